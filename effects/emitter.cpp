@@ -29,6 +29,8 @@ const EmitterDef& checked_emitter(const EmitterDef& def) {
     if (!holds) throw std::invalid_argument(owner(def) + ": " + what);
   };
   verify("rate", def.rate, kRates);
+  verify("rate_per_metre", def.rate_per_metre, kRates);
+  require(def.inherit_velocity >= 0 && std::isfinite(def.inherit_velocity), "inherit_velocity must be >= 0");
   verify("count", def.count, kCounts);
   verify("interval", def.interval, kIntervals);
   check_particle(owner(def), def);
@@ -82,8 +84,29 @@ void Emitter::collect_due(Real end) {
                    [](const Release& a, const Release& b) { return a.time < b.time; });
 }
 
+/// Adds the particles of the body's way in this sub-step, which is straight.
+void Emitter::collect_along_way(const sim::World& world, Real start, Real end) {
+  const Real rate = mean(def_.rate_per_metre, start - origin_);
+  if (!def_.body || !(rate > 0) || start < origin_ + def_.start || end > origin_ + def_.end || end > stopped_)
+    return;
+  const auto place = [&](Real time) {
+    return world.body_motion(def_.body, time).pose.point_to_world(def_.surface.pose.position);
+  };
+  const Real due = rate * (place(end) - place(start)).norm(), total = way_share_ + due;
+  const auto count = static_cast<uint64_t>(std::min(total, static_cast<Real>(def_.max_alive)));
+  for (uint64_t k = 1; k <= count; ++k) {
+    const Real share = std::clamp((static_cast<Real>(k) - way_share_) / due, 0.0, 1.0);
+    due_.push_back({start + share * (end - start), 1});
+  }
+  way_share_ = total - std::floor(total);
+}
+
 void Emitter::emit(sim::World& world, Real start, Real end) {
+  if (def_.body && !world.is_present(def_.body)) return;
   collect_due(end);
+  collect_along_way(world, start, end);
+  std::stable_sort(due_.begin(), due_.end(),
+                   [](const Release& a, const Release& b) { return a.time < b.time; });
   // The list grows during the loop, because the rest of a release may still be due in this sub-step.
   for (std::size_t i = 0; i < due_.size(); ++i) release(world, Release(due_[i]), start, end);
   report_.waiting = 0;
@@ -196,8 +219,12 @@ void Emitter::add(sim::World& world, const Draws& draw, const Place& place, cons
 
   particle.position =
       carrier.point_to_world(surface.point_to_world(place.point + particle.radius * place.normal));
-  particle.velocity = draw(def_.speed, kSpeed) * carrier.vector_to_world(direction) + batch.carrier.velocity +
-                      batch.carrier.angular_velocity.cross(particle.position - carrier.position);
+  const Vec3 own = draw(def_.speed, kSpeed) * carrier.vector_to_world(direction);
+  const Vec3 arm = particle.position - carrier.position;
+  const Real share = def_.inherit_velocity;
+  particle.velocity =
+      own + share * batch.carrier.velocity + share * batch.carrier.angular_velocity.cross(arm);
+  if (def_.recoil && def_.body) world.add_impulse(def_.body, -particle.mass * own, particle.position);
   world.add_particle(target_, particle, batch.end - batch.birth);
 }
 

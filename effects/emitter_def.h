@@ -29,12 +29,18 @@ struct EmitterDef {
   std::string name;  ///< also names its random stream
   uint64_t seed = 1;
   EmitterSurface surface;
-  /// Null: fixed in the world; otherwise it moves with the body, whose velocity is added.
+  /// Null: fixed in the world; otherwise it moves with the body, and releases nothing while the body does not
+  /// exist.
   sim::BodyHandle body;
+  Real inherit_velocity = 1;  ///< share of the velocity of the body's point that particles get, >= 0
+  bool recoil = false;        ///< whether particles push a dynamic body back by their momentum relative to it
   /// Particles are placed anywhere on the surface and are never postponed; for particles that do not collide
   /// with each other.
   bool overlap = false;
-  Varying rate = 100.0;    ///< particles per second, released one by one; 0: only `count` and bursts
+  Varying rate = 100.0;  ///< particles per second, released one by one; 0: only `count` and bursts
+  /// Particles per metre of the way of the body's point at the surface's origin [1/m], >= 0; spread evenly
+  /// along it.
+  Varying rate_per_metre = 0.0;
   Varying count = 0.0;     ///< particles per release, rounded; 0: no periodic release
   Varying interval = 0.1;  ///< time between releases [s], > 0
   std::vector<Burst> bursts;

@@ -200,6 +200,86 @@ Mesh make_box(const Vector3f& size, float bevel) {
   return mesh;
 }
 
+Mesh make_frustum(float radius, float top_radius, float height, int segments) {
+  const float half = 0.5f * height;
+  const Vector2f slope = Vector2f(height, radius - top_radius).normalized();
+  return revolve({{0, -half, {0, -1}},
+                  {radius, -half, {0, -1}},
+                  {radius, -half, slope},
+                  {top_radius, half, slope},
+                  {top_radius, half, {0, 1}},
+                  {0, half, {0, 1}}},
+                 std::max(segments, 3));
+}
+
+Mesh make_ellipsoid(const Vector3f& radii, int segments) {
+  Mesh mesh = make_sphere(1, segments);
+  for (Vector3f& p : mesh.positions) p = p.cwiseProduct(radii);
+  for (Vector3f& n : mesh.normals) n = n.cwiseQuotient(radii).normalized();
+  return mesh;
+}
+
+Mesh make_torus(float radius, float tube_radius, int segments) {
+  constexpr int kAround = 36;
+  std::vector<ProfilePoint> profile;
+  for (int k = 0; k <= kAround; ++k) {
+    // The first and the last point have the same bits, so the surface is closed.
+    const float angle = 2 * kPi * static_cast<float>(k % kAround) / static_cast<float>(kAround);
+    const Vector2f n(std::cos(angle), std::sin(angle));
+    profile.push_back({radius + tube_radius * n.x(), tube_radius * n.y(), n});
+  }
+  return revolve(profile, std::max(segments, 3));
+}
+
+Mesh make_tube(float radius, float height, float thickness, int segments) {
+  const float half = 0.5f * height, inner = radius - thickness;
+  const Vector2f out(1, 0), in(-1, 0), up(0, 1), down(0, -1);
+  return revolve({{inner, -half, down},
+                  {radius, -half, down},
+                  {radius, -half, out},
+                  {radius, half, out},
+                  {radius, half, up},
+                  {inner, half, up},
+                  {inner, half, in},
+                  {inner, -half, in}},
+                 std::max(segments, 3));
+}
+
+Mesh make_open_box(const Vector3f& size, float thickness) {
+  Mesh mesh;
+  // A rectangle with its corner, its two edges in the order that makes its normal their cross product.
+  const auto add = [&](const Vector3f& corner, const Vector3f& u, const Vector3f& v) {
+    const auto first = static_cast<uint32_t>(mesh.positions.size());
+    const Vector3f normal = u.cross(v).normalized();
+    for (const auto& [s, t] : {std::pair(0.f, 0.f), {1.f, 0.f}, {1.f, 1.f}, {0.f, 1.f}}) {
+      mesh.positions.push_back(corner + s * u + t * v);
+      mesh.normals.push_back(normal);
+      mesh.uvs.emplace_back(s, t);
+    }
+    for (const uint32_t k : {0u, 1u, 2u, 0u, 2u, 3u}) mesh.indices.push_back(first + k);
+  };
+  const Vector3f o = size / 2, i = o - Vector3f::Constant(thickness);
+  const Vector3f x = Vector3f::UnitX(), y = Vector3f::UnitY(), z = Vector3f::UnitZ();
+  const float depth = size.y() - thickness;  // of the inside
+  add(-o, size.x() * x, size.z() * z);
+  add({-i.x(), -i.y(), -i.z()}, 2 * i.z() * z, 2 * i.x() * x);
+  for (const float side : {-1.f, 1.f}) {
+    // Outside, then inside, of the walls across x and across z.
+    const auto facing = [&](const Vector3f& corner, const Vector3f& u, const Vector3f& v, bool swap) {
+      swap ? add(corner, v, u) : add(corner, u, v);
+    };
+    facing({side * o.x(), -o.y(), -o.z()}, size.y() * y, size.z() * z, side < 0);
+    facing({side * i.x(), -i.y(), -i.z()}, depth * y, 2 * i.z() * z, side > 0);
+    facing({-o.x(), -o.y(), side * o.z()}, size.x() * x, size.y() * y, side < 0);
+    facing({-i.x(), -i.y(), side * i.z()}, 2 * i.x() * x, depth * y, side > 0);
+    // The rim.
+    const float low_x = side < 0 ? -o.x() : i.x(), low_z = side < 0 ? -o.z() : i.z();
+    add({low_x, o.y(), -o.z()}, size.z() * z, thickness * x);
+    add({-i.x(), o.y(), low_z}, thickness * z, 2 * i.x() * x);
+  }
+  return mesh;
+}
+
 Mesh make_ground(float half_size) {
   // Each ring of cells is twice as wide as the one inside it, so that triangles near the middle are small.
   const int rings = std::clamp(static_cast<int>(std::ceil(std::log2(half_size))), 0, 24);

@@ -14,6 +14,16 @@ Mesh make_capsule(float radius, float height, int segments = 48);
 Mesh make_cylinder(float radius, float height, int segments = 64);
 /// The base is at -height/2, the apex at +height/2.
 Mesh make_cone(float radius, float height, int segments = 64);
+/// A cone with its tip cut off: the base is at -height/2, the top at +height/2.
+Mesh make_frustum(float radius, float top_radius, float height, int segments = 64);
+/// `radii`: half axes along x, y and z.
+Mesh make_ellipsoid(const Vector3f& radii, int segments = 48);
+/// `radius`: distance of the tube's centre line from the axis.
+Mesh make_torus(float radius, float tube_radius, int segments = 72);
+/// A hollow cylinder, open at both ends; `radius` is that of the outside.
+Mesh make_tube(float radius, float height, float thickness, int segments = 64);
+/// A cuboid without its top at +Y; `size` is that of the outside.
+Mesh make_open_box(const Vector3f& size, float thickness);
 /// Creates a square in the plane y = 0, facing +Y. Its cells get finer towards the centre, so that distant
 /// ground is cheap. It represents an infinite plane (see Mesh::endless).
 Mesh make_ground(float half_size);

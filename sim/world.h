@@ -29,6 +29,7 @@
 #include "sim/geometry/mass_properties.h"
 #include "sim/geometry/mesh.h"
 #include "sim/geometry/shape.h"
+#include "sim/geometry/solid_mesh.h"
 #include "sim/particles/particles.h"
 
 namespace offstage::sim {
@@ -74,6 +75,20 @@ enum class SolverKind {
               ///< steps
 };
 
+/// Algorithms of collision detection. All give the same results within their tolerances, except that
+/// bisection misses bodies that pass through each other within a sub-step; they differ in their cost.
+struct CollisionMethods {
+  /// Distance of convex polyhedra: GJK, or V-Clip (physics R4). Round shapes use GJK in either case.
+  enum class NarrowPhase : uint8_t { gjk, vclip };
+  /// Grid that finds pairs of boxes: several levels of cells, or one size of cells for all objects (H5, H6).
+  enum class BroadPhase : uint8_t { multi_grid, grid };
+  /// Time of an impact: conservative advancement, or bisection of the sub-step as in section 1.4.3 (R12).
+  enum class ImpactTime : uint8_t { advancement, bisection };
+  NarrowPhase narrow_phase = NarrowPhase::gjk;
+  BroadPhase broad_phase = BroadPhase::multi_grid;
+  ImpactTime impact_time = ImpactTime::advancement;
+};
+
 struct WorldDef {
   Vec3 gravity = {0, -9.81, 0};                     ///< [m/s^2]
   Vec3 wind = Vec3::Zero();                         ///< velocity of the air, for drag [m/s]
@@ -83,7 +98,8 @@ struct WorldDef {
   SolverKind solver = SolverKind::automatic;
   ImpactLaw impact = ImpactLaw::simultaneous;
   Real collision_speed = 0.05;  ///< bodies that approach more slowly do not bounce [m/s], > 0
-  bool sleep = true;            ///< whether islands at rest are not simulated until something reaches them
+  CollisionMethods collision = {};
+  bool sleep = true;  ///< whether islands at rest are not simulated until something reaches them
   Aabb bounds = Aabb(Vec3::Constant(-1000),
                      Vec3::Constant(1000));  ///< objects that leave are retired and reported (E3)
 };
@@ -112,6 +128,8 @@ struct StepReport {
   uint32_t islands = 0;            ///< groups of bodies connected by contacts or joints
   uint32_t contacts = 0;           ///< contact points
   Real penetration = 0;            ///< greatest penetration at the starts of sub-steps and at impacts [m]
+  uint64_t pairs_tested = 0;       ///< pairs of bodies with overlapping boxes, of all sub-steps
+  uint64_t impact_searches = 0;    ///< searches for the time of impact of a pair
   uint64_t collisions = 0;         ///< contacts whose speed of approach exceeded WorldDef::collision_speed
   uint64_t tracebacks = 0;         ///< trace-backs of islands to a time of impact
   uint64_t toi_limit_reached = 0;  ///< pairs that reached the limit of time-of-impact events in a sub-step;
@@ -201,6 +219,11 @@ class World {
   /// when a body first needs it, which is slow. Throws std::invalid_argument for an index out of range, a
   /// non-finite vertex or a mesh without faces.
   MeshHandle add_mesh(const TriangleMesh& mesh, std::optional<ConvexDecomposition> decomposition = {});
+  /// Registers a compound of solids, which are in its frame and may overlap. Its bodies collide by the convex
+  /// parts of all solids. The mass of a MeshShape of it counts overlaps twice and assumes one density;
+  /// sum_of() gives the mass of parts of several densities, for BodyDef. Throws std::invalid_argument as
+  /// add_mesh() does, and without solids.
+  MeshHandle add_compound(const std::vector<SolidMesh>& solids);
   const MeshTopology& topology(MeshHandle mesh) const;
   const TriangleMesh& mesh(MeshHandle mesh) const;  ///< as registered (welded)
   const CollisionMesh& collision_mesh(MeshHandle mesh) const;
@@ -229,6 +252,10 @@ class World {
   /// Sets the velocity of a dynamic body's centre of mass [m/s] and its angular velocity [rad/s].
   void set_velocity(BodyHandle body, const Vec3& velocity, const Vec3& angular_velocity);
 
+  /// Adds an impulse [N s] at a point of the world to a dynamic body, and wakes it. Bodies that joints
+  /// connect to it share it in the next sub-step.
+  void add_impulse(BodyHandle body, const Vec3& impulse, const Vec3& point);
+
   /// Adds a particle and returns its id. `elapsed` is the time from its birth to the end of the coming
   /// sub-step [s]; the particle is integrated over that part only. If `elapsed` is longer than the sub-step,
   /// the particle ignores bodies during the time before the sub-step. If it is negative, the particle exists
@@ -255,6 +282,8 @@ class World {
 
   /// Bodies whose pose changed during the last step (E5), in slot order.
   std::span<const MovedBody> moved() const;
+  /// Whether the body exists at this time; see BodyDef::appear_at.
+  bool is_present(BodyHandle body) const;
   BodyState body(BodyHandle body) const;
   const BodyDef& body_def(BodyHandle body) const;
   /// Motion of a point of a body (world position at its current pose) at a time inside the current sub-step:

@@ -71,10 +71,16 @@ Vec6 join(const Vec3& linear, const Vec3& angular) {
   return v;
 }
 
+/// Whether whole turns change its constraint.
+bool is_offset_by_turns(const Joint& joint) {
+  return joint.def.is_coupling() || joint.def.type == JointType::screw;
+}
+
 }  // namespace
 
 bool counts_turns(const Joint& joint) {
-  return joint.def.type == JointType::revolute || joint.def.type == JointType::universal;
+  using enum JointType;
+  return joint.def.type == revolute || joint.def.type == universal || joint.def.type == screw;
 }
 
 LinkMotion link_motion(const Body* body, Real time) {
@@ -94,7 +100,7 @@ JointFrame link_frame(const Body* body, const JointFrame& in_body) {
 
 bool Joint::has_bounded_rows() const {
   return def.lower > -JointDef::kFree || def.upper < JointDef::kFree || def.swing < JointDef::kFree ||
-         def.friction > 0 || def.damping > 0 || def.motor.mode != Motor::Mode::none;
+         def.friction > 0 || def.damping > 0 || def.stiffness > 0 || def.motor.mode != Motor::Mode::none;
 }
 
 Articulation::Articulation(std::vector<Joint*> joints)
@@ -327,14 +333,18 @@ void Articulation::respond(uint32_t link, const Vec6& impulse, std::span<Vec6> v
 }
 
 void Articulation::count_turns(Real time) {
-  if (std::none_of(joints_.begin(), joints_.end(), [](const Joint* j) { return counts_turns(*j); })) return;
+  if (std::none_of(joints_.begin(), joints_.end(),
+                   [](const Joint* j) { return counts_turns(*j) || is_offset_by_turns(*j); }))
+    return;
   LinkMotion still_a, still_b;
   read_bodies();
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     Joint& joint = *joints_[j];
-    if (!counts_turns(joint)) continue;
+    if (!counts_turns(joint) && !is_offset_by_turns(joint)) continue;
     const JointPlace place = place_of(j, time, motion_, still_a, still_b);
-    const Real now = free_row(joint.def.type, place, joint.length).error;
+    if (is_offset_by_turns(joint)) joint.length += turns_offset(joint.def, place, joint.length);
+    if (!counts_turns(joint)) continue;
+    const Real now = free_row(joint.def, place, joint.length).error;
     constexpr Real kTurn = 2 * std::numbers::pi;
     joint.coordinate = now + kTurn * std::round((joint.coordinate - now) / kTurn);
   }

@@ -24,11 +24,12 @@ struct Joint {
   JointHandle handle;
   Body *a = nullptr, *b = nullptr;  ///< b may be null: the world
   JointFrame on_a, on_b;            ///< frames in the bodies' frames
-  Real length = 0;                  ///< length of a rod
+  Real length = 0;                  ///< length of a rod or rope; offset of a coupling by whole turns
   Articulation* articulation = nullptr;
 
   bool is_broken = false;
-  Real coordinate = 0;  ///< accumulated coordinate, for joints that count turns
+  bool is_absent = false;  ///< before it appears, and after its removal
+  Real coordinate = 0;     ///< accumulated coordinate, for joints that count turns
   // Loads of the joint on body a, about the anchor.
   Wrench load;            ///< mean during the last motion, including the effect of contacts [N], [N m]
   Wrench impact_impulse;  ///< impulses of collisions in this sub-step [N s], [N m s]
@@ -36,7 +37,7 @@ struct Joint {
   /// Impulse of its constraints in the last contact solution; initial guess of the next one.
   Vec6 reaction = Vec6::Zero();
   /// Impulses of its rows with bounds (joint_limits.h); initial guess of the next solution.
-  std::array<Real, 9> efforts = {};
+  std::array<Real, 12> efforts = {};
 
   /// Whether the joint has a limit, a motor, friction or damping.
   bool has_bounded_rows() const;

@@ -26,6 +26,18 @@ enum class JointType : uint8_t {
   /// Keeps the distance of the anchors, as a massless rod does; with limits or a motor the length may change,
   /// as that of a rope or a winch.
   distance,
+  /// Couples the rotation of a about `axis` with that of b about `second_axis`: angle of a + ratio * angle of
+  /// b = 0. The axes are fixed in the bodies; other joints, whose carrier does not turn, hold the wheels.
+  gear,
+  /// Couples the rotation of a about `axis` with the displacement of b along `second_axis`, a direction of
+  /// the world: displacement = ratio * angle, where the ratio is the radius of the pinion [m].
+  rack,
+  /// Allows rotation of a about the axis together with displacement along it, relative to b: ratio metres per
+  /// turn, positive for a right-handed thread.
+  screw,
+  /// A rope from `anchor` on a over a fixed point to another one and to `anchor_b` on b:
+  /// |anchor - pulley_a| + ratio |anchor_b - pulley_b| stays at most at its length when the joint is created.
+  pulley,
 };
 
 /// Motor that drives the free coordinate of a joint: the angle of a revolute joint [rad], the displacement of
@@ -60,26 +72,41 @@ struct JointDef {
   Vec3 anchor = Vec3::Zero();    ///< common point of both bodies [m]
   Vec3 anchor_b = Vec3::Zero();  ///< other end of a rod, on b [m]
   Vec3 axis = Vec3::UnitZ();  ///< axis of rotation or sliding; for a spherical joint, the axis of its twist
-  Vec3 second_axis = Vec3::UnitX();  ///< second axis of a universal joint; not parallel to `axis`
+  /// Second axis of a universal joint, not parallel to `axis`; axis of b of a gear, direction of a rack.
+  Vec3 second_axis = Vec3::UnitX();
+  Real ratio = 1;  ///< of a gear [1], rack [m], screw [m per turn] or pulley [1, > 0]; not 0
+  Vec3 pulley_a = Vec3::Zero(),
+       pulley_b = Vec3::Zero();  ///< points of the world over which the rope runs [m]
   /// Limits of the free coordinate of a relative to b: the angle of a revolute joint, the displacement of a
-  /// prismatic joint, the length change of a rod (a rope has lower = minus infinity), the twist of a
-  /// spherical joint, or the angle of a universal joint about `axis`.
+  /// prismatic joint, the length change of a rod (a rope has lower = minus infinity) or of a pulley's rope,
+  /// the twist of a spherical joint, or the angle of a screw or of a universal joint about `axis`. A pulley
+  /// without limits has the upper limit 0.
   Real lower = -kFree, upper = kFree;
   Real swing = kFree;  ///< greatest tilt of a spherical joint's axis, or angle of a universal joint about its
                        ///< second axis [rad]
+  /// Coefficient of restitution at the limits `lower` and `upper`, in [0, 1], for speeds above kBounceSpeed.
+  Real restitution = 0;
+  static constexpr Real kBounceSpeed = 0.05;  ///< [m/s], [rad/s]
+  /// Spherical joints: torque per angle of rotation from the pose at creation, about any axis [N m/rad].
+  Real stiffness = 0;
   /// Dry friction: greatest torque or force against motion in each free direction [N m] or [N].
   Real friction = 0;
   Real damping = 0;        ///< viscous damping, in each free direction [N m s] or [N s/m]
-  Motor motor = {};        ///< for revolute, prismatic and distance joints
+  Motor motor = {};        ///< for revolute, prismatic, screw and distance joints
   Real max_force = kFree;  ///< the joint breaks at a larger force [N]
   /// The joint breaks at a larger torque of constraints, limits, motor and friction together [N m].
   Real max_torque = kFree;
   bool collide = false;  ///< whether the two bodies also collide with each other
+  /// Times between which it acts [s]. A joint that appears later joins its bodies in their poses of that
+  /// time; its anchors and axes have moved with the bodies.
+  Real appear_at = 0, remove_at = kFree;
 
+  /// Whether it only couples motions that other joints allow.
+  bool is_coupling() const { return type == JointType::gear || type == JointType::rack; }
   bool has_limits() const { return lower > -kFree || upper < kFree; }
   /// Whether the joint has a coordinate that limits, motor and friction can act on.
   bool has_free_coordinate() const {
-    return type != JointType::fixed &&
+    return type != JointType::fixed && !is_coupling() &&
            (type != JointType::distance || has_limits() || motor.mode != Motor::Mode::none);
   }
 };

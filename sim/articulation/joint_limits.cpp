@@ -16,7 +16,7 @@ constexpr Real kPushOut = 0.2, kFastestPush = 2;
 constexpr Real kNear = 0.02, kReached = 1e-4;
 
 /// Slots of Joint::efforts.
-enum Slot : std::size_t { kLimit = 0, kSwing = 1, kMotor = 2, kFriction = 3, kDamping = 6 };
+enum Slot : std::size_t { kLimit = 0, kSwing = 1, kMotor = 2, kFriction = 3, kDamping = 6, kSpring = 9 };
 
 /// Makes the rows of one joint.
 class RowMaker {
@@ -40,6 +40,7 @@ class RowMaker {
       add_range(swing, kSwing, def_.type == JointType::universal ? -def_.swing : -kInfinite, def_.swing);
     }
     if (def_.friction > 0 || def_.damping > 0) add_resistance();
+    if (def_.stiffness > 0) add_spring();
   }
 
   void add_stops(std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins) {
@@ -54,7 +55,7 @@ class RowMaker {
  private:
   /// The free coordinate including whole turns.
   JointRow free() const {
-    JointRow row = free_row(def_.type, place_, joint_.length);
+    JointRow row = free_row(def_, place_, joint_.length);
     if (!counts_turns(joint_)) return row;
     constexpr Real kTurn = 2 * std::numbers::pi;
     row.error += kTurn * std::round((joint_.coordinate - row.error) / kTurn);
@@ -93,6 +94,7 @@ class RowMaker {
     add_end(joint_.b, place_.b, row.on_b);
     return row.error - h_ / 2 * sum;
   }
+  Real speed_at_start(const JointRow& row) const { return 2 * (row.error - at_start(row)) / h_ - speed(row); }
 
   void add(const BoundedRow& row, std::size_t slot, bool is_stop) {
     rows_->push_back(row);
@@ -103,8 +105,28 @@ class RowMaker {
     add(row, slot, is_stop);
   }
 
+  /// Adds the impact at a limit that the coordinate reaches in this interval: the speed where it meets the
+  /// limit is reversed, and the acceleration of the free motion acts in the rest of the interval. `side` is 1
+  /// for a lower limit and -1 for an upper one. Returns false if it does not meet the limit fast enough.
+  bool add_bounce(const JointRow& row, std::size_t slot, Real limit, int side) {
+    const Real gap = side * (at_start(row) - limit), left = side * (row.error - limit);
+    if (!(def_.restitution > 0) || !(left < 0) || gap < 0) return false;
+    const Real before = side * speed_at_start(row), after = side * speed(row), share = gap / (gap - left);
+    const Real impact = before + share * (after - before);
+    if (!(impact < -JointDef::kBounceSpeed)) return false;
+    BoundedRow r = bounded(row);
+    r.lower = side > 0 ? 0 : -kInfinite;
+    r.upper = side > 0 ? kInfinite : 0;
+    r.target = side * (-def_.restitution * impact + (1 - share) * (after - before));
+    add(r, slot, false);
+    return true;
+  }
+
   /// Adds a row for the nearer of both limits. If they are equal, the coordinate is held.
   void add_range(const JointRow& row, std::size_t slot, Real lower, Real upper) {
+    if (slot == kLimit && lower < upper &&
+        (add_bounce(row, slot, lower, 1) || add_bounce(row, slot, upper, -1)))
+      return;
     const Real u = speed(row), start = at_start(row);
     const Real reach = kNear + 2 * h_ * std::abs(u);
     BoundedRow r = bounded(row);
@@ -173,6 +195,26 @@ class RowMaker {
         r.softness = 1 / (h_ * def_.damping);
         add_guessed(r, kDamping + i, false);
       }
+    }
+  }
+
+  /// The torque -k theta of a spherical joint at the interval's end, for the rotation vector theta of a
+  /// relative to b.
+  void add_spring() {
+    const Quat turn(Mat3(place_.axes_b.transpose() * place_.axes_a));
+    const Vec3 half = turn.w() < 0 ? Vec3(-turn.vec()) : Vec3(turn.vec());
+    const Real sine = half.norm();
+    const Vec3 theta =
+        sine > 0 ? Vec3(2 * angle_of(sine, std::abs(turn.w())) / sine * half) : Vec3(Vec3::Zero());
+    for (int i = 0; i < 3; ++i) {
+      JointRow row = turning_row(place_.axes_b.col(i));
+      row.error = theta[i];
+      BoundedRow r = bounded(row);
+      r.lower = -kInfinite;
+      r.upper = kInfinite;
+      r.softness = 1 / (h_ * h_ * def_.stiffness);
+      r.target = -at_start(row) / h_;
+      add_guessed(r, kSpring + static_cast<std::size_t>(i), false);
     }
   }
 

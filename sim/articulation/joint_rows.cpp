@@ -1,5 +1,6 @@
 #include "sim/articulation/joint_rows.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -60,7 +61,121 @@ JointRow length_row(const JointPlace& p, Real length) {
           n.dot(wa.cross(turning_a) - wb.cross(turning_b)) + (now > 0 ? across / now : 0)};
 }
 
+constexpr Real kWholeTurn = 2 * std::numbers::pi;
+
+/// Columns: the second axis, perpendicular to the axis; the third; the axis.
+Mat3 axes_along(const Vec3& axis, const Vec3& second) {
+  Mat3 m;
+  m.col(2) = axis.normalized();
+  Vec3 x = second - second.dot(m.col(2)) * m.col(2);
+  if (!(x.norm() > 1e-6)) x = m.col(2).unitOrthogonal();
+  m.col(0) = x.normalized();
+  m.col(1) = m.col(2).cross(m.col(0));
+  return m;
+}
+
+/// Rotation of a link about its joint axis since the joint was created; within half a turn.
+Real angle_since(const Mat3& axes, const Mat3& at_creation) {
+  return angle_of(axes.col(0).dot(at_creation.col(1)), axes.col(0).dot(at_creation.col(0)));
+}
+
+/// The constraint of a coupling, with its changes by one turn of a and of b.
+struct Coupling {
+  JointRow row;
+  Real turn_a = 0, turn_b = 0;
+};
+
+/// The axis of each wheel is fixed in it, so that its rate does no work: the row has no bias.
+Coupling gear_coupling(const JointDef& def, const JointPlace& p, Real length) {
+  const Real a = angle_since(p.axes_a, frame_axes(def, false)),
+             b = angle_since(p.axes_b, frame_axes(def, true));
+  return {{concatenate(Vec3::Zero(), p.axes_a.col(2)), concatenate(Vec3::Zero(), def.ratio * p.axes_b.col(2)),
+           a + def.ratio * b - length},
+          kWholeTurn,
+          def.ratio * kWholeTurn};
+}
+
+/// b's anchor moves along a direction of the world, which is its place in the world when the joint was
+/// created.
+Coupling rack_coupling(const JointDef& def, const JointPlace& p, Real length) {
+  const Vec3 d = def.second_axis.normalized(), &wb = p.b.angular_velocity;
+  const Real a = angle_since(p.axes_a, frame_axes(def, false));
+  return {{concatenate(Vec3::Zero(), -def.ratio * p.axes_a.col(2)), concatenate(d, p.arm_b.cross(d)),
+           d.dot(p.b.position + p.arm_b - def.anchor_b) - def.ratio * a - length,
+           d.dot(wb.cross(wb.cross(p.arm_b)))},
+          def.ratio * kWholeTurn};
+}
+
+Real screw_angle(const JointPlace& p) {
+  return angle_of(p.axes_a.col(0).dot(p.axes_b.col(1)), p.axes_a.col(0).dot(p.axes_b.col(0)));
+}
+
+Coupling screw_coupling(const JointDef& def, const JointPlace& p, Real length) {
+  const Vec3 z = p.axes_b.col(2);
+  const Real lead = def.ratio / kWholeTurn;  // per radian
+  JointRow row = slide_row(p, z);
+  const JointRow turning = turning_row(z);
+  row.on_a -= lead * turning.on_a;
+  row.on_b -= lead * turning.on_b;
+  row.error -= lead * screw_angle(p) + length;
+  const Vec3 &wa = p.a.angular_velocity, &wb = p.b.angular_velocity;
+  row.bias -= lead * wb.cross(z).dot(wa - wb);
+  return {row, def.ratio};
+}
+
+Coupling coupling(const JointDef& def, const JointPlace& p, Real length) {
+  if (def.type == JointType::gear) return gear_coupling(def, p, length);
+  return def.type == JointType::rack ? rack_coupling(def, p, length) : screw_coupling(def, p, length);
+}
+
+/// The change by whole turns that brings the constraint's error nearest to 0: angles jump by a turn.
+Real nearest_turns(const Coupling& c) {
+  Real best = 0;
+  for (const int a : {-1, 0, 1})
+    for (const int b : {-1, 0, 1}) {
+      const Real turns = a * c.turn_a + b * c.turn_b;
+      if (std::abs(c.row.error - turns) < std::abs(c.row.error - best)) best = turns;
+    }
+  return best;
+}
+
+JointRow coupling_row(const JointDef& def, const JointPlace& p, Real length) {
+  Coupling c = coupling(def, p, length);
+  c.row.error -= nearest_turns(c);
+  return c.row;
+}
+
+/// Length of the rope of a pulley from its fixed point to a body's anchor: the part of the row on this body.
+Real add_strand(const LinkMotion& link, const Vec3& arm, const Vec3& from, Real factor, Vec6& on,
+                JointRow& row) {
+  const Vec3 way = link.position + arm - from;
+  const Real length = way.norm();
+  const Vec3 n = length > 0 ? Vec3(way / length) : Vec3(-Vec3::UnitY());
+  const Vec3 turning = link.angular_velocity.cross(arm), rate = link.velocity + turning;
+  const Real across = rate.squaredNorm() - std::pow(n.dot(rate), 2);
+  on = factor * concatenate(n, arm.cross(n));
+  row.bias += factor * (n.dot(link.angular_velocity.cross(turning)) + (length > 0 ? across / length : 0));
+  return factor * length;
+}
+
+JointRow pulley_row(const JointDef& def, const JointPlace& p, Real length) {
+  JointRow row;
+  row.error = add_strand(p.a, p.arm_a, def.pulley_a, 1, row.on_a, row) +
+              add_strand(p.b, p.arm_b, def.pulley_b, def.ratio, row.on_b, row) - length;
+  return row;
+}
+
 }  // namespace
+
+Mat3 frame_axes(const JointDef& def, bool of_b) {
+  if (!def.is_coupling()) return axes_along(def.axis, def.second_axis);
+  const Vec3& axis = of_b && def.type == JointType::gear ? def.second_axis : def.axis;
+  return axes_along(axis, axis);  // any direction across it
+}
+
+Real turns_offset(const JointDef& def, const JointPlace& place, Real length) {
+  return nearest_turns(coupling(def, place, length));
+}
 
 JointPlace::JointPlace(const LinkMotion& link_a, const JointFrame& on_a, const LinkMotion& link_b,
                        const JointFrame& on_b)
@@ -93,6 +208,13 @@ uint32_t constraint_count(const JointDef& def) {
       return 4;
     case JointType::distance:
       return def.has_free_coordinate() ? 0 : 1;
+    case JointType::gear:
+    case JointType::rack:
+      return 1;
+    case JointType::screw:
+      return 5;
+    case JointType::pulley:
+      return 0;
   }
   return 0;
 }
@@ -107,30 +229,36 @@ void set_joint_rows(const JointDef& def, const JointPlace& p, Real length, Joint
     if (!def.has_free_coordinate()) rows.add(length_row(p, length));
     return;
   }
-  if (type == JointType::prismatic) {
+  if (type == JointType::pulley) return;
+  if (def.is_coupling()) return rows.add(coupling_row(def, p, length));
+  if (type == JointType::prismatic || type == JointType::screw) {
     for (const int across : {0, 1}) rows.add(slide_row(p, p.axes_b.col(across)));
   } else {
     add_meeting_rows(p, rows);
   }
   if (type == JointType::universal) perpendicular(2, 0);
-  if (type == JointType::revolute || type == JointType::fixed || type == JointType::prismatic) {
+  if (type == JointType::revolute || type == JointType::fixed || type == JointType::prismatic ||
+      type == JointType::screw) {
     perpendicular(2, 0);
     perpendicular(2, 1);
   }
   if (type == JointType::fixed || type == JointType::prismatic) perpendicular(0, 1);
+  if (type == JointType::screw) rows.add(coupling_row(def, p, length));
 }
 
 JointRow turning_row(const Vec3& axis) {
   return {concatenate(Vec3::Zero(), axis), concatenate(Vec3::Zero(), -axis)};
 }
 
-JointRow free_row(JointType type, const JointPlace& p, Real length) {
+JointRow free_row(const JointDef& def, const JointPlace& p, Real length) {
+  const JointType type = def.type;
   const auto xa = p.axes_a.col(0), ya = p.axes_a.col(1), za = p.axes_a.col(2);
   const auto xb = p.axes_b.col(0), yb = p.axes_b.col(1), zb = p.axes_b.col(2);
   if (type == JointType::prismatic) return slide_row(p, zb);
   if (type == JointType::distance) return length_row(p, length);
+  if (type == JointType::pulley) return pulley_row(def, p, length);
   JointRow row;
-  if (type == JointType::revolute) {
+  if (type == JointType::revolute || type == JointType::screw) {
     row = turning_row(zb);
     row.error = angle_of(xa.dot(yb), xa.dot(xb));
   } else if (type == JointType::universal) {

@@ -63,12 +63,20 @@ struct JointRows {
 
 /// Number of constraints. A distance joint has one only if it is a rod.
 uint32_t constraint_count(const JointDef& def);
-/// Computes the rows of a joint; `length` is that of a rod.
+/// Axes of a joint's frame on body a or on body b, in the world when the joint is created: the columns of
+/// JointFrame::axes.
+Mat3 frame_axes(const JointDef& def, bool of_b);
+/// Whole turns of coupled rotations change the constraint of a gear, rack or screw; this is the change of
+/// Joint::length after a motion in which each rotation was at most half a turn.
+Real turns_offset(const JointDef& def, const JointPlace& place, Real length);
+/// Computes the rows of a joint; `length` is that of a rod, or the offset by whole turns of a gear, rack or
+/// screw.
 void set_joint_rows(const JointDef& def, const JointPlace& place, Real length, JointRows& rows);
 
-/// Row of the free coordinate of a revolute, prismatic or distance joint, the first angle of a universal
-/// joint, or the twist of a spherical joint. `error` is the coordinate; angles are within half a turn.
-JointRow free_row(JointType type, const JointPlace& place, Real length);
+/// Row of the free coordinate of a revolute, prismatic, distance, screw or pulley joint, the first angle of a
+/// universal joint, or the twist of a spherical joint. `error` is the coordinate; angles are within half a
+/// turn.
+JointRow free_row(const JointDef& def, const JointPlace& place, Real length);
 /// Row of the tilt of a spherical joint's axis, or of the second angle of a universal joint.
 JointRow swing_row(JointType type, const JointPlace& place);
 /// Row of the rotation of a relative to b about a world axis.

@@ -103,7 +103,10 @@ struct ClothDef {
   std::vector<ClothSeam> seams;
   Real seam_time = 1;  ///< time in which seams close [s], > 0
 
-  Vec3 velocity = Vec3::Zero();  ///< at the start [m/s]
+  Vec3 velocity = Vec3::Zero();  ///< at the start, or when it appears [m/s]
+  /// Times between which it exists [s]. It appears at its initial shape, and is removed, at the start of the
+  /// first sub-step from then on.
+  Real appear_at = 0, remove_at = kInfinity;
 
   bool collides = true;        ///< with bodies and particles
   bool self_collision = true;  ///< with itself and with other cloths that have this flag

@@ -82,7 +82,8 @@ void add(const Grab& f, Run& run) {
     run.accelerate(i, -f.stiffness * gap - f.damping * (run.velocity(i) - hand.velocity));
   }
 }
-void add(const Explosion&, Run&) {}  // an impulse, not a force: the world applies it
+void add(const AppliedForce&, Run&) {}  // acts on bodies only
+void add(const Explosion&, Run&) {}     // an impulse, not a force: the world applies it
 template <class PairLaw>
 void add(const PairLaw&, Run&) {
   static_assert(kIsPairLaw<PairLaw>);

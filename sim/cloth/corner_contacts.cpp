@@ -73,6 +73,10 @@ std::vector<CornerContacts::Corner> CornerContacts::corners(const Solid& solid) 
     const Real depth = std::min(cone->radius, cone->height) / 2;
     rim(cone->radius, -cone->height / 2, -1, depth);
     found.push_back({Vec3(0, cone->height / 2, 0), Vec3::UnitY(), depth});
+  } else if (const auto* frustum = std::get_if<Frustum>(solid.shape)) {
+    const Real depth = std::min(std::min(frustum->radius, frustum->top_radius), frustum->height / 2);
+    rim(frustum->radius, -frustum->height / 2, -1, depth);
+    rim(frustum->top_radius, frustum->height / 2, 1, depth);
   } else if (solid.mesh && solid.mesh->solid && solid.mesh->hull.vertices().size() <= kMaxCorners) {
     const Aabb around = local_bounds(solid);
     for (const Vec3& v : solid.mesh->hull.vertices())

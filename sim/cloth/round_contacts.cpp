@@ -26,6 +26,8 @@ std::optional<Rounding> rounding(const Solid& solid) {
   if (const auto* s = std::get_if<Capsule>(solid.shape)) return Rounding{s->height / 2, s->radius};
   if (const auto* s = std::get_if<Cylinder>(solid.shape)) return Rounding{s->height / 2, s->radius};
   if (const auto* s = std::get_if<Cone>(solid.shape)) return Rounding{s->height / 2, s->radius / 2};
+  if (const auto* s = std::get_if<Frustum>(solid.shape))
+    return Rounding{s->height / 2, (s->radius + s->top_radius) / 2};
   return {};
 }
 

@@ -62,6 +62,33 @@ CollisionMesh::CollisionMesh(TriangleMesh welded, std::optional<ConvexDecomposit
       solid(topology.defects().closed() && !topology.defects().inverted),
       decomposition_(std::move(known)) {}
 
+namespace {
+
+TriangleMesh joined(const std::vector<SolidMesh>& solids) {
+  TriangleMesh all;
+  for (const SolidMesh& solid : solids) {
+    const auto first = static_cast<uint32_t>(all.vertices.size());
+    all.vertices.insert(all.vertices.end(), solid.mesh.vertices.begin(), solid.mesh.vertices.end());
+    for (const Triangle& t : solid.mesh.triangles)
+      all.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  }
+  return all;
+}
+
+ConvexDecomposition all_parts(const std::vector<SolidMesh>& solids) {
+  ConvexDecomposition all{.method = ConvexDecomposition::Method::exact, .parts = {}, .note = {}};
+  for (const SolidMesh& solid : solids)
+    all.parts.insert(all.parts.end(), solid.parts.begin(), solid.parts.end());
+  return all;
+}
+
+}  // namespace
+
+CollisionMesh::CollisionMesh(std::vector<SolidMesh> list) : CollisionMesh(joined(list), all_parts(list)) {
+  if (list.size() > 1)
+    for (const SolidMesh& one : list) solids.push_back(std::make_unique<CollisionMesh>(std::vector{one}));
+}
+
 void CollisionMesh::decompose_once() const {
   std::call_once(once_, [this] {
     if (!decomposition_) decomposition_ = decompose(mesh, topology);

@@ -4,6 +4,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <vector>
 
 #include "sim/collision/bounding_tree.h"
 #include "sim/collision/clearance_grid.h"
@@ -12,6 +13,7 @@
 #include "sim/geometry/convex_decomposition.h"
 #include "sim/geometry/mass_properties.h"
 #include "sim/geometry/mesh.h"
+#include "sim/geometry/solid_mesh.h"
 
 namespace offstage::sim {
 
@@ -21,6 +23,9 @@ class CollisionMesh {
   /// needed.
   explicit CollisionMesh(TriangleMesh welded, std::optional<ConvexDecomposition> known = {});
 
+  /// A compound: at least one welded solid. The mesh is that of all solids, without joining them.
+  explicit CollisionMesh(std::vector<SolidMesh> solids);
+
   TriangleMesh mesh;
   MeshTopology topology;
   MeshSurface surface;  ///< surroundings of each triangle
@@ -29,6 +34,8 @@ class CollisionMesh {
   ConvexPolyhedron hull;  ///< convex hull of the vertices
   /// The mesh is closed and not inverted, so it has an inside; otherwise it is a two-sided surface.
   bool solid;
+  /// The solids of a compound, if there are several. They may overlap, so faces of one can be inside another.
+  std::vector<std::unique_ptr<const CollisionMesh>> solids;
 
   /// Computed at the first call, which may take seconds; safe from several threads.
   const ConvexDecomposition& decomposition() const;

@@ -38,11 +38,23 @@ Vec3 rim(const Vec3& d, Real radius, Real height) {
   return {radius * (d.x() / rho), height, radius * (d.z() / rho)};
 }
 
-/// Support point of a cone: the apex if it is higher along d than the rim of the base.
+/// Support point of a cone or frustum: its top if that is higher along d than the rim of the base.
 Vec3 cone_support(const Vec3& half, const Vec3& d) {
+  if (half.z() > 0) {
+    const Real rho = std::sqrt(d.x() * d.x() + d.z() * d.z());
+    const bool up = 2 * half.y() * d.y() > (half.x() - half.z()) * rho;
+    return rim(d, up ? half.z() : half.x(), up ? half.y() : -half.y());
+  }
   const Real rho2 = d.x() * d.x() + d.z() * d.z(), rise = 2 * half.y() * d.y();
   if (rise > 0 && rise * rise >= half.x() * half.x() * rho2) return {0, half.y(), 0};
   return rim(d, half.x(), -half.y());
+}
+
+/// Support point of an ellipsoid: the affine image of that of the unit ball.
+Vec3 ellipsoid_support(const Vec3& half, const Vec3& d) {
+  const Vec3 scaled = half.cwiseProduct(d);
+  const Real length = scaled.norm();
+  return length > 0 ? Vec3(half.cwiseProduct(scaled) / length) : Vec3(half.x(), 0, 0);
 }
 
 struct ConvexOf {
@@ -57,6 +69,10 @@ struct ConvexOf {
   Convex operator()(const Cone& c) const {
     return {.core = Convex::Core::cone, .half = Vec3(c.radius, c.height / 2, 0)};
   }
+  Convex operator()(const Frustum& c) const {
+    return {.core = Convex::Core::cone, .half = Vec3(c.radius, c.height / 2, c.top_radius)};
+  }
+  Convex operator()(const Ellipsoid& e) const { return {.core = Convex::Core::ellipsoid, .half = e.radii}; }
   Convex operator()(const Plane&) const { return none(); }
   Convex operator()(const MeshShape&) const { return none(); }
 
@@ -113,6 +129,8 @@ Vec3 Convex::support(const Vec3& d, uint32_t& number) const {
       return rim(d, half.x(), std::copysign(half.y(), d.y()));
     case Core::cone:
       return cone_support(half, d);
+    case Core::ellipsoid:
+      return ellipsoid_support(half, d);
     case Core::polyhedron:
       number = support_vertex(*polyhedron, d, number);
       return polyhedron->vertex(number);
@@ -144,6 +162,8 @@ Real Convex::reach() const {
   if (core == Core::triangle)
     return radius + std::sqrt(std::max(
                         {corners[0]->squaredNorm(), corners[1]->squaredNorm(), corners[2]->squaredNorm()}));
+  if (core == Core::cone) return radius + std::hypot(std::max(half.x(), half.z()), half.y());
+  if (core == Core::ellipsoid) return radius + half.maxCoeff();
   return radius + (core == Core::polyhedron ? polyhedron->reach() : half.norm());
 }
 

@@ -13,11 +13,12 @@
 namespace offstage::sim {
 
 struct Convex {
-  enum class Core : uint8_t { point, segment, triangle, box, cylinder, cone, polyhedron };
+  enum class Core : uint8_t { point, segment, triangle, box, cylinder, cone, ellipsoid, polyhedron };
 
   Core core = Core::point;
-  /// Size of the core: half sizes of a box; (radius, half height, unused) of a cylinder or cone; half height
-  /// in y of a segment.
+  /// Size of the core: half sizes of a box; (radius, half height, unused) of a cylinder; (radius, half
+  /// height, radius of the top) of a cone, whose top is 0 unless it is a frustum; half axes of an ellipsoid;
+  /// half height in y of a segment.
   Vec3 half = Vec3::Zero();
   Real radius = 0;  ///< around the core [m]
   const ConvexPolyhedron* polyhedron = nullptr;
@@ -28,7 +29,9 @@ struct Convex {
   /// of the corner, for a segment the end, for a triangle the corner. Other cores do not use it.
   Vec3 support(const Vec3& d, uint32_t& vertex) const;
   /// Whether support points are vertices that can be identified by a number.
-  bool has_vertices() const { return core != Core::cylinder && core != Core::cone; }
+  bool has_vertices() const {
+    return core != Core::cylinder && core != Core::cone && core != Core::ellipsoid;
+  }
   /// The vertex of the core with this number, as support() gives it; an invalid number is mapped to a valid
   /// vertex.
   Vec3 vertex(uint32_t number) const;

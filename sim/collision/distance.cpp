@@ -75,6 +75,13 @@ Real support_of(const Cylinder& c, const Vec3& n) {
 Real support_of(const Cone& c, const Vec3& n) {
   return std::max(n.y() * c.height / 2, c.radius * to_profile(n).x() - n.y() * c.height / 2);
 }
+Real support_of(const Frustum& c, const Vec3& n) {
+  const Real out = to_profile(n).x();
+  return std::max(n.y() * c.height / 2 + c.top_radius * out, c.radius * out - n.y() * c.height / 2);
+}
+Real support_of(const Ellipsoid& e, const Vec3& n) {
+  return e.radii.cwiseProduct(n).norm();
+}
 Real support_of(const Plane&, const Vec3& n) {
   return n.x() == 0 && n.z() == 0 && n.y() >= 0 ? 0 : kInfinity;
 }
@@ -121,6 +128,86 @@ SurfaceDistance signed_distance(const Cone& c, const Vec3& p) {
   return {distance, from_profile(n, p, q.x())};
 }
 
+SurfaceDistance signed_distance(const Frustum& c, const Vec3& p) {
+  const Vec2 q = to_profile(p);
+  const Real half = c.height / 2;
+  const Vec2 base(c.radius, -half), top(c.top_radius, half);
+  const Vec2 slant_normal = Vec2(c.height, c.radius - c.top_radius).normalized();
+  const bool upper = q.y() > 0;
+  const Vec2 rim = upper ? top : base, centre(0, rim.y());
+  auto [distance, n] =
+      profile_distance(q, slant_normal.dot(q - base), slant_normal, closest_on_segment(q, base, top),
+                       std::abs(q.y()) - half, Vec2(0, upper ? 1 : -1), closest_on_segment(q, centre, rim));
+  return {distance, from_profile(n, p, q.x())};
+}
+
+namespace {
+
+/// The parameter t of the point y_i = r_i^2 p_i / (t + r_i^2) of an ellipsoid that is nearest to p: the root
+/// of F(t) = sum (r_i p_i / (t + r_i^2))^2 - 1 beyond the pole of the smallest radius (Eberly, "Distance from
+/// a point to an ellipse, an ellipsoid, or a hyperellipsoid", 2013). F falls and is convex there, so Newton's
+/// iteration from below the root never passes it.
+Real nearest_parameter(const Vec3& r, const Vec3& p, Real least) {
+  constexpr int kMostSteps = 100;
+  Real t = least;
+  for (int step = 0; step < kMostSteps; ++step) {
+    Real value = -1, slope = 0;
+    for (int i = 0; i < 3; ++i) {
+      const Real below = t + r[i] * r[i];
+      if (p[i] == 0 || !(below > 0)) continue;
+      const Real term = r[i] * p[i] / below;
+      value += term * term;
+      slope -= 2 * term * term / below;
+    }
+    if (!(value > 0) || !(slope < 0)) break;
+    const Real next = t - value / slope;
+    if (!(next > t)) break;
+    t = next;
+  }
+  return t;
+}
+
+}  // namespace
+
+SurfaceDistance signed_distance(const Ellipsoid& e, const Vec3& point) {
+  const Vec3& r = e.radii;
+  const Vec3 p = point.cwiseAbs();
+  int thin = 0;
+  const Real least_radius = r.minCoeff(&thin);
+  // Below the root: F >= 0 where the term of the thinnest axis alone is 1.
+  const Real pole = -least_radius * least_radius;
+  Vec3 nearest;
+  bool on_axis_plane = false;
+  if (!(p[thin] > 0)) {
+    // A point of the plane across the thinnest axis may have its nearest points off this plane.
+    Real others = 0;
+    for (int i = 0; i < 3; ++i)
+      if (i != thin && p[i] > 0) {
+        const Real below = pole + r[i] * r[i];
+        others += below > 0 ? std::pow(r[i] * p[i] / below, 2) : kInfinity;
+      }
+    if (others < 1) {
+      on_axis_plane = true;
+      for (int i = 0; i < 3; ++i)
+        nearest[i] = i == thin || p[i] == 0 ? 0 : r[i] * r[i] * p[i] / (pole + r[i] * r[i]);
+      nearest[thin] = least_radius * std::sqrt(1 - others);
+    }
+  }
+  if (!on_axis_plane) {
+    // Each term alone gives a bound below the root; the greatest is the best start.
+    Real start = pole;
+    for (int i = 0; i < 3; ++i) start = std::max(start, r[i] * p[i] - r[i] * r[i]);
+    const Real t = nearest_parameter(r, p, start);
+    for (int i = 0; i < 3; ++i) nearest[i] = p[i] == 0 ? 0 : r[i] * r[i] * p[i] / (t + r[i] * r[i]);
+  }
+  Vec3 normal = nearest.cwiseQuotient(r.cwiseAbs2());
+  for (int i = 0; i < 3; ++i)
+    if (point[i] < 0) normal[i] = -normal[i], nearest[i] = -nearest[i];
+  const bool inside = p.cwiseQuotient(r).squaredNorm() < 1;
+  const Real distance = (point - nearest).norm();
+  return {inside ? -distance : distance, direction(normal, Vec3::UnitY())};
+}
+
 SurfaceDistance signed_distance(const Plane&, const Vec3& p) {
   return {p.y(), Vec3::UnitY()};
 }
@@ -157,7 +244,13 @@ SurfaceDistance mesh_distance(const CollisionMesh& m, const Vec3& p, Real limit2
 }  // namespace
 
 SurfaceDistance signed_distance(const CollisionMesh& m, const Vec3& p) {
-  return mesh_distance(m, p, kInfinity);
+  if (m.solids.empty()) return mesh_distance(m, p, kInfinity);
+  // Of a union: the smallest distance. Outside it is exact, and inside the surface is at least as deep.
+  SurfaceDistance nearest;
+  for (const auto& solid : m.solids)
+    if (const SurfaceDistance d = mesh_distance(*solid, p, kInfinity); d.distance < nearest.distance)
+      nearest = d;
+  return nearest;
 }
 
 SurfaceDistance signed_distance_below(const Solid& s, const Vec3& p, Real limit) {
@@ -223,6 +316,7 @@ Real reach(const Solid& s) {
   if (s.mesh) return s.mesh->hull.reach();
   if (const auto* c = std::get_if<Capsule>(s.shape)) return c->height / 2 + c->radius;
   if (const auto* ball = std::get_if<Sphere>(s.shape)) return ball->radius;
+  if (const auto* e = std::get_if<Ellipsoid>(s.shape)) return e->radii.maxCoeff();
   const Aabb box = local_bounds(s);
   if (const auto* b = std::get_if<Box>(s.shape)) return b->size.norm() / 2;
   return Vec2(box.max().x(), box.max().y()).norm();

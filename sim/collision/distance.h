@@ -28,6 +28,8 @@ SurfaceDistance signed_distance(const Box& b, const Vec3& p);
 SurfaceDistance signed_distance(const Capsule& c, const Vec3& p);
 SurfaceDistance signed_distance(const Cylinder& c, const Vec3& p);
 SurfaceDistance signed_distance(const Cone& c, const Vec3& p);
+SurfaceDistance signed_distance(const Frustum& c, const Vec3& p);
+SurfaceDistance signed_distance(const Ellipsoid& e, const Vec3& p);
 SurfaceDistance signed_distance(const Plane&, const Vec3& p);
 /// Signed distance to a mesh. It is positive on both sides of a mesh that is not solid; for a solid mesh, the
 /// pseudonormal of the nearest feature determines whether the point is inside.

@@ -14,6 +14,8 @@ namespace offstage::sim {
 
 class GroupedBroadPhase {
  public:
+  explicit GroupedBroadPhase(GridKind kind = GridKind::multilevel) : grid_(kind) {}
+
   /// These functions are as those of BroadPhase, for objects of both levels.
   void insert(uint32_t object, const Aabb& box, bool is_static = false);
   void move(uint32_t object, const Aabb& box);

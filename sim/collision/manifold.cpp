@@ -149,7 +149,8 @@ Real tilt(const Body& reference, const SupportingFeature& f, const Body& inciden
 /// Whether the surface turns through its contact when the solid rolls.
 bool is_round(const Convex& c) {
   using Core = Convex::Core;
-  return c.core == Core::point || c.core == Core::segment || c.core == Core::cylinder || c.core == Core::cone;
+  return c.core == Core::point || c.core == Core::segment || c.core == Core::cylinder ||
+         c.core == Core::cone || c.core == Core::ellipsoid;
 }
 
 /// Contact with a face that gives the normal. `closest` is the closest point on the incident solid; for a rim

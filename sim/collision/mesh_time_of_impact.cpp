@@ -131,6 +131,37 @@ Vec3 velocity(const PosePath& path, Real share, const Vec3& place) {
 
 }  // namespace
 
+std::optional<Impact> bisected_time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance) {
+  constexpr int kMostHalvings = 60;
+  const auto a_from_b = [&](Real share) {
+    const Pose at_a = a.path.at(share), at_b = b.path.at(share);
+    return Pose{at_a.point_to_body(at_b.position), at_a.orientation.conjugate() * at_b.orientation};
+  };
+  const auto touch_at = [&](Real share) { return touching(a.shape, b.shape, a_from_b(share)); };
+  if (!touch_at(1)) return std::nullopt;
+  // Bound of the relative speed of any two points [m per step].
+  const auto fastest = [](const MovingShape& s) {
+    return s.shape.is_plane() ? s.path.velocity().norm()
+                              : s.path.velocity().norm() + s.path.turn() * s.shape.hull().reach();
+  };
+  const Real speed = fastest(a) + fastest(b);
+  Impact impact{.share = 0, .separation = {}};
+  Real low = 0, high = 1;
+  if (!touch_at(0))
+    while ((high - low) * speed > tolerance / 2 && impact.advances < kMostHalvings) {
+      const Real middle = (low + high) / 2;
+      (touch_at(middle) ? high : low) = middle;
+      ++impact.advances;
+    }
+  else
+    high = 0;
+  impact.share = low;
+  impact.converged = (high - low) * speed <= tolerance / 2;
+  PairCache none;
+  if (const auto s = separation(a.shape, b.shape, a_from_b(low), none)) impact.separation = *s;
+  return impact;
+}
+
 std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance) {
   assert(!a.shape.is_plane());
   const MovingConvex hull_a{a.shape.hull(), a.path};

@@ -92,7 +92,8 @@ class PiecePair {
   static bool continues(const CollisionShape& shape, uint32_t piece) {
     if (const CollisionMesh* mesh = shape.surface()) return !mesh->surface.is_at_border(piece);
     return std::holds_alternative<Sphere>(*shape.solid().shape) ||
-           std::holds_alternative<Capsule>(*shape.solid().shape);
+           std::holds_alternative<Capsule>(*shape.solid().shape) ||
+           std::holds_alternative<Ellipsoid>(*shape.solid().shape);
   }
 
   void find_solids(Real margin, DistanceMethod method, bool turning, std::vector<Manifold>& found) {

@@ -80,6 +80,10 @@ struct MovingShape {
 /// "C2A: controlled conservative advancement for continuous collision detection of polygonal models" (2009).
 std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance);
 
+/// The same by bisection of the step, as in the book: shapes that overlap at the end have met before. Impacts
+/// of shapes that are apart again at the end are missed.
+std::optional<Impact> bisected_time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance);
+
 /// Returns the time of the next impact of shapes that are within the tolerance at the start and may stay so
 /// or separate. An impact is where their nearest or deepest points approach faster than `speed` [m per step],
 /// > 0, plus the deviation of the turn from a constant rate. The points are sampled along the motion until

@@ -217,17 +217,38 @@ SupportingFeature polyhedron_edge(const ConvexPolyhedron& p, const Vec3& d, Real
   return segment_feature(p.vertex(v), v, p.vertex(end), end, d);
 }
 
+/// Area, projected along d, of the part of a face that is within `slack` of its vertex v along d. The two
+/// sides at v alone would not do: in a polygon of many corners they are short and almost in line.
+Real patch_within(const ConvexPolyhedron& p, uint32_t face, uint32_t v, const Vec3& d, Real slack) {
+  const std::span<const uint32_t> loop = p.face_vertices(face);
+  const auto start = static_cast<std::size_t>(std::find(loop.begin(), loop.end(), v) - loop.begin());
+  const Vec3& top = p.vertex(v);
+  Vec3 corner = Vec3::Zero(), last = Vec3::Zero();  // relative to v; corners of the face and of its part
+  Real height = slack, doubled = 0;                 // of a corner above the lower end of the part
+  const auto add = [&](const Vec3& next) {
+    doubled += d.dot(last.cross(next));
+    last = next;
+  };
+  for (std::size_t k = 1; k < loop.size(); ++k) {
+    const Vec3 next = p.vertex(loop[(start + k) % loop.size()]) - top;
+    const Real next_height = slack + d.dot(next);
+    if ((height >= 0) != (next_height >= 0)) add(corner + height / (height - next_height) * (next - corner));
+    if (next_height >= 0) add(next);
+    corner = next;
+    height = next_height;
+  }
+  // The side from the last corner back to v.
+  if (height < 0) add(corner - height / (height - slack) * corner);
+  return std::max(0.0, doubled / 2);
+}
+
 SupportingFeature polyhedron_face(const ConvexPolyhedron& p, const Vec3& d, Real slack, uint32_t v) {
   if (p.dimension() < 2) return polyhedron_edge(p, d, slack, v);
   uint32_t face = kNoFace;
   Real best = -1;
   for (uint32_t e : p.vertex_edges(v)) {
     const uint32_t f = p.edge(e).tail == v ? p.edge(e).left : p.edge(e).right;
-    const std::span<const uint32_t> loop = p.face_vertices(f);
-    const auto at = static_cast<std::size_t>(std::find(loop.begin(), loop.end(), v) - loop.begin());
-    const Vec3 next = part_within(p, v, loop[(at + 1) % loop.size()], d, slack),
-               last = part_within(p, v, loop[(at + loop.size() - 1) % loop.size()], d, slack);
-    const Real patch = std::max(0.0, d.dot(next.cross(last)));
+    const Real patch = patch_within(p, f, v, d, slack);
     if (patch <= best) continue;
     best = patch;
     face = f;
@@ -263,7 +284,7 @@ struct RoundSide {
 };
 
 RoundSide round_side(const Convex& c, const Vec3& d) {
-  const Real R = c.half.x(), h = c.half.y(), top = c.core == Convex::Core::cone ? 0 : R;
+  const Real R = c.half.x(), h = c.half.y(), top = c.core == Convex::Core::cone ? c.half.z() : R;
   const Vec3 out = outward(d);
   RoundSide side{out * R - h * Vec3::UnitY(), out * top + h * Vec3::UnitY(),
                  (2 * h * out + (R - top) * Vec3::UnitY()).normalized()};
@@ -274,12 +295,17 @@ RoundSide round_side(const Convex& c, const Vec3& d) {
   return side;
 }
 
+/// Radius of the upper or the lower disc.
+Real disc_radius(const Convex& c, bool up) {
+  return up && c.core == Convex::Core::cone ? c.half.z() : c.half.x();
+}
+
 /// Whether more of the flat side than of the round one is within `slack`. Both patches are about equally wide
 /// across the plane through d and the axis, so their lengths in this plane decide.
 bool rests_on_disc(const Convex& c, const RoundSide& side, const Vec3& d, Real slack) {
   const bool up = d.y() > 0;
-  if (up && c.core == Convex::Core::cone) return false;
-  const Real R = c.half.x(), lean = d.dot(outward(d)), length = (side.to - side.from).norm();
+  if (up && c.core == Convex::Core::cone && !(c.half.z() > 0)) return false;
+  const Real R = disc_radius(c, up), lean = d.dot(outward(d)), length = (side.to - side.from).norm();
   const Real disc_within = 2 * R * share_within(slack, 2 * R * lean) * std::abs(d.y()),
              line_within = length * share_within(slack, d.dot(side.from - side.to)) * d.dot(side.normal);
   return disc_within > line_within;
@@ -287,7 +313,8 @@ bool rests_on_disc(const Convex& c, const RoundSide& side, const Vec3& d, Real s
 
 SupportingFeature revolved(const Convex& c, const Vec3& d, Real slack) {
   const RoundSide side = round_side(c, d);
-  if (rests_on_disc(c, side, d, slack)) return disc(c.half.x(), std::copysign(c.half.y(), d.y()), d.y() > 0);
+  if (rests_on_disc(c, side, d, slack))
+    return disc(disc_radius(c, d.y() > 0), std::copysign(c.half.y(), d.y()), d.y() > 0);
   return segment_feature(side.from, side.from_tag, side.to, side.to_tag, d);
 }
 
@@ -301,10 +328,20 @@ SupportingFeature revolved_edge(const Convex& c, const Vec3& d, Real slack, cons
     line.rod = std::max(0.0, outward(d).dot(on_surface)) / side.normal.dot(outward(d));
     return line;
   }
-  const bool apex = c.core == Convex::Core::cone && side.from.y() > 0;
+  const bool apex = c.core == Convex::Core::cone && !(c.half.z() > 0) && side.from.y() > 0;
   if (rests_on_disc(c, side, d, slack)) line.count = 1;
   if (!apex) line.edge = Vec3::UnitY().cross(outward(d));
   return line;
+}
+
+/// The touching point, with the radius of the ball of the same Gaussian curvature there: r_1 r_2 r_3 / |h|^2
+/// with the support h, which is exact for a ball.
+SupportingFeature ellipsoid_point(const Convex& c, const Vec3& d) {
+  uint32_t none = 0;
+  SupportingFeature f = point_feature(c.support(d, none), 0);
+  const Real height = c.half.cwiseProduct(d).norm();
+  f.rod = height > 0 ? c.half.prod() / (height * height) : 0;
+  return f;
 }
 
 }  // namespace
@@ -352,6 +389,8 @@ SupportingFeature supporting_edge(const Convex& c, const Vec3& d, Real slack, co
     case Convex::Core::cylinder:
     case Convex::Core::cone:
       return revolved_edge(c, d, slack, on_surface);
+    case Convex::Core::ellipsoid:
+      return ellipsoid_point(c, d);
     case Convex::Core::polyhedron:
       return polyhedron_edge(*c.polyhedron, d, slack, support_vertex(*c.polyhedron, d, 0));
   }

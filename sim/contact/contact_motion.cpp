@@ -30,7 +30,8 @@ using Vec2 = Eigen::Vector2d;
 
 /// Round about its axis of revolution: the sides and rims of cylinders and cones.
 bool is_revolved(const Shape& shape) {
-  return std::holds_alternative<Cylinder>(shape) || std::holds_alternative<Cone>(shape);
+  return std::holds_alternative<Cylinder>(shape) || std::holds_alternative<Cone>(shape) ||
+         std::holds_alternative<Frustum>(shape);
 }
 /// Radius around the core of a sphere or capsule; 0 for other shapes.
 Real round_radius(const Shape& shape) {
@@ -278,6 +279,14 @@ Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3&
   const auto with_body = [&](const Vec3& r) { return Vec3(to * (from.conjugate() * r)); };
   if (const Real radius = round_radius(shape); radius > 0)
     return with_body(arm - radius * out_from) + radius * out_to;
+  if (const auto* ellipsoid = std::get_if<Ellipsoid>(&shape)) {
+    const auto facing = [&](const Quat& orientation, const Vec3& out) {
+      const Vec3 scaled = ellipsoid->radii.cwiseProduct(orientation.conjugate() * out);
+      return Vec3(ellipsoid->radii.cwiseProduct(scaled.normalized()));
+    };
+    // The distance from the point that faces the other body is only the error of the manifold.
+    return with_body(arm) + to * (facing(to, out_to) - facing(from, out_from));
+  }
   if (!is_revolved(shape)) return with_body(arm);
   const Vec3 centre = body.is_awake() ? body.rigid.centre : Vec3(Vec3::Zero());
   const Vec3 local = from.conjugate() * arm + centre;
@@ -343,7 +352,8 @@ ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, co
     return motion;
   }
   const Shape& carrier = (m.source == NormalSource::face_of_a ? b : a).def.shape;
-  if (is_face && most2 < kEven * kEven && !is_revolved(carrier) && round_radius(carrier) == 0) {
+  if (is_face && most2 < kEven * kEven && !is_revolved(carrier) && round_radius(carrier) == 0 &&
+      !std::holds_alternative<Ellipsoid>(carrier)) {
     set_even_motion(start, frame, duration, motion);
     return motion;
   }

@@ -128,7 +128,9 @@ class LeaningRim {
  public:
   /// `core` is the shape's frame in the manifold's frame, `out` is the direction towards the face.
   LeaningRim(const Shape& shape, const Pose& core, const Vec3& out) : core_(core) {
-    if (!std::holds_alternative<Cylinder>(shape) && !std::holds_alternative<Cone>(shape)) return;
+    if (!std::holds_alternative<Cylinder>(shape) && !std::holds_alternative<Cone>(shape) &&
+        !std::holds_alternative<Frustum>(shape))
+      return;
     const Vec3 facing = core.vector_to_body(out);
     const Real lean = std::hypot(facing.x(), facing.z());
     if (lean > kLeast) facing_ = {facing.x() / lean, facing.z() / lean};
@@ -293,7 +295,7 @@ void ContactPair::find_points(const Pose& a, const Pose& b, Real margin, Real re
     return;
   }
   found.clear();
-  find_manifolds(a_->collision_shape(), b_->collision_shape(), a_from_b, margin, cache_, DistanceMethod::gjk,
+  find_manifolds(a_->collision_shape(), b_->collision_shape(), a_from_b, margin, cache_, surface_.method,
                  found, turning);
   cache_.forget_unused();
   for (Manifold& m : found) follow_rims(m, *a_, *b_, a_from_b);
@@ -376,7 +378,7 @@ void ContactPair::add_speculative_contacts(Real duration) {
   found.clear();
   cache_.keeps_sides = false;
   find_manifolds(a_->collision_shape(), b_->collision_shape(), between(a_->pose, b_->pose), 0, cache_,
-                 DistanceMethod::gjk, found);
+                 surface_.method, found);
   cache_.keeps_sides = true;
   for (Manifold& local : found) {
     follow_rims(local, *a_, *b_, between(a_->pose, b_->pose));

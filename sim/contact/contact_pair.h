@@ -19,6 +19,7 @@ struct PairSurface {
   Real cross = 1;                   ///< friction across the friction axis over friction along it
   const Body* axis_body = nullptr;  ///< body that defines the friction axis; null: isotropic
   bool conveys = false;             ///< whether a surface is a conveyor
+  DistanceMethod method = DistanceMethod::gjk;
 };
 
 /// Force at a point of a manifold on body a, in the manifold's frame.

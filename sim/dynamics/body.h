@@ -23,13 +23,16 @@ struct Body {
 
  public:
   BodyHandle handle;
-  MotionType type = MotionType::dynamic;  // as defined; static after it left the world's bounds
+  MotionType type =
+      MotionType::dynamic;  // as defined; static while absent and after it left the world's bounds
   bool asleep = false;
-  uint32_t surface = 0;  // number of its material, for contact rules
-  uint32_t island = 0;   // awake: number of its island in the sub-step; asleep: number of its sleeping island
-  uint32_t row = 0;      // index among the bodies of its island
-  uint32_t rank = 0;     // position in the order of the world's bodies; see World::Impl::rank_bodies()
-  Real extent = 0;       // reach() of the solid; infinite for a plane
+  bool was_present = true;  // whether it has appeared
+  bool absent = false;      // it has not appeared yet, or was removed; then `type` is static
+  uint32_t surface = 0;     // number of its material, for contact rules
+  uint32_t island = 0;  // awake: number of its island in the sub-step; asleep: number of its sleeping island
+  uint32_t row = 0;     // index among the bodies of its island
+  uint32_t rank = 0;    // position in the order of the world's bodies; see World::Impl::rank_bodies()
+  Real extent = 0;      // reach() of the solid; infinite for a plane
   Real impact_speed_bound = 0;  // greatest speed of a nearby body that may hit it in the sub-step [m/s]
   Pose pose;                    // at the current time
 
@@ -57,6 +60,7 @@ struct Body {
 
   bool is_dynamic() const { return type == MotionType::dynamic; }
   bool is_kinematic() const { return type == MotionType::kinematic; }
+  bool collides() const { return def.collides && !absent; }
   bool is_awake() const { return is_dynamic() && !asleep; }
   /// Greatest speed of its surface in the interval due to rotation [m/s]; 0 for a sphere about its centre.
   Real turning_speed() const { return is_awake() || is_kinematic() ? turning : 0; }

@@ -1,6 +1,7 @@
 #pragma once
 /// The definition of a body: the properties with which it is created.
 
+#include <optional>
 #include <string>
 
 #include "sim/core/handle.h"
@@ -30,10 +31,16 @@ struct BodyDef {
   Vec3 angular_velocity = Vec3::Zero();  ///< world axes [rad/s]
   Real density = 1000;                   ///< [kg/m^3], > 0; ignored if mass > 0
   Real mass = 0;                         ///< [kg]; 0: from density and volume
-  Real linear_drag = 0;                  ///< k_v of F = -k_v v [kg/s]
-  Real angular_drag = 0;                 ///< k_w of tau = -k_w w [kg m^2/s]
-  std::string material;                  ///< name of the surface for ContactRule; may be empty
-  Real restitution = 0.5;                ///< in [0, 1]; a pair uses the larger value of both bodies
+  /// Centre of mass in the body's frame [m]; default: that of the shape.
+  std::optional<Vec3> centre = {};
+  /// Inertia about the centre of mass, axes of the body's frame [kg m^2]: symmetric, and each principal
+  /// moment at most the sum of the other two. Default: that of the shape about its own centre, scaled to the
+  /// mass.
+  std::optional<Mat3> inertia = {};
+  Real linear_drag = 0;       ///< k_v of F = -k_v v [kg/s]
+  Real angular_drag = 0;      ///< k_w of tau = -k_w w [kg m^2/s]
+  std::string material;       ///< name of the surface for ContactRule; may be empty
+  Real restitution = 0.5;     ///< in [0, 1]; a pair uses the larger value of both bodies
   Real friction = 0.5;        ///< dynamic coefficient of Coulomb friction; a pair uses the geometric mean
   Real static_friction = -1;  ///< static coefficient; negative: the same as `friction`
   /// Dynamic coefficient across friction_axis; negative: the same as along it. In every pair, friction across
@@ -47,6 +54,11 @@ struct BodyDef {
   Vec3 surface_velocity = Vec3::Zero();
   bool collides = true;  ///< takes part in collisions with bodies and particles
   KeyframeTrack track;   ///< for kinematic bodies
+  /// Times between which it exists [s]. It appears at its initial pose and velocity, and is removed, at the
+  /// start of the first sub-step from then on. While it does not exist, nothing touches it, and its springs
+  /// and joints have no effect; its joints take the poses of the time when it appears. Its removal releases
+  /// its springs, joints and pins.
+  Real appear_at = 0, remove_at = kInfinity;
 };
 
 }  // namespace offstage::sim

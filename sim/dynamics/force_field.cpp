@@ -52,6 +52,29 @@ Wrench at(const Grab& f, Real time, const Target& t) {
   const Vec3 force = -f.stiffness * gap - f.damping * gap_rate;
   return {force, arm.cross(force)};
 }
+Wrench at(const AppliedForce& f, Real time, const Target& t) {
+  using Six = Eigen::Array<Real, 6, 1>;
+  const auto key = [&](std::size_t k) -> CurveKey<6> {
+    Six value;
+    value << f.keys[k].force.array(), f.keys[k].torque.array();
+    return {f.keys[k].time, value, f.keys[k].interpolation};
+  };
+  Six now;
+  if (!(time > f.keys.front().time))
+    now = key(0).value;
+  else if (time >= f.keys.back().time)
+    now = key(f.keys.size() - 1).value;
+  else
+    now = sample_segment<6>(f.keys.size(), key, false,
+                            segment_at(
+                                f.keys.size(), [&](std::size_t k) { return f.keys[k].time; }, time),
+                            time)
+              .value;
+  Vec3 force = now.head<3>(), torque = now.tail<3>();
+  if (f.body_axes) force = t.motion.orientation * force, torque = t.motion.orientation * torque;
+  const Vec3 arm = f.point ? Vec3(t.motion.orientation * (*f.point - t.centre)) : Vec3(Vec3::Zero());
+  return {force, torque + arm.cross(force)};
+}
 Wrench at(const Explosion&, Real, const Target&) {
   return {};
 }
@@ -136,6 +159,17 @@ std::string problem(const Grab& f) {
   if (!is_not_negative(f.damping)) return "damping must be a finite number >= 0";
   return f.reach > 0 ? "" : "reach must be > 0";
 }
+std::string problem(const AppliedForce& f) {
+  if (f.keys.empty()) return "keys: there is none, a force needs at least one";
+  if (f.point && !f.point->allFinite()) return "point is not finite";
+  for (std::size_t i = 0; i < f.keys.size(); ++i) {
+    const AppliedForce::Key& key = f.keys[i];
+    if (!key.force.allFinite() || !key.torque.allFinite()) return "keys: a force or torque is not finite";
+    if (!std::isfinite(key.time) || (i > 0 && !(key.time > f.keys[i - 1].time)))
+      return "keys: times must be finite and strictly increasing";
+  }
+  return {};
+}
 std::string problem(const Explosion& f) {
   if (!f.point.allFinite()) return "point is not finite";
   if (!std::isfinite(f.impulse)) return "impulse is not finite";
@@ -167,8 +201,9 @@ bool ForceDef::is_pairwise() const {
 bool ForceDef::changes() const {
   if (is_explosion() || is_pairwise()) return false;
   const auto* grab = std::get_if<Grab>(&effect);
+  const auto* applied = std::get_if<AppliedForce>(&effect);
   return start > 0 || end < std::numeric_limits<Real>::infinity() || (grab && grab->track.moves()) ||
-         std::holds_alternative<Turbulence>(effect);
+         std::holds_alternative<Turbulence>(effect) || (applied && applied->keys.size() > 1);
 }
 
 std::string problem(const ForceDef& def) {
@@ -179,6 +214,9 @@ std::string problem(const ForceDef& def) {
   const bool holds_cloths = def.bodies.empty() && def.systems.empty() && !def.cloths.empty();
   if (std::holds_alternative<Grab>(def.effect) && !holds_body && !holds_particles && !holds_cloths)
     return "bodies: a grab holds exactly one body, or particle systems, or cloths";
+  if (std::holds_alternative<AppliedForce>(def.effect) &&
+      (def.bodies.empty() || !def.systems.empty() || !def.cloths.empty()))
+    return "bodies: an applied force acts on named bodies, and on nothing else";
   if (def.is_pairwise() && !holds_particles)
     return "systems: a force between particles needs particle systems, and no bodies";
   return std::visit([](const auto& effect) { return problem(effect); }, def.effect);

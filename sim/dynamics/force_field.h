@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <variant>
@@ -80,6 +81,19 @@ struct Grab {
   Real reach = std::numeric_limits<Real>::infinity();
 };
 
+/// A force at a point of a body, and a torque, both over time. It acts on named bodies only.
+struct AppliedForce {
+  struct Key {
+    Real time = 0;                                        ///< [s]
+    Vec3 force = Vec3::Zero();                            ///< [N]
+    Vec3 torque = Vec3::Zero();                           ///< [N m]
+    Interpolation interpolation = Interpolation::linear;  ///< to the next key
+  };
+  std::vector<Key> keys;           ///< at least one, with strictly increasing times; constant outside of them
+  std::optional<Vec3> point = {};  ///< in the body's frame [m]; default: the centre of mass
+  bool body_axes = false;          ///< force and torque are in the body's axes, not in the world's
+};
+
 /// An impulse away from a point, at the force's start. It acts on each body at its point nearest to the
 /// explosion, so it also turns bodies that are hit off-centre.
 struct Explosion {
@@ -92,7 +106,7 @@ struct Explosion {
 /// Definition of a force of the world.
 struct ForceDef {
   using Effect = std::variant<ConstantField, PointField, WindField, Grab, Explosion, Vortex, Turbulence,
-                              MutualGravitation, Coulomb, LennardJones>;
+                              MutualGravitation, Coulomb, LennardJones, AppliedForce>;
 
   std::string name;
   /// The objects on which it acts. If none is named: all dynamic bodies and all cloths, no particles.

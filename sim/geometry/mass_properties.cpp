@@ -86,6 +86,25 @@ MassProperties closed_form(const Cone& c) {
   return {volume, Vec3(0, -c.height / 4, 0), diagonal(across, volume * 3 * r2 / 10, across)};
 }
 
+/// With the radius R + (r - R) s at the height s h above the base, the integrals over the discs are
+/// polynomials of both radii.
+MassProperties closed_form(const Frustum& c) {
+  const Real R = c.radius, r = c.top_radius, h = c.height, pi = std::numbers::pi;
+  const Real area = (R * R + R * r + r * r) / 3, volume = pi * h * area;
+  const Real above_base = h * (R * R + 2 * R * r + 3 * r * r) / (12 * area);
+  const Real fourth = (R * R * R * R + R * R * R * r + R * R * r * r + R * r * r * r + r * r * r * r) / 5;
+  const Real along = pi * h * fourth / 2;
+  const Real second = pi * h * h * h * (R * R / 30 + R * r / 10 + r * r / 5);
+  const Real across = along / 2 + second - volume * above_base * above_base;
+  return {volume, Vec3(0, above_base - h / 2, 0), diagonal(across, along, across)};
+}
+
+MassProperties closed_form(const Ellipsoid& e) {
+  const Real volume = 4.0 / 3 * std::numbers::pi * e.radii.prod();
+  const Vec3 q = e.radii.cwiseAbs2() * (volume / 5);
+  return {volume, Vec3::Zero(), diagonal(q.y() + q.z(), q.z() + q.x(), q.x() + q.y())};
+}
+
 MassProperties closed_form(const Plane&) {
   return {};
 }

@@ -34,12 +34,21 @@ struct Cone {
   Real radius = 0.5;  ///< of the base [m], > 0
   Real height = 1;    ///< [m], > 0
 };
+/// A cone with its tip cut off: the base circle at y = -height/2, the top circle at y = +height/2.
+struct Frustum {
+  Real radius = 0.5;       ///< of the base [m], > 0
+  Real top_radius = 0.25;  ///< [m], > 0
+  Real height = 1;         ///< [m], > 0
+};
+struct Ellipsoid {
+  Vec3 radii = Vec3(0.5, 0.25, 0.25);  ///< half axes along x, y and z [m], > 0
+};
 /// The half-space y <= 0 of the body's frame; only for bodies that are not dynamic.
 struct Plane {};
 struct MeshShape {
   MeshHandle mesh;
 };
 
-using Shape = std::variant<Sphere, Box, Capsule, Cylinder, Cone, Plane, MeshShape>;
+using Shape = std::variant<Sphere, Box, Capsule, Cylinder, Cone, Plane, MeshShape, Frustum, Ellipsoid>;
 
 }  // namespace offstage::sim

@@ -100,7 +100,7 @@ void add(const Grab& f, const Run& run) {
 }
 template <class Other>
 void add(const Other&, const Run&) {
-  static_assert(kIsPairLaw<Other> || std::is_same_v<Other, Explosion>,
+  static_assert(kIsPairLaw<Other> || std::is_same_v<Other, Explosion> || std::is_same_v<Other, AppliedForce>,
                 "every other kind must be handled here");
 }
 

@@ -69,7 +69,7 @@ void World::Impl::hit_cloths(Real h) {
   std::vector<Aabb> boxes;
   std::map<const Cloth*, std::vector<uint8_t>> held;
   cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
-    if (!cloth->def.collides) return;
+    if (cloth->absent || !cloth->def.collides) return;
     for (const Triangle& t : cloth->triangles) {
       triangles.push_back({cloth.get(), t});
       Aabb& box = boxes.emplace_back();

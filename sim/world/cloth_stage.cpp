@@ -18,7 +18,9 @@ constexpr Real kImpact = 0.2;
 
 ClothHandle World::add_cloth(const ClothDef& def) {
   const std::string object = def.name.empty() ? "cloth" : "cloth \"" + def.name + '"';
-  const std::string wrong = problem(def);
+  std::string wrong = problem(def);
+  if (!(def.appear_at >= 0) || !std::isfinite(def.appear_at) || !(def.remove_at > def.appear_at))
+    wrong = "remove_at must be later than appear_at, which is at least 0";
   if (!wrong.empty()) throw std::invalid_argument(object + ": " + wrong);
   for (std::size_t i = 0; i < def.pins.size(); ++i)
     if (def.pins[i].body && !impl_->bodies.find(def.pins[i].body))
@@ -26,6 +28,8 @@ ClothHandle World::add_cloth(const ClothDef& def) {
                                   "] is on a body that does not exist");
   const ClothHandle handle = impl_->cloths.insert(nullptr);
   impl_->cloths[handle] = std::make_unique<Cloth>(handle, def);
+  impl_->cloths[handle]->absent = def.appear_at > impl_->now;
+  impl_->has_lifetimes |= def.appear_at > impl_->now || std::isfinite(def.remove_at);
   impl_->arrange_cloths();
   return handle;
 }
@@ -55,7 +59,9 @@ std::size_t World::cloth_count() const {
 
 void World::Impl::arrange_cloths() {
   std::vector<Cloth*> all;
-  cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) { all.push_back(cloth.get()); });
+  cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
+    if (!cloth->absent) all.push_back(cloth.get());
+  });
   cloth_system.assign(std::move(all));
 }
 
@@ -81,7 +87,7 @@ std::vector<ClothBody> World::Impl::bodies_near_cloths(Real h) const {
   const Aabb around = cloth_system.reach(h);
   std::vector<ClothBody> near;
   bodies.for_each([&](BodyHandle handle, const std::unique_ptr<Body>& body) {
-    if (!body->def.collides && !holds[handle.index]) return;
+    if (body->absent || (!body->def.collides && !holds[handle.index])) return;
     Obstacle way = swept_obstacle(*body, h);
     if (!holds[handle.index] && !std::holds_alternative<Plane>(*way.solid.shape) &&
         !way.swept_bounds().intersects(around))

@@ -85,7 +85,7 @@ void sort_by_rank(std::span<const RankedPair> pairs, std::size_t bodies, std::ve
 
 /// Whether the path is not within the box in the broad phase.
 bool leaves(const Body& body, const Aabb& way) {
-  return body.def.collides && !body.swept.contains(way);
+  return body.collides() && !body.swept.contains(way);
 }
 
 }  // namespace
@@ -95,6 +95,7 @@ PairSurface World::Impl::surface_of(const Body& a, const Body& b) const {
     return d.static_friction < 0 ? d.friction : d.static_friction;
   };
   PairSurface s;
+  if (def.collision.narrow_phase == CollisionMethods::NarrowPhase::vclip) s.method = DistanceMethod::vclip;
   s.restitution = std::max(a.def.restitution, b.def.restitution);
   s.friction = std::sqrt(a.def.friction * b.def.friction);
   s.static_friction = std::sqrt(static_friction(a.def) * static_friction(b.def));
@@ -379,6 +380,7 @@ void World::Impl::count_contacts(StepReport& report) const {
   report.islands = static_cast<uint32_t>(islands.size());
   report.bodies_awake = static_cast<uint32_t>(awake.size());
   report.bodies_asleep = static_cast<uint32_t>(asleep);
+  report.pairs_tested += active_pairs.size();
   report.contacts = 0;
   for (const ContactPair* pair : active_pairs) {
     report.contacts += pair->touching();

@@ -75,6 +75,7 @@ void CoupledSystem::gather(WorldState& world, std::span<Body* const> bodies, boo
     if (c != CouplingGraph::kNone && (all_systems || has_network(c))) network(c).systems.push_back(&system);
   });
   world.springs.for_each([&](SpringHandle, const Spring& spring) {
+    if (!world.acts(spring)) return;
     const std::size_t c = graph.component(spring);
     if (c != CouplingGraph::kNone && has_network(c)) network(c).springs.push_back(&spring);
   });

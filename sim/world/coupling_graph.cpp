@@ -25,8 +25,9 @@ CouplingGraph::CouplingGraph(const WorldState& world) : world_(world) {
 /// Calls f(a, b) for each direct connection; either may be null, or both the same.
 template <class F>
 void CouplingGraph::for_each_link(F&& f) const {
-  world_.springs.for_each(
-      [&](SpringHandle, const Spring& spring) { f(object(spring.def.a), object(spring.def.b)); });
+  world_.springs.for_each([&](SpringHandle, const Spring& spring) {
+    if (world_.acts(spring)) f(object(spring.def.a), object(spring.def.b));
+  });
   for (const auto& articulation : world_.articulations)
     for (const Body* body : articulation->bodies()) f(articulation->bodies().front(), body);
   world_.force_defs.for_each([&](ForceHandle, const ForceDef& force) {

@@ -129,6 +129,12 @@ class Tumbling {
 
 }  // namespace
 
+std::optional<sim::Impact> World::Impl::first_impact(const MovingShape& a, const MovingShape& b) const {
+  return def.collision.impact_time == CollisionMethods::ImpactTime::bisection
+             ? bisected_time_of_impact(a, b, kTouching / 2)
+             : time_of_impact(a, b, kTouching / 2);
+}
+
 /// Time at which the bodies of a pair will touch on their current paths. If they touch already and approach,
 /// it is the current time.
 std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) const {
@@ -146,8 +152,8 @@ std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) co
     const Real begin = from + (h - from) * i / pieces, end = from + (h - from) * (i + 1) / pieces;
     const PosePath path_a(on_arc(a, begin, h), on_arc(a, end, h)),
         path_b(on_arc(b, begin, h), on_arc(b, end, h));
-    const auto impact = time_of_impact(MovingShape{pair.a().collision_shape(), path_a},
-                                       MovingShape{pair.b().collision_shape(), path_b}, kTouching / 2);
+    const auto impact =
+        first_impact({pair.a().collision_shape(), path_a}, {pair.b().collision_shape(), path_b});
     if (impact) return begin + touching_share(*impact, path_a, path_b) * (end - begin);
   }
   return std::nullopt;
@@ -169,8 +175,7 @@ std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, R
     begin_b = path_b.end();
     const MovingShape a{pair.a().collision_shape(), path_a}, b{pair.b().collision_shape(), path_b};
     std::optional<sim::Impact> impact;
-    const bool met =
-        (i == 0 && touches) || ((impact = time_of_impact(a, b, kTouching / 2)) && impact->share == 0);
+    const bool met = (i == 0 && touches) || ((impact = first_impact(a, b)) && impact->share == 0);
     if (met) impact = time_of_next_impact(a, b, kTouching / 2, def.collision_speed * (end - begin));
     if (impact) return begin + impact->share * (end - begin);
     // The effect of the contact has ended by then, or the contact must be found again.
@@ -217,6 +222,7 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
     const std::vector<std::size_t> events = indices_where(active_pairs.size(), [&](std::size_t i) {
       return active_pairs[i]->needs_toi && is_wanted(*active_pairs[i]);
     });
+    report.impact_searches += events.size();
     std::vector<std::optional<Real>> times(events.size());
     for_each_index(events.size(),
                    [&](std::size_t i) { times[i] = impact_time(*active_pairs[events[i]], h); });

@@ -19,6 +19,26 @@ void check_not_negative(const JointDef& def, const char* field, Real value) {
   if (!(value >= 0)) refuse(def, std::string(field) + " is " + std::to_string(value) + ", allowed is >= 0");
 }
 
+/// Checks what gears, racks, screws and pulleys need.
+void check_kind(const JointDef& def) {
+  using enum JointType;
+  const bool has_ratio = def.is_coupling() || def.type == screw || def.type == pulley;
+  if (has_ratio && (!std::isfinite(def.ratio) || def.ratio == 0))
+    refuse(def, "ratio is " + std::to_string(def.ratio) + ", allowed is a finite number other than 0");
+  if (def.is_coupling() && (!def.a || !def.b)) refuse(def, "a gear or rack needs two bodies");
+  if (def.is_coupling() && !(def.second_axis.norm() > 1e-9))
+    refuse(def, "second_axis is 0 0 0, allowed is any direction");
+  if (def.is_coupling() && (def.has_limits() || def.motor.mode != Motor::Mode::none))
+    refuse(def, "a gear or rack has no limits and no motor; give them to the joints of its bodies");
+  if (def.type != pulley) return;
+  if (!(def.ratio > 0))
+    refuse(def, "ratio is " + std::to_string(def.ratio) + ", allowed is > 0 for a pulley");
+  if (!def.pulley_a.allFinite() || !def.pulley_b.allFinite())
+    refuse(def, "pulley_a or pulley_b is not finite");
+  if (!((def.anchor - def.pulley_a).norm() > 1e-9) || !((def.anchor_b - def.pulley_b).norm() > 1e-9))
+    refuse(def, "an anchor is at its pulley; both strands of the rope need a length");
+}
+
 void check(const JointDef& def) {
   for (const auto& [field, v] : {std::pair("anchor", def.anchor),
                                  {"anchor_b", def.anchor_b},
@@ -30,6 +50,9 @@ void check(const JointDef& def) {
     refuse(def, "second_axis is along axis, allowed is any direction across it");
   if (def.type == JointType::distance && !((def.anchor - def.anchor_b).norm() > 1e-9))
     refuse(def, "anchor and anchor_b are at the same place; a rod needs a length");
+  check_kind(def);
+  if (!(def.restitution >= 0 && def.restitution <= 1))
+    refuse(def, "restitution is " + std::to_string(def.restitution) + ", allowed is 0 to 1");
   if (!(def.lower <= def.upper) || def.lower > 0 || def.upper < 0)
     refuse(def, "limits are " + std::to_string(def.lower) + " to " + std::to_string(def.upper) +
                     ", allowed is a range that contains 0, where the joint is made");
@@ -39,15 +62,18 @@ void check(const JointDef& def) {
     refuse(def, "swing is for spherical and universal joints only");
   check_not_negative(def, "friction", def.friction);
   check_not_negative(def, "damping", def.damping);
+  check_not_negative(def, "stiffness", def.stiffness);
+  if (def.stiffness > 0 && def.type != JointType::spherical)
+    refuse(def, "stiffness is for spherical joints; use a motor with a stiffness for the others");
   check_not_negative(def, "max_force", def.max_force);
   check_not_negative(def, "max_torque", def.max_torque);
   check_not_negative(def, "motor.max_effort", def.motor.max_effort);
   check_not_negative(def, "motor.stiffness", def.motor.stiffness);
   check_not_negative(def, "motor.damping", def.motor.damping);
-  const bool can_drive =
-      def.type == JointType::revolute || def.type == JointType::prismatic || def.type == JointType::distance;
+  const bool can_drive = def.type == JointType::revolute || def.type == JointType::prismatic ||
+                         def.type == JointType::distance || def.type == JointType::screw;
   if (def.motor.mode != Motor::Mode::none && !can_drive)
-    refuse(def, "a motor drives revolute, prismatic and distance joints only");
+    refuse(def, "a motor drives revolute, prismatic, screw and distance joints only");
   if ((def.friction > 0 || def.damping > 0) && !def.has_free_coordinate())
     refuse(def,
            "friction and damping act where a joint may move: not on a fixed one, nor on a rod without "
@@ -59,20 +85,21 @@ void check(const JointDef& def) {
       refuse(def, "motor.targets: must be finite, with strictly increasing times");
 }
 
-/// Columns: the second axis, perpendicular to the axis; the third; the axis.
-Mat3 frame_axes(const Vec3& axis, const Vec3& second) {
-  Mat3 m;
-  m.col(2) = axis.normalized();
-  Vec3 x = second - second.dot(m.col(2)) * m.col(2);
-  if (!(x.norm() > 1e-6)) x = m.col(2).unitOrthogonal();
-  m.col(0) = x.normalized();
-  m.col(1) = m.col(2).cross(m.col(0));
-  return m;
-}
-
 JointFrame in_body(const Body* body, const Vec3& point, const Mat3& axes) {
   if (!body) return {point, axes};
   return {body->pose.point_to_body(point), body->pose.orientation.toRotationMatrix().transpose() * axes};
+}
+
+/// Joins the bodies at their poses, where the definition says.
+void fit(Joint& joint) {
+  const JointDef& def = joint.def;
+  const bool is_rod = def.type == JointType::distance, is_pulley = def.type == JointType::pulley;
+  const bool has_two_anchors = is_rod || is_pulley || def.type == JointType::rack;
+  joint.on_a = in_body(joint.a, def.anchor, frame_axes(def, false));
+  joint.on_b = in_body(joint.b, has_two_anchors ? def.anchor_b : def.anchor, frame_axes(def, true));
+  joint.length = is_rod ? (def.anchor - def.anchor_b).norm() : 0;
+  if (is_pulley)
+    joint.length = (def.anchor - def.pulley_a).norm() + def.ratio * (def.anchor_b - def.pulley_b).norm();
 }
 
 bool is_dynamic(const Body* body) {
@@ -97,7 +124,7 @@ std::vector<uint32_t> colliding_links(std::span<Joint* const> component) {
     const Body* body = open.back();
     open.pop_back();
     if (!seen.insert(body).second) continue;
-    if (body->def.collides) slots.push_back(body->handle.index);
+    if (body->collides()) slots.push_back(body->handle.index);
     const std::vector<const Body*>& next = neighbours[body];
     open.insert(open.end(), next.rbegin(), next.rend());
   }
@@ -147,14 +174,18 @@ JointHandle World::add_joint(const JointDef& def) {
   joint->def = def;
   joint->a = body(def.a, "a does not exist");
   joint->b = body(def.b, "b does not exist");
-  if (!is_dynamic(joint->a) && !is_dynamic(joint->b))
+  const auto becomes_dynamic = [](const Body* end) {
+    return end && (end->is_dynamic() || (end->absent && end->def.motion == MotionType::dynamic));
+  };
+  if (!becomes_dynamic(joint->a) && !becomes_dynamic(joint->b))
     refuse(def, "at least one of its bodies must be dynamic");
   if (joint->a == joint->b) refuse(def, "a and b are the same");
-  const Mat3 axes = frame_axes(def.axis, def.second_axis);
-  const bool is_rod = def.type == JointType::distance;
-  joint->on_a = in_body(joint->a, def.anchor, axes);
-  joint->on_b = in_body(joint->b, is_rod ? def.anchor_b : def.anchor, axes);
-  joint->length = is_rod ? (def.anchor - def.anchor_b).norm() : 0;
+  if (def.type == JointType::pulley && !def.has_limits()) joint->def.upper = 0;
+  fit(*joint);
+  if (!(def.appear_at >= 0) || !(def.remove_at > def.appear_at))
+    refuse(def, "remove_at must be later than appear_at, which is at least 0");
+  joint->is_absent = def.appear_at > 0 || (joint->a && joint->a->absent) || (joint->b && joint->b->absent);
+  impl_->has_lifetimes |= joint->is_absent || std::isfinite(def.remove_at);
   for (Body* end : {joint->a, joint->b})
     if (end) impl_->wake(*end);
   const JointHandle handle = impl_->joints.insert(std::move(joint));
@@ -184,9 +215,9 @@ JointState World::joint(JointHandle handle) const {
   state.axis = place.axes_b.col(2);
   state.force = joint.borne.force;
   state.torque = joint.borne.torque;
-  state.broken = joint.is_broken;
+  state.broken = joint.is_broken || joint.is_absent;
   if (joint.def.has_free_coordinate()) {
-    const JointRow row = free_row(joint.def.type, place, joint.length);
+    const JointRow row = free_row(joint.def, place, joint.length);
     Vec6 va, vb;
     va << a.velocity, a.angular_velocity;
     vb << b.velocity, b.angular_velocity;
@@ -207,6 +238,25 @@ void World::for_each_joint(const std::function<void(JointHandle)>& f) const {
   impl_->joints.for_each([&](JointHandle handle, const auto&) { f(handle); });
 }
 
+/// Joins the bodies of a joint that appears later at their poses of that time. Anchors and axes have moved
+/// with them: those of a with a, or with b if there is no a.
+void World::Impl::place(Joint& joint) {
+  const auto world = [](const Body* body, const JointFrame& frame) -> JointFrame {
+    if (!body) return frame;
+    return {body->pose.point_to_world(frame.point), body->pose.orientation.toRotationMatrix() * frame.axes};
+  };
+  const JointFrame a = world(joint.a, joint.on_a), b = world(joint.b, joint.on_b);
+  JointDef& moved_def = joint.def;
+  const JointFrame& main = joint.a ? a : b;
+  moved_def.anchor = main.point;
+  moved_def.anchor_b = b.point;
+  moved_def.axis = main.axes.col(2);
+  if (moved_def.type == JointType::universal) moved_def.second_axis = main.axes.col(0);
+  if (moved_def.type == JointType::gear) moved_def.second_axis = b.axes.col(2);
+  joint.coordinate = 0;
+  fit(joint);
+}
+
 /// Groups the intact joints by the bodies that they connect, in the order of their first joints.
 void World::Impl::update_articulations() {
   if (!std::exchange(joints_changed, false)) return;
@@ -223,7 +273,7 @@ void World::Impl::update_articulations() {
   std::vector<Joint*> holding;
   joints.for_each([&](JointHandle, const std::unique_ptr<Joint>& joint) {
     joint->articulation = nullptr;
-    if (joint->is_broken || (!is_dynamic(joint->a) && !is_dynamic(joint->b))) return;
+    if (joint->is_broken || joint->is_absent || (!is_dynamic(joint->a) && !is_dynamic(joint->b))) return;
     holding.push_back(joint.get());
     if (joint->a && joint->b && !joint->def.collide)
       apart.push_back(std::minmax(joint->a->handle.index, joint->b->handle.index));

@@ -99,6 +99,7 @@ void World::Impl::watch_springs(std::span<Body* const> group) {
     return std::holds_alternative<ParticlePoint>(end);
   };
   springs.for_each([&](SpringHandle handle, const Spring& s) {
+    if (!acts(s)) return;
     for (const auto& [own, other] : {std::pair(&s.def.a, &s.def.b), {&s.def.b, &s.def.a}})
       if (Body* body = moves(*other) ? sleeper(*own) : nullptr) {
         body->moving_springs.push_back(handle);

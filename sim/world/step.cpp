@@ -66,6 +66,7 @@ StepReport World::Impl::step(Real sampling, const BeforeSubStep& before) {
 void World::Impl::substep(Real start, Real end, StepReport& report) {
   const Real h = end - start;
   ++substeps;
+  update_presence(start);
   wake_pushed(start);
   explode(start, end);
   update_articulations();
@@ -252,7 +253,7 @@ Obstacle World::Impl::swept_obstacle(const Body& body, Real h) const {
 void World::Impl::update_obstacles(Real h) {
   std::vector<Obstacle> fixed, moving;
   bodies.for_each([&](BodyHandle, const std::unique_ptr<Body>& body) {
-    if (!body->def.collides) return;
+    if (!body->collides()) return;
     if (body->can_move() && !(prewarming && body->is_dynamic()))
       moving.push_back(swept_obstacle(*body, h));
     else if (fixed_changed)

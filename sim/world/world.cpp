@@ -66,6 +66,14 @@ void check_size(const std::string& o, const Cone& c) {
   check_positive(o, "radius", c.radius);
   check_positive(o, "height", c.height);
 }
+void check_size(const std::string& o, const Frustum& c) {
+  check_positive(o, "radius", c.radius);
+  check_positive(o, "top_radius", c.top_radius);
+  check_positive(o, "height", c.height);
+}
+void check_size(const std::string& o, const Ellipsoid& e) {
+  for (int i = 0; i < 3; ++i) check_positive(o, "radii", e.radii[i]);
+}
 void check_size(const std::string&, const Plane&) {}
 void check_size(const std::string&, const MeshShape&) {}
 
@@ -80,6 +88,23 @@ void check_track(const std::string& object, const KeyframeTrack& track) {
 
 void check_restitution(const std::string& object, Real e) {
   if (!(e >= 0 && e <= 1)) refuse(object, "restitution is " + std::to_string(e) + ", allowed is 0 to 1");
+}
+
+/// The principal moments of a solid are integrals of squares, so none exceeds the sum of the other two.
+void check_inertia(const std::string& object, const Mat3& inertia) {
+  constexpr Real kRounding = 1e-9;
+  if (!inertia.allFinite()) refuse(object, "inertia is not finite");
+  const Real scale = inertia.cwiseAbs().maxCoeff();
+  if (!((inertia - inertia.transpose()).cwiseAbs().maxCoeff() <= kRounding * scale))
+    refuse(object, "inertia is not symmetric");
+  const Vec3 moments = diagonalise(inertia).moments;
+  std::ostringstream values;
+  values << moments.x() << ", " << moments.y() << " and " << moments.z() << " kg m^2";
+  if (!(moments.x() > kRounding * scale))
+    refuse(object, "inertia has the principal moments " + values.str() + ", allowed are moments > 0");
+  if (moments.z() > (1 + kRounding) * (moments.x() + moments.y()))
+    refuse(object, "inertia has the principal moments " + values.str() +
+                       "; the largest may not exceed the sum of the other two");
 }
 
 void check_body(const std::string& object, const BodyDef& def) {
@@ -101,7 +126,25 @@ void check_body(const std::string& object, const BodyDef& def) {
     refuse(object, "cross_friction needs a friction_axis, allowed is any but 0 0 0");
   if (def.cross_friction > 0 && def.friction == 0)
     refuse(object, "cross_friction needs a friction along the axis, too, allowed is any but 0");
+  if (def.centre) check_finite(object, "centre", *def.centre);
+  if (def.inertia) check_inertia(object, *def.inertia);
   check_track(object, def.track);
+  if (!(def.appear_at >= 0) || !std::isfinite(def.appear_at) || !(def.remove_at > def.appear_at))
+    refuse(object, "appear_at is " + std::to_string(def.appear_at) + " s and remove_at " +
+                       std::to_string(def.remove_at) + " s, allowed are 0 or later, and a later removal");
+}
+
+void check_mesh(const std::string& object, const TriangleMesh& mesh) {
+  for (const Vec3& v : mesh.vertices) {
+    check_finite(object, "a vertex", v);
+    if (v.cwiseAbs().maxCoeff() > kMostCoordinate)
+      refuse(object, "a coordinate is beyond 1e12 m; use a smaller scale");
+  }
+  for (const Triangle& t : mesh.triangles)
+    for (uint32_t v : t)
+      if (v >= mesh.vertices.size())
+        refuse(object, "vertex index " + std::to_string(v) + " of " + std::to_string(mesh.vertices.size()) +
+                           " vertices");
 }
 
 RigidBody make_rigid_body(const std::string& object, const BodyDef& def, const Solid& solid) {
@@ -112,8 +155,9 @@ RigidBody make_rigid_body(const std::string& object, const BodyDef& def, const S
   if (!(unit.volume > 0)) refuse(object, "a dynamic body needs a solid shape, this one has no volume");
   RigidBody rigid;
   rigid.mass = def.mass > 0 ? def.mass : def.density * unit.volume;
-  rigid.centre = unit.centre;
-  rigid.inertia = rigid.mass / unit.volume * unit.inertia;
+  rigid.centre = def.centre.value_or(unit.centre);
+  rigid.inertia = def.inertia ? Mat3((*def.inertia + def.inertia->transpose()) / 2)
+                              : Mat3(rigid.mass / unit.volume * unit.inertia);
   rigid.inverse_inertia = rigid.inertia.inverse();
   const bool in_range = rigid.mass >= kLeastMass && rigid.mass <= kMostMass && rigid.centre.allFinite() &&
                         rigid.inertia.allFinite() && rigid.inverse_inertia.allFinite() &&
@@ -203,7 +247,10 @@ const CollisionShape& Body::collision_shape() {
 }
 
 bool WorldState::is_alive(const Attachment& a) const {
-  if (const auto* b = std::get_if<BodyPoint>(&a)) return bodies.find(b->body) != nullptr;
+  if (const auto* b = std::get_if<BodyPoint>(&a)) {
+    const auto* body = bodies.find(b->body);
+    return body && !((*body)->absent && (*body)->was_present);
+  }
   if (const auto* p = std::get_if<ParticlePoint>(&a)) {
     const ParticleSystem* system = systems.find(p->system);
     return system && system->find(p->id);
@@ -257,25 +304,30 @@ World::World(const WorldDef& def) : impl_(std::make_unique<Impl>()) {
   check_positive("world", "integration_error", def.integration_error);
   if (def.bounds.isEmpty()) refuse("world", "bounds are empty");
   impl_->def = def;
+  if (def.collision.broad_phase == CollisionMethods::BroadPhase::grid)
+    impl_->broad_phase = GroupedBroadPhase(GridKind::uniform);
 }
 World::~World() = default;
 World::World(World&&) noexcept = default;
 World& World::operator=(World&&) noexcept = default;
 
 MeshHandle World::add_mesh(const TriangleMesh& mesh, std::optional<ConvexDecomposition> decomposition) {
-  for (const Vec3& v : mesh.vertices) {
-    check_finite("mesh", "a vertex", v);
-    if (v.cwiseAbs().maxCoeff() > kMostCoordinate)
-      refuse("mesh", "a coordinate is beyond 1e12 m; use a smaller scale");
-  }
-  for (const Triangle& t : mesh.triangles)
-    for (uint32_t v : t)
-      if (v >= mesh.vertices.size())
-        refuse("mesh", "vertex index " + std::to_string(v) + " of " + std::to_string(mesh.vertices.size()) +
-                           " vertices");
+  check_mesh("mesh", mesh);
   TriangleMesh welded = weld(mesh);
   if (welded.triangles.empty()) refuse("mesh", "it has no face");
   return impl_->meshes.insert(std::make_unique<CollisionMesh>(std::move(welded), std::move(decomposition)));
+}
+
+MeshHandle World::add_compound(const std::vector<SolidMesh>& solids) {
+  if (solids.empty()) refuse("compound", "it has no parts");
+  std::vector<SolidMesh> welded;
+  for (const SolidMesh& solid : solids) {
+    check_mesh("compound", solid.mesh);
+    if (solid.parts.empty()) refuse("compound", "a part has no convex solids");
+    welded.push_back({weld(solid.mesh), solid.parts});
+    if (welded.back().mesh.triangles.empty()) refuse("compound", "a part has no face");
+  }
+  return impl_->meshes.insert(std::make_unique<CollisionMesh>(std::move(welded)));
 }
 
 const MeshTopology& World::topology(MeshHandle mesh) const {
@@ -308,10 +360,13 @@ BodyHandle World::add_body(const BodyDef& def) {
   body->extent =
       std::holds_alternative<Plane>(def.shape) ? std::numeric_limits<Real>::infinity() : reach(body->solid);
   body->surface = impl_->surface_number(def.material);
+  if (def.appear_at > impl_->now) body->absent = true, body->type = MotionType::static_body;
+  body->was_present = !body->absent;
+  impl_->has_lifetimes |= body->absent || std::isfinite(def.remove_at);
   impl_->fixed_changed = impl_->lists_changed = impl_->ranks_changed = true;
   const BodyHandle handle = impl_->bodies.insert(std::move(body));
   impl_->bodies[handle]->handle = handle;
-  if (const Body& added = *impl_->bodies[handle]; added.def.collides)
+  if (const Body& added = *impl_->bodies[handle]; added.collides())
     impl_->broad_phase.insert(handle.index, bounds(added.solid, added.pose), !added.is_dynamic());
   return handle;
 }
@@ -386,6 +441,14 @@ void World::set_velocity(BodyHandle handle, const Vec3& velocity, const Vec3& an
   body.rigid.set_velocity(velocity, angular_velocity);
 }
 
+void World::add_impulse(BodyHandle handle, const Vec3& impulse, const Vec3& point) {
+  Body& body = *impl_->bodies[handle];
+  if (!body.is_dynamic()) return;
+  impl_->wake(body);
+  body.rigid.momentum += impulse;
+  body.rigid.angular_momentum += (point - body.rigid.position).cross(impulse);
+}
+
 bool World::remove(ParticleSystemHandle system) {
   if (!impl_->systems.erase(system)) return false;
   std::erase_if(impl_->particle_events, [&](const ParticleEvent& e) { return e.system == system; });
@@ -450,7 +513,8 @@ BodyState World::body(BodyHandle handle) const {
     return {body.pose, rigid.position, rigid.velocity(), rigid.angular_velocity(), rigid.angular_momentum,
             rigid.mass};
   const Motion motion = body.motion(impl_->now, impl_->now);
-  const Vec3 centre = body.solid.mesh ? body.solid.mesh->mass.centre
+  const Vec3 centre = body.def.centre   ? *body.def.centre
+                      : body.solid.mesh ? body.solid.mesh->mass.centre
                       : std::holds_alternative<Plane>(body.def.shape)
                           ? Vec3(Vec3::Zero())
                           : mass_properties(body.def.shape).centre;
@@ -490,7 +554,7 @@ std::vector<BodyOverlap> World::overlaps(Real least) const {
   impl_->update_articulations();  // joined bodies do not collide with each other
   BroadPhase boxes;
   impl_->bodies.for_each([&](BodyHandle handle, const auto& body) {
-    if (body->def.collides) boxes.insert(handle.index, bounds(body->solid, body->pose), !body->is_dynamic());
+    if (body->collides()) boxes.insert(handle.index, bounds(body->solid, body->pose), !body->is_dynamic());
   });
   std::vector<BodyOverlap> found;
   for (const IndexPair& pair : boxes.pairs()) {
@@ -548,11 +612,13 @@ Energy World::energy() const {
     }
   });
   impl_->springs.for_each([&](auto, const Spring& s) {
+    if (!impl_->acts(s)) return;
     const Real stretch = (impl_->position(s.def.a) - impl_->position(s.def.b)).norm() - s.rest_length;
     e.elastic += s.def.stiffness * stretch * stretch / 2;
   });
   e.potential += pair_energy(*impl_, impl_->now);
   impl_->cloths.for_each([&](auto, const std::unique_ptr<Cloth>& cloth) {
+    if (cloth->absent) return;
     for (std::size_t i = 0; i < cloth->points.size(); ++i) {
       e.kinetic += cloth->masses[i] * cloth->velocities[i].squaredNorm() / 2;
       e.potential -= cloth->masses[i] * g.dot(cloth->points[i]);

@@ -54,6 +54,8 @@ struct WorldState {
   bool has_pair_forces() const;
   /// Whether the object of an attachment exists.
   bool is_alive(const Attachment& a) const;
+  /// Whether both ends of a spring exist at this time.
+  bool acts(const Spring& spring) const;
   Vec3 position(const Attachment& a) const;
 };
 
@@ -72,6 +74,13 @@ struct World::Impl : WorldState {
   CoupledSystem& move_some(std::span<Body* const> group, Real start, Real from, Real duration);
   bool is_within_bounds(const Body& body) const;
   void retire(Body& body, StepReport& report);
+
+  // Objects that exist for some time only (presence.cpp)
+  void update_presence(Real time);
+  void appear(Body& body, Real time);
+  void take_out(Body& body);
+  void update_joint_presence(Real time);
+  void place(Joint& joint);
 
   // Contacts (contact_stage.cpp)
   PairSurface surface_of(const Body& a, const Body& b) const;
@@ -99,6 +108,7 @@ struct World::Impl : WorldState {
     ContactPair* pair;
   };
   void resolve_impacts(Real start, Real h, StepReport& report);
+  std::optional<sim::Impact> first_impact(const MovingShape& a, const MovingShape& b) const;
   std::optional<Real> impact_time(const ContactPair& pair, Real h) const;
   std::optional<Real> tumbling_impact_time(const ContactPair& pair, Real from, Real h, Real turn) const;
   std::optional<Real> point_impact_time(const ContactPair& pair, Real h) const;
@@ -193,6 +203,7 @@ struct World::Impl : WorldState {
   // (E9).
   Obstacles fixed_obstacles, moving_obstacles;
   bool fixed_changed = true;
+  bool has_lifetimes = false;  // whether any body, joint or cloth appears or is removed at a time
   bool prewarming = false;
   std::vector<ParticleSystemHandle> waiting;  // systems that are paused while others are prewarmed
   ParticleCollisions particle_collisions;

@@ -195,6 +195,19 @@ TEST(Commands, TwoOutputsNeverShareAFile) {
   EXPECT_EQ(contents(folder.path()).size(), 1u);
 }
 
+TEST(Commands, BenchPrintsATableOfMethods) {
+  const TemporaryFolder folder;
+  write_file(folder / "s.json", falling_crate(""));
+  const Outcome run = offstage("bench s.json --repeat 2 --csv b.csv", folder.path());
+  EXPECT_EQ(run.code, 0) << run.err;
+  for (const char* text : {"method", "steps/s", "\nscene ", "\ncollision.impact_time=bisection "})
+    EXPECT_NE(run.out.find(text), std::string::npos) << run.out;
+  EXPECT_TRUE(std::filesystem::exists(folder / "b.csv"));
+  EXPECT_EQ(offstage("bench s.json --csv b.csv", folder.path()).code, 2);
+  const Outcome piped = offstage("bench - < s.json", folder.path());
+  EXPECT_EQ(piped.code, 0) << piped.err;
+}
+
 TEST(Commands, OverridesAreCheckedLikeTheFile) {
   const TemporaryFolder folder;
   EXPECT_EQ(offstage("validate " + tiny_scene() + " --set emitters.0.rate=200", folder.path()).code, 0);

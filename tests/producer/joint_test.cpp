@@ -53,10 +53,10 @@ TEST(SceneJoints, InvalidValuesAreRefusedWithTheAllowedOnes) {
             "/joints/0: has no dynamic body: at least one of \"a\" and \"b\" must be dynamic\n");
   EXPECT_EQ(joint_errors(bodies + R"("joints": [{"type": "revolute", "a": "door", "limits": [-1, 1]},
                                              {"type": "revolute", "a": "door", "limits_deg": [10, 20]}])"),
-            "/joints/0/limits: is for prismatic and distance joints; use \"limits_deg\"\n"
+            "/joints/0/limits: is for prismatic and distance joints and pulleys; use \"limits_deg\"\n"
             "/joints/1/limits_deg: must be a range that contains 0, the position of the joint at time 0\n");
   EXPECT_EQ(joint_errors(bodies + R"("joints": [{"a": "door", "motor": {}}])"),
-            "/joints/0/motor: drives revolute, prismatic and distance joints only\n");
+            "/joints/0/motor: drives revolute, prismatic, screw and distance joints only\n");
   EXPECT_EQ(joint_errors(bodies + R"("articulations": [{"type": "chain", "end": "world"}])"),
             "/articulations/0/sag: must be above 1.0005 if both ends are fixed: a taut chain cannot carry a "
             "sideways load\n");
@@ -176,7 +176,9 @@ TEST(ModelTrees, AreTheNodesOfTheirFile) {
                    R"({"node": "hnad"}, {"node": "hand", "type": "distance"}]}])"),
       "/articulations/0/joints/0/node: assets/models/robot_arm.glb has no node 'hnad' with triangles; did "
       "you mean 'hand'?\n"
-      "/articulations/0/joints/1/type: must not be \"distance\": the joint is at the origin of the node\n");
+      "/articulations/0/joints/1/type: must not be \"distance\", \"pulley\", \"gear\" or \"rack\": the joint "
+      "is at "
+      "the origin of the node\n");
   EXPECT_NE(joint_errors(R"("articulations": [{"type": "model", "file": "none.glb"}])")
                 .find("/articulations/0/file: "),
             std::string::npos);

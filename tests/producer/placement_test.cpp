@@ -144,9 +144,10 @@ TEST(Placement, TooManyCopiesAreAnErrorWhateverTheProduct) {
     scene_of(scene);
     FAIL();
   } catch (const SceneError& error) {
-    EXPECT_STREQ(error.what(),
-                 "scene:1:13: /bodies/0: asks for more than 100000 copies: the counts of repeat, grid and "
-                 "scatter multiply");
+    EXPECT_STREQ(
+        error.what(),
+        "scene:1:13: /bodies/0: asks for more than 100000 copies: the counts of fill, repeat, grid and "
+        "scatter multiply");
   }
 }
 

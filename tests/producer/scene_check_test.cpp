@@ -179,7 +179,8 @@ TEST(SceneCheck, ForcesNameExistingObjects) {
             "/forces/3/keyframes/1/time: times must increase, got 1 after 1\n"
             "/forces/4/name: the name 'force_0' is already used by /forces/0\n"
             "/forces/5/type: must be one of \"constant\", \"point\", \"wind\", \"grab\", \"explosion\", "
-            "\"vortex\", \"turbulence\", \"gravitation\", \"coulomb\" or \"lennard_jones\", got the string "
+            "\"vortex\", \"turbulence\", \"gravitation\", \"coulomb\", \"lennard_jones\" or \"applied\", got "
+            "the string "
             "\"field\"\n");
   EXPECT_EQ(warnings_of(R"({"bodies": [{"name": "wall", "motion": "static"}, {"name": "ball"}],
     "forces": [{"type": "point", "bodies": ["ball", "wall"], "drop_rate": 1}]})"),

@@ -141,10 +141,11 @@ TEST(SceneIo, ClosedLimitsTruncateANormalDistribution) {
 
 TEST(SceneIo, OmittedTypesHaveDefaultsOrAreReported) {
   EXPECT_TRUE(std::holds_alternative<StaticCamera>(loaded_scene(R"({"camera": {"eye": [0, 1, 9]}})").camera));
-  EXPECT_EQ(load_errors(R"({"bodies": [{"shape": {"radius": 1}}]})"),
-            "s:1:23: /bodies/0/shape/type: is required: one of \"sphere\", \"box\", \"capsule\", "
-            "\"cylinder\", \"cone\", "
-            "\"plane\" or \"mesh\"");
+  EXPECT_EQ(
+      load_errors(R"({"bodies": [{"shape": {"radius": 1}}]})"),
+      "s:1:23: /bodies/0/shape/type: is required: one of \"sphere\", \"box\", \"capsule\", "
+      "\"cylinder\", \"cone\", "
+      "\"plane\", \"mesh\", \"frustum\", \"ellipsoid\", \"torus\", \"tube\", \"open_box\" or \"compound\"");
 }
 
 TEST(SceneIo, CanonicalOfCanonicalIsTheSame) {

@@ -2,7 +2,7 @@
 # Documents name files, tests and pages that exist:  docs.sh SOURCE_DIR
 # - relative links of every Markdown page lead to a file,
 # - a code block below a comment `<!-- file: PATH -->` is the text of that file,
-# - source paths in docs/physics.md exist, and so does every test that it names.
+# - source paths in docs/physics.md exist, and so do the tests and scenes that it and docs/book.md name.
 set -euo pipefail
 cd "$1"
 failed=0
@@ -27,8 +27,13 @@ done < <(grep -oE '`(sim|effects|render|demos|tests)/[A-Za-z0-9_/.]+`' docs/phys
 tests=$(grep -rhoE '^(TEST|TEST_F|TEST_P|RC_GTEST_PROP)\([A-Za-z0-9_]+, *[A-Za-z0-9_]+' tests --include='*.cpp' | sed -E 's/^[A-Z_]+\(//; s/, */./')
 while read -r name; do
   case $name in
-    *.\*) grep -qF "${name%\*}" <<<"$tests" || problem "docs/physics.md: there is no test suite '${name%.\*}'" ;;
-    *) grep -qx "$name" <<<"$tests" || problem "docs/physics.md: there is no test '$name'" ;;
+    *.\*) grep -qF "${name%\*}" <<<"$tests" || problem "docs/physics.md or docs/book.md: there is no test suite '${name%.\*}'" ;;
+    *) grep -qx "$name" <<<"$tests" || problem "docs/physics.md or docs/book.md: there is no test '$name'" ;;
   esac
-done < <(grep -oE '`[A-Z][A-Za-z0-9]+\.(\*|[A-Z][A-Za-z0-9]+)`' docs/physics.md | tr -d '`' | sort -u)
+done < <(grep -ohE '`[A-Z][A-Za-z0-9]+\.(\*|[A-Z][A-Za-z0-9]+)`' docs/physics.md docs/book.md | tr -d '`' | sort -u)
+
+# The lists "scene `x`" and "scenes `x`, `y`" of docs/book.md.
+while read -r name; do
+  [ -e "demos/scenes/$name.json" ] || problem "docs/book.md: there is no scene '$name'"
+done < <(grep -oE 'scenes? `[a-z_]+`(, `[a-z_]+`)*' docs/book.md | grep -oE '`[a-z_]+`' | tr -d '`' | sort -u)
 exit $failed

@@ -35,6 +35,12 @@ void scale(ModelTree& tree, Real factor) {
 template <class Template>
 void add_copies(const Template& original, uint64_t seed, Scene& flat, std::vector<Problem>& errors,
                 std::vector<Problem>& warnings) {
+  if (needs_spacing(original.placement)) {
+    Where where = original.where;
+    where.path += "/fill";
+    errors.push_back({where, "needs a \"spacing\", the distance between neighbouring copies"});
+    return;
+  }
   if (copy_count(original.placement) > kMaxCopies) {
     errors.push_back({original.where, "asks for more than " + std::to_string(kMaxCopies) +
                                           " copies: the counts of repeat, grid and scatter multiply"});
@@ -64,7 +70,12 @@ const Body* named(const std::vector<Body>& bodies, const std::string& name) {
 }
 
 bool has_copies(const Body* body) {
-  return body && (body->placement.repeat || body->placement.grid || body->placement.scatter);
+  return body &&
+         (body->placement.fill || body->placement.repeat || body->placement.grid || body->placement.scatter);
+}
+
+Vec3 second_axis_of(const JointBehaviour& joint) {
+  return joint.second_axis.value_or(joint.type == sim::JointType::gear ? joint.axis : Vec3(Vec3::UnitX()));
 }
 
 /// One joint for each copy of its first body.
@@ -83,7 +94,9 @@ void add_copies(const Joint& joint, const Scene& scene, Scene& flat) {
     moved.anchor_b =
         has_copies(b) || joint.b.empty() ? copy.motion.point_to_world(joint.anchor_b) : joint.anchor_b;
     moved.behaviour.axis = copy.motion.vector_to_world(joint.behaviour.axis);
-    moved.behaviour.second_axis = copy.motion.vector_to_world(joint.behaviour.second_axis);
+    moved.behaviour.second_axis = copy.motion.vector_to_world(second_axis_of(joint.behaviour));
+    moved.pulley_a = copy.motion.point_to_world(joint.pulley_a);
+    moved.pulley_b = copy.motion.point_to_world(joint.pulley_b);
     flat.joints.push_back(std::move(moved));
   }
 }
@@ -116,22 +129,44 @@ void expand_joints(const Scene& scene, Scene& flat, std::vector<Problem>& errors
         articulation);
 }
 
+bool has_rope(sim::JointType type) {
+  return type == sim::JointType::distance || type == sim::JointType::pulley;
+}
+
+Real rope_length(const Joint& joint) {
+  if (joint.behaviour.type == sim::JointType::distance) return (joint.anchor - joint.anchor_b).norm();
+  return (joint.anchor - joint.pulley_a).norm() +
+         joint.behaviour.ratio * (joint.anchor_b - joint.pulley_b).norm();
+}
+
 sim::JointDef joint_def(const Joint& joint) {
   const JointBehaviour& how = joint.behaviour;
-  const bool slides = how.type == sim::JointType::prismatic || how.type == sim::JointType::distance;
+  const bool slides = how.type == sim::JointType::prismatic || has_rope(how.type);
   const Real unit = slides ? 1 : kDegree;
   sim::JointDef def{.name = joint.name,
                     .type = how.type,
                     .anchor = joint.anchor,
                     .anchor_b = joint.anchor_b,
                     .axis = how.axis,
-                    .second_axis = how.second_axis,
+                    .second_axis = second_axis_of(how),
+                    .ratio = how.ratio,
+                    .pulley_a = joint.pulley_a,
+                    .pulley_b = joint.pulley_b,
+                    .restitution = how.restitution,
+                    .stiffness = how.stiffness,
                     .friction = how.friction,
                     .damping = how.damping,
-                    .collide = joint.collide};
+                    .collide = joint.collide,
+                    .appear_at = joint.appear_at,
+                    .remove_at = joint.remove_at};
   if (const auto& limits = slides ? how.limits : how.limits_deg) {
     def.lower = unit * (*limits)[0];
     def.upper = unit * (*limits)[1];
+  }
+  if (how.length_limits && has_rope(how.type)) {
+    const Real length = rope_length(joint);
+    def.lower = std::min(0.0, (*how.length_limits)[0] - length);
+    def.upper = std::max(0.0, (*how.length_limits)[1] - length);
   }
   if (how.swing_deg) def.swing = kDegree * *how.swing_deg;
   if (how.motor) def.motor = motor_def(*how.motor, unit);

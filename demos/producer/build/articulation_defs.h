@@ -12,6 +12,11 @@ namespace offstage::producer {
 void expand_joints(const Scene& scene, Scene& flat, std::vector<Problem>& errors,
                    std::vector<Problem>& warnings);
 
+/// Whether joints of this type have a length that `length_limits` limit.
+bool has_rope(sim::JointType type);
+/// The length of such a joint at time 0 [m].
+Real rope_length(const Joint& joint);
+
 /// Converts a joint without its bodies.
 sim::JointDef joint_def(const Joint& joint);
 

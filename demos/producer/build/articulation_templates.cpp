@@ -42,15 +42,42 @@ std::vector<Vec3> hanging_nodes(const Vec3& from, const Vec3& to, int n, Real si
 
 }  // namespace
 
+/// Points in equal steps along a polyline.
+std::vector<Vec3> along_path(const std::vector<Vec3>& path, int steps) {
+  Real total = 0;
+  for (std::size_t i = 1; i < path.size(); ++i) total += (path[i] - path[i - 1]).norm();
+  std::vector<Vec3> points = {path.front()};
+  std::size_t piece = 1;
+  Real passed = 0;  // length of the pieces before this one
+  for (int k = 1; k < steps; ++k) {
+    const Real wanted = total * k / steps;
+    Real length = (path[piece] - path[piece - 1]).norm();
+    while (passed + length < wanted && piece + 1 < path.size()) {
+      passed += length;
+      ++piece;
+      length = (path[piece] - path[piece - 1]).norm();
+    }
+    points.push_back(path[piece - 1] +
+                     std::min(1.0, (wanted - passed) / length) * (path[piece] - path[piece - 1]));
+  }
+  points.push_back(path.back());
+  return points;
+}
+
 Parts build(const Chain& chain) {
   ArticulationBuilder make(chain.where, chain.name);
-  const Real side = (chain.to - chain.from).norm() * chain.sag / chain.links;
-  const std::vector<Vec3> nodes = hanging_nodes(chain.from, chain.to, chain.links, side);
+  const Real hanging_side = (chain.to - chain.from).norm() * chain.sag / chain.links;
+  const std::vector<Vec3> nodes = chain.path.empty()
+                                      ? hanging_nodes(chain.from, chain.to, chain.links, hanging_side)
+                                      : along_path(chain.path, chain.links);
+  const auto side = [&](std::size_t k) {
+    return chain.path.empty() ? hanging_side : (nodes[k + 1] - nodes[k]).norm();
+  };
   const auto link = [](int i) { return "link_" + std::to_string(i); };
   for (int i = 0; i < chain.links; ++i) {
     Body& b = make.body(link(i), chain.material);
     const auto k = static_cast<std::size_t>(i);
-    b.shape = sim::Capsule{chain.radius, std::max(side - 2 * chain.radius, 0.0)};
+    b.shape = sim::Capsule{chain.radius, std::max(side(k) - 2 * chain.radius, 0.0)};
     b.position = (nodes[k] + nodes[k + 1]) / 2;
     b.orientation = sim::rotation_between(Vec3::UnitY(), nodes[k + 1] - nodes[k]);
     b.density = chain.density;

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "producer/base/to_float.h"
+#include "producer/build/body_shapes.h"
 #include "sim/dynamics/keyframes.h"
 
 namespace offstage::producer {
@@ -21,18 +22,9 @@ Real vertical_fov_deg(const Lens& lens, const Eigen::Vector2i& size) {
 }
 
 /// Half the size of the box around a shape.
-Vec3 half_extent(const sim::Sphere& s, const ModelLibrary&) {
-  return Vec3::Constant(s.radius);
-}
-Vec3 half_extent(const sim::Box& s, const ModelLibrary&) {
-  return s.size / 2;
-}
-template <class Round>  // capsules, cylinders, cones
-Vec3 half_extent(const Round& s, const ModelLibrary&) {
-  return {s.radius, s.height / 2 + s.radius, s.radius};
-}
-Vec3 half_extent(const sim::Plane&, const ModelLibrary&) {
-  return Vec3::Zero();
+template <class S>
+Vec3 half_extent(const S& s, const ModelLibrary&) {
+  return producer::half_extent(s);
 }
 Vec3 half_extent(const MeshFile& s, const ModelLibrary& models) {
   const Eigen::AlignedBox3f box = models.model(s.file).bounds();

@@ -197,6 +197,8 @@ FlatCloth flat_cloth(const Cloth& cloth, const render::Model* model) {
   def.integrator = cloth.integrator;
   def.substep = cloth.substep;
   def.soften = cloth.soften;
+  def.appear_at = cloth.appear_at;
+  def.remove_at = cloth.remove_at;
   return flat;
 }
 

@@ -31,6 +31,21 @@ render::Mesh mesh_of(const sim::Cylinder& s) {
 render::Mesh mesh_of(const sim::Cone& s) {
   return render::make_cone(to_float(s.radius), to_float(s.height));
 }
+render::Mesh mesh_of(const sim::Frustum& s) {
+  return render::make_frustum(to_float(s.radius), to_float(s.top_radius), to_float(s.height));
+}
+render::Mesh mesh_of(const sim::Ellipsoid& s) {
+  return render::make_ellipsoid(s.radii.cast<float>());
+}
+render::Mesh mesh_of(const sim::Torus& s) {
+  return render::make_torus(to_float(s.radius), to_float(s.tube_radius));
+}
+render::Mesh mesh_of(const sim::Tube& s) {
+  return render::make_tube(to_float(s.radius), to_float(s.height), to_float(s.thickness));
+}
+render::Mesh mesh_of(const sim::OpenBox& s) {
+  return render::make_open_box(s.size.cast<float>(), to_float(s.thickness));
+}
 render::Mesh mesh_of(const sim::Plane&) {
   render::Mesh ground = render::make_ground(kGroundHalfSize);
   for (Eigen::Vector2f& uv : ground.uvs)

@@ -18,6 +18,11 @@ render::Mesh mesh_of(const sim::Box& s);
 render::Mesh mesh_of(const sim::Capsule& s);
 render::Mesh mesh_of(const sim::Cylinder& s);
 render::Mesh mesh_of(const sim::Cone& s);
+render::Mesh mesh_of(const sim::Frustum& s);
+render::Mesh mesh_of(const sim::Ellipsoid& s);
+render::Mesh mesh_of(const sim::Torus& s);
+render::Mesh mesh_of(const sim::Tube& s);
+render::Mesh mesh_of(const sim::OpenBox& s);
 render::Mesh mesh_of(const sim::Plane& s);
 render::Mesh mesh_of(const sim::ConvexPolyhedron& part);
 

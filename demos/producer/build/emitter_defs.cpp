@@ -39,6 +39,10 @@ effects::EmitterSurface surface_of(const DiscSurface& s) {
           .pose = {s.position, sim::rotation_between(Vec3::UnitY(), s.direction)},
           .radius = s.radius};
 }
+/// A face that could not be resolved; the scene is refused.
+effects::EmitterSurface surface_of(const FaceSurface& s) {
+  return {.kind = effects::SurfaceKind::plane, .pose = {s.position, Quat::Identity()}, .size = {1, 1}};
+}
 effects::EmitterSurface surface_of(const MeshSurface& s) {
   return {.kind = effects::SurfaceKind::mesh, .pose = {s.position, s.orientation}, .mesh = {}};
 }
@@ -141,6 +145,9 @@ effects::EmitterDef emitter_def(const Emitter& emitter, uint64_t seed) {
   auto def = newborn_def<effects::EmitterDef>(emitter, emitter.name, seed);
   def.surface = std::visit([](const auto& s) { return surface_of(s); }, emitter.surface);
   def.overlap = emitter.overlap;
+  def.inherit_velocity = emitter.inherit_velocity;
+  def.recoil = emitter.recoil;
+  def.rate_per_metre = emitter.rate_per_metre;
   def.rate = emitter.rate;
   def.count = emitter.count;
   def.interval = emitter.interval;

@@ -50,6 +50,13 @@ sim::Grab effect_of(const Grab& f) {
     grab.track.keys.push_back({key.time, {key.position, Quat::Identity()}, key.interpolation});
   return grab;
 }
+sim::AppliedForce effect_of(const AppliedForce& f) {
+  sim::AppliedForce applied{.keys = {}, .point = f.point, .body_axes = f.axes == ForceAxes::body};
+  for (const AppliedKey& key : f.keyframes)
+    applied.keys.push_back({key.time, key.force, key.torque, key.interpolation.value_or(f.interpolation)});
+  if (applied.keys.empty()) applied.keys.push_back({0, f.force, f.torque});
+  return applied;
+}
 sim::Explosion effect_of(const Explosion& f) {
   return {f.point, f.impulse, f.radius, whole_world(f.drop_rate)};
 }
@@ -72,7 +79,8 @@ sim::ForceDef force_def(const Force& force) {
 ForceTargets targets_of(const Force& force) {
   return std::visit(
       []<class F>(const F& f) {
-        ForceTargets targets{{}, f.particles, {}};
+        ForceTargets targets;
+        if constexpr (requires { f.particles; }) targets.particles = f.particles;
         if constexpr (requires { f.cloths; }) targets.cloths = f.cloths;
         if constexpr (requires { f.bodies; }) targets.bodies = f.bodies;
         if constexpr (requires { f.body; })

@@ -83,7 +83,7 @@ Parts build(const ModelTree& tree) {
     if (own != tree.joints.end()) {
       joint.behaviour = own->behaviour;
       joint.behaviour.axis = orientation * own->behaviour.axis;
-      joint.behaviour.second_axis = orientation * own->behaviour.second_axis;
+      if (own->behaviour.second_axis) joint.behaviour.second_axis = orientation * *own->behaviour.second_axis;
     } else {
       joint.behaviour.friction = tree.friction;
       joint.behaviour.damping = tree.damping;

@@ -60,6 +60,11 @@ class ParticleSources {
 
   /// One set for each source, in the order of for_each_source() over the emitters.
   void add_points(const sim::World& world, std::vector<PointSet>& sets) const;
+  /// Calls visit(full name, system, look) in the same order.
+  template <class Visit>
+  void for_each_system(Visit&& visit) const {
+    for (const System& system : systems_) visit(system.name, system.handle, system.look);
+  }
   /// The system of a source, by its full name; null if there is none.
   sim::ParticleSystemHandle system(const std::string& name) const;
 

@@ -4,6 +4,7 @@
 
 #include "effects/distribution.h"
 #include "producer/base/to_float.h"
+#include "producer/build/body_shapes.h"
 #include "producer/build/cloth_defs.h"
 #include "producer/build/drawn_objects.h"
 #include "producer/build/lights.h"
@@ -25,31 +26,24 @@ Affine3f affine(const Vec3& position, const Quat& orientation, Real scale = 1) {
          Eigen::Scaling(to_float(scale));
 }
 
-/// The numbers that distinguish the mesh of a primitive from others.
-std::vector<float> shape_key(const sim::Sphere& s) {
-  return {0, to_float(s.radius)};
-}
-std::vector<float> shape_key(const sim::Box& s) {
-  return {1, to_float(s.size.x()), to_float(s.size.y()), to_float(s.size.z())};
-}
-std::vector<float> shape_key(const sim::Capsule& s) {
-  return {2, to_float(s.radius), to_float(s.height)};
-}
-std::vector<float> shape_key(const sim::Cylinder& s) {
-  return {3, to_float(s.radius), to_float(s.height)};
-}
-std::vector<float> shape_key(const sim::Cone& s) {
-  return {4, to_float(s.radius), to_float(s.height)};
-}
-std::vector<float> shape_key(const sim::Plane&) {
-  return {5};
-}
-
 /// The parts overlay of a body, or null.
 const PartsOverlay* parts_overlay(const Scene& scene, const std::string& body) {
   for (const Overlay& overlay : scene.overlays)
     if (const auto* parts = std::get_if<PartsOverlay>(&overlay); parts && parts->body == body) return parts;
   return nullptr;
+}
+
+/// Brings meshes, each with its place in a whole, into the unit ball: the centre of the whole's box to the
+/// origin, the farthest vertex to a distance of 1.
+Affine3f into_unit_ball(const std::vector<std::pair<render::Mesh, Affine3f>>& meshes) {
+  Eigen::AlignedBox3f box;
+  for (const auto& [mesh, whole_from_part] : meshes)
+    for (const Vector3f& p : mesh.positions) box.extend(whole_from_part * p);
+  float radius = 0;
+  for (const auto& [mesh, whole_from_part] : meshes)
+    for (const Vector3f& p : mesh.positions)
+      radius = std::max(radius, (whole_from_part * p - box.center()).norm());
+  return Eigen::Scaling(1 / std::max(radius, 1e-9f)) * Eigen::Translation3f(-box.center());
 }
 
 std::string name_or(const std::string& name, const char* kind, uint32_t id) {
@@ -92,7 +86,7 @@ Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context
   };
   for (const Spring& spring : scene.springs) add_rod(spring);
   for (const Joint& joint : scene.joints)
-    if (joint.behaviour.type == sim::JointType::distance) add_rod(joint);
+    for (int i = 0; i < rod_count(joint); ++i) add_rod(joint);
   for (const Cloth& cloth : scene.cloths)
     for (const ClothCord& cord : cloth.cords)
       for (int i = 0; i < cord.segments; ++i) add_rod(cord);
@@ -126,28 +120,34 @@ void Picture::add_particle_mesh(const ParticleLook& look, const ModelLibrary& mo
   drawn.look = &look.mesh.value();
   drawn.casts_shadow = points_def(look).casts_shadow;
   drawn.object = object;
-  Eigen::AlignedBox3f box;
-  float radius = 0;
-  const auto measure = [&](const render::Mesh& mesh) {
-    for (const Vector3f& p : mesh.positions) radius = std::max(radius, (p - box.center()).norm());
+  std::vector<std::pair<render::Mesh, Affine3f>> meshes;
+  const auto add = [&](const auto& shape, const std::string& name, const Affine3f& whole_from_part) {
+    drawn.parts.push_back({primitive(shape), material(name, models), whole_from_part});
+    meshes.emplace_back(mesh_of(shape), whole_from_part);
   };
+  const std::string& own = drawn.look->material;
   std::visit(
-      [&](const auto& shape) {
-        using S = std::decay_t<decltype(shape)>;
+      [&]<class S>(const S& shape) {
         if constexpr (std::is_same_v<S, MeshFile>) {
-          const render::Model& model = models.model(shape.file);
-          drawn.parts = model_parts(shape.file, drawn.look->material, models);
-          box = model.bounds();
-          for (const render::Model::Part& part : model.parts) measure(part.mesh);
+          for (const auto& [mesh, handle] : model_parts(shape.file, own, models))
+            drawn.parts.push_back({mesh, handle, Affine3f::Identity()});
+          for (const render::Model::Part& part : models.model(shape.file).parts)
+            meshes.emplace_back(part.mesh, Affine3f::Identity());
+        } else if constexpr (std::is_same_v<S, Compound>) {
+          for (const CompoundPart& part : shape.parts)
+            std::visit(
+                [&](const auto& solid) {
+                  add(solid, part.material.empty() ? own : part.material,
+                      affine(part.position, part.orientation));
+                },
+                part.shape);
         } else {
-          drawn.parts = {{primitive(shape), material(drawn.look->material, models)}};
-          const render::Mesh mesh = mesh_of(shape);
-          box = mesh.bounds();
-          measure(mesh);
+          add(shape, own, Affine3f::Identity());
         }
       },
       drawn.look->shape);
-  drawn.unit_from_part = Eigen::Scaling(1 / std::max(radius, 1e-9f)) * Eigen::Translation3f(-box.center());
+  const Affine3f unit_from_whole = into_unit_ball(meshes);
+  for (DrawnMeshes::Part& part : drawn.parts) part.unit_from_part = unit_from_whole * part.unit_from_part;
 }
 
 render::PointsHandle Picture::add_blur_streaks(const ParticleLook& look) {
@@ -176,6 +176,8 @@ render::MaterialHandle Picture::cloth_material(const Cloth& cloth, const ModelLi
 
 void Picture::add_cloth(const Cloth& cloth, const ModelLibrary& models) {
   DrawnCloth drawn;
+  drawn.appear_at = cloth.appear_at;
+  drawn.remove_at = cloth.remove_at;
   if (cloth.visible) {
     const auto* mesh = std::get_if<MeshFile>(&cloth.shape);
     FlatCloth flat = flat_cloth(cloth, mesh ? &models.model(mesh->file) : nullptr);
@@ -231,6 +233,13 @@ void Picture::add_shape(const Body& body, const ModelLibrary& models, std::vecto
         if constexpr (std::is_same_v<S, MeshFile>) {
           add_model(shape.file, affine(Vec3::Zero(), Quat::Identity(), scale_of(shape, models)), body, models,
                     parts);
+        } else if constexpr (std::is_same_v<S, Compound>) {
+          for (const CompoundPart& part : shape.parts) {
+            const auto mesh = std::visit([&](const auto& own) { return primitive(own); }, part.shape);
+            const std::string& look = part.material.empty() ? body.material : part.material;
+            parts.push_back({stage_.add_instance(mesh, material(look, models), body.casts_shadow),
+                             affine(part.position, part.orientation)});
+          }
         } else {
           // A plane is the ground: it receives shadows and casts none.
           const bool casts = body.casts_shadow && !std::is_same_v<S, sim::Plane>;
@@ -258,7 +267,13 @@ void Picture::add_convex_parts(const MeshFile& mesh, const Body& body, const Mod
 }
 
 void Picture::add_body(const Body& body, const ModelLibrary& models, std::size_t& slot, uint32_t object) {
-  DrawnBody drawn{{}, affine(body.position, body.orientation), parts_overlay(scene_, body.name), {}, {}};
+  DrawnBody drawn{{},
+                  affine(body.position, body.orientation),
+                  parts_overlay(scene_, body.name),
+                  body.appear_at,
+                  body.remove_at,
+                  {},
+                  {}};
   const auto add_file = [&](const std::string& file, const Affine3f& body_from_model) {
     if (body.animation)
       add_animated(file, body_from_model, body, models, drawn);
@@ -285,7 +300,8 @@ void Picture::add_body(const Body& body, const ModelLibrary& models, std::size_t
     places_.add_fixed(body.name, drawn.world_from_body);
   else
     places_.add_moving(body.name, *(drawn.slot = slot++));
-  if (drawn.slot || drawn.overlay || drawn.animated) bodies_.push_back(std::move(drawn));
+  const bool has_lifetime = body.appear_at > 0 || body.remove_at < kForever;
+  if (drawn.slot || drawn.overlay || drawn.animated || has_lifetime) bodies_.push_back(std::move(drawn));
 }
 
 void Picture::add_animated(const std::string& file, const Affine3f& body_from_model, const Body& body,

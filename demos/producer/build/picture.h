@@ -70,6 +70,7 @@ class Picture {
     std::optional<std::size_t> slot;  // in Snapshot::bodies; none: it never moves
     Eigen::Affine3f world_from_body;  // at time 0
     const PartsOverlay* overlay;      // if it is drawn as convex parts; otherwise null
+    Real appear_at, remove_at;
     std::vector<DrawnPart> parts;
     std::optional<AnimatedLook> animated;  // instead of `parts`
   };
@@ -78,8 +79,12 @@ class Picture {
   /// state.
   struct DrawnMeshes {
     const LookMesh* look = nullptr;  // null: the set is drawn by the stage
-    std::vector<std::pair<render::MeshHandle, render::MaterialHandle>> parts;
-    Eigen::Affine3f unit_from_part;  // brings the mesh into the unit ball
+    struct Part {
+      render::MeshHandle mesh;
+      render::MaterialHandle material;
+      Eigen::Affine3f unit_from_part;  // brings the mesh to its place in the unit ball
+    };
+    std::vector<Part> parts;
     bool casts_shadow = true;
     uint32_t object = 0;
     std::vector<render::InstanceHandle> instances;  // for each particle, one for each part
@@ -91,6 +96,7 @@ class Picture {
     render::ClothHandle cloth;  // null if invisible
     std::vector<uint32_t> triangles;
     std::vector<Eigen::Vector2f> uvs;
+    Real appear_at = 0, remove_at = 0;
     uint32_t version = 0;
   };
 

@@ -112,11 +112,19 @@ void Picture::place_animated(const AnimatedLook& look, const Affine3f& world_fro
 }
 
 void Picture::place_body(const DrawnBody& body, const Affine3f& world_from_body, double time) {
-  if (body.animated) place_animated(*body.animated, world_from_body, time);
   const float explode = body.overlay ? to_float(effects::mean(body.overlay->explode, time)) : 0;
-  for (const DrawnPart& part : body.parts)
+  const bool has_lifetime = body.appear_at > 0 || body.remove_at < kForever;
+  const bool visible = exists(body.appear_at, body.remove_at, time);
+  if (body.animated) {
+    if (visible) place_animated(*body.animated, world_from_body, time);
+    for (const AnimatedLook::Surface& surface : body.animated->surfaces)
+      if (has_lifetime) stage_.set_visible(surface.instance, visible);
+  }
+  for (const DrawnPart& part : body.parts) {
+    if (has_lifetime) stage_.set_visible(part.instance, visible);
     stage_.set_transform(
         part.instance, world_from_body * Eigen::Translation3f(explode * part.outwards) * part.body_from_part);
+  }
 }
 
 void Picture::place_rods(const Snapshot& previous, const Snapshot& current, float w) {
@@ -176,17 +184,17 @@ void Picture::points_at(std::size_t set, const Snapshot& previous, const Snapsho
 void Picture::place_meshes(DrawnMeshes& drawn, std::span<const render::Point> points) {
   const std::size_t parts = drawn.parts.size();
   while (drawn.instances.size() < points.size() * parts)
-    for (const auto& [mesh, material] : drawn.parts) {
-      drawn.instances.push_back(stage_.add_instance(mesh, material, drawn.casts_shadow));
+    for (const DrawnMeshes::Part& part : drawn.parts) {
+      drawn.instances.push_back(stage_.add_instance(part.mesh, part.material, drawn.casts_shadow));
       stage_.set_object(drawn.instances.back(), drawn.object);
     }
   for (std::size_t i = 0; i < std::max(points.size(), drawn.shown); ++i) {
     const bool exists = i < points.size();
-    const Affine3f world_from_part =
-        exists ? pose_of(points[i], *drawn.look) * drawn.unit_from_part : Affine3f::Identity();
+    const Affine3f world_from_unit = exists ? pose_of(points[i], *drawn.look) : Affine3f::Identity();
     for (std::size_t k = 0; k < parts; ++k) {
-      stage_.set_visible(drawn.instances[i * parts + k], exists && points[i].radius > 0);
-      if (exists) stage_.set_transform(drawn.instances[i * parts + k], world_from_part);
+      const render::InstanceHandle instance = drawn.instances[i * parts + k];
+      stage_.set_visible(instance, exists && points[i].radius > 0);
+      if (exists) stage_.set_transform(instance, world_from_unit * drawn.parts[k].unit_from_part);
     }
   }
   drawn.shown = points.size();
@@ -206,6 +214,11 @@ void Picture::place_cloths(const Snapshot& previous, const Snapshot& current, fl
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     if (!cloths_[c].cloth) continue;
     const ClothSample &before = previous.cloths[c], &now = current.cloths[c];
+    if (!exists(cloths_[c].appear_at, cloths_[c].remove_at, current.time)) {
+      // A surface of points at one place has no area.
+      stage_.set_cloth(cloths_[c].cloth, std::vector<Vector3f>(now.points.size(), Vector3f::Zero()));
+      continue;
+    }
     give_mesh(cloths_[c], now);
     scratch_places_ = now.points;
     for (std::size_t i = 0; w < 1 && i < now.points.size(); ++i)

@@ -9,6 +9,7 @@
 
 #include "effects/random.h"
 #include "producer/build/articulation_defs.h"
+#include "producer/build/fill.h"
 
 namespace offstage::producer {
 namespace {
@@ -113,6 +114,33 @@ void scale_size(T& s, Real k) {
   s.radius *= k;
   s.height *= k;
 }
+void scale_size(sim::Frustum& s, Real k) {
+  s.radius *= k;
+  s.top_radius *= k;
+  s.height *= k;
+}
+void scale_size(sim::Ellipsoid& s, Real k) {
+  s.radii *= k;
+}
+void scale_size(sim::Torus& s, Real k) {
+  s.radius *= k;
+  s.tube_radius *= k;
+}
+void scale_size(sim::Tube& s, Real k) {
+  s.radius *= k;
+  s.height *= k;
+  s.thickness *= k;
+}
+void scale_size(sim::OpenBox& s, Real k) {
+  s.size *= k;
+  s.thickness *= k;
+}
+void scale_size(Compound& s, Real k) {
+  for (CompoundPart& part : s.parts) {
+    std::visit([k](auto& own) { scale_size(own, k); }, part.shape);
+    part.position *= k;
+  }
+}
 void scale_size(sim::Plane&, Real) {}
 void scale_size(MeshFile& s, Real k) {
   s.scale *= k;
@@ -147,6 +175,7 @@ void turn_surface(PlaneSurface& surface, const Quat& q) {
   surface.turn_deg = 2 * std::atan2(turn.y(), turn.w()) * 180 / std::numbers::pi;
 }
 void turn_surface(SphereSurface&, const Quat&) {}
+void turn_surface(FaceSurface&, const Quat&) {}
 void turn_surface(DiscSurface& surface, const Quat& q) {
   surface.direction = q * surface.direction;
 }
@@ -197,6 +226,9 @@ const Vec3& position_of(const Emitter& emitter) {
   return position_of(emitter.surface);
 }
 
+constexpr const char* kNoRoom =
+    "has no room for a single place; use a smaller \"spacing\" or a larger volume";
+
 template <class T>
 std::vector<T> expand_all(const std::vector<T>& originals, uint64_t seed, std::vector<Problem>& errors,
                           std::vector<Problem>& warnings) {
@@ -208,13 +240,26 @@ std::vector<T> expand_all(const std::vector<T>& originals, uint64_t seed, std::v
                                " objects of this kind with all copies; a body takes up to 10 kB of memory"});
       return all;
     }
+    if (needs_spacing(original.placement)) {
+      Where where = original.where;
+      where.path += "/fill";
+      errors.push_back({where, "needs a \"spacing\", the distance between neighbouring copies"});
+      all.push_back(original);
+      continue;
+    }
     if (copy_count(original.placement) > kMaxCopies) {
-      errors.push_back({original.where, "asks for more than " + std::to_string(kMaxCopies) +
-                                            " copies: the counts of repeat, grid and scatter multiply"});
+      errors.push_back(
+          {original.where, "asks for more than " + std::to_string(kMaxCopies) +
+                               " copies: the counts of fill, repeat, grid and scatter multiply"});
       all.push_back(original);
       continue;
     }
     const Copies copies = expand(original.placement, position_of(original), seed, original.name);
+    if (copies.placed.empty() && copies.left_out == 0) {
+      Where where = original.where;
+      where.path += "/fill";
+      errors.push_back({where, kNoRoom});
+    }
     for (const PlacedCopy& copy : copies.placed) all.push_back(moved(original, copy));
     if (copies.left_out > 0) {
       Where where = original.where;
@@ -245,11 +290,66 @@ void name_copies(const std::vector<T>& originals, const std::vector<T>& copies,
   names = std::move(all);
 }
 
+/// Adds the places of a group's fill to it.
+void resolve_fill(ParticleGroup& group, std::vector<Problem>& errors) {
+  if (!group.fill) return;
+  constexpr std::size_t kMostPlaces = 5'000'000;
+  const Real spacing = group.fill->spacing > 0 ? group.fill->spacing : 2 * group.radius;
+  std::vector<Vec3> places = fill_places(*group.fill, spacing, kMostPlaces);
+  Where where = group.where;
+  where.path += "/fill";
+  if (places.empty()) errors.push_back({where, kNoRoom});
+  if (places.size() > kMostPlaces) {
+    errors.push_back({where, "has more than 5000000 places; use a larger \"spacing\" or a smaller volume"});
+    places.clear();
+  }
+  for (const Vec3& p : places)
+    group.places.push_back({.position = group.fill->position + p, .velocity = Vec3::Zero(), .color = {}});
+  group.fill.reset();
+}
+
+/// Converts delays in sub-steps to seconds.
+void resolve_splits(ParticleSource& source, Real step) {
+  if (source.split && source.split->delay_steps > 0) source.split->delay = source.split->delay_steps * step;
+  const auto all = [&](auto& children) {
+    for (auto& child : children) resolve_splits(child, step);
+  };
+  all(source.trails);
+  all(source.on_age);
+  all(source.on_collision);
+  all(source.on_death);
+}
+
+/// Replaces a face by the rectangle or disc that it is.
+void resolve_face(const Scene& flat, Emitter& emitter, std::vector<Problem>& errors) {
+  const auto* face = std::get_if<FaceSurface>(&emitter.surface);
+  if (!face) return;
+  const auto body = std::ranges::find(flat.bodies, emitter.body, &Body::name);
+  if (!emitter.body.empty() && body == flat.bodies.end()) return;  // reported by another check
+  const auto surface = face_of(*face, emitter.body.empty() ? nullptr : &*body);
+  if (surface) {
+    emitter.surface = *surface;
+    return;
+  }
+  Where where = emitter.where;
+  where.path += "/surface/face";
+  errors.push_back(
+      {where, "the body '" + emitter.body +
+                  "' has no such face: boxes have six, cylinders and frusta have a top and a bottom, cones "
+                  "have a bottom"});
+}
+
 }  // namespace
+
+bool needs_spacing(const Placement& placement) {
+  return placement.fill && !(placement.fill->spacing > 0);
+}
 
 int copy_count(const Placement& placement) {
   int64_t n = 1;
   const auto multiply = [&](int count) { n = std::min<int64_t>(n * count, kMaxCopies + 1); };
+  if (placement.fill && !needs_spacing(placement))
+    multiply(static_cast<int>(fill_places(*placement.fill, placement.fill->spacing, kMaxCopies).size()));
   if (placement.repeat) multiply(placement.repeat->count);
   if (placement.grid)
     for (const int count : placement.grid->count) multiply(count);
@@ -258,17 +358,26 @@ int copy_count(const Placement& placement) {
 }
 
 Copies expand(const Placement& placement, const Vec3& position, uint64_t seed, std::string_view name) {
-  const auto& [repeat, grid, scatter] = placement;
-  if (!repeat && !grid && !scatter) return {{PlacedCopy{}}, 0};
+  const auto& [fill, repeat, grid, scatter] = placement;
+  if (!fill && !repeat && !grid && !scatter) return {{PlacedCopy{}}, 0};
+  std::vector<Vec3> filled = {Vec3::Zero()};
+  if (fill && !needs_spacing(placement)) {
+    filled = fill_places(*fill, fill->spacing, kMaxCopies);
+    for (Vec3& p : filled) p += fill->position;
+  }
+  const int places = static_cast<int>(filled.size());
   const int repeats = repeat ? repeat->count : 1, cells = grid ? grid->count.prod() : 1;
   const int scattered = scatter ? scatter->count : 1;
   std::optional<Scatterer> scatterer;
   if (scatter) scatterer.emplace(*scatter, seed, name);
 
   Copies copies;
-  for (int group = 0; group < repeats * cells; ++group) {
-    const Pose motion = (repeat ? repeated(*repeat, group / cells) : Pose{}) *
-                        (grid ? on_grid(*grid, group % cells) : Pose{});
+  for (int group = 0; group < repeats * cells * places; ++group) {
+    const int cell = group / places;
+    const Pose in_group =
+        (repeat ? repeated(*repeat, cell / cells) : Pose{}) * (grid ? on_grid(*grid, cell % cells) : Pose{});
+    const Pose motion =
+        fill ? in_group * Pose{filled[static_cast<std::size_t>(group % places)], Quat::Identity()} : in_group;
     if (scatterer) scatterer->begin_group();
     for (int i = 0; i < scattered; ++i) {
       PlacedCopy copy{motion, 1, "_" + std::to_string(group * scattered + i)};
@@ -294,12 +403,17 @@ Scene expand(const Scene& scene, std::vector<Problem>& errors, std::vector<Probl
   flat.bodies = expand_all(scene.bodies, scene.world.seed, errors, warnings);
   flat.emitters = expand_all(scene.emitters, scene.world.seed, errors, warnings);
   flat.cloths = expand_all(scene.cloths, scene.world.seed, errors, warnings);
+  for (ParticleGroup& group : flat.particles) resolve_fill(group, errors);
+  for (Emitter& emitter : flat.emitters) {
+    resolve_splits(emitter, scene.world.step);
+    resolve_face(flat, emitter, errors);
+  }
   expand_joints(scene, flat, errors, warnings);
   for (Force& force : flat.forces)
     std::visit(
         [&](auto& f) {
           if constexpr (requires { f.bodies; }) name_copies(scene.bodies, flat.bodies, f.bodies);
-          name_copies(scene.emitters, flat.emitters, f.particles);
+          if constexpr (requires { f.particles; }) name_copies(scene.emitters, flat.emitters, f.particles);
           if constexpr (requires { f.cloths; }) name_copies(scene.cloths, flat.cloths, f.cloths);
         },
         force);

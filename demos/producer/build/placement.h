@@ -1,8 +1,8 @@
 #pragma once
-/// Copies of bodies, cloths and emitters in rows, rings, grids and at random places.
+/// Copies of bodies, cloths and emitters in rows, rings, grids, volumes and at random places.
 ///
-/// The three kinds multiply: a repeat of a grid of a scatter. The same scene gives the same copies, bit for
-/// bit.
+/// The four kinds multiply: a repeat of a grid of a fill of a scatter. The same scene gives the same copies,
+/// bit for bit.
 
 #include <cstdint>
 #include <string>
@@ -29,6 +29,9 @@ struct Copies {
   std::vector<PlacedCopy> placed;
   int left_out = 0;  ///< number of scattered copies without room at min_distance from the others
 };
+
+/// Whether a fill lacks the spacing that copies need.
+bool needs_spacing(const Placement& placement);
 
 /// Number of copies of a placement; kMaxCopies + 1 if there are more than kMaxCopies.
 int copy_count(const Placement& placement);

@@ -9,6 +9,7 @@
 
 #include "producer/build/animated_bodies.h"
 #include "producer/build/articulation_defs.h"
+#include "producer/build/body_shapes.h"
 #include "producer/build/cloth_defs.h"
 #include "producer/build/emitter_defs.h"
 #include "producer/build/force_defs.h"
@@ -78,6 +79,8 @@ void SimulationTotals::add(const sim::StepReport& report) {
   bodies_asleep = report.bodies_asleep;
   islands = report.islands;
   penetration = std::max(penetration, report.penetration);
+  pairs_tested += report.pairs_tested;
+  impact_searches += report.impact_searches;
   collisions += report.collisions;
   tracebacks += report.tracebacks;
   toi_limit_reached += report.toi_limit_reached;
@@ -126,6 +129,7 @@ Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
               .solver = scene.world.solver,
               .impact = scene.world.impact,
               .collision_speed = scene.world.collision_speed,
+              .collision = scene.world.collision,
               .sleep = scene.world.sleep,
               .bounds = sim::Aabb(Vec3::Constant(-scene.world.bounds), Vec3::Constant(scene.world.bounds))}) {
   add_bodies(scene, models);
@@ -154,6 +158,7 @@ Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
 void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
   std::map<std::pair<std::string, Real>, sim::MeshHandle> meshes;
   std::vector<std::pair<const Body*, sim::BodyDef>> animated;
+  std::map<std::vector<float>, sim::MeshHandle> compounds;
   for (const Body& body : scene.bodies) {
     sim::BodyDef def{.name = body.name,
                      .motion = body.motion,
@@ -167,7 +172,11 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
                      .material = body.material,
                      .surface_velocity = body.surface_velocity,
                      .collides = body.collides,
-                     .track = track_of(body)};
+                     .track = track_of(body),
+                     .appear_at = body.appear_at,
+                     .remove_at = body.remove_at};
+    def.centre = body.centre;
+    def.inertia = inertia_of(body);
     if (const Material* material = find_material(scene, body.material)) {
       def.restitution = material->restitution;
       def.friction = material->friction;
@@ -188,6 +197,14 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
               sim::MeshHandle& mesh = meshes[{shape.file, scale_of(shape, models)}];
               if (!mesh) mesh = add_mesh(shape, models);
               def.shape = sim::MeshShape{mesh};
+            } else if constexpr (!std::is_constructible_v<sim::Shape, std::decay_t<decltype(shape)>>) {
+              sim::MeshHandle& mesh = compounds[solids_key(body.shape)];
+              if (!mesh) mesh = world_.add_compound(solids_of(body.shape));
+              def.shape = sim::MeshShape{mesh};
+              const sim::BodyMass mass = *mass_by_shape(body);
+              def.mass = mass.mass;
+              def.centre = mass.centre;
+              def.inertia = mass.inertia;
             } else {
               def.shape = shape;
             }
@@ -233,17 +250,34 @@ sim::MeshHandle Simulation::add_mesh(const MeshFile& file, const ModelLibrary& m
 void Simulation::add_particle_groups(const Scene& scene) {
   for (const ParticleGroup& group : scene.particles) {
     const auto system = world_.add_particle_system(system_def(group.name, group.behaviour));
-    for (const ParticlePlace& place : group.places)
-      world_.add_particle(system, {.position = place.position,
-                                   .velocity = place.velocity,
-                                   .mass = group.mass,
-                                   .radius = group.radius,
-                                   .restitution = group.restitution,
-                                   .friction = group.friction,
-                                   .charge = group.charge});
+    if (group.appear_at == 0) add_particles(group, system, -1);
     groups_.push_back({group.name, system});
     group_looks_.emplace_back(group.look, scene.world.seed, group.name);
   }
+}
+
+/// Adds the particles of a group; `elapsed` is as for World::add_particle().
+void Simulation::add_particles(const ParticleGroup& group, sim::ParticleSystemHandle system, Real elapsed) {
+  for (const ParticlePlace& place : group.places)
+    world_.add_particle(system,
+                        {.position = place.position,
+                         .velocity = place.velocity,
+                         .mass = group.mass,
+                         .radius = group.radius,
+                         .lifespan = group.remove_at < kForever ? group.remove_at - group.appear_at
+                                                                : sim::Particle{}.lifespan,
+                         .restitution = group.restitution,
+                         .friction = group.friction,
+                         .charge = group.charge},
+                        elapsed);
+}
+
+/// Adds the groups that appear in this sub-step.
+void Simulation::add_late_particles(Real start, Real end) {
+  for (std::size_t i = 0; i < groups_.size(); ++i)
+    if (const ParticleGroup& group = scene_.particles[i];
+        group.appear_at > 0 && group.appear_at >= start && group.appear_at < end)
+      add_particles(group, groups_[i].handle, end - group.appear_at);
 }
 
 void Simulation::add_springs(const Scene& scene) {
@@ -274,7 +308,7 @@ void Simulation::add_joints(const Scene& scene) {
     def.b = body_named(joint.b);
     at_place(joint.where, [&] {
       const sim::JointHandle handle = world_.add_joint(def);
-      if (def.type == sim::JointType::distance) rods_.push_back(handle);
+      if (rod_count(joint) > 0) rods_.push_back(handle);
     });
   }
 }
@@ -347,6 +381,7 @@ void Simulation::step(double sampling_time) {
   const sim::StepReport report = world_.step(sampling_time, [&](Real start, Real end) {
     if (on_substep_) on_substep_(start);
     overlays_->record(world_);
+    add_late_particles(start, end);
     sources_->emit(world_, start, end);
   });
   for (const sim::MovedBody& moved : world_.moved())
@@ -429,6 +464,8 @@ Snapshot Simulation::snapshot() const {
     snapshot.bodies.push_back({pose.position.cast<float>(), pose.orientation.cast<float>()});
 
   const auto end_point = [&](const sim::Attachment& attachment) -> Eigen::Vector3f {
+    if (const auto* body = std::get_if<sim::BodyPoint>(&attachment); body && !world_.is_present(body->body))
+      return Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
     if (const auto* body = std::get_if<sim::BodyPoint>(&attachment))
       return world_.body(body->body).pose.point_to_world(body->position).cast<float>();
     if (const auto* particle = std::get_if<sim::ParticlePoint>(&attachment)) {
@@ -444,8 +481,12 @@ Snapshot Simulation::snapshot() const {
     snapshot.rods.push_back({end_point(spring.a), end_point(spring.b)});
   for (const sim::JointHandle rod : rods_) {
     const sim::JointState state = world_.joint(rod);
-    const Eigen::Vector3f a = state.anchor_a.cast<float>();
-    snapshot.rods.push_back({a, state.broken ? a : Eigen::Vector3f(state.anchor_b.cast<float>())});
+    const sim::JointDef& def = world_.joint_def(rod);
+    std::vector<Vec3> corners = {state.anchor_a, state.anchor_b};
+    if (def.type == sim::JointType::pulley)
+      corners = {state.anchor_a, def.pulley_a, def.pulley_b, state.anchor_b};
+    for (std::size_t i = 0; i + 1 < corners.size(); ++i)
+      snapshot.rods.push_back({corners[i].cast<float>(), corners[state.broken ? i : i + 1].cast<float>()});
   }
   for (const NamedCloth& cloth : cloths_) {
     const sim::ClothView view = world_.cloth(cloth.handle);
@@ -462,6 +503,20 @@ Snapshot Simulation::snapshot() const {
   snapshot.overlays = overlays_->lines(world_);
   snapshot.state_hash = world_.state_hash();
   return snapshot;
+}
+
+void Simulation::for_each_particle_system(
+    const std::function<void(const std::string&, const sim::ParticleArrays&, const PointSet&)>& visit) const {
+  for (std::size_t i = 0; i < groups_.size(); ++i) {
+    const sim::ParticleArrays& particles = world_.particles(groups_[i].handle);
+    visit(groups_[i].name, particles,
+          group_looks_[i].points(particles, world_.time(), &scene_.particles[i].places));
+  }
+  sources_->for_each_system(
+      [&](const std::string& name, sim::ParticleSystemHandle handle, const LookRamps& look) {
+        const sim::ParticleArrays& particles = world_.particles(handle);
+        visit(name, particles, look.points(particles, world_.time(), nullptr));
+      });
 }
 
 std::string Simulation::state_dump(const sim::NonFinite& lost) const {

@@ -45,6 +45,7 @@ struct SimulationTotals {
   std::size_t contacts = 0;                                   ///< contact points of bodies at the end
   std::size_t most_contacts = 0;                              ///< at the end of a frame
   sim::Real penetration = 0;                                  ///< greatest in the run, and at its end [m]
+  uint64_t pairs_tested = 0, impact_searches = 0;
   uint64_t collisions = 0, tracebacks = 0, toi_limit_reached = 0, restitution_suppressed = 0,
            speculative_contacts = 0;
   uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;
@@ -110,6 +111,11 @@ class Simulation {
   /// In scene order.
   const std::vector<NamedCloth>& cloths() const { return cloths_; }
 
+  /// Calls visit(name, particles, as drawn) for each group and each source of particles, in the order of a
+  /// snapshot's point sets.
+  void for_each_particle_system(const std::function<void(const std::string&, const sim::ParticleArrays&,
+                                                         const PointSet&)>& visit) const;
+
   /// The object that is not finite, and the state of all others, as JSON text; it is saved when a run
   /// diverges.
   std::string state_dump(const sim::NonFinite& lost) const;
@@ -119,6 +125,8 @@ class Simulation {
   sim::MeshHandle add_mesh(const MeshFile& file, const ModelLibrary& models);
   void add_pieces(const Body& body, const sim::BodyDef& whole, const ModelLibrary& models);
   void add_particle_groups(const Scene& scene);
+  void add_particles(const ParticleGroup& group, sim::ParticleSystemHandle system, sim::Real elapsed);
+  void add_late_particles(sim::Real start, sim::Real end);
   void add_springs(const Scene& scene);
   void add_joints(const Scene& scene);
   void add_cloths(const Scene& scene, const ModelLibrary& models);
@@ -142,7 +150,7 @@ class Simulation {
   std::vector<sim::Pose> moving_poses_;             // kept up to date from World::moved()
   std::map<sim::BodyHandle, std::size_t> slot_of_;  // index in `moving_` by handle
   std::vector<sim::SpringDef> springs_;
-  std::vector<sim::JointHandle> rods_;  // distance joints
+  std::vector<sim::JointHandle> rods_;  // joints that are drawn
   std::optional<Overlays> overlays_;
   std::function<void(double)> on_substep_;
   SimulationTotals totals_;

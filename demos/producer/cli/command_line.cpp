@@ -268,6 +268,9 @@ CLI::App* add_simulate(CLI::App& app, SimulateOptions& simulate) {
                       "CSV of the contact points of bodies, with their forces");
   command->add_option("--cloths", simulate.cloths, "CSV of strain and contacts of cloths");
   command->add_option("--joints", simulate.joints, "CSV of the loads and positions of joints");
+  command->add_option(
+      "--particles", simulate.particles,
+      "Table of all particles, emitted ones included: CSV, or binary if its name ends in .bin");
   command->add_option("--trace-every", simulate.trace_every, "Interval of the CSV rows: frame or step")
       ->check(CLI::IsMember({"frame", "step"}));
   command->add_option("--cache", simulate.cache, "Folder for one snapshot per frame, for `render --cache`");
@@ -276,6 +279,22 @@ CLI::App* add_simulate(CLI::App& app, SimulateOptions& simulate) {
   add_threads(*command, simulate.threads);
   command->add_flag("--force", simulate.force, "Replace existing output");
   add_talk(*command, simulate.talk);
+  return command;
+}
+
+CLI::App* add_bench(CLI::App& app, BenchOptions& bench) {
+  CLI::App* command = app.add_subcommand(
+      "bench",
+      "Simulate a scene by each choice of solver and collision detection, and print a table of their speed, "
+      "work, fall-backs and errors");
+  add_scene(*command, bench.scene);
+  add_timing(*command, bench.scene);
+  command->add_option("--repeat", bench.repeat, "Runs of each method; the fastest one counts (default: 1)")
+      ->check(CLI::Range(1, 100));
+  command->add_option("--csv", bench.csv, "Write the table to this CSV file, too");
+  add_threads(*command, bench.threads);
+  command->add_flag("--force", bench.force, "Replace an existing file");
+  command->add_flag("-q,--quiet", bench.quiet, "Print no warnings");
   return command;
 }
 
@@ -551,9 +570,10 @@ std::string wrong_command(const std::vector<const char*>& arguments,
          " (--help lists all)";
 }
 
-constexpr std::array kCommandNames = {
-    "render",  "frame", "sheet",   "sweep", "simulate", "new", "tune",       "encode", "validate", "schema",
-    "presets", "info",  "compare", "bless", "doctor",   "man", "completion", "export", "cache",    "farm"};
+constexpr std::array kCommandNames = {"render",  "frame",  "sheet",    "sweep",  "simulate",   "new",
+                                      "tune",    "encode", "validate", "schema", "presets",    "info",
+                                      "compare", "bless",  "doctor",   "man",    "completion", "export",
+                                      "cache",   "farm",   "bench"};
 
 int dispatch(int argc, char** argv, const TuneCommand& tune) {
   std::vector<const char*> arguments(argv, argv + argc);
@@ -588,6 +608,8 @@ int dispatch(int argc, char** argv, const TuneCommand& tune) {
 
   SimulateOptions simulate;
   auto* simulate_app = add_simulate(app, simulate);
+  BenchOptions bench;
+  auto* bench_app = add_bench(app, bench);
   ExportOptions exporting;
   auto* export_app = add_export(app, exporting);
   CacheOptions caches;
@@ -645,6 +667,7 @@ int dispatch(int argc, char** argv, const TuneCommand& tune) {
     if (*sheet_app) return sheet_command(sheet);
     if (*sweep_app) return sweep_command(sweep);
     if (*simulate_app) return simulate_command(simulate);
+    if (*bench_app) return bench_command(bench);
     if (*export_app) return export_command(exporting);
     if (*cache_app) return cache_command(caches);
     if (*farm_app) return farm_command(farm);

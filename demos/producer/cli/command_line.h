@@ -1,7 +1,7 @@
 #pragma once
 /// The command line: offstage new | tune | render | encode | frame | sheet | sweep | simulate | validate |
-/// schema | presets | info | compare | bless | doctor | man | completion; and offstage SCENE.json, which
-/// renders SCENE.mp4.
+/// schema | presets | info | compare | bless | doctor | man | completion | bench; and offstage SCENE.json,
+/// which renders SCENE.mp4.
 
 #include "producer/cli/commands.h"
 

@@ -106,11 +106,21 @@ int sweep_command(const SweepOptions& options);
 struct SimulateOptions {
   SceneOptions scene;
   TalkOptions talk;
-  std::string trace, contacts, cloths, joints, trace_every = "frame", cache, stats;
+  std::string trace, contacts, cloths, joints, particles, trace_every = "frame", cache, stats;
   int threads = 0;
   bool force = false;
 };
 int simulate_command(const SimulateOptions& options);
+
+struct BenchOptions {
+  SceneOptions scene;
+  std::string csv;
+  int repeat = 1;  ///< runs of each method
+  int threads = 0;
+  bool force = false, quiet = false;
+};
+/// Simulates a scene by each of the algorithms that it can choose from, and prints a table.
+int bench_command(const BenchOptions& options);
 
 struct ExportOptions {
   SceneOptions scene;

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "producer/base/to_float.h"
+#include "producer/build/body_shapes.h"
 #include "producer/build/cloth_defs.h"
 #include "producer/build/drawn_objects.h"
 #include "producer/build/lights.h"
@@ -32,25 +33,6 @@ render::Mesh ground_square() {
           .normals = std::vector<Vector3f>(4, Vector3f::UnitY()),
           .uvs = {{0, 0}, {0, 1}, {1, 1}, {1, 0}},
           .indices = {0, 1, 2, 0, 2, 3}};
-}
-
-std::vector<float> size_key(const sim::Sphere& s) {
-  return {0, to_float(s.radius)};
-}
-std::vector<float> size_key(const sim::Box& s) {
-  return {1, to_float(s.size.x()), to_float(s.size.y()), to_float(s.size.z())};
-}
-std::vector<float> size_key(const sim::Capsule& s) {
-  return {2, to_float(s.radius), to_float(s.height)};
-}
-std::vector<float> size_key(const sim::Cylinder& s) {
-  return {3, to_float(s.radius), to_float(s.height)};
-}
-std::vector<float> size_key(const sim::Cone& s) {
-  return {4, to_float(s.radius), to_float(s.height)};
-}
-std::vector<float> size_key(const sim::Plane&) {
-  return {5};
 }
 
 /// A mesh whose texture coordinates are those that a texture of its material reads.
@@ -90,7 +72,9 @@ class FilmParts::Builder {
     FilmBody film{.name = names_(body.name, "body"),
                   .slot = {},
                   .place = {body.position.cast<float>(), body.orientation.cast<float>()},
-                  .parts = {}};
+                  .parts = {},
+                  .appear_at = body.appear_at,
+                  .remove_at = body.remove_at};
     if (body.motion == sim::MotionType::static_body) {
       parts_.places_.add_fixed(body.name, placed(body.position, body.orientation, 1));
     } else {
@@ -127,6 +111,8 @@ class FilmParts::Builder {
     for (const Vector2f& uv : flat.uvs) box.extend(uv);
     const Vector2f size = box.sizes().cwiseMax(1e-6f);
     FilmCloth film{.name = names_(cloth.name, "cloth"),
+                   .appear_at = cloth.appear_at,
+                   .remove_at = cloth.remove_at,
                    .cloth = index,
                    .material = cloth_material(cloth),
                    .triangles = flat.triangles(),
@@ -146,10 +132,17 @@ class FilmParts::Builder {
     if constexpr (std::is_same_v<S, MeshFile>) {
       add_model(shape.file, placed(Vec3::Zero(), Quat::Identity(), scale_of(shape, models_)), material_name,
                 film);
+    } else if constexpr (std::is_same_v<S, Compound>) {
+      for (const CompoundPart& part : shape.parts) {
+        const std::string& look = part.material.empty() ? material_name : part.material;
+        const std::size_t own = std::visit(
+            [&](const auto& s) { return mesh(shape_key(s), [&] { return mesh_of(s); }); }, part.shape);
+        film.parts.push_back({own, material(look), placed(part.position, part.orientation, 1)});
+      }
     } else if constexpr (std::is_same_v<S, sim::Plane>) {
-      film.parts.push_back({mesh(size_key(shape), ground_square), material(material_name)});
+      film.parts.push_back({mesh(shape_key(shape), ground_square), material(material_name)});
     } else {
-      film.parts.push_back({mesh(size_key(shape), [&] { return mesh_of(shape); }), material(material_name)});
+      film.parts.push_back({mesh(shape_key(shape), [&] { return mesh_of(shape); }), material(material_name)});
     }
   }
 
@@ -230,7 +223,7 @@ FilmParts::FilmParts(const Scene& s, const ModelLibrary& models) : scene(s), cam
   for (const Body& body : s.bodies) builder.add_body(body);
   for (const Spring& spring : s.springs) builder.add_rod(spring, "spring");
   for (const Joint& joint : s.joints)
-    if (joint.behaviour.type == sim::JointType::distance) builder.add_rod(joint, "rod");
+    for (int i = 0; i < rod_count(joint); ++i) builder.add_rod(joint, "rod");
   for (const Cloth& cloth : s.cloths)
     for (const ClothCord& cord : cloth.cords)
       for (int i = 0; i < cord.segments; ++i) builder.add_rod(cord, "cord");

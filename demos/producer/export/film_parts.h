@@ -35,6 +35,10 @@ struct FilmBody {
   std::optional<std::size_t> slot;  ///< in Snapshot::bodies; none: it never moves
   BodySample place;                 ///< at time 0
   std::vector<FilmPart> parts;
+  Real appear_at = 0, remove_at = 1e30;  ///< times between which it exists [s]
+
+  bool has_lifetime() const { return appear_at > 0 || remove_at < kForever; }
+  bool exists_at(double time) const { return exists(appear_at, remove_at, time); }
 };
 
 /// A spring, rod or rope: a cylinder of length 1 along Y, which is placed between two points.
@@ -46,7 +50,8 @@ struct FilmRod {
 
 struct FilmCloth {
   std::string name;
-  std::size_t cloth = 0;  ///< in Snapshot::cloths
+  Real appear_at = 0, remove_at = 1e30;  ///< [s]
+  std::size_t cloth = 0;                 ///< in Snapshot::cloths
   std::size_t material = 0;
   std::vector<uint32_t> triangles;   ///< for a cloth without tears
   std::vector<Eigen::Vector2f> uvs;  ///< texture coordinates of the intact cloth's vertices, over its bounds,

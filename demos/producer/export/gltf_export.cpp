@@ -163,6 +163,8 @@ class GltfExport : public FilmExport {
       const FilmBody& body = parts_.bodies[i];
       const BodySample& s = body.slot ? snapshot.bodies[*body.slot] : body.place;
       bodies_[i].add(frame, s.position, s.orientation);
+      if (body.has_lifetime())
+        bodies_[i].scale.add(frame, body.exists_at(snapshot.time) ? Vector3f::Ones() : Vector3f::Zero());
     }
     for (std::size_t i = 0; i < rods_.size(); ++i)
       write_rod(frame, snapshot.rods[parts_.rods[i].rod], rods_[i]);

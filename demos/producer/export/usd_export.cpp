@@ -63,6 +63,7 @@ class SpooledAttribute {
 struct PoseTrack {
   SampleTrack<Vector3f> position;
   SampleTrack<Quaternionf> orientation;
+  SampleTrack<std::string> visibility;  // of bodies that exist for some time only
 
   void add(int frame, const Vector3f& p, Quaternionf q) {
     // q and -q are the same rotation, but an interpolation between opposite signs would take the long way
@@ -73,6 +74,7 @@ struct PoseTrack {
   }
   std::string text() const {
     return sampled("quatf xformOp:orient", orientation) + sampled("double3 xformOp:translate", position) +
+           sampled("token visibility", visibility) +
            "uniform token[] xformOpOrder = [\"xformOp:translate\", \"xformOp:orient\"]\n";
   }
 };
@@ -150,6 +152,8 @@ class UsdExport : public FilmExport {
       const FilmBody& body = parts_.bodies[i];
       const BodySample& s = body.slot ? snapshot.bodies[*body.slot] : body.place;
       bodies_[i].add(frame, s.position, s.orientation);
+      if (body.has_lifetime())
+        bodies_[i].visibility.add(frame, body.exists_at(snapshot.time) ? "inherited" : "invisible");
     }
     for (std::size_t i = 0; i < rods_.size(); ++i) {
       const auto place = rod_transform(snapshot.rods[parts_.rods[i].rod]);

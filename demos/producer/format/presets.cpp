@@ -188,11 +188,15 @@ void place(Force& force, const Effect& effect, const std::string& prefix) {
   std::visit(
       [&](auto& f) {
         f.name = prefix + f.name;
-        for (std::string& name : f.particles) name = prefix + name;
+        if constexpr (requires { f.particles; })
+          for (std::string& name : f.particles) name = prefix + name;
         const Vec3& by = effect.position;
         if constexpr (requires { f.region; }) move_region(f.region, by);
         if constexpr (requires { f.keyframes; }) {
-          for (HandKey& key : f.keyframes) key.position += by, key.time += effect.start;
+          for (auto& key : f.keyframes) {
+            key.time += effect.start;
+            if constexpr (requires { key.position; }) key.position += by;
+          }
         } else if constexpr (requires { f.point; }) {
           f.point += by;
         }

@@ -13,6 +13,7 @@
 
 #include "producer/base/shipped_files.h"
 #include "producer/base/suggest.h"
+#include "producer/build/body_shapes.h"
 #include "producer/format/scene_check_cloths.h"
 #include "producer/format/scene_check_joints.h"
 #include "producer/format/scene_check_particles.h"
@@ -45,14 +46,9 @@ std::string step(std::size_t i) {
 std::optional<Real> mass_of(const Body& body) {
   if (body.motion != sim::MotionType::dynamic) return kUnlimited;
   if (body.mass > 0) return body.mass;
-  return std::visit(
-      [&]<class T>(const T& shape) -> std::optional<Real> {
-        if constexpr (std::is_same_v<T, MeshFile>)
-          return std::nullopt;
-        else
-          return body.density * sim::mass_properties(sim::Shape(shape)).volume;
-      },
-      body.shape);
+  if (std::holds_alternative<sim::Plane>(body.shape)) return 0;
+  const auto mass = mass_by_shape(body);
+  return mass ? std::optional(mass->mass) : std::nullopt;
 }
 
 class Checker {
@@ -145,10 +141,18 @@ class Checker {
     const std::string wrong = file.empty() ? "" : folder_.wrong_file(model_file(file, folder_));
     if (!wrong.empty()) fail(path, wrong);
   }
+  void check_part_materials(const Shape& shape) {
+    if (const auto* compound = std::get_if<Compound>(&shape))
+      for (const CompoundPart& part : compound->parts)
+        check_material_name(part.where.path + "/material", part.material);
+  }
   void check_materials() {
     for (const Material& material : scene_.materials)
       check_file(material.where.path + "/texture", material.texture);
-    for (const Body& body : scene_.bodies) check_material_name(body.where.path + "/material", body.material);
+    for (const Body& body : scene_.bodies) {
+      check_material_name(body.where.path + "/material", body.material);
+      check_part_materials(body.shape);
+    }
     for (const Spring& spring : scene_.springs)
       check_material_name(spring.where.path + "/material", spring.material);
     for (const Cloth& cloth : scene_.cloths)
@@ -156,6 +160,8 @@ class Checker {
     for (const Cloth& cloth : scene_.cloths)
       for (const ClothCord& cord : cloth.cords)
         check_material_name(cord.where.path + "/material", cord.material);
+    for (const Joint& joint : scene_.joints)
+      check_material_name(joint.where.path + "/material", joint.material);
     check_materials_of_articulations();
     for (const ParticleGroup& group : scene_.particles) {
       check_look(group.where.path + "/look", group.look);
@@ -176,6 +182,8 @@ class Checker {
     check_file(path + "/texture", look.texture);
     if (!look.mesh) return;
     check_material_name(path + "/mesh/material", look.mesh->material);
+    check_part_materials(look.mesh->shape);
+    if (const auto wrong = problem(look.mesh->shape)) fail(path + "/mesh/shape" + wrong->key, wrong->what);
     if (const auto* mesh = std::get_if<MeshFile>(&look.mesh->shape))
       check_model(path + "/mesh/shape/file", mesh->file);
   }
@@ -217,6 +225,11 @@ class Checker {
              fmt::format("times must increase, got {} after {}", keys[i].time, keys[i - 1].time));
   }
 
+  void check_lifetime(const std::string& path, Real appear_at, Real remove_at) {
+    if (remove_at <= appear_at)
+      fail(path + "/remove_at", fmt::format("must be later than \"appear_at\", {} s", appear_at));
+  }
+
   // --- Bodies ---
 
   void check_body(const Body& body) {
@@ -234,6 +247,12 @@ class Checker {
            "only kinematic bodies follow keyframes; give the body \"motion\": \"kinematic\"");
     if (!kinematic && !body.spin.isZero(0))
       fail(path + "/spin", "only kinematic bodies have a spin; give the body \"motion\": \"kinematic\"");
+    if (const auto wrong = problem(body.shape)) fail(path + "/shape" + wrong->key, wrong->what);
+    if (!body.inertia && !body.inertia_products.isZero(0))
+      fail(path + "/inertia_products", "need \"inertia\"");
+    if (!dynamic && (body.centre || body.inertia))
+      warn(path + (body.centre ? "/centre" : "/inertia"), "has no effect: the body is not dynamic");
+    check_lifetime(path, body.appear_at, body.remove_at);
     check_times(body.keyframes, path + "/keyframes");
     check_place(body.position, path + "/position");
     if (const auto mass = mass_of(body); dynamic && mass && *mass > 0)
@@ -420,6 +439,15 @@ class Checker {
     const auto mass = body == bodies_.end() ? std::nullopt : mass_of(*body->second);
     if (mass && *mass > 0 && std::isfinite(*mass))
       check_stiffness(grab.stiffness, grab.damping, *mass, path, "the grab '" + grab.name + "'");
+  }
+  void check_force(const AppliedForce& force) {
+    const std::string& path = force.where.path;
+    check_pushed(force, force.bodies);
+    if (force.bodies.empty() && !path.empty()) fail(path + "/bodies", "is empty; the force needs a body");
+    check_period(force, force.start, force.end);
+    check_times(force.keyframes, path + "/keyframes");
+    if (!force.keyframes.empty() && (!force.force.isZero(0) || !force.torque.isZero(0)))
+      fail(path, "has both \"keyframes\" and a \"force\" or \"torque\"; give one of them");
   }
   void check_force(const Explosion& explosion) {
     check_pushed(explosion, explosion.bodies);

@@ -24,6 +24,8 @@ class ClothChecker {
                   "there is no fabric '" + cloth.fabric + "'" + suggestion(cloth.fabric, fabric_names()));
     for (const ClothPin& pin : cloth.pins) check_body(scope_of(pin).body, scope_of(pin).where);
     for (const ClothCord& cord : cloth.cords) check_body(cord.body, cord.where);
+    if (cloth.remove_at <= cloth.appear_at)
+      fail(path + "/remove_at", fmt::format("must be later than \"appear_at\", {} s", cloth.appear_at));
     if (const auto* mesh = std::get_if<MeshFile>(&cloth.shape)) {
       const std::string wrong = mesh->file.empty() ? "" : folder_.wrong_file(model_file(mesh->file, folder_));
       if (!wrong.empty()) fail(path + "/shape/file", wrong);

@@ -63,13 +63,54 @@ class JointChecker {
     if (a && (joint.b.empty() || b) && !moves(a) && !moves(b))
       fail(path, "has no dynamic body: at least one of \"a\" and \"b\" must be dynamic");
     check(path, joint.behaviour);
+    check_lifetime(path, joint.appear_at, joint.remove_at);
+    check_rope(path, joint);
+  }
+
+  void check_lifetime(const std::string& path, Real appear_at, Real remove_at) {
+    if (!(remove_at > appear_at))
+      fail(path + "/remove_at", "must be later than \"appear_at\", " + std::to_string(appear_at) + " s");
+  }
+
+  void check_rope(const std::string& path, const Joint& joint) {
+    const JointBehaviour& how = joint.behaviour;
+    using enum sim::JointType;
+    if ((how.type == gear || how.type == rack) && joint.b.empty())
+      fail(path + "/b", "is needed: a gear or rack couples two bodies");
+    if (how.type == pulley) {
+      if (!(how.ratio > 0)) fail(path + "/ratio", "must be greater than 0 for a pulley");
+      for (const auto& [key, strand] : {std::pair("/pulley_a", Vec3(joint.anchor - joint.pulley_a)),
+                                        {"/pulley_b", Vec3(joint.anchor_b - joint.pulley_b)}})
+        if (!(strand.norm() > 1e-9))
+          fail(path + key, "is at the anchor; both strands of the rope need a length");
+    }
+    if (!how.length_limits || !has_rope(how.type)) return;
+    const Real length = rope_length(joint);
+    const auto& [least, most] = *how.length_limits;
+    constexpr Real kRounding = 1e-9;
+    if (!(least <= length + kRounding && most >= length - kRounding))
+      fail(path + "/length_limits",
+           "must be a range that contains the length at time 0, " + std::to_string(length) + " m");
   }
 
   void check(const std::string& path, const JointBehaviour& joint) {
     using enum sim::JointType;
-    const bool slides = joint.type == prismatic || joint.type == distance;
+    const bool slides = joint.type == prismatic || has_rope(joint.type);
+    const bool is_coupling = joint.type == gear || joint.type == rack;
+    if (joint.length_limits && !has_rope(joint.type))
+      fail(path + "/length_limits", "is for distance joints and pulleys; use \"limits\" or \"limits_deg\"");
+    if (joint.length_limits && joint.limits)
+      fail(path + "/length_limits", "replaces \"limits\"; give one of them");
+    if (joint.stiffness > 0 && joint.type != spherical)
+      fail(path + "/stiffness", "is for spherical joints; use a motor with a \"stiffness\"");
+    if (joint.ratio == 0) fail(path + "/ratio", "must not be 0");
+    if (joint.restitution > 0 && !joint.limits && !joint.length_limits && !joint.limits_deg &&
+        joint.type != pulley)
+      fail(path + "/restitution", "is that of impacts at limits, and the joint has none");
+    if (is_coupling && (joint.limits || joint.limits_deg || joint.motor))
+      fail(path, "a gear or rack has no limits and no motor; give them to the joints of its bodies");
     if (joint.limits && !slides)
-      fail(path + "/limits", "is for prismatic and distance joints; use \"limits_deg\"");
+      fail(path + "/limits", "is for prismatic and distance joints and pulleys; use \"limits_deg\"");
     if (joint.limits_deg && slides) fail(path + "/limits_deg", "is for joints that rotate; use \"limits\"");
     check_limits(path + "/limits", joint.limits);
     check_limits(path + "/limits_deg", joint.limits_deg);
@@ -85,8 +126,8 @@ class JointChecker {
           fail(path + key,
                "acts where a joint may move: not on a fixed one, nor on a rod without limits and motor");
     if (!joint.motor) return;
-    if (joint.type != revolute && !slides)
-      fail(path + "/motor", "drives revolute, prismatic and distance joints only");
+    if (joint.type != revolute && joint.type != prismatic && joint.type != distance && joint.type != screw)
+      fail(path + "/motor", "drives revolute, prismatic, screw and distance joints only");
     check_keys(path + "/motor/keys", joint.motor->keys);
   }
 
@@ -102,12 +143,19 @@ class JointChecker {
   }
 
   void check(const Chain& chain) {
-    if ((chain.to - chain.from).norm() < 1e-6) fail(chain.where.path + "/to", "must differ from \"from\"");
+    if (chain.path.empty() && (chain.to - chain.from).norm() < 1e-6)
+      fail(chain.where.path + "/to", "must differ from \"from\"");
+    if (chain.path.size() == 1) fail(chain.where.path + "/path", "needs at least two points");
+    for (std::size_t i = 1; i < chain.path.size(); ++i)
+      if ((chain.path[i] - chain.path[i - 1]).norm() < 1e-6)
+        fail(chain.where.path + "/path/" + std::to_string(i), "must differ from the point before it");
+    if (!chain.path.empty() && chain.sag != 1)
+      fail(chain.where.path + "/sag", "has no meaning with a \"path\"");
     const auto is_still = [this](const std::string& end) {
       const auto it = std::ranges::find(flat_.bodies, end, &Body::name);
       return end == "world" || (it != flat_.bodies.end() && it->motion != sim::MotionType::dynamic);
     };
-    if (is_still(chain.start) && is_still(chain.end) && chain.sag < 1.0005)
+    if (is_still(chain.start) && is_still(chain.end) && chain.path.empty() && chain.sag < 1.0005)
       fail(chain.where.path + "/sag",
            "must be above 1.0005 if both ends are fixed: a taut chain cannot carry a sideways load");
     for (const auto& [key, end] : {std::pair("/start", &chain.start), {"/end", &chain.end}})
@@ -145,8 +193,11 @@ class JointChecker {
     std::set<std::string> seen;
     for (const NodeJoint& joint : tree.joints) {
       check(joint.where.path, joint.behaviour);
-      if (joint.behaviour.type == sim::JointType::distance)
-        fail(joint.where.path + "/type", "must not be \"distance\": the joint is at the origin of the node");
+      if (has_rope(joint.behaviour.type) || joint.behaviour.type == sim::JointType::gear ||
+          joint.behaviour.type == sim::JointType::rack)
+        fail(joint.where.path + "/type",
+             "must not be \"distance\", \"pulley\", \"gear\" or \"rack\": the joint is at the origin of the "
+             "node");
       if (!names.empty() && std::ranges::find(names, joint.node) == names.end())
         fail(joint.where.path + "/node",
              tree.file + " has no node '" + joint.node + "' with triangles" + suggestion(joint.node, names));

@@ -46,7 +46,7 @@ class ParticleChecker {
       : scene_(scene), flat_(flat), findings_(findings) {}
 
   void run() {
-    for (const ParticleGroup& group : scene_.particles) check_group(group);
+    for (const ParticleGroup& group : flat_.particles) check_group(group);
     for (const Emitter& emitter : scene_.emitters) check_emitter(emitter);
     check_names();
     if (!too_many_) check_sum();
@@ -137,6 +137,9 @@ class ParticleChecker {
   void check_group(const ParticleGroup& group) {
     check_look(group.look, group.where.path + "/look");
     check_drag(group.behaviour, group.mass, group.where.path);
+    if (group.remove_at <= group.appear_at)
+      fail(group.where.path + "/remove_at",
+           fmt::format("must be later than \"appear_at\", {} s", group.appear_at));
     for (std::size_t i = 0; i < group.places.size(); ++i)
       if (const auto problem = outside(scene_, group.places[i].position)) {
         // The points of a file have no places in the scene.
@@ -209,6 +212,11 @@ class ParticleChecker {
     for (std::size_t i = 0; i < emitter.windows.size(); ++i)
       if (emitter.windows[i].end <= emitter.windows[i].start)
         fail(path + "/windows" + index_step(i) + "/end", "must be later than the start");
+    const bool moves_along = effects::upper_bound(emitter.rate_per_metre) > 0;
+    if (moves_along && emitter.body.empty())
+      fail(path + "/rate_per_metre", "is along the way of a body; the emitter needs a \"body\"");
+    if (emitter.recoil && emitter.body.empty())
+      fail(path + "/recoil", "pushes a body back; the emitter needs a \"body\"");
     check_count(emitter);
   }
 
@@ -235,7 +243,7 @@ class ParticleChecker {
                                           : "rate, count or lifespan"));
       return true;
     }
-    if (is_emitter && bound.possible.born == 0)
+    if (is_emitter && bound.possible.born == 0 && !(effects::upper_bound(emitter.rate_per_metre) > 0))
       warn(path,
            "releases no particles: rate, count and bursts are zero, or their times are outside the film");
     else if (possible > kTolerance * static_cast<Real>(source.max_alive))

@@ -269,6 +269,10 @@ struct Table<Cloth> {
             {"soften", &T::soften,
              "with the integrator `relaxed`: one step of the springs in each `substep`, which is faster. The "
              "stiffness of springs that are too stiff for it is reduced, and a warning tells by how much"},
+            {"appear_at", &T::appear_at, "time at which the cloth appears, with its shape of time 0", "s",
+             kNotNegative},
+            {"remove_at", &T::remove_at, "time at which the cloth is removed; must be later than `appear_at`",
+             "s", kPositive},
             {"visible", &T::visible, "is drawn"},
             {"casts_shadow", &T::casts_shadow, "casts a shadow"},
         })

@@ -167,6 +167,48 @@ struct Table<Grab> {
   }
 };
 template <>
+struct Names<ForceAxes> {
+  static constexpr std::array kNames = {"world", "body"};
+};
+template <>
+struct Table<AppliedKey> {
+  static constexpr const char* kName = "applied_key";
+  static constexpr const char* kHelp = "Force and torque at a time.";
+  static Fields<AppliedKey> fields() {
+    using T = AppliedKey;
+    return {{"time", &T::time, "time of the key; times must increase", "s"},
+            {"force", &T::force, "force at this time", "N"},
+            {"torque", &T::torque, "torque at this time", "N m"},
+            {"interpolation", &T::interpolation,
+             "interpolation from this key to the next; default: that of the force"}};
+  }
+};
+template <>
+struct Table<AppliedForce> {
+  static constexpr const char* kName = "applied_force";
+  static constexpr const char* kHelp =
+      "A force at a point of each of some bodies, and a torque, constant or over time: a thruster, a motor, "
+      "a push.";
+  static Fields<AppliedForce> fields() {
+    using T = AppliedForce;
+    return {
+        {"name", &T::name, kForceNameHelp},
+        {"bodies", &T::bodies, "names of the dynamic bodies that it acts on, of one copy or of all",
+         kRequired},
+        {"point", &T::point, "point of application in the body's frame; default: the centre of mass", "m"},
+        {"axes", &T::axes,
+         "axes of `force` and `torque`: those of the `world`, or those that turn with the `body`"},
+        {"force", &T::force, "force, without keyframes", "N"},
+        {"torque", &T::torque, "torque in addition to that of the force, without keyframes", "N m"},
+        {"keyframes", &T::keyframes,
+         "force and torque over time, instead of `force` and `torque`; constant before the first and after "
+         "the last"},
+        {"interpolation", &T::interpolation, kInterpolationHelp},
+        {"start", &T::start, "time from which on it acts", "s", kNotNegative},
+        {"end", &T::end, "time from which on it no longer acts", "s", kNotNegative}};
+  }
+};
+template <>
 struct Table<Explosion> {
   static constexpr const char* kName = "explosion";
   static constexpr const char* kHelp =
@@ -268,8 +310,9 @@ template <>
 struct Tags<Force> {
   static constexpr const char* kName = "force";
   static constexpr const char* kHelp = "A force on bodies, cloths and particles.";
-  static constexpr std::array kTags = {"constant", "point",      "wind",        "grab",    "explosion",
-                                       "vortex",   "turbulence", "gravitation", "coulomb", "lennard_jones"};
+  static constexpr std::array kTags = {"constant",  "point",         "wind",       "grab",
+                                       "explosion", "vortex",        "turbulence", "gravitation",
+                                       "coulomb",   "lennard_jones", "applied"};
   static constexpr bool kRequired = true;
 };
 

@@ -9,8 +9,8 @@ namespace offstage::producer {
 
 template <>
 struct Names<sim::JointType> {
-  static constexpr std::array kNames = {"spherical", "fixed",     "revolute",
-                                        "prismatic", "universal", "distance"};
+  static constexpr std::array kNames = {"spherical", "fixed", "revolute", "prismatic", "universal",
+                                        "distance",  "gear",  "rack",     "screw",     "pulley"};
 };
 template <>
 struct Names<sim::Motor::Mode> {
@@ -57,20 +57,56 @@ struct Table<JointBehaviour> {
         {"type", &T::type,
          "degrees of freedom: `spherical` rotates freely; `fixed` has none; `revolute` rotates about the "
          "axis; `prismatic` slides along the axis; `universal` rotates about two axes; `distance` keeps the "
-         "distance of the anchors, as a rod does, or with limits or a motor as a rope or a winch"},
+         "distance of the anchors, as a rod does, or with limits or a motor as a rope or a winch; `gear` "
+         "couples the "
+         "rotation of `a` about `axis` with that of `b` about `second_axis`: angle of a + `ratio` * angle of "
+         "b = 0; "
+         "`rack` couples it with the displacement of `b` along `second_axis`: displacement = `ratio` * "
+         "angle; `screw` "
+         "rotates about the axis and moves `ratio` metres along it per turn; `pulley` is a rope from "
+         "`anchor` over "
+         "`pulley_a` and `pulley_b` to `anchor_b`. A gear and a rack only couple motions: other joints hold "
+         "their "
+         "bodies, on a carrier that does not turn"},
         {"axis", &T::axis, "axis of rotation or sliding; for a spherical joint, axis of the twist", "",
          kDirection},
-        {"second_axis", &T::second_axis, "second axis of a universal joint", "", kDirection},
+        {"second_axis", &T::second_axis,
+         "second axis of a universal joint, axis of `b` of a gear, or direction of a rack; default: +X, or "
+         "`axis` for "
+         "a gear",
+         "", kDirection},
+        {"ratio", &T::ratio,
+         "gear: teeth of `b` / teeth of `a`, negative for an internal gear or a belt; rack: radius of the "
+         "pinion in m, "
+         "negative for the other direction; screw: lead in m per turn, positive for a right-handed thread; "
+         "pulley: "
+         "number of strands at `b`. Not 0"},
         {"limits", &T::limits,
          "least and greatest displacement of a prismatic joint, or change of the distance of a distance "
          "joint: a rope has [-its length, 0]",
          "m"},
+        {"length_limits", &T::length_limits,
+         "instead of `limits`: least and greatest length of a rope, of a distance joint or a pulley; of a "
+         "pulley, the "
+         "length from `anchor` to `pulley_a` plus `ratio` times that from `anchor_b` to `pulley_b`. A pulley "
+         "without "
+         "limits keeps its length from getting larger",
+         "m", kNotNegative},
         {"limits_deg", &T::limits_deg, "least and greatest angle; for a spherical joint, of the twist",
          "degrees"},
         {"swing_deg", &T::swing_deg,
          "largest angle between the axes of a spherical joint, or of rotation about the second axis of a "
          "universal joint",
          "degrees", between(0, 180)},
+        {"restitution", &T::restitution,
+         "coefficient of restitution at `limits`, `length_limits` and `limits_deg`, for speeds above 0.05 "
+         "m/s or rad/s",
+         "", kShare},
+        {"stiffness", &T::stiffness,
+         "spherical joint: torque per angle of rotation from the pose of time 0, about any axis; for the "
+         "other types use a "
+         "motor with a stiffness",
+         "N m/rad", kNotNegative},
         {"friction", &T::friction, "dry friction: greatest torque or force against the motion", "N m or N",
          kNotNegative},
         {"damping", &T::damping, "viscous damping: torque or force per speed", "N m s or N s/m",
@@ -94,9 +130,19 @@ struct Table<Joint> {
                      {"a", &T::a, "name of a body", kRequired},
                      {"b", &T::b, "name of a body; empty: the world"},
                      {"anchor", &T::anchor, "point at which the bodies are joined", "m"},
-                     {"anchor_b", &T::anchor_b, "other end of a distance joint, on `b`", "m"}}
+                     {"anchor_b", &T::anchor_b,
+                      "other end of a distance joint or pulley, on `b`; point of `b` of a rack", "m"},
+                     {"pulley_a", &T::pulley_a, "fixed point over which the rope of `a` runs", "m"},
+                     {"pulley_b", &T::pulley_b, "fixed point over which the rope of `b` runs", "m"}}
         .with(&T::behaviour)
         .then({{"collide", &T::collide, "the two bodies also collide with each other"},
+               {"appear_at", &T::appear_at,
+                "time from which on the joint acts; it then joins the bodies in their poses of that time, "
+                "and its "
+                "anchors and axes have moved with the bodies",
+                "s", kNotNegative},
+               {"remove_at", &T::remove_at,
+                "time at which the joint is removed; must be later than `appear_at`", "s", kPositive},
                {"visible", &T::visible, "a distance joint is drawn as a straight rod"},
                {"radius", &T::radius, "radius of the rod", "m", kPositive},
                {"material", &T::material, "name of the rod's material; empty: grey"}});
@@ -114,6 +160,10 @@ struct Table<Chain> {
         {"name", &T::name, "unique name; empty: articulation_ and its index"},
         {"from", &T::from, "start of the chain", "m"},
         {"to", &T::to, "end of the chain", "m"},
+        {"path", &T::path,
+         "instead of `from` and `to`: at least two points in the world, along which the links are laid in "
+         "equal steps",
+         "m"},
         {"links", &T::links, "number of links", "", between(1, 10000)},
         {"sag", &T::sag,
          "length of the chain relative to the distance of its ends; above 1.0005 if both ends are held still",

@@ -165,6 +165,7 @@ struct Table<ParticleGroup> {
     return Fields<T>{
         {"name", &T::name, "unique name; empty: particles_ and its index"},
         {"places", &T::places, "one entry for each particle"},
+        {"fill", &T::fill, "volume that is filled with further particles"},
         {"file", &T::file,
          "PLY or OBJ file whose points become particles after those of `places`, with the colours of the "
          "points; "
@@ -185,6 +186,9 @@ struct Table<ParticleGroup> {
          "coefficient of dynamic friction; of particle and body the geometric mean is used", "",
          kNotNegative},
         {"charge", &T::charge, "electric charge of each particle", "C"},
+        {"appear_at", &T::appear_at, "time at which the particles appear", "s", kNotNegative},
+        {"remove_at", &T::remove_at,
+         "time at which the particles are removed; must be later than `appear_at`", "s", kPositive},
         {"look", &T::look, "how the particles are drawn"},
     }
         .with(&T::behaviour);
@@ -206,6 +210,10 @@ struct Table<Split> {
         {"count", &T::count, "number of children of one split, rounded", "", between(0, 1000)},
         {"age", &T::age, "age of a particle at its first split", "s", kPositive},
         {"delay", &T::delay, "time to its next split", "s", kPositive},
+        {"delay_steps", &T::delay_steps,
+         "in place of `delay`: time to its next split as a number of sub-steps of `world.step`; 0: `delay` "
+         "applies",
+         "", between(0, 1e6)},
         {"depth", &T::depth,
          "largest number of splits in the history of a particle, including those of its ancestors", "",
          between(1, 16)},
@@ -367,12 +375,31 @@ struct Table<MeshSurface> {
   }
 };
 template <>
+struct Names<Face> {
+  static constexpr std::array kNames = {"top", "bottom", "left", "right", "front", "back"};
+};
+template <>
+struct Table<FaceSurface> {
+  static constexpr const char* kName = "face_surface";
+  static constexpr const char* kHelp =
+      "A face of the emitter's body, which releases particles along its normal: a face of a box, or the flat "
+      "top or "
+      "bottom of a cylinder, cone or frustum. Without a body, a face of a cuboid.";
+  static Fields<FaceSurface> fields() {
+    using T = FaceSurface;
+    return {{"face", &T::face,
+             "top and bottom are at +y and -y, right and left at +x and -x, front and back at +z and -z"},
+            {"position", &T::position, "centre of the cuboid, without a body", "m"},
+            {"size", &T::size, "edges of the cuboid, without a body", "m", kPositive}};
+  }
+};
+template <>
 struct Tags<EmitterSurface> {
   static constexpr const char* kName = "surface";
   static constexpr const char* kHelp =
       "Surface that particles are released from. Its coordinates are in the frame of the emitter's body, or "
       "in the world.";
-  static constexpr std::array kTags = {"plane", "sphere", "disc", "mesh"};
+  static constexpr std::array kTags = {"plane", "sphere", "disc", "mesh", "face"};
   static constexpr bool kRequired = false;
 };
 template <>
@@ -411,10 +438,21 @@ struct Table<Emitter> {
         {"surface", &T::surface, "surface that particles are released from"},
         {"direction", &T::direction,
          "direction of release, in the frame of the body or in the world; zero: the normal of the surface"},
+        {"inherit_velocity", &T::inherit_velocity,
+         "share of the velocity of the body's point that a new particle gets, in addition to its own", "",
+         kNotNegative},
+        {"recoil", &T::recoil,
+         "each new particle pushes the body back with its momentum relative to the body; dynamic bodies "
+         "only"},
         {"overlap", &T::overlap,
          "new particles may overlap and never wait for space; for particles that do not collide with each "
          "other"},
         {"rate", &T::rate, "number of particles released one by one per second", "1/s", between(0, 1e9)},
+        {"rate_per_metre", &T::rate_per_metre,
+         "number of particles released evenly along each metre of the way of the body, in addition to the "
+         "others; needs a "
+         "`body`",
+         "1/m", between(0, 1e9)},
         {"count", &T::count, "number of particles released together in every `interval`, rounded", "",
          kCounts},
         {"interval", &T::interval, "time between releases of `count`", "s", kPositive},

@@ -27,6 +27,40 @@ struct Names<sim::ImpactLaw> {
   static constexpr std::array kNames = {"simultaneous", "sequential"};
 };
 template <>
+struct Names<sim::CollisionMethods::NarrowPhase> {
+  static constexpr std::array kNames = {"gjk", "vclip"};
+};
+template <>
+struct Names<sim::CollisionMethods::BroadPhase> {
+  static constexpr std::array kNames = {"multi_grid", "grid"};
+};
+template <>
+struct Names<sim::CollisionMethods::ImpactTime> {
+  static constexpr std::array kNames = {"advancement", "bisection"};
+};
+template <>
+struct Table<sim::CollisionMethods> {
+  static constexpr const char* kName = "collision_methods";
+  static constexpr const char* kHelp =
+      "Algorithms of collision detection between bodies. They give the same motion within their tolerances "
+      "and differ "
+      "in their cost; `offstage bench` compares them.";
+  static Fields<sim::CollisionMethods> fields() {
+    using T = sim::CollisionMethods;
+    return {{"narrow_phase", &T::narrow_phase,
+             "distance of convex polyhedra: `gjk`, or `vclip`, which walks along their features; round "
+             "shapes use GJK "
+             "in either case"},
+            {"broad_phase", &T::broad_phase,
+             "search for pairs that may touch: `multi_grid` has several levels of cells, `grid` has cells of "
+             "one size"},
+            {"impact_time", &T::impact_time,
+             "time of an impact: `advancement` never passes it; `bisection` halves the sub-step of bodies "
+             "that overlap at "
+             "its end, and misses bodies that passed through each other"}};
+  }
+};
+template <>
 struct Table<WorldSettings> {
   static constexpr const char* kName = "world";
   static constexpr const char* kHelp = "Settings of the whole simulation.";
@@ -51,6 +85,7 @@ struct Table<WorldSettings> {
          "solves one after the other, so that an impact travels through a row of balls"},
         {"collision_speed", &T::collision_speed, "bodies that approach more slowly than this do not bounce",
          "m/s", over(0, 100)},
+        {"collision", &T::collision, "algorithms of collision detection"},
         {"sleep", &T::sleep, "bodies at rest are not simulated until something reaches them"},
         {"bounds", &T::bounds, "half the edge of the cube around the origin that all objects must stay in",
          "m", kPositive},
@@ -199,11 +234,101 @@ struct Table<MeshFile> {
   }
 };
 template <>
+struct Table<sim::Frustum> {
+  static constexpr const char* kName = "frustum";
+  static constexpr const char* kHelp = "A cone with its tip cut off, along y, centred on the body.";
+  static Fields<sim::Frustum> fields() {
+    return {{"radius", &sim::Frustum::radius, "radius of the base at -height/2", "m", kPositive},
+            {"top_radius", &sim::Frustum::top_radius, "radius of the top at +height/2", "m", kPositive},
+            {"height", &sim::Frustum::height, "length along y", "m", kPositive}};
+  }
+};
+template <>
+struct Table<sim::Ellipsoid> {
+  static constexpr const char* kName = "ellipsoid";
+  static constexpr const char* kHelp = "An ellipsoid centred on the body.";
+  static Fields<sim::Ellipsoid> fields() {
+    return {{"radii", &sim::Ellipsoid::radii, "half axes along x, y and z", "m", kPositive}};
+  }
+};
+template <>
+struct Table<sim::Torus> {
+  static constexpr const char* kName = "torus";
+  static constexpr const char* kHelp =
+      "A ring about y, centred on the body. It collides as 48 convex parts; its mass is exact.";
+  static Fields<sim::Torus> fields() {
+    return {
+        {"radius", &sim::Torus::radius, "distance of the tube's centre line from the axis", "m", kPositive},
+        {"tube_radius", &sim::Torus::tube_radius, "radius of the tube, less than `radius`", "m", kPositive}};
+  }
+};
+template <>
+struct Table<sim::Tube> {
+  static constexpr const char* kName = "tube";
+  static constexpr const char* kHelp =
+      "A hollow cylinder along y, open at both ends, centred on the body. It collides as 48 convex parts; "
+      "its mass is "
+      "exact.";
+  static Fields<sim::Tube> fields() {
+    return {
+        {"radius", &sim::Tube::radius, "radius of the outside", "m", kPositive},
+        {"height", &sim::Tube::height, "length along y", "m", kPositive},
+        {"thickness", &sim::Tube::thickness, "thickness of the wall, less than `radius`", "m", kPositive}};
+  }
+};
+template <>
+struct Table<sim::OpenBox> {
+  static constexpr const char* kName = "open_box";
+  static constexpr const char* kHelp =
+      "A cuboid without its top at +y, centred on the body: a floor and four walls.";
+  static Fields<sim::OpenBox> fields() {
+    return {{"size", &sim::OpenBox::size, "full lengths of the outside along x, y and z", "m", kPositive},
+            {"thickness", &sim::OpenBox::thickness,
+             "thickness of the floor and the walls, less than half of the width and less than the height",
+             "m", kPositive}};
+  }
+};
+template <>
+struct Tags<PartShape> {
+  static constexpr const char* kName = "part_shape";
+  static constexpr const char* kHelp = "Shape of a part of a compound.";
+  static constexpr std::array kTags = {"sphere",  "box",       "capsule", "cylinder", "cone",
+                                       "frustum", "ellipsoid", "torus",   "tube",     "open_box"};
+  static constexpr bool kRequired = true;
+};
+template <>
+struct Table<CompoundPart> {
+  static constexpr const char* kName = "compound_part";
+  static constexpr const char* kHelp = "A part of a compound.";
+  static Fields<CompoundPart> fields() {
+    using T = CompoundPart;
+    return {{"shape", &T::shape, "shape of the part"},
+            {"position", &T::position, "position of the part in the body's frame", "m"},
+            {"orientation", &T::orientation, "orientation of the part in the body's frame"},
+            {"density", &T::density, "density of the part; default: the body's", "kg/m^3", kPositive},
+            {"material", &T::material,
+             "name of the material that the part is drawn with; empty: the body's, whose friction and "
+             "restitution "
+             "apply to all parts"}};
+  }
+};
+template <>
+struct Table<Compound> {
+  static constexpr const char* kName = "compound";
+  static constexpr const char* kHelp =
+      "Several shapes that form one rigid body, such as a hammer. Mass, centre of mass and inertia are the "
+      "sums over "
+      "the parts; where parts overlap, both count. Round parts collide with 32 to 48 flat sides.";
+  static Fields<Compound> fields() { return {{"parts", &Compound::parts, "parts; at least one", kRequired}}; }
+};
+template <>
 struct Tags<Shape> {
   static constexpr const char* kName = "shape";
   static constexpr const char* kHelp =
       "Collision shape of a body, which is also drawn unless the body has a `model`.";
-  static constexpr std::array kTags = {"sphere", "box", "capsule", "cylinder", "cone", "plane", "mesh"};
+  static constexpr std::array kTags = {"sphere", "box",      "capsule", "cylinder",  "cone",
+                                       "plane",  "mesh",     "frustum", "ellipsoid", "torus",
+                                       "tube",   "open_box", "compound"};
   static constexpr bool kRequired = true;
 };
 
@@ -248,9 +373,66 @@ struct Table<Scatter> {
   }
 };
 template <>
+struct Table<BoxFill> {
+  static constexpr const char* kName = "box_fill";
+  static constexpr const char* kHelp = "A cuboid along the axes of the world.";
+  static Fields<BoxFill> fields() {
+    return {{"size", &BoxFill::size, "full lengths of the edges", "m", kPositive}};
+  }
+};
+template <>
+struct Table<CylinderFill> {
+  static constexpr const char* kName = "cylinder_fill";
+  static constexpr const char* kHelp = "A vertical cylinder.";
+  static Fields<CylinderFill> fields() {
+    return {{"radius", &CylinderFill::radius, "radius", "m", kPositive},
+            {"height", &CylinderFill::height, "height", "m", kPositive}};
+  }
+};
+template <>
+struct Table<SphereFill> {
+  static constexpr const char* kName = "sphere_fill";
+  static constexpr const char* kHelp = "A ball.";
+  static Fields<SphereFill> fields() { return {{"radius", &SphereFill::radius, "radius", "m", kPositive}}; }
+};
+template <>
+struct Tags<std::variant<BoxFill, CylinderFill, SphereFill>> {
+  static constexpr const char* kName = "fill_shape";
+  static constexpr const char* kHelp = "The volume that is filled.";
+  static constexpr std::array kTags = {"box", "cylinder", "sphere"};
+  static constexpr bool kRequired = false;
+};
+template <>
+struct Names<Packing> {
+  static constexpr std::array kNames = {"hexagonal", "cubic", "random"};
+};
+template <>
+struct Table<Fill> {
+  static constexpr const char* kName = "fill";
+  static constexpr const char* kHelp =
+      "Fills a volume with copies of a body, or with particles: a jar of marbles, a pool of drops. All "
+      "centres are at "
+      "least half the spacing inside the volume.";
+  static Fields<Fill> fields() {
+    return {
+        {"shape", &Fill::shape, "volume that is filled"},
+        {"position", &Fill::position,
+         "centre of the volume: relative to the original, or in the world for a particle group", "m"},
+        {"spacing", &Fill::spacing,
+         "distance between neighbours; 0: the diameter of the particles; copies of bodies need a distance",
+         "m", kNotNegative},
+        {"packing", &Fill::packing,
+         "arrangement of the centres: `hexagonal` is the closest (balls that touch fill 74 %), `cubic` is a "
+         "grid "
+         "(52 %), `random` places them one after the other at random (about 35 %)"},
+        {"seed", &Fill::seed, "another seed gives another random arrangement", "", kNotNegative}};
+  }
+};
+template <>
 struct Table<Placement> {
   static Fields<Placement> fields() {
-    return {{"repeat", &Placement::repeat, "copies in a row or a ring"},
+    return {{"fill", &Placement::fill, "copies that fill a volume"},
+            {"repeat", &Placement::repeat, "copies in a row or a ring"},
             {"grid", &Placement::grid, "copies on a grid"},
             {"scatter", &Placement::scatter, "copies at random places"}};
   }
@@ -334,6 +516,14 @@ struct Table<Body> {
          "angular velocity at time 0, in world axes; dynamic bodies only", "rad/s"},
         {"density", &T::density, "density; determines the mass unless `mass` is given", "kg/m^3", kPositive},
         {"mass", &T::mass, "mass of a dynamic body; 0: computed from density and volume", "kg", kNotNegative},
+        {"centre", &T::centre, "centre of mass in the body's frame; default: that of the shape", "m"},
+        {"inertia", &T::inertia,
+         "moments of inertia Ixx, Iyy and Izz about the centre of mass, in the body's axes; default: those "
+         "of the "
+         "shape about its own centre, for the body's mass",
+         "kg m^2", kPositive},
+        {"inertia_products", &T::inertia_products,
+         "off-diagonal elements Ixy, Iyz and Izx of the inertia matrix; need `inertia`", "kg m^2"},
         {"linear_drag", &T::linear_drag, "drag force per speed relative to the air", "kg/s", kNotNegative},
         {"angular_drag", &T::angular_drag, "drag torque per angular speed", "kg m^2/s", kNotNegative},
         {"friction_axis", &T::friction_axis,
@@ -348,6 +538,15 @@ struct Table<Body> {
         {"keyframes", &T::keyframes, "poses over time; kinematic bodies only"},
         {"interpolation", &T::interpolation, kInterpolationHelp},
         {"loop", &T::loop, "repeats the keyframes; otherwise the last pose is held"},
+        {"appear_at", &T::appear_at,
+         "time at which the body appears, at its pose and velocity of time 0; its joints join it to the "
+         "other bodies "
+         "in their poses of that time",
+         "s", kNotNegative},
+        {"remove_at", &T::remove_at,
+         "time at which the body is removed, with its springs, joints and cloth pins; must be later than "
+         "`appear_at`",
+         "s", kPositive},
         {"spin", &T::spin, "constant angular velocity in the body's axes; kinematic bodies only", "rad/s"},
     }
         .with(&T::placement);

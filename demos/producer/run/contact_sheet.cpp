@@ -17,13 +17,13 @@ using Rgb = std::array<uint8_t, 3>;
 
 constexpr Rgb kPaper = {24, 25, 28}, kInk = {225, 227, 230}, kHeadingInk = {150, 190, 235},
               kFaultPaper = {64, 22, 24}, kFaultInk = {255, 170, 160};
-constexpr int kGap_px = 12;  // between pictures, and around the sheet
-constexpr int kScale = 2;    // scale of the text
-constexpr int kLine_px = kScale * render::kTextHeight_px + 4;
+constexpr int kGap_px = 12;    // between pictures, and around the sheet
+constexpr int kTextScale = 2;  // scale of the text
+constexpr int kLine_px = kTextScale * render::kTextHeight_px + 4;
 constexpr int kMostSide_px = 16384;  // common limit of image readers
 
 int width_of(const std::string& text) {
-  return kScale * render::text_width_px(text);
+  return kTextScale * render::text_width_px(text);
 }
 
 /// Returns the end of a text that is too wide.
@@ -111,7 +111,7 @@ void draw_fault(render::Image& sheet, const Layout& layout, const std::string& f
   int y = top + kGap_px / 2;
   for (const std::string& line : wrapped(fault, layout.width - kGap_px)) {
     if (y + kLine_px > top + layout.height) break;
-    render::draw_text(sheet, left + kGap_px / 2, y, line, kScale, kFaultInk);
+    render::draw_text(sheet, left + kGap_px / 2, y, line, kTextScale, kFaultInk);
     y += kLine_px;
   }
 }
@@ -123,7 +123,7 @@ void draw_cell(render::Image& sheet, const Layout& layout, const SheetCell& cell
     paste(sheet, cell.picture, left, top);
   int y = top + layout.height + 4;
   for (const std::string& line : cell.label) {
-    render::draw_text(sheet, left, y, cut_start(line, layout.width), kScale, kInk);
+    render::draw_text(sheet, left, y, cut_start(line, layout.width), kTextScale, kInk);
     y += kLine_px;
   }
 }
@@ -136,7 +136,7 @@ render::Image contact_sheet(const std::vector<std::string>& heading, const std::
   render::Image sheet = blank(layout.sheet_width(), layout.sheet_height());
   for (std::size_t i = 0; i < heading.size(); ++i)
     render::draw_text(sheet, kGap_px, kGap_px + static_cast<int>(i) * kLine_px,
-                      cut_end(heading[i], layout.sheet_width() - 2 * kGap_px), kScale, kHeadingInk);
+                      cut_end(heading[i], layout.sheet_width() - 2 * kGap_px), kTextScale, kHeadingInk);
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const int column = static_cast<int>(i) % columns, row = static_cast<int>(i) / columns;
     draw_cell(sheet, layout, cells[i], kGap_px + column * layout.cell_width(),

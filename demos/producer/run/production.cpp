@@ -15,6 +15,7 @@
 #include "producer/base/interrupt.h"
 #include "producer/base/version.h"
 #include "producer/build/picture.h"
+#include "producer/run/particle_table.h"
 #include "producer/run/pipeline.h"
 #include "producer/run/snapshot_cache.h"
 #include "producer/run/trace.h"
@@ -321,8 +322,11 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
   if (job.cloths) cloths.emplace(*job.cloths, simulation);
   std::optional<JointTrace> joints;
   if (job.joints) joints.emplace(*job.joints, simulation);
+  std::optional<ParticleTable> particles;
+  if (job.particles) particles.emplace(*job.particles, simulation);
   const auto record = [&](double time) {
     try {
+      if (particles) particles->record(simulation.frame(), time);
       if (trace) trace->record(time);
       if (contacts) contacts->record(time);
       if (cloths) cloths->record(time);
@@ -363,6 +367,7 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
   if (contacts && stats.frames == total) contacts->close();
   if (cloths && stats.frames == total) cloths->close();
   if (joints && stats.frames == total) joints->close();
+  if (particles && stats.frames == total) particles->close();
   stats.totals = simulation.totals();
   stats.energy_end = simulation.energy();
   stats.state_hash = simulation.world().state_hash().hex();
@@ -456,6 +461,8 @@ void add_contact_figures(const SimulationTotals& t, Json& json) {
   json["contacts"] = t.contacts;
   json["most_contacts"] = t.most_contacts;
   json["penetration"] = t.penetration;
+  json["pairs_tested"] = t.pairs_tested;
+  json["impact_searches"] = t.impact_searches;
   json["collisions"] = t.collisions;
   json["tracebacks"] = t.tracebacks;
   json["toi_limit_reached"] = t.toi_limit_reached;

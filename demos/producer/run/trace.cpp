@@ -20,6 +20,7 @@ void Trace::record(double time) {
   const sim::World& world = simulation_.world();
   CsvRows rows;
   for (const auto& [name, handle] : simulation_.moving_bodies()) {
+    if (!world.is_present(handle)) continue;
     const sim::BodyState s = world.body(handle);
     add_state(rows, time, name, s.pose.position, s.pose.orientation, s.velocity, s.angular_velocity);
   }

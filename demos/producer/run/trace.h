@@ -15,7 +15,8 @@ class Trace {
  public:
   Trace(const std::filesystem::path& path, const Simulation& simulation);
 
-  /// One row per moving body, per cloth (its centre of mass and mean velocity) and per placed particle
+  /// One row per moving body that exists at the time, per cloth (its centre of mass and mean velocity) and
+  /// per placed particle
   /// ("group/id").
   void record(double time);
   void close() { file_.close(); }

@@ -113,6 +113,8 @@ struct Cloth {
   sim::ClothIntegrator integrator = sim::ClothIntegrator::relaxed;
   Real substep = 1.0 / 960;
   bool soften = false;
+  Real appear_at = 0;
+  Real remove_at = 1e30;
   bool visible = true;
   bool casts_shadow = true;
   Placement placement;  ///< its three keys are directly in the cloth

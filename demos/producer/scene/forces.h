@@ -103,6 +103,23 @@ struct Grab : NamedForce {
   Real start = 0;
   Real end = 1e30;
 };
+enum class ForceAxes { world, body };
+struct AppliedKey {
+  Real time = 0;
+  Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
+  std::optional<sim::Interpolation> interpolation;  ///< to the next key; default: the force's
+};
+/// A force at a point of bodies, and a torque.
+struct AppliedForce : NamedForce {
+  std::vector<std::string> bodies;
+  std::optional<Vec3> point;  ///< in the body's frame; default: the centre of mass
+  ForceAxes axes = ForceAxes::world;
+  Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  ///< without keyframes
+  std::vector<AppliedKey> keyframes;
+  sim::Interpolation interpolation = sim::Interpolation::linear;
+  Real start = 0;
+  Real end = 1e30;
+};
 struct Explosion : NamedForce {
   std::vector<std::string> bodies;
   std::vector<std::string> particles;
@@ -114,7 +131,7 @@ struct Explosion : NamedForce {
   int drop_rate = 1;
 };
 using Force = std::variant<ConstantField, PointField, WindField, Grab, Explosion, VortexField,
-                           TurbulenceField, GravitationForce, CoulombForce, LennardJonesForce>;
+                           TurbulenceField, GravitationForce, CoulombForce, LennardJonesForce, AppliedForce>;
 
 /// The part that every force has.
 NamedForce& named(Force& force);

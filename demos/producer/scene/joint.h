@@ -33,10 +33,14 @@ struct JointMotor {
 struct JointBehaviour {
   sim::JointType type = sim::JointType::spherical;
   Vec3 axis = Vec3::UnitZ();
-  Vec3 second_axis = Vec3::UnitX();
-  std::optional<std::array<Real, 2>> limits;      ///< of sliding and of lengths [m]
-  std::optional<std::array<Real, 2>> limits_deg;  ///< of rotation
+  std::optional<Vec3> second_axis;            ///< default: +X, or `axis` for a gear
+  Real ratio = 1;                             ///< of a gear [1], rack [m], screw [m per turn] or pulley [1]
+  std::optional<std::array<Real, 2>> limits;  ///< of sliding and of changes of lengths [m]
+  std::optional<std::array<Real, 2>> length_limits;  ///< least and greatest length of a rope [m]
+  std::optional<std::array<Real, 2>> limits_deg;     ///< of rotation
   std::optional<Real> swing_deg;
+  Real restitution = 0;  ///< at the limits
+  Real stiffness = 0;    ///< of a spherical joint [N m/rad]
   Real friction = 0, damping = 0;
   std::optional<JointMotor> motor;
   std::optional<Real> max_force, max_torque;
@@ -48,18 +52,30 @@ struct Joint {
   JointBehaviour behaviour;
   std::string a, b;  ///< names of bodies; b is empty for the world
   Vec3 anchor = Vec3::Zero();
-  Vec3 anchor_b = Vec3::Zero();  ///< end of a rod
+  Vec3 anchor_b = Vec3::Zero();  ///< end of a rod or rope, point of a rack
+  Vec3 pulley_a = Vec3::Zero(),
+       pulley_b = Vec3::Zero();  ///< points of the world over which a pulley's rope runs
+  Real appear_at = 0;
+  Real remove_at = 1e30;
   bool collide = false;
   bool visible = true;  ///< whether a rod or rope is drawn
   Real radius = 0.01;   ///< of the drawn rod or rope [m]
   std::string material;
 };
 
+/// Number of straight pieces that a joint is drawn as: a rod, or the three parts of a pulley's rope.
+inline int rod_count(const Joint& joint) {
+  return joint.behaviour.type == sim::JointType::distance ? 1
+         : joint.behaviour.type == sim::JointType::pulley ? 3
+                                                          : 0;
+}
+
 /// Links between two points: capsules end to end.
 struct Chain {
   Where where;
   std::string name;
   Vec3 from = Vec3::Zero(), to = Vec3::UnitX();
+  std::vector<Vec3> path;  ///< points of the chain, instead of `from` and `to`
   int links = 10;
   Real sag = 1;  ///< length of the chain as a multiple of the distance
   Real radius = 0.03;

@@ -1,7 +1,9 @@
 #include "producer/scene/particles.h"
 
 #include <numbers>
+#include <type_traits>
 
+#include "producer/scene/scene.h"
 #include "sim/core/rotation.h"
 
 namespace offstage::producer {
@@ -80,6 +82,43 @@ EventSource::EventSource() {
 Quat PlaneSurface::orientation() const {
   const Quat turned(Eigen::AngleAxisd(turn_deg * std::numbers::pi / 180, Vec3::UnitY()));
   return sim::rotation_between(Vec3::UnitY(), direction) * turned;
+}
+
+namespace {
+
+PlaneSurface rectangle(const Vec3& centre, const Vec3& size, Face face) {
+  const int axis = face <= Face::bottom ? 1 : face <= Face::right ? 0 : 2;
+  const bool positive = face == Face::top || face == Face::right || face == Face::front;
+  PlaneSurface plane;
+  plane.direction = (positive ? 1 : -1) * Vec3::Unit(axis);
+  plane.position = centre + size[axis] / 2 * plane.direction;
+  // The smallest rotation of +Y to the normal turns x into y (left, right), or z into y (front, back).
+  plane.size = {axis == 0 ? size.y() : size.x(), axis == 2 ? size.y() : size.z()};
+  return plane;
+}
+
+std::optional<EmitterSurface> cap(Real radius, Real height, Face face) {
+  if (face > Face::bottom || !(radius > 0)) return std::nullopt;
+  const Vec3 up = face == Face::top ? Vec3(Vec3::UnitY()) : Vec3(-Vec3::UnitY());
+  return DiscSurface{height / 2 * up, up, radius};
+}
+
+}  // namespace
+
+std::optional<EmitterSurface> face_of(const FaceSurface& surface, const Body* body) {
+  if (!body) return rectangle(surface.position, surface.size, surface.face);
+  const Face face = surface.face;
+  return std::visit(
+      [&]<class S>(const S& s) -> std::optional<EmitterSurface> {
+        if constexpr (std::is_same_v<S, sim::Box>) return rectangle(Vec3::Zero(), s.size, face);
+        if constexpr (std::is_same_v<S, sim::Cylinder>) return cap(s.radius, s.height, face);
+        if constexpr (std::is_same_v<S, sim::Cone>)
+          return cap(face == Face::bottom ? s.radius : 0, s.height, face);
+        if constexpr (std::is_same_v<S, sim::Frustum>)
+          return cap(face == Face::bottom ? s.radius : s.top_radius, s.height, face);
+        return std::nullopt;
+      },
+      body->shape);
 }
 
 Vec3& position_of(EmitterSurface& surface) {

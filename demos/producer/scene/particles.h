@@ -78,7 +78,8 @@ struct ParticlePlace {
 struct ParticleGroup {
   Where where;
   std::string name;
-  std::vector<ParticlePlace> places;  ///< after loading, those of the file follow
+  std::vector<ParticlePlace> places;  ///< after loading, those of the file and of `fill` follow
+  std::optional<Fill> fill;           ///< adds places
   std::string file;                   ///< PLY or OBJ file; empty: none
   Real scale = 1;
   std::optional<Vec3> fit;       ///< see MeshFile::fit
@@ -90,6 +91,8 @@ struct ParticleGroup {
   Real restitution = 0.5;
   Real friction = 0.5;
   Real charge = 0;
+  Real appear_at = 0;
+  Real remove_at = 1e30;
   ParticleBehaviour behaviour;  ///< its keys are directly in the group
   ParticleLook look;
 };
@@ -101,6 +104,7 @@ struct Split {
   Varying count = 2.0;
   Varying age = 1.0;
   Varying delay = 0.5;
+  int delay_steps = 0;  ///< in place of `delay`, in sub-steps of world.step
   int depth = 1;
   Varying velocity_percent = 100.0;
   Varying spread_deg = 0.0;
@@ -184,7 +188,18 @@ struct MeshSurface {
   Vec3 position = Vec3::Zero();
   Quat orientation = Quat::Identity();
 };
-using EmitterSurface = std::variant<PlaneSurface, SphereSurface, DiscSurface, MeshSurface>;
+enum class Face { top, bottom, left, right, front, back };
+/// A face of the emitter's body: of a box, or the flat top and bottom of a round shape. Without a body, a
+/// face of a cube.
+struct FaceSurface {
+  Face face = Face::top;
+  Vec3 position = Vec3::Zero();  ///< centre of the cube
+  Vec3 size = Vec3::Ones();      ///< of the cube
+};
+using EmitterSurface = std::variant<PlaneSurface, SphereSurface, DiscSurface, MeshSurface, FaceSurface>;
+/// Returns the face of a body's shape, or of the surface's own cube if it is null; none if the shape has no
+/// such face.
+std::optional<EmitterSurface> face_of(const FaceSurface& surface, const struct Body* body);
 
 /// Position of a surface.
 Vec3& position_of(EmitterSurface& surface);
@@ -203,7 +218,10 @@ struct Emitter : ParticleSource {
   EmitterSurface surface = PlaneSurface{};
   Vec3 direction = Vec3::Zero();  ///< zero: the normal of the surface
   bool overlap = false;
+  Real inherit_velocity = 1;  ///< share of the body's velocity that particles get
+  bool recoil = false;        ///< particles push the body back
   Varying rate = 100.0;
+  Varying rate_per_metre = 0.0;
   Varying count = 0.0;
   Varying interval = 0.1;
   std::vector<EmitterBurst> bursts;

@@ -42,8 +42,9 @@ struct WorldSettings {
   sim::SolverKind solver = sim::SolverKind::automatic;
   sim::ImpactLaw impact = sim::ImpactLaw::simultaneous;
   Real collision_speed = 0.05;  ///< bodies that approach more slowly do not bounce
-  bool sleep = true;            ///< whether islands at rest are not simulated
-  Real bounds = 1000;           ///< half the edge of the cube that contains all objects
+  sim::CollisionMethods collision;
+  bool sleep = true;   ///< whether islands at rest are not simulated
+  Real bounds = 1000;  ///< half the edge of the cube that contains all objects
   uint64_t seed = 1;
 };
 
@@ -126,6 +127,9 @@ struct Body {
   Vec3 angular_velocity = Vec3::Zero();
   Real density = 1000;
   Real mass = 0;
+  std::optional<Vec3> centre;   ///< centre of mass, in the body's frame; default: that of the shape
+  std::optional<Vec3> inertia;  ///< moments Ixx, Iyy, Izz about the centre of mass; default: the shape's
+  Vec3 inertia_products = Vec3::Zero();  ///< Ixy, Iyz, Izx of the inertia matrix, with `inertia`
   Real linear_drag = 0;
   Real angular_drag = 0;
   Vec3 friction_axis = Vec3::Zero();     ///< friction axis of the surface, in the body's frame
@@ -137,6 +141,8 @@ struct Body {
   sim::Interpolation interpolation = sim::Interpolation::monotone;
   bool loop = false;
   Vec3 spin = Vec3::Zero();
+  Real appear_at = 0;
+  Real remove_at = 1e30;
   Placement placement;  ///< its three keys are directly in the body
 
   /// Whether the parts of its shape move by an animation.

@@ -12,6 +12,7 @@
 #include "producer/base/error.h"
 #include "sim/core/types.h"
 #include "sim/geometry/shape.h"
+#include "sim/geometry/solid_mesh.h"
 
 namespace offstage::producer {
 
@@ -19,6 +20,15 @@ using effects::Varying;
 using sim::Quat;
 using sim::Real;
 using sim::Vec3;
+
+/// A time that never comes: the default of `remove_at` is later [s].
+inline constexpr Real kForever = 1e29;
+
+/// Whether an object with these times exists at a time; a rounding error before does not matter.
+inline bool exists(Real appear_at, Real remove_at, Real time) {
+  constexpr Real kRounding = 1e-9;
+  return time >= appear_at - kRounding && time < remove_at - kRounding;
+}
 
 /// Linear colour with straight alpha. In files "#rrggbb", "#rrggbbaa", "#rgb", "#rgba" (sRGB) or linear [r,
 /// g, b] or [r, g, b, a].
@@ -34,8 +44,25 @@ struct MeshFile {
   std::optional<Vec3> fit = {};  ///< edges of the box that the model just fits into before `scale` [m]
 };
 
+/// A solid in a compound.
+using PartShape = std::variant<sim::Sphere, sim::Box, sim::Capsule, sim::Cylinder, sim::Cone, sim::Frustum,
+                               sim::Ellipsoid, sim::Torus, sim::Tube, sim::OpenBox>;
+struct CompoundPart {
+  Where where;
+  PartShape shape = sim::Box{};
+  Vec3 position = Vec3::Zero();  ///< in the body's frame
+  Quat orientation = Quat::Identity();
+  std::optional<Real> density;  ///< default: the body's
+  std::string material;         ///< of its look; empty: the body's
+};
+/// Solids that form one body.
+struct Compound {
+  std::vector<CompoundPart> parts;
+};
+
 using Shape =
-    std::variant<sim::Sphere, sim::Box, sim::Capsule, sim::Cylinder, sim::Cone, sim::Plane, MeshFile>;
+    std::variant<sim::Sphere, sim::Box, sim::Capsule, sim::Cylinder, sim::Cone, sim::Plane, MeshFile,
+                 sim::Frustum, sim::Ellipsoid, sim::Torus, sim::Tube, sim::OpenBox, Compound>;
 
 /// Copies in a row or a ring: copy i is displaced by i * offset and rotated by i * turn_deg about the
 /// vertical through `pivot`.
@@ -59,7 +86,26 @@ struct Scatter {
   Varying scale = 1.0;    ///< factor of a body's shape and model
   uint64_t seed = 1;
 };
+struct BoxFill {
+  Vec3 size = Vec3::Ones();
+};
+struct CylinderFill {
+  Real radius = 0.5, height = 1;  ///< about the vertical
+};
+struct SphereFill {
+  Real radius = 0.5;
+};
+enum class Packing { hexagonal, cubic, random };
+/// Places that fill a volume, each at half the spacing or more from its surface.
+struct Fill {
+  std::variant<BoxFill, CylinderFill, SphereFill> shape = BoxFill{};
+  Vec3 position = Vec3::Zero();  ///< centre: relative to the original, or of particles in the world
+  Real spacing = 0;              ///< distance of neighbours; 0: the diameter of the particles
+  Packing packing = Packing::hexagonal;
+  uint64_t seed = 1;  ///< of random places
+};
 struct Placement {
+  std::optional<Fill> fill;
   std::optional<Repeat> repeat;
   std::optional<Grid> grid;
   std::optional<Scatter> scatter;

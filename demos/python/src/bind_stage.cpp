@@ -135,6 +135,11 @@ render::Mesh mesh_of(const sim::Shape& shape) {
           return render::make_cylinder(static_cast<float>(s.radius), static_cast<float>(s.height));
         if constexpr (std::is_same_v<S, sim::Cone>)
           return render::make_cone(static_cast<float>(s.radius), static_cast<float>(s.height));
+        if constexpr (std::is_same_v<S, sim::Frustum>)
+          return render::make_frustum(static_cast<float>(s.radius), static_cast<float>(s.top_radius),
+                                      static_cast<float>(s.height));
+        if constexpr (std::is_same_v<S, sim::Ellipsoid>)
+          return render::make_ellipsoid(s.radii.template cast<float>());
         if constexpr (std::is_same_v<S, sim::Plane>) return render::make_ground(256'000);
         throw std::invalid_argument("shape: give the vertices of a mesh to add_mesh");
       },

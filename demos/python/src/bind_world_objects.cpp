@@ -18,7 +18,9 @@ const std::map<std::string, sim::Interpolation> kInterpolations = {{"monotone", 
 const std::map<std::string, sim::JointType> kJoints = {
     {"spherical", sim::JointType::spherical}, {"fixed", sim::JointType::fixed},
     {"revolute", sim::JointType::revolute},   {"prismatic", sim::JointType::prismatic},
-    {"universal", sim::JointType::universal}, {"distance", sim::JointType::distance}};
+    {"universal", sim::JointType::universal}, {"distance", sim::JointType::distance},
+    {"gear", sim::JointType::gear},           {"rack", sim::JointType::rack},
+    {"screw", sim::JointType::screw},         {"pulley", sim::JointType::pulley}};
 const std::map<std::string, sim::Motor::Mode> kMotors = {{"none", sim::Motor::Mode::none},
                                                          {"speed", sim::Motor::Mode::speed},
                                                          {"position", sim::Motor::Mode::position}};
@@ -131,7 +133,13 @@ sim::JointHandle add_joint(LiveWorld& w, const std::string& type, sim::BodyHandl
   k.take("anchor", def.anchor);
   k.take("anchor_b", def.anchor_b);
   k.take("axis", def.axis);
+  if (def.type == sim::JointType::gear) def.second_axis = def.axis;
   k.take("second_axis", def.second_axis);
+  k.take("ratio", def.ratio);
+  k.take("pulley_a", def.pulley_a);
+  k.take("pulley_b", def.pulley_b);
+  k.take("restitution", def.restitution);
+  k.take("stiffness", def.stiffness);
   k.take("lower", def.lower);
   k.take("upper", def.upper);
   k.take("swing", def.swing);
@@ -386,7 +394,8 @@ void bind_building(py::class_<LiveWorld>& world) {
       .def("add_joint", &add_joint, py::arg("type"), py::arg("a"), py::arg("b") = py::none(),
            "Adds a joint between two bodies, or a body and the world. Types: spherical, fixed, revolute, "
            "prismatic,\n"
-           "universal, distance. Keywords: name, anchor, anchor_b, axis, second_axis, lower, upper, swing, "
+           "universal, distance, gear, rack, screw, pulley. Keywords: name, anchor, anchor_b, axis, "
+           "second_axis, ratio, pulley_a, pulley_b, restitution, stiffness, lower, upper, swing, "
            "friction,\n"
            "damping, max_force, max_torque, collide; motor ('speed', 'position'), motor_target, "
            "motor_effort,\n"

@@ -102,7 +102,8 @@ TEST(JointRows, FreeCoordinatesMoveAsTheirRowsSay) {
           at_a.axes = at_b.axes * Eigen::AngleAxisd(leans ? lean + t * lean_rate : 0, Vec3::UnitX()) *
                       Eigen::AngleAxisd(angle + t * rate, Vec3::UnitZ());
         const JointPlace place(at_a, frame, at_b, frame);
-        return std::pair(free_row(type, place, 1).error, leans ? swing_row(type, place).error : 0);
+        return std::pair(free_row(JointDef{.type = type}, place, 1).error,
+                         leans ? swing_row(type, place).error : 0);
       };
       constexpr Real kStep = 1e-5;
       const auto before = coordinates(-kStep), after = coordinates(kStep);
@@ -123,7 +124,7 @@ TEST(JointRows, FreeCoordinatesMoveAsTheirRowsSay) {
         return row.on_a.dot(join(at_a.velocity, at_a.angular_velocity)) +
                row.on_b.dot(join(at_b.velocity, at_b.angular_velocity));
       };
-      const JointRow row = free_row(type, place, 1);
+      const JointRow row = free_row(JointDef{.type = type}, place, 1);
       const Real turn = 2 * std::numbers::pi;
       EXPECT_NEAR(std::remainder(after.first - before.first, turn) / (2 * kStep), speed(row), 1e-5)
           << static_cast<int>(type);

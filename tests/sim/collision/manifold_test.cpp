@@ -259,6 +259,23 @@ TEST(Manifold, AFloorOfAlmostCoplanarTrianglesIsOneFace) {
   EXPECT_NEAR(area(on_slab), 2, 0.02);
 }
 
+// A solid with a bottom of 48 sides and a gentle slope around it, as the hull of a torus. Its sides at a
+// corner are almost in line and much shorter than the slope is wide, but the bottom is larger.
+TEST(Manifold, ABottomOfManySidesIsWiderThanTheSlopeBesideIt) {
+  std::vector<Vec3> corners;
+  for (int k = 0; k < 48; ++k) {
+    const Real angle = kPi * k / 24;
+    corners.push_back({0.3 * std::cos(angle), 0, 0.3 * std::sin(angle)});
+    corners.push_back({0.4 * std::cos(angle), 0.002, 0.4 * std::sin(angle)});
+  }
+  const ConvexPolyhedron solid = convex_hull(corners);
+  const Convex a = convex(solid), b = convex(Box{{4, 1, 4}});
+  const Manifold m = manifold_of(a, b, pose_at({0, -0.5, 0}), 0.01);
+  ASSERT_EQ(m.count, 4u);
+  EXPECT_LT((m.normal - Vec3::UnitY()).norm(), 1e-9);
+  EXPECT_NEAR(area(m), 2 * 0.3 * 0.3, 0.02 * 2 * 0.3 * 0.3);
+}
+
 // The ends lean outwards less steeply than the sides, so the face that most nearly faces the ground is an
 // end.
 TEST(Manifold, ABladeStandsOnBothEndsOfItsEdge) {

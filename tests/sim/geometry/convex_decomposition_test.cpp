@@ -90,7 +90,7 @@ void expect_tiling(const TriangleMesh& mesh, const ConvexDecomposition& d) {
   }
 }
 
-struct Solid {
+struct SampleSolid {
   const char* name;
   TriangleMesh mesh;
   Real volume;
@@ -101,7 +101,7 @@ Real prism_volume(uint32_t points, Real outer, Real inner, Real height) {
   return points * outer * inner * std::sin(std::numbers::pi / points) * height;
 }
 
-std::vector<Solid> solids() {
+std::vector<SampleSolid> solids() {
   return {{"L", l_solid(), 3, 2},
           {"U", u_solid(), 7, 3},
           {"cross", cross_solid(), 5, 3},
@@ -118,7 +118,7 @@ std::vector<Solid> solids() {
 }
 
 TEST(Decomposition, IsExactInAnyPoseAndSize) {
-  for (const Solid& s : solids()) {
+  for (const SampleSolid& s : solids()) {
     SCOPED_TRACE(s.name);
     for (Real scale : {0.01, 1.0, 100.0})
       for (uint64_t seed = 0; seed < 4; ++seed) {
@@ -132,7 +132,7 @@ TEST(Decomposition, IsExactInAnyPoseAndSize) {
 }
 
 TEST(Decomposition, PartsTileTheSolid) {
-  for (const Solid& s : solids()) {
+  for (const SampleSolid& s : solids()) {
     SCOPED_TRACE(s.name);
     const TriangleMesh mesh = placed_at_random(s.mesh, 1, 5);
     expect_tiling(mesh, decomposed(mesh));
@@ -185,7 +185,7 @@ TEST(Decomposition, CrumpledBalls) {
 }
 
 TEST(Decomposition, SinglePrecisionCoordinatesAreFlatEnough) {
-  for (const Solid& s : solids()) {
+  for (const SampleSolid& s : solids()) {
     SCOPED_TRACE(s.name);
     TriangleMesh mesh = placed_at_random(s.mesh, 1, 11);
     for (Vec3& v : mesh.vertices) v = v.cast<float>().cast<double>();

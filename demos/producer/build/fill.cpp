@@ -1,0 +1,139 @@
+#include "producer/build/fill.h"
+
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <type_traits>
+
+#include "effects/random.h"
+
+namespace offstage::producer {
+namespace {
+
+/// Half the size of the box around a volume.
+Vec3 half_size(const BoxFill& b) {
+  return b.size / 2;
+}
+Vec3 half_size(const CylinderFill& c) {
+  return {c.radius, c.height / 2, c.radius};
+}
+Vec3 half_size(const SphereFill& s) {
+  return Vec3::Constant(s.radius);
+}
+
+/// Whether a ball of this radius is inside.
+bool holds(const BoxFill& b, const Vec3& p, Real r) {
+  return ((b.size / 2 - p.cwiseAbs()).array() >= r).all();
+}
+bool holds(const CylinderFill& c, const Vec3& p, Real r) {
+  return std::hypot(p.x(), p.z()) <= c.radius - r && std::abs(p.y()) <= c.height / 2 - r;
+}
+bool holds(const SphereFill& s, const Vec3& p, Real r) {
+  return p.norm() <= s.radius - r;
+}
+
+Real row_step(Real d, bool cubic) {
+  return cubic ? d : d * std::numbers::sqrt3 / 2;
+}
+Real layer_step(Real d, bool cubic) {
+  return cubic ? d : d * std::sqrt(2.0 / 3);
+}
+
+/// Layers of rows: each row is shifted by half a step from the last one, each layer by a third of the
+/// triangle between rows, which is the closest packing of balls; or a cubic grid.
+template <class Add>
+void lay_lattice(const Vec3& half, Real d, bool cubic, Add&& add) {
+  const Real row = row_step(d, cubic), layer = layer_step(d, cubic);
+  constexpr Real kRounding = 1e-9;
+  const auto steps = [&](Real length, Real step) {
+    return length < 0 ? -1 : static_cast<int64_t>(std::floor(length / step + kRounding));
+  };
+  const Vec3 room = 2 * half - Vec3::Constant(d), low = -half + Vec3::Constant(d / 2);
+  const int64_t layers = steps(room.y(), layer);
+  for (int64_t k = 0; k <= layers; ++k) {
+    const Real shift_z = !cubic && k % 2 == 1 ? row / 3 : 0;
+    const int64_t rows = steps(room.z() - shift_z, row);
+    for (int64_t j = 0; j <= rows; ++j) {
+      const Real shift_x = !cubic && (j + k) % 2 == 1 ? d / 2 : 0;
+      const int64_t columns = steps(room.x() - shift_x, d);
+      for (int64_t i = 0; i <= columns; ++i)
+        if (!add(low + Vec3(static_cast<Real>(i) * d + shift_x, static_cast<Real>(k) * layer,
+                            static_cast<Real>(j) * row + shift_z)))
+          return;
+    }
+  }
+}
+
+/// Random sequential addition: places are tried until many in a row have no room.
+template <class Add>
+void lay_random(const Vec3& half, Real d, uint64_t seed, Add&& add) {
+  constexpr int kTries = 2000;
+  const effects::RandomStream random(seed, effects::stream_id("fill"));
+  using Cell = std::array<int64_t, 3>;
+  std::map<Cell, std::vector<Vec3>> cells;
+  const auto cell_of = [d](const Vec3& p) {
+    return Cell{static_cast<int64_t>(std::floor(p.x() / d)), static_cast<int64_t>(std::floor(p.y() / d)),
+                static_cast<int64_t>(std::floor(p.z() / d))};
+  };
+  const auto is_free = [&](const Vec3& p) {
+    const Cell c = cell_of(p);
+    for (int64_t x = -1; x <= 1; ++x)
+      for (int64_t y = -1; y <= 1; ++y)
+        for (int64_t z = -1; z <= 1; ++z)
+          if (const auto near = cells.find({c[0] + x, c[1] + y, c[2] + z}); near != cells.end())
+            for (const Vec3& q : near->second)
+              if ((p - q).squaredNorm() < d * d) return false;
+    return true;
+  };
+  int failures = 0;
+  for (uint64_t number = 0; failures < kTries; ++number) {
+    const auto u = [&](uint32_t axis) { return 2 * random.uniform(number, axis) - 1; };
+    const Vec3 p = half.cwiseProduct(Vec3(u(0), u(1), u(2)));
+    if (!is_free(p) || !add(p, true)) {
+      ++failures;
+      continue;
+    }
+    failures = 0;
+    cells[cell_of(p)].push_back(p);
+  }
+}
+
+}  // namespace
+
+/// Whether the box around a volume has so many places that the volume has more than `most`, or is much
+/// thinner than the spacing: a box is less than twice as large as a cylinder or ball in it.
+bool exceeds(const Vec3& half, const Fill& fill, Real spacing, std::size_t most) {
+  const bool cubic = fill.packing == Packing::cubic;
+  const Vec3 counts =
+      (2 * half).cwiseQuotient(Vec3(spacing, layer_step(spacing, cubic), row_step(spacing, cubic)));
+  return (counts + Vec3::Ones()).prod() > 8 * static_cast<Real>(most);
+}
+
+std::vector<Vec3> fill_places(const Fill& fill, Real spacing, std::size_t most) {
+  std::vector<Vec3> places;
+  constexpr Real kRounding = 1e-9;
+  std::visit(
+      [&](const auto& shape) {
+        // Adds a place if it is inside; returns whether the search goes on, or for a random one whether it
+        // was added.
+        const auto add = [&](const Vec3& p, bool random = false) {
+          const bool inside = holds(shape, p, spacing / 2 * (1 - kRounding)) && places.size() <= most;
+          if (inside) places.push_back(p);
+          return random ? inside : places.size() <= most;
+        };
+        const Vec3 half = half_size(shape);
+        if (exceeds(half, fill, spacing, most)) {
+          places.assign(most + 1, Vec3::Zero());
+          return;
+        }
+        if (fill.packing == Packing::random)
+          lay_random(half, spacing, fill.seed, add);
+        else
+          lay_lattice(half, spacing, fill.packing == Packing::cubic, add);
+      },
+      fill.shape);
+  return places;
+}
+
+}  // namespace offstage::producer

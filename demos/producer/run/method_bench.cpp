@@ -1,0 +1,152 @@
+#include "producer/run/method_bench.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <type_traits>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "producer/base/interrupt.h"
+#include "producer/format/table_world.h"
+#include "producer/run/csv.h"
+
+namespace offstage::producer {
+namespace {
+
+/// Adds a method for each value of a key except the present one.
+template <class E>
+void add_others(const std::string& key, E present, std::vector<Method>& methods) {
+  for (std::size_t i = 0; i < Names<E>::kNames.size(); ++i) {
+    if (i == static_cast<std::size_t>(present)) continue;
+    const std::string setting = fmt::format("{}={}", key, Names<E>::kNames[i]);
+    methods.push_back({setting, {"world." + setting}});
+  }
+}
+
+constexpr std::array kResultHeader = {"method",          "steps/s",     "steps",       "pairs tested",
+                                      "impact searches", "collisions",  "iterations",  "fall-backs",
+                                      "overlap mm",      "joint error", "deviation m", "fault"};
+using ResultRow = std::array<std::string, kResultHeader.size()>;
+
+ResultRow row_of(const MethodResult& r, const MethodResult& first) {
+  const SimulationTotals& t = r.totals;
+  const std::optional<double> deviation = r.deviation(first);
+  return {r.name,
+          fmt::format("{:.0f}", r.steps_per_second()),
+          fmt::format("{}", t.substeps),
+          fmt::format("{}", t.pairs_tested),
+          fmt::format("{}", t.impact_searches),
+          fmt::format("{}", t.collisions),
+          fmt::format("{}", r.iterations()),
+          fmt::format("{}", r.fallbacks()),
+          fmt::format("{:.3f}", 1000 * t.penetration),
+          fmt::format("{:.1e}", t.joint_error),
+          deviation ? fmt::format("{:.4g}", *deviation) : "",
+          r.fault};
+}
+
+}  // namespace
+
+std::vector<Method> methods_of(const Scene& scene) {
+  const sim::CollisionMethods& c = scene.world.collision;
+  std::vector<Method> methods = {{"scene", {}}};
+  add_others("solver", scene.world.solver, methods);
+  add_others("collision.narrow_phase", c.narrow_phase, methods);
+  add_others("collision.broad_phase", c.broad_phase, methods);
+  add_others("collision.impact_time", c.impact_time, methods);
+  methods.push_back({"collision: the book's",
+                     {"world.collision.narrow_phase=vclip", "world.collision.broad_phase=grid",
+                      "world.collision.impact_time=bisection"}});
+  return methods;
+}
+
+double MethodResult::steps_per_second() const {
+  return seconds > 0 ? static_cast<double>(totals.substeps) / seconds : 0;
+}
+
+uint64_t MethodResult::iterations() const {
+  return totals.exact.iterations + totals.fast.iterations + totals.impacts.iterations;
+}
+
+uint64_t MethodResult::fallbacks() const {
+  uint64_t sum = totals.toi_limit_reached + totals.restitution_suppressed + totals.joints_unsolved;
+  for (const sim::ContactWork* work : {&totals.exact, &totals.fast, &totals.impacts})
+    sum += work->fallbacks + work->over_budget;
+  return sum;
+}
+
+std::optional<double> MethodResult::deviation(const MethodResult& other) const {
+  if (!fault.empty() || !other.fault.empty()) return {};
+  double most = 0;
+  for (std::size_t i = 0; i < std::min(positions.size(), other.positions.size()); ++i)
+    most = std::max(most, (positions[i] - other.positions[i]).norm());
+  return most;
+}
+
+MethodResult run_method(const std::string& name, const LoadedScene& loaded, const ModelLibrary& models) {
+  MethodResult result;
+  result.name = name;
+  Simulation simulation(loaded.scene, models);
+  const int advances = simulation.advances_to(loaded.scene.frame_count());
+  const auto start = std::chrono::steady_clock::now();
+  try {
+    for (int i = 0; i < advances; ++i) {
+      if (const int signal = interrupt_signal()) throw Interrupted(signal);
+      simulation.advance();
+    }
+  } catch (const DivergedError& error) {
+    result.fault = error.what();
+  }
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.totals = simulation.totals();
+  for (const auto& body : simulation.moving_bodies())
+    result.positions.push_back(simulation.world().body(body.handle).pose.position);
+  return result;
+}
+
+void merge(MethodResult& result, const MethodResult& again) {
+  result.seconds = std::min(result.seconds, again.seconds);
+}
+
+std::string to_text(const std::vector<MethodResult>& results) {
+  std::vector<ResultRow> rows(1);
+  std::ranges::copy(kResultHeader, rows[0].begin());
+  for (const MethodResult& r : results) rows.push_back(row_of(r, results.front()));
+  std::array<std::size_t, kResultHeader.size()> width{};
+  for (const ResultRow& row : rows)
+    for (std::size_t i = 0; i < row.size(); ++i) width[i] = std::max(width[i], row[i].size());
+  std::string text;
+  for (const ResultRow& row : rows) {
+    std::string line;
+    for (std::size_t i = 0; i < row.size(); ++i)  // texts to the left, numbers to the right
+      line += i == 0 || i + 1 == row.size() ? fmt::format("{:<{}}  ", row[i], width[i])
+                                            : fmt::format("{:>{}}  ", row[i], width[i]);
+    text += line.substr(0, line.find_last_not_of(' ') + 1) + "\n";
+  }
+  return text;
+}
+
+std::string to_csv(const std::vector<MethodResult>& results) {
+  std::string text =
+      "method,seconds,steps,pairs_tested,impact_searches,collisions,iterations,fallbacks,penetration,"
+      "joint_error,deviation,fault\n";
+  for (const MethodResult& r : results) {
+    const SimulationTotals& t = r.totals;
+    CsvRows row;
+    row.text(r.name).number(r.seconds).count(t.substeps).count(t.pairs_tested).count(t.impact_searches);
+    row.count(t.collisions).count(r.iterations()).count(r.fallbacks());
+    row.number(t.penetration).number(t.joint_error);
+    if (const std::optional<double> deviation = r.deviation(results.front()))
+      row.number(*deviation);
+    else
+      row.text("");
+    row.text(r.fault);
+    row.end_row();
+    text += row.rows();
+  }
+  return text;
+}
+
+}  // namespace offstage::producer

@@ -1,0 +1,54 @@
+#pragma once
+/// Compares the algorithms that a scene can choose from: it simulates the film with each of them, and reports
+/// their cost, their work and their errors side by side.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "producer/build/models.h"
+#include "producer/build/simulation.h"
+#include "producer/format/scene_io.h"
+
+namespace offstage::producer {
+
+/// A choice of algorithms, as overrides of the scene.
+struct Method {
+  std::string name;                    ///< "scene" for the scene as it is, otherwise its first override
+  std::vector<std::string> overrides;  ///< such as "world.solver=fast"
+};
+
+/// The scene as it is, then one method for each other value of `world.solver` and of the keys of
+/// `world.collision`, and last the book's algorithms of collision detection together.
+std::vector<Method> methods_of(const Scene& scene);
+
+/// Results of one method over a whole film.
+struct MethodResult {
+  std::string name;
+  double seconds = 0;                ///< time of the simulation; the shortest of several runs [s]
+  SimulationTotals totals;           ///< work and fall-backs
+  std::vector<sim::Vec3> positions;  ///< of the moving bodies at the end [m]
+  std::string fault;                 ///< why the simulation diverged; empty if it did not
+
+  double steps_per_second() const;
+  /// Iterations of all contact solvers: pivots, Newton steps and sweeps.
+  uint64_t iterations() const;
+  /// Cases that the intended algorithm did not solve: those of the contact solvers, exceeded budgets and
+  /// limits of impacts, suppressed restitution, and failed projections of joints.
+  uint64_t fallbacks() const;
+  /// Greatest distance between a body's positions at the end of this run and of another one [m]; nothing if
+  /// either run diverged.
+  std::optional<double> deviation(const MethodResult& other) const;
+};
+
+/// Simulates all frames with the scene's methods. Throws Interrupted after a signal.
+MethodResult run_method(const std::string& name, const LoadedScene& loaded, const ModelLibrary& models);
+
+/// Keeps the shorter time of two runs of the same method.
+void merge(MethodResult& result, const MethodResult& again);
+
+/// A table in aligned columns, or as CSV. The deviation is that from the first result.
+std::string to_text(const std::vector<MethodResult>& results);
+std::string to_csv(const std::vector<MethodResult>& results);
+
+}  // namespace offstage::producer

@@ -1,0 +1,73 @@
+#pragma once
+/// Solids as closed meshes with the convex solids that fill them: the primitives, and the concave shapes
+/// torus, tube and open box, whose mass properties have closed forms (physics N7). Parts of compounds are
+/// made of them.
+
+#include <variant>
+#include <vector>
+
+#include "sim/core/types.h"
+#include "sim/geometry/convex_polyhedron.h"
+#include "sim/geometry/mass_properties.h"
+#include "sim/geometry/mesh.h"
+#include "sim/geometry/shape.h"
+
+namespace offstage::sim {
+
+/// A ring about Y, centred at the origin.
+struct Torus {
+  Real radius = 0.4;       ///< distance of the tube's centre line from the axis [m], > tube_radius
+  Real tube_radius = 0.1;  ///< [m], > 0
+};
+/// A hollow cylinder about Y, open at both ends.
+struct Tube {
+  Real radius = 0.5;     ///< of the outside [m], > thickness
+  Real height = 1;       ///< [m], > 0
+  Real thickness = 0.1;  ///< of the wall [m], > 0
+};
+/// A cuboid without its top at +Y, centred at the origin.
+struct OpenBox {
+  Vec3 size = Vec3::Ones();  ///< of the outside [m], > 0
+  Real thickness =
+      0.05;  ///< of the floor and the walls [m], less than half of the x and z sizes and the height
+};
+
+MassProperties mass_properties(const Torus& torus);
+MassProperties mass_properties(const Tube& tube);
+MassProperties mass_properties(const OpenBox& box);
+
+/// A closed mesh, and convex solids without overlap that fill it.
+struct SolidMesh {
+  TriangleMesh mesh;
+  std::vector<ConvexPolyhedron> parts;
+};
+
+/// Vertices are on the surface of the shape. A torus has 48 parts with 24 corners around the tube; a tube
+/// has 48. Flat sides between vertices deviate by at most 0.9 % of a tube_radius and 0.3 % of a radius.
+SolidMesh solid_mesh(const Torus& torus);
+SolidMesh solid_mesh(const Tube& tube);
+SolidMesh solid_mesh(const OpenBox& box);
+/// One convex part. A sphere has 32 x 16 faces, round sides have 48. Plane and MeshShape are not accepted.
+SolidMesh solid_mesh(const Shape& primitive);
+/// The solid at a pose.
+SolidMesh placed(SolidMesh solid, const Pose& pose);
+
+/// Mass, centre of mass and inertia of a body.
+struct BodyMass {
+  Real mass = 0;                ///< [kg]
+  Vec3 centre = Vec3::Zero();   ///< [m]
+  Mat3 inertia = Mat3::Zero();  ///< about the centre [kg m^2]
+};
+
+/// A uniform solid at a pose in a compound.
+struct MassPart {
+  MassProperties solid;
+  Pose pose;
+  Real density = 1000;  ///< [kg/m^3], > 0
+};
+
+/// The sums of rho_i V_i, of their moments, and of their inertias by the parallel axis theorem (the book's
+/// appendix D). Parts that overlap count twice.
+BodyMass sum_of(const std::vector<MassPart>& parts);
+
+}  // namespace offstage::sim
