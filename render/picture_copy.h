@@ -18,9 +18,6 @@ class PictureCopy {
   void change_all() { change(all_px_); }
   /// Copies the changed areas that are connected with `area_px`, at most once per change, and binds the copy.
   void update(GLuint picture, const Eigen::AlignedBox2i& area_px);
-  void update_all(GLuint picture) { update(picture, all_px_); }
-  /// The texture of the copy; 0 before the first update.
-  GLuint texture() const { return texture_; }
 
  private:
   GLenum format_, filter_;

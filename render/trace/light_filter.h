@@ -23,7 +23,6 @@ class LightPlane {
   LightPlane(int width_px, int height_px)
       : stride_(width_px + 2 * kMargin),
         values_(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(height_px)) {}
-  bool empty() const { return values_.empty(); }
   float* at(int x, int y) { return &values_[index(x, y)]; }
   const float* at(int x, int y) const { return &values_[index(x, y)]; }
   /// Eight pixels from x on.
