@@ -52,11 +52,13 @@ void ClothPass::draw_triangles(const Cloth& cloth) {
                  nullptr);
 }
 
-void ClothPass::bind(const Cloth& cloth, GLint texture_from_uv) {
+void ClothPass::bind(const Cloth& cloth, GLint texture_rows) {
   glBindBufferBase(GL_UNIFORM_BUFFER, kClothMaterialBlock, cloth.material->uniforms);
   if (cloth.material->textures[0] == 0) return;
   glBindTextureUnit(kClothTextureUnit, cloth.material->textures[0]);
-  glUniform2f(texture_from_uv, cloth.texture_from_uv.x(), cloth.texture_from_uv.y());
+  std::array<Vector3f, 2> rows = cloth.material->texture_rows;
+  for (Vector3f& row : rows) row.head<2>() = row.head<2>().cwiseProduct(cloth.texture_from_uv);
+  glUniform3fv(texture_rows, 2, rows[0].data());
 }
 
 void ClothPass::draw_shadow(const Cloth& cloth, const Matrix4f& shadow_clip_from_world) {

@@ -45,7 +45,7 @@ class ClothPass {
   void draw_surface(const Cloth& cloth);
 
  private:
-  static void bind(const Cloth& cloth, GLint texture_from_uv);
+  static void bind(const Cloth& cloth, GLint texture_rows);
   static void draw_triangles(const Cloth& cloth);
   gl::LazyProgram& program(const GpuMaterial& material, const Features& features);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "render/channels_pass.h"
@@ -17,10 +18,12 @@
 #include "render/points_pass.h"
 #include "render/puffs_pass.h"
 #include "render/shadow_map.h"
+#include "render/sky.h"
 #include "render/slots.h"
 #include "render/sprite_pictures.h"
 #include "render/streaks_pass.h"
 #include "render/surface_probe.h"
+#include "render/texture.h"
 
 namespace offstage::render {
 namespace {
@@ -75,6 +78,18 @@ Vector4f penumbra_of(const ShadowFrame& shadow, const Sun& sun, float size_px, i
           ratio * ratio, taps};
 }
 
+// Texture units of shaders/sky.glsl and sky.frag.
+constexpr GLuint kSkyLevelsUnit = 23, kSkyBackgroundUnit = 24;
+
+/// The beam as a lamp so far away that its light is the same everywhere.
+Lamp far_lamp(const SkyBeam& beam) {
+  constexpr float kDistance = 1e6f;  // [m]
+  return {.position = kDistance * beam.direction,
+          .intensity = kDistance * kDistance * beam.light,
+          .radius = 0,
+          .shadows = false};
+}
+
 }  // namespace
 
 struct Stage::Impl {
@@ -83,6 +98,10 @@ struct Stage::Impl {
   std::optional<Camera> camera_before;
   Sun sun;
   Environment environment;
+  SkyModel sky;                                    ///< of this sub-frame
+  Sun particle_sun;                                ///< see sun_of_particles()
+  std::shared_ptr<const SkyPicture> uploaded_sky;  ///< whose picture is in the textures
+  gl::Texture sky_levels, sky_background;
   std::vector<Lamp> lamps;
   std::vector<Lamp> shining;  ///< lamps and fires of this sub-frame
   float time = 0;
@@ -109,8 +128,7 @@ struct Stage::Impl {
   SurfaceProbe surface_probe;
   LinesPass lines_pass;
   std::optional<ChannelsPass> channels_pass;  ///< created on first use
-  gl::LazyProgram sky_program{
-      {"frame.glsl", "sky.vert"}, {"frame.glsl", "sky.glsl", "noise.glsl", "sky.frag"}, {"FLAT 1"}};
+  std::map<Features, gl::LazyProgram> sky_programs;
   gl::VertexArray no_attributes = gl::make_vertex_array();
   gl::StreamBuffer frame_buffer;
   std::vector<float> strip;
@@ -132,6 +150,8 @@ struct Stage::Impl {
     frame_buffer.write(std::span<const FrameUniforms>(&frame, 1));
     glBindBufferBase(GL_UNIFORM_BUFFER, kFrameBlock, frame_buffer);
   }
+  void prepare_sky();
+  void draw_sky();
   std::vector<PointSet*> prepare_points(const View& view);
   std::vector<const Cloth*> prepare_cloths();
   void draw_shadows(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
@@ -155,6 +175,34 @@ struct Stage::Impl {
   void draw_lines(const View& view);
   void add_picture(const FrameUniforms& frame, HdrImage& sum);
 };
+
+// The sky's picture as textures, and what depends on the sun.
+void Stage::Impl::prepare_sky() {
+  sky = make_sky(sun, environment);
+  particle_sun = sun_of_particles(sun, sky);
+  const std::shared_ptr<const SkyPicture>& picture_of_sky = environment.picture;
+  if (!picture_of_sky) return;
+  if (uploaded_sky != picture_of_sky) {
+    sky_levels = make_texture(picture_of_sky->levels());
+    sky_background = make_texture(picture_of_sky->background());
+    uploaded_sky = picture_of_sky;
+  }
+  glBindTextureUnit(kSkyLevelsUnit, sky_levels);
+  glBindTextureUnit(kSkyBackgroundUnit, sky_background);
+}
+
+// Where nothing was drawn.
+void Stage::Impl::draw_sky() {
+  Features defines = {"FLAT 1"};
+  for (const std::string& feature : features)
+    if (feature.starts_with("SKY_")) defines.push_back(feature);
+  const std::vector<std::string_view> vertex = {"frame.glsl", "sky.vert"};
+  const std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "noise.glsl", "sky.frag"};
+  sky_programs.try_emplace(defines, vertex, fragment, defines).first->second.use();
+  glDepthFunc(GL_EQUAL);
+  glBindVertexArray(no_attributes);
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+}
 
 std::vector<PointSet*> Stage::Impl::prepare_points(const View& view) {
   std::vector<PointSet*> result;
@@ -204,7 +252,7 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
       std::ranges::any_of(sheets, [](const Cloth* cloth) { return cloth->is_translucent(); }) ||
       std::ranges::any_of(sets, [](const PointSet* set) { return set->def.style != PointStyle::sphere; });
   ShadowFrame shadow;
-  if (sun.shadows && needed)
+  if (particle_sun.shadows && needed)
     shadow = fit_shadow(casters, view, frame.sun_direction.head<3>(), frame.eye.w(), def.shadow_map_px);
   if (shadow.texel_m > 0) {
     Matrix4f map_from_clip = Matrix4f::Identity();
@@ -215,7 +263,7 @@ void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span
       frame.shadow_rows[static_cast<std::size_t>(row)] = map_from_world.row(row).transpose();
     const auto size = static_cast<float>(def.shadow_map_px);
     frame.shadow.head<3>() << shadow.texel_m, size, 1 / size;
-    frame.penumbra = penumbra_of(shadow, sun, size, offsets.count);
+    frame.penumbra = penumbra_of(shadow, particle_sun, size, offsets.count);
     frame.sun_direction.w() = 1;
   }
   upload(frame);
@@ -237,11 +285,15 @@ void Stage::Impl::prepare_lamps(std::span<PointSet* const> sets, const SampleOff
   shining = lamps;
   for (const PointSet* set : sets)
     if (set->def.style == PointStyle::fire) shining.push_back(lamp_of_fire(*set));
-  prepare_lamp_uniforms(shining, offsets, frame);
+  std::vector<Lamp> of_particles = shining;
+  if (sky.has_bright_part() && sun.intensity > 0) of_particles.push_back(far_lamp(sky.turned.beam()));
+  prepare_lamp_uniforms(of_particles, offsets, frame);
   frame.air.y() = time;
   features.clear();
   if (puffs_pass.shades()) features.push_back("SMOKE 1");
-  if (frame.air.x() > 0) features.push_back("LAMPS 1");
+  if (frame.air.x() > 0 || sky.has_bright_part()) features.push_back("LAMPS 1");
+  if (sky.turned.picture) features.push_back("SKY_PICTURE 1");
+  if (sky.turned.picture && !sky.seen_as_colors) features.push_back("SKY_SEEN 1");
 }
 
 // Depth and surfaces of everything opaque. The depth also limits later shading to what is visible.
@@ -285,8 +337,9 @@ void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<
                         set->def.softness);
   }
   scene.build();
-  light_sources = {.sun = sun, .sky = make_sky(sun, environment), .fog = environment.fog};
+  light_sources = {.sun = sun, .sky = sky, .fog = environment.fog};
   for (const Lamp& lamp : shining) light_sources.lamps.emplace_back(lamp);
+  if (sky.has_bright_part()) light_sources.lamps.emplace_back(sky.turned);
   if (puffs_pass.shades()) light_sources.smoke = &puffs_pass.grid();
   light_pass.trace(light_sources, view, offsets);
 }
@@ -325,12 +378,7 @@ void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<Po
   for (const PointSet* set : sets) {
     if (set->def.style == PointStyle::sphere) points_pass.draw_spheres(*set, features);
   }
-  if (environment.visible) {
-    glDepthFunc(GL_EQUAL);  // only where nothing was drawn
-    sky_program.use();
-    glBindVertexArray(no_attributes);
-    glDrawArrays(GL_TRIANGLES, 0, 3);
-  }
+  if (environment.visible) draw_sky();
   glDepthMask(GL_TRUE);
   glDepthFunc(GL_GREATER);
   picture.depth_copy.change_all();
@@ -460,7 +508,9 @@ void Stage::Impl::draw_translucent(std::span<const Cloth* const> sheets, std::sp
   const std::vector<TranslucentBody> bodies = find_bodies(sheets, view, regions);
   probe_surfaces(bodies, sets, view, frame, regions);
   paint_order.build(sets, regions, view);
-  const PuffLight light(puffs_pass.grid(), frame, sun.direction.normalized());
+  SkyModel sky_of_frame = sky;
+  sky_of_frame.sun_direction = frame.sun_direction.head<3>();
+  const PuffLight light(puffs_pass.grid(), frame, sky_of_frame, particle_sun.direction.normalized());
   points_pass.prepare_blended(paint_order);
   puffs_pass.prepare_splats(paint_order, view, light, shadow_map);
   streaks_pass.prepare(paint_order, view, light, shadow_map, new_frame);
@@ -512,7 +562,10 @@ MeshHandle Stage::add_mesh(const Mesh& mesh) {
 }
 
 void Stage::set_mesh(MeshHandle handle, const Mesh& mesh) {
-  *impl_->meshes[handle] = GpuMesh(mesh);
+  GpuMesh& known = *impl_->meshes[handle];
+  GpuMesh next(mesh);
+  next.remember(known);
+  known = std::move(next);
   gl::check_error("uploading a mesh");
 }
 
@@ -627,6 +680,7 @@ void Stage::set_object(PointsHandle points, uint32_t id) {
 void Stage::store_previous_transforms() {
   Impl& s = *impl_;
   s.camera_before = s.camera;
+  s.meshes.for_each([](const std::unique_ptr<GpuMesh>& mesh) { mesh->store(); });
   s.instances.for_each([](const std::unique_ptr<Instance>& i) { i->before = i->world_from_mesh; });
   s.cloths.for_each([](const std::unique_ptr<Cloth>& cloth) {
     cloth->before.clear();
@@ -673,12 +727,13 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   }
   sum.transparent = !s.environment.visible;
   const View view = make_view(s.camera, offsets, s.def.width_px, s.def.height_px);
-  FrameUniforms frame = make_frame(view, s.sun, s.environment, offsets, s.def.height_px);
+  s.prepare_sky();
+  FrameUniforms frame = make_frame(view, s.particle_sun, s.environment, offsets, s.def.height_px);
 
   std::vector<const Instance*> shown;
   s.instances.for_each([&](const std::unique_ptr<Instance>& instance) { shown.push_back(instance.get()); });
   const std::vector<PointSet*> sets = s.prepare_points(view);
-  s.puffs_pass.prepare(sets, s.sun, frame);
+  s.puffs_pass.prepare(sets, s.particle_sun, frame);
   s.particles_behind_glass =
       std::ranges::any_of(shown, [](const Instance* i) { return i->visible && i->material->glass; }) &&
       std::ranges::any_of(sets, [](const PointSet* set) { return set->def.style != PointStyle::sphere; });

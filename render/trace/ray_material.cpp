@@ -52,6 +52,7 @@ RayMaterial::RayMaterial(const Material& material, std::span<const Image> textur
       pattern_(material.pattern),
       pattern_scale_(std::max(material.pattern_scale, 1e-4f)),
       alpha_cutoff_(material.alpha_cutoff),
+      triplanar_(material.triplanar),
       map_(material.base_color_texture) {
   pattern_color_ = material.pattern_color;
   mean_color_ = pattern_color(pattern_, Vector3f::Zero(), Vector3f::UnitY(), 1e3f * pattern_scale_,
@@ -83,6 +84,15 @@ Vector4f RayMaterial::texel(const Vector2f& uv) const {
   return (1 - t) * ((1 - s) * at(0, 0) + s * at(1, 0)) + t * ((1 - s) * at(0, 1) + s * at(1, 1));
 }
 
+// As triplanar_color() in shaders/mesh.frag.
+Vector4f RayMaterial::triplanar_texel(const Vector3f& p, const Vector3f& n) const {
+  const Vector3f weight = n.array().square().square();
+  const Vector2f x(n.x() < 0 ? p.z() : -p.z(), -p.y()), y(n.y() < 0 ? -p.x() : p.x(), p.z()),
+      z(n.z() < 0 ? -p.x() : p.x(), -p.y());
+  return (weight.x() * texel(x) + weight.y() * texel(y) + weight.z() * texel(z)) /
+         std::max(weight.sum(), 1e-12f);
+}
+
 Vector4f RayMaterial::color(const Hit& hit, float footprint) const {
   Vector4f result = color_;
   if (pattern_ != Pattern::none)
@@ -91,7 +101,9 @@ Vector4f RayMaterial::color(const Hit& hit, float footprint) const {
                            : pattern_color(pattern_, hit.object_position, hit.object_normal, footprint,
                                            color_.head<3>(), pattern_color_, pattern_scale_);
   result = result.cwiseProduct(hit.color);
-  if (texture_) result = result.cwiseProduct(texel(hit.uv));
+  if (texture_)
+    result = result.cwiseProduct(triplanar_ ? triplanar_texel(hit.object_position, hit.object_normal)
+                                            : texel(hit.uv));
   if (alpha_cutoff_ > 0) result.w() = result.w() < alpha_cutoff_ ? 0.0f : 1.0f;
   return result;
 }

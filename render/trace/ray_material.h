@@ -31,13 +31,14 @@ class RayMaterial {
 
  private:
   Vector4f texel(const Vector2f& uv) const;
+  Vector4f triplanar_texel(const Vector3f& place, const Vector3f& normal) const;
 
   Vector4f color_;
   Vector3f pattern_color_, mean_color_;
   Pattern pattern_ = Pattern::none;
   float pattern_scale_ = 1;
   float alpha_cutoff_ = 0;
-  bool opaque_ = true;
+  bool opaque_ = true, triplanar_ = false;
   TextureMap map_;
   std::shared_ptr<const Image> texture_;
   Vector4f mean_texel_ = {1, 1, 1, 1};
