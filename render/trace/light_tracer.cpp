@@ -98,11 +98,11 @@ Vector3f limited(const Vector3f& light, LightSums& sums) {
   return kept;
 }
 
-// GGX as in shaders/light.glsl.
-Lanes lobe_of(Lanes a, Lanes nl, Lanes nv, Lanes nh) {
+// GGX as in shaders/light.glsl; `most`: its limit.
+Lanes lobe_of(Lanes a, Lanes nl, Lanes nv, Lanes nh, Lanes most) {
   const Lanes a2 = a * a, d = nh * nh * (a2 - 1) + 1;
   const Lanes mean = 2 * nl * nv * (1 - a) + (nl + nv) * a;
-  return smaller(a2 / (d * d) * 0.5f / larger(mean, Lanes{} + 1e-6f), Lanes{} + 40);
+  return smaller(a2 / (d * d) * 0.5f / larger(mean, Lanes{} + 1e-6f), most);
 }
 
 /// Probability density of a direction that visible_facet() mirrors, for a = roughness^2 [1/sr].
@@ -112,7 +112,14 @@ T mirror_density(T a, T nv, T nh) {
   const T a2 = a * a, d = nh * nh * (a2 - 1.0f) + 1.0f;
   const T density =
       a2 / (2 * std::numbers::pi_v<float> * d * d * (nv + square_root(a2 + (1.0f - a2) * nv * nv)));
-  return a < kSharp ? T{} + 1e30f : density;
+  return a < kSharp ? T{} + 1e18f : density;
+}
+
+/// Weight of a direction that was found with density a, and could have been found in another way with density
+/// b: the power heuristic (E. Veach, "Robust Monte Carlo Methods", 1997).
+template <class T>
+T share_of_way(T a, T b) {
+  return a * a / (a * a + b * b + 1e-30f);
 }
 
 }  // namespace
@@ -206,12 +213,10 @@ Vector3f LightTracer::sky_met(const Vector3f& direction, bool sharp, float densi
   const TurnedSky& turned = sources_.sky.turned;
   if (!turned.picture) return sharp ? sky_seen(direction) : sky_radiance(sources_.sky, direction);
   const Vector3f there = turned.to_picture(direction);
-  if (!sharp) return turned.intensity * turned.picture->dim(there);
+  if (!sharp && density < 0) return turned.intensity * turned.picture->dim(there);
   float share = 1;
-  if (density >= 0) {
-    const float by_lamp = turned.picture->density(there);
-    share -= turned.picture->bright_share(there) * by_lamp / (by_lamp + density);
-  }
+  if (density >= 0)
+    share -= turned.picture->bright_share(there) * share_of_way(turned.picture->density(there), density);
   return share * turned.intensity * turned.picture->seen(there);
 }
 
@@ -311,6 +316,7 @@ struct LightTracer::Path {
   /// Leaves a surface in a mirrored direction.
   void turn(const Vector3f& way, const Hit& hit) {
     mirrored = true;
+    density = -1;
     direction = way.dot(hit.face) > 0 ? way : reflected(way, hit.face);
     from = off_surface(hit.position, hit.face);
   }
@@ -324,8 +330,8 @@ bool LightTracer::follow_glass(const Hit& hit, const Vector3f& albedo, PixelSamp
   const RayMaterial& material = *hit.material;
   if (material.transmission <= 0) return false;
   if (hit.front && material.transmission < 1) {
-    const Vector3f light = direct_light(hit, off_surface(hit.position, hit.face), sampler) +
-                           sky_radiance(sources_.sky, hit.normal);
+    const Vector3f light =
+        direct_light(hit, off_surface(hit.position, hit.face), sampler) + sky_met(hit.normal, false, -1);
     sum += (1 - material.transmission) * path.share.cwiseProduct(albedo).cwiseProduct(light);
     path.share *= material.transmission;
   }
@@ -364,7 +370,7 @@ Vector3f LightTracer::radiance(Path path, PixelSampler& sampler, const VisibleLi
   for (int step = 0; step < kMostSteps; ++step) {
     Hit hit;
     if (!scene_.first_hit(path.from, path.direction, kFar, hit)) {
-      return sum + path.share.cwiseProduct(sky_met(path.direction, sharp, step == 0 ? path.density : -1.0f));
+      return sum + path.share.cwiseProduct(sky_met(path.direction, sharp, path.density));
     }
     if (step == 0 && met != nullptr) *met = hit.distance;
     const int pixel = visible != nullptr && sharp ? visible->find(hit) : -1;
@@ -373,7 +379,9 @@ Vector3f LightTracer::radiance(Path path, PixelSampler& sampler, const VisibleLi
     travelled += hit.distance;
     if (sources_.fog > 0) {
       const float clear = std::exp(-sources_.fog * hit.distance);
-      sum += path.share.cwiseProduct(sky_seen(path.direction)) * (1 - clear);
+      const Vector3f haze = sources_.sky.turned.picture ? horizon_color(sources_.sky, path.direction)
+                                                        : sky_seen(path.direction);
+      sum += path.share.cwiseProduct(haze) * (1 - clear);
       path.share *= clear;
     }
     const RayMaterial& material = *hit.material;
@@ -461,12 +469,14 @@ void LightTracer::trace_lamps(const Points& points, int x, int y, const LightVie
     const LaneVectors h = normalized(point.towards + to_eye);
     const Lanes wide = 0.5f * lamp.def().radius / larger(point.distance, none + 1e-6f) + 0.002f;
     const Lanes m = 1 - clamped_to(dot(to_eye, h), 0, 1);
+    // A lamp is a single bright point in the mirror; what rays meet, too, has a weight in place of a limit.
+    const Lanes most = point.density > 0.0f ? none + 1e12f : none + 40;
     const Lanes lobe =
-        lobe_of(smaller(larger(rough * rough, wide), none + 1), nl, nv, clamped_to(dot(n, h), 0, 1));
-    // The traced mirror image has the rest of the weight (E. Veach, "Robust Monte Carlo Methods", 1997).
+        lobe_of(smaller(larger(rough * rough, wide), none + 1), nl, nv, clamped_to(dot(n, h), 0, 1), most);
+    // The traced mirror image has the rest of the weight.
     const Lanes by_mirror = mirror_density(rough * rough, nv, clamped_to(dot(n, h), 0, 1));
     const Lanes weight =
-        (points.mirrors & (point.density > 0.0f)) ? point.density / (point.density + by_mirror) : none + 1;
+        (points.mirrors & (point.density > 0.0f)) ? share_of_way(point.density, by_mirror) : none + 1;
     const LaneVectors bright = arriving * (lit ? lobe * weight : none);
     lobes = lobes + bright;
     const Lanes m2 = m * m;

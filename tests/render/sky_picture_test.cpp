@@ -2,11 +2,16 @@
 
 #include "render/sky_picture.h"
 
-#include <cmath>
-#include <numbers>
-
+#include "render/error.h"
+#include "render/frame_files.h"
 #include "render/image_io.h"
+#include "render/mesh_io.h"
+#include "render/tone_map.h"
+#include "render/trace/ray_material.h"
+#include "render/trace/ray_scene.h"
 #include "tests/render/gl_fixture.h"
+#include "tests/render/gltf_samples.h"
+#include "tests/render/scratch.h"
 
 namespace offstage::render {
 namespace {
@@ -83,9 +88,11 @@ TEST(SkyPicture, DimAndBrightPartAddUpToTheLightOfADisc) {
                       (static_cast<float>(i / kSamples) + 0.5f) / kSamples);
     const SkyPicture::Sample sample = picture.sample(uv);
     EXPECT_GT(sample.direction.dot(middle), std::cos(12.5f * kPi / 180));
-    EXPECT_NEAR(picture.bright_share(sample.direction) * picture.seen(sample.direction).y() /
-                    (sample.light.y() * picture.density(sample.direction)),
-                1, 0.01f);
+    if (sample.direction.dot(middle) > std::cos(11 * kPi / 180)) {  // seen() interpolates at the edge
+      EXPECT_NEAR(picture.bright_share(sample.direction) * picture.seen(sample.direction).y() /
+                      (sample.light.y() * picture.density(sample.direction)),
+                  1, 0.01f);
+    }
     bright += sample.light * (std::max(sample.direction.dot(middle), 0.0f) / kPi);
     mean += sample.direction;
   }
@@ -150,7 +157,7 @@ Vector3f mean_color(const HdrImage& picture, const Vector2f& place, int half) {
 const Material kPlaster{.color = {1, 1, 1, 1}, .roughness = 1};
 
 // The furnace: a white ball in a picture of one colour cannot be told from the picture behind it.
-TEST(SkyPictureLight, AWhiteBallVanishesInAPictureOfOneColour) {
+TEST(StageSkyPicture, AWhiteBallVanishesInAPictureOfOneColour) {
   LitStage s(sky_of([](const Vector3f&) { return Vector3f(Vector3f::Constant(0.35f)); }), 0, true, 2);
   s.add(make_sphere(1), kPlaster);
   s.look({.eye = {0, 0, 4}, .target = {0, 0, 0}});
@@ -161,7 +168,7 @@ TEST(SkyPictureLight, AWhiteBallVanishesInAPictureOfOneColour) {
 
 // A bright disc of radius r, whose middle has the cosine c to the normal: the radiance of a white floor is
 // L sin(r)^2 c. (A rough dielectric reflects up to 4 % more, as in sunlight.)
-TEST(SkyPictureLight, OfABrightDiscFollowsItsFormFactor) {
+TEST(StageSkyPicture, OfABrightDiscFollowsItsFormFactor) {
   for (const float cosine : {1.0f, 0.5f}) {
     const Vector3f middle(std::sqrt(1 - cosine * cosine), cosine, 0);
     LitStage s(disc_sky(middle, 8, {30, 30, 30}, 0, 1024));
@@ -173,11 +180,13 @@ TEST(SkyPictureLight, OfABrightDiscFollowsItsFormFactor) {
   }
 }
 
-// A small sun in the picture gives light without noise and a shadow with a soft edge, where a ball hides it.
-TEST(SkyPictureLight, OfASmallSunHasNoNoise) {
-  LitStage s(disc_sky(Vector3f(0, 1, 0), 1, {5000, 5000, 5000}, 0.1f, 1024));
+// A small sun in the picture, three rows of pixels around the zenith, gives light without noise and a shadow,
+// where a black ball hides it.
+TEST(StageSkyPicture, OfASmallSunHasNoNoise) {
+  const float radius_deg = 3 * 180.0f / 512;
+  LitStage s(disc_sky(Vector3f(0, 1, 0), radius_deg, {5000, 5000, 5000}, 0.1f, 1024));
   s.add(make_ground(20), kPlaster);
-  s.add(make_sphere(0.5f), kPlaster, {0, 1, 0});
+  s.add(make_sphere(0.5f), {.color = {0, 0, 0, 1}, .roughness = 1}, {0, 1, 0});
   s.look({.eye = {0, 5, 5}, .target = {0, 0, 0}, .fov_deg = 50});
   const HdrImage picture = s.mean_of(4);
   const Vector2f open = s.place_of({1.6f, 0, 0});
@@ -190,12 +199,12 @@ TEST(SkyPictureLight, OfASmallSunHasNoNoise) {
                    2.0f) /
           81;
   EXPECT_LT(std::sqrt(variance) / lit, 0.01f);
-  EXPECT_NEAR(lit / (5000 * std::pow(std::sin(kPi / 180), 2.0f) + 0.1f), 1, 0.06f);
+  EXPECT_NEAR(lit / (5000 * std::pow(std::sin(radius_deg * kPi / 180), 2.0f) + 0.1f), 1, 0.06f);
   EXPECT_LT(mean_color(picture, s.place_of({0, 0, 0.1f}), 1).y() / lit, 0.1f);
 }
 
 // Red light from +x and blue light from -x; half a turn exchanges them.
-TEST(SkyPictureLight, TurnsWithThePicture) {
+TEST(StageSkyPicture, TurnsWithThePicture) {
   const HdrImage sky =
       sky_of([](const Vector3f& d) { return d.x() > 0 ? Vector3f(1, 0, 0) : Vector3f(0, 0, 1); });
   for (const float turn : {0.0f, 180.0f}) {
@@ -208,7 +217,7 @@ TEST(SkyPictureLight, TurnsWithThePicture) {
 }
 
 // The background shows the picture in the directions of its pixels.
-TEST(SkyPictureLight, BackgroundIsThePictureAroundTheEye) {
+TEST(StageSkyPicture, BackgroundIsThePictureAroundTheEye) {
   const auto color = [](const Vector3f& d) {
     return Vector3f(d.x() > 0 ? 0.8f : 0.2f, d.y() > 0 ? 0.9f : 0.1f, d.z() < 0 ? 0.7f : 0.3f);
   };
@@ -226,7 +235,7 @@ TEST(SkyPictureLight, BackgroundIsThePictureAroundTheEye) {
   EXPECT_NEAR((pixel(picture, 20, 100).head<3>() - Vector3f(0.2f, 0.1f, 0.7f)).norm(), 0, 0.01f);
 }
 
-TEST(SkyPictureLight, BackgroundIsBlurredOrHidden) {
+TEST(StageSkyPicture, BackgroundIsBlurredOrHidden) {
   const HdrImage sky =
       sky_of([](const Vector3f& d) { return d.x() > 0 ? Vector3f(1, 1, 1) : Vector3f(0, 0, 0); });
   LitStage s(sky);
@@ -253,7 +262,7 @@ TEST(SkyPictureLight, BackgroundIsBlurredOrHidden) {
 // A rough mirror shows the mean of the sky over its lobe, which is partly found by the rays of the mirror
 // image and partly by those to the bright part: the integral of the density of mirrored directions times the
 // radiance.
-TEST(SkyPictureLight, RoughMetalMirrorsTheBrightPartOnce) {
+TEST(StageSkyPicture, RoughMetalMirrorsTheBrightPartOnce) {
   const Vector3f middle = Vector3f(0, 1, -1).normalized();
   const HdrImage sky = disc_sky(middle, 5, {40, 40, 40}, 0.05f, 1024);
   const SkyPicture whole(sky);
@@ -339,8 +348,8 @@ Image half_red_half_green() {
 
 // One copy is 2 m wide: seen from outside of each face, red is right of the middle, as a viewer who stands
 // upright sees it; and so it is for rays.
-TEST(Triplanar, LaysTheTextureUprightOnEachSide) {
-  Material material{.color = {1, 1, 1, 1}, .unlit = true, .triplanar = true};
+TEST(StageTriplanar, LaysTheTextureUprightOnEachSide) {
+  Material material{.color = {1, 1, 1, 1}, .triplanar = true, .unlit = true};
   material.base_color_texture = {.image = 0, .nearest = true};
   material.base_color_texture.rows = {Vector3f(0.5f, 0, 0), Vector3f(0, 0.5f, 0)};
   const std::vector<Image> textures = {half_red_half_green()};
@@ -371,7 +380,7 @@ TEST(Triplanar, LaysTheTextureUprightOnEachSide) {
 }
 
 // Where the normal is between two axes, both projections are mixed.
-TEST(Triplanar, BlendsBetweenTheSides) {
+TEST(StageTriplanar, BlendsBetweenTheSides) {
   Material material{.color = {1, 1, 1, 1}, .triplanar = true};
   material.base_color_texture = {.image = 0, .nearest = true};
   material.base_color_texture.rows = {Vector3f(0.5f, 0, 0), Vector3f(0, 0.5f, 0)};
