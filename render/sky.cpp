@@ -64,17 +64,6 @@ Vector3f horizon_color(const SkyModel& sky, const Vector3f& direction) {
   return sky.turned.intensity * sky.turned.picture->mirrored(sky.turned.to_picture(level), kRoughnessOfHaze);
 }
 
-Sun sun_of_particles(const Sun& sun, const SkyModel& sky) {
-  if (sun.intensity > 0 || !sky.turned.picture || !sky.turned.picture->has_bright_part()) return sun;
-  const SkyBeam beam = sky.turned.beam();
-  const float intensity = beam.light.maxCoeff();
-  if (!(intensity > 0)) return sun;
-  return {.direction = beam.direction,
-          .color = beam.light / intensity,
-          .intensity = intensity,
-          .size_deg = beam.size_deg};
-}
-
 std::array<Vector3f, 9> sky_irradiance(const SkyModel& sky) {
   if (sky.turned.picture) return sky.turned.irradiance();
   // Squares of the constants of the real spherical harmonics times the factors of the cosine lobe over pi (1,

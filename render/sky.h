@@ -34,10 +34,6 @@ Vector3f sky_mirrored(const SkyModel& sky, const Vector3f& direction, float roug
 /// Colour of fog in a direction, as horizon_color() in shaders/sky.glsl.
 Vector3f horizon_color(const SkyModel& sky, const Vector3f& direction);
 
-/// The sun that lights particles and translucent bodies, which are not traced: that of the scene or, if there
-/// is none, the bright part of the sky's picture.
-Sun sun_of_particles(const Sun& sun, const SkyModel& sky);
-
 /// Spherical-harmonics coefficients of the sky's irradiance. The radiance of a white diffuse surface with
 /// normal (x, y, z) is their sum weighted by 1, y, z, x, xy, yz, 3zz - 1, xz, xx - yy.
 std::array<Vector3f, 9> sky_irradiance(const SkyModel& sky);
