@@ -85,12 +85,12 @@ def write_hdr(path, width, height, radiance):
             run = 1
             while k + run < len(values) and run < 127 and values[k + run] == values[k]:
                 run += 1
-            if run >= 4:
+            if run >= 3:
                 out += bytes((128 + run, values[k]))
                 k += run
                 continue
             start = k
-            while k < len(values) and k - start < 128 and not (values[k:k + 4] == values[k:k + 1] * 4):
+            while k < len(values) and k - start < 128 and values[k:k + 3] != values[k:k + 1] * 3:
                 k += 1
             out += bytes((k - start,)) + bytes(values[start:k])
         return out
