@@ -188,19 +188,23 @@ Contents read_webp(FileView& file) {
   return found;
 }
 
-/// Animated PNG: a frame control chunk for every frame, up to IEND at the end.
+/// Animated PNG: a frame control chunk for every frame, up to IEND at the end. A film of one frame is a plain
+/// PNG.
 Contents read_apng(FileView& file) {
   Contents found;
   if (!file.is(0, "\x89PNG\r\n\x1a\n")) return found;
   uint64_t at = 8;
+  bool animated = false;
   while (at + 12 <= file.size()) {
     const uint64_t length = file.big(at, 4);
     if (length > file.size() - at - 12) return found;
     found.frames += file.is(at + 4, "fcTL");
+    animated = animated || file.is(at + 4, "acTL");
     const bool last = file.is(at + 4, "IEND");
     at += 12 + length;
     if (last) found.whole = at == file.size();
   }
+  if (!animated) found.frames = 1;
   return found;
 }
 

@@ -11,8 +11,12 @@ namespace offstage::render {
 namespace {
 
 constexpr int kRowsPerFilterTask = 16;
-constexpr float kShareOfReach = 0.3f;  // of the mean distance around, over which light is taken as even
-constexpr int kRun = 32;               // pixels that are averaged together
+// Shares of the mean distance around over which light is taken as even: all light, and noisy light.
+constexpr float kShareOfReach = 0.3f, kNoisyShareOfReach = 0.2f;
+// Least distance around noisy light, as a share of the height and in pixels; less leaves noise in corners.
+constexpr float kLeastNoisyShare = 0.1f, kLeastNoisy_px = 36;
+constexpr float kNoReach = 1e30f;  // 1 / distance^2: nothing is averaged
+constexpr int kRun = 32;           // pixels that are averaged together
 
 void for_filter_rows(int height_px, const auto& each) {
   tbb::parallel_for(tbb::blocked_range<int>(0, height_px, kRowsPerFilterTask), [&](const auto& rows) {
@@ -34,20 +38,80 @@ LightGuide::LightGuide(int width, int height)
       filled(width, height),
       inverse_size2(width, height) {}
 
-void LightGuide::find_reach(const LightPlane& inverse_distance, LightPlane& reach2) const {
-  for_filter_rows(height_px, [&](int y) {
-    for (int x = 0; x < width_px; ++x) {
-      float sum = 0, count = 0;
-      for (int row = std::max(y - 2, 0); row <= std::min(y + 2, height_px - 1); ++row) {
-        const float* inverse = inverse_distance.at(x, row);
-        const float* present = filled.at(x, row);
-        for (int dx = -2; dx <= 2; ++dx) {
-          sum += inverse[dx] * present[dx];
-          count += present[dx];
+namespace {
+
+constexpr int kBlock = 8;  // pixels
+
+/// Sums over blocks of pixels, of a brightness and of its square.
+class BlockSums {
+ public:
+  BlockSums(const LightGuide& guide, const LightPlane& brightness)
+      : columns_((guide.width_px + kBlock - 1) / kBlock),
+        rows_((guide.height_px + kBlock - 1) / kBlock),
+        sums_(static_cast<std::size_t>(columns_ * rows_)) {
+    tbb::parallel_for(0, rows_, [&](int row) {
+      for (int y = row * kBlock; y < std::min((row + 1) * kBlock, guide.height_px); ++y) {
+        const float *value = brightness.at(0, y), *filled = guide.filled.at(0, y);
+        for (int x = 0; x < guide.width_px; ++x) {
+          Sums& sums = at(x / kBlock, row);
+          sums.count += filled[x];
+          sums.value += filled[x] * value[x];
+          sums.square += filled[x] * value[x] * value[x];
         }
       }
-      const float mean = sum / std::max(count, 1.0f);
-      *reach2.at(x, y) = mean * mean / (kShareOfReach * kShareOfReach);
+    });
+  }
+  /// Variance over the square of the mean, in a block and its neighbours.
+  float relative_variance(int column, int row) const {
+    Sums total;
+    for (int y = std::max(row - 1, 0); y <= std::min(row + 1, rows_ - 1); ++y)
+      for (int x = std::max(column - 1, 0); x <= std::min(column + 1, columns_ - 1); ++x) {
+        const Sums& part = at(x, y);
+        total.count += part.count;
+        total.value += part.value;
+        total.square += part.square;
+      }
+    if (!(total.value > 0)) return 0;
+    return std::max(total.count * total.square / (total.value * total.value) - 1, 0.0f);
+  }
+
+ private:
+  struct Sums {
+    float count = 0, value = 0, square = 0;
+  };
+  Sums& at(int column, int row) { return sums_[static_cast<std::size_t>(row * columns_ + column)]; }
+  const Sums& at(int column, int row) const {
+    return sums_[static_cast<std::size_t>(row * columns_ + column)];
+  }
+
+  int columns_, rows_;
+  std::vector<Sums> sums_;
+};
+
+}  // namespace
+
+void LightGuide::find_reach(const LightPlane& inverse_distance, const LightPlane& brightness,
+                            LightPlane& reach2, LightPlane& noisy_reach2) const {
+  const BlockSums blocks(*this, brightness);
+  const float least_px = std::min(kLeastNoisyShare * static_cast<float>(height_px), kLeastNoisy_px);
+  for_filter_rows(height_px, [&](int y) {
+    for (int x = 0; x < width_px; x += kLanes) {
+      Lanes sum{}, count{};
+      for (int row = std::max(y - 2, 0); row <= std::min(y + 2, height_px - 1); ++row)
+        for (int dx = -2; dx <= 2; ++dx) {
+          const Lanes present = filled.lanes(x + dx, row);
+          sum += present * inverse_distance.lanes(x + dx, row);
+          count += present;
+        }
+      const float noise = blocks.relative_variance(x / kBlock, y / kBlock);
+      const float noisy = std::max(1 - 1 / std::max(noise, 1e-6f), 0.0f);
+      const Lanes mean = sum / larger(count, Lanes{} + 1);
+      const Lanes most = square_root(inverse_size2.lanes(x, y)) * (1 / least_px);
+      const Lanes inverse = mean + noisy * (smaller(mean, most) - mean);
+      const float noisy_share = kNoisyShareOfReach * noisy;
+      reach2.set_lanes(x, y, inverse * inverse * (1 / (kShareOfReach * kShareOfReach)));
+      noisy_reach2.set_lanes(
+          x, y, noisy > 0 ? inverse * inverse * (1 / (noisy_share * noisy_share)) : Lanes{} + kNoReach);
     }
   });
 }

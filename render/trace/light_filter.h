@@ -17,7 +17,7 @@ namespace offstage::render {
 /// A picture of numbers with empty margins at the sides, so that filters need not check for them.
 class LightPlane {
  public:
-  static constexpr int kMargin = 16;  ///< pixels; at least the largest step, and a vector
+  static constexpr int kMargin = 32;  ///< pixels; at least the largest step plus a vector
 
   LightPlane() = default;
   LightPlane(int width_px, int height_px)
@@ -45,9 +45,12 @@ class LightPlane {
 /// The surfaces in a picture, which say how far light may be averaged.
 struct LightGuide {
   LightGuide(int width_px, int height_px);
-  /// From 1 / (distance that a ray went) of each pixel, computes 1 / distance^2 over which light may vary. It
-  /// is a mean of the neighbourhood, since a single ray says little.
-  void find_reach(const LightPlane& inverse_distance, LightPlane& reach2) const;
+  /// From 1 / (distance that a ray went) and the brightness that it found, for each pixel, computes
+  /// 1 / distance^2 over which light may be averaged: a share of the mean distance around. `noisy_reach2` is
+  /// that of further steps, which only noisy light needs: light whose variance exceeds the square of its
+  /// mean. All are means of the neighbourhood, since a single ray says little.
+  void find_reach(const LightPlane& inverse_distance, const LightPlane& brightness, LightPlane& reach2,
+                  LightPlane& noisy_reach2) const;
 
   int width_px, height_px;
   std::array<LightPlane, 3> place, normal;

@@ -18,6 +18,7 @@ constexpr int kMostSteps = 32;    // along a path, mirrors and glass included
 constexpr int kRowsPerTask = 8;
 constexpr float kBrightest =
     50;  // of light that arrives after bounces; brighter samples would stay visible as dots
+constexpr int kWidestStep = 16;        // of the filter of light from around, in cells
 constexpr float kSmoothMetal = 0.35f;  // with less roughness, a path goes on in the mirrored direction
 
 constexpr float kGrazing = 0.02f;      // cosine between light and triangle; with less, it may shadow itself
@@ -183,7 +184,9 @@ LightBuffer::LightBuffer(int width, int height)
       around(cells.width_px, cells.height_px, 3),
       mirrors(cells.width_px, cells.height_px, 3),
       inverse_distance(cells.width_px, cells.height_px),
+      brightness(cells.width_px, cells.height_px),
       reach2(cells.width_px, cells.height_px),
+      noisy_reach2(cells.width_px, cells.height_px),
       with_mirror(cells.width_px, cells.height_px),
       with_rough_mirror(cells.width_px, cells.height_px) {
   arriving.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
@@ -472,8 +475,15 @@ Vector3f LightTracer::radiance(Path path, PixelSampler& sampler, const VisibleLi
     path.share = path.share.cwiseProduct(albedo);
     if (pixel >= 0) {
       const Vector4f light = visible->arriving(pixel);
-      const float sun = sources_.sun.intensity * std::max(hit.normal.dot(sources_.sky.sun_direction), 0.0f);
+      const float cosine = hit.normal.dot(sources_.sky.sun_direction);
+      const float sun = sources_.sun.intensity * (std::max((1 - hit.translucency) * cosine, 0.0f) +
+                                                  std::max(-hit.translucency * cosine, 0.0f));
       return sum + path.share.cwiseProduct(light.head<3>() + sun * light.w() * sources_.sun.color);
+    }
+    if (hit.translucency > 0 && sampler.next().x < hit.translucency) {  // light from the other side
+      hit.normal = -hit.normal;
+      hit.face = -hit.face;
+      path.from = off_surface(hit.position, hit.face);
     }
     sum += path.share.cwiseProduct(direct_light(hit, path.from, sampler));
     // Paths end at random in proportion to the light that they can still carry.
@@ -667,6 +677,7 @@ void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, const
   }
   store(light.around.channels(), x, y, around);
   light.inverse_distance.set_lanes(x, y, inverse_distance);
+  light.brightness.set_lanes(x, y, around.x + around.y + around.z);
 }
 
 namespace {
@@ -720,10 +731,11 @@ void LightTracer::trace_arriving(const SurfaceBuffer& surfaces, const LightView&
   });
   light.direct.average(light.pixels, light.pixels.filled, nullptr, 1);
   if (glows) light.glow.average(light.pixels, light.pixels.filled, nullptr, 1);
-  light.cells.find_reach(light.inverse_distance, light.reach2);
+  light.cells.find_reach(light.inverse_distance, light.brightness, light.reach2, light.noisy_reach2);
   const int widest = view.offsets.count >= 16 ? 4 : 8;
-  for (int step = 1; step <= widest; step *= 2)
-    light.around.average(light.cells, light.cells.filled, &light.reach2, step);
+  for (int step = 1; step <= kWidestStep; step *= 2)
+    light.around.average(light.cells, light.cells.filled,
+                         step <= widest ? &light.reach2 : &light.noisy_reach2, step);
   for_light_rows(height, [&](int y) {
     const std::size_t row = index_of(0, y, width);
     interpolate(light.pixels, light.cells, y, {&light.around, &light.cells.filled},

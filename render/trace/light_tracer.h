@@ -43,8 +43,8 @@ struct LightBuffer {
   LightValues direct;           ///< of the pixels: visible share of the sun, then diffuse light of lamps
   LightValues glow;             ///< of the pixels: light of glowing meshes; empty: there are none
   LightValues around, mirrors;  ///< of the cells
-  LightPlane inverse_distance, reach2;        ///< see LightGuide::find_reach
-  LightPlane with_mirror, with_rough_mirror;  ///< cells: 1 or 0
+  LightPlane inverse_distance, brightness, reach2, noisy_reach2;  ///< see LightGuide::find_reach
+  LightPlane with_mirror, with_rough_mirror;                      ///< cells: 1 or 0
 };
 
 /// Light at the glass surfaces in a part of the picture, rows from the bottom up.

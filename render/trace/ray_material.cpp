@@ -71,6 +71,7 @@ RayMaterial::RayMaterial(const Material& material, std::span<const Image> textur
       roughness(material.roughness),
       transmission(material.transmission),
       refraction(std::max(material.refraction, 1.0f)),
+      translucency(material.fabric.translucency),
       thin(material.thin),
       unlit(material.unlit),
       vertex_colors(material.vertex_colors),

@@ -329,6 +329,7 @@ void RayScene::Object::describe_cloth(unsigned triangle, const Vector3f& from, c
   hit.face = (b.position - a.position).cross(c.position - a.position).normalized();
   hit.normal = mixed(a.normal, b.normal, c.normal, uv).normalized();
   if (!hit.normal.allFinite()) hit.normal = hit.face;
+  hit.translucency = material->translucency;
   const Vector2f along = mixed(a.uv, b.uv, c.uv, uv);
   hit.object_position = {along.x(), along.y(), 0};
   hit.object_normal = Vector3f::UnitZ();

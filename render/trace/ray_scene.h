@@ -66,6 +66,7 @@ struct Hit {
   Vector3f face = Vector3f::Zero();    ///< of the triangle, unit, on the side of the ray's origin
   bool front = true;
   const RayMaterial* material = nullptr;
+  float translucency = 0;                       ///< of a cloth, else 0
   unsigned object = 0, triangle = 0;            ///< numbers in the scene and in the mesh
   Vector3f object_position = Vector3f::Zero();  ///< for patterns
   Vector3f object_normal = Vector3f::Zero();

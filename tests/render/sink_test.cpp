@@ -208,6 +208,15 @@ TEST(VideoSink, KeepsAlphaInProResAndVp9) {
   }
 }
 
+TEST(VideoSink, AFilmMayHaveOneFrame) {
+  const ScratchFolder folder;
+  for (const std::string extension : {".mp4", ".webm", ".mov", ".mkv", ".gif", ".webp", ".apng", ".png"}) {
+    EXPECT_NO_THROW(film({.path = folder / ("one" + extension), .width_px = 64, .height_px = 48}, 1))
+        << extension;
+    EXPECT_TRUE(std::filesystem::exists(folder / ("one" + extension))) << extension;
+  }
+}
+
 TEST(VideoSink, TheSameFramesGiveTheSameFile) {
   const ScratchFolder folder;
   for (const std::string extension : {".mp4", ".webm", ".mov", ".apng"}) {
