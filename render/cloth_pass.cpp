@@ -54,7 +54,9 @@ void ClothPass::bind(const Cloth& cloth) {
   glBindBufferBase(GL_UNIFORM_BUFFER, kClothMaterialBlock, cloth.material->uniforms);
   if (cloth.material->textures[0] == 0) return;
   glBindTextureUnit(kClothTextureUnit, cloth.material->textures[0]);
-  glUniform2f(0, cloth.texture_from_uv.x(), cloth.texture_from_uv.y());
+  std::array<Vector3f, 2> rows = cloth.material->texture_rows;
+  for (Vector3f& row : rows) row.head<2>() = row.head<2>().cwiseProduct(cloth.texture_from_uv);
+  glUniform3fv(0, 2, rows[0].data());
 }
 
 void ClothPass::draw_depth(const Cloth& cloth) {

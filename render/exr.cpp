@@ -1,4 +1,6 @@
-// The EXR files of channels.h and frame_files.h.
+// The EXR files of channels.h, frame_files.h and exr.h.
+
+#include "render/exr.h"
 
 #include <algorithm>
 #include <cstring>
@@ -15,6 +17,7 @@
 #include <half.h>
 
 #include "render/channels.h"
+#include "render/error.h"
 #include "render/file_io.h"
 #include "render/frame_files.h"
 #include "render/image_io.h"
@@ -41,9 +44,74 @@ class Buffer : public Imf::OStream {
   std::size_t at_ = 0;
 };
 
+/// Bytes in memory as a file.
+class Bytes : public Imf::IStream {
+ public:
+  explicit Bytes(std::span<const uint8_t> bytes) : Imf::IStream("memory"), bytes_(bytes) {}
+  bool read(char c[], int n) override {
+    const auto size = static_cast<std::size_t>(n);
+    if (at_ > bytes_.size() || size > bytes_.size() - at_) throw std::runtime_error("it ends too early");
+    std::memcpy(c, bytes_.data() + at_, size);
+    at_ += size;
+    return at_ < bytes_.size();
+  }
+  uint64_t tellg() override { return at_; }
+  void seekg(uint64_t place) override { at_ = place; }
+
+ private:
+  std::span<const uint8_t> bytes_;
+  std::size_t at_ = 0;
+};
+
+HdrImage decode_rgb(std::span<const uint8_t> bytes, uint64_t max_pixels) {
+  constexpr int kMostSide = 16384;
+  Bytes stream(bytes);
+  Imf::InputFile file(stream, 0);
+  const Imath::Box2i window = file.header().dataWindow();
+  const int64_t width = int64_t{window.max.x} - window.min.x + 1,
+                height = int64_t{window.max.y} - window.min.y + 1;
+  if (width < 1 || height < 1 || width > kMostSide || height > kMostSide ||
+      static_cast<uint64_t>(width * height) > max_pixels)
+    throw std::runtime_error("it has " + std::to_string(width) + "x" + std::to_string(height) +
+                             " pixels, of at most " + std::to_string(max_pixels >> 20) + " Mi and " +
+                             std::to_string(kMostSide) + " a side");
+  const Imf::ChannelList& channels = file.header().channels();
+  const bool grey = channels.findChannel("R") == nullptr;
+  const char* names[] = {grey ? "Y" : "R", grey ? "Y" : "G", grey ? "Y" : "B"};
+  HdrImage image{static_cast<int>(width), static_cast<int>(height), {}};
+  image.rgba.assign(image.pixel_count() * 4, 1.0f);
+  Imf::FrameBuffer pixels;
+  const std::size_t stride = 4 * sizeof(float), row = stride * static_cast<std::size_t>(width);
+  for (std::size_t c = 0; c < (grey ? 1u : 3u); ++c) {
+    const Imf::Channel* channel = channels.findChannel(names[c]);
+    if (channel == nullptr || channel->xSampling != 1 || channel->ySampling != 1)
+      throw std::runtime_error("it has no channels R, G and B of full resolution, and no Y");
+    // The library's origin is that of the display window.
+    auto* base = reinterpret_cast<char*>(image.rgba.data() + c);
+    base -=
+        static_cast<std::ptrdiff_t>(stride) * window.min.x + static_cast<std::ptrdiff_t>(row) * window.min.y;
+    pixels.insert(names[c], Imf::Slice(Imf::FLOAT, base, stride, row));
+  }
+  file.setFrameBuffer(pixels);
+  file.readPixels(window.min.y, window.max.y);
+  for (std::size_t i = 0; grey && i < image.rgba.size(); i += 4)
+    image.rgba[i + 1] = image.rgba[i + 2] = image.rgba[i];
+  return image;
+}
+
 constexpr const char* kSettings = "offstage settings";
 
 }  // namespace
+
+HdrImage decode_exr(std::span<const uint8_t> bytes, const std::string& name, uint64_t max_pixels) {
+  try {
+    return decode_rgb(bytes, max_pixels);
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw FileError(name + ": cannot be read as an image: " + one_line(error.what()));
+  }
+}
 
 void write_exr(const std::filesystem::path& path, const HdrImage& image, const std::string& settings) {
   constexpr float kLargest = 65504;  // of a half float

@@ -164,8 +164,8 @@ FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& en
   frame.sun_radiance = vec4(sun.color * sun.intensity, 0.5f * sun.size_deg * kRadians);
   frame.zenith = vec4(sky.zenith, environment.fog);
   frame.horizon = vec4(sky.horizon, offsets.count >= kManySamples ? 1.f : 0.f);
-  frame.ground = vec4(sky.ground);
-  frame.glow = vec4(sky.glow);
+  frame.ground = vec4(sky.ground, sky.turned.intensity);
+  frame.glow = vec4(sky.glow, environment.picture_turn_deg / 360);
   const std::array<Vector3f, 9> irradiance = sky_irradiance(sky);
   for (std::size_t k = 0; k < 7; ++k)
     frame.irradiance[k] = vec4(irradiance[k], k < 6 ? irradiance[7 + k / 3][static_cast<int>(k % 3)] : 0);

@@ -1,6 +1,9 @@
 #include "render/image_io.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <memory>
 #include <stdexcept>
 
@@ -9,17 +12,17 @@
 #include <unistd.h>
 
 #include "render/error.h"
+#include "render/exr.h"
 #include "render/file_io.h"
 #include "render/gltf_packed.h"
 #include "render/output_file.h"
 #include "render/png.h"
+#include "render/tone_map.h"
 
 #define STB_IMAGE_IMPLEMENTATION
 #define STB_IMAGE_STATIC
 #define STBI_FAILURE_USERMSG
 #define STBI_NO_STDIO
-#define STBI_NO_HDR
-#define STBI_NO_LINEAR
 #define STBI_NO_PIC
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wunused-function"
@@ -39,6 +42,70 @@ namespace {
 constexpr int kMaxSide = 16384;  // also OpenGL's limit here
 constexpr uint64_t kMaxImageBytes = uint64_t{1} << 30;
 
+FileError unreadable_image(const std::string& name, const std::string& why) {
+  return FileError(name + ": cannot be read as an image: " + why);
+}
+
+/// The size that the file declares, checked before anything is decoded.
+void check_image_size(int width, int height, const std::string& name, uint64_t max_pixels) {
+  const std::string size =
+      "it has " + std::to_string(width) + "x" + std::to_string(height) + " pixels, of at most ";
+  if (width > kMaxSide || height > kMaxSide)
+    throw unreadable_image(name, size + std::to_string(kMaxSide) + " a side");
+  if (static_cast<uint64_t>(width) * static_cast<uint64_t>(height) > max_pixels)
+    throw unreadable_image(name, size + std::to_string(max_pixels >> 20) + " Mi");
+}
+
+void check_declared_size(std::span<const uint8_t> bytes, const std::string& name, uint64_t max_pixels) {
+  int width = 0, height = 0, channels = 0;
+  if (!stbi_info_from_memory(bytes.data(), static_cast<int>(bytes.size()), &width, &height, &channels))
+    throw unreadable_image(name, stbi_failure_reason());
+  check_image_size(width, height, name, max_pixels);
+}
+
+template <class T>
+using StbPixels = std::unique_ptr<T, void (*)(void*)>;
+
+bool is_exr(std::span<const uint8_t> bytes) {
+  constexpr uint8_t kMagic[] = {0x76, 0x2F, 0x31, 0x01};
+  return bytes.size() > 4 && std::memcmp(bytes.data(), kMagic, 4) == 0;
+}
+
+/// Calls value(i) for the three colours of all pixels; i counts samples of RGBA.
+HdrImage filled_light(int width, int height, const auto& value) {
+  HdrImage image{width, height, {}};
+  image.rgba.resize(image.pixel_count() * 4);
+  for (std::size_t i = 0; i < image.rgba.size(); ++i) image.rgba[i] = i % 4 == 3 ? 1.0f : value(i);
+  return image;
+}
+
+HdrImage decode_light(std::span<const uint8_t> bytes, const std::string& name, uint64_t max_pixels) {
+  const int size = static_cast<int>(bytes.size());
+  if (is_exr(bytes)) return decode_exr(bytes, name, max_pixels);
+  int width = 0, height = 0, channels = 0;
+  if (!is_webp(bytes) && stbi_is_hdr_from_memory(bytes.data(), size)) {
+    check_declared_size(bytes, name, max_pixels);
+    const StbPixels<float> pixels(
+        stbi_loadf_from_memory(bytes.data(), size, &width, &height, &channels, STBI_rgb_alpha),
+        stbi_image_free);
+    if (!pixels) throw unreadable_image(name, stbi_failure_reason());
+    return filled_light(width, height, [&](std::size_t i) { return pixels.get()[i]; });
+  }
+  if (!is_webp(bytes) && bytes[0] != 'P' && stbi_is_16_bit_from_memory(bytes.data(), size)) {
+    check_declared_size(bytes, name, max_pixels);
+    const StbPixels<stbi_us> pixels(
+        stbi_load_16_from_memory(bytes.data(), size, &width, &height, &channels, STBI_rgb_alpha),
+        stbi_image_free);
+    if (!pixels) throw unreadable_image(name, stbi_failure_reason());
+    return filled_light(width, height, [&](std::size_t i) {
+      return srgb_decode(static_cast<float>(pixels.get()[i]) / 65535);
+    });
+  }
+  const Image image = decode_image(bytes, name, max_pixels);
+  return filled_light(image.width_px, image.height_px,
+                      [&](std::size_t i) { return srgb_decode(static_cast<float>(image.rgba[i]) / 255); });
+}
+
 std::vector<uint8_t> without_alpha(const Image& image) {
   std::vector<uint8_t> rgb(image.rgba.size() / 4 * 3);
   const uint8_t* in = image.rgba.data();
@@ -57,34 +124,43 @@ Image read_image(const std::filesystem::path& path, uint64_t max_pixels) {
 }
 
 Image decode_image(std::span<const uint8_t> bytes, const std::string& name, uint64_t max_pixels) {
-  const auto fail = [&](const std::string& why) -> FileError {
-    return FileError(name + ": cannot be read as an image: " + why);
-  };
+  const auto fail = [&](const std::string& why) { return unreadable_image(name, why); };
   if (bytes.empty()) throw fail("it is empty");
   if (bytes.size() > kMaxImageBytes) throw fail("it is larger than 1 GiB");
   if (is_webp(bytes)) return decode_webp(bytes, name, max_pixels);
   const int size = static_cast<int>(bytes.size());
+  if (is_exr(bytes) || stbi_is_hdr_from_memory(bytes.data(), size))
+    throw fail("HDR and EXR pictures are used for environment.picture alone; convert it to PNG");
   int width = 0, height = 0, channels = 0;
-  if (!stbi_info_from_memory(bytes.data(), size, &width, &height, &channels))
-    throw fail(stbi_failure_reason());
-  if (width > kMaxSide || height > kMaxSide) {
-    throw fail("it has " + std::to_string(width) + "x" + std::to_string(height) + " pixels, of at most " +
-               std::to_string(kMaxSide) + " a side");
-  }
-  if (static_cast<uint64_t>(width) * static_cast<uint64_t>(height) > max_pixels) {
-    throw fail("it has " + std::to_string(width) + "x" + std::to_string(height) + " pixels, of at most " +
-               std::to_string(max_pixels >> 20) + " Mi");
-  }
+  check_declared_size(bytes, name, max_pixels);
   if (bytes[0] == 'P' && stbi_is_16_bit_from_memory(bytes.data(), size)) {
     throw fail("PNM of 16 bits is not supported; convert it to PNG");  // stb_image swaps their bytes
   }
-  const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(
+  const StbPixels<stbi_uc> pixels(
       stbi_load_from_memory(bytes.data(), size, &width, &height, &channels, STBI_rgb_alpha), stbi_image_free);
   if (!pixels) throw fail(stbi_failure_reason());
   Image image{width, height, {}};
   image.rgba.assign(pixels.get(), pixels.get() + image.pixel_count() * 4);
   image.transparent = channels == 2 || channels == 4;
   return image;
+}
+
+LightImage decode_light_image(std::span<const uint8_t> bytes, const std::string& name, uint64_t max_pixels) {
+  if (bytes.empty()) throw unreadable_image(name, "it is empty");
+  if (bytes.size() > kMaxImageBytes) throw unreadable_image(name, "it is larger than 1 GiB");
+  constexpr float kLargest = 65504;  // of a half float
+  LightImage result{decode_light(bytes, name, max_pixels), {}};
+  std::size_t raised = 0, limited = 0;
+  for (float& value : result.image.rgba) {
+    if (!(value >= 0)) ++raised;
+    if (std::isinf(value) && value > 0) ++limited;
+    value = !(value >= 0) ? 0.0f : std::isinf(value) ? kLargest : value;
+  }
+  if (raised > 0)
+    result.warnings.push_back(std::to_string(raised) + " values are negative or not numbers; 0 was used");
+  if (limited > 0)
+    result.warnings.push_back(std::to_string(limited) + " values are infinite; 65504 was used");
+  return result;
 }
 
 std::vector<uint8_t> encode_png(const Image& image, const std::string& settings) {

@@ -23,6 +23,19 @@ Image read_image(const std::filesystem::path& path, uint64_t max_pixels = kMaxIm
 Image decode_image(std::span<const uint8_t> bytes, const std::string& name,
                    uint64_t max_pixels = kMaxImagePixels);
 
+inline constexpr uint64_t kMaxLightPixels = uint64_t{1} << 25;  ///< limit for pictures of light: 8192 x 4096
+
+/// Linear light of a picture, with what was repaired.
+struct LightImage {
+  HdrImage image;  ///< finite values, at least 0; alpha is 1
+  std::vector<std::string> warnings;
+};
+/// Reads Radiance HDR, OpenEXR (RGB or Y), or a picture in sRGB that read_image() reads, with all of its
+/// bits. Values that are negative or not numbers become 0, infinite ones the largest half float; both with a
+/// warning. Throws FileError.
+LightImage decode_light_image(std::span<const uint8_t> bytes, const std::string& name,
+                              uint64_t max_pixels = kMaxLightPixels);
+
 /// Encodes PNG: RGBA if the image is transparent, otherwise RGB. This does not depend on the pixels, so all
 /// frames of a film are alike. `settings` identify the settings of the picture (ASCII, at most 256 bytes);
 /// they are stored in the frames of a film.

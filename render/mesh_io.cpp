@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <fstream>
 #include <span>
+#include <string_view>
 #include <type_traits>
 
 #include "render/confined_child.h"
@@ -275,6 +277,29 @@ uint64_t pictures_beside(const std::filesystem::path& model) {
   return pictures;
 }
 
+/// Number of pictures in a file, by the first bytes of PNG, JPEG and WebP and by data URIs. Counting stops
+/// where more no longer changes the limits.
+uint64_t pictures_inside(const std::filesystem::path& model) {
+  constexpr uint64_t kMostCounted = 32;
+  constexpr std::size_t kBlock = std::size_t{1} << 20, kBehind = 16;
+  const std::string_view starts[] = {"\x89PNG\r\n\x1a\n", "\xFF\xD8\xFF", "data:image/", "RIFF"};
+  std::ifstream file(model, std::ios::binary);
+  std::string block;
+  uint64_t pictures = 0;
+  for (std::streamoff from = 0; file.seekg(from) && pictures < kMostCounted;
+       from += static_cast<std::streamoff>(kBlock)) {
+    block.resize(kBlock + kBehind);
+    file.read(block.data(), static_cast<std::streamsize>(block.size()));
+    block.resize(static_cast<std::size_t>(file.gcount()));
+    if (block.empty()) break;
+    for (const std::string_view start : starts)
+      for (std::size_t at = block.find(start); at < kBlock; at = block.find(start, at + 1))
+        pictures += start != "RIFF" || (at + 12 <= block.size() && block.compare(at + 8, 4, "WEBP") == 0);
+    file.clear();
+  }
+  return std::min(pictures, kMostCounted);
+}
+
 uint64_t checked_size(const std::filesystem::path& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) throw FileError(path.string() + ": there is no such file");
@@ -331,7 +356,7 @@ Model read_model(const std::filesystem::path& file, const InputFolders& folders,
   const InputFolders allowed = readable(path, folders);
   const ChildAnswer answer = run_confined({.what = path.string(),
                                            .file_bytes = size,
-                                           .pictures = pictures_beside(path),
+                                           .pictures = pictures_beside(path) + pictures_inside(path),
                                            .folders = &allowed,
                                            .stop = stop},
                                           [&](int memory) {
@@ -392,6 +417,35 @@ Image read_texture(const std::filesystem::path& path, const InputFolders& folder
   transfer_image(reader, image);
   if (!is_whole(image)) throw damaged_answer();
   return image;
+}
+
+LightImage read_light_image(const std::filesystem::path& path, const InputFolders& folders,
+                            const StopTest& stop) {
+  check_folder(path, folders);
+  const uint64_t size = checked_size(path);
+  const InputFolders allowed = readable(path, folders);
+  const auto transfer_light = [](auto& archive, LightImage& light) {
+    archive.value(light.image.width_px);
+    archive.value(light.image.height_px);
+    archive.array(light.image.rgba);
+    archive.list(light.warnings, [&](std::string& line) { archive.array(line); });
+  };
+  // A picture of 16 bits or of floats takes more memory than its file: as eight pictures.
+  const ChildAnswer answer = run_confined(
+      {.what = path.string(), .file_bytes = size, .pictures = 8, .folders = &allowed, .stop = stop},
+      [&](int memory) {
+        LightImage light = decode_light_image(read_file(path, kMaxMeshBytes), path.string());
+        Writer writer(memory);
+        transfer_light(writer, light);
+      });
+  LightImage light;
+  Reader reader(answer.bytes());
+  transfer_light(reader, light);
+  const HdrImage& image = light.image;
+  if (image.width_px < 1 || image.height_px < 1 || image.rgba.size() != 4 * image.pixel_count() ||
+      !std::ranges::all_of(image.rgba, [](float value) { return std::isfinite(value) && value >= 0; }))
+    throw damaged_answer();
+  return light;
 }
 
 }  // namespace offstage::render

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "render/file_io.h"
+#include "render/image_io.h"
 #include "render/input_folders.h"
 #include "render/model.h"
 
@@ -39,6 +40,10 @@ Model read_model(const std::filesystem::path& path, const InputFolders& folders 
 /// Reads an image of up to kMaxTexturePixels. Throws as read_model() does.
 Image read_texture(const std::filesystem::path& path, const InputFolders& folders = {},
                    const StopTest& stop = {});
+
+/// Reads a picture as light (decode_light_image()). Throws as read_model() does.
+LightImage read_light_image(const std::filesystem::path& path, const InputFolders& folders = {},
+                            const StopTest& stop = {});
 
 /// The packages of optional libraries for compressed glTF files without which offstage was built.
 std::vector<std::string> missing_model_libraries();

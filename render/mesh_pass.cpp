@@ -22,7 +22,7 @@ struct VertexDetails {
 };
 
 constexpr GLuint kVertexBinding = 0, kInstanceBinding = 1, kDetailBinding = 2;
-constexpr GLuint kSecondUv = 6, kColor = 7, kTangent = 8;  // attributes
+constexpr GLuint kSecondUv = 6, kColor = 7, kTangent = 8, kBefore = 9;  // attributes
 constexpr GLuint kMaterialBlock = 1;
 constexpr std::array<GLuint, kTextureMaps> kTextureUnits = {1, 2, 3, 14, 15, 16, 17};
 constexpr float kSmooth = 0.3f;  // with less roughness, a surface shows a mirror image of the scene
@@ -91,6 +91,7 @@ GpuMesh::GpuMesh(const Mesh& source) : vertex_array(gl::make_vertex_array()) {
   }
 
   rays = std::make_unique<RayMesh>(*mesh, mesh->normals);
+  vertex_count = packed.size();
   index_count = static_cast<GLsizei>(mesh->indices.size());
   if (index_count == 0) return;
   vertices = gl::make_buffer(std::span<const Vertex>(packed));
@@ -100,11 +101,26 @@ GpuMesh::GpuMesh(const Mesh& source) : vertex_array(gl::make_vertex_array()) {
   gl::set_attribute(vertex_array, 0, kVertexBinding, 3, offsetof(Vertex, position));
   gl::set_attribute(vertex_array, 1, kVertexBinding, 3, offsetof(Vertex, normal));
   gl::set_attribute(vertex_array, 2, kVertexBinding, 2, offsetof(Vertex, uv));
+  glVertexArrayVertexBuffer(vertex_array, kBeforeBinding, vertices, 0, sizeof(Vertex));
+  gl::set_attribute(vertex_array, kBefore, kBeforeBinding, 3, offsetof(Vertex, position));
   for (GLuint row = 0; row < 3; ++row) {
     gl::set_attribute(vertex_array, 3 + row, kInstanceBinding, 4, row * sizeof(Vector4f));
   }
   glVertexArrayBindingDivisor(vertex_array, kInstanceBinding, 1);
   add_details(*mesh, *this);
+}
+
+void GpuMesh::store() {
+  stored = true;
+  vertices_before = gl::Buffer();
+  if (vertices != 0) glVertexArrayVertexBuffer(vertex_array, kBeforeBinding, vertices, 0, sizeof(Vertex));
+}
+
+void GpuMesh::remember(GpuMesh& before) {
+  if (!before.stored || before.vertex_count != vertex_count || vertex_count == 0 || vertices == 0) return;
+  stored = true;
+  vertices_before = std::move(before.vertices_before != 0 ? before.vertices_before : before.vertices);
+  glVertexArrayVertexBuffer(vertex_array, kBeforeBinding, vertices_before, 0, sizeof(Vertex));
 }
 
 void bind_material(const GpuMaterial& material, GLuint white) {
@@ -142,6 +158,8 @@ GpuMaterial make_gpu_material(const Material& material, std::span<const Image> t
 
   result.detailed = material.is_detailed();
   result.textured = result.detailed;
+  result.triplanar = material.triplanar;
+  result.texture_rows = material.base_color_texture.rows;
   std::size_t k = 0;
   for_each_texture(material, [&](const TextureMap& map) {
     const std::size_t unit = k++;
@@ -240,8 +258,8 @@ gl::LazyProgram& MeshPass::surface_program(const Batch& batch, Shading shading) 
   // The relief of a pattern is visible only in mirror images; without them its surface is quick to draw.
   const bool surface = shading == Shading::surface;
   const Pattern pattern = surface && !material.smooth ? Pattern::none : material.pattern;
-  const auto key = std::make_tuple(pattern, material.textured, material.detailed, material.glass,
-                                   batch.mesh->endless, shading, features_);
+  const auto key = std::make_tuple(pattern, material.textured, material.detailed, material.triplanar,
+                                   material.glass, batch.mesh->endless, shading, features_);
   const auto found = surface_programs_.find(key);
   if (found != surface_programs_.end()) return found->second;
   std::vector<std::string> defines = features_;
@@ -251,6 +269,7 @@ gl::LazyProgram& MeshPass::surface_program(const Batch& batch, Shading shading) 
                                             surface ? "surface.glsl" : "traced.glsl"};
   if (material.textured) defines.push_back("TEXTURED 1");
   if (material.detailed) defines.push_back("DETAILED 1");
+  if (material.triplanar) defines.push_back("TRIPLANAR 1");
   if (batch.mesh->endless) defines.push_back("ENDLESS 1");
   if (material.glass && !surface) {
     defines.push_back("GLASS 1");

@@ -21,6 +21,7 @@ struct GpuMesh {
   explicit GpuMesh(const Mesh& mesh);
   gl::Buffer vertices, details, indices;
   gl::VertexArray vertex_array;
+  std::size_t vertex_count = 0;
   GLsizei index_count = 0;
   Eigen::AlignedBox3f box;
   Vector3f center;  ///< centre of the bounding ball
@@ -31,7 +32,17 @@ struct GpuMesh {
   bool round = false;                   ///< fills the ball inscribed in its box
   bool boxy = false;                    ///< fills its box, except for a bevel
   std::unique_ptr<const RayMesh> rays;  ///< the same for light rays
+
+  bool stored = false;         ///< was there at Stage::store_previous_transforms()
+  gl::Buffer vertices_before;  ///< its vertices then, if they have been replaced; otherwise 0
+
+  /// Makes the present vertices those from which motion starts.
+  void store();
+  /// The vertices that replace those of `before`, with as many of them, remember the stored ones.
+  void remember(GpuMesh& before);
 };
+/// The binding of the vertices from which motion in Channels starts.
+inline constexpr GLuint kBeforeBinding = 3;
 
 /// The uniform block of shaders/material.glsl.
 struct MaterialUniforms {
@@ -43,11 +54,13 @@ struct MaterialUniforms {
 struct GpuMaterial {
   gl::Buffer uniforms;
   std::array<gl::Texture, kTextureMaps> textures;  ///< in the order of for_each_texture()
+  std::array<Vector3f, 2> texture_rows;            ///< of the colour's texture
   Pattern pattern = Pattern::none;
   Weave weave = Weave::plain;
   bool textured = false;
   bool detailed = false;  ///< see Material::is_detailed(); textured then, too
   bool cut_out = false;   ///< has holes by its alpha, and is opaque elsewhere
+  bool triplanar = false;
   bool thin = false;
   bool two_sided = false;
   bool blended = false;
@@ -119,8 +132,9 @@ class MeshPass {
   static void set_facing(const Batch& batch);
   void draw_batch(const Batch& batch, Shading shading, float min_alpha);
 
-  /// Keyed by textured, detailed, glass, endless.
-  std::map<std::tuple<Pattern, bool, bool, bool, bool, Shading, Features>, gl::LazyProgram> surface_programs_;
+  /// Keyed by textured, detailed, triplanar, glass, endless.
+  std::map<std::tuple<Pattern, bool, bool, bool, bool, bool, Shading, Features>, gl::LazyProgram>
+      surface_programs_;
   gl::LazyProgram depth_program_{{"frame.glsl", "mesh.vert"}, {}, {"DEPTH 1"}};
   Features features_;
   gl::Texture white_;

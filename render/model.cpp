@@ -92,12 +92,12 @@ bool TextureMap::is_plain() const {
 }
 
 bool Material::is_detailed() const {
-  if (pattern != Pattern::none) return false;  // patterns replace these
+  const bool laid = triplanar || !base_color_texture.is_plain();
+  if (pattern != Pattern::none) return laid;  // patterns replace the others
   const bool more = normal_texture.image >= 0 || occlusion_texture.image >= 0 ||
                     transmission_texture.image >= 0 || specular_texture.image >= 0;
-  const bool moved = !base_color_texture.is_plain() || !metallic_roughness_texture.is_plain() ||
-                     !emission_texture.is_plain();
-  return more || moved || alpha_cutoff > 0 || unlit || vertex_colors || clearcoat > 0 ||
+  const bool moved = !metallic_roughness_texture.is_plain() || !emission_texture.is_plain();
+  return more || laid || moved || alpha_cutoff > 0 || unlit || vertex_colors || clearcoat > 0 ||
          specular != Vector3f::Constant(0.04f) || sheen_color != Vector3f::Zero();
 }
 

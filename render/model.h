@@ -77,8 +77,11 @@ struct Material {
   Vector3f pattern_color = {0.4f, 0.4f, 0.4f};  ///< second colour of the pattern
   float pattern_scale = 1;                      ///< size of one cell [m], > 0
   bool two_sided = false;
-  Fabric fabric = {};                          ///< used for cloths only
-  TextureMap base_color_texture = {};          ///< sRGB colour and alpha, times `color`
+  Fabric fabric = {};                  ///< used for cloths only
+  TextureMap base_color_texture = {};  ///< sRGB colour and alpha, times `color`
+  /// Projects `base_color_texture` along the three axes of the mesh, blended where the surface turns from one
+  /// to the next, in place of its texture coordinates. One unit of the coordinates is then a metre.
+  bool triplanar = false;
   TextureMap metallic_roughness_texture = {};  ///< G: roughness, B: metallic, times the factors
   TextureMap emission_texture = {};            ///< sRGB, times `emission`
   TextureMap normal_texture = {};              ///< tangent space, X towards +u, Y towards -v of the image

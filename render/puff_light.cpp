@@ -16,16 +16,8 @@ float sun_share(float depth, float albedo) {
 }  // namespace
 
 PuffLight::PuffLight(const OpacityGrid& opacity, const FrameUniforms& frame_uniforms,
-                     const Vector3f& sun_direction, const AirLight& air_light)
-    : grid(opacity),
-      frame(frame_uniforms),
-      air(air_light),
-      sky{.sun_direction = frame_uniforms.sun_direction.head<3>(),
-          .zenith = frame_uniforms.zenith.head<3>(),
-          .horizon = frame_uniforms.horizon.head<3>(),
-          .ground = frame_uniforms.ground.head<3>(),
-          .glow = frame_uniforms.glow.head<3>()},
-      to_sun(sun_direction) {}
+                     const SkyModel& sky_model, const Vector3f& sun_direction, const AirLight& air_light)
+    : grid(opacity), frame(frame_uniforms), air(air_light), sky(sky_model), to_sun(sun_direction) {}
 
 PuffRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vector3f& albedo, float number,
                                  const Vector3f& to_eye) const {
@@ -90,20 +82,14 @@ Vector3f PuffLight::ambient(const Vector3f& n) const {
 }
 
 Vector3f PuffLight::sky_reflection(const Vector3f& direction, float roughness) const {
-  const float blur = 0.02f + 0.5f * roughness;
-  const float t = std::clamp((blur - direction.y()) / (2 * blur), 0.0f, 1.0f), below = t * t * (3 - 2 * t);
-  const Vector3f above =
-      sky_radiance(sky, Vector3f(direction.x(), std::max(direction.y(), 0.0f), direction.z()));
-  const Vector3f sharp = above + below * (sky.ground - above);
-  return sharp + roughness * roughness * (ambient(direction) - sharp);
+  return sky_mirrored(sky, direction, roughness, ambient(direction));
 }
 
 Vector4f PuffLight::fog_to(const Vector3f& place) const {
   const Vector3f ray = place - frame.eye.head<3>();
   const float transmittance = std::exp(-frame.zenith.w() * ray.norm());
-  const Vector3f level = Vector3f(ray.x(), std::max(ray.y(), 0.0f), ray.z()).normalized();
   Vector4f result;
-  result << sky_radiance(sky, level) * (1 - transmittance), transmittance;
+  result << horizon_color(sky, ray) * (1 - transmittance), transmittance;
   return result;
 }
 

@@ -25,8 +25,9 @@ struct PuffLight {
   SkyModel sky;
   Vector3f to_sun;
 
-  PuffLight(const OpacityGrid& opacity, const FrameUniforms& frame_uniforms, const Vector3f& sun_direction,
-            const AirLight& air_light);
+  /// `sky_model`: with the direction of the sun in this sub-frame.
+  PuffLight(const OpacityGrid& opacity, const FrameUniforms& frame_uniforms, const SkyModel& sky_model,
+            const Vector3f& sun_direction, const AirLight& air_light);
   /// `number`: see AirLight::sun.
   PuffRadiance radiance(const Vector3f& place, float radius, const Vector3f& albedo, float number,
                         const Vector3f& to_eye) const;

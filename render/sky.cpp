@@ -22,10 +22,21 @@ SkyModel make_sky(const Sun& sun, const Environment& environment) {
                            std::max(direction.y(), 0.0f) * sun.intensity * sun.color;
     sky.ground = environment.ground_albedo->cwiseProduct(light);
   }
+  if (environment.picture) {
+    sky.turned = {environment.picture, environment.picture_turn_deg * std::numbers::pi_v<float> / 180,
+                  environment.intensity};
+    sky.glow.setZero();
+    sky.seen_as_colors = !environment.picture_visible;
+  }
   return sky;
 }
 
 Vector3f sky_radiance(const SkyModel& sky, const Vector3f& direction) {
+  if (!sky.turned.picture) return gradient_radiance(sky, direction);
+  return sky.turned.intensity * sky.turned.picture->seen(sky.turned.to_picture(direction));
+}
+
+Vector3f gradient_radiance(const SkyModel& sky, const Vector3f& direction) {
   if (direction.y() < 0) return sky.ground;
   const float u = 1 - std::min(direction.y(), 1.0f), u2 = u * u, u4 = u2 * u2;
   const float low = 0.3f * u2 + 0.7f * u4 * u4;
@@ -34,7 +45,27 @@ Vector3f sky_radiance(const SkyModel& sky, const Vector3f& direction) {
   return sky.zenith + low * (sky.horizon - sky.zenith) + (0.25f * x8 + 0.75f * x64) * sky.glow;
 }
 
+Vector3f sky_mirrored(const SkyModel& sky, const Vector3f& direction, float roughness,
+                      const Vector3f& ambient) {
+  if (sky.turned.picture)
+    return sky.turned.intensity * sky.turned.picture->mirrored(sky.turned.to_picture(direction), roughness);
+  const float blur = 0.02f + 0.5f * roughness;
+  const float t = std::clamp((blur - direction.y()) / (2 * blur), 0.0f, 1.0f), below = t * t * (3 - 2 * t);
+  const Vector3f above =
+      gradient_radiance(sky, Vector3f(direction.x(), std::max(direction.y(), 0.0f), direction.z()));
+  const Vector3f sharp = above + below * (sky.ground - above);
+  return sharp + roughness * roughness * (ambient - sharp);
+}
+
+Vector3f horizon_color(const SkyModel& sky, const Vector3f& direction) {
+  const Vector3f level = Vector3f(direction.x(), std::max(direction.y(), 0.0f), direction.z()).normalized();
+  if (!sky.turned.picture || sky.seen_as_colors) return gradient_radiance(sky, level);
+  constexpr float kRoughnessOfHaze = 0.5f;
+  return sky.turned.intensity * sky.turned.picture->mirrored(sky.turned.to_picture(level), kRoughnessOfHaze);
+}
+
 std::array<Vector3f, 9> sky_irradiance(const SkyModel& sky) {
+  if (sky.turned.picture) return sky.turned.irradiance();
   // Squares of the constants of the real spherical harmonics times the factors of the cosine lobe over pi (1,
   // 2/3, 1/4).
   constexpr float pi = std::numbers::pi_v<float>;
@@ -50,7 +81,7 @@ std::array<Vector3f, 9> sky_irradiance(const SkyModel& sky) {
     for (int column = 0; column < kColumns; ++column) {
       const float angle = (static_cast<float>(column) + 0.5f) * 2 * pi / kColumns;
       const float x = r * std::cos(angle), z = r * std::sin(angle);
-      const Vector3f radiance = sky_radiance(sky, {x, y, z});
+      const Vector3f radiance = gradient_radiance(sky, {x, y, z});
       const std::array<float, 9> basis = {1, y, z, x, x * y, y * z, 3 * z * z - 1, x * z, x * x - y * y};
       for (std::size_t k = 0; k < 9; ++k) sum[k] += basis[k] * radiance;
     }

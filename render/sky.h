@@ -4,6 +4,7 @@
 
 #include <array>
 
+#include "render/sky_picture.h"
 #include "render/stage.h"
 
 namespace offstage::render {
@@ -11,13 +12,27 @@ namespace offstage::render {
 struct SkyModel {
   Vector3f sun_direction;
   Vector3f zenith, horizon, ground;
-  Vector3f glow;  ///< radiance around the sun
+  Vector3f glow;          ///< radiance around the sun
+  TurnedSky turned = {};  ///< the picture in place of the colours
+  bool has_bright_part() const { return turned.picture && turned.picture->has_bright_part(); }
+  bool seen_as_colors = false;  ///< the picture only lights; background and fog have the colours
 };
 
 SkyModel make_sky(const Sun& sun, const Environment& environment);
 
-/// Radiance of the sky from a unit direction, without the sun's disc.
+/// Radiance of the sky from a unit direction, without the sun's disc. Of a picture, both of its parts.
 Vector3f sky_radiance(const SkyModel& sky, const Vector3f& direction);
+
+/// Radiance of the colours, even if there is a picture.
+Vector3f gradient_radiance(const SkyModel& sky, const Vector3f& direction);
+
+/// The sky as a surface of this roughness mirrors it, as sky_reflection() in shaders/sky.glsl. `ambient`:
+/// light on a white surface whose normal is the direction.
+Vector3f sky_mirrored(const SkyModel& sky, const Vector3f& direction, float roughness,
+                      const Vector3f& ambient);
+
+/// Colour of fog in a direction, as horizon_color() in shaders/sky.glsl.
+Vector3f horizon_color(const SkyModel& sky, const Vector3f& direction);
 
 /// Spherical-harmonics coefficients of the sky's irradiance. The radiance of a white diffuse surface with
 /// normal (x, y, z) is their sum weighted by 1, y, z, x, xy, yz, 3zz - 1, xz, xx - yy.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "render/channels_pass.h"
@@ -16,10 +17,12 @@
 #include "render/picture_copy.h"
 #include "render/points_pass.h"
 #include "render/puffs_pass.h"
+#include "render/sky.h"
 #include "render/slots.h"
 #include "render/sprite_pictures.h"
 #include "render/streaks_pass.h"
 #include "render/surface_probe.h"
+#include "render/texture.h"
 
 namespace offstage::render {
 namespace {
@@ -64,6 +67,9 @@ struct TranslucentBody {
   Eigen::AlignedBox2i looked_px;  ///< area of the picture that it shows by refraction
 };
 
+// Texture units of shaders/sky.glsl and sky.frag.
+constexpr GLuint kSkyLevelsUnit = 23, kSkyBackgroundUnit = 24;
+
 }  // namespace
 
 struct Stage::Impl {
@@ -72,6 +78,9 @@ struct Stage::Impl {
   std::optional<Camera> camera_before;
   Sun sun;
   Environment environment;
+  SkyModel sky;                                    ///< of this sub-frame
+  std::shared_ptr<const SkyPicture> uploaded_sky;  ///< whose picture is in the textures
+  gl::Texture sky_levels, sky_background;
   std::vector<Lamp> lamps;
   std::vector<Lamp> shining;  ///< lamps and fires of this sub-frame
   float time = 0;
@@ -97,8 +106,7 @@ struct Stage::Impl {
   SurfaceProbe surface_probe;
   LinesPass lines_pass;
   std::optional<ChannelsPass> channels_pass;  ///< created on first use
-  gl::LazyProgram sky_program{
-      {"frame.glsl", "sky.vert"}, {"frame.glsl", "sky.glsl", "noise.glsl", "sky.frag"}, {"FLAT 1"}};
+  std::map<Features, gl::LazyProgram> sky_programs;
   gl::VertexArray no_attributes = gl::make_vertex_array();
   gl::StreamBuffer frame_buffer;
   std::vector<float> strip;
@@ -119,6 +127,8 @@ struct Stage::Impl {
     frame_buffer.write(std::span<const FrameUniforms>(&frame, 1));
     glBindBufferBase(GL_UNIFORM_BUFFER, kFrameBlock, frame_buffer);
   }
+  void prepare_sky();
+  void draw_sky();
   std::vector<PointSet*> prepare_points(const View& view);
   std::vector<const Cloth*> prepare_cloths();
   void prepare_lamps(std::span<PointSet* const> sets);
@@ -141,6 +151,33 @@ struct Stage::Impl {
   void draw_lines(const View& view);
   void add_picture(const FrameUniforms& frame, HdrImage& sum);
 };
+
+// The sky and its picture as textures.
+void Stage::Impl::prepare_sky() {
+  sky = make_sky(sun, environment);
+  const std::shared_ptr<const SkyPicture>& picture_of_sky = environment.picture;
+  if (!picture_of_sky) return;
+  if (uploaded_sky != picture_of_sky) {
+    sky_levels = make_texture(picture_of_sky->levels());
+    sky_background = make_texture(picture_of_sky->background());
+    uploaded_sky = picture_of_sky;
+  }
+  glBindTextureUnit(kSkyLevelsUnit, sky_levels);
+  glBindTextureUnit(kSkyBackgroundUnit, sky_background);
+}
+
+// Where nothing was drawn.
+void Stage::Impl::draw_sky() {
+  Features defines = {"FLAT 1"};
+  for (const std::string& feature : features)
+    if (feature.starts_with("SKY_")) defines.push_back(feature);
+  const std::vector<std::string_view> vertex = {"frame.glsl", "sky.vert"};
+  const std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "noise.glsl", "sky.frag"};
+  sky_programs.try_emplace(defines, vertex, fragment, defines).first->second.use();
+  glDepthFunc(GL_EQUAL);
+  glBindVertexArray(no_attributes);
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+}
 
 std::vector<PointSet*> Stage::Impl::prepare_points(const View& view) {
   std::vector<PointSet*> result;
@@ -169,7 +206,9 @@ void Stage::Impl::prepare_lamps(std::span<PointSet* const> sets) {
   for (const PointSet* set : sets)
     if (set->def.style == PointStyle::fire) shining.push_back(lamp_of_fire(*set));
   features.clear();
-  if (!shining.empty()) features.push_back("LAMPS 1");
+  if (!shining.empty() || sky.has_bright_part()) features.push_back("LAMPS 1");
+  if (sky.turned.picture) features.push_back("SKY_PICTURE 1");
+  if (sky.turned.picture && !sky.seen_as_colors) features.push_back("SKY_SEEN 1");
 }
 
 // Depth and surfaces of everything opaque. The depth also limits later shading to what is visible.
@@ -196,7 +235,7 @@ void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<
                               const SampleOffsets& offsets) {
   RayScene& scene = light_pass.scene();
   scene.clear();
-  light_sources = {.sun = sun, .sky = make_sky(sun, environment), .fog = environment.fog};
+  light_sources = {.sun = sun, .sky = sky, .fog = environment.fog};
   for (const Instance* instance : shown) {
     if (!instance->visible) continue;
     const RayMaterial& material = *instance->material->rays;
@@ -221,6 +260,7 @@ void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<
   }
   scene.build();
   for (const Lamp& lamp : shining) light_sources.lamps.emplace_back(lamp);
+  if (sky.has_bright_part()) light_sources.lamps.emplace_back(sky.turned);
   if (!puffs_pass.grid().empty()) light_sources.smoke = &puffs_pass.grid();
   light_pass.trace(light_sources, view, offsets);
 }
@@ -258,12 +298,7 @@ void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<Po
   for (const PointSet* set : sets) {
     if (set->def.style == PointStyle::sphere) points_pass.draw_spheres(*set, features);
   }
-  if (environment.visible) {
-    glDepthFunc(GL_EQUAL);  // only where nothing was drawn
-    sky_program.use();
-    glBindVertexArray(no_attributes);
-    glDrawArrays(GL_TRIANGLES, 0, 3);
-  }
+  if (environment.visible) draw_sky();
   glDepthMask(GL_TRUE);
   glDepthFunc(GL_GREATER);
   picture.depth_copy.change_all();
@@ -413,7 +448,9 @@ void Stage::Impl::draw_translucent(std::span<const Cloth* const> sheets, std::sp
   probe_surfaces(bodies, sets, frame, regions);
   paint_order.build(sets, regions, view);
   const AirLight air(light_pass.scene(), light_sources, offsets);
-  const PuffLight light(puffs_pass.grid(), frame, sun.direction.normalized(), air);
+  SkyModel sky_of_frame = sky;
+  sky_of_frame.sun_direction = frame.sun_direction.head<3>();
+  const PuffLight light(puffs_pass.grid(), frame, sky_of_frame, sun.direction.normalized(), air);
   points_pass.prepare_blended(paint_order, light);
   puffs_pass.prepare_splats(paint_order, view, light);
   streaks_pass.prepare(paint_order, view, light, offsets.index == 0);
@@ -465,7 +502,10 @@ MeshHandle Stage::add_mesh(const Mesh& mesh) {
 }
 
 void Stage::set_mesh(MeshHandle handle, const Mesh& mesh) {
-  *impl_->meshes[handle] = GpuMesh(mesh);
+  GpuMesh& known = *impl_->meshes[handle];
+  GpuMesh next(mesh);
+  next.remember(known);
+  known = std::move(next);
   gl::check_error("uploading a mesh");
 }
 
@@ -580,6 +620,7 @@ void Stage::set_object(PointsHandle points, uint32_t id) {
 void Stage::store_previous_transforms() {
   Impl& s = *impl_;
   s.camera_before = s.camera;
+  s.meshes.for_each([](const std::unique_ptr<GpuMesh>& mesh) { mesh->store(); });
   s.instances.for_each([](const std::unique_ptr<Instance>& i) { i->before = i->world_from_mesh; });
   s.cloths.for_each([](const std::unique_ptr<Cloth>& cloth) {
     cloth->before.clear();
@@ -625,6 +666,7 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   }
   sum.transparent = !s.environment.visible;
   const View view = make_view(s.camera, offsets, s.def.width_px, s.def.height_px);
+  s.prepare_sky();
   const FrameUniforms frame = make_frame(view, s.sun, s.environment, offsets, s.time, s.def.height_px);
 
   std::vector<const Instance*> shown;

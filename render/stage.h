@@ -18,6 +18,7 @@
 #include "render/handle.h"
 #include "render/image.h"
 #include "render/model.h"
+#include "render/sky_picture.h"
 
 namespace offstage::render {
 
@@ -63,6 +64,11 @@ struct Environment {
   /// Density [1/m]; transmittance exp(-fog * distance). 0: nothing fades with distance.
   float fog = 0;
   bool visible = true;  ///< false: transparent background; it still lights the scene
+  /// A picture of the sky that lights the scene in place of the colours, scaled by `intensity`; null: none.
+  /// Clouds are then not drawn.
+  std::shared_ptr<const SkyPicture> picture = {};
+  float picture_turn_deg = 0;   ///< counter-clockwise as seen from above
+  bool picture_visible = true;  ///< false: the colours are the background and the colour of fog
 };
 
 /// One drawn particle.

@@ -129,6 +129,22 @@ gl::Texture make_texture(const Image& image, TextureContent content, const Textu
   return texture;
 }
 
+gl::Texture make_texture(std::span<const SkyPicture::Packed> levels) {
+  GLuint name = 0;
+  glCreateTextures(GL_TEXTURE_2D, 1, &name);
+  gl::Texture texture(name);
+  glTextureStorage2D(texture, static_cast<GLsizei>(levels.size()), GL_RGB9_E5, levels[0].columns,
+                     levels[0].rows);
+  glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
+  glTextureParameteri(texture, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  glTextureParameteri(texture, GL_TEXTURE_WRAP_S, GL_REPEAT);
+  glTextureParameteri(texture, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+  for (std::size_t k = 0; k < levels.size(); ++k)
+    glTextureSubImage2D(texture, static_cast<GLint>(k), 0, 0, levels[k].columns, levels[k].rows, GL_RGB,
+                        GL_UNSIGNED_INT_5_9_9_9_REV, levels[k].values.data());
+  return texture;
+}
+
 gl::Texture make_white_texture() {
   return make_texture({1, 1, {255, 255, 255, 255}}, TextureContent::data);
 }

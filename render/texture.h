@@ -5,6 +5,7 @@
 #include "render/gl.h"
 #include "render/image.h"
 #include "render/model.h"
+#include "render/sky_picture.h"
 
 namespace offstage::render {
 
@@ -15,6 +16,8 @@ enum class TextureContent { color /**< sRGB */, data /**< linear */ };
 /// "Computing alpha mipmaps", 2010).
 gl::Texture make_texture(const Image& image, TextureContent content, const TextureMap& map = {},
                          float alpha_cutoff = 0);
+/// Pictures of a sky, in levels of decreasing size.
+gl::Texture make_texture(std::span<const SkyPicture::Packed> levels);
 gl::Texture make_white_texture();
 /// True if any pixel is not opaque.
 bool has_alpha(const Image& image);

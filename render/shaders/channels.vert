@@ -3,6 +3,8 @@ layout(location = 0) in vec3 in_position;
 layout(location = 1) in vec3 in_normal;
 #ifdef CLOTH
 layout(location = 2) in vec3 in_before;
+#else
+layout(location = 9) in vec3 in_before;
 #endif
 #ifdef DETAILED
 layout(location = 2) in vec2 in_uv;
@@ -20,13 +22,8 @@ layout(location = 1) out vec4 now;
 layout(location = 2) out vec4 before;
 
 void main() {
-#ifdef CLOTH
-  vec3 was = in_before;
-#else
-  vec3 was = in_position;
-#endif
   normal = world_from_normal * in_normal;
-  before = clip_before_from_mesh * vec4(was, 1.0);
+  before = clip_before_from_mesh * vec4(in_before, 1.0);
   now = clip_from_mesh * vec4(in_position, 1.0);
   gl_Position = now;
 #ifdef DETAILED

@@ -1,7 +1,8 @@
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec4 normal;
 layout(location = 2) in vec2 uv;
-layout(location = 0) uniform vec2 texture_from_uv;
+layout(location = 0) uniform vec3 texture_rows[2];  // from the place on the cloth [m]
+vec2 texture_place(vec2 p) { return vec2(dot(texture_rows[0], vec3(p, 1.0)), dot(texture_rows[1], vec3(p, 1.0))); }
 #ifndef SURFACE
 layout(location = 0) out vec4 color;
 #endif
@@ -14,7 +15,7 @@ void main() {
 #ifdef SHEER
   float opacity = material.color.a * (1.0 - material.glass.x);
 #ifdef TEXTURED
-  opacity *= texture(base_color_texture, uv * texture_from_uv).a;
+  opacity *= texture(base_color_texture, texture_place(uv)).a;
 #endif
 #ifdef SURFACE
   float alpha = opacity;  // all layers take the light of the nearest one, which is even then
@@ -36,7 +37,7 @@ void main() {
   slope = pattern.slope.xy;
 #endif
 #ifdef TEXTURED
-  s.albedo *= texture(base_color_texture, uv * texture_from_uv).rgb;
+  s.albedo *= texture(base_color_texture, texture_place(uv)).rgb;
 #endif
   vec3 through = s.albedo;
   if (material.sheen.w != 0.0) {

@@ -25,11 +25,11 @@ layout(binding = 15) uniform sampler2D occlusion_texture;
 layout(binding = 16) uniform sampler2D transmission_texture;
 layout(binding = 17) uniform sampler2D specular_texture;
 
-// Coordinates of the k-th texture, from both sets.
-vec2 uv_of(int k, vec4 uv) {
-  vec4 row = material.uv_rows[2 * k];
-  vec3 p = vec3(row.w > 0.5 ? uv.zw : uv.xy, 1.0);
-  return vec2(dot(row.xyz, p), dot(material.uv_rows[2 * k + 1].xyz, p));
+// Coordinates of the k-th texture, and the same from both sets.
+vec2 transformed_uv(int k, vec2 uv) {
+  vec3 p = vec3(uv, 1.0);
+  return vec2(dot(material.uv_rows[2 * k].xyz, p), dot(material.uv_rows[2 * k + 1].xyz, p));
 }
+vec2 uv_of(int k, vec4 uv) { return transformed_uv(k, material.uv_rows[2 * k].w > 0.5 ? uv.zw : uv.xy); }
 #endif
 #endif

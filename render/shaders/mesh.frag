@@ -7,12 +7,12 @@ layout(location = 4) in vec4 tangent;
 #elif defined(TEXTURED)
 layout(location = 2) in vec2 uv;
 #endif
-#ifdef PATTERN
-layout(location = 3) in vec3 object_position;
-layout(location = 4) in vec3 object_normal;
-layout(location = 5) flat in vec3 axis_x;
-layout(location = 6) flat in vec3 axis_y;
-layout(location = 7) flat in vec3 axis_z;
+#if defined(PATTERN) || defined(TRIPLANAR)
+layout(location = 27) in vec3 object_position;
+layout(location = 28) in vec3 object_normal;
+layout(location = 29) flat in vec3 axis_x;
+layout(location = 30) flat in vec3 axis_y;
+layout(location = 31) flat in vec3 axis_z;
 #endif
 layout(location = 0) uniform float min_alpha;  // smallest alpha that this pass draws
 #ifndef SURFACE
@@ -50,6 +50,19 @@ vec3 mapped_normal(vec3 n) {
   return normalize(facing * (texel.x * along_u + texel.y * against_v) + max(texel.z, 0.01) * n);
 }
 
+#ifdef TRIPLANAR
+// The texture from the three sides of the object, as RayMaterial::triplanar_texel() in ray_material.cpp.
+vec4 triplanar_color(vec3 p, vec3 n) {
+  vec3 weight = n * n;
+  weight *= weight;
+  weight /= weight.x + weight.y + weight.z;
+  vec2 x = transformed_uv(0, vec2(n.x < 0.0 ? p.z : -p.z, -p.y)), y = transformed_uv(0, vec2(n.y < 0.0 ? -p.x : p.x, p.z)),
+       z = transformed_uv(0, vec2(n.z < 0.0 ? -p.x : p.x, -p.y));
+  return weight.x * texture(base_color_texture, x) + weight.y * texture(base_color_texture, y) +
+         weight.z * texture(base_color_texture, z);
+}
+#endif
+
 // A layer of lacquer (KHR_materials_clearcoat) and fibres at grazing angles (KHR_materials_sheen, see fabric.glsl) over
 // the light of a surface.
 vec3 with_layers(vec3 radiance, vec3 n, vec3 smooth_normal, vec3 view, Light light) {
@@ -82,7 +95,11 @@ void main() {
   n = normalize(n - (axis_x * pattern.slope.x + axis_y * pattern.slope.y + axis_z * pattern.slope.z));
 #endif
 #ifdef DETAILED
+#ifdef TRIPLANAR
+  vec4 base = triplanar_color(object_position, object_normal) * vertex_color;
+#else
   vec4 base = texture(base_color_texture, uv_of(0, uv)) * vertex_color;
+#endif
   vec4 metallic_roughness = texture(metallic_roughness_texture, uv_of(1, uv)), specular = texture(specular_texture, uv_of(6, uv));
   s.albedo *= base.rgb;
   alpha *= base.a;

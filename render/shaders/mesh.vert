@@ -21,12 +21,13 @@ layout(location = 4) out vec4 tangent;
 #elif defined(TEXTURED)
 layout(location = 2) out vec2 uv;
 #endif
-#ifdef PATTERN
-layout(location = 3) out vec3 object_position;
-layout(location = 4) out vec3 object_normal;
-layout(location = 5) flat out vec3 axis_x;  // the object's axes in the world
-layout(location = 6) flat out vec3 axis_y;
-layout(location = 7) flat out vec3 axis_z;
+#if defined(PATTERN) || defined(TRIPLANAR)
+// Behind those of the frame.
+layout(location = 27) out vec3 object_position;
+layout(location = 28) out vec3 object_normal;
+layout(location = 29) flat out vec3 axis_x;  // the object's axes in the world
+layout(location = 30) flat out vec3 axis_y;
+layout(location = 31) flat out vec3 axis_z;
 #endif
 
 invariant gl_Position;
@@ -54,7 +55,7 @@ void main() {
 #elif defined(TEXTURED)
   uv = in_uv;
 #endif
-#ifdef PATTERN
+#if defined(PATTERN) || defined(TRIPLANAR)
   object_position = in_position;
   object_normal = in_normal;
   axis_x = normalize(vec3(row_x.x, row_y.x, row_z.x));

@@ -10,6 +10,19 @@ vec3 sky_gradient(float y) {
   return mix(frame.zenith.rgb, frame.horizon.rgb, 0.3 * u2 + 0.7 * u4 * u4);
 }
 
+#ifdef SKY_PICTURE
+// The picture of the sky, in equirectangular projection. Its dim part is prefiltered for five values of roughness; its
+// bright part is traced as a light.
+layout(binding = 23) uniform sampler2D sky_levels;
+
+vec2 sky_place(vec3 direction) {
+  return vec2(0.5 + atan(direction.x, -direction.z) * 0.15915494 + frame.glow.w, acos(clamp(direction.y, -1.0, 1.0)) * 0.31830989);
+}
+vec3 sky_level(vec3 direction, float roughness) {
+  return frame.ground.w * textureLod(sky_levels, sky_place(direction), 4.0 * roughness).rgb;
+}
+#endif
+
 // Ambient light on a white surface, from spherical harmonics of order 2. The last two of the nine coefficients are in
 // the fourth components of the others.
 vec3 ambient(vec3 n) {
@@ -21,6 +34,9 @@ vec3 ambient(vec3 n) {
 
 // Sky reflected from a direction by a surface of this roughness; blurred with increasing roughness.
 vec3 sky_reflection(vec3 direction, float roughness) {
+#ifdef SKY_PICTURE
+  return sky_level(direction, roughness);
+#endif
   float blur = 0.02 + 0.5 * roughness;
   vec3 sharp = mix(sky_gradient(direction.y) + frame.glow.rgb * glow_profile(direction), frame.ground.rgb,
                    smoothstep(-blur, blur, -direction.y));
@@ -29,6 +45,9 @@ vec3 sky_reflection(vec3 direction, float roughness) {
 
 vec3 horizon_color(vec3 direction) {
   vec3 level = normalize(vec3(direction.x, max(direction.y, 0.0), direction.z));
+#ifdef SKY_SEEN
+  return sky_level(level, 0.5);
+#endif
   return sky_gradient(level.y) + frame.glow.rgb * glow_profile(level);
 }
 

@@ -25,7 +25,7 @@ class AirLight {
       const LampPoint<float> point = lamp.point(from_eigen(center), sampler.next());
       if (!(point.share > 0)) continue;
       const Vector3f towards = to_eigen(point.towards);
-      Vector3f light = point.share * lamp.def().intensity;
+      Vector3f light = to_eigen(point.arriving);
       if (lamp.def().shadows && point.distance > radius)
         light = light.cwiseProduct(
             scene_.transmittance(center + radius * towards, towards, point.distance - radius));

@@ -99,11 +99,28 @@ Vector3f limited(const Vector3f& light, LightSums& sums) {
   return kept;
 }
 
-// GGX as in shaders/light.glsl.
-Lanes lobe_of(Lanes a, Lanes nl, Lanes nv, Lanes nh) {
+// GGX as in shaders/light.glsl; `most`: its limit.
+Lanes lobe_of(Lanes a, Lanes nl, Lanes nv, Lanes nh, Lanes most) {
   const Lanes a2 = a * a, d = nh * nh * (a2 - 1) + 1;
   const Lanes mean = 2 * nl * nv * (1 - a) + (nl + nv) * a;
-  return smaller(a2 / (d * d) * 0.5f / larger(mean, Lanes{} + 1e-6f), Lanes{} + 40);
+  return smaller(a2 / (d * d) * 0.5f / larger(mean, Lanes{} + 1e-6f), most);
+}
+
+/// Probability density of a direction that visible_facet() mirrors, for a = roughness^2 [1/sr].
+template <class T>
+T mirror_density(T a, T nv, T nh) {
+  constexpr float kSharp = 0.002f;  // with less, all light of the sky comes from the mirror image
+  const T a2 = a * a, d = nh * nh * (a2 - 1.0f) + 1.0f;
+  const T density =
+      a2 / (2 * std::numbers::pi_v<float> * d * d * (nv + square_root(a2 + (1.0f - a2) * nv * nv)));
+  return a < kSharp ? T{} + 1e18f : density;
+}
+
+/// Weight of a direction that was found with density a, and could have been found in another way with density
+/// b: the power heuristic (E. Veach, "Robust Monte Carlo Methods", 1997).
+template <class T>
+T share_of_way(T a, T b) {
+  return a * a / (a * a + b * b + 1e-30f);
 }
 
 }  // namespace
@@ -180,11 +197,24 @@ LightTracer::LightTracer(const RayScene& scene, const LightSources& sources)
 
 // As the sky that the eye sees (shaders/sky.frag), without clouds and the sun's disc.
 Vector3f LightTracer::sky_seen(const Vector3f& direction) const {
-  if (direction.y() >= 0) return sky_radiance(sources_.sky, direction);
+  if (direction.y() >= 0 || sources_.sky.turned.picture) return sky_radiance(sources_.sky, direction);
   const Vector3f level = Vector3f(direction.x(), 0, direction.z()).normalized();
   const Vector3f haze = level.allFinite() ? sky_radiance(sources_.sky, level) : sources_.sky.horizon;
   const float x = std::clamp((-direction.y() - 0.03f) / 0.47f, 0.0f, 1.0f), share = x * x * (3 - 2 * x);
   return haze + share * (sources_.sky.ground - haze);
+}
+
+// What a ray meets that leaves the scene. The bright part of a picture also arrives as a lamp at diffuse
+// surfaces, so that paths from there meet its dim part alone; `density`: see Path.
+Vector3f LightTracer::sky_met(const Vector3f& direction, bool sharp, float density) const {
+  const TurnedSky& turned = sources_.sky.turned;
+  if (!turned.picture) return sharp ? sky_seen(direction) : sky_radiance(sources_.sky, direction);
+  const Vector3f there = turned.to_picture(direction);
+  if (!sharp && density < 0) return turned.intensity * turned.picture->dim(there);
+  float share = 1;
+  if (density >= 0)
+    share -= turned.picture->bright_share(there) * share_of_way(turned.picture->density(there), density);
+  return share * turned.intensity * turned.picture->seen(there);
 }
 
 float LightTracer::sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const {
@@ -213,12 +243,12 @@ Vector3f LightTracer::lamps_at(const Vector3f& place, const Vector3f& normal, co
   const SquarePoint<float> choice = sampler.next(), uv = sampler.next();
   const RayLamp* kept = nullptr;
   LampPoint<float> kept_point{};
-  float sum = 0, kept_share = 0, kept_weight = 0, random = choice.x;
+  float sum = 0, kept_cosine = 0, kept_weight = 0, random = choice.x;
   for (const RayLamp& lamp : sources_.lamps) {
     const LampPoint<float> point = lamp.point(from_eigen(place), uv);
     const Vector3f towards = to_eigen(point.towards);
-    const float share = point.share * std::max(normal.dot(towards), 0.0f);
-    const float weight = share * lamp.def().intensity.sum();
+    const float cosine = std::max(normal.dot(towards), 0.0f);
+    const float weight = cosine * to_eigen(point.arriving).sum();
     if (!(weight > 0) || face.dot(towards) <= 0) continue;
     sum += weight;
     const float chance = weight / sum;
@@ -226,7 +256,7 @@ Vector3f LightTracer::lamps_at(const Vector3f& place, const Vector3f& normal, co
       random /= chance;
       kept = &lamp;
       kept_point = point;
-      kept_share = share;
+      kept_cosine = cosine;
       kept_weight = weight;
     } else {
       random = (random - chance) / (1 - chance);
@@ -236,7 +266,7 @@ Vector3f LightTracer::lamps_at(const Vector3f& place, const Vector3f& normal, co
   const Vector3f visible =
       kept->def().shadows ? scene_.transmittance(place, to_eigen(kept_point.towards), kept_point.distance)
                           : Vector3f(Vector3f::Ones());
-  return kept->def().intensity.cwiseProduct(visible) * (kept_share * sum / kept_weight);
+  return to_eigen(kept_point.arriving).cwiseProduct(visible) * (kept_cosine * sum / kept_weight);
 }
 
 int VisibleLight::find(const Hit& hit) const {
@@ -271,6 +301,9 @@ struct LightTracer::Path {
   float cone;  ///< angle that the ray stands for [rad]
   Vector3f share = {1, 1, 1};
   bool mirrored = false;  ///< so far
+  /// Probability density of the direction [1/sr] if the bright part of the sky was sampled, too; else
+  /// negative.
+  float density = -1;
   /// Where it left a diffuse surface last, whose light from glowing meshes is also sampled; a normal of zero:
   /// that of no surface.
   Vector3f diffuse_place = Vector3f::Zero(), diffuse_normal = Vector3f::Zero();
@@ -291,6 +324,7 @@ struct LightTracer::Path {
   /// Leaves a surface in a mirrored direction.
   void turn(const Vector3f& way, const Hit& hit) {
     mirrored = true;
+    density = -1;
     diffuse_normal.setZero();
     direction = way.dot(hit.face) > 0 ? way : reflected(way, hit.face);
     from = off_surface(hit.position, hit.face);
@@ -305,8 +339,8 @@ bool LightTracer::follow_glass(const Hit& hit, const Vector3f& albedo, PixelSamp
   const RayMaterial& material = *hit.material;
   if (material.transmission <= 0) return false;
   if (hit.front && material.transmission < 1) {
-    const Vector3f light = direct_light(hit, off_surface(hit.position, hit.face), sampler) +
-                           sky_radiance(sources_.sky, hit.normal);
+    const Vector3f light =
+        direct_light(hit, off_surface(hit.position, hit.face), sampler) + sky_met(hit.normal, false, -1);
     sum += (1 - material.transmission) * path.share.cwiseProduct(albedo).cwiseProduct(light);
     path.share *= material.transmission;
   }
@@ -394,8 +428,7 @@ Vector3f LightTracer::radiance(Path path, PixelSampler& sampler, const VisibleLi
   for (int step = 0; step < kMostSteps; ++step) {
     Hit hit;
     if (!scene_.first_hit(path.from, path.direction, kFar, hit)) {
-      const Vector3f sky = sharp ? sky_seen(path.direction) : sky_radiance(sources_.sky, path.direction);
-      return sum + path.share.cwiseProduct(sky);
+      return sum + path.share.cwiseProduct(sky_met(path.direction, sharp, path.density));
     }
     if (step == 0 && met != nullptr) *met = hit.distance;
     const int pixel = visible != nullptr && sharp ? visible->find(hit) : -1;
@@ -404,7 +437,9 @@ Vector3f LightTracer::radiance(Path path, PixelSampler& sampler, const VisibleLi
     travelled += hit.distance;
     if (sources_.fog > 0) {
       const float clear = std::exp(-sources_.fog * hit.distance);
-      sum += path.share.cwiseProduct(sky_seen(path.direction)) * (1 - clear);
+      const Vector3f haze = sources_.sky.turned.picture ? horizon_color(sources_.sky, path.direction)
+                                                        : sky_seen(path.direction);
+      sum += path.share.cwiseProduct(haze) * (1 - clear);
       path.share *= clear;
     }
     const RayMaterial& material = *hit.material;
@@ -501,8 +536,7 @@ LightTracer::LampLight LightTracer::trace_lamps(const Points& points, const Ligh
     const Lanes nl = dot(n, point.towards);
     const IntLanes lit = points.visible & (nl > 0.0f) & (point.share > 0.0f);
     if (!any(lit)) continue;
-    const Lanes share = lit ? point.share * nl : none;
-    LaneVectors arriving = all_lanes(lamp.def().intensity) * share;
+    LaneVectors arriving = point.arriving * (lit ? nl : none);
     if (lamp.def().shadows) {
       LaneVectors place = points.place;
       lift(points, lit & (dot(points.face, point.towards) < kGrazing), view, place);
@@ -513,9 +547,15 @@ LightTracer::LampLight LightTracer::trace_lamps(const Points& points, const Ligh
     const LaneVectors h = normalized(point.towards + to_eye);
     const Lanes wide = 0.5f * lamp.def().radius / larger(point.distance, none + 1e-6f) + 0.002f;
     const Lanes m = 1 - clamped_to(dot(to_eye, h), 0, 1);
+    // A lamp is a single bright point in the mirror; what rays meet, too, has a weight in place of a limit.
+    const Lanes most = point.density > 0.0f ? none + 1e12f : none + 40;
     const Lanes lobe =
-        lobe_of(smaller(larger(rough * rough, wide), none + 1), nl, nv, clamped_to(dot(n, h), 0, 1));
-    const LaneVectors bright = arriving * (lit ? lobe : none);
+        lobe_of(smaller(larger(rough * rough, wide), none + 1), nl, nv, clamped_to(dot(n, h), 0, 1), most);
+    // The traced mirror image has the rest of the weight.
+    const Lanes by_mirror = mirror_density(rough * rough, nv, clamped_to(dot(n, h), 0, 1));
+    const Lanes weight =
+        (points.mirrors & (point.density > 0.0f)) ? share_of_way(point.density, by_mirror) : none + 1;
+    const LaneVectors bright = arriving * (lit ? lobe * weight : none);
     lobes = lobes + bright;
     const Lanes m2 = m * m;
     grazing += (bright.x + bright.y + bright.z) * (m2 * m2 * m);
@@ -540,7 +580,13 @@ Vector3f LightTracer::mirrored_light(const Point& point, const LightView& view, 
       a < 1e-4f ? point.normal : visible_facet(point.normal, point.view, a, sampler.next());
   Vector3f way = reflected(-point.view, facet);
   if (way.dot(point.face) <= 0) way = reflected(way, point.face);
-  const Path path{.from = point.place, .direction = way, .cone = std::max(a, view.pixel_m), .mirrored = true};
+  const float nv = std::max(point.normal.dot(point.view), 1e-3f);
+  const float nh = std::clamp(point.normal.dot((way + point.view).normalized()), 0.0f, 1.0f);
+  const Path path{.from = point.place,
+                  .direction = way,
+                  .cone = std::max(a, view.pixel_m),
+                  .mirrored = true,
+                  .density = mirror_density(a, nv, nh)};
   return limited(radiance(path, sampler, &visible), sums);
 }
 

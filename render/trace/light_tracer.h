@@ -130,6 +130,7 @@ class LightTracer {
   void trace_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view, LightBuffer& light,
                    LightSums& sums) const;
   Vector3f sky_seen(const Vector3f& direction) const;
+  Vector3f sky_met(const Vector3f& direction, bool sharp, float density) const;
 
   const RayScene& scene_;
   const LightSources& sources_;

@@ -15,6 +15,21 @@ RayLamp::RayLamp(const Lamp& lamp) : def_(lamp) {
   }
 }
 
+RayLamp::RayLamp(const TurnedSky& sky) : sky_(sky), right_(Vector3f::UnitX()), up_(Vector3f::UnitY()) {
+  const SkyBeam beam = sky.beam();
+  def_.intensity = beam.light;
+  def_.direction = -beam.direction;
+  def_.radius = 0;
+}
+
+LampPoint<float> RayLamp::point_of_sky(const SquarePoint<float>& uv) const {
+  constexpr float kFarAway = 1e9f;  // [m]
+  const SkyPicture::Sample sample = sky_.picture->sample({uv.x, uv.y});
+  const Vector3f arriving = sky_.intensity / std::numbers::pi_v<float> * sample.light;
+  return {from_eigen(sky_.from_picture(sample.direction)), kFarAway, 1, from_eigen(arriving),
+          sky_.picture->density(sample.direction)};
+}
+
 template <class T>
 LampPoint<T> RayLamp::point_of(const Three<T>& place, const SquarePoint<T>& uv) const {
   const bool rectangle = def_.size.x() > 0;
@@ -39,14 +54,31 @@ LampPoint<T> RayLamp::point_of(const Three<T>& place, const SquarePoint<T>& uv) 
   if (rectangle) share = larger(cosine, T{});
   if (def_.cone_deg > 0) share = clamped_to(cone_factor_ * cosine + cone_offset_, 0, 1);
   result.share = share / (result.distance * result.distance + softening + 1e-12f);
+  result.arriving = everywhere(def_.intensity) * result.share;
+  result.density = T{};
   return result;
 }
 
 LampPoint<float> RayLamp::point(const Three<float>& place, const SquarePoint<float>& uv) const {
-  return point_of(place, uv);
+  return sky_.picture ? point_of_sky(uv) : point_of(place, uv);
 }
 LampPoint<Lanes> RayLamp::point(const LaneVectors& place, const SquarePoint<Lanes>& uv) const {
-  return point_of(place, uv);
+  if (!sky_.picture) return point_of(place, uv);
+  LampPoint<Lanes> result{};
+  for (int i = 0; i < kLanes; ++i) {
+    const LampPoint<float> one = point_of_sky({uv.x[i], uv.y[i]});
+    const auto set = [i](LaneVectors& lanes, const Three<float>& value) {
+      lanes.x[i] = value.x;
+      lanes.y[i] = value.y;
+      lanes.z[i] = value.z;
+    };
+    set(result.towards, one.towards);
+    set(result.arriving, one.arriving);
+    result.distance[i] = one.distance;
+    result.share[i] = one.share;
+    result.density[i] = one.density;
+  }
+  return result;
 }
 
 }  // namespace offstage::render

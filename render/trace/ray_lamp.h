@@ -1,6 +1,7 @@
 #pragma once
-/// Private: a lamp as a light source with an area.
+/// Private: a lamp as a light source with an area, and the bright part of the sky's picture as another.
 
+#include "render/sky_picture.h"
 #include "render/stage.h"
 #include "render/trace/directions.h"
 
@@ -9,14 +10,18 @@ namespace offstage::render {
 /// A point of a lamp as seen from one place, or from eight.
 template <class T>
 struct LampPoint {
-  Three<T> towards;  ///< unit direction from the place to the point
-  T distance;        ///< [m]
-  T share;           ///< share of the lamp's intensity that arrives at a surface there that faces the point
+  Three<T> towards;   ///< unit direction from the place to the point
+  T distance;         ///< [m]
+  T share;            ///< share of the lamp's intensity that arrives at a surface there that faces the point
+  Three<T> arriving;  ///< the same times the intensity: radiance of a white surface
+  T density;  ///< probability density of the direction, if rays meet the lamp, too; otherwise 0 [1/sr]
 };
 
 class RayLamp {
  public:
   explicit RayLamp(const Lamp& lamp);
+  /// The bright part of the picture of a sky, which must have one.
+  explicit RayLamp(const TurnedSky& sky);
   /// The point of the lamp that belongs to `uv`. `place` is where the light arrives.
   LampPoint<float> point(const Three<float>& place, const SquarePoint<float>& uv) const;
   LampPoint<Lanes> point(const LaneVectors& place, const SquarePoint<Lanes>& uv) const;
@@ -25,8 +30,10 @@ class RayLamp {
  private:
   template <class T>
   LampPoint<T> point_of(const Three<T>& place, const SquarePoint<T>& uv) const;
+  LampPoint<float> point_of_sky(const SquarePoint<float>& uv) const;
 
   Lamp def_;
+  TurnedSky sky_;  ///< without a picture: a lamp near the scene
   Vector3f right_, up_;
   float cone_factor_ = 0, cone_offset_ = 1;
 };

@@ -80,6 +80,7 @@ RayMaterial::RayMaterial(const Material& material, std::span<const Image> textur
       pattern_(material.pattern),
       pattern_scale_(std::max(material.pattern_scale, 1e-4f)),
       alpha_cutoff_(material.alpha_cutoff),
+      triplanar_(material.triplanar),
       texels_(material.base_color_texture, textures),
       glowing_texels_(material.emission.isZero() ? TextureMap{} : material.emission_texture, textures) {
   pattern_color_ = material.pattern_color;
@@ -93,6 +94,15 @@ Vector3f RayMaterial::emission_at(const Vector2f& uv) const {
   return emission_.cwiseProduct(glowing_texels_.at(uv).head<3>());
 }
 
+// As triplanar_color() in shaders/mesh.frag.
+Vector4f RayMaterial::triplanar_texel(const Vector3f& p, const Vector3f& n) const {
+  const Vector3f weight = n.array().square().square();
+  const Vector2f x(n.x() < 0 ? p.z() : -p.z(), -p.y()), y(n.y() < 0 ? -p.x() : p.x(), p.z()),
+      z(n.z() < 0 ? -p.x() : p.x(), -p.y());
+  return (weight.x() * texels_.at(x) + weight.y() * texels_.at(y) + weight.z() * texels_.at(z)) /
+         std::max(weight.sum(), 1e-12f);
+}
+
 Vector4f RayMaterial::color(const Hit& hit, float footprint) const {
   Vector4f result = color_;
   if (pattern_ != Pattern::none)
@@ -101,7 +111,9 @@ Vector4f RayMaterial::color(const Hit& hit, float footprint) const {
                            : pattern_color(pattern_, hit.object_position, hit.object_normal, footprint,
                                            color_.head<3>(), pattern_color_, pattern_scale_);
   result = result.cwiseProduct(hit.color);
-  if (texels_.image) result = result.cwiseProduct(texels_.at(hit.uv));
+  if (texels_.image)
+    result = result.cwiseProduct(triplanar_ ? triplanar_texel(hit.object_position, hit.object_normal)
+                                            : texels_.at(hit.uv));
   if (alpha_cutoff_ > 0) result.w() = result.w() < alpha_cutoff_ ? 0.0f : 1.0f;
   return result;
 }

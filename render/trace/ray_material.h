@@ -42,6 +42,7 @@ class RayMaterial {
     Texels(const TextureMap& texture_map, std::span<const Image> textures);
     Vector4f at(const Vector2f& uv) const;
   };
+  Vector4f triplanar_texel(const Vector3f& place, const Vector3f& normal) const;
 
   Vector4f color_;
   Vector3f emission_, mean_emission_;
@@ -49,7 +50,7 @@ class RayMaterial {
   Pattern pattern_ = Pattern::none;
   float pattern_scale_ = 1;
   float alpha_cutoff_ = 0;
-  bool opaque_ = true;
+  bool opaque_ = true, triplanar_ = false;
   Texels texels_, glowing_texels_;
 };
 

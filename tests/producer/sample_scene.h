@@ -15,7 +15,8 @@ inline constexpr const char* kSampleScene = R"({
     {"name": "red", "color": "#c03020", "roughness": 0.3, "restitution": 1, "friction": 0.2,
      "static_friction": 0.4, "cross_friction": 0.6,
      "fabric": {"weave": "twill", "thread": 0.002, "sheen": 0.4, "translucency": 0.1, "back_color": "#ffffff"}},
-    {"name": "glass", "color": [0.9, 1, 1, 0.25], "metallic": 0, "pattern": "checker", "pattern_color": "#00000080"}
+    {"name": "glass", "color": [0.9, 1, 1, 0.25], "metallic": 0, "pattern": "checker", "pattern_color": "#00000080",
+     "texture": "LICENSE", "texture_projection": "triplanar", "texture_scale": 0.5, "texture_angle_deg": 10}
   ],
   "contacts": [{"materials": ["red", "glass"], "restitution": 0.1, "friction": 0, "static_friction": 0.05}],
   "bodies": [
@@ -87,7 +88,7 @@ inline constexpr const char* kSampleScene = R"({
   ],
   "camera": {"type": "keyframes", "keyframes": [{"time": 0, "eye": [4, 2, 6]}, {"time": 3, "eye": [0, 2, 7]}]},
   "lights": [{"type": "sun", "direction": [1, 2, 1], "color": [1, 0.9, 0.8]}],
-  "environment": {"fog": 0.01, "background": "sky"},
+  "environment": {"fog": 0.01, "background": "sky", "picture": {"file": "LICENSE", "turn_deg": 30, "blur_deg": 2, "visible": false}},
   "render": {"size": [320, 180], "quality": "draft", "tone_curve": "linear"},
   "output": {"fps": 24, "duration": 3, "start": 0.5}
 }

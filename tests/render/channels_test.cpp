@@ -118,6 +118,24 @@ TEST(StageChannels, BallsMoveWithTheirVelocityAndTheCameraMovesEverything) {
   EXPECT_NEAR(c.motion[middle(c)].x(), 0, 0.05f);
 }
 
+// A mesh that is replaced by its next pose, as an animated skin is.
+TEST(StageChannels, PosesMoveByTheirVertices) {
+  SmallStage s;
+  Mesh square = make_box({2, 2, 0.1f});
+  const MeshHandle mesh = s.stage.add_mesh(square);
+  s.stage.add_instance(mesh, s.stage.add_material({}));
+  s.stage.set_mesh(mesh, square);
+  s.stage.store_previous_transforms();
+  for (const float step : {0.3f, -0.2f}) {  // only the sum counts
+    for (Vector3f& p : square.positions) p.x() += step;
+    s.stage.set_mesh(mesh, square);
+  }
+  const Channels c = s.stage.channels(1);
+  EXPECT_NEAR(c.motion[middle(c)].x(), 0.1f * pixels_per_m(4.95f), 0.05f);
+  s.stage.store_previous_transforms();
+  EXPECT_NEAR(s.stage.channels(1).motion[middle(c)].x(), 0, 0.01f);
+}
+
 TEST(StageChannels, ClothsMoveByTheirVertices) {
   SmallStage s;
   const ClothHandle cloth = s.stage.add_cloth(

@@ -1,18 +1,38 @@
 #pragma once
 /// A model file drawn alone, whose pixels follow from its format.
 
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <vector>
 
 #include "gl_fixture.h"
 #include "render/image_io.h"
 #include "render/mesh_io.h"
+#include "render/tone_map.h"
 
 namespace offstage::render {
 
 inline const Vector3f kPureBlack(0, 0, 0), kPureRed(1, 0, 0), kPureGreen(0, 1, 0), kPureBlue(0, 0, 1),
     kPureWhite(1, 1, 1);
+
+/// For tests/render/model_sheet.sh: writes a picture into the folder OFFSTAGE_MODEL_SHEET, named by the test
+/// that draws it, if that variable is set.
+inline void put_on_sheet(const HdrImage& light) {
+  const char* folder = std::getenv("OFFSTAGE_MODEL_SHEET");
+  if (folder == nullptr) return;
+  static int count = 0;
+  Image image{light.width_px, light.height_px, {}};
+  for (const float value : light.rgba)
+    image.rgba.push_back(static_cast<uint8_t>(std::lround(255 * srgb_encode(std::clamp(value, 0.0f, 1.0f)))));
+  for (std::size_t i = 3; i < image.rgba.size(); i += 4) image.rgba[i] = 255;
+  const auto* test = testing::UnitTest::GetInstance()->current_test_info();
+  char name[256];
+  std::snprintf(name, sizeof name, "%03d_%s.%s.png", ++count, test->test_suite_name(), test->name());
+  write_png(std::filesystem::path(folder) / name, image);
+}
 
 /// A model, seen from z = 5, without any light unless it is set.
 class ModelPicture {
@@ -48,7 +68,11 @@ class ModelPicture {
     const Vector2f place = project(camera_, {x, y, 0}, 96, 64);
     return pixel(image, static_cast<int>(place.x()), static_cast<int>(place.y()));
   }
-  HdrImage draw() { return small_.draw(); }
+  HdrImage draw() {
+    HdrImage image = small_.draw();
+    put_on_sheet(image);
+    return image;
+  }
   Vector3f color_at(float x, float y) { return at(x, y).head<3>(); }
 
  private:

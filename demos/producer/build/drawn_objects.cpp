@@ -1,6 +1,8 @@
 #include "producer/build/drawn_objects.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "producer/base/to_float.h"
 #include "producer/build/cloth_defs.h"
@@ -63,6 +65,25 @@ render::Mesh mesh_of(const sim::ConvexPolyhedron& part) {
   return mesh;
 }
 
+namespace {
+
+/// The transform of texture coordinates that scales and turns a texture of this size.
+std::array<Eigen::Vector3f, 2> texture_rows(const Material& material, const render::Image& image) {
+  const float angle = to_float(material.texture_angle_deg) * std::numbers::pi_v<float> / 180;
+  const float scale = 1 / to_float(material.texture_scale);
+  const float c = scale * std::cos(angle), s = scale * std::sin(angle);
+  // v points downwards, so the coordinates turn clockwise where the picture turns counter-clockwise.
+  std::array<Eigen::Vector3f, 2> rows = {Eigen::Vector3f(c, -s, 0), Eigen::Vector3f(s, c, 0)};
+  if (material.texture_projection == TextureProjection::triplanar) {
+    rows[1] *= static_cast<float>(image.width_px) / static_cast<float>(image.height_px);
+  } else {
+    for (Eigen::Vector3f& row : rows) row.z() = 0.5f - 0.5f * (row.x() + row.y());
+  }
+  return rows;
+}
+
+}  // namespace
+
 render::Material material_of(const Scene& scene, const std::string& name, const ModelLibrary& models,
                              std::vector<render::Image>& textures) {
   render::Material m;
@@ -82,6 +103,8 @@ render::Material material_of(const Scene& scene, const std::string& name, const 
     if (!it->texture.empty()) {
       textures.push_back(models.texture(it->texture));
       m.base_color_texture.image = 0;
+      m.base_color_texture.rows = texture_rows(*it, textures.back());
+      m.triplanar = it->texture_projection == TextureProjection::triplanar;
     }
   }
   return m;

@@ -84,6 +84,10 @@ render::Environment environment_of(const Scene& scene) {
                                   .clouds = to_float(e.clouds),
                                   .fog = to_float(e.fog),
                                   .visible = e.background == Background::sky};
+  if (e.picture) {
+    environment.picture_turn_deg = to_float(e.picture->turn_deg);
+    environment.picture_visible = e.picture->visible;
+  }
   if (e.ground)
     environment.ground = e.ground->rgb();
   else

@@ -11,6 +11,7 @@ namespace offstage::producer {
 
 /// The sun; without one, a sun of intensity 0.
 render::Sun sun_of(const Scene& scene);
+/// Without the picture of the sky, which the caller sets.
 render::Environment environment_of(const Scene& scene);
 /// The other lights at a time, in scene order.
 std::vector<render::Lamp> lamps_of(const Scene& scene, double time, const BodyPlaces& places,

@@ -10,6 +10,7 @@
 #include "producer/base/interrupt.h"
 #include "producer/base/shipped_files.h"
 #include "producer/base/suggest.h"
+#include "producer/base/to_float.h"
 #include "producer/build/animated_bodies.h"
 #include "render/error.h"
 #include "render/image_io.h"
@@ -214,6 +215,7 @@ ModelLibrary::ModelLibrary(const Scene& scene, const SceneFolder& folder, const 
       problems.push_back({where, error.what()});
     }
   }
+  add_to(hash, read_sky(scene, folder, problems, warnings));
   for (const ParticleGroup& group : scene.particles)  // the points of its file are not in the scene's text
     for (const ParticlePlace& place : group.file.empty() ? std::vector<ParticlePlace>{} : group.places) {
       const Color color = place.color.value_or(Color{});
@@ -226,6 +228,25 @@ ModelLibrary::ModelLibrary(const Scene& scene, const SceneFolder& folder, const 
   XXH3_freeState(hash);
   if (!problems.empty()) throw SceneError(std::move(problems));
   decompose_models(scene, cache, warnings, on_step);
+}
+
+std::vector<float> ModelLibrary::read_sky(const Scene& scene, const SceneFolder& folder,
+                                          std::vector<Problem>& problems, std::vector<Problem>& warnings) {
+  if (!scene.environment.picture) return {};
+  const std::string& file = scene.environment.picture->file;
+  const Where& where = scene.environment.picture->where;
+  try {
+    render::LightImage light = render::read_light_image(folder / file, folder.inputs(), interrupt_signal);
+    for (const std::string& warning : light.warnings) warnings.push_back({where, file + ": " + warning});
+    sky_ = std::make_shared<const render::SkyPicture>(light.image,
+                                                      to_float(scene.environment.picture->blur_deg));
+    return std::move(light.image.rgba);
+  } catch (const render::FileError& error) {
+    problems.push_back({where, error.what()});
+  } catch (const std::invalid_argument& error) {
+    problems.push_back({where, file + ": " + error.what()});
+  }
+  return {};
 }
 
 std::string ModelLibrary::animation_key(const Body& body) {

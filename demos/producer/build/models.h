@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "producer/build/decomposition_cache.h"
 #include "producer/scene/scene.h"
 #include "render/model.h"
+#include "render/sky_picture.h"
 #include "sim/geometry/convex_decomposition.h"
 #include "sim/geometry/mesh.h"
 
@@ -47,6 +49,8 @@ class ModelLibrary {
   /// The colliding pieces of a body with an animated shape.
   const std::vector<AnimatedPiece>& pieces(const Body& body) const { return pieces_.at(animation_key(body)); }
   const render::Image& texture(const std::string& file) const { return textures_.at(file); }
+  /// The picture of the sky; null if the scene has none.
+  const std::shared_ptr<const render::SkyPicture>& sky() const { return sky_; }
   /// A model that was decomposed into convex parts, and the time this took (short if they were on disk).
   struct Decomposed {
     std::string file;
@@ -61,6 +65,9 @@ class ModelLibrary {
  private:
   /// Adds a problem for each sheet whose pictures would not have whole pixels.
   void check_sheets(const Scene& scene, std::vector<Problem>& problems) const;
+  /// Reads the picture of the sky, and returns its pixels for the digest.
+  std::vector<float> read_sky(const Scene& scene, const SceneFolder& folder, std::vector<Problem>& problems,
+                              std::vector<Problem>& warnings);
   static std::string animation_key(const Body& body);
   void read_animations(const Scene& scene, const DecompositionCache& cache, std::vector<Problem>& problems);
   void decompose_models(const Scene& scene, const DecompositionCache& cache, std::vector<Problem>& warnings,
@@ -68,6 +75,7 @@ class ModelLibrary {
 
   std::map<std::string, render::Model> models_;
   std::map<std::string, render::Image> textures_;
+  std::shared_ptr<const render::SkyPicture> sky_;
   std::map<std::string, sim::ConvexDecomposition> parts_;
   std::map<std::string, std::vector<AnimatedPiece>> pieces_;  ///< by animation_key()
   std::vector<Decomposed> decomposed_;

@@ -99,7 +99,9 @@ Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context
   }
   add_overlay_lines();
   stage_.set_sun(sun_of(scene));
-  stage_.set_environment(environment_of(scene));
+  render::Environment environment = environment_of(scene);
+  environment.picture = models.sky();
+  stage_.set_environment(environment);
 }
 
 void Picture::add_points(const ParticleLook& look, const ModelLibrary& models, uint32_t object) {

@@ -1,5 +1,6 @@
 #include "producer/export/film_parts.h"
 
+#include <algorithm>
 #include <map>
 #include <set>
 
@@ -273,6 +274,22 @@ ClothSurface cloth_surface(const FilmCloth& cloth, const ClothSample& sample) {
   for (Vector3f& n : surface.normals)
     n = n.norm() > 0 ? Vector3f(n.normalized()) : Vector3f(Vector3f::UnitY());
   return surface;
+}
+
+std::vector<std::string> look_notes(const Scene& scene) {
+  std::vector<std::string> notes;
+  if (scene.environment.picture)
+    notes.push_back("the picture of the sky is not written; load " + scene.environment.picture->file +
+                    " in the other program");
+  const bool laid = std::ranges::any_of(scene.materials, [](const Material& m) {
+    return !m.texture.empty() && (m.texture_projection == TextureProjection::triplanar ||
+                                  m.texture_scale != 1 || m.texture_angle_deg != 0);
+  });
+  if (laid)
+    notes.push_back(
+        "textures lie by the coordinates of their shapes: texture_projection, texture_scale and "
+        "texture_angle_deg are not written");
+  return notes;
 }
 
 }  // namespace offstage::producer

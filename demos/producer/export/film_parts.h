@@ -99,4 +99,7 @@ struct ClothSurface {
 };
 ClothSurface cloth_surface(const FilmCloth& cloth, const ClothSample& sample);
 
+/// What neither USD nor glTF files get of the looks of a scene, one line each.
+std::vector<std::string> look_notes(const Scene& scene);
+
 }  // namespace offstage::producer

@@ -197,7 +197,7 @@ class GltfExport : public FilmExport {
   }
 
   std::vector<std::string> notes() const override {
-    std::vector<std::string> notes;
+    std::vector<std::string> notes = look_notes(parts_.scene);
     if (!parts_.points.empty())
       notes.push_back(
           fmt::format("glTF has no form for particles: {} set{} left out; .usda, .ply and .csv hold them",

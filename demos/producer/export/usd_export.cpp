@@ -185,7 +185,7 @@ class UsdExport : public FilmExport {
   }
 
   std::vector<std::string> notes() const override {
-    std::vector<std::string> notes;
+    std::vector<std::string> notes = look_notes(parts_.scene);
     for (const FilmMaterial& m : parts_.materials)
       if (m.look.pattern != render::Pattern::none) {
         notes.push_back("USD: patterns of materials are replaced by their first colour");

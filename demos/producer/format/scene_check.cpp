@@ -86,6 +86,7 @@ class Checker {
           overlay);
     check_cameras();
     check_lights();
+    check_environment();
     check_film();
     return std::move(findings_);
   }
@@ -146,9 +147,22 @@ class Checker {
       for (const CompoundPart& part : compound->parts)
         check_material_name(part.where.path + "/material", part.material);
   }
+  void check_texture(const Material& material) {
+    check_file(material.where.path + "/texture", material.texture);
+    const bool triplanar = material.texture_projection == TextureProjection::triplanar;
+    for (const Cloth& cloth : scene_.cloths)
+      if (triplanar && cloth.material == material.name)
+        fail(material.where.path + "/texture_projection",
+             "the cloth '" + cloth.name + "' has this material; \"triplanar\" is for bodies");
+    const char* key = triplanar                         ? "/texture_projection"
+                      : material.texture_scale != 1     ? "/texture_scale"
+                      : material.texture_angle_deg != 0 ? "/texture_angle_deg"
+                                                        : nullptr;
+    if (key && material.texture.empty())
+      warn(material.where.path + key, "has no effect: there is no \"texture\"");
+  }
   void check_materials() {
-    for (const Material& material : scene_.materials)
-      check_file(material.where.path + "/texture", material.texture);
+    for (const Material& material : scene_.materials) check_texture(material);
     for (const Body& body : scene_.bodies) {
       check_material_name(body.where.path + "/material", body.material);
       check_part_materials(body.shape);
@@ -587,6 +601,14 @@ class Checker {
         fail(path, "a scene has at most one sun");
       std::visit([&](const auto& light) { check_light(light, path); }, scene_.lights[i]);
     }
+  }
+
+  void check_environment() {
+    const EnvironmentSettings& environment = scene_.environment;
+    if (environment.picture) check_file("/environment/picture/file", environment.picture->file);
+    if (environment.picture && environment.clouds > 0)
+      fail("/environment/clouds",
+           "a sky from a picture has the clouds of the picture; leave out one of both");
   }
 
   void check_film() {

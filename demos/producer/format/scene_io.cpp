@@ -92,6 +92,8 @@ LoadedScene parse_scene(std::string_view text, const std::string& name, const Sc
   Reader reader(source.files);
   read_scene(reader, source.root, described);
   errors.insert(errors.end(), reader.problems().begin(), reader.problems().end());
+  // The picture has its own sun.
+  if (described.environment.picture && source.root.find("lights") == nullptr) described.lights.clear();
   place_effects(described, from_effects);
   name_everything(described, name);
 

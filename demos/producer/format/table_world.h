@@ -102,6 +102,11 @@ struct Names<render::Pattern> {
 };
 
 template <>
+struct Names<TextureProjection> {
+  static constexpr std::array kNames = {"surface", "triplanar"};
+};
+
+template <>
 struct Table<Material> {
   static constexpr const char* kName = "material";
   static constexpr const char* kHelp = "Appearance and contact behaviour of a surface.";
@@ -124,6 +129,20 @@ struct Table<Material> {
         {"pattern_color", &T::pattern_color, "second colour, used by the pattern"},
         {"pattern_scale", &T::pattern_scale, "size of one cell of the pattern", "m", kPositive},
         {"texture", &T::texture, "image file that multiplies the base colour; empty: none"},
+        {"texture_projection", &T::texture_projection,
+         "`surface` lays the texture by the coordinates of the shape or model, once over a primitive's side "
+         "and "
+         "over a cloth; `triplanar` projects it along the three axes of the body, without distortion and "
+         "seams. "
+         "Triplanar is not for cloths"},
+        {"texture_scale", &T::texture_scale,
+         "size of one copy of the texture: with `surface` a factor of its size, with `triplanar` its width "
+         "in "
+         "metres",
+         "", kScale},
+        {"texture_angle_deg", &T::texture_angle_deg,
+         "turns the texture counter-clockwise, about its centre or, with `triplanar`, the body's axes",
+         "deg"},
         {"two_sided", &T::two_sided, "back faces are lit and drawn as well"},
         {"fabric", &T::fabric, "appearance of the threads on cloths; default: that of the cloth's fabric"},
         {"restitution", &T::restitution,

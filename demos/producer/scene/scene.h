@@ -60,6 +60,9 @@ struct FabricLook {
 };
 
 /// Look and contact properties.
+/// `surface`: by the coordinates of the surface; `triplanar`: from the three sides of the body.
+enum class TextureProjection { surface, triplanar };
+
 struct Material {
   Where where;
   std::string name;
@@ -74,6 +77,9 @@ struct Material {
   Color pattern_color{{0.4f, 0.4f, 0.4f, 1}};
   Real pattern_scale = 1;
   std::string texture;  ///< image file
+  TextureProjection texture_projection = TextureProjection::surface;
+  Real texture_scale = 1;
+  Real texture_angle_deg = 0;
   bool two_sided = false;
   std::optional<FabricLook> fabric;  ///< for cloths; default: that of the cloth's fabric
   Real restitution = 0.5;
@@ -339,6 +345,15 @@ using Light = std::variant<SunLight, PointLight, SpotLight, AreaLight>;
 
 enum class Background { sky, transparent };
 
+/// A picture of the whole sky, which lights the scene and is its background.
+struct SkyPictureSettings {
+  Where where;
+  std::string file;
+  Real turn_deg = 0;
+  Real blur_deg = 0;
+  bool visible = true;
+};
+
 struct EnvironmentSettings {
   Color zenith{{0.2f, 0.42f, 0.88f, 1}};
   Color horizon{{0.95f, 1.05f, 1.15f, 1}};
@@ -347,6 +362,7 @@ struct EnvironmentSettings {
   Real fog = 0;
   Real clouds = 0;
   Background background = Background::sky;
+  std::optional<SkyPictureSettings> picture;
 };
 
 /// Sub-frames per frame: draft 1 and an edge filter, preview 4, final 16. Never changes the physics.

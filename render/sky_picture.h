@@ -1,0 +1,125 @@
+#pragma once
+/// A picture of the whole sky (equirectangular projection) as a light source and as a background.
+///
+/// The picture is divided into two parts that add up to it: a dim part, which rays and prefiltered levels see
+/// without much noise, and a bright part (the sun, windows), whose directions are sampled in proportion to
+/// luminance times solid angle. The centre of the picture is at -Z, its upper edge at +Y, and its right half
+/// at +X.
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "render/image.h"
+
+namespace offstage::render {
+
+using Eigen::Vector2f;
+using Eigen::Vector3f;
+
+/// Values over the sphere of directions, by rows from the top.
+struct SkyGrid {
+  int columns = 0, rows = 0;
+  std::vector<Vector3f> values;
+
+  /// Interpolated between the cells, around the edges at the left and right.
+  Vector3f at(const Vector3f& direction) const;
+  Vector3f& cell(int column, int row);
+  const Vector3f& cell(int column, int row) const;
+  /// Solid angle of the cells of a row [sr].
+  float solid_angle(int row) const;
+};
+
+/// Mean values of the cells of another grid, weighted by solid angle.
+SkyGrid resampled(const SkyGrid& grid, int columns, int rows);
+
+/// A light with a direction that stands for many.
+struct SkyBeam {
+  Vector3f direction = Vector3f::UnitY();
+  Vector3f light = Vector3f::Zero();  ///< radiance of a white surface that faces it
+  float size_deg = 0;                 ///< diameter of a disc with the same spread
+};
+
+class SkyPicture {
+ public:
+  static constexpr int kMostColumns = 4096;       ///< of what is seen; larger pictures are reduced
+  static constexpr int kMostLightColumns = 1024;  ///< of the light
+  static constexpr int kLevels = 5;               ///< prefiltered for the roughness 0, 1/4 ... 1
+
+  /// `image`: twice as wide as high; finite values, at least 0. Throws std::invalid_argument otherwise.
+  /// `blur_deg`: standard deviation of a Gaussian that blurs the background, but not the light; 0: none.
+  explicit SkyPicture(const HdrImage& image, float blur_deg = 0);
+
+  /// Radiance from a unit direction, both parts.
+  Vector3f seen(const Vector3f& direction) const { return unpacked_at(direction); }
+  /// The dim part.
+  Vector3f dim(const Vector3f& direction) const;
+  /// The dim part as a surface of this roughness mirrors it, for the mirrored direction.
+  Vector3f mirrored(const Vector3f& direction, float roughness) const;
+  /// Light of the dim part on a white surface with normal n: constant + slope * n + n * curvature * n.
+  struct Irradiance {
+    Vector3f constant = Vector3f::Zero();
+    Eigen::Matrix3f slope = Eigen::Matrix3f::Zero();  ///< rows: red, green, blue
+    std::array<Eigen::Matrix3f, 3> curvature = {Eigen::Matrix3f::Zero(), Eigen::Matrix3f::Zero(),
+                                                Eigen::Matrix3f::Zero()};  ///< symmetric, without trace
+  };
+  const Irradiance& irradiance() const { return irradiance_; }
+
+  bool has_bright_part() const { return bright_total_ > 0; }
+  /// Share of the luminance from a direction that belongs to the bright part.
+  float bright_share(const Vector3f& direction) const;
+  /// Probability density of sample() [1/sr].
+  float density(const Vector3f& direction) const;
+  struct Sample {
+    Vector3f direction;
+    Vector3f light;  ///< radiance of the bright part divided by the density
+  };
+  /// The direction of the bright part that belongs to a point of the unit square.
+  Sample sample(const Vector2f& uv) const;
+  const SkyBeam& beam() const { return beam_; }  ///< the bright part as a whole
+
+  /// The background as GL_RGB9_E5, which has what seen() returns unless it is blurred, and its reduced
+  /// levels.
+  struct Packed {
+    int columns = 0, rows = 0;
+    std::vector<uint32_t> values;
+  };
+  const std::vector<Packed>& background() const { return background_; }
+  std::vector<Packed> levels() const;  ///< prefiltered, as mirrored() reads them
+
+ private:
+  Vector3f unpacked_at(const Vector3f& direction) const;
+  void split();
+  void find_beam();
+  void find_irradiance();
+  void prefilter();
+
+  Packed sharp_;
+  std::vector<Packed> background_;
+  SkyGrid light_;               ///< both parts
+  std::vector<float> share_;    ///< of the bright part, of the same cells
+  std::vector<float> row_sum_;  ///< of luminance * solid angle of the bright part, up to each row
+  std::vector<float> sums_;     ///< the same within each row
+  float bright_total_ = 0;
+  SkyBeam beam_;
+  Irradiance irradiance_;
+  std::array<SkyGrid, kLevels> levels_;
+};
+
+/// A sky picture as a scene uses it.
+struct TurnedSky {
+  std::shared_ptr<const SkyPicture> picture;  ///< null: none
+  float turn = 0;                             ///< counter-clockwise as seen from above [rad]
+  float intensity = 1;
+
+  Vector3f to_picture(const Vector3f& direction) const;
+  Vector3f from_picture(const Vector3f& direction) const;
+  /// Light of the dim part as the weights of the nine functions of sky_irradiance().
+  std::array<Vector3f, 9> irradiance() const;
+  SkyBeam beam() const;
+};
+
+}  // namespace offstage::render
