@@ -13,12 +13,12 @@ inline constexpr const char* kSampleScene = R"({
             "seed": 42},
   "materials": [
     {"name": "red", "color": "#c03020", "roughness": 0.3, "restitution": 1, "friction": 0.2,
-     "static_friction": 0.4, "cross_friction": 0.6,
+     "static_friction": 0.4, "cross_friction": 0.6, "rolling_friction": 0.001, "spinning_friction": 0.002,
      "fabric": {"weave": "twill", "thread": 0.002, "sheen": 0.4, "translucency": 0.1, "back_color": "#ffffff"}},
     {"name": "glass", "color": [0.9, 1, 1, 0.25], "metallic": 0, "pattern": "checker", "pattern_color": "#00000080",
      "texture": "LICENSE", "texture_projection": "triplanar", "texture_scale": 0.5, "texture_angle_deg": 10}
   ],
-  "contacts": [{"materials": ["red", "glass"], "restitution": 0.1, "friction": 0, "static_friction": 0.05}],
+  "contacts": [{"materials": ["red", "glass"], "restitution": 0.1, "friction": 0, "static_friction": 0.05, "rolling_friction": 0.003, "spinning_friction": 0.004}],
   "bodies": [
     // primitives
     {"name": "floor", "shape": {"type": "plane"}, "motion": "static", "material": "glass"},
