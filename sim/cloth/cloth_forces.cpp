@@ -3,18 +3,33 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 namespace offstage::sim {
 namespace {
 
 constexpr Real kAirDensity = 1.2;  // of leaking gas without a density of its own [kg/m^3]
 
-/// Pressure that the gas let in so far would have without a loss, at the present volume [Pa]. A volume of
-/// less than a tenth of that at rest counts as a tenth: a cloth that is crushed flat does not burst.
+/// Volume inside, at least a tenth of that at rest: a cloth that is crushed flat does not burst, and what is
+/// left of a torn one does not keep its gas because it has no inside [m^3].
+Real gas_volume(const Cloth& cloth) {
+  return std::max(cloth.gas.volume(cloth.points, cloth.triangles), 0.1 * cloth.rest_volume);
+}
+
+/// Pressure that the gas let in so far would have without a loss, at the present volume [Pa].
 Real overpressure(const Cloth& cloth) {
-  const Real volume = cloth.gas.volume(cloth.points, cloth.triangles);
   const Real let_in = cloth.age < cloth.def.inflate_time ? cloth.age / cloth.def.inflate_time : 1;
-  return let_in * cloth.def.pressure * cloth.rest_volume / std::max(volume, 0.1 * cloth.rest_volume);
+  return let_in * cloth.def.pressure * cloth.rest_volume / gas_volume(cloth);
+}
+
+Real gas_density(const Cloth& cloth) {
+  const Real density = cloth.def.gas_density.value_or(cloth.def.air.density);
+  return density > 0 ? density : kAirDensity;
+}
+
+/// Whether gas flows out of a tear.
+bool leaks(const Cloth& cloth) {
+  return cloth.def.pressure != 0 && cloth.version > 0 && cloth.gas.share() > 0 && !cloth.stopped;
 }
 
 /// The points of one cloth as their accelerations are made.
@@ -25,6 +40,8 @@ struct Run {
   ClothPoints& points;
   Real total_mass;
   std::vector<Vec3> air;  // velocity of it, at each point
+  /// How fast the force of the air on each point falls with its velocity, at most [kg/s].
+  std::vector<Real> resistance;
 
   std::size_t size() const { return cloth.points.size(); }
   Vec3 at(std::size_t i) const { return points.at(first + i); }
@@ -90,7 +107,7 @@ void add(const PairLaw&, Run&) {
 }
 
 /// Drag and lift (ClothAir), a third to each corner.
-void blow_on_triangles(Run& run, Real h) {
+void blow_on_triangles(Run& run) {
   const ClothAir& air = run.cloth.def.air;
   if (!(air.density > 0) || !(air.drag > 0)) return;
   for (const Triangle& t : run.cloth.triangles) {
@@ -103,11 +120,11 @@ void blow_on_triangles(Run& run, Real h) {
                     run.velocity(t[2])) /
                    3;
     const Real scale = air.density * size / 4 * u.norm();  // rho A/2 |u|
-    const Real mass = run.cloth.masses[t[0]] + run.cloth.masses[t[1]] + run.cloth.masses[t[2]];
-    const Real rate = 2 * scale * air.drag / mass;
-    const Vec3 force = scale / (1 + h * rate) * ((air.drag - air.lift) * u + air.lift * u.dot(n) * n);
-    for (uint32_t corner : t)
-      run.points.acceleration[run.first + corner] += padded(force / (3 * run.cloth.masses[corner]));
+    const Vec3 third = scale / 3 * ((air.drag - air.lift) * u + air.lift * u.dot(n) * n);
+    for (uint32_t corner : t) {
+      run.points.acceleration[run.first + corner] += padded(third / run.cloth.masses[corner]);
+      run.resistance[corner] += 2 * scale / 3 * air.drag;
+    }
   }
 }
 
@@ -150,7 +167,7 @@ void inflate(Run& run, const Vec3& gravity) {
 /// An open cloth that faces the air stops what comes in at its mouth: inside of it the pressure of stagnation
 /// builds up, everywhere the same. A fan over its border would close the surface, whose area vectors then
 /// add up to zero: that of the mouth is the opposite of the cloth's.
-void catch_air(Run& run, Real h) {
+void catch_air(Run& run) {
   const ClothDef& def = run.cloth.def;
   if (!(def.ram_pressure > 0)) return;
   Vec3 cap = Vec3::Zero(), stream = Vec3::Zero();
@@ -162,34 +179,81 @@ void catch_air(Run& run, Real h) {
     stream += run.cloth.masses[i] / run.total_mass * (run.air[i] - run.velocity(i));
   const Real area = cap.norm(), speed = area > 0 ? cap.dot(stream) / area : 0;
   if (!(speed > 0)) return;
-  const Real whole = def.ram_pressure * def.air.density / 2 * speed * speed;
-  const Real rate = 2 * whole * area / (speed * run.total_mass);
-  push_out(run, whole / (1 + h * rate));
+  const Real pressure = def.ram_pressure * def.air.density / 2 * speed * speed;
+  push_out(run, pressure);
+  for (const Triangle& t : run.cloth.triangles) {
+    const Vec3 a = run.at(t[0]);
+    const Real size = (run.at(t[1]) - a).cross(run.at(t[2]) - a).norm() / 2;
+    for (uint32_t corner : t) run.resistance[corner] += 2 * pressure / speed * size / 3;
+  }
+}
+
+/// Mass of the gas and the air that a skin of unit area moves when it bursts [kg/m^2]: that of a sphere of
+/// radius R in air that moves to and fro, rho_air R / 2, and of the gas in it, rho_gas R (Lamb,
+/// Hydrodynamics, art. 92). It is ten times that of the skin of a balloon, which without it would fly off
+/// faster than the gas.
+Real moved_with_skin(const Cloth& cloth) {
+  const Real radius = std::cbrt(3 * cloth.rest_volume / (4 * std::numbers::pi));
+  return cloth.gas.share() * radius * (cloth.def.air.density / 2 + gas_density(cloth));
+}
+
+/// Sets the points' masses. Forces act for a time h. Where the air brakes a point in less than that, its
+/// force would throw the point back. Such a point gets the inertia h * resistance in place of its mass, so
+/// that the force of the air just stops it, as in an implicit step. The forces themselves stay as they are,
+/// so that steady states are exact.
+void set_inertia(Run& run, Real h) {
+  std::vector<Real> inertia = run.cloth.masses;
+  if (leaks(run.cloth)) {
+    const Real moved = moved_with_skin(run.cloth);
+    for (const Triangle& t : run.cloth.triangles) {
+      const Vec3 a = run.at(t[0]);
+      const Real size = (run.at(t[1]) - a).cross(run.at(t[2]) - a).norm() / 2;
+      for (uint32_t corner : t) inertia[corner] += moved * size / 3;
+    }
+  }
+  for (std::size_t i = 0; i < run.size(); ++i) {
+    inertia[i] = std::max(inertia[i], h * run.resistance[i]);
+    run.points.mass[run.first + i] = inertia[i];
+    run.points.acceleration[run.first + i] *= run.cloth.masses[i] / inertia[i];
+  }
 }
 
 }  // namespace
-
-void leak_gas(Cloth& cloth, Real h) {
-  if (cloth.def.pressure == 0 || cloth.version == 0) return;
-  Real density = cloth.def.gas_density.value_or(cloth.def.air.density);
-  if (!(density > 0)) density = kAirDensity;
-  cloth.gas.leak(cloth.points, cloth.gas.volume(cloth.points, cloth.triangles), overpressure(cloth), density,
-                 h);
-}
 
 void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather& weather,
                       ClothPoints& points) {
   Real total = 0;
   for (Real m : cloth.masses) total += m;
-  Run run{cloth, first, weather.time, points, total, std::vector<Vec3>(cloth.points.size(), weather.wind)};
+  Run run{cloth,
+          first,
+          weather.time,
+          points,
+          total,
+          std::vector<Vec3>(cloth.points.size(), weather.wind),
+          std::vector<Real>(cloth.points.size(), 0)};
   std::fill_n(points.acceleration.begin() + static_cast<std::ptrdiff_t>(first), run.size(),
               padded(weather.gravity));
   for (const ForceDef* f : weather.forces)
     if (f->acts_on(cloth.handle) && f->is_on(weather.time))
       std::visit([&](const auto& effect) { add(effect, run); }, f->effect);
-  blow_on_triangles(run, weather.h);
+  blow_on_triangles(run);
   inflate(run, weather.gravity);
-  catch_air(run, weather.h);
+  catch_air(run);
+  set_inertia(run, weather.h);
+}
+
+void step_leaks(std::span<Cloth* const> cloths, std::span<const std::size_t> first,
+                const ClothWeather& weather, ClothPoints& points) {
+  for (std::size_t c = 0; c < cloths.size(); ++c) {
+    Cloth& cloth = *cloths[c];
+    if (!leaks(cloth)) continue;
+    const std::size_t begin = first[c], end = begin + cloth.points.size();
+    for (std::size_t i = begin; i < end; ++i) cloth.points[i - begin] = points.at(i);
+    cloth.gas.leak(cloth.points, gas_volume(cloth), overpressure(cloth), gas_density(cloth), weather.h);
+    add_outer_forces(cloth, begin, weather, points);
+    for (std::size_t i = begin; i < end; ++i)
+      if (points.inverse_mass[i] > 0) points.inverse_mass[i] = 1 / points.mass[i];
+  }
 }
 
 }  // namespace offstage::sim
