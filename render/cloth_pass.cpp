@@ -11,29 +11,27 @@ constexpr GLuint kClothMaterialBlock = 1, kClothTextureUnit = 1;
 
 gl::VertexArray make_layout() {
   gl::VertexArray layout = gl::make_vertex_array();
-  gl::set_attribute(layout, 0, 0, 4, offsetof(ClothVertex, position));
+  gl::set_attribute(layout, 0, 0, 3, offsetof(ClothVertex, position));
   gl::set_attribute(layout, 1, 0, 4, offsetof(ClothVertex, normal));
   gl::set_attribute(layout, 2, 0, 2, offsetof(ClothVertex, uv));
   return layout;
 }
 
-gl::LazyProgram make_sheer_shadow(std::vector<std::string> defines) {
+gl::LazyProgram make_surface_program(std::vector<std::string> defines) {
+  defines.insert(defines.end(), {"FLAT 1", "WEAVE 0", "SURFACE 1"});
   return {{"frame.glsl", "cloth.vert"},
-          {"frame.glsl", "material.glsl", "sheer.glsl", "cloth_shadow.frag"},
+          {"frame.glsl", "sky.glsl", "light.glsl", "material.glsl", "noise.glsl", "surface.glsl",
+           "sheer.glsl", "fabric.glsl", "cloth.frag"},
           std::move(defines)};
 }
 
 }  // namespace
 
 ClothPass::ClothPass()
-    : shadow_({"frame.glsl", "cloth.vert"}, {}, {"SHADOW 1"}),
-      sheer_shadow_(make_sheer_shadow({"SHADOW 1", "SHEER 1"})),
-      textured_sheer_shadow_(make_sheer_shadow({"SHADOW 1", "SHEER 1", "TEXTURED 1"})),
-      depth_({"frame.glsl", "cloth.vert"}, {}, {}),
-      surface_({"frame.glsl", "cloth.vert"},
-               {"frame.glsl", "sky.glsl", "light.glsl", "material.glsl", "noise.glsl", "surface.glsl",
-                "fabric.glsl", "cloth.frag"},
-               {"FLAT 1", "WEAVE 0", "SURFACE 1"}) {}
+    : depth_({"frame.glsl", "cloth.vert"}, {}, {}),
+      surface_(make_surface_program({})),
+      sheer_surface_(make_surface_program({"SHEER 1"})),
+      textured_sheer_surface_(make_surface_program({"SHEER 1", "TEXTURED 1"})) {}
 
 void ClothPass::prepare(Cloth& cloth) {
   if (cloth.vertex_array == 0) cloth.vertex_array = make_layout();
@@ -52,22 +50,11 @@ void ClothPass::draw_triangles(const Cloth& cloth) {
                  nullptr);
 }
 
-void ClothPass::bind(const Cloth& cloth, GLint texture_from_uv) {
+void ClothPass::bind(const Cloth& cloth) {
   glBindBufferBase(GL_UNIFORM_BUFFER, kClothMaterialBlock, cloth.material->uniforms);
   if (cloth.material->textures[0] == 0) return;
   glBindTextureUnit(kClothTextureUnit, cloth.material->textures[0]);
-  glUniform2f(texture_from_uv, cloth.texture_from_uv.x(), cloth.texture_from_uv.y());
-}
-
-void ClothPass::draw_shadow(const Cloth& cloth, const Matrix4f& shadow_clip_from_world) {
-  if (!cloth.is_translucent()) {
-    shadow_.use();
-  } else {
-    (cloth.material->textures[0] != 0 ? textured_sheer_shadow_ : sheer_shadow_).use();
-    bind(cloth, 1);
-  }
-  glUniformMatrix4fv(0, 1, GL_FALSE, shadow_clip_from_world.data());
-  draw_triangles(cloth);
+  glUniform2f(0, cloth.texture_from_uv.x(), cloth.texture_from_uv.y());
 }
 
 void ClothPass::draw_depth(const Cloth& cloth) {
@@ -84,8 +71,8 @@ gl::LazyProgram& ClothPass::program(const GpuMaterial& material, const Features&
   std::vector<std::string> defines = features;
   defines.push_back("FLAT 1");
   defines.push_back("WEAVE " + std::to_string(static_cast<int>(material.weave)));
-  std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl",      "light.glsl",
-                                            "lamps.glsl", "material.glsl", "noise.glsl"};
+  std::vector<std::string_view> fragment = {"frame.glsl",  "sky.glsl",      "light.glsl",
+                                            "traced.glsl", "material.glsl", "noise.glsl"};
   if (textured) defines.push_back("TEXTURED 1");
   if (material.pattern != Pattern::none) {
     defines.push_back("PATTERN " + std::to_string(static_cast<int>(material.pattern)));
@@ -94,8 +81,6 @@ gl::LazyProgram& ClothPass::program(const GpuMaterial& material, const Features&
   if (sheer) {
     defines.push_back("SHEER 1");
     fragment.push_back("sheer.glsl");
-  } else {
-    fragment.push_back("traced.glsl");
   }
   fragment.insert(fragment.end(), {"fabric.glsl", "cloth.frag"});
   const std::vector<std::string_view> vertex = {"frame.glsl", "cloth.vert"};
@@ -106,15 +91,18 @@ void ClothPass::draw(const Cloth& cloth, const Features& features) {
   program(*cloth.material, features).use();
   glDisable(GL_CULL_FACE);
   glFrontFace(GL_CCW);
-  bind(cloth, 0);
+  bind(cloth);
   draw_triangles(cloth);
 }
 
 void ClothPass::draw_surface(const Cloth& cloth) {
-  surface_.use();
+  if (!cloth.is_translucent())
+    surface_.use();
+  else
+    (cloth.material->textures[0] != 0 ? textured_sheer_surface_ : sheer_surface_).use();
   glDisable(GL_CULL_FACE);
   glFrontFace(GL_CCW);
-  bind(cloth, 0);
+  bind(cloth);
   draw_triangles(cloth);
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Private: draws cloths from both sides, and draws them into the shadow map.
+/// Private: draws cloths from both sides.
 
 #include <map>
 #include <span>
@@ -37,21 +37,20 @@ class ClothPass {
   ClothPass();
   /// Uploads the current state of a cloth.
   void prepare(Cloth& cloth);
-  void draw_shadow(const Cloth& cloth, const Matrix4f& shadow_clip_from_world);
   /// Draws the depth of an opaque cloth into the picture. It is exactly the surface that `draw` shades.
   void draw_depth(const Cloth& cloth);
   void draw(const Cloth& cloth, const Features& features);
-  /// Writes the surface of an opaque cloth for the tracer of light.
+  /// Writes the surface of a cloth for the tracer of light.
   void draw_surface(const Cloth& cloth);
 
  private:
-  static void bind(const Cloth& cloth, GLint texture_from_uv);
+  static void bind(const Cloth& cloth);
   static void draw_triangles(const Cloth& cloth);
   gl::LazyProgram& program(const GpuMaterial& material, const Features& features);
 
   std::map<std::tuple<Weave, Pattern, bool, bool, Features>, gl::LazyProgram>
       programs_;  ///< keyed also by textured, sheer
-  gl::LazyProgram shadow_, sheer_shadow_, textured_sheer_shadow_, depth_, surface_;
+  gl::LazyProgram depth_, surface_, sheer_surface_, textured_sheer_surface_;
 };
 
 }  // namespace offstage::render

@@ -12,8 +12,6 @@ namespace {
 /// pixels wide, triangles are then a few pixels wide.
 constexpr std::size_t kFineTriangles = 25'000;
 constexpr int kMostLevels = 3;
-/// Number of smoothing rounds; the difference to the smoothed surface distinguishes hollows from ridges.
-constexpr int kSmoothingRounds = 8;
 
 /// Smooth normals by N. Max's weights ("Weights for computing vertex normals from facet normals", 1999). They
 /// are exact on spheres, and do not need the arc cosine that angles would need.
@@ -47,20 +45,9 @@ void ClothSurface::set_mesh(std::span<const uint32_t> triangles, std::span<const
   if (triangles.size() % 3 != 0)
     throw std::invalid_argument("the triangles of a cloth need three indices each");
   coarse_count_ = uvs.size();
-  coarse_triangles_.assign(triangles.begin(), triangles.end());
-  first_neighbor_.assign(coarse_count_ + 1, 0);
-  for (const uint32_t index : triangles) first_neighbor_[index + 1] += 2;
-  for (std::size_t v = 0; v < coarse_count_; ++v) first_neighbor_[v + 1] += first_neighbor_[v];
-  neighbors_.resize(first_neighbor_.back());
-  std::vector<uint32_t> next(first_neighbor_.begin(), first_neighbor_.end() - 1);
-  for (std::size_t t = 0; t < triangles.size(); t += 3)
-    for (std::size_t k = 0; k < 3; ++k)
-      for (std::size_t other = 1; other < 3; ++other)
-        neighbors_[next[triangles[t + k]]++] = triangles[t + (k + other) % 3];
-
   subdivisions_.clear();
   uvs_.assign(uvs.begin(), uvs.end());
-  indices_ = coarse_triangles_;
+  indices_.assign(triangles.begin(), triangles.end());
   std::vector<Vector2f> finer;
   while (!indices_.empty() && indices_.size() < 3 * kFineTriangles && levels() < kMostLevels) {
     subdivisions_.emplace_back(indices_, uvs_);
@@ -77,40 +64,12 @@ void ClothSurface::set_mesh(std::span<const uint32_t> triangles, std::span<const
   ++version_;
 }
 
-void ClothSurface::measure_hollows() {
-  smooth_normals(places_, coarse_triangles_, normals_);
-  smooth_ = places_;
-  for (int round = 0; round < kSmoothingRounds; ++round) {
-    smoother_.resize(smooth_.size());
-    for (std::size_t v = 0; v < smooth_.size(); ++v) {
-      const uint32_t first = first_neighbor_[v], end = first_neighbor_[v + 1];
-      Vector4f sum = Vector4f::Zero();
-      for (uint32_t k = first; k < end; ++k) sum += smooth_[neighbors_[k]];
-      smoother_[v] = first == end
-                         ? smooth_[v]
-                         : Vector4f(0.5f * smooth_[v] + (0.5f / static_cast<float>(end - first)) * sum);
-    }
-    smooth_.swap(smoother_);
-  }
-  double squares = 0;
-  for (std::size_t v = 0; v < places_.size(); ++v)
-    if (first_neighbor_[v] < first_neighbor_[v + 1])
-      squares += static_cast<double>((places_[v] - places_[neighbors_[first_neighbor_[v]]]).squaredNorm());
-  // A round smooths over the square root of half the mean squared edge.
-  const float width = std::sqrt(static_cast<float>(squares) / static_cast<float>(places_.size() + 1) *
-                                (0.5f * kSmoothingRounds)) +
-                      1e-12f;
-  for (std::size_t v = 0; v < places_.size(); ++v)
-    places_[v].w() = normals_[v].dot((smooth_[v] - places_[v]).head<3>()) / width;
-}
-
 void ClothSurface::set_positions(std::span<const Vector3f> positions, float thickness) {
   if (positions.size() != coarse_count_)
     throw std::invalid_argument("a cloth of " + std::to_string(coarse_count_) + " vertices got " +
                                 std::to_string(positions.size()) + " positions");
   places_.resize(positions.size());
   for (std::size_t v = 0; v < positions.size(); ++v) places_[v] << positions[v], 0;
-  measure_hollows();
   for (const LoopSubdivision& subdivision : subdivisions_) {
     subdivision.refine(std::span<const Vector4f>(places_), finer_);
     places_.swap(finer_);
@@ -126,7 +85,7 @@ void ClothSurface::set_positions(std::span<const Vector3f> positions, float thic
     const Vector3f p = places_[v].head<3>();
     finite = finite && p.allFinite();
     box_.extend(p);
-    vertices_[v] = {p, places_[v].w(), normals_[v], half, uvs_[v]};
+    vertices_[v] = {p, normals_[v], half, uvs_[v]};
   }
   ClothVertex* rim = vertices_.data() + places_.size();
   for (const auto& [a, b] : rim_) {
@@ -134,7 +93,7 @@ void ClothSurface::set_positions(std::span<const Vector3f> positions, float thic
     for (const uint32_t end : {a, b}) {
       const ClothVertex& v = vertices_[end];
       const Vector3f outwards = along.cross(v.normal).normalized();
-      for (const float side : {half, -half}) *rim++ = {v.position + side * v.normal, 0, outwards, 0, v.uv};
+      for (const float side : {half, -half}) *rim++ = {v.position + side * v.normal, outwards, 0, v.uv};
     }
   }
   if (!finite) {

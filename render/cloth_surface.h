@@ -14,12 +14,11 @@ namespace offstage::render {
 
 struct ClothVertex {
   Vector3f position;  ///< on the middle layer; rim vertices lie on the surface
-  float hollow;       ///< depth over width of the surrounding fold; positive in hollows of the front
   Vector3f normal;    ///< normal of the front; rim normals point outwards
   float lift;         ///< half the thickness [m]; 0 for rim vertices
   Vector2f uv;        ///< position along the cloth [m]
 };
-static_assert(sizeof(ClothVertex) == 40);
+static_assert(sizeof(ClothVertex) == 36);
 
 class ClothSurface {
  public:
@@ -38,18 +37,14 @@ class ClothSurface {
   int levels() const { return static_cast<int>(subdivisions_.size()); }
 
  private:
-  void measure_hollows();
-
   std::size_t coarse_count_ = 0;
-  std::vector<uint32_t> coarse_triangles_;
-  std::vector<uint32_t> first_neighbor_, neighbors_;  // neighbours of the coarse vertices
   std::vector<LoopSubdivision> subdivisions_;
   std::vector<BoundaryEdge> rim_;
   std::vector<uint32_t> indices_;  // triangles of the sheet, then those of the rim
   std::vector<Vector2f> uvs_;      // for the fine vertices
   uint32_t version_ = 0;
 
-  std::vector<Vector4f> places_, finer_, smooth_, smoother_;  // w: hollow
+  std::vector<Vector4f> places_, finer_;  // w is not used
   std::vector<Vector3f> normals_;
   std::vector<ClothVertex> vertices_;
   Eigen::AlignedBox3f box_;

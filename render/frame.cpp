@@ -146,21 +146,21 @@ Vector3f FrameUniforms::irradiance_at(std::size_t k) const {
 }
 
 FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& environment,
-                         const SampleOffsets& offsets, int height_px) {
+                         const SampleOffsets& offsets, float time, int height_px) {
   const SkyModel sky = make_sky(sun, environment);
   const float n = view.near_m, f = view.far_m;
   const Vector3f x = view.right * view.tan_half.x(), y = view.up * view.tan_half.y();
 
   FrameUniforms frame;
   frame.clip_from_world = view.clip_from_world;
-  frame.shadow_rows = {Vector4f::UnitX(), Vector4f::UnitY(), Vector4f::UnitZ()};
-  frame.smoke_from_world = Matrix4f::Identity();
   frame.eye = vec4(view.eye, 2 * view.tan_half.y() / static_cast<float>(height_px));
   frame.ray_center = vec4(view.forward - view.shear.x() * x - view.shear.y() * y);
   frame.ray_x = vec4(x);
   frame.ray_y = vec4(y);
   frame.depth = {n * f / (f - n), n / (f - n), n, f};
-  frame.sun_direction = vec4(jittered_sun(sun, offsets.light), 0);
+  // The dither of every pixel is evenly distributed over [0, 1) in the sub-frames.
+  frame.sun_direction = vec4(jittered_sun(sun, offsets.light),
+                             static_cast<float>(offsets.index) / static_cast<float>(offsets.count));
   frame.sun_radiance = vec4(sun.color * sun.intensity, 0.5f * sun.size_deg * kRadians);
   frame.zenith = vec4(sky.zenith, environment.fog);
   frame.horizon = vec4(sky.horizon, offsets.count >= kManySamples ? 1.f : 0.f);
@@ -169,10 +169,7 @@ FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& en
   const std::array<Vector3f, 9> irradiance = sky_irradiance(sky);
   for (std::size_t k = 0; k < 7; ++k)
     frame.irradiance[k] = vec4(irradiance[k], k < 6 ? irradiance[7 + k / 3][static_cast<int>(k % 3)] : 0);
-  // The dither of every pixel is evenly distributed over [0, 1) in the sub-frames.
-  frame.shadow = {0, 0, 0, static_cast<float>(offsets.index) / static_cast<float>(offsets.count)};
-  frame.penumbra = Vector4f::Zero();
-  frame.air = {0, 0, environment.clouds, static_cast<float>(offsets.count)};
+  frame.air = {time, environment.clouds, static_cast<float>(offsets.count), 0};
   return frame;
 }
 

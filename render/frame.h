@@ -16,38 +16,25 @@ namespace offstage::render {
 
 using Eigen::Matrix4f;
 
-/// A lamp of a sub-frame, in the layout that shaders/lamps.glsl reads.
-struct LampUniforms {
-  Vector4f position = Vector4f::Zero();  ///< w: radius
-  Vector4f intensity = Vector4f::Zero();
-  Vector4f direction = Vector4f::Zero();  ///< w: factor of the cosine to this direction
-  Vector4f right = Vector4f::Zero();      ///< w: offset; factor * cosine + offset, clamped to [0, 1], is the
-                                          ///< share of light in that direction
-};
-
 /// The uniform block of shaders/frame.glsl, in std140 layout. Matrices come first because Eigen aligns them
 /// more strictly.
 struct FrameUniforms {
   Matrix4f clip_from_world;
-  Matrix4f smoke_from_world;
   Vector4f eye;
-  std::array<Vector4f, 3> shadow_rows;
   Vector4f sun_direction;
   Vector4f sun_radiance;
   Vector4f zenith, horizon, ground, glow;
   std::array<Vector4f, 7> irradiance;  ///< the last two of the nine coefficients are in the w components
-  Vector4f shadow, penumbra;
   Vector4f ray_center, ray_x, ray_y;
   Vector4f depth;
   Vector4f air;
-  std::array<LampUniforms, kMostLamps> lamps;
 
   Vector3f irradiance_at(std::size_t k) const;  ///< coefficient k of the nine
 };
 
-static_assert(offsetof(FrameUniforms, lamps) == 32 * sizeof(Vector4f));
+static_assert(offsetof(FrameUniforms, air) == 22 * sizeof(Vector4f));
 
-/// Defines of the shaders that depend on the lighting, such as "SMOKE 1".
+/// Defines of the shaders that depend on the lighting, such as "LAMPS 1".
 using Features = std::vector<std::string>;
 
 /// The eye of one sub-frame: displaced within the lens, looking along `forward`.
@@ -91,8 +78,8 @@ Vector2f square_to_disc(const Vector2f& p);
 /// The direction towards a point of the sun's disc.
 Vector3f jittered_sun(const Sun& sun, const Vector2f& offset);
 
-/// Fills all fields except those of the shadow map and of smoke.
+/// `time`: for clouds and waves [s].
 FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& environment,
-                         const SampleOffsets& offsets, int height_px);
+                         const SampleOffsets& offsets, float time, int height_px);
 
 }  // namespace offstage::render

@@ -73,59 +73,85 @@ LightView LightPass::light_view(const View& view, const SampleOffsets& offsets) 
           offsets};
 }
 
-void LightPass::trace(const LightSources& sources, const View& view, const SampleOffsets& offsets) {
-  read_surfaces(all_px_, surfaces_);
-  LightTracer(scene_, sources).trace(surfaces_, light_view(view, offsets), light_);
-  sums_ += light_.sums;
-  write_texture(arriving_, kArrivingUnit, all_px_, light_.arriving);
-  if (light_.has_mirrors) {
-    write_texture(mirrored_, kMirroredUnit, all_px_, light_.mirrored);
+void LightPass::write_lamps(const Eigen::AlignedBox2i& area_px, const std::vector<Vector4f>& lamps,
+                            const std::vector<Vector4f>& highlights) {
+  if (lamps.empty()) return;
+  for (gl::Texture* texture : {&lamps_, &highlights_})
+    if (*texture == 0)
+      *texture = gl::make_target(GL_RGBA32F, all_px_.sizes().x(), all_px_.sizes().y(), GL_NEAREST);
+  write_texture(lamps_, kLampsUnit, area_px, lamps);
+  write_texture(highlights_, kHighlightsUnit, area_px, highlights);
+}
+
+void LightPass::write_light(const Eigen::AlignedBox2i& area_px, const LightBuffer& light) {
+  write_texture(arriving_, kArrivingUnit, area_px, light.arriving);
+  if (light.has_mirrors) {
+    write_texture(mirrored_, kMirroredUnit, area_px, light.mirrored);
   } else if (mirrored_is_filled_) {
     glClearTexImage(mirrored_, 0, GL_RGBA, GL_FLOAT, nullptr);
     glBindTextureUnit(kMirroredUnit, mirrored_);
   }
-  mirrored_is_filled_ = light_.has_mirrors;
-  if (light_.lamps.empty()) return;
-  for (gl::Texture* texture : {&lamps_, &highlights_})
-    if (*texture == 0)
-      *texture = gl::make_target(GL_RGBA32F, all_px_.sizes().x(), all_px_.sizes().y(), GL_NEAREST);
-  write_texture(lamps_, kLampsUnit, all_px_, light_.lamps);
-  write_texture(highlights_, kHighlightsUnit, all_px_, light_.highlights);
+  mirrored_is_filled_ = light.has_mirrors;
+  write_lamps(area_px, light.lamps, light.highlights);
 }
 
-void LightPass::begin_glass(GLuint depth, const Eigen::AlignedBox2i& area_px) {
+void LightPass::trace(const LightSources& sources, const View& view, const SampleOffsets& offsets) {
+  read_surfaces(all_px_, surfaces_);
+  LightTracer(scene_, sources).trace(surfaces_, light_view(view, offsets), light_);
+  sums_ += light_.sums;
+  write_light(all_px_, light_);
+}
+
+bool LightPass::begin_part(GLuint depth, const Eigen::AlignedBox2i& area_px) {
+  part_px_ = area_px.intersection(all_px_);
+  if (part_px_.isEmpty() || part_px_.volume() == 0) return false;
   const int width = all_px_.sizes().x(), height = all_px_.sizes().y();
-  if (glass_framebuffer_ == 0) {
-    glass_depth_ = gl::make_target(GL_DEPTH_COMPONENT32F, width, height, GL_NEAREST);
-    through_glass_ = gl::make_target(GL_RGBA32F, width, height, GL_NEAREST);
-    mirrored_by_glass_ = gl::make_target(GL_RGBA32F, width, height, GL_NEAREST);
-    glass_framebuffer_ = gl::make_framebuffer(places_, glass_depth_);
-    write_to_both(glass_framebuffer_, normals_);
+  if (part_framebuffer_ == 0) {
+    part_depth_ = gl::make_target(GL_DEPTH_COMPONENT32F, width, height, GL_NEAREST);
+    part_framebuffer_ = gl::make_framebuffer(places_, part_depth_);
+    write_to_both(part_framebuffer_, normals_);
   }
-  glass_px_ = area_px.intersection(all_px_);
-  const int x = glass_px_.min().x(), y = glass_px_.min().y(), w = glass_px_.sizes().x(),
-            h = glass_px_.sizes().y();
-  glCopyImageSubData(depth, GL_TEXTURE_2D, 0, x, y, 0, glass_depth_, GL_TEXTURE_2D, 0, x, y, 0, w, h, 1);
-  glBindFramebuffer(GL_FRAMEBUFFER, glass_framebuffer_);
+  const int x = part_px_.min().x(), y = part_px_.min().y(), w = part_px_.sizes().x(),
+            h = part_px_.sizes().y();
+  glCopyImageSubData(depth, GL_TEXTURE_2D, 0, x, y, 0, part_depth_, GL_TEXTURE_2D, 0, x, y, 0, w, h, 1);
+  glBindFramebuffer(GL_FRAMEBUFFER, part_framebuffer_);
   glViewport(0, 0, width, height);
   glEnable(GL_SCISSOR_TEST);
   glScissor(x, y, w, h);
-  clear_surfaces(glass_framebuffer_);
+  clear_surfaces(part_framebuffer_);
+  return true;
 }
 
 void LightPass::trace_glass(const LightSources& sources, const View& view, const SampleOffsets& offsets,
                             GLuint picture_framebuffer) {
   glDisable(GL_SCISSOR_TEST);
-  read_surfaces(glass_px_, glass_);
+  if (through_glass_ == 0)
+    for (gl::Texture* texture : {&through_glass_, &mirrored_by_glass_})
+      *texture = gl::make_target(GL_RGBA32F, all_px_.sizes().x(), all_px_.sizes().y(), GL_NEAREST);
+  read_surfaces(part_px_, part_);
   picture_.resize(light_.arriving.size());
   glBindFramebuffer(GL_READ_FRAMEBUFFER, picture_framebuffer);
   glReadPixels(0, 0, all_px_.sizes().x(), all_px_.sizes().y(), GL_RGBA, GL_FLOAT, picture_.data());
+  const LightView seen = light_view(view, offsets);
   LightTracer(scene_, sources)
-      .trace_glass(glass_, glass_px_.min().x(), glass_px_.min().y(), light_view(view, offsets), light_,
-                   picture_, glass_light_);
+      .trace_glass(part_, part_px_.min().x(), part_px_.min().y(), seen, VisibleLight(light_, seen, picture_),
+                   glass_light_);
   sums_ += glass_light_.sums;
-  write_texture(through_glass_, kThroughGlassUnit, glass_px_, glass_light_.through);
-  write_texture(mirrored_by_glass_, kMirroredByGlassUnit, glass_px_, glass_light_.mirrored);
+  write_texture(through_glass_, kThroughGlassUnit, part_px_, glass_light_.through);
+  write_texture(mirrored_by_glass_, kMirroredByGlassUnit, part_px_, glass_light_.mirrored);
+  write_lamps(part_px_, glass_light_.lamps, glass_light_.highlights);
+}
+
+void LightPass::trace_body(const LightSources& sources, const View& view, const SampleOffsets& offsets) {
+  glDisable(GL_SCISSOR_TEST);
+  read_surfaces(part_px_, part_);
+  if (!body_light_ || body_light_->pixels.width_px != part_.width_px ||
+      body_light_->pixels.height_px != part_.height_px)
+    body_light_.emplace(part_.width_px, part_.height_px);
+  const LightView seen = light_view(view, offsets);
+  LightTracer(scene_, sources).trace_body(part_, seen, VisibleLight(light_, seen), *body_light_);
+  sums_ += body_light_->sums;
+  write_light(part_px_, *body_light_);
 }
 
 }  // namespace offstage::render

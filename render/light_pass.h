@@ -1,8 +1,9 @@
 #pragma once
-/// Private: the light of opaque surfaces in a sub-frame. The surfaces are drawn into targets and read back,
-/// their light is traced (render/trace), and the shaders read it from textures (shaders/traced.glsl).
+/// Private: the light of surfaces in a sub-frame. The surfaces are drawn into targets and read back, their
+/// light is traced (render/trace), and the shaders read it from textures (shaders/traced.glsl). This is done
+/// once for all opaque objects, then for all glass, and then for each other translucent body.
 
-#include <span>
+#include <optional>
 
 #include "render/gl.h"
 #include "render/trace/light_tracer.h"
@@ -17,22 +18,30 @@ class LightPass {
   LightPass(int width_px, int height_px, const gl::Texture& depth);
   /// The scene that rays meet, to be filled and built before trace().
   RayScene& scene() { return scene_; }
+  const RayScene& scene() const { return scene_; }
   /// Of everything that was traced.
   const LightSums& sums() const { return sums_; }
   /// Binds and clears the targets for drawing surfaces.
   void begin() const;
   /// Reads the surfaces, traces their light, and binds it for the shaders.
   void trace(const LightSources& sources, const View& view, const SampleOffsets& offsets);
-  /// After trace(): binds the targets for drawing the surfaces of glass in a part of the picture, and then
-  /// traces their light. `depth`: the picture's, which hides glass behind opaque surfaces. The picture must
-  /// show the opaque objects.
-  void begin_glass(GLuint depth, const Eigen::AlignedBox2i& area_px);
+  /// After trace(): binds the targets for drawing the surfaces of glass, or of a translucent body, in a part
+  /// of the picture. `depth`: the picture's, which hides them behind nearer surfaces. Returns false if no
+  /// pixel of the area is in the picture.
+  bool begin_part(GLuint depth, const Eigen::AlignedBox2i& area_px);
+  /// Traces the light of glass. The picture must show the opaque objects.
   void trace_glass(const LightSources& sources, const View& view, const SampleOffsets& offsets,
                    GLuint picture_framebuffer);
+  /// Traces the light of a translucent body. It replaces that of the opaque objects, which must have been
+  /// drawn.
+  void trace_body(const LightSources& sources, const View& view, const SampleOffsets& offsets);
 
  private:
   void read_surfaces(const Eigen::AlignedBox2i& area_px, SurfaceBuffer& surfaces) const;
   LightView light_view(const View& view, const SampleOffsets& offsets) const;
+  void write_light(const Eigen::AlignedBox2i& area_px, const LightBuffer& light);
+  void write_lamps(const Eigen::AlignedBox2i& area_px, const std::vector<Vector4f>& lamps,
+                   const std::vector<Vector4f>& highlights);
 
   RayScene scene_;
   Eigen::AlignedBox2i all_px_;
@@ -45,11 +54,13 @@ class LightPass {
   bool mirrored_is_filled_ = true;  ///< with anything but zeros
   gl::Texture lamps_, highlights_;  ///< created when there are lamps
 
-  // Created when there is glass.
-  gl::Texture glass_depth_, through_glass_, mirrored_by_glass_;
-  gl::Framebuffer glass_framebuffer_;
-  Eigen::AlignedBox2i glass_px_;
-  SurfaceBuffer glass_;
+  // Created when there is something translucent.
+  gl::Texture part_depth_;
+  gl::Framebuffer part_framebuffer_;
+  Eigen::AlignedBox2i part_px_;
+  SurfaceBuffer part_;
+  std::optional<LightBuffer> body_light_;
+  gl::Texture through_glass_, mirrored_by_glass_;
   GlassBuffer glass_light_;
   std::vector<Vector4f> picture_;
 };

@@ -25,9 +25,6 @@ struct Mesh {
   /// Empty: derived from the texture coordinates while drawing.
   std::vector<Vector4f> tangents = {};
   std::vector<uint32_t> indices;  ///< three per triangle, counter-clockwise seen from outside
-  /// A coarser surface with the same vertices, slightly inside the fine one and closed if that is. It is used
-  /// for shadows and depth. Empty: none.
-  std::vector<uint32_t> coarse_indices = {};
   /// Marks a mesh that stands for an infinite plane. It fades into the sky near its horizon, where it is seen
   /// at a grazing angle.
   bool endless = false;

@@ -40,33 +40,6 @@ const Image* texture_at(std::span<const Image> textures, int index) {
              : nullptr;
 }
 
-/// Whether each edge is used once in either direction; corners at the same position count as one.
-bool is_closed(const Mesh& mesh) {
-  const auto bits = [](float x) { return std::bit_cast<uint32_t>(x + 0.0f); };  // -0 is 0
-  const auto before = [&](uint32_t a, uint32_t b) {
-    const Vector3f &p = mesh.positions[a], &q = mesh.positions[b];
-    return std::array{bits(p.x()), bits(p.y()), bits(p.z())} <
-           std::array{bits(q.x()), bits(q.y()), bits(q.z())};
-  };
-  std::vector<uint32_t> order(mesh.positions.size()), place(order.size());
-  std::iota(order.begin(), order.end(), 0u);
-  std::sort(order.begin(), order.end(), before);
-  for (std::size_t i = 0; i < order.size(); ++i)
-    place[order[i]] = i > 0 && !before(order[i - 1], order[i]) ? place[order[i - 1]] : order[i];
-
-  std::vector<uint64_t> edges, reversed;
-  for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3)
-    for (std::size_t k = 0; k < 3; ++k) {
-      const uint64_t a = place[mesh.indices[i + k]], b = place[mesh.indices[i + (k + 1) % 3]];
-      if (a == b) continue;
-      edges.push_back(a << 32 | b);
-      reversed.push_back(b << 32 | a);
-    }
-  std::sort(edges.begin(), edges.end());
-  std::sort(reversed.begin(), reversed.end());
-  return edges == reversed;
-}
-
 /// Uploads the second texture coordinates, colours and tangents of a mesh that has any of them.
 void add_details(const Mesh& mesh, GpuMesh& gpu) {
   if (mesh.second_uvs.empty() && mesh.colors.empty() && mesh.tangents.empty()) return;
@@ -112,7 +85,6 @@ GpuMesh::GpuMesh(const Mesh& source) : vertex_array(gl::make_vertex_array()) {
     return ((p - center).array().abs() >= 0.4f * box.sizes().array()).all();
   });
   round = !box.isEmpty() && radius < 0.505f * box.sizes().minCoeff();
-  closed = is_closed(*mesh);
   endless = mesh->endless;
   if (!box.isEmpty()) {
     flat = box.sizes().minCoeff() <= 1e-4f * box.sizes().maxCoeff();
@@ -122,10 +94,7 @@ GpuMesh::GpuMesh(const Mesh& source) : vertex_array(gl::make_vertex_array()) {
   index_count = static_cast<GLsizei>(mesh->indices.size());
   if (index_count == 0) return;
   vertices = gl::make_buffer(std::span<const Vertex>(packed));
-  std::vector<uint32_t> both = mesh->indices;
-  both.insert(both.end(), source.coarse_indices.begin(), source.coarse_indices.end());
-  coarse_count = static_cast<GLsizei>(source.coarse_indices.size());
-  indices = gl::make_buffer(std::span<const uint32_t>(both));
+  indices = gl::make_buffer(std::span<const uint32_t>(mesh->indices));
   glVertexArrayVertexBuffer(vertex_array, kVertexBinding, vertices, 0, sizeof(Vertex));
   glVertexArrayElementBuffer(vertex_array, indices);
   gl::set_attribute(vertex_array, 0, kVertexBinding, 3, offsetof(Vertex, position));
@@ -191,7 +160,6 @@ GpuMaterial make_gpu_material(const Material& material, std::span<const Image> t
   result.blended = !result.cut_out &&
                    (material.color.w() < 1 || material.vertex_alpha || (base != nullptr && has_alpha(*base)));
   result.thin = material.thin;
-  result.casts = material.color.w() > 0;
   result.glass = material.transmission > 0 && !result.blended;
   result.smooth = material.roughness < kSmooth || material.metallic > 0.5f;
   return result;
@@ -201,24 +169,12 @@ float Instance::scale() const {
   return world_from_mesh.linear().colwise().norm().maxCoeff();
 }
 
-Caster Instance::ball() const {
-  return {world_from_mesh * mesh->center, mesh->radius * scale()};
+bool Instance::is_ball() const {
+  const Vector3f sides = world_from_mesh.linear().colwise().norm();
+  return mesh->round && sides.minCoeff() > 0.999f * sides.maxCoeff();
 }
 
-bool Instance::is_ground() const {
-  const float radius = ball().radius;
-  return radius > 150 || (mesh->flat && radius > 10);
-}
-
-MeshPass::MeshPass()
-    : opaque_shadow_({"frame.glsl", "mesh.vert"}, {}, {"SHADOW 1"}),
-      dithered_shadow_({"frame.glsl", "mesh.vert"}, {"frame.glsl", "material.glsl", "mesh_shadow.frag"},
-                       {"SHADOW 1"}),
-      textured_shadow_({"frame.glsl", "mesh.vert"}, {"frame.glsl", "material.glsl", "mesh_shadow.frag"},
-                       {"SHADOW 1", "TEXTURED 1"}),
-      detailed_shadow_({"frame.glsl", "mesh.vert"}, {"frame.glsl", "material.glsl", "mesh_shadow.frag"},
-                       {"SHADOW 1", "TEXTURED 1", "DETAILED 1"}),
-      white_(make_white_texture()) {
+MeshPass::MeshPass() : white_(make_white_texture()) {
   // Values for meshes without these attributes.
   glVertexAttrib4f(kColor, 1, 1, 1, 1);
   glVertexAttrib4f(kTangent, 0, 0, 0, 1);
@@ -227,15 +183,14 @@ MeshPass::MeshPass()
 void MeshPass::prepare(std::span<const Instance* const> instances, const View& view,
                        const Features& features) {
   features_ = features;
-  std::vector<Item> seen, casting;
+  std::vector<Item> seen;
   for (uint32_t i = 0; i < instances.size(); ++i) {
     const Instance& instance = *instances[i];
     if (!instance.visible || instance.mesh->index_count == 0) continue;
-    const Caster ball = instance.ball();
-    const Item item{&instance, view.depth_of(ball.center) + ball.radius, i,
-                    instance.world_from_mesh.linear().determinant() < 0};
-    if (view.sees(ball.center, ball.radius)) seen.push_back(item);
-    if (instance.casts_shadow && instance.material->casts && !instance.is_ground()) casting.push_back(item);
+    const Vector3f center = instance.center();
+    if (!view.sees(center, instance.radius())) continue;
+    seen.push_back({&instance, view.depth_of(center) + instance.radius(), i,
+                    instance.world_from_mesh.linear().determinant() < 0});
   }
   const auto transparent = std::stable_partition(
       seen.begin(), seen.end(), [](const Item& item) { return !item.instance->material->lets_through(); });
@@ -247,10 +202,8 @@ void MeshPass::prepare(std::span<const Instance* const> instances, const View& v
            std::tie(b.instance->batch_key, b.mirrored, b.depth, b.order);
   };
   std::sort(seen.begin(), seen.end(), by_batch);
-  std::sort(casting.begin(), casting.end(), by_batch);
-  std::vector<Rows> rows, shadow_rows;
-  const auto append = [](const std::vector<Item>& items, bool merge, std::vector<Rows>& out,
-                         std::vector<Batch>& batches) {
+  std::vector<Rows> rows;
+  const auto append = [&rows](const std::vector<Item>& items, bool merge, std::vector<Batch>& batches) {
     batches.clear();
     for (const Item& item : items) {
       const Instance& instance = *item.instance;
@@ -259,35 +212,26 @@ void MeshPass::prepare(std::span<const Instance* const> instances, const View& v
                          batches.back().mirrored == item.mirrored;
       if (!joins) {
         batches.push_back({instance.mesh, instance.material, item.mirrored, item.depth,
-                           static_cast<GLuint>(out.size()), 0, instance.mesh->thickness * instance.scale()});
+                           static_cast<GLuint>(rows.size()), 0, instance.mesh->thickness * instance.scale()});
       }
       ++batches.back().count;
-      out.push_back(rows_of(instance.world_from_mesh));
+      rows.push_back(rows_of(instance.world_from_mesh));
     }
   };
-  seen_.clear();
-  for (const Item& item : seen) seen_.push_back(item.instance);
   see_through_.clear();
   for (const Item& item : see_through) see_through_.push_back(item.instance);
-  casting_.clear();
-  for (const Item& item : casting) casting_.push_back(item.instance);
-  append(seen, true, rows, opaque_);
-  append(see_through, false, rows, translucent_);
-  append(casting, true, shadow_rows, casters_);
+  append(seen, true, opaque_);
+  append(see_through, false, translucent_);
   std::stable_sort(opaque_.begin(), opaque_.end(),
                    [](const Batch& a, const Batch& b) { return a.depth < b.depth; });
   rows_.write(std::span<const Rows>(rows));
-  shadow_rows_.write(std::span<const Rows>(shadow_rows));
 }
 
-void MeshPass::draw(const Batch& batch, const gl::StreamBuffer& rows, Detail detail) {
+void MeshPass::draw(const Batch& batch) {
   const GpuMesh& mesh = *batch.mesh;
-  const bool coarse = detail == Detail::coarse && mesh.coarse_count > 0;
-  const std::size_t first = coarse ? static_cast<std::size_t>(mesh.index_count) * sizeof(uint32_t) : 0;
-  glVertexArrayVertexBuffer(mesh.vertex_array, kInstanceBinding, rows, 0, sizeof(Rows));
+  glVertexArrayVertexBuffer(mesh.vertex_array, kInstanceBinding, rows_, 0, sizeof(Rows));
   glBindVertexArray(mesh.vertex_array);
-  glDrawElementsInstancedBaseInstance(GL_TRIANGLES, coarse ? mesh.coarse_count : mesh.index_count,
-                                      GL_UNSIGNED_INT, reinterpret_cast<const void*>(first), batch.count,
+  glDrawElementsInstancedBaseInstance(GL_TRIANGLES, mesh.index_count, GL_UNSIGNED_INT, nullptr, batch.count,
                                       batch.first);
 }
 
@@ -302,22 +246,15 @@ gl::LazyProgram& MeshPass::surface_program(const Batch& batch, Shading shading) 
   if (found != surface_programs_.end()) return found->second;
   std::vector<std::string> defines = features_;
   defines.push_back("FLAT 1");
-  std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "light.glsl", "lamps.glsl",
-                                            "material.glsl"};
-  if (surface) {
-    defines.push_back("SURFACE 1");
-    fragment = {"frame.glsl", "sky.glsl", "light.glsl", "material.glsl", "surface.glsl"};
-  }
-  if (shading == Shading::traced) {
-    defines.push_back("TRACED 1");
-    fragment.push_back("traced.glsl");
-  }
+  if (surface) defines.push_back("SURFACE 1");
+  std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "light.glsl", "material.glsl",
+                                            surface ? "surface.glsl" : "traced.glsl"};
   if (material.textured) defines.push_back("TEXTURED 1");
   if (material.detailed) defines.push_back("DETAILED 1");
   if (batch.mesh->endless) defines.push_back("ENDLESS 1");
   if (material.glass && !surface) {
     defines.push_back("GLASS 1");
-    if (shading == Shading::forward_with_particles) defines.push_back("PARTICLES 1");
+    if (shading == Shading::traced_with_particles) defines.push_back("PARTICLES 1");
     fragment.push_back("glass.glsl");
   }
   if (pattern != Pattern::none) {
@@ -329,74 +266,41 @@ gl::LazyProgram& MeshPass::surface_program(const Batch& batch, Shading shading) 
   return surface_programs_.emplace(key, gl::LazyProgram(vertex, fragment, defines)).first->second;
 }
 
-gl::LazyProgram& MeshPass::shadow_program(const GpuMaterial& material) {
-  if (!material.blended && !material.glass && !material.cut_out) return opaque_shadow_;
-  if (material.detailed) return detailed_shadow_;
-  return material.textured ? textured_shadow_ : dithered_shadow_;
-}
-
-void MeshPass::draw_shadows(const Matrix4f& shadow_clip_from_world, bool front_only) {
-  for (const Batch& batch : casters_) {
-    shadow_program(*batch.material).use();
-    glUniformMatrix4fv(0, 1, GL_FALSE, shadow_clip_from_world.data());
-    const GpuMaterial& material = *batch.material;
-    set_facing(batch, !(front_only && batch.mesh->closed && !material.blended && !material.glass &&
-                        !material.cut_out));
-    bind_material(*batch.material, white_);
-    draw(batch, shadow_rows_, Detail::coarse);
-  }
-  glDisable(GL_CULL_FACE);
-  glFrontFace(GL_CCW);
-}
-
-void MeshPass::set_facing(const Batch& batch, bool both_sides) {
-  (both_sides ? glDisable : glEnable)(GL_CULL_FACE);
+void MeshPass::set_facing(const Batch& batch) {
+  (batch.material->two_sided ? glDisable : glEnable)(GL_CULL_FACE);
   glFrontFace(batch.mirrored ? GL_CW : GL_CCW);
 }
 
-void MeshPass::draw_batch(const Batch& batch, Shading shading) {
-  constexpr float kOpaqueAlpha = 0.99f;
+void MeshPass::draw_batch(const Batch& batch, Shading shading, float min_alpha) {
   surface_program(batch, shading).use();
-  glUniform1f(0, kOpaqueAlpha);
-  set_facing(batch, batch.material->two_sided);
+  glUniform1f(0, min_alpha);
+  set_facing(batch);
   bind_material(*batch.material, white_);
-  draw(batch, rows_);
+  draw(batch);
 }
 
 void MeshPass::draw_opaque(Shading shading) {
-  for (const Batch& batch : opaque_) draw_batch(batch, shading);
+  constexpr float kOpaqueAlpha = 0.99f;
+  for (const Batch& batch : opaque_) draw_batch(batch, shading, kOpaqueAlpha);
   for (const Batch& batch : translucent_) {
-    if (batch.material->blended && batch.material->textured) draw_batch(batch, shading);
+    if (batch.material->blended && batch.material->textured) draw_batch(batch, shading, kOpaqueAlpha);
   }
 }
 
-void MeshPass::draw_glass_surfaces() {
-  for (const Batch& batch : translucent_) {
-    if (!batch.material->glass) continue;
-    surface_program(batch, Shading::surface).use();
-    glUniform1f(0, 0);
-    set_facing(batch, batch.material->two_sided);
-    bind_material(*batch.material, white_);
-    draw(batch, rows_);
-  }
-}
-
-void MeshPass::draw_translucent(std::size_t k, bool particles) {
+void MeshPass::draw_translucent(std::size_t k, Shading shading) {
   constexpr float kVisibleAlpha = 1.0f / 512;
   const Batch& batch = translucent_[k];
-  surface_program(batch, particles ? Shading::forward_with_particles : Shading::forward).use();
-  glUniform1f(0, batch.material->glass ? 0 : kVisibleAlpha);
-  if (batch.material->glass && particles) glUniform1f(1, batch.material->thin ? 0 : batch.thickness);
-  set_facing(batch, batch.material->two_sided);
-  bind_material(*batch.material, white_);
-  draw(batch, rows_);
+  if (batch.material->glass && shading == Shading::traced_with_particles) {
+    surface_program(batch, shading).use();
+    glUniform1f(1, batch.material->thin ? 0 : batch.thickness);
+  }
+  draw_batch(batch, shading, batch.material->glass ? 0 : kVisibleAlpha);
 }
 
-void MeshPass::draw_translucent_depth(std::size_t k, const Matrix4f& clip_from_world) {
-  opaque_shadow_.use();
-  glUniformMatrix4fv(0, 1, GL_FALSE, clip_from_world.data());
-  set_facing(translucent_[k], translucent_[k].material->two_sided);
-  draw(translucent_[k], rows_);
+void MeshPass::draw_translucent_depth(std::size_t k) {
+  depth_program_.use();
+  set_facing(translucent_[k]);
+  draw(translucent_[k]);
 }
 
 }  // namespace offstage::render

@@ -1,7 +1,6 @@
 #pragma once
-/// Private: draws the instances of meshes, and casters into the shadow map. Opaque instances are drawn front
-/// to back in batches of one mesh and material; translucent ones are drawn one by one in the order of
-/// PaintOrder.
+/// Private: draws the instances of meshes. Opaque instances are drawn front to back in batches of one mesh
+/// and material; translucent ones are drawn one by one in the order of PaintOrder.
 
 #include <array>
 #include <map>
@@ -14,7 +13,6 @@
 
 #include "render/frame.h"
 #include "render/gl.h"
-#include "render/shadow_map.h"
 #include "render/trace/ray_scene.h"
 
 namespace offstage::render {
@@ -24,7 +22,6 @@ struct GpuMesh {
   gl::Buffer vertices, details, indices;
   gl::VertexArray vertex_array;
   GLsizei index_count = 0;
-  GLsizei coarse_count = 0;  ///< number of indices of Mesh::coarse_indices, which follow the others
   Eigen::AlignedBox3f box;
   Vector3f center;  ///< centre of the bounding ball
   float radius = 0;
@@ -34,7 +31,6 @@ struct GpuMesh {
   bool round = false;                   ///< fills the ball inscribed in its box
   bool boxy = false;                    ///< fills its box, except for a bevel
   std::unique_ptr<const RayMesh> rays;  ///< the same for light rays
-  bool closed = false;  ///< every edge has two triangles, so the front faces hide the back faces
 };
 
 /// The uniform block of shaders/material.glsl.
@@ -55,7 +51,6 @@ struct GpuMaterial {
   bool thin = false;
   bool two_sided = false;
   bool blended = false;
-  bool casts = true;                        ///< false if fully transparent
   bool glass = false;                       ///< light goes through and is refracted
   bool smooth = false;                      ///< mirrors the scene
   std::unique_ptr<const RayMaterial> rays;  ///< the same for light rays
@@ -80,10 +75,11 @@ struct Instance {
   std::optional<Eigen::Affine3f> before;  ///< pose at Stage::store_previous_transforms
 
   float scale() const;
-  Caster ball() const;
-  /// Whether this is ground. Ground casts no visible shadow, and would extend the shadow map over its whole
-  /// area.
-  bool is_ground() const;
+  /// Ball around the instance.
+  Vector3f center() const { return world_from_mesh * mesh->center; }
+  float radius() const { return mesh->radius * scale(); }
+  /// Whether it fills that ball.
+  bool is_ball() const;
 };
 
 class MeshPass {
@@ -91,31 +87,24 @@ class MeshPass {
   MeshPass();
   /// Sorts the visible instances for this view. The instances must stay in memory until the view is drawn.
   void prepare(std::span<const Instance* const> instances, const View& view, const Features& features);
-  /// Draws casters into a shadow map. `front_only`: of closed opaque meshes, only the faces that the light
-  /// reaches; the matrix must then not mirror.
-  void draw_shadows(const Matrix4f& shadow_clip_from_world, bool front_only);
   enum class Shading {
     surface,                ///< writes surfaces for the tracer of light
     traced,                 ///< in the light that was traced
-    forward,                ///< translucent bodies: glass in traced light, others without
-    forward_with_particles  ///< the same; glass also shows particles behind it
+    traced_with_particles,  ///< the same; glass also shows particles behind it
   };
   /// Draws the opaque instances, and the opaque parts of blended ones.
   void draw_opaque(Shading shading);
   GLuint white() const { return white_; }
   /// Translucent instances, in the order of the instances.
   std::span<const Instance* const> translucent() const { return see_through_; }
-  /// Writes the surfaces of the glass among `translucent` for the tracer of light.
-  void draw_glass_surfaces();
-  /// Draws one of `translucent`. The light of glass has been traced and is bound. `particles`: whether glass
-  /// shows those behind it, from pictures with and without them that are bound.
-  void draw_translucent(std::size_t k, bool particles);
-  /// Draws only the depth of one of `translucent`, by the picture's matrix.
-  void draw_translucent_depth(std::size_t k, const Matrix4f& clip_from_world);
+  /// Draws one of `translucent`. With Shading::traced_with_particles, pictures with and without the particles
+  /// behind it are bound.
+  void draw_translucent(std::size_t k, Shading shading);
+  /// Draws only the depth of one of `translucent`.
+  void draw_translucent_depth(std::size_t k);
 
  private:
   struct Item;
-  enum class Detail { full, coarse };
   struct Batch {
     const GpuMesh* mesh;
     const GpuMaterial* material;
@@ -125,22 +114,19 @@ class MeshPass {
     GLsizei count;
     float thickness;  ///< thickness of its first instance, in the world
   };
-  void draw(const Batch& batch, const gl::StreamBuffer& rows, Detail detail = Detail::full);
+  void draw(const Batch& batch);
   gl::LazyProgram& surface_program(const Batch& batch, Shading shading);
-  gl::LazyProgram& shadow_program(const GpuMaterial& material);
-  static void set_facing(const Batch& batch, bool both_sides);
-  void draw_batch(const Batch& batch, Shading shading);
+  static void set_facing(const Batch& batch);
+  void draw_batch(const Batch& batch, Shading shading, float min_alpha);
 
   /// Keyed by textured, detailed, glass, endless.
   std::map<std::tuple<Pattern, bool, bool, bool, bool, Shading, Features>, gl::LazyProgram> surface_programs_;
-  gl::LazyProgram opaque_shadow_, dithered_shadow_, textured_shadow_, detailed_shadow_;
+  gl::LazyProgram depth_program_{{"frame.glsl", "mesh.vert"}, {}, {"DEPTH 1"}};
   Features features_;
   gl::Texture white_;
-  gl::StreamBuffer rows_, shadow_rows_;
-  std::vector<Batch> opaque_, translucent_, casters_;
-  std::vector<const Instance*> seen_;         ///< opaque instances, in the order of the rows
+  gl::StreamBuffer rows_;
+  std::vector<Batch> opaque_, translucent_;
   std::vector<const Instance*> see_through_;  ///< instances of translucent_
-  std::vector<const Instance*> casting_;      ///< casters, in the order of the rows
 };
 
 }  // namespace offstage::render

@@ -108,14 +108,4 @@ float OpacityGrid::density(const Vector3f& place) const {
   return empty() ? 0 : trilinear(amounts_, nz_, local(place) - Vector3f::Constant(0.5f)) / cell_;
 }
 
-Eigen::Matrix4f OpacityGrid::texture_from_world() const {
-  Eigen::Matrix4f result = Eigen::Matrix4f::Identity();
-  const Vector3f size(static_cast<float>(nx_), static_cast<float>(ny_), static_cast<float>(nz_ + 1));
-  const Eigen::Matrix3f linear = size.cwiseInverse().asDiagonal() * axes_ / cell_;
-  result.block<3, 3>(0, 0) = linear;
-  result.block<3, 1>(0, 3) = -linear * origin_;
-  result(2, 3) += 0.5f / size.z();  // sums are at the boundary of two cells, texels at the cell centre
-  return result;
-}
-
 }  // namespace offstage::render

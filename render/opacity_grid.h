@@ -31,11 +31,6 @@ class OpacityGrid {
   float density(const Vector3f& place) const;
   float cell_m() const { return cell_; }
 
-  /// Data for a 3D texture: the sums with their size, x fastest, and the map from the world to [0, 1]^3.
-  std::span<const float> sums() const { return sums_; }
-  std::array<int, 3> size() const { return {nx_, ny_, nz_ + 1}; }
-  Eigen::Matrix4f texture_from_world() const;
-
  private:
   void fit(std::span<const Absorber> absorbers, const Vector3f& away);
   void deposit(const Vector3f& place, float depth);

@@ -4,7 +4,11 @@
 #include <cmath>
 #include <numbers>
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 #include "render/paint_order.h"
+#include "render/puff_light.h"
 
 namespace offstage::render {
 namespace {
@@ -78,29 +82,27 @@ float PointSet::reach(std::size_t i) const {
   return radius + stretch;
 }
 
-PointsPass::Programs& PointsPass::programs(PointStyle style, const Features& features, bool pictures) {
-  const auto found = programs_.find({style, features, pictures});
-  if (found != programs_.end()) return found->second;
-  const std::string define = "STYLE " + std::to_string(static_cast<int>(style));
-  const std::vector<std::string_view> vertex = {"frame.glsl", "sky.glsl", "light.glsl", "lamps.glsl",
-                                                "points.vert"};
-  std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "points_shape.glsl", "points.frag"};
-  if (style == PointStyle::sphere)
-    fragment = {"frame.glsl", "sky.glsl", "light.glsl", "lamps.glsl", "traced.glsl", "sphere.frag"};
+gl::LazyProgram& PointsPass::ball_program(const Features& features) {
+  const auto found = ball_programs_.find(features);
+  if (found != ball_programs_.end()) return found->second;
   std::vector<std::string> defines = features;
-  defines.push_back(define);
-  std::vector<std::string> shadow_defines = {define, "SHADOW 1"};
-  if (pictures)
-    for (std::vector<std::string>* list : {&defines, &shadow_defines}) list->push_back("PICTURES 1");
-  return programs_
-      .emplace(std::tuple(style, features, pictures),
-               Programs{{vertex, fragment, defines},
-                        {{"frame.glsl", "points.vert"},
-                         {"frame.glsl", "points_shape.glsl", "points_shadow.frag"},
-                         shadow_defines},
-                        {vertex,
-                         {"frame.glsl", "sky.glsl", "light.glsl", "surface.glsl", "sphere.frag"},
-                         {define, "SURFACE 1"}}})
+  defines.push_back("STYLE 2");
+  return ball_programs_
+      .emplace(features, gl::LazyProgram(
+                             {"frame.glsl", "sky.glsl", "points.vert"},
+                             {"frame.glsl", "sky.glsl", "light.glsl", "traced.glsl", "sphere.frag"}, defines))
+      .first->second;
+}
+
+gl::LazyProgram& PointsPass::blended_program(PointStyle style, bool pictures) {
+  const auto found = blended_programs_.find({style, pictures});
+  if (found != blended_programs_.end()) return found->second;
+  std::vector<std::string> defines = {"STYLE " + std::to_string(static_cast<int>(style))};
+  if (pictures) defines.push_back("PICTURES 1");
+  return blended_programs_
+      .emplace(std::pair(style, pictures),
+               gl::LazyProgram({"frame.glsl", "sky.glsl", "points.vert"},
+                               {"frame.glsl", "sky.glsl", "points_shape.glsl", "points.frag"}, defines))
       .first->second;
 }
 
@@ -113,40 +115,28 @@ PointsPass::PointsPass() : vertex_array_(gl::make_vertex_array()), blended_array
   }
   gl::set_attribute(blended_array_, 3, 0, 4, offsetof(BlendedPoint, style));
   gl::set_attribute(blended_array_, 4, 0, 4, offsetof(BlendedPoint, picture));
-  gl::set_attribute(vertex_array_, 4, 1, 4, 0);
-  glVertexArrayBindingDivisor(vertex_array_, 1, 1);
+  gl::set_attribute(blended_array_, 5, 0, 4, offsetof(BlendedPoint, light));
 }
 
 void PointsPass::prepare(PointSet& set, const View& view) {
-  set.unseen = 0;
-  if (set.def.style != PointStyle::sphere) {
-    if (set.def.casts_shadow) {
-      set.buffer.write(std::span<const GpuPoint>(set.points));
-      set.turn_buffer.write(std::span<const GpuPicture>(set.turns));
-    }
-    return;
-  }
+  if (set.def.style != PointStyle::sphere) return;
   keys_.clear();
   ordered_.clear();
   for (uint32_t i = 0; i < set.points.size(); ++i) {
     const Vector3f center = set.points[i].position.head<3>();
     const float depth = view.depth_of(center);
     // The margin accounts for thin particles, which are drawn one pixel wide.
-    if (!view.sees(center, set.reach(i) + 0.01f * std::abs(depth))) {
-      ordered_.push_back(set.points[i]);
-      continue;
-    }
-    keys_.emplace_back(depth, i);
+    if (view.sees(center, set.reach(i) + 0.01f * std::abs(depth))) keys_.emplace_back(depth, i);
   }
   std::sort(keys_.begin(), keys_.end(), [&set](const auto& a, const auto& b) {
     return a.first != b.first ? a.first < b.first : set.ids[a.second] < set.ids[b.second];
   });
-  set.unseen = ordered_.size();
   for (const auto& [depth, i] : keys_) ordered_.push_back(set.points[i]);
+  set.seen = ordered_.size();
   set.buffer.write(std::span<const GpuPoint>(ordered_));
 }
 
-void PointsPass::prepare_blended(const PaintOrder& order) {
+void PointsPass::prepare_blended(const PaintOrder& order, const PuffLight& light) {
   blended_.clear();
   picture_runs_.clear();
   const auto append = [&](PaintOrder::Kind kind) {
@@ -156,40 +146,41 @@ void PointsPass::prepare_blended(const PaintOrder& order) {
       const GLuint pictures = at.set->pictures;
       if (picture_runs_.empty() || picture_runs_.back().pictures != pictures)
         picture_runs_.push_back({blended_.size(), pictures});
-      blended_.push_back({at.set->points[at.index], style_of(at.set->def), at.set->turns[at.index]});
+      blended_.push_back(
+          {at.set->points[at.index], style_of(at.set->def), at.set->turns[at.index], Vector4f::Zero()});
     }
     return static_cast<uint32_t>(keys.size());
   };
   sprites_ = append(PaintOrder::Kind::sprites);
   flakes_ = append(PaintOrder::Kind::flakes);
-  if (!blended_.empty()) blended_buffer_.write(std::span<const BlendedPoint>(blended_));
+  if (blended_.empty()) return;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blended_.size(), 256), [&](const auto& range) {
+    for (std::size_t k = range.begin(); k < range.end(); ++k) {
+      BlendedPoint& p = blended_[k];
+      if (p.style.z() == 0) continue;  // not lit
+      const Vector3f place = p.point.position.head<3>();
+      const float radius = p.point.position.w(), number = p.point.velocity.w();
+      p.light << light.air.lamps_around(place, radius, number),
+          light.air.sun(place, radius, number) * std::exp(-light.grid.depth(place));
+    }
+  });
+  blended_buffer_.write(std::span<const BlendedPoint>(blended_));
 }
 
-void PointsPass::draw(const PointSet& set, std::size_t first) {
-  const auto offset = static_cast<GLintptr>(first * sizeof(GpuPoint));
-  glVertexArrayVertexBuffer(vertex_array_, 0, set.buffer, offset, sizeof(GpuPoint));
-  // The programs of balls do not read it.
-  glVertexArrayVertexBuffer(vertex_array_, 1, set.is_turned() ? set.turn_buffer : set.buffer, 0,
-                            set.is_turned() ? sizeof(GpuPicture) : 0);
+void PointsPass::draw(const PointSet& set) {
+  glVertexArrayVertexBuffer(vertex_array_, 0, set.buffer, 0, sizeof(GpuPoint));
   glBindVertexArray(vertex_array_);
   glUniform4fv(1, 1, style_of(set.def).data());
-  glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(set.points.size() - first));
-}
-
-void PointsPass::draw_shadow(const PointSet& set, const Matrix4f& shadow_clip_from_world) {
-  programs(set.def.style, {}, set.pictures != 0).shadow.use();
-  if (set.pictures) glBindTextureUnit(kPictureUnit, set.pictures);
-  glUniformMatrix4fv(0, 1, GL_FALSE, shadow_clip_from_world.data());
-  draw(set, 0);
+  glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(set.seen));
 }
 
 void PointsPass::draw_spheres(const PointSet& set, const Features& features) {
-  programs(PointStyle::sphere, features).seen.use();
+  ball_program(features).use();
   glUniform2f(2, set.def.metallic, set.def.roughness);
-  draw(set, set.unseen);
+  draw(set);
 }
 
-void PointsPass::draw_blended(PointStyle style, uint32_t first, uint32_t last, const Features& features) {
+void PointsPass::draw_blended(PointStyle style, uint32_t first, uint32_t last) {
   const uint32_t begin = style == PointStyle::flake ? sprites_ + flakes_ - last : sprites_ - last;
   const uint32_t end = begin + (last - first);
   // Neighbours with other pictures are drawn by further calls.
@@ -197,14 +188,13 @@ void PointsPass::draw_blended(PointStyle style, uint32_t first, uint32_t last, c
                               [](std::size_t place, const PictureRun& r) { return place < r.first; });
   for (std::size_t from = begin; from < end; ++run) {
     const std::size_t to = run == picture_runs_.end() ? end : std::min<std::size_t>(run->first, end);
-    draw_blended(style, std::prev(run)->pictures, from, to, features);
+    draw_blended(style, std::prev(run)->pictures, from, to);
     from = to;
   }
 }
 
-void PointsPass::draw_blended(PointStyle style, GLuint pictures, std::size_t first, std::size_t last,
-                              const Features& features) {
-  programs(style, features, pictures != 0).seen.use();
+void PointsPass::draw_blended(PointStyle style, GLuint pictures, std::size_t first, std::size_t last) {
+  blended_program(style, pictures != 0).use();
   if (pictures) glBindTextureUnit(kPictureUnit, pictures);
   const auto offset = static_cast<GLintptr>(first * sizeof(BlendedPoint));
   glVertexArrayVertexBuffer(blended_array_, 0, blended_buffer_, offset, sizeof(BlendedPoint));
@@ -213,9 +203,9 @@ void PointsPass::draw_blended(PointStyle style, GLuint pictures, std::size_t fir
 }
 
 void PointsPass::draw_surfaces(const PointSet& set) {
-  programs(PointStyle::sphere).surface.use();
+  surface_.use();
   glUniform2f(2, set.def.metallic, set.def.roughness);
-  draw(set, set.unseen);
+  draw(set);
 }
 
 }  // namespace offstage::render

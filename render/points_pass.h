@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "render/frame.h"
@@ -27,6 +27,7 @@ struct BlendedPoint {
   GpuPoint point;
   Vector4f style;
   GpuPicture picture;
+  Vector4f light;  ///< of lamps; w: share of the sun that reaches it
 };
 
 struct PointSet {
@@ -35,14 +36,12 @@ struct PointSet {
       points;  ///< w of position: radius; w of velocity: a pseudo-random number per particle in [0, 1)
   std::vector<uint64_t> ids;
   std::vector<float> ages;
-  std::vector<GpuPicture> turns;  ///< for each point; sprites and flakes only
-  gl::Texture pictures;           ///< see make_sprite_pictures(); 0: soft discs
-  Eigen::AlignedBox3f box;        ///< bounds of the drawn particles, streaks at full length
-  gl::StreamBuffer buffer;       ///< balls: first those outside the view whose shadows fall into it, then the
-                                 ///< visible ones by depth
-  gl::StreamBuffer turn_buffer;  ///< `turns`, for the shadow map
-  std::size_t unseen = 0;        ///< number of balls outside the view
-  uint32_t object = 0;           ///< id in Channels
+  std::vector<GpuPicture> turns;            ///< for each point; sprites and flakes only
+  gl::Texture pictures;                     ///< see make_sprite_pictures(); 0: soft discs
+  Eigen::AlignedBox3f box;                  ///< bounds of the drawn particles, streaks at full length
+  gl::StreamBuffer buffer;                  ///< visible balls by depth
+  std::size_t seen = 0;                     ///< number of them
+  uint32_t object = 0;                      ///< id in Channels
   std::unique_ptr<const RayMaterial> rays;  ///< of balls, for light rays
 
   void assign(std::span<const Point> values);
@@ -57,36 +56,36 @@ struct PointSet {
 };
 
 class PaintOrder;
+struct PuffLight;
 
 class PointsPass {
  public:
   PointsPass();
-  /// Uploads the points for the shadow map, and balls in drawing order.
+  /// Uploads the visible balls of a set in drawing order.
   void prepare(PointSet& set, const View& view);
-  /// Uploads the sprites and flakes of all sets.
-  void prepare_blended(const PaintOrder& order);
-  void draw_shadow(const PointSet& set, const Matrix4f& shadow_clip_from_world);
+  /// Lights and uploads the sprites and flakes of all sets.
+  void prepare_blended(const PaintOrder& order, const PuffLight& light);
   void draw_spheres(const PointSet& set, const Features& features);
   /// Writes the surfaces of balls for the tracer of light.
   void draw_surfaces(const PointSet& set);
   /// Draws sprites or flakes; `first` and `last` are their keys in the PaintOrder.
-  void draw_blended(PointStyle style, uint32_t first, uint32_t last, const Features& features);
+  void draw_blended(PointStyle style, uint32_t first, uint32_t last);
   /// Makes the program of channels_ball.frag current, so that its uniforms can be set before the draw.
   void use_channels() { channels_.use(); }
-  void draw_channels(const PointSet& set) { draw(set, set.unseen); }
+  void draw_channels(const PointSet& set) { draw(set); }
 
  private:
-  void draw(const PointSet& set, std::size_t first);
+  void draw(const PointSet& set);
+  gl::LazyProgram& ball_program(const Features& features);
+  gl::LazyProgram& blended_program(PointStyle style, bool pictures);
+  void draw_blended(PointStyle style, GLuint pictures, std::size_t first, std::size_t last);
 
-  struct Programs {
-    gl::LazyProgram seen, shadow, surface;
-  };
-  Programs& programs(PointStyle style, const Features& features = {}, bool pictures = false);
-  void draw_blended(PointStyle style, GLuint pictures, std::size_t first, std::size_t last,
-                    const Features& features);
-
-  std::map<std::tuple<PointStyle, Features, bool>, Programs> programs_;
-  gl::LazyProgram channels_{{"frame.glsl", "sky.glsl", "light.glsl", "lamps.glsl", "points.vert"},
+  std::map<Features, gl::LazyProgram> ball_programs_;
+  std::map<std::pair<PointStyle, bool>, gl::LazyProgram> blended_programs_;  ///< keyed also by pictures
+  gl::LazyProgram surface_{{"frame.glsl", "sky.glsl", "points.vert"},
+                           {"frame.glsl", "sky.glsl", "light.glsl", "surface.glsl", "sphere.frag"},
+                           {"STYLE 2", "SURFACE 1"}};
+  gl::LazyProgram channels_{{"frame.glsl", "sky.glsl", "points.vert"},
                             {"frame.glsl", "channels_ball.frag"},
                             {"STYLE 2", "CHANNELS 1"}};
   gl::VertexArray vertex_array_, blended_array_;

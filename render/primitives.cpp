@@ -81,45 +81,6 @@ void add_box_vertex(Mesh& mesh, const Vector3f& point, const Vector3f& half, flo
   mesh.normals.push_back(normal);
 }
 
-// The flat parts of a bevelled box's faces, connected by one facet at each edge and corner: two fifths of its
-// triangles.
-void add_coarse_box(Mesh& mesh) {
-  constexpr int kColumns = 4, kFace = kColumns * kColumns;  // number of vertices, in the layout of make_box
-  // The corner of the flat part of the face across `axis`, towards (or away from) each axis.
-  const auto corner = [](int axis, const std::array<bool, 3>& towards) {
-    const auto along = [&](int offset) { return towards[static_cast<std::size_t>((axis + offset) % 3)]; };
-    return static_cast<uint32_t>((2 * axis + along(0)) * kFace + (1 + along(2)) * kColumns + 1 + along(1));
-  };
-  const auto add = [&](std::vector<uint32_t> polygon, bool outwards) {
-    if (!outwards) std::ranges::reverse(polygon);
-    for (std::size_t k = 2; k < polygon.size(); ++k)
-      mesh.coarse_indices.insert(mesh.coarse_indices.end(), {polygon[0], polygon[k - 1], polygon[k]});
-  };
-  for (int axis = 0; axis < 3; ++axis) {
-    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-    for (const bool a : {false, true}) {
-      const auto at = [&](int face, bool towards_u, bool towards_v, bool towards_axis) {
-        std::array<bool, 3> towards;
-        towards[static_cast<std::size_t>(u)] = towards_u;
-        towards[static_cast<std::size_t>(v)] = towards_v;
-        towards[static_cast<std::size_t>(axis)] = towards_axis;
-        return corner(face, towards);
-      };
-      add({at(axis, false, false, a), at(axis, true, false, a), at(axis, true, true, a),
-           at(axis, false, true, a)},
-          a);
-      // Edges along the axis.
-      for (const bool b : {false, true})
-        add({at(u, a, b, false), at(v, a, b, false), at(v, a, b, true), at(u, a, b, true)}, a == b);
-    }
-  }
-  for (int k = 0; k < 8; ++k) {
-    const std::array<bool, 3> towards = {(k & 1) != 0, (k & 2) != 0, (k & 4) != 0};
-    add({corner(0, towards), corner(1, towards), corner(2, towards)},
-        (towards[0] == towards[1]) == towards[2]);
-  }
-}
-
 }  // namespace
 
 Mesh make_sphere(float radius, int segments) {
@@ -194,9 +155,6 @@ Mesh make_box(const Vector3f& size, float bevel) {
       }
     }
   }
-  // Bevel below which one facet is enough for the shadow, as a share of half a side.
-  constexpr float kFine = 0.1f;
-  if (bevel > 0 && bevel <= kFine * half.minCoeff()) add_coarse_box(mesh);
   return mesh;
 }
 

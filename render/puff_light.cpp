@@ -4,8 +4,6 @@
 #include <array>
 #include <cmath>
 
-#include "render/lamps.h"
-
 namespace offstage::render {
 namespace {
 
@@ -18,9 +16,10 @@ float sun_share(float depth, float albedo) {
 }  // namespace
 
 PuffLight::PuffLight(const OpacityGrid& opacity, const FrameUniforms& frame_uniforms,
-                     const Vector3f& sun_direction)
+                     const Vector3f& sun_direction, const AirLight& air_light)
     : grid(opacity),
       frame(frame_uniforms),
+      air(air_light),
       sky{.sun_direction = frame_uniforms.sun_direction.head<3>(),
           .zenith = frame_uniforms.zenith.head<3>(),
           .horizon = frame_uniforms.horizon.head<3>(),
@@ -28,8 +27,8 @@ PuffLight::PuffLight(const OpacityGrid& opacity, const FrameUniforms& frame_unif
           .glow = frame_uniforms.glow.head<3>()},
       to_sun(sun_direction) {}
 
-PuffRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vector3f& albedo,
-                                 float visibility, const Vector3f& to_eye) const {
+PuffRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vector3f& albedo, float number,
+                                 const Vector3f& to_eye) const {
   // Optical depth and its gradient, from the corners of a tetrahedron in the puff.
   static const std::array<Vector3f, 4> kCorners = {Vector3f(1, 1, 1), Vector3f(1, -1, -1),
                                                    Vector3f(-1, 1, -1), Vector3f(-1, -1, 1)};
@@ -56,7 +55,7 @@ PuffRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vect
   const float light = sun_share(std::max(depth - change, 0.0f), white),
               dark = sun_share(depth + change, white);
   const float forward = std::max(-to_sun.dot(to_eye), 0.0f), forward2 = forward * forward;
-  const Vector3f sun = visibility * frame.sun_radiance.head<3>();
+  const Vector3f sun = air.sun(place, radius, number) * frame.sun_radiance.head<3>();
   const float sky_share = 0.25f + 0.75f * std::exp(-0.6f * above);
 
   PuffRadiance result;
@@ -65,12 +64,10 @@ PuffRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vect
   Vector3f towards_light = 0.36f * direct * to_sun;
   if (steepness > 1e-6f) towards_light -= 0.65f * (light - dark) / steepness * slope;
   result.slope = sun * towards_light.transpose();
-  for (int k = 0; k < static_cast<int>(frame.air.x()); ++k) {
-    Vector3f towards;
-    const Vector3f lamp = lamp_radiance(frame.lamps[static_cast<std::size_t>(k)], place, towards);
+  air.for_each_lamp(place, radius, number, [&](const Vector3f& lamp, const Vector3f& towards) {
     result.constant += 0.3f * lamp;
     result.slope += 0.3f * lamp * towards.transpose();
-  }
+  });
   result.slope.col(0) += sky_share * frame.irradiance_at(3);
   result.slope.col(1) += sky_share * frame.irradiance_at(1);
   result.slope.col(2) += sky_share * frame.irradiance_at(2);
@@ -99,14 +96,6 @@ Vector3f PuffLight::sky_reflection(const Vector3f& direction, float roughness) c
       sky_radiance(sky, Vector3f(direction.x(), std::max(direction.y(), 0.0f), direction.z()));
   const Vector3f sharp = above + below * (sky.ground - above);
   return sharp + roughness * roughness * (ambient(direction) - sharp);
-}
-
-Vector3f PuffLight::lamps_around(const Vector3f& place) const {
-  constexpr float kShare = 0.3f;
-  Vector3f sum = Vector3f::Zero(), towards;
-  for (int k = 0; k < static_cast<int>(frame.air.x()); ++k)
-    sum += lamp_radiance(frame.lamps[static_cast<std::size_t>(k)], place, towards);
-  return kShare * sum;
 }
 
 Vector4f PuffLight::fog_to(const Vector3f& place) const {

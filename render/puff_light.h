@@ -7,6 +7,7 @@
 #include "render/frame.h"
 #include "render/opacity_grid.h"
 #include "render/sky.h"
+#include "render/trace/air_light.h"
 
 namespace offstage::render {
 
@@ -20,19 +21,19 @@ struct PuffRadiance {
 struct PuffLight {
   const OpacityGrid& grid;
   const FrameUniforms& frame;
+  const AirLight& air;
   SkyModel sky;
   Vector3f to_sun;
 
-  PuffLight(const OpacityGrid& opacity, const FrameUniforms& frame_uniforms, const Vector3f& sun_direction);
-  /// `visibility`: share of the sunlight that the scene lets through.
-  PuffRadiance radiance(const Vector3f& place, float radius, const Vector3f& albedo, float visibility,
+  PuffLight(const OpacityGrid& opacity, const FrameUniforms& frame_uniforms, const Vector3f& sun_direction,
+            const AirLight& air_light);
+  /// `number`: see AirLight::sun.
+  PuffRadiance radiance(const Vector3f& place, float radius, const Vector3f& albedo, float number,
                         const Vector3f& to_eye) const;
   /// Sky light on a white surface with this normal, and the sky reflected from a direction by a surface of
   /// this roughness, as in shaders/sky.glsl.
   Vector3f ambient(const Vector3f& normal) const;
   Vector3f sky_reflection(const Vector3f& direction, float roughness) const;
-  /// Radiance of a white particle so small that lamps light it from all sides.
-  Vector3f lamps_around(const Vector3f& place) const;
   /// Light that fog adds on the way to the eye, and in w the share that arrives, as fog_to in
   /// shaders/sky.glsl.
   Vector4f fog_to(const Vector3f& place) const;

@@ -7,12 +7,10 @@
 
 #include <tbb/parallel_for.h>
 
-#include "render/scene_shadow.h"
-
 namespace offstage::render {
 namespace {
 
-constexpr GLuint kSmokeUnit = 5, kColorUnit = 6, kLowDepthUnit = 7;
+constexpr GLuint kColorUnit = 6, kLowDepthUnit = 7;
 constexpr float kMostOpaque = 0.98f;  // greatest opacity of one puff, so that its optical depth is finite
 constexpr double kHalf_px = 8, kQuarter_px = 64;  // radii from which the picture is reduced
 constexpr float kNearestPuff = 1.2f;  // radius from which a puff fades out, as a share of half the height
@@ -55,7 +53,7 @@ constexpr float kFlameThin[3] = {0.85f, 0.45f, 0.2f}, kFlameThick[3] = {0.3f, 0.
 
 }  // namespace
 
-void PuffsPass::prepare(std::span<const PointSet* const> sets, const Sun& sun, FrameUniforms& frame) {
+void PuffsPass::prepare(std::span<const PointSet* const> sets, const Sun& sun) {
   std::vector<OpacityGrid::Absorber> absorbers;
   for (const PointSet* set : sets) {
     if (set->is_puffs() && !atlas_) atlas_ = std::make_unique<PuffAtlas>();
@@ -70,23 +68,6 @@ void PuffsPass::prepare(std::span<const PointSet* const> sets, const Sun& sun, F
     }
   }
   grid_.build(absorbers, -sun.direction.normalized());
-  if (grid_.empty()) return;
-  const auto size = grid_.size();
-  if (grid_texture_ == 0 || size != grid_size_) {
-    GLuint name = 0;
-    glCreateTextures(GL_TEXTURE_3D, 1, &name);
-    grid_texture_ = gl::Texture(name);
-    grid_size_ = size;
-    glTextureStorage3D(grid_texture_, 1, GL_R32F, size[0], size[1], size[2]);
-    glTextureParameteri(grid_texture_, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-    glTextureParameteri(grid_texture_, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-    for (const auto axis : std::array<GLenum, 3>{GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, GL_TEXTURE_WRAP_R})
-      glTextureParameteri(grid_texture_, axis, GL_CLAMP_TO_EDGE);
-  }
-  glTextureSubImage3D(grid_texture_, 0, 0, 0, 0, size[0], size[1], size[2], GL_RED, GL_FLOAT,
-                      grid_.sums().data());
-  glBindTextureUnit(kSmokeUnit, grid_texture_);
-  frame.smoke_from_world = grid_.texture_from_world();
 }
 
 void PuffsPass::measure(const PaintOrder& order, const View& view, float pixel_m) {
@@ -110,14 +91,8 @@ void PuffsPass::measure(const PaintOrder& order, const View& view, float pixel_m
   factor_ = typical_px < kHalf_px ? 1 : typical_px < kQuarter_px ? 2 : 4;
 }
 
-void PuffsPass::make_splats(const PaintOrder& order, const View& view, const PuffLight& light,
-                            const ShadowMap& shadow_map) {
+void PuffsPass::make_splats(const PaintOrder& order, const View& view, const PuffLight& light) {
   const FrameUniforms& frame = light.frame;
-  Eigen::AlignedBox3f box;
-  for (const PaintOrder::Source& source : order.sources(PaintOrder::Kind::puffs))
-    if (source.set->def.style == PointStyle::smoke && source.set->def.lit) box.extend(source.set->box);
-  SceneShadow shadow;
-  if (!box.isEmpty()) shadow.read(shadow_map, frame, box);
   const float pixel_m = frame.eye.w() * static_cast<float>(factor_);
   const Vector2f half_size(0.5f * static_cast<float>(width_px_) / static_cast<float>(factor_),
                            0.5f * static_cast<float>(height_px_) / static_cast<float>(factor_));
@@ -181,8 +156,7 @@ void PuffsPass::make_splats(const PaintOrder& order, const View& view, const Puf
         by_cell_normal(k, 2) = (0.5f + shape.turn) * kFlameThick[k];
       }
     } else if (set.def.lit) {
-      radiance = light.radiance(center, radius, albedo, shadow.visibility(center, radius),
-                                (view.eye - center).normalized());
+      radiance = light.radiance(center, radius, albedo, point.velocity.w(), (view.eye - center).normalized());
       Eigen::Matrix3f world_from_cell;
       world_from_cell << u.x() * view.right + u.y() * view.up, v.x() * view.right + v.y() * view.up,
           -view.forward;
@@ -302,12 +276,11 @@ void PuffsPass::composite(GLuint framebuffer) {
   glEnable(GL_DEPTH_TEST);
 }
 
-void PuffsPass::prepare_splats(const PaintOrder& order, const View& view, const PuffLight& light,
-                               const ShadowMap& shadow_map) {
+void PuffsPass::prepare_splats(const PaintOrder& order, const View& view, const PuffLight& light) {
   splats_.clear();
   if (order.keys(PaintOrder::Kind::puffs).empty()) return;
   measure(order, view, light.frame.eye.w());
-  make_splats(order, view, light, shadow_map);
+  make_splats(order, view, light);
 }
 
 void PuffsPass::draw(uint32_t first, uint32_t last, const FrameUniforms& frame, GLuint framebuffer) {

@@ -14,7 +14,6 @@
 #include "render/points_pass.h"
 #include "render/puff_atlas.h"
 #include "render/puff_light.h"
-#include "render/shadow_map.h"
 #include "render/splatter.h"
 
 namespace offstage::render {
@@ -22,15 +21,11 @@ namespace offstage::render {
 class PuffsPass {
  public:
   PuffsPass(int width_px, int height_px) : width_px_(width_px), height_px_(height_px) {}
-  /// Computes the attenuation of sunlight by the smoke and drops of these sets. If it shades the scene, sets
-  /// the frame's smoke fields and binds the grid.
-  void prepare(std::span<const PointSet* const> sets, const Sun& sun, FrameUniforms& frame);
+  /// Computes the attenuation of sunlight by the smoke and drops of these sets.
+  void prepare(std::span<const PointSet* const> sets, const Sun& sun);
   const OpacityGrid& grid() const { return grid_; }
-  /// Whether the scene must look up the smoke's shadow.
-  bool shades() const { return !grid_.empty(); }
   /// Lights the puffs of a sub-frame. The order must stay in memory until they are drawn.
-  void prepare_splats(const PaintOrder& order, const View& view, const PuffLight& light,
-                      const ShadowMap& shadow_map);
+  void prepare_splats(const PaintOrder& order, const View& view, const PuffLight& light);
   /// The pixels that puffs `first` to `last` (keys in the PaintOrder) can change.
   Eigen::AlignedBox2i area_px(uint32_t first, uint32_t last) const;
   /// Draws these puffs over the picture in `framebuffer`. The depth of the picture must also be bound to the
@@ -39,16 +34,13 @@ class PuffsPass {
 
  private:
   void measure(const PaintOrder& order, const View& view, float pixel_m);
-  void make_splats(const PaintOrder& order, const View& view, const PuffLight& light,
-                   const ShadowMap& shadow_map);
+  void make_splats(const PaintOrder& order, const View& view, const PuffLight& light);
   void read_depth(std::span<const Splat> splats, const FrameUniforms& frame, GLuint framebuffer);
   void composite(GLuint framebuffer);
 
   int width_px_, height_px_;
   std::unique_ptr<const PuffAtlas> atlas_;  ///< created on first use
   OpacityGrid grid_;
-  gl::Texture grid_texture_;
-  std::array<int, 3> grid_size_{};
 
   float typical_m_ = 0;   ///< typical radius of a puff
   float farthest_m_ = 0;  ///< depth of the farthest puff

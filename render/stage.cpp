@@ -16,7 +16,6 @@
 #include "render/picture_copy.h"
 #include "render/points_pass.h"
 #include "render/puffs_pass.h"
-#include "render/shadow_map.h"
 #include "render/slots.h"
 #include "render/sprite_pictures.h"
 #include "render/streaks_pass.h"
@@ -65,16 +64,6 @@ struct TranslucentBody {
   Eigen::AlignedBox2i looked_px;  ///< area of the picture that it shows by refraction
 };
 
-/// Softening that one sub-frame must do itself, so that the mean of all is as soft as the sun's disc makes
-/// it.
-Vector4f penumbra_of(const ShadowFrame& shadow, const Sun& sun, float size_px, int count) {
-  const float half = std::tan(0.5f * sun.size_deg * std::numbers::pi_v<float> / 180);
-  const float side_m = shadow.texel_m * size_px, ratio = side_m / shadow.depth_m;
-  const float taps = count == 1 ? 8 : count < 16 ? 6 : 4;
-  return {half * shadow.depth_m / shadow.texel_m / std::sqrt(static_cast<float>(count)), kWidestPenumbra_px,
-          ratio * ratio, taps};
-}
-
 }  // namespace
 
 struct Stage::Impl {
@@ -98,7 +87,6 @@ struct Stage::Impl {
   Slots<std::unique_ptr<Cloth>, ClothTag> cloths{"cloth"};
 
   Picture picture;
-  ShadowMap shadow_map;
   LightPass light_pass;
   MeshPass mesh_pass;
   ClothPass cloth_pass;
@@ -118,7 +106,6 @@ struct Stage::Impl {
   explicit Impl(const StageDef& stage_def)
       : def(stage_def),
         picture(def.width_px, def.height_px),
-        shadow_map(def.shadow_map_px),
         light_pass(def.width_px, def.height_px, picture.depth),
         puffs_pass(def.width_px, def.height_px),
         streaks_pass(def.width_px, def.height_px),
@@ -134,10 +121,7 @@ struct Stage::Impl {
   }
   std::vector<PointSet*> prepare_points(const View& view);
   std::vector<const Cloth*> prepare_cloths();
-  void draw_shadows(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
-                    std::span<PointSet* const> sets, const View& view, const SampleOffsets& offsets,
-                    FrameUniforms& frame);
-  void prepare_lamps(std::span<PointSet* const> sets, const SampleOffsets& offsets, FrameUniforms& frame);
+  void prepare_lamps(std::span<PointSet* const> sets);
   void trace_light(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
                    std::span<PointSet* const> sets, const View& view, const SampleOffsets& offsets);
   void trace_glass(const View& view, const SampleOffsets& offsets);
@@ -146,11 +130,13 @@ struct Stage::Impl {
   std::vector<TranslucentBody> find_bodies(std::span<const Cloth* const> sheets, const View& view,
                                            std::vector<Region>& regions);
   void draw_translucent(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets,
-                        const View& view, const FrameUniforms& frame, bool new_frame);
+                        const View& view, const FrameUniforms& frame, const SampleOffsets& offsets);
   void probe_surfaces(std::span<const TranslucentBody> bodies, std::span<PointSet* const> sets,
-                      const View& view, const FrameUniforms& frame, std::vector<Region>& regions);
+                      const FrameUniforms& frame, std::vector<Region>& regions);
   void draw_run(const PaintOrder::Run& run, const View& view, const FrameUniforms& frame);
-  void draw_body(const TranslucentBody& body, const FrameUniforms& frame);
+  void draw_body(const TranslucentBody& body, const View& view, const FrameUniforms& frame,
+                 const SampleOffsets& offsets);
+  void trace_body(const TranslucentBody& body, const View& view, const SampleOffsets& offsets);
   void lay_streaks_behind(const Eigen::AlignedBox2i& area_px, const FrameUniforms& frame);
   void draw_lines(const View& view);
   void add_picture(const FrameUniforms& frame, HdrImage& sum);
@@ -176,72 +162,14 @@ std::vector<const Cloth*> Stage::Impl::prepare_cloths() {
   return result;
 }
 
-void Stage::Impl::draw_shadows(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
-                               std::span<PointSet* const> sets, const View& view,
-                               const SampleOffsets& offsets, FrameUniforms& frame) {
-  std::vector<Caster> casters;
-  for (const Instance* instance : shown) {
-    if (instance->visible && instance->casts_shadow && instance->mesh->index_count > 0 &&
-        !instance->is_ground()) {
-      casters.push_back(instance->ball());
-    }
-  }
-  const auto add_box = [&](const Eigen::AlignedBox3f& box) {
-    for (int k = 0; k < 8; ++k)
-      casters.push_back({box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(k)), 1e-3f});
-  };
-  for (const Cloth* cloth : sheets) {
-    if (cloth->casts_shadow) add_box(cloth->surface.box());
-  }
-  for (const PointSet* set : sets) {
-    if (set->def.casts_shadow && !set->is_splatted()) add_box(set->box);
-  }
-  // Opaque surfaces, balls and glass have traced light; the map is for everything else. Without a caster it
-  // is empty, which means light everywhere.
-  const bool needed =
-      std::ranges::any_of(mesh_pass.translucent(),
-                          [](const Instance* instance) { return !instance->material->glass; }) ||
-      std::ranges::any_of(sheets, [](const Cloth* cloth) { return cloth->is_translucent(); }) ||
-      std::ranges::any_of(sets, [](const PointSet* set) { return set->def.style != PointStyle::sphere; });
-  ShadowFrame shadow;
-  if (sun.shadows && needed)
-    shadow = fit_shadow(casters, view, frame.sun_direction.head<3>(), frame.eye.w(), def.shadow_map_px);
-  if (shadow.texel_m > 0) {
-    Matrix4f map_from_clip = Matrix4f::Identity();
-    map_from_clip.diagonal() << 0.5f, 0.5f, 1, 1;
-    map_from_clip.col(3) << 0.5f, 0.5f, 0, 1;
-    const Matrix4f map_from_world = map_from_clip * shadow.clip_from_world;
-    for (int row = 0; row < 3; ++row)
-      frame.shadow_rows[static_cast<std::size_t>(row)] = map_from_world.row(row).transpose();
-    const auto size = static_cast<float>(def.shadow_map_px);
-    frame.shadow.head<3>() << shadow.texel_m, size, 1 / size;
-    frame.penumbra = penumbra_of(shadow, sun, size, offsets.count);
-    frame.sun_direction.w() = 1;
-  }
-  upload(frame);
-  if (shadow.texel_m == 0) return;
-
-  shadow_map.begin();
-  mesh_pass.draw_shadows(shadow.clip_from_world, true);
-  for (const Cloth* cloth : sheets) {
-    if (cloth->casts_shadow) cloth_pass.draw_shadow(*cloth, shadow.clip_from_world);
-  }
-  for (const PointSet* set : sets) {
-    if (set->def.casts_shadow && !set->is_splatted()) points_pass.draw_shadow(*set, shadow.clip_from_world);
-  }
-  shadow_map.end();
-}
-
-void Stage::Impl::prepare_lamps(std::span<PointSet* const> sets, const SampleOffsets& offsets,
-                                FrameUniforms& frame) {
-  shining = lamps;
+void Stage::Impl::prepare_lamps(std::span<PointSet* const> sets) {
+  shining.clear();
+  for (const Lamp& lamp : lamps)
+    if (lamp.intensity.sum() > 0) shining.push_back(lamp);
   for (const PointSet* set : sets)
     if (set->def.style == PointStyle::fire) shining.push_back(lamp_of_fire(*set));
-  prepare_lamp_uniforms(shining, offsets, frame);
-  frame.air.y() = time;
   features.clear();
-  if (puffs_pass.shades()) features.push_back("SMOKE 1");
-  if (frame.air.x() > 0) features.push_back("LAMPS 1");
+  if (!shining.empty()) features.push_back("LAMPS 1");
 }
 
 // Depth and surfaces of everything opaque. The depth also limits later shading to what is visible.
@@ -268,10 +196,17 @@ void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<
                               const SampleOffsets& offsets) {
   RayScene& scene = light_pass.scene();
   scene.clear();
-  for (const Instance* instance : shown)
-    if (instance->visible)
-      scene.add(*instance->mesh->rays, *instance->material->rays, instance->world_from_mesh,
-                instance->casts_shadow);
+  light_sources = {.sun = sun, .sky = make_sky(sun, environment), .fog = environment.fog};
+  for (const Instance* instance : shown) {
+    if (!instance->visible) continue;
+    const RayMaterial& material = *instance->material->rays;
+    const unsigned object =
+        scene.add(*instance->mesh->rays, material, instance->world_from_mesh, instance->casts_shadow);
+    if (object != RayScene::kNone && !material.mean_emission().isZero())
+      light_sources.glow.add(object, *instance->mesh->rays, material, instance->world_from_mesh,
+                             instance->center(), instance->radius(), instance->is_ball());
+  }
+  light_sources.glow.limit();
   for (const Cloth* cloth : sheets)
     scene.add_cloth(cloth->surface.vertices(), cloth->surface.indices(), *cloth->material->rays,
                     cloth->texture_from_uv, cloth->casts_shadow);
@@ -285,9 +220,8 @@ void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<
                         set->def.softness);
   }
   scene.build();
-  light_sources = {.sun = sun, .sky = make_sky(sun, environment), .fog = environment.fog};
   for (const Lamp& lamp : shining) light_sources.lamps.emplace_back(lamp);
-  if (puffs_pass.shades()) light_sources.smoke = &puffs_pass.grid();
+  if (!puffs_pass.grid().empty()) light_sources.smoke = &puffs_pass.grid();
   light_pass.trace(light_sources, view, offsets);
 }
 
@@ -301,14 +235,13 @@ void Stage::Impl::trace_glass(const View& view, const SampleOffsets& offsets) {
   }
   if (area.empty()) return;
   Eigen::AlignedBox2i area_px = area.pixels(def.width_px, def.height_px);
-  area_px = Eigen::AlignedBox2i(area_px.min().array() - 1, area_px.max().array() + 1)
-                .intersection(
-                    Eigen::AlignedBox2i(Eigen::Vector2i(0, 0), Eigen::Vector2i(def.width_px, def.height_px)));
-  if (area_px.isEmpty() || area_px.volume() == 0) return;
-  light_pass.begin_glass(picture.depth, area_px);
+  area_px = Eigen::AlignedBox2i(area_px.min().array() - 1, area_px.max().array() + 1);
+  if (!light_pass.begin_part(picture.depth, area_px)) return;
   glDepthMask(GL_TRUE);
   glDepthFunc(GL_GREATER);
-  mesh_pass.draw_glass_surfaces();
+  for (std::size_t k = 0; k < mesh_pass.translucent().size(); ++k)
+    if (mesh_pass.translucent()[k]->material->glass)
+      mesh_pass.draw_translucent(k, MeshPass::Shading::surface);
   light_pass.trace_glass(light_sources, view, offsets, picture.framebuffer);
   glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
 }
@@ -383,7 +316,7 @@ std::vector<TranslucentBody> Stage::Impl::find_bodies(std::span<const Cloth* con
 
 // For bodies that have particles around them, but within their box.
 void Stage::Impl::probe_surfaces(std::span<const TranslucentBody> bodies, std::span<PointSet* const> sets,
-                                 const View& view, const FrameUniforms& frame, std::vector<Region>& regions) {
+                                 const FrameUniforms& frame, std::vector<Region>& regions) {
   const Eigen::AlignedBox2i all(Eigen::Vector2i(0, 0), Eigen::Vector2i(def.width_px, def.height_px));
   const Vector2f size_px = all.sizes().cast<float>();
   for (std::size_t k = 0; k < bodies.size(); ++k) {
@@ -400,8 +333,7 @@ void Stage::Impl::probe_surfaces(std::span<const TranslucentBody> bodies, std::s
                                                      if (body.cloth)
                                                        cloth_pass.draw_depth(*body.cloth);
                                                      else
-                                                       mesh_pass.draw_translucent_depth(body.instance,
-                                                                                        view.clip_from_world);
+                                                       mesh_pass.draw_translucent_depth(body.instance);
                                                    }),
                            size_px);
   }
@@ -425,19 +357,38 @@ void Stage::Impl::draw_run(const PaintOrder::Run& run, const View& view, const F
     puffs_pass.draw(run.first, run.last, frame, picture.framebuffer);
   else
     points_pass.draw_blended(run.kind == PaintOrder::Kind::sprites ? PointStyle::sprite : PointStyle::flake,
-                             run.first, run.last, features);
+                             run.first, run.last);
   picture.behind.change(area);
 }
 
-void Stage::Impl::draw_body(const TranslucentBody& body, const FrameUniforms& frame) {
+// The light of the nearest surfaces of one body other than glass; surfaces behind them in the same pixel show
+// the same light.
+void Stage::Impl::trace_body(const TranslucentBody& body, const View& view, const SampleOffsets& offsets) {
+  if (!light_pass.begin_part(picture.depth, body.area_px)) return;
+  glDisable(GL_BLEND);
+  glDepthMask(GL_TRUE);
+  if (body.cloth)
+    cloth_pass.draw_surface(*body.cloth);
+  else
+    mesh_pass.draw_translucent(body.instance, MeshPass::Shading::surface);
+  light_pass.trace_body(light_sources, view, offsets);
+  glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
+  glEnable(GL_BLEND);
+  glDepthMask(GL_FALSE);
+}
+
+void Stage::Impl::draw_body(const TranslucentBody& body, const View& view, const FrameUniforms& frame,
+                            const SampleOffsets& offsets) {
+  if (!body.glass) trace_body(body, view, offsets);
   lay_streaks_behind(body.looked_px, frame);
   if (body.glass && particles_behind_glass) picture.behind.update(picture.color, body.looked_px);
   if (body.glass) glDisable(GL_BLEND);
   const auto draw = [&](bool particles) {
+    using enum MeshPass::Shading;
     if (body.cloth)
       cloth_pass.draw(*body.cloth, features);
     else
-      mesh_pass.draw_translucent(body.instance, particles);
+      mesh_pass.draw_translucent(body.instance, particles ? traced_with_particles : traced);
   };
   if (particles_behind_glass) {
     glBindFramebuffer(GL_FRAMEBUFFER, picture.bodies_framebuffer);
@@ -455,15 +406,17 @@ void Stage::Impl::draw_body(const TranslucentBody& body, const FrameUniforms& fr
 }
 
 void Stage::Impl::draw_translucent(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets,
-                                   const View& view, const FrameUniforms& frame, bool new_frame) {
+                                   const View& view, const FrameUniforms& frame,
+                                   const SampleOffsets& offsets) {
   std::vector<Region> regions;
   const std::vector<TranslucentBody> bodies = find_bodies(sheets, view, regions);
-  probe_surfaces(bodies, sets, view, frame, regions);
+  probe_surfaces(bodies, sets, frame, regions);
   paint_order.build(sets, regions, view);
-  const PuffLight light(puffs_pass.grid(), frame, sun.direction.normalized());
-  points_pass.prepare_blended(paint_order);
-  puffs_pass.prepare_splats(paint_order, view, light, shadow_map);
-  streaks_pass.prepare(paint_order, view, light, shadow_map, new_frame);
+  const AirLight air(light_pass.scene(), light_sources, offsets);
+  const PuffLight light(puffs_pass.grid(), frame, sun.direction.normalized(), air);
+  points_pass.prepare_blended(paint_order, light);
+  puffs_pass.prepare_splats(paint_order, view, light);
+  streaks_pass.prepare(paint_order, view, light, offsets.index == 0);
 
   // Premultiplied: additive light has no alpha, so one blend function serves both.
   glEnable(GL_BLEND);
@@ -474,7 +427,7 @@ void Stage::Impl::draw_translucent(std::span<const Cloth* const> sheets, std::sp
   if (particles_behind_glass) picture.begin_bodies(def.width_px, def.height_px);
   for (std::size_t k = 0; k <= bodies.size(); ++k) {
     for (const PaintOrder::Run& run : paint_order.runs_before(k)) draw_run(run, view, frame);
-    if (k < bodies.size()) draw_body(bodies[k], frame);
+    if (k < bodies.size()) draw_body(bodies[k], view, frame, offsets);
   }
 }
 
@@ -642,14 +595,13 @@ Channels Stage::channels(float time) {
     return make_view(camera, {}, s.def.width_px, s.def.height_px);
   };
   const View view = view_of(s.camera);
-  s.upload(make_frame(view, s.sun, s.environment, {}, s.def.height_px));
+  s.upload(make_frame(view, s.sun, s.environment, {}, s.time, s.def.height_px));
   const std::vector<PointSet*> sets = s.prepare_points(view);
   const std::vector<const Cloth*> sheets = s.prepare_cloths();
   pass.begin(view.clip_from_world, view_of(s.camera_before.value_or(s.camera)).clip_from_world);
   s.instances.for_each([&](const std::unique_ptr<Instance>& instance) {
-    const Caster ball = instance->ball();
     if (instance->visible && instance->mesh->index_count > 0 && !instance->material->blended &&
-        view.sees(ball.center, ball.radius))
+        view.sees(instance->center(), instance->radius()))
       pass.draw(*instance);
   });
   for (const Cloth* cloth : sheets) pass.draw(*cloth);
@@ -673,24 +625,24 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   }
   sum.transparent = !s.environment.visible;
   const View view = make_view(s.camera, offsets, s.def.width_px, s.def.height_px);
-  FrameUniforms frame = make_frame(view, s.sun, s.environment, offsets, s.def.height_px);
+  const FrameUniforms frame = make_frame(view, s.sun, s.environment, offsets, s.time, s.def.height_px);
 
   std::vector<const Instance*> shown;
   s.instances.for_each([&](const std::unique_ptr<Instance>& instance) { shown.push_back(instance.get()); });
   const std::vector<PointSet*> sets = s.prepare_points(view);
-  s.puffs_pass.prepare(sets, s.sun, frame);
+  s.upload(frame);
+  s.puffs_pass.prepare(sets, s.sun);
   s.particles_behind_glass =
       std::ranges::any_of(shown, [](const Instance* i) { return i->visible && i->material->glass; }) &&
       std::ranges::any_of(sets, [](const PointSet* set) { return set->def.style != PointStyle::sphere; });
-  s.prepare_lamps(sets, offsets, frame);
+  s.prepare_lamps(sets);
   s.mesh_pass.prepare(shown, view, s.features);
   const std::vector<const Cloth*> sheets = s.prepare_cloths();
-  s.draw_shadows(shown, sheets, sets, view, offsets, frame);
   s.draw_surfaces(sheets, sets);
   s.trace_light(shown, sheets, sets, view, offsets);
   s.draw_opaque(sheets, sets);
   s.trace_glass(view, offsets);
-  s.draw_translucent(sheets, sets, view, frame, offsets.index == 0);
+  s.draw_translucent(sheets, sets, view, frame, offsets);
   s.draw_lines(view);
 
   s.add_picture(frame, sum);

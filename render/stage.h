@@ -50,9 +50,6 @@ struct Lamp {
   float softness = 0.3f;              ///< share of the cone over which its edge fades
   bool shadows = true;
 };
-/// Number of lamps that light particles and translucent bodies at once: the strongest. Opaque surfaces are
-/// lit by all.
-inline constexpr std::size_t kMostLamps = 8;
 
 /// Sky, ambient light from it, and fog towards its horizon.
 struct Environment {
@@ -161,7 +158,6 @@ struct LightSums {
 
 struct StageDef {
   int width_px = 1280, height_px = 720;
-  int shadow_map_px = 2048;
 };
 
 class Stage {

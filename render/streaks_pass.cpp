@@ -12,12 +12,15 @@ constexpr float kNearestStreak = 0.016f;
 constexpr float kThinnest_px = 0.6f;  // radius; thinner streaks are drawn with this radius and fainter
 
 // A drop stretched by its motion: it refracts the sky behind it, and is bright when the sun is behind it.
-Vector3f drop_light(const PuffLight& light, const Vector3f& place, const Vector3f& to_eye, float visibility) {
+Vector3f drop_light(const PuffLight& light, const GpuPoint& point, const Vector3f& to_eye) {
+  const Vector3f place = point.position.head<3>();
+  const float radius = point.position.w(), number = point.velocity.w();
   const Vector3f through = 0.5f * (light.sky_reflection(-to_eye, 0.25f) + light.ambient(Vector3f::UnitY()));
   const float forward = 0.5f - 0.5f * light.to_sun.dot(to_eye);
   const float forward2 = forward * forward, forward8 = forward2 * forward2 * forward2 * forward2;
-  const float sun = visibility * std::exp(-light.grid.depth(place)) * (0.12f + 0.9f * forward8);
-  return through + sun * light.frame.sun_radiance.head<3>() + light.lamps_around(place);
+  const float visibility = light.air.sun(place, radius, number) * std::exp(-light.grid.depth(place));
+  return through + visibility * (0.12f + 0.9f * forward8) * light.frame.sun_radiance.head<3>() +
+         light.air.lamps_around(place, radius, number);
 }
 
 // Position on the screen [px], and distance along the view axis.
@@ -28,14 +31,14 @@ Vector3f project(const View& view, const Vector3f& place, const Vector2f& half_s
 
 /// `along`: direction of the streak on the screen.
 StreakLight light_of(const GpuPoint& point, const PointsDef& def, const View& view, const PuffLight& light,
-                     const SceneShadow& shadow, const Vector2f& along) {
+                     const Vector2f& along) {
   const Vector3f center = point.position.head<3>(), to_eye = (view.eye - center).normalized();
   const Vector4f fog = light.fog_to(center);
   const float cover = def.additive ? 0.0f : 1.0f;
   const Vector3f own = point.color.head<3>(), haze = cover * fog.head<3>();
   Vector3f middle = own, left = own, right = own;
   if (def.lit) {
-    middle = own.cwiseProduct(drop_light(light, center, to_eye, shadow.visibility(center)));
+    middle = own.cwiseProduct(drop_light(light, point, to_eye));
     const Vector3f across = along.y() * view.right - along.x() * view.up;
     left = light.sky_reflection((-across - 0.6f * to_eye).normalized(), 0.1f);
     right = light.sky_reflection((across - 0.6f * to_eye).normalized(), 0.1f);
@@ -95,8 +98,7 @@ StreakSplat splat_of(const GpuPoint& point, const PointsDef& def, const View& vi
 
 StreaksPass::StreaksPass(int width_px, int height_px) : width_px_(width_px), height_px_(height_px) {}
 
-void StreaksPass::prepare(const PaintOrder& order, const View& view, const PuffLight& light,
-                          const ShadowMap& shadow_map, bool new_frame) {
+void StreaksPass::prepare(const PaintOrder& order, const View& view, const PuffLight& light, bool new_frame) {
   constexpr auto kKind = PaintOrder::Kind::streaks;
   const std::span<const uint64_t> keys = order.keys(kKind);
   splats_.resize(keys.size());
@@ -104,10 +106,6 @@ void StreaksPass::prepare(const PaintOrder& order, const View& view, const PuffL
   if (keys.empty()) return;
   if (new_frame) lights_.clear();
   lights_.resize(order.count(kKind));
-  Eigen::AlignedBox3f box;
-  for (const PaintOrder::Source& source : order.sources(kKind))
-    if (source.set->def.lit) box.extend(source.set->box);
-  if (new_frame && !box.isEmpty()) shadow_.read(shadow_map, light.frame, box);
 
   const Vector2f half_size(0.5f * static_cast<float>(width_px_), 0.5f * static_cast<float>(height_px_));
   constexpr std::size_t kBlock = 512;
@@ -118,8 +116,7 @@ void StreaksPass::prepare(const PaintOrder& order, const View& view, const PuffL
       s = splat_of(set->points[i], set->def, view, light.frame.eye.w(), half_size);
       KnownLight& known = lights_[order.number(kKind, keys[k])];
       if (known.id != set->ids[i])
-        known = {set->ids[i],
-                 light_of(set->points[i], set->def, view, light, shadow_, {s.along_x, s.along_y})};
+        known = {set->ids[i], light_of(set->points[i], set->def, view, light, {s.along_x, s.along_y})};
       s.light = &known.light;
     }
   });

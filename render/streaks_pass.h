@@ -12,7 +12,6 @@
 #include "render/paint_order.h"
 #include "render/points_pass.h"
 #include "render/puff_light.h"
-#include "render/scene_shadow.h"
 #include "render/splatter.h"
 
 namespace offstage::render {
@@ -22,8 +21,7 @@ class StreaksPass {
   StreaksPass(int width_px, int height_px);
   /// Prepares the streaks of a sub-frame. `light` includes the smoke between sun and streaks. Streaks do not
   /// move during a frame, so only its first sub-frame (`new_frame`) computes their light.
-  void prepare(const PaintOrder& order, const View& view, const PuffLight& light, const ShadowMap& shadow_map,
-               bool new_frame);
+  void prepare(const PaintOrder& order, const View& view, const PuffLight& light, bool new_frame);
   /// The streaks from `first` of their keys in the PaintOrder on are behind the next object.
   void pass(uint32_t first) { first_behind_ = first; }
   /// Draws the streaks behind the next object over an area of the picture; returns the pixels that may have
@@ -41,7 +39,6 @@ class StreaksPass {
     StreakLight light;
   };
   std::vector<KnownLight> lights_;  ///< by number, for those visible in this frame
-  SceneShadow shadow_;
   int width_px_, height_px_;
   uint32_t first_behind_ = 0;
   StreakBands bands_;

@@ -1,6 +1,6 @@
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec4 normal;
-layout(location = 2) in vec3 place;
+layout(location = 2) in vec2 uv;
 layout(location = 0) uniform vec2 texture_from_uv;
 #ifndef SURFACE
 layout(location = 0) out vec4 color;
@@ -11,13 +11,16 @@ void main() {
   float side = gl_FrontFacing ? 1.0 : -1.0;
   vec3 n = normalize(normal.xyz) * side;
   n = normalize(n + view * max(0.02 - dot(n, view), 0.0));  // smooth normals can turn away at outlines
-  vec2 uv = place.xy;
 #ifdef SHEER
   float opacity = material.color.a * (1.0 - material.glass.x);
 #ifdef TEXTURED
   opacity *= texture(base_color_texture, uv * texture_from_uv).a;
 #endif
+#ifdef SURFACE
+  float alpha = opacity;  // all layers take the light of the nearest one, which is even then
+#else
   float alpha = alpha_of(cover_of(opacity, dot(n, view)), uv);
+#endif
   if (alpha == 0.0) discard;
 #endif
 #ifdef SURFACE
@@ -48,24 +51,8 @@ void main() {
   mat2x3 along = cloth_frame(position, n, uv);
   vec3 relief = normalize(n - side * (along[0] * slope.x + along[1] * slope.y));
 
-#ifdef SHEER
-  // In folds the sky is hidden by the cloth itself, so the light from there has the colour of the cloth.
-  float open = exp2(-2.2 * max(side * place.z, 0.0));
-  // Only the side that faces the sun can be in shadow.
-  float towards_sun = dot(n, frame.sun_direction.xyz) < 0.0 ? -1.0 : 1.0;
-  vec3 lit = position + normal.xyz * (abs(normal.w) * towards_sun * side - normal.w);
-  Light light = Light(sun_visibility(lit, n * towards_sun), ambient(relief) * (open / (1.0 - s.albedo * (0.8 * (1.0 - open)))), vec3(0.0), open, vec4(0.0));
-#else
-  Light light = traced_light(relief, n);
-#endif
-  vec3 radiance = shade_fabric(s, through, relief, view, light);
-#ifdef LAMPS
-#ifdef SHEER
-  radiance += lamp_light(s, relief, view, position);
-#else
-  radiance += traced_highlight(mix(vec3(0.04), s.albedo, s.metallic));
-#endif
-#endif
+  vec3 radiance = shade_fabric(s, through, relief, view, traced_light(relief, n)) +
+                  highlights_of_lamps(mix(vec3(0.04), s.albedo, s.metallic));
   radiance = apply_fog(radiance, position);
 #ifdef SHEER
   color = vec4(radiance * alpha, alpha);

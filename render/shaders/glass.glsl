@@ -33,5 +33,5 @@ vec3 seen_through(vec3 color, vec3 position, vec3 n, vec3 view) {
 
 Light light_on_glass(vec3 normal) {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  return Light(texelFetch(traced_through, pixel, 0).w, ambient(normal), vec3(0.0), 1.0, texelFetch(traced_by_glass, pixel, 0));
+  return Light(texelFetch(traced_through, pixel, 0).w, ambient(normal), light_of_lamps(), 1.0, texelFetch(traced_by_glass, pixel, 0));
 }

@@ -129,24 +129,15 @@ void main() {
 #ifdef GLASS
   s.albedo *= 1.0 - transmitted;
 #endif
-#if defined(TRACED)
-  Light light = traced_light(n, smooth_normal);
-#elif defined(GLASS)
+#ifdef GLASS
   Light light = light_on_glass(n);
 #else
-  Light light = Light(sun_visibility(position, smooth_normal), ambient(n), vec3(0.0), 1.0, vec4(0.0));
+  Light light = traced_light(n, smooth_normal);
 #endif
   light.around *= occlusion;
   light.lamps *= occlusion;
   light.open *= occlusion;
-  vec3 radiance = shade(s, n, view, light);
-#ifdef LAMPS
-#ifdef TRACED
-  radiance += traced_highlight(mix(dielectric_f0, s.albedo, s.metallic));
-#else
-  radiance += lamp_light(s, n, view, position);
-#endif
-#endif
+  vec3 radiance = shade(s, n, view, light) + highlights_of_lamps(mix(dielectric_f0, s.albedo, s.metallic));
 #ifdef GLASS
   radiance += transmitted * seen_through(albedo, position, n, view);
 #endif

@@ -10,9 +10,7 @@ layout(location = 7) in vec4 in_color;
 layout(location = 8) in vec4 in_tangent;
 #endif
 
-#ifdef SHADOW
-layout(location = 0) uniform mat4 shadow_clip_from_world;  // or that of the picture, when only depth is drawn
-#else
+#ifndef DEPTH
 layout(location = 0) out vec3 position;
 layout(location = 1) out vec3 normal;
 #endif
@@ -36,9 +34,8 @@ invariant gl_Position;
 void main() {
   vec4 p = vec4(in_position, 1.0);
   vec3 world = vec3(dot(row_x, p), dot(row_y, p), dot(row_z, p));
-#ifdef SHADOW
-  gl_Position = shadow_clip_from_world * vec4(world, 1.0);
-#else
+  gl_Position = uniforms.clip_from_world * vec4(world, 1.0);
+#ifndef DEPTH
   // Normals are transformed by the cofactor matrix, the inverse transpose up to a factor.
   vec3 cx = cross(row_y.xyz, row_z.xyz), cy = cross(row_z.xyz, row_x.xyz), cz = cross(row_x.xyz, row_y.xyz);
   normal = normalize(vec3(dot(cx, in_normal), dot(cy, in_normal), dot(cz, in_normal)));
@@ -47,7 +44,6 @@ void main() {
 #ifdef FLAT
   pass_frame();
 #endif
-  gl_Position = uniforms.clip_from_world * vec4(world, 1.0);
 #endif
 #ifdef DETAILED
   uv = vec4(in_uv, in_second_uv);

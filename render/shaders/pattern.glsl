@@ -151,7 +151,7 @@ PatternSample pattern_sample(vec3 p, vec3 n) {
   slope = m.slope;
 
 #elif PATTERN == 13  // water: ripples of several lengths that run in their directions
-  float t = uniforms.air.y;
+  float t = uniforms.air.x;
   vec2 r = q / scale, turned = mat2(0.8, 0.6, -0.6, 0.8) * r;
   vec3 n1 = noise(r * 1.3 + t * vec2(0.7, 0.2), 36u), n2 = noise(turned * 2.9 - t * vec2(0.5, 0.9), 37u);
   vec3 n3 = noise(r * 6.1 + t * vec2(-1.3, 0.8), 38u);

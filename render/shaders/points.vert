@@ -1,30 +1,17 @@
-// One quad per particle. STYLE is 0 sprite, 2 sphere, 5 flake; with SHADOW it faces the sun instead of the eye.
+// One quad per particle, facing the eye. STYLE is 0 sprite, 2 sphere, 5 flake.
 layout(location = 0) in vec4 in_position;  // w: radius
 layout(location = 1) in vec4 in_velocity;  // w: random number in [0, 1)
 layout(location = 2) in vec4 in_color;
 #if STYLE != 2
-layout(location = 4) in vec4 in_picture;   // angle, two layers of the sheet, share of the second one
-#endif
-#ifdef SHADOW
-layout(location = 0) uniform mat4 shadow_clip_from_world;
-#endif
-// Softness, stretch [s], lit, additive: per particle, because sprites and flakes of several sets are drawn together.
-#if defined(SHADOW) || STYLE == 2
-layout(location = 1) uniform vec4 style;
-#else
-layout(location = 3) in vec4 style;
+layout(location = 3) in vec4 style;       // softness, stretch [s], lit, additive
+layout(location = 4) in vec4 in_picture;  // angle, two layers of the sheet, share of the second one
+layout(location = 5) in vec4 in_light;    // of lamps; w: share of the sun that reaches the particle
 #endif
 
 // Position on the quad in radii: across, up, and half the length of its axis, which is vertical.
 // With pictures: coordinates on the picture.
 layout(location = 0) out vec3 place;
-#ifdef SHADOW
-layout(location = 1) flat out vec2 dimming;  // alpha, offset of the dither
-#ifdef PICTURES
-layout(location = 5) flat out vec3 picture;  // two layers, share of the second one
-layout(binding = 1) uniform sampler2DArray pictures;
-#endif
-#elif STYLE == 2
+#if STYLE == 2
 layout(location = 1) flat out vec4 color;
 layout(location = 2) flat out vec4 ball;     // centre, radius
 layout(location = 3) out vec3 position;  // position on the quad
@@ -45,38 +32,28 @@ layout(binding = 1) uniform sampler2DArray pictures;
 #endif
 #endif
 
-// Unit vector between viewer and particle, and the width of a pixel or texel there.
+// Unit vector from a particle to the eye, and the width of a pixel there.
 vec4 viewer_of(vec3 p) {
-#ifdef SHADOW
-  return vec4(frame.sun_direction.xyz, frame.shadow.x);
-#else
   vec3 to_eye = frame.eye.xyz - p;
   float distance = max(length(to_eye), 1e-6);
   return vec4(to_eye / distance, frame.eye.w * distance);
-#endif
 }
 
-#ifndef SHADOW
 #if STYLE == 0
 // A puff is a soft ball: bright towards the light, and brighter still against it.
-vec3 puff_light(vec3 p, vec3 n, vec3 u, vec3 to_viewer, float radius) {
+vec3 puff_light(vec3 n, vec3 to_viewer) {
   vec3 l = frame.sun_direction.xyz;
-  vec3 a = normalize(cross(l, u + 0.01)) * (0.6 * radius), b = cross(l, a), front = p + radius * l;
-  float visibility = 0.25 * (sun_visibility(front + a, l) + sun_visibility(front - a, l) +
-                             sun_visibility(front + b, l) + sun_visibility(front - b, l));
   float forward = saturate(-dot(l, to_viewer)), forward2 = forward * forward;
   float phase = max(0.45 + 0.35 * dot(n, l) + 0.8 * forward2 * forward2, 0.0);
   // Some light reaches the shadow of a cloud from all sides.
-  return ambient(n) + frame.sun_radiance.rgb * (phase * mix(0.2, 1.0, visibility));
+  return ambient(n) + frame.sun_radiance.rgb * (phase * mix(0.2, 1.0, in_light.w));
 }
 #elif STYLE == 5
 // Ice and dust transmit light in all directions, most of it forwards.
-vec3 flake_light(vec3 p, vec3 to_viewer) {
+vec3 flake_light(vec3 to_viewer) {
   float forward = saturate(-dot(frame.sun_direction.xyz, to_viewer)), forward2 = forward * forward;
-  float visibility = sun_visibility(p, frame.sun_direction.xyz);
-  return ambient(vec3(0.0, 0.5, 0.0)) + frame.sun_radiance.rgb * (visibility * (0.4 + 0.8 * forward2 * forward2));
+  return ambient(vec3(0.0, 0.5, 0.0)) + frame.sun_radiance.rgb * (in_light.w * (0.4 + 0.8 * forward2 * forward2));
 }
-#endif
 #endif
 
 void main() {
@@ -93,11 +70,9 @@ void main() {
 #if STYLE == 2
   vec3 w = cross(viewer.xyz, u);
   float half_side = drawn;
-#if !defined(SHADOW)
   // The silhouette is that of the cone from the eye that touches the ball.
   float sine = radius * frame.eye.w / viewer.w;
   half_side *= inversesqrt(max(1.0 - sine * sine, 0.02));
-#endif
   vec3 at = p + half_side * (u * corner.x + w * corner.y);
 #else
   vec3 half_axis = in_velocity.xyz * (0.5 * style.y);
@@ -129,10 +104,6 @@ void main() {
 #endif
 #endif
 
-#ifdef SHADOW
-  dimming = vec2(alpha, in_velocity.w);
-  gl_Position = shadow_clip_from_world * vec4(at, 1.0);
-#else
   gl_Position = uniforms.clip_from_world * vec4(at, 1.0);
 #if STYLE == 5
   float turn = 6.2831853 * in_velocity.w + in_picture.x;
@@ -154,21 +125,17 @@ void main() {
   rim = vec2(style.x, style.w);
   if (style.z != 0.0) {
 #if STYLE == 0
-    vec3 shine = puff_light(p, normalize(u * corner.x + w * corner.y + 0.7 * viewer.xyz), u, viewer.xyz, drawn);
+    vec3 shine = puff_light(normalize(u * corner.x + w * corner.y + 0.7 * viewer.xyz), viewer.xyz);
 #elif STYLE == 5
-    vec3 shine = flake_light(p, viewer.xyz);
+    vec3 shine = flake_light(viewer.xyz);
 #endif
-#ifdef LAMPS
-    shine += lamps_all_around(p);
-#endif
-    light.rgb *= shine;
+    light.rgb *= shine + in_light.rgb;
   }
 #ifdef PICTURES
   light.rgb *= fog.w;
   haze = fog.rgb;
 #else
   light.rgb = light.rgb * fog.w + fog.rgb;
-#endif
 #endif
 #endif
 }

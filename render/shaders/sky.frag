@@ -5,18 +5,18 @@ layout(location = 0) out vec4 color;
 float cloud_thickness(vec2 p) {
   float sum = 0.0, amplitude = 0.5;
   // Not a constant, so that the loop is not unrolled, which would take long to compile.
-  int octaves = uniforms.air.z > 0.0 ? 5 : 0;
+  int octaves = uniforms.air.y > 0.0 ? 5 : 0;
   for (int octave = 0; octave < octaves; ++octave) {
     sum += amplitude * noise(p, uint(40 + octave)).x;
     p = mat2(1.6, 1.2, -1.2, 1.6) * p + 7.1;
     amplitude *= 0.5;
   }
-  return max(sum - mix(0.78, 0.28, uniforms.air.z), 0.0);
+  return max(sum - mix(0.78, 0.28, uniforms.air.y), 0.0);
 }
 
 vec3 with_clouds(vec3 sky, vec3 d) {
   vec3 l = frame.sun_direction.xyz;
-  vec2 p = d.xz / (d.y + 0.06) * 1.3 + uniforms.air.y * vec2(0.006, 0.002);
+  vec2 p = d.xz / (d.y + 0.06) * 1.3 + uniforms.air.x * vec2(0.006, 0.002);
   float thick = cloud_thickness(p), towards_sun = cloud_thickness(p + 0.12 * l.xz);
   float cover = (1.0 - exp(-9.0 * thick)) * smoothstep(0.015, 0.22, d.y);
   float lit = exp(-5.0 * towards_sun), silver = pow(max(dot(d, l), 0.0), 12.0) * exp(-7.0 * thick);
@@ -34,6 +34,6 @@ void main() {
                step(0.0, dot(d, frame.sun_direction.xyz)) * smoothstep(-0.02, 0.0, d.y);
   sky += frame.sun_radiance.rgb * (8.0 * disc);
   // Without clouds the loop has no rounds and costs nothing.
-  for (int k = 0; k < (uniforms.air.z > 0.0 && d.y > 0.015 ? 1 : 0); ++k) sky = with_clouds(sky, d);
+  for (int k = 0; k < (uniforms.air.y > 0.0 && d.y > 0.015 ? 1 : 0); ++k) sky = with_clouds(sky, d);
   color = vec4(sky, 1.0);
 }

@@ -26,10 +26,7 @@ void main() {
   vec3 radiance = color.rgb;
   if (style.z != 0.0) {
     Surface s = Surface(color.rgb, surface.y, surface.x, vec3(0.0));
-    radiance = shade(s, n, -ray, traced_light(n, n));
-#ifdef LAMPS
-    radiance += traced_highlight(mix(vec3(0.04), s.albedo, s.metallic));
-#endif
+    radiance = shade(s, n, -ray, traced_light(n, n)) + highlights_of_lamps(mix(vec3(0.04), s.albedo, s.metallic));
   }
   result = vec4(apply_fog(radiance, hit), 1.0);
 #endif

@@ -173,13 +173,7 @@ LightBuffer::LightBuffer(int width, int height)
 }
 
 LightTracer::LightTracer(const RayScene& scene, const LightSources& sources)
-    : scene_(scene), sources_(sources) {
-  const float radius = std::tan(0.5f * sources.sun.size_deg * std::numbers::pi_v<float> / 180);
-  Three<float> a, b;
-  make_basis(from_eigen(sources.sky.sun_direction), a, b);
-  sun_across_ = radius * to_eigen(a);
-  sun_along_ = radius * to_eigen(b);
-}
+    : scene_(scene), sources_(sources), sun_disc_(sources.sun, sources.sky.sun_direction) {}
 
 // As the sky that the eye sees (shaders/sky.frag), without clouds and the sun's disc.
 Vector3f LightTracer::sky_seen(const Vector3f& direction) const {
@@ -194,9 +188,7 @@ float LightTracer::sun_visibility(const Vector3f& place, const SquarePoint<float
   const Sun& sun = sources_.sun;
   float share = sources_.smoke != nullptr ? std::exp(-sources_.smoke->depth(place)) : 1.0f;
   if (!sun.shadows) return share;
-  const SquarePoint<float> d = on_disc(uv);
-  const Vector3f direction = (sources_.sky.sun_direction + d.x * sun_across_ + d.y * sun_along_).normalized();
-  return share * scene_.transmittance(place, direction, kFar).mean();
+  return share * scene_.transmittance(place, sun_disc_.direction(uv), kFar).mean();
 }
 
 Lanes LightTracer::sun_visibility(const LaneVectors& place, IntLanes active,
@@ -207,10 +199,7 @@ Lanes LightTracer::sun_visibility(const LaneVectors& place, IntLanes active,
       if (active[i]) share[i] = std::exp(-sources_.smoke->depth({place.x[i], place.y[i], place.z[i]}));
   }
   if (!sources_.sun.shadows) return share;
-  const SquarePoint<Lanes> d = on_disc(uv);
-  const LaneVectors direction = normalized(all_lanes(sources_.sky.sun_direction) +
-                                           all_lanes(sun_across_) * d.x + all_lanes(sun_along_) * d.y);
-  const LaneVectors light = scene_.transmittance(place, direction, Lanes{} + kFar, active);
+  const LaneVectors light = scene_.transmittance(place, sun_disc_.direction(uv), Lanes{} + kFar, active);
   return share * ((light.x + light.y + light.z) * (1.0f / 3));
 }
 
@@ -279,10 +268,27 @@ struct LightTracer::Path {
   float cone;  ///< angle that the ray stands for [rad]
   Vector3f share = {1, 1, 1};
   bool mirrored = false;  ///< so far
+  /// Where it left a diffuse surface last, whose light from glowing meshes is also sampled; a normal of zero:
+  /// that of no surface.
+  Vector3f diffuse_place = Vector3f::Zero(), diffuse_normal = Vector3f::Zero();
 
+  /// Leaves a diffuse surface.
+  void scatter(const Vector3f& normal, const Vector3f& way) {
+    diffuse_place = from;
+    diffuse_normal = normal;
+    direction = way;
+  }
+  /// The share of the glow of what is met that is not found by sampling.
+  float share_of_glow(const Hit& hit, const Glow& glow) const {
+    if (glow.empty() || diffuse_normal.isZero()) return 1;
+    const Vector3f way = (hit.position - diffuse_place).normalized();
+    const float own = std::max(way.dot(diffuse_normal), 1e-3f) / std::numbers::pi_v<float>;
+    return own / (own + glow.density(diffuse_place, diffuse_normal, hit));
+  }
   /// Leaves a surface in a mirrored direction.
   void turn(const Vector3f& way, const Hit& hit) {
     mirrored = true;
+    diffuse_normal.setZero();
     direction = way.dot(hit.face) > 0 ? way : reflected(way, hit.face);
     from = off_surface(hit.position, hit.face);
   }
@@ -322,7 +328,56 @@ Vector3f LightTracer::direct_light(const Hit& hit, const Vector3f& from, PixelSa
   const SquarePoint<float> on_sun = sampler.next();
   if (towards_sun > 0 && sources_.sun.intensity > 0)
     result = sources_.sun.intensity * towards_sun * sun_visibility(from, on_sun) * sources_.sun.color;
-  return result + lamps_at(from, hit.normal, hit.face, sampler);
+  return result + lamps_at(from, hit.normal, hit.face, sampler) +
+         glow_at(from, hit.normal, hit.face, sampler);
+}
+
+namespace {
+
+/// The light of a sample of a glowing mesh on a white surface, if nothing is between them, weighted against
+/// that of rays that meet the mesh by chance.
+Vector3f light_of_glow(const GlowSample& sample, const Vector3f& normal, const Vector3f& face) {
+  const float cosine = normal.dot(sample.towards);
+  if (!(sample.density > 0) || cosine <= 0 || face.dot(sample.towards) <= 0) return Vector3f::Zero();
+  const float by_chance = cosine / std::numbers::pi_v<float>;
+  return sample.radiance * (by_chance / (sample.density + by_chance));
+}
+
+// Shadow rays end before the surface that glows, by more than their rounding.
+constexpr float kBeforeGlow = 1 - 2e-5f;
+
+}  // namespace
+
+Vector3f LightTracer::glow_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
+                              PixelSampler& sampler) const {
+  if (sources_.glow.empty()) return Vector3f::Zero();
+  const float choice = sampler.next().x;
+  const GlowSample sample = sources_.glow.sample(place, normal, choice, sampler.next());
+  const Vector3f light = light_of_glow(sample, normal, face);
+  if (light.isZero()) return light;
+  return light.cwiseProduct(scene_.transmittance(place, sample.towards, kBeforeGlow * sample.distance));
+}
+
+LaneVectors LightTracer::trace_glow(const Points& points, int x, int y, const LightView& view) const {
+  const Lanes none{};
+  LaneVectors light{none, none, none}, towards{none, none + 1, none};
+  Lanes distance{};
+  for (int i = 0; i < kLanes; ++i) {
+    if (!points.visible[i]) continue;
+    PixelSampler sampler(static_cast<uint32_t>(x + i), static_cast<uint32_t>(y), view.offsets.index,
+                         view.offsets.count);
+    sampler.skip(1 + static_cast<uint32_t>(sources_.lamps.size()));
+    const Point point = points.one(i, view.eye);
+    const float choice = sampler.next().x;
+    const GlowSample sample = sources_.glow.sample(point.place, point.normal, choice, sampler.next());
+    set_lane(light, i, light_of_glow(sample, point.normal, point.face));
+    set_lane(towards, i, sample.towards);
+    distance[i] = kBeforeGlow * sample.distance;
+  }
+  const IntLanes lit = light.x + light.y + light.z > 0.0f;
+  if (!any(lit)) return light;
+  const LaneVectors seen = scene_.transmittance(points.place, towards, distance, lit);
+  return {light.x * seen.x, light.y * seen.y, light.z * seen.z};
 }
 
 // Radiance that arrives along a path. `met`, if not null, gets the distance of what it meets first, and is
@@ -358,7 +413,8 @@ Vector3f LightTracer::radiance(Path path, PixelSampler& sampler, const VisibleLi
     const Vector3f albedo = color.head<3>();
     if (material.unlit) return sum + path.share.cwiseProduct(albedo);
     // Of glass, as on the screen, only the side towards the eye glows.
-    if (hit.front || material.transmission <= 0) sum += path.share.cwiseProduct(material.emission);
+    if ((hit.front || material.transmission <= 0) && !material.mean_emission().isZero())
+      sum += path.share_of_glow(hit, sources_.glow) * path.share.cwiseProduct(material.emission_at(hit.uv));
     if (follow_glass(hit, albedo, sampler, path, sum)) continue;
     path.from = off_surface(hit.position, hit.face);
     const bool smooth = material.roughness < kSmoothMetal;
@@ -389,8 +445,8 @@ Vector3f LightTracer::radiance(Path path, PixelSampler& sampler, const VisibleLi
     const float survives = std::min(path.share.maxCoeff(), 0.95f);
     if (++bounces >= kMostBounces || sampler.next().x >= survives) return sum;
     path.share /= survives;
-    path.direction = to_eigen(cosine_direction(from_eigen(hit.normal), sampler.next()));
-    if (path.direction.dot(hit.face) <= 0) path.direction = reflected(path.direction, hit.face);
+    const Vector3f way = to_eigen(cosine_direction(from_eigen(hit.normal), sampler.next()));
+    path.scatter(hit.normal, way.dot(hit.face) > 0 ? way : reflected(way, hit.face));
     sharp = false;
     path.cone = 0.5f;
   }
@@ -409,8 +465,20 @@ void LightTracer::lift(const Points& points, IntLanes lanes, const LightView& vi
   }
 }
 
-void LightTracer::trace_lamps(const Points& points, int x, int y, const LightView& view,
-                              Sampler<UintLanes>& sampler, LightBuffer& light) const {
+struct LightTracer::LampLight {
+  LaneVectors diffuse, lobes;
+  Lanes fresnel;  ///< factor of the lobes
+
+  void store(std::span<Vector4f> lamps, std::span<Vector4f> highlights) const {
+    for (std::size_t i = 0; i < lamps.size(); ++i) {
+      lamps[i] = {diffuse.x[i], diffuse.y[i], diffuse.z[i], 0};
+      highlights[i] = {lobes.x[i], lobes.y[i], lobes.z[i], fresnel[i]};
+    }
+  }
+};
+
+LightTracer::LampLight LightTracer::trace_lamps(const Points& points, const LightView& view,
+                                                Sampler<UintLanes>& sampler) const {
   const Lanes none{};
   const LaneVectors& n = points.normal;
   const LaneVectors to_eye = normalized(all_lanes(view.eye) - points.place);
@@ -442,12 +510,18 @@ void LightTracer::trace_lamps(const Points& points, int x, int y, const LightVie
     const Lanes m2 = m * m;
     grazing += (bright.x + bright.y + bright.z) * (m2 * m2 * m);
   }
-  store(light.direct.channels().subspan(1), x, y, diffuse);
-  const Lanes fresnel = grazing / larger(lobes.x + lobes.y + lobes.z, none + 1e-12f);
-  const int width = light.pixels.width_px;
-  for (int i = 0; i < kLanes && x + i < width; ++i)
-    light.highlights[index_of(x + i, y, width)] = {lobes.x[i], lobes.y[i], lobes.z[i], fresnel[i]};
+  return {diffuse, lobes, grazing / larger(lobes.x + lobes.y + lobes.z, none + 1e-12f)};
 }
+
+namespace {
+
+/// The values of up to eight pixels of a row, from x on.
+std::span<Vector4f> row_part(std::vector<Vector4f>& values, int x, int y, int width) {
+  return std::span(values).subspan(index_of(x, y, width),
+                                   static_cast<std::size_t>(std::min(kLanes, width - x)));
+}
+
+}  // namespace
 
 Vector3f LightTracer::mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler,
                                      const VisibleLight& visible, LightSums& sums) const {
@@ -496,16 +570,27 @@ void LightTracer::trace_pixels(const SurfaceBuffer& surfaces, int x, int y, cons
   if (sources_.sun.intensity <= 0) sunny = IntLanes{};
   lift(points, sunny & ~points.cloth & (dot(points.face, to_sun) < kGrazing), view, place);
   light.direct.channels()[0].set_lanes(x, y, sun_visibility(place, sunny, on_sun));
-  if (!sources_.lamps.empty()) trace_lamps(points, x, y, view, sampler, light);
+  if (!sources_.glow.empty()) store(light.glow.channels(), x, y, trace_glow(points, x, y, view));
+  if (sources_.lamps.empty()) return;
+  const LampLight lamps = trace_lamps(points, view, sampler);
+  store(light.direct.channels().subspan(1), x, y, lamps.diffuse);
+  const int width = surfaces.width_px;
+  lamps.store(row_part(light.lamps, x, y, width), row_part(light.highlights, x, y, width));
 }
 
-// Indices of the pixels of eight cells of a row whose light is computed: another one in each sub-frame.
+// Indices of the pixels of eight cells of a row whose light is computed: another one in each sub-frame, if
+// there is a surface.
 IntLanes LightTracer::pixels_of_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view) {
-  const int k = view.offsets.index, columns = (surfaces.width_px + 1) / 2;
-  const int py = std::min(2 * y + ((k >> 1 ^ k) & 1), surfaces.height_px - 1);
+  const int columns = (surfaces.width_px + 1) / 2;
   IntLanes at = IntLanes{} - 1;
-  for (int i = 0; i < kLanes && x + i < columns; ++i)
-    at[i] = py * surfaces.width_px + std::min(2 * (x + i) + (k & 1), surfaces.width_px - 1);
+  for (int i = 0; i < kLanes && x + i < columns; ++i) {
+    for (int k = view.offsets.index; k < view.offsets.index + 4; ++k) {
+      const int px = std::min(2 * (x + i) + (k & 1), surfaces.width_px - 1);
+      const int py = std::min(2 * y + ((k >> 1 ^ k) & 1), surfaces.height_px - 1);
+      at[i] = py * surfaces.width_px + px;
+      if (surfaces.places[static_cast<std::size_t>(at[i])].w() >= 0) break;
+    }
+  }
   return at;
 }
 
@@ -529,7 +614,9 @@ void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, const
     Vector3f way(ways.x[i], ways.y[i], ways.z[i]);
     if (way.dot(point.face) <= 0) way = reflected(way, point.face);
     float met = kFar;
-    set_lane(around, i, limited(radiance({point.place, way, 0.5f}, sampler, nullptr, &met), sums));
+    Path path{.from = point.place, .direction = way, .cone = 0.5f};
+    path.scatter(point.normal, way);
+    set_lane(around, i, limited(radiance(path, sampler, nullptr, &met), sums));
     inverse_distance[i] = 1 / std::max(met, 8 * view.pixel_m * (point.place - view.eye).norm());
   }
   store(light.around.channels(), x, y, around);
@@ -556,12 +643,26 @@ LightSums sum_over_light_rows(int height, const auto& each) {
 }  // namespace
 
 void LightTracer::trace(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const {
+  trace_arriving(surfaces, view, light);
+  if (light.has_mirrors) trace_mirrors(surfaces, view, VisibleLight(light, view), light);
+}
+
+void LightTracer::trace_body(const SurfaceBuffer& surfaces, const LightView& view,
+                             const VisibleLight& visible, LightBuffer& light) const {
+  trace_arriving(surfaces, view, light);
+  if (light.has_mirrors) trace_mirrors(surfaces, view, visible, light);
+}
+
+void LightTracer::trace_arriving(const SurfaceBuffer& surfaces, const LightView& view,
+                                 LightBuffer& light) const {
   const int width = surfaces.width_px, height = surfaces.height_px;
   const std::size_t pixels = light.arriving.size(), with_lamps = sources_.lamps.empty() ? 0 : pixels;
   const std::size_t channels = sources_.lamps.empty() ? 1 : 4;
   if (light.direct.channels().size() != channels) light.direct = LightValues(width, height, channels);
   light.lamps.resize(with_lamps);
   light.highlights.resize(with_lamps);
+  const bool glows = !sources_.glow.empty();
+  if (glows && light.glow.channels().empty()) light.glow = LightValues(width, height, 3);
   light.has_mirrors = std::ranges::any_of(surfaces.places,
                                           [](const Vector4f& p) { return p.w() >= SurfaceBuffer::kMirrors; });
   if (light.has_mirrors) light.mirrored.resize(pixels);
@@ -572,6 +673,7 @@ void LightTracer::trace(const SurfaceBuffer& surfaces, const LightView& view, Li
     for (int x = 0; x < light.cells.width_px; x += kLanes) trace_cells(surfaces, x, y, view, light, sums);
   });
   light.direct.average(light.pixels, light.pixels.filled, nullptr, 1);
+  if (glows) light.glow.average(light.pixels, light.pixels.filled, nullptr, 1);
   light.cells.find_reach(light.inverse_distance, light.reach2);
   const int widest = view.offsets.count >= 16 ? 4 : 8;
   for (int step = 1; step <= widest; step *= 2)
@@ -580,21 +682,22 @@ void LightTracer::trace(const SurfaceBuffer& surfaces, const LightView& view, Li
     const std::size_t row = index_of(0, y, width);
     interpolate(light.pixels, light.cells, y, {&light.around, &light.cells.filled},
                 &light.direct.channels()[0], &light.arriving[row]);
+    for (int x = 0; x < width && glows; ++x)
+      for (std::size_t i = 0; i < 3; ++i)
+        light.arriving[row + static_cast<std::size_t>(x)][static_cast<int>(i)] +=
+            *light.glow.channels()[i].at(x, y);
     for (int x = 0; x < width && !light.lamps.empty(); ++x) {
       Vector4f& lamps = light.lamps[row + static_cast<std::size_t>(x)];
       for (std::size_t i = 0; i < 3; ++i)
         lamps[static_cast<int>(i)] = *light.direct.channels()[i + 1].at(x, y);
-      lamps.w() = light.highlights[row + static_cast<std::size_t>(x)].w();
     }
   });
-  if (light.has_mirrors) trace_mirrors(surfaces, view, light);
 }
 
 // Smooth metals have a mirror image in each pixel, other surfaces in each cell.
 void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& view,
-                                LightBuffer& light) const {
+                                const VisibleLight& visible, LightBuffer& light) const {
   const int width = surfaces.width_px;
-  const VisibleLight visible(light, view);
   const Lanes none{};
   const auto mirrored = [&](const Points& points, int i, int x, int y, LightSums& sums) {
     PixelSampler sampler(static_cast<uint32_t>(x + i), static_cast<uint32_t>(y), view.offsets.index,
@@ -640,15 +743,23 @@ Vector3f LightTracer::light_through(const Point& point, PixelSampler& sampler, c
 }
 
 void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, const LightView& view,
-                              const LightBuffer& light, std::span<const Vector4f> picture,
-                              GlassBuffer& glass) const {
-  const VisibleLight behind(light, view, picture);
+                              const VisibleLight& behind, GlassBuffer& glass) const {
   glass.through.assign(surfaces.places.size(), Vector4f::Zero());
   glass.mirrored.assign(surfaces.places.size(), Vector4f::Zero());
+  const std::size_t with_lamps = sources_.lamps.empty() ? 0 : surfaces.places.size();
+  glass.lamps.resize(with_lamps);
+  glass.highlights.resize(with_lamps);
   const int width = surfaces.width_px;
   glass.sums = sum_over_light_rows(surfaces.height_px, [&](int y, LightSums& sums) {
     for (int x = 0; x < width; x += kLanes) {
       const Points points(surfaces, pixels_of_row(surfaces, x, y));
+      if (with_lamps > 0) {
+        Sampler<UintLanes> sampler(UintLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<uint32_t>(x0 + x),
+                                   UintLanes{} + static_cast<uint32_t>(y0 + y), view.offsets.index,
+                                   view.offsets.count);
+        trace_lamps(points, view, sampler)
+            .store(row_part(glass.lamps, x, y, width), row_part(glass.highlights, x, y, width));
+      }
       for (int i = 0; i < kLanes; ++i) {
         if (!points.visible[i]) continue;
         const Point point = points.one(i, view.eye);

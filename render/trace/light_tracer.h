@@ -7,17 +7,13 @@
 #include <cstdint>
 #include <vector>
 
-#include "render/opacity_grid.h"
-#include "render/sky.h"
-#include "render/stage.h"
 #include "render/trace/light_filter.h"
-#include "render/trace/ray_lamp.h"
+#include "render/trace/light_sources.h"
 #include "render/trace/ray_scene.h"
-#include "render/trace/sampler.h"
 
 namespace offstage::render {
 
-/// The visible opaque surfaces, one value per pixel, rows from the bottom up.
+/// The visible surfaces in a picture or a part of it, one value per pixel, rows from the bottom up.
 struct SurfaceBuffer {
   int width_px = 0, height_px = 0;
   /// Position; w: roughness, plus the flags below; negative: nothing is visible.
@@ -36,16 +32,16 @@ struct LightBuffer {
   // Results, rows from the bottom up.
   std::vector<Vector4f>
       arriving;  ///< light from the sky and other surfaces; w: share of the sun that is visible
-  std::vector<Vector4f> mirrored;  ///< light from the mirrored direction; w: 1 where it was computed
-  bool has_mirrors = false;        ///< if not, `mirrored` is not up to date
-  std::vector<Vector4f>
-      lamps;  ///< diffuse light of lamps; w: Fresnel factor of their highlights. Empty: no lamps
-  std::vector<Vector4f> highlights;  ///< lobes of lamps, without reflectance
+  std::vector<Vector4f> mirrored;    ///< light from the mirrored direction; w: 1 where it was computed
+  bool has_mirrors = false;          ///< if not, `mirrored` is not up to date
+  std::vector<Vector4f> lamps;       ///< diffuse light of lamps; empty: there are none
+  std::vector<Vector4f> highlights;  ///< lobes of lamps, without reflectance; w: their Fresnel factor
   LightSums sums;
 
   // In between. Light from around is computed for cells of 2x2 pixels.
   LightGuide pixels, cells;
   LightValues direct;           ///< of the pixels: visible share of the sun, then diffuse light of lamps
+  LightValues glow;             ///< of the pixels: light of glowing meshes; empty: there are none
   LightValues around, mirrors;  ///< of the cells
   LightPlane inverse_distance, reach2;        ///< see LightGuide::find_reach
   LightPlane with_mirror, with_rough_mirror;  ///< cells: 1 or 0
@@ -54,7 +50,8 @@ struct LightBuffer {
 /// Light at the glass surfaces in a part of the picture, rows from the bottom up.
 struct GlassBuffer {
   std::vector<Vector4f> through;  ///< light that comes through the glass; w: share of the sun that is visible
-  std::vector<Vector4f> mirrored;  ///< light from the mirrored direction; w: 1
+  std::vector<Vector4f> mirrored;           ///< light from the mirrored direction; w: 1
+  std::vector<Vector4f> lamps, highlights;  ///< as in LightBuffer
   LightSums sums;
 };
 
@@ -85,24 +82,19 @@ class VisibleLight {
   std::span<const Vector4f> picture_;
 };
 
-struct LightSources {
-  Sun sun;
-  SkyModel sky;
-  float fog = 0;
-  std::vector<RayLamp> lamps;
-  const OpacityGrid* smoke = nullptr;  ///< null: none
-};
-
 class LightTracer {
  public:
   LightTracer(const RayScene& scene, const LightSources& sources);
 
   void trace(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
+  /// The same for the surfaces of a translucent body in a part of the picture. `visible`: the opaque objects.
+  void trace_body(const SurfaceBuffer& surfaces, const LightView& view, const VisibleLight& visible,
+                  LightBuffer& light) const;
 
-  /// `surfaces`: a part of the picture, with glass only; (x, y) is its first pixel. `picture`: the opaque
-  /// objects, whose light trace() has put into `light`.
+  /// `surfaces`: a part of the picture, with glass only; (x, y) is its first pixel. `behind`: the opaque
+  /// objects, with their picture.
   void trace_glass(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
-                   const LightBuffer& light, std::span<const Vector4f> picture, GlassBuffer& glass) const;
+                   const VisibleLight& behind, GlassBuffer& glass) const;
 
  private:
   struct Point;   ///< a visible surface
@@ -113,6 +105,9 @@ class LightTracer {
   bool follow_glass(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Path& path,
                     Vector3f& sum) const;
   Vector3f direct_light(const Hit& hit, const Vector3f& from, PixelSampler& sampler) const;
+  Vector3f glow_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
+                   PixelSampler& sampler) const;
+  LaneVectors trace_glow(const Points& points, int x, int y, const LightView& view) const;
   Vector3f lamps_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
                     PixelSampler& sampler) const;
   float sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const;
@@ -122,12 +117,14 @@ class LightTracer {
   Vector3f mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler,
                           const VisibleLight& visible, LightSums& sums) const;
   void lift(const Points& points, IntLanes lanes, const LightView& view, LaneVectors& place) const;
-  void trace_lamps(const Points& points, int x, int y, const LightView& view, Sampler<UintLanes>& sampler,
-                   LightBuffer& light) const;
+  struct LampLight;
+  LampLight trace_lamps(const Points& points, const LightView& view, Sampler<UintLanes>& sampler) const;
   void trace_pixels(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
                     LightBuffer& light) const;
   static IntLanes pixels_of_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view);
-  void trace_mirrors(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
+  void trace_arriving(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
+  void trace_mirrors(const SurfaceBuffer& surfaces, const LightView& view, const VisibleLight& visible,
+                     LightBuffer& light) const;
   static void set_guide(const Points& points, int x, int y, const LightView& view, float size_px,
                         LightGuide& guide);
   void trace_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view, LightBuffer& light,
@@ -136,7 +133,7 @@ class LightTracer {
 
   const RayScene& scene_;
   const LightSources& sources_;
-  Vector3f sun_across_, sun_along_;  ///< radii of the sun's disc at distance 1
+  SunDisc sun_disc_;
 };
 
 }  // namespace offstage::render

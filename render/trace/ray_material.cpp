@@ -39,9 +39,35 @@ int wrapped(int k, int size, Wrap wrap) {
 
 }  // namespace
 
+RayMaterial::Texels::Texels(const TextureMap& texture_map, std::span<const Image> textures)
+    : map(texture_map) {
+  if (map.image < 0 || static_cast<std::size_t>(map.image) >= textures.size()) return;
+  const Image& source = textures[static_cast<std::size_t>(map.image)];
+  if (source.pixel_count() == 0) return;
+  image = std::make_shared<const Image>(reduced(source, kMostTexels));
+  Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+  for (int y = 0; y < image->height_px; ++y)
+    for (int x = 0; x < image->width_px; ++x) sum += linear_texel(*image, x, y).cast<double>();
+  mean = (sum / static_cast<double>(image->pixel_count())).cast<float>();
+}
+
+Vector4f RayMaterial::Texels::at(const Vector2f& uv) const {
+  if (!image) return mean;
+  const Vector3f place(uv.x(), uv.y(), 1);
+  const float x = map.rows[0].dot(place) * static_cast<float>(image->width_px) - 0.5f;
+  const float y = map.rows[1].dot(place) * static_cast<float>(image->height_px) - 0.5f;
+  if (!(std::abs(x) < 1e8f && std::abs(y) < 1e8f)) return mean;
+  const int x0 = static_cast<int>(std::floor(x)), y0 = static_cast<int>(std::floor(y));
+  const float s = x - static_cast<float>(x0), t = y - static_cast<float>(y0);
+  const auto texel = [&](int dx, int dy) {
+    return linear_texel(*image, wrapped(x0 + dx, image->width_px, map.wrap_u),
+                        wrapped(y0 + dy, image->height_px, map.wrap_v));
+  };
+  return (1 - t) * ((1 - s) * texel(0, 0) + s * texel(1, 0)) + t * ((1 - s) * texel(0, 1) + s * texel(1, 1));
+}
+
 RayMaterial::RayMaterial(const Material& material, std::span<const Image> textures)
-    : emission(material.emission),
-      metallic(material.metallic),
+    : metallic(material.metallic),
       roughness(material.roughness),
       transmission(material.transmission),
       refraction(std::max(material.refraction, 1.0f)),
@@ -49,38 +75,21 @@ RayMaterial::RayMaterial(const Material& material, std::span<const Image> textur
       unlit(material.unlit),
       vertex_colors(material.vertex_colors),
       color_(material.color),
+      emission_(material.emission),
       pattern_(material.pattern),
       pattern_scale_(std::max(material.pattern_scale, 1e-4f)),
       alpha_cutoff_(material.alpha_cutoff),
-      map_(material.base_color_texture) {
+      texels_(material.base_color_texture, textures),
+      glowing_texels_(material.emission.isZero() ? TextureMap{} : material.emission_texture, textures) {
   pattern_color_ = material.pattern_color;
   mean_color_ = pattern_color(pattern_, Vector3f::Zero(), Vector3f::UnitY(), 1e3f * pattern_scale_,
                               color_.head<3>(), pattern_color_, pattern_scale_);
-  opaque_ = material.color.w() >= 1 && !material.vertex_alpha && transmission <= 0;
-  if (map_.image < 0 || static_cast<std::size_t>(map_.image) >= textures.size()) return;
-  const Image& image = textures[static_cast<std::size_t>(map_.image)];
-  if (image.pixel_count() == 0) return;
-  texture_ = std::make_shared<const Image>(reduced(image, kMostTexels));
-  Eigen::Vector4d sum = Eigen::Vector4d::Zero();
-  for (int y = 0; y < texture_->height_px; ++y)
-    for (int x = 0; x < texture_->width_px; ++x) sum += linear_texel(*texture_, x, y).cast<double>();
-  mean_texel_ = (sum / static_cast<double>(texture_->pixel_count())).cast<float>();
-  opaque_ = opaque_ && mean_texel_.w() >= 1;
+  mean_emission_ = emission_.cwiseProduct(glowing_texels_.mean.head<3>());
+  opaque_ = material.color.w() >= 1 && !material.vertex_alpha && transmission <= 0 && texels_.mean.w() >= 1;
 }
 
-Vector4f RayMaterial::texel(const Vector2f& uv) const {
-  if (!texture_) return {1, 1, 1, 1};
-  const Vector3f place(uv.x(), uv.y(), 1);
-  const float x = map_.rows[0].dot(place) * static_cast<float>(texture_->width_px) - 0.5f;
-  const float y = map_.rows[1].dot(place) * static_cast<float>(texture_->height_px) - 0.5f;
-  if (!(std::abs(x) < 1e8f && std::abs(y) < 1e8f)) return mean_texel_;
-  const int x0 = static_cast<int>(std::floor(x)), y0 = static_cast<int>(std::floor(y));
-  const float s = x - static_cast<float>(x0), t = y - static_cast<float>(y0);
-  const auto at = [&](int dx, int dy) {
-    return linear_texel(*texture_, wrapped(x0 + dx, texture_->width_px, map_.wrap_u),
-                        wrapped(y0 + dy, texture_->height_px, map_.wrap_v));
-  };
-  return (1 - t) * ((1 - s) * at(0, 0) + s * at(1, 0)) + t * ((1 - s) * at(0, 1) + s * at(1, 1));
+Vector3f RayMaterial::emission_at(const Vector2f& uv) const {
+  return emission_.cwiseProduct(glowing_texels_.at(uv).head<3>());
 }
 
 Vector4f RayMaterial::color(const Hit& hit, float footprint) const {
@@ -91,7 +100,7 @@ Vector4f RayMaterial::color(const Hit& hit, float footprint) const {
                            : pattern_color(pattern_, hit.object_position, hit.object_normal, footprint,
                                            color_.head<3>(), pattern_color_, pattern_scale_);
   result = result.cwiseProduct(hit.color);
-  if (texture_) result = result.cwiseProduct(texel(hit.uv));
+  if (texels_.image) result = result.cwiseProduct(texels_.at(hit.uv));
   if (alpha_cutoff_ > 0) result.w() = result.w() < alpha_cutoff_ ? 0.0f : 1.0f;
   return result;
 }

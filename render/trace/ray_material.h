@@ -13,10 +13,9 @@ struct Hit;
 
 class RayMaterial {
  public:
-  /// Keeps a reduced copy of the colour texture.
+  /// Keeps reduced copies of the textures of colour and emission.
   explicit RayMaterial(const Material& material, std::span<const Image> textures);
 
-  Vector3f emission = {0, 0, 0};
   float metallic = 0, roughness = 0.5f;
   float transmission = 0;  ///< share of the light that is refracted
   float refraction = 1.5f;
@@ -24,23 +23,33 @@ class RayMaterial {
 
   /// Colour and opacity at a point. `footprint`: width of what is averaged [m].
   Vector4f color(const Hit& hit, float footprint) const;
+  /// Radiance that the surface itself emits, and its mean.
+  Vector3f emission_at(const Vector2f& uv) const;
+  const Vector3f& mean_emission() const { return mean_emission_; }
   /// Whether no light passes anywhere.
   bool is_opaque() const { return opaque_; }
   /// Share of the light that passes through the surface along a shadow ray.
   Vector3f transmittance(const Hit& hit, const Vector3f& direction) const;
 
  private:
-  Vector4f texel(const Vector2f& uv) const;
+  /// A reduced copy of a texture.
+  struct Texels {
+    std::shared_ptr<const Image> image;  ///< null: white
+    TextureMap map;
+    Vector4f mean = {1, 1, 1, 1};
+
+    Texels(const TextureMap& texture_map, std::span<const Image> textures);
+    Vector4f at(const Vector2f& uv) const;
+  };
 
   Vector4f color_;
+  Vector3f emission_, mean_emission_;
   Vector3f pattern_color_, mean_color_;
   Pattern pattern_ = Pattern::none;
   float pattern_scale_ = 1;
   float alpha_cutoff_ = 0;
   bool opaque_ = true;
-  TextureMap map_;
-  std::shared_ptr<const Image> texture_;
-  Vector4f mean_texel_ = {1, 1, 1, 1};
+  Texels texels_, glowing_texels_;
 };
 
 }  // namespace offstage::render

@@ -120,6 +120,46 @@ RTCSceneTy* RayMesh::tree() const {
   return tree_.get();
 }
 
+std::array<Vector3f, 3> RayMesh::corners(unsigned triangle, const Eigen::Affine3f& world_from_mesh) const {
+  std::array<Vector3f, 3> result;
+  for (std::size_t i = 0; i < 3; ++i)
+    result[i] = world_from_mesh * positions[indices[3 * std::size_t{triangle} + i]].head<3>();
+  return result;
+}
+
+Vector2f RayMesh::uv_at(unsigned triangle, const Vector2f& barycentric) const {
+  if (uvs.empty()) return {0, 0};
+  const uint32_t* k = &indices[3 * std::size_t{triangle}];
+  return mixed(uvs[k[0]], uvs[k[1]], uvs[k[2]], barycentric);
+}
+
+const std::vector<float>& RayMesh::areas() const {
+  if (area_up_to_.empty()) {
+    double sum = 0;
+    for (unsigned t = 0; 3 * std::size_t{t} + 2 < indices.size(); ++t) {
+      const std::array<Vector3f, 3> p = corners(t, Eigen::Affine3f::Identity());
+      sum += 0.5 * static_cast<double>((p[1] - p[0]).cross(p[2] - p[0]).norm());
+      area_up_to_.push_back(static_cast<float>(sum));
+    }
+  }
+  return area_up_to_;
+}
+
+float RayMesh::area() const {
+  return areas().empty() ? 0 : areas().back();
+}
+
+unsigned RayMesh::triangle_at(float choice) const {
+  const std::vector<float>& up_to = areas();
+  const auto found = std::ranges::upper_bound(up_to, choice * up_to.back());
+  return static_cast<unsigned>(std::min(found - up_to.begin(), std::ssize(up_to) - 1));
+}
+
+float RayMesh::chance_of(unsigned triangle) const {
+  const std::vector<float>& up_to = areas();
+  return (up_to[triangle] - (triangle > 0 ? up_to[triangle - 1] : 0)) / up_to.back();
+}
+
 struct RayScene::Object {
   const RayMaterial* material = nullptr;
   const RayMesh* mesh = nullptr;  ///< null: a cloth or balls
@@ -156,27 +196,28 @@ void RayScene::clear() {
   has_translucent_ = false;
 }
 
-void RayScene::attach(RTCGeometryTy* geometry, Object object, bool casts_shadow) {
+unsigned RayScene::attach(RTCGeometryTy* geometry, Object object, bool casts_shadow) {
   const bool solid = object.material->is_opaque();
   rtcSetGeometryMask(geometry, !casts_shadow ? kNoCaster : solid ? kOpaqueCaster : kTranslucentCaster);
   has_translucent_ = has_translucent_ || (casts_shadow && !solid);
   const unsigned id = attach_to(tree_.get(), geometry);
   if (objects_.size() <= id) objects_.resize(id + 1);
   objects_[id] = std::move(object);
+  return id;
 }
 
-void RayScene::add(const RayMesh& mesh, const RayMaterial& material, const Eigen::Affine3f& world_from_mesh,
-                   bool casts_shadow) {
-  if (mesh.indices.empty() || !world_from_mesh.matrix().allFinite()) return;
+unsigned RayScene::add(const RayMesh& mesh, const RayMaterial& material,
+                       const Eigen::Affine3f& world_from_mesh, bool casts_shadow) {
+  if (mesh.indices.empty() || !world_from_mesh.matrix().allFinite()) return kNone;
   const float determinant = world_from_mesh.linear().determinant();
-  if (determinant == 0) return;
+  if (determinant == 0) return kNone;
   RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_INSTANCE);
   rtcSetGeometryInstancedScene(geometry, mesh.tree());
   rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, world_from_mesh.matrix().data());
   Object object{.material = &material, .mesh = &mesh, .world_from_mesh = world_from_mesh};
   object.normal_from_mesh = world_from_mesh.linear().inverse().transpose();
   object.mirrored = determinant < 0;
-  attach(geometry, std::move(object), casts_shadow);
+  return attach(geometry, std::move(object), casts_shadow);
 }
 
 void RayScene::add_cloth(std::span<const ClothVertex> vertices, std::span<const uint32_t> indices,
@@ -243,11 +284,9 @@ void RayScene::Object::describe_mesh(unsigned triangle, const Vector3f& from, co
                                      Hit& hit) const {
   std::array<std::size_t, 3> k;
   for (std::size_t i = 0; i < 3; ++i) k[i] = mesh->indices[3 * std::size_t{triangle} + i];
-  std::array<Vector3f, 3> local, p;
-  for (std::size_t i = 0; i < 3; ++i) {
-    local[i] = mesh->positions[k[i]].head<3>();
-    p[i] = world_from_mesh * local[i];
-  }
+  std::array<Vector3f, 3> local;
+  for (std::size_t i = 0; i < 3; ++i) local[i] = mesh->positions[k[i]].head<3>();
+  const std::array<Vector3f, 3> p = mesh->corners(triangle, world_from_mesh);
   const Vector2f uv = barycentric(from, direction, p[0], p[1], p[2]);
   hit.position = mixed(p[0], p[1], p[2], uv);
   hit.face = (p[1] - p[0]).cross(p[2] - p[0]).normalized() * (mirrored ? -1.0f : 1.0f);
@@ -263,10 +302,9 @@ void RayScene::Object::describe_mesh(unsigned triangle, const Vector3f& from, co
 // The mean of the point's projections onto the planes through the corners, across their normals.
 Vector3f RayScene::Object::smoothed(unsigned triangle, const Vector3f& from,
                                     const Vector3f& direction) const {
-  std::array<Vector3f, 3> p, n;
+  std::array<Vector3f, 3> p = mesh->corners(triangle, world_from_mesh), n;
   for (std::size_t i = 0; i < 3; ++i) {
     const std::size_t k = mesh->indices[3 * std::size_t{triangle} + i];
-    p[i] = world_from_mesh * mesh->positions[k].head<3>();
     n[i] = (normal_from_mesh * mesh->normals[k]).normalized();
   }
   const Vector2f uv = barycentric(from, direction, p[0], p[1], p[2]);
@@ -339,6 +377,8 @@ bool RayScene::first_hit(const Vector3f& from, const Vector3f& direction, float 
   const Object* object = meet(ray);
   if (object == nullptr) return false;
   hit = {};
+  hit.object = static_cast<unsigned>(object - objects_.data());
+  hit.triangle = ray.hit.primID;
   object->describe(ray.hit.primID, from, direction, hit);
   return true;
 }

@@ -36,6 +36,15 @@ class RayMesh {
   /// Copies what rays need. `normals`: as many as positions.
   RayMesh(const Mesh& mesh, const std::vector<Vector3f>& normals);
   RTCSceneTy* tree() const;
+  /// Corners of a triangle in the world.
+  std::array<Vector3f, 3> corners(unsigned triangle, const Eigen::Affine3f& world_from_mesh) const;
+  /// Texture coordinates at the barycentric coordinates of the second and third corner.
+  Vector2f uv_at(unsigned triangle, const Vector2f& barycentric) const;
+  /// Area of all triangles, in the mesh's own units.
+  float area() const;
+  /// The triangle that belongs to a number in [0, 1), each in proportion to its area, and its chance.
+  unsigned triangle_at(float choice) const;
+  float chance_of(unsigned triangle) const;
 
   std::vector<Vector4f> positions;  ///< w is not used; Embree reads 16 bytes
   std::vector<Vector3f> normals;
@@ -44,7 +53,9 @@ class RayMesh {
   std::vector<uint32_t> indices;
 
  private:
+  const std::vector<float>& areas() const;
   mutable RayTree tree_;
+  mutable std::vector<float> area_up_to_;  ///< sums over the triangles; computed on first use
 };
 
 /// What a ray meets first.
@@ -55,6 +66,7 @@ struct Hit {
   Vector3f face = Vector3f::Zero();    ///< of the triangle, unit, on the side of the ray's origin
   bool front = true;
   const RayMaterial* material = nullptr;
+  unsigned object = 0, triangle = 0;            ///< numbers in the scene and in the mesh
   Vector3f object_position = Vector3f::Zero();  ///< for patterns
   Vector3f object_normal = Vector3f::Zero();
   Vector2f uv = {0, 0};
@@ -70,9 +82,10 @@ class RayScene {
 
   /// Removes all objects.
   void clear();
-  /// The mesh and the material must stay in memory until clear().
-  void add(const RayMesh& mesh, const RayMaterial& material, const Eigen::Affine3f& world_from_mesh,
-           bool casts_shadow);
+  /// Returns the object's number. The mesh and the material must stay in memory until clear().
+  unsigned add(const RayMesh& mesh, const RayMaterial& material, const Eigen::Affine3f& world_from_mesh,
+               bool casts_shadow);
+  static constexpr unsigned kNone = ~0u;  ///< in place of a number: it has no triangles
   /// The lists must stay in memory until clear(). Positions must be finite.
   void add_cloth(std::span<const ClothVertex> vertices, std::span<const uint32_t> indices,
                  const RayMaterial& material, const Vector2f& texture_from_uv, bool casts_shadow);
@@ -103,7 +116,7 @@ class RayScene {
   struct Object;
   const Object* meet(RTCRayHit& ray) const;
   Vector3f through_translucent(const Vector3f& from, const Vector3f& direction, float length) const;
-  void attach(RTCGeometryTy* geometry, Object object, bool casts_shadow);
+  unsigned attach(RTCGeometryTy* geometry, Object object, bool casts_shadow);
 
   std::vector<Object> objects_;  ///< by Embree's geometry id
   std::vector<RayTree> cloth_trees_;

@@ -12,7 +12,7 @@
 namespace offstage::render {
 namespace {
 
-constexpr StageDef kStage{.width_px = 1280, .height_px = 720, .shadow_map_px = 2048};
+constexpr StageDef kStage{.width_px = 1280, .height_px = 720};
 
 const bool kPinned = (pin_environment(0), true);
 

@@ -22,7 +22,7 @@ float spread_sprites(uint64_t i, double step) {
 void time_points(benchmark::State& state, const PointsDef& def, const Vector3f& size, float radius,
                  float alpha) {
   Context context;
-  Stage stage(context, {.width_px = 1280, .height_px = 720, .shadow_map_px = 2048});
+  Stage stage(context, {.width_px = 1280, .height_px = 720});
   stage.set_camera({.eye = {0, 2.6f, 9.5f}, .target = {0, 2.2f, 0}, .fov_deg = 32});
   stage.add_instance(stage.add_mesh(make_ground(1000)), stage.add_material({.pattern = Pattern::checker}));
   std::vector<Point> values;

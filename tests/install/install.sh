@@ -33,7 +33,7 @@ mv "$prefix/share/offstage/assets/models/duck.glb" "$prefix/share/offstage/asset
 cat >"$work/scene.json" <<'JSON'
 {"version": 1, "effects": [{"preset": "only_installed"}],
  "bodies": [{"motion": "static", "shape": {"type": "mesh", "file": "only_installed.glb"}}],
- "render": {"size": [64, 36], "quality": "draft", "shadow_map": 512}, "output": {"duration": 0.1}}
+ "render": {"size": [64, 36], "quality": "draft"}, "output": {"duration": 0.1}}
 JSON
 cd "$work"
 prefix/bin/offstage frame scene.json -n 1 -o one.png -q

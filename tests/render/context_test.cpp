@@ -29,7 +29,7 @@ const ::testing::Environment* const kPinned = ::testing::AddGlobalTestEnvironmen
 
 // Draws a scene that uses every pass, with sample offsets, and returns the hash of its displayed pixels.
 std::string hash_of_a_rich_scene(Context& context) {
-  Stage stage(context, {.width_px = 160, .height_px = 90, .shadow_map_px = 512});
+  Stage stage(context, {.width_px = 160, .height_px = 90});
   const MaterialHandle brick = stage.add_material({.pattern = Pattern::brick});
   const MaterialHandle checker = stage.add_material({.pattern = Pattern::checker});
   const MaterialHandle glass = stage.add_material({.color = {0.2f, 0.5f, 0.7f, 0.4f}, .roughness = 0.1f});

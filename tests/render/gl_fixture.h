@@ -14,7 +14,7 @@ Context& shared_context();
 /// A stage without fog and sky, and a camera on the Z axis that looks at the origin.
 struct SmallStage {
   explicit SmallStage(int width_px = 96, int height_px = 64)
-      : stage(shared_context(), {.width_px = width_px, .height_px = height_px, .shadow_map_px = 512}) {
+      : stage(shared_context(), {.width_px = width_px, .height_px = height_px}) {
     stage.set_camera({.eye = {0, 0, 5}, .target = {0, 0, 0}});
     stage.set_environment({.visible = false});
   }

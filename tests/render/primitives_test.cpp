@@ -80,17 +80,6 @@ TEST(Primitives, AreClosedAndWoundOutwards) {
   }
 }
 
-TEST(Primitives, CoarseBoxIsClosedAndJustInsideOfTheOther) {
-  const Mesh box = make_box({1, 2, 3}, 0.02f);
-  Mesh coarse = box;
-  coarse.indices = box.coarse_indices;
-  EXPECT_EQ(bad_edges(coarse), 0);
-  EXPECT_EQ(coarse.indices.size() / 3, 44u);
-  EXPECT_EQ(box.indices.size() / 3, 108u);
-  EXPECT_LT(totals_of(coarse).volume, totals_of(box).volume);
-  EXPECT_GT(totals_of(coarse).volume, 0.999 * totals_of(box).volume);
-}
-
 TEST(Primitives, HaveTheAreaVolumeAndBoundsOfTheirShape) {
   for (const Named& shape : closed_primitives()) {
     const Totals totals = totals_of(shape.mesh);

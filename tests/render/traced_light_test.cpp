@@ -95,6 +95,79 @@ TEST_F(TracedLight, OfAGlowingDiscFollowsItsFormFactor) {
   }
 }
 
+// Small and bright: rays in random directions would hardly ever meet it. A ball of radius r at distance d
+// lights a white surface that faces it with the share r^2 / d^2 of its radiance; a small face of area A with
+// A / (pi d^2). One sub-frame already shows it without noise, and halves of the floor agree.
+TEST_F(TracedLight, OfASmallGlowingMeshHasNoNoise) {
+  const float radius = 0.04f, height = 2, radiance = 500;
+  const Material glow{
+      .color = {0, 0, 0, 1}, .roughness = 1, .emission = Vector3f::Constant(radiance), .two_sided = true};
+  struct Case {
+    Mesh mesh;
+    float share;
+  };
+  const float side = 0.08f;
+  for (const Case& c :
+       {Case{make_sphere(radius, 48), radius * radius / (height * height)},
+        Case{make_box({side, 1e-3f, side}), side * side / (std::numbers::pi_v<float> * height * height)}}) {
+    SmallStage scene(160, 120);
+    scene.stage.set_environment(kNoLight);
+    scene.stage.set_sun({.intensity = 0, .shadows = false});
+    const Camera low{.eye = {0.5f, 0.7f, 0}, .target = {0, 0, 0}, .fov_deg = 20};
+    scene.stage.set_camera(low);
+    scene.add(make_ground(20), kPlaster);
+    scene.add(c.mesh, glow, {0, height, 0});
+    const HdrImage picture = mean_of(scene, 16);
+    const Vector2f below = project(low, {0, 0, 0}, 160, 120);
+    const float middle = mean_around(picture, below, 4);
+    EXPECT_NEAR(middle / (radiance * c.share), 1, 0.05f);
+    for (int dx = -4; dx <= 4; ++dx)
+      EXPECT_NEAR(pixel(picture, static_cast<int>(below.x()) + dx, static_cast<int>(below.y())).y() / middle,
+                  1, 0.1f);
+    scene.add(make_box({0.5f, 0.01f, 0.5f}), {.color = {0, 0, 0, 1}, .roughness = 1},
+              {0, 0.5f * height, 0});  // in the way
+    EXPECT_LT(mean_around(mean_of(scene, 4), below, 4), 0.03f * middle);
+  }
+}
+
+// A sprite, smoke and a pane of which one half is behind a wall, as the lamp and the sun see them.
+TEST_F(TracedLight, ReachesParticlesAndPanesOnlyWhereNothingIsInTheWay) {
+  s.add(make_box({2, 2, 0.01f}), kPlaster, {-1, 0, 2});  // before the left half, out of the picture's way
+  look({.eye = {0, 6, 0.01f}, .target = {0, 0, 0}, .fov_deg = 40});
+  const auto brightness = [&] {
+    const HdrImage picture = mean_of(s, 4);
+    return std::array{mean_around(picture, place_of({-0.8f, 0, 0}), 2),
+                      mean_around(picture, place_of({0.8f, 0, 0}), 2)};
+  };
+  const auto expect_half_lit = [&](const char* what) {
+    const std::array light = brightness();
+    EXPECT_GT(light[1], 0.01f) << what;
+    EXPECT_LT(light[0], 0.35f * light[1]) << what;  // a cloud scatters some light into shadow
+  };
+  const auto with_each_light = [&](const char* what) {
+    s.stage.set_sun({.direction = {0, 0, 1}, .intensity = 2});
+    expect_half_lit(what);
+    s.stage.set_sun({.intensity = 0, .shadows = false});
+    s.stage.set_lamps(std::array{Lamp{.position = {0, 0, 60}, .intensity = Vector3f::Constant(9e3f)}});
+    expect_half_lit(what);
+    s.stage.set_lamps({});
+  };
+  for (const PointStyle style : {PointStyle::sprite, PointStyle::flake, PointStyle::smoke}) {
+    const PointsHandle points = s.stage.add_points({.style = style, .casts_shadow = false});
+    Point left{
+        .position = {-0.8f, 0, 0}, .velocity = {0, 0, 0}, .radius = 0.2f, .color = {1, 1, 1, 1}, .id = 1};
+    Point right = left;
+    right.position.x() = 0.8f;
+    right.id = 2;
+    s.stage.set_points(points, std::array{left, right});
+    with_each_light(style == PointStyle::sprite ? "sprite" : style == PointStyle::flake ? "flake" : "smoke");
+    s.stage.remove(points);
+  }
+  s.add(make_box({4, 0.3f, 0.3f}), {.color = {1, 1, 1, 0.7f}, .roughness = 1});
+  s.stage.set_sun({.direction = Vector3f(0, 0.3f, 1).normalized(), .intensity = 2});
+  expect_half_lit("pane");
+}
+
 // A wide screen with a straight edge at height h, and the sun overhead, whose disc has the radius w = h
 // tan(s) on the floor: at distance x from the edge's shadow, a segment of the disc is visible, with the share
 // 1/2 + (u sqrt(1 - u^2) + asin u) / pi, u = x / w.
@@ -221,7 +294,13 @@ TEST_F(TracedLight, SumsCountWhatIsTakenFromRaysThatFindTooMuch) {
   EXPECT_GT(s.stage.light_sums().arriving, 0);
   EXPECT_EQ(s.stage.light_sums().removed, 0);
   s.stage.set_environment(kNoLight);
-  s.add(make_sphere(0.3f), {.color = {0, 0, 0, 1}, .emission = Vector3f::Constant(500)}, {0, 1, 0});
+  // A particle, which only rays in random directions find.
+  const PointsHandle ball = s.stage.add_points({.style = PointStyle::sphere, .lit = false});
+  s.stage.set_points(ball, std::array{Point{.position = {0, 1, 0},
+                                            .velocity = {0, 0, 0},
+                                            .radius = 0.3f,
+                                            .color = {500, 500, 500, 1},
+                                            .id = 1}});
   const LightSums before = s.stage.light_sums();
   s.draw();
   const LightSums& after = s.stage.light_sums();

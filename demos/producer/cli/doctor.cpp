@@ -32,7 +32,7 @@ using Json = nlohmann::ordered_json;
 
 /// Hash of a small picture of a lit ball on a plane, which tests the whole drawing.
 std::string test_render_hash(render::Context& context) {
-  render::Stage stage(context, {.width_px = 128, .height_px = 72, .shadow_map_px = 512});
+  render::Stage stage(context, {.width_px = 128, .height_px = 72});
   const auto material = stage.add_material({});
   stage.add_instance(stage.add_mesh(render::make_sphere(1)), material);
   const auto ground = stage.add_instance(stage.add_mesh(render::make_ground(100)), material, false);

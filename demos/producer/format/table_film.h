@@ -248,11 +248,7 @@ struct Table<RenderSettings> {
          "`fixed` uses `exposure` unchanged; `automatic` also brings each frame to the same average "
          "brightness"},
         {"bloom", &T::bloom, "share of very bright light that spreads as glow; 0: none", "", kNotNegative},
-        {"tone_curve", &T::tone_curve, "mapping from light to picture values"},
-        {"shadow_map", &T::shadow_map,
-         "width and height of the sun's shadow map for particles and translucent bodies; other shadows are "
-         "traced",
-         "pixels", between(64, 16384)}};
+        {"tone_curve", &T::tone_curve, "mapping from light to picture values"}};
   }
 };
 template <>

@@ -95,7 +95,7 @@ std::string judge_frame(const GoldenFrame& expected, const GoldenFrame& actual, 
 }  // namespace
 
 std::vector<std::string> golden_overrides() {
-  return {"/render/size=[256,144]", "/render/quality=preview", "/render/shadow_map=1024"};
+  return {"/render/size=[256,144]", "/render/quality=preview"};
 }
 
 GoldenPlace find_golden(const fs::path& folder, const LoadedScene& scene, const fs::path& scene_file,

@@ -364,7 +364,6 @@ struct RenderSettings {
   Metering metering = Metering::fixed;
   Real bloom = 0.12;  ///< share of the light beyond white that is spread as glow
   render::ToneCurve tone_curve = render::ToneCurve::filmic;
-  int shadow_map = 2048;
 };
 
 struct OutputSettings {

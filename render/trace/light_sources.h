@@ -1,0 +1,35 @@
+#pragma once
+/// Private: everything that emits light in a sub-frame.
+
+#include <vector>
+
+#include "render/opacity_grid.h"
+#include "render/sky.h"
+#include "render/stage.h"
+#include "render/trace/glow.h"
+#include "render/trace/ray_lamp.h"
+
+namespace offstage::render {
+
+struct LightSources {
+  Sun sun;
+  SkyModel sky;
+  float fog = 0;
+  std::vector<RayLamp> lamps;
+  Glow glow;
+  const OpacityGrid* smoke = nullptr;  ///< null: none
+};
+
+/// The disc of the sun.
+class SunDisc {
+ public:
+  SunDisc(const Sun& sun, const Vector3f& direction);
+  /// The unit direction to the point of the disc that belongs to `uv`.
+  Vector3f direction(const SquarePoint<float>& uv) const;
+  LaneVectors direction(const SquarePoint<Lanes>& uv) const;
+
+ private:
+  Vector3f middle_, across_, along_;  ///< radii of the disc at distance 1
+};
+
+}  // namespace offstage::render
