@@ -40,8 +40,6 @@ struct Run {
   ClothPoints& points;
   Real total_mass;
   std::vector<Vec3> air;  // velocity of it, at each point
-  /// How fast the force of the air on each point falls with its velocity, at most [kg/s].
-  std::vector<Real> resistance;
 
   std::size_t size() const { return cloth.points.size(); }
   Vec3 at(std::size_t i) const { return points.at(first + i); }
@@ -107,7 +105,7 @@ void add(const PairLaw&, Run&) {
 }
 
 /// Drag and lift (ClothAir), a third to each corner.
-void blow_on_triangles(Run& run) {
+void blow_on_triangles(Run& run, Real h) {
   const ClothAir& air = run.cloth.def.air;
   if (!(air.density > 0) || !(air.drag > 0)) return;
   for (const Triangle& t : run.cloth.triangles) {
@@ -120,11 +118,11 @@ void blow_on_triangles(Run& run) {
                     run.velocity(t[2])) /
                    3;
     const Real scale = air.density * size / 4 * u.norm();  // rho A/2 |u|
-    const Vec3 third = scale / 3 * ((air.drag - air.lift) * u + air.lift * u.dot(n) * n);
-    for (uint32_t corner : t) {
-      run.points.acceleration[run.first + corner] += padded(third / run.cloth.masses[corner]);
-      run.resistance[corner] += 2 * scale / 3 * air.drag;
-    }
+    const Real mass = run.cloth.masses[t[0]] + run.cloth.masses[t[1]] + run.cloth.masses[t[2]];
+    const Real rate = 2 * scale * air.drag / mass;
+    const Vec3 force = scale / (1 + h * rate) * ((air.drag - air.lift) * u + air.lift * u.dot(n) * n);
+    for (uint32_t corner : t)
+      run.points.acceleration[run.first + corner] += padded(force / (3 * run.cloth.masses[corner]));
   }
 }
 
@@ -167,7 +165,7 @@ void inflate(Run& run, const Vec3& gravity) {
 /// An open cloth that faces the air stops what comes in at its mouth: inside of it the pressure of stagnation
 /// builds up, everywhere the same. A fan over its border would close the surface, whose area vectors then
 /// add up to zero: that of the mouth is the opposite of the cloth's.
-void catch_air(Run& run) {
+void catch_air(Run& run, Real h) {
   const ClothDef& def = run.cloth.def;
   if (!(def.ram_pressure > 0)) return;
   Vec3 cap = Vec3::Zero(), stream = Vec3::Zero();
@@ -179,13 +177,9 @@ void catch_air(Run& run) {
     stream += run.cloth.masses[i] / run.total_mass * (run.air[i] - run.velocity(i));
   const Real area = cap.norm(), speed = area > 0 ? cap.dot(stream) / area : 0;
   if (!(speed > 0)) return;
-  const Real pressure = def.ram_pressure * def.air.density / 2 * speed * speed;
-  push_out(run, pressure);
-  for (const Triangle& t : run.cloth.triangles) {
-    const Vec3 a = run.at(t[0]);
-    const Real size = (run.at(t[1]) - a).cross(run.at(t[2]) - a).norm() / 2;
-    for (uint32_t corner : t) run.resistance[corner] += 2 * pressure / speed * size / 3;
-  }
+  const Real whole = def.ram_pressure * def.air.density / 2 * speed * speed;
+  const Real rate = 2 * whole * area / (speed * run.total_mass);
+  push_out(run, whole / (1 + h * rate));
 }
 
 /// Mass of the gas and the air that a skin of unit area moves when it bursts [kg/m^2]: that of a sphere of
@@ -197,11 +191,8 @@ Real moved_with_skin(const Cloth& cloth) {
   return cloth.gas.share() * radius * (cloth.def.air.density / 2 + gas_density(cloth));
 }
 
-/// Sets the points' masses. Forces act for a time h. Where the air brakes a point in less than that, its
-/// force would throw the point back. Such a point gets the inertia h * resistance in place of its mass, so
-/// that the force of the air just stops it, as in an implicit step. The forces themselves stay as they are,
-/// so that steady states are exact.
-void set_inertia(Run& run, Real h) {
+/// Sets the points' masses. Those of a torn skin move the gas, too.
+void set_inertia(Run& run) {
   std::vector<Real> inertia = run.cloth.masses;
   if (leaks(run.cloth)) {
     const Real moved = moved_with_skin(run.cloth);
@@ -212,7 +203,6 @@ void set_inertia(Run& run, Real h) {
     }
   }
   for (std::size_t i = 0; i < run.size(); ++i) {
-    inertia[i] = std::max(inertia[i], h * run.resistance[i]);
     run.points.mass[run.first + i] = inertia[i];
     run.points.acceleration[run.first + i] *= run.cloth.masses[i] / inertia[i];
   }
@@ -224,22 +214,16 @@ void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather&
                       ClothPoints& points) {
   Real total = 0;
   for (Real m : cloth.masses) total += m;
-  Run run{cloth,
-          first,
-          weather.time,
-          points,
-          total,
-          std::vector<Vec3>(cloth.points.size(), weather.wind),
-          std::vector<Real>(cloth.points.size(), 0)};
+  Run run{cloth, first, weather.time, points, total, std::vector<Vec3>(cloth.points.size(), weather.wind)};
   std::fill_n(points.acceleration.begin() + static_cast<std::ptrdiff_t>(first), run.size(),
               padded(weather.gravity));
   for (const ForceDef* f : weather.forces)
     if (f->acts_on(cloth.handle) && f->is_on(weather.time))
       std::visit([&](const auto& effect) { add(effect, run); }, f->effect);
-  blow_on_triangles(run);
+  blow_on_triangles(run, weather.h);
   inflate(run, weather.gravity);
-  catch_air(run);
-  set_inertia(run, weather.h);
+  catch_air(run, weather.h);
+  set_inertia(run);
 }
 
 void step_leaks(std::span<Cloth* const> cloths, std::span<const std::size_t> first,

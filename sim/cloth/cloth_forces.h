@@ -17,9 +17,9 @@ struct ClothWeather {
   std::span<const ForceDef* const> forces;
 };
 
-/// Sets the accelerations and masses of a cloth's points, which begin at index `first`. A point that the air
-/// stops in less than h gets more than its own mass, which keeps the step stable. So do those of a cloth
-/// under pressure that is torn, by the gas that it moves.
+/// Sets the accelerations and masses of a cloth's points, which begin at index `first`. The drag of the air
+/// is limited so that it at most brings a triangle to rest relative to the air within h, which keeps the step
+/// stable. Points of a cloth under pressure that is torn have the mass of the gas that they move, too.
 void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather& weather,
                       ClothPoints& points);
 

@@ -197,43 +197,6 @@ TEST_P(StretchedBalloon, StaysRoundAndComesToRest) {
 
 INSTANTIATE_TEST_SUITE_P(Balloons, StretchedBalloon, testing::Values(2, 3));
 
-/// World step [s].
-class RisingBalloon : public testing::TestWithParam<Real> {};
-
-TEST_P(RisingBalloon, HasTheDragThatBalancesItsLift) {
-  // A skin so light that the air stops it within a step of 1/60 s. However long the step, in steady motion
-  // the force of the air, rho A / 2 |u| ((C_D - C_L) u + C_L (u.n) n) summed over the triangles, is lift less
-  // weight.
-  effects::Fabric skin = effects::find_fabric("balloon")->fabric;
-  skin.areal_density = 0.01;
-  ClothDef def = effects::sphere_cloth(0.1, 2, {}, skin);
-  def.pressure = 2700;
-  def.gas_density = 0.17;
-  def.self_collision = false;
-  World world({.max_step = GetParam()});
-  const ClothHandle cloth = world.add_cloth(def);
-  Real drag = 0, lift = 0;
-  constexpr int kFrames = 180, kMeasured = 60;
-  for (int i = 0; i < kFrames; ++i) {
-    world.step(1.0 / 60);
-    if (i < kFrames - kMeasured) continue;
-    const ClothView view = world.cloth(cloth);
-    lift += 9.81 * ((1.2 - 0.17) * enclosed_volume(view.points, view.triangles) - mass_of(def)) / kMeasured;
-    for (const Triangle& t : view.triangles) {
-      const Vec3 doubled =
-          (view.points[t[1]] - view.points[t[0]]).cross(view.points[t[2]] - view.points[t[0]]);
-      const Vec3 n = doubled.normalized();
-      const Vec3 u = -(view.velocities[t[0]] + view.velocities[t[1]] + view.velocities[t[2]]) / 3;
-      const Vec3 force = 1.2 * doubled.norm() / 4 * u.norm() *
-                         ((def.air.drag - def.air.lift) * u + def.air.lift * u.dot(n) * n);
-      drag -= force.y() / kMeasured;
-    }
-  }
-  EXPECT_NEAR(drag, lift, 0.01 * lift);
-}
-
-INSTANTIATE_TEST_SUITE_P(Steps, RisingBalloon, testing::Values(1.0 / 60, 1.0 / 240));
-
 /// Number of segments of a cord.
 class ClothCord : public testing::TestWithParam<uint32_t> {};
 
