@@ -3,18 +3,33 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 namespace offstage::sim {
 namespace {
 
 constexpr Real kAirDensity = 1.2;  // of leaking gas without a density of its own [kg/m^3]
 
-/// Pressure that the gas let in so far would have without a loss, at the present volume [Pa]. A volume of
-/// less than a tenth of that at rest counts as a tenth: a cloth that is crushed flat does not burst.
+/// Volume inside, at least a tenth of that at rest: a cloth that is crushed flat does not burst, and what is
+/// left of a torn one does not keep its gas because it has no inside [m^3].
+Real gas_volume(const Cloth& cloth) {
+  return std::max(cloth.gas.volume(cloth.points, cloth.triangles), 0.1 * cloth.rest_volume);
+}
+
+/// Pressure that the gas let in so far would have without a loss, at the present volume [Pa].
 Real overpressure(const Cloth& cloth) {
-  const Real volume = cloth.gas.volume(cloth.points, cloth.triangles);
   const Real let_in = cloth.age < cloth.def.inflate_time ? cloth.age / cloth.def.inflate_time : 1;
-  return let_in * cloth.def.pressure * cloth.rest_volume / std::max(volume, 0.1 * cloth.rest_volume);
+  return let_in * cloth.def.pressure * cloth.rest_volume / gas_volume(cloth);
+}
+
+Real gas_density(const Cloth& cloth) {
+  const Real density = cloth.def.gas_density.value_or(cloth.def.air.density);
+  return density > 0 ? density : kAirDensity;
+}
+
+/// Whether gas flows out of a tear.
+bool leaks(const Cloth& cloth) {
+  return cloth.def.pressure != 0 && cloth.version > 0 && cloth.gas.share() > 0 && !cloth.stopped;
 }
 
 /// The points of one cloth as their accelerations are made.
@@ -167,15 +182,33 @@ void catch_air(Run& run, Real h) {
   push_out(run, whole / (1 + h * rate));
 }
 
-}  // namespace
-
-void leak_gas(Cloth& cloth, Real h) {
-  if (cloth.def.pressure == 0 || cloth.version == 0) return;
-  Real density = cloth.def.gas_density.value_or(cloth.def.air.density);
-  if (!(density > 0)) density = kAirDensity;
-  cloth.gas.leak(cloth.points, cloth.gas.volume(cloth.points, cloth.triangles), overpressure(cloth), density,
-                 h);
+/// Mass of the gas and the air that a skin of unit area moves when it bursts [kg/m^2]: that of a sphere of
+/// radius R in air that moves to and fro, rho_air R / 2, and of the gas in it, rho_gas R (Lamb,
+/// Hydrodynamics, art. 92). It is ten times that of the skin of a balloon, which without it would fly off
+/// faster than the gas.
+Real moved_with_skin(const Cloth& cloth) {
+  const Real radius = std::cbrt(3 * cloth.rest_volume / (4 * std::numbers::pi));
+  return cloth.gas.share() * radius * (cloth.def.air.density / 2 + gas_density(cloth));
 }
+
+/// Sets the points' masses. Those of a torn skin move the gas, too.
+void set_inertia(Run& run) {
+  std::vector<Real> inertia = run.cloth.masses;
+  if (leaks(run.cloth)) {
+    const Real moved = moved_with_skin(run.cloth);
+    for (const Triangle& t : run.cloth.triangles) {
+      const Vec3 a = run.at(t[0]);
+      const Real size = (run.at(t[1]) - a).cross(run.at(t[2]) - a).norm() / 2;
+      for (uint32_t corner : t) inertia[corner] += moved * size / 3;
+    }
+  }
+  for (std::size_t i = 0; i < run.size(); ++i) {
+    run.points.mass[run.first + i] = inertia[i];
+    run.points.acceleration[run.first + i] *= run.cloth.masses[i] / inertia[i];
+  }
+}
+
+}  // namespace
 
 void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather& weather,
                       ClothPoints& points) {
@@ -190,6 +223,21 @@ void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather&
   blow_on_triangles(run, weather.h);
   inflate(run, weather.gravity);
   catch_air(run, weather.h);
+  set_inertia(run);
+}
+
+void step_leaks(std::span<Cloth* const> cloths, std::span<const std::size_t> first,
+                const ClothWeather& weather, ClothPoints& points) {
+  for (std::size_t c = 0; c < cloths.size(); ++c) {
+    Cloth& cloth = *cloths[c];
+    if (!leaks(cloth)) continue;
+    const std::size_t begin = first[c], end = begin + cloth.points.size();
+    for (std::size_t i = begin; i < end; ++i) cloth.points[i - begin] = points.at(i);
+    cloth.gas.leak(cloth.points, gas_volume(cloth), overpressure(cloth), gas_density(cloth), weather.h);
+    add_outer_forces(cloth, begin, weather, points);
+    for (std::size_t i = begin; i < end; ++i)
+      if (points.inverse_mass[i] > 0) points.inverse_mass[i] = 1 / points.mass[i];
+  }
 }
 
 }  // namespace offstage::sim

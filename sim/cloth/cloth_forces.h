@@ -17,12 +17,16 @@ struct ClothWeather {
   std::span<const ForceDef* const> forces;
 };
 
-/// Lets the gas of a cloth under pressure flow out of its tears for a time h [s].
-void leak_gas(Cloth& cloth, Real h);
-
-/// Sets the accelerations of a cloth's points, which begin at index `first`. The drag of the air is limited
-/// so that it at most brings a triangle to rest relative to the air within h, which keeps the step stable.
+/// Sets the accelerations and masses of a cloth's points, which begin at index `first`. The drag of the air
+/// is limited so that it at most brings a triangle to rest relative to the air within h, which keeps the step
+/// stable. Points of a cloth under pressure that is torn have the mass of the gas that they move, too.
 void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather& weather,
                       ClothPoints& points);
+
+/// Lets the gas of torn cloths flow out for a time weather.h, and sets their accelerations and masses for the
+/// next sub-step: their skin moves too fast for forces that stay through a sub-step of the world. `first`
+/// holds the index of each cloth's first point.
+void step_leaks(std::span<Cloth* const> cloths, std::span<const std::size_t> first,
+                const ClothWeather& weather, ClothPoints& points);
 
 }  // namespace offstage::sim

@@ -5,6 +5,12 @@
 #include <map>
 
 namespace offstage::sim {
+namespace {
+
+/// A smaller share of the overpressure counts as none.
+constexpr Real kLeastGas = 1e-3;
+
+}  // namespace
 
 void ClothGas::assign(std::span<const Triangle> triangles) {
   // Edges without a counterpart in the opposite direction, by their start.
@@ -67,6 +73,7 @@ void ClothGas::leak(std::span<const Vec3> points, Real volume, Real pressure, Re
   const Real flow = kDischarge * hole_area(points) * std::sqrt(2 * std::abs(pressure) / density);
   const Real root = 1 / (1 / std::sqrt(share_) + h * flow / (2 * volume));
   share_ = root * root;
+  if (share_ < kLeastGas) share_ = 0;
 }
 
 }  // namespace offstage::sim

@@ -20,6 +20,12 @@ constexpr uint32_t kMaxColors = 64;
 /// that it grows (measured; an exact solution has no such limit). What counts is what all springs of both
 /// points make of it, four times as much there: in a mesh of triangles, where six meet, each may have less.
 constexpr Real kMaxRatio = 6, kMaxRatioOfAll = 24;
+/// Of the step squared times the sum of k e / (l m) of the springs at both points, with the elongation e and
+/// the length l: the explicit step is stable up to 4 (Anderson and Morley, 1985). The rest is for the stretch
+/// that a sub-step of the world adds.
+constexpr Real kMaxAcross = 3;
+/// Up to this length over rest length, kMaxRatioOfAll keeps that limit: 3 / 24 = 1 - 1 / 1.143.
+constexpr Real kShortEnough = 1.14;
 /// A spring as soft as this stays as it is.
 constexpr Real kSoftRatio = 0.5;
 /// Points as near as this have no direction between them [m^2].
@@ -91,7 +97,6 @@ void ClothSprings::assign(std::span<const ClothSpring> springs, const ClothPoint
   for (uint32_t c : color) ++color_start_[c + 1];
   for (std::size_t c = 1; c < color_start_.size(); ++c) color_start_[c] += color_start_[c - 1];
   std::vector<std::size_t> next(color_start_.begin(), color_start_.end());
-  longest_step_ = std::numeric_limits<Real>::infinity();
   spring_.resize(springs.size());
   material_.resize(springs.size());
   for (std::size_t i = 0; i < springs.size(); ++i) {
@@ -99,10 +104,11 @@ void ClothSprings::assign(std::span<const ClothSpring> springs, const ClothPoint
     const std::size_t at = next[color[i]]++;
     spring_[at] = {s.a, s.b, s.counterpart, s.rest_length, 0, s.counterpart_rest};
     if (s.counterpart_rest == 0) spring_[at].counterpart = {s.a, s.a};
-    material_[at] = {s.stiffness, s.damping, most(s)};
     const Real fastest = s.stiffness * (1 / points.mass[s.a] + 1 / points.mass[s.b]);
-    longest_step_ = std::min(longest_step_, std::sqrt(material_[at].most / fastest));
+    material_[at] = {s.stiffness, s.damping, fastest, most(s), most(s)};
   }
+  is_stretched_ = false;
+  set_longest_step();
   link_.resize(spring_.size());
   prepared_for_ = -1;
   pull_.clear();
@@ -115,6 +121,42 @@ void ClothSprings::assign(std::span<const ClothSpring> springs, const ClothPoint
             .push_back({kind, color_start_[k], color_start_[k + 1], k == kMaxColors});
     }
   }
+}
+
+void ClothSprings::set_longest_step() {
+  Real square = std::numeric_limits<Real>::infinity();
+  for (const Material& m : material_) square = std::min(square, m.most / m.fastest);
+  longest_step_ = std::sqrt(square);
+}
+
+void ClothSprings::adapt_to_stretch(const ClothPoints& points) {
+  const auto length2 = [&](const Spring& s) {
+    return (points.position[s.a] - points.position[s.b]).squaredNorm();
+  };
+  const bool is_stretched = std::ranges::any_of(
+      spring_, [&](const Spring& s) { return length2(s) > kShortEnough * kShortEnough * s.rest * s.rest; });
+  if (!is_stretched && !is_stretched_) return;
+  std::vector<Real> across(points.size(), 0);  // sum of k e / (l m) of the springs at each point
+  for (std::size_t i = 0; i < spring_.size(); ++i) {
+    const Spring& s = spring_[i];
+    const Real length = std::sqrt(length2(s));
+    Real elongation = length - s.rest;
+    if (s.counterpart_rest > 0) {
+      const auto [c, d] = s.counterpart;
+      elongation = (elongation - (points.position[c] - points.position[d]).norm() + s.counterpart_rest) / 2;
+    }
+    if (!(elongation > 0)) continue;
+    const Real stiffness = material_[i].stiffness * elongation / length;
+    for (uint32_t end : {s.a, s.b}) across[end] += stiffness / points.mass[end];
+  }
+  for (std::size_t i = 0; i < spring_.size(); ++i) {
+    Material& m = material_[i];
+    const Real sum = across[spring_[i].a] + across[spring_[i].b];
+    m.most = sum > 0 ? std::min(m.most_at_rest, kMaxAcross * m.fastest / sum) : m.most_at_rest;
+  }
+  is_stretched_ = is_stretched;
+  prepared_for_ = -1;
+  set_longest_step();
 }
 
 uint32_t ClothSprings::Stage::block_count() const {

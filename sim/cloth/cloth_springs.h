@@ -20,6 +20,10 @@ class ClothSprings {
   /// Springs of one cloth, between points of all cloths; their order determines the colours.
   void assign(std::span<const ClothSpring> springs, const ClothPoints& points);
 
+  /// Adapts the stable step to the points' present positions: a spring under tension also acts across its
+  /// direction, by its force over its length, and the sweeps do not make that part implicit. To be called
+  /// where the stretch may have changed much; the result depends on the positions alone.
+  void adapt_to_stretch(const ClothPoints& points);
   /// The longest step at which no spring's stiffness is clamped [s].
   Real longest_step() const { return longest_step_; }
   /// To be called before steps of length h.
@@ -43,7 +47,8 @@ class ClothSprings {
   };
   struct Material {
     Real stiffness, damping;
-    Real most;  // of h^2 k (1/m_a + 1/m_b)
+    Real fastest;             // k (1/m_a + 1/m_b)
+    Real most, most_at_rest;  // of h^2 `fastest`; at the present stretch, and without stretch
   };
   /// A spring in the step. It is small because every sweep reads all of them. A relative move d along the
   /// axis is resisted by the impulse `along` d, less the share `forget` of the impulse of previous sweeps.
@@ -60,6 +65,7 @@ class ClothSprings {
     uint32_t block_count() const;
   };
 
+  void set_longest_step();
   void run(std::span<const Stage> stages, ClothPoints& points, std::span<Vec4> moves);
   void pull(ClothPoints& points, std::span<Vec4> moves, std::size_t begin, std::size_t end);
   void relax(ClothPoints& points, std::span<Vec4> moves, std::size_t spring);
@@ -70,6 +76,7 @@ class ClothSprings {
   std::vector<Link> link_;                // of the step
   std::vector<Stage> pull_, relax_;       // of any step
   std::vector<Real> inverse_mass_;        // that springs were prepared for
+  bool is_stretched_ = false;             // whether some `most` is not that at rest
   Real prepared_for_ = -1;                // step [s]; < 0: none
   Real longest_step_ = 0, least_stiffness_ = 1;
   uint64_t clamped_ = 0;

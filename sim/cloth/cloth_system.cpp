@@ -177,10 +177,10 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
     longest = std::min(longest, cloths_[c]->def.substep);
     for (std::size_t i = 0; i < cloths_[c]->points.size(); ++i)  // impacts may have changed them
       points_.velocity[first_[c] + i] = padded(cloths_[c]->velocities[i]);
-    leak_gas(*cloths_[c], weather.h);
     add_outer_forces(*cloths_[c], first_[c], weather, points_);
   }
   for (Cloth* cloth : cloths_) cloth->before = cloth->points;
+  adapt_springs();
   find_held(weather.time, bodies);
   for (const Carrier& carrier : carriers_) carrier.body->fall_along_parabola(weather.gravity);
   contacts_.find(points_, collides_, bodies, weather.h);
@@ -200,6 +200,10 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
   for (Real k = 0; k < parts; ++k) {
     for (Cloth* cloth : cloths_) cloth->age += dt;
     substep(k / parts, (k + 1) / parts, dt, k + 1 == parts || span_ + 1 >= span);
+    ClothWeather next = weather;
+    next.time += (k + 1) * dt;
+    next.h = dt;
+    step_leaks(cloths_, first_, next, points_);
     // A body that goes by more than an edge of the cloth in a sub-step of the world must find the holes that
     // it tears.
     since_look += speed * dt;
@@ -281,6 +285,11 @@ void ClothSystem::move_held() {
         padded(held.body ? held.body->end().point_to_world(held.position) : held.position);
     points_.pull[held.point].setZero();
   }
+}
+
+void ClothSystem::adapt_springs() {
+  for (std::size_t c = 0; c < cloths_.size(); ++c)
+    if (cloths_[c]->def.integrator == ClothIntegrator::relaxed) springs_[c].adapt_to_stretch(points_);
 }
 
 /// Number of steps of the springs in a sub-step of a `relaxed` cloth.
@@ -433,6 +442,7 @@ void ClothSystem::tear_within(const ClothWeather& weather, Real fraction) {
   ClothWeather now = weather;
   now.time += fraction * weather.h;
   for (std::size_t c = 0; c < cloths_.size(); ++c) add_outer_forces(*cloths_[c], first_[c], now, points_);
+  adapt_springs();
   find_held(weather.time, bodies_);
   contacts_.find(points_, collides_, bodies_, weather.h, fraction);
   corner_contacts_.find(points_, bodies_, weather.h);

@@ -65,6 +65,7 @@ class ClothSystem {
   void find_held(Real time, std::span<ClothBody> bodies);
   void carry(uint32_t point, ClothBody& body, const Vec3& place);
   void set_clamps(std::size_t cloth);
+  void adapt_springs();
   uint32_t spring_steps(std::size_t cloth, Real dt) const;
   std::span<const ClothSpring> springs_of(std::size_t cloth) const {
     return std::span(all_springs_)
