@@ -154,12 +154,12 @@ Vector3f mean_color(const HdrImage& picture, const Vector2f& place, int half) {
   return sum / static_cast<float>((2 * half + 1) * (2 * half + 1));
 }
 
-const Material kPlaster{.color = {1, 1, 1, 1}, .roughness = 1};
+const Material kWhitePlaster{.color = {1, 1, 1, 1}, .roughness = 1};
 
 // The furnace: a white ball in a picture of one colour cannot be told from the picture behind it.
 TEST(StageSkyPicture, AWhiteBallVanishesInAPictureOfOneColour) {
   LitStage s(sky_of([](const Vector3f&) { return Vector3f(Vector3f::Constant(0.35f)); }), 0, true, 2);
-  s.add(make_sphere(1), kPlaster);
+  s.add(make_sphere(1), kWhitePlaster);
   s.look({.eye = {0, 0, 4}, .target = {0, 0, 0}});
   const HdrImage picture = s.mean_of(4);
   for (int y = 0; y < 120; ++y)
@@ -172,7 +172,7 @@ TEST(StageSkyPicture, OfABrightDiscFollowsItsFormFactor) {
   for (const float cosine : {1.0f, 0.5f}) {
     const Vector3f middle(std::sqrt(1 - cosine * cosine), cosine, 0);
     LitStage s(disc_sky(middle, 8, {30, 30, 30}, 0, 1024));
-    s.add(make_ground(20), kPlaster);
+    s.add(make_ground(20), kWhitePlaster);
     s.look({.eye = {0, 3, 3}, .target = {0, 0, 0}});
     const float expected = 30 * std::pow(std::sin(8 * kPi / 180), 2.0f) * cosine;
     const HdrImage picture = s.mean_of(4);
@@ -185,7 +185,7 @@ TEST(StageSkyPicture, OfABrightDiscFollowsItsFormFactor) {
 TEST(StageSkyPicture, OfASmallSunHasNoNoise) {
   const float radius_deg = 3 * 180.0f / 512;
   LitStage s(disc_sky(Vector3f(0, 1, 0), radius_deg, {5000, 5000, 5000}, 0.1f, 1024));
-  s.add(make_ground(20), kPlaster);
+  s.add(make_ground(20), kWhitePlaster);
   s.add(make_sphere(0.5f), {.color = {0, 0, 0, 1}, .roughness = 1}, {0, 1, 0});
   s.look({.eye = {0, 5, 5}, .target = {0, 0, 0}, .fov_deg = 50});
   const HdrImage picture = s.mean_of(4);
@@ -209,7 +209,7 @@ TEST(StageSkyPicture, TurnsWithThePicture) {
       sky_of([](const Vector3f& d) { return d.x() > 0 ? Vector3f(1, 0, 0) : Vector3f(0, 0, 1); });
   for (const float turn : {0.0f, 180.0f}) {
     LitStage s(sky, turn);
-    s.add(make_box({0.2f, 2, 2}), kPlaster);
+    s.add(make_box({0.2f, 2, 2}), kWhitePlaster);
     s.look({.eye = {4, 0, 0}, .target = {0, 0, 0}});
     const Vector3f color = mean_color(s.mean_of(4), {80, 60}, 5);
     EXPECT_GT(turn == 0 ? color.x() / color.z() : color.z() / color.x(), 20);
@@ -252,7 +252,7 @@ TEST(StageSkyPicture, BackgroundIsBlurredOrHidden) {
   environment.picture_visible = false;
   s.stage.set_environment(environment);
   s.look({.eye = {0, 0, 4}, .target = {0, 0, 0}});
-  s.add(make_sphere(1), kPlaster);
+  s.add(make_sphere(1), kWhitePlaster);
   const HdrImage picture = s.mean_of(4);
   EXPECT_NEAR(pixel(picture, 5, 5).y(), 0.2f, 0.01f);
   EXPECT_GT(mean_color(picture, {100, 60}, 2).y(), 0.6f);  // the right half is lit, the left one is not
