@@ -70,8 +70,7 @@ render::ObjectNames object_names(const Scene& scene) {
 
 Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context& context)
     : scene_(scene),
-      stage_(context, {.width_px = scene.render.size.x(),
-                       .height_px = scene.render.size.y()}),
+      stage_(context, {.width_px = scene.render.size.x(), .height_px = scene.render.size.y()}),
       camera_(scene, models) {
   std::size_t slot = 0;
   uint32_t object = 0;
