@@ -8,25 +8,18 @@
 #include <tbb/parallel_for.h>
 
 #include "render/frame.h"
+#include "render/trace/light_path.h"
 
 namespace offstage::render {
 namespace {
 
-constexpr float kFar = 1e9f;      // [m]; nothing is farther away
-constexpr int kMostBounces = 16;  // between diffuse surfaces
-constexpr int kMostSteps = 32;    // along a path, mirrors and glass included
 constexpr int kRowsPerTask = 8;
 constexpr float kBrightest =
     50;  // of light that arrives after bounces; brighter samples would stay visible as dots
-constexpr int kWidestStep = 16;        // of the filter of light from around, in cells
-constexpr float kSmoothMetal = 0.35f;  // with less roughness, a path goes on in the mirrored direction
+constexpr int kWidestStep = 16;  // of the filter of light from around, in cells
 
 constexpr float kGrazing = 0.02f;      // cosine between light and triangle; with less, it may shadow itself
 constexpr float kSharpMirror = 0.12f;  // with more roughness, mirror images are averaged over pixels
-
-std::size_t index_of(int x, int y, int width) {
-  return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
-}
 
 LaneVectors from_octahedral(Lanes x, Lanes z) {
   const Lanes one = Lanes{} + 1, y = 1 - absolute(x) - absolute(z);
@@ -53,43 +46,6 @@ void store(std::span<LightPlane> planes, int x, int y, const LaneVectors& value)
   planes[2].set_lanes(x, y, value.z);
 }
 
-float fresnel_of_glass(float cosine, float ratio) {
-  const float sine2 = ratio * ratio * (1 - cosine * cosine);
-  if (sine2 >= 1) return 1;
-  const float t = std::sqrt(1 - sine2);
-  const float s = (ratio * cosine - t) / (ratio * cosine + t),
-              p = (cosine - ratio * t) / (cosine + ratio * t);
-  return 0.5f * (s * s + p * p);
-}
-
-float refraction_ratio(const Hit& hit) {
-  return hit.front || hit.material->thin ? 1 / hit.material->refraction : hit.material->refraction;
-}
-
-/// Share of the light along a ray that a surface of glass mirrors.
-float mirrored_share(const Hit& hit, const Vector3f& direction) {
-  return fresnel_of_glass(std::min(-hit.normal.dot(direction), 1.0f), refraction_ratio(hit));
-}
-
-/// Moves a ray through a surface of glass, which it refracts; returns the share of the light that the colour
-/// leaves. A solid piece takes half of its colour, as a factor, where the ray enters, and half where it
-/// leaves.
-Vector3f enter(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Vector3f& from,
-               Vector3f& direction) {
-  from = off_surface(hit.position, -hit.face);
-  const Vector3f color = albedo.cwiseMax(0);
-  if (hit.material->thin) return color;
-  const float a = hit.material->roughness * hit.material->roughness;
-  const Vector3f n = a < 1e-3f ? hit.normal : visible_facet(hit.normal, -direction, a, sampler.next());
-  const float ratio = refraction_ratio(hit), cosine = std::min(-n.dot(direction), 1.0f);
-  const float sine2 = ratio * ratio * std::max(1 - cosine * cosine, 0.0f);
-  const Vector3f refracted = ratio * direction + (ratio * cosine - std::sqrt(std::max(1 - sine2, 0.0f))) * n;
-  direction = refracted.normalized();
-  if (direction.dot(hit.face) >= 0)
-    direction = reflected(direction, hit.face);  // smooth normals are not exact
-  return color.cwiseSqrt();
-}
-
 /// Limits a value that a ray found, and adds it to the sums.
 Vector3f limited(const Vector3f& light, LightSums& sums) {
   const Vector3f kept = light.cwiseMin(kBrightest);
@@ -104,23 +60,6 @@ Lanes lobe_of(Lanes a, Lanes nl, Lanes nv, Lanes nh, Lanes most) {
   const Lanes a2 = a * a, d = nh * nh * (a2 - 1) + 1;
   const Lanes mean = 2 * nl * nv * (1 - a) + (nl + nv) * a;
   return smaller(a2 / (d * d) * 0.5f / larger(mean, Lanes{} + 1e-6f), most);
-}
-
-/// Probability density of a direction that visible_facet() mirrors, for a = roughness^2 [1/sr].
-template <class T>
-T mirror_density(T a, T nv, T nh) {
-  constexpr float kSharp = 0.002f;  // with less, all light of the sky comes from the mirror image
-  const T a2 = a * a, d = nh * nh * (a2 - 1.0f) + 1.0f;
-  const T density =
-      a2 / (2 * std::numbers::pi_v<float> * d * d * (nv + square_root(a2 + (1.0f - a2) * nv * nv)));
-  return a < kSharp ? T{} + 1e18f : density;
-}
-
-/// Weight of a direction that was found with density a, and could have been found in another way with density
-/// b: the power heuristic (E. Veach, "Robust Monte Carlo Methods", 1997).
-template <class T>
-T share_of_way(T a, T b) {
-  return a * a / (a * a + b * b + 1e-30f);
 }
 
 }  // namespace
@@ -195,35 +134,6 @@ LightBuffer::LightBuffer(int width, int height)
 LightTracer::LightTracer(const RayScene& scene, const LightSources& sources)
     : scene_(scene), sources_(sources), sun_disc_(sources.sun, sources.sky.sun_direction) {}
 
-// As the sky that the eye sees (shaders/sky.frag), without clouds and the sun's disc.
-Vector3f LightTracer::sky_seen(const Vector3f& direction) const {
-  if (direction.y() >= 0 || sources_.sky.turned.picture) return sky_radiance(sources_.sky, direction);
-  const Vector3f level = Vector3f(direction.x(), 0, direction.z()).normalized();
-  const Vector3f haze = level.allFinite() ? sky_radiance(sources_.sky, level) : sources_.sky.horizon;
-  const float x = std::clamp((-direction.y() - 0.03f) / 0.47f, 0.0f, 1.0f), share = x * x * (3 - 2 * x);
-  return haze + share * (sources_.sky.ground - haze);
-}
-
-// What a ray meets that leaves the scene. The bright part of a picture also arrives as a lamp at diffuse
-// surfaces, so that paths from there meet its dim part alone; `density`: see Path.
-Vector3f LightTracer::sky_met(const Vector3f& direction, bool sharp, float density) const {
-  const TurnedSky& turned = sources_.sky.turned;
-  if (!turned.picture) return sharp ? sky_seen(direction) : sky_radiance(sources_.sky, direction);
-  const Vector3f there = turned.to_picture(direction);
-  if (!sharp && density < 0) return turned.intensity * turned.picture->dim(there);
-  float share = 1;
-  if (density >= 0)
-    share -= turned.picture->bright_share(there) * share_of_way(turned.picture->density(there), density);
-  return share * turned.intensity * turned.picture->seen(there);
-}
-
-float LightTracer::sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const {
-  const Sun& sun = sources_.sun;
-  float share = sources_.smoke != nullptr ? std::exp(-sources_.smoke->depth(place)) : 1.0f;
-  if (!sun.shadows) return share;
-  return share * scene_.transmittance(place, sun_disc_.direction(uv), kFar).mean();
-}
-
 Lanes LightTracer::sun_visibility(const LaneVectors& place, IntLanes active,
                                   const SquarePoint<Lanes>& uv) const {
   Lanes share = active ? Lanes{} + 1 : Lanes{};
@@ -234,165 +144,6 @@ Lanes LightTracer::sun_visibility(const LaneVectors& place, IntLanes active,
   if (!sources_.sun.shadows) return share;
   const LaneVectors light = scene_.transmittance(place, sun_disc_.direction(uv), Lanes{} + kFar, active);
   return share * ((light.x + light.y + light.z) * (1.0f / 3));
-}
-
-// One lamp is chosen in proportion to its light without shadows.
-Vector3f LightTracer::lamps_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
-                               PixelSampler& sampler) const {
-  if (sources_.lamps.empty()) return Vector3f::Zero();
-  const SquarePoint<float> choice = sampler.next(), uv = sampler.next();
-  const RayLamp* kept = nullptr;
-  LampPoint<float> kept_point{};
-  float sum = 0, kept_cosine = 0, kept_weight = 0, random = choice.x;
-  for (const RayLamp& lamp : sources_.lamps) {
-    const LampPoint<float> point = lamp.point(from_eigen(place), uv);
-    const Vector3f towards = to_eigen(point.towards);
-    const float cosine = std::max(normal.dot(towards), 0.0f);
-    const float weight = cosine * to_eigen(point.arriving).sum();
-    if (!(weight > 0) || face.dot(towards) <= 0) continue;
-    sum += weight;
-    const float chance = weight / sum;
-    if (random < chance) {
-      random /= chance;
-      kept = &lamp;
-      kept_point = point;
-      kept_cosine = cosine;
-      kept_weight = weight;
-    } else {
-      random = (random - chance) / (1 - chance);
-    }
-  }
-  if (kept == nullptr) return Vector3f::Zero();
-  const Vector3f visible =
-      kept->def().shadows ? scene_.transmittance(place, to_eigen(kept_point.towards), kept_point.distance)
-                          : Vector3f(Vector3f::Ones());
-  return to_eigen(kept_point.arriving).cwiseProduct(visible) * (kept_cosine * sum / kept_weight);
-}
-
-int VisibleLight::find(const Hit& hit) const {
-  const LightGuide& guide = light_.pixels;
-  const Vector4f clip = view_.clip_from_world * hit.position.homogeneous();
-  if (!(clip.w() > 0)) return -1;
-  const float x = (0.5f + 0.5f * clip.x() / clip.w()) * static_cast<float>(guide.width_px);
-  const float y = (0.5f + 0.5f * clip.y() / clip.w()) * static_cast<float>(guide.height_px);
-  if (!(x >= 0 && y >= 0 && x < static_cast<float>(guide.width_px) &&
-        y < static_cast<float>(guide.height_px)))
-    return -1;
-  const int column = static_cast<int>(x), row = static_cast<int>(y);
-  if (*guide.filled.at(column, row) == 0) return -1;
-  const auto three = [&](const std::array<LightPlane, 3>& planes) {
-    return Vector3f(*planes[0].at(column, row), *planes[1].at(column, row), *planes[2].at(column, row));
-  };
-  const Vector3f normal = three(guide.normal);
-  const float off = normal.dot(three(guide.place) - hit.position);
-  const bool same = normal.dot(hit.normal) > 0.9f && off * off * *guide.inverse_size2.at(column, row) < 1;
-  return same ? static_cast<int>(index_of(column, row, guide.width_px)) : -1;
-}
-
-Vector4f VisibleLight::arriving(int pixel) const {
-  const auto k = static_cast<std::size_t>(pixel);
-  Vector4f result = light_.arriving[k];
-  if (!light_.lamps.empty()) result.head<3>() += light_.lamps[k].head<3>();
-  return result;
-}
-
-struct LightTracer::Path {
-  Vector3f from, direction;
-  float cone;  ///< angle that the ray stands for [rad]
-  Vector3f share = {1, 1, 1};
-  bool mirrored = false;  ///< so far
-  /// Probability density of the direction [1/sr] if the bright part of the sky was sampled, too; else
-  /// negative.
-  float density = -1;
-  /// Where it left a diffuse surface last, whose light from glowing meshes is also sampled; a normal of zero:
-  /// that of no surface.
-  Vector3f diffuse_place = Vector3f::Zero(), diffuse_normal = Vector3f::Zero();
-
-  /// Leaves a diffuse surface.
-  void scatter(const Vector3f& normal, const Vector3f& way) {
-    diffuse_place = from;
-    diffuse_normal = normal;
-    direction = way;
-  }
-  /// The share of the glow of what is met that is not found by sampling.
-  float share_of_glow(const Hit& hit, const Glow& glow) const {
-    if (glow.empty() || diffuse_normal.isZero()) return 1;
-    const Vector3f way = (hit.position - diffuse_place).normalized();
-    const float own = std::max(way.dot(diffuse_normal), 1e-3f) / std::numbers::pi_v<float>;
-    return own / (own + glow.density(diffuse_place, diffuse_normal, hit));
-  }
-  /// Leaves a surface in a mirrored direction.
-  void turn(const Vector3f& way, const Hit& hit) {
-    mirrored = true;
-    density = -1;
-    diffuse_normal.setZero();
-    direction = way.dot(hit.face) > 0 ? way : reflected(way, hit.face);
-    from = off_surface(hit.position, hit.face);
-  }
-};
-
-// Moves a path through or off a surface of glass, and adds the light that the surface itself sends back. To
-// keep noise low, a mirror image of less than a tenth is not followed: outside of the glass it is that of the
-// sky, and inside its light is counted with the light that leaves.
-bool LightTracer::follow_glass(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Path& path,
-                               Vector3f& sum) const {
-  const RayMaterial& material = *hit.material;
-  if (material.transmission <= 0) return false;
-  if (hit.front && material.transmission < 1) {
-    const Vector3f light =
-        direct_light(hit, off_surface(hit.position, hit.face), sampler) + sky_met(hit.normal, false, -1);
-    sum += (1 - material.transmission) * path.share.cwiseProduct(albedo).cwiseProduct(light);
-    path.share *= material.transmission;
-  }
-  const float mirrored = mirrored_share(hit, path.direction);
-  const Vector3f mirrored_way = reflected(path.direction, hit.normal);
-  if (mirrored >= 0.1f && sampler.next().x < mirrored) {
-    path.turn(mirrored_way, hit);
-    return true;
-  }
-  if (mirrored < 0.1f && hit.front) {
-    sum += mirrored * path.share.cwiseProduct(sky_radiance(sources_.sky, mirrored_way));
-    path.share *= 1 - mirrored;
-  }
-  path.share = path.share.cwiseProduct(enter(hit, albedo, sampler, path.from, path.direction));
-  return true;
-}
-
-// Of sun and lamps, on a white surface.
-Vector3f LightTracer::direct_light(const Hit& hit, const Vector3f& from, PixelSampler& sampler) const {
-  Vector3f result = Vector3f::Zero();
-  const float towards_sun = hit.normal.dot(sources_.sky.sun_direction);
-  const SquarePoint<float> on_sun = sampler.next();
-  if (towards_sun > 0 && sources_.sun.intensity > 0)
-    result = sources_.sun.intensity * towards_sun * sun_visibility(from, on_sun) * sources_.sun.color;
-  return result + lamps_at(from, hit.normal, hit.face, sampler) +
-         glow_at(from, hit.normal, hit.face, sampler);
-}
-
-namespace {
-
-/// The light of a sample of a glowing mesh on a white surface, if nothing is between them, weighted against
-/// that of rays that meet the mesh by chance.
-Vector3f light_of_glow(const GlowSample& sample, const Vector3f& normal, const Vector3f& face) {
-  const float cosine = normal.dot(sample.towards);
-  if (!(sample.density > 0) || cosine <= 0 || face.dot(sample.towards) <= 0) return Vector3f::Zero();
-  const float by_chance = cosine / std::numbers::pi_v<float>;
-  return sample.radiance * (by_chance / (sample.density + by_chance));
-}
-
-// Shadow rays end before the surface that glows, by more than their rounding.
-constexpr float kBeforeGlow = 1 - 2e-5f;
-
-}  // namespace
-
-Vector3f LightTracer::glow_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
-                              PixelSampler& sampler) const {
-  if (sources_.glow.empty()) return Vector3f::Zero();
-  const float choice = sampler.next().x;
-  const GlowSample sample = sources_.glow.sample(place, normal, choice, sampler.next());
-  const Vector3f light = light_of_glow(sample, normal, face);
-  if (light.isZero()) return light;
-  return light.cwiseProduct(scene_.transmittance(place, sample.towards, kBeforeGlow * sample.distance));
 }
 
 LaneVectors LightTracer::trace_glow(const Points& points, int x, int y, const LightView& view) const {
@@ -415,87 +166,6 @@ LaneVectors LightTracer::trace_glow(const Points& points, int x, int y, const Li
   if (!any(lit)) return light;
   const LaneVectors seen = scene_.transmittance(points.place, towards, distance, lit);
   return {light.x * seen.x, light.y * seen.y, light.z * seen.z};
-}
-
-// Radiance that arrives along a path. `met`, if not null, gets the distance of what it meets first, and is
-// unchanged if it meets nothing. Mirrors and glass are followed sharply until the first diffuse surface.
-Vector3f LightTracer::radiance(Path path, PixelSampler& sampler, const VisibleLight* visible,
-                               float* met) const {
-  Vector3f sum = Vector3f::Zero();
-  float travelled = 0;
-  bool sharp = path.cone < 0.1f;
-  int bounces = 0;
-  for (int step = 0; step < kMostSteps; ++step) {
-    Hit hit;
-    if (!scene_.first_hit(path.from, path.direction, kFar, hit)) {
-      return sum + path.share.cwiseProduct(sky_met(path.direction, sharp, path.density));
-    }
-    if (step == 0 && met != nullptr) *met = hit.distance;
-    const int pixel = visible != nullptr && sharp ? visible->find(hit) : -1;
-    if (pixel >= 0 && visible->has_picture() && !path.mirrored)
-      return sum + path.share.cwiseProduct(visible->color(pixel));
-    travelled += hit.distance;
-    if (sources_.fog > 0) {
-      const float clear = std::exp(-sources_.fog * hit.distance);
-      const Vector3f haze = sources_.sky.turned.picture ? horizon_color(sources_.sky, path.direction)
-                                                        : sky_seen(path.direction);
-      sum += path.share.cwiseProduct(haze) * (1 - clear);
-      path.share *= clear;
-    }
-    const RayMaterial& material = *hit.material;
-    const Vector4f color = material.color(hit, travelled * path.cone);
-    if (color.w() < 1 && sampler.next().x >= color.w()) {  // through a hole, or a translucent surface
-      path.from = off_surface(hit.position, -hit.face);
-      continue;
-    }
-    const Vector3f albedo = color.head<3>();
-    if (material.unlit) return sum + path.share.cwiseProduct(albedo);
-    // Of glass, as on the screen, only the side towards the eye glows.
-    if ((hit.front || material.transmission <= 0) && !material.mean_emission().isZero())
-      sum += path.share_of_glow(hit, sources_.glow) * path.share.cwiseProduct(material.emission_at(hit.uv));
-    if (follow_glass(hit, albedo, sampler, path, sum)) continue;
-    path.from = off_surface(hit.position, hit.face);
-    const bool smooth = material.roughness < kSmoothMetal;
-    const float m = 1 - std::min(-hit.normal.dot(path.direction), 1.0f), grazing = m * m * m * m * m;
-    if (smooth && material.metallic > 0.5f) {
-      const float a = std::max(material.roughness * material.roughness, bounces > 0 ? 0.04f : 1e-4f);
-      path.turn(reflected(path.direction, visible_facet(hit.normal, -path.direction, a, sampler.next())),
-                hit);
-      path.share = path.share.cwiseProduct(albedo + (Vector3f::Ones() - albedo) * grazing);
-      continue;
-    }
-    if (smooth && sharp) {  // in a mirror image, a varnished surface mirrors the sky alone
-      const float fresnel = 0.04f + 0.96f * grazing;
-      Path sky = path;
-      sky.turn(reflected(path.direction, hit.normal), hit);
-      sum += fresnel * path.share.cwiseProduct(sky_seen(sky.direction))
-                           .cwiseProduct(scene_.transmittance(sky.from, sky.direction, kFar));
-      path.share *= 1 - fresnel;
-    }
-    path.share = path.share.cwiseProduct(albedo);
-    if (pixel >= 0) {
-      const Vector4f light = visible->arriving(pixel);
-      const float cosine = hit.normal.dot(sources_.sky.sun_direction);
-      const float sun = sources_.sun.intensity * (std::max((1 - hit.translucency) * cosine, 0.0f) +
-                                                  std::max(-hit.translucency * cosine, 0.0f));
-      return sum + path.share.cwiseProduct(light.head<3>() + sun * light.w() * sources_.sun.color);
-    }
-    if (hit.translucency > 0 && sampler.next().x < hit.translucency) {  // light from the other side
-      hit.normal = -hit.normal;
-      hit.face = -hit.face;
-      path.from = off_surface(hit.position, hit.face);
-    }
-    sum += path.share.cwiseProduct(direct_light(hit, path.from, sampler));
-    // Paths end at random in proportion to the light that they can still carry.
-    const float survives = std::min(path.share.maxCoeff(), 0.95f);
-    if (++bounces >= kMostBounces || sampler.next().x >= survives) return sum;
-    path.share /= survives;
-    const Vector3f way = to_eigen(cosine_direction(from_eigen(hit.normal), sampler.next()));
-    path.scatter(hit.normal, way.dot(hit.face) > 0 ? way : reflected(way, hit.face));
-    sharp = false;
-    path.cone = 0.5f;
-  }
-  return sum;
 }
 
 // Where a triangle turns away from the light but its smooth normals do not, shadow rays start from the smooth

@@ -1,0 +1,84 @@
+#pragma once
+/// Private: the paths of single rays, for light_path.cpp, which follows them, and light_tracer.cpp, which
+/// starts them.
+
+#include <numbers>
+
+#include "render/trace/light_tracer.h"
+
+namespace offstage::render {
+
+inline constexpr float kFar = 1e9f;  // [m]; nothing is farther away
+// Shadow rays end before the surface that glows, by more than their rounding.
+inline constexpr float kBeforeGlow = 1 - 2e-5f;
+
+inline std::size_t index_of(int x, int y, int width) {
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+}
+
+/// Share of the light along a ray that a surface of glass mirrors.
+float mirrored_share(const Hit& hit, const Vector3f& direction);
+
+/// Moves a ray through a surface of glass, which it refracts; returns the share of the light that the colour
+/// leaves. A solid piece takes half of its colour, as a factor, where the ray enters, and half where it
+/// leaves.
+Vector3f enter(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Vector3f& from,
+               Vector3f& direction);
+
+/// The light of a sample of a glowing mesh on a white surface, if nothing is between them, weighted against
+/// that of rays that meet the mesh by chance.
+Vector3f light_of_glow(const GlowSample& sample, const Vector3f& normal, const Vector3f& face);
+
+/// Probability density of a direction that visible_facet() mirrors, for a = roughness^2 [1/sr].
+template <class T>
+T mirror_density(T a, T nv, T nh) {
+  constexpr float kSharp = 0.002f;  // with less, all light of the sky comes from the mirror image
+  const T a2 = a * a, d = nh * nh * (a2 - 1.0f) + 1.0f;
+  const T density =
+      a2 / (2 * std::numbers::pi_v<float> * d * d * (nv + square_root(a2 + (1.0f - a2) * nv * nv)));
+  return a < kSharp ? T{} + 1e18f : density;
+}
+
+/// Weight of a direction that was found with density a, and could have been found in another way with density
+/// b: the power heuristic (E. Veach, "Robust Monte Carlo Methods", 1997).
+template <class T>
+T share_of_way(T a, T b) {
+  return a * a / (a * a + b * b + 1e-30f);
+}
+
+struct LightTracer::Path {
+  Vector3f from, direction;
+  float cone;  ///< angle that the ray stands for [rad]
+  Vector3f share = {1, 1, 1};
+  bool mirrored = false;  ///< so far
+  /// Probability density of the direction [1/sr] if the bright part of the sky was sampled, too; else
+  /// negative.
+  float density = -1;
+  /// Where it left a diffuse surface last, whose light from glowing meshes is also sampled; a normal of zero:
+  /// that of no surface.
+  Vector3f diffuse_place = Vector3f::Zero(), diffuse_normal = Vector3f::Zero();
+
+  /// Leaves a diffuse surface.
+  void scatter(const Vector3f& normal, const Vector3f& way) {
+    diffuse_place = from;
+    diffuse_normal = normal;
+    direction = way;
+  }
+  /// The share of the glow of what is met that is not found by sampling.
+  float share_of_glow(const Hit& hit, const Glow& glow) const {
+    if (glow.empty() || diffuse_normal.isZero()) return 1;
+    const Vector3f way = (hit.position - diffuse_place).normalized();
+    const float own = std::max(way.dot(diffuse_normal), 1e-3f) / std::numbers::pi_v<float>;
+    return own / (own + glow.density(diffuse_place, diffuse_normal, hit));
+  }
+  /// Leaves a surface in a mirrored direction.
+  void turn(const Vector3f& way, const Hit& hit) {
+    mirrored = true;
+    density = -1;
+    diffuse_normal.setZero();
+    direction = way.dot(hit.face) > 0 ? way : reflected(way, hit.face);
+    from = off_surface(hit.position, hit.face);
+  }
+};
+
+}  // namespace offstage::render
