@@ -64,6 +64,7 @@ struct SpringDef {
 struct ContactRule {
   std::string a, b;  ///< materials, in any order
   std::optional<Real> restitution, friction, static_friction;
+  std::optional<Real> rolling_friction = {}, spinning_friction = {};
 };
 
 /// How resting contact is computed (physics N11, N12).

@@ -17,6 +17,7 @@ namespace offstage::sim {
 struct PairSurface {
   Real restitution = 0, friction = 0, static_friction = 0;
   Real cross = 1;                   ///< friction across the friction axis over friction along it
+  Real rolling = 0, spinning = 0;   ///< rolling and spinning friction [m]
   const Body* axis_body = nullptr;  ///< body that defines the friction axis; null: isotropic
   bool conveys = false;             ///< whether a surface is a conveyor
   DistanceMethod method = DistanceMethod::gjk;

@@ -6,6 +6,12 @@
 /// each contact has
 ///   0 <= p_n,  0 <= u_n - target,  p_n (u_n - target) = 0,
 ///   (p_t, p_k) within the friction limits given by p_n, with the greatest dissipation against (u_t, u_k).
+/// A contact with rolling or spinning friction also has the angular impulses m = (m_n, m_t, m_k), with the
+/// relative angular velocity w:
+///   (m_t, m_k) in a disc of radius `rolling` p_n, with the greatest dissipation against (w_t, w_k),
+///   (p_t, p_k, m_n / s) in a ball of radius mu p_n, with the greatest dissipation against (u_t, u_k, s w_n),
+/// where s = `spinning` / mu. The latter is one law for sliding and spinning, because both are the sliding of
+/// one area of contact. Rolling loses its energy inside the bodies, not by sliding, and has its own law.
 /// For a collision v are the velocities before it, and target = -e u_n of those. For resting contact over a
 /// time h, v are the velocities that the bodies would have after h without contacts; then p / h are the
 /// contact forces, and (u - u(now)) / h the relative accelerations of R9.
@@ -49,15 +55,24 @@ struct Contact {
   /// Coulomb's coefficients along t and k. Equal ones give the round cone, |p_tk| <= mu p_n; with different
   /// ones each axis has its own limit (R6).
   Real friction_t = 0, friction_k = 0;
+  /// Rolling and spinning friction: the greatest angular impulse about the tangents and about the normal, per
+  /// normal impulse [m].
+  Real rolling = 0, spinning = 0;
   Vec3 impulse = Vec3::Zero();  ///< in: a guess; out: the solution [N s]
+  Vec3 moment = Vec3::Zero();   ///< out: angular impulse (m_n, m_t, m_k), 0 without such friction [N m s]
   bool is_guessed = false;      ///< whether there is a guess
 
   bool is_isotropic() const { return friction_t == friction_k; }
+  bool resists_turning() const { return rolling > 0 || spinning > 0; }
   Vec3 to_world(const Vec3& p) const { return p.x() * frame.n + p.y() * frame.t + p.z() * frame.k; }
   Vec3 to_frame(const Vec3& v) const { return {frame.n.dot(v), frame.t.dot(v), frame.k.dot(v)}; }
   /// Relative velocity (u_n, u_t, u_k), offset included.
   Vec3 relative_velocity(std::span<const ContactBody> bodies) const {
     return to_frame(bodies[a].velocity_at(arm_a) - bodies[b].velocity_at(arm_b)) + offset;
+  }
+  /// Relative angular velocity (w_n, w_t, w_k) [rad/s].
+  Vec3 relative_spin(std::span<const ContactBody> bodies) const {
+    return to_frame(bodies[a].angular_velocity - bodies[b].angular_velocity);
   }
 };
 
@@ -68,6 +83,9 @@ Mat3 mobility(const Contact& contact, std::span<const ContactBody> bodies);
 
 /// Adds a contact's impulse to its bodies.
 void apply(const Contact& contact, const Vec3& impulse, std::span<ContactBody> bodies);
+
+/// Adds an angular impulse in the contact's frame to its bodies.
+void apply_moment(const Contact& contact, const Vec3& moment, std::span<ContactBody> bodies);
 
 /// Residual of an approximate solution: the greatest violation of the conditions above [m/s]. Impulses are
 /// converted to velocities by |K| p.

@@ -137,6 +137,8 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       c.target = touches ? std::min(-kPushOut * point.separation / interval.substep, kFastestPush)
                          : -point.separation / h;
       std::tie(c.friction_t, c.friction_k) = friction(pair.surface(), u);
+      c.rolling = pair.surface().rolling;
+      c.spinning = pair.surface().spinning;
       c.impulse = h * m.forces[k].last;
       c.is_guessed = m.forces[k].known;
       contacts_.push_back(c);

@@ -69,6 +69,8 @@ void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifol
              contact_motion(pair.a(), pair.b(), m.manifold, m.frame, place, duration, interval.substep));
   patch.offset = in_frame(patch.frame, surface);
   std::tie(patch.friction_t, patch.friction_k) = friction(pair.surface(), u);
+  patch.rolling = pair.surface().rolling;
+  patch.spinning = pair.surface().spinning;
   Vec3 last(0, 0, m.torque), mean(0, 0, m.mean_torque);
   for (uint32_t k = 0; k < patch.count; ++k) {
     const PointForce& f = m.forces[k];

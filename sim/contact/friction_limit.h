@@ -24,4 +24,24 @@ inline Vec3 projected(const Contact& c, const Vec3& p, Real normal) {
   return q;
 }
 
+using Tangential = Eigen::Matrix<Real, 2, 1>;  ///< components along t and k
+
+/// A vector, shortened to a length of at most `limit` [>= 0].
+template <class Vector>
+Vector shortened(const Vector& v, Real limit) {
+  const Real length = v.norm();
+  return length > limit ? Vector(limit / length * v) : v;
+}
+
+/// Sliding and spinning friction have one common limit up to this arm; a longer one belongs to surfaces that
+/// are nearly without friction, and then each has its own limit [m].
+inline constexpr Real kLongestSpinArm = 0.1;
+
+/// The arm s at which spinning counts as sliding [m]; 0 if sliding and spinning are limited separately: no
+/// spinning friction, or a friction axis.
+inline Real spin_arm(const Contact& c) {
+  const bool is_common = c.is_isotropic() && c.spinning <= kLongestSpinArm * c.friction_t;
+  return is_common && c.spinning > 0 ? c.spinning / c.friction_t : 0;
+}
+
 }  // namespace offstage::sim

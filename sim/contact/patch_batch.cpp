@@ -30,6 +30,8 @@ constexpr float kHolds = 0.96F, kSlides = 0.999F;
 /// Greatest factor by which sliding friction follows a later increase of the normal impulses. A larger one
 /// could reverse the sliding.
 constexpr float kMostGrowth = 1.1F;
+/// Lower bound of the coefficient of friction of contacts with spinning friction, which is relative to it.
+constexpr Real kLeastFriction = 1e-4;
 
 using Vector = PatchBatch::Vector;
 using Symmetric = PatchBatch::Symmetric;
@@ -151,6 +153,11 @@ Mobility mobility(const PatchBatch& p, const Vector& arm, FloatLanes m, const Sy
   return {symmetric(f), symmetric(g), {row(g[0]), row(g[1]), row(g[2])}};
 }
 
+/// Whether the patches have one point each and no torques.
+bool is_single(const PatchBatch& p) {
+  return p.count == 1 && !p.resists_turning;
+}
+
 void set_single_mobility(PatchBatch& p) {
   const Vector* const axes[] = {&p.n, &p.t, &p.k};
   const auto entry = [&](int i, int j) {
@@ -193,12 +200,12 @@ Symmetric inverse(const Symmetric& m) {
 }
 
 void set_mobility(PatchBatch& p) {
-  if (p.count == 1)
+  if (is_single(p))
     set_single_mobility(p);
   else
     set_full_mobility(p);
   const Symmetric& K = p.friction_mobility;
-  if (p.count == 1) {
+  if (is_single(p)) {
     const FloatLanes inverse = lane_inverse(K.xx * K.yy - K.xy * K.xy);
     p.friction_stiffness.xx = inverse * K.yy;
     p.friction_stiffness.xy = -inverse * K.xy;
@@ -258,6 +265,15 @@ void set_patch(PatchBatch& p, unsigned lane, const ContactPatch& c, Real substep
   p.arm_b.set(lane, c.arm_b);
   p.friction_t[lane] = narrow(c.friction_t);
   p.friction_k[lane] = narrow(c.friction_k);
+  Real arm = 0;
+  if (c.rolling > 0 || c.spinning > 0) {
+    arm = c.spinning / std::max(std::min(c.friction_t, c.friction_k), kLeastFriction);
+    p.resists_turning = true;
+    p.rolling[lane] = narrow(c.rolling);
+    p.spin_arm[lane] = narrow(arm);
+    p.friction_t[lane] = narrow(std::max(c.friction_t, kLeastFriction));
+    p.friction_k[lane] = narrow(std::max(c.friction_k, kLeastFriction));
+  }
   // A patch of one point has no torque about the normal; sweep_single() does not compute one.
   const bool is_single = c.count == 1;
   p.friction_impulse.set(lane, substep * Vec3(c.force_t, c.force_k, is_single ? 0 : c.torque_n));
@@ -266,7 +282,8 @@ void set_patch(PatchBatch& p, unsigned lane, const ContactPatch& c, Real substep
     PatchBatch::Point& q = p.points[i];
     q.x[lane] = narrow(c.points[i].t);
     q.y[lane] = narrow(c.points[i].k);
-    q.radius[lane] = narrow(std::sqrt(c.points[i].t * c.points[i].t + c.points[i].k * c.points[i].k));
+    q.radius[lane] =
+        narrow(std::sqrt(c.points[i].t * c.points[i].t + c.points[i].k * c.points[i].k + arm * arm));
     q.mass[lane] = 1;
     q.start[lane] = narrow(c.points[i].separation);
     q.impulse[lane] = narrow(substep * c.points[i].force);
@@ -274,7 +291,8 @@ void set_patch(PatchBatch& p, unsigned lane, const ContactPatch& c, Real substep
   }
   const bool fresh =
       std::none_of(c.points.begin(), c.points.begin() + c.count, [](const auto& q) { return q.force > 0; });
-  if (fresh) p.tolerance = kSolved;
+  // There is no guess of rolling friction, and the friction depends on it.
+  if (fresh || c.rolling > 0) p.tolerance = kSolved;
   p.renewal[lane] = fresh ? 1 : kRenewal;
 }
 
@@ -293,6 +311,8 @@ Vector normal_wrench(const PatchBatch& p) {
 Vector solve_friction(PatchBatch& p, Groups& u) {
   Vector next = p.friction_impulse - p.friction_stiffness * u.friction;
   const Vector limits = friction_limits(p);
+  // A single point without spinning friction does not slide because it spins.
+  if (p.resists_turning) next.z = limits.z > FloatLanes{} ? next.z : FloatLanes{};
   const FloatLanes size2 = next.x * next.x + next.y * next.y;
   const auto within = p.friction_t == p.friction_k
                           ? size2 <= limits.x * limits.x
@@ -302,14 +322,25 @@ Vector solve_friction(PatchBatch& p, Groups& u) {
   p.pressure = slides ? pressure(p) : FloatLanes{};
   if (_mm256_movemask_ps(FloatLanes(slides)) != 0) {
     const bool isotropic = _mm256_movemask_ps(FloatLanes(p.friction_t == p.friction_k)) == 0xFF;
-    const Vector slide = isotropic ? sliding_impulse<true>(p, u.friction, limits)
-                                   : sliding_impulse<false>(p, u.friction, limits);
+    const Vector slide = p.resists_turning ? sliding_impulse<false, true>(p, u.friction, limits)
+                         : isotropic       ? sliding_impulse<true, false>(p, u.friction, limits)
+                                           : sliding_impulse<false, false>(p, u.friction, limits);
     next = {slides ? slide.x : next.x, slides ? slide.y : next.y, slides ? slide.z : next.z};
   }
   const Vector change = next - p.friction_impulse;
   p.friction_impulse = next;
   u.friction = u.friction + p.friction_mobility * change;
   u.normal = u.normal + transposed_product(p.coupling, change);
+  return change;
+}
+
+/// Updates the rolling friction and applies the change to the twist `u`. Returns the change, in the normal
+/// group's terms.
+Vector solve_rolling(PatchBatch& p, Groups& u) {
+  const Vector change = rolling_impulse(p, u.normal) - p.rolling_impulse;
+  p.rolling_impulse = p.rolling_impulse + change;
+  u.normal = u.normal + p.normal_mobility * change;
+  u.friction = u.friction + p.coupling * change;
   return change;
 }
 
@@ -553,12 +584,14 @@ void begin_substep(PatchBatch& p) {
   }
   p.friction_before = p.friction_before + p.friction_impulse;
   p.friction_shift = p.friction_shift + p.friction_before;
+  p.rolling_before = p.rolling_before + p.rolling_impulse;
+  p.rolling_shift = p.rolling_shift + p.rolling_before;
 }
 
 // Friction uses the normal impulses of this sweep, and its effect on the normal velocities is corrected
 // afterwards.
 void sweep(PatchBatch& p, std::span<BodyMotion> motions, const SubstepTime& time) {
-  if (p.count == 1) return sweep_single(p, motions, time);
+  if (is_single(p)) return sweep_single(p, motions, time);
   const Vector moved = moved_normal(p, motions, time);
   Gaps gaps;
   for (uint32_t i = 0; i < p.count; ++i)
@@ -572,6 +605,7 @@ void sweep(PatchBatch& p, std::span<BodyMotion> motions, const SubstepTime& time
   for (uint32_t i = 0; i < kPatchRounds; ++i) {
     const Groups last = u;
     change.normal = change.normal + solve_normal(p, u, gaps);
+    if (p.resists_turning) change.normal = change.normal + solve_rolling(p, u);
     change.friction = change.friction + solve_friction(p, u);
     FloatLanes change_now = lane_max(greatest(u.normal - last.normal), greatest(u.friction - last.friction));
     if (is_below(change_now, tolerance)) break;
@@ -592,6 +626,7 @@ void end_substeps(PatchBatch& p, Real substep) {
     q.shift = time * (q.shift + q.before + q.impulse);
   }
   p.friction_shift = time * (p.friction_shift + p.friction_before + p.friction_impulse);
+  p.rolling_shift = time * (p.rolling_shift + p.rolling_before + p.rolling_impulse);
 }
 
 FloatLanes push_out(PatchBatch& p, std::span<BodyMotion> motions, const PushOut& push) {
@@ -637,6 +672,8 @@ void report(const PatchBatch& p, std::span<ContactPatch> patches, Real substep) 
     c.mean_friction = lane_of(p.friction_mean, lane) / substep;
     c.friction_impulse = lane_of(p.friction_before, lane) + friction;
     c.friction_shift = lane_of(p.friction_shift, lane);
+    c.rolling_impulse = (lane_of(p.rolling_before, lane) + lane_of(p.rolling_impulse, lane)).tail<2>();
+    c.rolling_shift = lane_of(p.rolling_shift, lane).tail<2>();
   }
 }
 

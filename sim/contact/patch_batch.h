@@ -68,6 +68,11 @@ struct PatchBatch {
   PatchGroups approach;  ///< twist due to the velocities at the start, conveyors included
   Lanes conveyed;        ///< the part of it along n due to conveyors [m/s]
   Lanes friction_t, friction_k;
+  bool resists_turning;                  ///< whether a lane has rolling or spinning friction
+  Lanes rolling;                         ///< radius of the disc of rolling friction per normal impulse [m]
+  Lanes spin_arm;                        ///< spinning friction over the coefficient of friction [m]
+  Vector rolling_impulse;                ///< about t and k in y and z, like the normal group; x is 0 [N m s]
+  Vector rolling_before, rolling_shift;  ///< see Point
   /// Along t, k, about n; see Point.
   Vector friction_impulse, friction_mean, friction_before, friction_shift;
   /// Sum of the normal impulses with which the friction was computed, if the patch slides; else 0 [N s].

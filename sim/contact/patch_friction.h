@@ -83,10 +83,11 @@ inline PatchVector separate_impulse(const PatchBatch& p, const PatchVector& u, c
 /// against its own velocity, so sliding reduces the friction against spin and vice versa. The friction of a
 /// point is linearized as viscous with the coefficient limit / speed, which gives one linear system per
 /// patch. The speeds are those after separate_impulse(), which is exact without spin. `kIsotropic`:
-/// friction_t equals friction_k in all lanes, which takes fewer operations.
-template <bool kIsotropic>
+/// friction_t equals friction_k in all lanes, which takes fewer operations. `kSpins`: points have spinning
+/// friction, which is sliding at the distance spin_arm; with a friction axis it has a limit of its own.
+template <bool kIsotropic, bool kSpins>
 PatchVector sliding_impulse(const PatchBatch& p, const PatchVector& twist, const PatchVector& limits) {
-  std::array<FloatLanes, 4> viscous_t, viscous_k;
+  std::array<FloatLanes, 4> viscous_t, viscous_k, viscous_n;
   const auto round = p.friction_t == p.friction_k;
   const FloatLanes slowest = float_lanes(kSlowestSliding);
   const auto at = [&p](uint32_t i, const PatchVector& v) {
@@ -99,7 +100,8 @@ PatchVector sliding_impulse(const PatchBatch& p, const PatchVector& twist, const
   for (uint32_t i = 0; i < p.count; ++i) {
     const PatchBatch::Point& q = p.points[i];
     const auto [t, k] = at(i, u);
-    const FloatLanes speed = lane_sqrt(t * t + k * k);
+    const FloatLanes turning = kSpins ? p.spin_arm * u.z : FloatLanes{};
+    const FloatLanes speed = kSpins ? lane_sqrt(t * t + k * k + turning * turning) : lane_sqrt(t * t + k * k);
     if constexpr (kIsotropic) {
       viscous_t[i] = viscous_k[i] = q.impulse * p.friction_t / lane_max(speed, slowest);
     } else {
@@ -112,6 +114,12 @@ PatchVector sliding_impulse(const PatchBatch& p, const PatchVector& twist, const
     A.yy += viscous_k[i];
     A.yz += x;
     A.zz += x * q.x + y * q.y;
+    if constexpr (kSpins) {
+      const FloatLanes separate =
+          q.impulse * lane_min(p.friction_t, p.friction_k) / lane_max(lane_abs(turning), slowest);
+      viscous_n[i] = round ? viscous_t[i] : separate;
+      A.zz += viscous_n[i] * p.spin_arm * p.spin_arm;
+    }
   }
   const PatchVector next = solution_of(A, p.friction_stiffness * twist - p.friction_impulse);
   PatchVector impulse{};
@@ -121,8 +129,10 @@ PatchVector sliding_impulse(const PatchBatch& p, const PatchVector& twist, const
     FloatLanes f = viscous_t[i] * t, g = viscous_k[i] * k;
     // A component whose speed increased is clamped to its limit.
     const FloatLanes limit_t = q.impulse * p.friction_t, limit_k = q.impulse * p.friction_k;
-    const FloatLanes size = lane_sqrt(f * f + g * g);
+    FloatLanes h = kSpins ? viscous_n[i] * p.spin_arm * next.z : FloatLanes{};
+    const FloatLanes size = kSpins ? lane_sqrt(f * f + g * g + h * h) : lane_sqrt(f * f + g * g);
     const FloatLanes scale = size > limit_t ? limit_t / size : float_lanes(1);
+    if constexpr (kSpins) h = round ? scale * h : lane_clamp(h, lane_min(limit_t, limit_k));
     if constexpr (kIsotropic) {
       f *= scale;
       g *= scale;
@@ -130,9 +140,38 @@ PatchVector sliding_impulse(const PatchBatch& p, const PatchVector& twist, const
       f = round ? scale * f : lane_clamp(f, limit_t);
       g = round ? scale * g : lane_clamp(g, limit_k);
     }
-    impulse = impulse - PatchVector{f, g, q.x * g - q.y * f};
+    FloatLanes moment = q.x * g - q.y * f;
+    if constexpr (kSpins) moment += p.spin_arm * h;
+    impulse = impulse - PatchVector{f, g, moment};
   }
   return impulse;
+}
+
+/// Rolling friction of a patch, about t and k in y and z, from the normal group's twist: the angular impulse
+/// that stops the rolling if it is within the disc, else a projected gradient step as in coulomb_impulse().
+/// Where the patch sticks, its friction follows a change of the rolling: a ball then rolls about the contact
+/// with the inertia I + m r^2, not with I, and the stopping impulse takes that into account. (With I alone,
+/// rolling and friction in turn leave 5/7 of the error.)
+inline PatchVector rolling_impulse(const PatchBatch& p, const PatchVector& u) {
+  const FloatLanes zero{};
+  const PatchSymmetric& K = p.normal_mobility;
+  const PatchVector t{p.coupling.x.y, p.coupling.y.y, p.coupling.z.y},
+      k{p.coupling.x.z, p.coupling.y.z, p.coupling.z.z};
+  const PatchVector St = p.friction_stiffness * t, Sk = p.friction_stiffness * k;
+  const FloatLanes sticks = p.pressure > zero ? zero : float_lanes(1);
+  // The friction's share of the mobility is at most nearly all of it.
+  const FloatLanes yy = K.yy - sticks * dot(t, St), yz = K.yz - sticks * dot(t, Sk),
+                   zz = K.zz - sticks * dot(k, Sk);
+  const FloatLanes scale = lane_inverse(yy * zz - yz * yz);
+  const FloatLanes stop_y = p.rolling_impulse.y - scale * (zz * u.y - yz * u.z),
+                   stop_z = p.rolling_impulse.z - scale * (yy * u.z - yz * u.y);
+  const FloatLanes step = lane_inverse(lane_max(K.yy, K.zz) + lane_abs(K.yz));
+  const FloatLanes y = p.rolling_impulse.y - step * u.y, z = p.rolling_impulse.z - step * u.z;
+  const FloatLanes limit = p.rolling * pressure(p), size = lane_sqrt(y * y + z * z);
+  const FloatLanes share = size > limit ? limit / size : float_lanes(1);
+  const auto stops = stop_y * stop_y + stop_z * stop_z <= limit * limit;
+  const auto resists = p.rolling > zero;
+  return {zero, resists ? (stops ? stop_y : share * y) : zero, resists ? (stops ? stop_z : share * z) : zero};
 }
 
 }  // namespace offstage::sim

@@ -131,6 +131,7 @@ std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, 
     gradient(contacts);
   }
 
+  store_moments(contacts);
   if (!joints.empty()) {
     for (std::size_t i = 0; i < contacts.size(); ++i) contacts[i].impulse = points_[i].multiplier;
     finish_joints(bodies);
@@ -141,6 +142,7 @@ std::optional<ContactWork> ProximalNewton::solve(std::span<ContactBody> bodies, 
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     contacts[i].impulse = points_[i].multiplier;
     apply(contacts[i], contacts[i].impulse, bodies);
+    if (contacts[i].resists_turning()) apply_moment(contacts[i], contacts[i].moment, bodies);
   }
   if (!solved) {
     work.iterations += projected_gauss_seidel(bodies, contacts, kMaxSweeps, tolerance);
@@ -227,6 +229,7 @@ uint32_t ProximalNewton::pair_of(uint32_t row, uint32_t other) const {
 void ProximalNewton::scale_penalties(Real contacts, Real bounded) {
   if (contacts == 1 && bounded_.empty()) return;
   for (Point& p : points_) p.rho *= contacts;
+  for (Turning& t : turnings_) t.rho *= contacts;
   for (Bounded& p : bounded_) p.rho *= bounded;
   is_factored_ = false;
 }
@@ -255,6 +258,7 @@ bool ProximalNewton::ramp_penalties(std::span<const Contact> contacts, Real tole
 void ProximalNewton::set_points(std::span<const ContactBody> bodies, std::span<const Contact> contacts) {
   if (factored_contacts_ != contacts.size()) is_factored_ = false;
   points_.resize(contacts.size());
+  turnings_.clear();
   fixed_.resize(contacts.size());
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const Contact& c = contacts[i];
@@ -269,6 +273,9 @@ void ProximalNewton::set_points(std::span<const ContactBody> bodies, std::span<c
     if (p.a == kNone) fixed_[i] += c.to_frame(bodies[c.a].velocity_at(c.arm_a));
     if (p.b == kNone) fixed_[i] -= c.to_frame(bodies[c.b].velocity_at(c.arm_b));
 
+    p.turning = kNone;
+    if (c.resists_turning()) set_turning(bodies, c, p);
+
     const Vec3 impulse = c.to_world(p.multiplier);
     const auto add = [&](uint32_t row, uint32_t body, const Vec3& arm, Real sign) {
       if (row == kNone) return;
@@ -279,8 +286,8 @@ void ProximalNewton::set_points(std::span<const ContactBody> bodies, std::span<c
     add(p.b, c.b, c.arm_b, -1);
   }
   for (std::size_t i = 0; i < contacts.size(); ++i)
-    points_[i].lift =
-        cone_lift(contacts[i], relative_velocity(contacts[i], points_[i], velocity_) + fixed_[i]);
+    points_[i].lift = turning_lift(contacts[i], points_[i],
+                                   relative_velocity(contacts[i], points_[i], velocity_) + fixed_[i]);
 }
 
 /// Called after set_points(): the impulses of rows with bounds also change the velocities.
@@ -409,6 +416,10 @@ void ProximalNewton::evaluate(std::span<const Contact> contacts) {
     const Contact& c = contacts[i];
     Point& p = points_[i];
     const Vec3 u = relative_velocity(c, p, velocity_) + fixed_[i] + Vec3(p.lift, 0, 0);
+    if (p.turning != kNone) {
+      evaluate_turning(c, p, u);
+      continue;
+    }
     const Vec3 q = p.multiplier - p.rho * u;
     const ConeProjection projection = project_on_cone(c, q);
     p.impulse = projection.point;
@@ -447,6 +458,11 @@ void ProximalNewton::gradient(std::span<const Contact> contacts) {
     const Contact& c = contacts[i];
     const Point& p = points_[i];
     const Vec3 impulse = c.to_world(p.impulse);
+    if (p.turning != kNone) {
+      const Vec3 moment = turning_impulse(c, p);
+      if (p.a != kNone) gradient_[p.a].tail<3>() -= moment;
+      if (p.b != kNone) gradient_[p.b].tail<3>() += moment;
+    }
     if (p.a != kNone) {
       gradient_[p.a].head<3>() -= impulse;
       gradient_[p.a].tail<3>() -= c.arm_a.cross(impulse);
@@ -488,6 +504,10 @@ bool ProximalNewton::assemble(std::span<const Contact> contacts, ContactWork& wo
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const Contact& c = contacts[i];
     const Point& p = points_[i];
+    if (p.turning != kNone) {
+      assemble_turning(c, p);
+      continue;
+    }
     if (p.region == ConeRegion::apex) continue;
     Mat3 axes;
     axes << c.frame.n, c.frame.t, c.frame.k;
@@ -582,13 +602,13 @@ ProximalNewton::Change ProximalNewton::update_multipliers(std::span<const Contac
     p.multiplier = p.impulse;
     const Contact& c = contacts[i];
     const Vec3 u = relative_velocity(c, p, velocity_) + fixed_[i];
-    const Real lift = cone_lift(c, u);
+    const Real lift = turning_lift(c, p, u);
     // An open contact does not depend on g if it stays open.
-    const bool open = p.region == ConeRegion::apex &&
-                      project_on_cone(c, -p.rho * (u + Vec3(lift, 0, 0))).region == ConeRegion::apex;
+    const bool open = p.region == ConeRegion::apex && stays_open(c, p, u + Vec3(lift, 0, 0));
     p.rise = open ? 0 : lift - p.lift;
     change.lifts = std::max(change.lifts, std::abs(p.rise));
     p.lift = lift;
+    if (p.turning != kNone) update_turning(c, p, change);
   }
   for (Bounded& p : bounded_) {
     change.multipliers = std::max(change.multipliers, std::abs(p.impulse - p.multiplier) / p.rho);

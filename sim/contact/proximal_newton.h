@@ -53,6 +53,18 @@ class ProximalNewton {
     Real rho, lift, rise;               // lift: g; rise: the change of g that is still needed
     uint32_t a, b, pair;                // rows of the matrix; kNone for bodies that are not moved
     ConeRegion region;
+    uint32_t turning;  // index into turnings_; kNone without rolling and spinning friction
+  };
+  /// Rolling and spinning friction of a point. The vectors have the components (s, t, k): spinning friction,
+  /// and rolling friction about t and k [N m s]. The limits are those of the last multipliers, so the
+  /// minimized function stays convex. With an `arm` [m], the spinning friction is divided by it and shares
+  /// the cone of the point; its velocity is then arm * w_n, and its penalty that of the point.
+  struct Turning {
+    Vec3 multiplier = Vec3::Zero(), impulse = Vec3::Zero(), shifted = Vec3::Zero(), fixed = Vec3::Zero();
+    Real arm = 0, rho = 0, mobility = 0;
+    Real radius = 0;  // length that makes angular velocities comparable to velocities [m]
+    Real spin_limit = 0, roll_limit = 0;
+    Real spin_scale() const { return arm > 0 ? arm : 1; }
   };
   /// A row with bounds: q, p(v), and whether p(v) is within the bounds.
   struct Bounded {
@@ -105,6 +117,16 @@ class ProximalNewton {
   bool descend(std::span<const Contact> contacts);
   Change update_multipliers(std::span<const Contact> contacts);
   void mix_lifts(bool slow);
+  // Contacts with rolling or spinning friction, proximal_turning.cpp
+  void set_turning(std::span<const ContactBody> bodies, const Contact& c, Point& p);
+  Vec3 turning_speed(const Contact& c, const Point& p) const;
+  void evaluate_turning(const Contact& c, Point& p, const Vec3& u);
+  Vec3 turning_impulse(const Contact& c, const Point& p) const;
+  void assemble_turning(const Contact& c, const Point& p);
+  Real turning_lift(const Contact& c, const Point& p, const Vec3& u) const;
+  bool stays_open(const Contact& c, const Point& p, const Vec3& u) const;
+  void update_turning(const Contact& c, Point& p, Change& change);
+  void store_moments(std::span<Contact> contacts) const;
   Vec3 relative_velocity(const Contact& c, const Point& p, std::span<const Vec6> velocity) const;
 
   Real relative_velocity(const BoundedRow& r, const Bounded& p, std::span<const Vec6> velocity) const;
@@ -112,6 +134,7 @@ class ProximalNewton {
   std::vector<uint32_t> body_of_row_, row_of_body_;
   std::vector<std::pair<uint32_t, uint32_t>> pairs_;
   std::vector<Point> points_;
+  std::vector<Turning> turnings_;
   std::vector<Vec6> free_, velocity_, trial_, gradient_, direction_;
   std::vector<Vec3> fixed_;  // relative velocity due to immovable bodies and offsets, less the target
   std::vector<Mat6> mass_;   // of each row

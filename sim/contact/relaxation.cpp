@@ -299,12 +299,14 @@ namespace {
 
 /// Wrench about a patch's centre, in world axes, from the normal components of the points and the common
 /// components along t, k and about n.
-Wrench wrench(const ContactPatch& p, Real ContactPatch::Point::*normal, const Vec3& friction) {
+Wrench wrench(const ContactPatch& p, Real ContactPatch::Point::*normal, const Vec3& friction,
+              const Tangential& rolling) {
   Vec3 sum = Vec3::Zero();  // along n, and moments about t and k
   for (uint32_t i = 0; i < p.count; ++i) {
     const ContactPatch::Point& q = p.points[i];
     sum += q.*normal * Vec3(1, q.k, -q.t);
   }
+  sum.tail<2>() += rolling;
   const auto& [n, t, k] = p.frame;
   return {sum.x() * n + friction.x() * t + friction.y() * k, friction.z() * n + sum.y() * t + sum.z() * k};
 }
@@ -313,8 +315,8 @@ Wrench wrench(const ContactPatch& p, Real ContactPatch::Point::*normal, const Ve
 
 /// Adds the effect of the patch in the step to both bodies, in double precision.
 void RelaxationSolver::give(const ContactPatch& p) {
-  const Wrench impulse = wrench(p, &ContactPatch::Point::impulse, p.friction_impulse);
-  const Wrench shift = wrench(p, &ContactPatch::Point::shift, p.friction_shift);
+  const Wrench impulse = wrench(p, &ContactPatch::Point::impulse, p.friction_impulse, p.rolling_impulse);
+  const Wrench shift = wrench(p, &ContactPatch::Point::shift, p.friction_shift, p.rolling_shift);
   const auto to = [&](uint32_t body, const Vec3& arm, Real sign) {
     RelaxedBody& b = bodies_[body];
     if (b.inverse_mass == 0) return;

@@ -26,6 +26,7 @@
 #include "sim/collision/manifold.h"
 #include "sim/contact/contact_coloring.h"
 #include "sim/contact/contact_problem.h"
+#include "sim/contact/friction_limit.h"
 #include "sim/contact/patch_batch.h"
 #include "sim/contact/relaxed_joints.h"
 #include "sim/core/types.h"
@@ -89,6 +90,9 @@ struct ContactPatch {
   Vec3 mean_friction = Vec3::Zero();     ///< the mean of these, like Point::mean_force
   Vec3 friction_impulse = Vec3::Zero();  ///< in the order of mean_friction, like Point::impulse
   Vec3 friction_shift = Vec3::Zero();    ///< in the order of mean_friction, like Point::shift
+  Real rolling = 0, spinning = 0;        ///< see Contact
+  /// Rolling friction: angular impulse about t and k, like Point::impulse [N m s], and its Point::shift.
+  Tangential rolling_impulse = Tangential::Zero(), rolling_shift = Tangential::Zero();
 };
 
 /// Sets the points of a patch from a manifold, in the manifold's order. Manifold and frame are in world axes,

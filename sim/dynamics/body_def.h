@@ -50,6 +50,12 @@ struct BodyDef {
   /// Friction axis, in the body's frame; zero: isotropic. If both bodies of a pair have one, that of the body
   /// that was added first is used.
   Vec3 friction_axis = Vec3::Zero();
+  /// Rolling friction [m], >= 0: the greatest torque about the tangents of a contact, per normal force. It is
+  /// how far the centre of pressure is ahead of the middle of the contact. A pair uses the larger value.
+  Real rolling_friction = 0;
+  /// Spinning friction [m], >= 0: the greatest torque about the normal of a contact, per normal force. For a
+  /// round contact of radius a it is 3 pi / 16 friction a. A pair uses the larger value.
+  Real spinning_friction = 0;
   /// Velocity of the surface relative to the body, as of a conveyor, in its frame [m/s].
   Vec3 surface_velocity = Vec3::Zero();
   bool collides = true;  ///< takes part in collisions with bodies and particles

@@ -6,11 +6,12 @@
 #include <utility>
 
 #include "sim/geometry/convex_hull.h"
+#include "sim/geometry/cut_decomposition.h"
 #include "sim/geometry/hull_merge.h"
 #include "sim/geometry/joe_decomposition.h"
 #include "sim/geometry/mass_properties.h"
 #include "sim/geometry/polyhedron.h"
-#include "sim/geometry/voxel_decomposition.h"
+#include "sim/geometry/solid_samples.h"
 #include "sim/geometry/winding_number.h"
 
 namespace offstage::sim {
@@ -83,12 +84,26 @@ TriangleMesh turned_over(TriangleMesh mesh) {
   return mesh;
 }
 
+/// `volume`: of a closed mesh. It counts overlapping parts of a surface twice; the samples do not.
 ConvexDecomposition decompose_approximately(const TriangleMesh& mesh, std::optional<Real> volume,
                                             const DecompositionSettings& settings, const std::string& why) {
-  VoxelDecomposition voxels = decompose_by_voxels(mesh, settings.resolution, settings.max_parts);
-  if (voxels.parts.empty()) return {Method::none, {}, 0, "the surface encloses nothing: " + why};
-  const Real error = relative_error(voxels.parts, volume.value_or(voxels.inside_volume));
-  return {Method::approximate, std::move(voxels.parts), error, why};
+  const SolidSamples samples = sample_solid(mesh, volume.has_value(), settings.resolution);
+  const Real inside = volume && !samples.overlaps ? *volume : samples.volume();
+  if (!(inside > 0)) return {Method::none, {}, 0, "the surface encloses nothing: " + why};
+  std::vector<ConvexPolyhedron> parts =
+      decompose_by_cuts(mesh, volume.has_value(), samples, {inside, settings.max_error, settings.max_parts});
+  if (parts.empty()) return {Method::none, {}, 0, "the surface encloses nothing: " + why};
+  const Real error = relative_error(parts, inside);
+  return {Method::approximate, std::move(parts), error, why};
+}
+
+ConvexDecomposition hull_alone(const TriangleMesh& mesh, std::optional<Real> volume, uint32_t resolution) {
+  ConvexPolyhedron hull = convex_hull(mesh.vertices);
+  if (hull.dimension() < 3) return {Method::none, {}, 0, "the surface is flat"};
+  const Real inside = volume ? *volume : sample_solid(mesh, false, resolution).volume();
+  std::vector<ConvexPolyhedron> parts = {std::move(hull)};
+  const Real error = inside > 0 ? relative_error(parts, inside) : 0;
+  return {Method::approximate, std::move(parts), error, "\"method\" is hull"};
 }
 
 }  // namespace
@@ -96,14 +111,19 @@ ConvexDecomposition decompose_approximately(const TriangleMesh& mesh, std::optio
 ConvexDecomposition decompose(const TriangleMesh& mesh, const MeshTopology& topology,
                               const DecompositionSettings& settings) {
   if (mesh.triangles.empty()) return {Method::none, {}, 0, "no faces"};
-  if (!topology.defects().closed())
+  if (!topology.defects().closed()) {
+    if (settings.method == DecompositionMethod::hull) return hull_alone(mesh, {}, settings.resolution);
     return decompose_approximately(mesh, {}, settings, topology.defects().describe());
+  }
   if (topology.defects().inverted) {
     const TriangleMesh outward = turned_over(mesh);
     return decompose(outward, MeshTopology(outward), settings);
   }
   const Real volume = mass_properties(mesh).volume;
   if (!(volume > 0)) return {Method::none, {}, 0, "the surface encloses nothing"};
+  if (settings.method == DecompositionMethod::hull) return hull_alone(mesh, volume, settings.resolution);
+  if (settings.method == DecompositionMethod::approximate)
+    return decompose_approximately(mesh, volume, settings, "\"method\" is approximate");
   ExactResult exact = decompose_exactly(mesh, topology, volume, settings);
   if (exact.parts.empty()) return decompose_approximately(mesh, volume, settings, exact.failure);
   const Real error = relative_error(exact.parts, volume);

@@ -14,22 +14,37 @@
 
 namespace offstage::sim {
 
+/// How a solid is decomposed.
+enum class DecompositionMethod : uint8_t {
+  automatic,    ///< exact where that is possible, else approximate
+  approximate,  ///< hulls of the parts of the solid
+  hull,         ///< one part: the convex hull
+};
+
 struct DecompositionSettings {
+  DecompositionMethod method = DecompositionMethod::automatic;
   /// Smallest angle between a cut and the faces that it meets [rad]; relaxed if no cut satisfies it.
   Real min_dihedral = 0.35;
   /// Smallest distance of a cut from vertices off it, as a share of the mean edge. Relaxed if no cut
   /// satisfies it.
   Real min_distance = 0.1;
   uint32_t max_reflex_edges = 2000;  ///< with more reflex edges the solid is approximated at once
-  uint32_t max_parts = 32;           ///< greatest number of parts of an approximate decomposition
-  uint32_t resolution = 64;          ///< voxels along the longest side, for an approximate decomposition
+  /// Accepted volume error of an approximate decomposition, and its greatest number of parts, which may
+  /// prevent that. A thin curved shell takes the most parts: hulls of n equal patches of half a sphere of
+  /// radius r and thickness t are about r / (n t) too large, as a share of its volume.
+  Real max_error = 0.05;
+  uint32_t max_parts = 512;
+  /// Number of lines along the longest side, along which an approximate decomposition samples the solid.
+  uint32_t resolution = 128;
+
+  bool operator==(const DecompositionSettings&) const = default;
 };
 
 struct ConvexDecomposition {
   enum class Method : uint8_t {
     convex,       ///< the solid was convex: one part
     exact,        ///< cut along reflex edges: the parts fill the solid
-    approximate,  ///< hulls of the solid's parts in boxes; `note` has the reason
+    approximate,  ///< hulls of the solid's parts between cut planes; `note` has the reason
     none,         ///< the surface has no inside: no parts
   };
   Method method = Method::none;

@@ -28,14 +28,15 @@ class Merger {
     find_gains(false);
   }
 
-  std::vector<ConvexPolyhedron> run(std::size_t max_parts, Real free_gain) {
+  std::vector<ConvexPolyhedron> run(std::size_t max_parts, Real room) {
     while (parts_.size() > 1) {
       Pair best = cheapest();
-      if (best.gain > free_gain && parts_.size() <= max_parts) break;
+      if (best.gain > room && parts_.size() <= max_parts) break;
       if (best.gain == kApart) {
         find_gains(true);
         best = cheapest();
       }
+      room -= std::max(best.gain, 0.0);
       join(best);
     }
     return std::move(parts_);
@@ -95,8 +96,8 @@ Real hull_volume(const ConvexPolyhedron& p) {
 }
 
 std::vector<ConvexPolyhedron> merge_hulls(std::vector<ConvexPolyhedron> parts, std::size_t max_parts,
-                                          Real free_gain) {
-  return Merger(std::move(parts)).run(max_parts, free_gain);
+                                          Real room) {
+  return Merger(std::move(parts)).run(max_parts, room);
 }
 
 }  // namespace offstage::sim

@@ -11,9 +11,9 @@ namespace offstage::sim {
 Real hull_volume(const ConvexPolyhedron& p);
 
 /// Replaces two parts by their common hull, those with the least additional volume first, while there are
-/// more than `max_parts` and then while the additional volume is at most `free_gain` [m^3]. Parts whose boxes
-/// are separate are merged last.
+/// more than `max_parts` and then while the additional volume of all mergers together is at most `room`
+/// [m^3]. Parts whose boxes are separate are merged last.
 std::vector<ConvexPolyhedron> merge_hulls(std::vector<ConvexPolyhedron> parts, std::size_t max_parts,
-                                          Real free_gain);
+                                          Real room);
 
 }  // namespace offstage::sim

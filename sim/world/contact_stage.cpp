@@ -99,12 +99,16 @@ PairSurface World::Impl::surface_of(const Body& a, const Body& b) const {
   s.restitution = std::max(a.def.restitution, b.def.restitution);
   s.friction = std::sqrt(a.def.friction * b.def.friction);
   s.static_friction = std::sqrt(static_friction(a.def) * static_friction(b.def));
+  s.rolling = std::max(a.def.rolling_friction, b.def.rolling_friction);
+  s.spinning = std::max(a.def.spinning_friction, b.def.spinning_friction);
   const auto rule = rules.find(std::minmax(a.surface, b.surface));
   if (rule != rules.end()) {
     s.restitution = rule->second.restitution.value_or(s.restitution);
     s.friction = rule->second.friction.value_or(s.friction);
     s.static_friction =
         rule->second.static_friction.value_or(rule->second.friction.value_or(s.static_friction));
+    s.rolling = rule->second.rolling_friction.value_or(s.rolling);
+    s.spinning = rule->second.spinning_friction.value_or(s.spinning);
   }
   const bool a_is_first = a.handle.index < b.handle.index;
   for (const Body* body : {a_is_first ? &a : &b, a_is_first ? &b : &a}) {

@@ -117,6 +117,8 @@ void check_body(const std::string& object, const BodyDef& def) {
   check_not_negative(object, "linear_drag", def.linear_drag);
   check_not_negative(object, "angular_drag", def.angular_drag);
   check_not_negative(object, "friction", def.friction);
+  check_not_negative(object, "rolling_friction", def.rolling_friction);
+  check_not_negative(object, "spinning_friction", def.spinning_friction);
   check_restitution(object, def.restitution);
   check_finite(object, "friction_axis", def.friction_axis);
   check_finite(object, "surface_velocity", def.surface_velocity);
@@ -407,6 +409,8 @@ void World::add_contact_rule(const ContactRule& rule) {
   if (rule.restitution) check_restitution(object, *rule.restitution);
   if (rule.friction) check_not_negative(object, "friction", *rule.friction);
   if (rule.static_friction) check_not_negative(object, "static_friction", *rule.static_friction);
+  if (rule.rolling_friction) check_not_negative(object, "rolling_friction", *rule.rolling_friction);
+  if (rule.spinning_friction) check_not_negative(object, "spinning_friction", *rule.spinning_friction);
   impl_->rules[std::minmax(impl_->surface_number(rule.a), impl_->surface_number(rule.b))] = rule;
   impl_->graph.forget_all();
   impl_->pairs_changed = true;

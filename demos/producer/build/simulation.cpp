@@ -139,7 +139,9 @@ Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
                                .b = rule.materials[1],
                                .restitution = rule.restitution,
                                .friction = rule.friction,
-                               .static_friction = rule.static_friction});
+                               .static_friction = rule.static_friction,
+                               .rolling_friction = rule.rolling_friction,
+                               .spinning_friction = rule.spinning_friction});
     });
   add_particle_groups(scene);
   add_springs(scene);
@@ -181,6 +183,8 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
       def.restitution = material->restitution;
       def.friction = material->friction;
       def.static_friction = material->static_friction.value_or(def.static_friction);
+      def.rolling_friction = material->rolling_friction;
+      def.spinning_friction = material->spinning_friction;
       if (material->cross_friction && !body.friction_axis.isZero(0)) {
         def.cross_friction = *material->cross_friction;
         def.friction_axis = body.friction_axis;

@@ -138,6 +138,17 @@ struct Table<Material> {
          "coefficient of dynamic friction across the `friction_axis` of a body; needs a `friction` above 0; "
          "default: `friction`",
          "", kNotNegative},
+        {"rolling_friction", &T::rolling_friction,
+         "greatest torque against rolling, per contact force, between bodies: how far the centre of pressure "
+         "is ahead of the middle of the contact. A ball of radius r decelerates by 5/7 g times this / r. "
+         "Steel on steel has about 1e-5 m, a ball on carpet 1e-3 m; of two materials the larger value is "
+         "used",
+         "m", kNotNegative},
+        {"spinning_friction", &T::spinning_friction,
+         "greatest torque against spinning about the contact's normal, per contact force, between bodies: "
+         "about 0.6 times `friction` times the radius of the contact area. It shares its limit with sliding "
+         "friction; of two materials the larger value is used",
+         "m", kNotNegative},
     };
   }
 };
@@ -160,6 +171,10 @@ struct Table<ContactRule> {
          "coefficient of static friction; default: `friction` of this rule if given, or else from the "
          "materials",
          "", kNotNegative},
+        {"rolling_friction", &T::rolling_friction, "see materials; default: from the materials", "m",
+         kNotNegative},
+        {"spinning_friction", &T::spinning_friction, "see materials; default: from the materials", "m",
+         kNotNegative},
     };
   }
 };

@@ -80,13 +80,14 @@ struct Material {
   Real friction = 0.5;                  ///< dynamic coefficient
   std::optional<Real> static_friction;  ///< static coefficient; default: `friction`
   std::optional<Real> cross_friction;   ///< coefficient across a body's friction_axis; default: `friction`
+  Real rolling_friction = 0, spinning_friction = 0;  ///< see sim::BodyDef [m]
 };
 
 /// Contact properties of two materials, which replace those combined from both.
 struct ContactRule {
   Where where;
   std::array<std::string, 2> materials;  ///< names, in any order
-  std::optional<Real> restitution, friction, static_friction;
+  std::optional<Real> restitution, friction, static_friction, rolling_friction, spinning_friction;
 };
 
 /// A model file that is drawn instead of a body's shape.

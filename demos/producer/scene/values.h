@@ -11,6 +11,7 @@
 #include "effects/distribution.h"
 #include "producer/base/error.h"
 #include "sim/core/types.h"
+#include "sim/geometry/convex_decomposition.h"
 #include "sim/geometry/shape.h"
 #include "sim/geometry/solid_mesh.h"
 
@@ -42,6 +43,8 @@ struct MeshFile {
   std::string file;
   Real scale = 1;
   std::optional<Vec3> fit = {};  ///< edges of the box that the model just fits into before `scale` [m]
+  /// How a dynamic body of the model is divided into convex parts.
+  std::optional<sim::DecompositionSettings> decomposition = {};
 };
 
 /// A solid in a compound.

@@ -58,6 +58,8 @@ sim::BodyHandle add_body(LiveWorld& w, const sim::Shape& shape, const py::kwargs
   k.take("static_friction", def.static_friction);
   k.take("cross_friction", def.cross_friction);
   k.take("friction_axis", def.friction_axis);
+  k.take("rolling_friction", def.rolling_friction);
+  k.take("spinning_friction", def.spinning_friction);
   k.take("surface_velocity", def.surface_velocity);
   k.take("collides", def.collides);
   def.track = track_of(k);
@@ -380,8 +382,9 @@ void bind_building(py::class_<LiveWorld>& world) {
            "position,\n"
            "orientation [w, x, y, z], velocity, angular_velocity, density or mass, linear_drag, "
            "angular_drag, material,\n"
-           "restitution, friction, static_friction, cross_friction, friction_axis, surface_velocity, "
-           "collides;\n"
+           "restitution, friction, static_friction, cross_friction, friction_axis, "
+           "rolling_friction,\n"
+           "spinning_friction, surface_velocity, collides, centre, inertia, appear_at, remove_at;\n"
            "keyframes [(time, position, orientation)], interpolation, loop, spin of kinematic bodies.")
       .def("add_particle_system", &add_particle_system,
            "Keywords: name, linear_drag, gravity, force, collides, internal, external, dies_on_hit, "
@@ -415,11 +418,14 @@ void bind_building(py::class_<LiveWorld>& world) {
       .def(
           "add_contact_rule",
           [](LiveWorld& w, const std::string& a, const std::string& b, std::optional<double> restitution,
-             std::optional<double> friction, std::optional<double> static_friction) {
-            w.world.add_contact_rule({a, b, restitution, friction, static_friction});
+             std::optional<double> friction, std::optional<double> static_friction,
+             std::optional<double> rolling_friction, std::optional<double> spinning_friction) {
+            w.world.add_contact_rule(
+                {a, b, restitution, friction, static_friction, rolling_friction, spinning_friction});
           },
           py::arg("a"), py::arg("b"), py::arg("restitution") = py::none(), py::arg("friction") = py::none(),
-          py::arg("static_friction") = py::none(), "Coefficients for a pair of materials.");
+          py::arg("static_friction") = py::none(), py::arg("rolling_friction") = py::none(),
+          py::arg("spinning_friction") = py::none(), "Coefficients for a pair of materials.");
   const auto removal = [&]<class H>(H) {
     world.def(
         "remove", [](LiveWorld& w, H handle) { return w.remove(handle); }, py::arg("object"),
