@@ -9,9 +9,6 @@
 namespace offstage::render {
 namespace {
 
-/// From this number of sub-frames on, the different sun directions of the sub-frames filter its shadows.
-constexpr int kManySamples = 16;
-
 constexpr float kRadians = std::numbers::pi_v<float> / 180;
 
 Vector4f vec4(const Vector3f& v, float w = 0) {
@@ -59,17 +56,6 @@ bool View::sees(const Vector3f& center, float radius) const {
     if (std::max(over, under) > radius * std::sqrt(1 + slope * slope)) return false;
   }
   return true;
-}
-
-std::array<Vector3f, 8> View::corners(float far_distance) const {
-  std::array<Vector3f, 8> result;
-  for (std::size_t k = 0; k < 8; ++k) {
-    const float depth = k < 4 ? near_m : std::clamp(far_distance, near_m, far_m);
-    const Vector2f ndc((k & 1) != 0 ? 1.0f : -1.0f, (k & 2) != 0 ? 1.0f : -1.0f);
-    const Vector2f place = (ndc - shear).cwiseProduct(tan_half) * depth;
-    result[k] = eye + forward * depth + right * place.x() + up * place.y();
-  }
-  return result;
 }
 
 void ScreenArea::add(const Vector3f& place) {
@@ -163,7 +149,7 @@ FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& en
                              static_cast<float>(offsets.index) / static_cast<float>(offsets.count));
   frame.sun_radiance = vec4(sun.color * sun.intensity, 0.5f * sun.size_deg * kRadians);
   frame.zenith = vec4(sky.zenith, environment.fog);
-  frame.horizon = vec4(sky.horizon, offsets.count >= kManySamples ? 1.f : 0.f);
+  frame.horizon = vec4(sky.horizon);
   frame.ground = vec4(sky.ground, sky.turned.intensity);
   frame.glow = vec4(sky.glow, environment.picture_turn_deg / 360);
   const std::array<Vector3f, 9> irradiance = sky_irradiance(sky);

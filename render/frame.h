@@ -48,8 +48,6 @@ struct View {
   /// Whether a ball may be in view; false only if it is outside of one plane of the frustum.
   bool sees(const Vector3f& center, float radius) const;
   float depth_of(const Vector3f& point) const { return forward.dot(point - eye); }
-  /// Corners of the frustum up to a distance: four near ones, then four far ones.
-  std::array<Vector3f, 8> corners(float far_distance) const;
 };
 
 /// The rectangle of the picture that covers a set of points, each with a margin around it [m].

@@ -62,17 +62,6 @@ Texture make_target(GLenum format, int width_px, int height_px, GLenum filter) {
   return texture;
 }
 
-Sampler make_depth_sampler() {
-  GLuint name = 0;
-  glCreateSamplers(1, &name);
-  Sampler sampler(name);
-  glSamplerParameteri(sampler, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-  glSamplerParameteri(sampler, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-  glSamplerParameteri(sampler, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
-  glSamplerParameteri(sampler, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-  return sampler;
-}
-
 Framebuffer make_framebuffer(GLuint color, GLuint depth) {
   GLuint name = 0;
   glCreateFramebuffers(1, &name);

@@ -45,9 +45,6 @@ struct BufferTraits {
 struct TextureTraits {
   static void destroy(GLuint name) { glDeleteTextures(1, &name); }
 };
-struct SamplerTraits {
-  static void destroy(GLuint name) { glDeleteSamplers(1, &name); }
-};
 struct FramebufferTraits {
   static void destroy(GLuint name) { glDeleteFramebuffers(1, &name); }
 };
@@ -59,7 +56,6 @@ struct ProgramTraits {
 };
 using Buffer = Object<BufferTraits>;
 using Texture = Object<TextureTraits>;
-using Sampler = Object<SamplerTraits>;
 using Framebuffer = Object<FramebufferTraits>;
 using VertexArray = Object<VertexArrayTraits>;
 using Program = Object<ProgramTraits>;
@@ -75,8 +71,6 @@ Buffer make_buffer(std::span<const T> values) {
 }
 /// A 2D texture of one level, clamped to its edges.
 Texture make_target(GLenum format, int width_px, int height_px, GLenum filter);
-/// Creates a sampler that reads depths without comparison, for a texture that otherwise compares.
-Sampler make_depth_sampler();
 /// Creates a framebuffer. Throws UnavailableError if it is not complete. A texture of 0 leaves that
 /// attachment empty.
 Framebuffer make_framebuffer(GLuint color, GLuint depth);

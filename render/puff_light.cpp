@@ -67,15 +67,7 @@ PuffRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vect
 }
 
 Vector3f PuffLight::ambient(const Vector3f& n) const {
-  const std::array<float, 9> basis = {1,
-                                      n.y(),
-                                      n.z(),
-                                      n.x(),
-                                      n.x() * n.y(),
-                                      n.y() * n.z(),
-                                      3 * n.z() * n.z() - 1,
-                                      n.x() * n.z(),
-                                      n.x() * n.x() - n.y() * n.y()};
+  const std::array<float, 9> basis = sky_basis(n);
   Vector3f sum = Vector3f::Zero();
   for (std::size_t k = 0; k < basis.size(); ++k) sum += basis[k] * frame.irradiance_at(k);
   return sum.cwiseMax(0.0f);

@@ -64,6 +64,18 @@ Vector3f horizon_color(const SkyModel& sky, const Vector3f& direction) {
   return sky.turned.intensity * sky.turned.picture->mirrored(sky.turned.to_picture(level), kRoughnessOfHaze);
 }
 
+std::array<float, 9> sky_basis(const Vector3f& n) {
+  return {1,
+          n.y(),
+          n.z(),
+          n.x(),
+          n.x() * n.y(),
+          n.y() * n.z(),
+          3 * n.z() * n.z() - 1,
+          n.x() * n.z(),
+          n.x() * n.x() - n.y() * n.y()};
+}
+
 std::array<Vector3f, 9> sky_irradiance(const SkyModel& sky) {
   if (sky.turned.picture) return sky.turned.irradiance();
   // Squares of the constants of the real spherical harmonics times the factors of the cosine lobe over pi (1,
@@ -82,7 +94,7 @@ std::array<Vector3f, 9> sky_irradiance(const SkyModel& sky) {
       const float angle = (static_cast<float>(column) + 0.5f) * 2 * pi / kColumns;
       const float x = r * std::cos(angle), z = r * std::sin(angle);
       const Vector3f radiance = gradient_radiance(sky, {x, y, z});
-      const std::array<float, 9> basis = {1, y, z, x, x * y, y * z, 3 * z * z - 1, x * z, x * x - y * y};
+      const std::array<float, 9> basis = sky_basis({x, y, z});
       for (std::size_t k = 0; k < 9; ++k) sum[k] += basis[k] * radiance;
     }
   }

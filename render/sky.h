@@ -34,6 +34,10 @@ Vector3f sky_mirrored(const SkyModel& sky, const Vector3f& direction, float roug
 /// Colour of fog in a direction, as horizon_color() in shaders/sky.glsl.
 Vector3f horizon_color(const SkyModel& sky, const Vector3f& direction);
 
+/// The functions of a direction that sky_irradiance() weights, as in shaders/sky.glsl: real spherical
+/// harmonics up to order 2 without their constants.
+std::array<float, 9> sky_basis(const Vector3f& n);
+
 /// Spherical-harmonics coefficients of the sky's irradiance. The radiance of a white diffuse surface with
 /// normal (x, y, z) is their sum weighted by 1, y, z, x, xy, yz, 3zz - 1, xz, xx - yy.
 std::array<Vector3f, 9> sky_irradiance(const SkyModel& sky);

@@ -7,7 +7,7 @@
   qualifier vec4 sun_direction;     /* w: seed of the dither */ \
   qualifier vec4 sun_radiance;      /* of a white surface that faces it; w: radius of the disc [rad] */ \
   qualifier vec4 zenith;            /* w: fog density */ \
-  qualifier vec4 horizon;           /* w: 1 if one of many sub-frames */ \
+  qualifier vec4 horizon; \
   qualifier vec4 ground;            /* w: intensity of the sky's picture */ \
   qualifier vec4 glow;              /* w: turn of the sky's picture, as a share of a full turn */ \
   qualifier vec4 irradiance[7];     /* ambient light of a white surface: see ambient() */

@@ -87,27 +87,18 @@ GlowSample Glow::Source::sample_area(const Vector3f& place, float choice,
   return result;
 }
 
-GlowSample Glow::sample(const Vector3f& place, const Vector3f& normal, float choice,
+GlowSample Glow::sample(const Vector3f& place, const Vector3f& normal, float random,
                         const SquarePoint<float>& uv) const {
   const Source* kept = nullptr;
-  float sum = 0, kept_weight = 0;
+  WeightedChoice choice(random);
   for (const Source& source : sources_) {
     const float weight = estimate(source, place, normal);
-    if (!(weight > 0)) continue;
-    sum += weight;
-    const float chance = weight / sum;
-    if (choice < chance) {
-      choice /= chance;
-      kept = &source;
-      kept_weight = weight;
-    } else {
-      choice = (choice - chance) / (1 - chance);
-    }
+    if (weight > 0 && choice.take(weight)) kept = &source;
   }
   if (kept == nullptr) return {};
-  choice = std::clamp(choice, 0.0f, 0x1.fffffep-1f);
-  GlowSample result = kept->is_ball ? kept->sample_ball(place, uv) : kept->sample_area(place, choice, uv);
-  result.density *= kept_weight / sum;
+  GlowSample result =
+      kept->is_ball ? kept->sample_ball(place, uv) : kept->sample_area(place, choice.rest(), uv);
+  result.density *= choice.weight() / choice.sum();
   return result;
 }
 

@@ -31,7 +31,7 @@ class Glow {
   bool empty() const { return sources_.empty(); }
   /// Chooses a source in proportion to an estimate of its light on a surface at `place`, and a point of it in
   /// proportion to its area, or to its solid angle if it is a ball.
-  GlowSample sample(const Vector3f& place, const Vector3f& normal, float choice,
+  GlowSample sample(const Vector3f& place, const Vector3f& normal, float random,
                     const SquarePoint<float>& uv) const;
   /// The density with which sample() chooses what a ray from `place` met. 0: it is not a source.
   float density(const Vector3f& place, const Vector3f& normal, const Hit& hit) const;

@@ -85,33 +85,26 @@ float LightTracer::sun_visibility(const Vector3f& place, const SquarePoint<float
 Vector3f LightTracer::lamps_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
                                PixelSampler& sampler) const {
   if (sources_.lamps.empty()) return Vector3f::Zero();
-  const SquarePoint<float> choice = sampler.next(), uv = sampler.next();
+  WeightedChoice choice(sampler.next().x);
+  const SquarePoint<float> uv = sampler.next();
   const RayLamp* kept = nullptr;
   LampPoint<float> kept_point{};
-  float sum = 0, kept_cosine = 0, kept_weight = 0, random = choice.x;
+  float kept_cosine = 0;
   for (const RayLamp& lamp : sources_.lamps) {
     const LampPoint<float> point = lamp.point(from_eigen(place), uv);
     const Vector3f towards = to_eigen(point.towards);
     const float cosine = std::max(normal.dot(towards), 0.0f);
     const float weight = cosine * to_eigen(point.arriving).sum();
-    if (!(weight > 0) || face.dot(towards) <= 0) continue;
-    sum += weight;
-    const float chance = weight / sum;
-    if (random < chance) {
-      random /= chance;
-      kept = &lamp;
-      kept_point = point;
-      kept_cosine = cosine;
-      kept_weight = weight;
-    } else {
-      random = (random - chance) / (1 - chance);
-    }
+    if (!(weight > 0) || face.dot(towards) <= 0 || !choice.take(weight)) continue;
+    kept = &lamp;
+    kept_point = point;
+    kept_cosine = cosine;
   }
   if (kept == nullptr) return Vector3f::Zero();
   const Vector3f visible =
       kept->def().shadows ? scene_.transmittance(place, to_eigen(kept_point.towards), kept_point.distance)
                           : Vector3f(Vector3f::Ones());
-  return to_eigen(kept_point.arriving).cwiseProduct(visible) * (kept_cosine * sum / kept_weight);
+  return to_eigen(kept_point.arriving).cwiseProduct(visible) * (kept_cosine * choice.sum() / choice.weight());
 }
 
 int VisibleLight::find(const Hit& hit) const {

@@ -91,4 +91,26 @@ class Sampler {
 
 using PixelSampler = Sampler<uint32_t>;
 
+/// Selects one of a sequence of items in proportion to their weights, by one random number in [0, 1).
+class WeightedChoice {
+ public:
+  explicit WeightedChoice(float random) : random_(random) {}
+  /// Whether the item, of positive weight, is selected in place of the one before.
+  bool take(float weight) {
+    sum_ += weight;
+    const float chance = weight / sum_;
+    const bool taken = random_ < chance;
+    random_ = taken ? random_ / chance : (random_ - chance) / (1 - chance);
+    if (taken) weight_ = weight;
+    return taken;
+  }
+  float weight() const { return weight_; }  ///< of the selected item
+  float sum() const { return sum_; }        ///< of all weights
+  /// A random number in [0, 1) that does not depend on the selection.
+  float rest() const { return random_ < 0 ? 0.0f : random_ < 1 ? random_ : 0x1.fffffep-1f; }
+
+ private:
+  float random_, sum_ = 0, weight_ = 0;
+};
+
 }  // namespace offstage::render

@@ -6,6 +6,7 @@
 #include "render/frame_files.h"
 #include "render/image_io.h"
 #include "render/mesh_io.h"
+#include "render/sky.h"
 #include "render/tone_map.h"
 #include "render/trace/ray_material.h"
 #include "render/trace/ray_scene.h"
@@ -46,15 +47,7 @@ HdrImage disc_sky(const Vector3f& middle, float radius_deg, const Vector3f& radi
 
 float irradiance_at(const TurnedSky& sky, const Vector3f& n) {
   const std::array<Vector3f, 9> c = sky.irradiance();
-  const std::array<float, 9> basis = {1,
-                                      n.y(),
-                                      n.z(),
-                                      n.x(),
-                                      n.x() * n.y(),
-                                      n.y() * n.z(),
-                                      3 * n.z() * n.z() - 1,
-                                      n.x() * n.z(),
-                                      n.x() * n.x() - n.y() * n.y()};
+  const std::array<float, 9> basis = sky_basis(n);
   float sum = 0;
   for (std::size_t k = 0; k < 9; ++k) sum += basis[k] * c[k].y();
   return sum;
