@@ -29,16 +29,20 @@ constexpr std::size_t kRelaxationChunk = ParticleSearch::kChunk;
 struct Load {
   const Obstacle* obstacle;
   Vec3 impulse = Vec3::Zero(), angular_impulse = Vec3::Zero();
+  Real arm = 0;  ///< greatest lever arm of its parts [m]
   Real share = 1;
 };
 
 /// Limits the load on a body. A load against the body's motion can at most stop it. Beyond that, the body
-/// gets no more momentum than the touching particles, of total `mass`, have `brought` relative to the body.
+/// gets no more momentum than the touching particles, of total `mass`, have `brought` relative to the body,
+/// and no more angular momentum than this at the greatest lever arm.
 void limit_loads(std::span<Reaction> reactions, std::map<uint32_t, Load>& loads, Real brought, Real mass) {
   for (const Reaction& r : reactions)
     if (const auto load = loads.find(r.body); load != loads.end()) {
       load->second.impulse += r.impulse;
       load->second.angular_impulse += r.angular_impulse;
+      if (const Real size = r.impulse.norm(); size > 0)
+        load->second.arm = std::max(load->second.arm, r.angular_impulse.norm() / size);
     }
   for (auto& [body, load] : loads) {
     const Obstacle& o = *load.obstacle;
@@ -47,9 +51,11 @@ void limit_loads(std::span<Reaction> reactions, std::map<uint32_t, Load>& loads,
     const Real second = (o.inverse_mass * load.impulse.squaredNorm() +
                          load.angular_impulse.dot(o.inverse_inertia * load.angular_impulse)) /
                         2;
-    const Real size = load.impulse.norm();
+    const Real size = load.impulse.norm(), turn = load.angular_impulse.norm();
     const Real stops = second > 0 ? std::max(0.0, -first) / (2 * second) : 1;
-    const Real bears = size > 0 ? (brought + mass * o.end_velocity.norm()) / size : 1;
+    const Real most = brought + mass * o.end_velocity.norm();
+    Real bears = size > 0 ? most / size : 1;
+    if (turn > 0) bears = std::min(bears, most * load.arm / turn);
     load.share = std::min(1.0, stops + bears);
   }
   for (Reaction& r : reactions)
