@@ -1,5 +1,6 @@
 #include "sim/contact/fast_contacts.h"
 
+#include <algorithm>
 #include <tuple>
 
 #include "sim/contact/contact_motion.h"
@@ -132,6 +133,32 @@ void FastContacts::collect(std::span<const Island* const> islands) {
     }
 }
 
+/// The contact points of links, by articulation.
+void FastContacts::collect_link_contacts() {
+  link_contacts_.clear();
+  if (joints_.articulations().empty()) return;
+  constexpr uint32_t kNone = UINT32_MAX;
+  std::vector<uint32_t> part_of(members_.size(), kNone);
+  for (uint32_t i = 0; i < joints_.articulations().size(); ++i)
+    for (const Body* body : joints_.articulations()[i]->bodies()) part_of[body->row] = i;
+  for (uint32_t k = 0; k < patches_.size(); ++k) {
+    const ContactPatch& p = patches_[k];
+    const uint32_t part = std::min(part_of[p.a], part_of[p.b]);
+    if (part == kNone) continue;
+    for (uint32_t i = 0; i < p.count; ++i) {
+      const Vec3 place = p.points[i].t * p.frame.t + p.points[i].k * p.frame.k;
+      LinkContact c{.part = part, .patch = k, .point = i, .row = {}, .separation = p.points[i].separation};
+      c.row.a = p.a;
+      c.row.b = p.b;
+      c.row.on_a << p.frame.n, (p.arm_a + place).cross(p.frame.n);
+      c.row.on_b << -p.frame.n, -(p.arm_b + place).cross(p.frame.n);
+      link_contacts_.push_back(c);
+    }
+  }
+  std::stable_sort(link_contacts_.begin(), link_contacts_.end(),
+                   [](const LinkContact& x, const LinkContact& y) { return x.part < y.part; });
+}
+
 ContactWork FastContacts::solve(std::span<const Island* const> islands, const ContactInterval& interval) {
   const Real h = interval.duration;
   collect(islands);
@@ -146,10 +173,13 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
     patches_[i].b = b;
     set_patch(patches_[i], *pair, *manifold, interval);
   });
-  RelaxedJoints relaxed_joints(joints_.problem(), joints_.articulations(), joints_.bounded_ends());
+  collect_link_contacts();
+  RelaxedJoints relaxed_joints(joints_.problem(), joints_.articulations(), joints_.bounded_ends(),
+                               link_contacts_);
   ContactWork work = solver_.solve(bodies_, patches_, {h, relaxation_substeps(h)}, &relaxed_joints);
   work.solves = islands.size();
   joints_.store_impulses(h);
+  for (const LinkContact& c : link_contacts_) patches_[c.patch].points[c.point].impulse += c.row.impulse;
   for_each_index(patches_.size(),
                  [&](std::size_t i) { store_forces(patches_[i], interval, *origins_[i].manifold); });
   std::size_t first = 0;

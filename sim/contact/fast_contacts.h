@@ -22,6 +22,7 @@ class FastContacts {
     uint32_t a, b;
   };
   void collect(std::span<const Island* const> islands);
+  void collect_link_contacts();
 
   // Movable bodies first, then one entry for each contact with an immovable body.
   std::vector<Body*> members_;
@@ -30,6 +31,7 @@ class FastContacts {
   std::vector<Origin> origins_;  // origins of the patches
   std::vector<ContactPatch> patches_;
   IslandJoints joints_;
+  std::vector<LinkContact> link_contacts_;
   RelaxationSolver solver_;
 };
 

@@ -133,6 +133,17 @@ void RelaxationSolver::plan_sweeps(Stage first, Stage again, uint32_t substep) {
   }
 }
 
+/// The same for the push-out, in which the joints move their links after each sweep.
+void RelaxationSolver::plan_push(uint32_t substeps, uint32_t joints) {
+  if (joints > 0) ranges_.push_back({Stage::begin_push, 0, joints, 1});
+  for (uint32_t k = 0; k <= kRepeats; ++k) {
+    ++sweeps_;
+    plan_colors(k == 0 ? Stage::push : Stage::push_again, substeps, k % 2 == 1);
+    if (joints > 0) ranges_.push_back({Stage::push_joints, 0, joints, 1, substeps, sweeps_});
+  }
+  push_sweep_ = sweeps_ - kRepeats;
+}
+
 void RelaxationSolver::plan(uint32_t substeps) {
   times_.clear();
   for (uint32_t i = 0; i <= substeps; ++i) times_.emplace_back(substep_, i, def_.duration);
@@ -145,14 +156,14 @@ void RelaxationSolver::plan(uint32_t substeps) {
   if (joints > 0) ranges_.push_back({Stage::start_joints, 0, joints, 1});
   for (uint32_t i = 0; i < substeps; ++i) {
     plan_sweeps(i > 0 ? Stage::solve_next : Stage::solve, Stage::solve_again, i);
-    if (joints > 0) ranges_.push_back({Stage::join, 0, joints, 1, i + 1});
+    if (joints > 0) ranges_.push_back({Stage::join, 0, joints, joints, i + 1});
     ranges_.push_back({i + 1 < substeps ? Stage::advance : Stage::advance_last, 0, bodies, kBodiesPerBlock});
   }
   // Contacts that closed in the last sub-step still have the velocity with which they closed.
-  plan_sweeps(Stage::push, Stage::push_again, substeps);
+  plan_push(substeps, joints);
   ++sweeps_;
   plan_colors(Stage::solve, substeps);
-  if (joints > 0) ranges_.push_back({Stage::join_last, 0, joints, 1, substeps});
+  if (joints > 0) ranges_.push_back({Stage::join_last, 0, joints, joints, substeps});
   ranges_.push_back({Stage::finish, 0, bodies, kBodiesPerBlock});
   plan_colors(Stage::report, substeps);
   strikes_.assign(sweeps_ + 1, 0);
@@ -160,7 +171,8 @@ void RelaxationSolver::plan(uint32_t substeps) {
 }
 
 bool RelaxationSolver::is_needed(const Range& range) const {
-  const bool again = range.stage == Stage::solve_again || range.stage == Stage::push_again;
+  const bool again = range.stage == Stage::solve_again || range.stage == Stage::push_again ||
+                     (range.stage == Stage::push_joints && range.sweep > push_sweep_);
   return !again || strikes_[range.sweep - 1];
 }
 
@@ -211,6 +223,10 @@ void RelaxationSolver::run(const Range& range, uint32_t block) {
       return each([&](uint32_t i) {
         if (is_struck(i, range.sweep - 1)) push(i, range, kPassedOn);
       });
+    case Stage::begin_push:
+      return each([this](uint32_t i) { joints_->begin_push(i, motions_); });
+    case Stage::push_joints:
+      return each([&](uint32_t i) { push_joints(i, range); });
     case Stage::finish:
       return each([this](uint32_t i) { finish(i); });
     case Stage::report:
@@ -246,6 +262,13 @@ void RelaxationSolver::push(uint32_t i, const Range& range, Real threshold) {
   PatchBatch& p = batches_[i];
   const PushOut how{times_.back(), kPushShare, kMaxPush * def_.duration};
   strike(p, range.sweep, push_out(p, motions_, how), threshold);
+}
+
+/// Contacts of links that the joints moved far are pushed again.
+void RelaxationSolver::push_joints(uint32_t part, const Range& range) {
+  if (!(joints_->push(part, motions_) > kPassedOn)) return;
+  for (const uint32_t body : joints_->bodies(part)) struck_[body] = range.sweep;
+  std::atomic_ref(strikes_[range.sweep]).store(1, std::memory_order_relaxed);
 }
 
 /// Marks the bodies in lanes with an impact above the threshold; their contacts get another sweep.

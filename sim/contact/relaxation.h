@@ -131,8 +131,10 @@ class RelaxationSolver {
     join_last,
     advance,
     advance_last,
+    begin_push,
     push,
-    push_again,  // repeated push-out of the bodies moved in the previous one
+    push_again,   // repeated push-out of the bodies moved in the previous one
+    push_joints,  // the joints move their links after the push-out of the same sweep
     finish,
     report
   };
@@ -150,12 +152,14 @@ class RelaxationSolver {
   void plan(uint32_t substeps);
   void plan_colors(Stage stage, uint32_t substep = 0, bool backward = false);
   void plan_sweeps(Stage first, Stage again, uint32_t substep);
+  void plan_push(uint32_t substeps, uint32_t joints);
   bool is_needed(const Range& range) const;
   void run(const Range& range, uint32_t block);
   void start(uint32_t body);
   void extrapolate(uint32_t body);
   void solve(uint32_t batch, const Range& range);
   void push(uint32_t batch, const Range& range, Real threshold);
+  void push_joints(uint32_t part, const Range& range);
   void strike(const PatchBatch& batch, uint32_t sweep, FloatLanes impact, Real threshold);
   bool is_struck(uint32_t batch, uint32_t since) const;
   void advance(uint32_t body);
@@ -178,9 +182,9 @@ class RelaxationSolver {
   std::vector<SubstepTime> times_;    // and that of the sub-step after the last one
   std::vector<Range> ranges_;
   // Sweeps are numbered from 1; a body stores the number of the last sweep in which it was hit.
-  uint32_t sweeps_ = 0;
-  std::vector<uint32_t> struck_;  // by body
-  std::vector<uint8_t> strikes_;  // by sweep: whether any body was hit
+  uint32_t sweeps_ = 0, push_sweep_ = 0;  // the latter: the first sweep of the push-out
+  std::vector<uint32_t> struck_;          // by body
+  std::vector<uint8_t> strikes_;          // by sweep: whether any body was hit
 };
 
 }  // namespace offstage::sim

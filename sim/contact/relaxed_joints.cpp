@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "sim/contact/relaxation.h"
 
@@ -10,15 +11,21 @@ namespace {
 
 /// Rows times links above which the responses of all links are not stored.
 constexpr std::size_t kMostResponses = 20000;
+/// A contact of a link that approaches faster than this after the joints were solved is stopped [m/s].
+constexpr Real kApproach = 0.1;
+
+Vec6 twist(const FloatLanes& lanes) {
+  Vec6 v;
+  for (unsigned i = 0; i < 3; ++i) {
+    v[i] = lanes[i];
+    v[i + 3] = lanes[i + 4];
+  }
+  return v;
+}
 
 /// Change of velocity since the step's start.
 Vec6 change_of(const BodyMotion& m) {
-  Vec6 v;
-  for (unsigned i = 0; i < 3; ++i) {
-    v[i] = m.velocity[i];
-    v[i + 3] = m.velocity[i + 4];
-  }
-  return v;
+  return twist(m.velocity);
 }
 
 Vec6 velocity_of(const RelaxedBody& b, const BodyMotion& m) {
@@ -27,9 +34,13 @@ Vec6 velocity_of(const RelaxedBody& b, const BodyMotion& m) {
   return v + change_of(m);
 }
 
-void add_to(BodyMotion& m, const Vec6& v) {
+FloatLanes lanes(const Vec6& v) {
   const Eigen::Matrix<float, 6, 1> f = v.cast<float>();
-  m.velocity += FloatLanes{f[0], f[1], f[2], 0, f[3], f[4], f[5], 0};
+  return FloatLanes{f[0], f[1], f[2], 0, f[3], f[4], f[5], 0};
+}
+
+void add_to(BodyMotion& m, const Vec6& v) {
+  m.velocity += lanes(v);
 }
 
 /// Change of velocity without contacts and rows with bounds.
@@ -42,14 +53,17 @@ Vec6 free_change(const RelaxedBody& b, Real elapsed) {
 }  // namespace
 
 RelaxedJoints::RelaxedJoints(const JointProblem& problem, std::span<Articulation* const> articulations,
-                             std::span<const uint32_t> bounded_ends)
-    : problem_(problem), rows_(problem.bounded.size()) {
-  uint32_t constraint = 0, row = 0;
+                             std::span<const uint32_t> bounded_ends, std::span<LinkContact> contacts)
+    : problem_(problem), contacts_(contacts), rows_(problem.bounded.size()), contact_rows_(contacts.size()) {
+  uint32_t constraint = 0, row = 0, contact = 0;
   for (std::size_t i = 0; i < articulations.size(); ++i) {
     Part part{.articulation = articulations[i],
               .first_constraint = constraint,
               .first_row = row,
-              .last_row = bounded_ends[i]};
+              .last_row = bounded_ends[i],
+              .first_contact = contact};
+    while (contact < contacts.size() && contacts[contact].part == i) ++contact;
+    part.last_contact = contact;
     for (const Body* body : articulations[i]->bodies()) part.bodies.push_back(body->row);
     const std::size_t links = part.bodies.size(), joints = articulations[i]->joints().size();
     part.velocities.resize(links);
@@ -80,32 +94,37 @@ void RelaxedJoints::begin(std::span<const RelaxedBody> bodies, Real duration, ui
 }
 
 void RelaxedJoints::prepare(Part& part, std::span<const RelaxedBody> bodies) {
-  for (uint32_t i = part.first_row; i < part.last_row; ++i) prepare_row(part, i, bodies);
+  for (uint32_t i = part.first_row; i < part.last_row; ++i)
+    prepare_row(part, problem_.bounded[i], rows_[i], bodies);
 }
 
-void RelaxedJoints::prepare_row(Part& part, uint32_t i, std::span<const RelaxedBody> bodies) {
-  const BoundedRow& r = problem_.bounded[i];
-  Row& row = rows_[i];
+void RelaxedJoints::prepare_row(Part& part, const BoundedRow& r, Row& row,
+                                std::span<const RelaxedBody> bodies) {
   const auto response = [&](uint32_t body, const Vec6& on) -> Vec6 {
     if (body == kUnmoved) return Vec6::Zero();
     return LinkMobility{bodies[body].inverse_mass, bodies[body].inverse_inertia}.velocity(on);
   };
   row.response_a = response(r.a, r.on_a);
   row.response_b = response(r.b, r.on_b);
-  const std::size_t links = part.bodies.size();
+  const std::size_t links = part.bodies.size(),
+                    rows = part.last_row - part.first_row + part.last_contact - part.first_contact;
   Real mobility = r.on_a.dot(row.response_a) + r.on_b.dot(row.response_b);
-  if (links * (part.last_row - part.first_row) <= kMostResponses) {
+  if (links * rows <= kMostResponses) {
     row.response.assign(links, Vec6::Zero());
+    bool has_a = false, has_b = false;
     for (std::size_t k = 0; k < links; ++k) {
-      if (part.bodies[k] == r.a) row.response[k] = row.response_a;
-      if (part.bodies[k] == r.b) row.response[k] = row.response_b;
+      if (part.bodies[k] == r.a) row.response[k] = row.response_a, has_a = true;
+      if (part.bodies[k] == r.b) row.response[k] = row.response_b, has_b = true;
     }
     JointSystem& system = part.articulation->system();
     system.relative(row.response, part.change);
     for (Vec6& c : part.change) c = -c;
     system.correct(part.change, part.impulses, row.response);
     row.reaction = part.impulses;
-    mobility = 0;
+    // Bodies outside the articulation respond on their own.
+    if (has_a) row.response_a.setZero();
+    if (has_b) row.response_b.setZero();
+    mobility = r.on_a.dot(row.response_a) + r.on_b.dot(row.response_b);
     for (std::size_t k = 0; k < links; ++k) {
       if (part.bodies[k] == r.a) mobility += r.on_a.dot(row.response[k]);
       if (part.bodies[k] == r.b) mobility += r.on_b.dot(row.response[k]);
@@ -115,23 +134,27 @@ void RelaxedJoints::prepare_row(Part& part, uint32_t i, std::span<const RelaxedB
   row.inverse_stiffness = stiffness > 1e-300 ? 1 / stiffness : 0;
 }
 
-void RelaxedJoints::push(Part& part, uint32_t i, Real impulse, std::span<BodyMotion> motions) const {
-  const Row& row = rows_[i];
-  if (!row.response.empty()) {
-    for (std::size_t k = 0; k < part.bodies.size(); ++k)
-      add_to(motions[part.bodies[k]], impulse * row.response[k]);
+void RelaxedJoints::push(Part& part, const BoundedRow& r, const Row& row, Real impulse,
+                         std::span<BodyMotion> motions) const {
+  for (std::size_t k = 0; k < row.response.size(); ++k)
+    add_to(motions[part.bodies[k]], impulse * row.response[k]);
+  if (!row.response.empty())
     for (std::size_t j = 0; j < part.now.size(); ++j) part.now[j] += impulse * row.reaction[j];
-    return;
-  }
-  const BoundedRow& r = problem_.bounded[i];
   if (r.a != kUnmoved) add_to(motions[r.a], impulse * row.response_a);
   if (r.b != kUnmoved) add_to(motions[r.b], impulse * row.response_b);
+}
+
+Real RelaxedJoints::speed(const BoundedRow& r, std::span<const BodyMotion> motions) const {
+  Real u = r.offset;
+  if (r.a != kUnmoved) u += r.on_a.dot(velocity_of(bodies_[r.a], motions[r.a]));
+  if (r.b != kUnmoved) u += r.on_b.dot(velocity_of(bodies_[r.b], motions[r.b]));
+  return u;
 }
 
 void RelaxedJoints::start(uint32_t p, std::span<BodyMotion> motions) {
   Part& part = parts_[p];
   for (uint32_t i = part.first_row; i < part.last_row; ++i)
-    if (rows_[i].impulse != 0) push(part, i, rows_[i].impulse, motions);
+    if (rows_[i].impulse != 0) push(part, problem_.bounded[i], rows_[i], rows_[i].impulse, motions);
 }
 
 void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapsed, bool is_last) {
@@ -155,19 +178,67 @@ void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapse
     Row& row = rows_[i];
     row.acts |= elapsed > r.from * duration_;
     if (!row.acts) continue;
-    Real u = r.offset;
-    if (r.a != kUnmoved) u += r.on_a.dot(velocity_of(bodies_[r.a], motions[r.a]));
-    if (r.b != kUnmoved) u += r.on_b.dot(velocity_of(bodies_[r.b], motions[r.b]));
+    const Real u = speed(r, motions);
     const Real wanted = row.impulse - (u - r.target + row.softness * row.impulse) * row.inverse_stiffness;
     const Real next = std::clamp(wanted, row.lower, row.upper);
-    push(part, i, next - row.impulse, motions);
+    push(part, r, row, next - row.impulse, motions);
     row.sum += is_last ? next - row.impulse : next;
     row.impulse = next;
   }
+  solve_contacts(part, motions, elapsed, is_last);
   for (std::size_t j = 0; j < part.sum.size(); ++j) part.sum[j] += part.now[j];
   if (is_last) return;
   for (uint32_t i = part.first_row; i < part.last_row; ++i) rows_[i].shift += substep_ * rows_[i].sum;
+  for (uint32_t i = part.first_contact; i < part.last_contact; ++i)
+    contact_rows_[i].shift += substep_ * contact_rows_[i].sum;
   for (std::size_t j = 0; j < part.sum.size(); ++j) part.shift[j] += substep_ * part.sum[j];
+}
+
+/// Limits the approach of the links' contacts to the speed that closes their gaps in the sub-step.
+void RelaxedJoints::solve_contacts(Part& part, std::span<BodyMotion> motions, Real elapsed, bool is_last) {
+  const Real before = is_last ? elapsed : elapsed - substep_;
+  for (uint32_t i = part.first_contact; i < part.last_contact; ++i) {
+    const BoundedRow& r = contacts_[i].row;
+    Row& row = contact_rows_[i];
+    Real gap = contacts_[i].separation;
+    for (const auto& [body, on] : {std::pair(r.a, &r.on_a), std::pair(r.b, &r.on_b)}) {
+      Vec6 v;
+      v << bodies_[body].velocity, bodies_[body].angular_velocity;
+      gap += on->dot(before * v + twist(motions[body].shift));
+    }
+    const Real target = -std::max(0.0, gap) / substep_, u = speed(r, motions);
+    if (row.impulse == 0 && u > target - kApproach) continue;
+    if (!std::exchange(row.is_ready, true)) prepare_row(part, r, row, bodies_);
+    const Real next = std::max(0.0, row.impulse - (u - target) * row.inverse_stiffness);
+    push(part, r, row, next - row.impulse, motions);
+    row.sum += is_last ? next - row.impulse : next;
+    row.impulse = next;
+  }
+}
+
+void RelaxedJoints::begin_push(uint32_t p, std::span<const BodyMotion> motions) {
+  Part& part = parts_[p];
+  part.before_push.clear();
+  for (const uint32_t body : part.bodies) part.before_push.push_back(motions[body].shift);
+}
+
+Real RelaxedJoints::push(uint32_t p, std::span<BodyMotion> motions) {
+  Part& part = parts_[p];
+  JointSystem& system = part.articulation->system();
+  for (std::size_t k = 0; k < part.bodies.size(); ++k)
+    part.velocities[k] = twist(motions[part.bodies[k]].shift - part.before_push[k]);
+  system.relative(part.velocities, part.change);
+  for (Vec6& c : part.change) c = -c;
+  std::vector<Vec6>& correction = part.velocities;
+  std::fill(correction.begin(), correction.end(), Vec6::Zero());
+  system.correct(part.change, part.impulses, correction);
+  Real farthest = 0;
+  for (std::size_t k = 0; k < part.bodies.size(); ++k) {
+    motions[part.bodies[k]].shift += lanes(correction[k]);
+    farthest = std::max(farthest, correction[k].head<3>().norm());
+  }
+  for (std::size_t j = 0; j < part.shift.size(); ++j) part.shift[j] += part.impulses[j];
+  return farthest;
 }
 
 void RelaxedJoints::give(std::span<RelaxedBody> bodies, std::span<const Real> late) const {
@@ -193,6 +264,11 @@ void RelaxedJoints::give(std::span<RelaxedBody> bodies, std::span<const Real> la
       to(r.a, rows_[i].sum * r.on_a, rows_[i].shift * r.on_a);
       to(r.b, rows_[i].sum * r.on_b, rows_[i].shift * r.on_b);
     }
+    for (uint32_t i = part.first_contact; i < part.last_contact; ++i) {
+      const BoundedRow& r = contacts_[i].row;
+      to(r.a, contact_rows_[i].sum * r.on_a, contact_rows_[i].shift * r.on_a);
+      to(r.b, contact_rows_[i].sum * r.on_b, contact_rows_[i].shift * r.on_b);
+    }
   }
 }
 
@@ -200,6 +276,7 @@ void RelaxedJoints::finish() {
   for (const Part& part : parts_)
     std::copy(part.sum.begin(), part.sum.end(), problem_.impulses.begin() + part.first_constraint);
   for (std::size_t i = 0; i < rows_.size(); ++i) problem_.bounded[i].impulse = rows_[i].sum;
+  for (std::size_t i = 0; i < contacts_.size(); ++i) contacts_[i].row.impulse = contact_rows_[i].sum;
 }
 
 }  // namespace offstage::sim
