@@ -50,8 +50,15 @@ double metres_per_unit(const aiScene& scene) {
   return centimetres > 1e-6 && centimetres < 1e6 ? centimetres / 100 : 1;
 }
 
+Model::UnitSource unit_source_of(const std::filesystem::path& path) {
+  using Source = Model::UnitSource;
+  if (has_ending(path, ".dae") || has_ending(path, ".fbx") || is_gltf(path)) return Source::stated;
+  return has_ending(path, ".stl") || has_ending(path, ".3mf") ? Source::millimetres : Source::none;
+}
+
 /// The unit of a file in words, with what was assumed where the format has none.
 std::string unit_of(const aiScene& scene, const std::filesystem::path& path) {
+  if (is_gltf(path)) return "1 m, as the format defines (glTF)";
   if (has_ending(path, ".dae")) return "stated by the file (Collada) and converted to metres";
   if (has_ending(path, ".fbx")) {
     char text[64];
@@ -123,9 +130,18 @@ class AssimpSurfaces {
   std::map<unsigned, FileSurface> surfaces_;
 };
 
+void measure(const aiMesh& mesh, const Affine3d& world, Eigen::AlignedBox3f& box) {
+  for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
+    const Vector3f p = (world * to_eigen(mesh.mVertices[i]).cast<double>()).cast<float>();
+    if (p.allFinite()) box.extend(p);
+  }
+}
+
 /// Lists the nodes that have meshes, and adds the meshes of all of them, or of the node `wanted`. Depth first
-/// with an explicit stack, because the depth depends on the file.
-void place_nodes(const aiScene& scene, const std::string& wanted, AssimpSurfaces& surfaces, Model& model) {
+/// with an explicit stack, because the depth depends on the file. `all_nodes`: gets the
+/// box around them, if only one is wanted.
+void place_nodes(const aiScene& scene, const std::string& wanted, AssimpSurfaces& surfaces, Model& model,
+                 Eigen::AlignedBox3f& all_nodes) {
   struct Item {
     const aiNode* node;
     Affine3d world_from_parent;
@@ -149,6 +165,8 @@ void place_nodes(const aiScene& scene, const std::string& wanted, AssimpSurfaces
           surfaces.add(node.mMeshes[i], world_from_node);
         else if (wanted == model.nodes.back().name)
           surfaces.add(node.mMeshes[i], rigid.inverse() * world_from_node);
+        if (!wanted.empty() && node.mMeshes[i] < scene.mNumMeshes)
+          measure(*scene.mMeshes[node.mMeshes[i]], world_from_node, all_nodes);
       }
     }
     for (unsigned i = node.mNumChildren; i-- > 0;)
@@ -179,10 +197,13 @@ Model import_by_assimp(const std::filesystem::path& path, const std::string& nod
       import_materials(*scene, path.parent_path(), folders,
                        obj ? read_mtl_of(path, folders) : std::map<std::string, MtlMaterial>{}, model);
   model.unit = unit_of(*scene, path);
+  model.unit_source = unit_source_of(path);
   if (model.materials.empty()) model.materials.emplace_back();
   PartBuilder builder(model);
   AssimpSurfaces surfaces(*scene, std::move(uv_sets), model, builder);
-  place_nodes(*scene, node, surfaces, model);
+  Eigen::AlignedBox3f all_nodes;
+  place_nodes(*scene, node, surfaces, model, all_nodes);
+  model.file_size = largest_side(model, all_nodes);
   const std::vector<std::string> left_out = builder.left_out();
   model.warnings.insert(model.warnings.end(), left_out.begin(), left_out.end());
   return model;
