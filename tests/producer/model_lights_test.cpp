@@ -231,6 +231,11 @@ TEST(ModelLight, AndCamerasThatNothingUsesAreWarnedOf) {
   EXPECT_NE(text.find("1 cameras are not used"), std::string::npos) << text;
   EXPECT_NE(text.find("1 lights are not used"), std::string::npos) << text;
   EXPECT_TRUE(used.warnings.empty());
+  Room room;
+  room.light()["range"] = 9;
+  const LoadedRoom ended(room, scene_of(kBoth));
+  ASSERT_EQ(ended.warnings.size(), 1u);
+  EXPECT_NE(ended.warnings[0].what.find("the range of the light 'Bulb' is ignored"), std::string::npos);
 }
 
 }  // namespace

@@ -41,10 +41,12 @@ bool is_animated(const Body& body, const render::Model::Place& place, const rend
 
 class PlaceCheck {
  public:
-  PlaceCheck(const Scene& scene, const ModelLibrary& models, std::vector<Problem>& problems)
+  PlaceCheck(const Scene& scene, const ModelLibrary& models, std::vector<Problem>& problems,
+             std::vector<Problem>& warnings)
       : scene_(scene),
         models_(models),
         problems_(problems),
+        warnings_(warnings),
         suns_(std::ranges::count_if(
             scene.lights, [](const Light& light) { return std::holds_alternative<SunLight>(light); })) {}
 
@@ -71,6 +73,11 @@ class PlaceCheck {
       if (has_light(lights, light)) {
         found = true;
         if (light.kind == FileLight::Kind::directional) sun(lights, light, file);
+        if (light.range_m > 0)
+          warnings_.push_back(
+              {lights.where, fmt::format("{}: the range of the light '{}' is ignored: its light "
+                                         "decreases with the square of the distance, without an end",
+                                         file, light.name)});
       }
     if (!found) fail(lights.where, unknown_place(file, "light", lights.name, known));
   }
@@ -99,6 +106,7 @@ class PlaceCheck {
   const Scene& scene_;
   const ModelLibrary& models_;
   std::vector<Problem>& problems_;
+  std::vector<Problem>& warnings_;
   std::ptrdiff_t suns_;
 };
 
@@ -143,7 +151,7 @@ Affine3f pose_in_body(const Body& body, const render::Model::Place& place, const
 
 void check_cameras_and_lights(const Scene& scene, const ModelLibrary& models, std::vector<Problem>& problems,
                               std::vector<Problem>& warnings) {
-  PlaceCheck check(scene, models, problems);
+  PlaceCheck check(scene, models, problems, warnings);
   check.camera(scene.camera);
   for (const NamedCamera& camera : scene.cameras) check.camera(camera.camera);
   for (const Light& light : scene.lights)
