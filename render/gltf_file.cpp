@@ -166,7 +166,10 @@ GltfFile::GltfFile(std::filesystem::path path, const InputFolders& folders)
 }
 
 bool GltfFile::is_version_1() const {
-  return root_.child("asset").text("version", "1.0").starts_with("1.");
+  const GltfValue asset = root_.child("asset");
+  const bool is_number =
+      asset.has("version") && (*asset.json())["version"].is_number();  // only 1.0 allows it
+  return is_number ? asset.number("version", 1) < 2 : asset.text("version", "1.0").starts_with("1.");
 }
 
 void GltfFile::check() {

@@ -7,6 +7,7 @@
 #include "render/gltf_file.h"
 #include "render/gltf_geometry.h"
 #include "render/gltf_material.h"
+#include "render/gltf_places.h"
 #include "render/gltf_rig.h"
 #include "render/part_builder.h"
 
@@ -103,9 +104,15 @@ class GltfImporter {
     if (rig_) model_.rig = rig_->finish();
     warn_of_ignored();
     model_.unit = "1 m, as the format defines (glTF)";
+    model_.unit_source = Model::UnitSource::stated;
+    model_.file_size = largest_side(model_, all_nodes_);
     model_.warnings = file_.take_warnings();
     const std::vector<std::string> left_out = builder_.left_out();
     model_.warnings.insert(model_.warnings.end(), left_out.begin(), left_out.end());
+    if (!wanted_.empty()) {  // they belong to the whole file
+      model_.cameras.clear();
+      model_.lights.clear();
+    }
     drop_unused_default();
     return std::move(model_);
   }
@@ -153,9 +160,22 @@ class GltfImporter {
         add_mesh(item.node, node, *mesh, item.parent);
         item.parent = static_cast<int>(model_.nodes.size() - 1);
       }
+      add_views_and_lights(item.node, node);
       const std::vector<std::size_t>& children = nodes_->children(item.node);
       for (std::size_t i = children.size(); i-- > 0;) stack.push_back({children[i], item.parent});
     }
+  }
+
+  void add_views_and_lights(std::size_t index, const GltfValue& node) {
+    const auto add = [&](auto&& read, NodeNames& names, auto& list) {
+      if (!read) return;
+      read->name = names.next(read->name.empty() ? "node" : read->name);
+      read->node = rig_ ? rig_->index_of(index) : -1;
+      read->model_from_place = nodes_->world(index).matrix().cast<float>();
+      list.push_back(std::move(*read));
+    };
+    add(gltf_camera(file_, node), camera_names_, model_.cameras);
+    add(gltf_light(file_, node), light_names_, model_.lights);
   }
 
   void add_mesh(std::size_t index, const GltfValue& node, std::size_t mesh, int parent) {
@@ -165,6 +185,7 @@ class GltfImporter {
     const Affine3d rigid = turned_and_moved(world);
     const std::string name = node.text("name", "nodes[" + std::to_string(index) + "]");
     model_.nodes.push_back(model_node(names_.next(name.empty() ? "node" : name), parent, rigid));
+    if (!wanted_.empty()) measure(mesh, world);
     if (!wanted_.empty() && wanted_ != model_.nodes.back().name) return;
     const Affine3d frame = wanted_.empty() ? world : rigid.inverse() * world;
     const std::vector<Affine3d> instances = instances_of(node);
@@ -180,6 +201,12 @@ class GltfImporter {
         builder_.add(own ? *own : primitive.surface, frame * instance);
     }
     if (rig_) rig_->add_mesh(index, mesh, instances);
+  }
+
+  void measure(std::size_t mesh, const Affine3d& world) {
+    for (std::size_t k = 0; k < geometry_->primitive_count(mesh); ++k)
+      for (const Vector3f& p : geometry_->primitive(mesh, k).surface.mesh.positions)
+        if (p.allFinite()) all_nodes_.extend((world * p.cast<double>()).cast<float>());
   }
 
   /// EXT_mesh_gpu_instancing; without it, the node itself.
@@ -239,9 +266,10 @@ class GltfImporter {
     if (!rig_)
       warn(file_.count("animations"),
            "animations are not played: the model is in its rest pose; `animation` of a body plays one");
-    warn(file_.count("cameras"), "cameras are ignored: the scene has its own");
-    warn(file_.root().extension("KHR_lights_punctual").count("lights"),
-         "lights are ignored: the scene has its own");
+    if (model_.cameras.empty()) warn(file_.count("cameras"), "cameras have no usable place in the scene");
+    if (model_.lights.empty())
+      warn(file_.root().extension("KHR_lights_punctual").count("lights"),
+           "lights have no usable place in the scene");
   }
 
   /// The default material is the last one; it is kept if a part uses it, or if there is no other.
@@ -261,7 +289,8 @@ class GltfImporter {
   std::optional<GltfGeometry> geometry_;
   std::optional<GltfRig> rig_;
   const GltfNodes* nodes_ = nullptr;
-  NodeNames names_;
+  NodeNames names_, camera_names_, light_names_;
+  Eigen::AlignedBox3f all_nodes_;  ///< the box around them, if only one is wanted
 };
 
 }  // namespace

@@ -21,6 +21,8 @@ class GltfRig {
   /// Adds the primitives of a node's mesh. `instances`: places of the mesh in the node's frame; meshes that
   /// deform are drawn once, with a warning.
   void add_mesh(std::size_t node, std::size_t mesh, std::span<const Eigen::Affine3d> instances);
+  /// Index of a node of the file in the rig.
+  int index_of(std::size_t node) const { return rig_index_[node]; }
   /// Reads the animations; call it after all meshes.
   ModelRig finish();
 

@@ -66,6 +66,25 @@ void check_declared_size(std::span<const uint8_t> bytes, const std::string& name
 template <class T>
 using StbPixels = std::unique_ptr<T, void (*)(void*)>;
 
+/// stb_image reads zeros behind the end of its input in silence, and so draws files that are cut short with
+/// black or grey rows. Here it gets a copy with zeros behind the end, and a file of which it reads them is
+/// refused. `load(context)` calls its function for pixels of type T.
+template <class T, class Load>
+StbPixels<T> decode_whole(std::span<const uint8_t> bytes, const std::string& name, Load load) {
+  int width = 0, height = 0, channels = 0;
+  stbi_info_from_memory(bytes.data(), static_cast<int>(bytes.size()), &width, &height, &channels);
+  // More than a decoder reads at once: rows, but all pixels of PNM files.
+  const std::size_t rows = bytes[0] == 'P' ? static_cast<std::size_t>(height) : 4;
+  std::vector<uint8_t> padded(bytes.size() + 4 * static_cast<std::size_t>(width) * rows + 65536);
+  std::ranges::copy(bytes, padded.begin());
+  stbi__context context;
+  stbi__start_mem(&context, padded.data(), static_cast<int>(padded.size()));
+  StbPixels<T> pixels(static_cast<T*>(load(&context)), stbi_image_free);
+  if (context.img_buffer > padded.data() + bytes.size()) throw unreadable_image(name, "it is cut short");
+  if (!pixels) throw unreadable_image(name, stbi_failure_reason());
+  return pixels;
+}
+
 bool is_exr(std::span<const uint8_t> bytes) {
   constexpr uint8_t kMagic[] = {0x76, 0x2F, 0x31, 0x01};
   return bytes.size() > 4 && std::memcmp(bytes.data(), kMagic, 4) == 0;
@@ -85,18 +104,16 @@ HdrImage decode_light(std::span<const uint8_t> bytes, const std::string& name, u
   int width = 0, height = 0, channels = 0;
   if (!is_webp(bytes) && stbi_is_hdr_from_memory(bytes.data(), size)) {
     check_declared_size(bytes, name, max_pixels);
-    const StbPixels<float> pixels(
-        stbi_loadf_from_memory(bytes.data(), size, &width, &height, &channels, STBI_rgb_alpha),
-        stbi_image_free);
-    if (!pixels) throw unreadable_image(name, stbi_failure_reason());
+    const auto pixels = decode_whole<float>(bytes, name, [&](stbi__context* file) {
+      return stbi__loadf_main(file, &width, &height, &channels, STBI_rgb_alpha);
+    });
     return filled_light(width, height, [&](std::size_t i) { return pixels.get()[i]; });
   }
   if (!is_webp(bytes) && bytes[0] != 'P' && stbi_is_16_bit_from_memory(bytes.data(), size)) {
     check_declared_size(bytes, name, max_pixels);
-    const StbPixels<stbi_us> pixels(
-        stbi_load_16_from_memory(bytes.data(), size, &width, &height, &channels, STBI_rgb_alpha),
-        stbi_image_free);
-    if (!pixels) throw unreadable_image(name, stbi_failure_reason());
+    const auto pixels = decode_whole<stbi_us>(bytes, name, [&](stbi__context* file) {
+      return stbi__load_and_postprocess_16bit(file, &width, &height, &channels, STBI_rgb_alpha);
+    });
     return filled_light(width, height, [&](std::size_t i) {
       return srgb_decode(static_cast<float>(pixels.get()[i]) / 65535);
     });
@@ -136,9 +153,9 @@ Image decode_image(std::span<const uint8_t> bytes, const std::string& name, uint
   if (bytes[0] == 'P' && stbi_is_16_bit_from_memory(bytes.data(), size)) {
     throw fail("PNM of 16 bits is not supported; convert it to PNG");  // stb_image swaps their bytes
   }
-  const StbPixels<stbi_uc> pixels(
-      stbi_load_from_memory(bytes.data(), size, &width, &height, &channels, STBI_rgb_alpha), stbi_image_free);
-  if (!pixels) throw fail(stbi_failure_reason());
+  const auto pixels = decode_whole<stbi_uc>(bytes, name, [&](stbi__context* file) {
+    return stbi__load_and_postprocess_8bit(file, &width, &height, &channels, STBI_rgb_alpha);
+  });
   Image image{width, height, {}};
   image.rgba.assign(pixels.get(), pixels.get() + image.pixel_count() * 4);
   image.transparent = channels == 2 || channels == 4;

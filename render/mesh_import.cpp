@@ -50,8 +50,15 @@ double metres_per_unit(const aiScene& scene) {
   return centimetres > 1e-6 && centimetres < 1e6 ? centimetres / 100 : 1;
 }
 
+Model::UnitSource unit_source_of(const std::filesystem::path& path) {
+  using Source = Model::UnitSource;
+  if (has_ending(path, ".dae") || has_ending(path, ".fbx") || is_gltf(path)) return Source::stated;
+  return has_ending(path, ".stl") || has_ending(path, ".3mf") ? Source::millimetres : Source::none;
+}
+
 /// The unit of a file in words, with what was assumed where the format has none.
 std::string unit_of(const aiScene& scene, const std::filesystem::path& path) {
+  if (is_gltf(path)) return "1 m, as the format defines (glTF)";
   if (has_ending(path, ".dae")) return "stated by the file (Collada) and converted to metres";
   if (has_ending(path, ".fbx")) {
     char text[64];
@@ -70,14 +77,26 @@ Vector2f top_down(const aiVector3D& uv) {
 Vector4f linear_color(const aiColor4D& c) {
   const auto decode = [](float value) { return srgb_decode(std::clamp(value, 0.0f, 1.0f)); };
   return {decode(static_cast<float>(c.r)), decode(static_cast<float>(c.g)), decode(static_cast<float>(c.b)),
-          static_cast<float>(c.a)};
+          std::clamp(static_cast<float>(c.a), 0.0f, 1.0f)};
+}
+
+/// assimp gives the bytes of Blender's files as signed numbers: 255 is -1.
+aiColor4D from_bytes(const aiColor4D& c) {
+  const auto share = [](ai_real value) { return (value < 0 ? value + 256 : value) / 255; };
+  return {share(c.r), share(c.g), share(c.b), share(c.a)};
 }
 
 /// Converts the meshes of assimp's scene, each when it is used first.
 class AssimpSurfaces {
  public:
-  AssimpSurfaces(const aiScene& scene, std::vector<unsigned> uv_sets, Model& model, PartBuilder& builder)
-      : scene_(scene), uv_sets_(std::move(uv_sets)), model_(model), builder_(builder) {}
+  /// `byte_colors`: see from_bytes().
+  AssimpSurfaces(const aiScene& scene, std::vector<unsigned> uv_sets, bool byte_colors, Model& model,
+                 PartBuilder& builder)
+      : scene_(scene),
+        uv_sets_(std::move(uv_sets)),
+        byte_colors_(byte_colors),
+        model_(model),
+        builder_(builder) {}
 
   void add(unsigned mesh_index, const Affine3d& world_from_mesh) {
     if (mesh_index >= scene_.mNumMeshes) return;
@@ -102,13 +121,26 @@ class AssimpSurfaces {
       out.positions.push_back(to_eigen(mesh.mVertices[i]));
       if (mesh.HasNormals()) out.normals.push_back(to_eigen(mesh.mNormals[i]));
       if (has_uvs) out.uvs.push_back(top_down(mesh.mTextureCoords[uv_set][i]));
-      if (has_colors) out.colors.push_back(linear_color(mesh.mColors[0][i]));
+      if (has_colors)
+        out.colors.push_back(
+            linear_color(byte_colors_ ? from_bytes(mesh.mColors[0][i]) : mesh.mColors[0][i]));
     }
     for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
       const aiFace& face = mesh.mFaces[f];
       if (face.mNumIndices == 3) out.indices.insert(out.indices.end(), face.mIndices, face.mIndices + 3);
     }
-    if (!has_colors) return;
+    if (has_colors) add_colors(material, out);
+  }
+
+  /// Readers leave colours empty, or their alpha at 0, where a file has none.
+  void add_colors(std::size_t material, Mesh& out) {
+    if (std::ranges::all_of(out.colors, [](const Vector4f& c) { return c.isZero(); }))
+      return out.colors.clear();
+    if (std::ranges::all_of(out.colors, [](const Vector4f& c) { return c.w() == 0; })) {
+      for (Vector4f& color : out.colors) color.w() = 1;
+      model_.warnings.push_back("vertex colours of material '" + model_.materials[material].name +
+                                "': opacity 0 taken as opaque");
+    }
     Material& look = model_.materials[material];
     look.vertex_colors = true;
     // The grey of files without materials, such as scans, would darken the colours.
@@ -118,14 +150,24 @@ class AssimpSurfaces {
 
   const aiScene& scene_;
   std::vector<unsigned> uv_sets_;
+  bool byte_colors_;
   Model& model_;
   PartBuilder& builder_;
   std::map<unsigned, FileSurface> surfaces_;
 };
 
+void measure(const aiMesh& mesh, const Affine3d& world, Eigen::AlignedBox3f& box) {
+  for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
+    const Vector3f p = (world * to_eigen(mesh.mVertices[i]).cast<double>()).cast<float>();
+    if (p.allFinite()) box.extend(p);
+  }
+}
+
 /// Lists the nodes that have meshes, and adds the meshes of all of them, or of the node `wanted`. Depth first
-/// with an explicit stack, because the depth depends on the file.
-void place_nodes(const aiScene& scene, const std::string& wanted, AssimpSurfaces& surfaces, Model& model) {
+/// with an explicit stack, because the depth depends on the file. `all_nodes`: gets the
+/// box around them, if only one is wanted.
+void place_nodes(const aiScene& scene, const std::string& wanted, AssimpSurfaces& surfaces, Model& model,
+                 Eigen::AlignedBox3f& all_nodes) {
   struct Item {
     const aiNode* node;
     Affine3d world_from_parent;
@@ -149,6 +191,8 @@ void place_nodes(const aiScene& scene, const std::string& wanted, AssimpSurfaces
           surfaces.add(node.mMeshes[i], world_from_node);
         else if (wanted == model.nodes.back().name)
           surfaces.add(node.mMeshes[i], rigid.inverse() * world_from_node);
+        if (!wanted.empty() && node.mMeshes[i] < scene.mNumMeshes)
+          measure(*scene.mMeshes[node.mMeshes[i]], world_from_node, all_nodes);
       }
     }
     for (unsigned i = node.mNumChildren; i-- > 0;)
@@ -179,10 +223,13 @@ Model import_by_assimp(const std::filesystem::path& path, const std::string& nod
       import_materials(*scene, path.parent_path(), folders,
                        obj ? read_mtl_of(path, folders) : std::map<std::string, MtlMaterial>{}, model);
   model.unit = unit_of(*scene, path);
+  model.unit_source = unit_source_of(path);
   if (model.materials.empty()) model.materials.emplace_back();
   PartBuilder builder(model);
-  AssimpSurfaces surfaces(*scene, std::move(uv_sets), model, builder);
-  place_nodes(*scene, node, surfaces, model);
+  AssimpSurfaces surfaces(*scene, std::move(uv_sets), has_ending(path, ".blend"), model, builder);
+  Eigen::AlignedBox3f all_nodes;
+  place_nodes(*scene, node, surfaces, model, all_nodes);
+  model.file_size = largest_side(model, all_nodes);
   const std::vector<std::string> left_out = builder.left_out();
   model.warnings.insert(model.warnings.end(), left_out.begin(), left_out.end());
   return model;

@@ -128,6 +128,25 @@ void transfer(Archive& archive, Model& model) {
     archive.array(clip.name);
     archive.value(clip.duration);
   });
+  const auto transfer_place = [&](Model::Place& place) {
+    archive.array(place.name);
+    archive.value(place.node);
+    archive.value(place.model_from_place);
+  };
+  archive.list(model.cameras, [&](Model::Camera& camera) {
+    transfer_place(camera);
+    archive.value(camera.perspective);
+    archive.value(camera.fov_deg);
+  });
+  archive.list(model.lights, [&](Model::Light& light) {
+    transfer_place(light);
+    archive.value(light.kind);
+    archive.value(light.color);
+    for (float* number : {&light.intensity, &light.inner_deg, &light.outer_deg, &light.range_m})
+      archive.value(*number);
+  });
+  archive.value(model.unit_source);
+  archive.value(model.file_size);
   transfer_rig(archive, model.rig);
   archive.list(model.textures, [&](Image& image) { transfer_image(archive, image); });
   archive.array(model.unit);
@@ -217,6 +236,24 @@ bool is_whole(const Mesh& mesh) {
          std::ranges::all_of(mesh.positions, [](const Vector3f& p) { return p.allFinite(); });
 }
 
+bool is_whole(const Model::Place& place, const ModelRig& rig) {
+  const bool has_node = place.node >= 0 && static_cast<std::size_t>(place.node) < rig.nodes.size();
+  return place.model_from_place.allFinite() && (has_node || place.node == -1);
+}
+
+bool is_whole(const Model::Camera& camera, const ModelRig& rig) {
+  return is_whole(static_cast<const Model::Place&>(camera), rig) && camera.fov_deg >= 0 &&
+         camera.fov_deg < 180;
+}
+
+bool is_whole(const Model::Light& light, const ModelRig& rig) {
+  const float cone = light.outer_deg;
+  return is_whole(static_cast<const Model::Place&>(light), rig) &&
+         static_cast<unsigned>(light.kind) <= static_cast<unsigned>(Model::Light::Kind::spot) &&
+         light.color.allFinite() && std::isfinite(light.intensity) && light.inner_deg >= 0 &&
+         light.inner_deg <= cone && cone <= 90 && std::isfinite(light.range_m);
+}
+
 /// All indices refer to something and all sizes agree. What this accepts can be drawn and simulated safely.
 bool is_whole(const Model& model) {
   const auto refers = [](int index, std::size_t size) {
@@ -247,6 +284,11 @@ bool is_whole(const Model& model) {
                              }) &&
          std::ranges::all_of(model.textures, [](const Image& image) { return is_whole(image); }) &&
          std::ranges::all_of(model.clips, [](const Model::Clip& c) { return std::isfinite(c.duration); }) &&
+         std::ranges::all_of(model.cameras,
+                             [&](const auto& camera) { return is_whole(camera, model.rig); }) &&
+         std::ranges::all_of(model.lights, [&](const auto& light) { return is_whole(light, model.rig); }) &&
+         std::isfinite(model.file_size) &&
+         static_cast<unsigned>(model.unit_source) <= static_cast<unsigned>(Model::UnitSource::millimetres) &&
          is_whole(model.rig, model.materials.size());
 }
 

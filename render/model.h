@@ -145,9 +145,32 @@ struct Model {
     float duration = 0;  ///< [s]
   };
   std::vector<Clip> clips;
-  ModelRig rig;                       ///< its moving parts, if they were asked for
-  std::string unit;                   ///< unit of length in the file and how it was found, in words
-  std::vector<std::string> warnings;  ///< repaired or ignored elements, one line each
+  ModelRig rig;  ///< its moving parts, if they were asked for
+  /// The place of a camera or light in the file.
+  struct Place {
+    std::string name;  ///< that of its node, unique among cameras or lights
+    int node = -1;     ///< index in `rig`, if it was read; -1: none
+    Eigen::Matrix4f model_from_place = Eigen::Matrix4f::Identity();  ///< in the rest pose; looks along -z
+  };
+  struct Camera : Place {
+    bool perspective = true;  ///< false: orthographic
+    float fov_deg = 0;        ///< vertical
+  };
+  struct Light : Place {
+    enum class Kind { directional, point, spot };
+    Kind kind = Kind::point;
+    Vector3f color = Vector3f::Ones();
+    float intensity = 1;                  ///< [lx] of directional lights, else [cd]
+    float inner_deg = 0, outer_deg = 45;  ///< half angles of a spot's cone: full light, no light
+    float range_m = 0;                    ///< distance at which the file ends its light; 0: none
+  };
+  std::vector<Camera> cameras;
+  std::vector<Light> lights;
+  std::string unit;  ///< unit of length in the file and how it was found, in words
+  enum class UnitSource { stated, none, millimetres };
+  UnitSource unit_source = UnitSource::none;  ///< `millimetres`: none, but customary (STL); taken as metres
+  float file_size = 0;                        ///< longest side of the box around all nodes of the file [m]
+  std::vector<std::string> warnings;          ///< repaired or ignored elements, one line each
 
   Eigen::AlignedBox3f bounds() const;
   std::size_t triangle_count() const;

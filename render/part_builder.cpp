@@ -163,6 +163,11 @@ std::string NodeNames::next(const std::string& name) {
   return unique;
 }
 
+float largest_side(const Model& model, const Eigen::AlignedBox3f& all_nodes) {
+  const Eigen::AlignedBox3f box = all_nodes.isEmpty() ? model.bounds() : all_nodes;
+  return box.isEmpty() ? 0 : box.sizes().maxCoeff();
+}
+
 Eigen::Affine3d turned_and_moved(const Eigen::Affine3d& m) {
   const Eigen::Matrix3d rotation = m.rotation();
   if (!rotation.allFinite() || !m.translation().cast<float>().allFinite()) return Eigen::Affine3d::Identity();

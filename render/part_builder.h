@@ -47,6 +47,10 @@ class NodeNames {
   std::set<std::string> taken_;
 };
 
+/// Longest side of the box around a model at rest, or around all nodes of its file, if it is only one of
+/// them.
+float largest_side(const Model& model, const Eigen::AlignedBox3f& all_nodes);
+
 /// Rotation and translation without the scale, which is applied to the triangles. For a node that is flat or
 /// mirrored, the nearest rotation.
 Eigen::Affine3d turned_and_moved(const Eigen::Affine3d& m);

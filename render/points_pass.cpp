@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -183,23 +184,22 @@ void PointsPass::draw_spheres(const PointSet& set, const Features& features) {
 void PointsPass::draw_blended(PointStyle style, uint32_t first, uint32_t last) {
   const uint32_t begin = style == PointStyle::flake ? sprites_ + flakes_ - last : sprites_ - last;
   const uint32_t end = begin + (last - first);
-  // Neighbours with other pictures are drawn by further calls.
+  glVertexArrayVertexBuffer(blended_array_, 0, blended_buffer_, 0, sizeof(BlendedPoint));
+  glBindVertexArray(blended_array_);
+  // Neighbours with other pictures are drawn by further calls, between which as little as possible changes.
   auto run = std::upper_bound(picture_runs_.begin(), picture_runs_.end(), std::size_t{begin},
                               [](std::size_t place, const PictureRun& r) { return place < r.first; });
+  std::optional<bool> with_pictures;
   for (std::size_t from = begin; from < end; ++run) {
     const std::size_t to = run == picture_runs_.end() ? end : std::min<std::size_t>(run->first, end);
-    draw_blended(style, std::prev(run)->pictures, from, to);
+    const GLuint pictures = std::prev(run)->pictures;
+    if (with_pictures != (pictures != 0)) blended_program(style, pictures != 0).use();
+    with_pictures = pictures != 0;
+    if (pictures) glBindTextureUnit(kPictureUnit, pictures);
+    glDrawArraysInstancedBaseInstance(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(to - from),
+                                      static_cast<GLuint>(from));
     from = to;
   }
-}
-
-void PointsPass::draw_blended(PointStyle style, GLuint pictures, std::size_t first, std::size_t last) {
-  blended_program(style, pictures != 0).use();
-  if (pictures) glBindTextureUnit(kPictureUnit, pictures);
-  const auto offset = static_cast<GLintptr>(first * sizeof(BlendedPoint));
-  glVertexArrayVertexBuffer(blended_array_, 0, blended_buffer_, offset, sizeof(BlendedPoint));
-  glBindVertexArray(blended_array_);
-  glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(last - first));
 }
 
 void PointsPass::draw_surfaces(const PointSet& set) {

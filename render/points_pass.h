@@ -78,7 +78,6 @@ class PointsPass {
   void draw(const PointSet& set);
   gl::LazyProgram& ball_program(const Features& features);
   gl::LazyProgram& blended_program(PointStyle style, bool pictures);
-  void draw_blended(PointStyle style, GLuint pictures, std::size_t first, std::size_t last);
 
   std::map<Features, gl::LazyProgram> ball_programs_;
   std::map<std::pair<PointStyle, bool>, gl::LazyProgram> blended_programs_;  ///< keyed also by pictures

@@ -49,6 +49,8 @@ struct Lamp {
   Vector3f direction = {0, -1, 0};    ///< unit direction of cones and rectangles
   float cone_deg = 0;                 ///< full angle of a cone; otherwise zero
   float softness = 0.3f;              ///< share of the cone over which its edge fades
+  bool squared_edge =
+      false;  ///< fades with the square (KHR_lights_punctual), not in proportion to the cosine
   bool shadows = true;
 };
 

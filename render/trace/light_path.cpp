@@ -29,6 +29,10 @@ float mirrored_share(const Hit& hit, const Vector3f& direction) {
   return fresnel_of_glass(std::min(-hit.normal.dot(direction), 1.0f), refraction_ratio(hit));
 }
 
+bool is_rough_glass(const RayMaterial& material) {
+  return !material.thin && material.roughness * material.roughness >= kSharp;
+}
+
 Vector3f enter(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Vector3f& from,
                Vector3f& direction) {
   from = off_surface(hit.position, -hit.face);
@@ -151,8 +155,10 @@ bool LightTracer::follow_glass(const Hit& hit, const Vector3f& albedo, PixelSamp
   const Vector3f mirrored_way = reflected(path.direction, hit.normal);
   if (mirrored >= 0.1f && sampler.next().x < mirrored) {
     path.turn(mirrored_way, hit);
+    path.by_chance |= mirrored < 0.5f;  // of two ways, the likelier one brings no dots
     return true;
   }
+  path.by_chance |= mirrored >= 0.5f || is_rough_glass(material);
   if (mirrored < 0.1f && hit.front) {
     sum += mirrored * path.share.cwiseProduct(sky_radiance(sources_.sky, mirrored_way));
     path.share *= 1 - mirrored;
@@ -182,23 +188,56 @@ Vector3f LightTracer::glow_at(const Vector3f& place, const Vector3f& normal, con
   return light.cwiseProduct(scene_.transmittance(place, sample.towards, kBeforeGlow * sample.distance));
 }
 
+// Moves a path off a smooth metal, or adds the light that a smooth layer of varnish mirrors.
+bool LightTracer::follow_smooth(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, bool sharp,
+                                bool scattered, Path& path, FoundLight& light) const {
+  const RayMaterial& material = *hit.material;
+  if (material.roughness >= kSmoothMetal) return false;
+  const float m = 1 - std::min(-hit.normal.dot(path.direction), 1.0f), grazing = m * m * m * m * m;
+  if (material.metallic > 0.5f) {
+    const float a = std::max(material.roughness * material.roughness, scattered ? 0.04f : 1e-4f);
+    path.by_chance |= a >= kSharp;
+    path.turn(reflected(path.direction, visible_facet(hit.normal, -path.direction, a, sampler.next())), hit);
+    path.share = path.share.cwiseProduct(albedo + (Vector3f::Ones() - albedo) * grazing);
+    return true;
+  }
+  if (sharp) {  // in a mirror image, a varnished surface mirrors the sky alone
+    const float fresnel = 0.04f + 0.96f * grazing;
+    Path sky = path;
+    sky.turn(reflected(path.direction, hit.normal), hit);
+    (path.by_chance ? light.noisy : light.certain) +=
+        fresnel * path.share.cwiseProduct(sky_seen(sky.direction))
+                      .cwiseProduct(scene_.transmittance(sky.from, sky.direction, kFar));
+    path.share *= 1 - fresnel;
+  }
+  return false;
+}
+
 // Radiance that arrives along a path. `met`, if not null, gets the distance of what it meets first, and is
 // unchanged if it meets nothing. Mirrors and glass are followed sharply until the first diffuse surface.
-Vector3f LightTracer::radiance(Path path, PixelSampler& sampler, const VisibleLight* visible,
-                               float* met) const {
-  Vector3f sum = Vector3f::Zero();
+LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, const VisibleLight* visible,
+                                              float* met) const {
+  FoundLight light;
+  Vector3f& sum = light.noisy;
+  // Adds what the path meets; the sky of a path with a density has a weight in place of a limit.
+  const auto meet = [&](const Vector3f& radiance) {
+    (path.by_chance && path.density < 0 ? light.noisy : light.certain) += path.share.cwiseProduct(radiance);
+  };
   float travelled = 0;
   bool sharp = path.cone < 0.1f;
   int bounces = 0;
   for (int step = 0; step < kMostSteps; ++step) {
     Hit hit;
     if (!scene_.first_hit(path.from, path.direction, kFar, hit)) {
-      return sum + path.share.cwiseProduct(sky_met(path.direction, sharp, path.density));
+      meet(sky_met(path.direction, sharp, path.density));
+      return light;
     }
     if (step == 0 && met != nullptr) *met = hit.distance;
     const int pixel = visible != nullptr && sharp ? visible->find(hit) : -1;
-    if (pixel >= 0 && visible->has_picture() && !path.mirrored)
-      return sum + path.share.cwiseProduct(visible->color(pixel));
+    if (pixel >= 0 && visible->has_picture() && !path.mirrored) {
+      meet(visible->color(pixel));
+      return light;
+    }
     travelled += hit.distance;
     if (sources_.fog > 0) {
       const float clear = std::exp(-sources_.fog * hit.distance);
@@ -209,41 +248,31 @@ Vector3f LightTracer::radiance(Path path, PixelSampler& sampler, const VisibleLi
     }
     const RayMaterial& material = *hit.material;
     const Vector4f color = material.color(hit, travelled * path.cone);
+    path.by_chance |= color.w() > 0 && color.w() < 1;
     if (color.w() < 1 && sampler.next().x >= color.w()) {  // through a hole, or a translucent surface
       path.from = off_surface(hit.position, -hit.face);
       continue;
     }
     const Vector3f albedo = color.head<3>();
-    if (material.unlit) return sum + path.share.cwiseProduct(albedo);
+    if (material.unlit) {
+      sum += path.share.cwiseProduct(albedo);
+      return light;
+    }
     // Of glass, as on the screen, only the side towards the eye glows.
     if ((hit.front || material.transmission <= 0) && !material.mean_emission().isZero())
-      sum += path.share_of_glow(hit, sources_.glow) * path.share.cwiseProduct(material.emission_at(hit.uv));
+      (path.by_chance ? light.noisy : light.certain) +=
+          path.share_of_glow(hit, sources_.glow) * path.share.cwiseProduct(material.emission_at(hit.uv));
     if (follow_glass(hit, albedo, sampler, path, sum)) continue;
     path.from = off_surface(hit.position, hit.face);
-    const bool smooth = material.roughness < kSmoothMetal;
-    const float m = 1 - std::min(-hit.normal.dot(path.direction), 1.0f), grazing = m * m * m * m * m;
-    if (smooth && material.metallic > 0.5f) {
-      const float a = std::max(material.roughness * material.roughness, bounces > 0 ? 0.04f : 1e-4f);
-      path.turn(reflected(path.direction, visible_facet(hit.normal, -path.direction, a, sampler.next())),
-                hit);
-      path.share = path.share.cwiseProduct(albedo + (Vector3f::Ones() - albedo) * grazing);
-      continue;
-    }
-    if (smooth && sharp) {  // in a mirror image, a varnished surface mirrors the sky alone
-      const float fresnel = 0.04f + 0.96f * grazing;
-      Path sky = path;
-      sky.turn(reflected(path.direction, hit.normal), hit);
-      sum += fresnel * path.share.cwiseProduct(sky_seen(sky.direction))
-                           .cwiseProduct(scene_.transmittance(sky.from, sky.direction, kFar));
-      path.share *= 1 - fresnel;
-    }
+    if (follow_smooth(hit, albedo, sampler, sharp, bounces > 0, path, light)) continue;
     path.share = path.share.cwiseProduct(albedo);
     if (pixel >= 0) {
-      const Vector4f light = visible->arriving(pixel);
+      const Vector4f arriving = visible->arriving(pixel);
       const float cosine = hit.normal.dot(sources_.sky.sun_direction);
       const float sun = sources_.sun.intensity * (std::max((1 - hit.translucency) * cosine, 0.0f) +
                                                   std::max(-hit.translucency * cosine, 0.0f));
-      return sum + path.share.cwiseProduct(light.head<3>() + sun * light.w() * sources_.sun.color);
+      sum += path.share.cwiseProduct(arriving.head<3>() + sun * arriving.w() * sources_.sun.color);
+      return light;
     }
     if (hit.translucency > 0 && sampler.next().x < hit.translucency) {  // light from the other side
       hit.normal = -hit.normal;
@@ -253,14 +282,14 @@ Vector3f LightTracer::radiance(Path path, PixelSampler& sampler, const VisibleLi
     sum += path.share.cwiseProduct(direct_light(hit, path.from, sampler));
     // Paths end at random in proportion to the light that they can still carry.
     const float survives = std::min(path.share.maxCoeff(), 0.95f);
-    if (++bounces >= kMostBounces || sampler.next().x >= survives) return sum;
+    if (++bounces >= kMostBounces || sampler.next().x >= survives) return light;
     path.share /= survives;
     const Vector3f way = to_eigen(cosine_direction(from_eigen(hit.normal), sampler.next()));
     path.scatter(hit.normal, way.dot(hit.face) > 0 ? way : reflected(way, hit.face));
     sharp = false;
     path.cone = 0.5f;
   }
-  return sum;
+  return light;
 }
 
 }  // namespace offstage::render

@@ -19,6 +19,9 @@ inline std::size_t index_of(int x, int y, int width) {
 /// Share of the light along a ray that a surface of glass mirrors.
 float mirrored_share(const Hit& hit, const Vector3f& direction);
 
+/// Whether rays that enter a piece of glass are scattered at random.
+bool is_rough_glass(const RayMaterial& material);
+
 /// Moves a ray through a surface of glass, which it refracts; returns the share of the light that the colour
 /// leaves. A solid piece takes half of its colour, as a factor, where the ray enters, and half where it
 /// leaves.
@@ -29,10 +32,12 @@ Vector3f enter(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Ve
 /// that of rays that meet the mesh by chance.
 Vector3f light_of_glow(const GlowSample& sample, const Vector3f& normal, const Vector3f& face);
 
+/// Surfaces with less roughness^2 mirror and refract a single direction.
+inline constexpr float kSharp = 0.002f;
+
 /// Probability density of a direction that visible_facet() mirrors, for a = roughness^2 [1/sr].
 template <class T>
 T mirror_density(T a, T nv, T nh) {
-  constexpr float kSharp = 0.002f;  // with less, all light of the sky comes from the mirror image
   const T a2 = a * a, d = nh * nh * (a2 - 1.0f) + 1.0f;
   const T density =
       a2 / (2 * std::numbers::pi_v<float> * d * d * (nv + square_root(a2 + (1.0f - a2) * nv * nv)));
@@ -51,6 +56,9 @@ struct LightTracer::Path {
   float cone;  ///< angle that the ray stands for [rad]
   Vector3f share = {1, 1, 1};
   bool mirrored = false;  ///< so far
+  /// Whether its directions depend on random numbers. If not, what it meets is a part of the picture, however
+  /// bright, and not a dot of noise.
+  bool by_chance = false;
   /// Probability density of the direction [1/sr] if the bright part of the sky was sampled, too; else
   /// negative.
   float density = -1;
@@ -63,6 +71,8 @@ struct LightTracer::Path {
     diffuse_place = from;
     diffuse_normal = normal;
     direction = way;
+    by_chance = true;
+    density = -1;
   }
   /// The share of the glow of what is met that is not found by sampling.
   float share_of_glow(const Hit& hit, const Glow& glow) const {

@@ -46,15 +46,6 @@ void store(std::span<LightPlane> planes, int x, int y, const LaneVectors& value)
   planes[2].set_lanes(x, y, value.z);
 }
 
-/// Limits a value that a ray found, and adds it to the sums.
-Vector3f limited(const Vector3f& light, LightSums& sums) {
-  const Vector3f kept = light.cwiseMin(kBrightest);
-  const Vector3f luminance(0.2126f, 0.7152f, 0.0722f);
-  sums.arriving += static_cast<double>(luminance.dot(light));
-  sums.removed += static_cast<double>(luminance.dot(light - kept));
-  return kept;
-}
-
 // GGX as in shaders/light.glsl; `most`: its limit.
 Lanes lobe_of(Lanes a, Lanes nl, Lanes nv, Lanes nh, Lanes most) {
   const Lanes a2 = a * a, d = nh * nh * (a2 - 1) + 1;
@@ -63,6 +54,15 @@ Lanes lobe_of(Lanes a, Lanes nl, Lanes nv, Lanes nh, Lanes most) {
 }
 
 }  // namespace
+
+/// Limits what was found by chance, and adds all to the sums.
+Vector3f LightTracer::FoundLight::limited(LightSums& sums) const {
+  const Vector3f kept = noisy.cwiseMin(kBrightest);
+  const Vector3f luminance(0.2126f, 0.7152f, 0.0722f);
+  sums.arriving += static_cast<double>(luminance.dot(certain + noisy));
+  sums.removed += static_cast<double>(luminance.dot(noisy - kept));
+  return certain + kept;
+}
 
 struct LightTracer::Point {
   Vector3f place, normal, face, view;
@@ -256,8 +256,9 @@ Vector3f LightTracer::mirrored_light(const Point& point, const LightView& view, 
                   .direction = way,
                   .cone = std::max(a, view.pixel_m),
                   .mirrored = true,
+                  .by_chance = a >= kSharp,
                   .density = mirror_density(a, nv, nh)};
-  return limited(radiance(path, sampler, &visible), sums);
+  return radiance(path, sampler, &visible).limited(sums);
 }
 
 // Positions and normals of eight pixels, which guide the filter. `size_px`: width of what a value stands for.
@@ -342,7 +343,7 @@ void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, const
     float met = kFar;
     Path path{.from = point.place, .direction = way, .cone = 0.5f};
     path.scatter(point.normal, way);
-    set_lane(around, i, limited(radiance(path, sampler, nullptr, &met), sums));
+    set_lane(around, i, radiance(path, sampler, nullptr, &met).limited(sums));
     inverse_distance[i] = 1 / std::max(met, 8 * view.pixel_m * (point.place - view.eye).norm());
   }
   store(light.around.channels(), x, y, around);
@@ -466,8 +467,9 @@ Vector3f LightTracer::light_through(const Point& point, PixelSampler& sampler, c
   if (!scene_.first_hit(path.from, path.direction, kFar, hit)) return sky_seen(path.direction);
   const Vector3f albedo = hit.material->color(hit, 0).head<3>();
   path.share *= 1 - mirrored_share(hit, path.direction);
+  path.by_chance = is_rough_glass(*hit.material);
   path.share = path.share.cwiseProduct(enter(hit, albedo, sampler, path.from, path.direction));
-  return limited(radiance(path, sampler, &visible), sums);
+  return radiance(path, sampler, &visible).limited(sums);
 }
 
 void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, const LightView& view,
@@ -480,7 +482,8 @@ void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, con
   const int width = surfaces.width_px;
   glass.sums = sum_over_light_rows(surfaces.height_px, [&](int y, LightSums& sums) {
     for (int x = 0; x < width; x += kLanes) {
-      const Points points(surfaces, pixels_of_row(surfaces, x, y));
+      Points points(surfaces, pixels_of_row(surfaces, x, y));
+      points.mirrors = points.visible;  // glass of any roughness
       if (with_lamps > 0) {
         Sampler<UintLanes> sampler(UintLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<uint32_t>(x0 + x),
                                    UintLanes{} + static_cast<uint32_t>(y0 + y), view.offsets.index,

@@ -100,10 +100,18 @@ class LightTracer {
   struct Point;   ///< a visible surface
   struct Points;  ///< eight of them
   struct Path;    ///< from the eye
-  Vector3f radiance(Path path, PixelSampler& sampler, const VisibleLight* visible = nullptr,
-                    float* met = nullptr) const;
+  /// Light that a path found.
+  struct FoundLight {
+    Vector3f noisy = Vector3f::Zero();    ///< by random directions
+    Vector3f certain = Vector3f::Zero();  ///< by a way without random directions, or weighted against a lamp
+    Vector3f limited(LightSums& sums) const;
+  };
+  FoundLight radiance(Path path, PixelSampler& sampler, const VisibleLight* visible = nullptr,
+                      float* met = nullptr) const;
   bool follow_glass(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Path& path,
                     Vector3f& sum) const;
+  bool follow_smooth(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, bool sharp,
+                     bool scattered, Path& path, FoundLight& light) const;
   Vector3f direct_light(const Hit& hit, const Vector3f& from, PixelSampler& sampler) const;
   Vector3f glow_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
                    PixelSampler& sampler) const;

@@ -53,6 +53,7 @@ LampPoint<T> RayLamp::point_of(const Three<T>& place, const SquarePoint<T>& uv) 
   T share = T{} + 1.0f;
   if (rectangle) share = larger(cosine, T{});
   if (def_.cone_deg > 0) share = clamped_to(cone_factor_ * cosine + cone_offset_, 0, 1);
+  if (def_.squared_edge) share = share * share;
   result.share = share / (result.distance * result.distance + softening + 1e-12f);
   result.arriving = everywhere(def_.intensity) * result.share;
   result.density = T{};

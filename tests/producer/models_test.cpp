@@ -2,6 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include "producer/format/scene_io.h"
+#include "render/mesh_io.h"
+#include "tests/render/gltf_samples.h"
+#include "tests/render/scratch.h"
+
 namespace offstage::producer {
 namespace {
 
@@ -15,6 +20,57 @@ TEST(ModelSize, FitGivesTheLargestSizeWithinABox) {
   EXPECT_DOUBLE_EQ(fitted_scale(1, Vec3(2, 0.5, 2), model), 0.005) << "or the tightest";
   EXPECT_DOUBLE_EQ(fitted_scale(1, Vec3(2, 2, 1e-6), model), 0.01) << "a side without extent does not count";
   EXPECT_DOUBLE_EQ(fitted_scale(3, Vec3(2, 2, 2), model), 0.03) << "copies scale the fitted size";
+}
+
+render::Model model_of_size(float side, render::Model::UnitSource unit) {
+  render::Model model;
+  render::Mesh& mesh = model.parts.emplace_back().mesh;
+  mesh.positions = {{0, 0, 0}, {side, 0, 0}, {0, 0.5f * side, 0}};
+  mesh.indices = {0, 1, 2};
+  model.file_size = side;
+  model.unit_source = unit;
+  return model;
+}
+
+TEST(ModelSize, AutoBringsALikelyUnitToMetres) {
+  using Source = render::Model::UnitSource;
+  ModelScale automatic;
+  automatic.automatic = true;
+  const auto scale = [&](float side, Source unit) {
+    return fitted_scale(automatic, std::nullopt, model_of_size(side, unit));
+  };
+  EXPECT_EQ(scale(1.8f, Source::none), 1) << "a person in metres";
+  EXPECT_EQ(scale(180, Source::none), 0.01) << "in centimetres";
+  EXPECT_EQ(scale(1800, Source::none), 0.001) << "in millimetres";
+  EXPECT_EQ(scale(80, Source::stated), 1) << "a street in the unit of its file";
+  EXPECT_EQ(scale(500, Source::stated), 0.01) << "a model in centimetres in a file that says metres";
+  EXPECT_EQ(scale(60, Source::millimetres), 0.001) << "a part for a printer";
+  EXPECT_EQ(scale(0.06f, Source::millimetres), 1) << "no part is 0.06 mm large";
+  automatic *= 2;
+  EXPECT_EQ(scale(180, Source::none), 0.02) << "copies scale the size";
+}
+
+// A node of a file has the scale of the whole file, although it is small.
+TEST(ModelSize, AutoIsTheSameForAllNodesOfAFile) {
+  render::GltfSample sample;
+  sample.document["nodes"] = {{{"mesh", 0}, {"name", "house"}, {"scale", {300, 300, 300}}},
+                              {{"mesh", 0}, {"name", "door"}, {"scale", {20, 20, 20}}}};
+  sample.document["scenes"][0]["nodes"] = {0, 1};
+  const render::ScratchFolder folder;
+  const std::filesystem::path file = folder.put("a.gltf", sample.text());
+  for (const char* node : {"", "#house", "#door"})
+    EXPECT_EQ(automatic_scale(render::read_model(file.string() + node)).factor, 0.01) << node;
+}
+
+TEST(ModelSize, AutoIsReadAndWritten) {
+  const std::string text =
+      R"({"bodies": [{"shape": {"type": "mesh", "file": "rock.glb", "scale": "auto"}}]})";
+  const LoadedScene loaded = parse_scene(text, "scene", OFFSTAGE_SOURCE_DIR);
+  EXPECT_TRUE(std::get<MeshFile>(loaded.scene.bodies[0].shape).scale.automatic);
+  EXPECT_NE(loaded.canonical.find(R"("scale":"auto")"), std::string::npos) << loaded.canonical.substr(0, 400);
+  const std::string wrong =
+      R"({"bodies": [{"shape": {"type": "mesh", "file": "rock.glb", "scale": "car"}}]})";
+  EXPECT_THROW(parse_scene(wrong, "scene", OFFSTAGE_SOURCE_DIR), SceneError);
 }
 
 }  // namespace

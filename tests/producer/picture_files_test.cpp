@@ -90,8 +90,8 @@ TEST(SkyPictures, LightASceneWithoutASun) {
                "scene", folder.path())
         .scene;
   };
-  EXPECT_EQ(sun_of(scene("")).intensity, 0);
-  EXPECT_GT(sun_of(scene(R"(, "lights": [{"type": "sun"}])")).intensity, 0);
+  EXPECT_EQ(sun_of(scene(""), {}).intensity, 0);
+  EXPECT_GT(sun_of(scene(R"(, "lights": [{"type": "sun"}])"), {}).intensity, 0);
   const render::Environment environment = environment_of(scene(""));
   EXPECT_EQ(environment.picture_turn_deg, 30);
   EXPECT_FALSE(environment.picture_visible);

@@ -104,6 +104,26 @@ TEST(ModelCorpus, EveryFileLoadsOrIsRefusedInOneLine) {
   EXPECT_LT(tally.slowest_s, 10);
 }
 
+/// Some of the triangles of every model are opaque: readers leave alpha at 0 where a format has none.
+bool has_something_opaque(const Model& model) {
+  return std::ranges::any_of(model.parts, [&](const Model::Part& part) {
+    const Material& look = model.materials[static_cast<std::size_t>(part.material)];
+    const bool vertices = !look.vertex_colors || part.mesh.colors.empty() ||
+                          std::ranges::any_of(part.mesh.colors, [](const Vector4f& c) { return c.w() > 0; });
+    return look.color.w() > 0 && vertices;
+  });
+}
+
+TEST(ModelCorpus, NoModelIsInvisible) {
+  for (const auto& file : corpus_files()) {
+    if (is_address_sanitized() && file.filename() == "OutOfMemory.off") continue;
+    try {
+      EXPECT_TRUE(has_something_opaque(read_model(file))) << file;
+    } catch (const FileError&) {  // the test above counts these
+    }
+  }
+}
+
 // The controllers and skinned hands of the npm package @webxr-input-profiles/assets.
 TEST(LongModelCorpus, EveryGltfModelOfTheRegistryLoads) {
   const char* folder = std::getenv("OFFSTAGE_MESHES");

@@ -151,6 +151,43 @@ TEST(GltfExtensions, ContentThatIsNotDrawnIsNamed) {
     EXPECT_TRUE(warns(model, name)) << name;
 }
 
+TEST(GltfPlaces, OfCamerasAndLightsAreThoseOfTheirNodes) {
+  GltfSample sample;
+  Json& nodes = sample.document["nodes"];
+  nodes[0]["translation"] = {1, 2, 3};
+  nodes[0]["children"] = {1, 2};
+  const Json light = {{"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}};
+  nodes.push_back({{"name", "eye"}, {"camera", 0}, {"translation", {0, 0, 4}}});
+  nodes.push_back(light);
+  sample.document["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 1}}}}};
+  Json& lights = sample.document["extensions"]["KHR_lights_punctual"]["lights"];
+  lights = {{{"name", "bulb"}, {"type", "spot"}, {"intensity", 7}, {"color", {1, 0, 0.5}}, {"range", 20}}};
+  const Model model = read_sample(sample);
+  ASSERT_EQ(model.cameras.size(), 1u);
+  EXPECT_EQ(model.cameras[0].name, "eye");
+  EXPECT_EQ(Vector3f(model.cameras[0].model_from_place.block<3, 1>(0, 3)), Vector3f(1, 2, 7));
+  EXPECT_NEAR(model.cameras[0].fov_deg, 57.29578f, 1e-4f);
+  ASSERT_EQ(model.lights.size(), 1u);
+  EXPECT_EQ(model.lights[0].name, "bulb") << "its node has no name";
+  EXPECT_EQ(model.lights[0].color, Vector3f(1, 0, 0.5f));
+  EXPECT_NEAR(model.lights[0].outer_deg, 45, 1e-4f) << "the default";
+  EXPECT_EQ(model.lights[0].range_m, 20);
+
+  const Json broken[] = {{{"type", "laser"}},
+                         {{"type", "point"}, {"intensity", -1}},
+                         {{"type", "spot"}, {"spot", {{"outerConeAngle", 2}}}},
+                         {{"type", "spot"}, {"spot", {{"innerConeAngle", 0.5}, {"outerConeAngle", 0.4}}}}};
+  for (const Json& entry : broken) {
+    lights[0] = entry;
+    const Model without = read_sample(sample);
+    EXPECT_TRUE(without.lights.empty() && warns(without, "lights[0]: its ")) << entry;
+  }
+  sample.document["cameras"][0]["perspective"]["yfov"] = 4;
+  EXPECT_TRUE(warns(read_sample(sample), "cameras[0]: its yfov"));
+  sample.document["cameras"][0]["perspective"]["yfov"] = "wide";
+  EXPECT_NE(why_not(sample.text()).find("yfov: must be a number"), std::string::npos);
+}
+
 TEST(GltfNodes, InstancesAreDrawnAtTheirPlaces) {
   GltfSample sample;
   sample.document["extensionsUsed"] = sample.document["extensionsRequired"] = {"EXT_mesh_gpu_instancing"};
@@ -332,6 +369,13 @@ TEST(GltfHostile, LiesAboutSizesAndIndicesAreFound) {
     EXPECT_EQ(message.find("crash"), std::string::npos) << name << ": " << message;
     EXPECT_EQ(message.find('\n'), std::string::npos) << name;
   }
+}
+
+TEST(GltfVersions, ANumberIsVersionOne) {
+  GltfSample sample;
+  sample.document["asset"]["version"] = 1.0;
+  EXPECT_EQ(why_not(sample.text()).find("version: must be a string"), std::string::npos)
+      << why_not(sample.text());
 }
 
 TEST(GltfHostile, BrokenContainersAreRefused) {

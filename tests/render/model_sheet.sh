@@ -9,7 +9,7 @@ sheet=$(realpath -m "${1:?usage: tests/render/model_sheet.sh SHEET.png}")
 columns=12
 pictures=$(mktemp -d)
 trap 'rm -r "$pictures"' EXIT
-OFFSTAGE_MODEL_SHEET=$pictures build/test_render --gtest_brief=1 --gtest_filter='GltfPicture.*:ObjPicture.*'
+OFFSTAGE_MODEL_SHEET=$pictures build/test_render --gtest_brief=1 --gtest_filter='GltfPicture.*:ObjPicture.*:PlyPicture.*'
 count=0
 for picture in "$pictures"/*.png; do
   name=$(basename -s .png "$picture")

@@ -94,6 +94,22 @@ TEST(ObjPicture, VertexColoursAreSrgb) {
   EXPECT_LT(color.y(), 0.04f);
 }
 
+// Programs that know no alpha write 0, which would make the whole model invisible.
+TEST(PlyPicture, ColoursOfOpacityZeroAreOpaque) {
+  const ScratchFolder folder;
+  std::string text = "ply\nformat ascii 1.0\nelement vertex 4\n";
+  for (const char* name : {"x", "y", "z"}) text += std::string("property float ") + name + "\n";
+  for (const char* name : {"red", "green", "blue", "alpha"})
+    text += std::string("property uchar ") + name + "\n";
+  text += "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  for (const char* corner : {"-1 -1", "1 -1", "1 1", "-1 1"}) text += std::string(corner) + " 0 255 0 0 0\n";
+  ModelPicture picture(folder.put("a.ply", text + "4 0 1 2 3\n"));
+  picture.set_sun({0, 0, 1});
+  EXPECT_GT(picture.color_at(0.1f, 0.1f).x(), 0.9f);
+  ASSERT_EQ(picture.model().warnings.size(), 1u);
+  EXPECT_NE(picture.model().warnings[0].find("opacity 0 taken as opaque"), std::string::npos);
+}
+
 TEST(Mtl, StatementsAreParsedAndBrokenOnesSkipped) {
   std::map<std::string, MtlMaterial> materials;
   read_mtl(

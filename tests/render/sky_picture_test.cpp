@@ -285,6 +285,79 @@ TEST(StageSkyPicture, RoughMetalMirrorsTheBrightPartOnce) {
   }
 }
 
+/// The split-sum reflectance of light.glsl (B. Karis, 2014) of a dielectric.
+float reflectance_of_glass(float roughness, float nv) {
+  const Vector4f r =
+      roughness * Vector4f(-1, -0.0275f, -0.572f, 0.022f) + Vector4f(1, 0.0425f, 1.04f, -0.04f);
+  const float t = std::min(r.x() * r.x(), std::exp2(-9.28f * nv)) * r.x() + r.y();
+  return 0.04f * (-1.04f * t + r.z()) + (1.04f * t + r.w());
+}
+
+// Black glass shows its mirror image alone: the mean of the sky over the lobe times the reflectance. The
+// bright part is so large that both ways to find it have a weight.
+TEST(StageSkyPicture, RoughGlassMirrorsTheBrightPartOnce) {
+  const Vector3f middle = Vector3f(0, 1, -1).normalized(), view = Vector3f(0, 1, 1).normalized();
+  const HdrImage sky = disc_sky(middle, 20, {20, 20, 20}, 0.2f, 512);
+  for (const float roughness : {0.2f, 0.35f, 0.5f}) {
+    LitStage s(sky);
+    s.add(make_box({20, 1, 20}), {.color = {0, 0, 0, 1}, .roughness = roughness, .transmission = 1},
+          {0, -0.5f, 0});
+    s.look({.eye = {0, 3, 3}, .target = {0, 0, 0}, .fov_deg = 10});
+    const float a = roughness * roughness, a2 = a * a, nv = std::sqrt(0.5f);
+    double sum = 0;
+    for (int y = 0; y < 128; ++y) {
+      for (int x = 0; x < 512; ++x) {
+        const float angle = 2 * kPi * ((static_cast<float>(x) + 0.5f) / 512 - 0.5f);
+        const float polar = kPi * (static_cast<float>(y) + 0.5f) / 256;
+        const Vector3f d(std::sin(polar) * std::sin(angle), std::cos(polar),
+                         -std::sin(polar) * std::cos(angle));
+        const float nh = (d + view).normalized().y(), k = nh * nh * (a2 - 1) + 1;
+        const double density = a2 / (2 * kPi * k * k * (nv + std::sqrt(a2 + (1 - a2) * nv * nv)));
+        sum += density * std::sin(polar) * (kPi / 256) * (2 * kPi / 512) *
+               (d.dot(middle) > std::cos(20 * kPi / 180) ? 20 : 0.2);
+      }
+    }
+    EXPECT_NEAR(mean_color(s.mean_of(64), {80, 60}, 4).y() / (sum * reflectance_of_glass(roughness, nv)), 1,
+                0.15f)
+        << roughness;
+  }
+}
+
+// A sun of 5000 times the brightness of white is as bright in a mirror, and in a mirror of a mirror, as in
+// the sky. A pane lets through what it does not mirror.
+TEST(StageSkyPicture, ABrightSunIsAsBrightInAMirrorAndBehindAPane) {
+  const Vector3f sun = Vector3f(0, 1, -1).normalized();
+  const HdrImage sky = disc_sky(sun, 4, {5000, 4000, 2000}, 0.1f, 1024);
+  const Material mirror{.color = {1, 1, 1, 1}, .metallic = 1, .roughness = 0};
+  {
+    LitStage s(sky);
+    s.add(make_ground(20), mirror);
+    s.look({.eye = {0, 3, 3}, .target = {0, 0, 0}, .fov_deg = 4});
+    const Vector3f seen = mean_color(s.mean_of(4), {80, 60}, 4);
+    EXPECT_NEAR(seen.x() / 5000, 1, 0.02f);
+    EXPECT_NEAR(seen.z() / 2000, 1, 0.02f);
+  }
+  {
+    LitStage s(sky);
+    s.add(make_box({9, 9, 0.001f}), {.color = {1, 1, 1, 1}, .roughness = 0, .transmission = 1, .thin = true});
+    s.look({.eye = -3 * sun, .target = {0, 0, 0}, .fov_deg = 4});
+    EXPECT_GT(mean_color(s.mean_of(4), {80, 60}, 4).x(), 0.8f * 5000);
+  }
+}
+
+// A mirror shows a white wall that a small sun does not reach: what bounces from the wall to the sun is a
+// lamp's light, and is not found a second time by chance.
+TEST(StageSkyPicture, AMirrorShowsAWallAsBrightAsItIs) {
+  const Vector3f sun = Vector3f(0, 1, 1).normalized();
+  LitStage s(disc_sky(sun, 10, {100, 100, 100}, 0, 512));
+  s.add(make_box({30, 30, 0.1f}), kWhitePlaster, {0, 0, -8});
+  s.add(make_ground(3), {.color = {1, 1, 1, 1}, .metallic = 1, .roughness = 0});
+  s.look({.eye = {0, 3, 3}, .target = {0, 0, 0}, .fov_deg = 4});
+  const float in_mirror = mean_color(s.mean_of(16), {80, 60}, 8).y();
+  s.look({.eye = {0, 3, 3}, .target = {0, 8, -8}, .fov_deg = 4});
+  EXPECT_NEAR(in_mirror / mean_color(s.mean_of(16), {80, 60}, 8).y(), 1, 0.05f);
+}
+
 // --- Files ---
 
 TEST(LightImage, RadianceIsMantissaTimesTwoToTheExponent) {
@@ -298,6 +371,49 @@ TEST(LightImage, RadianceIsMantissaTimesTwoToTheExponent) {
   EXPECT_EQ(pixel(light.image, 1, 0), Vector4f(3200, 1600, 0, 1));
   EXPECT_TRUE(light.warnings.empty());
   EXPECT_THROW(read_texture(folder.put("c.hdr", text)), FileError) << "it is no texture";
+}
+
+/// Runs a decoder over all beginnings of a file: they are refused with its name, or nothing of the picture is
+/// missing.
+void expect_cut_files_refused(const std::vector<uint8_t>& bytes, const auto& decode) {
+  const auto whole = decode(bytes);
+  std::size_t refused = 0;
+  for (std::size_t size = 0; size < bytes.size(); ++size) {
+    try {
+      EXPECT_EQ(decode(std::span(bytes).first(size)), whole) << size << " of " << bytes.size();
+    } catch (const FileError& error) {
+      ++refused;
+      EXPECT_EQ(std::string(error.what()).find("cut: "), 0u) << error.what();
+    }
+  }
+  EXPECT_GE(refused + 16, bytes.size());
+}
+
+std::vector<uint8_t> bytes_of(const std::string& text) {
+  return {text.begin(), text.end()};
+}
+
+TEST(CutPictures, AreRefusedByName) {
+  const auto as_light = [](std::span<const uint8_t> bytes) {
+    return decode_light_image(bytes, "cut").image.rgba;
+  };
+  const auto as_texture = [](std::span<const uint8_t> bytes) { return decode_image(bytes, "cut").rgba; };
+  Image image{24, 16, {}};
+  for (int i = 0; i < 24 * 16; ++i)
+    for (const int k : {i * 7, i * 3, i, 255}) image.rgba.push_back(static_cast<uint8_t>(k | 64));
+  expect_cut_files_refused(encode_png(image), as_texture);
+  expect_cut_files_refused(encode_jpeg(image, ""), as_texture);
+  std::string pixels, flat = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 3 +X 6\n", ppm = "P6 24 16 255\n";
+  for (int i = 0; i < 3 * 6 * 4; ++i) flat += static_cast<char>(i % 4 == 3 ? 129 : 64 + i);
+  for (int i = 0; i < 24 * 16 * 3; ++i) ppm += static_cast<char>(64 + i % 100);
+  expect_cut_files_refused(bytes_of(flat), as_light);
+  expect_cut_files_refused(bytes_of(ppm), as_texture);
+  std::string tga(18, '\0');
+  tga[2] = 2;
+  tga[12] = 24;
+  tga[14] = 16;
+  tga[16] = 24;
+  expect_cut_files_refused(bytes_of(tga + ppm.substr(13)), as_texture);
 }
 
 TEST(LightImage, OpenExrIsReadAsWrittenAndRepairedWithAWarning) {

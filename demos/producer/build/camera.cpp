@@ -6,6 +6,7 @@
 
 #include "producer/base/to_float.h"
 #include "producer/build/body_shapes.h"
+#include "producer/build/shown_model.h"
 #include "sim/dynamics/keyframes.h"
 
 namespace offstage::producer {
@@ -49,6 +50,7 @@ Vec3 follow_keys(const KeyframedCamera& camera, double time, Value&& value) {
 struct View {
   Vec3 eye, target;
   Real fov_deg, focus;
+  Vec3 up = Vec3::UnitY();
 };
 
 View view_of(const StaticCamera& c, const View& lens, double) {
@@ -73,9 +75,21 @@ View view_of(const OrbitCamera& c, const View& lens, double time) {
           lens.fov_deg, lens.focus};
 }
 
+/// `world_of`: gives the pose of a camera, which looks along -z.
+View view_of(const ModelCamera& c, const View& lens, const render::Model::Camera& camera,
+             const auto& world_of) {
+  const Eigen::Affine3f world = world_of(camera);
+  const Vec3 eye = world.translation().template cast<Real>();
+  const auto axis = [&](const Vector3f& own) {
+    return Vec3((world.linear() * own).normalized().cast<Real>());
+  };
+  return {eye, eye + axis(-Vector3f::UnitZ()), c.focal_mm ? lens.fov_deg : Real{camera.fov_deg}, lens.focus,
+          axis(Vector3f::UnitY())};
+}
+
 }  // namespace
 
-CameraRig::CameraRig(const Scene& scene, const ModelLibrary& models) : scene_(scene) {
+CameraRig::CameraRig(const Scene& scene, const ModelLibrary& models) : scene_(scene), models_(models) {
   const std::vector<std::string>& names =
       std::visit([](const Lens& lens) -> const std::vector<std::string>& { return lens.fit; }, scene.camera);
   for (const Body& body : scene.bodies)
@@ -93,11 +107,19 @@ render::Camera CameraRig::at(double time, const BodyPlaces& places,
       [&]<class C>(const C& c) {
         if constexpr (std::is_same_v<C, FollowCamera>)
           return View{place(c.body) + c.offset, place(c.body) + c.look_offset, own.fov_deg, own.focus};
+        else if constexpr (std::is_same_v<C, ModelCamera>)
+          return view_of(c, own, *find_camera(c, scene_, models_), [&](const render::Model::Place& camera) {
+            return Eigen::Affine3f(places.at(c.body, moving) *
+                                   pose_in_body(body_of(scene_, c.body), camera, models_, time));
+          });
         else
           return view_of(c, own, time);
       },
       scene_.camera);
-  if (!lens.look_at.empty()) view.target = place(lens.look_at);
+  if (!lens.look_at.empty()) {
+    view.target = place(lens.look_at);
+    view.up = Vec3::UnitY();
+  }
   if (!fitted_.isEmpty()) {
     // The ball around the bodies touches the nearer sides of the picture.
     const Real aspect = Real(scene_.render.size.x()) / scene_.render.size.y();
@@ -111,6 +133,7 @@ render::Camera CameraRig::at(double time, const BodyPlaces& places,
     view.focus = std::max((place(lens.focus_on) - view.eye).dot((view.target - view.eye).normalized()), 0.01);
   return {.eye = view.eye.cast<float>(),
           .target = view.target.cast<float>(),
+          .up = view.up.cast<float>(),
           .fov_deg = to_float(view.fov_deg),
           .aperture = to_float(lens.aperture),
           .focus = to_float(view.focus)};

@@ -17,6 +17,7 @@ class CameraRig {
 
  private:
   const Scene& scene_;
+  const ModelLibrary& models_;
   Eigen::AlignedBox3f fitted_;  ///< box of the bodies that are to fill the picture; empty if there are none
 };
 

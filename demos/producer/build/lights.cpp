@@ -1,9 +1,11 @@
 #include "producer/build/lights.h"
 
 #include <algorithm>
+#include <numbers>
 
 #include "effects/distribution.h"
 #include "producer/base/to_float.h"
+#include "producer/build/shown_model.h"
 
 namespace offstage::producer {
 namespace {
@@ -41,6 +43,7 @@ struct LampOf {
   }
 
   std::optional<render::Lamp> operator()(const SunLight&) const { return {}; }
+  std::optional<render::Lamp> operator()(const ModelLights&) const { return {}; }  // several: see lamps_of()
   std::optional<render::Lamp> operator()(const PointLight& l) const {
     render::Lamp lamp = base(l);
     lamp.radius = to_float(l.radius);
@@ -63,9 +66,37 @@ struct LampOf {
   }
 };
 
+// A surface that reflects all light has the radiance E / pi under the irradiance E.
+constexpr float kPerCandela = 1 / std::numbers::pi_v<float>;
+
+/// Calls each(settings, light, body) for all lights of model files that an entry of the scene stands for.
+template <class Each>
+void for_each_file_light(const Light& light, const Scene& scene, const ModelLibrary& models, Each each) {
+  const auto* settings = std::get_if<ModelLights>(&light);
+  if (!settings) return;
+  const Body& body = body_of(scene, settings->body);
+  for (const FileLight& own : models.model(shown_model(body, models).value().file).lights)
+    if (has_light(*settings, own)) each(*settings, own, body);
+}
+
+render::Lamp lamp_of(const ModelLights& settings, const FileLight& light,
+                     const Eigen::Affine3f& world_from_light) {
+  render::Lamp lamp{.position = world_from_light.translation(),
+                    .intensity = kPerCandela * to_float(settings.intensity) * light.intensity * light.color,
+                    .radius = to_float(settings.radius),
+                    .direction = (world_from_light.linear() * -Eigen::Vector3f::UnitZ()).normalized(),
+                    .shadows = settings.shadows};
+  if (light.kind == FileLight::Kind::spot) {
+    lamp.cone_deg = 2 * light.outer_deg;
+    lamp.softness = 1 - light.inner_deg / light.outer_deg;
+    lamp.squared_edge = true;
+  }
+  return lamp;
+}
+
 }  // namespace
 
-render::Sun sun_of(const Scene& scene) {
+render::Sun sun_of(const Scene& scene, const ModelLibrary& models) {
   for (const Light& light : scene.lights)
     if (const auto* l = std::get_if<SunLight>(&light))
       return {.direction = l->direction.normalized().cast<float>(),
@@ -73,7 +104,21 @@ render::Sun sun_of(const Scene& scene) {
               .intensity = to_float(l->intensity),
               .size_deg = to_float(l->size_deg),
               .shadows = l->shadows};
-  return {.intensity = 0, .shadows = false};
+  render::Sun sun{.intensity = 0, .shadows = false};
+  for (const Light& light : scene.lights)
+    for_each_file_light(light, scene, models,
+                        [&](const ModelLights& settings, const FileLight& own, const Body& body) {
+                          if (own.kind != FileLight::Kind::directional) return;
+                          const Eigen::Vector3f towards =
+                              body.orientation.cast<float>() *
+                              (pose_in_body(body, own, models, 0).linear() * Eigen::Vector3f::UnitZ());
+                          sun = {.direction = towards.normalized(),
+                                 .color = own.color,
+                                 .intensity = kPerCandela * to_float(settings.intensity) * own.intensity,
+                                 .size_deg = to_float(settings.size_deg),
+                                 .shadows = settings.shadows};
+                        });
+  return sun;
 }
 
 render::Environment environment_of(const Scene& scene) {
@@ -95,13 +140,32 @@ render::Environment environment_of(const Scene& scene) {
   return environment;
 }
 
-std::vector<render::Lamp> lamps_of(const Scene& scene, double time, const BodyPlaces& places,
-                                   const std::vector<BodySample>& moving) {
+std::vector<render::Lamp> lamps_of(const Scene& scene, const ModelLibrary& models, double time,
+                                   const BodyPlaces& places, const std::vector<BodySample>& moving) {
   std::vector<render::Lamp> lamps;
-  const LampOf lamp_of{time, places, moving};
-  for (const Light& light : scene.lights)
-    if (const auto lamp = std::visit(lamp_of, light)) lamps.push_back(*lamp);
+  const LampOf own_lamp{time, places, moving};
+  for (const Light& light : scene.lights) {
+    if (const auto lamp = std::visit(own_lamp, light)) lamps.push_back(*lamp);
+    for_each_file_light(
+        light, scene, models, [&](const ModelLights& settings, const FileLight& own, const Body& body) {
+          if (own.kind == FileLight::Kind::directional) return;
+          lamps.push_back(
+              lamp_of(settings, own, places.at(body.name, moving) * pose_in_body(body, own, models, time)));
+        });
+  }
   return lamps;
+}
+
+std::vector<std::string> lamp_names(const Scene& scene, const ModelLibrary& models) {
+  std::vector<std::string> names;
+  for (const Light& light : scene.lights) {
+    if (!std::holds_alternative<SunLight>(light) && !std::holds_alternative<ModelLights>(light))
+      names.emplace_back();
+    for_each_file_light(light, scene, models, [&](const ModelLights&, const FileLight& own, const Body&) {
+      if (own.kind != FileLight::Kind::directional) names.push_back(own.name);
+    });
+  }
+  return names;
 }
 
 }  // namespace offstage::producer

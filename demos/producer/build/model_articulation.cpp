@@ -17,7 +17,8 @@ namespace {
 void append_cloud(const render::PointCloud& cloud, ParticleGroup& group) {
   sim::Aabb box;
   for (const Eigen::Vector3f& p : cloud.positions) box.extend(p.cast<Real>());
-  const Real scale = fitted_scale(group.scale, group.fit, box.sizes());
+  const Real likely = automatic_scale(box.sizes().maxCoeff(), render::Model::UnitSource::none).factor;
+  const Real scale = fitted_scale(group.scale, group.fit, box.sizes(), likely);
   const std::size_t n = cloud.positions.size(),
                     taken = std::min(n, static_cast<std::size_t>(group.max_points));
   for (std::size_t k = 0; k < taken; ++k) {
@@ -49,8 +50,10 @@ void read_links(Scene& scene, const SceneFolder& folder, std::vector<Problem>& e
     auto* tree = std::get_if<ModelTree>(&articulation);
     if (!tree || tree->file.empty()) continue;
     try {
-      for (const render::Model::Node& node :
-           render::read_model(model_file(tree->file, folder), folder.inputs(), interrupt_signal).nodes)
+      const render::Model model =
+          render::read_model(model_file(tree->file, folder), folder.inputs(), interrupt_signal);
+      tree->scale = fitted_scale(tree->scale, {}, model);
+      for (const render::Model::Node& node : model.nodes)
         tree->links.push_back({node.name,
                                node.parent,
                                {node.position.cast<Real>(), node.orientation.cast<Real>().normalized()}});
@@ -67,7 +70,7 @@ Parts build(const ModelTree& tree) {
   for (const ModelTree::Link& link : tree.links) {
     Body& body = make.body(link.name, tree.material);
     body.shape = MeshFile{tree.file + "#" + link.name, tree.scale};
-    body.position = tree.position + tree.orientation * (tree.scale * link.pose.position);
+    body.position = tree.position + tree.orientation * (tree.scale.factor * link.pose.position);
     body.orientation = (tree.orientation * link.pose.orientation).normalized();
     body.velocity = tree.velocity;
     body.density = tree.density;

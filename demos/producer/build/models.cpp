@@ -12,6 +12,7 @@
 #include "producer/base/suggest.h"
 #include "producer/base/to_float.h"
 #include "producer/build/animated_bodies.h"
+#include "producer/build/shown_model.h"
 #include "render/error.h"
 #include "render/image_io.h"
 #include "render/mesh_io.h"
@@ -112,6 +113,25 @@ void add_to(XXH3_state_t* hash, const render::Model& model) {
     XXH3_128bits_update(hash, choices, sizeof choices);
   }
   add_to(hash, model.rig);
+  const auto add_place = [&](const render::Model::Place& place) {
+    XXH3_128bits_update(hash, place.name.data(), place.name.size());
+    XXH3_128bits_update(hash, place.model_from_place.data(), 16 * sizeof(float));
+  };
+  for (const render::Model::Camera& camera : model.cameras) {
+    add_place(camera);
+    XXH3_128bits_update(hash, &camera.fov_deg, sizeof camera.fov_deg);
+  }
+  for (const render::Model::Light& light : model.lights) {
+    add_place(light);
+    const float numbers[] = {light.color.x(),
+                             light.color.y(),
+                             light.color.z(),
+                             light.intensity,
+                             light.inner_deg,
+                             light.outer_deg,
+                             static_cast<float>(light.kind)};
+    XXH3_128bits_update(hash, numbers, sizeof numbers);
+  }
   for (const render::Image& texture : model.textures) add_to(hash, texture);
 }
 
@@ -224,6 +244,7 @@ ModelLibrary::ModelLibrary(const Scene& scene, const SceneFolder& folder, const 
     }
   check_sheets(scene, problems);
   if (problems.empty()) read_animations(scene, cache, problems);
+  if (problems.empty()) check_cameras_and_lights(scene, *this, problems, warnings);
   digest_ = hex(XXH3_128bits_digest(hash));
   XXH3_freeState(hash);
   if (!problems.empty()) throw SceneError(std::move(problems));
@@ -335,11 +356,32 @@ const std::string& animated_file(const Body& body) {
   return body.model ? body.model->file : std::get<MeshFile>(body.shape).file;
 }
 
-Real fitted_scale(Real scale, const std::optional<Vec3>& fit, const render::Model& model) {
-  return fit ? fitted_scale(scale, fit, Vec3(model.bounds().sizes().cast<Real>())) : scale;
+ChosenScale automatic_scale(Real largest_side, render::Model::UnitSource unit) {
+  using Source = render::Model::UnitSource;
+  constexpr Real kLeastPart_mm = 5;
+  if (unit == Source::millimetres)
+    return largest_side >= kLeastPart_mm
+               ? ChosenScale{0.001, "STL files are usually in millimetres"}
+               : ChosenScale{1, fmt::format("{:.3g} mm would be too small for a part", largest_side)};
+  const Real largest_m = unit == Source::stated ? 100 : 10;
+  const std::string size = fmt::format("the longest side of {:.4g}", largest_side);
+  if (largest_side <= largest_m) return {1, size + fmt::format(" is at most {:g} m", largest_m)};
+  if (0.01 * largest_side <= largest_m)
+    return {0.01, size + fmt::format(" is likely in centimetres: more than {:g} m are unlikely", largest_m)};
+  return {0.001, size + fmt::format(" is likely in millimetres: more than {:g} m are unlikely", largest_m)};
 }
 
-Real fitted_scale(Real scale, const std::optional<Vec3>& fit, const Vec3& size) {
+ChosenScale automatic_scale(const render::Model& model) {
+  return automatic_scale(static_cast<Real>(model.file_size), model.unit_source);
+}
+
+Real fitted_scale(const ModelScale& scale, const std::optional<Vec3>& fit, const render::Model& model) {
+  return fitted_scale(scale, fit, Vec3(model.bounds().sizes().cast<Real>()), automatic_scale(model).factor);
+}
+
+Real fitted_scale(const ModelScale& scale_of_use, const std::optional<Vec3>& fit, const Vec3& size,
+                  Real likely) {
+  const Real scale = scale_of_use.automatic ? scale_of_use.factor * likely : scale_of_use.factor;
   if (!fit) return scale;
   Real factor = std::numeric_limits<Real>::infinity();
   for (int k = 0; k < 3; ++k)

@@ -85,12 +85,28 @@ class ModelLibrary {
 /// The model file whose animation a body plays.
 const std::string& animated_file(const Body& body);
 
+/// A scale factor and why it was chosen, in words.
+struct ChosenScale {
+  Real factor = 1;
+  std::string reason;
+};
+/// The factor that brings a model from its file's likely unit to metres: 1, 0.01 (centimetres) or 0.001
+/// (millimetres). `largest_side`: of the box around all of the file, with the unit that was read or assumed
+/// [m].
+ChosenScale automatic_scale(Real largest_side, render::Model::UnitSource unit);
+ChosenScale automatic_scale(const render::Model& model);
+
 /// Scale factor that brings a model to the size of its use: `scale` times the factor that fits its bounding
-/// box into the box `fit`, if there is one. Axes along which the model is flat do not count.
-Real fitted_scale(Real scale, const std::optional<Vec3>& fit, const Vec3& size);
-Real fitted_scale(Real scale, const std::optional<Vec3>& fit, const render::Model& model);
-Real scale_of(const auto& use, const ModelLibrary& models) {
-  return fitted_scale(use.scale, use.fit, models.model(use.file));
+/// box into the box `fit`, if there is one. Axes along which the model is flat do not count. `likely`: the
+/// factor of automatic_scale().
+Real fitted_scale(const ModelScale& scale, const std::optional<Vec3>& fit, const Vec3& size, Real likely);
+Real fitted_scale(const ModelScale& scale, const std::optional<Vec3>& fit, const render::Model& model);
+template <class Use>
+Real scale_of(const Use& use, const ModelLibrary& models) {
+  if constexpr (requires { use.fit; })
+    return fitted_scale(use.scale, use.fit, models.model(use.file));
+  else
+    return fitted_scale(use.scale, {}, models.model(use.file));
 }
 
 /// All triangles of a model as one mesh for the simulation, scaled.

@@ -122,7 +122,7 @@ void ParticleSources::add(const Emitter& emitter, const ModelLibrary& models, si
         effects::EmitterDef def = emitter_def(emitter, seed);
         def.body = body(emitter.body);
         if (const auto* mesh = std::get_if<MeshSurface>(&emitter.surface))
-          def.surface.mesh = collision_mesh(models.model(mesh->file), mesh->scale);
+          def.surface.mesh = collision_mesh(models.model(mesh->file), scale_of(*mesh, models));
         emitters_.emplace_back(def, system);
       } else if (birth.trail) {
         trails_.emplace_back(trail_def(*birth.trail, name, seed), handles.at(parent), system);

@@ -70,6 +70,7 @@ render::ObjectNames object_names(const Scene& scene) {
 
 Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context& context)
     : scene_(scene),
+      library_(models),
       stage_(context, {.width_px = scene.render.size.x(), .height_px = scene.render.size.y()}),
       camera_(scene, models) {
   std::size_t slot = 0;
@@ -97,7 +98,7 @@ Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context
     add_points(*look, models, ++object);
   }
   add_overlay_lines();
-  stage_.set_sun(sun_of(scene));
+  stage_.set_sun(sun_of(scene, models));
   render::Environment environment = environment_of(scene);
   environment.picture = models.sky();
   stage_.set_environment(environment);

@@ -141,6 +141,7 @@ class Picture {
   float exposure(double time, float sample_weight) const;
 
   const Scene& scene_;
+  const ModelLibrary& library_;
   render::Stage stage_;
   std::map<std::string, render::MaterialHandle> materials_;
   std::map<std::string, std::pair<std::vector<render::MeshHandle>, std::vector<render::MaterialHandle>>>

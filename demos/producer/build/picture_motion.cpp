@@ -265,7 +265,7 @@ void Picture::place(const Snapshot& previous, const Snapshot& current, float w, 
   place_overlays(previous, current, w);
   latest_camera_ = camera_.at(time, places_, samples);
   stage_.set_camera(latest_camera_);
-  stage_.set_lamps(lamps_of(scene_, time, places_, samples));
+  stage_.set_lamps(lamps_of(scene_, library_, time, places_, samples));
   stage_.set_time(to_float(time));
 }
 

@@ -51,11 +51,35 @@ std::string size_hint(float largest_side) {
   if (largest_side > kHuge)
     return fmt::format(
         "it is {:.4g} m large; if its unit is the centimetre or millimetre, \"scale\": 0.01 or 0.001 "
-        "corrects it, or \"fit\" gives it a size",
+        "corrects it (\"auto\" chooses), or \"fit\" gives it a size",
         largest_side);
   if (largest_side < kTiny)
     return fmt::format("it is {:.3g} m small; \"scale\" or \"fit\" gives it a size", largest_side);
   return "";
+}
+
+Json cameras_json(const render::Model& model) {
+  Json cameras = Json::array();
+  for (const render::Model::Camera& camera : model.cameras) {
+    cameras.push_back(
+        {{"name", camera.name}, {"projection", camera.perspective ? "perspective" : "orthographic"}});
+    if (camera.perspective) cameras.back()["fov_deg"] = camera.fov_deg;
+  }
+  return cameras;
+}
+
+Json lights_json(const render::Model& model) {
+  using Kind = render::Model::Light::Kind;
+  static const std::map<Kind, const char*> names = {
+      {Kind::directional, "directional"}, {Kind::point, "point"}, {Kind::spot, "spot"}};
+  Json lights = Json::array();
+  for (const render::Model::Light& light : model.lights) {
+    lights.push_back({{"name", light.name}, {"type", names.at(light.kind)}, {"color", json_of(light.color)}});
+    lights.back()[light.kind == Kind::directional ? "lux" : "candela"] = light.intensity;
+    if (light.kind == Kind::spot) lights.back()["cone_half_angles_deg"] = {light.inner_deg, light.outer_deg};
+    if (light.range_m > 0) lights.back()["range"] = light.range_m;
+  }
+  return lights;
 }
 
 Json describe_model(const std::filesystem::path& path, const DecompositionCache& cache) {
@@ -96,8 +120,18 @@ Json describe_model(const std::filesystem::path& path, const DecompositionCache&
   for (const render::Model::Clip& clip : model.clips)
     clips.push_back({{"name", clip.name}, {"duration", clip.duration}});
   json["animations"] = clips;
+  json["cameras"] = cameras_json(model);
+  json["lights"] = lights_json(model);
+  const ChosenScale likely = automatic_scale(model);
+  json["automatic_scale"] = {{"scale", likely.factor}, {"reason", likely.reason}};
   if (const std::string hint = size_hint(bounds.sizes().maxCoeff()); !hint.empty()) json["hint"] = hint;
-  json["warnings"] = model.warnings;
+  std::vector<std::string> warnings = model.warnings;
+  if (!model.cameras.empty() || !model.lights.empty())
+    warnings.push_back("the cameras and lights are used only by a `camera` or `lights` of the type `model`");
+  for (const render::Model::Light& light : model.lights)
+    if (light.range_m > 0)
+      warnings.push_back("the light '" + light.name + "' has a range, which is ignored: light has no end");
+  json["warnings"] = warnings;
   return json;
 }
 

@@ -219,7 +219,8 @@ class FilmParts::Builder {
   std::size_t slots_ = 0, rods_ = 0;
 };
 
-FilmParts::FilmParts(const Scene& s, const ModelLibrary& models) : scene(s), camera_(s, models) {
+FilmParts::FilmParts(const Scene& s, const ModelLibrary& models)
+    : scene(s), models_(models), camera_(s, models) {
   Builder builder(*this, s, models);
   for (const Body& body : s.bodies) builder.add_body(body);
   for (const Spring& spring : s.springs) builder.add_rod(spring, "spring");
@@ -238,8 +239,8 @@ FilmParts::FilmParts(const Scene& s, const ModelLibrary& models) : scene(s), cam
   const std::vector<const ParticleLook*> looks = looks_of(s);
   for (std::size_t i = 0; i < set_names.size(); ++i)
     points.push_back({builder.unique(set_names[i], "particles"), i, !points_def(*looks[i]).lit});
-  for (const Light& light : s.lights)
-    if (!std::holds_alternative<SunLight>(light)) lamps.push_back(builder.unique("", "lamp"));
+  for (const std::string& name : lamp_names(s, models)) lamps.push_back(builder.unique(name, "lamp"));
+  sun = sun_of(s, models);
 }
 
 render::Camera FilmParts::camera_at(const Snapshot& snapshot) const {
@@ -247,7 +248,7 @@ render::Camera FilmParts::camera_at(const Snapshot& snapshot) const {
 }
 
 std::vector<render::Lamp> FilmParts::lamps_at(const Snapshot& snapshot) const {
-  return lamps_of(scene, snapshot.time, places_, snapshot.bodies);
+  return lamps_of(scene, models_, snapshot.time, places_, snapshot.bodies);
 }
 
 std::optional<Affine3f> rod_transform(const RodSample& rod) {

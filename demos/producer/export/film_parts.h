@@ -77,6 +77,7 @@ class FilmParts {
   std::vector<FilmCloth> cloths;
   std::vector<FilmPoints> points;
   std::vector<std::string> lamps;  ///< names, in the order of lamps_at()
+  render::Sun sun;
 
   render::Camera camera_at(const Snapshot& snapshot) const;
   std::vector<render::Lamp> lamps_at(const Snapshot& snapshot) const;
@@ -84,6 +85,7 @@ class FilmParts {
  private:
   class Builder;
   BodyPlaces places_;
+  const ModelLibrary& models_;
   CameraRig camera_;
 };
 

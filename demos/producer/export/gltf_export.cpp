@@ -436,7 +436,7 @@ class GltfExport : public FilmExport {
     // no absolute scale, so one unit stands for 1 W, which importers convert to 683 lm.
     constexpr float kLumens = 683;
     const float pi = std::numbers::pi_v<float>;
-    const render::Sun sun = sun_of(parts_.scene);
+    const render::Sun& sun = parts_.sun;
     if (sun.intensity > 0) {
       NodeTracks tracks;
       tracks.add(1, Vector3f::Zero(), look_rotation(-sun.direction, Vector3f::UnitY()));

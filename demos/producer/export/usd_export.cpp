@@ -380,7 +380,7 @@ class UsdExport : public FilmExport {
   }
 
   void put_lights() {
-    const render::Sun sun = sun_of(parts_.scene);
+    const render::Sun& sun = parts_.sun;
     if (sun.intensity > 0)
       put(fmt::format(
           "def DistantLight \"{}\"\n{{\nfloat inputs:angle = {}\nfloat inputs:intensity = {}\n"

@@ -552,6 +552,21 @@ class Checker {
     check_view(camera.offset, camera.look_offset, path);
   }
 
+  /// The body shows a model file, whose cameras and lights are known when it is read.
+  void check_model_body(const std::string& path, const std::string& name) {
+    const Body* body = named_body(path, name);
+    if (body && !body->model && !std::holds_alternative<MeshFile>(body->shape))
+      fail(path, "the body '" + name + "' shows no model file");
+  }
+  void check_view(const ModelCamera& camera, const std::string& path) {
+    check_model_body(path + "/body", camera.body);
+    if (camera.fov_deg != Lens().fov_deg)
+      fail(path + "/fov_deg", "a camera of a file has the field of view of the file; `focal_mm` replaces it");
+    if (camera.aperture > 0 && camera.focus <= 0 && camera.focus_on.empty())
+      fail(path + "/aperture",
+           "needs a focus: a camera of a file has no target; give \"focus\" or \"focus_on\"");
+  }
+
   void check_camera(const Camera& camera, const std::string& path) {
     const auto& lens = std::visit([](const Lens& l) -> const Lens& { return l; }, camera);
     std::visit([&](const auto& c) { check_view(c, path); }, camera);
@@ -587,6 +602,9 @@ class Checker {
   void check_lamp(const LampBase& lamp, const std::string& path) {
     if (!lamp.body.empty()) check_body_name(path + "/body", lamp.body);
     check_not_random(path + "/intensity", lamp.intensity);
+  }
+  void check_light(const ModelLights& lights, const std::string& path) {
+    check_model_body(path + "/body", lights.body);
   }
   void check_light(const PointLight& light, const std::string& path) { check_lamp(light, path); }
   template <class Directed>

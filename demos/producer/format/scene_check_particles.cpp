@@ -111,7 +111,7 @@ class ParticleChecker {
     if (std::holds_alternative<sim::Plane>(look.mesh->shape))
       fail(path + "/mesh/shape", "a plane is infinite; use a flat box");
     const auto* mesh = std::get_if<MeshFile>(&look.mesh->shape);
-    if (mesh && (mesh->fit || mesh->scale != 1))
+    if (mesh && (mesh->fit || mesh->scale != ModelScale()))
       warn(path + "/mesh/shape", "its size has no effect: the mesh gets the size of the particle");
     if (look.color.rgba != Eigen::Vector4f::Ones() || !look.color_over_age.empty() ||
         !look.temperature_over_age.empty())

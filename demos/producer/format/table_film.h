@@ -92,10 +92,26 @@ struct Table<FollowCamera> {
   }
 };
 template <>
+struct Table<ModelCamera> {
+  static constexpr const char* kName = "model_camera";
+  static constexpr const char* kHelp =
+      "A camera of the glTF file that a body shows. It moves with the body and with the animation that the "
+      "body "
+      "plays. Its field of view is that of the file, unless `focal_mm` is given; `offstage info FILE` lists "
+      "the "
+      "cameras of a file.";
+  static Fields<ModelCamera> fields() {
+    using T = ModelCamera;
+    return Fields<T>{{"body", &T::body, "name of the body that shows the file", kRequired},
+                     {"name", &T::name, "name of the camera's node in the file; empty: the first camera"}}
+        .with_base<Lens>();
+  }
+};
+template <>
 struct Tags<Camera> {
   static constexpr const char* kName = "camera";
-  static constexpr const char* kHelp = "The camera. Up is +Y.";
-  static constexpr std::array kTags = {"static", "keyframes", "orbit", "follow"};
+  static constexpr const char* kHelp = "The camera. Up is +Y, except for cameras of files.";
+  static constexpr std::array kTags = {"static", "keyframes", "orbit", "follow", "model"};
   static constexpr bool kRequired = false;
 };
 
@@ -181,11 +197,35 @@ struct Table<AreaLight> {
   }
 };
 template <>
+struct Table<ModelLights> {
+  static constexpr const char* kName = "model_lights";
+  static constexpr const char* kHelp =
+      "Lights of the glTF file that a body shows (KHR_lights_punctual). They move with the body and with the "
+      "animation that the body plays. Their candela and lux are converted by 1 / pi: a white surface that "
+      "faces "
+      "a lamp of 1 cd at a distance of 1 m has a luminance of 1 / pi cd/m^2, and 1 cd/m^2 is the brightness "
+      "1. "
+      "`offstage info FILE` lists the lights of a file.";
+  static Fields<ModelLights> fields() {
+    using T = ModelLights;
+    return {
+        {"body", &T::body, "name of the body that shows the file", kRequired},
+        {"name", &T::name, "name of the light's node in the file; empty: all lights"},
+        {"intensity", &T::intensity,
+         "factor of their intensities; files by Blender in watts need about 0.001", "", kNotNegative},
+        {"radius", &T::radius, "radius of point and spot lights, which have none in the file", "m",
+         kPositive},
+        {"size_deg", &T::size_deg, "angular diameter of a directional light, which becomes the scene's sun",
+         "degrees", between(0, 90)},
+        {"shadows", &T::shadows, "cast shadows"}};
+  }
+};
+template <>
 struct Tags<Light> {
   static constexpr const char* kName = "light";
   static constexpr const char* kHelp =
       "A light source in addition to the sky. With an empty list of lights, only the sky gives light.";
-  static constexpr std::array kTags = {"sun", "point", "spot", "area"};
+  static constexpr std::array kTags = {"sun", "point", "spot", "area", "model"};
   static constexpr bool kRequired = false;
 };
 

@@ -302,7 +302,11 @@ struct Table<ModelTree> {
                      {"position", &T::position, "position of the model's origin", "m"},
                      {"orientation", &T::orientation, "orientation of the model, about `position`"},
                      {"velocity", &T::velocity, "velocity of all links at time 0", "m/s"},
-                     {"scale", &T::scale, "scale factor of the model", "", kPositive},
+                     {"scale", &T::scale,
+                      "scale factor of the model; `auto`: from the file's likely unit to metres "
+                      "(docs/models.md; `offstage info FILE` "
+                      "shows it)",
+                      "", kPositive},
                      {"density", &T::density, "density of the links", "kg/m^3", kPositive},
                      {"base", &T::base,
                       "name of the body that holds the uppermost nodes, or `world`; empty: they are free"},

@@ -170,7 +170,9 @@ struct Table<ParticleGroup> {
          "PLY or OBJ file whose points become particles after those of `places`, with the colours of the "
          "points; "
          "empty: none"},
-        {"scale", &T::scale, "scale factor of the file's points", "", kScale},
+        {"scale", &T::scale,
+         "scale factor of the file's points; `auto`: from the file's likely unit to metres (docs/models.md)",
+         "", kScale},
         {"fit", &T::fit,
          "edges of a box; the points get the largest size with which they fit, before `scale`", "m",
          kPositive},
@@ -369,7 +371,11 @@ struct Table<MeshSurface> {
   static Fields<MeshSurface> fields() {
     return {
         {"file", &MeshSurface::file, "model file", kRequired},
-        {"scale", &MeshSurface::scale, "scale factor of the model", "", kPositive},
+        {"scale", &MeshSurface::scale,
+         "scale factor of the model; `auto`: from the file's likely unit to metres (docs/models.md; "
+         "`offstage info FILE` "
+         "shows it)",
+         "", kPositive},
         {"position", &MeshSurface::position, "position of the model's origin, in the emitter's frame", "m"},
         {"orientation", &MeshSurface::orientation, "orientation of the model, in the emitter's frame"}};
   }

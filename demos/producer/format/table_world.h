@@ -259,7 +259,11 @@ struct Table<MeshFile> {
              "model file relative to the scene, or the name of a model that comes with offstage; FILE#NODE "
              "selects one node",
              kRequired},
-            {"scale", &MeshFile::scale, "scale factor of the model", "", kScale},
+            {"scale", &MeshFile::scale,
+             "scale factor of the model; `auto`: from the file's likely unit to metres (docs/models.md; "
+             "`offstage info FILE` "
+             "shows it)",
+             "", kScale},
             {"fit", &MeshFile::fit,
              "edges of a box along the model's axes; the model gets the largest size with which it fits, "
              "whatever "
@@ -484,7 +488,11 @@ struct Table<ModelLook> {
   static constexpr const char* kHelp = "A model file drawn instead of the body's shape.";
   static Fields<ModelLook> fields() {
     return {{"file", &ModelLook::file, "model file", kRequired},
-            {"scale", &ModelLook::scale, "scale factor of the model", "", kScale},
+            {"scale", &ModelLook::scale,
+             "scale factor of the model; `auto`: from the file's likely unit to metres (docs/models.md; "
+             "`offstage info FILE` "
+             "shows it)",
+             "", kScale},
             {"fit", &ModelLook::fit,
              "edges of a box along the model's axes; the model gets the largest size with which it fits, "
              "whatever "

@@ -149,6 +149,27 @@ Description Codec<render::FrameRate>::describe(Catalogue&, const Spec& spec) {
   return {{{"oneOf", List{number, fraction}}}, "number or `\"n/d\"`"};
 }
 
+void Codec<ModelScale>::read(Reader& in, const Node& node, const Spec& spec, ModelScale& out) {
+  const std::string* text = node.as<std::string>();
+  if (text && *text == "auto") {
+    out = {};
+    out.automatic = true;
+  } else if (text) {
+    in.refuse(node, "a number or \"auto\"");
+  } else if (const auto v = in.number(node, spec)) {
+    out = *v;
+  }
+}
+Node Codec<ModelScale>::write(const ModelScale& value) {
+  if (value.automatic) return std::string("auto");
+  return value.factor;
+}
+Description Codec<ModelScale>::describe(Catalogue&, const Spec& spec) {
+  Object number = {{"type", "number"}};
+  spec.limits.add_to(number);
+  return {{{"oneOf", List{number, Object{{"const", "auto"}}}}}, "number or `\"auto\"`"};
+}
+
 // --- vectors, orientations, colours ---
 
 Description describe_tuple(Description item, std::size_t size) {

@@ -71,6 +71,13 @@ struct Codec<render::FrameRate> {
   static Node write(const render::FrameRate& value);
   static Description describe(Catalogue& all, const Spec& spec);
 };
+/// A number or "auto".
+template <>
+struct Codec<ModelScale> {
+  static void read(Reader& in, const Node& node, const Spec& spec, ModelScale& out);
+  static Node write(const ModelScale& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
 /// A number, {"mean", "deviation", "min", "max", "clip"}, {"range": [a, b]} or {"curve": [[time, value],
 /// ...]}. All possible values must be within the limits; a closed limit also truncates a normal distribution.
 template <>

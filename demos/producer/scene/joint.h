@@ -162,7 +162,7 @@ struct ModelTree {
   Vec3 position = Vec3::Zero();
   Quat orientation = Quat::Identity();
   Vec3 velocity = Vec3::Zero();
-  Real scale = 1;
+  ModelScale scale;
   Real density = 1000;
   std::string base = "world";  ///< holder of the uppermost nodes: a body, "world", or nothing
   std::string material;        ///< empty: those of the file

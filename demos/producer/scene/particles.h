@@ -81,7 +81,7 @@ struct ParticleGroup {
   std::vector<ParticlePlace> places;  ///< after loading, those of the file and of `fill` follow
   std::optional<Fill> fill;           ///< adds places
   std::string file;                   ///< PLY or OBJ file; empty: none
-  Real scale = 1;
+  ModelScale scale;
   std::optional<Vec3> fit;       ///< see MeshFile::fit
   Vec3 position = Vec3::Zero();  ///< of the file's origin
   Quat orientation = Quat::Identity();
@@ -184,7 +184,7 @@ struct DiscSurface {
 };
 struct MeshSurface {
   std::string file;
-  Real scale = 1;
+  ModelScale scale;
   Vec3 position = Vec3::Zero();
   Quat orientation = Quat::Identity();
 };

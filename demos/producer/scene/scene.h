@@ -99,7 +99,7 @@ struct ContactRule {
 /// A model file that is drawn instead of a body's shape.
 struct ModelLook {
   std::string file;
-  Real scale = 1;
+  ModelScale scale = {};
   std::optional<Vec3> fit = {};  ///< see MeshFile::fit
   Vec3 position = Vec3::Zero();  ///< in the body's frame
   Quat orientation = Quat::Identity();
@@ -302,7 +302,13 @@ struct FollowCamera : Lens {
   Vec3 offset = {0, 2, 6};  ///< position of the eye relative to the body, world axes
   Vec3 look_offset = Vec3::Zero();
 };
-using Camera = std::variant<StaticCamera, KeyframedCamera, OrbitCamera, FollowCamera>;
+/// A camera of the model file that a body shows. Its field of view is that of the file.
+struct ModelCamera : Lens {
+  Where where;
+  std::string body;
+  std::string name;  ///< empty: the first one
+};
+using Camera = std::variant<StaticCamera, KeyframedCamera, OrbitCamera, FollowCamera, ModelCamera>;
 
 /// A further camera, which is drawn on request.
 struct NamedCamera {
@@ -342,7 +348,17 @@ struct AreaLight : LampBase {
   Vec3 target = Vec3::Zero();
   Eigen::Vector2d size = {1, 1};
 };
-using Light = std::variant<SunLight, PointLight, SpotLight, AreaLight>;
+/// Lights of the model file that a body shows.
+struct ModelLights {
+  Where where;
+  std::string body;
+  std::string name;     ///< empty: all of them
+  Real intensity = 1;   ///< factor of their intensities
+  Real radius = 0.01;   ///< of point and spot lights
+  Real size_deg = 0.5;  ///< of directional lights
+  bool shadows = true;
+};
+using Light = std::variant<SunLight, PointLight, SpotLight, AreaLight, ModelLights>;
 
 enum class Background { sky, transparent };
 

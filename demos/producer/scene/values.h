@@ -37,10 +37,24 @@ struct Color {
   Eigen::Vector3f rgb() const { return rgba.head<3>(); }
 };
 
+/// Scale factor of a model file. `automatic`: `factor` times the factor from the file's likely unit to metres
+/// (automatic_scale() in producer/build/models.h).
+struct ModelScale {
+  Real factor = 1;
+  bool automatic = false;
+
+  ModelScale(Real number = 1) : factor(number) {}
+  ModelScale& operator*=(Real k) {
+    factor *= k;
+    return *this;
+  }
+  bool operator==(const ModelScale&) const = default;
+};
+
 /// A model file as a shape: its triangles collide and determine the mass; for a cloth, they are the cloth.
 struct MeshFile {
   std::string file;
-  Real scale = 1;
+  ModelScale scale = {};
   std::optional<Vec3> fit = {};  ///< edges of the box that the model just fits into before `scale` [m]
 };
 

@@ -1,0 +1,42 @@
+#pragma once
+/// Model files that bodies show, and the cameras and lights in them.
+
+#include <optional>
+#include <string>
+
+#include <Eigen/Geometry>
+
+#include "producer/build/models.h"
+#include "producer/scene/scene.h"
+
+namespace offstage::producer {
+
+using FileLight = render::Model::Light;
+
+/// A model file as a body shows it.
+struct ShownModel {
+  std::string file;
+  Eigen::Affine3f body_from_model = Eigen::Affine3f::Identity();
+};
+/// The model file that is drawn for a body; empty if it is drawn as its shape.
+std::optional<ShownModel> shown_model(const Body& body, const ModelLibrary& models);
+
+/// The body of a name. It must exist.
+const Body& body_of(const Scene& scene, const std::string& name);
+/// The camera of a scene's entry, or null.
+const render::Model::Camera* find_camera(const ModelCamera& camera, const Scene& scene,
+                                         const ModelLibrary& models);
+/// Whether an entry of the scene's lights contains a light of its file.
+bool has_light(const ModelLights& lights, const FileLight& light);
+
+/// Pose of a camera or light of the file that a body shows, in the body's frame, at a time of the film [s].
+/// It contains the model's scale.
+Eigen::Affine3f pose_in_body(const Body& body, const render::Model::Place& place, const ModelLibrary& models,
+                             double time);
+
+/// Adds a problem for each camera and light of a model file that a scene asks for and that is missing or
+/// cannot be used, and a warning for each file whose cameras or lights nothing uses.
+void check_cameras_and_lights(const Scene& scene, const ModelLibrary& models, std::vector<Problem>& problems,
+                              std::vector<Problem>& warnings);
+
+}  // namespace offstage::producer
