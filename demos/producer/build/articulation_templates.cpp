@@ -149,6 +149,9 @@ Parts build(const Ragdoll& doll) {
   // The volume of all parts is kVolume H^3. The dry friction of a limp joint can bear the share kLimp of the
   // torque that would hold the whole figure horizontally at its feet.
   constexpr Real kVolume = 0.0098, kLimp = 0.004, kGravity = 9.81;
+  // The knees lie in front of the legs' axes, so that the weight bends them: with all joints in one line, the
+  // figure would stand by their friction.
+  constexpr Real kKnee = 0.025;
   const Real torque = doll.stiffness * kLimp * kVolume * doll.density * H * H * H * kGravity * H;
   const auto join = [&](const std::string& a, const std::string& b, const Vec3& anchor, const Vec3& axis,
                         Real share) -> Joint& {
@@ -185,7 +188,7 @@ Parts build(const Ragdoll& doll) {
     ball("upper_arm" + side, "chest", {x * 0.127, 0.79, 0}, -Vec3::UnitY(), 110, 60, 0.5);
     hinge("forearm" + side, "upper_arm" + side, {x * 0.127, 0.62, 0}, -Vec3::UnitX(), 0, 140, 0.3);
     ball("thigh" + side, "pelvis", {x * 0.05, 0.49, 0}, -Vec3::UnitY(), 75, 35, 1);
-    hinge("shin" + side, "thigh" + side, {x * 0.05, 0.285, 0}, Vec3::UnitX(), 0, 130, 0.7);
+    hinge("shin" + side, "thigh" + side, {x * 0.05, 0.285, kKnee}, Vec3::UnitX(), 0, 130, 0.7);
     hinge("foot" + side, "shin" + side, {x * 0.05, 0.05, 0}, Vec3::UnitX(), -25, 35, 0.3);
   }
   return std::move(make.parts);
