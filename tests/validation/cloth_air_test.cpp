@@ -5,10 +5,13 @@
 #include <numbers>
 #include <numeric>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include "effects/cloth.h"
+#include "meshes.h"
 #include "sim/cloth/cloth_state.h"
 #include "sim/world.h"
 
@@ -198,6 +201,128 @@ INSTANTIATE_TEST_SUITE_P(Steps, ClothGust,
                          testing::Combine(testing::Values(ClothIntegrator::relaxed,
                                                           ClothIntegrator::implicit),
                                           testing::Values(1.0 / 240, 1.0 / 60)));
+
+/// A flag of 1 m x 0.7 m that a pole holds along one side, in a steady wind along it.
+class Flag {
+ public:
+  Flag(const effects::Fabric& fabric, Real wind, Real gravity, Real step)
+      : world_({.gravity = {0, -gravity, 0}, .wind = {wind, 0, 0}, .max_step = step}) {
+    const Pose upright{Vec3::Zero(), Quat(Eigen::AngleAxis<Real>(std::numbers::pi / 2, Vec3::UnitX()))};
+    ClothDef def = effects::grid_cloth({1, 0.7, kCells, kRows}, upright, fabric);
+    def.self_collision = false;
+    for (uint32_t i = 0; i < def.vertices.size(); ++i)
+      if (def.vertices[i].x() < -0.499) def.pins.push_back({.vertex = i, .position = def.vertices[i]});
+    def.rest_vertices = def.vertices;
+    for (Vec3& p : def.vertices) p.z() += 0.002 * std::sin(6 * (p.x() + 0.5));  // what begins the motion
+    cloth_ = world_.add_cloth(def);
+  }
+
+  struct Swing {
+    Real amplitude;  ///< of the free end, from peak to peak [m]
+    Real frequency;  ///< [Hz]
+  };
+  /// Of some seconds, after others.
+  Swing swing(int seconds, int after) {
+    std::vector<Real> place;
+    for (int i = 0; i < 60 * (after + seconds); ++i) {
+      world_.step(1.0 / 60);
+      if (i >= 60 * after)
+        place.push_back(world_.cloth(cloth_).points[kRows / 2 * (kCells + 1) + kCells].z());
+    }
+    const auto [low, high] = std::ranges::minmax(place);
+    const Real middle = std::accumulate(place.begin(), place.end(), 0.0) / static_cast<Real>(place.size());
+    int waves = 0;
+    bool is_up = false;
+    for (Real z : place) {
+      const Real beyond = 0.1 * (high - low);
+      waves += !is_up && z > middle + beyond;
+      is_up = is_up ? z > middle - beyond : z > middle + beyond;
+    }
+    return {high - low, static_cast<Real>(waves) / seconds};
+  }
+
+ private:
+  static constexpr uint32_t kCells = 24, kRows = 16;
+  World world_;
+  ClothHandle cloth_;
+};
+
+/// Wind [m/s] and step of the world [s].
+class FlagFlutter : public testing::TestWithParam<std::pair<Real, Real>> {};
+
+TEST_P(FlagFlutter, HasTheStrouhalNumberOfFlappingFlags) {
+  // frequency * amplitude / wind is about 0.2 for flags, as for fins and wings (Taylor, Nudds and Thomas,
+  // 2003); the frequency grows with the wind.
+  const auto [wind, step] = GetParam();
+  effects::Fabric fabric = effects::find_fabric("cotton")->fabric;
+  fabric.areal_density = 0.12;
+  const Flag::Swing swing = Flag(fabric, wind, kAirGravity, step).swing(5, 4);
+  const Real strouhal = swing.frequency * swing.amplitude / wind;
+  EXPECT_GT(strouhal, 0.1);
+  EXPECT_LT(strouhal, 0.3);
+  EXPECT_GT(swing.amplitude, 0.1);
+  EXPECT_GT(swing.frequency * 1 / wind, 0.5);  // about one wave at a time is on the flag
+  EXPECT_LT(swing.frequency * 1 / wind, 1.5);
+}
+
+INSTANTIATE_TEST_SUITE_P(Winds, FlagFlutter,
+                         testing::Values(std::pair(5.0, 1.0 / 240), std::pair(10.0, 1.0 / 240),
+                                         std::pair(5.0, 1.0 / 60), std::pair(10.0, 1.0 / 60)));
+
+TEST(FlagFlutter, BeginsAtACriticalWind) {
+  // A stiff flag comes to rest in a slow wind, and flaps in a faster one: bending waves of a wavelength about
+  // as long as it have the speed 2 pi / L sqrt(B / sigma) = 0.8 m/s, and the air drives what is slower than
+  // itself by more than damping takes.
+  effects::Fabric card = effects::find_fabric("cotton")->fabric;
+  card.areal_density = 0.12;
+  card.bend = 2e-3;
+  EXPECT_LT(Flag(card, 2, 0, 1.0 / 240).swing(2, 4).amplitude, 0.005);
+  const Flag::Swing slow = Flag(card, 4, 0, 1.0 / 240).swing(3, 3);
+  const Flag::Swing fast = Flag(card, 8, 0, 1.0 / 240).swing(3, 3);
+  EXPECT_GT(slow.amplitude, 0.1);
+  EXPECT_GT(fast.amplitude, 0.1);
+  EXPECT_GT(fast.frequency, 1.3 * slow.frequency);
+}
+
+/// Mass of the load [kg] and step of the world [s].
+class Parachute : public testing::TestWithParam<std::pair<Real, Real>> {};
+
+TEST_P(Parachute, DescendsByItsDragArea) {
+  // Half a sphere whose rim holds a load: weight = rho / 2 v^2 times the area of the mouth.
+  const auto [load, step] = GetParam();
+  constexpr Real kRadius = 0.5;
+  TriangleMesh dome = weld(sphere_mesh(kRadius, 24, 12));
+  std::erase_if(dome.triangles, [&](const Triangle& t) {
+    return dome.vertices[t[0]].y() + dome.vertices[t[1]].y() + dome.vertices[t[2]].y() < 1e-9;
+  });
+  std::vector<uint32_t> index(dome.vertices.size(), 0);
+  TriangleMesh half;
+  for (std::size_t i = 0; i < index.size(); ++i) {
+    index[i] = static_cast<uint32_t>(half.vertices.size());
+    if (dome.vertices[i].y() > -1e-9) half.vertices.push_back(dome.vertices[i]);
+  }
+  for (const Triangle& t : dome.triangles) half.triangles.push_back({index[t[0]], index[t[1]], index[t[2]]});
+  ClothDef def = effects::mesh_cloth(half, {}, effects::find_fabric("silk")->fabric);
+  def.air.drag = def.air.lift = 0;
+  def.ram_pressure = 1;
+  def.self_collision = def.collides = false;
+  World world({.max_step = step});
+  const BodyHandle body = world.add_body({.shape = Cylinder{kRadius, 0.02}, .mass = load, .collides = false});
+  Real mouth = 0;
+  for (const Triangle& t : def.triangles)
+    mouth += (def.vertices[t[1]] - def.vertices[t[0]]).cross(def.vertices[t[2]] - def.vertices[t[0]]).y() / 2;
+  for (uint32_t i = 0; i < def.vertices.size(); ++i)
+    if (def.vertices[i].y() < 1e-6)
+      def.pins.push_back({.vertex = i, .body = body, .position = def.vertices[i]});
+  world.add_cloth(def);
+  for (int i = 0; i < 180; ++i) world.step(1.0 / 60);
+  const Real expected = std::sqrt(2 * (load + mass_of_cloth(def)) * kAirGravity / (1.2 * mouth));
+  EXPECT_NEAR(-world.body(body).velocity.y(), expected, 0.01 * expected);
+}
+
+INSTANTIATE_TEST_SUITE_P(Loads, Parachute,
+                         testing::Values(std::pair(0.3, 1.0 / 240), std::pair(0.3, 1.0 / 60),
+                                         std::pair(2.0, 1.0 / 240), std::pair(2.0, 1.0 / 60)));
 
 }  // namespace
 }  // namespace offstage::sim
