@@ -156,20 +156,28 @@ void Articulation::begin_motion(Real t, Real h) {
   }
 }
 
-/// `still_a` and `still_b` hold the motion of driven links, to which the result refers.
+/// `still_a` and `still_b` hold the motion of driven links, to which the result refers. The poses are those
+/// `before` the time of the velocities [s].
 JointPlace Articulation::place_of(std::size_t j, Real time, std::span<const LinkMotion> motion,
-                                  LinkMotion& still_a, LinkMotion& still_b) const {
+                                  LinkMotion& still_a, LinkMotion& still_b, Real before) const {
   const auto& [a, b, count] = system_.joints()[j];
   const auto link = [&](uint32_t i, const Body* body, LinkMotion& still) -> const LinkMotion& {
-    return i != JointSystem::kDriven ? motion[i] : still = link_motion(body, time);
+    if (i != JointSystem::kDriven) return motion[i];
+    still = link_motion(body, time - before);
+    if (before > 0 && body && body->is_kinematic()) {
+      const LinkMotion end = link_motion(body, time);
+      still.velocity = end.velocity;
+      still.angular_velocity = end.angular_velocity;
+    }
+    return still;
   };
   return {link(a, joints_[j]->a, still_a), frames_a_[j], link(b, joints_[j]->b, still_b), frames_b_[j]};
 }
 
-void Articulation::read_rows(Real time, std::span<const LinkMotion> motion) {
+void Articulation::read_rows(Real time, std::span<const LinkMotion> motion, Real before) {
   LinkMotion still_a, still_b;
   for (std::size_t j = 0; j < joints_.size(); ++j)
-    set_joint_rows(joints_[j]->def, place_of(j, time, motion, still_a, still_b), joints_[j]->length,
+    set_joint_rows(joints_[j]->def, place_of(j, time, motion, still_a, still_b, before), joints_[j]->length,
                    rows_[j]);
 }
 
@@ -361,8 +369,30 @@ void Articulation::read_bodies(bool at_start) {
 
 void Articulation::place(Real time, bool at_start) {
   read_bodies(at_start);
+  start_motion_ = end_motion_ = motion_;
+  before_ = 0;
   read_rows(time, motion_);
   system_.factorize(rows_, mobility_);
+}
+
+void Articulation::place_within(Real time, Real duration, Real share) {
+  read_bodies(true);
+  start_motion_ = motion_;
+  read_bodies();
+  end_motion_ = motion_;
+  before_ = (1 - share) * duration;
+  for (LinkMotion& m : motion_) {
+    m.position -= before_ * m.velocity;
+    m.axes = rotation(m.angular_velocity, -before_).toRotationMatrix() * m.axes;
+  }
+  read_rows(time, motion_, before_);
+  system_.factorize(rows_, mobility_);
+}
+
+void Articulation::project(Real time, std::span<Vec6> velocities) {
+  residual(time, velocities, change_);
+  for (Vec6& c : change_) c = -c;
+  system_.correct(change_, impulses_, velocities);
 }
 
 /// Computes J v, including the velocities of driven links.

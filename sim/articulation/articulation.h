@@ -85,12 +85,26 @@ class Articulation final : public JointedBodies {
   /// smallest mass-weighted displacement, then the velocities.
   void settle(Real time, JointTally& tally);
 
-  /// Evaluates the constraints for the contact solver, at the bodies' current `rigid` states or, if
-  /// `at_start`, at those of their interval's start.
+  /// Evaluates the constraints at the bodies' current `rigid` states or, if `at_start`, at those of their
+  /// interval's start.
   void place(Real time, bool at_start = false);
-  /// Place of a joint, as computed by the last place().
+  /// Evaluates the constraints for the contact solver, after a share of an interval of this duration [s] that
+  /// ends at `time` with the bodies' `rigid` states: where the impulses of the interval act, on average.
+  /// Applied at the poses of its end, they would change the angular momentum by the turn of the arms until
+  /// then.
+  void place_within(Real time, Real duration, Real share);
+  /// Projects velocities of the links at `time` onto the constraints of the last place_within().
+  void project(Real time, std::span<Vec6> velocities);
+  /// Place of a joint for which the last of both evaluated the constraints.
   JointPlace joint_place(std::size_t j, Real time, LinkMotion& still_a, LinkMotion& still_b) const {
-    return place_of(j, time, motion_, still_a, still_b);
+    return place_of(j, time, motion_, still_a, still_b, before_);
+  }
+  /// The same at the end and at the start of the interval.
+  JointPlace end_place(std::size_t j, Real time, LinkMotion& still_a, LinkMotion& still_b) const {
+    return place_of(j, time, end_motion_, still_a, still_b);
+  }
+  JointPlace start_place(std::size_t j, Real start, LinkMotion& still_a, LinkMotion& still_b) const {
+    return place_of(j, start, start_motion_, still_a, still_b);
   }
   bool has_bounded_rows() const { return has_bounded_rows_; }
   const JointSystem& system() const { return system_; }
@@ -121,8 +135,8 @@ class Articulation final : public JointedBodies {
   };
 
   JointPlace place_of(std::size_t j, Real time, std::span<const LinkMotion> motion, LinkMotion& still_a,
-                      LinkMotion& still_b) const;
-  void read_rows(Real time, std::span<const LinkMotion> motion);
+                      LinkMotion& still_b, Real before = 0) const;
+  void read_rows(Real time, std::span<const LinkMotion> motion, Real before = 0);
   void read_bodies(bool at_start = false);
   void residual(Real time, std::span<const Vec6> velocities, std::span<Vec6> result) const;
   Wrench wrench(std::size_t j, const Vec6& impulse, std::span<const LinkMotion> motion) const;
@@ -136,7 +150,8 @@ class Articulation final : public JointedBodies {
   JointSystem system_;
 
   std::vector<JointRows> rows_;
-  std::vector<LinkMotion> motion_;
+  std::vector<LinkMotion> motion_, start_motion_, end_motion_;
+  Real before_ = 0;  // time by which the poses of motion_ are earlier than its velocities [s]
   std::vector<LinkMobility> mobility_;
   std::vector<Vec6> velocities_, change_, impulses_;
 

@@ -14,9 +14,16 @@ constexpr Real kPushOut = 0.2, kFastestPush = 2;
 /// A limit within kNear of the coordinate has a row; limits within kReached take part in collisions [rad],
 /// [m].
 constexpr Real kNear = 0.02, kReached = 1e-4;
+/// A joint that approaches its limit faster than this reaches it in the interval [m/s], [rad/s].
+constexpr Real kClosing = 1e-3;
 
 /// Slots of Joint::efforts.
 enum Slot : std::size_t { kLimit = 0, kSwing = 1, kMotor = 2, kFriction = 3, kDamping = 6, kSpring = 9 };
+
+/// A direction of a joint at the interval's start, where the impulses of the interval act, and at its end.
+struct Direction {
+  JointRow start, acting, end;
+};
 
 /// Makes the rows of one joint.
 class RowMaker {
@@ -26,7 +33,9 @@ class RowMaker {
         def_(joint_.def),
         h_(duration),
         time_(time),
-        place_(articulation.joint_place(j, time, still_a_, still_b_)) {}
+        start_(articulation.start_place(j, time - duration, start_a_, start_b_)),
+        acting_(articulation.joint_place(j, time, still_a_, still_b_)),
+        end_(articulation.end_place(j, time, end_a_, end_b_)) {}
 
   void add_all(std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins) {
     rows_ = &rows;
@@ -36,8 +45,7 @@ class RowMaker {
       add_motor(free());
     }
     if (def_.swing < kInfinite) {
-      const JointRow swing = swing_row(def_.type, place_);
-      add_range(swing, kSwing, def_.type == JointType::universal ? -def_.swing : -kInfinite, def_.swing);
+      add_range(swing(), kSwing, least_swing(), def_.swing);
     }
     if (def_.friction > 0 || def_.damping > 0) add_resistance();
     if (def_.stiffness > 0) add_spring();
@@ -47,22 +55,45 @@ class RowMaker {
     rows_ = &rows;
     origins_ = &origins;
     if (def_.has_free_coordinate()) add_stop(free(), kLimit, def_.lower, def_.upper);
-    if (def_.swing < kInfinite)
-      add_stop(swing_row(def_.type, place_), kSwing,
-               def_.type == JointType::universal ? -def_.swing : -kInfinite, def_.swing);
+    if (def_.swing < kInfinite) add_stop(swing(), kSwing, least_swing(), def_.swing);
+  }
+
+  /// See first_stop().
+  std::optional<Real> first_stop() const {
+    std::optional<Real> first;
+    const auto look = [&](const Direction& row, Real lower, Real upper) {
+      if (lower == upper) return;
+      for (const auto& [limit, side] : {std::pair(lower, 1), std::pair(upper, -1)})
+        if (const auto at = stop(row, limit, side)) first = std::min(first.value_or(1), at->share);
+    };
+    if (def_.has_free_coordinate()) look(free(), def_.lower, def_.upper);
+    if (def_.swing < kInfinite) look(swing(), least_swing(), def_.swing);
+    return first;
   }
 
  private:
+  Real least_swing() const { return def_.type == JointType::universal ? -def_.swing : -kInfinite; }
+
   /// The free coordinate including whole turns.
-  JointRow free() const {
-    JointRow row = free_row(def_, place_, joint_.length);
-    if (!counts_turns(joint_)) return row;
+  Direction free() const {
+    const auto row = [&](const JointPlace& place) { return free_row(def_, place, joint_.length); };
+    Direction d{row(start_), row(acting_), row(end_)};
+    if (!counts_turns(joint_)) return d;
     constexpr Real kTurn = 2 * std::numbers::pi;
-    row.error += kTurn * std::round((joint_.coordinate - row.error) / kTurn);
-    return row;
+    for (JointRow* r : {&d.start, &d.end})
+      r->error += kTurn * std::round((joint_.coordinate - r->error) / kTurn);
+    return d;
+  }
+  Direction swing() const {
+    return {swing_row(def_.type, start_), swing_row(def_.type, acting_), swing_row(def_.type, end_)};
+  }
+  Direction turning(Eigen::Index axis) const {
+    const auto row = [axis](const JointPlace& place) { return turning_row(place.axes_b.col(axis)); };
+    return {row(start_), row(acting_), row(end_)};
   }
 
-  BoundedRow bounded(const JointRow& row) const {
+  BoundedRow bounded(const Direction& d) const {
+    const JointRow& row = d.acting;
     BoundedRow r{.on_a = row.on_a, .on_b = row.on_b};
     const auto end = [&](const Body* body, const LinkMotion& motion, const Vec6& on, uint32_t& index) {
       if (body && body->is_dynamic()) {
@@ -71,80 +102,87 @@ class RowMaker {
         r.offset += on.head<3>().dot(motion.velocity) + on.tail<3>().dot(motion.angular_velocity);
       }
     };
-    end(joint_.a, place_.a, row.on_a, r.a);
-    end(joint_.b, place_.b, row.on_b, r.b);
+    end(joint_.a, acting_.a, row.on_a, r.a);
+    end(joint_.b, acting_.b, row.on_b, r.b);
     return r;
   }
 
-  Real speed(const JointRow& row) const {
-    return row.on_a.head<3>().dot(place_.a.velocity) + row.on_a.tail<3>().dot(place_.a.angular_velocity) +
-           row.on_b.head<3>().dot(place_.b.velocity) + row.on_b.tail<3>().dot(place_.b.angular_velocity);
+  static Real speed(const JointRow& row, const JointPlace& at) {
+    return row.on_a.head<3>().dot(at.a.velocity) + row.on_a.tail<3>().dot(at.a.angular_velocity) +
+           row.on_b.head<3>().dot(at.b.velocity) + row.on_b.tail<3>().dot(at.b.angular_velocity);
   }
+  /// The speed of the coordinate at the interval's end, without the effect of the rows.
+  Real speed(const Direction& d) const { return speed(d.end, end_); }
 
-  /// The coordinate at the interval's start, by the mean of the speeds at both ends, without the effect of
-  /// the rows.
-  Real at_start(const JointRow& row) const {
-    Real sum = speed(row);
-    const auto add_end = [&](const Body* body, const LinkMotion& motion, const Vec6& on) {
-      const Twist& t =
-          body && body->is_dynamic() ? body->start_twist : Twist{motion.velocity, motion.angular_velocity};
-      sum += on.head<3>().dot(t.velocity) + on.tail<3>().dot(t.angular_velocity);
-    };
-    add_end(joint_.a, place_.a, row.on_a);
-    add_end(joint_.b, place_.b, row.on_b);
-    return row.error - h_ / 2 * sum;
-  }
-  Real speed_at_start(const JointRow& row) const { return 2 * (row.error - at_start(row)) / h_ - speed(row); }
+  /// The coordinate at the interval's start for which the mean of the speeds at both ends leads to its end,
+  /// without the effect of the rows. From there, the row's target leads exactly to the wanted coordinate.
+  Real at_start(const Direction& d) const { return d.end.error - h_ / 2 * (speed_at_start(d) + speed(d)); }
+  Real speed_at_start(const Direction& d) const { return speed(d.start, start_); }
 
-  void add(const BoundedRow& row, std::size_t slot, bool is_stop) {
+  void add(const BoundedRow& row, std::size_t slot, bool closes) {
     rows_->push_back(row);
-    origins_->push_back({&joint_, slot, place_.arm_a, is_stop});
+    origins_->push_back({&joint_, slot, acting_.arm_a, closes});
   }
-  void add_guessed(BoundedRow row, std::size_t slot, bool is_stop) {
+  void add_guessed(BoundedRow row, std::size_t slot, bool closes) {
     row.impulse = std::clamp(h_ * joint_.efforts[slot], row.lower, row.upper);
-    add(row, slot, is_stop);
+    add(row, slot, closes);
   }
 
-  /// Adds the impact at a limit that the coordinate reaches in this interval: the speed where it meets the
-  /// limit is reversed, and the acceleration of the free motion acts in the rest of the interval. `side` is 1
-  /// for a lower limit and -1 for an upper one. Returns false if it does not meet the limit fast enough.
-  bool add_bounce(const JointRow& row, std::size_t slot, Real limit, int side) {
-    const Real gap = side * (at_start(row) - limit), left = side * (row.error - limit);
-    if (!(def_.restitution > 0) || !(left < 0) || gap < 0) return false;
+  /// The impact at a limit that the free motion reaches in this interval.
+  struct Stop {
+    Real share;   ///< share of the interval before it
+    Real target;  ///< speed away from the limit at the interval's end
+  };
+  /// The speed with which the coordinate reaches the limit is reversed, and the acceleration of the free
+  /// motion acts in the rest of the interval; a joint without restitution stays at its limit. `side` is 1 for
+  /// a lower limit and -1 for an upper one.
+  std::optional<Stop> stop(const Direction& row, Real limit, int side) const {
+    const Real gap = side * (row.start.error - limit), left = side * (row.end.error - limit);
+    if (!(left < 0) || gap < 0) return std::nullopt;
     const Real before = side * speed_at_start(row), after = side * speed(row), share = gap / (gap - left);
     const Real impact = before + share * (after - before);
-    if (!(impact < -JointDef::kBounceSpeed)) return false;
+    // A joint that rests at its limit approaches it by as much as the forces of an interval make it.
+    if (!(impact < -std::max(kClosing, std::abs(after - before)))) return std::nullopt;
+    const Real restitution = impact < -JointDef::kBounceSpeed ? def_.restitution : 0;
+    return Stop{share, std::max(0.0, (1 - share) * (after - before) - restitution * impact)};
+  }
+
+  bool add_stop_within(const Direction& row, std::size_t slot, Real limit, int side) {
+    const std::optional<Stop> at = stop(row, limit, side);
+    if (!at) return false;
     BoundedRow r = bounded(row);
     r.lower = side > 0 ? 0 : -kInfinite;
     r.upper = side > 0 ? kInfinite : 0;
-    r.target = side * (-def_.restitution * impact + (1 - share) * (after - before));
+    r.target = side * at->target;
+    r.from = at->share;
     add(r, slot, false);
     return true;
   }
 
   /// Adds a row for the nearer of both limits. If they are equal, the coordinate is held.
-  void add_range(const JointRow& row, std::size_t slot, Real lower, Real upper) {
-    if (slot == kLimit && lower < upper &&
-        (add_bounce(row, slot, lower, 1) || add_bounce(row, slot, upper, -1)))
+  void add_range(const Direction& row, std::size_t slot, Real lower, Real upper) {
+    if (lower < upper && (add_stop_within(row, slot, lower, 1) || add_stop_within(row, slot, upper, -1)))
       return;
-    const Real u = speed(row), start = at_start(row);
-    const Real reach = kNear + 2 * h_ * std::abs(u);
-    BoundedRow r = bounded(row);
-    const auto towards = [&](Real gap) {
-      return gap > 0 ? gap / h_ : std::max(gap * kPushOut / h_, -kFastestPush);
-    };
-    const Real below = row.error - lower, above = upper - row.error;
+    const Real reach = kNear + 2 * h_ * std::abs(speed(row));
+    const Real below = row.end.error - lower, above = upper - row.end.error;
     if (std::min(below, above) > reach) {
       joint_.efforts[slot] = 0;
       return;
     }
-    r.lower = lower == upper || above < below ? -kInfinite : 0;
-    r.upper = lower == upper || below <= above ? kInfinite : 0;
-    r.target = below <= above ? -towards(start - lower) : towards(upper - start);
-    add_guessed(r, slot, true);
+    const bool is_low = below <= above;
+    const Real side = is_low ? 1 : -1, limit = is_low ? lower : upper;
+    // A joint that rests at its limit, or leaves it, is held by a constant force in the whole interval.
+    const bool closes =
+        side * speed_at_start(row) < -std::max(kClosing, std::abs(speed(row) - speed_at_start(row)));
+    const Real gap = side * ((closes ? at_start(row) : row.start.error) - limit);
+    BoundedRow r = bounded(row);
+    r.lower = lower == upper || !is_low ? -kInfinite : 0;
+    r.upper = lower == upper || is_low ? kInfinite : 0;
+    r.target = -side * (gap > 0 ? gap / h_ : std::max(gap * kPushOut / h_, -kFastestPush));
+    add_guessed(r, slot, closes);
   }
 
-  void add_motor(const JointRow& row) {
+  void add_motor(const Direction& row) {
     const Motor& motor = def_.motor;
     if (motor.mode == Motor::Mode::none) return;
     BoundedRow r = bounded(row);
@@ -164,20 +202,20 @@ class RowMaker {
       r.softness = 1 / (h_ * resistance);
       r.target = motor.stiffness * missing / resistance;
     }
-    add_guessed(r, kMotor, true);
+    add_guessed(r, kMotor, std::abs(speed_at_start(row) - r.target) > kClosing);
   }
 
   /// Friction and damping of all free directions.
   void add_resistance() {
-    std::vector<JointRow> free_directions;
+    std::vector<Direction> free_directions;
     switch (def_.type) {
       case JointType::fixed:
         return;
       case JointType::spherical:
-        for (int i = 0; i < 3; ++i) free_directions.push_back(turning_row(place_.axes_b.col(i)));
+        for (int i = 0; i < 3; ++i) free_directions.push_back(turning(i));
         break;
       case JointType::universal:
-        free_directions = {free(), swing_row(def_.type, place_)};
+        free_directions = {free(), swing()};
         break;
       default:
         free_directions = {free()};
@@ -201,14 +239,14 @@ class RowMaker {
   /// The torque -k theta of a spherical joint at the interval's end, for the rotation vector theta of a
   /// relative to b.
   void add_spring() {
-    const Quat turn(Mat3(place_.axes_b.transpose() * place_.axes_a));
+    const Quat turn(Mat3(end_.axes_b.transpose() * end_.axes_a));
     const Vec3 half = turn.w() < 0 ? Vec3(-turn.vec()) : Vec3(turn.vec());
     const Real sine = half.norm();
     const Vec3 theta =
         sine > 0 ? Vec3(2 * angle_of(sine, std::abs(turn.w())) / sine * half) : Vec3(Vec3::Zero());
     for (int i = 0; i < 3; ++i) {
-      JointRow row = turning_row(place_.axes_b.col(i));
-      row.error = theta[i];
+      Direction row = turning(i);
+      row.end.error = theta[i];
       BoundedRow r = bounded(row);
       r.lower = -kInfinite;
       r.upper = kInfinite;
@@ -218,27 +256,36 @@ class RowMaker {
     }
   }
 
-  void add_stop(const JointRow& row, std::size_t slot, Real lower, Real upper) {
+  void add_stop(const Direction& row, std::size_t slot, Real lower, Real upper) {
     BoundedRow r = bounded(row);
-    if (row.error - lower < kReached)
+    if (row.end.error - lower < kReached)
       r.upper = kInfinite;
-    else if (upper - row.error < kReached)
+    else if (upper - row.end.error < kReached)
       r.lower = -kInfinite;
     else
       return;
-    add(r, slot, true);
+    add(r, slot, false);
   }
 
   Joint& joint_;
   const JointDef& def_;
   Real h_, time_;
-  LinkMotion still_a_, still_b_;
-  JointPlace place_;
+  LinkMotion start_a_, start_b_, still_a_, still_b_, end_a_, end_b_;
+  JointPlace start_, acting_, end_;
   std::vector<BoundedRow>* rows_ = nullptr;
   std::vector<BoundedOrigin>* origins_ = nullptr;
 };
 
 }  // namespace
+
+std::optional<Real> first_stop(const Articulation& articulation, Real duration, Real time) {
+  std::optional<Real> first;
+  for (std::size_t j = 0; j < articulation.joints().size(); ++j)
+    if (articulation.joints()[j]->def.has_limits())
+      if (const auto at = RowMaker(articulation, j, duration, time).first_stop())
+        first = std::min(first.value_or(1), *at);
+  return first;
+}
 
 void collect_bounded_rows(const Articulation& articulation, Real duration, Real time,
                           std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins) {

@@ -1,6 +1,7 @@
 #pragma once
 /// Limits, motors, friction and damping of joints as rows with bounds (physics A6).
 
+#include <optional>
 #include <vector>
 
 #include "sim/articulation/articulation.h"
@@ -13,12 +14,17 @@ struct BoundedOrigin {
   Joint* joint;
   std::size_t slot;  ///< index in Joint::efforts
   Vec3 arm;          ///< from the centre of the joint's body a to the anchor, world [m]
-  /// The row limits the coordinate at the interval's end, not the velocity during the interval.
-  bool is_stop;
+  /// The row leads the coordinate to its value at the interval's end with another speed than before: the
+  /// bodies have their new velocities in the whole interval.
+  bool closes;
 };
 
-/// Appends the bounded rows of an articulation, after its place(), for an interval that ends at `time`. Its
-/// bodies have the indices Body::row.
+/// The share of an interval that ends at `time` after which the free motion of an articulation first reaches
+/// a limit, after its place_within(); none if it reaches no limit.
+std::optional<Real> first_stop(const Articulation& articulation, Real duration, Real time);
+
+/// Appends the bounded rows of an articulation, after its place_within(), for an interval that ends at
+/// `time`. Its bodies have the indices Body::row.
 void collect_bounded_rows(const Articulation& articulation, Real duration, Real time,
                           std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins);
 

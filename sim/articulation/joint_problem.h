@@ -28,6 +28,7 @@ struct BoundedRow {
   Real softness = 0;          ///< [1/kg] or [1/(kg m^2)], >= 0
   Real lower = 0, upper = 0;  ///< bounds of the impulse [N s] or [N m s]
   Real impulse = 0;           ///< in: a guess; out: the solution
+  Real from = 0;              ///< share of the interval after which it acts, for the fast solver
 };
 
 struct JointProblem {

@@ -48,6 +48,7 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
   if (contacts_.empty() && joints_.bounded().empty()) return {.is_applied = true, .work = {}};
 
   free_ = bodies_;
+  joints_.project(bodies_, interval.end);
   const std::optional<ContactWork> work = newton_.solve(bodies_, contacts_, joints_.problem(), budget);
   if (!work) return {};
   Outcome outcome{.is_applied = is_safe(*work), .work = *work};
@@ -149,7 +150,8 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
     }
 }
 
-/// Constant forces over the interval move a body by half of the change of velocity times the time. If a
+/// Constant forces over the interval move a body by half of the change of velocity times the time, and those
+/// of a joint that reaches a limit by its whole change of velocity times the rest of the interval. If a
 /// contact of the body closed in the interval, or opened and closed again, the force acts only in a part of
 /// it. The body then moves by its new velocity throughout the interval, which is what the contact's target
 /// assumes.
@@ -160,17 +162,22 @@ void ExactContacts::move_bodies(const Island& island, Real duration) {
       closing_[contacts_[i].a] = closing_[contacts_[i].b] = 1;
   close_stops();
   close_neighbors(island, duration);
+  rest_.assign(island.bodies.size(), 0.5);
+  for (std::size_t i = 0; i < joints_.articulations().size(); ++i)
+    for (const Body* body : joints_.articulations()[i]->bodies())
+      rest_[body->row] = 1 - joints_.acting_from(i);
   for (std::size_t i = 0; i < island.bodies.size(); ++i) {
     Body& body = *island.bodies[i];
-    Vec3 dv = bodies_[i].velocity - free_[i].velocity,
-         dw = bodies_[i].angular_velocity - free_[i].angular_velocity;
+    const Vec3 dv = bodies_[i].velocity - free_[i].velocity,
+               dw = bodies_[i].angular_velocity - free_[i].angular_velocity;
     body.rigid.momentum += body.rigid.mass * dv;
     body.rigid.angular_momentum += body.rigid.spin_momentum(body.rigid.orientation, dw);
+    Vec3 way = rest_[i] * dv, turn = rest_[i] * dw;
     if (closing_[i]) {
-      dv += bodies_[i].velocity - body.start_twist.velocity;
-      dw += bodies_[i].angular_velocity - body.start_twist.angular_velocity;
+      way = (dv + bodies_[i].velocity - body.start_twist.velocity) / 2;
+      turn = (dw + bodies_[i].angular_velocity - body.start_twist.angular_velocity) / 2;
     }
-    displace(body, duration / 2 * dv, duration / 2 * dw);
+    displace(body, duration * way, duration * turn);
   }
 }
 
@@ -196,11 +203,11 @@ void ExactContacts::close_neighbors(const Island& island, Real duration) {
   }
 }
 
-/// Joints at a stop also stop their bodies.
+/// Joints that reach a stop also stop their bodies.
 void ExactContacts::close_stops() {
   for (std::size_t i = 0; i < joints_.bounded().size(); ++i) {
     const BoundedRow& row = joints_.bounded()[i];
-    if (!joints_.origins()[i].is_stop || row.impulse == 0) continue;
+    if (!joints_.origins()[i].closes || row.impulse == 0) continue;
     for (uint32_t body : {row.a, row.b})
       if (body != kUnmoved) closing_[body] = 1;
   }

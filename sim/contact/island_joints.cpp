@@ -9,17 +9,45 @@ bool has_forces(const Island& island) {
                                               [](const Articulation* a) { return a->has_bounded_rows(); });
 }
 
-void IslandJoints::collect_constraints(const Island& island, Real time, bool at_start) {
+/// `place` evaluates the constraints of an articulation.
+template <class Place>
+void IslandJoints::collect_constraints(const Island& island, Place&& place) {
   const auto row = [](const Articulation& a, uint32_t link) {
     return link == JointSystem::kDriven ? kUnmoved : a.bodies()[link]->row;
   };
   for (Articulation* a : island.articulations) {
-    a->place(time, at_start);
+    place(*a);
     articulations_.push_back(a);
     const JointSystem& system = a->system();
     for (std::size_t j = 0; j < system.joints().size(); ++j)
       constraints_.push_back(
           {row(*a, system.joints()[j].a), row(*a, system.joints()[j].b), &system.rows()[j]});
+  }
+}
+
+/// The impulses act in the middle of the interval. Those of a limit that is reached act from then on: they
+/// would otherwise change the angular momentum, by the motion of the joint between both times.
+void IslandJoints::place(Articulation& a, const ContactInterval& interval) {
+  a.place_within(interval.end, interval.duration, kMiddle);
+  std::optional<Real> stop;
+  if (a.has_bounded_rows()) stop = first_stop(a, interval.duration, interval.end);
+  if (stop) a.place_within(interval.end, interval.duration, *stop);
+  stops_.push_back(stop);
+}
+
+void IslandJoints::project(std::span<ContactBody> bodies, Real end) const {
+  std::vector<Vec6> velocities;
+  for (std::size_t i = 0; i < articulations_.size(); ++i) {
+    if (!stops_[i]) continue;
+    const std::span<Body* const> links = articulations_[i]->bodies();
+    velocities.resize(links.size());
+    for (std::size_t k = 0; k < links.size(); ++k)
+      velocities[k] << bodies[links[k]->row].velocity, bodies[links[k]->row].angular_velocity;
+    articulations_[i]->project(end, velocities);
+    for (std::size_t k = 0; k < links.size(); ++k) {
+      bodies[links[k]->row].velocity = velocities[k].head<3>();
+      bodies[links[k]->row].angular_velocity = velocities[k].tail<3>();
+    }
   }
 }
 
@@ -29,10 +57,11 @@ void IslandJoints::collect(std::span<const Island* const> islands, const Contact
   bounded_.clear();
   origins_.clear();
   bounded_ends_.clear();
+  stops_.clear();
   impulses_.clear();
   for (const Island* island : islands) {
     const std::size_t first = articulations_.size();
-    collect_constraints(*island, interval.end, false);
+    collect_constraints(*island, [&](Articulation& a) { place(a, interval); });
     for (std::size_t i = first; i < articulations_.size(); ++i) {
       collect_bounded_rows(*articulations_[i], interval.duration, interval.end, bounded_, origins_);
       bounded_ends_.push_back(static_cast<uint32_t>(bounded_.size()));
@@ -47,7 +76,7 @@ void IslandJoints::collect_for_collision(const Island& island, Real time) {
   constraints_.clear();
   bounded_.clear();
   origins_.clear();
-  collect_constraints(island, time, true);
+  collect_constraints(island, [&](Articulation& a) { a.place(time, true); });
   for (const Articulation* a : articulations_) collect_stops(*a, time, bounded_, origins_);
   impulses_.assign(constraints_.size(), Vec6::Zero());
 }

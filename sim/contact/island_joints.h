@@ -1,6 +1,7 @@
 #pragma once
 /// The joints of islands, as part of the problems of contacts and of impacts (physics A3, A4).
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -8,6 +9,7 @@
 #include "sim/articulation/joint_problem.h"
 #include "sim/contact/contact_graph.h"
 #include "sim/contact/contact_interval.h"
+#include "sim/contact/contact_problem.h"
 
 namespace offstage::sim {
 
@@ -28,13 +30,22 @@ class IslandJoints {
   void store_impulses(Real duration);
 
   std::span<Articulation* const> articulations() const { return articulations_; }
+  /// The share of the interval after which the impulses of an articulation act.
+  Real acting_from(std::size_t articulation) const { return stops_[articulation].value_or(kMiddle); }
+  /// Projects the velocities of articulations that reach a limit onto their constraints at that time: with
+  /// the joint's speed, the forces end that turned the velocities in the rest of the free motion.
+  void project(std::span<ContactBody> bodies, Real end) const;
   /// End of the bounded rows of each articulation.
   std::span<const uint32_t> bounded_ends() const { return bounded_ends_; }
   std::span<const BoundedRow> bounded() const { return bounded_; }
   std::span<const BoundedOrigin> origins() const { return origins_; }
 
  private:
-  void collect_constraints(const Island& island, Real time, bool at_start);
+  static constexpr Real kMiddle = 0.5;
+
+  template <class Place>
+  void collect_constraints(const Island& island, Place&& place);
+  void place(Articulation& a, const ContactInterval& interval);
   Wrench wrench(std::size_t bounded, Real impulse) const;
 
   std::vector<Articulation*> articulations_;
@@ -42,6 +53,8 @@ class IslandJoints {
   std::vector<BoundedRow> bounded_;
   std::vector<BoundedOrigin> origins_;
   std::vector<uint32_t> bounded_ends_;
+  std::vector<std::optional<Real>>
+      stops_;  // by articulation: share of the interval before a limit is reached
   std::vector<Vec6> impulses_;
 };
 

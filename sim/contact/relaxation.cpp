@@ -278,21 +278,12 @@ void RelaxationSolver::finish(uint32_t i) {
   if (b.inverse_mass == 0) return;
   const BodyMotion& m = motions_[i];
   const Real h = def_.duration;
-  const Vec3 dv = linear_part(m.velocity), dw = angular_part(m.velocity);
   const FloatLanes greatest = lane_max(greatest_[i], lane_abs(m.velocity - last_[i]));
   late_[i] = jumps(b, m, greatest, def_) ? 0 : substep_ / 2;
   b.impulse = b.angular_impulse = b.displacement = b.rotation_vector = Vec3::Zero();
-  if (!has_joints()) {  // report() adds the effect of contacts
-    b.velocity += h * b.free_acceleration;
-    b.angular_velocity += h * b.free_angular_acceleration;
-    return;
-  }
-  b.displacement = linear_part(m.shift) - h * h / 2 * b.free_acceleration - late_[i] * dv;
-  b.rotation_vector = angular_part(m.shift) - h * h / 2 * b.free_angular_acceleration - late_[i] * dw;
-  b.velocity += dv;
-  b.angular_velocity += dw;
-  b.impulse = (dv - h * b.free_acceleration) / b.inverse_mass;
-  b.angular_impulse = b.inverse_inertia.inverse() * (dw - h * b.free_angular_acceleration);
+  // The effect of contacts and joints is added afterwards.
+  b.velocity += h * b.free_acceleration;
+  b.angular_velocity += h * b.free_angular_acceleration;
 }
 
 namespace {
@@ -334,11 +325,10 @@ void RelaxationSolver::give(const ContactPatch& p) {
   to(p.b, p.arm_b, -1);
 }
 
-// If only contacts act, the motion is computed again from their impulses in double precision. The impulses on
-// both bodies are opposite to the last bit, so momentum is conserved.
+// The motion is computed again from the impulses in double precision. The impulses on both bodies are
+// opposite to the last bit, so momentum is conserved.
 void RelaxationSolver::report(uint32_t i) {
   sim::report(batches_[i], patches_, substep_);
-  if (has_joints()) return;
   for (const uint32_t patch : coloring_.batches()[i])
     if (patch != ContactColoring::kNone) give(patches_[patch]);
 }
@@ -372,7 +362,10 @@ ContactWork RelaxationSolver::solve(std::span<RelaxedBody> bodies, std::span<Con
   run_stages(
       std::span<const Range>(ranges_), threads, [this](const Range& range) { return is_needed(range); },
       [this](const Range& range, uint32_t block) { run(range, block); });
-  if (joints) joints->finish();
+  if (joints) {
+    joints->give(bodies, late_);
+    joints->finish();
+  }
   ContactWork work{.solves = 1, .iterations = def.substeps + 1};
   for (const PatchBatch& p : batches_)
     for (unsigned lane = 0; lane < ContactColoring::kLanes; ++lane)

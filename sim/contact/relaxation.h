@@ -162,7 +162,6 @@ class RelaxationSolver {
   void finish(uint32_t body);
   void report(uint32_t batch);
   void give(const ContactPatch& patch);
-  bool has_joints() const { return joints_ && joints_->count() > 0; }
 
   std::span<RelaxedBody> bodies_;
   std::span<ContactPatch> patches_;

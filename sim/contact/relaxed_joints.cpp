@@ -57,6 +57,7 @@ RelaxedJoints::RelaxedJoints(const JointProblem& problem, std::span<Articulation
     part.impulses.resize(joints);
     part.now.assign(joints, Vec6::Zero());
     part.sum.assign(joints, Vec6::Zero());
+    part.shift.assign(joints, Vec6::Zero());
     parts_.push_back(std::move(part));
     constraint += static_cast<uint32_t>(joints);
     row = bounded_ends[i];
@@ -152,6 +153,8 @@ void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapse
   for (uint32_t i = part.first_row; i < part.last_row; ++i) {
     const BoundedRow& r = problem_.bounded[i];
     Row& row = rows_[i];
+    row.acts |= elapsed > r.from * duration_;
+    if (!row.acts) continue;
     Real u = r.offset;
     if (r.a != kUnmoved) u += r.on_a.dot(velocity_of(bodies_[r.a], motions[r.a]));
     if (r.b != kUnmoved) u += r.on_b.dot(velocity_of(bodies_[r.b], motions[r.b]));
@@ -162,6 +165,35 @@ void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapse
     row.impulse = next;
   }
   for (std::size_t j = 0; j < part.sum.size(); ++j) part.sum[j] += part.now[j];
+  if (is_last) return;
+  for (uint32_t i = part.first_row; i < part.last_row; ++i) rows_[i].shift += substep_ * rows_[i].sum;
+  for (std::size_t j = 0; j < part.sum.size(); ++j) part.shift[j] += substep_ * part.sum[j];
+}
+
+void RelaxedJoints::give(std::span<RelaxedBody> bodies, std::span<const Real> late) const {
+  const auto to = [&](uint32_t body, const Vec6& impulse, const Vec6& shift) {
+    if (body == kUnmoved || bodies[body].inverse_mass == 0) return;
+    RelaxedBody& b = bodies[body];
+    const Vec6 way = shift - late[body] * impulse;
+    b.impulse += impulse.head<3>();
+    b.angular_impulse += impulse.tail<3>();
+    b.velocity += b.inverse_mass * impulse.head<3>();
+    b.angular_velocity += b.inverse_inertia * impulse.tail<3>();
+    b.displacement += b.inverse_mass * way.head<3>();
+    b.rotation_vector += b.inverse_inertia * way.tail<3>();
+  };
+  for (const Part& part : parts_) {
+    for (std::size_t j = 0; j < part.sum.size(); ++j) {
+      const JointConstraint& c = problem_.constraints[part.first_constraint + j];
+      to(c.a, c.rows->on_a * part.sum[j], c.rows->on_a * part.shift[j]);
+      to(c.b, c.rows->on_b * part.sum[j], c.rows->on_b * part.shift[j]);
+    }
+    for (uint32_t i = part.first_row; i < part.last_row; ++i) {
+      const BoundedRow& r = problem_.bounded[i];
+      to(r.a, rows_[i].sum * r.on_a, rows_[i].shift * r.on_a);
+      to(r.b, rows_[i].sum * r.on_b, rows_[i].shift * r.on_b);
+    }
+  }
 }
 
 void RelaxedJoints::finish() {

@@ -30,6 +30,9 @@ class RelaxedJoints {
   void start(uint32_t part, std::span<BodyMotion> motions);
   /// Solves a part at the end of a sub-step, `elapsed` after the start.
   void solve(uint32_t part, std::span<BodyMotion> motions, Real elapsed, bool is_last);
+  /// Adds the effect of the joints in the step to the bodies, in double precision. `late` is, by body, the
+  /// time by which the displacement by the sub-steps is too large per change of velocity [s].
+  void give(std::span<RelaxedBody> bodies, std::span<const Real> late) const;
   /// Writes the impulses of the whole step.
   void finish();
 
@@ -38,6 +41,8 @@ class RelaxedJoints {
     Real inverse_stiffness;      // change of u per unit impulse, softness included
     Real impulse, lower, upper;  // bounds and impulse of a sub-step
     Real softness, sum = 0;      // softness; impulse of the whole step
+    Real shift = 0;              // integral of the sum over the step
+    bool acts = false;           // whether the time from which it acts has come
     // Of the links to a unit impulse; empty: only of its own two links, in `response_a` and `response_b`.
     std::vector<Vec6> response;
     std::vector<Vec6> reaction;  // of the joints to a unit impulse
@@ -48,7 +53,8 @@ class RelaxedJoints {
     uint32_t first_constraint, first_row, last_row;
     std::vector<uint32_t> bodies;  // indices of the links' bodies
     std::vector<Vec6> velocities, change, impulses;
-    std::vector<Vec6> now, sum;  // impulses of the joints in this sub-step, and in the whole step
+    // Impulses of the joints in this sub-step, in the whole step, and the integral of these over the step.
+    std::vector<Vec6> now, sum, shift;
   };
 
   void prepare(Part& part, std::span<const RelaxedBody> bodies);

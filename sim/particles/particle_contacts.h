@@ -143,7 +143,7 @@ class ParticleContacts {
   void keep_outside(std::span<Vec3> end, std::vector<Reaction>& reactions,
                     std::vector<ParticleStrike>& strikes);
   void keep_outside(uint32_t i, NearObstacles& near, Vec3& end, Found& found);
-  void report(uint32_t i, const Vec3& end, Found& found) const;
+  void report(uint32_t i, Found& found) const;
 
   std::span<CollidingParticle> particles_;
   Order order_;

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <set>
 
 #include <oneapi/tbb/parallel_for.h>
 
+#include "sim/core/disjoint_sets.h"
 #include "sim/particles/particle_contacts.h"
 
 namespace offstage::sim {
@@ -29,16 +31,27 @@ constexpr std::size_t kRelaxationChunk = ParticleSearch::kChunk;
 struct Load {
   const Obstacle* obstacle;
   Vec3 impulse = Vec3::Zero(), angular_impulse = Vec3::Zero();
+  Real arm = 0;                ///< greatest lever arm of its parts [m]
+  Real brought = 0, mass = 0;  ///< of the particles that load it, see Heap
   Real share = 1;
 };
 
+/// Particles that touch each other.
+struct Heap {
+  Real brought = 0;  ///< sum of the momenta that they had before the contacts acted [N s]
+  Real mass = 0;     ///< [kg]
+};
+
 /// Limits the load on a body. A load against the body's motion can at most stop it. Beyond that, the body
-/// gets no more momentum than the touching particles, of total `mass`, have `brought` relative to the body.
-void limit_loads(std::span<Reaction> reactions, std::map<uint32_t, Load>& loads, Real brought, Real mass) {
+/// gets no more momentum than the particles that load it have brought relative to it, and no more angular
+/// momentum than this at the greatest lever arm.
+void limit_loads(std::span<Reaction> reactions, std::map<uint32_t, Load>& loads) {
   for (const Reaction& r : reactions)
     if (const auto load = loads.find(r.body); load != loads.end()) {
       load->second.impulse += r.impulse;
       load->second.angular_impulse += r.angular_impulse;
+      if (const Real size = r.impulse.norm(); size > 0)
+        load->second.arm = std::max(load->second.arm, r.angular_impulse.norm() / size);
     }
   for (auto& [body, load] : loads) {
     const Obstacle& o = *load.obstacle;
@@ -47,9 +60,11 @@ void limit_loads(std::span<Reaction> reactions, std::map<uint32_t, Load>& loads,
     const Real second = (o.inverse_mass * load.impulse.squaredNorm() +
                          load.angular_impulse.dot(o.inverse_inertia * load.angular_impulse)) /
                         2;
-    const Real size = load.impulse.norm();
+    const Real size = load.impulse.norm(), turn = load.angular_impulse.norm();
     const Real stops = second > 0 ? std::max(0.0, -first) / (2 * second) : 1;
-    const Real bears = size > 0 ? (brought + mass * o.end_velocity.norm()) / size : 1;
+    const Real most = load.brought + load.mass * o.end_velocity.norm();
+    Real bears = size > 0 ? most / size : 1;
+    if (turn > 0) bears = std::min(bears, most * load.arm / turn);
     load.share = std::min(1.0, stops + bears);
   }
   for (Reaction& r : reactions)
@@ -197,7 +212,7 @@ void ParticleContacts::keep_outside(std::span<Vec3> end, std::vector<Reaction>& 
   for_each([&](uint32_t i, NearObstacles& near, Found& found) {
     if (particles_[i].hits_bodies) keep_outside(i, near, end[i], found);
   });
-  for_each([&](uint32_t i, NearObstacles&, Found& found) { report(i, end[i], found); });
+  for_each([&](uint32_t i, NearObstacles&, Found& found) { report(i, found); });
   const std::size_t first = reactions.size();
   for (const Found& found : found_) {
     reactions.insert(reactions.end(), found.reactions.begin(), found.reactions.end());
@@ -223,12 +238,26 @@ void ParticleContacts::keep_outside(std::span<Vec3> end, std::vector<Reaction>& 
     take_back(c, c.b, -1);
   }
   for (const Surface& c : surfaces_) take_back(c, c.particle, 1);
-  Real brought = 0, mass = 0;
-  for (std::size_t i = 0; i < particles_.size(); ++i) {
-    brought += acts[i] ? momentum[i].norm() : 0;
-    mass += acts[i] ? particles_[i].mass : 0;
+  // Particles that touch each other load a body together.
+  DisjointSets heaps(particles_.size());
+  for (const Pair& c : pairs_)
+    if (c.acts()) heaps.join(c.a, c.b);
+  std::map<uint32_t, Heap> of_heap;
+  for (uint32_t i = 0; i < particles_.size(); ++i)
+    if (acts[i]) {
+      Heap& heap = of_heap[heaps.find(i)];
+      heap.brought += momentum[i].norm();
+      heap.mass += particles_[i].mass;
+    }
+  std::set<std::pair<uint32_t, uint32_t>> seen;
+  for (const Surface& s : surfaces_) {
+    const auto load = loads.find(s.body);
+    if (!s.acts() || load == loads.end() || !seen.insert({s.body, heaps.find(s.particle)}).second) continue;
+    const Heap& heap = of_heap[heaps.find(s.particle)];
+    load->second.brought += heap.brought;
+    load->second.mass += heap.mass;
   }
-  limit_loads(std::span(reactions).subspan(first), loads, brought, mass);
+  limit_loads(std::span(reactions).subspan(first), loads);
 }
 
 void ParticleContacts::keep_outside(uint32_t i, NearObstacles& near, Vec3& end, Found& found) {
@@ -264,7 +293,7 @@ void ParticleContacts::keep_outside(uint32_t i, NearObstacles& near, Vec3& end, 
 }
 
 /// Records the collisions of a particle's contacts; those of pairs are recorded for both particles.
-void ParticleContacts::report(uint32_t i, const Vec3& end, Found& found) const {
+void ParticleContacts::report(uint32_t i, Found& found) const {
   const auto strike = [&](const auto& c, uint32_t particle, const Vec3& normal) {
     if (c.is_impact && c.acts())
       found.strikes.push_back(
@@ -277,9 +306,10 @@ void ParticleContacts::report(uint32_t i, const Vec3& end, Found& found) const {
   for (uint32_t k = surface_begin_[i]; k < surface_begin_[i + 1]; ++k) {
     const Surface& s = surfaces_[k];
     strike(s, i, s.normal());
-    if (s.obstacle->is_dynamic() && s.acts())
-      found.reactions.push_back(
-          reaction(*s.obstacle, end - particles_[i].radius * s.normal(), s.time / step_->h, s.impulse()));
+    if (!s.obstacle->is_dynamic() || !s.acts()) continue;
+    // The impulse acts where the contact begins; the particle may be far away afterwards.
+    const Vec3 contact = particles_[i].at(s.time) - particles_[i].radius * s.normal();
+    found.reactions.push_back(reaction(*s.obstacle, contact, s.time / step_->h, s.impulse()));
   }
 }
 

@@ -1,0 +1,28 @@
+#pragma once
+/// Disjoint sets of the numbers below a count. The representative of a set is its smallest member.
+
+#include <algorithm>
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+namespace offstage::sim {
+
+class DisjointSets {
+ public:
+  explicit DisjointSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
+
+  uint32_t find(uint32_t i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  void join(uint32_t i, uint32_t j) {
+    const auto [low, high] = std::minmax(find(i), find(j));
+    parent_[high] = low;
+  }
+
+ private:
+  std::vector<uint32_t> parent_;
+};
+
+}  // namespace offstage::sim
