@@ -429,6 +429,31 @@ def hammock():
     write_glb(MODELS / "hammock.glb", [(shaded(Mesh(positions, triangles), 180), Material("canvas", "#d8c9a8", 0.9))])
 
 
+def swatch():
+    """A flat round sample of cloth for the drape test, 30 cm wide: rings of nearly equilateral triangles."""
+    radius, rings = 0.15, 14
+    positions = [(0, 0, 0)]
+    for r in range(1, rings + 1):
+        for k in range(6 * r):
+            angle = math.pi * k / (3 * r)
+            positions.append((radius * r / rings * math.cos(angle), 0, -radius * r / rings * math.sin(angle)))
+
+    def vertex(r, k):
+        return 1 + 3 * r * (r - 1) + k % (6 * r) if r > 0 else 0
+
+    triangles = []
+    for r in range(1, rings + 1):
+        for side in range(6):
+            for k in range(r):
+                outer, inner = side * r + k, side * (r - 1) + k
+                triangles.append((vertex(r - 1, inner), vertex(r, outer), vertex(r, outer + 1)))
+                if k + 1 < r:
+                    triangles.append((vertex(r - 1, inner), vertex(r, outer + 1), vertex(r - 1, inner + 1)))
+    mesh = shaded(Mesh(positions, triangles), 180)
+    mesh.uvs = [(p[0], p[2]) for p in mesh.positions]
+    write_glb(MODELS / "swatch.glb", [(mesh, Material("cloth", "#d8d2c4", 0.9))])
+
+
 # --- set dressing ---------------------------------------------------------------------------------
 
 
@@ -617,7 +642,7 @@ def tentacle():
 ALL = [
     duck, fountain, sprinkler, t_handle, landscape, gears, crank, connecting_rod, piston, flywheel, robot_arm,
     voussoir, top, marble_run, dishes, parachute,
-    hammock, grass_patch, rock, pot, tree,
+    hammock, swatch, grass_patch, rock, pot, tree,
     tentacle
 ]
 

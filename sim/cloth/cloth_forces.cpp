@@ -39,14 +39,15 @@ struct Run {
   Real time;
   ClothPoints& points;
   Real total_mass;
-  std::vector<Vec3> air;  // velocity of it, at each point
 
   std::size_t size() const { return cloth.points.size(); }
   Vec3 at(std::size_t i) const { return points.at(first + i); }
-  Vec3 velocity(std::size_t i) const { return points.velocity[first + i].head<3>(); }
   /// A force on the whole cloth gives each point its share by mass.
-  void accelerate(std::size_t i, const Vec3& force) {
-    points.acceleration[first + i] += padded(force / total_mass);
+  void accelerate(std::size_t i, const Vec3& force) { points.outer[first + i] += padded(force / total_mass); }
+  /// The same of a force `drag` times (velocity - that of the point) (air_drag.h).
+  void drag(std::size_t i, Real drag, const Vec3& velocity) {
+    accelerate(i, drag * velocity);
+    points.field_drag[first + i] += drag / total_mass;
   }
 };
 
@@ -61,8 +62,8 @@ void blow(const Field& f, Run& run, Flow&& flow) {
     const Real share = strength(f.region, f.drop_rate, run.at(i));
     if (!(share > 0)) continue;
     const Vec3 air = flow(i);
-    run.air[i] += share * air;
-    if (f.drag > 0) run.accelerate(i, share * f.drag * (air - run.velocity(i)));
+    run.points.flow[run.first + i] += padded(share * air);
+    if (f.drag > 0) run.drag(i, share * f.drag, air);
   }
 }
 
@@ -94,7 +95,8 @@ void add(const Grab& f, Run& run) {
   for (std::size_t i = 0; i < run.size(); ++i) {
     const Vec3 gap = run.at(i) - hand.pose.position;
     if (gap.norm() > f.reach) continue;
-    run.accelerate(i, -f.stiffness * gap - f.damping * (run.velocity(i) - hand.velocity));
+    run.accelerate(i, -f.stiffness * gap);
+    run.drag(i, f.damping, hand.velocity);
   }
 }
 void add(const AppliedForce&, Run&) {}  // acts on bodies only
@@ -104,35 +106,13 @@ void add(const PairLaw&, Run&) {
   static_assert(kIsPairLaw<PairLaw>);
 }
 
-/// Drag and lift (ClothAir), a third to each corner.
-void blow_on_triangles(Run& run, Real h) {
-  const ClothAir& air = run.cloth.def.air;
-  if (!(air.density > 0) || !(air.drag > 0)) return;
-  for (const Triangle& t : run.cloth.triangles) {
-    const Vec3 a = run.at(t[0]);
-    const Vec3 doubled = (run.at(t[1]) - a).cross(run.at(t[2]) - a);
-    const Real size = doubled.norm();
-    if (!(size > 0)) continue;
-    const Vec3 n = doubled / size;
-    const Vec3 u = (run.air[t[0]] + run.air[t[1]] + run.air[t[2]] - run.velocity(t[0]) - run.velocity(t[1]) -
-                    run.velocity(t[2])) /
-                   3;
-    const Real scale = air.density * size / 4 * u.norm();  // rho A/2 |u|
-    const Real mass = run.cloth.masses[t[0]] + run.cloth.masses[t[1]] + run.cloth.masses[t[2]];
-    const Real rate = 2 * scale * air.drag / mass;
-    const Vec3 force = scale / (1 + h * rate) * ((air.drag - air.lift) * u + air.lift * u.dot(n) * n);
-    for (uint32_t corner : t)
-      run.points.acceleration[run.first + corner] += padded(force / (3 * run.cloth.masses[corner]));
-  }
-}
-
 /// A pressure inside, the same on all triangles.
 void push_out(Run& run, Real pressure) {
   for (const Triangle& t : run.cloth.triangles) {
     const Vec3 a = run.at(t[0]);
     const Vec3 third = pressure / 6 * (run.at(t[1]) - a).cross(run.at(t[2]) - a);
     for (uint32_t corner : t)
-      run.points.acceleration[run.first + corner] += padded(third / run.cloth.masses[corner]);
+      run.points.outer[run.first + corner] += padded(third / run.cloth.masses[corner]);
   }
 }
 
@@ -151,7 +131,7 @@ void lift(Run& run, const Vec3& gravity) {
     const std::array<Real, 3> p = {slope.dot(a - origin), slope.dot(b - origin), slope.dot(c - origin)};
     const Real sum = p[0] + p[1] + p[2];
     for (std::size_t k = 0; k < 3; ++k)
-      run.points.acceleration[run.first + t[k]] += padded((sum + p[k]) / 12 / cloth.masses[t[k]] * area);
+      run.points.outer[run.first + t[k]] += padded((sum + p[k]) / 12 / cloth.masses[t[k]] * area);
   }
 }
 
@@ -160,26 +140,6 @@ void inflate(Run& run, const Vec3& gravity) {
   if (cloth.def.pressure == 0) return;
   push_out(run, cloth.gas.share() * overpressure(cloth));
   lift(run, gravity);
-}
-
-/// An open cloth that faces the air stops what comes in at its mouth: inside of it the pressure of stagnation
-/// builds up, everywhere the same. A fan over its border would close the surface, whose area vectors then
-/// add up to zero: that of the mouth is the opposite of the cloth's.
-void catch_air(Run& run, Real h) {
-  const ClothDef& def = run.cloth.def;
-  if (!(def.ram_pressure > 0)) return;
-  Vec3 cap = Vec3::Zero(), stream = Vec3::Zero();
-  for (const Triangle& t : run.cloth.triangles) {
-    const Vec3 a = run.at(t[0]);
-    cap += (run.at(t[1]) - a).cross(run.at(t[2]) - a) / 2;
-  }
-  for (std::size_t i = 0; i < run.size(); ++i)
-    stream += run.cloth.masses[i] / run.total_mass * (run.air[i] - run.velocity(i));
-  const Real area = cap.norm(), speed = area > 0 ? cap.dot(stream) / area : 0;
-  if (!(speed > 0)) return;
-  const Real whole = def.ram_pressure * def.air.density / 2 * speed * speed;
-  const Real rate = 2 * whole * area / (speed * run.total_mass);
-  push_out(run, whole / (1 + h * rate));
 }
 
 /// Mass of the gas and the air that a skin of unit area moves when it bursts [kg/m^2]: that of a sphere of
@@ -204,7 +164,9 @@ void set_inertia(Run& run) {
   }
   for (std::size_t i = 0; i < run.size(); ++i) {
     run.points.mass[run.first + i] = inertia[i];
-    run.points.acceleration[run.first + i] *= run.cloth.masses[i] / inertia[i];
+    const Real share = run.cloth.masses[i] / inertia[i];
+    run.points.outer[run.first + i] *= share;
+    run.points.field_drag[run.first + i] *= share;
   }
 }
 
@@ -214,30 +176,29 @@ void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather&
                       ClothPoints& points) {
   Real total = 0;
   for (Real m : cloth.masses) total += m;
-  Run run{cloth, first, weather.time, points, total, std::vector<Vec3>(cloth.points.size(), weather.wind)};
-  std::fill_n(points.acceleration.begin() + static_cast<std::ptrdiff_t>(first), run.size(),
-              padded(weather.gravity));
+  Run run{cloth, first, weather.time, points, total};
+  const auto fill = [&](auto& values, const auto& value) {
+    std::fill_n(values.begin() + static_cast<std::ptrdiff_t>(first), run.size(), value);
+  };
+  fill(points.outer, padded(weather.gravity));
+  fill(points.flow, padded(weather.wind));
+  fill(points.field_drag, Real{0});
   for (const ForceDef* f : weather.forces)
     if (f->acts_on(cloth.handle) && f->is_on(weather.time))
       std::visit([&](const auto& effect) { add(effect, run); }, f->effect);
-  blow_on_triangles(run, weather.h);
   inflate(run, weather.gravity);
-  catch_air(run, weather.h);
   set_inertia(run);
 }
 
-void step_leaks(std::span<Cloth* const> cloths, std::span<const std::size_t> first,
-                const ClothWeather& weather, ClothPoints& points) {
-  for (std::size_t c = 0; c < cloths.size(); ++c) {
-    Cloth& cloth = *cloths[c];
-    if (!leaks(cloth)) continue;
-    const std::size_t begin = first[c], end = begin + cloth.points.size();
-    for (std::size_t i = begin; i < end; ++i) cloth.points[i - begin] = points.at(i);
-    cloth.gas.leak(cloth.points, gas_volume(cloth), overpressure(cloth), gas_density(cloth), weather.h);
-    add_outer_forces(cloth, begin, weather, points);
-    for (std::size_t i = begin; i < end; ++i)
-      if (points.inverse_mass[i] > 0) points.inverse_mass[i] = 1 / points.mass[i];
-  }
+bool step_leak(Cloth& cloth, std::size_t first, const ClothWeather& weather, ClothPoints& points) {
+  if (!leaks(cloth)) return false;
+  const std::size_t end = first + cloth.points.size();
+  for (std::size_t i = first; i < end; ++i) cloth.points[i - first] = points.at(i);
+  cloth.gas.leak(cloth.points, gas_volume(cloth), overpressure(cloth), gas_density(cloth), weather.h);
+  add_outer_forces(cloth, first, weather, points);
+  for (std::size_t i = first; i < end; ++i)
+    if (points.inverse_mass[i] > 0) points.inverse_mass[i] = 1 / points.mass[i];
+  return true;
 }
 
 }  // namespace offstage::sim

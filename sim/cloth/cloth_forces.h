@@ -1,6 +1,6 @@
 #pragma once
-/// External forces on cloth: gravity, fields, aerodynamic forces on its triangles and internal pressure
-/// (physics F8, P2).
+/// External forces on cloth: gravity, fields and internal pressure (physics F8, P2). The forces of the air on
+/// its triangles are in air_drag.h.
 
 #include <span>
 
@@ -17,16 +17,15 @@ struct ClothWeather {
   std::span<const ForceDef* const> forces;
 };
 
-/// Sets the accelerations and masses of a cloth's points, which begin at index `first`. The drag of the air
-/// is limited so that it at most brings a triangle to rest relative to the air within h, which keeps the step
-/// stable. Points of a cloth under pressure that is torn have the mass of the gas that they move, too.
+/// Sets the masses of a cloth's points, which begin at index `first`, their accelerations by outer forces,
+/// the velocity of the air there, and the rate of linear drag by fields and hands. Points of a cloth under
+/// pressure that is torn have the mass of the gas that they move, too.
 void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather& weather,
                       ClothPoints& points);
 
-/// Lets the gas of torn cloths flow out for a time weather.h, and sets their accelerations and masses for the
-/// next sub-step: their skin moves too fast for forces that stay through a sub-step of the world. `first`
-/// holds the index of each cloth's first point.
-void step_leaks(std::span<Cloth* const> cloths, std::span<const std::size_t> first,
-                const ClothWeather& weather, ClothPoints& points);
+/// Lets the gas of a torn cloth flow out for a time weather.h, and calls add_outer_forces() for the next
+/// sub-step: its skin moves too fast for forces that stay through a sub-step of the world. Returns false if
+/// no gas flows.
+bool step_leak(Cloth& cloth, std::size_t first, const ClothWeather& weather, ClothPoints& points);
 
 }  // namespace offstage::sim

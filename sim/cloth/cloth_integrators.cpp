@@ -52,6 +52,14 @@ void accelerate(const ClothPoints& points, const ClothRange& cloth, const Spring
   }
 }
 
+/// Velocities gained in a step h of a run that began with v, with the drag of the gain implicit.
+void drag_gains(const ClothRange& cloth, const SpringRun& v, Real h, SpringRun& gain) {
+  if (cloth.air.empty()) return;
+  cloth.air.begin(h);
+  for (std::size_t i = 0; i < v.size(); ++i)
+    gain[i] = cloth.air.respond(i, gain[i] + h * cloth.air.change(i, v[i]));
+}
+
 /// What springs do to what is held, over the time h.
 void pass_on(ClothPoints& points, const ClothRange& cloth, const SpringRun& x, const SpringRun& v, Real h,
              Real dt) {
@@ -101,6 +109,12 @@ class ImplicitSystem {
       block_[i].diagonal().setConstant(
           points.mass[cloth.begin + i] +
           (bending_ > 0 ? bending_ * cloth.bending.diagonal(static_cast<uint32_t>(i)) : 0));
+    if (!cloth.air.empty()) {
+      for (std::size_t i = 0; i < block_.size(); ++i) {
+        drag_.push_back(h * points.mass[cloth.begin + i] * cloth.air.resistance(i));
+        block_[i] += drag_[i];
+      }
+    }
     for (const ClothSpring& s : cloth.springs) {
       const Vec4 d = points.start[s.a] - points.start[s.b];
       const Real length = d.norm();
@@ -120,6 +134,7 @@ class ImplicitSystem {
   /// y = A p, 0 where held.
   void multiply(const SpringRun& p, SpringRun& y) const {
     for (std::size_t i = 0; i < p.size(); ++i) y[i] = points_.mass[cloth_.begin + i] * p[i];
+    for (std::size_t i = 0; i < drag_.size(); ++i) y[i] += dragged(i, p[i]);
     for (std::size_t k = 0; k < links_.size(); ++k) {
       const ClothSpring& s = cloth_.springs[k];
       const Link& link = links_[k];
@@ -157,13 +172,19 @@ class ImplicitSystem {
     for (std::size_t i = 0; i < r.size(); ++i) z[i] = padded(block_[i] * r[i].head<3>());
   }
 
-  /// M v + h (spring forces + M a), 0 where held.
+  /// Impulse of the linear part of the drag on point i at a velocity.
+  Vec4 dragged(std::size_t i, const Vec4& v) const {
+    return drag_.empty() ? Vec4(Vec4::Zero()) : padded(drag_[i] * v.head<3>());
+  }
+
+  /// M v + h (spring forces + M a), 0 where held; drag is that of its velocity, with what is linear added.
   SpringRun right_side(const SpringRun& v, Real h) const {
     SpringRun b(v.size());
     for (std::size_t i = 0; i < b.size(); ++i) {
       const std::size_t k = cloth_.begin + i;
       b[i] = points_.mass[k] * (v[i] + h * points_.acceleration[k]);
     }
+    for (std::size_t i = 0; i < drag_.size(); ++i) b[i] += dragged(i, cloth_.air.from(i));
     for (std::size_t k = 0; k < links_.size(); ++k) {
       const Vec4 f = h * links_[k].force * links_[k].direction;
       b[cloth_.springs[k].a - cloth_.begin] -= f;
@@ -190,6 +211,7 @@ class ImplicitSystem {
   Real bending_;  // factor of its matrix
   std::vector<Link> links_;
   std::vector<Mat3> block_;  // inverse
+  std::vector<Mat3> drag_;   // of each point; none without air
 };
 
 Real dot(const SpringRun& a, const SpringRun& b) {
@@ -225,12 +247,13 @@ bool solve(const ImplicitSystem& system, const SpringRun& b, SpringRun& v) {
 }
 
 /// What the solution left of the momentum of a cloth that nothing holds, is given to all of it.
-void keep_momentum(const ClothPoints& points, const ClothRange& cloth, const SpringRun& b, SpringRun& v) {
+void keep_momentum(const ClothPoints& points, const ClothRange& cloth, const ImplicitSystem& system,
+                   const SpringRun& b, SpringRun& v) {
   Vec4 lost = Vec4::Zero();
   Real mass = 0;
   for (std::size_t i = 0; i < v.size(); ++i) {
     if (is_held(points, cloth.begin + i)) return;
-    lost += b[i] - points.mass[cloth.begin + i] * v[i];
+    lost += b[i] - points.mass[cloth.begin + i] * v[i] - system.dragged(i, v[i]);
     mass += points.mass[cloth.begin + i];
   }
   for (Vec4& velocity : v) velocity += lost / mass;
@@ -304,15 +327,21 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
   std::optional<RelaxedBending> bending;
   if (bends) bending.emplace(points, cloth, dt, h);
   std::vector<Vec4>& moves = points.moves;
+  const bool drags = !cloth.air.empty();
+  if (drags) cloth.air.begin(h);
   springs.begin(points, h);
   bool solved = true;
   for (uint32_t step = 0; step < steps; ++step) {
     for (std::size_t i = 0; i < n; ++i) {
       const std::size_t k = cloth.begin + i;
       moves[k] = is_held(points, k) ? velocity[i] : Vec4(velocity[i] + h * h * points.acceleration[k]);
+      if (drags && !is_held(points, k)) moves[k] += h * h * cloth.air.change(i, velocity[i] / h);
     }
     if (bends) bending->pull(points, moves);
     springs.pull(points, moves);
+    for (std::size_t i = 0; drags && i < n; ++i)
+      if (Vec4& move = moves[cloth.begin + i]; !is_held(points, cloth.begin + i))
+        move = velocity[i] + cloth.air.respond(i, move - velocity[i]);
     if (bends && bending->is_stiff()) solved &= bending->filter(points, moves);
     springs.relax(points, moves);
     for (std::size_t i = 0; i < n; ++i) {
@@ -339,8 +368,10 @@ void step_symplectic(ClothPoints& points, const ClothRange& cloth, Real h) {
   SpringRun a(x.size());
   accelerate(points, cloth, x, v, a);
   pass_on(points, cloth, x, v, h, h);
+  for (Vec4& gain : a) gain *= h;
+  drag_gains(cloth, v, h, a);
   for (std::size_t i = 0; i < x.size(); ++i)
-    if (!is_held(points, cloth.begin + i)) points.position[cloth.begin + i] = x[i] + h * (v[i] + h * a[i]);
+    if (!is_held(points, cloth.begin + i)) points.position[cloth.begin + i] = x[i] + h * (v[i] + a[i]);
 }
 
 void step_rk4(ClothPoints& points, const ClothRange& cloth, Real h, std::span<Vec4> kick) {
@@ -362,9 +393,12 @@ void step_rk4(ClothPoints& points, const ClothRange& cloth, Real h, std::span<Ve
       gain[i] += share[k] * dv[i];
     }
   }
+  const SpringRun free = gain;
+  drag_gains(cloth, v, h, gain);
   for (std::size_t i = 0; i < n; ++i) {
     const std::size_t k = cloth.begin + i;
     if (is_held(points, k)) continue;
+    move[i] += h / 2 * (gain[i] - free[i]);
     points.position[k] = x[i] + move[i];
     kick[k] = v[i] + gain[i] - move[i] / h;
   }
@@ -376,7 +410,7 @@ bool step_implicit(ClothPoints& points, const ClothRange& cloth, Real h) {
   const ImplicitSystem system(points, cloth, h);
   const SpringRun b = system.right_side(v, h);
   const bool converged = solve(system, b, v);
-  keep_momentum(points, cloth, b, v);
+  keep_momentum(points, cloth, system, b, v);
   system.pass_on(points, v, h);
   for (std::size_t i = 0; i < x.size(); ++i)
     if (!is_held(points, cloth.begin + i)) points.position[cloth.begin + i] = x[i] + h * v[i];

@@ -1,10 +1,12 @@
 #pragma once
 /// Moves the points of a cloth by its springs, its bending and outer accelerations through a sub-step of
-/// length h, without contacts. Pinned points have already been moved. Where the velocity at the end differs
-/// from the mean velocity of the move, `kick` gets the difference.
+/// length h, without contacts. Drag is implicit in all of them (air_drag.h). Pinned points have already been
+/// moved. Where the velocity at the end differs from the mean velocity of the move, `kick` gets the
+/// difference.
 
 #include <span>
 
+#include "sim/cloth/air_drag.h"
 #include "sim/cloth/bending.h"
 #include "sim/cloth/cloth.h"
 #include "sim/cloth/cloth_points.h"
@@ -17,6 +19,7 @@ struct ClothRange {
   std::size_t begin, end;
   std::span<const ClothSpring> springs;  ///< between points of all cloths
   ClothBending& bending;
+  AirDrag& air;
 
   /// The values of this cloth's points, of those of all points.
   template <class T>

@@ -89,12 +89,16 @@ void ClothSystem::assemble() {
   kick_.assign(points_.size(), Vec4::Zero());
   points_.moves.assign(points_.size(), Vec4::Zero());
   points_.start = points_.position;
-  points_.acceleration.assign(points_.size(), Vec4::Zero());
+  points_.outer.assign(points_.size(), Vec4::Zero());
+  points_.acceleration = points_.flow = points_.outer;
+  points_.field_drag.assign(points_.size(), 0);
   points_.pull.assign(points_.size(), Vec4::Zero());
   springs_.clear();
   springs_.resize(cloths_.size());
   for (std::size_t c = 0; c < cloths_.size(); ++c)
     if (cloths_[c]->def.integrator == ClothIntegrator::relaxed) springs_[c].assign(springs_of(c), points_);
+  air_.resize(cloths_.size());
+  for (std::size_t c = 0; c < cloths_.size(); ++c) air_[c].assign(*cloths_[c], first_[c]);
   drift_.assign(points_.size(), Vec4::Zero());
   pieces_.assign(points_.size());
   for (const ClothSpring& s : all_springs_) pieces_.join(s.a, s.b);
@@ -178,6 +182,7 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
     for (std::size_t i = 0; i < cloths_[c]->points.size(); ++i)  // impacts may have changed them
       points_.velocity[first_[c] + i] = padded(cloths_[c]->velocities[i]);
     add_outer_forces(*cloths_[c], first_[c], weather, points_);
+    air_[c].expire();
   }
   for (Cloth* cloth : cloths_) cloth->before = cloth->points;
   adapt_springs();
@@ -199,11 +204,13 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
   Real since_look = 0;  // way of the fastest body [m]
   for (Real k = 0; k < parts; ++k) {
     for (Cloth* cloth : cloths_) cloth->age += dt;
+    blow(dt, parts - k);
     substep(k / parts, (k + 1) / parts, dt, k + 1 == parts || span_ + 1 >= span);
     ClothWeather next = weather;
     next.time += (k + 1) * dt;
     next.h = dt;
-    step_leaks(cloths_, first_, next, points_);
+    for (std::size_t c = 0; c < cloths_.size(); ++c)
+      if (step_leak(*cloths_[c], first_[c], next, points_)) air_[c].expire();
     // A body that goes by more than an edge of the cloth in a sub-step of the world must find the holes that
     // it tears.
     since_look += speed * dt;
@@ -292,6 +299,14 @@ void ClothSystem::adapt_springs() {
     if (cloths_[c]->def.integrator == ClothIntegrator::relaxed) springs_[c].adapt_to_stretch(points_);
 }
 
+/// Before a sub-step, with as many `left` in that of the world.
+void ClothSystem::blow(Real dt, Real left) {
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    const bool relaxed = cloths_[c]->def.integrator == ClothIntegrator::relaxed;
+    air_[c].renew(points_, dt, static_cast<uint32_t>(left), relaxed ? spring_steps(c, dt) : 1);
+  }
+}
+
 /// Number of steps of the springs in a sub-step of a `relaxed` cloth.
 uint32_t ClothSystem::spring_steps(std::size_t cloth, Real dt) const {
   if (cloths_[cloth]->def.soften) return 1;
@@ -306,7 +321,7 @@ void ClothSystem::integrate(Real dt) {
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     const ClothIntegrator integrator = cloths_[c]->def.integrator;
     const ClothRange range{first_[c], first_[c] + cloths_[c]->points.size(), springs_of(c),
-                           cloths_[c]->bending};
+                           cloths_[c]->bending, air_[c]};
     if (integrator == ClothIntegrator::symplectic) step_symplectic(points_, range, dt);
     if (integrator == ClothIntegrator::rk4) step_rk4(points_, range, dt, kick_);
     if (integrator == ClothIntegrator::implicit && !step_implicit(points_, range, dt))

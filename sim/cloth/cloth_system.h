@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "sim/cloth/air_drag.h"
 #include "sim/cloth/cloth_bodies.h"
 #include "sim/cloth/cloth_contacts.h"
 #include "sim/cloth/cloth_forces.h"
@@ -66,6 +67,7 @@ class ClothSystem {
   void carry(uint32_t point, ClothBody& body, const Vec3& place);
   void set_clamps(std::size_t cloth);
   void adapt_springs();
+  void blow(Real dt, Real left);
   uint32_t spring_steps(std::size_t cloth, Real dt) const;
   std::span<const ClothSpring> springs_of(std::size_t cloth) const {
     return std::span(all_springs_)
@@ -118,6 +120,7 @@ class ClothSystem {
 
   ClothPoints points_;
   std::vector<ClothSprings> springs_;  // of each `relaxed` cloth
+  std::vector<AirDrag> air_;           // on each cloth
   StretchLimit limit_;
   ClothContacts contacts_;
   CornerContacts corner_contacts_;

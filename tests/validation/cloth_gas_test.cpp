@@ -56,9 +56,13 @@ TEST(ClothGas, ABalloonHitByADartTearsAndShrinks) {
   EXPECT_FALSE(world.cloth_report(cloth).first_tear.has_value());
   const BodyHandle dart = world.add_body(
       {.shape = Capsule{0.006, 0.1}, .pose = {Vec3(0, 0.4, 0)}, .velocity = {0, -15, 0}, .mass = 0.05});
-  for (int i = 0; i < 24; ++i) ASSERT_TRUE(world.step(1.0 / 48).finite);
+  Real lowest = 0.4;
+  for (int i = 0; i < 24; ++i) {
+    ASSERT_TRUE(world.step(1.0 / 48).finite);
+    lowest = std::min(lowest, world.body(dart).pose.position.y());
+  }
   EXPECT_TRUE(world.cloth_report(cloth).first_tear.has_value());
-  EXPECT_LT(world.body(dart).pose.position.y(), 0.4);
+  EXPECT_LT(lowest, 0);  // it went through the skin, and beyond the centre
   // Its gas has left, and the skin goes back to its volume at rest.
   const Real rest = enclosed_volume(def.vertices, def.triangles);
   EXPECT_LT(volume() - rest, 0.5 * (blown_up - rest));

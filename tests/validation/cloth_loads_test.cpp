@@ -35,8 +35,8 @@ TEST(ClothAir, AFlatSheetFallsAtItsTerminalSpeed) {
   for (int frame = 1; frame <= 48; ++frame) {
     world.step(1.0 / 48);
     const Real speed = -momentum(def, world.cloth(cloth)).y() / mass;
-    // Of first order in the world's step: 1/240 s of g / v_t is 0.026.
-    EXPECT_NEAR(speed, terminal * std::tanh(kClothGravity * frame / 48 / terminal), 0.01 * terminal) << frame;
+    EXPECT_NEAR(speed, terminal * std::tanh(kClothGravity * frame / 48 / terminal), 0.001 * terminal)
+        << frame;
   }
 }
 

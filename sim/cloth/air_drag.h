@@ -1,0 +1,63 @@
+#pragma once
+/// Drag, lift and ram pressure of the air on a cloth (ClothAir, physics F8), and the linear drag of fields
+/// and hands. The force is linearised in the velocities of the points, and the integrators make this linear
+/// part implicit. Steady motion and loads at rest are exact for any step. Free decay is of second order; with
+/// one step of the springs per linearisation, the decay u0 / (1 + k u0 t) of a flat cloth is exact.
+
+#include <cstdint>
+#include <vector>
+
+#include "sim/cloth/cloth_points.h"
+#include "sim/cloth/cloth_state.h"
+
+namespace offstage::sim {
+
+class AirDrag {
+ public:
+  /// The cloth's points begin at index `first`. Its address must stay valid until the next call.
+  void assign(const Cloth& cloth, std::size_t first);
+
+  /// The next renew() linearises again, because other forces, masses or velocities changed.
+  void expire() { left_ = 0; }
+  /// To be called before each sub-step of length dt. Where the last linearisation no longer holds, sets the
+  /// accelerations of the points to those by outer forces and by air at their present velocities. `substeps`
+  /// of the world's sub-step are left, each with `steps` steps of the integrator.
+  void renew(ClothPoints& points, Real dt, uint32_t substeps, uint32_t steps);
+  /// Whether the velocities have no influence.
+  bool empty() const { return !is_active_; }
+
+  /// To be called before steps of length h.
+  void begin(Real h);
+  /// Change of the acceleration of the cloth's point i, because its velocity is v now.
+  Vec4 change(std::size_t i, const Vec4& v) const { return -times(resistance_[i], v - from_[i]); }
+  /// What drag leaves of a change of velocity in a step: (1 + h R)^-1 dv.
+  Vec4 respond(std::size_t i, const Vec4& dv) const { return times(response_[i], dv); }
+  /// R: by how much the acceleration decreases with the velocity [1/s].
+  Mat3 resistance(std::size_t i) const { return resistance_[i].topRows<3>(); }
+  /// Velocity at which the acceleration of the points holds.
+  const Vec4& from(std::size_t i) const { return from_[i]; }
+
+ private:
+  using Columns = Eigen::Matrix<Real, 4, 3>;  // the fourth row is 0
+
+  static Vec4 times(const Columns& m, const Vec4& v) {
+    return v[0] * m.col(0) + v[1] * m.col(1) + v[2] * m.col(2);
+  }
+  uint32_t substeps_until_change(const ClothPoints& points, Real dt) const;
+  void drag_points(ClothPoints& points);
+  void drag_triangles(ClothPoints& points);
+  void catch_air(ClothPoints& points);
+
+  const Cloth* cloth_ = nullptr;
+  std::size_t first_ = 0;
+  Real lightness_ = 0;  // greatest area per mass of a point [m^2/kg]
+  uint32_t left_ = 0;   // sub-steps for which the linearisation still holds
+  Real span_ = 0;       // time for which it holds in all [s]
+  Real share_ = 0.5;    // of the linear part that is implicit
+  bool is_active_ = false;
+  std::vector<Columns> resistance_, response_;
+  std::vector<Vec4> from_;
+  Real prepared_for_ = -1;  // step [s]; < 0: none
+};
+
+}  // namespace offstage::sim
