@@ -138,8 +138,10 @@ class AssimpSurfaces {
       return out.colors.clear();
     if (std::ranges::all_of(out.colors, [](const Vector4f& c) { return c.w() == 0; })) {
       for (Vector4f& color : out.colors) color.w() = 1;
-      model_.warnings.push_back("vertex colours of material '" + model_.materials[material].name +
-                                "': opacity 0 taken as opaque");
+      const std::string warning = "material '" + model_.materials[material].name +
+                                  "': all vertex colours have opacity 0; drawn opaque";
+      if (std::ranges::find(model_.warnings, warning) == model_.warnings.end())
+        model_.warnings.push_back(warning);
     }
     Material& look = model_.materials[material];
     look.vertex_colors = true;

@@ -250,8 +250,9 @@ bool is_whole(const Model::Light& light, const ModelRig& rig) {
   const float cone = light.outer_deg;
   return is_whole(static_cast<const Model::Place&>(light), rig) &&
          static_cast<unsigned>(light.kind) <= static_cast<unsigned>(Model::Light::Kind::spot) &&
-         light.color.allFinite() && std::isfinite(light.intensity) && light.inner_deg >= 0 &&
-         light.inner_deg <= cone && cone <= 90 && std::isfinite(light.range_m);
+         light.color.allFinite() && light.color.minCoeff() >= 0 && std::isfinite(light.intensity) &&
+         light.intensity >= 0 && light.inner_deg >= 0 && light.inner_deg <= cone &&
+         (light.kind != Model::Light::Kind::spot || cone > 0) && cone <= 90 && std::isfinite(light.range_m);
 }
 
 /// All indices refer to something and all sizes agree. What this accepts can be drawn and simulated safely.

@@ -142,25 +142,27 @@ Vector4f VisibleLight::arriving(int pixel) const {
 // keep noise low, a mirror image of less than a tenth is not followed: outside of the glass it is that of the
 // sky, and inside its light is counted with the light that leaves.
 bool LightTracer::follow_glass(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Path& path,
-                               Vector3f& sum) const {
+                               FoundLight& found) const {
   const RayMaterial& material = *hit.material;
   if (material.transmission <= 0) return false;
   if (hit.front && material.transmission < 1) {
     const Vector3f light =
         direct_light(hit, off_surface(hit.position, hit.face), sampler) + sky_met(hit.normal, false, -1);
-    sum += (1 - material.transmission) * path.share.cwiseProduct(albedo).cwiseProduct(light);
+    found.noisy += (1 - material.transmission) * path.share.cwiseProduct(albedo).cwiseProduct(light);
     path.share *= material.transmission;
   }
   const float mirrored = mirrored_share(hit, path.direction);
   const Vector3f mirrored_way = reflected(path.direction, hit.normal);
   if (mirrored >= 0.1f && sampler.next().x < mirrored) {
     path.turn(mirrored_way, hit);
-    path.by_chance |= mirrored < 0.5f;  // of two ways, the likelier one brings no dots
+    path.by_chance |= mirrored < 0.5f;  // the likelier of both ways causes no bright dots
     return true;
   }
+  const bool came_by_chance = path.by_chance;
   path.by_chance |= mirrored >= 0.5f || is_rough_glass(material);
   if (mirrored < 0.1f && hit.front) {
-    sum += mirrored * path.share.cwiseProduct(sky_radiance(sources_.sky, mirrored_way));
+    (came_by_chance ? found.noisy : found.certain) +=
+        mirrored * path.share.cwiseProduct(sky_radiance(sources_.sky, mirrored_way));
     path.share *= 1 - mirrored;
   }
   path.share = path.share.cwiseProduct(enter(hit, albedo, sampler, path.from, path.direction));
@@ -262,7 +264,7 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
     if ((hit.front || material.transmission <= 0) && !material.mean_emission().isZero())
       (path.by_chance ? light.noisy : light.certain) +=
           path.share_of_glow(hit, sources_.glow) * path.share.cwiseProduct(material.emission_at(hit.uv));
-    if (follow_glass(hit, albedo, sampler, path, sum)) continue;
+    if (follow_glass(hit, albedo, sampler, path, light)) continue;
     path.from = off_surface(hit.position, hit.face);
     if (follow_smooth(hit, albedo, sampler, sharp, bounces > 0, path, light)) continue;
     path.share = path.share.cwiseProduct(albedo);

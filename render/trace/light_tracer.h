@@ -109,7 +109,7 @@ class LightTracer {
   FoundLight radiance(Path path, PixelSampler& sampler, const VisibleLight* visible = nullptr,
                       float* met = nullptr) const;
   bool follow_glass(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Path& path,
-                    Vector3f& sum) const;
+                    FoundLight& found) const;
   bool follow_smooth(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, bool sharp,
                      bool scattered, Path& path, FoundLight& light) const;
   Vector3f direct_light(const Hit& hit, const Vector3f& from, PixelSampler& sampler) const;

@@ -14,6 +14,8 @@ constexpr Real kPushOut = 0.2, kFastestPush = 2;
 /// A limit within kNear of the coordinate has a row; limits within kReached take part in collisions [rad],
 /// [m].
 constexpr Real kNear = 0.02, kReached = 1e-4;
+/// Links that turn by more than this in an interval are not predicted [rad].
+constexpr Real kMostTurn = 1;
 /// A joint that approaches its limit faster than this reaches it in the interval [m/s], [rad/s].
 constexpr Real kClosing = 1e-3;
 
@@ -107,6 +109,17 @@ class RowMaker {
     return r;
   }
 
+  /// The same with the change of the speed by which the direction turns from the interval's start to its end.
+  BoundedRow turning_with(const Direction& d) const {
+    BoundedRow r = bounded(d);
+    const auto turn = [&](const LinkMotion& motion) { return h_ * motion.angular_velocity.norm(); };
+    if (std::max(turn(end_.a), turn(end_.b)) > kMostTurn) return r;
+    const Real at_end = speed(d.end, end_) - speed(d.acting, end_);
+    r.offset += at_end;
+    r.turning = speed(d.start, start_) - speed(d.acting, start_) - at_end;
+    return r;
+  }
+
   static Real speed(const JointRow& row, const JointPlace& at) {
     return row.on_a.head<3>().dot(at.a.velocity) + row.on_a.tail<3>().dot(at.a.angular_velocity) +
            row.on_b.head<3>().dot(at.b.velocity) + row.on_b.tail<3>().dot(at.b.angular_velocity);
@@ -141,9 +154,9 @@ class RowMaker {
     if (!(left < 0) || gap < 0) return std::nullopt;
     const Real before = side * speed_at_start(row), after = side * speed(row), share = gap / (gap - left);
     const Real impact = before + share * (after - before);
-    // A joint that rests at its limit approaches it by as much as the forces of an interval make it.
-    if (!(impact < -std::max(kClosing, std::abs(after - before)))) return std::nullopt;
     const Real restitution = impact < -JointDef::kBounceSpeed ? def_.restitution : 0;
+    // A joint that rests at its limit approaches it by as much as the forces of an interval make it.
+    if (restitution == 0 && !(impact < -std::max(kClosing, std::abs(after - before)))) return std::nullopt;
     return Stop{share, std::max(0.0, (1 - share) * (after - before) - restitution * impact)};
   }
 
@@ -175,7 +188,7 @@ class RowMaker {
     const bool closes =
         side * speed_at_start(row) < -std::max(kClosing, std::abs(speed(row) - speed_at_start(row)));
     const Real gap = side * ((closes ? at_start(row) : row.start.error) - limit);
-    BoundedRow r = bounded(row);
+    BoundedRow r = turning_with(row);
     r.lower = lower == upper || !is_low ? -kInfinite : 0;
     r.upper = lower == upper || is_low ? kInfinite : 0;
     r.target = -side * (gap > 0 ? gap / h_ : std::max(gap * kPushOut / h_, -kFastestPush));
@@ -185,7 +198,7 @@ class RowMaker {
   void add_motor(const Direction& row) {
     const Motor& motor = def_.motor;
     if (motor.mode == Motor::Mode::none) return;
-    BoundedRow r = bounded(row);
+    BoundedRow r = turning_with(row);
     r.upper = h_ * motor.max_effort;
     r.lower = -r.upper;
     const Real target = motor.target(time_);
@@ -221,7 +234,7 @@ class RowMaker {
         free_directions = {free()};
     }
     for (std::size_t i = 0; i < free_directions.size(); ++i) {
-      BoundedRow r = bounded(free_directions[i]);
+      BoundedRow r = turning_with(free_directions[i]);
       if (def_.friction > 0) {
         r.upper = h_ * def_.friction;
         r.lower = -r.upper;
@@ -281,7 +294,7 @@ class RowMaker {
 std::optional<Real> first_stop(const Articulation& articulation, Real duration, Real time) {
   std::optional<Real> first;
   for (std::size_t j = 0; j < articulation.joints().size(); ++j)
-    if (articulation.joints()[j]->def.has_limits())
+    if (const JointDef& def = articulation.joints()[j]->def; def.has_limits() || def.swing < kInfinite)
       if (const auto at = RowMaker(articulation, j, duration, time).first_stop())
         first = std::min(first.value_or(1), *at);
   return first;

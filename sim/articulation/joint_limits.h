@@ -14,8 +14,8 @@ struct BoundedOrigin {
   Joint* joint;
   std::size_t slot;  ///< index in Joint::efforts
   Vec3 arm;          ///< from the centre of the joint's body a to the anchor, world [m]
-  /// The row leads the coordinate to its value at the interval's end with another speed than before: the
-  /// bodies have their new velocities in the whole interval.
+  /// Whether the row changes the joint's speed so that it reaches its coordinate at the interval's end. The
+  /// bodies then move with their new velocities during the whole interval.
   bool closes;
 };
 

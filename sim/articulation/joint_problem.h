@@ -23,12 +23,14 @@ struct JointConstraint {
 struct BoundedRow {
   uint32_t a = kUnmoved, b = kUnmoved;
   Vec6 on_a = Vec6::Zero(), on_b = Vec6::Zero();
-  Real offset = 0;            ///< contribution of driven links [m/s] or [rad/s]
+  Real offset = 0;            ///< contribution of driven links and of the turning direction [m/s] or [rad/s]
   Real target = 0;            ///< [m/s] or [rad/s]
   Real softness = 0;          ///< [1/kg] or [1/(kg m^2)], >= 0
   Real lower = 0, upper = 0;  ///< bounds of the impulse [N s] or [N m s]
   Real impulse = 0;           ///< in: a guess; out: the solution
-  Real from = 0;              ///< share of the interval after which it acts, for the fast solver
+  // For the fast solver: the share of the interval after which the row acts, and how much greater `offset` is
+  // at the interval's start, decreasing linearly [m/s] or [rad/s].
+  Real from = 0, turning = 0;
 };
 
 struct JointProblem {

@@ -32,8 +32,9 @@ class IslandJoints {
   std::span<Articulation* const> articulations() const { return articulations_; }
   /// The share of the interval after which the impulses of an articulation act.
   Real acting_from(std::size_t articulation) const { return stops_[articulation].value_or(kMiddle); }
-  /// Projects the velocities of articulations that reach a limit onto their constraints at that time: with
-  /// the joint's speed, the forces end that turned the velocities in the rest of the free motion.
+  /// Removes the parts of the velocities at the interval's end that violate the constraints of the time when
+  /// a limit is reached: the joint forces that would have turned the velocities afterwards end with the
+  /// motion. Articulations that reach no limit are not changed.
   void project(std::span<ContactBody> bodies, Real end) const;
   /// End of the bounded rows of each articulation.
   std::span<const uint32_t> bounded_ends() const { return bounded_ends_; }

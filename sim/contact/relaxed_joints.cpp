@@ -11,6 +11,12 @@ namespace {
 
 /// Rows times links above which the responses of all links are not stored.
 constexpr std::size_t kMostResponses = 20000;
+/// A row that acts from the interval's end on acts in its last sub-step; share of the interval.
+constexpr Real kInstant = 1e-9;
+/// The contacts of an articulation depend on each other. Passes over them end when none changes a velocity by
+/// more than kSettled [m/s].
+constexpr int kContactPasses = 30;
+constexpr Real kSettled = 1e-3;
 /// A contact of a link that approaches faster than this after the joints were solved is stopped [m/s].
 constexpr Real kApproach = 0.1;
 
@@ -94,22 +100,23 @@ void RelaxedJoints::begin(std::span<const RelaxedBody> bodies, Real duration, ui
 }
 
 void RelaxedJoints::prepare(Part& part, std::span<const RelaxedBody> bodies) {
+  const bool whole = part.bodies.size() * (part.last_row - part.first_row) <= kMostResponses;
   for (uint32_t i = part.first_row; i < part.last_row; ++i)
-    prepare_row(part, problem_.bounded[i], rows_[i], bodies);
+    prepare_row(part, problem_.bounded[i], rows_[i], bodies, whole);
 }
 
+/// `whole`: whether the response of the whole articulation is found, not only that of the row's bodies.
 void RelaxedJoints::prepare_row(Part& part, const BoundedRow& r, Row& row,
-                                std::span<const RelaxedBody> bodies) {
+                                std::span<const RelaxedBody> bodies, bool whole) {
   const auto response = [&](uint32_t body, const Vec6& on) -> Vec6 {
     if (body == kUnmoved) return Vec6::Zero();
     return LinkMobility{bodies[body].inverse_mass, bodies[body].inverse_inertia}.velocity(on);
   };
   row.response_a = response(r.a, r.on_a);
   row.response_b = response(r.b, r.on_b);
-  const std::size_t links = part.bodies.size(),
-                    rows = part.last_row - part.first_row + part.last_contact - part.first_contact;
+  const std::size_t links = part.bodies.size();
   Real mobility = r.on_a.dot(row.response_a) + r.on_b.dot(row.response_b);
-  if (links * rows <= kMostResponses) {
+  if (whole) {
     row.response.assign(links, Vec6::Zero());
     bool has_a = false, has_b = false;
     for (std::size_t k = 0; k < links; ++k) {
@@ -176,9 +183,9 @@ void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapse
   for (uint32_t i = part.first_row; i < part.last_row; ++i) {
     const BoundedRow& r = problem_.bounded[i];
     Row& row = rows_[i];
-    row.acts |= elapsed > r.from * duration_;
+    row.acts |= elapsed > (r.from - kInstant) * duration_;
     if (!row.acts) continue;
-    const Real u = speed(r, motions);
+    const Real u = speed(r, motions) + (1 - elapsed / duration_) * r.turning;
     const Real wanted = row.impulse - (u - r.target + row.softness * row.impulse) * row.inverse_stiffness;
     const Real next = std::clamp(wanted, row.lower, row.upper);
     push(part, r, row, next - row.impulse, motions);
@@ -197,7 +204,8 @@ void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapse
 /// Limits the approach of the links' contacts to the speed that closes their gaps in the sub-step.
 void RelaxedJoints::solve_contacts(Part& part, std::span<BodyMotion> motions, Real elapsed, bool is_last) {
   const Real before = is_last ? elapsed : elapsed - substep_;
-  for (uint32_t i = part.first_contact; i < part.last_contact; ++i) {
+  Real change = 0;
+  const auto solve_one = [&](uint32_t i) {
     const BoundedRow& r = contacts_[i].row;
     Row& row = contact_rows_[i];
     Real gap = contacts_[i].separation;
@@ -207,12 +215,22 @@ void RelaxedJoints::solve_contacts(Part& part, std::span<BodyMotion> motions, Re
       gap += on->dot(before * v + twist(motions[body].shift));
     }
     const Real target = -std::max(0.0, gap) / substep_, u = speed(r, motions);
-    if (row.impulse == 0 && u > target - kApproach) continue;
-    if (!std::exchange(row.is_ready, true)) prepare_row(part, r, row, bodies_);
+    if (row.impulse == 0 && u > target - kApproach) return;
+    if (!std::exchange(row.is_ready, true))
+      prepare_row(part, r, row, bodies_, part.bodies.size() * ++part.prepared <= kMostResponses);
     const Real next = std::max(0.0, row.impulse - (u - target) * row.inverse_stiffness);
+    if (next == row.impulse) return;
+    change = std::max(change, std::abs(u - target));
     push(part, r, row, next - row.impulse, motions);
-    row.sum += is_last ? next - row.impulse : next;
+    row.sum += next - row.impulse;
     row.impulse = next;
+  };
+  for (uint32_t i = part.first_contact; i < part.last_contact; ++i)
+    if (!is_last) contact_rows_[i].sum += contact_rows_[i].impulse;
+  for (int pass = 0; pass < kContactPasses; ++pass) {
+    change = 0;
+    for (uint32_t i = part.first_contact; i < part.last_contact; ++i) solve_one(i);
+    if (change < kSettled) break;
   }
 }
 

@@ -71,6 +71,7 @@ class RelaxedJoints {
     Articulation* articulation;
     uint32_t first_constraint, first_row, last_row;
     uint32_t first_contact = 0, last_contact = 0;
+    std::size_t prepared = 0;      // number of contacts with a known response
     std::vector<uint32_t> bodies;  // indices of the links' bodies
     std::vector<Vec6> velocities, change, impulses;
     std::vector<FloatLanes> before_push;  // by link: its displacement
@@ -79,7 +80,8 @@ class RelaxedJoints {
   };
 
   void prepare(Part& part, std::span<const RelaxedBody> bodies);
-  void prepare_row(Part& part, const BoundedRow& r, Row& row, std::span<const RelaxedBody> bodies);
+  void prepare_row(Part& part, const BoundedRow& r, Row& row, std::span<const RelaxedBody> bodies,
+                   bool whole);
   void push(Part& part, const BoundedRow& r, const Row& row, Real impulse,
             std::span<BodyMotion> motions) const;
   void solve_contacts(Part& part, std::span<BodyMotion> motions, Real elapsed, bool is_last);

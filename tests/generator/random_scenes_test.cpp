@@ -77,9 +77,15 @@ TEST_P(ReplayedScene, Replays) {
 INSTANTIATE_TEST_SUITE_P(Seed, ReplayedScene, testing::ValuesIn(seeds_to_replay()));
 
 // These seeds have universal joints near their singular pose (204, 256, 454), and particles between a body
-// and a wall (357, 419, 454).
+// and a wall (357, 419, 454, 907).
 TEST(RandomScene, SeedsThatGainedEnergyKeepIt) {
-  for (const uint64_t seed : {204, 256, 357, 419, 454}) check(seed, Parts::all);
+  for (const uint64_t seed : {204, 256, 357, 419, 454, 734, 907}) check(seed, Parts::all);
+}
+
+// These seeds have joints at their limits (64, 261, 346, 428), and light links with heavy bodies behind them
+// at a wall (8, 73, 699).
+TEST(RandomScene, SeedsWithJointsKeepMomentumAndDoNotOverlap) {
+  for (const uint64_t seed : {8, 64, 73, 261, 346, 428, 699}) check(seed, Parts::all);
 }
 
 // The same seed gives the same scene, so that failures can be reproduced.

@@ -107,7 +107,7 @@ TEST(PlyPicture, ColoursOfOpacityZeroAreOpaque) {
   picture.set_sun({0, 0, 1});
   EXPECT_GT(picture.color_at(0.1f, 0.1f).x(), 0.9f);
   ASSERT_EQ(picture.model().warnings.size(), 1u);
-  EXPECT_NE(picture.model().warnings[0].find("opacity 0 taken as opaque"), std::string::npos);
+  EXPECT_NE(picture.model().warnings[0].find("have opacity 0; drawn opaque"), std::string::npos);
 }
 
 TEST(Mtl, StatementsAreParsedAndBrokenOnesSkipped) {

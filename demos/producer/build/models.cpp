@@ -120,6 +120,7 @@ void add_to(XXH3_state_t* hash, const render::Model& model) {
   for (const render::Model::Camera& camera : model.cameras) {
     add_place(camera);
     XXH3_128bits_update(hash, &camera.fov_deg, sizeof camera.fov_deg);
+    XXH3_128bits_update(hash, &camera.perspective, sizeof camera.perspective);
   }
   for (const render::Model::Light& light : model.lights) {
     add_place(light);
@@ -132,6 +133,9 @@ void add_to(XXH3_state_t* hash, const render::Model& model) {
                              static_cast<float>(light.kind)};
     XXH3_128bits_update(hash, numbers, sizeof numbers);
   }
+  // The automatic scale depends on the whole file, of which this may be a node.
+  XXH3_128bits_update(hash, &model.file_size, sizeof model.file_size);
+  XXH3_128bits_update(hash, &model.unit_source, sizeof model.unit_source);
   for (const render::Image& texture : model.textures) add_to(hash, texture);
 }
 
@@ -381,7 +385,7 @@ Real fitted_scale(const ModelScale& scale, const std::optional<Vec3>& fit, const
 
 Real fitted_scale(const ModelScale& scale_of_use, const std::optional<Vec3>& fit, const Vec3& size,
                   Real likely) {
-  const Real scale = scale_of_use.automatic ? scale_of_use.factor * likely : scale_of_use.factor;
+  const Real scale = scale_of_use.automatic && !fit ? scale_of_use.factor * likely : scale_of_use.factor;
   if (!fit) return scale;
   Real factor = std::numeric_limits<Real>::infinity();
   for (int k = 0; k < 3; ++k)

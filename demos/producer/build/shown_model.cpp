@@ -93,13 +93,14 @@ class PlaceCheck {
     const auto wrong = [&](const std::string& why) {
       fail(lights.where, fmt::format("{}: the directional light '{}' {}", file, light.name, why));
     };
-    if (++suns_ > 1) wrong("is one sun too many: a scene has at most one");
+    if (++suns_ > 1) wrong("is a second sun; a scene has at most one. Select other lights by \"name\"");
     if (body.motion != sim::MotionType::static_body || is_animated(body, light, models_.model(file).rig))
-      return wrong("moves, and the sun of a scene does not");
+      return wrong("moves, but the sun cannot move. Make the body static, without an animation of the light");
     const Eigen::Vector3f towards =
         body.orientation.cast<float>() *
         (pose_in_body(body, light, models_, 0).linear() * Eigen::Vector3f::UnitZ());
-    if (!(towards.normalized().y() > 0)) wrong("shines upwards, and the sun of a scene is above the horizon");
+    if (!(towards.normalized().y() > 0))
+      wrong("does not shine downwards; the sun must be above the horizon. Turn the body");
   }
   void fail(const Where& where, std::string what) { problems_.push_back({where, std::move(what)}); }
 

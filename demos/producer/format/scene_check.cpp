@@ -563,8 +563,7 @@ class Checker {
     if (camera.fov_deg != Lens().fov_deg)
       fail(path + "/fov_deg", "a camera of a file has the field of view of the file; `focal_mm` replaces it");
     if (camera.aperture > 0 && camera.focus <= 0 && camera.focus_on.empty())
-      fail(path + "/aperture",
-           "needs a focus: a camera of a file has no target; give \"focus\" or \"focus_on\"");
+      fail(path + "/aperture", "needs \"focus\" or \"focus_on\": a camera of a file has no target");
   }
 
   void check_camera(const Camera& camera, const std::string& path) {

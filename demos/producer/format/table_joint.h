@@ -99,8 +99,8 @@ struct Table<JointBehaviour> {
          "universal joint",
          "degrees", between(0, 180)},
         {"restitution", &T::restitution,
-         "coefficient of restitution at `limits`, `length_limits` and `limits_deg`, for speeds above 0.05 "
-         "m/s or rad/s",
+         "coefficient of restitution at `limits`, `length_limits`, `limits_deg` and `swing_deg`, for speeds "
+         "above 0.05 m/s or rad/s",
          "", kShare},
         {"stiffness", &T::stiffness,
          "spherical joint: torque per angle of rotation from the pose of time 0, about any axis; for the "
