@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "sim/core/disjoint_sets.h"
 #include "sim/core/parallel_loop.h"
 
 namespace offstage::sim {
@@ -15,26 +16,6 @@ struct Link {
   uint32_t a = kNone, b = kNone;
 
   bool moves() const { return a != kNone || b != kNone; }
-};
-
-/// Disjoint sets of numbers; each set is represented by its least number.
-class Sets {
- public:
-  explicit Sets(std::size_t size) : parent_(size) {
-    for (uint32_t i = 0; i < size; ++i) parent_[i] = i;
-  }
-  uint32_t find(uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(const Link& link) {
-    if (link.a == kNone || link.b == kNone) return;
-    const uint32_t i = find(link.a), j = find(link.b);
-    parent_[std::max(i, j)] = std::min(i, j);
-  }
-
- private:
-  std::vector<uint32_t> parent_;
 };
 
 }  // namespace
@@ -55,9 +36,12 @@ void find_islands(std::span<Body* const> bodies, std::span<ContactPair* const> p
   for_each_index(pairs.size(), [&](std::size_t i) {
     if (!pairs[i]->manifolds().empty()) links[i] = link(pairs[i]->a(), pairs[i]->b());
   });
-  Sets sets(bodies.size());
-  for (const Link& l : links) sets.join(l);
-  for (const auto& [a, b] : springs) sets.join(link(*a, *b));
+  DisjointSets sets(bodies.size());
+  const auto join = [&](const Link& l) {
+    if (l.a != kNone && l.b != kNone) sets.join(l.a, l.b);
+  };
+  for (const Link& l : links) join(l);
+  for (const auto& [a, b] : springs) join(link(*a, *b));
 
   struct Size {
     uint32_t bodies = 0, pairs = 0;

@@ -17,8 +17,8 @@ class DisjointSets {
     return i;
   }
   void join(uint32_t i, uint32_t j) {
-    const auto [low, high] = std::minmax(find(i), find(j));
-    parent_[high] = low;
+    const uint32_t a = find(i), b = find(j);
+    parent_[std::max(a, b)] = std::min(a, b);
   }
 
  private:

@@ -6,6 +6,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "sim/core/disjoint_sets.h"
 #include "sim/world/world_impl.h"
 
 namespace offstage::sim {
@@ -264,12 +265,7 @@ void World::Impl::update_articulations() {
   links.clear();
   articulation_of.clear();
   apart.clear();
-  std::vector<uint32_t> parent(bodies.slot_count());
-  for (uint32_t i = 0; i < parent.size(); ++i) parent[i] = i;
-  const auto root = [&](uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
+  DisjointSets sets(bodies.slot_count());
   std::vector<Joint*> holding;
   joints.for_each([&](JointHandle, const std::unique_ptr<Joint>& joint) {
     joint->articulation = nullptr;
@@ -278,14 +274,13 @@ void World::Impl::update_articulations() {
     if (joint->a && joint->b && !joint->def.collide)
       apart.push_back(std::minmax(joint->a->handle.index, joint->b->handle.index));
     if (!is_dynamic(joint->a) || !is_dynamic(joint->b)) return;
-    const uint32_t a = root(joint->a->handle.index), b = root(joint->b->handle.index);
-    parent[std::max(a, b)] = std::min(a, b);
+    sets.join(joint->a->handle.index, joint->b->handle.index);
   });
   std::sort(apart.begin(), apart.end());
-  std::vector<std::size_t> number(parent.size(), SIZE_MAX);
+  std::vector<std::size_t> number(bodies.slot_count(), SIZE_MAX);
   std::vector<std::vector<Joint*>> components;
   for (Joint* joint : holding) {
-    std::size_t& n = number[root((is_dynamic(joint->a) ? joint->a : joint->b)->handle.index)];
+    std::size_t& n = number[sets.find((is_dynamic(joint->a) ? joint->a : joint->b)->handle.index)];
     if (n == SIZE_MAX) {
       n = components.size();
       components.emplace_back();

@@ -290,8 +290,8 @@ class Parachute : public testing::TestWithParam<std::pair<Real, Real>> {};
 TEST_P(Parachute, DescendsByItsDragArea) {
   // Half a sphere whose rim holds a load: weight = rho / 2 v^2 times the area of the mouth.
   const auto [load, step] = GetParam();
-  constexpr Real kRadius = 0.5;
-  TriangleMesh dome = weld(sphere_mesh(kRadius, 24, 12));
+  constexpr Real kCanopyRadius = 0.5;
+  TriangleMesh dome = weld(sphere_mesh(kCanopyRadius, 24, 12));
   std::erase_if(dome.triangles, [&](const Triangle& t) {
     return dome.vertices[t[0]].y() + dome.vertices[t[1]].y() + dome.vertices[t[2]].y() < 1e-9;
   });
@@ -307,7 +307,8 @@ TEST_P(Parachute, DescendsByItsDragArea) {
   def.ram_pressure = 1;
   def.self_collision = def.collides = false;
   World world({.max_step = step});
-  const BodyHandle body = world.add_body({.shape = Cylinder{kRadius, 0.02}, .mass = load, .collides = false});
+  const BodyHandle body =
+      world.add_body({.shape = Cylinder{kCanopyRadius, 0.02}, .mass = load, .collides = false});
   Real mouth = 0;
   for (const Triangle& t : def.triangles)
     mouth += (def.vertices[t[1]] - def.vertices[t[0]]).cross(def.vertices[t[2]] - def.vertices[t[0]]).y() / 2;
