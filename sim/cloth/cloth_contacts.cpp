@@ -223,6 +223,7 @@ void ClothContacts::block(Touch& t, ClothBody* holder) {
 
 std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::span<const uint8_t> shortened,
                                              std::span<const Vec4> kick, std::span<const Real> recoil,
+                                             std::span<const Vec3> mean_velocity,
                                              std::span<const BodyContact> triangles) {
   struct Stop {
     ClothBody* body;
@@ -232,6 +233,7 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
     uint32_t cloth;
     bool moves = true;  // in this sub-step; a body that holds cloth would take that along beyond its limits
     Real share = 1;     // of the body's contacts here, whose impulses are found at the same time
+    Real recoil = 0;    // of the cloth by one impulse at all of its contacts, times the share [1/kg]
     Real impulse = 0;   // so far [N s]
     Real change = 0;    // in this sweep
   };
@@ -241,12 +243,17 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
     bool holds_cloth = false;
   };
   std::map<const ClothBody*, OnBody> on_bodies;
+  std::vector<Real> on_cloths(recoil.size(), 0);  // contacts
   const auto add = [&](ClothBody& body, const Vec3& normal, const Vec3& on_body, const Vec3& velocity,
                        Real depth, uint32_t point) {
-    stops.push_back({&body, normal, on_body, normal.dot(velocity), std::min(depth, points.thickness[point]),
-                     points.cloth[point]});
+    const uint32_t cloth = points.cloth[point];
+    Real speed = normal.dot(velocity);
+    // A cloth that recoils as a whole gets no impulse while it leaves as a whole: that would add energy.
+    if (recoil[cloth] > 0) speed = std::max(speed, normal.dot(mean_velocity[cloth]));
+    stops.push_back({&body, normal, on_body, speed, std::min(depth, points.thickness[point]), cloth});
     const auto [at, is_new] = on_bodies.try_emplace(&body);
     ++at->second.contacts;
+    ++on_cloths[cloth];
     if (is_new) at->second.holds_cloth = std::ranges::count(points.holder, &body) > 0;
   };
   const auto velocity = [&](uint32_t i, const ClothBody& body) {
@@ -271,6 +278,7 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
   }
   for (Stop& s : stops) {
     s.share = 1 / on_bodies[s.body].contacts;
+    s.recoil = s.share * on_cloths[s.cloth] * recoil[s.cloth];
     s.moves = !on_bodies[s.body].holds_cloth;
   }
   std::vector<Vec3> taken(recoil.size(), Vec3::Zero());
@@ -279,9 +287,9 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
   // of it, a fast one would be behind the cloth.
   for (int sweep = 0; sweep < kStopSweeps && !stops.empty(); ++sweep) {
     for (Stop& s : stops) {
-      const Real approach =
-          s.normal.dot(s.body->velocity(s.on_body)) - s.speed + kStabilization * s.depth / h_;
-      const Real mobility = s.body->mobility(s.on_body, s.normal) + recoil[s.cloth];
+      const Real speed = s.speed + recoil[s.cloth] * s.normal.dot(taken[s.cloth]);
+      const Real approach = s.normal.dot(s.body->velocity(s.on_body)) - speed + kStabilization * s.depth / h_;
+      const Real mobility = s.body->mobility(s.on_body, s.normal) + s.recoil;
       s.change = std::max(-s.impulse, s.share * approach / mobility);
     }
     for (Stop& s : stops) {

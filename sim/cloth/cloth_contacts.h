@@ -40,11 +40,12 @@ class ClothContacts {
   /// Stops bodies that press into cloth whose moves were shortened, which are those of points with a non-zero
   /// `shortened`, and takes back the part of their moves that goes on against it. `triangles` are their
   /// contacts with triangles. The result does not depend on the order of the contacts. `recoil` is the
-  /// inverse mass of the piece of cloth of each point: 0 if it is pinned to the world; `kick` is the velocity
-  /// of points besides that of their moves. Returns for each cloth the impulse that it absorbs [N s].
+  /// inverse mass of each cloth with the bodies that hold it: 0 if it is pinned to the world, and
+  /// `mean_velocity` their velocity else; `kick` is the velocity of points besides that of their moves.
+  /// Returns for each cloth the impulse that it absorbs [N s].
   std::vector<Vec3> stop_bodies(const ClothPoints& points, std::span<const uint8_t> shortened,
                                 std::span<const Vec4> kick, std::span<const Real> recoil,
-                                std::span<const BodyContact> triangles);
+                                std::span<const Vec3> mean_velocity, std::span<const BodyContact> triangles);
 
   /// A body to which a point was so close in the last solve() that it may soon touch it, or null; and whether
   /// there were several.

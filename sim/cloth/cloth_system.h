@@ -55,6 +55,7 @@ class ClothSystem {
     Vec4 move = Vec4::Zero();           // mean, of the leader's points or of all and bodies
     Real mass = 0;                      // of the same
     Vec4 momentum = Vec4::Zero();       // lost by shortening
+    Vec4 velocity = Vec4::Zero();       // mean, of points and bodies
     Real total_mass = 0;                // of points and bodies
   };
   struct Seam {
@@ -90,11 +91,15 @@ class ClothSystem {
   bool shorten_straight(Shortened how, bool& turned);
   void shorten_carrier(Carrier& carrier, Real share);
   void add_momenta(Real sign, std::span<const Vec4> from, Real dt);
+  std::vector<Vec4> end_velocities(std::span<const Vec4> from, Real dt) const;
+  std::vector<Real> inner_energies(std::span<const Vec4> velocity);
+  void take_gains(std::span<const Real> before, std::span<const Vec4> velocity);
   void give_momenta_back();
   Frame& frame_of(uint32_t point) { return frames_[pieces_.of(point)]; }
-  void stop_bodies();
+  void stop_bodies(Real dt);
   std::vector<const Carrier*> carriers_of(std::size_t cloth) const;
   std::vector<Real> recoils() const;
+  std::vector<Vec3> mean_velocities(std::span<const Real> recoil, std::span<const Vec4> velocity) const;
 
   void end_substep(Real dt);
   void pull_bodies(Real dt);

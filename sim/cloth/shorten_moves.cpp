@@ -6,6 +6,7 @@
 /// nothing but dynamic bodies keeps its momentum, together with them.
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <numeric>
 
@@ -99,6 +100,7 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   find_doubtful();
   const bool any_drifts = find_drifts();
   add_momenta(1, from, dt);
+  const std::vector<Real> energy = inner_energies(end_velocities(from, dt));
   if (any_drifts) find_doubtful();
   bool any = any_drifts ? shorten_in_pieces() : shorten_doubtful(kInWorld);
   if (any_drifts) {
@@ -118,6 +120,7 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   }
   if (self) std::erase_if(cuts_, [&](const VelocityCut& cut) { return shortened_[cut.point] != kWhole; });
   if (any) {
+    take_gains(energy, end_velocities(from, dt));
     add_momenta(-1, from, dt);
     give_momenta_back();
   }
@@ -125,7 +128,7 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
     self_contacts_.end_substep(points_, span_ * dt);
     points_.start.swap(span_start_);
   }
-  stop_bodies();
+  stop_bodies(dt);
 }
 
 /// In the frames of the pieces; whether any.
@@ -155,6 +158,47 @@ void ClothSystem::add_momenta(Real sign, std::span<const Vec4> from, Real dt) {
   for (const VelocityCut& cut : cuts_)
     if (points_.inverse_mass[cut.point] > 0)
       frame_of(cut.point).momentum -= sign * points_.mass[cut.point] / dt * cut.move;
+}
+
+/// Of all points at the end of the sub-step that began at `from`.
+std::vector<Vec4> ClothSystem::end_velocities(std::span<const Vec4> from, Real dt) const {
+  std::vector<Vec4> velocity(points_.size());
+  for (uint32_t i = 0; i < points_.size(); ++i)
+    velocity[i] =
+        points_.carried[i] ? points_.velocity[i] : Vec4((points_.position[i] - from[i]) / dt + kick_[i]);
+  for (const VelocityCut& cut : cuts_) velocity[cut.point] -= cut.move / dt;
+  return velocity;
+}
+
+/// Of each piece that nothing fixed holds, twice the kinetic energy of its points against the mean velocity,
+/// which the frames get: of the points and the bodies that hang on them.
+std::vector<Real> ClothSystem::inner_energies(std::span<const Vec4> velocity) {
+  for (Frame& frame : frames_) frame.velocity.setZero();
+  const auto add = [](Frame& frame, Real mass, const Vec4& v) {
+    frame.velocity += mass / frame.total_mass * v;
+  };
+  for (uint32_t i = 0; i < points_.size(); ++i) add(frame_of(i), points_.mass[i], velocity[i]);
+  for (const Carrier& carrier : carriers_) {
+    const ClothBody& body = *carrier.body;
+    add(frame_of(carrier.points[0]), body.mass(), padded(body.velocity(body.centre())));
+  }
+  std::vector<Real> energy(frames_.size(), 0);
+  for (uint32_t i = 0; i < points_.size(); ++i)
+    if (const Frame& frame = frame_of(i); !frame.anchored && points_.inverse_mass[i] > 0)
+      energy[pieces_.of(i)] += points_.mass[i] * (velocity[i] - frame.velocity).squaredNorm();
+  return energy;
+}
+
+/// Points that make different shares of their moves move against each other, even if all moved alike before;
+/// and the piece gets its momentum back. So motion within it is slowed to the energy that it had `before`:
+/// both together then add none.
+void ClothSystem::take_gains(std::span<const Real> before, std::span<const Vec4> velocity) {
+  const std::vector<Real> now = inner_energies(velocity);
+  for (uint32_t i = 0; i < points_.size(); ++i) {
+    const uint32_t piece = pieces_.of(i);
+    if (!(points_.inverse_mass[i] > 0) || !(now[piece] > before[piece])) continue;
+    kick_[i] -= (1 - std::sqrt(before[piece] / now[piece])) * (velocity[i] - frames_[piece].velocity);
+  }
 }
 
 /// What pieces and the bodies that hang on them lost by shortening. Pieces that hang on anything fixed lost
@@ -227,11 +271,13 @@ void ClothSystem::shorten_carrier(Carrier& carrier, Real share) {
 }
 
 /// A cloth that gives no more stops bodies as one with those that it hangs on.
-void ClothSystem::stop_bodies() {
+void ClothSystem::stop_bodies(Real dt) {
   const std::vector<Real> recoil = recoils();
+  const std::vector<Vec3> mean = mean_velocities(recoil, end_velocities(points_.start, dt));
   body_contacts_.clear();
   corner_contacts_.collect(points_, 0, body_contacts_);
-  const std::vector<Vec3> taken = contacts_.stop_bodies(points_, shortened_, kick_, recoil, body_contacts_);
+  const std::vector<Vec3> taken =
+      contacts_.stop_bodies(points_, shortened_, kick_, recoil, mean, body_contacts_);
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     if (!(recoil[c] > 0) || taken[c] == Vec3::Zero()) continue;
     const Vec3 gain = recoil[c] * taken[c];
@@ -267,6 +313,20 @@ std::vector<Real> ClothSystem::recoils() const {
     recoil.push_back(1 / mass[c]);
   }
   return recoil;
+}
+
+/// Of each cloth with the bodies that hold it, by their total mass; 0 if anything fixed does.
+std::vector<Vec3> ClothSystem::mean_velocities(std::span<const Real> recoil,
+                                               std::span<const Vec4> velocity) const {
+  std::vector<Vec3> mean(cloths_.size(), Vec3::Zero());
+  for (uint32_t i = 0; i < points_.size(); ++i) {
+    const uint32_t c = points_.cloth[i];
+    mean[c] += recoil[c] * points_.mass[i] * velocity[i].head<3>();
+  }
+  for (std::size_t c = 0; c < cloths_.size(); ++c)
+    for (const Carrier* carrier : carriers_of(c))
+      mean[c] += recoil[c] * carrier->body->mass() * carrier->body->velocity(carrier->body->centre());
+  return mean;
 }
 
 }  // namespace offstage::sim

@@ -92,5 +92,22 @@ INSTANTIATE_TEST_SUITE_P(Fabrics, ClothBullet,
                          testing::Combine(testing::Values("cotton", "denim"), testing::Values(0.0, 1.3),
                                           testing::Values(0.0, 0.009, 0.0125)));
 
+TEST(ClothImpacts, GiveAFreeClothNoEnergyOfTheirOwn) {
+  // The cloth is forty times lighter than the ball that takes it along, and soon as long as it can be.
+  ClothDef def = effects::grid_cloth({0.4, 0.4, 8, 8}, {}, effects::find_fabric("cotton")->fabric);
+  def.air.density = 0;
+  World world({.gravity = Vec3::Zero(), .max_step = 1.0 / 120});
+  world.add_body({.shape = Sphere{0.1}, .pose = {Vec3(0.1, 0.12, 0)}, .velocity = {0, -12, 0}, .mass = 1});
+  const ClothHandle cloth = world.add_cloth(def);
+  const Real before = world.energy().total();
+  uint64_t limited = 0;
+  for (int i = 0; i < 60; ++i) {
+    world.step(1.0 / 120);
+    limited += world.cloth_report(cloth).limited;
+    ASSERT_LE(world.energy().total(), before * (1 + 1e-9)) << i;
+  }
+  EXPECT_GT(limited, 0);
+}
+
 }  // namespace
 }  // namespace offstage::sim
