@@ -140,8 +140,8 @@ constexpr const char* kSlidingExact = "dd732251e043ec037777fcccaae4b8d9";
 constexpr const char* kBouncingExact = "2f1c3cdf0257928ef668a7ebb6dfc2d6";
 constexpr const char* kBouncingFast = "eb1b23678611757101c8e8be769c38fb";
 constexpr const char* kHeapFast = "734beb91905c68281f9844c144799541";
-constexpr const char* kChainExact = "d6ae8ef9451a0d726610c4f5e0e33738";
-constexpr const char* kChainFast = "77800bd8120112c655309534bb7ecb74";
+constexpr const char* kChainExact = "2c24cd68aba9b5fec5e983f6bb681eb9";
+constexpr const char* kChainFast = "d292c745f55bee8c0eca1fe3db974edc";
 
 TEST(Determinism, SameHashInEveryBuild) {
   EXPECT_EQ(run().hex(), kParticles);
