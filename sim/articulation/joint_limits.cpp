@@ -110,6 +110,7 @@ class RowMaker {
   }
 
   /// The same with the change of the speed by which the direction turns from the interval's start to its end.
+  /// It is predicted from the free motion, so it is for limits alone: motors change that motion too much.
   BoundedRow turning_with(const Direction& d) const {
     BoundedRow r = bounded(d);
     const auto turn = [&](const LinkMotion& motion) { return h_ * motion.angular_velocity.norm(); };
@@ -198,7 +199,7 @@ class RowMaker {
   void add_motor(const Direction& row) {
     const Motor& motor = def_.motor;
     if (motor.mode == Motor::Mode::none) return;
-    BoundedRow r = turning_with(row);
+    BoundedRow r = bounded(row);
     r.upper = h_ * motor.max_effort;
     r.lower = -r.upper;
     const Real target = motor.target(time_);
@@ -234,7 +235,7 @@ class RowMaker {
         free_directions = {free()};
     }
     for (std::size_t i = 0; i < free_directions.size(); ++i) {
-      BoundedRow r = turning_with(free_directions[i]);
+      BoundedRow r = bounded(free_directions[i]);
       if (def_.friction > 0) {
         r.upper = h_ * def_.friction;
         r.lower = -r.upper;
