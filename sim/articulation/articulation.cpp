@@ -376,9 +376,9 @@ void Articulation::place(Real time, bool at_start) {
 }
 
 void Articulation::place_within(Real time, Real duration, Real share) {
-  read_bodies(true);
-  start_motion_ = motion_;
   read_bodies();
+  start_motion_.resize(bodies_.size());
+  for (std::size_t i = 0; i < bodies_.size(); ++i) start_motion_[i] = motion_of(bodies_[i]->at_start());
   end_motion_ = motion_;
   before_ = (1 - share) * duration;
   for (LinkMotion& m : motion_) {

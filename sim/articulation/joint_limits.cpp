@@ -110,7 +110,8 @@ class RowMaker {
   }
 
   /// The same with the change of the speed by which the direction turns from the interval's start to its end.
-  /// It is predicted from the free motion, so it is for limits alone: motors change that motion too much.
+  /// It is for limits alone: with motors it makes nothing more accurate that is known, and the gripper of
+  /// demos/scenes/robot_arm.json, whose contacts the exact solver often leaves to its fall-back, diverged.
   BoundedRow turning_with(const Direction& d) const {
     BoundedRow r = bounded(d);
     const auto turn = [&](const LinkMotion& motion) { return h_ * motion.angular_velocity.norm(); };

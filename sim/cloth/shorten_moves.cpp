@@ -100,7 +100,9 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   find_doubtful();
   const bool any_drifts = find_drifts();
   add_momenta(1, from, dt);
-  const std::vector<Real> energy = inner_energies(end_velocities(from, dt));
+  const bool any_free = std::ranges::any_of(frames_, [](const Frame& frame) { return !frame.anchored; });
+  std::vector<Real> energy;
+  if (any_free) energy = inner_energies(end_velocities(from, dt));
   if (any_drifts) find_doubtful();
   bool any = any_drifts ? shorten_in_pieces() : shorten_doubtful(kInWorld);
   if (any_drifts) {
@@ -120,7 +122,7 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   }
   if (self) std::erase_if(cuts_, [&](const VelocityCut& cut) { return shortened_[cut.point] != kWhole; });
   if (any) {
-    take_gains(energy, end_velocities(from, dt));
+    if (any_free) take_gains(energy, end_velocities(from, dt));
     add_momenta(-1, from, dt);
     give_momenta_back();
   }
@@ -273,7 +275,9 @@ void ClothSystem::shorten_carrier(Carrier& carrier, Real share) {
 /// A cloth that gives no more stops bodies as one with those that it hangs on.
 void ClothSystem::stop_bodies(Real dt) {
   const std::vector<Real> recoil = recoils();
-  const std::vector<Vec3> mean = mean_velocities(recoil, end_velocities(points_.start, dt));
+  std::vector<Vec3> mean(recoil.size(), Vec3::Zero());
+  if (std::ranges::any_of(recoil, [](Real r) { return r > 0; }))
+    mean = mean_velocities(recoil, end_velocities(points_.start, dt));
   body_contacts_.clear();
   corner_contacts_.collect(points_, 0, body_contacts_);
   const std::vector<Vec3> taken =

@@ -266,7 +266,7 @@ void RelaxationSolver::push(uint32_t i, const Range& range, Real threshold) {
 
 /// Contacts of links that the joints moved far are pushed again.
 void RelaxationSolver::push_joints(uint32_t part, const Range& range) {
-  if (!(joints_->push(part, motions_) > kPassedOn)) return;
+  if (!(joints_->push_out(part, motions_) > kPassedOn)) return;
   for (const uint32_t body : joints_->bodies(part)) struck_[body] = range.sweep;
   std::atomic_ref(strikes_[range.sweep]).store(1, std::memory_order_relaxed);
 }
@@ -386,7 +386,7 @@ ContactWork RelaxationSolver::solve(std::span<RelaxedBody> bodies, std::span<Con
       std::span<const Range>(ranges_), threads, [this](const Range& range) { return is_needed(range); },
       [this](const Range& range, uint32_t block) { run(range, block); });
   if (joints) {
-    joints->give(bodies, late_);
+    joints->add_motion(bodies, late_);
     joints->finish();
   }
   ContactWork work{.solves = 1, .iterations = def.substeps + 1};

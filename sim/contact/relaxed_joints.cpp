@@ -240,7 +240,7 @@ void RelaxedJoints::begin_push(uint32_t p, std::span<const BodyMotion> motions) 
   for (const uint32_t body : part.bodies) part.before_push.push_back(motions[body].shift);
 }
 
-Real RelaxedJoints::push(uint32_t p, std::span<BodyMotion> motions) {
+Real RelaxedJoints::push_out(uint32_t p, std::span<BodyMotion> motions) {
   Part& part = parts_[p];
   JointSystem& system = part.articulation->system();
   for (std::size_t k = 0; k < part.bodies.size(); ++k)
@@ -259,7 +259,7 @@ Real RelaxedJoints::push(uint32_t p, std::span<BodyMotion> motions) {
   return farthest;
 }
 
-void RelaxedJoints::give(std::span<RelaxedBody> bodies, std::span<const Real> late) const {
+void RelaxedJoints::add_motion(std::span<RelaxedBody> bodies, std::span<const Real> late) const {
   const auto to = [&](uint32_t body, const Vec6& impulse, const Vec6& shift) {
     if (body == kUnmoved || bodies[body].inverse_mass == 0) return;
     RelaxedBody& b = bodies[body];

@@ -45,12 +45,12 @@ class RelaxedJoints {
   /// Moves the links of a part so that the displacements since begin_push() agree with the joints. Returns
   /// the greatest one [m]. Without this, joints would pull bodies back into the overlap at the end of each
   /// step.
-  Real push(uint32_t part, std::span<BodyMotion> motions);
+  Real push_out(uint32_t part, std::span<BodyMotion> motions);
   /// The links' bodies of a part.
   std::span<const uint32_t> bodies(uint32_t part) const { return parts_[part].bodies; }
   /// Adds the effect of the joints in the step to the bodies, in double precision. `late` is, by body, the
   /// time by which the displacement by the sub-steps is too large per change of velocity [s].
-  void give(std::span<RelaxedBody> bodies, std::span<const Real> late) const;
+  void add_motion(std::span<RelaxedBody> bodies, std::span<const Real> late) const;
   /// Writes the impulses of the whole step.
   void finish();
 

@@ -10,7 +10,8 @@ TOKEN = re.compile(r'\s*(?:#[^\n]*\n\s*)*("(?:\\.|[^"\\])*"|@[^@]*@|<[^>]*>|[A-Z
 
 class Prim:
     def __init__(self, kind, name):
-        self.kind, self.name, self.metadata, self.attributes, self.children = kind, name, {}, {}, []
+        self.kind, self.name, self.metadata, self.children = kind, name, {}, []
+        self.attributes, self.types = {}, {}
 
     def find(self, name):
         return next(child for child in self.children if child.name == name)
@@ -19,13 +20,13 @@ class Prim:
         return [child for child in self.children if child.kind == kind]
 
     def at(self, attribute, time):
-        """The value at a time, as USD interpolates: linear for numbers of equal shape, held for others."""
+        """The value at a time, as USD interpolates: linear for reals of equal shape, held for others."""
         if attribute + ".timeSamples" not in self.attributes:
             return self.attributes[attribute]
         samples = self.attributes[attribute + ".timeSamples"]
         before = max((t for t in samples if t <= time), default=min(samples))
         after = min((t for t in samples if t >= time), default=max(samples))
-        if before == after:
+        if before == after or self.types[attribute + ".timeSamples"].startswith(("int", "bool", "token", "string")):
             return samples[before]
         share = (time - before) / (after - before)
         return blend(samples[before], samples[after], share)
@@ -98,6 +99,7 @@ class UsdText:
             words.append(self.take())
         name = self.take()
         prim.attributes.setdefault(name, None)
+        prim.types[name] = words[-1]
         if self.peek() == "=":
             self.take("=")
             prim.attributes[name] = self.value()
