@@ -250,6 +250,51 @@ TEST(Render, WatchRemovesFramesAndChannelsThatTheNewFilmLacks) {
       << "a film without channels";
 }
 
+TEST(Render, WatchDrawsANewLookFromTheStatesOfTheLastSimulation) {
+  const TemporaryFolder folder;
+  const auto scene = [](const std::string& color, double height) {
+    return R"({"version": 1, "materials": [{"name": "paint", "color": ")" + color +
+           R"("}], "bodies": [{"shape": {"type": "sphere"}, "material": "paint", "position": [0, )" +
+           std::to_string(height) +
+           R"(, 0]}], "render": {"size": [64, 36], "quality": "preview"}, "output": {"duration": 0.1}})";
+  };
+  const auto states = [&] {  // the published generation
+    for (const auto& entry : fs::directory_iterator(folder.path()))
+      if (entry.path().filename().string().find(".states-") != std::string::npos &&
+          fs::exists(entry.path() / "cache.json"))
+        return read_file(entry.path() / "cache.json");
+    return std::string();
+  };
+  const auto wait_for_frames = [&](const std::map<std::string, std::string>& expected) {
+    for (int i = 0; i < 3000 && frames(folder / "out") != expected; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    return frames(folder / "out") == expected;
+  };
+  const auto rendered = [&](const std::string& text) {
+    const TemporaryFolder other;
+    write_file(other / "scene.json", text);
+    EXPECT_EQ(offstage("render scene.json -o out/ -q", other.path()).code, 0);
+    return frames(other / "out");
+  };
+  fs::create_directory(folder / "out");
+  write_file(folder / "scene.json", scene("#b03020", 1));
+  std::string first;
+  {
+    const WatchedRender watch(folder.path());
+    ASSERT_TRUE(wait_for_frames(rendered(scene("#b03020", 1))));
+    first = states();
+    ASSERT_FALSE(first.empty());
+    write_file(folder / "scene.json", scene("#2030b0", 1));
+    EXPECT_TRUE(wait_for_frames(rendered(scene("#2030b0", 1))));
+    EXPECT_EQ(states(), first) << "the colour does not need a new simulation";
+    write_file(folder / "scene.json", scene("#2030b0", 2));
+    EXPECT_TRUE(wait_for_frames(rendered(scene("#2030b0", 2))));
+    EXPECT_NE(states(), first);
+  }
+  for (const auto& entry : fs::directory_iterator(folder.path()))
+    EXPECT_FALSE(entry.path().filename().string().starts_with(".")) << entry.path() << " is left over";
+}
+
 TEST(Render, FullDiskIsAnErrorAndLeavesNoBrokenFile) {
   const TemporaryFolder folder;
   // A file size limit stands in for the full disk: the write fails in the same way.

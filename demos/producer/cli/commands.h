@@ -54,9 +54,11 @@ struct RenderOptions {
   std::string format = "rgba";  ///< format of standard output
   std::string cache, stats, report;
   std::vector<std::string> cameras;  ///< cameras to draw, or kAllCameras; empty: the scene's `camera`
-  std::string keep;                  ///< folder that receives the states, for other cameras; empty: none
-  int threads = 0;                   ///< 0: all available
-  int jobs = 0;                      ///< 0: chosen by `threads`
+  /// Folder of the states, for other cameras and further renders: they are read if it holds those of this
+  /// simulation, otherwise they are written to it. Empty: none.
+  std::string states;
+  int threads = 0;  ///< 0: all available
+  int jobs = 0;     ///< 0: chosen by `threads`
   bool resume = false, force = false, dry_run = false, watch = false;
   render::GlPlatform gl = render::GlPlatform::automatic;
 };

@@ -16,6 +16,7 @@
 #include "producer/base/suggest.h"
 #include "producer/cli/command_line.h"
 #include "producer/cli/commands.h"
+#include "producer/cli/hidden_folder.h"
 #include "producer/cli/run_progress.h"
 #include "producer/run/fingerprint.h"
 #include "producer/run/frame_list.h"
@@ -23,6 +24,7 @@
 #include "producer/run/production.h"
 #include "producer/run/run_notes.h"
 #include "producer/run/run_report.h"
+#include "producer/run/snapshot_cache.h"
 #include "render/context.h"
 #include "render/error.h"
 #include "render/frame_files.h"
@@ -33,6 +35,8 @@ namespace offstage::producer {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr uint64_t kStatesBytes = 4ull << 30;  // most that states for further renders take on the disk
 
 void report_run(const RunStats& stats, const TalkOptions& talk, const std::string& stats_file) {
   if (!stats_file.empty()) write_text_file(stats_file, to_json(stats));
@@ -168,7 +172,12 @@ RunStats draw(const Plan& plan, const ModelLibrary& models, const RenderOptions&
   RenderJob job{
       .frames = std::move(frames), .threads = plan.jobs, .cache = {}, .report = !options.report.empty()};
   if (!options.cache.empty()) job.cache = options.cache;
-  if (!options.keep.empty()) job.keep = options.keep;
+  if (!options.states.empty()) {
+    const SnapshotCache states(options.states);
+    const bool known = states.holds(simulation_key(plan.loaded, models), plan.loaded.scene.frame_count());
+    (known ? job.cache : job.keep) = options.states;
+    job.keep_at_most = kStatesBytes;
+  }
   job.channels = plan.channels.choice;
   job.channels_stem = plan.channels.stem;
   RunStats stats = render_frames(plan.loaded, models, job, sink, std::ref(progress));
@@ -249,23 +258,6 @@ int render_to_pipe(const Plan& plan, const ModelLibrary& models, const RenderOpt
   return stats.interrupted_by ? interrupted(stats, static_cast<int>(plan.frames.size()), "") : kOk;
 }
 
-/// A folder for the states of a run, which is removed at its end.
-class StatesFolder {
- public:
-  /// Beside an output.
-  explicit StatesFolder(const fs::path& out)
-      : path_(out.parent_path() / fmt::format(".{}.states-{}", out.filename().string(), ::getpid())) {}
-  ~StatesFolder() {
-    std::error_code error;
-    fs::remove_all(path_, error);
-  }
-  StatesFolder(const StatesFolder&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
-
 /// The output of one of several cameras: film-NAME.mp4, or frames/NAME/####.png.
 std::string output_of_camera(const std::string& out, const std::string& camera) {
   const OutputTarget target = parse_output(out);
@@ -299,7 +291,7 @@ int render_cameras(const RenderOptions& options) {
     const OutputTarget target = parse_output(output_of_camera(options.out, name));
     if (target.kind == OutputKind::video) check_file(target.path.string(), options.force);
   }
-  const StatesFolder states(parse_output(options.out).path);
+  const HiddenFolder states(parse_output(options.out).path, "states");
   const bool shares = options.cache.empty() && !options.resume && !options.dry_run && names.size() > 1;
   for (const std::string& name : names) {
     RenderOptions one = options;
@@ -307,7 +299,7 @@ int render_cameras(const RenderOptions& options) {
     one.out = output_of_camera(options.out, name);
     one.stats = file_of_camera(options.stats, name);
     one.report = file_of_camera(options.report, name);
-    if (shares) (name == names.front() ? one.keep : one.cache) = states.path().string();
+    if (shares) one.states = states.path().string();
     const int code = render_command(one);
     if (code != kOk) return code;
   }

@@ -1,7 +1,9 @@
 // render --watch.
 
+#include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <optional>
 
 #include <fcntl.h>
@@ -13,6 +15,7 @@
 #include "producer/base/interrupt.h"
 #include "producer/base/log.h"
 #include "producer/cli/commands.h"
+#include "producer/cli/hidden_folder.h"
 #include "producer/run/output.h"
 #include "producer/run/watch.h"
 #include "render/error.h"
@@ -73,29 +76,6 @@ class RenderProcess {
   pid_t pid_ = -1;
 };
 
-/// A hidden folder beside the output for the unfinished result; it is removed with the object.
-class Workshop {
- public:
-  explicit Workshop(const fs::path& output) {
-    static int number = 0;
-    const fs::path beside = output.has_parent_path() ? output.parent_path() : ".";
-    fs::create_directories(beside);
-    folder_ = beside / fmt::format(".{}.watch-{}-{}", output.filename().string(), getpid(), ++number);
-    fs::create_directory(folder_);
-  }
-  ~Workshop() {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
-  }
-  Workshop(const Workshop&) = delete;
-  Workshop& operator=(const Workshop&) = delete;
-
-  const fs::path& folder() const { return folder_; }
-
- private:
-  fs::path folder_;
-};
-
 /// The existing files that the manifest of a folder lists.
 std::set<fs::path> frames_in(const fs::path& pattern) {
   const std::vector<fs::path> files = files_of_frames(pattern.parent_path());
@@ -123,6 +103,7 @@ class Watcher {
       throw OutputError(folder().string() + ": already contains frames; replace them with --force");
     }
     check_file(options.stats, options.force);
+    if (options.cache.empty()) states_.emplace(beside(), "states");
   }
 
   int run() {
@@ -141,11 +122,12 @@ class Watcher {
  private:
   /// Renders unless the files change meanwhile, which would make the result outdated.
   void render_once(FileWatch& watch, const std::string& hash) {
-    const Workshop workshop(target_.kind == OutputKind::frames ? folder() : target_.path);
+    const HiddenFolder unfinished(beside(), "watch");
     RenderOptions options = options_;
     options.watch = false;
     options.force = true;
-    options.out = (workshop.folder() / target_.path.filename()).string();
+    options.out = (unfinished.path() / target_.path.filename()).string();
+    if (states_) options.states = states_->path().string();
     const auto start = std::chrono::steady_clock::now();
     RenderProcess process(options, render_);
     std::optional<int> code;
@@ -154,7 +136,7 @@ class Watcher {
       if (interrupt_signal() || watch.changed()) return;
     }
     rendered_ = hash;
-    if (*code == 0) publish(workshop.folder());
+    if (*code == 0) publish(unfinished.path());
     if (options_.talk.quiet) return;
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
     if (*code == 0)
@@ -164,6 +146,8 @@ class Watcher {
           published_ ? "kept the last good result" : "there is no result yet");
   }
 
+  /// The output beside which hidden folders are placed.
+  fs::path beside() const { return target_.kind == OutputKind::frames ? folder() : target_.path; }
   fs::path folder() const { return target_.path.has_parent_path() ? target_.path.parent_path() : "."; }
 
   /// Renames the finished files, and removes those of an earlier, longer film.
@@ -196,8 +180,9 @@ class Watcher {
   const RenderOptions& options_;
   const Renderer& render_;
   OutputTarget target_;
-  std::string rendered_;    // hash of the files of the last render, successful or not
-  bool published_ = false;  // whether this watch has published a result
+  std::optional<HiddenFolder> states_;  // of the latest simulation, for renders that change only its look
+  std::string rendered_;                // hash of the files of the last render, successful or not
+  bool published_ = false;              // whether this watch has published a result
 };
 
 }  // namespace

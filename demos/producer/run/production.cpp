@@ -1,6 +1,7 @@
 #include "producer/run/production.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <exception>
 #include <fstream>
@@ -102,8 +103,10 @@ class SnapshotSource {
 
 class LiveSource : public SnapshotSource {
  public:
-  LiveSource(Simulation& simulation, ProgressMeter& meter, const SnapshotCache* kept)
-      : simulation_(simulation), meter_(meter), kept_(kept) {}
+  /// `kept` receives the requested states, unless it is empty; `keep_at_most` as in RenderJob.
+  LiveSource(Simulation& simulation, ProgressMeter& meter, std::optional<SnapshotCache>& kept,
+             std::optional<uint64_t> keep_at_most)
+      : simulation_(simulation), meter_(meter), kept_(kept), keep_at_most_(keep_at_most) {}
   Snapshot at(int frame, const std::function<bool()>& stop) override {
     meter_.simulation_goes_on();
     while (simulation_.frame() < frame && !stop()) {
@@ -111,7 +114,7 @@ class LiveSource : public SnapshotSource {
       meter_.simulated_one();
     }
     Snapshot snapshot = simulation_.snapshot();
-    if (kept_) kept_->write(snapshot);
+    keep(snapshot);
     return snapshot;
   }
   void describe(FrameJob& frame_job) const override {
@@ -120,9 +123,28 @@ class LiveSource : public SnapshotSource {
   }
 
  private:
+  void keep(const Snapshot& snapshot) {
+    if (!kept_) return;
+    if (!keep_at_most_) {
+      kept_->write(snapshot);
+      return;
+    }
+    bool fits = false;
+    try {
+      bytes_ += kept_->write(snapshot);
+      fits = bytes_ <= *keep_at_most_;
+    } catch (const render::FileError&) {
+    }
+    if (fits) return;
+    kept_->discard();
+    kept_.reset();
+  }
+
   Simulation& simulation_;
   ProgressMeter& meter_;
-  const SnapshotCache* kept_;  ///< receives the requested states; may be null
+  std::optional<SnapshotCache>& kept_;
+  const std::optional<uint64_t> keep_at_most_;
+  uint64_t bytes_ = 0;  // written so far
 };
 
 class CachedSource : public SnapshotSource {
@@ -270,7 +292,7 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
     if (job.keep)
       kept.emplace(*job.keep).create(simulation_key(loaded, models), loaded.scene.frame_count(), true);
     meter.emplace(progress, frames, frames > 0 ? simulation->advances_to(job.frames.back()) : 0, kDrawing_ms);
-    source = std::make_unique<LiveSource>(*simulation, *meter, kept ? &*kept : nullptr);
+    source = std::make_unique<LiveSource>(*simulation, *meter, kept, job.keep_at_most);
   }
 
   Pipeline pipeline(job.threads + 2);
@@ -288,7 +310,8 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
       for (int i = 0; i < job.threads; ++i) workers.emplace_back(draw);
       workers.emplace_back(print);
       produce_frames(pipeline, *source, job.frames,
-                     subframes(loaded.scene.render.quality) > 1 || job.channels.any(), job.report);
+                     subframes(loaded.scene.render.quality) > 1 || job.channels.any() || job.keep,
+                     job.report);
     });
   }
   pipeline.rethrow_failure();
@@ -380,6 +403,7 @@ RunStats visit_frames(const LoadedScene& loaded, const ModelLibrary& models, con
   const auto start = Clock::now();
   RunStats stats;
   std::optional<Simulation> simulation;
+  std::optional<SnapshotCache> kept;  // stays empty
   std::unique_ptr<SnapshotSource> source;
   std::optional<ProgressMeter> meter;
   const auto frames = static_cast<int>(job.frames.size());
@@ -392,7 +416,7 @@ RunStats visit_frames(const LoadedScene& loaded, const ModelLibrary& models, con
     simulation.emplace(loaded.scene, models);
     stats.bodies = simulation->body_count();
     meter.emplace(progress, frames, frames > 0 ? simulation->advances_to(job.frames.back()) : 0, 0);
-    source = std::make_unique<LiveSource>(*simulation, *meter, nullptr);
+    source = std::make_unique<LiveSource>(*simulation, *meter, kept, std::nullopt);
   }
   for (const int frame : job.frames) {
     const auto sim_start = Clock::now();
@@ -415,12 +439,24 @@ RunStats visit_frames(const LoadedScene& loaded, const ModelLibrary& models, con
   return stats;
 }
 
+/// The keys of a material that Simulation reads; the others are its look.
+constexpr std::array kPhysicalKeys = {
+    "name",           "restitution",      "friction",         "static_friction",
+    "cross_friction", "rolling_friction", "spinning_friction"};
+
 std::string simulation_key(const LoadedScene& loaded, const ModelLibrary& models) {
   auto scene = nlohmann::ordered_json::parse(loaded.canonical);
   for (const char* key : {"name", "description", "camera", "cameras", "lights", "environment", "render"})
     scene.erase(key);
   if (scene.contains("output"))
     for (const char* key : {"channels", "channel_format"}) scene["output"].erase(key);
+  if (scene.contains("materials"))
+    for (auto& material : scene["materials"]) {
+      nlohmann::ordered_json physical;
+      for (const char* key : kPhysicalKeys)
+        if (material.contains(key)) physical[key] = material[key];
+      material = std::move(physical);
+    }
   return text_hash(std::string(version()) + scene.dump() + models.digest());
 }
 

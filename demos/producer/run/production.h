@@ -89,6 +89,9 @@ struct RenderJob {
   std::optional<std::filesystem::path> cache;  ///< states are read from here instead of simulating
   /// States that are drawn are written here, to be read as `cache`.
   std::optional<std::filesystem::path> keep;
+  /// If the states take more bytes, or cannot be written, they are not kept, and the run continues. None: all
+  /// of them are kept, and the run fails if they cannot be.
+  std::optional<uint64_t> keep_at_most;
   bool report = false;             ///< whether figures and pictures are stored
   render::ChannelChoice channels;  ///< channels to write ...
   /// ... to these files; '#' as in render::frame_path, or for one frame.
@@ -127,8 +130,8 @@ struct SnapshotJob {
 RunStats visit_frames(const LoadedScene& loaded, const ModelLibrary& models, const SnapshotJob& job,
                       const std::function<void(const Snapshot&)>& take, const ProgressCallback& progress);
 
-/// Hash of everything on which a cache of snapshots depends: the scene without camera, light, environment and
-/// picture settings.
+/// Hash of everything on which a cache of snapshots depends: the scene without camera, light, environment,
+/// looks of materials and picture settings.
 std::string simulation_key(const LoadedScene& loaded, const ModelLibrary& models);
 /// Hash of everything on which the pixels of a frame depend.
 std::string settings_key(const LoadedScene& loaded, const ModelLibrary& models);

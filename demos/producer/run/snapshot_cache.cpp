@@ -105,6 +105,21 @@ void SnapshotCache::open(const std::string& key, int frames) {
   refuse("its snapshots are gone; simulate again with --force");
 }
 
+bool SnapshotCache::holds(const std::string& key, int frames) const {
+  try {
+    SnapshotCache(folder_).open(key, frames);
+    return true;
+  } catch (const render::FileError&) {
+    return false;
+  }
+}
+
+void SnapshotCache::discard() {
+  generation_.clear();
+  hold_ = {};
+  remove_old_generations();
+}
+
 void SnapshotCache::publish() {
   const nlohmann::ordered_json published = {{"offstage_cache", kFormat},
                                             {"program", std::string(version())},
@@ -140,8 +155,10 @@ std::string SnapshotCache::file_name(int frame) {
   return fmt::format("{:06}.snap", frame);
 }
 
-void SnapshotCache::write(const Snapshot& snapshot) const {
-  render::write_file_atomically(file(snapshot.frame), serialize(snapshot, key_));
+uint64_t SnapshotCache::write(const Snapshot& snapshot) const {
+  const auto bytes = serialize(snapshot, key_);
+  render::write_file_atomically(file(snapshot.frame), bytes);
+  return bytes.size();
 }
 
 Snapshot SnapshotCache::read(int frame) const {

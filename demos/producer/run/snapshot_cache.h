@@ -28,13 +28,18 @@ class SnapshotCache {
   /// Opens the published generation for reading. Throws FileError if the folder contains no cache, an
   /// unfinished one, or one of another simulation.
   void open(const std::string& key, int frames);
+  /// Whether open() would find this simulation.
+  bool holds(const std::string& key, int frames) const;
   /// Publishes the generation by one rename, and removes the generations that nobody reads or writes.
   void publish();
+  /// Removes the generation that was begun.
+  void discard();
   /// Removes the generations that are not published and that no process holds.
   void remove_unused_generations() const { remove_old_generations(); }
 
   /// For the generation begun or opened. Both throw FileError; read() also for a snapshot of another run.
-  void write(const Snapshot& snapshot) const;
+  /// write() returns the bytes that the snapshot takes.
+  uint64_t write(const Snapshot& snapshot) const;
   Snapshot read(int frame) const;
 
  private:
