@@ -239,6 +239,33 @@ TEST(GltfPicture, OcclusionHidesTheSkyByItsStrength) {
   EXPECT_LT(light[2], 0.01f);
 }
 
+// Indirect light is hidden in the reflection of metal, too, and direct light never.
+TEST(GltfPicture, OcclusionHidesMirroredLightButNoDirectLight) {
+  const auto light = [](double open, double roughness, bool sun) {
+    GltfSample sample;
+    sample.pbr() = {
+        {"metallicFactor", 1}, {"roughnessFactor", roughness}, {"baseColorFactor", {0.5, 0.5, 0.5, 1}}};
+    const int texture = sample.texture(encoded_texels(1, 1, {{static_cast<float>(open), 1, 1, 1}}));
+    sample.material()["occlusionTexture"]["index"] = texture;
+    Picture picture(sample);
+    if (sun)
+      picture.set_sun({0, 0, 1});
+    else
+      picture.set_sky(kPureWhite);
+    return picture.color_at(0, 0).x();
+  };
+  for (const double roughness : {0.0, 0.5, 1.0}) {
+    const float whole = light(1, roughness, false);
+    EXPECT_GT(whole, 0.1f) << roughness;
+    EXPECT_LT(light(0, roughness, false), 1e-3f) << roughness;
+  }
+  EXPECT_NEAR(light(0.5, 1, false) / light(1, 1, false), 0.5f, 0.02f)
+      << "rough metal reflects from all around";
+  EXPECT_GT(light(1, 0.5, true), 0.01f);
+  // The rest is what the mirror image has of the sun's disc.
+  EXPECT_NEAR(light(0, 0.5, true) / light(1, 0.5, true), 1, 0.002f);
+}
+
 TEST(GltfPicture, EmissiveStrengthScalesTheGlow) {
   GltfSample sample;
   sample.material()["emissiveFactor"] = {0.25, 0.5, 1};
@@ -260,6 +287,68 @@ TEST(GltfPicture, TransmissionShowsWhatIsBehind) {
       picture.stage().add_material({.color = {0, 0, 0, 1}, .emission = {0.2f, 0.4f, 0.6f}}), false);
   (void)behind;
   expect_color(picture.color_at(0.2f, 0.2f), {0.2f, 0.2f, 0.6f}, 0.02f);
+}
+
+// A pane before a wall whose right half glows: a rough one spreads the light of the edge.
+TEST(GltfPicture, RoughTransmissionBlursTheBackground) {
+  const auto light_left_of_the_edge = [](double roughness) {
+    GltfSample sample;
+    sample.pbr() = {{"metallicFactor", 0}, {"roughnessFactor", roughness}};
+    sample.extension("KHR_materials_transmission")["transmissionFactor"] = 1;
+    Picture picture(sample);
+    Mesh wall = picture.model().parts.at(0).mesh;
+    for (Vector3f& p : wall.positions) p = Vector3f(4 + 4 * p.x(), 4 * p.y(), -1);
+    const InstanceHandle behind = picture.stage().add_instance(
+        picture.stage().add_mesh(wall),
+        picture.stage().add_material({.color = {0, 0, 0, 1}, .emission = {1, 1, 1}}), false);
+    (void)behind;
+    const HdrImage image = picture.draw();
+    float sum = 0;  // 0.1 to 0.5 m beside the edge
+    int count = 0;
+    for (float x = -0.5f; x < -0.1f; x += 0.05f)
+      for (float y = -0.8f; y < 0.8f; y += 0.05f) {
+        sum += picture.at(image, x, y).x();
+        ++count;
+      }
+    return sum / static_cast<float>(count);
+  };
+  EXPECT_LT(light_left_of_the_edge(0), 0.01f);
+  EXPECT_GT(light_left_of_the_edge(0.6), 0.1f);
+}
+
+// A quarter wave of green in a film whose index is the root of that of the glass: green is not reflected at
+// all (E. Hecht, "Optics", section 9.7), which leaves purple.
+TEST(GltfPicture, AFilmOfAQuarterWaveReflectsPurple) {
+  const auto highlight = [](const Json& film, double metallic) {
+    GltfSample sample;
+    const double base = metallic > 0 ? 0.5 : 0;
+    sample.pbr() = {
+        {"baseColorFactor", {base, base, base, 1}}, {"metallicFactor", metallic}, {"roughnessFactor", 0.5}};
+    if (!film.is_null()) sample.extension("KHR_materials_iridescence") = film;
+    Picture picture(sample);
+    const bool is_named = std::ranges::any_of(picture.model().warnings, [](const std::string& line) {
+      return line.find("KHR_materials_iridescence is approximated") != line.npos;
+    });
+    EXPECT_EQ(is_named, !film.is_null());
+    picture.set_sun({0, 0, 1}, 1);
+    return picture.color_at(0, 0);
+  };
+  const double n = std::sqrt(1.5), quarter = 550 / (4 * n);
+  const auto film = [&](double waves, double factor) {
+    return Json{{"iridescenceFactor", factor},
+                {"iridescenceIor", n},
+                {"iridescenceThicknessMaximum", waves * quarter}};
+  };
+  const Vector3f bare = highlight(Json(), 0), coated = highlight(film(1, 1), 0);
+  EXPECT_LT(coated.y(), 0.1f * bare.y());
+  EXPECT_GT(std::min(coated.x(), coated.z()), 2 * coated.y());
+  EXPECT_LT(coated.maxCoeff(), bare.y());
+  const Vector3f half = highlight(film(1, 0.5), 0);
+  EXPECT_LT((half - 0.5f * (bare + coated)).cwiseAbs().maxCoeff(), 0.02f * bare.y());
+  const Vector3f twice = highlight(film(2, 1), 0);  // a half wave is as if it were not there
+  EXPECT_NEAR(twice.y() / bare.y(), 1, 0.15f);
+  const Vector3f metal = highlight(film(2, 1), 1);
+  EXPECT_GT((metal / metal.maxCoeff() - Vector3f::Ones()).cwiseAbs().maxCoeff(), 0.05f) << "metal is tinted";
 }
 
 TEST(GltfPicture, IndexOfRefractionAndSpecularSetTheHighlight) {

@@ -109,13 +109,21 @@ TEST(GltfPrimitives, StripsFansAndBareVerticesAreTriangles) {
 }
 
 TEST(GltfPrimitives, PointsAndLinesAreLeftOutWithAWarning) {
-  GltfSample sample;
-  Json points = sample.primitive();
-  points["mode"] = 0;
-  sample.document["meshes"][0]["primitives"].push_back(points);
-  const Model model = read_sample(sample);
-  EXPECT_EQ(model.triangle_count(), 2u);
-  EXPECT_TRUE(warns(model, "6 points or lines left out")) << ::testing::PrintToString(model.warnings);
+  // Six indices are six points, three separate lines, a closed line of six parts, or an open one of five.
+  for (const auto& [mode, line] : {std::pair(0, "6 points left out"),
+                                   {1, "3 lines left out"},
+                                   {2, "6 lines left out"},
+                                   {3, "5 lines left out"}}) {
+    GltfSample sample;
+    Json other = sample.primitive();
+    other["mode"] = mode;
+    sample.document["meshes"][0]["primitives"].push_back(other);
+    const Model model = read_sample(sample);
+    EXPECT_EQ(model.triangle_count(), 2u);
+    EXPECT_TRUE(warns(model, line)) << ::testing::PrintToString(model.warnings);
+    sample.primitive()["mode"] = mode;
+    EXPECT_NE(why_not(sample.text()).find("left out: only triangles are drawn"), std::string::npos);
+  }
 }
 
 TEST(GltfPrimitives, FacesWithoutNormalsAreFlat) {
@@ -145,10 +153,38 @@ TEST(GltfExtensions, ContentThatIsNotDrawnIsNamed) {
   sample.document["cameras"] = {{{"type", "perspective"}}};
   sample.document["animations"] = {Json::object(), Json::object()};
   sample.document["extensions"]["KHR_lights_punctual"]["lights"] = {Json::object()};
-  sample.material()["extensions"]["KHR_materials_iridescence"] = {{"iridescenceFactor", 1}};
+  // Extensions that extensionsUsed does not list are found wherever they are, but not in data of
+  // applications.
+  sample.material()["extensions"]["KHR_materials_anisotropy"] = {{"anisotropyStrength", 1}};
+  sample.document["nodes"][0]["extensions"]["ACME_node"] = Json::object();
+  sample.primitive()["extensions"]["ACME_deep"]["extensions"]["ACME_deeper"] = 1;
+  sample.primitive()["extras"]["extensions"]["ACME_private"] = Json::object();
+  sample.set("COLOR_1", std::vector<float>(16, 1), "VEC4");
   const Model model = read_sample(sample);
-  for (const char* name : {"2 animations", "1 cameras", "1 lights", "KHR_materials_iridescence"})
+  for (const char* name : {"2 animations", "1 cameras", "1 lights", "KHR_materials_anisotropy", "ACME_node",
+                           "ACME_deep ", "COLOR_1"})
     EXPECT_TRUE(warns(model, name)) << name;
+  for (const char* name : {"ACME_private", "KHR_lights_punctual"}) EXPECT_FALSE(warns(model, name)) << name;
+}
+
+/// The message about a texture whose only image needs a transcoder that Debian does not have.
+TEST(GltfExtensions, BasisUniversalIsNamedAndItsFallbackIsDrawn) {
+  GltfSample sample;
+  sample.pbr()["baseColorTexture"] = {
+      {"index", sample.texture(base64_bytes(
+                    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR42mP4z8AAAAMBAQDJ/pLvAAAA"
+                    "AElFTkSuQmCC"))}};
+  Json& texture = sample.document["textures"][0];
+  texture["extensions"]["KHR_texture_basisu"]["source"] = 0;
+  const Model with_fallback = read_sample(sample);
+  EXPECT_TRUE(warns(with_fallback, "KHR_texture_basisu"));
+  EXPECT_EQ(with_fallback.textures.size(), 1u) << "the PNG";
+  texture.erase("source");
+  const Model without = read_sample(sample);
+  EXPECT_TRUE(warns(without, "KHR_texture_basisu") && warns(without, "textures[0] is left out"));
+  EXPECT_TRUE(without.textures.empty());
+  sample.document["extensionsUsed"] = sample.document["extensionsRequired"] = {"KHR_texture_basisu"};
+  EXPECT_NE(why_not(sample.text()).find("KHR_texture_basisu"), std::string::npos);
 }
 
 TEST(GltfPlaces, OfCamerasAndLightsAreThoseOfTheirNodes) {

@@ -245,7 +245,7 @@ TEST(ReadModel, LeavesOutWhatCannotBeDrawnAndSaysSo) {
   for (const std::string& line : model.warnings) all += line + "\n";
   EXPECT_NE(all.find("1 faces left out: a vertex is not finite"), std::string::npos) << all;
   EXPECT_NE(all.find("faces left out: they have no area"), std::string::npos) << all;
-  EXPECT_NE(all.find("1 points or lines left out"), std::string::npos) << all;
+  EXPECT_NE(all.find("left out: only triangles are drawn"), std::string::npos) << all;
 }
 
 TEST(ReadModel, RefusesInOneLine) {
