@@ -4,7 +4,6 @@
 #include <map>
 #include <optional>
 #include <span>
-#include <string_view>
 
 #include <assimp/Importer.hpp>
 #include <assimp/config.h>
@@ -27,7 +26,6 @@ using Eigen::Vector3d;
 
 constexpr unsigned kSteps = aiProcess_Triangulate | aiProcess_RemoveComponent | aiProcess_GenUVCoords |
                             aiProcess_TransformUVCoords | aiProcess_JoinIdenticalVertices;
-constexpr uint64_t kMaxFbxBytes = uint64_t{2} << 30;
 constexpr int kIgnored = aiComponent_ANIMATIONS | aiComponent_BONEWEIGHTS | aiComponent_LIGHTS |
                          aiComponent_CAMERAS | aiComponent_TANGENTS_AND_BITANGENTS;
 
@@ -205,26 +203,21 @@ std::string reason(const Assimp::Importer& importer) {
 
 /// Names what the file has and the reader drops. Files of FBX are searched, because their animations are not
 /// read.
-std::vector<std::string> ignored_by_assimp(const aiScene& scene, const std::filesystem::path& path) {
+std::vector<std::string> ignored_by_assimp(const aiScene& scene) {
   std::vector<std::string> lines;
   const auto add = [&lines](std::size_t count, const char* what) {
     if (count > 0) lines.push_back(std::to_string(count) + what);
   };
   const std::span<aiMesh* const> meshes(scene.mMeshes, scene.mNumMeshes);
-  add(scene.mNumAnimations, " animations are ignored: of glTF 2.0 files alone they are played");
+  add(scene.mNumAnimations, " animations are ignored: only those of glTF 2.0 files are played");
   add(static_cast<std::size_t>(
           std::ranges::count_if(meshes, [](const aiMesh* m) { return m->mNumBones > 0; })),
       " meshes have bones, which are ignored: they are drawn as stored");
   add(static_cast<std::size_t>(
           std::ranges::count_if(meshes, [](const aiMesh* m) { return m->mNumAnimMeshes > 0; })),
       " meshes have morph targets, which are ignored");
-  add(scene.mNumCameras, " cameras are ignored: of glTF 2.0 files alone they can be used");
-  add(scene.mNumLights, " lights are ignored: of glTF 2.0 files alone they can be used");
-  if (!has_ending(path, ".fbx")) return lines;
-  const std::vector<uint8_t> bytes = read_file(path, kMaxFbxBytes);
-  constexpr std::string_view kCurve = "AnimationCurve";
-  if (std::ranges::search(bytes, kCurve).size() > 0)
-    lines.emplace_back("animations are ignored: of glTF 2.0 files alone they are played");
+  add(scene.mNumCameras, " cameras are ignored: only those of glTF 2.0 files can be used");
+  add(scene.mNumLights, " lights are ignored: only those of glTF 2.0 files can be used");
   return lines;
 }
 
@@ -238,7 +231,7 @@ Model import_by_assimp(const std::filesystem::path& path, const std::string& nod
   const aiScene* scene = importer.ReadFile(path.string(), 0);
   Model model;
   if (scene) {
-    model.warnings = ignored_by_assimp(*scene, path);
+    model.warnings = ignored_by_assimp(*scene);
     scene = importer.ApplyPostProcessing(kSteps);
   }
   if (!scene) throw FileError("cannot be read as a model: " + reason(importer));

@@ -67,6 +67,53 @@ TEST(GltfAccessors, QuantizedAndNormalizedIntegersAreScaled) {
   expect_box(read_sample(shorts), {-5, -5, 0}, {5, 5, 0});
 }
 
+/// Numbers of [0, 1] as normalised integers of a type, or as floats.
+template <class T>
+std::vector<T> stored(const std::vector<float>& values) {
+  std::vector<T> result;
+  for (const float value : values) {
+    if constexpr (std::is_same_v<T, float>)
+      result.push_back(value);
+    else
+      result.push_back(
+          static_cast<T>(std::lround(value * static_cast<float>(std::numeric_limits<T>::max()))));
+  }
+  return result;
+}
+
+// Colours, coordinates and weights are floats or normalised integers, indices integers of any width.
+TEST(GltfAccessors, AttributesMayHaveAnyTypeThatTheFormatAllows) {
+  const std::vector<float> rgb = {1, 0, 0.2f, 0, 1, 0.4f, 0, 0, 1, 1, 1, 0.6f},
+                           uv = {0, 1, 1, 1, 1, 0, 0, 0.2f};
+  const auto expect = [&]<class T>(T /*type*/, double step) {
+    GltfSample sample;
+    constexpr bool kIsInteger = !std::is_same_v<T, float>;
+    if constexpr (!std::is_signed_v<T> || !kIsInteger)
+      sample.set("COLOR_0", stored<T>(rgb), "VEC3", kIsInteger);
+    sample.set("TEXCOORD_0", stored<T>(uv), "VEC2", kIsInteger);
+    if constexpr (kIsInteger && std::is_unsigned_v<T>)
+      sample.primitive()["indices"] = sample.accessor(std::vector<T>{0, 1, 2, 0, 2, 3}, "SCALAR");
+    const Model model = read_sample(sample);
+    const Mesh& mesh = model.parts.at(0).mesh;
+    ASSERT_EQ(mesh.uvs.size(), 4u);
+    EXPECT_EQ(model.triangle_count(), 2u);
+    for (std::size_t i = 0; i < 4; ++i) {
+      EXPECT_NEAR(mesh.uvs[i].x(), uv[2 * i], step);
+      EXPECT_NEAR(mesh.uvs[i].y(), uv[2 * i + 1], step);
+      for (std::size_t k = 0; k < 3 && !mesh.colors.empty(); ++k)
+        EXPECT_NEAR(mesh.colors[i][static_cast<Eigen::Index>(k)], rgb[3 * i + k], step);
+    }
+  };
+  expect(uint8_t{}, 0.5 / 255 + 1e-6);
+  expect(uint16_t{}, 0.5 / 65535 + 1e-6);
+  expect(int8_t{}, 0.5 / 127 + 1e-6);
+  expect(int16_t{}, 0.5 / 32767 + 1e-6);
+  expect(float{}, 1e-7);
+  GltfSample wide;
+  wide.primitive()["indices"] = wide.accessor(std::vector<uint32_t>{0, 1, 2, 0, 2, 3}, "SCALAR");
+  EXPECT_EQ(read_sample(wide).triangle_count(), 2u);
+}
+
 TEST(GltfAccessors, InterleavedSparseAndMissingDataAreRead) {
   GltfSample interleaved;  // position and normal in turn
   const int view = interleaved.view(
