@@ -32,6 +32,7 @@ constexpr std::array kGltfExtensions = {"KHR_mesh_quantization",
                                         "KHR_materials_clearcoat",
                                         "KHR_materials_sheen",
                                         "KHR_materials_specular",
+                                        "KHR_materials_iridescence",
                                         "KHR_materials_pbrSpecularGlossiness",
                                         "EXT_mesh_gpu_instancing",
                                         "KHR_lights_punctual",
@@ -115,6 +116,27 @@ std::size_t component_bytes(std::size_t type, const GltfValue& place) {
   }
 }
 
+bool is_known_extension(const std::string& name) {
+  return std::ranges::find(kGltfExtensions, name) != kGltfExtensions.end();
+}
+
+/// The names of all extensions in a document, without those in application data (`extras`).
+std::set<std::string> extensions_within(const GltfValue::Json& document) {
+  std::set<std::string> names;
+  std::vector<const GltfValue::Json*> stack = {&document};  // explicit, because the depth depends on the file
+  while (!stack.empty()) {
+    const GltfValue::Json& json = *stack.back();
+    stack.pop_back();
+    for (const auto& [key, value] : json.items()) {
+      if (!value.is_structured() || (json.is_object() && key == "extras")) continue;
+      if (json.is_object() && key == "extensions" && value.is_object())
+        for (const auto& extension : value.items()) names.insert(extension.key());
+      stack.push_back(&value);
+    }
+  }
+  return names;
+}
+
 std::vector<uint8_t> base64_decoded(std::string_view text, const std::string& what) {
   std::vector<uint8_t> result;
   result.reserve(text.size() / 4 * 3);
@@ -137,10 +159,6 @@ std::vector<uint8_t> base64_decoded(std::string_view text, const std::string& wh
 }
 
 }  // namespace
-
-bool is_known_extension(const std::string& name) {
-  return std::ranges::find(kGltfExtensions, name) != kGltfExtensions.end();
-}
 
 /// The memory layout of an accessor.
 struct GltfFile::Layout {
@@ -231,12 +249,15 @@ void GltfFile::check_extensions() {
     if (library == gltf_libraries().end() && !is_known_extension(name))
       throw FileError("it requires the extension " + name + ", which is not supported");
   }
-  for (const std::string& name : names("extensionsUsed")) {
+  const std::vector<std::string> listed = names("extensionsUsed");
+  std::set<std::string> used(listed.begin(), listed.end());
+  used.merge(extensions_within(document_));  // not all writers list them
+  for (const std::string& name : used) {
     const auto library = std::ranges::find(gltf_libraries(), name, &GltfLibrary::extension);
     if (library != gltf_libraries().end() && !library->built)
       warn("extension " + name + " is ignored: this program was built without " + library->package);
     else if (library == gltf_libraries().end() && !is_known_extension(name))
-      warn("extension " + name + " is not supported and is ignored");
+      warn("extension " + one_line(name) + " is not supported and is ignored");
   }
 }
 

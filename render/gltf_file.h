@@ -79,9 +79,6 @@ class GltfFile {
   std::set<std::string> warned_;
 };
 
-/// Whether an extension is drawn, or changes nothing in the picture, without an optional library.
-bool is_known_extension(const std::string& name);
-
 /// Whether a file is glTF by its name.
 bool is_gltf(const std::filesystem::path& path);
 

@@ -133,6 +133,8 @@ void GltfGeometry::read_attributes(const Source& given, GltfPrimitive& result) {
   };
   mesh.uvs = uvs(first);
   mesh.second_uvs = uvs(second);
+  if (source.primitive.child("attributes").has("COLOR_1"))
+    file_.warn(source.primitive.place() + ": COLOR_1 is ignored; COLOR_0 colours vertices");
   const GltfNumbers colors = source.attribute(file_, "COLOR_0", 0);
   if (colors.count == 0) return;
   if (colors.width != 3 && colors.width != 4)
@@ -157,8 +159,11 @@ void GltfGeometry::read_triangles(const Source& source, GltfPrimitive& result) {
   const std::size_t mode = source.draco ? std::size_t{kTriangles} : source.primitive.size("mode", kTriangles);
   if (mode > kTriangleFan)
     throw source.primitive.wrong("mode", "is " + std::to_string(mode) + "; 0 to 6 are defined");
-  if (mode < kTriangles)
-    result.left_out = indices.size();
+  const std::size_t n = indices.size();
+  if (mode == kPoints)
+    result.points = n;
+  else if (mode < kTriangles)  // section 3.7.2.1
+    result.lines = mode == kLines ? n / 2 : n < 2 ? 0 : mode == kLineLoop ? n : n - 1;
   else
     mesh.indices = as_triangles(indices, mode);
 }
@@ -235,7 +240,7 @@ std::optional<FileSurface> GltfGeometry::morphed(std::size_t mesh, std::size_t i
     if (!out.normals.empty()) add("NORMAL", [&](std::size_t i, const Vector3f& d) { out.normals[i] += d; });
     if (!out.tangents.empty())
       add("TANGENT", [&](std::size_t i, const Vector3f& d) { out.tangents[i].head<3>() += d; });
-    if (target.has("COLOR_0") || target.has("TEXCOORD_0"))
+    if (target.has("COLOR_0") || target.has("TEXCOORD_0") || target.has("TEXCOORD_1"))
       file_.warn("morph targets of colours and texture coordinates are ignored");
   }
   return result;

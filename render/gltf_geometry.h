@@ -15,10 +15,10 @@ namespace offstage::render {
 /// A primitive as triangles, with what a skin needs.
 struct GltfPrimitive {
   FileSurface surface;
-  std::size_t left_out = 0;      ///< points, or ends of lines, that it consists of instead
-  std::vector<uint32_t> joints;  ///< `influences` per vertex, of the skin's list
-  std::vector<float> weights;    ///< as long as `joints`
-  std::size_t influences = 0;    ///< joints per vertex
+  std::size_t points = 0, lines = 0;  ///< that it consists of instead; they are not drawn
+  std::vector<uint32_t> joints;       ///< `influences` per vertex, of the skin's list
+  std::vector<float> weights;         ///< as long as `joints`
+  std::size_t influences = 0;         ///< joints per vertex
 };
 
 class GltfGeometry {

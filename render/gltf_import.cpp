@@ -105,7 +105,6 @@ class GltfImporter {
     warn_of_ignored();
     model_.unit = "1 m, as the format defines (glTF)";
     model_.unit_source = Model::UnitSource::stated;
-    model_.file_size = largest_side(model_, all_nodes_);
     model_.warnings = file_.take_warnings();
     const std::vector<std::string> left_out = builder_.left_out();
     model_.warnings.insert(model_.warnings.end(), left_out.begin(), left_out.end());
@@ -185,14 +184,13 @@ class GltfImporter {
     const Affine3d rigid = turned_and_moved(world);
     const std::string name = node.text("name", "nodes[" + std::to_string(index) + "]");
     model_.nodes.push_back(model_node(names_.next(name.empty() ? "node" : name), parent, rigid));
-    if (!wanted_.empty()) measure(mesh, world);
     if (!wanted_.empty() && wanted_ != model_.nodes.back().name) return;
     const Affine3d frame = wanted_.empty() ? world : rigid.inverse() * world;
     const std::vector<Affine3d> instances = instances_of(node);
     const std::vector<Affine3d> joints = skin ? joints_of(*skin) : std::vector<Affine3d>{};
     for (std::size_t k = 0; k < geometry_->primitive_count(mesh); ++k) {
       const GltfPrimitive& primitive = geometry_->primitive(mesh, k);
-      builder_.leave_out(primitive.left_out);
+      builder_.leave_out(primitive.points, primitive.lines);
       if (primitive.surface.mesh.indices.empty()) continue;
       std::optional<FileSurface> own = geometry_->morphed(mesh, k, node);
       if (skin && primitive.influences > 0)
@@ -201,12 +199,6 @@ class GltfImporter {
         builder_.add(own ? *own : primitive.surface, frame * instance);
     }
     if (rig_) rig_->add_mesh(index, mesh, instances);
-  }
-
-  void measure(std::size_t mesh, const Affine3d& world) {
-    for (std::size_t k = 0; k < geometry_->primitive_count(mesh); ++k)
-      for (const Vector3f& p : geometry_->primitive(mesh, k).surface.mesh.positions)
-        if (p.allFinite()) all_nodes_.extend((world * p.cast<double>()).cast<float>());
   }
 
   /// EXT_mesh_gpu_instancing; without it, the node itself.
@@ -290,7 +282,6 @@ class GltfImporter {
   std::optional<GltfRig> rig_;
   const GltfNodes* nodes_ = nullptr;
   NodeNames names_, camera_names_, light_names_;
-  Eigen::AlignedBox3f all_nodes_;  ///< the box around them, if only one is wanted
 };
 
 }  // namespace

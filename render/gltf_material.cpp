@@ -7,6 +7,7 @@
 #include "render/file_io.h"
 #include "render/gltf_packed.h"
 #include "render/image_io.h"
+#include "render/thin_film.h"
 
 namespace offstage::render {
 namespace {
@@ -85,12 +86,8 @@ Material GltfMaterials::material(const GltfValue& source, GltfUvSets& sets) {
   look.unlit = source.extension("KHR_materials_unlit").exists();
   read_transmission(source, look, sets);
   read_layers(source, look, sets);
+  read_iridescence(source, look);
   if (sets[0] < 0) sets[0] = 0;
-  const GltfValue extensions = source.child("extensions");
-  if (!extensions.exists()) return look;
-  for (const auto& [name, value] : extensions.json()->items())
-    if (!is_known_extension(name))
-      file_.warn("extension " + one_line(name) + " is not supported and is ignored");
   return look;
 }
 
@@ -144,7 +141,6 @@ void GltfMaterials::read_transmission(const GltfValue& source, Material& look, G
   look.transmission_texture = map(transmission, "transmissionTexture", Alpha::drop, sets);
   const double thickness = volume.number("thicknessFactor", 0);
   look.thin = thickness <= 0;
-  if (look.roughness > 0.3f) file_.warn(source.place() + ": rough transmission is drawn clear");
   if (look.thin) return;
   const double distance = volume.number("attenuationDistance", 0);
   if (distance > 0) {  // absorption over the nominal thickness tints the transmitted light
@@ -172,6 +168,22 @@ void GltfMaterials::read_layers(const GltfValue& source, Material& look, GltfUvS
   look.specular = share(specular.number("specularFactor", 1)) * look.specular.cwiseProduct(tint).cwiseMin(1);
   look.specular_texture = map(specular, "specularColorTexture", Alpha::drop, sets);
   warn_of_textures(specular, {"specularTexture"});
+}
+
+void GltfMaterials::read_iridescence(const GltfValue& source, Material& look) {
+  const GltfValue film = source.extension("KHR_materials_iridescence");
+  const float strength = share(film.number("iridescenceFactor", 0));
+  if (strength == 0) return;
+  const double n = std::clamp(film.number("iridescenceIor", 1.3), 1.0, 5.0);
+  const double thickness_nm = std::clamp(film.number("iridescenceThicknessMaximum", 400), 0.0, 1e5);
+  const Vector3f metal = film_reflectance(n, thickness_nm, look.color.head<3>());
+  const float of_metal = strength * look.metallic;
+  look.color.head<3>() += of_metal * (metal - look.color.head<3>());
+  look.specular += strength * (film_reflectance(n, thickness_nm, look.specular) - look.specular);
+  file_.warn(
+      "KHR_materials_iridescence is approximated: the colours that it has from the front are drawn at all "
+      "angles");
+  warn_of_textures(film, {"iridescenceTexture", "iridescenceThicknessTexture"});
 }
 
 void GltfMaterials::warn_of_textures(const GltfValue& source, std::initializer_list<const char*> names) {

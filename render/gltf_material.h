@@ -31,6 +31,7 @@ class GltfMaterials {
   void read_glossiness(const GltfValue& source, Material& look, GltfUvSets& sets);
   void read_transmission(const GltfValue& source, Material& look, GltfUvSets& sets);
   void read_layers(const GltfValue& source, Material& look, GltfUvSets& sets);
+  void read_iridescence(const GltfValue& source, Material& look);
   void warn_of_textures(const GltfValue& source, std::initializer_list<const char*> names);
   TextureMap map(const GltfValue& owner, const char* name, Alpha alpha, GltfUvSets& sets);
   void read_sampler(const GltfValue& texture, TextureMap& result);

@@ -160,6 +160,9 @@ void GltfRig::read_targets(const GltfValue& primitive, RigSurface& surface) {
       return result;
     };
     surface.targets.push_back({offsets("POSITION"), offsets("NORMAL")});
+    for (const char* name : {"TANGENT", "COLOR_0", "TEXCOORD_0", "TEXCOORD_1"})
+      if (source.has(name))
+        file_.warn("morph targets of " + std::string(name) + " are ignored while an animation plays");
   }
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <span>
 
 #include <assimp/Importer.hpp>
 #include <assimp/config.h>
@@ -109,7 +110,9 @@ class AssimpSurfaces {
       convert(mesh, material, surface.mesh);
     }
     builder_.add(surface, world_from_mesh);
-    builder_.leave_out(mesh.mNumFaces - surface.mesh.indices.size() / 3);
+    const auto points = static_cast<std::size_t>(std::count_if(
+        mesh.mFaces, mesh.mFaces + mesh.mNumFaces, [](const aiFace& face) { return face.mNumIndices == 1; }));
+    builder_.leave_out(points, mesh.mNumFaces - surface.mesh.indices.size() / 3 - points);
   }
 
  private:
@@ -158,18 +161,9 @@ class AssimpSurfaces {
   std::map<unsigned, FileSurface> surfaces_;
 };
 
-void measure(const aiMesh& mesh, const Affine3d& world, Eigen::AlignedBox3f& box) {
-  for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
-    const Vector3f p = (world * to_eigen(mesh.mVertices[i]).cast<double>()).cast<float>();
-    if (p.allFinite()) box.extend(p);
-  }
-}
-
 /// Lists the nodes that have meshes, and adds the meshes of all of them, or of the node `wanted`. Depth first
-/// with an explicit stack, because the depth depends on the file. `all_nodes`: gets the
-/// box around them, if only one is wanted.
-void place_nodes(const aiScene& scene, const std::string& wanted, AssimpSurfaces& surfaces, Model& model,
-                 Eigen::AlignedBox3f& all_nodes) {
+/// with an explicit stack, because the depth depends on the file.
+void place_nodes(const aiScene& scene, const std::string& wanted, AssimpSurfaces& surfaces, Model& model) {
   struct Item {
     const aiNode* node;
     Affine3d world_from_parent;
@@ -193,8 +187,6 @@ void place_nodes(const aiScene& scene, const std::string& wanted, AssimpSurfaces
           surfaces.add(node.mMeshes[i], world_from_node);
         else if (wanted == model.nodes.back().name)
           surfaces.add(node.mMeshes[i], rigid.inverse() * world_from_node);
-        if (!wanted.empty() && node.mMeshes[i] < scene.mNumMeshes)
-          measure(*scene.mMeshes[node.mMeshes[i]], world_from_node, all_nodes);
       }
     }
     for (unsigned i = node.mNumChildren; i-- > 0;)
@@ -209,6 +201,26 @@ std::string reason(const Assimp::Importer& importer) {
   return error.empty() ? "no reason given" : error;
 }
 
+/// Names what the file has and the reader drops. Files of FBX are searched, because their animations are not
+/// read.
+std::vector<std::string> ignored_by_assimp(const aiScene& scene) {
+  std::vector<std::string> lines;
+  const auto add = [&lines](std::size_t count, const char* what) {
+    if (count > 0) lines.push_back(std::to_string(count) + what);
+  };
+  const std::span<aiMesh* const> meshes(scene.mMeshes, scene.mNumMeshes);
+  add(scene.mNumAnimations, " animations are ignored: only those of glTF 2.0 files are played");
+  add(static_cast<std::size_t>(
+          std::ranges::count_if(meshes, [](const aiMesh* m) { return m->mNumBones > 0; })),
+      " meshes have bones, which are ignored: they are drawn as stored");
+  add(static_cast<std::size_t>(
+          std::ranges::count_if(meshes, [](const aiMesh* m) { return m->mNumAnimMeshes > 0; })),
+      " meshes have morph targets, which are ignored");
+  add(scene.mNumCameras, " cameras are ignored: only those of glTF 2.0 files can be used");
+  add(scene.mNumLights, " lights are ignored: only those of glTF 2.0 files can be used");
+  return lines;
+}
+
 Model import_by_assimp(const std::filesystem::path& path, const std::string& node,
                        const InputFolders& folders) {
   Assimp::Importer importer;
@@ -216,10 +228,14 @@ Model import_by_assimp(const std::filesystem::path& path, const std::string& nod
   importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, kIgnored);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_READ_ANIMATIONS, false);
-  const aiScene* scene = importer.ReadFile(path.string(), kSteps);
+  const aiScene* scene = importer.ReadFile(path.string(), 0);
+  Model model;
+  if (scene) {
+    model.warnings = ignored_by_assimp(*scene);
+    scene = importer.ApplyPostProcessing(kSteps);
+  }
   if (!scene) throw FileError("cannot be read as a model: " + reason(importer));
 
-  Model model;
   const bool obj = has_ending(path, ".obj");
   std::vector<unsigned> uv_sets =
       import_materials(*scene, path.parent_path(), folders,
@@ -229,9 +245,7 @@ Model import_by_assimp(const std::filesystem::path& path, const std::string& nod
   if (model.materials.empty()) model.materials.emplace_back();
   PartBuilder builder(model);
   AssimpSurfaces surfaces(*scene, std::move(uv_sets), has_ending(path, ".blend"), model, builder);
-  Eigen::AlignedBox3f all_nodes;
-  place_nodes(*scene, node, surfaces, model, all_nodes);
-  model.file_size = largest_side(model, all_nodes);
+  place_nodes(*scene, node, surfaces, model);
   const std::vector<std::string> left_out = builder.left_out();
   model.warnings.insert(model.warnings.end(), left_out.begin(), left_out.end());
   return model;

@@ -146,7 +146,6 @@ void transfer(Archive& archive, Model& model) {
       archive.value(*number);
   });
   archive.value(model.unit_source);
-  archive.value(model.file_size);
   transfer_rig(archive, model.rig);
   archive.list(model.textures, [&](Image& image) { transfer_image(archive, image); });
   archive.array(model.unit);
@@ -288,9 +287,14 @@ bool is_whole(const Model& model) {
          std::ranges::all_of(model.cameras,
                              [&](const auto& camera) { return is_whole(camera, model.rig); }) &&
          std::ranges::all_of(model.lights, [&](const auto& light) { return is_whole(light, model.rig); }) &&
-         std::isfinite(model.file_size) &&
          static_cast<unsigned>(model.unit_source) <= static_cast<unsigned>(Model::UnitSource::millimetres) &&
          is_whole(model.rig, model.materials.size());
+}
+
+/// Of the box around a model [m].
+float longest_side(const Model& model) {
+  const Eigen::AlignedBox3f box = model.bounds();
+  return box.isEmpty() ? 0 : box.sizes().maxCoeff();
 }
 
 /// The folders that a child may read: the given ones or, if there are none, that of the file itself.
@@ -410,7 +414,28 @@ Model read_model(const std::filesystem::path& file, const InputFolders& folders,
   for (Model::Part& part : model.parts) {
     if (part.mesh.normals.empty()) compute_normals(part.mesh);
   }
+  if (place.node.empty()) model.file_size = longest_side(model);
   return model;
+}
+
+float read_file_size(const std::filesystem::path& file, const InputFolders& folders, const StopTest& stop) {
+  const std::filesystem::path path = split_node(file).file;
+  check_folder(path, folders);
+  const uint64_t size = checked_size(path);
+  const InputFolders allowed = readable(path, folders);
+  const ChildAnswer answer = run_confined({.what = path.string(),
+                                           .file_bytes = size,
+                                           .pictures = pictures_beside(path) + pictures_inside(path),
+                                           .folders = &allowed,
+                                           .stop = stop},
+                                          [&](int memory) {
+                                            float side = longest_side(import_model(path, "", allowed, false));
+                                            Writer(memory).value(side);
+                                          });
+  float side = 0;
+  Reader(answer.bytes()).value(side);
+  if (!std::isfinite(side)) throw damaged_answer();
+  return side;
 }
 
 PointCloud read_points(const std::filesystem::path& path, const InputFolders& folders, const StopTest& stop) {

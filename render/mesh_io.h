@@ -37,6 +37,11 @@ ModelPath split_node(const std::filesystem::path& path);
 Model read_model(const std::filesystem::path& path, const InputFolders& folders = {},
                  const StopTest& stop = {}, bool with_rig = false);
 
+/// Longest side of the box around all that read_model() draws of a whole file [m], also for a path that ends
+/// in #NODE. Reads and throws as read_model() does.
+float read_file_size(const std::filesystem::path& path, const InputFolders& folders = {},
+                     const StopTest& stop = {});
+
 /// Reads an image of up to kMaxTexturePixels. Throws as read_model() does.
 Image read_texture(const std::filesystem::path& path, const InputFolders& folders = {},
                    const StopTest& stop = {});

@@ -49,10 +49,9 @@ class MaterialImporter {
     for (const auto& [key, map] : source.maps) {
       if (key == "map_kd") lay(map, look.base_color_texture);
       if (key == "map_ke") add_glow(map, look);
-      if (key == "map_ks" || key == "map_ns" || key == "map_pr" || key == "map_pm" || key == "disp" ||
-          key == "refl")
-        model_.warnings.push_back("material '" + look.name + "': " + key + " is ignored");
     }
+    for (const std::string& key : source.ignored)
+      model_.warnings.push_back("material '" + look.name + "': " + key + " is ignored");
     if (const auto mask = source.maps.find("map_d"); mask != source.maps.end()) add_mask(mask->second, look);
     for (const char* key : {"bump", "norm"})
       if (const auto map = source.maps.find(key); map != source.maps.end()) add_bumps(map->second, look);
@@ -87,11 +86,26 @@ class MaterialImporter {
       material.color.w() = 1;
       model_.warnings.push_back("material '" + material.name + "': opacity 0 taken as opaque");
     }
+    name_ignored(source, material.name);
     model_.materials.push_back(std::move(material));
     return uv_set;
   }
 
  private:
+  /// Of MTL files, assimp sees only textures that are drawn.
+  void name_ignored(const aiMaterial& source, const std::string& name) {
+    constexpr std::pair<aiTextureType, const char*> kIgnoredTextures[] = {
+        {aiTextureType_NORMALS, "normal map"},        {aiTextureType_NORMAL_CAMERA, "normal map"},
+        {aiTextureType_HEIGHT, "bump map"},           {aiTextureType_DISPLACEMENT, "displacement map"},
+        {aiTextureType_METALNESS, "metal map"},       {aiTextureType_DIFFUSE_ROUGHNESS, "roughness map"},
+        {aiTextureType_SPECULAR, "specular map"},     {aiTextureType_SHININESS, "shininess map"},
+        {aiTextureType_OPACITY, "opacity map"},       {aiTextureType_AMBIENT_OCCLUSION, "occlusion map"},
+        {aiTextureType_REFLECTION, "reflection map"}, {aiTextureType_LIGHTMAP, "light map"}};
+    for (const auto& [type, what] : kIgnoredTextures)
+      if (source.GetTextureCount(type) > 0)
+        model_.warnings.push_back("material '" + name + "': its " + what + " is ignored");
+  }
+
   /// A file without materials gets an unnamed white one, which for glTF is rough metal.
   static void give_default_look(Material& material) {
     material.color = Material{}.color;

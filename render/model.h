@@ -169,8 +169,10 @@ struct Model {
   std::string unit;  ///< unit of length in the file and how it was found, in words
   enum class UnitSource { stated, none, millimetres };
   UnitSource unit_source = UnitSource::none;  ///< `millimetres`: none, but customary (STL); taken as metres
-  float file_size = 0;                        ///< longest side of the box around all nodes of the file [m]
-  std::vector<std::string> warnings;          ///< repaired or ignored elements, one line each
+  /// Longest side of the box around all of the file [m]; empty if only a node was read (see
+  /// read_file_size()).
+  std::optional<float> file_size;
+  std::vector<std::string> warnings;  ///< repaired or ignored elements, one line each
 
   Eigen::AlignedBox3f bounds() const;
   std::size_t triangle_count() const;

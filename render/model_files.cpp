@@ -7,6 +7,7 @@
 
 #include "render/error.h"
 #include "render/file_io.h"
+#include "render/mtl_file.h"
 
 namespace offstage::render {
 namespace {
@@ -73,7 +74,12 @@ class ModelFiles : public Assimp::IOSystem {
   Assimp::IOStream* Open(const char* name, const char* mode) override {
     if (std::strpbrk(mode, "wa+") || !Exists(name)) return nullptr;
     try {
-      return new ModelStream(read_file(name, kMaxBytes));
+      std::vector<uint8_t> bytes = read_file(name, kMaxBytes);
+      if (has_ending(name, ".mtl")) {
+        const std::string text = mtl_for_assimp({bytes.begin(), bytes.end()});
+        bytes.assign(text.begin(), text.end());
+      }
+      return new ModelStream(std::move(bytes));
     } catch (const FileError&) {
       return nullptr;
     }

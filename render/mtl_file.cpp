@@ -1,6 +1,7 @@
 #include "render/mtl_file.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <string_view>
@@ -15,6 +16,10 @@ namespace {
 constexpr uint64_t kMaxMtlBytes = uint64_t{256} << 20;
 constexpr uint64_t kMaxObjBytes = uint64_t{2} << 30;
 constexpr std::size_t kMaxLibraries = 64;
+constexpr std::array kAssimpMtl = {"newmtl", "Ka", "Kd", "Ks",    "Ke",     "Ns",
+                                   "Ni",     "d",  "Tr", "illum", "map_Kd", "map_Ke"};
+constexpr std::array<std::string_view, 5> kDrawnMtlMaps = {"map_kd", "map_ke", "map_d", "bump", "norm"};
+constexpr std::array<std::string_view, 7> kIgnoredMtl = {"decal", "aniso", "anisor", "pc", "pcr", "ps", "tf"};
 
 bool is_blank(char c) {
   return c == ' ' || c == '\t' || c == '\r';
@@ -82,7 +87,9 @@ MtlMap read_map(std::string_view line) {
       next_word(line);
     }
   }
-  map.file = std::string(trimmed(line));
+  line = trimmed(line);
+  if (line.size() >= 2 && line.front() == '"' && line.back() == '"') line = line.substr(1, line.size() - 2);
+  map.file = std::string(line);
   return map;
 }
 
@@ -105,13 +112,37 @@ void read_mtl(const std::string& text, std::map<std::string, MtlMaterial>& mater
     if (current == nullptr) return;
     if (key == "pr") current->roughness = mtl_number(next_word(line));
     if (key == "pm") current->metallic = mtl_number(next_word(line));
+    const bool without_effect = key == "tf" && next_pair(line, 1) == Eigen::Vector2f(1, 1);
+    if (!without_effect && std::ranges::find(kIgnoredMtl, key) != kIgnoredMtl.end())
+      current->ignored.insert(key);
     const bool is_map =
         key.starts_with("map_") || key == "bump" || key == "norm" || key == "disp" || key == "refl";
     if (!is_map) return;
     MtlMap map = read_map(line);
-    if (!map.file.empty())
-      current->maps[key == "map_bump" ? "bump" : key == "map_norm" ? "norm" : key] = std::move(map);
+    if (map.file.empty()) return;
+    const std::string name = key == "map_bump" ? "bump" : key == "map_norm" ? "norm" : key;
+    if (std::ranges::find(kDrawnMtlMaps, name) == kDrawnMtlMaps.end()) current->ignored.insert(name);
+    current->maps[name] = std::move(map);
   });
+  for (auto& [name, material] : materials) {  // programs write the same picture for the light around
+    const auto around = material.maps.find("map_ka"), base = material.maps.find("map_kd");
+    if (around != material.maps.end() && base != material.maps.end() &&
+        around->second.file == base->second.file)
+      material.ignored.erase("map_ka");
+  }
+}
+
+std::string mtl_for_assimp(const std::string& text) {
+  std::string result;
+  for_each_line(text, [&](std::string_view line) {
+    const std::string key = lower_case(next_word(line));
+    const auto known =
+        std::ranges::find_if(kAssimpMtl, [&](const char* statement) { return lower_case(statement) == key; });
+    if (known == kAssimpMtl.end()) return;
+    result += std::string(*known) + " " +
+              (key.starts_with("map_") ? read_map(line).file : std::string(line)) + "\n";
+  });
+  return result;
 }
 
 std::map<std::string, MtlMaterial> read_mtl_of(const std::filesystem::path& obj,

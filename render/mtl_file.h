@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -25,10 +26,16 @@ struct MtlMap {
 struct MtlMaterial {
   std::map<std::string, MtlMap> maps;  ///< by statement, in lower case: map_kd, map_d, bump, norm, map_ke ...
   std::optional<float> roughness, metallic;  ///< Pr, Pm
+  std::set<std::string> ignored;             ///< statements that are not drawn, in lower case
 };
 
-/// Parses the text of one library; unknown statements are skipped.
+/// Parses the text of one library.
 void read_mtl(const std::string& text, std::map<std::string, MtlMaterial>& materials);
+
+/// The statements of a library that assimp reads correctly: names, colours and numbers, and textures without
+/// options. Its own reader takes the number of an option's values as fixed and refuses files with statements
+/// such as `decal`.
+std::string mtl_for_assimp(const std::string& text);
 
 /// Reads the libraries that an OBJ file names, as far as they exist in `folders`.
 std::map<std::string, MtlMaterial> read_mtl_of(const std::filesystem::path& obj, const InputFolders& folders);

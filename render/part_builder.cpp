@@ -91,7 +91,8 @@ std::vector<std::string> PartBuilder::left_out() const {
   const auto add = [&lines](std::size_t count, const char* what) {
     if (count > 0) lines.push_back(std::to_string(count) + what);
   };
-  add(no_triangle_, " points or lines left out");
+  add(points_, " points left out: only triangles are drawn");
+  add(lines_, " lines left out: only triangles are drawn");
   add(bad_index_, " faces left out: their indices are out of range");
   add(not_finite_, " faces left out: a vertex is not finite");
   add(no_area_, " faces left out: they have no area");
@@ -161,11 +162,6 @@ std::string NodeNames::next(const std::string& name) {
   for (int& count = counts_[name]; !taken_.insert(unique).second;)
     unique = name + "_" + std::to_string(++count + 1);
   return unique;
-}
-
-float largest_side(const Model& model, const Eigen::AlignedBox3f& all_nodes) {
-  const Eigen::AlignedBox3f box = all_nodes.isEmpty() ? model.bounds() : all_nodes;
-  return box.isEmpty() ? 0 : box.sizes().maxCoeff();
 }
 
 Eigen::Affine3d turned_and_moved(const Eigen::Affine3d& m) {

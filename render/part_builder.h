@@ -23,8 +23,11 @@ class PartBuilder {
   explicit PartBuilder(Model& model) : model_(model) {}
 
   void add(const FileSurface& surface, const Eigen::Affine3d& world_from_mesh);
-  /// Records points, lines or degenerate primitives that are left out.
-  void leave_out(std::size_t count) { no_triangle_ += count; }
+  /// Records elements that are left out, because only triangles are drawn.
+  void leave_out(std::size_t points, std::size_t lines) {
+    points_ += points;
+    lines_ += lines;
+  }
   /// One line for each kind of element that was left out.
   std::vector<std::string> left_out() const;
 
@@ -34,7 +37,7 @@ class PartBuilder {
 
   Model& model_;
   std::map<std::tuple<int, bool, bool, bool, bool, bool>, std::size_t> parts_;
-  std::size_t no_triangle_ = 0, bad_index_ = 0, not_finite_ = 0, no_area_ = 0, bad_normals_ = 0;
+  std::size_t points_ = 0, lines_ = 0, bad_index_ = 0, not_finite_ = 0, no_area_ = 0, bad_normals_ = 0;
 };
 
 /// Makes the names of nodes unique.
@@ -46,10 +49,6 @@ class NodeNames {
   std::map<std::string, int> counts_;
   std::set<std::string> taken_;
 };
-
-/// Longest side of the box around a model at rest, or around all nodes of its file, if it is only one of
-/// them.
-float largest_side(const Model& model, const Eigen::AlignedBox3f& all_nodes);
 
 /// Rotation and translation without the scale, which is applied to the triangles. For a node that is flat or
 /// mirrored, the nearest rotation.

@@ -117,6 +117,7 @@ PointsPass::PointsPass() : vertex_array_(gl::make_vertex_array()), blended_array
   gl::set_attribute(blended_array_, 3, 0, 4, offsetof(BlendedPoint, style));
   gl::set_attribute(blended_array_, 4, 0, 4, offsetof(BlendedPoint, picture));
   gl::set_attribute(blended_array_, 5, 0, 4, offsetof(BlendedPoint, light));
+  gl::set_attribute(blended_array_, 6, 0, 2, offsetof(BlendedPoint, size_px));
 }
 
 void PointsPass::prepare(PointSet& set, const View& view) {
@@ -140,15 +141,27 @@ void PointsPass::prepare(PointSet& set, const View& view) {
 void PointsPass::prepare_blended(const PaintOrder& order, const PuffLight& light) {
   blended_.clear();
   picture_runs_.clear();
+  textures_.update();
+  const PointSet* latest = nullptr;
+  SpriteTextures::Place pictures;
+  Vector2f size_px = Vector2f::Ones();
+  const auto look_up = [&](const PointSet& set) {
+    if (latest == &set) return;
+    latest = &set;
+    pictures = set.pictures ? textures_.place(*set.pictures) : SpriteTextures::Place();
+    if (set.pictures)
+      size_px = Eigen::Vector2i(set.pictures->width_px, set.pictures->height_px).cast<float>();
+  };
   const auto append = [&](PaintOrder::Kind kind) {
     const std::span<const uint64_t> keys = order.keys(kind);
     for (std::size_t k = keys.size(); k-- > 0;) {
       const PaintOrder::Place at = order.place(kind, keys[k]);
-      const GLuint pictures = at.set->pictures;
-      if (picture_runs_.empty() || picture_runs_.back().pictures != pictures)
-        picture_runs_.push_back({blended_.size(), pictures});
-      blended_.push_back(
-          {at.set->points[at.index], style_of(at.set->def), at.set->turns[at.index], Vector4f::Zero()});
+      look_up(*at.set);
+      if (picture_runs_.empty() || picture_runs_.back().pictures != pictures.texture)
+        picture_runs_.push_back({blended_.size(), pictures.texture});
+      const auto layer = static_cast<float>(pictures.first_layer);
+      blended_.push_back({at.set->points[at.index], style_of(at.set->def),
+                          at.set->turns[at.index] + Vector4f(0, layer, layer, 0), Vector4f::Zero(), size_px});
     }
     return static_cast<uint32_t>(keys.size());
   };

@@ -10,6 +10,7 @@
 
 #include "render/frame.h"
 #include "render/gl.h"
+#include "render/sprite_pictures.h"
 #include "render/trace/ray_material.h"
 
 namespace offstage::render {
@@ -18,8 +19,8 @@ struct GpuPoint {
   Vector4f position, velocity, color;
 };
 
-/// Rotation and pictures of a sprite or flake: angle [rad], two layers of SpritePictures, and the share of
-/// the second one.
+/// Rotation and pictures of a sprite or flake: angle [rad], two pictures of its sheet, and the share of the
+/// second one. In a BlendedPoint, the pictures are layers of the texture.
 using GpuPicture = Vector4f;
 
 /// A sprite or flake of any set.
@@ -27,7 +28,8 @@ struct BlendedPoint {
   GpuPoint point;
   Vector4f style;
   GpuPicture picture;
-  Vector4f light;  ///< of lamps; w: share of the sun that reaches it
+  Vector4f light;                       ///< of lamps; w: share of the sun that reaches it
+  Vector2f size_px = Vector2f::Ones();  ///< of its picture
 };
 
 struct PointSet {
@@ -36,13 +38,13 @@ struct PointSet {
       points;  ///< w of position: radius; w of velocity: a pseudo-random number per particle in [0, 1)
   std::vector<uint64_t> ids;
   std::vector<float> ages;
-  std::vector<GpuPicture> turns;            ///< for each point; sprites and flakes only
-  gl::Texture pictures;                     ///< see make_sprite_pictures(); 0: soft discs
-  Eigen::AlignedBox3f box;                  ///< bounds of the drawn particles, streaks at full length
-  gl::StreamBuffer buffer;                  ///< visible balls by depth
-  std::size_t seen = 0;                     ///< number of them
-  uint32_t object = 0;                      ///< id in Channels
-  std::unique_ptr<const RayMaterial> rays;  ///< of balls, for light rays
+  std::vector<GpuPicture> turns;                   ///< for each point; sprites and flakes only
+  std::shared_ptr<const SpritePictures> pictures;  ///< null: soft discs
+  Eigen::AlignedBox3f box;                         ///< bounds of the drawn particles, streaks at full length
+  gl::StreamBuffer buffer;                         ///< visible balls by depth
+  std::size_t seen = 0;                            ///< number of them
+  uint32_t object = 0;                             ///< id in Channels
+  std::unique_ptr<const RayMaterial> rays;         ///< of balls, for light rays
 
   void assign(std::span<const Point> values);
   /// Smoke and fire, which PuffsPass draws; StreaksPass draws streaks.
@@ -65,6 +67,10 @@ class PointsPass {
   void prepare(PointSet& set, const View& view);
   /// Lights and uploads the sprites and flakes of all sets.
   void prepare_blended(const PaintOrder& order, const PuffLight& light);
+  /// The pictures of sprites, for PointSet::pictures.
+  std::shared_ptr<const SpritePictures> add_pictures(SpritePictures pictures) {
+    return textures_.add(std::move(pictures));
+  }
   void draw_spheres(const PointSet& set, const Features& features);
   /// Writes the surfaces of balls for the tracer of light.
   void draw_surfaces(const PointSet& set);
@@ -91,13 +97,14 @@ class PointsPass {
   std::vector<GpuPoint> ordered_;
   gl::StreamBuffer blended_buffer_;
   std::vector<BlendedPoint> blended_;  ///< sprites, then flakes, each back to front
-  /// The first of a run of blended points with the same pictures.
+  /// The first of a run of blended points with pictures in the same texture.
   struct PictureRun {
     std::size_t first;
     GLuint pictures;
   };
   std::vector<PictureRun> picture_runs_;  ///< of all blended points, in their order
-  uint32_t sprites_ = 0, flakes_ = 0;     ///< number of each
+  SpriteTextures textures_;
+  uint32_t sprites_ = 0, flakes_ = 0;  ///< number of each
   std::vector<std::pair<float, uint32_t>> keys_;
 };
 

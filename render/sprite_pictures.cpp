@@ -64,9 +64,77 @@ std::vector<uint8_t> encode(const LinearPicture& picture) {
   return bytes;
 }
 
+/// Sheets whose pictures are layers of one texture.
+struct TextureGroup {
+  int width_px = 0, height_px = 0;
+  std::size_t layers = 0;
+  std::vector<const SpritePictures*> sheets;
+
+  bool takes(const SpritePictures& sheet) const {
+    constexpr std::size_t kMostTextureLayers = 2048,
+                          kMostGroupBytes = std::size_t{64} << 20;  // OpenGL allows 2048
+    const auto width = static_cast<std::size_t>(std::max(width_px, sheet.width_px)),
+               height = static_cast<std::size_t>(std::max(height_px, sheet.height_px));
+    const std::size_t all = layers + sheet.levels.size();
+    const bool same = sheet.width_px == width_px && sheet.height_px == height_px;
+    return all <= kMostTextureLayers && (same || width * height * 4 * all <= kMostGroupBytes);
+  }
+  void add(const SpritePictures& sheet) {
+    width_px = std::max(width_px, sheet.width_px);
+    height_px = std::max(height_px, sheet.height_px);
+    layers += sheet.levels.size();
+    sheets.push_back(&sheet);
+  }
+};
+
+/// A mip level in the corner of a larger one. Its edges are continued, so that filters find nothing else
+/// there.
+std::vector<uint8_t> padded_level(const std::vector<uint8_t>& level, int width, int height, int to_width,
+                                  int to_height) {
+  if (width == to_width && height == to_height) return level;
+  std::vector<uint8_t> result;
+  result.reserve(4 * static_cast<std::size_t>(to_width) * static_cast<std::size_t>(to_height));
+  for (int y = 0; y < to_height; ++y)
+    for (int x = 0; x < to_width; ++x) {
+      const auto from = level.begin() + 4 * (static_cast<std::ptrdiff_t>(std::min(y, height - 1)) * width +
+                                             std::min(x, width - 1));
+      result.insert(result.end(), from, from + 4);
+    }
+  return result;
+}
+
+gl::Texture upload_group(const TextureGroup& group) {
+  GLuint name = 0;
+  glCreateTextures(GL_TEXTURE_2D_ARRAY, 1, &name);
+  gl::Texture texture(name);
+  const int width = group.width_px, height = group.height_px;
+  const auto levels = static_cast<int>(std::bit_width(static_cast<unsigned>(std::max(width, height))));
+  glTextureStorage3D(texture, levels, GL_SRGB8_ALPHA8, width, height, static_cast<GLsizei>(group.layers));
+  glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
+  glTextureParameteri(texture, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  glTextureParameteri(texture, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  glTextureParameteri(texture, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+  int layer = 0;
+  for (const SpritePictures* sheet : group.sheets)
+    for (const std::vector<std::vector<uint8_t>>& picture : sheet->levels) {
+      for (int k = 0; k < levels; ++k) {
+        const int own = std::min(k, static_cast<int>(picture.size()) - 1);
+        const int to_width = std::max(width >> k, 1), to_height = std::max(height >> k, 1);
+        glTextureSubImage3D(
+            texture, k, 0, 0, layer, to_width, to_height, 1, GL_RGBA, GL_UNSIGNED_BYTE,
+            padded_level(picture[static_cast<std::size_t>(own)], std::max(sheet->width_px >> own, 1),
+                         std::max(sheet->height_px >> own, 1), to_width, to_height)
+                .data());
+      }
+      ++layer;
+    }
+  gl::check_error("uploading the pictures of sprites");
+  return texture;
+}
+
 }  // namespace
 
-gl::Texture make_sprite_pictures(const Image& sheet, int columns, int rows) {
+SpritePictures sprite_pictures(const Image& sheet, int columns, int rows) {
   if (columns < 1 || rows < 1 || columns > kMostSheetPictures / rows)
     throw std::invalid_argument("a sheet has 1 to " + std::to_string(kMostSheetPictures) + " pictures");
   const int width = sheet.width_px / columns, height = sheet.height_px / rows;
@@ -74,24 +142,52 @@ gl::Texture make_sprite_pictures(const Image& sheet, int columns, int rows) {
     throw std::invalid_argument("a sheet of " + std::to_string(sheet.width_px) + "x" +
                                 std::to_string(sheet.height_px) + " pixels cannot hold " +
                                 std::to_string(columns) + "x" + std::to_string(rows) + " pictures");
-  GLuint name = 0;
-  glCreateTextures(GL_TEXTURE_2D_ARRAY, 1, &name);
-  gl::Texture texture(name);
-  const auto levels = static_cast<GLsizei>(std::bit_width(static_cast<unsigned>(std::max(width, height))));
-  glTextureStorage3D(texture, levels, GL_SRGB8_ALPHA8, width, height, columns * rows);
-  glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
-  glTextureParameteri(texture, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-  glTextureParameteri(texture, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
-  glTextureParameteri(texture, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-  for (int layer = 0; layer < columns * rows; ++layer) {
-    LinearPicture level = cut(sheet, layer % columns * width, layer / columns * height, width, height);
+  SpritePictures result{width, height, {}};
+  const auto levels = static_cast<int>(std::bit_width(static_cast<unsigned>(std::max(width, height))));
+  for (int i = 0; i < columns * rows; ++i) {
+    LinearPicture level = cut(sheet, i % columns * width, i / columns * height, width, height);
+    std::vector<std::vector<uint8_t>>& encoded = result.levels.emplace_back();
     for (int k = 0; k < levels; ++k) {
       if (k > 0) level = half_of(level);
-      glTextureSubImage3D(texture, k, 0, 0, layer, level.width_px, level.height_px, 1, GL_RGBA,
-                          GL_UNSIGNED_BYTE, encode(level).data());
+      encoded.push_back(encode(level));
     }
   }
-  return texture;
+  return result;
+}
+
+std::shared_ptr<const SpritePictures> SpriteTextures::add(SpritePictures pictures) {
+  for (const auto& known : sheets_)
+    if (const auto sheet = known.lock(); sheet && *sheet == pictures) return sheet;
+  auto sheet = std::make_shared<const SpritePictures>(std::move(pictures));
+  sheets_.push_back(sheet);
+  is_current_ = false;
+  return sheet;
+}
+
+void SpriteTextures::update() {
+  is_current_ &= std::erase_if(sheets_, [](const auto& sheet) { return sheet.expired(); }) == 0;
+  if (is_current_) return;
+  std::vector<std::shared_ptr<const SpritePictures>> sheets;
+  for (const auto& sheet : sheets_) sheets.push_back(sheet.lock());
+  std::ranges::stable_sort(sheets, std::ranges::greater(), [](const auto& sheet) {
+    return int64_t{sheet->width_px} * sheet->height_px;  // so that those of similar sizes are together
+  });
+  std::vector<TextureGroup> groups;
+  for (const auto& sheet : sheets) {
+    auto group = std::ranges::find_if(groups, [&](const TextureGroup& g) { return g.takes(*sheet); });
+    (group == groups.end() ? groups.emplace_back() : *group).add(*sheet);
+  }
+  textures_.clear();
+  places_.clear();
+  for (const TextureGroup& group : groups) {
+    textures_.push_back(upload_group(group));
+    int layer = 0;
+    for (const SpritePictures* sheet : group.sheets) {
+      places_[sheet] = {textures_.back(), layer};
+      layer += static_cast<int>(sheet->levels.size());
+    }
+  }
+  is_current_ = true;
 }
 
 }  // namespace offstage::render

@@ -1,15 +1,51 @@
 #pragma once
-/// Private: the pictures of sprites, as the layers of an array texture.
+/// Private: the pictures of sprites, as the layers of array textures. Sheets share textures as far as
+/// possible, because sprites of different textures that alternate in depth need one draw call for each
+/// change.
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <vector>
 
 #include "render/gl.h"
 #include "render/image.h"
 
 namespace offstage::render {
 
-/// Uploads the pictures of a sheet, in rows from the upper left corner, each as one layer with mip levels of
-/// its own, so that neighbours on the sheet never mix. Texels have premultiplied alpha and sRGB colour.
-/// Pixels beyond a whole number of pictures are left out. Throws std::invalid_argument if there are no
-/// pictures, or more than kMostSheetPictures, or if a picture would have no pixel.
-gl::Texture make_sprite_pictures(const Image& sheet, int columns, int rows);
+/// The pictures of a sheet.
+struct SpritePictures {
+  int width_px = 0, height_px = 0;  ///< of each picture
+  /// For each picture its mip levels, encoded: RGBA, sRGB colour with premultiplied alpha, rows from the top.
+  std::vector<std::vector<std::vector<uint8_t>>> levels;
+  bool operator==(const SpritePictures&) const = default;
+};
+
+/// Cuts a sheet into pictures, in rows from the upper left corner. Each has mip levels of its own, so that
+/// neighbours on the sheet never mix. Pixels beyond a whole number of pictures are left out. Throws
+/// std::invalid_argument if there are no pictures, or more than kMostSheetPictures, or if a picture would
+/// have no pixel.
+SpritePictures sprite_pictures(const Image& sheet, int columns, int rows);
+
+class SpriteTextures {
+ public:
+  /// Where the pictures of a sheet are: consecutive layers, in their upper left corner.
+  struct Place {
+    GLuint texture = 0;
+    int first_layer = 0;
+  };
+  /// Adds a sheet, or returns the one with the same pictures. Its layers exist while the pointer does.
+  std::shared_ptr<const SpritePictures> add(SpritePictures pictures);
+  /// Uploads all sheets again if some were added or removed. Sheets of pictures with the same size share a
+  /// texture; those of different sizes do if the layers that fit all of them take at most 64 MiB.
+  void update();
+  Place place(const SpritePictures& pictures) const { return places_.at(&pictures); }
+
+ private:
+  std::vector<std::weak_ptr<const SpritePictures>> sheets_;
+  bool is_current_ = true;
+  std::vector<gl::Texture> textures_;
+  std::map<const SpritePictures*, Place> places_;
+};
 
 }  // namespace offstage::render

@@ -533,8 +533,8 @@ PointsHandle Stage::add_points(const PointsDef& def, const Image& picture) {
             .color = {1, 1, 1, 1}, .metallic = def.metallic, .roughness = def.roughness, .unlit = !def.lit},
         std::span<const Image>());
   if (def.style == PointStyle::sprite && picture.pixel_count() > 0) {
-    set->pictures = make_sprite_pictures(picture, def.sheet.columns, def.sheet.rows);
-    gl::check_error("uploading a sprite's picture");
+    set->pictures =
+        impl_->points_pass.add_pictures(sprite_pictures(picture, def.sheet.columns, def.sheet.rows));
   }
   return impl_->point_sets.add(std::move(set));
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "producer/build/shown_model.h"
 #include "producer/run/run_notes.h"
 
 namespace offstage::tune {
@@ -24,17 +25,34 @@ Eigen::Vector2i fitted(const Eigen::Vector2i& size, const Eigen::Vector2i& box) 
   return {std::max(2, int(size.x() * scale + 0.5)), std::max(2, int(size.y() * scale + 0.5))};
 }
 
-void look_with(Scene& scene, const Scene& original, const std::optional<ViewCamera>& camera) {
+/// Replaces the pose of the scene's camera; its lens remains, with the field of view of a glTF file's camera
+/// and with keys of field of view and focus.
+void look_with(Scene& scene, const Scene& original, const producer::ModelLibrary& models,
+               const std::optional<ViewCamera>& camera) {
   scene.camera = original.camera;
   if (!camera) return;
-  StaticCamera view;
-  static_cast<producer::Lens&>(view) =
-      std::visit([](const producer::Lens& lens) -> const producer::Lens& { return lens; }, original.camera);
-  view.look_at.clear();
-  view.fit.clear();
-  view.eye = camera->eye;
-  view.target = camera->target;
-  scene.camera = view;
+  if (auto* keyed = std::get_if<producer::KeyframedCamera>(&scene.camera)) {
+    for (producer::CameraKey& key : keyed->keyframes) {
+      key.eye = camera->eye;
+      key.target = camera->target;
+    }
+  } else {
+    StaticCamera view;
+    static_cast<producer::Lens&>(view) =
+        std::visit([](const producer::Lens& lens) -> const producer::Lens& { return lens; }, original.camera);
+    const auto* of_model = std::get_if<producer::ModelCamera>(&original.camera);
+    if (of_model && !view.focal_mm)
+      view.fov_deg = producer::Real{producer::find_camera(*of_model, original, models)->fov_deg};
+    view.eye = camera->eye;
+    view.target = camera->target;
+    scene.camera = view;
+  }
+  std::visit(
+      [](producer::Lens& lens) {
+        lens.look_at.clear();
+        lens.fit.clear();
+      },
+      scene.camera);
 }
 
 }  // namespace
@@ -47,15 +65,15 @@ FilmRun::FilmRun(FilmDef def, std::shared_ptr<const producer::ModelLibrary> mode
       physics_(workshop_.physics.open(def_.physics)) {
   scene_.render.size = fitted(scene_.render.size, workshop_.draft_px);
   scene_.render.quality = producer::Quality::draft;
-  look_with(scene_, def_.loaded->scene, def_.camera);
+  look_with(scene_, def_.loaded->scene, *models_, def_.camera);
 }
 
 void FilmRun::look_from(const std::optional<ViewCamera>& camera, const std::string& film) {
   def_.camera = camera;
   def_.film = film;
   missing_hint_ = 1;
-  look_with(scene_, def_.loaded->scene, camera);
-  if (refined_) look_with(refined_->scene, def_.loaded->scene, camera);
+  look_with(scene_, def_.loaded->scene, *models_, camera);
+  if (refined_) look_with(refined_->scene, def_.loaded->scene, *models_, camera);
 }
 
 bool FilmRun::has_state(int frame) const {
@@ -171,7 +189,7 @@ bool FilmRun::refine(int frame, Detail detail, const Stop& stop) {
   if (!refined_) {
     refined_ = std::make_unique<Refined>();
     refined_->scene = def_.loaded->scene;
-    look_with(refined_->scene, def_.loaded->scene, def_.camera);
+    look_with(refined_->scene, def_.loaded->scene, *models_, def_.camera);
     refined_->picture.emplace(refined_->scene, *models_, workshop_.context);
     if (stop()) return false;
   }

@@ -6,6 +6,9 @@ layout(location = 2) in vec4 in_color;
 layout(location = 3) in vec4 style;       // softness, stretch [s], lit, additive
 layout(location = 4) in vec4 in_picture;  // angle, two layers of the sheet, share of the second one
 layout(location = 5) in vec4 in_light;    // of lamps; w: share of the sun that reaches the particle
+#ifdef PICTURES
+layout(location = 6) in vec2 in_size;     // of the picture, which is in the corner of its layer [px]
+#endif
 #endif
 
 // Position on the quad in radii: across, up, and half the length of its axis, which is vertical.
@@ -88,15 +91,14 @@ void main() {
   float straight = max(half_length - drawn, 0.0) / drawn;
   vec3 lengthening = half_axis * (half_length > drawn ? 1.0 - drawn / half_length : 0.0);
 #ifdef PICTURES
-  vec2 size = vec2(textureSize(pictures, 0).xy);
-  vec2 side = size / max(size.x, size.y);
+  vec2 side = in_size / max(in_size.x, in_size.y);
   float turn_cos = cos(in_picture.x), turn_sin = sin(in_picture.x);
   vec3 side_u = u * turn_cos + w * turn_sin, side_w = w * turn_cos - u * turn_sin;
   vec2 from_center = drawn * side * corner;
   vec3 offset = side_u * from_center.x + side_w * from_center.y;
   // A picture is stretched along the motion, wherever its own axes point to.
   vec3 at = p + offset + lengthening * (half_length > drawn ? dot(offset, w) / drawn : 0.0);
-  place = vec3(0.5 + 0.5 * corner.x, 0.5 - 0.5 * corner.y, 0.0);
+  place = vec3(vec2(0.5 + 0.5 * corner.x, 0.5 - 0.5 * corner.y) * (in_size / vec2(textureSize(pictures, 0).xy)), 0.0);
   picture = in_picture.yzw;
 #else
   vec3 at = p + lengthening * corner.y + drawn * (w * corner.y + u * corner.x);

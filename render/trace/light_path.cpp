@@ -30,16 +30,23 @@ float mirrored_share(const Hit& hit, const Vector3f& direction) {
 }
 
 bool is_rough_glass(const RayMaterial& material) {
-  return !material.thin && material.roughness * material.roughness >= kSharp;
+  return material.roughness * material.roughness >= kSharp;
 }
 
 Vector3f enter(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Vector3f& from,
                Vector3f& direction) {
   from = off_surface(hit.position, -hit.face);
   const Vector3f color = albedo.cwiseMax(0);
-  if (hit.material->thin) return color;
   const float a = hit.material->roughness * hit.material->roughness;
-  const Vector3f n = a < 1e-3f ? hit.normal : visible_facet(hit.normal, -direction, a, sampler.next());
+  const bool smooth = a < 1e-3f;
+  if (hit.material->thin && smooth) return color;
+  const Vector3f n = smooth ? hit.normal : visible_facet(hit.normal, -direction, a, sampler.next());
+  if (hit.material
+          ->thin) {  // spreads light as its mirror image, to the other side (KHR_materials_transmission)
+    direction = reflected(reflected(direction, n), hit.normal);
+    if (direction.dot(hit.face) >= 0) direction = reflected(direction, hit.face);
+    return color;
+  }
   const float ratio = refraction_ratio(hit), cosine = std::min(-n.dot(direction), 1.0f);
   const float sine2 = ratio * ratio * std::max(1 - cosine * cosine, 0.0f);
   const Vector3f refracted = ratio * direction + (ratio * cosine - std::sqrt(std::max(1 - sine2, 0.0f))) * n;

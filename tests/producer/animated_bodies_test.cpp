@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "producer/build/picture.h"
 #include "producer/build/simulation.h"
 #include "producer/format/scene_io.h"
 #include "tests/render/gltf_samples.h"
@@ -76,6 +77,37 @@ TEST(AnimatedBodies, PushOtherBodiesWithTheSpeedOfTheAnimation) {
   // The face reaches the ball after 0.25 s; at 1 s it is at x = 1.5.
   EXPECT_NEAR(ball.velocity.x(), 1, 1e-3);
   EXPECT_NEAR(ball.pose.position.x(), 1.75, 5e-3);
+}
+
+// The cube moves by 0.5 m while the shutter is open, so the light of its edges grows and fades over 0.5 m
+// each, and it is complete in the 0.5 m between.
+TEST(AnimatedBodies, AreBlurredAlongTheirAnimation) {
+  const CubeFolder folder;
+  Loaded scene(R"({"materials": [{"name": "glow", "color": [0, 0, 0], "emission": [1, 1, 1]}],
+    "bodies": [{"motion": "static", "collides": false, "material": "glow",
+                "shape": {"type": "mesh", "file": "cube.gltf"}, "animation": {"loop": false}}],
+    "camera": {"type": "static", "eye": [0.75, 0, 10.5], "target": [0.75, 0, 0], "fov_deg": 20},
+    "environment": {"intensity": 0}, "lights": [{"type": "sun", "intensity": 0}],
+    "render": {"size": [192, 96], "quality": "final", "shutter": 1, "bloom": 0},
+    "output": {"fps": 2, "duration": 1.6}})",
+               folder.path());
+  Simulation simulation(scene.loaded.scene, scene.models);
+  simulation.advance();
+  const Snapshot before = simulation.snapshot();
+  simulation.advance();
+  const Snapshot after = simulation.snapshot();
+  render::Context context;
+  Picture picture(scene.loaded.scene, scene.models, context);
+  picture.draw(before, after);
+  const render::HdrImage image = picture.linear();
+  const double metres_per_pixel = 10 * std::tan(10 * std::acos(-1.0) / 180) / 48;
+  double partial = 0, whole = 0;
+  for (std::size_t x = 0; x < 192; ++x) {
+    const float light = image.rgba[4 * (192 * 48 + x)];
+    (light > 0.97f ? whole : partial) += light > 0.03f ? metres_per_pixel : 0;
+  }
+  EXPECT_NEAR(whole, 0.5, 0.1);
+  EXPECT_NEAR(partial, 1, 0.15);
 }
 
 TEST(AnimatedBodies, StartSpeedAndRepetitionDetermineTheTimeInTheClip) {

@@ -50,6 +50,23 @@ TEST(ModelSize, AutoBringsALikelyUnitToMetres) {
   EXPECT_EQ(scale(180, Source::none), 0.02) << "copies scale the size";
 }
 
+/// The scale of bodies with `scale: "auto"` whose shapes are the files or nodes `names` in a folder.
+std::vector<Real> automatic_scales(const render::ScratchFolder& folder,
+                                   const std::vector<std::string>& names) {
+  Scene scene;
+  for (const std::string& name : names) {
+    MeshFile mesh{name};
+    mesh.scale.automatic = true;
+    scene.bodies.emplace_back().shape = mesh;
+    scene.bodies.back().collides = false;
+  }
+  std::vector<Problem> warnings;
+  const ModelLibrary models(scene, SceneFolder(folder.path()), {}, warnings);
+  std::vector<Real> scales;
+  for (const Body& body : scene.bodies) scales.push_back(scale_of(std::get<MeshFile>(body.shape), models));
+  return scales;
+}
+
 // A node of a file has the scale of the whole file, although it is small.
 TEST(ModelSize, AutoIsTheSameForAllNodesOfAFile) {
   render::GltfSample sample;
@@ -57,9 +74,37 @@ TEST(ModelSize, AutoIsTheSameForAllNodesOfAFile) {
                               {{"mesh", 0}, {"name", "door"}, {"scale", {20, 20, 20}}}};
   sample.document["scenes"][0]["nodes"] = {0, 1};
   const render::ScratchFolder folder;
-  const std::filesystem::path file = folder.put("a.gltf", sample.text());
-  for (const char* node : {"", "#house", "#door"})
-    EXPECT_EQ(automatic_scale(render::read_model(file.string() + node)).factor, 0.01) << node;
+  folder.put("a.gltf", sample.text());
+  EXPECT_EQ(automatic_scales(folder, {"a.gltf#door"}), std::vector<Real>{0.01});
+  EXPECT_EQ(automatic_scales(folder, {"a.gltf", "a.gltf#house", "a.gltf#door"}), std::vector<Real>(3, 0.01));
+}
+
+// Instances and skins are where they are drawn, not where their nodes are.
+TEST(ModelSize, AutoCountsInstancesAndSkins) {
+  render::GltfSample instances;  // two squares, 500 m apart
+  instances.document["extensionsUsed"] = {"EXT_mesh_gpu_instancing"};
+  instances.document["nodes"] = {{{"mesh", 0}, {"name", "posts"}}, {{"mesh", 0}, {"name", "stone"}}};
+  instances.document["scenes"][0]["nodes"] = {0, 1};
+  instances.document["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["TRANSLATION"] =
+      instances.accessor(std::vector<float>{0, 0, 0, 500, 0, 0}, "VEC3");
+
+  render::GltfSample skin;  // of 2 m, on a node whose transform is ignored
+  skin.set("JOINTS_0", std::vector<uint8_t>(16, 0), "VEC4");
+  skin.set("WEIGHTS_0", std::vector<float>{1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, "VEC4");
+  skin.document["skins"] = {{{"joints", {1}}}};
+  skin.document["nodes"] = {{{"mesh", 0}, {"skin", 0}, {"name", "hide"}, {"scale", {300, 300, 300}}},
+                            {{"name", "bone"}}};
+  skin.document["meshes"].push_back(skin.document["meshes"][0]);
+  skin.document["nodes"].push_back({{"mesh", 1}, {"name", "box"}});
+  skin.document["scenes"][0]["nodes"] = {0, 1, 2};
+
+  const render::ScratchFolder folder;
+  folder.put("posts.gltf", instances.text());
+  folder.put("hide.gltf", skin.text());
+  EXPECT_EQ(automatic_scales(folder, {"posts.gltf", "posts.gltf#posts", "posts.gltf#stone"}),
+            std::vector<Real>(3, 0.01));
+  EXPECT_EQ(automatic_scales(folder, {"hide.gltf", "hide.gltf#hide", "hide.gltf#box"}),
+            std::vector<Real>(3, 1));
 }
 
 TEST(ModelSize, AutoIsReadAndWritten) {

@@ -6,9 +6,11 @@
 
 #include <gtest/gtest.h>
 
+#include "producer/build/picture.h"
 #include "producer/build/simulation.h"
 #include "producer/format/scene_io.h"
 #include "render/image_io.h"
+#include "tests/render/gltf_samples.h"
 #include "tests/render/scratch.h"
 
 namespace offstage::producer {
@@ -104,6 +106,43 @@ TEST(ParticleLooks, KeysWithoutEffectAndImpossibleSheetsAreNamed) {
       "");
   EXPECT_EQ(
       findings(R"({"style": "mesh", "mesh": {"shape": {"type": "box"}}, "spin_deg_per_s": 90})", folder), "");
+}
+
+// A glowing square of 2 m, whose corners are brought to the ball of each particle: its side becomes sqrt(2)
+// radii.
+TEST(ParticleLooks, MeshesOfAFileFillTheBallOfEachParticle) {
+  render::GltfSample square;
+  square.pbr()["baseColorFactor"] = {0, 0, 0, 1};
+  square.material()["emissiveFactor"] = {1, 0, 0};
+  const PictureFolder folder;
+  folder.put("square.gltf", square.text());
+  const LoadedScene loaded = parse_scene(
+      R"({"particles": [{"radius": 0.5, "gravity": false, "places": [{"position": [-1, 0, 0]}, {"position": [1, 0.5, 0]}],
+            "look": {"style": "mesh", "mesh": {"shape": {"type": "mesh", "file": "square.gltf"}}}}],
+          "camera": {"type": "static", "eye": [0, 0, 5], "target": [0, 0, 0], "fov_deg": 40},
+          "environment": {"intensity": 0}, "lights": [{"type": "sun", "intensity": 0}],
+          "render": {"size": [96, 96], "bloom": 0}, "output": {"fps": 10, "duration": 1.1}})",
+      "scene", folder.path());
+  std::vector<Problem> warnings;
+  const ModelLibrary models(loaded.scene, loaded.folder, {}, warnings);
+  Simulation simulation(loaded.scene, models);
+  render::Context context;
+  Picture picture(loaded.scene, models, context);
+  const Snapshot state = simulation.snapshot();
+  picture.draw(state, state);
+  const render::HdrImage image = picture.linear();
+  const auto red_at = [&](double x, double y) {
+    const double pixels_per_m = 48 / (5 * std::tan(20 * std::numbers::pi / 180));
+    const auto column = static_cast<std::size_t>(48 + x * pixels_per_m),
+               row = static_cast<std::size_t>(48 - y * pixels_per_m);
+    return image.rgba[4 * (96 * row + column)];
+  };
+  for (const auto& [x, y] : {std::pair(-1.0, 0.0), {1.0, 0.5}}) {
+    EXPECT_GT(red_at(x, y), 0.9f);
+    EXPECT_GT(red_at(x + 0.3, y - 0.3), 0.9f);
+    EXPECT_LT(red_at(x + 0.41, y), 0.1f) << "beside the square, within the ball";
+    EXPECT_LT(red_at(x, y - 0.41), 0.1f);
+  }
 }
 
 TEST(ParticleGroups, TakeThePointsOfAFile) {

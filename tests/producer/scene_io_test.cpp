@@ -28,6 +28,19 @@ std::string load_errors(const std::string& text, const std::vector<std::string>&
 
 // --- Reading ---
 
+TEST(ParseScene, KeysOfEarlierVersionsAreWarnedOf) {
+  const LoadedScene old = parse_scene(
+      "{\"environment\": {\"intensity\": 2, \"occlusion\": 0},\n \"render\": {\"shadow_map\": 1024}}",
+      "scene", "");
+  EXPECT_EQ(old.scene.environment.intensity, 2);
+  ASSERT_EQ(old.warnings.size(), 2u);
+  EXPECT_EQ(old.warnings[0].where.path, "/environment/occlusion");
+  EXPECT_EQ(old.warnings[1].where.path, "/render/shadow_map");
+  EXPECT_EQ(old.warnings[1].where.line, 2);
+  EXPECT_NE(old.warnings[0].what.find("no effect"), std::string::npos);
+  EXPECT_EQ(old.canonical.find("occlusion"), std::string::npos);
+}
+
 TEST(SceneIo, AnEmptySceneIsAllDefaults) {
   const Scene scene = loaded_scene("{}");
   EXPECT_EQ(scene.name, "s");

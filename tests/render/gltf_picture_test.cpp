@@ -134,6 +134,75 @@ TEST(GltfPicture, EachTextureHasItsSetOfCoordinates) {
   expect_color(swapped.color_at(-0.5f, 0), kPureRed);
 }
 
+/// The owner of each texture of a material, by its path, with what makes it visible.
+struct TextureUse {
+  const char* name;
+  std::function<Json&(GltfSample&)> texture;
+};
+const std::vector<TextureUse> kTextureUses = {
+    {"base colour", [](GltfSample& s) -> Json& { return s.pbr()["baseColorTexture"]; }},
+    {"metallic and roughness", [](GltfSample& s) -> Json& { return s.pbr()["metallicRoughnessTexture"]; }},
+    {"emission",
+     [](GltfSample& s) -> Json& {
+       s.material()["emissiveFactor"] = {1, 1, 1};
+       return s.material()["emissiveTexture"];
+     }},
+    {"normal", [](GltfSample& s) -> Json& { return s.material()["normalTexture"]; }},
+    {"occlusion", [](GltfSample& s) -> Json& { return s.material()["occlusionTexture"]; }},
+    {"transmission",
+     [](GltfSample& s) -> Json& {
+       s.pbr() = {{"metallicFactor", 0}, {"roughnessFactor", 0}};
+       Json& extension = s.extension("KHR_materials_transmission");
+       extension["transmissionFactor"] = 1;
+       return extension["transmissionTexture"];
+     }},
+    {"specular colour",
+     [](GltfSample& s) -> Json& {
+       s.pbr() = {{"metallicFactor", 0}, {"roughnessFactor", 0.5}, {"baseColorFactor", {0, 0, 0, 1}}};
+       return s.extension("KHR_materials_specular")["specularColorTexture"];
+     }},
+    {"diffuse",
+     [](GltfSample& s) -> Json& {
+       Json& extension = s.extension("KHR_materials_pbrSpecularGlossiness");
+       extension["specularFactor"] = {0, 0, 0};
+       return extension["diffuseTexture"];
+     }},
+    {"specular and glossiness", [](GltfSample& s) -> Json& {
+       return s.extension("KHR_materials_pbrSpecularGlossiness")["specularGlossinessTexture"];
+     }}};
+
+// For each texture, `texCoord` and that of KHR_texture_transform choose the set, whatever the other set
+// holds.
+TEST(GltfPicture, EveryTextureUsesTheSetThatItNames) {
+  const std::vector<float> across = {0, 1, 1, 1, 1, 0, 0, 0},
+                           at_a_point = {0.1f, 0.1f, 0.1f, 0.1f, 0.1f, 0.1f, 0.1f, 0.1f};
+  for (const TextureUse& use : kTextureUses) {
+    const auto draw = [&](bool second_is_across, const Json& reference) {
+      GltfSample sample;
+      sample.set("TEXCOORD_0", second_is_across ? at_a_point : across, "VEC2");
+      sample.set("TEXCOORD_1", second_is_across ? across : at_a_point, "VEC2");
+      const int texture = sample.texture(
+          encoded_texels(
+              2, 2,
+              {{0.9f, 0.5f, 0.8f, 1}, {0.1f, 0.9f, 0.2f, 1}, {0.2f, 0.1f, 0.9f, 1}, {0.5f, 0.5f, 1, 1}}),
+          kNearestTexels);
+      Json& entry = use.texture(sample);
+      entry = reference;
+      entry["index"] = texture;
+      Picture picture(sample);
+      picture.set_sun({1, 1, 2});
+      picture.set_sky({0.3f, 0.3f, 0.3f});
+      return picture.draw().rgba;
+    };
+    const auto first = draw(false, Json::object());
+    EXPECT_EQ(draw(true, {{"texCoord", 1}}), first) << use.name;
+    EXPECT_EQ(draw(true, {{"texCoord", 0}, {"extensions", {{"KHR_texture_transform", {{"texCoord", 1}}}}}}),
+              first)
+        << use.name;
+    EXPECT_NE(draw(true, {{"texCoord", 0}}), first) << use.name;
+  }
+}
+
 TEST(GltfPicture, TextureTransformsScaleTurnAndMove) {
   const auto draw = [](const Json& transform) {
     GltfSample sample;
@@ -239,6 +308,33 @@ TEST(GltfPicture, OcclusionHidesTheSkyByItsStrength) {
   EXPECT_LT(light[2], 0.01f);
 }
 
+// Indirect light is hidden in the reflection of metal, too, and direct light never.
+TEST(GltfPicture, OcclusionHidesMirroredLightButNoDirectLight) {
+  const auto light = [](double open, double roughness, bool sun) {
+    GltfSample sample;
+    sample.pbr() = {
+        {"metallicFactor", 1}, {"roughnessFactor", roughness}, {"baseColorFactor", {0.5, 0.5, 0.5, 1}}};
+    const int texture = sample.texture(encoded_texels(1, 1, {{static_cast<float>(open), 1, 1, 1}}));
+    sample.material()["occlusionTexture"]["index"] = texture;
+    Picture picture(sample);
+    if (sun)
+      picture.set_sun({0, 0, 1});
+    else
+      picture.set_sky(kPureWhite);
+    return picture.color_at(0, 0).x();
+  };
+  for (const double roughness : {0.0, 0.5, 1.0}) {
+    const float whole = light(1, roughness, false);
+    EXPECT_GT(whole, 0.1f) << roughness;
+    EXPECT_LT(light(0, roughness, false), 1e-3f) << roughness;
+  }
+  EXPECT_NEAR(light(0.5, 1, false) / light(1, 1, false), 0.5f, 0.02f)
+      << "rough metal reflects from all around";
+  EXPECT_GT(light(1, 0.5, true), 0.01f);
+  // The rest is what the mirror image has of the sun's disc.
+  EXPECT_NEAR(light(0, 0.5, true) / light(1, 0.5, true), 1, 0.002f);
+}
+
 TEST(GltfPicture, EmissiveStrengthScalesTheGlow) {
   GltfSample sample;
   sample.material()["emissiveFactor"] = {0.25, 0.5, 1};
@@ -260,6 +356,95 @@ TEST(GltfPicture, TransmissionShowsWhatIsBehind) {
       picture.stage().add_material({.color = {0, 0, 0, 1}, .emission = {0.2f, 0.4f, 0.6f}}), false);
   (void)behind;
   expect_color(picture.color_at(0.2f, 0.2f), {0.2f, 0.2f, 0.6f}, 0.02f);
+}
+
+// Two squares with their fronts outside enclose glass. Light passes both, and is tinted as on the nominal way
+// through it.
+TEST(GltfPicture, AVolumeTintsTheLightThroughItByItsThickness) {
+  const auto behind = [](double thickness) {
+    GltfSample sample;
+    sample.pbr() = {{"metallicFactor", 0}, {"roughnessFactor", 0}};
+    sample.extension("KHR_materials_transmission")["transmissionFactor"] = 1;
+    sample.extension("KHR_materials_ior")["ior"] = 1;
+    sample.extension("KHR_materials_volume") = {
+        {"thicknessFactor", thickness}, {"attenuationDistance", 0.5}, {"attenuationColor", {0.25, 0.5, 1}}};
+    sample.document["nodes"].push_back(
+        {{"mesh", 0}, {"rotation", {0, 1, 0, 0}}, {"translation", {0, 0, -0.5}}});
+    sample.document["scenes"][0]["nodes"] = {0, 1};
+    Picture picture(sample);
+    Mesh wall = picture.model().parts.at(0).mesh;
+    for (Vector3f& p : wall.positions) p = Vector3f(4 * p.x(), 4 * p.y(), -2);
+    for (Vector3f& n : wall.normals) n = Vector3f::UnitZ();
+    picture.stage().add_instance(
+        picture.stage().add_mesh(wall),
+        picture.stage().add_material({.color = {0, 0, 0, 1}, .emission = {1, 1, 1}, .two_sided = true}),
+        false);
+    return picture.color_at(0.2f, 0.2f);
+  };
+  expect_color(behind(0.5), {0.25f, 0.5f, 1}, 0.02f);
+  expect_color(behind(0.25), {0.5f, std::sqrt(0.5f), 1}, 0.02f);
+}
+
+// A pane before a wall whose right half glows: a rough one spreads the light of the edge.
+TEST(GltfPicture, RoughTransmissionBlursTheBackground) {
+  const auto light_left_of_the_edge = [](double roughness) {
+    GltfSample sample;
+    sample.pbr() = {{"metallicFactor", 0}, {"roughnessFactor", roughness}};
+    sample.extension("KHR_materials_transmission")["transmissionFactor"] = 1;
+    Picture picture(sample);
+    Mesh wall = picture.model().parts.at(0).mesh;
+    for (Vector3f& p : wall.positions) p = Vector3f(4 + 4 * p.x(), 4 * p.y(), -1);
+    const InstanceHandle behind = picture.stage().add_instance(
+        picture.stage().add_mesh(wall),
+        picture.stage().add_material({.color = {0, 0, 0, 1}, .emission = {1, 1, 1}}), false);
+    (void)behind;
+    const HdrImage image = picture.draw();
+    float sum = 0;  // 0.1 to 0.5 m beside the edge
+    int count = 0;
+    for (float x = -0.5f; x < -0.1f; x += 0.05f)
+      for (float y = -0.8f; y < 0.8f; y += 0.05f) {
+        sum += picture.at(image, x, y).x();
+        ++count;
+      }
+    return sum / static_cast<float>(count);
+  };
+  EXPECT_LT(light_left_of_the_edge(0), 0.01f);
+  EXPECT_GT(light_left_of_the_edge(0.6), 0.1f);
+}
+
+// A quarter wave of green in a film whose index is the root of that of the glass: green is not reflected at
+// all (E. Hecht, "Optics", section 9.7), which leaves purple.
+TEST(GltfPicture, AFilmOfAQuarterWaveReflectsPurple) {
+  const auto highlight = [](const Json& film, double metallic) {
+    GltfSample sample;
+    const double base = metallic > 0 ? 0.5 : 0;
+    sample.pbr() = {
+        {"baseColorFactor", {base, base, base, 1}}, {"metallicFactor", metallic}, {"roughnessFactor", 0.5}};
+    if (!film.is_null()) sample.extension("KHR_materials_iridescence") = film;
+    Picture picture(sample);
+    const bool is_named = std::ranges::any_of(picture.model().warnings, [](const std::string& line) {
+      return line.find("KHR_materials_iridescence is approximated") != line.npos;
+    });
+    EXPECT_EQ(is_named, !film.is_null());
+    picture.set_sun({0, 0, 1}, 1);
+    return picture.color_at(0, 0);
+  };
+  const double n = std::sqrt(1.5), quarter = 550 / (4 * n);
+  const auto film = [&](double waves, double factor) {
+    return Json{{"iridescenceFactor", factor},
+                {"iridescenceIor", n},
+                {"iridescenceThicknessMaximum", waves * quarter}};
+  };
+  const Vector3f bare = highlight(Json(), 0), coated = highlight(film(1, 1), 0);
+  EXPECT_LT(coated.y(), 0.1f * bare.y());
+  EXPECT_GT(std::min(coated.x(), coated.z()), 2 * coated.y());
+  EXPECT_LT(coated.maxCoeff(), bare.y());
+  const Vector3f half = highlight(film(1, 0.5), 0);
+  EXPECT_LT((half - 0.5f * (bare + coated)).cwiseAbs().maxCoeff(), 0.02f * bare.y());
+  const Vector3f twice = highlight(film(2, 1), 0);  // a half wave is as if it were not there
+  EXPECT_NEAR(twice.y() / bare.y(), 1, 0.15f);
+  const Vector3f metal = highlight(film(2, 1), 1);
+  EXPECT_GT((metal / metal.maxCoeff() - Vector3f::Ones()).cwiseAbs().maxCoeff(), 0.05f) << "metal is tinted";
 }
 
 TEST(GltfPicture, IndexOfRefractionAndSpecularSetTheHighlight) {

@@ -105,6 +105,10 @@ TEST(GltfAnimations, MorphTargetsFollowTheirWeightsAndFlatFacesStayFlat) {
   float highest = 0;
   for (const Vector3f& p : half.positions) highest = std::max(highest, p.z());
   EXPECT_FLOAT_EQ(highest, 1);
+  EXPECT_TRUE(model.warnings.empty());
+  sample.primitive()["targets"][0]["TEXCOORD_0"] = sample.accessor(std::vector<float>(8, 0), "VEC2");
+  ASSERT_EQ(with_rig(sample).warnings.size(), 1u);
+  EXPECT_NE(with_rig(sample).warnings[0].find("targets of TEXCOORD_0 are ignored"), std::string::npos);
 }
 
 TEST(GltfAnimations, AreListedAndReadOnRequest) {

@@ -67,6 +67,53 @@ TEST(GltfAccessors, QuantizedAndNormalizedIntegersAreScaled) {
   expect_box(read_sample(shorts), {-5, -5, 0}, {5, 5, 0});
 }
 
+/// Numbers of [0, 1] as normalised integers of a type, or as floats.
+template <class T>
+std::vector<T> stored(const std::vector<float>& values) {
+  std::vector<T> result;
+  for (const float value : values) {
+    if constexpr (std::is_same_v<T, float>)
+      result.push_back(value);
+    else
+      result.push_back(
+          static_cast<T>(std::lround(value * static_cast<float>(std::numeric_limits<T>::max()))));
+  }
+  return result;
+}
+
+// Colours, coordinates and weights are floats or normalised integers, indices integers of any width.
+TEST(GltfAccessors, AttributesMayHaveAnyTypeThatTheFormatAllows) {
+  const std::vector<float> rgb = {1, 0, 0.2f, 0, 1, 0.4f, 0, 0, 1, 1, 1, 0.6f},
+                           uv = {0, 1, 1, 1, 1, 0, 0, 0.2f};
+  const auto expect = [&]<class T>(T /*type*/, double step) {
+    GltfSample sample;
+    constexpr bool kIsInteger = !std::is_same_v<T, float>;
+    if constexpr (!std::is_signed_v<T> || !kIsInteger)
+      sample.set("COLOR_0", stored<T>(rgb), "VEC3", kIsInteger);
+    sample.set("TEXCOORD_0", stored<T>(uv), "VEC2", kIsInteger);
+    if constexpr (kIsInteger && std::is_unsigned_v<T>)
+      sample.primitive()["indices"] = sample.accessor(std::vector<T>{0, 1, 2, 0, 2, 3}, "SCALAR");
+    const Model model = read_sample(sample);
+    const Mesh& mesh = model.parts.at(0).mesh;
+    ASSERT_EQ(mesh.uvs.size(), 4u);
+    EXPECT_EQ(model.triangle_count(), 2u);
+    for (std::size_t i = 0; i < 4; ++i) {
+      EXPECT_NEAR(mesh.uvs[i].x(), uv[2 * i], step);
+      EXPECT_NEAR(mesh.uvs[i].y(), uv[2 * i + 1], step);
+      for (std::size_t k = 0; k < 3 && !mesh.colors.empty(); ++k)
+        EXPECT_NEAR(mesh.colors[i][static_cast<Eigen::Index>(k)], rgb[3 * i + k], step);
+    }
+  };
+  expect(uint8_t{}, 0.5 / 255 + 1e-6);
+  expect(uint16_t{}, 0.5 / 65535 + 1e-6);
+  expect(int8_t{}, 0.5 / 127 + 1e-6);
+  expect(int16_t{}, 0.5 / 32767 + 1e-6);
+  expect(float{}, 1e-7);
+  GltfSample wide;
+  wide.primitive()["indices"] = wide.accessor(std::vector<uint32_t>{0, 1, 2, 0, 2, 3}, "SCALAR");
+  EXPECT_EQ(read_sample(wide).triangle_count(), 2u);
+}
+
 TEST(GltfAccessors, InterleavedSparseAndMissingDataAreRead) {
   GltfSample interleaved;  // position and normal in turn
   const int view = interleaved.view(
@@ -109,13 +156,21 @@ TEST(GltfPrimitives, StripsFansAndBareVerticesAreTriangles) {
 }
 
 TEST(GltfPrimitives, PointsAndLinesAreLeftOutWithAWarning) {
-  GltfSample sample;
-  Json points = sample.primitive();
-  points["mode"] = 0;
-  sample.document["meshes"][0]["primitives"].push_back(points);
-  const Model model = read_sample(sample);
-  EXPECT_EQ(model.triangle_count(), 2u);
-  EXPECT_TRUE(warns(model, "6 points or lines left out")) << ::testing::PrintToString(model.warnings);
+  // Six indices are six points, three separate lines, a closed line of six parts, or an open one of five.
+  for (const auto& [mode, line] : {std::pair(0, "6 points left out"),
+                                   {1, "3 lines left out"},
+                                   {2, "6 lines left out"},
+                                   {3, "5 lines left out"}}) {
+    GltfSample sample;
+    Json other = sample.primitive();
+    other["mode"] = mode;
+    sample.document["meshes"][0]["primitives"].push_back(other);
+    const Model model = read_sample(sample);
+    EXPECT_EQ(model.triangle_count(), 2u);
+    EXPECT_TRUE(warns(model, line)) << ::testing::PrintToString(model.warnings);
+    sample.primitive()["mode"] = mode;
+    EXPECT_NE(why_not(sample.text()).find("left out: only triangles are drawn"), std::string::npos);
+  }
 }
 
 TEST(GltfPrimitives, FacesWithoutNormalsAreFlat) {
@@ -145,10 +200,38 @@ TEST(GltfExtensions, ContentThatIsNotDrawnIsNamed) {
   sample.document["cameras"] = {{{"type", "perspective"}}};
   sample.document["animations"] = {Json::object(), Json::object()};
   sample.document["extensions"]["KHR_lights_punctual"]["lights"] = {Json::object()};
-  sample.material()["extensions"]["KHR_materials_iridescence"] = {{"iridescenceFactor", 1}};
+  // Extensions that extensionsUsed does not list are found wherever they are, but not in data of
+  // applications.
+  sample.material()["extensions"]["KHR_materials_anisotropy"] = {{"anisotropyStrength", 1}};
+  sample.document["nodes"][0]["extensions"]["ACME_node"] = Json::object();
+  sample.primitive()["extensions"]["ACME_deep"]["extensions"]["ACME_deeper"] = 1;
+  sample.primitive()["extras"]["extensions"]["ACME_private"] = Json::object();
+  sample.set("COLOR_1", std::vector<float>(16, 1), "VEC4");
   const Model model = read_sample(sample);
-  for (const char* name : {"2 animations", "1 cameras", "1 lights", "KHR_materials_iridescence"})
+  for (const char* name : {"2 animations", "1 cameras", "1 lights", "KHR_materials_anisotropy", "ACME_node",
+                           "ACME_deep ", "COLOR_1"})
     EXPECT_TRUE(warns(model, name)) << name;
+  for (const char* name : {"ACME_private", "KHR_lights_punctual"}) EXPECT_FALSE(warns(model, name)) << name;
+}
+
+/// The message about a texture whose only image needs a transcoder that Debian does not have.
+TEST(GltfExtensions, BasisUniversalIsNamedAndItsFallbackIsDrawn) {
+  GltfSample sample;
+  sample.pbr()["baseColorTexture"] = {
+      {"index", sample.texture(base64_bytes(
+                    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR42mP4z8AAAAMBAQDJ/pLvAAAA"
+                    "AElFTkSuQmCC"))}};
+  Json& texture = sample.document["textures"][0];
+  texture["extensions"]["KHR_texture_basisu"]["source"] = 0;
+  const Model with_fallback = read_sample(sample);
+  EXPECT_TRUE(warns(with_fallback, "KHR_texture_basisu"));
+  EXPECT_EQ(with_fallback.textures.size(), 1u) << "the PNG";
+  texture.erase("source");
+  const Model without = read_sample(sample);
+  EXPECT_TRUE(warns(without, "KHR_texture_basisu") && warns(without, "textures[0] is left out"));
+  EXPECT_TRUE(without.textures.empty());
+  sample.document["extensionsUsed"] = sample.document["extensionsRequired"] = {"KHR_texture_basisu"};
+  EXPECT_NE(why_not(sample.text()).find("KHR_texture_basisu"), std::string::npos);
 }
 
 TEST(GltfPlaces, OfCamerasAndLightsAreThoseOfTheirNodes) {

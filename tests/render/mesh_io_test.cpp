@@ -245,7 +245,166 @@ TEST(ReadModel, LeavesOutWhatCannotBeDrawnAndSaysSo) {
   for (const std::string& line : model.warnings) all += line + "\n";
   EXPECT_NE(all.find("1 faces left out: a vertex is not finite"), std::string::npos) << all;
   EXPECT_NE(all.find("faces left out: they have no area"), std::string::npos) << all;
-  EXPECT_NE(all.find("1 points or lines left out"), std::string::npos) << all;
+  EXPECT_NE(all.find("left out: only triangles are drawn"), std::string::npos) << all;
+}
+
+/// A red triangle with a picture of its shine, a camera, a light, and an animation.
+const char kFullCollada[] = R"(<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset>
+<unit name="centimeter" meter="0.01"/>
+<up_axis>Y_UP</up_axis>
+</asset>
+<library_cameras>
+<camera id="c">
+<optics>
+<technique_common>
+<perspective>
+<yfov>40</yfov>
+<aspect_ratio>1</aspect_ratio>
+<znear>0.1</znear>
+<zfar>10</zfar>
+</perspective>
+</technique_common>
+</optics>
+</camera>
+</library_cameras>
+<library_lights>
+<light id="l">
+<technique_common>
+<point>
+<color>1 1 1</color>
+</point>
+</technique_common>
+</light>
+</library_lights>
+<library_images>
+<image id="i">
+<init_from>shine.png</init_from>
+</image>
+</library_images>
+<library_effects>
+<effect id="e">
+<profile_COMMON>
+<newparam sid="su">
+<surface type="2D">
+<init_from>i</init_from>
+</surface>
+</newparam>
+<newparam sid="sa">
+<sampler2D>
+<source>su</source>
+</sampler2D>
+</newparam>
+<technique sid="t">
+<phong>
+<diffuse>
+<color>1 0 0 1</color>
+</diffuse>
+<specular>
+<texture texture="sa" texcoord="UV"/>
+</specular>
+</phong>
+</technique>
+</profile_COMMON>
+</effect>
+</library_effects>
+<library_materials>
+<material id="m" name="m">
+<instance_effect url="#e"/>
+</material>
+</library_materials>
+<library_geometries>
+<geometry id="g">
+<mesh>
+<source id="p">
+<float_array id="pa" count="9">0 0 0 100 0 0 0 100 0</float_array>
+<technique_common>
+<accessor source="#pa" count="3" stride="3">
+<param name="X" type="float"/>
+<param name="Y" type="float"/>
+<param name="Z" type="float"/>
+</accessor>
+</technique_common>
+</source>
+<vertices id="v">
+<input semantic="POSITION" source="#p"/>
+</vertices>
+<triangles count="1" material="s">
+<input semantic="VERTEX" source="#v" offset="0"/>
+<p>0 1 2</p>
+</triangles>
+</mesh>
+</geometry>
+</library_geometries>
+<library_animations>
+<animation id="a">
+<source id="ai">
+<float_array id="aia" count="2">0 1</float_array>
+<technique_common>
+<accessor source="#aia" count="2" stride="1">
+<param name="TIME" type="float"/>
+</accessor>
+</technique_common>
+</source>
+<source id="ao">
+<float_array id="aoa" count="2">0 1</float_array>
+<technique_common>
+<accessor source="#aoa" count="2" stride="1">
+<param name="X" type="float"/>
+</accessor>
+</technique_common>
+</source>
+<source id="an">
+<Name_array id="ana" count="2">LINEAR LINEAR</Name_array>
+<technique_common>
+<accessor source="#ana" count="2" stride="1">
+<param name="INTERPOLATION" type="name"/>
+</accessor>
+</technique_common>
+</source>
+<sampler id="as">
+<input semantic="INPUT" source="#ai"/>
+<input semantic="OUTPUT" source="#ao"/>
+<input semantic="INTERPOLATION" source="#an"/>
+</sampler>
+<channel source="#as" target="n/t.X"/>
+</animation>
+</library_animations>
+<library_visual_scenes>
+<visual_scene id="s">
+<node id="n">
+<translate sid="t">0 0 0</translate>
+<instance_geometry url="#g">
+<bind_material>
+<technique_common>
+<instance_material symbol="s" target="#m"/>
+</technique_common>
+</bind_material>
+</instance_geometry>
+</node>
+<node id="cn">
+<instance_camera url="#c"/>
+</node>
+<node id="ln">
+<instance_light url="#l"/>
+</node>
+</visual_scene>
+</library_visual_scenes>
+<scene>
+<instance_visual_scene url="#s"/>
+</scene>
+</COLLADA>)";
+
+TEST(ReadModel, NamesWhatItIgnoresOfOtherFormats) {
+  const ScratchFolder folder;
+  const Model model = read_model(folder.put("a.dae", kFullCollada));
+  EXPECT_EQ(model.triangle_count(), 1u);
+  std::string all;
+  for (const std::string& line : model.warnings) all += line + "\n";
+  for (const char* what : {"1 animations are ignored", "1 cameras are ignored", "1 lights are ignored",
+                           "material 'm': its specular map is ignored"})
+    EXPECT_NE(all.find(what), std::string::npos) << what << " in " << all;
 }
 
 TEST(ReadModel, RefusesInOneLine) {

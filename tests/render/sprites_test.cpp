@@ -5,6 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "render/sprite_pictures.h"
 #include "tests/render/gl_fixture.h"
 
 namespace offstage::render {
@@ -111,6 +112,41 @@ TEST(StageSprites, AreDrawnInOneOrderWithThoseOfOtherSets) {
   };
   expect_color(shown(near, far), 1, 0, 0, 1, "red in front");
   expect_color(shown(far, near), 0, 1, 0, 1, "green in front");
+}
+
+// Sheets share textures, so that sprites of all of them are drawn by few calls.
+TEST(SpriteTextures, HoldPicturesOfDifferentSizesTogetherUntilTheyWasteMemory) {
+  SmallStage stage;  // its context
+  SpriteTextures textures;
+  const auto book = textures.add(sprite_pictures(cells(2, 16, {kRed, kGreen, kBlue, kWhite}), 2, 2));
+  const auto wide = textures.add(sprite_pictures(cells(1, 48, {kRed}), 2, 1));
+  EXPECT_EQ(textures.add(sprite_pictures(cells(2, 16, {kRed, kGreen, kBlue, kWhite}), 2, 2)), book)
+      << "the same pictures";
+  textures.update();
+  EXPECT_EQ(textures.place(*book).texture, textures.place(*wide).texture);
+  EXPECT_NE(textures.place(*book).first_layer, textures.place(*wide).first_layer);
+  // A picture of 4 MiB; the 64 pictures of the other sheet would take 256 MiB in layers of its size.
+  const auto large = textures.add(sprite_pictures(cells(1, 1024, {kRed}), 1, 1));
+  const auto many = textures.add(sprite_pictures(cells(1, 128, {kRed}), 8, 8));
+  textures.update();
+  EXPECT_NE(textures.place(*large).texture, textures.place(*many).texture);
+  EXPECT_GE(textures.place(*many).texture, 1u);
+}
+
+TEST(StageSprites, LookTheSameBesideSheetsOfOtherSizes) {
+  const Image small = cells(2, 12, {kRed, kGreen, kBlue, kWhite});
+  const auto drawn = [&](bool with_others) {
+    SpriteStage s;
+    if (with_others) {
+      s.stage.add_points(kGlowing, cells(1, 64, {kNothing}));
+      PointsDef book = kGlowing;
+      book.sheet = {.columns = 3, .rows = 1};
+      s.stage.add_points(book, cells(1, 90, {kGreen}));
+    }
+    return s.drawn(kGlowing, small, SpriteStage::point());
+  };
+  const HdrImage alone = drawn(false), beside = drawn(true);
+  for (std::size_t i = 0; i < alone.rgba.size(); ++i) ASSERT_NEAR(alone.rgba[i], beside.rgba[i], 0.02f) << i;
 }
 
 TEST(StageSprites, AreLengthenedAlongTheirMotion) {

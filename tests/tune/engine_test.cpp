@@ -11,6 +11,8 @@
 
 #include "producer/format/scene_io.h"
 #include "producer/run/production.h"
+#include "tests/render/gltf_samples.h"
+#include "tests/render/scratch.h"
 #include "tune/session.h"
 
 namespace offstage::tune {
@@ -134,6 +136,43 @@ TEST_F(Engines, ReuseStatesForAnotherCamera) {
   ASSERT_TRUE(events_.wait_until_complete(other.number));
   EXPECT_EQ(engine_.figures().back().state_hash, state);
   EXPECT_TRUE(engine_.frame(other.film, 10));
+}
+
+// The lens of the scene's camera remains while the view is moved, wherever its field of view is stated.
+TEST_F(Engines, KeepTheFieldOfViewOfAMovedCamera) {
+  render::GltfSample room;
+  room.document["nodes"].push_back({{"camera", 0}, {"translation", {0, 0, 5}}});
+  room.document["scenes"][0]["nodes"] = {0, 1};
+  room.document["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 1}}}}};
+  const render::ScratchFolder folder;
+  folder.put("room.gltf", room.text());
+  const auto fov_of = [&](const std::string& camera, const std::optional<ViewCamera>& moved) {
+    const std::string text =
+        R"({"bodies": [{"name": "room", "motion": "static", "collides": false,
+                        "shape": {"type": "mesh", "file": "room.gltf"}}],
+            "render": {"size": [64, 36]}, "output": {"fps": 20, "duration": 0.1}, "camera": )" +
+        camera + "}";
+    const auto scene =
+        std::make_shared<const LoadedScene>(producer::parse_scene(text, "room", folder.path()));
+    const Engine::Run run = engine_.show(scene, moved);
+    float fov = 0;
+    events_.wait_for<FrameEvent>([&](const FrameEvent& e) {
+      if (e.run == run.number) fov = e.camera.fov_deg;
+      return e.run == run.number;
+    });
+    return fov;
+  };
+  const ViewCamera moved{{0, 1, 4}, {0, 0, 0}};
+  const std::string of_model = R"({"type": "model", "body": "room")";
+  EXPECT_NEAR(fov_of(of_model + "}", {}), 57.29578f, 1e-4f);
+  EXPECT_NEAR(fov_of(of_model + "}", moved), 57.29578f, 1e-4f);
+  const float by_length = fov_of(of_model + R"(, "focal_mm": 50})", {});
+  EXPECT_LT(by_length, 30);
+  EXPECT_EQ(fov_of(of_model + R"(, "focal_mm": 50})", moved), by_length);
+  const std::string keyed = R"({"type": "keyframes", "keyframes": [
+      {"time": 0, "eye": [0, 0, 5], "target": [0, 0, 0], "fov_deg": 25},
+      {"time": 1, "eye": [1, 0, 5], "target": [0, 0, 0], "fov_deg": 25}]})";
+  EXPECT_NEAR(fov_of(keyed, moved), 25, 1e-4f);
 }
 
 TEST_F(Engines, NameTheObjectUnderThePointer) {

@@ -134,7 +134,8 @@ void add_to(XXH3_state_t* hash, const render::Model& model) {
     XXH3_128bits_update(hash, numbers, sizeof numbers);
   }
   // The automatic scale depends on the whole file, of which this may be a node.
-  XXH3_128bits_update(hash, &model.file_size, sizeof model.file_size);
+  const float file_size = model.file_size.value_or(0);
+  XXH3_128bits_update(hash, &file_size, sizeof file_size);
   XXH3_128bits_update(hash, &model.unit_source, sizeof model.unit_source);
   for (const render::Image& texture : model.textures) add_to(hash, texture);
 }
@@ -156,24 +157,30 @@ void for_each_look(const Scene& scene, Visit visit) {
 /// All files named by a scene, with the first place that names each.
 struct Files {
   std::map<std::string, Where> models, textures;
-  std::set<std::string> animated;  ///< those of the models that are read with their animations
+  std::set<std::string> animated;   ///< those of the models that are read with their animations
+  std::set<std::string> automatic;  ///< those of the models whose scale depends on the size of their file
 };
 
 Files files_of(const Scene& scene) {
   Files files;
+  const auto add_model = [&](const auto& use, const Where& where) {
+    files.models.emplace(use.file, where);
+    bool fitted = false;
+    if constexpr (requires { use.fit; }) fitted = use.fit.has_value();
+    if (use.scale.automatic && !fitted) files.automatic.insert(use.file);
+  };
   for (const Body& body : scene.bodies) {
-    if (const auto* mesh = std::get_if<MeshFile>(&body.shape)) files.models.emplace(mesh->file, body.where);
-    if (body.model) files.models.emplace(body.model->file, body.where);
+    if (const auto* mesh = std::get_if<MeshFile>(&body.shape)) add_model(*mesh, body.where);
+    if (body.model) add_model(*body.model, body.where);
     if (body.animation) files.animated.insert(animated_file(body));
   }
   for (const Cloth& cloth : scene.cloths)
-    if (const auto* mesh = std::get_if<MeshFile>(&cloth.shape)) files.models.emplace(mesh->file, cloth.where);
+    if (const auto* mesh = std::get_if<MeshFile>(&cloth.shape)) add_model(*mesh, cloth.where);
   for (const Emitter& emitter : scene.emitters)
-    if (const auto* mesh = std::get_if<MeshSurface>(&emitter.surface))
-      files.models.emplace(mesh->file, emitter.where);
+    if (const auto* mesh = std::get_if<MeshSurface>(&emitter.surface)) add_model(*mesh, emitter.where);
   const auto add_look = [&](const ParticleLook& look, const Where& where) {
     if (look.style == LookStyle::sprite && !look.texture.empty()) files.textures.emplace(look.texture, where);
-    if (const auto* mesh = mesh_file(look)) files.models.emplace(mesh->file, where);
+    if (const auto* mesh = mesh_file(look)) add_model(*mesh, where);
   };
   for_each_look(scene, add_look);
   for (const Material& material : scene.materials)
@@ -217,13 +224,20 @@ ModelLibrary::ModelLibrary(const Scene& scene, const SceneFolder& folder, const 
   XXH3_state_t* hash = XXH3_createState();
   XXH3_128bits_reset(hash);
   const Files files = files_of(scene);
+  std::map<std::filesystem::path, std::optional<float>> file_sizes;
   for (const auto& [file, where] : files.models) {
     try {
-      const render::Model& model =
-          models_
-              .emplace(file, render::read_model(model_file(file, folder), folder.inputs(), interrupt_signal,
-                                                files.animated.contains(file)))
-              .first->second;
+      const std::filesystem::path path = model_file(file, folder);
+      render::Model& model = models_
+                                 .emplace(file, render::read_model(path, folder.inputs(), interrupt_signal,
+                                                                   files.animated.contains(file)))
+                                 .first->second;
+      if (files.automatic.contains(file) && !model.file_size) {  // once for all nodes of a file
+        const std::filesystem::path whole = render::split_node(path).file;
+        auto& side = file_sizes[whole];
+        if (!side) side = render::read_file_size(whole, folder.inputs(), interrupt_signal);
+        model.file_size = side;
+      }
       for (const std::string& warning : model.warnings) warnings.push_back({where, file + ": " + warning});
       add_to(hash, model);
     } catch (const render::FileError& error) {
@@ -376,11 +390,12 @@ ChosenScale automatic_scale(Real largest_side, render::Model::UnitSource unit) {
 }
 
 ChosenScale automatic_scale(const render::Model& model) {
-  return automatic_scale(static_cast<Real>(model.file_size), model.unit_source);
+  return automatic_scale(static_cast<Real>(model.file_size.value()), model.unit_source);
 }
 
 Real fitted_scale(const ModelScale& scale, const std::optional<Vec3>& fit, const render::Model& model) {
-  return fitted_scale(scale, fit, Vec3(model.bounds().sizes().cast<Real>()), automatic_scale(model).factor);
+  const Real likely = scale.automatic && !fit ? automatic_scale(model).factor : 1;
+  return fitted_scale(scale, fit, Vec3(model.bounds().sizes().cast<Real>()), likely);
 }
 
 Real fitted_scale(const ModelScale& scale_of_use, const std::optional<Vec3>& fit, const Vec3& size,

@@ -94,6 +94,7 @@ struct ChosenScale {
 /// (millimetres). `largest_side`: of the box around all of the file, with the unit that was read or assumed
 /// [m].
 ChosenScale automatic_scale(Real largest_side, render::Model::UnitSource unit);
+/// Needs Model::file_size.
 ChosenScale automatic_scale(const render::Model& model);
 
 /// Scale factor that brings a model to the size of its use: `scale` times the factor that fits its bounding

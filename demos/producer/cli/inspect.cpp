@@ -83,7 +83,8 @@ Json lights_json(const render::Model& model) {
 }
 
 Json describe_model(const std::filesystem::path& path, const DecompositionCache& cache) {
-  const render::Model model = render::read_model(path, {}, interrupt_signal);
+  render::Model model = render::read_model(path, {}, interrupt_signal);
+  if (!model.file_size) model.file_size = render::read_file_size(path, {}, interrupt_signal);
   const sim::TriangleMesh mesh = sim::weld(collision_mesh(model, 1));
   const sim::MeshTopology topology(mesh);
   const sim::MassProperties mass = sim::mass_properties(mesh);

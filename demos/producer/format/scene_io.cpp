@@ -62,6 +62,22 @@ void check_count(const SceneSource& source) {
                                                    " are possible: each takes up to 10 kB");
 }
 
+/// Removes keys that had a meaning in earlier versions, so that old scenes can be read. Returns a warning for
+/// each.
+std::vector<Problem> drop_retired_keys(SceneSource& source) {
+  constexpr std::pair<const char*, const char*> kRetired[] = {{"environment", "occlusion"},
+                                                              {"render", "shadow_map"}};
+  std::vector<Problem> warnings;
+  for (const auto& [name, key] : kRetired) {
+    Node* owner = source.root.find(name);
+    if (owner == nullptr || !owner->find(key)) continue;
+    const Where where = source.locate("/" + std::string(name) + "/" + key);
+    warnings.push_back({where, "has no effect since light is traced; remove it"});
+    std::erase_if(std::get<Object>(owner->value), [&](const Member& member) { return member.key == key; });
+  }
+  return warnings;
+}
+
 void append(std::vector<Problem>& all, const std::vector<Problem>& more, const SceneSource& source) {
   // Finding a position takes time; problems that are only counted do not need one.
   constexpr std::size_t kLocated = 4 * kMostProblems;
@@ -88,6 +104,7 @@ LoadedScene parse_scene(std::string_view text, const std::string& name, const Sc
   for (const std::string& override : overrides) apply_override(source, override, defaults, errors);
   const std::vector<EffectParts> from_effects = lay_presets(source, folder, errors);
 
+  const std::vector<Problem> retired = drop_retired_keys(source);
   Scene described;
   Reader reader(source.files);
   read_scene(reader, source.root, described);
@@ -105,6 +122,7 @@ LoadedScene parse_scene(std::string_view text, const std::string& name, const Sc
   const Findings findings = check_scene(described, loaded.scene, folder);
   append(errors, misplaced, source);
   append(errors, findings.errors, source);
+  loaded.warnings = retired;
   append(loaded.warnings, crowded, source);
   append(loaded.warnings, findings.warnings, source);
   sort_by_place(errors);
