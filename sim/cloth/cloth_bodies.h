@@ -46,6 +46,7 @@ class ClothBody {
   /// Velocity of the body's material point at `p` at the end of the world's sub-step, including the changes
   /// due to cloth.
   Vec3 velocity(const Vec3& p) const { return velocity_ + angular_velocity_.cross(p - centre_); }
+  const Vec3& angular_velocity() const { return angular_velocity_; }  ///< the same [rad/s]
   /// Velocity that a unit impulse along n (unit) at p gives to the point there, along n [1/kg].
   Real mobility(const Vec3& p, const Vec3& n) const;
   /// Applies an impulse at a point [N s].

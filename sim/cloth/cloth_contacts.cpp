@@ -223,7 +223,7 @@ void ClothContacts::block(Touch& t, ClothBody* holder) {
 
 std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::span<const uint8_t> shortened,
                                              std::span<const Vec4> kick, std::span<const Real> recoil,
-                                             std::span<const Vec3> mean_velocity,
+                                             std::span<const std::optional<Vec3>> whole_velocity,
                                              std::span<const BodyContact> triangles) {
   struct Stop {
     ClothBody* body;
@@ -248,8 +248,9 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
                        Real depth, uint32_t point) {
     const uint32_t cloth = points.cloth[point];
     Real speed = normal.dot(velocity);
-    // A cloth that recoils as a whole gets no impulse while it leaves as a whole: that would add energy.
-    if (recoil[cloth] > 0) speed = std::max(speed, normal.dot(mean_velocity[cloth]));
+    // The cloth stops the body as a whole, which has no part in how its light points vibrate: a body that
+    // took their speed would gain energy.
+    if (whole_velocity[cloth]) speed = std::max(speed, normal.dot(*whole_velocity[cloth]));
     stops.push_back({&body, normal, on_body, speed, std::min(depth, points.thickness[point]), cloth});
     const auto [at, is_new] = on_bodies.try_emplace(&body);
     ++at->second.contacts;

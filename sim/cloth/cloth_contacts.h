@@ -5,6 +5,7 @@
 /// from one to the other.
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -14,12 +15,6 @@
 #include "sim/cloth/taut_springs.h"
 
 namespace offstage::sim {
-
-/// A part of a point's move that must not count as velocity: the correction of an existing penetration.
-struct VelocityCut {
-  uint32_t point;
-  Vec4 move;  // [m]
-};
 
 class ClothContacts {
  public:
@@ -40,12 +35,14 @@ class ClothContacts {
   /// Stops bodies that press into cloth whose moves were shortened, which are those of points with a non-zero
   /// `shortened`, and takes back the part of their moves that goes on against it. `triangles` are their
   /// contacts with triangles. The result does not depend on the order of the contacts. `recoil` is the
-  /// inverse mass of each cloth with the bodies that hold it: 0 if it is pinned to the world, and
-  /// `mean_velocity` their velocity else; `kick` is the velocity of points besides that of their moves.
-  /// Returns for each cloth the impulse that it absorbs [N s].
+  /// inverse mass of each cloth with the bodies that hold it: 0 if it is pinned to the world.
+  /// `whole_velocity` is their velocity, or that of what it is pinned to, if that is one; `kick` is the
+  /// velocity of points besides that of their moves. Returns for each cloth the impulse that it absorbs [N
+  /// s].
   std::vector<Vec3> stop_bodies(const ClothPoints& points, std::span<const uint8_t> shortened,
                                 std::span<const Vec4> kick, std::span<const Real> recoil,
-                                std::span<const Vec3> mean_velocity, std::span<const BodyContact> triangles);
+                                std::span<const std::optional<Vec3>> whole_velocity,
+                                std::span<const BodyContact> triangles);
 
   /// A body to which a point was so close in the last solve() that it may soon touch it, or null; and whether
   /// there were several.

@@ -41,4 +41,10 @@ struct ClothPoints {
   Vec3 start_at(std::size_t i) const { return start[i].head<3>(); }
 };
 
+/// A part of a point's move that must not count as velocity, such as the correction of a penetration.
+struct VelocityCut {
+  uint32_t point;
+  Vec4 move;  // [m]
+};
+
 }  // namespace offstage::sim

@@ -225,8 +225,8 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
 
 /// Contact of cloth with cloth is dearest, and looked at once in a span of several sub-steps.
 void ClothSystem::substep(Real from, Real to, Real dt, bool ends_span) {
-  if (span_++ == 0) span_start_ = points_.position;
   for (ClothBody& body : bodies_) body.begin(from, to, dt);
+  if (span_++ == 0) begin_span();
   points_.start = points_.position;
   cuts_.clear();
   move_held();
@@ -234,13 +234,19 @@ void ClothSystem::substep(Real from, Real to, Real dt, bool ends_span) {
   stop_lost(dt);
   pull_bodies(dt);
   close_seams(dt);
-  limit_.project(points_, carriers_, dt);
+  limit_.project(points_, carriers_, dt, kick_, cuts_);
   if (ends_span && !self_contacts_.empty()) push_apart(dt);
   touch_bodies(dt);
   push_holders(dt);
   shorten_moves(dt, ends_span);
   end_substep(dt);
   if (ends_span) span_ = 0;
+}
+
+void ClothSystem::begin_span() {
+  span_start_ = points_.position;
+  span_centre_.clear();
+  for (const ClothBody& body : bodies_) span_centre_.push_back(body.centre() - body.move());
 }
 
 /// Pushes layers of cloth apart that came too near in the span. That changes velocities as spread over it.
@@ -268,7 +274,7 @@ void ClothSystem::touch_bodies(Real dt) {
     contacts_.collect(points_, body_contacts_);
     collect_triangles();
     if (body_contacts_.empty()) break;
-    limit_.project_with(body_contacts_, points_, carriers_, dt);
+    limit_.project_with(body_contacts_, points_, carriers_, dt, kick_, cuts_);
   }
 }
 

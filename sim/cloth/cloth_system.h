@@ -4,6 +4,7 @@
 /// limit, contacts with cloth and contacts with bodies are solved; and moves are shortened until no spring is
 /// too long and no cloth has passed through cloth.
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -52,6 +53,7 @@ class ClothSystem {
     bool anchored = false;              // something fixed holds it
     bool carries = false;               // dynamic bodies hang on it
     const ClothBody* leader = nullptr;  // the only body that holds it, if that is not dynamic
+    const ClothBody* pusher = nullptr;  // the only body that it touches or is near, if that is dynamic
     Vec4 move = Vec4::Zero();           // mean, of the leader's points or of all and bodies
     Real mass = 0;                      // of the same
     Vec4 momentum = Vec4::Zero();       // lost by shortening
@@ -75,6 +77,7 @@ class ClothSystem {
         .subspan(first_spring_[cloth], first_spring_[cloth + 1] - first_spring_[cloth]);
   }
   void substep(Real from, Real to, Real dt, bool ends_span);
+  void begin_span();
   void push_apart(Real dt);
   void move_held();
   void integrate(Real dt);
@@ -83,7 +86,8 @@ class ClothSystem {
   void collect_triangles();
   // In shorten_moves.cpp:
   void find_frames();
-  bool is_near_another(uint32_t point);
+  const ClothBody* near_another(uint32_t point);
+  void follow_or_rest(uint32_t point);
   bool find_drifts();
   void shorten_moves(Real dt, bool ends_span);
   bool shorten_in_pieces();
@@ -93,13 +97,15 @@ class ClothSystem {
   void add_momenta(Real sign, std::span<const Vec4> from, Real dt);
   std::vector<Vec4> end_velocities(std::span<const Vec4> from, Real dt) const;
   std::vector<Real> inner_energies(std::span<const Vec4> velocity);
-  void take_gains(std::span<const Real> before, std::span<const Vec4> velocity);
+  std::vector<Real> elastic_gains(std::span<const Vec4> whole);
+  void take_gains(std::span<const Vec4> whole, std::span<const Vec4> before, std::span<const Vec4> velocity);
   void give_momenta_back();
   Frame& frame_of(uint32_t point) { return frames_[pieces_.of(point)]; }
   void stop_bodies(Real dt);
   std::vector<const Carrier*> carriers_of(std::size_t cloth) const;
   std::vector<Real> recoils() const;
-  std::vector<Vec3> mean_velocities(std::span<const Real> recoil, std::span<const Vec4> velocity) const;
+  std::vector<std::optional<Vec3>> whole_velocities(std::span<const Real> recoil,
+                                                    std::span<const Vec4> velocity) const;
 
   void end_substep(Real dt);
   void pull_bodies(Real dt);
@@ -133,6 +139,7 @@ class ClothSystem {
   std::vector<Vec4> span_start_,
       free_;           // positions at the start of the span of self-contact; positions before its corrections
   uint32_t span_ = 0;  // sub-steps of cloth since then
+  std::vector<Vec3> span_centre_;  // of each body, at the start of the span
   std::vector<uint8_t> collides_;
   std::vector<Held> held_;
   std::vector<Carrier> carriers_;  // of the sub-step of the world

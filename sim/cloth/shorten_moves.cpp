@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "sim/cloth/cloth_system.h"
 
@@ -48,19 +49,33 @@ void ClothSystem::find_frames() {
   }
 }
 
-/// Whether a point may soon touch a body other than those that its piece hangs on.
-bool ClothSystem::is_near_another(uint32_t point) {
+/// A body that a point may soon touch, other than those that its piece hangs on; or null.
+const ClothBody* ClothSystem::near_another(uint32_t point) {
   const ClothBody* near = contacts_.near_to(point);
-  if (!near) return false;
-  if (contacts_.is_near_several(point)) return true;
+  if (!near) return nullptr;
+  if (contacts_.is_near_several(point)) return near;
   const Frame& frame = frame_of(point);
-  if (frame.leader) return near != frame.leader;
+  if (frame.leader) return near != frame.leader ? near : nullptr;
   const auto carrier = std::ranges::find(carriers_, near, &Carrier::body);
-  return carrier == carriers_.end() || &frame_of(carrier->points[0]) != &frame;
+  return carrier == carriers_.end() || &frame_of(carrier->points[0]) != &frame ? near : nullptr;
+}
+
+/// A piece that nothing holds and that one free body pushes goes with that body: held back in the world, it
+/// would be left behind within a body that flies on.
+void ClothSystem::follow_or_rest(uint32_t point) {
+  Frame& frame = frame_of(point);
+  const ClothBody* near = frame.rests ? nullptr : near_another(point);
+  if (!near) return;
+  const bool is_loose = !frame.anchored && !frame.carries && near->is_dynamic();
+  const bool is_one = !contacts_.is_near_several(point) && (!frame.pusher || frame.pusher == near);
+  if (is_loose && is_one)
+    frame.pusher = near;
+  else
+    frame.rests = true;
 }
 
 /// The move of each frame: that of the body which leads it, or the mean one of the piece with the bodies that
-/// hang on it; none if it is near another body. Whether any moves.
+/// hang on it, or that of the one body that pushes it; none if it is near another body. Whether any moves.
 bool ClothSystem::find_drifts() {
   find_frames();
   const auto all_rest = [&] { return std::ranges::all_of(frames_, &Frame::rests); };
@@ -71,7 +86,7 @@ bool ClothSystem::find_drifts() {
   };
   for (uint32_t i = 0; i < points_.size(); ++i) {
     Frame& frame = frame_of(i);
-    frame.rests = frame.rests || is_near_another(i);
+    follow_or_rest(i);
     if (!frame.leader || points_.holder[i] == frame.leader)
       add(frame, points_.mass[i], points_.position[i] - points_.start[i]);
   }
@@ -79,8 +94,11 @@ bool ClothSystem::find_drifts() {
     if (Frame& frame = frame_of(carrier.points[0]); !frame.leader)
       add(frame, carrier.body->mass(), padded(carrier.body->move()));
   if (all_rest()) return false;
-  for (Frame& frame : frames_)
+  for (Frame& frame : frames_) {
     if (!frame.rests && frame.mass > 0) frame.move /= frame.mass;
+    if (frame.pusher)
+      frame.move = padded(frame.pusher->centre() - span_centre_[frame.pusher - bodies_.data()]);
+  }
   for (uint32_t i = 0; i < points_.size(); ++i)
     if (!frame_of(i).rests) drift_[i] = frame_of(i).move;
   return true;
@@ -100,9 +118,7 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   find_doubtful();
   const bool any_drifts = find_drifts();
   add_momenta(1, from, dt);
-  const bool any_free = std::ranges::any_of(frames_, [](const Frame& frame) { return !frame.anchored; });
-  std::vector<Real> energy;
-  if (any_free) energy = inner_energies(end_velocities(from, dt));
+  const std::vector<Vec4> whole = points_.position, velocity = end_velocities(from, dt);
   if (any_drifts) find_doubtful();
   bool any = any_drifts ? shorten_in_pieces() : shorten_doubtful(kInWorld);
   if (any_drifts) {
@@ -122,7 +138,7 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   }
   if (self) std::erase_if(cuts_, [&](const VelocityCut& cut) { return shortened_[cut.point] != kWhole; });
   if (any) {
-    if (any_free) take_gains(energy, end_velocities(from, dt));
+    take_gains(whole, velocity, end_velocities(from, dt));
     add_momenta(-1, from, dt);
     give_momenta_back();
   }
@@ -143,7 +159,9 @@ bool ClothSystem::shorten_in_pieces() {
   shift_starts(-1);
   if (!any) return false;
   // A piece that nothing holds goes on as a whole as it would have.
-  const auto is_loose = [](const Frame& frame) { return !frame.rests && !frame.leader && !frame.carries; };
+  const auto is_loose = [](const Frame& frame) {
+    return !frame.rests && !frame.leader && !frame.pusher && !frame.carries;
+  };
   for (uint32_t i = 0; i < points_.size(); ++i)
     if (Frame& frame = frame_of(i); is_loose(frame))
       frame.move -= points_.mass[i] / frame.mass * (points_.position[i] - points_.start[i]);
@@ -172,12 +190,16 @@ std::vector<Vec4> ClothSystem::end_velocities(std::span<const Vec4> from, Real d
   return velocity;
 }
 
-/// Of each piece that nothing fixed holds, twice the kinetic energy of its points against the mean velocity,
-/// which the frames get: of the points and the bodies that hang on them.
+/// Of each piece, twice the kinetic energy of its points against its frame, whose velocity it finds: the mean
+/// of points and the bodies that hang on them, or that of what is fixed and holds the piece.
 std::vector<Real> ClothSystem::inner_energies(std::span<const Vec4> velocity) {
-  for (Frame& frame : frames_) frame.velocity.setZero();
+  for (Frame& frame : frames_) {
+    frame.velocity.setZero();
+    if (frame.anchored && frame.leader)
+      frame.velocity = padded(frame.leader->velocity(frame.leader->centre()));
+  }
   const auto add = [](Frame& frame, Real mass, const Vec4& v) {
-    frame.velocity += mass / frame.total_mass * v;
+    if (!frame.anchored) frame.velocity += mass / frame.total_mass * v;
   };
   for (uint32_t i = 0; i < points_.size(); ++i) add(frame_of(i), points_.mass[i], velocity[i]);
   for (const Carrier& carrier : carriers_) {
@@ -186,20 +208,40 @@ std::vector<Real> ClothSystem::inner_energies(std::span<const Vec4> velocity) {
   }
   std::vector<Real> energy(frames_.size(), 0);
   for (uint32_t i = 0; i < points_.size(); ++i)
-    if (const Frame& frame = frame_of(i); !frame.anchored && points_.inverse_mass[i] > 0)
-      energy[pieces_.of(i)] += points_.mass[i] * (velocity[i] - frame.velocity).squaredNorm();
+    if (points_.inverse_mass[i] > 0)
+      energy[pieces_.of(i)] += points_.mass[i] * (velocity[i] - frame_of(i).velocity).squaredNorm();
   return energy;
 }
 
-/// Points that make different shares of their moves move against each other, even if all moved alike before;
-/// and the piece gets its momentum back. So motion within it is slowed to the energy that it had `before`:
-/// both together then add none.
-void ClothSystem::take_gains(std::span<const Real> before, std::span<const Vec4> velocity) {
-  const std::vector<Real> now = inner_energies(velocity);
+/// Of each piece, twice the energy of the springs at points whose moves were shortened, less what it was when
+/// points were at `whole`.
+std::vector<Real> ClothSystem::elastic_gains(std::span<const Vec4> whole) {
+  std::vector<Real> gain(frames_.size(), 0);
+  for (const ClothSpring& s : all_springs_) {
+    const bool alone = s.counterpart_rest == 0;
+    if (shortened_[s.a] == kWhole && shortened_[s.b] == kWhole &&
+        (alone || (shortened_[s.counterpart[0]] == kWhole && shortened_[s.counterpart[1]] == kWhole)))
+      continue;
+    const auto& at = points_.position;
+    const Real before = s.elongation((whole[s.a] - whole[s.b]).norm(), whole);
+    const Real now = s.elongation((at[s.a] - at[s.b]).norm(), at);
+    gain[pieces_.of(s.a)] += s.stiffness * (now * now - before * before);
+  }
+  return gain;
+}
+
+/// Points that make different shares of their moves move against each other, even if all moved alike before,
+/// and compress springs between them; and the piece gets its momentum back. So motion within it is slowed to
+/// the energy that it had when points were at `whole` with the velocity `before`, less what springs gained.
+void ClothSystem::take_gains(std::span<const Vec4> whole, std::span<const Vec4> before,
+                             std::span<const Vec4> velocity) {
+  const std::vector<Real> first = inner_energies(before), now = inner_energies(velocity);
+  const std::vector<Real> elastic = elastic_gains(whole);
   for (uint32_t i = 0; i < points_.size(); ++i) {
     const uint32_t piece = pieces_.of(i);
-    if (!(points_.inverse_mass[i] > 0) || !(now[piece] > before[piece])) continue;
-    kick_[i] -= (1 - std::sqrt(before[piece] / now[piece])) * (velocity[i] - frames_[piece].velocity);
+    const Real left = std::max(first[piece] - std::max(elastic[piece], 0.0), 0.0);
+    if (!(points_.inverse_mass[i] > 0) || !(now[piece] > left)) continue;
+    kick_[i] -= (1 - std::sqrt(left / now[piece])) * (velocity[i] - frames_[piece].velocity);
   }
 }
 
@@ -275,13 +317,11 @@ void ClothSystem::shorten_carrier(Carrier& carrier, Real share) {
 /// A cloth that gives no more stops bodies as one with those that it hangs on.
 void ClothSystem::stop_bodies(Real dt) {
   const std::vector<Real> recoil = recoils();
-  std::vector<Vec3> mean(recoil.size(), Vec3::Zero());
-  if (std::ranges::any_of(recoil, [](Real r) { return r > 0; }))
-    mean = mean_velocities(recoil, end_velocities(points_.start, dt));
+  const auto whole = whole_velocities(recoil, end_velocities(points_.start, dt));
   body_contacts_.clear();
   corner_contacts_.collect(points_, 0, body_contacts_);
   const std::vector<Vec3> taken =
-      contacts_.stop_bodies(points_, shortened_, kick_, recoil, mean, body_contacts_);
+      contacts_.stop_bodies(points_, shortened_, kick_, recoil, whole, body_contacts_);
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     if (!(recoil[c] > 0) || taken[c] == Vec3::Zero()) continue;
     const Vec3 gain = recoil[c] * taken[c];
@@ -319,18 +359,30 @@ std::vector<Real> ClothSystem::recoils() const {
   return recoil;
 }
 
-/// Of each cloth with the bodies that hold it, by their total mass; 0 if anything fixed does.
-std::vector<Vec3> ClothSystem::mean_velocities(std::span<const Real> recoil,
-                                               std::span<const Vec4> velocity) const {
-  std::vector<Vec3> mean(cloths_.size(), Vec3::Zero());
-  for (uint32_t i = 0; i < points_.size(); ++i) {
-    const uint32_t c = points_.cloth[i];
-    mean[c] += recoil[c] * points_.mass[i] * velocity[i].head<3>();
+/// Of each cloth the mean velocity, with the bodies that hold it, or that of what is fixed and holds it; none
+/// if several such things do, or one that turns.
+std::vector<std::optional<Vec3>> ClothSystem::whole_velocities(std::span<const Real> recoil,
+                                                               std::span<const Vec4> velocity) const {
+  std::vector<std::optional<Vec3>> whole(cloths_.size(), Vec3(Vec3::Zero()));
+  std::vector<const ClothBody*> holder(cloths_.size(), nullptr);
+  std::vector<uint8_t> is_held(cloths_.size(), 0);
+  for (const Held& held : held_) {
+    if (points_.carried[held.point]) continue;
+    const uint32_t c = points_.cloth[held.point];
+    const bool is_first = std::exchange(is_held[c], uint8_t{1}) == 0;
+    if (is_first) holder[c] = held.body;
+    if (held.body != holder[c] || (held.body && held.body->angular_velocity() != Vec3::Zero()))
+      whole[c].reset();
+    if (is_first && held.body && whole[c]) whole[c] = held.body->velocity(held.body->centre());
   }
+  for (uint32_t i = 0; i < points_.size(); ++i)
+    if (const uint32_t c = points_.cloth[i]; recoil[c] > 0)
+      *whole[c] += recoil[c] * points_.mass[i] * velocity[i].head<3>();
   for (std::size_t c = 0; c < cloths_.size(); ++c)
     for (const Carrier* carrier : carriers_of(c))
-      mean[c] += recoil[c] * carrier->body->mass() * carrier->body->velocity(carrier->body->centre());
-  return mean;
+      if (recoil[c] > 0)
+        *whole[c] += recoil[c] * carrier->body->mass() * carrier->body->velocity(carrier->body->centre());
+  return whole;
 }
 
 }  // namespace offstage::sim

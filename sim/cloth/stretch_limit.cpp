@@ -39,7 +39,8 @@ void StretchLimit::assign(std::vector<Limit> limits, std::vector<Limit> ties, st
     for (const uint32_t end : {limits_[k].a, limits_[k].b}) limits_at_[next[end]++] = k;
 }
 
-bool StretchLimit::project(ClothPoints& points, std::span<const Carrier> carriers, Real dt) {
+bool StretchLimit::project(ClothPoints& points, std::span<const Carrier> carriers, Real dt,
+                           std::span<const Vec4> kick, std::vector<VelocityCut>& cuts) {
   bool all_hold = true;
   if (!sweep(points, all_hold)) return false;
   if (carriers.empty())
@@ -51,7 +52,7 @@ bool StretchLimit::project(ClothPoints& points, std::span<const Carrier> carrier
     all_hold = !taut.any_too_long();
     if (all_hold) break;
     taut.solve();
-    taut.apply(points, dt);
+    taut.apply(points, dt, kick, cuts);
   }
   return true;
 }
@@ -63,13 +64,14 @@ bool StretchLimit::any_too_long(const ClothPoints& points) const {
 }
 
 void StretchLimit::project_with(std::span<const BodyContact> contacts, ClothPoints& points,
-                                std::span<const Carrier> carriers, Real dt) const {
+                                std::span<const Carrier> carriers, Real dt, std::span<const Vec4> kick,
+                                std::vector<VelocityCut>& cuts) const {
   TautSprings taut(points, carriers);
   for (const auto* some : {&limits_, &ties_})
     for (const Limit& l : *some) taut.add(l);
   for (const BodyContact& contact : contacts) taut.add(contact);
   taut.solve();
-  taut.apply(points, dt);
+  taut.apply(points, dt, kick, cuts);
 }
 
 /// Whether any spring was too long. `all_hold` gets whether none is any more, as far as bodies do not have to

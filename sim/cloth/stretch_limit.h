@@ -34,12 +34,15 @@ class StretchLimit {
 
   /// Shortens springs that are too long in a sub-step of length dt, and moves the bodies that hang on them.
   /// Returns whether there were any. Some may stay too long.
-  bool project(ClothPoints& points, std::span<const Carrier> carriers, Real dt);
+  /// `kick` and `cuts`: see TautSprings::apply().
+  bool project(ClothPoints& points, std::span<const Carrier> carriers, Real dt, std::span<const Vec4> kick,
+               std::vector<VelocityCut>& cuts);
   /// Whether any spring is too long.
   bool any_too_long(const ClothPoints& points) const;
   /// Solves for all springs at their limits and these contacts together.
   void project_with(std::span<const BodyContact> contacts, ClothPoints& points,
-                    std::span<const Carrier> carriers, Real dt) const;
+                    std::span<const Carrier> carriers, Real dt, std::span<const Vec4> kick,
+                    std::vector<VelocityCut>& cuts) const;
 
   /// Lowers shares of moves where a limit does not hold, and returns whether it did. This ends, because with
   /// shares of 0 the lengths are those at the start, where the limits held. Points that a dynamic body

@@ -205,23 +205,50 @@ void TautSprings::solve() {
   for (Real& impulse : lambda_) impulse *= scale;
 }
 
-void TautSprings::apply(ClothPoints& points, Real dt) {
-  gather(lambda_);
+/// The greatest c from 0 to 1 so that c times the gathered impulses p, on velocities v, add no energy:
+/// c p.v + c^2 p.W p / 2 <= 0. Corrections of what was too long or too deep at the start of the sub-step, or
+/// became so by other corrections that are no motion, would add some. What moves pins does work by them.
+Real TautSprings::velocity_share(Real dt, std::span<const Vec4> kick,
+                                 std::span<const VelocityCut> cuts) const {
+  Real work = 0, inertial = 0;
+  std::vector<Vec4> cut(places_.size(), Vec4::Zero());
+  for (const VelocityCut& c : cuts)
+    if (place_[c.point] != kNone) cut[place_[c.point]] += c.move;
   for (std::size_t k = 0; k < places_.size(); ++k) {
     const Place& at = places_[k];
     if (at.body != kNone || at.point == kNone) continue;
-    if (points.inverse_mass[at.point] > 0)
-      points.position[at.point] += points.inverse_mass[at.point] * moves_[k];
-    else
-      points.pull[at.point] += moves_[k];
+    const Vec4 move = points_.position[at.point] - points_.start[at.point] + dt * kick[at.point] - cut[k];
+    work += moves_[k].dot(move);
+    inertial += points_.inverse_mass[at.point] * moves_[k].squaredNorm();
+  }
+  for (std::size_t b = 0; b < bodies_.size(); ++b) {
+    const ClothBody& body = *bodies_[b].body;
+    const Vec6 move = dt * (Vec6() << body.velocity(body.centre()), body.angular_velocity()).finished();
+    work += impulses_[b].dot(move);
+    inertial += impulses_[b].dot(bodies_[b].mobility * impulses_[b]);
+  }
+  return inertial > 0 ? std::clamp(-2 * work / inertial, 0.0, 1.0) : 1;
+}
+
+void TautSprings::apply(ClothPoints& points, Real dt, std::span<const Vec4> kick,
+                        std::vector<VelocityCut>& cuts) {
+  gather(lambda_);
+  const Real share = velocity_share(dt, kick, cuts);
+  for (std::size_t k = 0; k < places_.size(); ++k) {
+    const Place& at = places_[k];
+    if (at.body != kNone || at.point == kNone) continue;
+    const Vec4 move = points.inverse_mass[at.point] * moves_[k];
+    points.position[at.point] += move;
+    if (share < 1 && !move.isZero(0)) cuts.push_back({at.point, (1 - share) * move});
+    if (points.inverse_mass[at.point] == 0) points.pull[at.point] += share * moves_[k];
   }
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     if (impulses_[b] == Vec6::Zero()) continue;
-    const Vec6 impulse = impulses_[b] / dt;
+    const Vec6 moving = impulses_[b] / dt, impulse = share * moving;
     if (bodies_[b].carrier)
-      bodies_[b].carrier->pull(impulse, impulse, points);
+      bodies_[b].carrier->pull(impulse, moving, points);
     else
-      bodies_[b].body->pull(impulse, impulse, bodies_[b].carried);
+      bodies_[b].body->pull(impulse, moving, bodies_[b].carried);
   }
 }
 

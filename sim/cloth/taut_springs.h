@@ -50,8 +50,10 @@ class TautSprings {
   bool any_too_long() const { return any_too_long_; }
   void solve();
   /// Moves points and bodies by the impulses; they act through a sub-step of length dt. The impulses on
-  /// points that are pinned to anything else are added to their `pull`.
-  void apply(ClothPoints& points, Real dt);
+  /// points that are pinned to anything else are added to their `pull`. Velocities change by the greatest
+  /// share of that which adds no kinetic energy; the rest of the moves of points is appended to `cuts`.
+  /// `kick` is the velocity of points besides that of their moves. The sum of momenta is kept.
+  void apply(ClothPoints& points, Real dt, std::span<const Vec4> kick, std::vector<VelocityCut>& cuts);
 
  private:
   static constexpr uint32_t kNone = ~0u;
@@ -86,6 +88,7 @@ class TautSprings {
   Real compliance_at(uint32_t place, const Vec4& direction) const;
   void add_row(uint32_t first, uint32_t second, const Vec4& direction, Real excess);
   void gather(std::span<const Real> impulses);
+  Real velocity_share(Real dt, std::span<const Vec4> kick, std::span<const VelocityCut> cuts) const;
   void multiply(std::span<const Real> x, std::span<Real> y);
   bool solve_acting();
   bool change_set();
