@@ -190,16 +190,12 @@ std::vector<Vec4> ClothSystem::end_velocities(std::span<const Vec4> from, Real d
   return velocity;
 }
 
-/// Of each piece, twice the kinetic energy of its points against its frame, whose velocity it finds: the mean
-/// of points and the bodies that hang on them, or that of what is fixed and holds the piece.
+/// Of each piece that nothing fixed holds, twice the kinetic energy of its points against the mean velocity,
+/// which the frames get: of the points and the bodies that hang on them.
 std::vector<Real> ClothSystem::inner_energies(std::span<const Vec4> velocity) {
-  for (Frame& frame : frames_) {
-    frame.velocity.setZero();
-    if (frame.anchored && frame.leader)
-      frame.velocity = padded(frame.leader->velocity(frame.leader->centre()));
-  }
+  for (Frame& frame : frames_) frame.velocity.setZero();
   const auto add = [](Frame& frame, Real mass, const Vec4& v) {
-    if (!frame.anchored) frame.velocity += mass / frame.total_mass * v;
+    frame.velocity += mass / frame.total_mass * v;
   };
   for (uint32_t i = 0; i < points_.size(); ++i) add(frame_of(i), points_.mass[i], velocity[i]);
   for (const Carrier& carrier : carriers_) {
@@ -208,8 +204,8 @@ std::vector<Real> ClothSystem::inner_energies(std::span<const Vec4> velocity) {
   }
   std::vector<Real> energy(frames_.size(), 0);
   for (uint32_t i = 0; i < points_.size(); ++i)
-    if (points_.inverse_mass[i] > 0)
-      energy[pieces_.of(i)] += points_.mass[i] * (velocity[i] - frame_of(i).velocity).squaredNorm();
+    if (const Frame& frame = frame_of(i); !frame.anchored && points_.inverse_mass[i] > 0)
+      energy[pieces_.of(i)] += points_.mass[i] * (velocity[i] - frame.velocity).squaredNorm();
   return energy;
 }
 
@@ -233,6 +229,8 @@ std::vector<Real> ClothSystem::elastic_gains(std::span<const Vec4> whole) {
 /// Points that make different shares of their moves move against each other, even if all moved alike before,
 /// and compress springs between them; and the piece gets its momentum back. So motion within it is slowed to
 /// the energy that it had when points were at `whole` with the velocity `before`, less what springs gained.
+/// Pieces that anything fixed holds lose energy to that; where they lie against themselves in the wind, moves
+/// are shortened in each sub-step, and taking the springs' gains each time would bring them to rest.
 void ClothSystem::take_gains(std::span<const Vec4> whole, std::span<const Vec4> before,
                              std::span<const Vec4> velocity) {
   const std::vector<Real> first = inner_energies(before), now = inner_energies(velocity);
@@ -240,7 +238,7 @@ void ClothSystem::take_gains(std::span<const Vec4> whole, std::span<const Vec4> 
   for (uint32_t i = 0; i < points_.size(); ++i) {
     const uint32_t piece = pieces_.of(i);
     const Real left = std::max(first[piece] - std::max(elastic[piece], 0.0), 0.0);
-    if (!(points_.inverse_mass[i] > 0) || !(now[piece] > left)) continue;
+    if (frames_[piece].anchored || !(points_.inverse_mass[i] > 0) || !(now[piece] > left)) continue;
     kick_[i] -= (1 - std::sqrt(left / now[piece])) * (velocity[i] - frames_[piece].velocity);
   }
 }
