@@ -229,15 +229,17 @@ std::vector<Real> ClothSystem::elastic_gains(std::span<const Vec4> whole) {
 /// Points that make different shares of their moves move against each other, even if all moved alike before,
 /// and compress springs between them; and the piece gets its momentum back. So motion within it is slowed to
 /// the energy that it had when points were at `whole` with the velocity `before`, less what springs gained.
-/// Pieces that anything fixed holds lose energy to that; where they lie against themselves in the wind, moves
-/// are shortened in each sub-step, and taking the springs' gains each time would bring them to rest.
+/// Only a piece that moves freely pays for its springs. Where one hangs on or lies on anything else, moves
+/// are shortened in each sub-step, and paying each time would stop a flag in the wind or cloth on a turning
+/// ball.
 void ClothSystem::take_gains(std::span<const Vec4> whole, std::span<const Vec4> before,
                              std::span<const Vec4> velocity) {
   const std::vector<Real> first = inner_energies(before), now = inner_energies(velocity);
   const std::vector<Real> elastic = elastic_gains(whole);
   for (uint32_t i = 0; i < points_.size(); ++i) {
     const uint32_t piece = pieces_.of(i);
-    const Real left = std::max(first[piece] - std::max(elastic[piece], 0.0), 0.0);
+    const Real spent = frames_[piece].rests ? 0 : std::max(elastic[piece], 0.0);
+    const Real left = std::max(first[piece] - spent, 0.0);
     if (frames_[piece].anchored || !(points_.inverse_mass[i] > 0) || !(now[piece] > left)) continue;
     kick_[i] -= (1 - std::sqrt(left / now[piece])) * (velocity[i] - frames_[piece].velocity);
   }
