@@ -359,6 +359,22 @@ uint64_t checked_size(const std::filesystem::path& path) {
   return size;
 }
 
+/// Runs `import` with the folders that the model at `path` may read, in a child process whose memory and time
+/// are limited by the sizes of the file and its pictures. Returns what it writes to its descriptor.
+ChildAnswer import_confined(const std::filesystem::path& path, const InputFolders& folders,
+                            const StopTest& stop,
+                            const std::function<void(int, const InputFolders&)>& import) {
+  check_folder(path, folders);
+  const uint64_t size = checked_size(path);
+  const InputFolders allowed = readable(path, folders);
+  return run_confined({.what = path.string(),
+                       .file_bytes = size,
+                       .pictures = pictures_beside(path) + pictures_inside(path),
+                       .folders = &allowed,
+                       .stop = stop},
+                      [&](int memory) { import(memory, allowed); });
+}
+
 }  // namespace
 
 std::vector<std::string> missing_model_libraries() {
@@ -397,19 +413,11 @@ Model decode_model(std::span<const uint8_t> bytes) {
 Model read_model(const std::filesystem::path& file, const InputFolders& folders, const StopTest& stop,
                  bool with_rig) {
   const ModelPath place = split_node(file);
-  const std::filesystem::path& path = place.file;
-  check_folder(path, folders);
-  const uint64_t size = checked_size(path);
-  const InputFolders allowed = readable(path, folders);
-  const ChildAnswer answer = run_confined({.what = path.string(),
-                                           .file_bytes = size,
-                                           .pictures = pictures_beside(path) + pictures_inside(path),
-                                           .folders = &allowed,
-                                           .stop = stop},
-                                          [&](int memory) {
-                                            Model model = import_model(path, place.node, allowed, with_rig);
-                                            write_model(model, memory);
-                                          });
+  const ChildAnswer answer =
+      import_confined(place.file, folders, stop, [&](int memory, const InputFolders& allowed) {
+        Model model = import_model(place.file, place.node, allowed, with_rig);
+        write_model(model, memory);
+      });
   Model model = decode_model(answer.bytes());
   for (Model::Part& part : model.parts) {
     if (part.mesh.normals.empty()) compute_normals(part.mesh);
@@ -420,18 +428,11 @@ Model read_model(const std::filesystem::path& file, const InputFolders& folders,
 
 float read_file_size(const std::filesystem::path& file, const InputFolders& folders, const StopTest& stop) {
   const std::filesystem::path path = split_node(file).file;
-  check_folder(path, folders);
-  const uint64_t size = checked_size(path);
-  const InputFolders allowed = readable(path, folders);
-  const ChildAnswer answer = run_confined({.what = path.string(),
-                                           .file_bytes = size,
-                                           .pictures = pictures_beside(path) + pictures_inside(path),
-                                           .folders = &allowed,
-                                           .stop = stop},
-                                          [&](int memory) {
-                                            float side = longest_side(import_model(path, "", allowed, false));
-                                            Writer(memory).value(side);
-                                          });
+  const ChildAnswer answer =
+      import_confined(path, folders, stop, [&](int memory, const InputFolders& allowed) {
+        float side = longest_side(import_model(path, "", allowed, false));
+        Writer(memory).value(side);
+      });
   float side = 0;
   Reader(answer.bytes()).value(side);
   if (!std::isfinite(side)) throw damaged_answer();

@@ -118,7 +118,12 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   find_doubtful();
   const bool any_drifts = find_drifts();
   add_momenta(1, from, dt);
-  const std::vector<Vec4> whole = points_.position, velocity = end_velocities(from, dt);
+  const bool any_free = !std::ranges::all_of(frames_, &Frame::anchored);
+  std::vector<Vec4> whole, velocity;
+  if (any_free) {
+    whole = points_.position;
+    velocity = end_velocities(from, dt);
+  }
   if (any_drifts) find_doubtful();
   bool any = any_drifts ? shorten_in_pieces() : shorten_doubtful(kInWorld);
   if (any_drifts) {
@@ -138,7 +143,7 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   }
   if (self) std::erase_if(cuts_, [&](const VelocityCut& cut) { return shortened_[cut.point] != kWhole; });
   if (any) {
-    take_gains(whole, velocity, end_velocities(from, dt));
+    if (any_free) take_gains(whole, velocity, end_velocities(from, dt));
     add_momenta(-1, from, dt);
     give_momenta_back();
   }
@@ -209,11 +214,14 @@ std::vector<Real> ClothSystem::inner_energies(std::span<const Vec4> velocity) {
   return energy;
 }
 
-/// Of each piece, twice the energy of the springs at points whose moves were shortened, less what it was when
-/// points were at `whole`.
+/// Of each piece that moves freely, twice the energy of the springs at points whose moves were shortened,
+/// less what it was when points were at `whole`; at least 0. Where a piece hangs on or lies on anything else,
+/// moves are shortened in each sub-step, and taking these gains from its motion each time would stop a flag
+/// in the wind or cloth on a turning ball.
 std::vector<Real> ClothSystem::elastic_gains(std::span<const Vec4> whole) {
   std::vector<Real> gain(frames_.size(), 0);
   for (const ClothSpring& s : all_springs_) {
+    if (const Frame& frame = frame_of(s.a); frame.anchored || frame.rests) continue;
     const bool alone = s.counterpart_rest == 0;
     if (shortened_[s.a] == kWhole && shortened_[s.b] == kWhole &&
         (alone || (shortened_[s.counterpart[0]] == kWhole && shortened_[s.counterpart[1]] == kWhole)))
@@ -223,23 +231,20 @@ std::vector<Real> ClothSystem::elastic_gains(std::span<const Vec4> whole) {
     const Real now = s.elongation((at[s.a] - at[s.b]).norm(), at);
     gain[pieces_.of(s.a)] += s.stiffness * (now * now - before * before);
   }
+  for (Real& g : gain) g = std::max(g, 0.0);
   return gain;
 }
 
 /// Points that make different shares of their moves move against each other, even if all moved alike before,
 /// and compress springs between them; and the piece gets its momentum back. So motion within it is slowed to
 /// the energy that it had when points were at `whole` with the velocity `before`, less what springs gained.
-/// Only a piece that moves freely pays for its springs. Where one hangs on or lies on anything else, moves
-/// are shortened in each sub-step, and paying each time would stop a flag in the wind or cloth on a turning
-/// ball.
 void ClothSystem::take_gains(std::span<const Vec4> whole, std::span<const Vec4> before,
                              std::span<const Vec4> velocity) {
   const std::vector<Real> first = inner_energies(before), now = inner_energies(velocity);
   const std::vector<Real> elastic = elastic_gains(whole);
   for (uint32_t i = 0; i < points_.size(); ++i) {
     const uint32_t piece = pieces_.of(i);
-    const Real spent = frames_[piece].rests ? 0 : std::max(elastic[piece], 0.0);
-    const Real left = std::max(first[piece] - spent, 0.0);
+    const Real left = std::max(first[piece] - elastic[piece], 0.0);
     if (frames_[piece].anchored || !(points_.inverse_mass[i] > 0) || !(now[piece] > left)) continue;
     kick_[i] -= (1 - std::sqrt(left / now[piece])) * (velocity[i] - frames_[piece].velocity);
   }

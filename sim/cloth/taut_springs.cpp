@@ -205,9 +205,10 @@ void TautSprings::solve() {
   for (Real& impulse : lambda_) impulse *= scale;
 }
 
-/// The greatest c from 0 to 1 so that c times the gathered impulses p, on velocities v, add no energy:
-/// c p.v + c^2 p.W p / 2 <= 0. Corrections of what was too long or too deep at the start of the sub-step, or
-/// became so by other corrections that are no motion, would add some. What moves pins does work by them.
+/// The greatest c from 0 to 1 for which c times the gathered impulses p adds no kinetic energy to the
+/// velocities v: c p.v + c^2 p.W p / 2 <= 0, where W is the inverse mass matrix. Without it, impulses that
+/// correct an error of earlier sub-steps (a spring that was already too long, an overlap that already
+/// existed) would add energy. Moving pins may add energy, because whatever moves them does work.
 Real TautSprings::velocity_share(Real dt, std::span<const Vec4> kick,
                                  std::span<const VelocityCut> cuts) const {
   Real work = 0, inertial = 0;

@@ -176,9 +176,8 @@ CLI::App* add_render(CLI::App& app, RenderOptions& render, bool bare) {
   command
       ->add_flag("--watch", render.watch,
                  "Render again whenever the scene, an include, a model or a texture changes, until "
-                 "Ctrl-C;\nthe output is replaced only by a complete result, never after an error; changes "
-                 "of cameras, "
-                 "lights\nand looks do not simulate again")
+                 "Ctrl-C;\nthe output is replaced only by a complete result, never after an error. Changes "
+                 "of cameras,\nlights and looks do not simulate again")
       ->excludes(resume)
       ->excludes(dry_run);
   command->add_option("--stats", render.stats, "Write statistics of the run to this JSON file");

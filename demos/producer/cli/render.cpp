@@ -9,7 +9,6 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
-#include <unistd.h>
 
 #include "producer/base/interrupt.h"
 #include "producer/base/log.h"
@@ -291,15 +290,16 @@ int render_cameras(const RenderOptions& options) {
     const OutputTarget target = parse_output(output_of_camera(options.out, name));
     if (target.kind == OutputKind::video) check_file(target.path.string(), options.force);
   }
-  const HiddenFolder states(parse_output(options.out).path, "states");
-  const bool shares = options.cache.empty() && !options.resume && !options.dry_run && names.size() > 1;
+  std::optional<HiddenFolder> states;
+  if (options.cache.empty() && !options.resume && !options.dry_run && names.size() > 1)
+    states.emplace(parse_output(options.out).path, "states");
   for (const std::string& name : names) {
     RenderOptions one = options;
     one.cameras = {name};
     one.out = output_of_camera(options.out, name);
     one.stats = file_of_camera(options.stats, name);
     one.report = file_of_camera(options.report, name);
-    if (shares) one.states = states.path().string();
+    if (states) one.states = states->path().string();
     const int code = render_command(one);
     if (code != kOk) return code;
   }
