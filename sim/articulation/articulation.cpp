@@ -375,10 +375,13 @@ void Articulation::place(Real time, bool at_start) {
   system_.factorize(rows_, mobility_);
 }
 
-void Articulation::place_within(Real time, Real duration, Real share) {
+void Articulation::place_within(Real time, Real duration, Real share, Real substep) {
   read_bodies();
   start_motion_.resize(bodies_.size());
-  for (std::size_t i = 0; i < bodies_.size(); ++i) start_motion_[i] = motion_of(bodies_[i]->at_start());
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    start_motion_[i] = motion_of(bodies_[i]->at_start());
+    mobility_[i].inverse_inertia = bodies_[i]->impulse_inverse_inertia(substep);
+  }
   end_motion_ = motion_;
   before_ = (1 - share) * duration;
   for (LinkMotion& m : motion_) {

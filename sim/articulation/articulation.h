@@ -92,7 +92,7 @@ class Articulation final : public JointedBodies {
   /// ends at `time` with the bodies' `rigid` states: where the impulses of the interval act, on average.
   /// Applied at the poses of its end, they would change the angular momentum by the turn of the arms until
   /// then.
-  void place_within(Real time, Real duration, Real share);
+  void place_within(Real time, Real duration, Real share, Real substep);
   /// Projects velocities of the links at `time` onto the constraints of the last place_within().
   void project(Real time, std::span<Vec6> velocities);
   /// Place of a joint for which the last of both evaluated the constraints.

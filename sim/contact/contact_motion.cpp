@@ -13,8 +13,6 @@ constexpr Real kStraight = 2e-4;
 /// Up to this rotation the path of a corner is nearly straight and its velocity changes at a constant rate
 /// [rad].
 constexpr Real kEven = 0.1;
-/// The contacts of bodies that turn by more than this in a sub-step are not predicted [rad].
-constexpr Real kMostTurn = 1;
 /// Cosine of the greatest predicted rotation of a normal within an interval.
 constexpr Real kPredictable = 0.8;
 /// Sine of the angle between an axis of revolution and the contact's direction: below it the direction around
@@ -318,7 +316,8 @@ ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, co
   const Real most2 = std::max(turn2(a), turn2(b));
   const ContactPlace at_start{m.normal, start.arm_a, start.arm_b, Quat::Identity()};
   motion.middle = at_start;
-  if (const Real share = duration / substep; most2 > share * share * kMostTurn * kMostTurn) return motion;
+  if (const Real share = duration / substep; most2 > share * share * kMostPredictedTurn * kMostPredictedTurn)
+    return motion;
   if (is_face && most2 < kStraight * kStraight) {
     // One body slides along the face of the other.
     if (m.source == NormalSource::face_of_b)

@@ -37,7 +37,7 @@ Real kept_share(const Island& island, std::span<const RelaxedBody> relaxed) {
     kinetic += (v.dot(body.momentum) + w.dot(body.angular_momentum)) / 2;
     first += v.dot(r.impulse) + w.dot(r.angular_impulse);
     second += (r.inverse_mass * r.impulse.squaredNorm() +
-               r.angular_impulse.dot(body.angular_velocity(body.orientation, r.angular_impulse))) /
+               r.angular_impulse.dot(r.inverse_inertia * r.angular_impulse)) /
               2;
   }
   if (!(first + second > kAdded * kinetic) || is_driven(island)) return 1;

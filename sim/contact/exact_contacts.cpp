@@ -40,7 +40,7 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
   approach_.clear();
   for (Body* body : island.bodies) {
     body->row = static_cast<uint32_t>(bodies_.size());
-    add_body(*body);
+    add_body(*body, interval.substep);
   }
   for (ContactPair* pair : island.pairs) add_points(*pair, interval);
   const Island* const one[] = {&island};
@@ -98,11 +98,11 @@ bool ExactContacts::is_safe(const ContactWork& work) const {
   return energy <= kTermsShare * kinetic + mass * push * push / 2;
 }
 
-uint32_t ExactContacts::add_body(Body& body) {
+uint32_t ExactContacts::add_body(Body& body, Real substep) {
   ContactBody b;
   if (body.is_awake()) {
     b.inverse_mass = 1 / body.rigid.mass;
-    b.inverse_inertia = inverse_inertia(body.rigid, body.rigid.orientation);
+    b.inverse_inertia = body.impulse_inverse_inertia(substep);
     b.velocity = body.rigid.velocity();
     b.angular_velocity = body.rigid.angular_velocity();
   } else if (body.is_kinematic()) {
@@ -115,8 +115,8 @@ uint32_t ExactContacts::add_body(Body& body) {
 
 void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interval) {
   const Real h = interval.duration;
-  const uint32_t a = pair.a().is_awake() ? pair.a().row : add_body(pair.a());
-  const uint32_t b = pair.b().is_awake() ? pair.b().row : add_body(pair.b());
+  const uint32_t a = pair.a().is_awake() ? pair.a().row : add_body(pair.a(), interval.substep);
+  const uint32_t b = pair.b().is_awake() ? pair.b().row : add_body(pair.b(), interval.substep);
   const Vec3 surface = surface_velocity(pair);
   for (PlacedManifold& m : pair.manifolds())
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
@@ -161,6 +161,7 @@ void ExactContacts::move_bodies(const Island& island, Real duration) {
     if (approach_[i] > kClosing && contacts_[i].impulse.x() > 0)
       closing_[contacts_[i].a] = closing_[contacts_[i].b] = 1;
   close_stops();
+  close_links();
   close_neighbors(island, duration);
   rest_.assign(island.bodies.size(), 0.5);
   for (std::size_t i = 0; i < joints_.articulations().size(); ++i)
@@ -171,7 +172,7 @@ void ExactContacts::move_bodies(const Island& island, Real duration) {
     const Vec3 dv = bodies_[i].velocity - free_[i].velocity,
                dw = bodies_[i].angular_velocity - free_[i].angular_velocity;
     body.rigid.momentum += body.rigid.mass * dv;
-    body.rigid.angular_momentum += body.rigid.spin_momentum(body.rigid.orientation, dw);
+    body.rigid.angular_momentum += bodies_[i].inverse_inertia.inverse() * dw;
     Vec3 way = rest_[i] * dv, turn = rest_[i] * dw;
     if (closing_[i]) {
       way = (dv + bodies_[i].velocity - body.start_twist.velocity) / 2;
@@ -200,6 +201,17 @@ void ExactContacts::close_neighbors(const Island& island, Real duration) {
       closing_[c.a] = closing_[c.b] = 1;
       changed = true;
     }
+    if (changed) close_links();
+  }
+}
+
+/// Links move together: if some moved by the mean of their velocities and others by the new ones, the joints
+/// would come apart, and their projection would push light links into what stopped them.
+void ExactContacts::close_links() {
+  for (const Articulation* articulation : joints_.articulations()) {
+    const std::span<Body* const> links = articulation->bodies();
+    if (std::any_of(links.begin(), links.end(), [&](const Body* link) { return closing_[link->row] != 0; }))
+      for (const Body* link : links) closing_[link->row] = 1;
   }
 }
 

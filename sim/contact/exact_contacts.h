@@ -27,11 +27,12 @@ class ExactContacts {
   Real cost() const { return newton_.cost(); }
 
  private:
-  uint32_t add_body(Body& body);
+  uint32_t add_body(Body& body, Real substep);
   void add_points(ContactPair& pair, const ContactInterval& interval);
   bool is_safe(const ContactWork& work) const;
   void move_bodies(const Island& island, Real duration);
   void close_stops();
+  void close_links();
   void close_neighbors(const Island& island, Real duration);
 
   std::vector<ContactBody> bodies_, free_;  // free_: the velocities without contacts

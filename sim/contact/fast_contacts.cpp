@@ -16,8 +16,7 @@ RelaxedBody relaxed(const Body& body, const ContactInterval& interval) {
   const Real duration = interval.duration;
   if (body.is_awake()) {
     b.inverse_mass = 1 / body.rigid.mass;
-    // The inertia at the end, so that velocities and momenta agree there.
-    b.inverse_inertia = inverse_inertia(body.rigid, body.rigid.orientation);
+    b.inverse_inertia = body.impulse_inverse_inertia(interval.substep);
     b.velocity = body.start_twist.velocity;
     b.angular_velocity = body.start_twist.angular_velocity;
     b.free_acceleration = (body.rigid.velocity() - b.velocity) / duration;

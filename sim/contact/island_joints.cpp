@@ -28,10 +28,10 @@ void IslandJoints::collect_constraints(const Island& island, Place&& place) {
 /// The impulses act in the middle of the interval. Those of a limit that is reached act from then on: they
 /// would otherwise change the angular momentum, by the motion of the joint between both times.
 void IslandJoints::place(Articulation& a, const ContactInterval& interval) {
-  a.place_within(interval.end, interval.duration, kMiddle);
+  a.place_within(interval.end, interval.duration, kMiddle, interval.substep);
   std::optional<Real> stop;
   if (a.has_bounded_rows()) stop = first_stop(a, interval.duration, interval.end);
-  if (stop) a.place_within(interval.end, interval.duration, *stop);
+  if (stop) a.place_within(interval.end, interval.duration, *stop, interval.substep);
   stops_.push_back(stop);
 }
 

@@ -67,6 +67,7 @@ struct View {
   uint32_t y_piece() const { return x_is_a ? m->piece_b : m->piece_a; }
   Vec3 normal() const { return x_is_a ? m->normal : Vec3(-m->normal); }  ///< towards X
   const Vec3& on_y(uint32_t k) const { return x_is_a ? m->points[k].on_b : m->points[k].on_a; }
+  const Vec3& on_x(uint32_t k) const { return x_is_a ? m->points[k].on_a : m->points[k].on_b; }
   bool continues() const { return x_is_a ? m->continues_b : m->continues_a; }
   bool is_face() const { return m->source == (x_is_a ? NormalSource::face_of_b : NormalSource::face_of_a); }
   uint32_t deepest() const {
@@ -165,7 +166,11 @@ class BodyContacts {
     const Vec3& on_face = face.on_y(deepest);
     const Real clipped = kClipped * x_.extent;
     Real low = std::min(0.0, face.m->points[deepest].separation) - flush_ - clipped;
-    if (v.speculative) low -= std::abs(up.dot(x_.pose.position - x_.start_pose.position));
+    const Real moved = v.speculative ? std::abs(up.dot(x_.pose.position - x_.start_pose.position)) : 0;
+    low -= moved;
+    // What is level with a face is not nearer to X than the face. A contact that is nearer is beside the face.
+    if (v.m->points[v.deepest()].separation < face.m->points[deepest].separation - flush_ - clipped - moved)
+      return std::nullopt;
     for (uint32_t k = 0; k < v.m->count; ++k)
       if (const Real height = up.dot(v.on_y(k) - on_face); height < low || height > flush_ + clipped)
         return std::nullopt;
@@ -242,12 +247,21 @@ class BodyContacts {
     const Real least =
         std::min({0.0, v.m->points[v.deepest()].separation, face.m->points[face.deepest()].separation}) -
         flush_;
+    const auto add = [&](const ContactPoint& p) {
+      m.points[m.count++] = v.x_is_a ? p : ContactPoint{p.on_b, p.on_a, p.separation, p.id};
+    };
     for (uint32_t k = 0; k < on_plane.count; ++k) {
       const ContactPoint& p = on_plane.points[k];
       if (p.separation < least) return {};
-      if (piece_distance(v.y().collision_shape(), v.y_piece(), y.point_to_body(p.on_b)).distance > margin)
-        continue;
-      m.points[m.count++] = v.x_is_a ? p : ContactPoint{p.on_b, p.on_a, p.separation, p.id};
+      if (piece_distance(v.y().collision_shape(), v.y_piece(), y.point_to_body(p.on_b)).distance <= margin)
+        add(p);
+    }
+    if (m.count > 0) return m;
+    // A narrow slope, such as the side of a cone, ends before the corners of X: it touches X where it begins.
+    for (uint32_t k = 0; k < v.m->count; ++k) {
+      const Real separation = normal.dot(v.on_x(k) - plane.position);
+      if (separation < least) return {};
+      add({v.on_x(k), v.on_x(k) - separation * normal, separation, v.m->points[k].id});
     }
     return m;
   }

@@ -15,6 +15,9 @@
 
 namespace offstage::sim {
 
+/// The motion of the contacts of a body is predicted if it turns by less than this in a sub-step [rad].
+inline constexpr Real kMostPredictedTurn = 1;
+
 /// `solid` has pointers into the body and to its mesh, so a body is never moved or copied.
 struct Body {
   // The members that contact pairs read come first, close together in memory.
@@ -96,6 +99,12 @@ struct Body {
     body.set_state(start);
     return body;
   }
+  /// The inverse inertia in world axes for contact and joint impulses in the interval, part of a sub-step of
+  /// this length [s]. It belongs to the time at which they act: the middle, or the start if the contacts of
+  /// the body are not predicted. Then the terms that the solvers leave out, I^-1 (dw x I w + w x I dw) h / 2,
+  /// are at most h |w| |dw|. With the inertia of any other time, an impulse across the axis of a thin rod
+  /// would spin it about the axis.
+  Mat3 impulse_inverse_inertia(Real substep) const;
   /// Path from the interval's start to the current pose.
   PosePath path() const { return {start_pose, pose}; }
   /// Pose at a time of a sub-step of length h, not before the interval's start.

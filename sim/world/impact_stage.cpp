@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/contact/contact_motion.h"
 #include "sim/core/parallel_loop.h"
 #include "sim/dynamics/free_body.h"
 #include "sim/world/coupled_system.h"
@@ -48,6 +49,13 @@ Real spin(const Body& body) {
 /// Angular speed of the faster turning body of a pair [rad/s].
 Real turn_of(const ContactPair& pair) {
   return std::max(spin(pair.a()), spin(pair.b()));
+}
+
+/// Whether a body may touch in an interval with points that are not known at its start: the known points of a
+/// rim or of a round side are those that face the other body now.
+bool turns_other_points(const Body& body, Real duration) {
+  return runs_along(body, duration) ||
+         (std::holds_alternative<Ellipsoid>(body.def.shape) && body.turning_speed() * duration > kTouching);
 }
 
 /// Number of pieces into which a rotation is divided.
@@ -144,7 +152,12 @@ std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) co
   if (from >= h * (1 - kInstant)) return std::nullopt;
   const Real turn = turn_of(pair) * (h - from);
   if (turn > kImpactTurn) return tumbling_impact_time(pair, from, h, turn);
-  if (pair.separation() <= kTouching) return point_impact_time(pair, h);
+  if (pair.separation() <= kTouching) {
+    const std::optional<Real> at_points = point_impact_time(pair, h);
+    if (!turns_other_points(a, h - from) && !turns_other_points(b, h - from)) return at_points;
+    const std::optional<Real> beside = tumbling_impact_time(pair, from, h, turn);
+    return at_points && beside ? std::min(at_points, beside) : at_points ? at_points : beside;
+  }
   const Real bow = (bend(a, h) - bend(b, h)).norm() * (h - from) / 8;
   const auto pieces =
       static_cast<uint32_t>(std::clamp(std::ceil(std::sqrt(bow / kStraight)), 1.0, kMostArcs));

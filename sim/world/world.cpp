@@ -203,21 +203,6 @@ Real pair_energy(const WorldState& world, Real time) {
 
 }  // namespace
 
-Motion Body::motion(Real now, Real time) const {
-  if (is_kinematic()) return def.track.at(time, def.pose);
-  if (!is_dynamic()) return {.pose = pose};
-  // Extrapolated with the current velocities.
-  const Real dt = time - now;
-  const Vec3 v = rigid.velocity(), w = rigid.angular_velocity();
-  const Real rate = w.norm();
-  RigidBody later = rigid;
-  later.position += dt * v;
-  if (rate > 0)
-    later.orientation = (Quat(Eigen::AngleAxisd(rate * dt, w / rate)) * rigid.orientation).normalized();
-  const Vec3 arm = -(later.orientation * rigid.centre);
-  return {later.pose(), v + w.cross(arm), w};
-}
-
 uint32_t World::Impl::surface_number(const std::string& material) {
   const auto at = std::find(materials.begin(), materials.end(), material);
   if (at == materials.end())
@@ -241,11 +226,6 @@ void World::Impl::detach(Body& body) {
   std::erase(stepped, &body);
   active_pairs.clear();
   islands.clear();
-}
-
-const CollisionShape& Body::collision_shape() {
-  if (!collision_shape_) collision_shape_.emplace(solid, def.motion == MotionType::dynamic);
-  return *collision_shape_;
 }
 
 bool WorldState::is_alive(const Attachment& a) const {
