@@ -1,12 +1,17 @@
 #include "sim/contact/contact_terms.h"
 
+#include <algorithm>
 #include <cmath>
+
+#include "sim/core/rotation.h"
 
 namespace offstage::sim {
 namespace {
 
 /// Below this sliding speed, static friction applies [m/s].
 constexpr Real kSlip = 1e-3;
+/// Share of the energy of rotation by which the result of a sub-step may exceed the expectation.
+constexpr Real kSpinExcess = 0.02;
 
 /// The material point of a round body that represents a point of its surface: on the axis, or at the centre.
 /// The surface turns through the contact; these points do not.
@@ -129,10 +134,19 @@ Vec3 rotation_vector(const Quat& from, const Quat& to) {
   return 2 * (1 + s / 6 * (1 + 9 * s / 20 * (1 + 25 * s / 42))) * sine;
 }
 
-void displace(Body& body, const Vec3& shift, const Vec3& turn) {
+void add_effect(Body& body, const IntervalEffect& effect) {
   RigidBody& r = body.rigid;
-  r.position += shift;
-  if (turn != Vec3::Zero()) r.orientation = (rotation(turn) * r.orientation).normalized();
+  const Vec3 free = r.angular_velocity(), expected = free + effect.spin;
+  const Real free_energy = free.dot(r.angular_momentum);  // twice the energy
+  r.position += effect.shift;
+  if (effect.turn != Vec3::Zero()) r.orientation = (rotation(effect.turn) * r.orientation).normalized();
+  r.momentum += effect.impulse;
+  r.angular_momentum += effect.angular_impulse;
+  const Vec3 wanted = r.spin_momentum(r.orientation, expected);
+  const Real most = std::max(free_energy, expected.dot(wanted));
+  if (r.angular_velocity().dot(r.angular_momentum) > (1 + effect.share * kSpinExcess) * most &&
+      wanted != Vec3::Zero())
+    r.orientation = (rotation_between(wanted, r.angular_momentum) * r.orientation).normalized();
   body.pose = r.pose();
 }
 

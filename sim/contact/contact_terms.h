@@ -32,7 +32,20 @@ Mat3 inverse_inertia(const RigidBody& body, const Quat& orientation);
 /// Rotation vector (angle times axis) from one orientation to another [rad], for small rotations.
 Vec3 rotation_vector(const Quat& from, const Quat& to);
 
-/// Moves a body by a shift [m] and a small rotation vector [rad].
-void displace(Body& body, const Vec3& shift, const Vec3& turn);
+/// Effect of the contacts and joints of an interval on a body.
+struct IntervalEffect {
+  Vec3 impulse, angular_impulse;  ///< [N s], [N m s]
+  Vec3 spin;                      ///< expected change of the angular velocity [rad/s]
+  Vec3 shift, turn;               ///< displacement [m] and small rotation vector [rad]
+  Real share;                     ///< of the sub-step that the interval is
+};
+
+/// Adds the effect of an interval to a body in its state at the end of the free motion.
+///
+/// The angular momentum is exact, while the orientation is known to second order in the interval. For a thin
+/// body the difference may be a large rotation about its axis, with an energy that no force has supplied. If
+/// the angular momentum has more energy than the expected angular velocity, the body is turned to the
+/// orientation in which both agree.
+void add_effect(Body& body, const IntervalEffect& effect);
 
 }  // namespace offstage::sim

@@ -40,7 +40,7 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
   approach_.clear();
   for (Body* body : island.bodies) {
     body->row = static_cast<uint32_t>(bodies_.size());
-    add_body(*body, interval.substep);
+    add_body(*body, interval);
   }
   for (ContactPair* pair : island.pairs) add_points(*pair, interval);
   const Island* const one[] = {&island};
@@ -61,7 +61,7 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
     forces_[i]->now = contacts_[i].impulse / interval.duration;
   if (interval.is_whole)
     for (PointForce* force : forces_) force->last = force->now;
-  move_bodies(island, interval.duration);
+  move_bodies(island, interval);
   return outcome;
 }
 
@@ -98,11 +98,11 @@ bool ExactContacts::is_safe(const ContactWork& work) const {
   return energy <= kTermsShare * kinetic + mass * push * push / 2;
 }
 
-uint32_t ExactContacts::add_body(Body& body, Real substep) {
+uint32_t ExactContacts::add_body(Body& body, const ContactInterval& interval) {
   ContactBody b;
   if (body.is_awake()) {
     b.inverse_mass = 1 / body.rigid.mass;
-    b.inverse_inertia = body.impulse_inverse_inertia(substep);
+    b.inverse_inertia = body.impulse_inverse_inertia(interval.duration, interval.substep);
     b.velocity = body.rigid.velocity();
     b.angular_velocity = body.rigid.angular_velocity();
   } else if (body.is_kinematic()) {
@@ -115,8 +115,8 @@ uint32_t ExactContacts::add_body(Body& body, Real substep) {
 
 void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interval) {
   const Real h = interval.duration;
-  const uint32_t a = pair.a().is_awake() ? pair.a().row : add_body(pair.a(), interval.substep);
-  const uint32_t b = pair.b().is_awake() ? pair.b().row : add_body(pair.b(), interval.substep);
+  const uint32_t a = pair.a().is_awake() ? pair.a().row : add_body(pair.a(), interval);
+  const uint32_t b = pair.b().is_awake() ? pair.b().row : add_body(pair.b(), interval);
   const Vec3 surface = surface_velocity(pair);
   for (PlacedManifold& m : pair.manifolds())
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
@@ -155,7 +155,8 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
 /// contact of the body closed in the interval, or opened and closed again, the force acts only in a part of
 /// it. The body then moves by its new velocity throughout the interval, which is what the contact's target
 /// assumes.
-void ExactContacts::move_bodies(const Island& island, Real duration) {
+void ExactContacts::move_bodies(const Island& island, const ContactInterval& interval) {
+  const Real duration = interval.duration;
   closing_.assign(bodies_.size(), 0);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
     if (approach_[i] > kClosing && contacts_[i].impulse.x() > 0)
@@ -171,14 +172,13 @@ void ExactContacts::move_bodies(const Island& island, Real duration) {
     Body& body = *island.bodies[i];
     const Vec3 dv = bodies_[i].velocity - free_[i].velocity,
                dw = bodies_[i].angular_velocity - free_[i].angular_velocity;
-    body.rigid.momentum += body.rigid.mass * dv;
-    body.rigid.angular_momentum += bodies_[i].inverse_inertia.inverse() * dw;
     Vec3 way = rest_[i] * dv, turn = rest_[i] * dw;
     if (closing_[i]) {
       way = (dv + bodies_[i].velocity - body.start_twist.velocity) / 2;
       turn = (dw + bodies_[i].angular_velocity - body.start_twist.angular_velocity) / 2;
     }
-    displace(body, duration * way, duration * turn);
+    add_effect(body, {body.rigid.mass * dv, bodies_[i].inverse_inertia.inverse() * dw, dw, duration * way,
+                      duration * turn, duration / interval.substep});
   }
 }
 

@@ -27,10 +27,10 @@ class ExactContacts {
   Real cost() const { return newton_.cost(); }
 
  private:
-  uint32_t add_body(Body& body, Real substep);
+  uint32_t add_body(Body& body, const ContactInterval& interval);
   void add_points(ContactPair& pair, const ContactInterval& interval);
   bool is_safe(const ContactWork& work) const;
-  void move_bodies(const Island& island, Real duration);
+  void move_bodies(const Island& island, const ContactInterval& interval);
   void close_stops();
   void close_links();
   void close_neighbors(const Island& island, Real duration);

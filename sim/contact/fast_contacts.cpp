@@ -16,7 +16,7 @@ RelaxedBody relaxed(const Body& body, const ContactInterval& interval) {
   const Real duration = interval.duration;
   if (body.is_awake()) {
     b.inverse_mass = 1 / body.rigid.mass;
-    b.inverse_inertia = body.impulse_inverse_inertia(interval.substep);
+    b.inverse_inertia = body.impulse_inverse_inertia(duration, interval.substep);
     b.velocity = body.start_twist.velocity;
     b.angular_velocity = body.start_twist.angular_velocity;
     b.free_acceleration = (body.rigid.velocity() - b.velocity) / duration;
@@ -104,13 +104,6 @@ void store_forces(const ContactPatch& patch, const ContactInterval& interval, Pl
   m.mean_torque = patch.mean_friction.z();
 }
 
-void move(Body& body, const RelaxedBody& b) {
-  displace(body, b.displacement, b.rotation_vector);
-  RigidBody& r = body.rigid;
-  r.momentum += b.impulse;
-  r.angular_momentum += b.angular_impulse;
-}
-
 }  // namespace
 
 void FastContacts::collect(std::span<const Island* const> islands) {
@@ -190,8 +183,11 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
     ++work.restitution_reduced;
     for (RelaxedBody& b : own) b.scale(share);
   }
-  for_each_interval(std::span(members_).first(moved_),
-                    [&](std::size_t i) { move(*members_[i], bodies_[i]); });
+  for_each_interval(std::span(members_).first(moved_), [&](std::size_t i) {
+    const RelaxedBody& b = bodies_[i];
+    add_effect(*members_[i], {b.impulse, b.angular_impulse, b.inverse_inertia * b.angular_impulse,
+                              b.displacement, b.rotation_vector, h / interval.substep});
+  });
   return work;
 }
 

@@ -1,5 +1,7 @@
 #include "sim/dynamics/body.h"
 
+#include "sim/dynamics/free_body.h"
+
 namespace offstage::sim {
 
 const CollisionShape& Body::collision_shape() {
@@ -22,13 +24,10 @@ Motion Body::motion(Real now, Real time) const {
   return {later.pose(), v + w.cross(arm), w};
 }
 
-Mat3 Body::impulse_inverse_inertia(Real substep) const {
-  Quat when = start.orientation;
-  if (start_twist.angular_velocity.norm() * substep <= kMostPredictedTurn) {
-    const Eigen::Vector4d &first = start.orientation.coeffs(), &last = rigid.orientation.coeffs();
-    when.coeffs() =
-        (first.dot(last) < 0 ? Eigen::Vector4d(first - last) : Eigen::Vector4d(first + last)).normalized();
-  }
+Mat3 Body::impulse_inverse_inertia(Real duration, Real substep) const {
+  const Vec3& w = start_twist.angular_velocity;
+  const bool is_predicted = substep * w.norm() <= kMostPredictedTurn;
+  const Quat when = is_predicted ? rotation(w, duration / 2) * start.orientation : start.orientation;
   const Mat3 axes = when.toRotationMatrix();
   return axes * rigid.inverse_inertia * axes.transpose();
 }
