@@ -10,7 +10,9 @@ namespace {
 /// Share of the kinetic energy that the velocity terms may add in a step.
 constexpr Real kAdded = 0.02;
 
-bool is_driven(const Island& island) {
+}  // namespace
+
+bool can_do_work(const Island& island) {
   const auto drives = [](const Body* body) {
     return body && body->is_kinematic() && body->def.track.moves();
   };
@@ -25,7 +27,14 @@ bool is_driven(const Island& island) {
          });
 }
 
-}  // namespace
+Real kinetic_energy(const Island& island) {
+  Real sum = 0;
+  for (const Body* body : island.bodies) {
+    const RigidBody& r = body->rigid;
+    sum += (r.velocity().dot(r.momentum) + r.angular_velocity().dot(r.angular_momentum)) / 2;
+  }
+  return sum;
+}
 
 Real kept_share(const Island& island, std::span<const RelaxedBody> relaxed) {
   // Energy with s times the impulses: kinetic + first s + second s^2.
@@ -40,7 +49,7 @@ Real kept_share(const Island& island, std::span<const RelaxedBody> relaxed) {
                r.angular_impulse.dot(r.inverse_inertia * r.angular_impulse)) /
               2;
   }
-  if (!(first + second > kAdded * kinetic) || is_driven(island)) return 1;
+  if (!(first + second > kAdded * kinetic) || can_do_work(island)) return 1;
   return first < 0 ? -first / second : 0;
 }
 

@@ -8,6 +8,12 @@
 
 namespace offstage::sim {
 
+/// Whether something in an island may do work: a kinematic body, a conveyor or a motor.
+bool can_do_work(const Island& island);
+
+/// Kinetic energy of an island's bodies [J].
+Real kinetic_energy(const Island& island);
+
 /// Factor for an island's contact and joint impulses with which they add no kinetic energy to its free
 /// motion, which is in Body::rigid. It is 1 unless they add more than a fiftieth of that energy. Contacts and
 /// joints dissipate energy, except for the error of their velocity terms over a step, which is unbounded for

@@ -6,6 +6,8 @@
 
 #include <oneapi/tbb/parallel_for.h>
 
+#include "sim/articulation/joint_energy.h"
+#include "sim/contact/energy_guard.h"
 #include "sim/core/parallel_loop.h"
 #include "sim/world/coupled_system.h"
 #include "sim/world/coupling_graph.h"
@@ -39,6 +41,8 @@ constexpr uint32_t kPassedOn = 3;
 constexpr Real kTurning = 2e-4;
 /// Bodies with more relative motion than this in an interval may touch with other features [m].
 constexpr Real kFastPair = 3e-3;
+/// Share of the kinetic energy of an island with joints that a sub-step may add.
+constexpr Real kAddedByJoints = 1e-3;
 
 Real smaller_extent(const Body& a, const Body& b) {
   return std::min(a.extent, b.extent);
@@ -324,12 +328,28 @@ void World::Impl::solve_islands(Real start, Real h, StepReport& report) {
   solve(all, {.duration = h, .end = start + h, .substep = h, .is_whole = true}, report);
 }
 
-/// The motion by contacts satisfies the joints only approximately, so it is projected.
-void World::Impl::settle_joints(const Island& island, Real end) {
+/// The motion by contacts and limits satisfies the joints only approximately, so it is projected. If links
+/// turn far in a step, the result may have more than the most kinetic energy [J] that the island can have;
+/// the relative velocities of its links are then reduced.
+void World::Impl::settle_joints(const Island& island, Real end, Real most_energy) {
   for (Articulation* articulation : island.articulations) {
     articulation->settle(end, joint_tally);
     for (Body* body : articulation->bodies()) body->pose = body->rigid.pose();
   }
+  if (const Real excess = kinetic_energy(island) - most_energy; excess > 0) {
+    Real internal = 0;
+    for (const Articulation* a : island.articulations) internal += internal_energy(*a);
+    for (const Articulation* a : island.articulations)
+      slow_down(*a, std::sqrt(std::max(0.0, 1 - excess / internal)));
+    ++joint_tally.unsolved;
+  }
+}
+
+/// The most kinetic energy that an island may have after its contacts are solved in an interval, which is a
+/// share of the sub-step: contacts and joints dissipate energy, except for the error of their velocity terms.
+Real World::Impl::most_energy(const Island& island, Real share) {
+  if (island.articulations.empty() || can_do_work(island)) return std::numeric_limits<Real>::infinity();
+  return (1 + kAddedByJoints * share) * kinetic_energy(island);
 }
 
 /// Solves the contact forces of islands over an interval, each by the suitable solver.
@@ -349,6 +369,9 @@ void World::Impl::solve(std::span<Island* const> group, const ContactInterval& i
     if (!choice.exact) choice.exact = std::make_unique<ExactContacts>();
     exact.emplace_back(island, &choice);
   }
+  std::vector<Real> most(group.size());
+  for (std::size_t i = 0; i < group.size(); ++i)
+    most[i] = most_energy(*group[i], interval.duration / interval.substep);
   std::vector<ExactContacts::Outcome> outcomes(exact.size());
   const auto run = [&](std::size_t i) {
     const auto& [island, choice] = exact[i];
@@ -373,7 +396,8 @@ void World::Impl::solve(std::span<Island* const> group, const ContactInterval& i
     fast.push_back(island);
   }
   if (!fast.empty()) report.fast.add(fast_contacts.solve(fast, interval));
-  for (Island* island : group) settle_joints(*island, interval.end);
+  for (std::size_t i = 0; i < group.size(); ++i)
+    if (!group[i]->articulations.empty()) settle_joints(*group[i], interval.end, most[i]);
 }
 
 void World::Impl::add_rough(const ContactPair* pair, StepReport& report) {

@@ -98,7 +98,8 @@ struct World::Impl : WorldState {
   void find_moving_islands();
   void solve_islands(Real start, Real h, StepReport& report);
   void solve(std::span<Island* const> group, const ContactInterval& interval, StepReport& report);
-  void settle_joints(const Island& island, Real end);
+  void settle_joints(const Island& island, Real end, Real most_energy);
+  static Real most_energy(const Island& island, Real share);
   static void add_rough(const ContactPair* pair, StepReport& report);
   void count_contacts(StepReport& report) const;
 
