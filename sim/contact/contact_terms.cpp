@@ -11,7 +11,9 @@ namespace {
 /// Below this sliding speed, static friction applies [m/s].
 constexpr Real kSlip = 1e-3;
 /// Share of the energy of rotation by which the result of a sub-step may exceed the expectation.
-constexpr Real kSpinExcess = 0.02;
+constexpr Real kSpinExcess = 0.02, kThinExcess = 1e-3;
+/// Cosine of the greatest angle by which a body is turned to agree with its angular momentum.
+constexpr Real kAligned = 0.995;
 
 /// The material point of a round body that represents a point of its surface: on the axis, or at the centre.
 /// The surface turns through the contact; these points do not.
@@ -143,10 +145,16 @@ void add_effect(Body& body, const IntervalEffect& effect) {
   r.momentum += effect.impulse;
   r.angular_momentum += effect.angular_impulse;
   const Vec3 wanted = r.spin_momentum(r.orientation, expected);
-  const Real most = std::max(free_energy, expected.dot(wanted));
-  if (r.angular_velocity().dot(r.angular_momentum) > (1 + effect.share * kSpinExcess) * most &&
-      wanted != Vec3::Zero())
-    r.orientation = (rotation_between(wanted, r.angular_momentum) * r.orientation).normalized();
+  const Real expected_energy = expected.dot(wanted),
+             allowed = effect.share * (r.is_thin() ? kThinExcess : kSpinExcess);
+  if (r.angular_velocity().dot(r.angular_momentum) >
+      expected_energy + allowed * std::max(free_energy, expected_energy)) {
+    const Real along = wanted.dot(r.angular_momentum);
+    if (along > kAligned * wanted.norm() * r.angular_momentum.norm())
+      r.orientation = (rotation_between(wanted, r.angular_momentum) * r.orientation).normalized();
+    else
+      r.angular_momentum = wanted;
+  }
   body.pose = r.pose();
 }
 

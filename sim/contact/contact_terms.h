@@ -45,7 +45,7 @@ struct IntervalEffect {
 /// The angular momentum is exact, while the orientation is known to second order in the interval. For a thin
 /// body the difference may be a large rotation about its axis, with an energy that no force has supplied. If
 /// the angular momentum has more energy than the expected angular velocity, the body is turned to the
-/// orientation in which both agree.
+/// orientation in which both agree, or, if that is far, gets the expected angular velocity.
 void add_effect(Body& body, const IntervalEffect& effect);
 
 }  // namespace offstage::sim

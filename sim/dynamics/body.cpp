@@ -5,10 +5,6 @@
 namespace offstage::sim {
 namespace {
 
-/// tr I tr I^-1 of thin bodies, of which the greatest moment of inertia is about ten times the least one. It
-/// is 9 for a ball and 10 for a coin.
-constexpr Real kThin = 26;
-
 Mat3 in_world(const Quat& orientation, const Mat3& local) {
   const Mat3 axes = orientation.toRotationMatrix();
   return axes * local * axes.transpose();
@@ -37,8 +33,7 @@ Motion Body::motion(Real now, Real time) const {
 }
 
 Mat3 Body::impulse_inverse_inertia(Real duration, Real substep) const {
-  if (rigid.inertia.trace() * rigid.inverse_inertia.trace() < kThin)
-    return in_world(rigid.orientation, rigid.inverse_inertia);
+  if (!rigid.is_thin()) return in_world(rigid.orientation, rigid.inverse_inertia);
   const Vec3& w = start_twist.angular_velocity;
   const bool is_predicted = substep * w.norm() <= kMostPredictedTurn;
   const Quat when = is_predicted ? rotation(w, duration / 2) * start.orientation : start.orientation;
