@@ -236,7 +236,7 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
   std::size_t work = look([](const ContactPair&) { return true; });
 
   const std::size_t most = kMaxImpacts + kImpactsPerBody * awake.size();
-  const std::size_t most_work = (def.solver == SolverKind::exact ? kExactImpactWork : 1) * kImpactWork;
+  const std::size_t most_work = (is_exact() ? kExactImpactWork : 1) * kImpactWork;
   for (std::size_t count = 0; !impacts.empty(); ++count) {
     const auto first = std::min_element(impacts.begin(), impacts.end(),
                                         [](const Impact& x, const Impact& y) { return x.time < y.time; });
@@ -338,7 +338,7 @@ std::size_t World::Impl::collide(uint32_t number, Real start, Real time, Real h,
   Island& island = islands[number];
   remove_seams(island.pairs, time, h);
   const CollisionSettings settings{start + time, kCluster, def.collision_speed, def.impact,
-                                   def.solver == SolverKind::exact};
+                                   is_exact()};
   const CollisionOutcome outcome = resolve_collisions(island, settings);
   report.collisions += outcome.bounces;
   report.impacts.add(outcome.work);

@@ -82,6 +82,9 @@ struct World::Impl : WorldState {
   void update_joint_presence(Real time);
   void place(Joint& joint);
 
+  /// Whether each collision is resolved at its own time, and contacts are solved to rounding.
+  bool is_exact() const { return def.solver == SolverKind::exact || def.solver == SolverKind::lcp; }
+
   // Contacts (contact_stage.cpp)
   PairSurface surface_of(const Body& a, const Body& b) const;
   void propagate_impact_speeds(Real h);
