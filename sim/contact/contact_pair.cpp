@@ -225,7 +225,10 @@ ContactPair::ContactPair(Body& a, Body& b, const PairSurface& surface)
       b_(&b),
       surface_(surface),
       is_on_plane_(b.collision_shape().is_plane()),
-      has_sphere_(is_sphere_pair(a, b)) {}
+      has_sphere_(is_sphere_pair(a, b)) {
+  // Created here, because pairs are processed in parallel.
+  for (Body* body : {&a, &b}) shape_of(*body);
+}
 
 void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_within, bool turning) {
   find_points(a, b, margin, reuse_within, turning);
@@ -295,8 +298,7 @@ void ContactPair::find_points(const Pose& a, const Pose& b, Real margin, Real re
     return;
   }
   found.clear();
-  find_manifolds(a_->collision_shape(), b_->collision_shape(), a_from_b, margin, cache_, surface_.method,
-                 found, turning);
+  find_manifolds(shape_a(), shape_b(), a_from_b, margin, cache_, surface_.method, found, turning);
   cache_.forget_unused();
   for (Manifold& m : found) follow_rims(m, *a_, *b_, a_from_b);
   a_from_b_ = a_from_b;
@@ -377,8 +379,7 @@ void ContactPair::add_speculative_contacts(Real duration) {
   static thread_local std::vector<Manifold> found;
   found.clear();
   cache_.keeps_sides = false;
-  find_manifolds(a_->collision_shape(), b_->collision_shape(), between(a_->pose, b_->pose), 0, cache_,
-                 surface_.method, found);
+  find_manifolds(shape_a(), shape_b(), between(a_->pose, b_->pose), 0, cache_, surface_.method, found);
   cache_.keeps_sides = true;
   for (Manifold& local : found) {
     follow_rims(local, *a_, *b_, between(a_->pose, b_->pose));

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "sim/collision/contact_frame.h"
@@ -21,6 +22,7 @@ struct PairSurface {
   const Body* axis_body = nullptr;  ///< body that defines the friction axis; null: isotropic
   bool conveys = false;             ///< whether a surface is a conveyor
   DistanceMethod method = DistanceMethod::gjk;
+  bool by_triangles = false;  ///< both are meshes and collide by their triangles
 };
 
 /// Force at a point of a manifold on body a, in the manifold's frame.
@@ -71,6 +73,15 @@ class alignas(64) ContactPair {
   Body& a() const { return *a_; }
   Body& b() const { return *b_; }
   const PairSurface& surface() const { return surface_; }
+  /// The shapes by which the two bodies collide.
+  const CollisionShape& shape_a() const { return shape_of(*a_); }
+  const CollisionShape& shape_b() const { return shape_of(*b_); }
+  /// That of one of its bodies.
+  const CollisionShape& shape_of(Body& body) const {
+    return surface_.by_triangles ? body.triangle_shape() : body.collision_shape();
+  }
+  /// Tests of volumes and pieces since the last call.
+  TestCounts take_tests() { return std::exchange(cache_.tests, {}); }
 
   /// Finds the contact points where the bodies at these poses are within `margin` [m] of each other. If their
   /// relative pose has changed by less than `reuse` [m], the points are reused and only their separations are

@@ -96,6 +96,10 @@ PairSurface World::Impl::surface_of(const Body& a, const Body& b) const {
   };
   PairSurface s;
   if (def.collision.narrow_phase == CollisionMethods::NarrowPhase::vclip) s.method = DistanceMethod::vclip;
+  if (def.collision.mesh_pairs == CollisionMethods::MeshPairs::triangles)
+    // The solids of a compound may overlap, so that triangles of one lie inside another.
+    s.by_triangles =
+        a.solid.mesh && b.solid.mesh && a.solid.mesh->solids.empty() && b.solid.mesh->solids.empty();
   s.restitution = std::max(a.def.restitution, b.def.restitution);
   s.friction = std::sqrt(a.def.friction * b.def.friction);
   s.static_friction = std::sqrt(static_friction(a.def) * static_friction(b.def));
@@ -388,7 +392,10 @@ void World::Impl::count_contacts(StepReport& report) const {
   report.bodies_asleep = static_cast<uint32_t>(asleep);
   report.pairs_tested += active_pairs.size();
   report.contacts = 0;
-  for (const ContactPair* pair : active_pairs) {
+  for (ContactPair* pair : active_pairs) {
+    const TestCounts tests = pair->take_tests();
+    report.volume_tests += tests.volumes;
+    report.piece_tests += tests.pieces;
     report.contacts += pair->touching();
     report.speculative_contacts += pair->speculative;
     report.penetration = std::max(report.penetration, pair->deepest);

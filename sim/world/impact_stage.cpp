@@ -137,13 +137,13 @@ std::optional<sim::Impact> World::Impl::first_impact(const MovingShape& a, const
 
 /// Time at which the bodies of a pair will touch on their current paths. If they touch already and approach,
 /// it is the current time.
-std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) const {
+std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h, TestCounts& tests) const {
   if (pair.toi_exhausted) return std::nullopt;
   const Body &a = pair.a(), &b = pair.b();
   const Real from = std::max(a.is_awake() ? a.from : 0, b.is_awake() ? b.from : 0);
   if (from >= h * (1 - kInstant)) return std::nullopt;
   const Real turn = turn_of(pair) * (h - from);
-  if (turn > kImpactTurn) return tumbling_impact_time(pair, from, h, turn);
+  if (turn > kImpactTurn) return tumbling_impact_time(pair, from, h, turn, tests);
   if (pair.separation() <= kTouching) return point_impact_time(pair, h);
   const Real bow = (bend(a, h) - bend(b, h)).norm() * (h - from) / 8;
   const auto pieces =
@@ -152,16 +152,15 @@ std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) co
     const Real begin = from + (h - from) * i / pieces, end = from + (h - from) * (i + 1) / pieces;
     const PosePath path_a(on_arc(a, begin, h), on_arc(a, end, h)),
         path_b(on_arc(b, begin, h), on_arc(b, end, h));
-    const auto impact =
-        first_impact({pair.a().collision_shape(), path_a}, {pair.b().collision_shape(), path_b});
+    const auto impact = first_impact({pair.shape_a(), path_a, &tests}, {pair.shape_b(), path_b});
     if (impact) return begin + touching_share(*impact, path_a, path_b) * (end - begin);
   }
   return std::nullopt;
 }
 
 /// A path describes at most half a turn, so faster rotations are divided into pieces.
-std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, Real from, Real h,
-                                                      Real turn) const {
+std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, Real from, Real h, Real turn,
+                                                      TestCounts& tests) const {
   const bool spins_fast = turn > kFastSpin;
   Tumbling body_a(pair.a(), def, spins_fast, h), body_b(pair.b(), def, spins_fast, h);
   Pose begin_a = body_a.go_on(from), begin_b = body_b.go_on(from);
@@ -173,7 +172,7 @@ std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, R
     const PosePath path_a(begin_a, body_a.go_on(end)), path_b(begin_b, body_b.go_on(end));
     begin_a = path_a.end();
     begin_b = path_b.end();
-    const MovingShape a{pair.a().collision_shape(), path_a}, b{pair.b().collision_shape(), path_b};
+    const MovingShape a{pair.shape_a(), path_a, &tests}, b{pair.shape_b(), path_b};
     std::optional<sim::Impact> impact;
     const bool met = (i == 0 && touches) || ((impact = first_impact(a, b)) && impact->share == 0);
     if (met) impact = time_of_next_impact(a, b, kTouching / 2, def.collision_speed * (end - begin));
@@ -224,8 +223,13 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
     });
     report.impact_searches += events.size();
     std::vector<std::optional<Real>> times(events.size());
+    std::vector<TestCounts> tests(events.size());
     for_each_index(events.size(),
-                   [&](std::size_t i) { times[i] = impact_time(*active_pairs[events[i]], h); });
+                   [&](std::size_t i) { times[i] = impact_time(*active_pairs[events[i]], h, tests[i]); });
+    for (const TestCounts& t : tests) {
+      report.volume_tests += t.volumes;
+      report.piece_tests += t.pieces;
+    }
     std::size_t taken = 0;
     for (std::size_t i = 0; i < events.size(); ++i) {
       if (times[i]) impacts.push_back({*times[i], active_pairs[events[i]]});
@@ -337,8 +341,7 @@ std::size_t World::Impl::collide(uint32_t number, Real start, Real time, Real h,
   }
   Island& island = islands[number];
   remove_seams(island.pairs, time, h);
-  const CollisionSettings settings{start + time, kCluster, def.collision_speed, def.impact,
-                                   is_exact()};
+  const CollisionSettings settings{start + time, kCluster, def.collision_speed, def.impact, is_exact()};
   const CollisionOutcome outcome = resolve_collisions(island, settings);
   report.collisions += outcome.bounces;
   report.impacts.add(outcome.work);
