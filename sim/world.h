@@ -93,7 +93,8 @@ struct CollisionMethods {
   /// Volumes of the trees over the parts and triangles of meshes (H1-H3). `mixed`: spheres for dynamic bodies
   /// and axis-aligned boxes for the others, so that trees of two kinds meet.
   enum class Trees : uint8_t { aabb, obb, sphere, mixed };
-  /// What two meshes collide by: their convex parts, or their triangles as in section 2.4 (R3).
+  /// What the time of an impact of two meshes is found by: their convex parts, or their triangles as in
+  /// section 2.4 (R3). Contact points are those of the parts in either case.
   enum class MeshPairs : uint8_t { parts, triangles };
   /// Distance of convex polyhedra: GJK, or V-Clip (physics R4). Round shapes use GJK in either case.
   enum class NarrowPhase : uint8_t { gjk, vclip };

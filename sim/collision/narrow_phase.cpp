@@ -195,8 +195,7 @@ class PiecePair {
     for (const auto* t : {&triangles.a, &triangles.b})
       if (*t && (*t)->mesh->surface.is_sliver((*t)->face)) return;
     PairCache::Entry& entry = cache_.of(i_, j_);
-    const Separation s = are_triangles(shape_a_, shape_b_) ? measure_triangles(a_, b_, a_from_b_, entry)
-                                                           : measure(a_, b_, a_from_b_, method, entry);
+    const Separation s = measure(a_, b_, a_from_b_, method, entry);
     const bool apart = s.distance > 0;
     // If the normal is along the triangle, the centre of the other piece determines the side.
     const auto height = [&](const SurfaceTriangle& t, const Vec3& outward, const Vec3& middle) {

@@ -1,7 +1,7 @@
 #pragma once
 /// Narrow phase: distance, contacts and time of impact of two shapes of any kind at given poses (physics
 /// R3-R5, R12). Pairs of their convex pieces are found by traversing both trees, and each pair is measured by
-/// GJK, V-Clip or, for the triangles of two shapes by_triangles, the closest points of two triangles.
+/// GJK, V-Clip or, for distances of two shapes by_triangles, the closest points of two triangles.
 /// Everything is reported in the frame of the first shape, A, with normals from B to A. Only the second shape
 /// can be a plane.
 

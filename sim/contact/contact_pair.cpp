@@ -226,8 +226,8 @@ ContactPair::ContactPair(Body& a, Body& b, const PairSurface& surface)
       surface_(surface),
       is_on_plane_(b.collision_shape().is_plane()),
       has_sphere_(is_sphere_pair(a, b)) {
-  // Created here, because pairs are processed in parallel.
-  for (Body* body : {&a, &b}) shape_of(*body);
+  if (!surface.by_triangles) return;
+  for (Body* body : {&a, &b}) body->triangle_shape();  // created here, because pairs are used in parallel
 }
 
 void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_within, bool turning) {
@@ -298,7 +298,8 @@ void ContactPair::find_points(const Pose& a, const Pose& b, Real margin, Real re
     return;
   }
   found.clear();
-  find_manifolds(shape_a(), shape_b(), a_from_b, margin, cache_, surface_.method, found, turning);
+  find_manifolds(a_->collision_shape(), b_->collision_shape(), a_from_b, margin, cache_, surface_.method,
+                 found, turning);
   cache_.forget_unused();
   for (Manifold& m : found) follow_rims(m, *a_, *b_, a_from_b);
   a_from_b_ = a_from_b;
@@ -379,7 +380,8 @@ void ContactPair::add_speculative_contacts(Real duration) {
   static thread_local std::vector<Manifold> found;
   found.clear();
   cache_.keeps_sides = false;
-  find_manifolds(shape_a(), shape_b(), between(a_->pose, b_->pose), 0, cache_, surface_.method, found);
+  find_manifolds(a_->collision_shape(), b_->collision_shape(), between(a_->pose, b_->pose), 0, cache_,
+                 surface_.method, found);
   cache_.keeps_sides = true;
   for (Manifold& local : found) {
     follow_rims(local, *a_, *b_, between(a_->pose, b_->pose));

@@ -22,7 +22,7 @@ struct PairSurface {
   const Body* axis_body = nullptr;  ///< body that defines the friction axis; null: isotropic
   bool conveys = false;             ///< whether a surface is a conveyor
   DistanceMethod method = DistanceMethod::gjk;
-  bool by_triangles = false;  ///< both are meshes and collide by their triangles
+  bool by_triangles = false;  ///< impacts are found by the triangles of two meshes
 };
 
 /// Force at a point of a manifold on body a, in the manifold's frame.
@@ -73,13 +73,9 @@ class alignas(64) ContactPair {
   Body& a() const { return *a_; }
   Body& b() const { return *b_; }
   const PairSurface& surface() const { return surface_; }
-  /// The shapes by which the two bodies collide.
-  const CollisionShape& shape_a() const { return shape_of(*a_); }
-  const CollisionShape& shape_b() const { return shape_of(*b_); }
-  /// That of one of its bodies.
-  const CollisionShape& shape_of(Body& body) const {
-    return surface_.by_triangles ? body.triangle_shape() : body.collision_shape();
-  }
+  /// The shapes by which the time of an impact of the two bodies is found.
+  const CollisionShape& impact_shape_a() const { return impact_shape(*a_); }
+  const CollisionShape& impact_shape_b() const { return impact_shape(*b_); }
   /// Tests of volumes and pieces since the last call.
   TestCounts take_tests() { return std::exchange(cache_.tests, {}); }
 
@@ -128,6 +124,9 @@ class alignas(64) ContactPair {
   Vec3 relative_velocity(const Vec3& point) const;
 
  private:
+  const CollisionShape& impact_shape(Body& body) const {
+    return surface_.by_triangles ? body.triangle_shape() : body.collision_shape();
+  }
   /// A point with its forces, all in a's frame.
   struct Remembered {
     Vec3 on_a, last, mean, normal;

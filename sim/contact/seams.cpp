@@ -63,8 +63,6 @@ struct View {
 
   Body& x() const { return x_is_a ? pair->a() : pair->b(); }
   Body& y() const { return x_is_a ? pair->b() : pair->a(); }
-  const CollisionShape& x_shape() const { return pair->shape_of(x()); }
-  const CollisionShape& y_shape() const { return pair->shape_of(y()); }
   uint32_t x_piece() const { return x_is_a ? m->piece_a : m->piece_b; }
   uint32_t y_piece() const { return x_is_a ? m->piece_b : m->piece_a; }
   Vec3 normal() const { return x_is_a ? m->normal : Vec3(-m->normal); }  ///< towards X
@@ -79,7 +77,7 @@ struct View {
   }
   /// A seam is a line, or a point on a line.
   bool may_be_at_seam() const {
-    if (continues() || y_shape().is_plane() || !is_narrow(*m)) return false;
+    if (continues() || y().collision_shape().is_plane() || !is_narrow(*m)) return false;
     return !is_face() || !std::holds_alternative<Sphere>(x().def.shape);
   }
 };
@@ -208,7 +206,7 @@ class BodyContacts {
   /// Distance of a place in the world from Y's piece.
   SurfaceDistance distance(const View& v, const Vec3& place) const {
     const Pose y = pose(v.y(), v.speculative);
-    SurfaceDistance d = piece_distance(v.y_shape(), v.y_piece(), y.point_to_body(place));
+    SurfaceDistance d = piece_distance(v.y().collision_shape(), v.y_piece(), y.point_to_body(place));
     d.normal = y.vector_to_world(d.normal);
     return d;
   }
@@ -216,7 +214,7 @@ class BodyContacts {
   /// direction. Above a convex edge or a corner the nearest point of Y is on the edge, directly below, for
   /// many directions of `up`. This alone does not prove a face.
   bool is_flat(const View& v, const Vec3& over, const Vec3& up, const Vec3& along) const {
-    const CollisionShape& shape = v.y_shape();
+    const CollisionShape& shape = v.y().collision_shape();
     const bool is_triangle =
         !shape.is_plane() && shape.solid().mesh && shape.piece(v.y_piece()).core == Convex::Core::triangle;
     if (is_triangle) return true;  // its neighbours continue it
@@ -232,7 +230,7 @@ class BodyContacts {
     const Pose plane_from_x{plane.point_to_body(x.position), plane.orientation.conjugate() * x.orientation};
     const Real margin = std::max(0.0, v.m->points[v.deepest()].separation) + kSlopeMargin;
     const Manifold on_plane =
-        placed(plane_manifold(v.x_shape().piece(v.x_piece()), plane_from_x, margin), plane);
+        placed(plane_manifold(v.x().collision_shape().piece(v.x_piece()), plane_from_x, margin), plane);
     Manifold m = *v.m;
     m.normal = v.x_is_a ? normal : Vec3(-normal);
     m.source = v.x_is_a ? NormalSource::face_of_b : NormalSource::face_of_a;
@@ -247,7 +245,8 @@ class BodyContacts {
     for (uint32_t k = 0; k < on_plane.count; ++k) {
       const ContactPoint& p = on_plane.points[k];
       if (p.separation < least) return {};
-      if (piece_distance(v.y_shape(), v.y_piece(), y.point_to_body(p.on_b)).distance > margin) continue;
+      if (piece_distance(v.y().collision_shape(), v.y_piece(), y.point_to_body(p.on_b)).distance > margin)
+        continue;
       m.points[m.count++] = v.x_is_a ? p : ContactPoint{p.on_b, p.on_a, p.separation, p.id};
     }
     return m;
@@ -281,7 +280,7 @@ std::vector<Group> groups_with_seams(std::span<ContactPair* const> pairs) {
     for (const auto& [x, y] : {std::pair(&pair->a(), &pair->b()), std::pair(&pair->b(), &pair->a())}) {
       if (x->is_awake() || x->is_kinematic())
         bodies.push_back(x);
-      else if (pair->shape_of(*y).piece_count() > 1)
+      else if (y->collision_shape().piece_count() > 1)
         groups.push_back({x, {pair}});
     }
   }

@@ -68,7 +68,7 @@ struct Body {
   bool can_move() const { return is_awake() || (is_kinematic() && def.track.moves()); }
   /// Created on first use, because a mesh may have to be decomposed for it.
   const CollisionShape& collision_shape();
-  /// The shape of a mesh by its triangles, for pairs of meshes that collide by them.
+  /// The shape of a mesh by its triangles, for the impacts of two meshes.
   const CollisionShape& triangle_shape();
   /// Pose and velocities of the body's origin at a time near `now`.
   Motion motion(Real now, Real time) const;

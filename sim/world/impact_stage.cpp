@@ -152,7 +152,8 @@ std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h, Te
     const Real begin = from + (h - from) * i / pieces, end = from + (h - from) * (i + 1) / pieces;
     const PosePath path_a(on_arc(a, begin, h), on_arc(a, end, h)),
         path_b(on_arc(b, begin, h), on_arc(b, end, h));
-    const auto impact = first_impact({pair.shape_a(), path_a, &tests}, {pair.shape_b(), path_b});
+    const auto impact =
+        first_impact({pair.impact_shape_a(), path_a, &tests}, {pair.impact_shape_b(), path_b});
     if (impact) return begin + touching_share(*impact, path_a, path_b) * (end - begin);
   }
   return std::nullopt;
@@ -172,7 +173,7 @@ std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, R
     const PosePath path_a(begin_a, body_a.go_on(end)), path_b(begin_b, body_b.go_on(end));
     begin_a = path_a.end();
     begin_b = path_b.end();
-    const MovingShape a{pair.shape_a(), path_a, &tests}, b{pair.shape_b(), path_b};
+    const MovingShape a{pair.impact_shape_a(), path_a, &tests}, b{pair.impact_shape_b(), path_b};
     std::optional<sim::Impact> impact;
     const bool met = (i == 0 && touches) || ((impact = first_impact(a, b)) && impact->share == 0);
     if (met) impact = time_of_next_impact(a, b, kTouching / 2, def.collision_speed * (end - begin));

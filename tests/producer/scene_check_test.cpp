@@ -62,11 +62,10 @@ TEST(SceneCheck, AlgorithmsWithoutEffectAreRefused) {
     "mesh_pairs": "triangles"}, "particle_cluster": 8}, "bodies": [{"name": "box"}]})"),
       "/world/collision/cell_factor: is for \"broad_phase\": \"grid\"; \"multi_grid\" chooses its cells "
       "by the size of each body\n"
-      "/world/particle_cluster: is for \"particle_contacts\": \"lcp\"\n"
-      "/world/collision/mesh_pairs: has no effect: two bodies with shapes of meshes are needed, there are "
-      "0\n"
       "/world/collision/trees: has no effect: no body has the shape of a mesh or a compound\n"
-      "/world/collision/tree_split: has no effect: no body has the shape of a mesh or a compound\n");
+      "/world/collision/tree_split: has no effect: no body has the shape of a mesh or a compound\n"
+      "/world/collision/mesh_pairs: has no effect: two bodies with shapes of meshes are needed, there are 0\n"
+      "/world/particle_cluster: is for \"particle_contacts\": \"lcp\"\n");
   const std::string rings = R"("bodies": [{"name": "ring", "shape": {"type": "torus"}, "position": [0, 5, 0],
     "repeat": {"count": 2, "offset": [0, 4, 0]}}])";
   EXPECT_EQ(errors_of(R"({"world": {"collision": {"broad_phase": "grid", "cell_factor": 3, "trees": "obb",

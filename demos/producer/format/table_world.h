@@ -83,9 +83,8 @@ struct Table<sim::CollisionMethods> {
          "rule by which these trees divide their items: the `surface_area` heuristic, or the `mean` of "
          "the midpoints"},
         {"mesh_pairs", &T::mesh_pairs,
-         "two meshes collide by their convex `parts`, or by their `triangles`; a compound always "
-         "collides by its parts. Triangles have no inside, so a mesh that has passed through a surface is "
-         "not pushed back"},
+         "when two meshes meet is found by their convex `parts`, or by tests of their `triangles`; their "
+         "contact points are those of the parts, and a compound always meets others by its parts"},
         {"cell_factor", &T::cell_factor,
          "for `broad_phase: grid`: width of a cell in mean diameters of the bodies", "", between(0.1, 100)}};
   }

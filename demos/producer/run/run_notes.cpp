@@ -65,10 +65,11 @@ std::vector<std::string> notes_of(const SimulationTotals& t) {
       "sub-step was dropped");
   if (!t.rough_bodies.empty()) notes.push_back(note_of_rough_contacts(t));
   if (t.lcp.fallbacks)
-    notes.push_back(fmt::format(
-        "note: world.solver \"lcp\": the exact solver took over {} of {} solutions of groups of bodies, which "
-        "pivoting could not solve or which had too many contacts",
-        t.lcp.fallbacks, t.lcp.solves));
+    notes.push_back(
+        fmt::format("note: world.solver \"lcp\": the exact solver took over {} of {} solutions of groups of "
+                    "bodies, which "
+                    "pivoting could not solve or which had too many contacts",
+                    t.lcp.fallbacks, t.lcp.solves));
   if (t.particle_lcp.fallbacks)
     notes.push_back(fmt::format(
         "note: world.particle_contacts \"lcp\": relaxation solved {} of {} clusters of particles, which had "

@@ -45,8 +45,8 @@ struct WorldSettings {
   sim::CollisionMethods collision;
   sim::ParticleContactMethod particle_contacts = sim::ParticleContactMethod::relaxation;
   int particle_cluster = 24;  ///< greatest number of contacts that `lcp` solves together
-  bool sleep = true;   ///< whether islands at rest are not simulated
-  Real bounds = 1000;  ///< half the edge of the cube that contains all objects
+  bool sleep = true;          ///< whether islands at rest are not simulated
+  Real bounds = 1000;         ///< half the edge of the cube that contains all objects
   uint64_t seed = 1;
 };
 
