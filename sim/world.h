@@ -17,6 +17,8 @@
 
 #include "sim/articulation/joint.h"
 #include "sim/cloth/cloth.h"
+#include "sim/collision/grid.h"
+#include "sim/collision/tree_split.h"
 #include "sim/contact/collision.h"
 #include "sim/core/handle.h"
 #include "sim/core/non_finite.h"
@@ -74,11 +76,26 @@ enum class SolverKind {
   fast,       ///< time stepping on velocities: a bounded amount of work, errors far below a millimetre
   automatic,  ///< exact for small islands and where it costs less than fast, judged by the work of previous
               ///< steps
+  lcp,  ///< as exact, with forces by Dantzig's and Baraff's pivoting and separate limits of friction along
+        ///< both tangents (N9, N10); islands that it does not solve go to the exact solver and are counted
+};
+
+/// How the contact forces of particles are computed (physics P7).
+enum class ParticleContactMethod : uint8_t {
+  relaxation,  ///< Gauss-Seidel with bounded work
+  lcp  ///< clusters of at most WorldDef::particle_cluster contacts by Dantzig's and Baraff's pivoting; other
+       ///< clusters, and those that pivoting does not solve, by relaxation, and counted
 };
 
 /// Algorithms of collision detection. All give the same results within their tolerances, except that
 /// bisection misses bodies that pass through each other within a sub-step; they differ in their cost.
 struct CollisionMethods {
+  /// Volumes of the trees over the parts and triangles of meshes (H1-H3). `mixed`: spheres for dynamic bodies
+  /// and axis-aligned boxes for the others, so that trees of two kinds meet.
+  enum class Trees : uint8_t { aabb, obb, sphere, mixed };
+  /// What the time of an impact of two meshes is found by: their convex parts, or their triangles as in
+  /// section 2.4 (R3). Contact points are those of the parts in either case.
+  enum class MeshPairs : uint8_t { parts, triangles };
   /// Distance of convex polyhedra: GJK, or V-Clip (physics R4). Round shapes use GJK in either case.
   enum class NarrowPhase : uint8_t { gjk, vclip };
   /// Grid that finds pairs of boxes: several levels of cells, or one size of cells for all objects (H5, H6).
@@ -88,6 +105,11 @@ struct CollisionMethods {
   NarrowPhase narrow_phase = NarrowPhase::gjk;
   BroadPhase broad_phase = BroadPhase::multi_grid;
   ImpactTime impact_time = ImpactTime::advancement;
+  Trees trees = Trees::aabb;
+  TreeSplit tree_split = TreeSplit::surface_area;  ///< of these trees
+  MeshPairs mesh_pairs = MeshPairs::parts;
+  /// Width of a cell of the uniform grid in mean diameters of the bodies (the book's k), > 0.
+  Real cell_factor = CellSizes::kMeansInCell;
 };
 
 struct WorldDef {
@@ -100,7 +122,9 @@ struct WorldDef {
   ImpactLaw impact = ImpactLaw::simultaneous;
   Real collision_speed = 0.05;  ///< bodies that approach more slowly do not bounce [m/s], > 0
   CollisionMethods collision = {};
-  bool sleep = true;  ///< whether islands at rest are not simulated until something reaches them
+  ParticleContactMethod particle_contacts = ParticleContactMethod::relaxation;
+  uint32_t particle_cluster = 24;  ///< greatest number of contacts of a cluster solved by `lcp`, 1 to 64
+  bool sleep = true;               ///< whether islands at rest are not simulated until something reaches them
   Aabb bounds = Aabb(Vec3::Constant(-1000),
                      Vec3::Constant(1000));  ///< objects that leave are retired and reported (E3)
 };
@@ -131,6 +155,8 @@ struct StepReport {
   Real penetration = 0;            ///< greatest penetration at the starts of sub-steps and at impacts [m]
   uint64_t pairs_tested = 0;       ///< pairs of bodies with overlapping boxes, of all sub-steps
   uint64_t impact_searches = 0;    ///< searches for the time of impact of a pair
+  uint64_t volume_tests = 0;       ///< tests of two volumes of the trees of two bodies, of all sub-steps
+  uint64_t piece_tests = 0;        ///< tests of two convex parts or triangles of two bodies
   uint64_t collisions = 0;         ///< contacts whose speed of approach exceeded WorldDef::collision_speed
   uint64_t tracebacks = 0;         ///< trace-backs of islands to a time of impact
   uint64_t toi_limit_reached = 0;  ///< pairs that reached the limit of time-of-impact events in a sub-step;
@@ -139,8 +165,9 @@ struct StepReport {
   uint64_t restitution_suppressed = 0;
   uint64_t speculative_contacts = 0;  ///< speculative contacts of the fast solver
   uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;
-  ContactWork exact, fast;  ///< work of the solvers of resting contact
-  ContactWork impacts;      ///< work of the solver of collisions
+  ContactWork exact, fast, lcp;  ///< work of the solvers of resting contact
+  ContactWork particle_lcp;      ///< contact forces of particles by pivoting
+  ContactWork impacts;           ///< work of the solver of collisions
   std::vector<RoughContact>
       rough_contacts;            ///< one for each fall-back of these solvers, in the order of occurrence
   IntegratorReport integration;  ///< of the motion without contacts

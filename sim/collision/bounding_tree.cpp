@@ -62,6 +62,18 @@ void fit_points(Tree& tree, std::span<typename Tree::Node> nodes, const Triangle
   });
 }
 
+template <class Tree>
+void fit_sets(const Tree& tree, std::span<typename Tree::Node> nodes,
+              std::span<const std::span<const Vec3>> sets) {
+  std::vector<Vec3> points;
+  for (typename Tree::Node& node : nodes) {
+    points.clear();
+    for (const uint32_t item : tree.items(node))
+      points.insert(points.end(), sets[item].begin(), sets[item].end());
+    fit(node.volume, points, true);
+  }
+}
+
 Real reach_of(const Aabb& v) {
   return v.min().cwiseAbs().cwiseMax(v.max().cwiseAbs()).norm();
 }
@@ -85,6 +97,26 @@ BoundingTree<Volume>::BoundingTree(std::span<const Aabb> boxes,
                                    TreeSplit split) requires std::same_as<Volume, Aabb> {
   build(box_items(boxes), split);
   if constexpr (std::same_as<Volume, Aabb>) refit(boxes);
+}
+
+template <class Volume>
+BoundingTree<Volume>::BoundingTree(std::span<const std::span<const Vec3>> items, TreeSplit split) {
+  std::vector<Aabb> boxes(items.size());
+  for (std::size_t i = 0; i < items.size(); ++i)
+    for (const Vec3& p : items[i]) boxes[i].extend(p);
+  build(box_items(boxes), split);
+  if constexpr (std::same_as<Volume, Aabb>)
+    refit(boxes);
+  else
+    fit_sets(*this, std::span<Node>(nodes_), items);
+}
+
+template <class Volume>
+BoundingTree<Volume> BoundingTree<Volume>::of_one(const Volume& volume) {
+  BoundingTree tree;
+  tree.nodes_ = {{volume, 1, 0, 1}};
+  tree.items_ = {0};
+  return tree;
 }
 
 template <class Volume>

@@ -36,6 +36,12 @@ class BoundingTree {
   explicit BoundingTree(std::span<const Aabb> boxes,
                         TreeSplit split = TreeSplit::surface_area) requires std::same_as<Volume, Aabb>;
 
+  /// A tree of items that are sets of points, such as the vertices of convex parts. No set may be empty.
+  explicit BoundingTree(std::span<const std::span<const Vec3>> items,
+                        TreeSplit split = TreeSplit::surface_area);
+  /// A tree of one item.
+  static BoundingTree of_one(const Volume& volume);
+
   /// Fits the volumes to the moved vertices of a mesh with the same triangles. Oriented boxes keep their
   /// axes.
   void refit(const TriangleMesh& mesh);

@@ -71,7 +71,7 @@ void BroadPhase::count_diameter(uint32_t object, Real sign) {
 void BroadPhase::fit_uniform_width() {
   constexpr Real kTolerance = 1.25;
   if (sizes_.kind != GridKind::uniform || !(bounded_ > 0 && diameters_ > 0)) return;
-  const Real width = CellSizes::kMeansInCell * diameters_ / bounded_;
+  const Real width = means_in_cell_ * diameters_ / bounded_;
   if (width < sizes_.uniform_width * kTolerance && width * kTolerance > sizes_.uniform_width) return;
   sizes_.uniform_width = width;
   for (uint32_t i = 0; i < states_.size(); ++i)

@@ -17,7 +17,11 @@ namespace offstage::sim {
 
 class BroadPhase {
  public:
-  explicit BroadPhase(GridKind kind = GridKind::multilevel) { sizes_.kind = kind; }
+  /// `means_in_cell`, > 0: width of a cell of the uniform grid in mean diameters.
+  explicit BroadPhase(GridKind kind = GridKind::multilevel, Real means_in_cell = CellSizes::kMeansInCell)
+      : means_in_cell_(means_in_cell) {
+    sizes_.kind = kind;
+  }
 
   /// Adds an object under an index chosen by the caller, below CellTable::kMaxObjects; memory is proportional
   /// to the greatest index. The box is that of the bounding sphere, or a tighter or swept one. It may be a
@@ -58,6 +62,7 @@ class BroadPhase {
   void settle_if_due();
 
   CellSizes sizes_;
+  Real means_in_cell_;
   std::size_t count_ = 0;  // number of objects
   Real diameters_ = 0;     // sum of the diameters of bounded objects [m]
   Real bounded_ = 0;       // number of these

@@ -108,6 +108,16 @@ const AabbTree& CollisionMesh::part_tree() const {
   return part_tree_;
 }
 
+const PieceTree& CollisionMesh::piece_tree(bool of_triangles, const TreeChoice& choice) const {
+  const std::lock_guard lock(trees_mutex_);
+  const std::pair key(of_triangles, choice);
+  if (const auto known = trees_.find(key); known != trees_.end()) return known->second;
+  if (of_triangles) return trees_.emplace(key, make_tree(mesh, choice)).first->second;
+  std::vector<std::span<const Vec3>> parts;
+  for (const ConvexPolyhedron& part : decomposition().parts) parts.push_back(part.vertices());
+  return trees_.emplace(key, make_tree(std::span<const std::span<const Vec3>>(parts), choice)).first->second;
+}
+
 const ClearanceGrid& CollisionMesh::clearance_grid() const {
   std::call_once(clear_once_, [this] { clear_cells_ = recent_grid(mesh, solid); });
   return *clear_cells_;

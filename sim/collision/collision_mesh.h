@@ -1,15 +1,18 @@
 #pragma once
 /// A registered mesh with the data that registration computes once, in the mesh's own frame (physics E2).
 
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "sim/collision/bounding_tree.h"
 #include "sim/collision/clearance_grid.h"
 #include "sim/collision/convex.h"
 #include "sim/collision/mesh_surface.h"
+#include "sim/collision/piece_tree.h"
 #include "sim/geometry/convex_decomposition.h"
 #include "sim/geometry/mass_properties.h"
 #include "sim/geometry/mesh.h"
@@ -41,6 +44,9 @@ class CollisionMesh {
   const ConvexDecomposition& decomposition() const;
   /// Tree over the boxes of the decomposition's parts, whose items are their indices.
   const AabbTree& part_tree() const;
+  /// Trees of other kinds over the triangles or over the parts. Computed at the first call for each kind;
+  /// safe from several threads.
+  const PieceTree& piece_tree(bool of_triangles, const TreeChoice& choice) const;
   /// Grid of the free space around the mesh. Computed at the first call, which takes about 10 ms; safe from
   /// several threads.
   const ClearanceGrid& clearance_grid() const;
@@ -51,6 +57,8 @@ class CollisionMesh {
   mutable std::once_flag once_;
   mutable std::optional<ConvexDecomposition> decomposition_;
   mutable AabbTree part_tree_;
+  mutable std::mutex trees_mutex_;
+  mutable std::map<std::pair<bool, TreeChoice>, PieceTree> trees_;
   mutable std::once_flag clear_once_;
   mutable std::optional<ClearanceGrid> clear_cells_;
 };

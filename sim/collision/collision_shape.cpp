@@ -1,26 +1,52 @@
 #include "sim/collision/collision_shape.h"
 
-#include <array>
+#include <algorithm>
 
 namespace offstage::sim {
+namespace {
 
-CollisionShape::CollisionShape(const Solid& solid, bool needs_volume) : solid_(solid) {
+/// The tree of a primitive in its box.
+PieceTree tree_of(const Convex& hull, const Aabb& box, TreeVolume volume) {
+  const Vec3 half = box.sizes() / 2;
+  switch (volume) {
+    case TreeVolume::obb:
+      return ObbTree::of_one({box.center(), half, Mat3::Identity()});
+    case TreeVolume::sphere:
+      return SphereTree::of_one(half.norm() < hull.reach() ? BoundingSphere{box.center(), half.norm()}
+                                                           : BoundingSphere{Vec3::Zero(), hull.reach()});
+    case TreeVolume::aabb:
+      break;
+  }
+  return AabbTree::of_one(box);
+}
+
+}  // namespace
+
+CollisionShape::CollisionShape(const Solid& solid, const Options& options) : solid_(solid) {
   if (is_plane()) return;
   if (!solid.mesh) {
     hull_ = convex(*solid.shape);
-    own_tree_ = AabbTree(std::array{local_bounds(solid)});
+    box_ = local_bounds(solid);
+    own_tree_ = tree_of(hull_, box_, options.tree.volume);
+    pieces_ = 1;
     return;
   }
   const CollisionMesh& mesh = *solid.mesh;
   hull_ = convex(mesh.hull);
   using Method = ConvexDecomposition::Method;
-  triangles_ = !mesh.solid || mesh.decomposition().method == Method::none ||
-               (mesh.decomposition().method == Method::approximate && !needs_volume);
-  mesh_tree_ = triangles_ ? &mesh.tree : &mesh.part_tree();
+  by_triangles_ = options.by_triangles;
+  triangles_ = by_triangles_ || !mesh.solid || mesh.decomposition().method == Method::none ||
+               (mesh.decomposition().method == Method::approximate && !options.needs_volume);
+  if (options.tree == TreeChoice{})
+    tree_ = triangles_ ? &mesh.tree : &mesh.part_tree();
+  else
+    std::visit([&](const auto& tree) { tree_ = &tree; }, mesh.piece_tree(triangles_, options.tree));
+  box_ = triangles_ ? mesh.tree.bounds() : mesh.part_tree().bounds();
+  pieces_ = static_cast<uint32_t>(with_tree([](const auto& tree) { return tree.items().size(); }));
 }
 
 Convex CollisionShape::piece(uint32_t index) const {
-  if (!mesh_tree_) return hull_;
+  if (!solid_.mesh) return hull_;
   const CollisionMesh& mesh = *solid_.mesh;
   if (!triangles_) return convex(mesh.decomposition().parts[index]);
   const Triangle& t = mesh.mesh.triangles[index];

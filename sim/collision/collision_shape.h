@@ -1,10 +1,11 @@
 #pragma once
-/// A body's shape as the narrow phase sees it: convex pieces, and a tree over their boxes. A primitive is one
-/// piece. A mesh is represented by the parts of its convex decomposition, or by its triangles if it has no
-/// inside or if its decomposition is only approximate and the body does not need one (see CollisionShape's
+/// A body's shape as the narrow phase sees it: convex pieces, and a tree over their volumes. A primitive is
+/// one piece. A mesh is represented by the parts of its convex decomposition, or by its triangles if it has
+/// no inside or if its decomposition is only approximate and the body does not need one (see CollisionShape's
 /// constructor). The half-space under a plane has no pieces.
 
 #include <optional>
+#include <variant>
 
 #include "sim/collision/collision_mesh.h"
 #include "sim/collision/convex.h"
@@ -14,32 +15,69 @@ namespace offstage::sim {
 
 class CollisionShape {
  public:
-  /// `solid` and the data it points to must outlive the shape. Dynamic bodies set `needs_volume`: contacts
-  /// with them need a penetration depth, so a mesh is represented by its parts even if these are approximate.
-  /// For other bodies the exact surface is preferred.
-  CollisionShape(const Solid& solid, bool needs_volume);
+  struct Options {
+    /// For dynamic bodies: contacts with them need a penetration depth, so a mesh is represented by its parts
+    /// even if these are approximate. For other bodies the exact surface is preferred.
+    bool needs_volume = false;
+    /// A mesh is represented by its triangles in any case, and two such shapes by tests of two triangles.
+    bool by_triangles = false;
+    TreeChoice tree = {};
+  };
+  /// `solid` and the data it points to must outlive the shape.
+  CollisionShape(const Solid& solid, const Options& options);
+  CollisionShape(const Solid& solid, bool needs_volume)
+      : CollisionShape(solid, Options{.needs_volume = needs_volume}) {}
 
   const Solid& solid() const { return solid_; }
   bool is_plane() const { return std::holds_alternative<Plane>(*solid_.shape); }
 
-  uint32_t piece_count() const { return static_cast<uint32_t>(tree().items().size()); }
+  uint32_t piece_count() const { return pieces_; }
   Convex piece(uint32_t index) const;
-  /// Its items are the indices of the pieces.
-  const AabbTree& tree() const { return mesh_tree_ ? *mesh_tree_ : own_tree_; }
+  /// Calls f(tree) for the tree of its pieces, whose items are their indices. Not available for a plane.
+  template <class F>
+  decltype(auto) with_tree(F&& f) const {
+    switch (tree_.index()) {
+      case 1:
+        return f(*std::get<1>(tree_));
+      case 2:
+        return f(*std::get<2>(tree_));
+      case 3:
+        return f(*std::get<3>(tree_));
+      default:
+        break;
+    }
+    if (const auto* tree = std::get_if<ObbTree>(&own_tree_)) return f(*tree);
+    if (const auto* tree = std::get_if<SphereTree>(&own_tree_)) return f(*tree);
+    return f(std::get<AabbTree>(own_tree_));
+  }
+  /// Box of all pieces.
+  const Aabb& box() const { return box_; }
   /// Whether the pieces are triangles that bound a solid. An object can then be inside it without touching a
   /// piece.
   bool is_hollow() const { return triangles_ && solid_.mesh->solid; }
   /// The mesh whose triangles are the pieces; null if the pieces are not triangles.
   const CollisionMesh* surface() const { return triangles_ ? solid_.mesh : nullptr; }
+  /// Whether Options::by_triangles was chosen for a mesh.
+  bool is_by_triangles() const { return by_triangles_; }
   /// The convex hull of all pieces. Not available for a plane.
   const Convex& hull() const { return hull_; }
 
  private:
   Solid solid_;
   Convex hull_;
-  AabbTree own_tree_;                    // tree of a primitive: one box
-  const AabbTree* mesh_tree_ = nullptr;  // tree of the parts or triangles
-  bool triangles_ = false;
+  PieceTree own_tree_;  // tree of a primitive: one volume
+  // The tree of a mesh's parts or triangles.
+  std::variant<std::monostate, const AabbTree*, const ObbTree*, const SphereTree*> tree_;
+  Aabb box_;
+  uint32_t pieces_ = 0;
+  bool triangles_ = false, by_triangles_ = false;
 };
+
+/// Calls f(tree of a, tree of b), each of its own kind.
+template <class F>
+decltype(auto) with_trees(const CollisionShape& a, const CollisionShape& b, F&& f) {
+  return a.with_tree(
+      [&](const auto& tree_a) { return b.with_tree([&](const auto& tree_b) { return f(tree_a, tree_b); }); });
+}
 
 }  // namespace offstage::sim

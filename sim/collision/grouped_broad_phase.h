@@ -14,7 +14,9 @@ namespace offstage::sim {
 
 class GroupedBroadPhase {
  public:
-  explicit GroupedBroadPhase(GridKind kind = GridKind::multilevel) : grid_(kind) {}
+  explicit GroupedBroadPhase(GridKind kind = GridKind::multilevel,
+                             Real means_in_cell = CellSizes::kMeansInCell)
+      : grid_(kind, means_in_cell) {}
 
   /// These functions are as those of BroadPhase, for objects of both levels.
   void insert(uint32_t object, const Aabb& box, bool is_static = false);

@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
 #include "sim/collision/narrow_phase.h"
 #include "sim/collision/tree_pair.h"
@@ -15,7 +16,78 @@ constexpr int kMaxMeshAdvances = 2000;
 /// Number of points of the motion at which shapes that touch are sampled.
 constexpr int kLooks = 32;
 
-using Node = AabbTree::Node;
+/// A lower bound of the distance of two volumes along a direction from B to A, in A's frame.
+struct DirectedGap {
+  Real distance;
+  Vec3 normal;
+};
+
+Mat3 axes_of(const Aabb&) {
+  return Mat3::Identity();
+}
+Mat3 axes_of(const Obb& box) {
+  return box.axes;
+}
+
+/// Two boxes: along the axis of either on which they are farthest apart. A sphere: along the line of the
+/// centres or, with a box, along the box's axes.
+template <class A, class B>
+DirectedGap directed_gap(const A& a, const B& b, const Placement& p) {
+  const Vec3 offset = p.point(centre(b)) - centre(a);
+  if constexpr (kIsSphere<A> && kIsSphere<B>) {
+    const Real distance = offset.norm();
+    if (!(distance > 0)) return {-a.radius - b.radius, Vec3::UnitX()};
+    return {distance - a.radius - b.radius, -offset / distance};
+  } else if constexpr (kIsSphere<A> || kIsSphere<B>) {
+    Mat3 axes;
+    Vec3 half;
+    Real radius;
+    if constexpr (kIsSphere<A>) {
+      axes = p.rotation * axes_of(b);
+      half = half_sizes(b);
+      radius = a.radius;
+    } else {
+      axes = axes_of(a);
+      half = half_sizes(a);
+      radius = b.radius;
+    }
+    const Vec3 local = axes.transpose() * offset;
+    int k;
+    const Real distance = (local.cwiseAbs() - half).maxCoeff(&k) - radius;
+    return {distance, local[k] > 0 ? Vec3(-axes.col(k)) : Vec3(axes.col(k))};
+  } else if constexpr (std::is_same_v<A, Aabb> && std::is_same_v<B, Aabb>) {
+    const Mat3& R = p.rotation;
+    const Vec3 half_a = half_sizes(a), half_b = half_sizes(b);
+    const Vec3 gaps_a = offset.cwiseAbs() - half_a - R.cwiseAbs() * half_b,
+               gaps_b = (R.transpose() * offset).cwiseAbs() - half_b - R.transpose().cwiseAbs() * half_a;
+    int i, j;
+    const Real gap_a = gaps_a.maxCoeff(&i), gap_b = gaps_b.maxCoeff(&j);
+    Vec3 normal = gap_a >= gap_b ? Vec3(Vec3::Unit(i)) : Vec3(R.col(j));
+    if (normal.dot(offset) > 0) normal = -normal;
+    return {std::max(gap_a, gap_b), normal};
+  } else {
+    const Mat3 axes_a = axes_of(a), axes_b = p.rotation * axes_of(b), R = axes_a.transpose() * axes_b;
+    const Vec3 local = axes_a.transpose() * offset, half_a = half_sizes(a), half_b = half_sizes(b);
+    const Vec3 gaps_a = local.cwiseAbs() - half_a - R.cwiseAbs() * half_b,
+               gaps_b = (R.transpose() * local).cwiseAbs() - half_b - R.transpose().cwiseAbs() * half_a;
+    int i, j;
+    const Real gap_a = gaps_a.maxCoeff(&i), gap_b = gaps_b.maxCoeff(&j);
+    Vec3 normal = gap_a >= gap_b ? Vec3(axes_a.col(i)) : Vec3(axes_b.col(j));
+    if (normal.dot(offset) > 0) normal = -normal;
+    return {std::max(gap_a, gap_b), normal};
+  }
+}
+
+/// Greatest distance of a volume's points from the frame's origin [m].
+Real volume_reach(const Aabb& box) {
+  return box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).norm();
+}
+Real volume_reach(const Obb& box) {
+  return box.centre.norm() + box.half.norm();
+}
+Real volume_reach(const BoundingSphere& sphere) {
+  return sphere.centre.norm() + sphere.radius;
+}
 
 /// Two shapes at one time of their motions.
 class Instant {
@@ -42,15 +114,23 @@ class Instant {
   /// within it now.
   Real time_to_contact(Real limit) {
     time_ = limit;
-    const AabbTree &tree_a = a_.shape.tree(), &tree_b = b_.shape.tree();
-    NodePairStack<Aabb, Aabb> stack;  // `gap` holds the time here
-    const auto timed = [&](NodePair<Aabb, Aabb> pair) {
+    with_trees(a_.shape, b_.shape,
+               [&](const auto& tree_a, const auto& tree_b) { search(tree_a, tree_b, limit); });
+    return time_;
+  }
+
+ private:
+  template <class A, class B>
+  void search(const BoundingTree<A>& tree_a, const BoundingTree<B>& tree_b, Real limit) {
+    NodePairStack<A, B> stack;  // `gap` holds the time here
+    const auto timed = [&](NodePair<A, B> pair) {
+      if (a_.counts) ++a_.counts->volumes;
       pair.gap = node_time(*pair.a, *pair.b);
       return pair;
     };
     stack.push(timed({&tree_a.nodes()[0], &tree_b.nodes()[0]}));
     while (!stack.empty()) {
-      const NodePair<Aabb, Aabb> pair = stack.pop();
+      const NodePair<A, B> pair = stack.pop();
       // Touching pairs have time 0. The nearest of them is wanted, so pairs with equal times are not skipped.
       if (pair.gap > time_ || pair.gap >= limit) continue;
       if (pair.a->is_leaf() && pair.b->is_leaf()) {
@@ -65,24 +145,15 @@ class Instant {
       stack.push(far);
       stack.push(near);
     }
-    return time_;
   }
 
- private:
-  /// Lower bound of the time for all pieces below two nodes, along the axis of the two boxes on which they
-  /// are farthest apart.
-  Real node_time(const Node& a, const Node& b) const {
-    const Mat3& R = placement_.rotation;
-    const Vec3 offset = placement_.point(centre(b.volume)) - centre(a.volume);
-    const Vec3 half_a = half_sizes(a.volume), half_b = half_sizes(b.volume);
-    const Vec3 gaps_a = offset.cwiseAbs() - half_a - R.cwiseAbs() * half_b,
-               gaps_b = (R.transpose() * offset).cwiseAbs() - half_b - R.transpose().cwiseAbs() * half_a;
-    int i, j;
-    const Real gap_a = gaps_a.maxCoeff(&i), gap_b = gaps_b.maxCoeff(&j);
-    Vec3 normal = gap_a >= gap_b ? Vec3(Vec3::Unit(i)) : Vec3(R.col(j));
-    if (normal.dot(offset) > 0) normal = -normal;  // from B to A
-    const Real reach_a = reach(a.volume), reach_b = reach(b.volume);
-    Gap gap{std::max(gap_a, gap_b) - placement_.slack, normal.dot(closing_), 0};
+  /// Lower bound of the time for all pieces below two nodes.
+  template <class NodeA, class NodeB>
+  Real node_time(const NodeA& a, const NodeB& b) const {
+    const DirectedGap directed = directed_gap(a.volume, b.volume, placement_);
+    const Vec3& normal = directed.normal;
+    const Real reach_a = volume_reach(a.volume), reach_b = volume_reach(b.volume);
+    Gap gap{directed.distance - placement_.slack, normal.dot(closing_), 0};
     if (a_.path.turns()) {
       gap.rate += spin_a_.cross(normal).norm() * reach_a;
       gap.acceleration += a_.path.max_acceleration(reach_a);
@@ -94,12 +165,10 @@ class Instant {
     return gap.time_to(tolerance_ / 2);
   }
 
-  static Real reach(const Aabb& box) { return box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).norm(); }
-
   Real piece_time(uint32_t i, uint32_t j) {
+    if (a_.counts) ++a_.counts->pieces;
     const Convex p = a_.shape.piece(i), q = b_.shape.piece(j);
-    GjkCache fresh;
-    const Separation s = gjk(p, q, a_from_b_, fresh);
+    const Separation s = piece_separation(a_.shape, i, b_.shape, j, a_from_b_);
     if (s.distance <= tolerance_) {
       if (!contact_ || s.distance < contact_->distance) contact_ = s;
       return 0;
@@ -137,7 +206,9 @@ std::optional<Impact> bisected_time_of_impact(const MovingShape& a, const Moving
     const Pose at_a = a.path.at(share), at_b = b.path.at(share);
     return Pose{at_a.point_to_body(at_b.position), at_a.orientation.conjugate() * at_b.orientation};
   };
-  const auto touch_at = [&](Real share) { return touching(a.shape, b.shape, a_from_b(share)); };
+  TestCounts uncounted;
+  TestCounts& counts = a.counts ? *a.counts : uncounted;
+  const auto touch_at = [&](Real share) { return touching(a.shape, b.shape, a_from_b(share), counts); };
   if (!touch_at(1)) return std::nullopt;
   // Bound of the relative speed of any two points [m per step].
   const auto fastest = [](const MovingShape& s) {
@@ -168,7 +239,11 @@ std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b,
   if (b.shape.is_plane()) return time_of_plane_impact(hull_a, b.path, tolerance);
   const bool convex = !a.shape.is_hollow() && !b.shape.is_hollow() && a.shape.piece_count() == 1 &&
                       b.shape.piece_count() == 1;
-  if (convex) return time_of_impact(hull_a, {b.shape.hull(), b.path}, tolerance);
+  if (convex) {
+    const auto found = time_of_impact(hull_a, {b.shape.hull(), b.path}, tolerance);
+    if (a.counts) a.counts->pieces += found ? static_cast<uint64_t>(found->advances) : 1;
+    return found;
+  }
 
   Impact impact{0, {}};
   for (impact.advances = 1;; ++impact.advances) {

@@ -9,9 +9,13 @@
 #include "sim/collision/tree_pair.h"
 #include "sim/collision/triangle_contact.h"
 #include "sim/geometry/closest_points.h"
+#include "sim/geometry/intersection.h"
 
 namespace offstage::sim {
 namespace {
+
+/// Triangles that are nearer have no reliable direction between their closest points [m].
+constexpr Real kLeastTriangleDistance = 1e-9;
 
 Pose inverse(const Pose& p) {
   const Quat back = p.orientation.conjugate();
@@ -28,6 +32,43 @@ Separation measure(const Convex& a, const Convex& b, const Pose& a_from_b, Dista
   if (method == DistanceMethod::vclip && polyhedra)
     return vclip(*a.polyhedron, *b.polyhedron, a_from_b, entry.vclip);
   return gjk(a, b, a_from_b, entry.gjk);
+}
+
+TriangleVertices vertices_of(const Convex& triangle) {
+  return {*triangle.corners[0], *triangle.corners[1], *triangle.corners[2]};
+}
+
+/// Whether two pieces are tested as triangles.
+bool are_triangles(const CollisionShape& a, const CollisionShape& b) {
+  return a.is_by_triangles() && b.is_by_triangles();
+}
+
+/// The triangle `t`, in the frame of its mesh, placed by a pose.
+TriangleVertices placed_vertices(const Convex& t, const Pose& pose) {
+  TriangleVertices v = vertices_of(t);
+  for (Vec3& p : v) p = pose.point_to_world(p);
+  return v;
+}
+
+/// Two triangles by their closest points (2.4, appendix A). If they intersect, GJK gives the depth.
+Separation measure_triangles(const Convex& a, const Convex& b, const Pose& a_from_b,
+                             PairCache::Entry& entry) {
+  const ClosestPoints closest = closest_on_triangles(vertices_of(a), placed_vertices(b, a_from_b));
+  const Real distance = std::sqrt(closest.squared_distance);
+  if (!(distance > kLeastTriangleDistance)) return gjk(a, b, a_from_b, entry.gjk);
+  Separation s;
+  s.distance = distance;
+  s.normal = (closest.on_a - closest.on_b) / distance;
+  s.on_a = closest.on_a;
+  s.on_b = closest.on_b;
+  s.iterations = 1;
+  return s;
+}
+
+Separation measure(const CollisionShape& a, uint32_t i, const CollisionShape& b, uint32_t j,
+                   const Pose& a_from_b, DistanceMethod method, PairCache::Entry& entry) {
+  if (are_triangles(a, b)) return measure_triangles(a.piece(i), b.piece(j), a_from_b, entry);
+  return measure(a.piece(i), b.piece(j), a_from_b, method, entry);
 }
 
 Separation plane_separation(const Convex& a, const Pose& a_from_plane) {
@@ -197,7 +238,7 @@ std::optional<Inside> inside(const CollisionShape& hollow, const CollisionShape&
                              const Pose& hollow_from_other) {
   if (!hollow.is_hollow() || other.is_plane()) return std::nullopt;
   const Vec3 centre = hollow_from_other.point_to_world(other.hull().centre());
-  if (!hollow.tree().bounds().contains(centre)) return std::nullopt;
+  if (!hollow.box().contains(centre)) return std::nullopt;
   const SurfaceDistance s = signed_distance(*hollow.solid().mesh, centre);
   if (s.distance >= 0) return std::nullopt;
   const Convex& hull = other.hull();
@@ -255,6 +296,12 @@ void PairCache::forget_unused() {
   for (Used& e : entries_) e.used = false;
 }
 
+Separation piece_separation(const CollisionShape& a, uint32_t i, const CollisionShape& b, uint32_t j,
+                            const Pose& a_from_b) {
+  PairCache::Entry fresh{.piece_a = i, .piece_b = j, .gjk = {}, .vclip = {}};
+  return measure(a, i, b, j, a_from_b, DistanceMethod::gjk, fresh);
+}
+
 std::optional<Separation> separation(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b,
                                      PairCache& cache, DistanceMethod method, Real limit) {
   assert(!a.is_plane());
@@ -265,25 +312,37 @@ std::optional<Separation> separation(const CollisionShape& a, const CollisionSha
     return nearest;
   }
   const auto distance = [&](uint32_t i, uint32_t j) {
-    const Separation s = measure(a.piece(i), b.piece(j), a_from_b, method, cache.of(i, j));
+    const Separation s = measure(a, i, b, j, a_from_b, method, cache.of(i, j));
     if (s.distance <= limit && (!nearest || s.distance < nearest->distance)) nearest = s;
     return s.distance;
   };
-  nearest_pair(a.tree(), b.tree(), placement(a, b, a_from_b, 0), limit, distance);
+  with_trees(a, b, [&](const auto& tree_a, const auto& tree_b) {
+    nearest_pair(tree_a, tree_b, placement(a, b, a_from_b, 0), limit, distance, cache.tests);
+  });
   if (!nearest || nearest->distance > 0)
     if (const auto contained = containment(a, b, a_from_b)) return contained;
   return nearest;
 }
 
-bool touching(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b) {
+bool touching(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b, TestCounts& counts) {
   assert(!a.is_plane());
   if (b.is_plane()) return plane_separation(a.hull(), a_from_b).distance <= 0;
-  const bool apart =
-      for_each_pair(a.tree(), b.tree(), placement(a, b, a_from_b, 0), [&](uint32_t i, uint32_t j) {
-        GjkCache fresh;
-        return !overlap(a.piece(i), b.piece(j), a_from_b, fresh);
-      });
+  const bool as_triangles = are_triangles(a, b);
+  const auto are_apart = [&](uint32_t i, uint32_t j) {
+    const Convex p = a.piece(i), q = b.piece(j);
+    if (as_triangles) return !triangles_intersect(vertices_of(p), placed_vertices(q, a_from_b));
+    GjkCache fresh;
+    return !overlap(p, q, a_from_b, fresh);
+  };
+  const bool apart = with_trees(a, b, [&](const auto& tree_a, const auto& tree_b) {
+    return for_each_pair(tree_a, tree_b, placement(a, b, a_from_b, 0), are_apart, counts);
+  });
   return !apart || containment(a, b, a_from_b);
+}
+
+bool touching(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b) {
+  TestCounts counts;
+  return touching(a, b, a_from_b, counts);
 }
 
 void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b, Real margin,
@@ -298,10 +357,14 @@ void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose
   const auto visit = [&](uint32_t i, uint32_t j) {
     PiecePair(a, i, b, j, a_from_b, cache).find(margin, method, turning, manifolds);
   };
-  if (a.piece_count() == 1 && b.piece_count() == 1)
+  if (a.piece_count() == 1 && b.piece_count() == 1) {
+    ++cache.tests.pieces;
     visit(0, 0);
-  else
-    for_each_pair(a.tree(), b.tree(), placement(a, b, a_from_b, margin), visit);
+  } else {
+    with_trees(a, b, [&](const auto& tree_a, const auto& tree_b) {
+      for_each_pair(tree_a, tree_b, placement(a, b, a_from_b, margin), visit, cache.tests);
+    });
+  }
   if (manifolds.size() > before) return;
   if (const auto s = containment(a, b, a_from_b)) {
     Manifold m;

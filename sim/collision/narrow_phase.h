@@ -1,8 +1,9 @@
 #pragma once
 /// Narrow phase: distance, contacts and time of impact of two shapes of any kind at given poses (physics
 /// R3-R5, R12). Pairs of their convex pieces are found by traversing both trees, and each pair is measured by
-/// GJK or V-Clip. Everything is reported in the frame of the first shape, A, with normals from B to A. Only
-/// the second shape can be a plane.
+/// GJK, V-Clip or, for distances of two shapes by_triangles, the closest points of two triangles.
+/// Everything is reported in the frame of the first shape, A, with normals from B to A. Only the second shape
+/// can be a plane.
 
 #include <cstdint>
 #include <limits>
@@ -13,6 +14,7 @@
 #include "sim/collision/gjk.h"
 #include "sim/collision/manifold.h"
 #include "sim/collision/time_of_impact.h"
+#include "sim/collision/tree_pair.h"
 #include "sim/collision/vclip.h"
 
 namespace offstage::sim {
@@ -39,6 +41,8 @@ class PairCache {
   /// Removes the entries that were not used since the last call.
   void forget_unused();
 
+  /// Tests of the queries with this cache.
+  TestCounts tests;
   /// Whether the shapes are at their actual, not predicted, poses. Sides are stored only then.
   bool keeps_sides = true;
 
@@ -56,7 +60,12 @@ std::optional<Separation> separation(const CollisionShape& a, const CollisionSha
                                      PairCache& cache, DistanceMethod method = DistanceMethod::gjk,
                                      Real limit = std::numeric_limits<Real>::infinity());
 
-/// Whether the shapes have a point in common.
+/// Signed distance of two pieces without a cache.
+Separation piece_separation(const CollisionShape& a, uint32_t i, const CollisionShape& b, uint32_t j,
+                            const Pose& a_from_b);
+
+/// Whether the shapes have a point in common. The tests are added to `counts`.
+bool touching(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b, TestCounts& counts);
 bool touching(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b);
 
 /// Appends the manifolds of all pairs of pieces within `margin` [m] of each other, in an order that depends
@@ -71,6 +80,7 @@ void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose
 struct MovingShape {
   const CollisionShape& shape;
   const PosePath& path;
+  TestCounts* counts = nullptr;  ///< if given for the first shape, tests are added to it
 };
 
 /// Returns the time, as a share of the step, at which the shapes are within `tolerance` [m], > 0, of each

@@ -6,12 +6,24 @@
 #include <algorithm>
 #include <array>
 #include <concepts>
+#include <cstdint>
 #include <utility>
 
 #include "sim/collision/bounding_tree.h"
 #include "sim/collision/volume_pair.h"
 
 namespace offstage::sim {
+
+/// Numbers of the tests that queries have made.
+struct TestCounts {
+  uint64_t volumes = 0;  ///< pairs of volumes of the trees
+  uint64_t pieces = 0;   ///< pairs of items, such as triangles or convex parts
+
+  void add(const TestCounts& more) {
+    volumes += more.volumes;
+    pieces += more.pieces;
+  }
+};
 
 /// A pair of nodes to be visited; `gap` is a lower bound of the distance of their items.
 template <class A, class B>
@@ -47,11 +59,12 @@ std::pair<NodePair<A, B>, NodePair<A, B>> descend(const BoundingTree<A>& tree_a,
 
 /// Calls visit(item of a, item of b) for every pair of items whose leaves' volumes are within the placement's
 /// margin, in an order that depends only on the trees. If visit returns bool, false ends the traversal.
-/// Returns whether the traversal was complete.
+/// Returns whether the traversal was complete. The tests are added to `counts`.
 template <class A, class B, class Visit>
 bool for_each_pair(const BoundingTree<A>& tree_a, const BoundingTree<B>& tree_b, const Placement& a_from_b,
-                   Visit&& visit) {
+                   Visit&& visit, TestCounts& counts) {
   const auto go_on = [&](uint32_t i, uint32_t j) {
+    ++counts.pieces;
     if constexpr (std::same_as<decltype(visit(i, j)), bool>) return visit(i, j);
     visit(i, j);
     return true;
@@ -61,6 +74,7 @@ bool for_each_pair(const BoundingTree<A>& tree_a, const BoundingTree<B>& tree_b,
   stack.push({&tree_a.nodes()[0], &tree_b.nodes()[0]});
   while (!stack.empty()) {
     const NodePair<A, B> pair = stack.pop();
+    ++counts.volumes;
     if (!overlap(pair.a->volume, pair.b->volume, a_from_b)) continue;
     if (pair.a->is_leaf() && pair.b->is_leaf()) {
       for (uint32_t i : tree_a.items(*pair.a))
@@ -75,13 +89,22 @@ bool for_each_pair(const BoundingTree<A>& tree_a, const BoundingTree<B>& tree_b,
   return true;
 }
 
+template <class A, class B, class Visit>
+bool for_each_pair(const BoundingTree<A>& tree_a, const BoundingTree<B>& tree_b, const Placement& a_from_b,
+                   Visit&& visit) {
+  TestCounts counts;
+  return for_each_pair(tree_a, tree_b, a_from_b, visit, counts);
+}
+
 /// Branch and bound: calls distance(item of a, item of b) for every pair that can be nearer than the smallest
-/// value so far, starting from `limit`; nearer volumes first. The placement's margin is not used.
+/// value so far, starting from `limit`; nearer volumes first. The placement's margin is not used. The tests
+/// are added to `counts`.
 template <class A, class B, class Distance>
 void nearest_pair(const BoundingTree<A>& tree_a, const BoundingTree<B>& tree_b, const Placement& a_from_b,
-                  Real limit, Distance&& distance) {
+                  Real limit, Distance&& distance, TestCounts& counts) {
   if (tree_a.empty() || tree_b.empty()) return;
   const auto bounded = [&](NodePair<A, B> pair) {
+    ++counts.volumes;
     pair.gap = std::max(gap(pair.a->volume, pair.b->volume, a_from_b) - a_from_b.slack, 0.0);
     return pair;
   };
@@ -92,7 +115,10 @@ void nearest_pair(const BoundingTree<A>& tree_a, const BoundingTree<B>& tree_b, 
     if (pair.gap >= limit) continue;
     if (pair.a->is_leaf() && pair.b->is_leaf()) {
       for (uint32_t i : tree_a.items(*pair.a))
-        for (uint32_t j : tree_b.items(*pair.b)) limit = std::min(limit, distance(i, j));
+        for (uint32_t j : tree_b.items(*pair.b)) {
+          ++counts.pieces;
+          limit = std::min(limit, distance(i, j));
+        }
       continue;
     }
     auto [near, far] = descend(tree_a, tree_b, pair);
@@ -102,6 +128,13 @@ void nearest_pair(const BoundingTree<A>& tree_a, const BoundingTree<B>& tree_b, 
     stack.push(far);
     stack.push(near);
   }
+}
+
+template <class A, class B, class Distance>
+void nearest_pair(const BoundingTree<A>& tree_a, const BoundingTree<B>& tree_b, const Placement& a_from_b,
+                  Real limit, Distance&& distance) {
+  TestCounts counts;
+  nearest_pair(tree_a, tree_b, a_from_b, limit, distance, counts);
 }
 
 }  // namespace offstage::sim

@@ -225,7 +225,10 @@ ContactPair::ContactPair(Body& a, Body& b, const PairSurface& surface)
       b_(&b),
       surface_(surface),
       is_on_plane_(b.collision_shape().is_plane()),
-      has_sphere_(is_sphere_pair(a, b)) {}
+      has_sphere_(is_sphere_pair(a, b)) {
+  if (!surface.by_triangles) return;
+  for (Body* body : {&a, &b}) body->triangle_shape();  // created here, because pairs are used in parallel
+}
 
 void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_within, bool turning) {
   find_points(a, b, margin, reuse_within, turning);

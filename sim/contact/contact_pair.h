@@ -4,6 +4,7 @@
 
 #include <array>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "sim/collision/contact_frame.h"
@@ -21,6 +22,7 @@ struct PairSurface {
   const Body* axis_body = nullptr;  ///< body that defines the friction axis; null: isotropic
   bool conveys = false;             ///< whether a surface is a conveyor
   DistanceMethod method = DistanceMethod::gjk;
+  bool by_triangles = false;  ///< impacts are found by the triangles of two meshes
 };
 
 /// Force at a point of a manifold on body a, in the manifold's frame.
@@ -71,6 +73,11 @@ class alignas(64) ContactPair {
   Body& a() const { return *a_; }
   Body& b() const { return *b_; }
   const PairSurface& surface() const { return surface_; }
+  /// The shapes by which the time of an impact of the two bodies is found.
+  const CollisionShape& impact_shape_a() const { return impact_shape(*a_); }
+  const CollisionShape& impact_shape_b() const { return impact_shape(*b_); }
+  /// Tests of volumes and pieces since the last call.
+  TestCounts take_tests() { return std::exchange(cache_.tests, {}); }
 
   /// Finds the contact points where the bodies at these poses are within `margin` [m] of each other. If their
   /// relative pose has changed by less than `reuse` [m], the points are reused and only their separations are
@@ -117,6 +124,9 @@ class alignas(64) ContactPair {
   Vec3 relative_velocity(const Vec3& point) const;
 
  private:
+  const CollisionShape& impact_shape(Body& body) const {
+    return surface_.by_triangles ? body.triangle_shape() : body.collision_shape();
+  }
   /// A point with its forces, all in a's frame.
   struct Remembered {
     Vec3 on_a, last, mean, normal;

@@ -5,6 +5,7 @@
 #include <optional>
 #include <tuple>
 
+#include "sim/contact/contact_lcp.h"
 #include "sim/contact/contact_motion.h"
 #include "sim/contact/contact_terms.h"
 #include "sim/contact/rough_collision.h"
@@ -32,7 +33,7 @@ constexpr Real kTermsShare = 0.02;
 }  // namespace
 
 ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactInterval& interval,
-                                            Real budget) {
+                                            Real budget, Method method) {
   bodies_.clear();
   contacts_.clear();
   pairs_.clear();
@@ -49,13 +50,18 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
 
   free_ = bodies_;
   joints_.project(bodies_, interval.end);
-  const std::optional<ContactWork> work = newton_.solve(bodies_, contacts_, joints_.problem(), budget);
-  if (!work) return {};
-  Outcome outcome{.is_applied = is_safe(*work), .work = *work};
-  if (!outcome.is_applied) outcome.work.fallbacks = 1;
-  if (outcome.work.fallbacks > 0)
-    if (const auto worst = worst_contact(bodies_, contacts_)) outcome.rough = pairs_[*worst];
-  if (!outcome.is_applied) return outcome;
+  Outcome outcome;
+  if (method == Method::lcp) outcome.is_applied = solve_lcp(outcome.lcp);
+  if (!outcome.is_applied) {
+    const std::optional<ContactWork> work = newton_.solve(bodies_, contacts_, joints_.problem(), budget);
+    if (!work) return outcome;
+    outcome.is_applied = is_safe(*work);
+    outcome.work = *work;
+    if (!outcome.is_applied) outcome.work.fallbacks = 1;
+    if (outcome.work.fallbacks > 0)
+      if (const auto worst = worst_contact(bodies_, contacts_)) outcome.rough = pairs_[*worst];
+    if (!outcome.is_applied) return outcome;
+  }
   joints_.store_impulses(interval.duration);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
     forces_[i]->now = contacts_[i].impulse / interval.duration;
@@ -65,12 +71,29 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
   return outcome;
 }
 
+/// Solves by linear complementarity; if that fails or the result is unsafe, nothing is changed.
+bool ExactContacts::solve_lcp(ContactWork& work) {
+  const std::vector<Contact> guesses = contacts_;
+  const std::vector<BoundedRow> rows(joints_.bounded().begin(), joints_.bounded().end());
+  const JointProblem joints = joints_.problem();
+  const std::vector<Vec6> reactions(joints.impulses.begin(), joints.impulses.end());
+  if (!solve_by_lcp(bodies_, contacts_, joints, work)) return false;
+  if (is_safe({}, true)) return true;
+  ++work.fallbacks;
+  bodies_ = free_;
+  contacts_ = guesses;
+  std::copy(rows.begin(), rows.end(), joints.bounded.begin());
+  std::copy(reactions.begin(), reactions.end(), joints.impulses.begin());
+  return false;
+}
+
 /// Whether the solution can be applied. Contacts that push a body out of overlaps from two sides have no
 /// solution; their unbounded impulses nearly cancel, and the rest throws bodies away. The velocity terms of
 /// R9 are wrong if a thin body turns far in a step. Moving surfaces, motors and friction in joints may do
 /// work. All other forces may only dissipate energy, apart from the speed at which overlaps are removed and a
-/// small share for those terms.
-bool ExactContacts::is_safe(const ContactWork& work) const {
+/// small share for those terms. `brakes_count`: energy that motors and friction take away is counted, too; a
+/// limit against which a motor pushes returns a part of it.
+bool ExactContacts::is_safe(const ContactWork& work, bool brakes_count) const {
   if (work.fallbacks > 0 && work.residual > kRough) return false;
   Real energy = added_energy(free_, bodies_, contacts_);
   const auto power = [](const BoundedRow& r, std::span<const ContactBody> bodies) {
@@ -81,8 +104,9 @@ bool ExactContacts::is_safe(const ContactWork& work) const {
     return r.impulse * u;
   };
   for (const BoundedRow& r : joints_.bounded())
-    if (!std::isfinite(r.lower) || !std::isfinite(r.upper))
-      energy += (power(r, free_) + power(r, bodies_)) / 2;
+    if (const Real gain = (power(r, free_) + power(r, bodies_)) / 2;
+        !std::isfinite(r.lower) || !std::isfinite(r.upper) || (brakes_count && gain < 0))
+      energy += gain;
   if (energy <= 0) return true;
 
   Real push = 0, kinetic = 0, mass = 0;

@@ -12,24 +12,32 @@ namespace offstage::sim {
 /// their `start` to `rigid`; the effect of the contacts is added to this motion. Keep one object per island.
 class ExactContacts {
  public:
+  /// How the problem is solved.
+  enum class Method : uint8_t {
+    proximal,  ///< by the proximal Newton method on the true friction cone
+    lcp        ///< by linear complementarity (contact_lcp.h), or else as above
+  };
   struct Outcome {
     /// False: nothing was changed, because the cost exceeded the budget, or because the result of a fall-back
     /// was unsafe.
     bool is_applied = false;
     ContactWork work;
+    ContactWork lcp;                     ///< work of Method::lcp; with a fall-back, `work` solved the island
     const ContactPair* rough = nullptr;  ///< after a fall-back: the pair with the greatest error
   };
   /// Solves the contacts and applies the result. It stops when the cost exceeds `budget` [ns, see
   /// SolverChoice]. The result of a fall-back is applied only if its error is small and it adds no kinetic
   /// energy; otherwise the fast solver, whose work is bounded, must solve the island.
-  Outcome solve(const Island& island, const ContactInterval& interval, Real budget);
+  Outcome solve(const Island& island, const ContactInterval& interval, Real budget,
+                Method method = Method::proximal);
   /// Cost of the last solve() [ns].
   Real cost() const { return newton_.cost(); }
 
  private:
   uint32_t add_body(Body& body, const ContactInterval& interval);
   void add_points(ContactPair& pair, const ContactInterval& interval);
-  bool is_safe(const ContactWork& work) const;
+  bool solve_lcp(ContactWork& work);
+  bool is_safe(const ContactWork& work, bool brakes_count = false) const;
   void move_bodies(const Island& island, const ContactInterval& interval);
   void close_stops();
   void close_links();

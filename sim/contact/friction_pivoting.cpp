@@ -48,6 +48,9 @@ class Pivoting {
     return contacts_.friction[static_cast<std::size_t>(tangent / 3)][tangent % 3 - 1];
   }
   bool slides(Index row) const { return contacts_.slides[static_cast<std::size_t>(row / 3)] != 0; }
+  bool is_held(Index row) const {
+    return !contacts_.held.empty() && contacts_.held[static_cast<std::size_t>(row / 3)] != 0;
+  }
   Real share(Index tangent) const;
   Real entry(Index row, Index column) const;
 
@@ -93,6 +96,11 @@ Pivoting::Pivoting(const DenseContacts& contacts, VectorXd& F)
       factor_(a_.size()),
       max_pivots_(static_cast<uint32_t>(100 + 20 * a_.size())) {
   F_.setZero(a_.size());
+  for (Index n = 0; n < a_.size(); n += 3)
+    if (is_held(n)) {
+      F_[n] = 1;
+      state(n) = State::free;
+    }
 }
 
 /// F_t / F_n if the normal force determines it. The normal's column then contains this multiple of the
@@ -300,6 +308,7 @@ bool Pivoting::end_step(const Block& block, Index m) {
 }
 
 Pivoting::Outcome Pivoting::bring_in(Index m) {
+  if (m % 3 == 0 && is_held(m)) return Outcome::solved;
   if (m % 3 != 0 && (slides(m) || friction(m) == 0)) return Outcome::solved;
   if (m % 3 != 0 && state(m - m % 3) == State::fixed) return Outcome::postponed;
   std::fill(moves_.begin(), moves_.end(), uint8_t{0});

@@ -20,6 +20,9 @@ struct DenseContacts {
   std::vector<Eigen::Vector2d> friction;  ///< for each contact, along t and k
   /// Dynamic friction: p_t = -mu p_n and p_k = 0 for any tangential velocities.
   std::vector<uint8_t> slides;
+  /// Optional: rows whose normal impulse is 1 and takes part in nothing, so that the limits of its tangents
+  /// are constant. The rows and columns of these normals in A and b are zero.
+  std::vector<uint8_t> held = {};
 
   std::size_t count() const { return friction.size(); }
 };

@@ -13,8 +13,16 @@ Mat3 in_world(const Quat& orientation, const Mat3& local) {
 }  // namespace
 
 const CollisionShape& Body::collision_shape() {
-  if (!collision_shape_) collision_shape_.emplace(solid, def.motion == MotionType::dynamic);
+  if (!collision_shape_)
+    collision_shape_.emplace(
+        solid, CollisionShape::Options{.needs_volume = def.motion == MotionType::dynamic, .tree = tree});
   return *collision_shape_;
+}
+
+const CollisionShape& Body::triangle_shape() {
+  if (!triangle_shape_)
+    triangle_shape_.emplace(solid, CollisionShape::Options{.by_triangles = true, .tree = tree});
+  return *triangle_shape_;
 }
 
 Motion Body::motion(Real now, Real time) const {

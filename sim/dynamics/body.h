@@ -22,13 +22,14 @@ inline constexpr Real kMostPredictedTurn = 1;
 struct Body {
   // The members that contact pairs read come first, close together in memory.
  private:
-  std::optional<CollisionShape> collision_shape_;
+  std::optional<CollisionShape> collision_shape_, triangle_shape_;
 
  public:
   BodyHandle handle;
   MotionType type =
       MotionType::dynamic;  // as defined; static while absent and after it left the world's bounds
   bool asleep = false;
+  TreeChoice tree = {};     // tree of its collision shapes
   bool was_present = true;  // whether it has appeared
   bool absent = false;      // it has not appeared yet, or was removed; then `type` is static
   uint32_t surface = 0;     // number of its material, for contact rules
@@ -70,6 +71,8 @@ struct Body {
   bool can_move() const { return is_awake() || (is_kinematic() && def.track.moves()); }
   /// Created on first use, because a mesh may have to be decomposed for it.
   const CollisionShape& collision_shape();
+  /// The shape of a mesh by its triangles, for the impacts of two meshes.
+  const CollisionShape& triangle_shape();
   /// Pose and velocities of the body's origin at a time near `now`.
   Motion motion(Real now, Real time) const;
   /// Begins an interval at this time.

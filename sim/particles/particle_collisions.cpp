@@ -27,7 +27,7 @@ void for_each_chunked(std::size_t n, F&& f) {
 }  // namespace
 
 void ParticleCollisions::step(std::span<ParticleSystem* const> systems, const ParticleStage& stage,
-                              ImpactLaw law, Real collision_speed) {
+                              ImpactLaw law, Real collision_speed, uint32_t lcp_cluster) {
   systems_ = systems;
   outcomes_.assign(systems.size(), {});
   strikes_.clear();
@@ -57,8 +57,8 @@ void ParticleCollisions::step(std::span<ParticleSystem* const> systems, const Pa
     search_.list_partners(particles_);
   }
   touched_.assign(particles_.size(), 0);
-  contacts_.solve(particles_, {layer_begin_, layer_, before_}, search_, impacts_, step, end_, touched_,
-                  reactions_, strikes_);
+  contacts_.solve(particles_, {layer_begin_, layer_, before_}, search_, impacts_, step, lcp_cluster, end_,
+                  touched_, reactions_, strikes_);
   scatter(stage);
 }
 

@@ -22,9 +22,12 @@ class ParticleCollisions {
   };
 
   /// Moves the particles of systems after their flight (ParticleSystem::fly_all) to the end of the sub-step.
-  /// The systems are in the order of their handles.
+  /// The systems are in the order of their handles. `lcp_cluster`: see ParticleContacts::solve().
   void step(std::span<ParticleSystem* const> systems, const ParticleStage& stage, ImpactLaw law,
-            Real collision_speed);
+            Real collision_speed, uint32_t lcp_cluster = 0);
+
+  /// Work of pivoting on contacts in the last step.
+  const ContactWork& lcp_work() const { return contacts_.lcp_work(); }
 
   /// Results of the last step by system.
   std::span<Outcome> outcomes() { return outcomes_; }

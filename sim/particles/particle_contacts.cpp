@@ -243,8 +243,9 @@ void ParticleContacts::collect() {
 
 void ParticleContacts::solve(std::span<CollidingParticle> particles, const Order& order,
                              const ParticleSearch& search, const ParticleImpacts& impacts,
-                             const ParticleStep& step, std::span<Vec3> end, std::span<uint8_t> touched,
-                             std::vector<Reaction>& reactions, std::vector<ParticleStrike>& strikes) {
+                             const ParticleStep& step, uint32_t lcp_cluster, std::span<Vec3> end,
+                             std::span<uint8_t> touched, std::vector<Reaction>& reactions,
+                             std::vector<ParticleStrike>& strikes) {
   particles_ = particles;
   order_ = order;
   search_ = &search;
@@ -257,6 +258,9 @@ void ParticleContacts::solve(std::span<CollidingParticle> particles, const Order
   pair_begin_.resize(particles.size() + 1);
   surface_begin_.resize(particles.size() + 1);
   find();
+  solved_.clear();
+  lcp_work_ = {};
+  if (lcp_cluster > 0) solve_clusters(lcp_cluster);
   relax();
   displace(end, touched);
   push_apart(end);

@@ -14,6 +14,7 @@
 #include <tuple>
 #include <vector>
 
+#include "sim/contact/contact_problem.h"
 #include "sim/particles/colliding_particle.h"
 #include "sim/particles/particle_impacts.h"
 #include "sim/particles/particle_search.h"
@@ -35,16 +36,19 @@ class ParticleContacts {
     std::span<const uint32_t> before;  ///< index of each particle in the previous solution, or kNone
   };
 
-  /// Moves the particles to the end of their sub-step. Writes their positions to `end`, their velocities to
-  /// the particles, and to `touched` whether they touch anything. Appends the reactions of bodies and the
-  /// collisions of particles.
+  /// Clusters of at most `lcp_cluster` contacts are solved by pivoting (contact_lcp.h), the others by
+  /// relaxation. 0: all by relaxation. Moves the particles to the end of their sub-step. Writes their
+  /// positions to `end`, their velocities to the particles, and to `touched` whether they touch anything.
+  /// Appends the reactions of bodies and the collisions of particles.
   void solve(std::span<CollidingParticle> particles, const Order& order, const ParticleSearch& search,
-             const ParticleImpacts& impacts, const ParticleStep& step, std::span<Vec3> end,
-             std::span<uint8_t> touched, std::vector<Reaction>& reactions,
+             const ParticleImpacts& impacts, const ParticleStep& step, uint32_t lcp_cluster,
+             std::span<Vec3> end, std::span<uint8_t> touched, std::vector<Reaction>& reactions,
              std::vector<ParticleStrike>& strikes);
 
   std::size_t contacts() const { return pairs_.size() + surfaces_.size(); }
   uint32_t sweeps() const { return sweeps_; }
+  /// Work of pivoting in the last solve(); its fall-backs are the clusters that relaxation has solved.
+  const ContactWork& lcp_work() const { return lcp_work_; }
 
  private:
   static constexpr Real kNever = std::numeric_limits<Real>::infinity();
@@ -126,6 +130,14 @@ class ParticleContacts {
   void recall(Pair& pair) const;
   void recall(Surface& surface) const;
   void collect();
+  // particle_lcp.cpp
+  struct Cluster {
+    std::vector<uint32_t> pairs, surfaces;
+  };
+  std::vector<Cluster> find_clusters(uint32_t most);
+  bool solve_cluster(const Cluster& cluster, ContactWork& work);
+  void solve_clusters(uint32_t most);
+  bool is_solved(uint32_t particle) const { return !solved_.empty() && solved_[particle] != 0; }
   // particle_relaxation.cpp
   void relax();
   void displace(std::span<Vec3> end, std::span<uint8_t> touched);
@@ -167,6 +179,8 @@ class ParticleContacts {
   std::vector<uint32_t> near_begin_, near_;
   Real h_before_ = 0;
   uint32_t sweeps_ = 0;
+  std::vector<uint8_t> solved_;  // by particle: whether pivoting has solved its contacts; empty without it
+  ContactWork lcp_work_;
 };
 
 }  // namespace offstage::sim

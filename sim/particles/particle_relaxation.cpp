@@ -146,11 +146,13 @@ void ParticleContacts::relax() {
     };
     for_each_contact(
         [&](Pair& c, std::size_t slab) {
+          if (is_solved(c.a)) return;
           const Vec3 more = correct(c, motion_[c.a].velocity - motion_[c.b].velocity);
           apply(c, more);
           note(slab, more, c.mass);
         },
         [&](Surface& c, std::size_t slab) {
+          if (is_solved(c.particle)) return;
           const Vec3 more = correct(c, motion_[c.particle].velocity - c.velocity);
           press(c, more);
           note(slab, more, c.mass);

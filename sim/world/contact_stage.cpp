@@ -100,6 +100,10 @@ PairSurface World::Impl::surface_of(const Body& a, const Body& b) const {
   };
   PairSurface s;
   if (def.collision.narrow_phase == CollisionMethods::NarrowPhase::vclip) s.method = DistanceMethod::vclip;
+  if (def.collision.mesh_pairs == CollisionMethods::MeshPairs::triangles)
+    // The solids of a compound may overlap, so that triangles of one lie inside another.
+    s.by_triangles =
+        a.solid.mesh && b.solid.mesh && a.solid.mesh->solids.empty() && b.solid.mesh->solids.empty();
   s.restitution = std::max(a.def.restitution, b.def.restitution);
   s.friction = std::sqrt(a.def.friction * b.def.friction);
   s.static_friction = std::sqrt(static_friction(a.def) * static_friction(b.def));
@@ -168,7 +172,7 @@ void World::Impl::collect_pairs(bool again) {
 /// Computes a bound of the speed that an impact in the sub-step can give to each body, propagated from body
 /// to body with decreasing shares.
 void World::Impl::propagate_impact_speeds(Real h) {
-  if (def.solver == SolverKind::exact) return;  // the exact solver resolves each impact at its own time
+  if (is_exact()) return;  // the exact solver resolves each impact at its own time
   struct Approach {
     Body *a, *b;
     Real speed;
@@ -233,7 +237,7 @@ Real World::Impl::motion_bound(const ContactPair& pair, Real left) const {
 }
 Real World::Impl::motion_known(const ContactPair& pair) const {
   const Real size = smaller_extent(pair.a(), pair.b());
-  const bool bounces = def.solver == SolverKind::exact || pair.surface().restitution > 0;
+  const bool bounces = is_exact() || pair.surface().restitution > 0;
   return std::max(std::min(kMargin, kMarginShare * size), (bounces ? kFar : kFarWithoutBounce) * size);
 }
 
@@ -244,7 +248,7 @@ void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
   const Real size = smaller_extent(pair.a(), pair.b());
   const Real base = std::min(kMargin, kMarginShare * size);
   const Real motion = motion_bound(pair, left), far = motion_known(pair);
-  const bool exact = def.solver == SolverKind::exact;
+  const bool exact = is_exact();
   // An impact moves a body at most as fast as the body that hits it.
   const Real impact = std::max(pair.a().impact_speed_bound, pair.b().impact_speed_bound) * left;
   const Real margin = base + std::min(std::max(2 * motion, impact), far);
@@ -264,7 +268,7 @@ void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
 /// points.
 void World::Impl::choose_event(ContactPair& pair, bool far, Real left) const {
   pair.needs_toi = far && !pair.toi_exhausted;
-  const bool bounces = def.solver == SolverKind::exact || pair.surface().restitution > 0;
+  const bool bounces = is_exact() || pair.surface().restitution > 0;
   if (far || pair.toi_exhausted || !bounces || pair.restitution_suppressed) return;
   for (const PlacedManifold& m : pair.manifolds())
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
@@ -373,12 +377,13 @@ void World::Impl::solve(std::span<Island* const> group, const ContactInterval& i
   for (std::size_t i = 0; i < group.size(); ++i)
     most[i] = most_energy(*group[i], interval.duration / interval.substep);
   std::vector<ExactContacts::Outcome> outcomes(exact.size());
+  using Method = ExactContacts::Method;
+  const Method method = def.solver == SolverKind::lcp ? Method::lcp : Method::proximal;
   const auto run = [&](std::size_t i) {
     const auto& [island, choice] = exact[i];
-    const Real budget = def.solver == SolverKind::exact
-                            ? std::numeric_limits<Real>::infinity()
-                            : choice->budget(*island, interval.duration, patience);
-    outcomes[i] = choice->exact->solve(*island, interval, budget);
+    const Real budget = is_exact() ? std::numeric_limits<Real>::infinity()
+                                   : choice->budget(*island, interval.duration, patience);
+    outcomes[i] = choice->exact->solve(*island, interval, budget, method);
   };
   if (exact.size() < 2) {
     for (std::size_t i = 0; i < exact.size(); ++i) run(i);
@@ -389,6 +394,7 @@ void World::Impl::solve(std::span<Island* const> group, const ContactInterval& i
     const auto& [island, choice] = exact[i];
     const ExactContacts::Outcome& outcome = outcomes[i];
     report.exact.add(outcome.work);
+    report.lcp.add(outcome.lcp);
     add_rough(outcome.rough, report);
     choice->learn(*island, interval.duration, outcome.is_applied, patience);
     if (outcome.is_applied) continue;
@@ -410,7 +416,10 @@ void World::Impl::count_contacts(StepReport& report) const {
   report.bodies_asleep = static_cast<uint32_t>(asleep);
   report.pairs_tested += active_pairs.size();
   report.contacts = 0;
-  for (const ContactPair* pair : active_pairs) {
+  for (ContactPair* pair : active_pairs) {
+    const TestCounts tests = pair->take_tests();
+    report.volume_tests += tests.volumes;
+    report.piece_tests += tests.pieces;
     report.contacts += pair->touching();
     report.speculative_contacts += pair->speculative;
     report.penetration = std::max(report.penetration, pair->deepest);

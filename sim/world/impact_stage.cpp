@@ -145,17 +145,17 @@ std::optional<sim::Impact> World::Impl::first_impact(const MovingShape& a, const
 
 /// Time at which the bodies of a pair will touch on their current paths. If they touch already and approach,
 /// it is the current time.
-std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) const {
+std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h, TestCounts& tests) const {
   if (pair.toi_exhausted) return std::nullopt;
   const Body &a = pair.a(), &b = pair.b();
   const Real from = std::max(a.is_awake() ? a.from : 0, b.is_awake() ? b.from : 0);
   if (from >= h * (1 - kInstant)) return std::nullopt;
   const Real turn = turn_of(pair) * (h - from);
-  if (turn > kImpactTurn) return tumbling_impact_time(pair, from, h, turn);
+  if (turn > kImpactTurn) return tumbling_impact_time(pair, from, h, turn, tests);
   if (pair.separation() <= kTouching) {
     const std::optional<Real> at_points = point_impact_time(pair, h);
     if (!turns_other_points(a, h - from) && !turns_other_points(b, h - from)) return at_points;
-    const std::optional<Real> beside = tumbling_impact_time(pair, from, h, turn);
+    const std::optional<Real> beside = tumbling_impact_time(pair, from, h, turn, tests);
     return at_points && beside ? std::min(at_points, beside) : at_points ? at_points : beside;
   }
   const Real bow = (bend(a, h) - bend(b, h)).norm() * (h - from) / 8;
@@ -166,15 +166,15 @@ std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h) co
     const PosePath path_a(on_arc(a, begin, h), on_arc(a, end, h)),
         path_b(on_arc(b, begin, h), on_arc(b, end, h));
     const auto impact =
-        first_impact({pair.a().collision_shape(), path_a}, {pair.b().collision_shape(), path_b});
+        first_impact({pair.impact_shape_a(), path_a, &tests}, {pair.impact_shape_b(), path_b});
     if (impact) return begin + touching_share(*impact, path_a, path_b) * (end - begin);
   }
   return std::nullopt;
 }
 
 /// A path describes at most half a turn, so faster rotations are divided into pieces.
-std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, Real from, Real h,
-                                                      Real turn) const {
+std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, Real from, Real h, Real turn,
+                                                      TestCounts& tests) const {
   const bool spins_fast = turn > kFastSpin;
   Tumbling body_a(pair.a(), def, spins_fast, h), body_b(pair.b(), def, spins_fast, h);
   Pose begin_a = body_a.go_on(from), begin_b = body_b.go_on(from);
@@ -186,7 +186,7 @@ std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, R
     const PosePath path_a(begin_a, body_a.go_on(end)), path_b(begin_b, body_b.go_on(end));
     begin_a = path_a.end();
     begin_b = path_b.end();
-    const MovingShape a{pair.a().collision_shape(), path_a}, b{pair.b().collision_shape(), path_b};
+    const MovingShape a{pair.impact_shape_a(), path_a, &tests}, b{pair.impact_shape_b(), path_b};
     std::optional<sim::Impact> impact;
     const bool met = (i == 0 && touches) || ((impact = first_impact(a, b)) && impact->share == 0);
     if (met) impact = time_of_next_impact(a, b, kTouching / 2, def.collision_speed * (end - begin));
@@ -237,8 +237,13 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
     });
     report.impact_searches += events.size();
     std::vector<std::optional<Real>> times(events.size());
+    std::vector<TestCounts> tests(events.size());
     for_each_index(events.size(),
-                   [&](std::size_t i) { times[i] = impact_time(*active_pairs[events[i]], h); });
+                   [&](std::size_t i) { times[i] = impact_time(*active_pairs[events[i]], h, tests[i]); });
+    for (const TestCounts& t : tests) {
+      report.volume_tests += t.volumes;
+      report.piece_tests += t.pieces;
+    }
     std::size_t taken = 0;
     for (std::size_t i = 0; i < events.size(); ++i) {
       if (times[i]) impacts.push_back({*times[i], active_pairs[events[i]]});
@@ -249,7 +254,7 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
   std::size_t work = look([](const ContactPair&) { return true; });
 
   const std::size_t most = kMaxImpacts + kImpactsPerBody * awake.size();
-  const std::size_t most_work = (def.solver == SolverKind::exact ? kExactImpactWork : 1) * kImpactWork;
+  const std::size_t most_work = (is_exact() ? kExactImpactWork : 1) * kImpactWork;
   for (std::size_t count = 0; !impacts.empty(); ++count) {
     const auto first = std::min_element(impacts.begin(), impacts.end(),
                                         [](const Impact& x, const Impact& y) { return x.time < y.time; });
@@ -350,8 +355,7 @@ std::size_t World::Impl::collide(uint32_t number, Real start, Real time, Real h,
   }
   Island& island = islands[number];
   remove_seams(island.pairs, time, h);
-  const CollisionSettings settings{start + time, kCluster, def.collision_speed, def.impact,
-                                   def.solver == SolverKind::exact};
+  const CollisionSettings settings{start + time, kCluster, def.collision_speed, def.impact, is_exact()};
   const CollisionOutcome outcome = resolve_collisions(island, settings);
   report.collisions += outcome.bounces;
   report.impacts.add(outcome.work);

@@ -51,15 +51,19 @@ StepReport World::Impl::prewarm(Real from, Real to, const BeforeSubStep& before)
   return report;
 }
 
-/// Moves the particles that collide with particles, of all systems together.
-void World::Impl::collide_particles(const ParticleStage& stage, const CoupledSystem& coupled) {
+/// Moves the particles that collide with particles, of all systems together. Returns the work of pivoting.
+ContactWork World::Impl::collide_particles(const ParticleStage& stage, const CoupledSystem& coupled) {
   std::vector<ParticleSystem*> colliding;
   systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {
     if (!system.hits_particles() || waits(handle)) return;
     system.fly_all(stage, forces(system), coupled.holds(system));
     colliding.push_back(&system);
   });
-  if (!colliding.empty()) particle_collisions.step(colliding, stage, def.impact, def.collision_speed);
+  if (colliding.empty()) return {};
+  const bool by_lcp = def.particle_contacts == ParticleContactMethod::lcp;
+  particle_collisions.step(colliding, stage, def.impact, def.collision_speed,
+                           by_lcp ? def.particle_cluster : 0);
+  return particle_collisions.lcp_work();
 }
 
 /// Appends the events of a system, ordered by particle.

@@ -268,7 +268,7 @@ void World::Impl::step_particles(Real start, Real h, const CoupledSystem& couple
   for (const auto& articulation : articulations) articulation->begin_impulses(start + h);
   body_impulses.begin(links);
   const ParticleStage stage{start, h, fixed_obstacles, moving_obstacles, def.bounds, body_impulses};
-  collide_particles(stage, coupled);
+  report.particle_lcp.add(collide_particles(stage, coupled));
   auto collided = particle_collisions.outcomes().begin();
   bool removed_any = false;
   particle_events.clear();

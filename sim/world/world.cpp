@@ -6,6 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "sim/contact/contact_lcp.h"
 #include "sim/dynamics/pair_forces.h"
 #include "sim/world/coupled_system.h"
 #include "sim/world/world_impl.h"
@@ -284,10 +285,13 @@ World::World(const WorldDef& def) : impl_(std::make_unique<Impl>()) {
   check_finite("world", "wind", def.wind);
   check_positive("world", "collision_speed", def.collision_speed);
   check_positive("world", "integration_error", def.integration_error);
+  check_positive("world", "collision.cell_factor", def.collision.cell_factor);
+  if (def.particle_cluster < 1 || def.particle_cluster > kMostLcpContacts)
+    refuse("world", "particle_cluster must be between 1 and 64");
   if (def.bounds.isEmpty()) refuse("world", "bounds are empty");
   impl_->def = def;
   if (def.collision.broad_phase == CollisionMethods::BroadPhase::grid)
-    impl_->broad_phase = GroupedBroadPhase(GridKind::uniform);
+    impl_->broad_phase = GroupedBroadPhase(GridKind::uniform, def.collision.cell_factor);
 }
 World::~World() = default;
 World::World(World&&) noexcept = default;
@@ -323,12 +327,27 @@ const CollisionMesh& World::collision_mesh(MeshHandle mesh) const {
   return *impl_->meshes[mesh];
 }
 
+namespace {
+
+TreeChoice tree_choice(const CollisionMethods& methods, MotionType motion) {
+  using Trees = CollisionMethods::Trees;
+  const bool dynamic = motion == MotionType::dynamic;
+  const bool spheres = methods.trees == Trees::sphere || (methods.trees == Trees::mixed && dynamic);
+  return {.volume = spheres                       ? TreeVolume::sphere
+                    : methods.trees == Trees::obb ? TreeVolume::obb
+                                                  : TreeVolume::aabb,
+          .split = methods.tree_split};
+}
+
+}  // namespace
+
 BodyHandle World::add_body(const BodyDef& def) {
   const std::string object = quoted("body", def.name);
   check_body(object, def);
   auto body = std::make_unique<Body>();
   body->def = def;
   body->type = def.motion;
+  body->tree = tree_choice(impl_->def.collision, def.motion);
   body->solid.shape = &body->def.shape;
   if (const auto* shape = std::get_if<MeshShape>(&def.shape)) {
     const auto* mesh = impl_->meshes.find(shape->mesh);

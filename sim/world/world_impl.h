@@ -82,6 +82,9 @@ struct World::Impl : WorldState {
   void update_joint_presence(Real time);
   void place(Joint& joint);
 
+  /// Whether each collision is resolved at its own time, and contacts are solved to rounding.
+  bool is_exact() const { return def.solver == SolverKind::exact || def.solver == SolverKind::lcp; }
+
   // Contacts (contact_stage.cpp)
   PairSurface surface_of(const Body& a, const Body& b) const;
   void propagate_impact_speeds(Real h);
@@ -110,8 +113,9 @@ struct World::Impl : WorldState {
   };
   void resolve_impacts(Real start, Real h, StepReport& report);
   std::optional<sim::Impact> first_impact(const MovingShape& a, const MovingShape& b) const;
-  std::optional<Real> impact_time(const ContactPair& pair, Real h) const;
-  std::optional<Real> tumbling_impact_time(const ContactPair& pair, Real from, Real h, Real turn) const;
+  std::optional<Real> impact_time(const ContactPair& pair, Real h, TestCounts& tests) const;
+  std::optional<Real> tumbling_impact_time(const ContactPair& pair, Real from, Real h, Real turn,
+                                           TestCounts& tests) const;
   std::optional<Real> point_impact_time(const ContactPair& pair, Real h) const;
   void suppress_restitution(uint32_t island, StepReport& report);
   void bring_to(Island& island, Real start, Real time, Real h, StepReport& report);
@@ -152,7 +156,7 @@ struct World::Impl : WorldState {
   void step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report);
   Obstacle swept_obstacle(const Body& body, Real h) const;
   void update_obstacles(Real h);
-  void collide_particles(const ParticleStage& stage, const CoupledSystem& coupled);
+  ContactWork collide_particles(const ParticleStage& stage, const CoupledSystem& coupled);
   void add_events(std::vector<ParticleEvent>& events);
   void push_bodies(std::span<const Reaction> reactions, Real time);
 

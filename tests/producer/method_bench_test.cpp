@@ -31,9 +31,11 @@ TEST(MethodBench, VariesOneChoiceAtATimeAndLastTheBooksTogether) {
     names.push_back(method.name);
     EXPECT_NO_THROW(falling_cups(method.overrides));
   }
-  EXPECT_EQ(names, (std::vector<std::string>{"scene", "solver=fast", "solver=auto",
-                                             "collision.narrow_phase=vclip", "collision.broad_phase=grid",
-                                             "collision.impact_time=bisection", "collision: the book's"}));
+  EXPECT_EQ(names, (std::vector<std::string>{
+                       "scene", "solver=fast", "solver=auto", "solver=lcp", "collision.narrow_phase=vclip",
+                       "collision.broad_phase=grid", "collision.impact_time=bisection", "collision.trees=obb",
+                       "collision.trees=sphere", "collision.trees=mixed", "collision.tree_split=mean",
+                       "collision.mesh_pairs=triangles", "all of the book's"}));
 }
 
 TEST(MethodBench, CountsTheWorkAndTheDeviationOfEachMethod) {

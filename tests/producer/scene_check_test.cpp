@@ -56,6 +56,33 @@ TEST(SceneCheck, NamesReferToExistingObjects) {
             "/camera/body: there is no body 'car'; known: 'ball', 'rock_0', 'rock_1'\n");
 }
 
+TEST(SceneCheck, AlgorithmsWithoutEffectAreRefused) {
+  EXPECT_EQ(
+      errors_of(R"({"world": {"collision": {"cell_factor": 3, "trees": "obb", "tree_split": "mean",
+    "mesh_pairs": "triangles"}, "particle_cluster": 8}, "bodies": [{"name": "box"}]})"),
+      "/world/collision/cell_factor: is for \"broad_phase\": \"grid\"; \"multi_grid\" chooses its cells "
+      "by the size of each body\n"
+      "/world/collision/trees: has no effect: no body has the shape of a mesh or a compound\n"
+      "/world/collision/tree_split: has no effect: no body has the shape of a mesh or a compound\n"
+      "/world/collision/mesh_pairs: has no effect: two bodies with shapes of meshes are needed, there are 0\n"
+      "/world/particle_cluster: is for \"particle_contacts\": \"lcp\"\n");
+  const std::string rings = R"("bodies": [{"name": "ring", "shape": {"type": "torus"}, "position": [0, 5, 0],
+    "repeat": {"count": 2, "offset": [0, 4, 0]}}])";
+  EXPECT_EQ(errors_of(R"({"world": {"collision": {"broad_phase": "grid", "cell_factor": 3, "trees": "obb",
+    "tree_split": "mean", "mesh_pairs": "triangles"}, "particle_contacts": "lcp", "particle_cluster": 8}, )" +
+                      rings + "}"),
+            "");
+  EXPECT_NE(errors_of(R"({"world": {"particle_contacts": "lcp", "particle_cluster": 65}})").find("64"),
+            std::string::npos);
+  EXPECT_NE(errors_of(R"({"world": {"collision": {"broad_phase": "grid", "cell_factor": 0}}})").find("0.1"),
+            std::string::npos);
+  EXPECT_NE(errors_of(R"({"world": {"solver": "dantzig"}})").find("lcp"), std::string::npos);
+  EXPECT_NE(warnings_of(
+                R"({"world": {"solver": "lcp"}, "materials": [{"name": "felt", "rolling_friction": 0.01}]})")
+                .find("'felt'"),
+            std::string::npos);
+}
+
 TEST(SceneCheck, OverlaysNameExistingObjects) {
   EXPECT_EQ(errors_of(R"({
     "bodies": [{"name": "ball"}, {"name": "floor", "motion": "static", "shape": {"type": "plane"}},

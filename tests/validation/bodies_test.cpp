@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <set>
 
 #include <gtest/gtest.h>
 
@@ -477,10 +478,65 @@ TEST(CollisionMethods, GiveTheSameMotion) {
   using Methods = CollisionMethods;
   for (const Methods& other : {Methods{.narrow_phase = Methods::NarrowPhase::vclip},
                                Methods{.broad_phase = Methods::BroadPhase::grid},
+                               Methods{.broad_phase = Methods::BroadPhase::grid, .cell_factor = 0.7},
                                Methods{.impact_time = Methods::ImpactTime::bisection}}) {
     const std::vector<Real> now = heights(other);
     for (std::size_t i = 0; i < now.size(); ++i) EXPECT_NEAR(now[i], usual[i], 1e-4) << i;
   }
+}
+
+/// Two rings that fall on a floor and on each other, and come to rest.
+struct FallenRings {
+  std::vector<Real> heights;
+  uint64_t volume_tests = 0, piece_tests = 0;
+  Real penetration = 0;
+  bool finite = true;
+};
+
+FallenRings fallen_rings(const CollisionMethods& methods) {
+  World world({.solver = SolverKind::exact, .collision = methods, .sleep = false});
+  add_floor(world, 0);
+  const MeshHandle mesh = world.add_compound({solid_mesh(Torus{0.3, 0.1})});
+  std::vector<BodyHandle> bodies;
+  for (int i = 0; i < 2; ++i) {
+    BodyDef def;
+    def.shape = MeshShape{mesh};
+    def.restitution = 0;
+    def.pose.position = {0, 0.1 + 0.21 * i, 0};
+    bodies.push_back(world.add_body(def));
+  }
+  FallenRings result;
+  while (world.time() < 0.4) {
+    const StepReport r = world.step(1.0 / 240);
+    result.volume_tests += r.volume_tests;
+    result.piece_tests += r.piece_tests;
+    result.penetration = std::max(result.penetration, r.penetration);
+    result.finite &= r.finite;
+  }
+  for (const BodyHandle body : bodies) result.heights.push_back(world.body(body).pose.position.y());
+  return result;
+}
+
+// All kinds of trees find the same pairs, with different numbers of tests. Triangles give the same heights.
+TEST(CollisionMethods, TreesAndTrianglesGiveTheSameHeights) {
+  using Methods = CollisionMethods;
+  const FallenRings usual = fallen_rings({});
+  EXPECT_NEAR(usual.heights[0], 0.1, 1e-3);
+  EXPECT_NEAR(usual.heights[1], 0.3, 1e-3);
+  EXPECT_GT(usual.volume_tests, usual.piece_tests);
+  std::set<uint64_t> counts = {usual.volume_tests};
+  for (const Methods& other :
+       {Methods{.trees = Methods::Trees::obb}, Methods{.trees = Methods::Trees::sphere},
+        Methods{.trees = Methods::Trees::mixed}, Methods{.tree_split = TreeSplit::mean},
+        Methods{.mesh_pairs = Methods::MeshPairs::triangles},
+        Methods{.trees = Methods::Trees::obb, .mesh_pairs = Methods::MeshPairs::triangles}}) {
+    const FallenRings now = fallen_rings(other);
+    EXPECT_TRUE(now.finite);
+    EXPECT_LT(now.penetration, 1e-3);
+    for (std::size_t i = 0; i < 2; ++i) EXPECT_NEAR(now.heights[i], usual.heights[i], 5e-4) << i;
+    counts.insert(now.volume_tests);
+  }
+  EXPECT_GE(counts.size(), 5u);
 }
 
 }  // namespace

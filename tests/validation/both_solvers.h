@@ -1,6 +1,6 @@
 #pragma once
-/// Shared by the tests of bodies in contact: each test runs with both solvers, and bodies do not sleep unless
-/// the test is about sleep.
+/// Shared by the tests of bodies in contact: each test runs with both solvers and with the book's, and bodies
+/// do not sleep unless the test is about sleep.
 
 #include <algorithm>
 #include <string>
@@ -12,12 +12,24 @@
 namespace offstage::sim {
 
 inline std::string solver_name(const testing::TestParamInfo<SolverKind>& info) {
-  return info.param == SolverKind::exact ? "exact" : info.param == SolverKind::fast ? "fast" : "auto";
+  switch (info.param) {
+    case SolverKind::exact:
+      return "exact";
+    case SolverKind::fast:
+      return "fast";
+    case SolverKind::automatic:
+      return "auto";
+    case SolverKind::lcp:
+      return "lcp";
+  }
+  return "unknown";
 }
 
 class BothSolvers : public testing::TestWithParam<SolverKind> {
  protected:
-  static bool is_exact() { return GetParam() == SolverKind::exact; }
+  /// Whether the solver works to rounding.
+  static bool is_exact() { return GetParam() == SolverKind::exact || is_lcp(); }
+  static bool is_lcp() { return GetParam() == SolverKind::lcp; }
   /// The definition of a world with the solver under test.
   static WorldDef def(Real max_step = 1.0 / 240) {
     return {.max_step = max_step, .solver = GetParam(), .sleep = false};
@@ -27,19 +39,24 @@ class BothSolvers : public testing::TestWithParam<SolverKind> {
   }
 };
 
-/// Instances of a suite for both solvers; `kind` is Solvers, or Long for tests that take minutes.
+/// Instances of a suite for both solvers, and for the book's (`lcp`) in place of the exact one; `kind` is
+/// Solvers, or Long for tests that take minutes.
 #define OFFSTAGE_BOTH_SOLVERS(kind, suite) \
-  INSTANTIATE_TEST_SUITE_P(kind, suite, testing::Values(SolverKind::exact, SolverKind::fast), solver_name)
+  INSTANTIATE_TEST_SUITE_P(                \
+      kind, suite, testing::Values(SolverKind::exact, SolverKind::fast, SolverKind::lcp), solver_name)
 
 /// Instances of a suite for all solvers, including `auto`.
-#define OFFSTAGE_ALL_SOLVERS(kind, suite) \
-  INSTANTIATE_TEST_SUITE_P(               \
-      kind, suite, testing::Values(SolverKind::exact, SolverKind::fast, SolverKind::automatic), solver_name)
+#define OFFSTAGE_ALL_SOLVERS(kind, suite)                                                           \
+  INSTANTIATE_TEST_SUITE_P(                                                                         \
+      kind, suite,                                                                                  \
+      testing::Values(SolverKind::exact, SolverKind::fast, SolverKind::automatic, SolverKind::lcp), \
+      solver_name)
 
 /// Accumulated reports of many steps: counts are added, other figures are the greatest values.
 struct Tally {
   Real penetration = 0;
-  uint64_t collisions = 0, tracebacks = 0, toi_limit_reached = 0, exact_fallbacks = 0, fast_fallbacks = 0;
+  uint64_t collisions = 0, tracebacks = 0, toi_limit_reached = 0, exact_fallbacks = 0, fast_fallbacks = 0,
+           lcp_solves = 0, lcp_fallbacks = 0;
   bool finite = true;
   StepReport last;
 
@@ -50,6 +67,8 @@ struct Tally {
     toi_limit_reached += r.toi_limit_reached;
     exact_fallbacks += r.exact.fallbacks + r.impacts.fallbacks;
     fast_fallbacks += r.fast.fallbacks;
+    lcp_solves += r.lcp.solves;
+    lcp_fallbacks += r.lcp.fallbacks;
     finite &= r.finite;
     last = r;
   }

@@ -216,4 +216,10 @@ std::optional<ShapeProblem> problem(const Shape& shape) {
   return std::visit([](const auto& s) { return problem_of(s); }, shape);
 }
 
+bool is_mesh(const Body& body) {
+  return std::visit(
+      [](const auto& shape) { return !std::is_constructible_v<sim::Shape, std::decay_t<decltype(shape)>>; },
+      body.shape);
+}
+
 }  // namespace offstage::producer

@@ -40,6 +40,9 @@ Vec3 half_extent(const Compound& s);
 /// The solids of a torus, tube, open box or compound; none for other shapes.
 std::vector<sim::SolidMesh> solids_of(const Shape& shape);
 
+/// Whether a body collides by the parts or triangles of a mesh: mesh files and the shapes of solids_of().
+bool is_mesh(const Body& body);
+
 /// Numbers that distinguish the solids of such a shape from others.
 std::vector<float> solids_key(const Shape& shape);
 

@@ -81,6 +81,8 @@ void SimulationTotals::add(const sim::StepReport& report) {
   penetration = std::max(penetration, report.penetration);
   pairs_tested += report.pairs_tested;
   impact_searches += report.impact_searches;
+  volume_tests += report.volume_tests;
+  piece_tests += report.piece_tests;
   collisions += report.collisions;
   tracebacks += report.tracebacks;
   toi_limit_reached += report.toi_limit_reached;
@@ -101,6 +103,8 @@ void SimulationTotals::add(const sim::StepReport& report) {
   cloth_springs_torn += report.cloth_springs_torn;
   cloth_unconverged += report.cloth_unconverged;
   exact.add(report.exact);
+  lcp.add(report.lcp);
+  particle_lcp.add(report.particle_lcp);
   fast.add(report.fast);
   impacts.add(report.impacts);
   integration.add(report.integration);
@@ -130,6 +134,8 @@ Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
               .impact = scene.world.impact,
               .collision_speed = scene.world.collision_speed,
               .collision = scene.world.collision,
+              .particle_contacts = scene.world.particle_contacts,
+              .particle_cluster = static_cast<uint32_t>(scene.world.particle_cluster),
               .sleep = scene.world.sleep,
               .bounds = sim::Aabb(Vec3::Constant(-scene.world.bounds), Vec3::Constant(scene.world.bounds))}) {
   add_bodies(scene, models);

@@ -45,7 +45,7 @@ struct SimulationTotals {
   std::size_t contacts = 0;                                   ///< contact points of bodies at the end
   std::size_t most_contacts = 0;                              ///< at the end of a frame
   sim::Real penetration = 0;                                  ///< greatest in the run, and at its end [m]
-  uint64_t pairs_tested = 0, impact_searches = 0;
+  uint64_t pairs_tested = 0, impact_searches = 0, volume_tests = 0, piece_tests = 0;
   uint64_t collisions = 0, tracebacks = 0, toi_limit_reached = 0, restitution_suppressed = 0,
            speculative_contacts = 0;
   uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;
@@ -57,7 +57,7 @@ struct SimulationTotals {
            cloth_unconverged = 0;
   std::map<std::string, sim::Real> softened_cloths;  ///< least share of its stiffness that a spring had
   std::map<std::string, sim::ClothTear> first_tears;
-  sim::ContactWork exact, fast, impacts;
+  sim::ContactWork exact, fast, lcp, impacts, particle_lcp;
   /// Bodies with approximate contact forces, and how often a solver fell back for them.
   std::map<std::string, uint64_t> rough_bodies;
   double first_rough_s = 0;  ///< time of the first fall-back [s]

@@ -63,6 +63,7 @@ class Checker {
 
   Findings run() {
     check_names();
+    check_algorithms();
     check_materials();
     check_contact_rules();
     for (const Body& body : scene_.bodies) check_body(body);
@@ -97,6 +98,36 @@ class Checker {
   }
   void warn(std::string path, std::string what) {
     findings_.warnings.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
+  }
+
+  // --- Choices of algorithms that have no effect together ---
+
+  void check_algorithms() {
+    const WorldSettings& w = scene_.world;
+    const sim::CollisionMethods &c = w.collision, usual = {};
+    if (c.cell_factor != usual.cell_factor && c.broad_phase != sim::CollisionMethods::BroadPhase::grid)
+      fail("/world/collision/cell_factor",
+           "is for \"broad_phase\": \"grid\"; \"multi_grid\" chooses its cells by the size of each body");
+    if (w.particle_cluster != WorldSettings().particle_cluster &&
+        w.particle_contacts != sim::ParticleContactMethod::lcp)
+      fail("/world/particle_cluster", "is for \"particle_contacts\": \"lcp\"");
+    std::size_t meshes = 0;
+    for (const Body& body : flat_.bodies) meshes += is_mesh(body);
+    if (c.mesh_pairs != usual.mesh_pairs && meshes < 2)
+      fail("/world/collision/mesh_pairs",
+           fmt::format("has no effect: two bodies with shapes of meshes are needed, there {} {}",
+                       meshes == 1 ? "is" : "are", meshes));
+    if (c.trees != usual.trees && meshes == 0)
+      fail("/world/collision/trees", "has no effect: no body has the shape of a mesh or a compound");
+    if (c.tree_split != usual.tree_split && meshes == 0)
+      fail("/world/collision/tree_split", "has no effect: no body has the shape of a mesh or a compound");
+    if (w.solver != sim::SolverKind::lcp) return;
+    for (const Material& m : scene_.materials)
+      if (m.rolling_friction > 0 || m.spinning_friction > 0)
+        warn("/world/solver",
+             "\"lcp\" has no rolling and spinning friction; the exact solver takes over groups "
+             "of bodies with the material '" +
+                 m.name + "'");
   }
 
   // --- Names and references ---

@@ -20,7 +20,7 @@ struct Names<sim::IntegratorKind> {
 };
 template <>
 struct Names<sim::SolverKind> {
-  static constexpr std::array kNames = {"exact", "fast", "auto"};
+  static constexpr std::array kNames = {"exact", "fast", "auto", "lcp"};
 };
 template <>
 struct Names<sim::ImpactLaw> {
@@ -39,6 +39,22 @@ struct Names<sim::CollisionMethods::ImpactTime> {
   static constexpr std::array kNames = {"advancement", "bisection"};
 };
 template <>
+struct Names<sim::CollisionMethods::Trees> {
+  static constexpr std::array kNames = {"aabb", "obb", "sphere", "mixed"};
+};
+template <>
+struct Names<sim::TreeSplit> {
+  static constexpr std::array kNames = {"mean", "surface_area"};
+};
+template <>
+struct Names<sim::CollisionMethods::MeshPairs> {
+  static constexpr std::array kNames = {"parts", "triangles"};
+};
+template <>
+struct Names<sim::ParticleContactMethod> {
+  static constexpr std::array kNames = {"relaxation", "lcp"};
+};
+template <>
 struct Table<sim::CollisionMethods> {
   static constexpr const char* kName = "collision_methods";
   static constexpr const char* kHelp =
@@ -47,17 +63,30 @@ struct Table<sim::CollisionMethods> {
       "in their cost; `offstage bench` compares them.";
   static Fields<sim::CollisionMethods> fields() {
     using T = sim::CollisionMethods;
-    return {{"narrow_phase", &T::narrow_phase,
-             "distance of convex polyhedra: `gjk`, or `vclip`, which walks along their features; round "
-             "shapes use GJK "
-             "in either case"},
-            {"broad_phase", &T::broad_phase,
-             "search for pairs that may touch: `multi_grid` has several levels of cells, `grid` has cells of "
-             "one size"},
-            {"impact_time", &T::impact_time,
-             "time of an impact: `advancement` never passes it; `bisection` halves the sub-step of bodies "
-             "that overlap at "
-             "its end, and misses bodies that passed through each other"}};
+    return {
+        {"narrow_phase", &T::narrow_phase,
+         "distance of convex polyhedra: `gjk`, or `vclip`, which walks along their features; round "
+         "shapes use GJK "
+         "in either case"},
+        {"broad_phase", &T::broad_phase,
+         "search for pairs that may touch: `multi_grid` has several levels of cells, `grid` has cells of "
+         "one size"},
+        {"impact_time", &T::impact_time,
+         "time of an impact: `advancement` never passes it; `bisection` halves the sub-step of bodies "
+         "that overlap at "
+         "its end, and misses bodies that passed through each other"},
+        {"trees", &T::trees,
+         "volumes of the trees over the convex parts and triangles of meshes: axis-aligned boxes, "
+         "oriented boxes or spheres; `mixed` has spheres for dynamic bodies and axis-aligned boxes for "
+         "the others"},
+        {"tree_split", &T::tree_split,
+         "rule by which these trees divide their items: the `surface_area` heuristic, or the `mean` of "
+         "the midpoints"},
+        {"mesh_pairs", &T::mesh_pairs,
+         "when two meshes meet is found by their convex `parts`, or by tests of their `triangles`; their "
+         "contact points are those of the parts, and a compound always meets others by its parts"},
+        {"cell_factor", &T::cell_factor,
+         "for `broad_phase: grid`: width of a cell in mean diameters of the bodies", "", between(0.1, 100)}};
   }
 };
 template <>
@@ -79,13 +108,22 @@ struct Table<WorldSettings> {
          "m", between(1e-14, 1)},
         {"solver", &T::solver,
          "contact solver: `exact` computes contact forces to rounding and each collision at its own time; "
-         "`fast` does a bounded amount of work; `auto` uses `exact` where it is not slower"},
+         "`fast` does a bounded amount of work; `auto` uses `exact` where it is not slower; `lcp` is as "
+         "`exact`, with forces by Dantzig's and Baraff's pivoting for groups of at most 64 contacts, whose "
+         "friction has separate limits along two tangents, and hands other groups to `exact`"},
         {"impact", &T::impact,
          "how collisions at the same time are resolved: `simultaneous` solves them together; `sequential` "
          "solves one after the other, so that an impact travels through a row of balls"},
         {"collision_speed", &T::collision_speed, "bodies that approach more slowly than this do not bounce",
          "m/s", over(0, 100)},
         {"collision", &T::collision, "algorithms of collision detection"},
+        {"particle_contacts", &T::particle_contacts,
+         "contact forces of particles that collide with particles: `relaxation`, or `lcp`, which solves "
+         "clusters of at most `particle_cluster` contacts by Dantzig's and Baraff's pivoting and the others "
+         "by relaxation"},
+        {"particle_cluster", &T::particle_cluster,
+         "for `particle_contacts: lcp`: greatest number of contacts that are solved together", "",
+         between(1, 64)},
         {"sleep", &T::sleep, "bodies at rest are not simulated until something reaches them"},
         {"bounds", &T::bounds, "half the edge of the cube around the origin that all objects must stay in",
          "m", kPositive},

@@ -9,25 +9,30 @@
 #include <fmt/format.h>
 
 #include "producer/base/interrupt.h"
+#include "producer/build/body_shapes.h"
 #include "producer/format/table_world.h"
 #include "producer/run/csv.h"
 
 namespace offstage::producer {
 namespace {
 
-/// Adds a method for each value of a key except the present one.
+/// Adds a method for each value of a key except the present one. `dependent`: keys that only some values
+/// allow, with their defaults.
 template <class E>
-void add_others(const std::string& key, E present, std::vector<Method>& methods) {
+void add_others(const std::string& key, E present, std::vector<Method>& methods,
+                const std::string& dependent = {}) {
   for (std::size_t i = 0; i < Names<E>::kNames.size(); ++i) {
     if (i == static_cast<std::size_t>(present)) continue;
     const std::string setting = fmt::format("{}={}", key, Names<E>::kNames[i]);
     methods.push_back({setting, {"world." + setting}});
+    if (!dependent.empty()) methods.back().overrides.push_back(dependent);
   }
 }
 
-constexpr std::array kResultHeader = {"method",          "steps/s",     "steps",       "pairs tested",
-                                      "impact searches", "collisions",  "iterations",  "fall-backs",
-                                      "overlap mm",      "joint error", "deviation m", "fault"};
+constexpr std::array kResultHeader = {
+    "method",      "steps/s",         "steps",       "pairs tested", "volume tests",
+    "piece tests", "impact searches", "collisions",  "iterations",   "pivots",
+    "fall-backs",  "overlap mm",      "joint error", "deviation m",  "fault"};
 using ResultRow = std::array<std::string, kResultHeader.size()>;
 
 ResultRow row_of(const MethodResult& r, const MethodResult& first) {
@@ -37,9 +42,12 @@ ResultRow row_of(const MethodResult& r, const MethodResult& first) {
           fmt::format("{:.0f}", r.steps_per_second()),
           fmt::format("{}", t.substeps),
           fmt::format("{}", t.pairs_tested),
+          fmt::format("{}", t.volume_tests),
+          fmt::format("{}", t.piece_tests),
           fmt::format("{}", t.impact_searches),
           fmt::format("{}", t.collisions),
           fmt::format("{}", r.iterations()),
+          fmt::format("{}", r.pivots()),
           fmt::format("{}", r.fallbacks()),
           fmt::format("{:.3f}", 1000 * t.penetration),
           fmt::format("{:.1e}", t.joint_error),
@@ -54,11 +62,26 @@ std::vector<Method> methods_of(const Scene& scene) {
   std::vector<Method> methods = {{"scene", {}}};
   add_others("solver", scene.world.solver, methods);
   add_others("collision.narrow_phase", c.narrow_phase, methods);
-  add_others("collision.broad_phase", c.broad_phase, methods);
+  add_others("collision.broad_phase", c.broad_phase, methods,
+             fmt::format("world.collision.cell_factor={}", sim::CollisionMethods().cell_factor));
   add_others("collision.impact_time", c.impact_time, methods);
-  methods.push_back({"collision: the book's",
-                     {"world.collision.narrow_phase=vclip", "world.collision.broad_phase=grid",
-                      "world.collision.impact_time=bisection"}});
+  const auto meshes = std::ranges::count_if(scene.bodies, is_mesh);
+  if (meshes > 0) {
+    add_others("collision.trees", c.trees, methods);
+    add_others("collision.tree_split", c.tree_split, methods);
+  }
+  const bool pairs = meshes > 1;
+  if (pairs) add_others("collision.mesh_pairs", c.mesh_pairs, methods);
+  if (!scene.particles.empty() || !scene.emitters.empty())
+    add_others("particle_contacts", scene.world.particle_contacts, methods,
+               fmt::format("world.particle_cluster={}", WorldSettings().particle_cluster));
+  std::vector<std::string> books = {"world.solver=lcp", "world.collision.narrow_phase=vclip",
+                                    "world.collision.broad_phase=grid",
+                                    "world.collision.impact_time=bisection"};
+  if (meshes > 0) books.insert(books.end(), {"world.collision.trees=obb", "world.collision.tree_split=mean"});
+  if (pairs) books.push_back("world.collision.mesh_pairs=triangles");
+  if (!scene.particles.empty() || !scene.emitters.empty()) books.push_back("world.particle_contacts=lcp");
+  methods.push_back({"all of the book's", books});
   return methods;
 }
 
@@ -70,9 +93,14 @@ uint64_t MethodResult::iterations() const {
   return totals.exact.iterations + totals.fast.iterations + totals.impacts.iterations;
 }
 
+uint64_t MethodResult::pivots() const {
+  return totals.lcp.iterations + totals.particle_lcp.iterations;
+}
+
 uint64_t MethodResult::fallbacks() const {
   uint64_t sum = totals.toi_limit_reached + totals.restitution_suppressed + totals.joints_unsolved;
-  for (const sim::ContactWork* work : {&totals.exact, &totals.fast, &totals.impacts})
+  for (const sim::ContactWork* work :
+       {&totals.exact, &totals.fast, &totals.lcp, &totals.impacts, &totals.particle_lcp})
     sum += work->fallbacks + work->over_budget;
   return sum;
 }
@@ -130,13 +158,16 @@ std::string to_text(const std::vector<MethodResult>& results) {
 
 std::string to_csv(const std::vector<MethodResult>& results) {
   std::string text =
-      "method,seconds,steps,pairs_tested,impact_searches,collisions,iterations,fallbacks,penetration,"
+      "method,seconds,steps,pairs_tested,volume_tests,piece_tests,impact_searches,collisions,iterations,"
+      "pivots,"
+      "fallbacks,penetration,"
       "joint_error,deviation,fault\n";
   for (const MethodResult& r : results) {
     const SimulationTotals& t = r.totals;
     CsvRows row;
-    row.text(r.name).number(r.seconds).count(t.substeps).count(t.pairs_tested).count(t.impact_searches);
-    row.count(t.collisions).count(r.iterations()).count(r.fallbacks());
+    row.text(r.name).number(r.seconds).count(t.substeps).count(t.pairs_tested).count(t.volume_tests);
+    row.count(t.piece_tests).count(t.impact_searches);
+    row.count(t.collisions).count(r.iterations()).count(r.pivots()).count(r.fallbacks());
     row.number(t.penetration).number(t.joint_error);
     if (const std::optional<double> deviation = r.deviation(results.front()))
       row.number(*deviation);

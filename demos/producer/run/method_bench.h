@@ -19,7 +19,7 @@ struct Method {
 };
 
 /// The scene as it is, then one method for each other value of `world.solver` and of the keys of
-/// `world.collision`, and last the book's algorithms of collision detection together.
+/// `world.collision` that the scene has a use for, and last all of the book's algorithms together.
 std::vector<Method> methods_of(const Scene& scene);
 
 /// Results of one method over a whole film.
@@ -31,8 +31,10 @@ struct MethodResult {
   std::string fault;                 ///< why the simulation diverged; empty if it did not
 
   double steps_per_second() const;
-  /// Iterations of all contact solvers: pivots, Newton steps and sweeps.
+  /// Iterations of the exact and the fast solver and of that of impacts: Newton steps, sweeps and pivots.
   uint64_t iterations() const;
+  /// Pivots of contact forces by linear complementarity.
+  uint64_t pivots() const;
   /// Cases that the intended algorithm did not solve: those of the contact solvers, exceeded budgets and
   /// limits of impacts, suppressed restitution, and failed projections of joints.
   uint64_t fallbacks() const;

@@ -499,6 +499,8 @@ void add_contact_figures(const SimulationTotals& t, Json& json) {
   json["penetration"] = t.penetration;
   json["pairs_tested"] = t.pairs_tested;
   json["impact_searches"] = t.impact_searches;
+  json["volume_tests"] = t.volume_tests;
+  json["piece_tests"] = t.piece_tests;
   json["collisions"] = t.collisions;
   json["tracebacks"] = t.tracebacks;
   json["toi_limit_reached"] = t.toi_limit_reached;
@@ -511,6 +513,8 @@ void add_contact_figures(const SimulationTotals& t, Json& json) {
   json["broken_joints"] = t.broken_joints;
   json["exact_solver"] = report_json(t.exact);
   json["fast_solver"] = report_json(t.fast);
+  json["lcp_solver"] = report_json(t.lcp);
+  json["particle_lcp"] = report_json(t.particle_lcp);
   json["impact_solver"] = report_json(t.impacts);
   json["rough_bodies"] = t.rough_bodies;
   json["integration"] = report_json(t.integration);

@@ -64,6 +64,17 @@ std::vector<std::string> notes_of(const SimulationTotals& t) {
       "note: {} particles reached the limit of collisions per sub-step; the rest of their motion in that "
       "sub-step was dropped");
   if (!t.rough_bodies.empty()) notes.push_back(note_of_rough_contacts(t));
+  if (t.lcp.fallbacks)
+    notes.push_back(
+        fmt::format("note: world.solver \"lcp\": the exact solver took over {} of {} solutions of groups of "
+                    "bodies, which "
+                    "pivoting could not solve or which had too many contacts",
+                    t.lcp.fallbacks, t.lcp.solves));
+  if (t.particle_lcp.fallbacks)
+    notes.push_back(fmt::format(
+        "note: world.particle_contacts \"lcp\": relaxation solved {} of {} clusters of particles, which had "
+        "more than world.particle_cluster contacts or which pivoting could not solve",
+        t.particle_lcp.fallbacks, t.particle_lcp.solves));
   if (t.toi_limit_reached)
     notes.push_back(fmt::format(
         "warning: pairs of bodies reached the limit of collisions per sub-step {} times; they did "

@@ -43,8 +43,10 @@ struct WorldSettings {
   sim::ImpactLaw impact = sim::ImpactLaw::simultaneous;
   Real collision_speed = 0.05;  ///< bodies that approach more slowly do not bounce
   sim::CollisionMethods collision;
-  bool sleep = true;   ///< whether islands at rest are not simulated
-  Real bounds = 1000;  ///< half the edge of the cube that contains all objects
+  sim::ParticleContactMethod particle_contacts = sim::ParticleContactMethod::relaxation;
+  int particle_cluster = 24;  ///< greatest number of contacts that `lcp` solves together
+  bool sleep = true;          ///< whether islands at rest are not simulated
+  Real bounds = 1000;         ///< half the edge of the cube that contains all objects
   uint64_t seed = 1;
 };
 

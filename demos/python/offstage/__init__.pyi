@@ -131,7 +131,7 @@ ForceType = Literal["constant", "point", "wind", "vortex", "turbulence", "gravit
 
 class World:
     def __init__(self, *, gravity: Triple = ..., wind: Triple = ..., max_step: float = ..., integrator: str = ...,
-                 integration_error: float = ..., solver: Literal["exact", "fast", "auto"] = ...,
+                 integration_error: float = ..., solver: Literal["exact", "fast", "auto", "lcp"] = ...,
                  impact: Literal["simultaneous", "sequential"] = ..., collision_speed: float = ..., sleep: bool = ...,
                  bounds: float = ...) -> None: ...
     time: float

@@ -23,8 +23,10 @@ const std::map<std::string, sim::IntegratorKind> kIntegrators = {
     {"adaptive_midpoint", sim::IntegratorKind::adaptive_midpoint},
     {"adaptive_rk4", sim::IntegratorKind::adaptive_rk4},
     {"dormand_prince", sim::IntegratorKind::dormand_prince}};
-const std::map<std::string, sim::SolverKind> kSolvers = {
-    {"exact", sim::SolverKind::exact}, {"fast", sim::SolverKind::fast}, {"auto", sim::SolverKind::automatic}};
+const std::map<std::string, sim::SolverKind> kSolvers = {{"exact", sim::SolverKind::exact},
+                                                         {"fast", sim::SolverKind::fast},
+                                                         {"auto", sim::SolverKind::automatic},
+                                                         {"lcp", sim::SolverKind::lcp}};
 const std::map<std::string, sim::ImpactLaw> kImpacts = {{"simultaneous", sim::ImpactLaw::simultaneous},
                                                         {"sequential", sim::ImpactLaw::sequential}};
 py::dict to_dict(const sim::StepReport& r) {

@@ -42,18 +42,66 @@ Real greatest_overlap(const ParticleArrays& p) {
   return overlap;
 }
 
-TEST(ParticleRest, AStackOfTenBeadsStandsAndItsForcesSumUp) {
-  World world({.max_step = kRestFrame});
+class ParticleStack : public testing::TestWithParam<ParticleContactMethod> {};
+
+TEST_P(ParticleStack, OfTenBeadsStandsAndItsForcesSumUp) {
+  World world({.max_step = kRestFrame, .particle_contacts = GetParam()});
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0});
   const auto system = world.add_particle_system({.internal = true});
   for (int i = 0; i < 10; ++i)
     world.add_particle(system,
                        {.position = {0, 0.01 + 0.02 * i, 0}, .mass = 0.1 + 0.1 * (i % 3), .restitution = 0});
-  for (int i = 0; i < 300; ++i) world.step(kRestFrame);
+  ContactWork work;
+  for (int i = 0; i < 300; ++i) work.add(world.step(kRestFrame).particle_lcp);
   for (std::size_t i = 0; i < 10; ++i) {
     EXPECT_NEAR(world.particles(system).velocity[i].norm(), 0, 1e-6);
     EXPECT_NEAR(world.particles(system).position[i].y(), 0.01 + 0.02 * Real(i), 5e-4);
     EXPECT_NEAR(world.particles(system).position[i].x(), 0, 1e-9);
+  }
+  const bool by_lcp = GetParam() == ParticleContactMethod::lcp;
+  EXPECT_EQ(work.solves, by_lcp ? 300u : 0u);
+  EXPECT_EQ(work.iterations > 0, by_lcp);
+  EXPECT_EQ(work.fallbacks, 0u);
+}
+INSTANTIATE_TEST_SUITE_P(Methods, ParticleStack,
+                         testing::Values(ParticleContactMethod::relaxation, ParticleContactMethod::lcp));
+
+// A cluster of more contacts than the limit is solved by relaxation, to the same bits, and counted.
+TEST(ParticleRest, RelaxationTakesOverLargeClusters) {
+  const auto state = [](ParticleContactMethod method, ContactWork& work) {
+    World world({.max_step = kRestFrame, .particle_contacts = method, .particle_cluster = 9});
+    world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0});
+    const auto system = world.add_particle_system({.internal = true});
+    for (int i = 0; i < 10; ++i)
+      world.add_particle(system, {.position = {0, 0.01 + 0.02 * i, 0}, .mass = 0.1, .restitution = 0});
+    for (int i = 0; i < 20; ++i) work.add(world.step(kRestFrame).particle_lcp);
+    return world.state_hash().hex();
+  };
+  ContactWork lcp, relaxed;
+  EXPECT_EQ(state(ParticleContactMethod::lcp, lcp), state(ParticleContactMethod::relaxation, relaxed));
+  EXPECT_EQ(lcp.solves, 20u);
+  EXPECT_EQ(lcp.fallbacks, 20u);
+}
+
+// Without other particles, a particle is a cluster with its contacts. It slides down an incline as by
+// Coulomb's law along a tangent of the contact's frame.
+TEST(ParticleRest, SlidesDownAnInclineByPivotingAsByRelaxation) {
+  for (const ParticleContactMethod method : {ParticleContactMethod::relaxation, ParticleContactMethod::lcp}) {
+    World world({.max_step = kRestFrame, .particle_contacts = method});
+    constexpr Real kAngle = 0.6, kMu = 0.3;
+    const Quat tilt(Eigen::AngleAxisd(-kAngle, Vec3::UnitZ()));
+    world.add_body({.shape = Plane{},
+                    .motion = MotionType::static_body,
+                    .pose = {Vec3::Zero(), tilt},
+                    .restitution = 0,
+                    .friction = kMu});
+    const auto system = world.add_particle_system({.internal = true});
+    const Vec3 start = tilt * Vec3(0, 0.01, 0);
+    world.add_particle(system, {.position = start, .mass = 0.1, .restitution = 0, .friction = kMu});
+    for (int i = 0; i < 240; ++i) world.step(kRestFrame);
+    const Real t = 240 * kRestFrame,
+               expected = 9.81 * (std::sin(kAngle) - kMu * std::cos(kAngle)) * t * t / 2;
+    EXPECT_NEAR((world.particles(system).position[0] - start).norm() / expected, 1, 0.02);
   }
 }
 

@@ -1,0 +1,37 @@
+#pragma once
+/// The choice of a bounding tree for the pieces of a shape (physics H1-H3).
+
+#include <cstdint>
+#include <variant>
+
+#include "sim/collision/bounding_tree.h"
+
+namespace offstage::sim {
+
+/// Kind of the volumes of a tree.
+enum class TreeVolume : uint8_t { aabb, obb, sphere };
+
+struct TreeChoice {
+  TreeVolume volume = TreeVolume::aabb;
+  TreeSplit split = TreeSplit::surface_area;
+  friend auto operator<=>(const TreeChoice&, const TreeChoice&) = default;
+};
+
+/// A tree of one of the kinds, in the order of TreeVolume.
+using PieceTree = std::variant<AabbTree, ObbTree, SphereTree>;
+
+/// A tree of the chosen kind, from the same arguments as BoundingTree.
+template <class Items>
+PieceTree make_tree(const Items& items, const TreeChoice& choice) {
+  switch (choice.volume) {
+    case TreeVolume::obb:
+      return ObbTree(items, choice.split);
+    case TreeVolume::sphere:
+      return SphereTree(items, choice.split);
+    case TreeVolume::aabb:
+      break;
+  }
+  return AabbTree(items, choice.split);
+}
+
+}  // namespace offstage::sim
