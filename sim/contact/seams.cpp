@@ -168,7 +168,8 @@ class BodyContacts {
     Real low = std::min(0.0, face.m->points[deepest].separation) - flush_ - clipped;
     const Real moved = v.speculative ? std::abs(up.dot(x_.pose.position - x_.start_pose.position)) : 0;
     low -= moved;
-    // What is level with a face is not nearer to X than the face. A contact that is nearer is beside the face.
+    // What is level with a face is not nearer to X than the face. A contact that is nearer is beside the
+    // face.
     if (v.m->points[v.deepest()].separation < face.m->points[deepest].separation - flush_ - clipped - moved)
       return std::nullopt;
     for (uint32_t k = 0; k < v.m->count; ++k)
