@@ -55,7 +55,7 @@ GIVEN_BY = {
     "unordered_map": "unordered_map",
     "unordered_set": "unordered_set",
     "utility": "move forward swap exchange as_const pair make_pair in_place declval index_sequence",
-    "variant": "variant holds_alternative get_if visit monostate variant_alternative_t",
+    "variant": "variant holds_alternative get get_if visit monostate variant_alternative_t",
     "vector": "vector",
 }
 NEEDED = {name: header for header, names in GIVEN_BY.items() for name in names.split()}
