@@ -380,7 +380,8 @@ void Articulation::place_within(Real time, Real duration, Real share, Real subst
   start_motion_.resize(bodies_.size());
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     start_motion_[i] = motion_of(bodies_[i]->at_start());
-    mobility_[i].inverse_inertia = bodies_[i]->impulse_inverse_inertia(duration, substep);
+    const Quat acting = bodies_[i]->impulse_orientation(duration, substep);
+    mobility_[i] = mobility_of(bodies_[i]->rigid, acting.toRotationMatrix());
   }
   end_motion_ = motion_;
   before_ = (1 - share) * duration;

@@ -10,8 +10,9 @@ namespace {
 
 /// Below this sliding speed, static friction applies [m/s].
 constexpr Real kSlip = 1e-3;
-/// Share of the energy of rotation by which the result of a sub-step may exceed the expectation.
-constexpr Real kSpinExcess = 0.02, kThinExcess = 1e-3;
+/// Share of the energy of rotation by which the result of a sub-step may exceed the expectation for a thin
+/// body.
+constexpr Real kSpinExcess = 1e-3;
 /// Cosine of the greatest angle by which a body is turned to agree with its angular momentum.
 constexpr Real kAligned = 0.995;
 
@@ -69,6 +70,19 @@ Quat rotation(const Vec3& v) {
   const Real s = v.squaredNorm() / 4;
   const Real sine = 1 - s / 6 * (1 - s / 20 * (1 - s / 42)), cosine = 1 - s / 2 * (1 - s / 12 * (1 - s / 30));
   return Quat(cosine, sine * v.x() / 2, sine * v.y() / 2, sine * v.z() / 2);
+}
+
+/// Turns a body to the orientation in which its angular momentum has the direction that belongs to the
+/// expected angular velocity, if it has more energy by a share of the expected or of the free energy (twice
+/// the energy). If that is far, the body gets the expected angular velocity.
+void agree_with_spin(RigidBody& r, const Vec3& expected, Real free_energy, Real share) {
+  const Vec3 wanted = r.spin_momentum(r.orientation, expected);
+  const Real energy = expected.dot(wanted), excess = r.angular_velocity().dot(r.angular_momentum) - energy;
+  if (!(excess > share * std::max(free_energy, energy))) return;
+  if (wanted.dot(r.angular_momentum) > kAligned * wanted.norm() * r.angular_momentum.norm())
+    r.orientation = (rotation_between(wanted, r.angular_momentum) * r.orientation).normalized();
+  else
+    r.angular_momentum = wanted;
 }
 
 }  // namespace
@@ -144,17 +158,7 @@ void add_effect(Body& body, const IntervalEffect& effect) {
   if (effect.turn != Vec3::Zero()) r.orientation = (rotation(effect.turn) * r.orientation).normalized();
   r.momentum += effect.impulse;
   r.angular_momentum += effect.angular_impulse;
-  const Vec3 wanted = r.spin_momentum(r.orientation, expected);
-  const Real expected_energy = expected.dot(wanted),
-             allowed = effect.share * (r.is_thin() ? kThinExcess : kSpinExcess);
-  if (r.angular_velocity().dot(r.angular_momentum) >
-      expected_energy + allowed * std::max(free_energy, expected_energy)) {
-    const Real along = wanted.dot(r.angular_momentum);
-    if (along > kAligned * wanted.norm() * r.angular_momentum.norm())
-      r.orientation = (rotation_between(wanted, r.angular_momentum) * r.orientation).normalized();
-    else
-      r.angular_momentum = wanted;
-  }
+  if (r.is_thin()) agree_with_spin(r, expected, free_energy, effect.share * kSpinExcess);
   body.pose = r.pose();
 }
 

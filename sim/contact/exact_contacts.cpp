@@ -126,7 +126,8 @@ uint32_t ExactContacts::add_body(Body& body, const ContactInterval& interval) {
   ContactBody b;
   if (body.is_awake()) {
     b.inverse_mass = 1 / body.rigid.mass;
-    b.inverse_inertia = body.impulse_inverse_inertia(interval.duration, interval.substep);
+    b.inverse_inertia =
+        inverse_inertia(body.rigid, body.impulse_orientation(interval.duration, interval.substep));
     b.velocity = body.rigid.velocity();
     b.angular_velocity = body.rigid.angular_velocity();
   } else if (body.is_kinematic()) {
@@ -201,8 +202,9 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
       way = (dv + bodies_[i].velocity - body.start_twist.velocity) / 2;
       turn = (dw + bodies_[i].angular_velocity - body.start_twist.angular_velocity) / 2;
     }
-    add_effect(body, {body.rigid.mass * dv, bodies_[i].inverse_inertia.inverse() * dw, dw, duration * way,
-                      duration * turn, duration / interval.substep});
+    add_effect(body, {body.rigid.mass * dv,
+                      body.rigid.spin_momentum(body.impulse_orientation(duration, interval.substep), dw), dw,
+                      duration * way, duration * turn, duration / interval.substep});
   }
 }
 

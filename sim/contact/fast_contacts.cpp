@@ -16,7 +16,7 @@ RelaxedBody relaxed(const Body& body, const ContactInterval& interval) {
   const Real duration = interval.duration;
   if (body.is_awake()) {
     b.inverse_mass = 1 / body.rigid.mass;
-    b.inverse_inertia = body.impulse_inverse_inertia(duration, interval.substep);
+    b.inverse_inertia = inverse_inertia(body.rigid, body.impulse_orientation(duration, interval.substep));
     b.velocity = body.start_twist.velocity;
     b.angular_velocity = body.start_twist.angular_velocity;
     b.free_acceleration = (body.rigid.velocity() - b.velocity) / duration;

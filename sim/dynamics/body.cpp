@@ -3,14 +3,6 @@
 #include "sim/dynamics/free_body.h"
 
 namespace offstage::sim {
-namespace {
-
-Mat3 in_world(const Quat& orientation, const Mat3& local) {
-  const Mat3 axes = orientation.toRotationMatrix();
-  return axes * local * axes.transpose();
-}
-
-}  // namespace
 
 const CollisionShape& Body::collision_shape() {
   if (!collision_shape_)
@@ -40,12 +32,11 @@ Motion Body::motion(Real now, Real time) const {
   return {later.pose(), v + w.cross(arm), w};
 }
 
-Mat3 Body::impulse_inverse_inertia(Real duration, Real substep) const {
-  if (!rigid.is_thin()) return in_world(rigid.orientation, rigid.inverse_inertia);
+Quat Body::impulse_orientation(Real duration, Real substep) const {
+  if (!rigid.is_thin()) return rigid.orientation;
   const Vec3& w = start_twist.angular_velocity;
   const bool is_predicted = substep * w.norm() <= kMostPredictedTurn;
-  const Quat when = is_predicted ? rotation(w, duration / 2) * start.orientation : start.orientation;
-  return in_world(when, rigid.inverse_inertia);
+  return is_predicted ? rotation(w, duration / 2) * start.orientation : start.orientation;
 }
 
 }  // namespace offstage::sim

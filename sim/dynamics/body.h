@@ -102,15 +102,15 @@ struct Body {
     body.set_state(start);
     return body;
   }
-  /// The inverse inertia in world axes for contact and joint impulses in the interval, which has this
-  /// duration [s] and is part of a sub-step of this length [s].
+  /// The orientation whose inertia turns the contact and joint impulses of the interval into velocities. The
+  /// interval has this duration [s] and is part of a sub-step of this length [s].
   ///
-  /// In compact bodies it is that of the interval's end, so that velocities and momenta agree there. In thin
-  /// bodies it belongs to the time at which the impulses act: the middle, as contact_motion() predicts it, or
-  /// the start if the contacts of the body are not predicted. Then the terms that the solvers leave out,
-  /// I^-1 (dw x I w + w x I dw) h / 2, are at most h |w| |dw|, whereas the impulse on a thin rod would spin
-  /// it about its axis at the end, by a speed that grows with the ratio of its moments of inertia.
-  Mat3 impulse_inverse_inertia(Real duration, Real substep) const;
+  /// For compact bodies it is that of the interval's end, so that velocities and momenta agree there. For
+  /// thin bodies it belongs to the time at which the impulses act: the middle, as contact_motion() predicts
+  /// it, or the start if the contacts of the body are not predicted. Then the terms that the solvers leave
+  /// out, I^-1 (dw x I w + w x I dw) h / 2, are at most h |w| |dw|, whereas the impulse on a thin rod would
+  /// spin it about its axis at the end, by a speed that grows with the ratio of its moments of inertia.
+  Quat impulse_orientation(Real duration, Real substep) const;
   /// Path from the interval's start to the current pose.
   PosePath path() const { return {start_pose, pose}; }
   /// Pose at a time of a sub-step of length h, not before the interval's start.

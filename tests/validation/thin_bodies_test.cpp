@@ -2,12 +2,10 @@
 /// force supplies energy, and nothing passes into anything.
 
 #include <cmath>
-#include <numbers>
 
 #include <gtest/gtest.h>
 
 #include "tests/convex_samples.h"
-#include "tests/meshes.h"
 #include "tests/validation/both_solvers.h"
 
 namespace offstage::sim {
@@ -19,6 +17,16 @@ BodyDef smooth_ground() {
           .pose = {Vec3(0, -1, 0), Quat::Identity()},
           .restitution = 0,
           .friction = 0};
+}
+
+/// The deepest overlap at the end of a frame [m].
+Real deepest_in_a_second(World& w) {
+  Real deepest = 0;
+  for (int k = 0; k < 60; ++k) {
+    w.step(1.0 / 60);
+    for (const BodyOverlap& overlap : w.overlaps(1e-4)) deepest = std::max(deepest, overlap.depth);
+  }
+  return deepest;
 }
 
 class ThinBodies : public BothSolvers {};
@@ -61,8 +69,7 @@ class Rims : public BothSolvers {};
 TEST_P(Rims, HitTheGroundWithEveryPoint) {
   Dice dice(8);
   for (int i = 0; i < 60; ++i) {
-    WorldDef world_def = def(1.0 / 240);
-    World w(world_def);
+    World w(def());
     w.add_body(smooth_ground());
     const Real radius = dice.uniform(0.05, 0.15), height = radius * dice.uniform(1, 3);
     const Shape shape = i % 2 == 0 ? Shape(Cone{radius, height}) : Shape(Cylinder{radius, height});
@@ -73,12 +80,7 @@ TEST_P(Rims, HitTheGroundWithEveryPoint) {
                 .mass = 2,
                 .restitution = 0.5,
                 .friction = 0.3});
-    Real deepest = 0;
-    for (int k = 0; k < 60; ++k) {
-      w.step(1.0 / 60);
-      for (const BodyOverlap& overlap : w.overlaps(1e-4)) deepest = std::max(deepest, overlap.depth);
-    }
-    EXPECT_LT(deepest, 1e-3) << (i % 2 == 0 ? "cone " : "cylinder ") << i;
+    EXPECT_LT(deepest_in_a_second(w), 1e-3) << (i % 2 == 0 ? "cone " : "cylinder ") << i;
   }
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, Rims);
@@ -105,12 +107,7 @@ TEST_P(LightLinks, StopTheBodiesBehindThem) {
                                             .restitution = 0,
                                             .friction = 0.3});
       w.add_joint({.type = JointType::fixed, .a = end, .b = weight, .anchor = Vec3(0, 1.6, 0)});
-      Real deepest = 0;
-      for (int k = 0; k < 60; ++k) {
-        w.step(1.0 / 60);
-        for (const BodyOverlap& overlap : w.overlaps(1e-4)) deepest = std::max(deepest, overlap.depth);
-      }
-      EXPECT_LT(deepest, 1e-3) << "step " << step << ", mass " << heavy;
+      EXPECT_LT(deepest_in_a_second(w), 1e-3) << "step " << step << ", mass " << heavy;
     }
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, LightLinks);
@@ -136,12 +133,7 @@ TEST_P(NoSeams, ABoxOnTheFloorStopsAtACone) {
                   .mass = 1,
                   .restitution = 0,
                   .friction = 0});
-      Real deepest = 0;
-      for (int k = 0; k < 60; ++k) {
-        w.step(1.0 / 60);
-        for (const BodyOverlap& overlap : w.overlaps(1e-4)) deepest = std::max(deepest, overlap.depth);
-      }
-      EXPECT_LT(deepest, 2e-3) << "yaw " << yaw << ", slenderness " << slenderness;
+      EXPECT_LT(deepest_in_a_second(w), 2e-3) << "yaw " << yaw << ", slenderness " << slenderness;
     }
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, NoSeams);

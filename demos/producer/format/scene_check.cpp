@@ -15,31 +15,16 @@
 #include "producer/base/suggest.h"
 #include "producer/build/body_shapes.h"
 #include "producer/format/scene_check_cloths.h"
+#include "producer/format/scene_check_film.h"
 #include "producer/format/scene_check_joints.h"
 #include "producer/format/scene_check_particles.h"
+#include "producer/format/scene_checker.h"
 #include "sim/geometry/mass_properties.h"
 
 namespace offstage::producer {
 namespace {
 
 constexpr Real kUnlimited = std::numeric_limits<Real>::infinity();
-
-template <class T>
-std::vector<std::string> names_of(const std::vector<T>& objects) {
-  std::vector<std::string> names;
-  for (const T& object : objects) names.push_back(object.name);
-  return names;
-}
-
-template <class T>
-const T* find_named(const std::vector<T>& objects, const std::string& name) {
-  const auto it = std::find_if(objects.begin(), objects.end(), [&](const T& o) { return o.name == name; });
-  return it == objects.end() ? nullptr : &*it;
-}
-
-std::string step(std::size_t i) {
-  return "/" + std::to_string(i);
-}
 
 /// The mass that resists a force; infinite for a body that is not dynamic; nothing for a mesh, which is not
 /// read here.
@@ -51,17 +36,16 @@ std::optional<Real> mass_of(const Body& body) {
   return mass ? std::optional(mass->mass) : std::nullopt;
 }
 
-class Checker {
+class Checker : SceneChecker {
  public:
-  Checker(const Scene& scene, const Scene& flat, const SceneFolder& folder)
-      : scene_(scene), flat_(flat), folder_(folder) {
-    for (const Body& body : flat.bodies) bodies_.emplace(body.name, &body);
+  Checker(const Scene& scene, const Scene& flat, const SceneFolder& folder, Findings& findings)
+      : SceneChecker(scene, flat, folder, findings) {
     systems_ = particle_names(flat);
     for (const std::string& name : particle_names(scene))
       if (std::ranges::find(systems_, name) == systems_.end()) systems_.push_back(name);
   }
 
-  Findings run() {
+  void run() {
     check_names();
     check_algorithms();
     check_materials();
@@ -78,28 +62,10 @@ class Checker {
             if (!f.where.path.empty()) check_force(f);  // otherwise its type was invalid, and it was not read
           },
           force);
-    for (const Overlay& overlay : scene_.overlays)
-      std::visit(
-          [&](const auto& o) {
-            // Otherwise its type was invalid, and it was not read.
-            if (!o.where.path.empty()) check_overlay(o);
-          },
-          overlay);
-    check_cameras();
-    check_lights();
-    check_environment();
-    check_film();
-    return std::move(findings_);
+    check_film(scene_, flat_, folder_, findings_);
   }
 
  private:
-  void fail(std::string path, std::string what) {
-    findings_.errors.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
-  }
-  void warn(std::string path, std::string what) {
-    findings_.warnings.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
-  }
-
   // --- Choices of algorithms that have no effect together ---
 
   void check_algorithms() {
@@ -132,16 +98,6 @@ class Checker {
 
   // --- Names and references ---
 
-  template <class T>
-  void check_unique(const std::vector<T>& objects) {
-    std::map<std::string, std::string> owners;
-    std::set<std::string> reported;
-    for (const T& object : objects) {
-      const auto [it, fresh] = owners.emplace(object.name, object.where.path);
-      if (fresh || !reported.insert(object.where.path).second) continue;
-      fail(object.where.path + "/name", "the name '" + object.name + "' is already used by " + it->second);
-    }
-  }
   void check_names() {
     check_unique(scene_.materials);
     check_unique(flat_.bodies);
@@ -153,20 +109,10 @@ class Checker {
     check_unique(forces);
   }
 
-  void check_body_name(const std::string& path, const std::string& name) {
-    if (bodies_.contains(name)) return;
-    if (find_named(scene_.bodies, name))
-      return fail(path, "the body '" + name + "' has copies; name one of them, such as '" + name + "_0'");
-    fail(path, "there is no body '" + name + "'" + suggestion(name, names_of(flat_.bodies)));
-  }
   void check_material_name(const std::string& path, const std::string& name) {
     used_materials_.insert(name);
     if (!name.empty() && !find_named(scene_.materials, name))
       fail(path, "there is no material '" + name + "'" + suggestion(name, names_of(scene_.materials)));
-  }
-  void check_file(const std::string& path, const std::string& file) {
-    const std::string wrong = file.empty() ? "" : folder_.wrong_file(folder_ / file);
-    if (!wrong.empty()) fail(path, wrong);
   }
   /// Checks the file of a model: beside the scene, or one that comes with offstage.
   void check_model(const std::string& path, const std::string& file) {
@@ -261,14 +207,6 @@ class Checker {
           !rule.spinning_friction)
         warn(path, "has no effect: it has neither restitution nor friction");
     }
-  }
-
-  template <class Key>
-  void check_times(const std::vector<Key>& keys, const std::string& path) {
-    for (std::size_t i = 1; i < keys.size(); ++i)
-      if (keys[i].time <= keys[i - 1].time)
-        fail(path + step(i) + "/time",
-             fmt::format("times must increase, got {} after {}", keys[i].time, keys[i - 1].time));
   }
 
   void check_lifetime(const std::string& path, Real appear_at, Real remove_at) {
@@ -503,186 +441,16 @@ class Checker {
 
   // --- Overlays ---
 
-  /// Returns the body of that name; reports an error if there is none.
-  const Body* named_body(const std::string& path, const std::string& name) {
-    check_body_name(path, name);
-    const auto body = bodies_.find(name);
-    return body == bodies_.end() ? nullptr : body->second;
-  }
-  void check_mesh_body(const std::string& path, const std::string& name) {
-    const Body* body = named_body(path, name);
-    if (body && !std::holds_alternative<MeshFile>(body->shape))
-      fail(path, "the body '" + name + "' has no mesh");
-  }
-  void check_pair(const std::string& path, const std::string& a, const std::string& b) {
-    const Body *first = named_body(path + "/a", a), *second = named_body(path + "/b", b);
-    if (a == b) return fail(path + "/b", "is the same body as \"a\"");
-    const auto is_plane = [](const Body* body) {
-      return body && std::holds_alternative<sim::Plane>(body->shape);
-    };
-    if (is_plane(first) && is_plane(second)) fail(path, "two planes never have a contact");
-  }
-  void check_not_random(const std::string& path, const Varying& v) {
-    if (!std::holds_alternative<Real>(v) && !std::holds_alternative<effects::Curve>(v))
-      fail(path, "must be a number or a curve over time, not a random distribution");
-  }
-  void check_overlay(const TreeOverlay& overlay) {
-    check_mesh_body(overlay.where.path + "/body", overlay.body);
-    check_not_random(overlay.where.path + "/level", overlay.level);
-  }
-  void check_overlay(const PartsOverlay& overlay) {
-    check_mesh_body(overlay.where.path + "/body", overlay.body);
-    check_not_random(overlay.where.path + "/explode", overlay.explode);
-  }
-  void check_overlay(const ClosestOverlay& overlay) { check_pair(overlay.where.path, overlay.a, overlay.b); }
-  void check_overlay(const ContactsOverlay& overlay) {
-    if (!overlay.a.empty() || !overlay.b.empty()) check_pair(overlay.where.path, overlay.a, overlay.b);
-  }
-  void check_overlay(const VelocitiesOverlay& overlay) {
-    const std::string path = overlay.where.path + "/body";
-    const Body* body = overlay.body.empty() ? nullptr : named_body(path, overlay.body);
-    if (body && body->motion == sim::MotionType::static_body)
-      warn(path, "shows nothing: the body '" + overlay.body + "' is static");
-  }
-  void check_overlay(const IslandsOverlay&) {}
-  void check_overlay(const TrailsOverlay& overlay) {
-    if (!overlay.body.empty()) named_body(overlay.where.path + "/body", overlay.body);
-  }
-  void check_overlay(const TextOverlay& overlay) {
-    if (overlay.until && *overlay.until <= overlay.from)
-      fail(overlay.where.path + "/until", "must be later than \"from\"");
-  }
-  void check_overlay(const JointsOverlay& overlay) {
-    if (!overlay.joint.empty() && !find_named(flat_.joints, overlay.joint))
-      fail(overlay.where.path + "/joint",
-           "there is no joint '" + overlay.joint + "'" + suggestion(overlay.joint, names_of(flat_.joints)));
-  }
-  void check_overlay(const ClothOverlay& overlay) {
-    if (!overlay.cloth.empty() && !find_named(flat_.cloths, overlay.cloth))
-      fail(overlay.where.path + "/cloth",
-           "there is no cloth '" + overlay.cloth + "'" + suggestion(overlay.cloth, names_of(flat_.cloths)));
-  }
-
-  // --- Camera, light, film ---
-
-  void check_view(const Vec3& eye, const Vec3& target, const std::string& path) {
-    if (eye == target) fail(path, "the camera is at the point that it looks at");
-  }
-  void check_view(const StaticCamera& camera, const std::string& path) {
-    check_view(camera.eye, camera.target, path);
-  }
-  void check_view(const KeyframedCamera& camera, const std::string& path) {
-    if (camera.keyframes.empty()) fail(path, "needs at least one of \"keyframes\"");
-    check_times(camera.keyframes, path + "/keyframes");
-    for (std::size_t i = 0; i < camera.keyframes.size(); ++i)
-      check_view(camera.keyframes[i].eye, camera.keyframes[i].target, path + "/keyframes" + step(i));
-  }
-  void check_view(const OrbitCamera&, const std::string&) {}
-  void check_view(const FollowCamera& camera, const std::string& path) {
-    if (!camera.body.empty()) check_body_name(path + "/body", camera.body);
-    check_view(camera.offset, camera.look_offset, path);
-  }
-
-  /// The body shows a model file, whose cameras and lights are known when it is read.
-  void check_model_body(const std::string& path, const std::string& name) {
-    const Body* body = named_body(path, name);
-    if (body && !body->model && !std::holds_alternative<MeshFile>(body->shape))
-      fail(path, "the body '" + name + "' shows no model file");
-  }
-  void check_view(const ModelCamera& camera, const std::string& path) {
-    check_model_body(path + "/body", camera.body);
-    if (camera.fov_deg != Lens().fov_deg)
-      fail(path + "/fov_deg", "a camera of a file has the field of view of the file; `focal_mm` replaces it");
-    if (camera.aperture > 0 && camera.focus <= 0 && camera.focus_on.empty())
-      fail(path + "/aperture", "needs \"focus\" or \"focus_on\": a camera of a file has no target");
-  }
-
-  void check_camera(const Camera& camera, const std::string& path) {
-    const auto& lens = std::visit([](const Lens& l) -> const Lens& { return l; }, camera);
-    std::visit([&](const auto& c) { check_view(c, path); }, camera);
-    if (!lens.focus_on.empty()) check_body_name(path + "/focus_on", lens.focus_on);
-    if (!lens.look_at.empty()) check_body_name(path + "/look_at", lens.look_at);
-    for (std::size_t i = 0; i < lens.fit.size(); ++i) check_body_name(path + "/fit" + step(i), lens.fit[i]);
-  }
-  /// Their names become parts of file names.
-  void check_cameras() {
-    constexpr std::size_t kMostLetters = 64;
-    check_camera(scene_.camera, "/camera");
-    check_unique(scene_.cameras);
-    for (const NamedCamera& camera : scene_.cameras) {
-      const std::string& path = camera.where.path;
-      const bool plain = std::ranges::all_of(
-          camera.name, [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; });
-      if (camera.name == kMainCamera || camera.name == kAllCameras)
-        fail(path + "/name", fmt::format("'{}' is the name of {}", camera.name,
-                                         camera.name == kMainCamera ? "`camera`" : "all cameras together"));
-      else if (!plain || camera.name.size() > kMostLetters)
-        fail(path + "/name",
-             fmt::format("'{}': the name of a camera is part of file names; it has at most {} "
-                         "letters, digits, _ and -",
-                         camera.name, kMostLetters));
-      check_camera(camera.camera, path + "/camera");
-    }
-  }
-
-  void check_light(const SunLight& sun, const std::string& path) {
-    if (sun.direction.y() <= 0)
-      fail(path + "/direction", "the sun must be above the horizon: y must be greater than 0");
-  }
-  void check_lamp(const LampBase& lamp, const std::string& path) {
-    if (!lamp.body.empty()) check_body_name(path + "/body", lamp.body);
-    check_not_random(path + "/intensity", lamp.intensity);
-  }
-  void check_light(const ModelLights& lights, const std::string& path) {
-    check_model_body(path + "/body", lights.body);
-  }
-  void check_light(const PointLight& light, const std::string& path) { check_lamp(light, path); }
-  template <class Directed>
-  void check_light(const Directed& light, const std::string& path) {
-    check_lamp(light, path);
-    if (light.target == light.position) fail(path + "/target", "is at the position of the light");
-  }
-  void check_lights() {
-    std::size_t suns = 0;
-    for (std::size_t i = 0; i < scene_.lights.size(); ++i) {
-      const std::string path = "/lights" + step(i);
-      if (std::holds_alternative<SunLight>(scene_.lights[i]) && ++suns > 1)
-        fail(path, "a scene has at most one sun");
-      std::visit([&](const auto& light) { check_light(light, path); }, scene_.lights[i]);
-    }
-  }
-
-  void check_environment() {
-    const EnvironmentSettings& environment = scene_.environment;
-    if (environment.picture) check_file("/environment/picture/file", environment.picture->file);
-    if (environment.picture && environment.clouds > 0)
-      fail("/environment/clouds",
-           "a sky from a picture has the clouds of the picture; leave out one of both");
-  }
-
-  void check_film() {
-    check_not_random("/render/exposure", scene_.render.exposure);
-    const auto& size = scene_.render.size;
-    if (size.x() % 2 != 0 || size.y() % 2 != 0)
-      warn("/render/size", "is odd; most video formats need an even width and height");
-    if (scene_.frame_count() < 1)
-      fail("/output/duration",
-           fmt::format("is shorter than one frame at {} frames per second", scene_.output.fps.text()));
-  }
-
-  const Scene& scene_;
-  const Scene& flat_;
-  const SceneFolder& folder_;
-  std::map<std::string, const Body*> bodies_;  // including copies, by name
-  std::vector<std::string> systems_;           // names of particle systems
+  std::vector<std::string> systems_;  // names of particle systems
   std::set<std::string> used_materials_;
-  Findings findings_;
 };
 
 }  // namespace
 
 Findings check_scene(const Scene& scene, const Scene& flat, const SceneFolder& folder) {
-  return Checker(scene, flat, folder).run();
+  Findings findings;
+  Checker(scene, flat, folder, findings).run();
+  return findings;
 }
 
 Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real c, Real m) {
