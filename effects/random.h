@@ -56,8 +56,8 @@ class Permutation {
 /// 1e-16. Uses only + - * / and sqrt, so its bits are the same everywhere.
 Real normal_quantile(Real p);
 
-/// sin and cos of x by range reduction and polynomials, error under 1e-15 for |x| < 1e6; same bits
-/// everywhere.
+/// sin and cos of a finite x by range reduction and polynomials, error under 1e-15 for |x| < 1e6; same bits
+/// everywhere. Larger x are reduced by the double nearest to 2 pi.
 struct SinCos {
   Real sin, cos;
 };

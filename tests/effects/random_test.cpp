@@ -85,6 +85,14 @@ TEST(NormalQuantile, InvertsTheDistributionFunction) {
   for (Real p : {0.01, 0.06, 0.2, 0.45}) EXPECT_NEAR(normal_quantile(p), -normal_quantile(1 - p), 2e-14);
 }
 
+// A scene may have an angle of any size.
+TEST(SinCos, IsAPointOfTheCircleForEveryFiniteAngle) {
+  for (const Real x : {1.1e6, -1e9, 1e19, -5.6e36, 1e308}) {
+    const SinCos sc = sincos(x);
+    EXPECT_NEAR(sc.sin * sc.sin + sc.cos * sc.cos, 1, 1e-14) << x;
+  }
+}
+
 TEST(SinCos, AgreesWithTheLibrary) {
   for (Real x = -1e6; x < 1e6; x += 77.7331) {
     const SinCos sc = sincos(x);

@@ -13,7 +13,7 @@ import sys
 
 # The names of the standard library that headers use, by the header that they need. Another may give them as well.
 GIVEN_BY = {
-    "algorithm": "min max clamp copy swap_ranges ranges sort",
+    "algorithm": "min max clamp copy find_if swap_ranges ranges sort",
     "any": "any",
     "array": "array",
     "atomic": "atomic atomic_ref memory_order_relaxed memory_order_release memory_order_acquire",
