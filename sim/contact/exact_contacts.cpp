@@ -150,8 +150,8 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       if (pair.needs_toi && !touches) continue;
       const Vec3 place = (point.on_a + point.on_b) / 2;
       const Vec3 u = in_frame(m.frame, pair.relative_velocity(place) + surface);
-      const ContactMotion motion =
-          contact_motion(pair.a(), pair.b(), m.manifold, m.frame, place, h, interval.substep);
+      const ContactMotion motion = contact_motion(pair.a(), pair.b(), m.manifold, m.frame, place,
+                                                  point.separation, h, interval.substep);
       Contact c{.a = a, .b = b, .frame = motion.frame};
       c.arm_a = motion.middle.arm_a;
       c.arm_b = motion.middle.arm_b;
