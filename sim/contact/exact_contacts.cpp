@@ -103,9 +103,10 @@ bool ExactContacts::is_safe(const ContactWork& work) const {
         u += on->head<3>().dot(bodies[body].velocity) + on->tail<3>().dot(bodies[body].angular_velocity);
     return r.impulse * u;
   };
+  // Limits have one finite bound; motors and friction have two, and motors of any strength none.
   for (const BoundedRow& r : joints_.bounded())
     if (const Real gain = (power(r, free_) + power(r, bodies_)) / 2;
-        !std::isfinite(r.lower) || !std::isfinite(r.upper) || gain < 0)
+        std::isfinite(r.lower) != std::isfinite(r.upper) || gain < 0)
       energy += gain;
   if (energy <= 0) return true;
 
