@@ -23,10 +23,6 @@ constexpr std::array<Real, 5> kShares = {0.25, 0.5, 0.75, 0.375, 0.625};
 constexpr std::size_t kMaxCandidates = 12;
 /// Number of reflex edges with an acceptable cut that are compared before the best of their cuts is made.
 constexpr int kCompared = 8;
-/// Bounds of the total work: number of parts, and of half-edges of the polyhedra for which candidate planes
-/// are tried.
-constexpr std::size_t kMaxParts = 1024;
-constexpr Real kMaxWork = 5e7;
 
 Real mean_edge(const Polyhedron& p) {
   Real sum = 0;
@@ -128,7 +124,8 @@ class Decomposer {
         continue;
       }
       const std::optional<RatedCut> best = best_cut(p, reflex);
-      if (work_ > kMaxWork || result.parts.size() + rest.size() > kMaxParts) return {{}, "too many cuts"};
+      if (work_ > limits_.max_work) return {{}, "too many cuts"};
+      if (result.parts.size() + rest.size() >= limits_.max_parts) return {{}, too_many_parts(limits_)};
       if (!best) return {{}, "no plane resolves an edge"};
       for (Polyhedron& part : separate(std::move(p), best->cut)) rest.push_back(std::move(part));
     }
@@ -151,7 +148,7 @@ class Decomposer {
     for (Real relaxed : kRelaxed) {
       int compared = 0;
       for (uint32_t h : reflex) {
-        if (compared == kCompared || work_ > kMaxWork) break;
+        if (compared == kCompared || work_ > limits_.max_work) break;
         std::optional<RatedCut> cut = best_cut_at(p, h, relaxed, edge);
         if (!cut) continue;
         ++compared;
@@ -194,6 +191,10 @@ uint32_t count_reflex_edges(const Polyhedron& p) {
   uint32_t n = 0;
   for (uint32_t h = 0; h < p.half_edges.size(); ++h) n += h < p.half_edges[h].twin && is_reflex(p, h);
   return n;
+}
+
+std::string too_many_parts(const CutLimits& limits) {
+  return "more than " + std::to_string(limits.max_parts) + " exact parts";
 }
 
 JoeResult resolve_reflex_edges(std::vector<Polyhedron> polyhedra, const CutLimits& limits, Real tolerance) {

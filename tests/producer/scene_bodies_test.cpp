@@ -14,6 +14,7 @@
 #include "producer/build/simulation.h"
 #include "producer/format/scene_io.h"
 #include "producer/run/production.h"
+#include "tests/meshes.h"
 
 namespace offstage::producer {
 namespace {
@@ -138,6 +139,37 @@ TEST(Fills, HoldAllBallsAtTheirDistance) {
       EXPECT_LT(share, ideal + 1e-9);
       EXPECT_GT(share, 0.6 * ideal) << static_cast<int>(packing) << " " << shape.index();
     }
+}
+
+TEST(Fills, HoldBallsInsideAModel) {
+  const sim::TriangleMesh torus = sim::torus_mesh(1, 0.3, 48, 32);
+  const Real d = 0.1;
+  for (const Packing packing : {Packing::hexagonal, Packing::cubic, Packing::random}) {
+    MeshFill shape;
+    shape.solid = torus;
+    for (Vec3& v : shape.solid.vertices) v += Vec3(5, 0, 0);
+    const std::vector<Vec3> places = fill_places({.shape = shape, .packing = packing}, d, 100'000);
+    for (const Vec3& p : places) {
+      const Vec3 q = p - Vec3(5, 0, 0);
+      EXPECT_LE(std::hypot(std::hypot(q.x(), q.z()) - 1, q.y()), 0.3 - d / 2 + 1e-9);
+    }
+    // The places fill about the torus of the tube radius 0.25 at the density of their packing.
+    const Real share = static_cast<Real>(places.size()) * d * d * d /
+                       (2 * std::numbers::pi * std::numbers::pi * 0.25 * 0.25);
+    EXPECT_GT(share, packing == Packing::random ? 0.6 : 0.9);
+    EXPECT_LT(share, packing == Packing::hexagonal ? 1.6 : 1.2);
+  }
+}
+
+TEST(Fills, OfAModelReadItsFile) {
+  const LoadedScene loaded = body_scene(R"(
+    "particles": [{"name": "water", "radius": 0.01, "fill": {"shape": {"type": "mesh", "file": "rock.glb", "fit": [0.2, 0.2, 0.2]},
+                                                           "position": [0, 1, 0]}}])");
+  EXPECT_GT(loaded.scene.particles[0].places.size(), 50u);
+  EXPECT_FALSE(loaded.scene.fill_digest.empty());
+  EXPECT_THROW(body_scene(R"("particles": [{"name": "water", "radius": 0.01,
+    "fill": {"shape": {"type": "mesh", "file": "hammock.glb"}}}])"),
+               SceneError);
 }
 
 TEST(Fills, MakeParticlesAndCopiesOfBodies) {
