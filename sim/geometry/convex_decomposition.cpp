@@ -87,6 +87,14 @@ TriangleMesh triangles_of(const Polyhedron& p) {
   return mesh;
 }
 
+TriangleMesh triangles_of(const SolidPiece& solid) {
+  TriangleMesh mesh{solid.points, {}};
+  for (std::size_t k = 0; k < solid.polygon_count(); ++k)
+    for (uint32_t i = solid.first[k] + 1; i + 1 < solid.first[k + 1]; ++i)
+      mesh.triangles.push_back({solid.corners[solid.first[k]], solid.corners[i], solid.corners[i + 1]});
+  return mesh;
+}
+
 /// Appends the convex parts of one connected surface. Returns the reason why there are none, or an empty
 /// string.
 std::string add_exact_parts(Polyhedron shell, const CutLimits& limits, Real tolerance,
@@ -152,15 +160,29 @@ bool may_overlap(const std::vector<SolidPiece>& solids) {
   return false;
 }
 
+/// Whether points are inside a solid without caps.
+struct BoundedWinding {
+  explicit BoundedWinding(const SolidPiece& solid) : winding(triangles_of(solid)) {
+    for (const Vec3& p : solid.points) box.extend(p);
+  }
+  bool contains(const Vec3& p) const { return box.contains(p) && winding.at(p) > 0.5; }
+
+  WindingNumber winding;
+  Aabb box;
+};
+
 /// Replaces the errors, which count overlapping solids twice, by those of the unions of the solids and of the
 /// parts, estimated by points in a regular pattern.
-void estimate_errors(const TriangleMesh& mesh, ConvexDecomposition& result) {
+void estimate_errors(const std::vector<SolidPiece>& solids, ConvexDecomposition& result) {
   Aabb box;
   for (const ConvexPolyhedron& part : result.parts) box.extend(part.box());
-  for (const Vec3& v : mesh.vertices) box.extend(v);
+  std::vector<BoundedWinding> windings;
+  for (const SolidPiece& solid : solids) {
+    windings.emplace_back(solid);
+    box.extend(windings.back().box);
+  }
   const Real step = std::cbrt(box.volume() / kErrorPoints);
   const Eigen::Array3i counts = (box.sizes().array() / step).ceil().max(1).cast<int>();
-  const WindingNumber winding(mesh);
   struct Count {
     int solid = 0, parts = 0, different = 0;
   };
@@ -171,7 +193,8 @@ void estimate_errors(const TriangleMesh& mesh, ConvexDecomposition& result) {
       for (int x = 0; x < counts.x(); ++x) {
         const Vec3 share((x + 0.5) / counts.x(), (y + 0.5) / counts.y(), (z + 0.5) / counts.z());
         const Vec3 p = box.min() + box.sizes().cwiseProduct(share);
-        const bool in_solid = winding.at(p) > 0.5;
+        const bool in_solid = std::any_of(windings.begin(), windings.end(),
+                                          [&](const BoundedWinding& w) { return w.contains(p); });
         const bool in_parts = std::any_of(result.parts.begin(), result.parts.end(),
                                           [&](const ConvexPolyhedron& part) { return contains(part, p); });
         count.solid += in_solid;
@@ -186,16 +209,21 @@ void estimate_errors(const TriangleMesh& mesh, ConvexDecomposition& result) {
   result.difference = static_cast<Real>(all.different) / all.solid;
 }
 
-ConvexDecomposition decompose_approximately(const TriangleMesh& mesh, const std::vector<SolidPiece>& solids,
-                                            const DecompositionSettings& settings, const std::string& why) {
+Real volume_of(const std::vector<SolidPiece>& solids) {
   Real volume = 0;
   for (const SolidPiece& solid : solids) volume += moments(solid).volume;
+  return volume;
+}
+
+ConvexDecomposition decompose_approximately(const std::vector<SolidPiece>& solids,
+                                            const DecompositionSettings& settings, const std::string& why) {
+  const Real volume = volume_of(solids);
   if (!(volume > 0)) return no_parts("the surface encloses nothing: " + why);
   CutDecomposition cuts = decompose_by_cuts(solids, {settings.max_error, settings.max_parts});
   if (cuts.parts.empty()) return no_parts("the surface encloses nothing: " + why);
   const Real error = relative_error(cuts.parts, volume);
   ConvexDecomposition result{Method::approximate, std::move(cuts.parts), error, cuts.error, why};
-  if (solids.size() > 1 && may_overlap(solids)) estimate_errors(mesh, result);
+  if (solids.size() > 1 && may_overlap(solids)) estimate_errors(solids, result);
   return result;
 }
 
@@ -208,10 +236,9 @@ ConvexDecomposition hull_alone(const TriangleMesh& mesh, Real volume) {
 
 ConvexDecomposition decompose_open(const TriangleMesh& mesh, const DecompositionSettings& settings,
                                    const std::string& why) {
-  const std::vector<SolidPiece> solids = solids_of_open(mesh, settings.resolution);
-  if (settings.method == DecompositionMethod::hull)
-    return hull_alone(mesh, solids.empty() ? 0 : moments(solids[0]).volume);
-  return decompose_approximately(mesh, solids, settings, why);
+  const std::vector<SolidPiece> solids = solids_of_open(mesh, settings.resolution, settings.max_parts);
+  if (settings.method == DecompositionMethod::hull) return hull_alone(mesh, volume_of(solids));
+  return decompose_approximately(solids, settings, why);
 }
 
 }  // namespace
@@ -238,7 +265,7 @@ ConvexDecomposition decompose(const TriangleMesh& mesh, const MeshTopology& topo
     }
     why = exact.failure;
   }
-  return decompose_approximately(mesh, solids_of_closed(mesh, settings.max_parts), settings, why);
+  return decompose_approximately(solids_of_closed(mesh, settings.max_parts), settings, why);
 }
 
 }  // namespace offstage::sim

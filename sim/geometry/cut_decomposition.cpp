@@ -22,10 +22,8 @@ constexpr Real kTrim = 0.02;
 /// More pieces than wanted parts are cut before mergers, by these factors: of whole solids, of Voronoi cells.
 constexpr Real kMorePieces = 1.5, kMoreCells = 1.25;
 /// Excess of the hulls up to which pieces are cut, and up to which they are merged, in accepted errors.
-/// Trimming removes a part of it, which only the trial shows. With as many pieces as wanted parts and more
-/// than kTooFar, whole solids are given up for Voronoi cells.
+/// Trimming removes a part of it, which only the trial shows.
 constexpr Real kCutTo = 0.7;
-constexpr Real kTooFar = 4;
 constexpr std::array<Real, 3> kMergeTo = {2, 1.4, 1};
 
 class SolidCutter {
@@ -44,9 +42,9 @@ class SolidCutter {
   CutDecomposition run() const {
     std::vector<HulledPiece> pieces;
     for (uint32_t k = 0; k < solids_.size(); ++k) pieces.push_back(with_hull(solids_[k], k));
-    CutDecomposition few;
-    if (cut_worst(pieces, kMorePieces)) few = merged(pieces);
-    if ((!few.parts.empty() && few.error <= goal_.max_error) || goal_.max_parts < 2) return few;
+    cut_worst(pieces, kMorePieces);
+    CutDecomposition few = merged(pieces);
+    if (few.error <= goal_.max_error || goal_.max_parts < 2) return few;
     std::vector<HulledPiece> cells = voronoi_cells();
     cut_worst(cells, kMoreCells);
     CutDecomposition many = merged(cells);
@@ -74,15 +72,13 @@ class SolidCutter {
   }
 
   /// Cuts the piece with the most excess, until the excess of all is small or there are `factor` times the
-  /// wanted parts. Returns false if it ends early because the goal is too far.
-  bool cut_worst(std::vector<HulledPiece>& pieces, Real factor) const {
+  /// wanted parts.
+  void cut_worst(std::vector<HulledPiece>& pieces, Real factor) const {
     const Real wanted = static_cast<Real>(goal_.max_parts), accepted = goal_.max_error * whole_;
-    bool near = true;
-    while (near && static_cast<Real>(pieces.size()) < factor * wanted) {
+    while (static_cast<Real>(pieces.size()) < factor * wanted) {
       Real excess = 0;
       for (const HulledPiece& p : pieces) excess += p.excess;
       if (excess <= kCutTo * accepted) break;
-      near = static_cast<Real>(pieces.size()) < wanted || excess <= kTooFar * accepted || wanted < 2;
       const auto worst =
           std::max_element(pieces.begin(), pieces.end(),
                            [](const HulledPiece& a, const HulledPiece& b) { return a.excess < b.excess; });
@@ -96,28 +92,33 @@ class SolidCutter {
       pieces.push_back(std::move(both[1]));
     }
     std::erase_if(pieces, [](const HulledPiece& p) { return p.hull.dimension() < 3; });
-    return near;
   }
 
   /// The decomposition with the fewest parts that has the accepted error, or else with the smallest error.
   CutDecomposition merged(const std::vector<HulledPiece>& pieces) const {
-    CutDecomposition result;
-    for (Real merge_to : kMergeTo) {
-      result = merged(pieces, merge_to);
-      if (result.error <= goal_.max_error) break;
-    }
-    return result;
-  }
-
-  CutDecomposition merged(const std::vector<HulledPiece>& pieces, Real merge_to) const {
     std::vector<HullToMerge> hulls;
     Real excess = 0;
     for (const HulledPiece& p : pieces) {
       hulls.push_back({p.hull, p.solid_id});
       excess += p.excess;
     }
-    const Real budget = std::max(0.0, merge_to * goal_.max_error * whole_ - excess);
-    std::vector<MergedHull> parts = merge_hulls(hulls, goal_.max_parts, budget);
+    const HullMerger merger(hulls);
+    CutDecomposition result;
+    std::size_t count = 0;
+    for (Real merge_to : kMergeTo) {
+      const Real budget = std::max(0.0, merge_to * goal_.max_error * whole_ - excess);
+      std::vector<MergedHull> parts = merger.run(goal_.max_parts, budget);
+      // A smaller budget ends the same mergers earlier.
+      if (parts.size() == count) continue;
+      count = parts.size();
+      result = trimmed_parts(pieces, std::move(parts));
+      if (result.error <= goal_.max_error) break;
+    }
+    return result;
+  }
+
+  CutDecomposition trimmed_parts(const std::vector<HulledPiece>& pieces,
+                                 std::vector<MergedHull> parts) const {
     std::vector<TrimmedHull> done(parts.size());
     tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t k) {
       std::vector<const SolidPiece*> members;

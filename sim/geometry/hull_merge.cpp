@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <memory>
 #include <span>
 #include <utility>
 
@@ -68,9 +69,11 @@ ConvexPolyhedron thinned(const ConvexPolyhedron& p) {
   return convex_hull(extreme_points(p.vertices(), static_cast<int>(kManyVertices)));
 }
 
-class Merger {
+}  // namespace
+
+class HullMerger::Mergers {
  public:
-  explicit Merger(std::span<const HullToMerge> parts) {
+  explicit Mergers(std::span<const HullToMerge> parts) {
     for (const HullToMerge& p : parts) {
       solids_.push_back(p.solid);
       parts_.push_back({thinned(p.hull), {static_cast<uint32_t>(parts_.size())}, 0});
@@ -154,18 +157,21 @@ class Merger {
   std::vector<std::vector<Real>> gains_;  // gain of joining a and b at [a][b], a < b
 };
 
-}  // namespace
-
 Real hull_volume(const ConvexPolyhedron& p) {
   return p.dimension() == 3 ? mass_properties(p.triangles()).volume : 0;
 }
 
-std::vector<MergedHull> merge_hulls(std::span<const HullToMerge> parts, std::size_t max_parts, Real budget) {
-  std::vector<MergedHull> merged = Merger(parts).run(max_parts, budget);
+HullMerger::HullMerger(std::span<const HullToMerge> parts)
+    : parts_(parts), start_(std::make_unique<const Mergers>(parts)) {}
+
+HullMerger::~HullMerger() = default;
+
+std::vector<MergedHull> HullMerger::run(std::size_t max_parts, Real budget) const {
+  std::vector<MergedHull> merged = Mergers(*start_).run(max_parts, budget);
   tbb::parallel_for(std::size_t{0}, merged.size(), [&](std::size_t k) {
     std::vector<Vec3> points;
     for (uint32_t m : merged[k].members)
-      points.insert(points.end(), parts[m].hull.vertices().begin(), parts[m].hull.vertices().end());
+      points.insert(points.end(), parts_[m].hull.vertices().begin(), parts_[m].hull.vertices().end());
     merged[k].hull = convex_hull(points);
   });
   return merged;

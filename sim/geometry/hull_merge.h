@@ -2,6 +2,7 @@
 /// Merging of convex parts, at the price of some additional volume.
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -25,9 +26,22 @@ struct HullToMerge {
   uint32_t solid = 0;  ///< parts of one solid do not overlap much; those of different solids may
 };
 
-/// Replaces two parts by their common hull, those with the least additional volume first, while there are
-/// more than `max_parts` and then while all additional volumes together are at most `budget` [m^3]. Parts
-/// whose boxes are separate are merged last.
-std::vector<MergedHull> merge_hulls(std::span<const HullToMerge> parts, std::size_t max_parts, Real budget);
+/// Merges parts, for several bounds.
+class HullMerger {
+ public:
+  /// `parts` must remain.
+  explicit HullMerger(std::span<const HullToMerge> parts);
+  ~HullMerger();
+
+  /// Replaces two parts by their common hull, those with the least additional volume first, while there are
+  /// more than `max_parts` and then while all additional volumes together are at most `budget` [m^3]. Parts
+  /// whose boxes are separate are merged last.
+  std::vector<MergedHull> run(std::size_t max_parts, Real budget) const;
+
+ private:
+  class Mergers;
+  std::span<const HullToMerge> parts_;
+  std::unique_ptr<const Mergers> start_;
+};
 
 }  // namespace offstage::sim

@@ -130,17 +130,22 @@ class HullSketch {
 }  // namespace
 
 std::vector<Vec3> extreme_points(std::span<const Vec3> points, int directions) {
-  std::vector<std::size_t> extreme;
-  for (const Vec3& d : spread_directions(directions)) {
-    std::size_t best = 0;
-    Real farthest = -kInfinity;
-    for (std::size_t i = 0; i < points.size(); ++i)
-      if (const Real at = d.dot(points[i]); at > farthest) {
-        farthest = at;
-        best = i;
-      }
-    extreme.push_back(best);
+  // All directions are compared at once for each point, in arrays that the compiler vectorizes.
+  Eigen::Array<Real, Eigen::Dynamic, 3> unit(directions, 3);
+  const std::vector<Vec3> list = spread_directions(directions);
+  for (int k = 0; k < directions; ++k) unit.row(k) = list[static_cast<std::size_t>(k)].transpose().array();
+  Eigen::ArrayXd farthest = Eigen::ArrayXd::Constant(directions, -kInfinity), at(directions),
+                 best(directions);
+  best.setZero();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vec3& p = points[i];
+    at = p.x() * unit.col(0) + p.y() * unit.col(1) + p.z() * unit.col(2);
+    if (!(at > farthest).any()) continue;
+    best = (at > farthest).select(static_cast<Real>(i), best);
+    farthest = farthest.max(at);
   }
+  std::vector<std::size_t> extreme;
+  for (const Real index : best) extreme.push_back(static_cast<std::size_t>(index));
   std::sort(extreme.begin(), extreme.end());
   extreme.erase(std::unique(extreme.begin(), extreme.end()), extreme.end());
   std::vector<Vec3> some;

@@ -20,6 +20,8 @@ constexpr int kMostTrims = 24;
 constexpr Real kCovered = 0.5;
 /// A face moves by at most this share of the hull's extent along its normal.
 constexpr Real kMostOfHull = 0.25;
+/// Most of the pieces' volume that may be lost outside of their hull, as a share.
+constexpr Real kMostLost = 0.03;
 /// Distances below this share of the hull's extent count as zero.
 constexpr Real kOnFace = 1e-6;
 
@@ -43,6 +45,7 @@ class HullTrimmer {
     Real solid = -shared;
     for (const SolidPiece* p : pieces_) solid += moments(*p).volume;
     error_ = std::max(0.0, hull_volume(hull_) - solid);
+    may_lose_ = kMostLost * std::max(0.0, solid);
     on_face_ = kOnFace * hull_.box().diagonal().norm();
   }
 
@@ -50,33 +53,38 @@ class HullTrimmer {
     std::vector<TrimPlane> faces = bridges();
     for (const TrimPlane& face : faces) {
       const SolidPiece whole = solid_piece(hull_);
-      Real best_gain = 0, best_depth = 0;
+      Trim best;
       const Real most = std::min(limit_, kMostOfHull * extent(face));
       for (int k = 1; k <= kDepths; ++k) {
         const Real depth = most * k * k / (kDepths * kDepths);
-        const Real gained = gain(whole, {face.normal, face.offset - depth});
-        if (gained > best_gain) {
-          best_gain = gained;
-          best_depth = depth;
-        }
+        const Trim trim = trimmed_at(whole, face, depth);
+        if (trim.lost <= may_lose_ && trim.gain() > best.gain()) best = trim;
       }
-      if (best_depth == 0) continue;
-      ConvexPolyhedron smaller = below(hull_, {face.normal, face.offset - best_depth});
+      if (best.depth == 0) continue;
+      ConvexPolyhedron smaller = below(hull_, {face.normal, face.offset - best.depth});
       if (smaller.dimension() < 3) continue;
       hull_ = std::move(smaller);
-      error_ -= best_gain;
+      error_ -= best.gain();
+      may_lose_ -= best.lost;
     }
     return {std::move(hull_), std::max(0.0, error_)};
   }
 
  private:
-  /// Volume by which the difference shrinks if all above a plane is removed: empty space is gained, the
-  /// solid is lost.
-  Real gain(const SolidPiece& whole, const TrimPlane& plane) const {
-    const Real removed = moments_above(whole, plane).volume;
-    Real lost = 0;
-    for (const SolidPiece* p : pieces_) lost += moments_above(*p, plane).volume;
-    return removed - 2 * lost;
+  /// A face moved inwards.
+  struct Trim {
+    Real depth = 0;    // [m]
+    Real removed = 0;  // volume of the hull [m^3]
+    Real lost = 0;     // volume of the solid in it [m^3]
+    /// Volume by which the difference shrinks: empty space is gained, the solid is lost.
+    Real gain() const { return removed - 2 * lost; }
+  };
+
+  Trim trimmed_at(const SolidPiece& whole, const TrimPlane& face, Real depth) const {
+    const TrimPlane plane{face.normal, face.offset - depth};
+    Trim trim{depth, moments_above(whole, plane).volume};
+    for (const SolidPiece* p : pieces_) trim.lost += moments_above(*p, plane).volume;
+    return trim;
   }
 
   /// Extent of the hull below one of its faces.
@@ -138,7 +146,7 @@ class HullTrimmer {
 
   ConvexPolyhedron hull_;
   std::span<const SolidPiece* const> pieces_;
-  Real limit_, error_ = 0, on_face_ = 0;
+  Real limit_, error_ = 0, on_face_ = 0, may_lose_ = 0;
 };
 
 }  // namespace

@@ -18,6 +18,8 @@ using Index3 = Eigen::Array3i;
 /// Lower bounds of the mean winding number of the inside: for a solid, and for both sides of a surface
 /// together.
 constexpr Real kHardlyInside = 0.6, kSurelyInside = 0.9;
+/// Number of times that the surface of voxels is smoothed.
+constexpr int kSmoothings = 2;
 /// Greatest difference between the volume with closed holes and that of the voxels, as a share.
 constexpr Real kSameSolid = 0.1;
 
@@ -42,8 +44,8 @@ class Groups {
 /// The voxels of a mesh's box, and whether the centre of each is inside.
 class VoxelGrid {
  public:
-  VoxelGrid(const TriangleMesh& mesh, const Aabb& box, uint32_t resolution) : winding_(mesh) {
-    size_ = box.sizes().maxCoeff() / resolution;
+  /// `size`: side of a voxel [m].
+  VoxelGrid(const TriangleMesh& mesh, const Aabb& box, Real size) : winding_(mesh), size_(size) {
     counts_ = (box.sizes().array() / size_ - 1e-9).ceil().max(1).cast<int>();
     low_ = box.center() - size_ / 2 * counts_.matrix().cast<Real>();
     find_inside();
@@ -53,8 +55,44 @@ class VoxelGrid {
     return size_ * size_ * size_ * static_cast<Real>(std::count(inside_.begin(), inside_.end(), 1));
   }
 
-  /// The boundary between the inside and the outside, as squares.
+  /// The boundary between the inside and the outside, of one quadrilateral for each side of a voxel. Its
+  /// corners are moved so that the steps of the voxels disappear.
   SolidPiece surface() const {
+    SolidPiece piece = squares();
+    for (int k = 0; k < kSmoothings; ++k) smooth(piece);
+    return piece;
+  }
+
+ private:
+  /// Moves each point to the mean of the centres of the polygons around it, then back by the mean of these
+  /// moves, so that the volume remains. Taubin, "A signal processing approach to fair surface design" (1995).
+  static void smooth(SolidPiece& piece) {
+    const std::vector<Vec3> before = piece.points;
+    spread(piece, piece.points);
+    std::vector<Vec3> moved(before.size());
+    for (std::size_t i = 0; i < before.size(); ++i) moved[i] = piece.points[i] - before[i];
+    spread(piece, moved);
+    for (std::size_t i = 0; i < before.size(); ++i) piece.points[i] -= moved[i];
+  }
+
+  /// Replaces the value of each point by the mean over the polygons around it of the means of their corners.
+  static void spread(const SolidPiece& piece, std::vector<Vec3>& values) {
+    std::vector<Vec3> sums(values.size(), Vec3::Zero());
+    std::vector<int> counts(values.size(), 0);
+    for (std::size_t k = 0; k < piece.polygon_count(); ++k) {
+      Vec3 mean = Vec3::Zero();
+      for (uint32_t i = piece.first[k]; i < piece.first[k + 1]; ++i) mean += values[piece.corners[i]];
+      mean /= piece.first[k + 1] - piece.first[k];
+      for (uint32_t i = piece.first[k]; i < piece.first[k + 1]; ++i) {
+        sums[piece.corners[i]] += mean;
+        ++counts[piece.corners[i]];
+      }
+    }
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = sums[i] / counts[i];
+  }
+
+  /// The boundary between the inside and the outside, as squares.
+  SolidPiece squares() const {
     SolidPiece piece;
     std::map<std::size_t, uint32_t> places;
     Index3 i;
@@ -70,7 +108,6 @@ class VoxelGrid {
     return piece;
   }
 
- private:
   std::size_t slot(const Index3& i) const {
     return static_cast<std::size_t>(i.x() + counts_.x() * (i.y() + counts_.y() * i.z()));
   }
@@ -174,9 +211,9 @@ void turn_over(SolidPiece& piece) {
     std::reverse(piece.corners.begin() + piece.first[k], piece.corners.begin() + piece.first[k + 1]);
 }
 
-}  // namespace
-
-std::vector<SolidPiece> solids_of_closed(const TriangleMesh& mesh, std::size_t most) {
+/// The connected pieces of a surface, each with its own vertices alone. One piece, the surface, if there are
+/// more than `most`.
+std::vector<TriangleMesh> connected_pieces(const TriangleMesh& mesh, std::size_t most) {
   Groups shells(mesh.vertices.size());
   for (const Triangle& t : mesh.triangles) {
     shells.join(t[0], t[1]);
@@ -184,31 +221,65 @@ std::vector<SolidPiece> solids_of_closed(const TriangleMesh& mesh, std::size_t m
   }
   std::map<uint32_t, TriangleMesh> meshes;
   for (const Triangle& t : mesh.triangles) meshes[shells.find(t[0])].triangles.push_back(t);
-  if (meshes.size() > most) return {solid_piece(mesh)};
+  if (meshes.size() > most) return {mesh};
+  std::vector<TriangleMesh> pieces;
+  for (auto& [shell, piece] : meshes) {
+    piece.vertices = mesh.vertices;
+    pieces.push_back(weld(piece));  // without the vertices of the others
+  }
+  return pieces;
+}
+
+Aabb box_of(const TriangleMesh& mesh) {
+  Aabb box;
+  for (const Vec3& v : mesh.vertices) box.extend(v);
+  return box;
+}
+
+/// The solid of one piece of a surface; without points if it has no inside. `voxel`: size of the voxels [m].
+SolidPiece solid_of_piece(const TriangleMesh& mesh, Real voxel) {
+  const Aabb box = box_of(mesh);
+  const bool was_closed = MeshTopology(mesh).defects().closed();
+  SolidPiece closed = solid_piece(was_closed ? mesh : with_closed_holes(mesh));
+  Real volume = moments(closed).volume;
+  if (was_closed) return volume > 0 ? closed : SolidPiece{};
+  const VoxelGrid grid(mesh, box, voxel);
+  const Real inside = grid.volume();
+  if (!(inside > 0)) return {};
+  if (volume < 0) {
+    turn_over(closed);
+    volume = -volume;
+  }
+  if (std::abs(volume - inside) <= kSameSolid * inside) return closed;
+  return grid.surface();
+}
+
+/// Whether a closed piece is inside out, and so a cavity of another.
+bool is_cavity(const TriangleMesh& piece) {
+  return MeshTopology(piece).defects().closed() && moments(solid_piece(piece)).volume < 0;
+}
+
+}  // namespace
+
+std::vector<SolidPiece> solids_of_closed(const TriangleMesh& mesh, std::size_t most) {
   std::vector<SolidPiece> solids;
-  for (auto& [shell, part] : meshes) {
-    part.vertices = mesh.vertices;
-    solids.push_back(solid_piece(weld(part)));  // without the vertices of the others
+  for (const TriangleMesh& piece : connected_pieces(mesh, most)) {
+    solids.push_back(solid_piece(piece));
     if (!(moments(solids.back()).volume > 0)) return {solid_piece(mesh)};
   }
   return solids;
 }
 
-std::vector<SolidPiece> solids_of_open(const TriangleMesh& mesh, uint32_t resolution) {
-  Aabb box;
-  for (const Vec3& v : mesh.vertices) box.extend(v);
-  if (box.isEmpty() || !(box.sizes().maxCoeff() > 0)) return {};
-  const VoxelGrid grid(mesh, box, resolution);
-  const Real inside = grid.volume();
-  if (!(inside > 0)) return {};
-  SolidPiece closed = solid_piece(with_closed_holes(mesh));
-  Real volume = moments(closed).volume;
-  if (volume < 0) {
-    turn_over(closed);
-    volume = -volume;
-  }
-  if (std::abs(volume - inside) <= kSameSolid * inside) return {std::move(closed)};
-  return {grid.surface()};
+std::vector<SolidPiece> solids_of_open(const TriangleMesh& mesh, uint32_t resolution, std::size_t most) {
+  const Real longest = box_of(mesh).sizes().maxCoeff();
+  if (mesh.triangles.empty() || !(longest > 0)) return {};
+  std::vector<TriangleMesh> pieces = connected_pieces(mesh, most);
+  if (std::any_of(pieces.begin(), pieces.end(), is_cavity)) pieces = {mesh};
+  std::vector<SolidPiece> solids;
+  for (const TriangleMesh& piece : pieces)
+    if (SolidPiece solid = solid_of_piece(piece, longest / resolution); !solid.points.empty())
+      solids.push_back(std::move(solid));
+  return solids;
 }
 
 }  // namespace offstage::sim

@@ -255,6 +255,27 @@ Real covered(const TriangleMesh& mesh, const ConvexDecomposition& d, uint64_t po
   return static_cast<Real>(held) / inside;
 }
 
+/// Greatest height of a point of the surface over the part that is nearest, as a share of the mesh's extent.
+Real greatest_gap(const TriangleMesh& mesh, const ConvexDecomposition& d) {
+  Real gap = 0;
+  for (const Triangle& t : mesh.triangles) {
+    const Vec3 &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+    for (const Vec3& p : {a, Vec3((a + b) / 2), Vec3((a + b + c) / 3)}) {
+      Real least = extent(mesh);
+      for (const ConvexPolyhedron& part : d.parts) least = std::min(least, height_over(part, p));
+      gap = std::max(gap, least);
+    }
+  }
+  return gap / extent(mesh);
+}
+
+/// Trimmed hulls lose at most this share of the solid: rims around hollows, which lie about as far outside of
+/// the hull as the ground of the hollow lies inside. A limit of 0.01 leaves 7.7 % more volume than the model
+/// in the bowl that comes with offstage, and 8.0 % in the goblet; 0.03 leaves 3.3 and 4.3 %.
+constexpr Real kMostUncovered = 0.03;
+/// No rim lies farther outside than this share of the extent.
+constexpr Real kDeepestGap = 0.02;
+
 TEST(ApproximateDecomposition, HolesAreBridgedAndSidesStaySmooth) {
   TriangleMesh mesh = placed_at_random(u_solid(), 1, 4);
   mesh.triangles.pop_back();
@@ -295,6 +316,8 @@ TEST(ApproximateDecomposition, CavitiesAndTooManyReflexEdges) {
   EXPECT_LE(ring.parts.size(), 16u);
   EXPECT_LE(ring.difference, 0.05);
   EXPECT_LE(ring.volume_error, ring.difference);
+  EXPECT_GT(covered(torus, ring, 2000), 1 - kMostUncovered);
+  EXPECT_LE(greatest_gap(torus, ring), kDeepestGap);
 }
 
 TEST(ApproximateDecomposition, SurfacesWithoutInsideHaveNoParts) {
@@ -362,6 +385,8 @@ TEST(ApproximateDecomposition, DiffersAsMuchAsItSays) {
     EXPECT_LE(d.difference, 0.05);
     EXPECT_LE(d.volume_error, d.difference + 1e-9);
     EXPECT_LE(sampled_difference(mesh, d, 4000), d.difference + 0.015);  // three standard deviations
+    EXPECT_GT(covered(mesh, d, 4000), 1 - kMostUncovered);
+    EXPECT_LE(greatest_gap(mesh, d), kDeepestGap);
     for (const ConvexPolyhedron& p : d.parts) EXPECT_LE(concavity(p), 1e-9 * extent(mesh));
   }
 }
@@ -384,6 +409,32 @@ TEST(ApproximateDecomposition, OverlappingSolidsAreMeasuredAsTheirUnion) {
   const ConvexDecomposition d = decomposed(mesh, {.method = DecompositionMethod::approximate});
   EXPECT_EQ(d.parts.size(), 2u);
   EXPECT_LE(d.difference, 0.01);
+}
+
+// A thin shell has hollows that no cut removes; its parts hold it all the same.
+TEST(ApproximateDecomposition, ThinBowlsKeepTheirVolumeAndTheirGround) {
+  const TriangleMesh mesh = placed_at_random(bowl(1, 0.92, 32, 16), 1, 3);
+  const ConvexDecomposition d = decomposed(mesh, {.method = DecompositionMethod::approximate});
+  EXPECT_LE(d.parts.size(), 64u);
+  EXPECT_LE(d.volume_error, 0.05);
+  EXPECT_GT(covered(mesh, d, 8000), 1 - kMostUncovered);
+  EXPECT_LE(greatest_gap(mesh, d), kDeepestGap);
+}
+
+// The water of a fountain: a flat sheet beside the solid, and one through it.
+TEST(ApproximateDecomposition, SheetsBesideASolidDoNotCount) {
+  TriangleMesh mesh = u_solid();
+  const Real volume = mass_properties(mesh).volume;
+  for (const Real z : {0.5, 4.0}) {
+    const auto first = static_cast<uint32_t>(mesh.vertices.size());
+    for (const auto& [x, y] : {std::pair{0.1, 0.1}, std::pair{0.9, 0.1}, std::pair{0.5, 0.8}})
+      mesh.vertices.emplace_back(x, y, z);
+    mesh.triangles.push_back({first, first + 1, first + 2});
+  }
+  const ConvexDecomposition d = decomposed(mesh, {});
+  EXPECT_EQ(d.note, "6 border edges");
+  EXPECT_EQ(d.parts.size(), 3u);
+  EXPECT_NEAR(total_volume(d), volume, 1e-6);
 }
 
 TEST(ApproximateDecomposition, HullIsOnePart) {
@@ -450,7 +501,8 @@ TEST(LongDecomposition, RealMeshes) {
     EXPECT_NE(d.method, Method::none) << d.note;
     if (d.method != Method::approximate) continue;
     EXPECT_LE(d.parts.size(), DecompositionSettings().max_parts);
-    EXPECT_GT(covered(mesh, d, 200), 0.9);
+    EXPECT_GT(covered(mesh, d, 1000), 1 - kMostUncovered);
+    EXPECT_LE(greatest_gap(mesh, d), kDeepestGap);
     EXPECT_LE(d.volume_error, 0.1);
     for (const ConvexPolyhedron& p : d.parts) EXPECT_LE(concavity(p), 1e-9 * extent(mesh));
   }

@@ -111,7 +111,7 @@ TEST(HullMerge, BlocksBecomeTheirUnionForNothing) {
   std::vector<HullToMerge> blocks;
   for (int i = 0; i < 3; ++i) blocks.push_back({box_at(Vec3(i, 0, 0), Vec3(i + 1, 1, 1)), 0});
   blocks.push_back({box_at(Vec3(0, 1, 0), Vec3(1, 2, 1)), 0});
-  const std::vector<MergedHull> merged = merge_hulls(blocks, 8, 1e-6);
+  const std::vector<MergedHull> merged = HullMerger(blocks).run(8, 1e-6);
   ASSERT_EQ(merged.size(), 2u);  // the L keeps a corner
   EXPECT_NEAR(hull_volume(merged[0].hull) + hull_volume(merged[1].hull), 4, 1e-9);
 }
@@ -120,8 +120,8 @@ TEST(HullMerge, OverlapOfDifferentSolidsIsNotGainedTwice) {
   const std::vector<HullToMerge> cross = {{box_at(Vec3(-2, -0.5, 0), Vec3(2, 0.5, 1)), 0},
                                           {box_at(Vec3(-0.5, -2, 0), Vec3(0.5, 2, 1)), 1}};
   // The hull is an octagon of 16 - 4 * 9/8 = 11.5, the union has 7.
-  EXPECT_EQ(merge_hulls(cross, 2, 4.49).size(), 2u);
-  const std::vector<MergedHull> one = merge_hulls(cross, 2, 4.51);
+  EXPECT_EQ(HullMerger(cross).run(2, 4.49).size(), 2u);
+  const std::vector<MergedHull> one = HullMerger(cross).run(2, 4.51);
   ASSERT_EQ(one.size(), 1u);
   EXPECT_NEAR(one[0].shared, 1, 1e-9);
 }
