@@ -152,6 +152,51 @@ TEST(Decomposition, PartsShareTheCornersOfACutBitwise) {
   EXPECT_GE(shared, 2);  // at least those of the reflex edge
 }
 
+/// Prism of an L whose caps are cut into ears, as model readers do it: the third ear of each cap is a sliver,
+/// between three corners in a line.
+TriangleMesh l_prism_of_ears() {
+  const std::array<std::array<Real, 2>, 6> outline = {{{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}}};
+  TriangleMesh mesh;
+  for (const Real z : {0.0, 1.0})
+    for (const auto& [x, y] : outline) mesh.vertices.emplace_back(x, y, z);
+  for (const auto& [a, b, c] : {Triangle{1, 2, 3}, Triangle{3, 4, 5}, Triangle{1, 3, 5}, Triangle{0, 1, 5}}) {
+    mesh.triangles.push_back({c, b, a});
+    mesh.triangles.push_back({a + 6, b + 6, c + 6});
+  }
+  for (uint32_t i = 0; i < 6; ++i) {
+    const uint32_t j = (i + 1) % 6;
+    mesh.triangles.push_back({i, j, j + 6});
+    mesh.triangles.push_back({i, j + 6, i + 6});
+  }
+  return mesh;
+}
+
+TEST(Decomposition, SliversOfCapsDoNotMatter) {
+  for (uint64_t pose = 0; pose < 20; ++pose) {
+    SCOPED_TRACE(pose);
+    TriangleMesh mesh = placed_at_random(l_prism_of_ears(), 1, pose);
+    for (Vec3& v : mesh.vertices) v = v.cast<float>().cast<double>();
+    const ConvexDecomposition d = decomposed(mesh);
+    EXPECT_EQ(d.method, Method::exact) << d.note;
+    EXPECT_EQ(d.parts.size(), 2u);
+    EXPECT_NEAR(total_volume(d), 3, 3e-6);
+  }
+}
+
+TEST(Decomposition, FineToriAndBowlsAreExact) {
+  const TriangleMesh torus = torus_mesh(1, 0.3, 64, 32);
+  const ConvexDecomposition ring = decomposed(torus);
+  EXPECT_EQ(ring.method, Method::exact) << ring.note;
+  EXPECT_EQ(ring.parts.size(), 64u);
+  EXPECT_NEAR(total_volume(ring), mass_properties(torus).volume, 1e-6);
+  EXPECT_EQ(decomposed(torus, {}).method, Method::exact);  // within the default number of parts
+  const TriangleMesh shell = bowl(1, 0.8, 24, 8);
+  const ConvexDecomposition pieces = decomposed(shell);
+  EXPECT_EQ(pieces.method, Method::exact) << pieces.note;
+  EXPECT_LE(pieces.parts.size(), 24u * 8u);
+  EXPECT_NEAR(total_volume(pieces), mass_properties(shell).volume, 1e-6);
+}
+
 // Unions of random cubes have many coplanar faces, collinear edges, tunnels and corners that touch.
 TEST(Decomposition, RandomPolycubes) {
   int exact = 0;
