@@ -26,7 +26,7 @@ constexpr Real kSamePlace = 2e-7;
 constexpr Real kExact = 1e-6;
 
 /// Bound of CutLimits::max_work if an approximation will do.
-constexpr Real kQuickWork = 1e7;
+constexpr Real kQuickWork = 3e7;
 
 /// Number of points for estimated errors.
 constexpr Real kErrorPoints = 3e4;
