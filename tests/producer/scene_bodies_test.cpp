@@ -7,6 +7,7 @@
 #include <fstream>
 #include <numbers>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "producer/build/body_shapes.h"
@@ -14,6 +15,7 @@
 #include "producer/build/simulation.h"
 #include "producer/format/scene_io.h"
 #include "producer/run/production.h"
+#include "sim/geometry/mass_properties.h"
 #include "tests/meshes.h"
 
 namespace offstage::producer {
@@ -286,6 +288,57 @@ TEST(ParticleTables, HoldEveryParticleOfEveryFrame) {
   const std::string records((std::istreambuf_iterator<char>(binary)), {});
   constexpr std::size_t kRecord = 4 + 8 + 4 + 8 + 7 * 8 + 5 * 4;
   EXPECT_EQ(records.size(), rows * kRecord);
+  std::filesystem::remove_all(folder);
+}
+
+// Rows of two cloths; the volume of the balloon is that of the mesh of its vertices, the sheet has none.
+TEST(ClothTables, HoldEveryVertexAndTheVolumeInside) {
+  const LoadedScene loaded = body_scene(R"("output": {"fps": 10, "duration": 0.5},
+    "cloths": [{"name": "sheet", "shape": {"type": "grid", "size": [1, 1], "cells": [2, 2]}, "position": [0, 5, 0]},
+               {"name": "balloon", "shape": {"type": "sphere", "radius": 0.1, "divisions": 2}, "position": [3, 5, 0], "fabric": "balloon",
+                "pressure": 3000}])");
+  const ModelLibrary models;
+  const std::filesystem::path folder = std::filesystem::temp_directory_path() / "offstage_cloth_table";
+  std::filesystem::create_directories(folder);
+  simulate_frames(loaded, models,
+                  {.cache = {},
+                   .trace = {},
+                   .contacts = {},
+                   .cloths = folder / "c.csv",
+                   .joints = {},
+                   .particles = {},
+                   .cloth_points = folder / "v.csv"},
+                  {});
+  Simulation simulation(loaded.scene, models);
+  for (int i = 0; i < 5; ++i) simulation.advance();
+  const sim::ClothView balloon = simulation.world().cloth(simulation.cloths()[1].handle);
+
+  std::ifstream points(folder / "v.csv"), cloths(folder / "c.csv");
+  std::string line, last;
+  std::getline(points, line);
+  EXPECT_EQ(line, "time,cloth,vertex,x,y,z,vx,vy,vz");
+  std::size_t rows = 0, of_sheet = 0;
+  for (; std::getline(points, line); ++rows) {
+    of_sheet += line.find(",sheet,") != std::string::npos;
+    last = line;
+  }
+  EXPECT_EQ(of_sheet, 5u * 9u);
+  EXPECT_EQ(rows - of_sheet, 5 * balloon.points.size());
+  const sim::Vec3& p = balloon.points.back();
+  EXPECT_NE(last.find(fmt::format(",balloon,{},{},{},{},", balloon.points.size() - 1, p.x(), p.y(), p.z())),
+            std::string::npos)
+      << last;
+
+  std::getline(cloths, line);
+  EXPECT_TRUE(line.ends_with(",volume"));
+  std::string sheet;
+  while (std::getline(cloths, line)) (line.find(",sheet,") != std::string::npos ? sheet : last) = line;
+  EXPECT_TRUE(sheet.ends_with(",0"));
+  const sim::TriangleMesh skin{{balloon.points.begin(), balloon.points.end()},
+                               {balloon.triangles.begin(), balloon.triangles.end()}};
+  const Real volume = sim::mass_properties(skin).volume;
+  EXPECT_GT(volume, 0.002);  // of the ball: 0.0042 m^3
+  EXPECT_NEAR(std::stod(last.substr(last.rfind(',') + 1)), volume, 1e-9);
   std::filesystem::remove_all(folder);
 }
 

@@ -267,7 +267,9 @@ CLI::App* add_simulate(CLI::App& app, SimulateOptions& simulate) {
                       "CSV of position, orientation and velocities of moving objects");
   command->add_option("--contacts", simulate.contacts,
                       "CSV of the contact points of bodies, with their forces");
-  command->add_option("--cloths", simulate.cloths, "CSV of strain and contacts of cloths");
+  command->add_option("--cloths", simulate.cloths, "CSV of strain, contacts and volume of cloths");
+  command->add_option("--cloth-points", simulate.cloth_points,
+                      "CSV of position and velocity of the vertices of cloths");
   command->add_option("--joints", simulate.joints, "CSV of the loads and positions of joints");
   command->add_option(
       "--particles", simulate.particles,

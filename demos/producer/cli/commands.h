@@ -108,7 +108,7 @@ int sweep_command(const SweepOptions& options);
 struct SimulateOptions {
   SceneOptions scene;
   TalkOptions talk;
-  std::string trace, contacts, cloths, joints, particles, trace_every = "frame", cache, stats;
+  std::string trace, contacts, cloths, cloth_points, joints, particles, trace_every = "frame", cache, stats;
   int threads = 0;
   bool force = false;
 };
