@@ -2,10 +2,11 @@
 /// Decomposition of solids into convex parts (physics N8). Exact: reflex edges are resolved by cut planes
 /// after Joe, "Tetrahedral mesh generation in polyhedral regions based on convex polyhedron decompositions"
 /// (1994), in the simplified form of the book's appendix F. Where this is not possible (open or non-manifold
-/// scans, cavities, surfaces that intersect themselves, too many reflex edges or cuts) the solid is
-/// approximated by convex hulls of its parts in boxes, and the result states the reason.
+/// scans, cavities, surfaces that intersect themselves, too many parts) the solid is approximated by convex
+/// hulls of its pieces between cut planes, and the result states the reason.
 
 #include <cstdint>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -14,35 +15,53 @@
 
 namespace offstage::sim {
 
+/// How a solid is decomposed.
+enum class DecompositionMethod : uint8_t {
+  automatic,    ///< exact if that takes at most `max_parts`, else approximate
+  exact,        ///< exact with up to 1024 parts, else approximate
+  approximate,  ///< hulls of pieces
+  hull,         ///< one part: the convex hull
+};
+
 struct DecompositionSettings {
-  /// Smallest angle between a cut and the faces that it meets [rad]; relaxed if no cut satisfies it.
-  Real min_dihedral = 0.35;
-  /// Smallest distance of a cut from vertices off it, as a share of the mean edge. Relaxed if no cut
+  DecompositionMethod method = DecompositionMethod::automatic;
+  /// Smallest angle between an exact cut and the faces that it meets [rad], 20 degrees; relaxed if no cut
+  /// satisfies it.
+  Real min_dihedral = 20 * std::numbers::pi / 180;
+  /// Smallest distance of an exact cut from vertices off it, as a share of the mean edge. Relaxed if no cut
   /// satisfies it.
   Real min_distance = 0.1;
   uint32_t max_reflex_edges = 2000;  ///< with more reflex edges the solid is approximated at once
-  uint32_t max_parts = 32;           ///< greatest number of parts of an approximate decomposition
-  uint32_t resolution = 64;          ///< voxels along the longest side, for an approximate decomposition
+  Real max_error = 0.05;             ///< accepted error of an approximate decomposition, > 0
+  uint32_t max_parts = 64;           ///< has priority over the error, >= 1
+  uint32_t resolution = 64;          ///< voxels along the longest side of a mesh with holes
+
+  bool operator==(const DecompositionSettings&) const = default;
 };
 
 struct ConvexDecomposition {
   enum class Method : uint8_t {
     convex,       ///< the solid was convex: one part
     exact,        ///< cut along reflex edges: the parts fill the solid
-    approximate,  ///< hulls of the solid's parts in boxes; `note` has the reason
+    approximate,  ///< hulls of the solid's pieces; `note` has the reason
     none,         ///< the surface has no inside: no parts
+    hull,         ///< the convex hull, as the settings want
   };
   Method method = Method::none;
   std::vector<ConvexPolyhedron> parts;
-  /// |sum of the parts - solid| / solid; for open meshes relative to the volume of the voxels.
+  /// |volume of the parts - volume of the solid| / volume of the solid.
   Real volume_error = 0;
+  /// Upper bound of the volume in which the parts and the solid differ, as a share of the solid's volume;
+  /// DecompositionSettings::max_error limits it. 0 for exact parts. For several surfaces that may overlap, an
+  /// estimate with an accuracy of about 1 %, as is `volume_error`.
+  Real difference = 0;
   std::string note;  ///< reason why the method is approximate or none; otherwise empty
 };
 
 /// Decomposes a welded mesh with finite coordinates; it may be inside out. The result does not depend on the
 /// number of threads. Parts of the exact method do not overlap, and their volumes sum to that of the solid
-/// within 1e-6. Faces that are flat within 2e-7 of the mesh's diagonal count as flat. Takes at most one or
-/// two seconds for meshes of up to 100 000 faces.
+/// within 1e-6. Faces that are flat within 2e-7 of the mesh's diagonal count as flat. Approximate parts
+/// differ from the solid by up to 2 % of its diagonal more than their number demands.
 ConvexDecomposition decompose(const TriangleMesh& mesh, const MeshTopology& topology,
                               const DecompositionSettings& settings = {});
 

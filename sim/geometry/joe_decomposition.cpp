@@ -21,12 +21,10 @@ constexpr std::array<Real, 5> kRelaxed = {1, 0.5, 0.25, 0.1, 0};
 /// (F.2).
 constexpr std::array<Real, 5> kShares = {0.25, 0.5, 0.75, 0.375, 0.625};
 constexpr std::size_t kMaxCandidates = 12;
+/// Angles are ordered in steps of this size, so that rounding does not order equal ones [rad].
+constexpr Real kSameAngle = 1e-4;
 /// Number of reflex edges with an acceptable cut that are compared before the best of their cuts is made.
 constexpr int kCompared = 8;
-/// Bounds of the total work: number of parts, and of half-edges of the polyhedra for which candidate planes
-/// are tried.
-constexpr std::size_t kMaxParts = 1024;
-constexpr Real kMaxWork = 5e7;
 
 Real mean_edge(const Polyhedron& p) {
   Real sum = 0;
@@ -76,16 +74,19 @@ struct Merit {
   Real distance = std::numeric_limits<Real>::infinity();  ///< distance of the nearest vertex off the cut [m]
 };
 
-void measure_distances(const Polyhedron& p, const Cut& cut, uint32_t face, Real tolerance, Merit& merit) {
-  p.for_each_around(face, [&](uint32_t h) {
-    const Real d = std::abs(cut.plane.normal.dot(p.origin_point(h)) - cut.plane.offset);
-    if (d > tolerance) merit.distance = std::min(merit.distance, d);
-  });
+/// Distance from a plane to the nearest vertex off it, which limits how short the new edges can be.
+Real least_distance(const Polyhedron& p, const Polyhedron::Plane& plane, Real tolerance) {
+  Real least = std::numeric_limits<Real>::infinity();
+  for (const Vec3& v : p.points)
+    if (const Real d = std::abs(plane.normal.dot(v) - plane.offset); d > tolerance)
+      least = std::min(least, d);
+  return least;
 }
 
 /// Returns nothing if a side of the cut is not inside the solid, which only rounding can cause.
 std::optional<Merit> merit(const Polyhedron& p, const Cut& cut, Real tolerance) {
   Merit m;
+  m.distance = least_distance(p, cut.plane, tolerance);
   for (std::size_t k = 0; k < cut.corners.size(); ++k) {
     const Cut::Corner &c = cut.corners[k], &next = cut.corners[(k + 1) % cut.corners.size()];
     const uint32_t left = p.half_edges[c.half_edge].face;
@@ -93,8 +94,6 @@ std::optional<Merit> merit(const Polyhedron& p, const Cut& cut, Real tolerance) 
     const Wedge inside(next.point - c.point, p.faces[left].plane.normal, p.faces[right].plane.normal);
     const Real above = inside.angle_of(cut.plane.normal.cross(inside.along)), below = inside.angle - above;
     m.dihedral = std::min({m.dihedral, above, below});
-    measure_distances(p, cut, left, tolerance, m);
-    measure_distances(p, cut, right, tolerance, m);
     if (!c.across_face && inside.angle > std::numbers::pi + kFlatFace &&
         std::max(above, below) <= std::numbers::pi + kFlatFace)
       ++m.resolved;
@@ -128,7 +127,8 @@ class Decomposer {
         continue;
       }
       const std::optional<RatedCut> best = best_cut(p, reflex);
-      if (work_ > kMaxWork || result.parts.size() + rest.size() > kMaxParts) return {{}, "too many cuts"};
+      if (work_ > limits_.max_work) return {{}, "too many cuts"};
+      if (result.parts.size() + rest.size() >= limits_.max_parts) return {{}, too_many_parts(limits_)};
       if (!best) return {{}, "no plane resolves an edge"};
       for (Polyhedron& part : separate(std::move(p), best->cut)) rest.push_back(std::move(part));
     }
@@ -136,10 +136,16 @@ class Decomposer {
   }
 
  private:
+  /// The reflex edges, those with the largest angles first: cuts through sharp edges resolve the most of the
+  /// flat ones.
   static std::vector<uint32_t> reflex_edges(const Polyhedron& p) {
-    std::vector<uint32_t> edges;
+    std::vector<std::pair<Real, uint32_t>> order;
     for (uint32_t h = 0; h < p.half_edges.size(); ++h)
-      if (h < p.half_edges[h].twin && is_reflex(p, h)) edges.push_back(h);
+      if (h < p.half_edges[h].twin && is_reflex(p, h))
+        order.emplace_back(-std::floor(wedge(p, h).angle / kSameAngle), h);
+    std::sort(order.begin(), order.end());
+    std::vector<uint32_t> edges;
+    for (const auto& [angle, h] : order) edges.push_back(h);
     return edges;
   }
 
@@ -151,7 +157,7 @@ class Decomposer {
     for (Real relaxed : kRelaxed) {
       int compared = 0;
       for (uint32_t h : reflex) {
-        if (compared == kCompared || work_ > kMaxWork) break;
+        if (compared == kCompared || work_ > limits_.max_work) break;
         std::optional<RatedCut> cut = best_cut_at(p, h, relaxed, edge);
         if (!cut) continue;
         ++compared;
@@ -194,6 +200,10 @@ uint32_t count_reflex_edges(const Polyhedron& p) {
   uint32_t n = 0;
   for (uint32_t h = 0; h < p.half_edges.size(); ++h) n += h < p.half_edges[h].twin && is_reflex(p, h);
   return n;
+}
+
+std::string too_many_parts(const CutLimits& limits) {
+  return "more than " + std::to_string(limits.max_parts) + " exact parts";
 }
 
 JoeResult resolve_reflex_edges(std::vector<Polyhedron> polyhedra, const CutLimits& limits, Real tolerance) {

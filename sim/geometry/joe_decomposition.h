@@ -10,11 +10,14 @@
 
 namespace offstage::sim {
 
-/// Initial limits of a cut. They are relaxed in steps, at last to zero, if no cut satisfies them.
+/// Initial limits of a cut, relaxed in steps, at last to zero, if no cut satisfies them; and a bound.
 struct CutLimits {
   Real dihedral = 0;  ///< smallest angle between the cut and a face it meets [rad]
-  /// Smallest distance of the cut from neighbouring vertices off it, as a share of the mean edge.
+  /// Smallest distance of the cut from vertices off it, as a share of the mean edge.
   Real distance = 0;
+  // The method fails beyond these bounds.
+  std::size_t max_parts = 1024;
+  Real max_work = 5e7;  ///< half-edges of the polyhedra, summed over the planes that are tried
 };
 
 /// Whether the dihedral angle at a half-edge is over pi.
@@ -25,6 +28,9 @@ struct JoeResult {
   std::vector<Polyhedron> parts;  ///< parts without reflex edges; empty if it failed
   std::string failure;            ///< reason of the failure; otherwise empty
 };
+
+/// The failure when there are more parts than allowed.
+std::string too_many_parts(const CutLimits& limits);
 
 /// Cuts polyhedra into parts without reflex edges. Points within `tolerance` of a cut count as on it.
 JoeResult resolve_reflex_edges(std::vector<Polyhedron> polyhedra, const CutLimits& limits, Real tolerance);

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <numeric>
 #include <utility>
+
+#include "sim/geometry/polygon.h"
 
 namespace offstage::sim {
 namespace {
@@ -28,10 +31,17 @@ Real thickness(const TriangleMesh& mesh, uint32_t face, Real area2) {
   return longest > 0 ? area2 / longest : 0;
 }
 
-/// The plane of each triangle, shared by neighbours that lie in it. Planes grow from the largest triangles,
-/// whose normals are the most accurate. Slivers have no reliable normal and take the plane of their
-/// neighbours.
-std::vector<FacePlane> shared_planes(const TriangleMesh& mesh, const MeshTopology& topology, Real tolerance) {
+/// Triangles that lie in common planes with their neighbours.
+struct FlatRegions {
+  std::vector<FacePlane> planes;               // of each region
+  std::vector<std::vector<uint32_t>> members;  // triangles of each region, in their order
+  std::vector<uint32_t> region;                // of each triangle
+};
+
+/// Divides the triangles into connected regions that lie in one plane. Planes grow from the largest
+/// triangles, whose normals are the most accurate. Slivers have no reliable normal and take the plane of
+/// their neighbours.
+FlatRegions flat_regions(const TriangleMesh& mesh, const MeshTopology& topology, Real tolerance) {
   const auto n = static_cast<uint32_t>(mesh.triangles.size());
   std::vector<Real> area(n);
   for (uint32_t f = 0; f < n; ++f) area[f] = doubled_area_of(mesh, f).norm();
@@ -39,7 +49,8 @@ std::vector<FacePlane> shared_planes(const TriangleMesh& mesh, const MeshTopolog
   std::iota(seeds.begin(), seeds.end(), 0u);
   std::stable_sort(seeds.begin(), seeds.end(), [&](uint32_t a, uint32_t b) { return area[a] > area[b]; });
 
-  std::vector<FacePlane> planes(n);
+  FlatRegions regions;
+  regions.region.assign(n, kNone);
   std::vector<bool> done(n, false);
   const auto lies_in = [&](uint32_t f, const FacePlane& plane) {
     for (uint32_t v : mesh.triangles[f])
@@ -51,12 +62,14 @@ std::vector<FacePlane> shared_planes(const TriangleMesh& mesh, const MeshTopolog
     if (done[seed]) continue;
     const Vec3& normal = topology.face_normal(seed);
     const FacePlane plane{normal, normal.dot(mesh.vertices[mesh.triangles[seed][0]])};
+    const auto region = static_cast<uint32_t>(regions.planes.size());
+    regions.planes.push_back(plane);
     done[seed] = true;
     front = {seed};
     while (!front.empty()) {
       const uint32_t f = front.back();
       front.pop_back();
-      planes[f] = plane;
+      regions.region[f] = region;
       for (uint32_t g : topology.face_neighbours(f)) {
         if (g == kNoFace || done[g] || !lies_in(g, plane)) continue;
         done[g] = true;
@@ -64,7 +77,100 @@ std::vector<FacePlane> shared_planes(const TriangleMesh& mesh, const MeshTopolog
       }
     }
   }
-  return planes;
+  regions.members.resize(regions.planes.size());
+  for (uint32_t f = 0; f < n; ++f)
+    if (topology.face_edges(f)[0] != kNoFace) regions.members[regions.region[f]].push_back(f);
+  return regions;
+}
+
+/// A side of a polygon: a vertex and the mesh's edge from it to the next one; kNone for a new diagonal.
+struct PolygonSide {
+  uint32_t from, edge;
+};
+using Polygon = std::vector<PolygonSide>;
+
+/// The outline of a region, or nothing if it has holes or touches itself.
+Polygon outline_of(const TriangleMesh& mesh, const MeshTopology& topology, const FlatRegions& regions,
+                   uint32_t region) {
+  struct Outward {
+    uint32_t to, edge;
+  };
+  std::map<uint32_t, Outward> sides;
+  for (uint32_t f : regions.members[region])
+    for (uint32_t k = 0; k < 3; ++k) {
+      const uint32_t across = topology.face_neighbours(f)[k];
+      if (across != kNoFace && regions.region[across] == region) continue;
+      const uint32_t from = mesh.triangles[f][k], to = mesh.triangles[f][(k + 1) % 3];
+      if (!sides.try_emplace(from, Outward{to, topology.face_edges(f)[k]}).second) return {};
+    }
+  Polygon outline;
+  if (sides.empty()) return outline;
+  const uint32_t first = sides.begin()->first;
+  for (uint32_t at = first; outline.size() < sides.size(); at = sides.at(at).to) {
+    if (at == first && !outline.empty()) return {};  // a second outline is left
+    outline.push_back({at, sides.at(at).edge});
+    if (!sides.contains(sides.at(at).to)) return {};
+  }
+  return outline;
+}
+
+/// Convex polygons that fill a region: those of its outline, so that the way in which a file divides a
+/// polygon into triangles, slivers among them, does not matter; or else its triangles.
+std::vector<Polygon> polygons_of(const TriangleMesh& mesh, const MeshTopology& topology,
+                                 const FlatRegions& regions, uint32_t region, Real tolerance) {
+  std::vector<Polygon> polygons;
+  if (regions.members[region].size() > 1) {
+    const Polygon outline = outline_of(mesh, topology, regions, region);
+    const Vec3 x = regions.planes[region].normal.unitOrthogonal(), y = regions.planes[region].normal.cross(x);
+    std::vector<Vec2> flat;
+    for (const PolygonSide& side : outline) {
+      const Vec3 d = mesh.vertices[side.from] - mesh.vertices[outline[0].from];
+      flat.emplace_back(x.dot(d), y.dot(d));
+    }
+    for (const std::vector<uint32_t>& piece :
+         flat.empty() ? std::vector<std::vector<uint32_t>>() : convex_pieces(flat, tolerance)) {
+      Polygon& polygon = polygons.emplace_back();
+      for (std::size_t k = 0; k < piece.size(); ++k) {
+        const bool is_side = (piece[k] + 1) % outline.size() == piece[(k + 1) % piece.size()];
+        polygon.push_back({outline[piece[k]].from, is_side ? outline[piece[k]].edge : kNone});
+      }
+    }
+  }
+  if (polygons.empty())
+    for (uint32_t f : regions.members[region]) {
+      Polygon& triangle = polygons.emplace_back();
+      for (uint32_t k = 0; k < 3; ++k) triangle.push_back({mesh.triangles[f][k], topology.face_edges(f)[k]});
+    }
+  return polygons;
+}
+
+/// Adds the polygons of one region to a polyhedron. `first_side`: the half-edge at each edge of the mesh that
+/// has no twin yet.
+void add_polygons(const std::vector<Polygon>& polygons, const FacePlane& plane,
+                  std::vector<uint32_t>& first_side, Polyhedron& all) {
+  std::map<std::pair<uint32_t, uint32_t>, uint32_t> diagonals;
+  const auto join = [&](uint32_t h, uint32_t& other) {
+    if (other == kNone) {
+      other = h;
+    } else {
+      all.half_edges[h].twin = other;
+      all.half_edges[other].twin = h;
+    }
+  };
+  for (const Polygon& polygon : polygons) {
+    const auto first = static_cast<uint32_t>(all.half_edges.size()),
+               n = static_cast<uint32_t>(polygon.size());
+    const auto face = static_cast<uint32_t>(all.faces.size());
+    all.faces.push_back({first, plane});
+    for (uint32_t k = 0; k < n; ++k) {
+      const uint32_t from = polygon[k].from, to = polygon[(k + 1) % n].from;
+      all.half_edges.push_back({from, face, first + (k + 1) % n, first + (k + n - 1) % n, kNone});
+      if (polygon[k].edge != kNone)
+        join(first + k, first_side[polygon[k].edge]);
+      else
+        join(first + k, diagonals.try_emplace(std::minmax(from, to), kNone).first->second);
+    }
+  }
 }
 
 /// Copies the faces of one piece of surface to a polyhedron of its own.
@@ -123,25 +229,17 @@ Wedge wedge(const Polyhedron& p, uint32_t h) {
 }
 
 std::vector<Polyhedron> boundaries(const TriangleMesh& mesh, const MeshTopology& topology, Real tolerance) {
-  const std::vector<FacePlane> planes = shared_planes(mesh, topology, tolerance);
+  const FlatRegions regions = flat_regions(mesh, topology, tolerance);
   Polyhedron all;
   all.points = mesh.vertices;
   std::vector<uint32_t> first_side(topology.edges().size(), kNone);
+  std::vector<bool> added(regions.planes.size(), false);
   for (uint32_t f = 0; f < mesh.triangles.size(); ++f) {
-    if (topology.face_edges(f)[0] == kNoFace) continue;
-    const auto first = static_cast<uint32_t>(all.half_edges.size());
-    const auto face = static_cast<uint32_t>(all.faces.size());
-    all.faces.push_back({first, planes[f]});
-    for (uint32_t k = 0; k < 3; ++k) {
-      all.half_edges.push_back({mesh.triangles[f][k], face, first + (k + 1) % 3, first + (k + 2) % 3, kNone});
-      uint32_t& met = first_side[topology.face_edges(f)[k]];
-      if (met == kNone) {
-        met = first + k;
-      } else {
-        all.half_edges[first + k].twin = met;
-        all.half_edges[met].twin = first + k;
-      }
-    }
+    const uint32_t region = regions.region[f];
+    if (added[region]) continue;
+    added[region] = true;
+    add_polygons(polygons_of(mesh, topology, regions, region, tolerance), regions.planes[region], first_side,
+                 all);
   }
   return components(all);
 }

@@ -75,8 +75,9 @@ struct Wedge {
 /// The wedge at a half-edge, between its face and its twin's.
 Wedge wedge(const Polyhedron& p, uint32_t half_edge);
 
-/// Builds one polyhedron for each connected piece of the surface. Triangles that lie in one plane within
-/// `tolerance` get the same plane. The mesh must be closed and consistently wound; triangles that repeat a
+/// Builds one polyhedron for each connected piece of the surface. Neighbouring triangles that lie in one
+/// plane within `tolerance` are merged into convex polygons with the same plane, unless they enclose a hole
+/// or touch themselves at a vertex. The mesh must be closed and consistently wound; triangles that repeat a
 /// vertex are left out.
 std::vector<Polyhedron> boundaries(const TriangleMesh& mesh, const MeshTopology& topology, Real tolerance);
 

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <numbers>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "producer/build/body_shapes.h"
@@ -14,6 +15,8 @@
 #include "producer/build/simulation.h"
 #include "producer/format/scene_io.h"
 #include "producer/run/production.h"
+#include "sim/geometry/mass_properties.h"
+#include "tests/meshes.h"
 
 namespace offstage::producer {
 namespace {
@@ -140,6 +143,44 @@ TEST(Fills, HoldAllBallsAtTheirDistance) {
     }
 }
 
+TEST(Fills, HoldBallsInsideAModel) {
+  const sim::TriangleMesh torus = sim::torus_mesh(1, 0.3, 48, 32);
+  const Real d = 0.06, free = 0.3 - d / 2;  // radius of the tube in which the centres lie
+  for (const Packing packing : {Packing::hexagonal, Packing::cubic, Packing::random}) {
+    MeshFill shape;
+    shape.solid = torus;
+    for (Vec3& v : shape.solid.vertices) v += Vec3(5, 0, 0);
+    const std::vector<Vec3> places = fill_places({.shape = shape, .packing = packing}, d, 100'000);
+    for (const Vec3& p : places) {
+      const Vec3 q = p - Vec3(5, 0, 0);
+      // The mesh's chords leave the torus by up to 0.7 (1 - cos(pi / 48)) = 0.0015, at its inner equator.
+      EXPECT_LE(std::hypot(std::hypot(q.x(), q.z()) - 1, q.y()), free + 0.0015);
+    }
+    Real nearest = d * d;
+    for (std::size_t i = 0; i < places.size(); ++i)
+      for (std::size_t k = 0; k < i; ++k) nearest = std::min(nearest, (places[i] - places[k]).squaredNorm());
+    EXPECT_GE(std::sqrt(nearest), d * (1 - 1e-9));
+    // The places fill that tube at the density of their packing: 1 or sqrt(2) per cube of d for the lattices,
+    // whose ten rows cover 0.96 of the tube's section, and less than the limit of random sequential addition,
+    // 0.384 * 6 / pi = 0.733, for random places.
+    const Real share = static_cast<Real>(places.size()) * d * d * d /
+                       (2 * std::numbers::pi * std::numbers::pi * free * free);
+    EXPECT_GT(share, packing == Packing::random ? 0.55 : packing == Packing::hexagonal ? 1.25 : 0.9);
+    EXPECT_LT(share, packing == Packing::random ? 0.733 : packing == Packing::hexagonal ? 1.5 : 1.1);
+  }
+}
+
+TEST(Fills, OfAModelReadItsFile) {
+  const LoadedScene loaded = body_scene(R"(
+    "particles": [{"name": "water", "radius": 0.01, "fill": {"shape": {"type": "mesh", "file": "rock.glb", "fit": [0.2, 0.2, 0.2]},
+                                                           "position": [0, 1, 0]}}])");
+  EXPECT_GT(loaded.scene.particles[0].places.size(), 50u);
+  EXPECT_FALSE(loaded.scene.fill_digest.empty());
+  EXPECT_THROW(body_scene(R"("particles": [{"name": "water", "radius": 0.01,
+    "fill": {"shape": {"type": "mesh", "file": "hammock.glb"}}}])"),
+               SceneError);
+}
+
 TEST(Fills, MakeParticlesAndCopiesOfBodies) {
   const LoadedScene loaded = body_scene(R"(
     "particles": [{"name": "water", "radius": 0.05, "places": [{"position": [9, 0, 0]}],
@@ -247,6 +288,57 @@ TEST(ParticleTables, HoldEveryParticleOfEveryFrame) {
   const std::string records((std::istreambuf_iterator<char>(binary)), {});
   constexpr std::size_t kRecord = 4 + 8 + 4 + 8 + 7 * 8 + 5 * 4;
   EXPECT_EQ(records.size(), rows * kRecord);
+  std::filesystem::remove_all(folder);
+}
+
+// Rows of two cloths; the volume of the balloon is that of the mesh of its vertices, the sheet has none.
+TEST(ClothTables, HoldEveryVertexAndTheVolumeInside) {
+  const LoadedScene loaded = body_scene(R"("output": {"fps": 10, "duration": 0.5},
+    "cloths": [{"name": "sheet", "shape": {"type": "grid", "size": [1, 1], "cells": [2, 2]}, "position": [0, 5, 0]},
+               {"name": "balloon", "shape": {"type": "sphere", "radius": 0.1, "divisions": 2}, "position": [3, 5, 0], "fabric": "balloon",
+                "pressure": 3000}])");
+  const ModelLibrary models;
+  const std::filesystem::path folder = std::filesystem::temp_directory_path() / "offstage_cloth_table";
+  std::filesystem::create_directories(folder);
+  simulate_frames(loaded, models,
+                  {.cache = {},
+                   .trace = {},
+                   .contacts = {},
+                   .cloths = folder / "c.csv",
+                   .joints = {},
+                   .particles = {},
+                   .cloth_points = folder / "v.csv"},
+                  {});
+  Simulation simulation(loaded.scene, models);
+  for (int i = 0; i < 5; ++i) simulation.advance();
+  const sim::ClothView balloon = simulation.world().cloth(simulation.cloths()[1].handle);
+
+  std::ifstream points(folder / "v.csv"), cloths(folder / "c.csv");
+  std::string line, last;
+  std::getline(points, line);
+  EXPECT_EQ(line, "time,cloth,vertex,x,y,z,vx,vy,vz");
+  std::size_t rows = 0, of_sheet = 0;
+  for (; std::getline(points, line); ++rows) {
+    of_sheet += line.find(",sheet,") != std::string::npos;
+    last = line;
+  }
+  EXPECT_EQ(of_sheet, 5u * 9u);
+  EXPECT_EQ(rows - of_sheet, 5 * balloon.points.size());
+  const sim::Vec3& p = balloon.points.back();
+  EXPECT_NE(last.find(fmt::format(",balloon,{},{},{},{},", balloon.points.size() - 1, p.x(), p.y(), p.z())),
+            std::string::npos)
+      << last;
+
+  std::getline(cloths, line);
+  EXPECT_TRUE(line.ends_with(",volume"));
+  std::string sheet;
+  while (std::getline(cloths, line)) (line.find(",sheet,") != std::string::npos ? sheet : last) = line;
+  EXPECT_TRUE(sheet.ends_with(",0"));
+  const sim::TriangleMesh skin{{balloon.points.begin(), balloon.points.end()},
+                               {balloon.triangles.begin(), balloon.triangles.end()}};
+  const Real volume = sim::mass_properties(skin).volume;
+  EXPECT_GT(volume, 0.002);  // of the ball: 0.0042 m^3
+  EXPECT_NEAR(std::stod(last.substr(last.rfind(',') + 1)), volume, 1e-9);
   std::filesystem::remove_all(folder);
 }
 

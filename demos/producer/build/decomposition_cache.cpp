@@ -12,18 +12,20 @@ namespace offstage::producer {
 namespace {
 
 /// Increase the version whenever decompose() gives other results.
-constexpr FileKind kPartsKind = {"offparts", 2, "convex decomposition"};
+constexpr FileKind kPartsKind = {"offparts", 4, "convex decomposition"};
 
 using sim::ConvexDecomposition;
 using sim::ConvexPolyhedron;
 
-/// `mesh_hash` is stored in the file, so that a renamed file is not used for another mesh.
+/// `mesh_hash`: of the mesh and the settings. It is stored in the file, so that a renamed file is not used
+/// for another mesh.
 std::vector<uint8_t> serialize(const ConvexDecomposition& d, const XXH128_hash_t& mesh_hash) {
   ByteWriter out;
   out.put(uint64_t{mesh_hash.low64});
   out.put(uint64_t{mesh_hash.high64});
   out.put(static_cast<uint8_t>(d.method));
   out.put(d.volume_error);
+  out.put(d.difference);
   out.put(uint64_t{d.note.size()});
   for (char c : d.note) out.put(c);
   out.put(uint64_t{d.parts.size()});
@@ -39,12 +41,20 @@ std::vector<uint8_t> serialize(const ConvexDecomposition& d, const XXH128_hash_t
   return pack(kPartsKind, out.bytes());
 }
 
-XXH128_hash_t hash_of(const sim::TriangleMesh& mesh) {
+XXH128_hash_t hash_of(const sim::TriangleMesh& mesh, const sim::DecompositionSettings& settings) {
   static_assert(sizeof(sim::Vec3) == 24 && sizeof(sim::Triangle) == 12, "hashed as they lie in memory");
   XXH3_state_t* hash = XXH3_createState();
   XXH3_128bits_reset(hash);
   XXH3_128bits_update(hash, mesh.vertices.data(), mesh.vertices.size() * sizeof(sim::Vec3));
   XXH3_128bits_update(hash, mesh.triangles.data(), mesh.triangles.size() * sizeof(sim::Triangle));
+  const auto add = [&](const auto& value) { XXH3_128bits_update(hash, &value, sizeof value); };
+  add(settings.method);
+  add(settings.min_dihedral);
+  add(settings.min_distance);
+  add(settings.max_reflex_edges);
+  add(settings.max_error);
+  add(settings.max_parts);
+  add(settings.resolution);
   const XXH128_hash_t h = XXH3_128bits_digest(hash);
   XXH3_freeState(hash);
   return h;
@@ -71,6 +81,7 @@ ConvexDecomposition decomposition_from(std::span<const uint8_t> bytes, const std
   ConvexDecomposition d;
   d.method = static_cast<ConvexDecomposition::Method>(in.take<uint8_t>());
   d.volume_error = in.take<double>();
+  d.difference = in.take<double>();
   d.note.resize(in.take_count(1));
   for (char& c : d.note) c = in.take<char>();
   d.parts.resize(in.take_count(2 * sizeof(uint64_t)));
@@ -108,16 +119,18 @@ DecompositionCache DecompositionCache::of_user() {
   return {};
 }
 
-std::filesystem::path DecompositionCache::file(const sim::TriangleMesh& mesh) const {
-  return folder_.empty() ? std::filesystem::path() : folder_ / name_of(hash_of(mesh));
+std::filesystem::path DecompositionCache::file(const sim::TriangleMesh& mesh,
+                                               const sim::DecompositionSettings& settings) const {
+  return folder_.empty() ? std::filesystem::path() : folder_ / name_of(hash_of(mesh, settings));
 }
 
-ConvexDecomposition DecompositionCache::decompose(const sim::TriangleMesh& mesh) const {
-  if (folder_.empty()) return sim::decompose(mesh, sim::MeshTopology(mesh));
-  const XXH128_hash_t mesh_hash = hash_of(mesh);
+ConvexDecomposition DecompositionCache::decompose(const sim::TriangleMesh& mesh,
+                                                  const sim::DecompositionSettings& settings) const {
+  if (folder_.empty()) return sim::decompose(mesh, sim::MeshTopology(mesh), settings);
+  const XXH128_hash_t mesh_hash = hash_of(mesh, settings);
   const std::filesystem::path path = folder_ / name_of(mesh_hash);
   if (auto known = read_kept(path, mesh_hash)) return std::move(*known);
-  ConvexDecomposition made = sim::decompose(mesh, sim::MeshTopology(mesh));
+  ConvexDecomposition made = sim::decompose(mesh, sim::MeshTopology(mesh), settings);
   try {
     std::filesystem::create_directories(folder_);
     render::write_file_atomically(path, serialize(made, mesh_hash));

@@ -20,10 +20,12 @@ class DecompositionCache {
 
   /// Returns a decomposition from the disk, or computes and stores it. A damaged file is computed again. A
   /// folder that cannot be written to is not an error, because the cache only saves time.
-  sim::ConvexDecomposition decompose(const sim::TriangleMesh& mesh) const;
+  sim::ConvexDecomposition decompose(const sim::TriangleMesh& mesh,
+                                     const sim::DecompositionSettings& settings = {}) const;
 
   /// File of a mesh's decomposition, whether it exists or not; empty if nothing is stored.
-  std::filesystem::path file(const sim::TriangleMesh& mesh) const;
+  std::filesystem::path file(const sim::TriangleMesh& mesh,
+                             const sim::DecompositionSettings& settings = {}) const;
 
  private:
   std::filesystem::path folder_;

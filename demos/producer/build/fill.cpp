@@ -7,9 +7,20 @@
 #include <type_traits>
 
 #include "effects/random.h"
+#include "sim/collision/collision_mesh.h"
+#include "sim/collision/distance.h"
 
 namespace offstage::producer {
 namespace {
+
+/// A closed model with the means to find distances to it.
+struct SolidModel {
+  explicit SolidModel(const sim::TriangleMesh& solid) : mesh(solid) {
+    for (const Vec3& v : solid.vertices) box.extend(v);
+  }
+  sim::CollisionMesh mesh;
+  sim::Aabb box;
+};
 
 /// Half the size of the box around a volume.
 Vec3 half_size(const BoxFill& b) {
@@ -22,6 +33,19 @@ Vec3 half_size(const SphereFill& s) {
   return Vec3::Constant(s.radius);
 }
 
+Vec3 half_size(const SolidModel& m) {
+  return m.box.sizes() / 2;
+}
+
+/// Middle of the box around a volume.
+template <class Volume>
+Vec3 middle(const Volume& volume) {
+  if constexpr (std::is_same_v<Volume, SolidModel>)
+    return volume.box.center();
+  else
+    return Vec3::Zero();
+}
+
 /// Whether a ball of this radius is inside.
 bool holds(const BoxFill& b, const Vec3& p, Real r) {
   return ((b.size / 2 - p.cwiseAbs()).array() >= r).all();
@@ -31,6 +55,10 @@ bool holds(const CylinderFill& c, const Vec3& p, Real r) {
 }
 bool holds(const SphereFill& s, const Vec3& p, Real r) {
   return p.norm() <= s.radius - r;
+}
+
+bool holds(const SolidModel& m, const Vec3& p, Real r) {
+  return sim::signed_distance(m.mesh, p).distance <= -r;
 }
 
 Real row_step(Real d, bool cubic) {
@@ -113,24 +141,32 @@ bool exceeds(const Vec3& half, const Fill& fill, Real spacing, std::size_t most)
 std::vector<Vec3> fill_places(const Fill& fill, Real spacing, std::size_t most) {
   std::vector<Vec3> places;
   constexpr Real kRounding = 1e-9;
+  const auto fill_volume = [&](const auto& volume) {
+    const Vec3 offset = middle(volume), half = half_size(volume);
+    // Adds a place if it is inside; returns whether the search goes on, or for a random one whether it
+    // was added.
+    const auto add = [&](const Vec3& from_middle, bool random = false) {
+      const Vec3 p = offset + from_middle;
+      const bool inside = holds(volume, p, spacing / 2 * (1 - kRounding)) && places.size() <= most;
+      if (inside) places.push_back(p);
+      return random ? inside : places.size() <= most;
+    };
+    if (exceeds(half, fill, spacing, most)) {
+      places.assign(most + 1, Vec3::Zero());
+      return;
+    }
+    if (fill.packing == Packing::random)
+      lay_random(half, spacing, fill.seed, add);
+    else
+      lay_lattice(half, spacing, fill.packing == Packing::cubic, add);
+  };
   std::visit(
       [&](const auto& shape) {
-        // Adds a place if it is inside; returns whether the search goes on, or for a random one whether it
-        // was added.
-        const auto add = [&](const Vec3& p, bool random = false) {
-          const bool inside = holds(shape, p, spacing / 2 * (1 - kRounding)) && places.size() <= most;
-          if (inside) places.push_back(p);
-          return random ? inside : places.size() <= most;
-        };
-        const Vec3 half = half_size(shape);
-        if (exceeds(half, fill, spacing, most)) {
-          places.assign(most + 1, Vec3::Zero());
-          return;
+        if constexpr (std::is_same_v<std::decay_t<decltype(shape)>, MeshFill>) {
+          if (!shape.solid.triangles.empty()) fill_volume(SolidModel(shape.solid));
+        } else {
+          fill_volume(shape);
         }
-        if (fill.packing == Packing::random)
-          lay_random(half, spacing, fill.seed, add);
-        else
-          lay_lattice(half, spacing, fill.packing == Packing::cubic, add);
       },
       fill.shape);
   return places;

@@ -1,6 +1,7 @@
 #include "producer/build/model_articulation.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "producer/base/interrupt.h"
 #include "producer/base/shipped_files.h"
@@ -9,6 +10,7 @@
 #include "render/error.h"
 #include "render/mesh_io.h"
 #include "render/point_cloud.h"
+#include "sim/geometry/mesh.h"
 
 namespace offstage::producer {
 
@@ -30,7 +32,39 @@ void append_cloud(const render::PointCloud& cloud, ParticleGroup& group) {
   }
 }
 
+/// Reads the model of a fill and adds it to the scene's digest.
+void read_fill(const SceneFolder& folder, std::string& digest, MeshFill& fill) {
+  const render::Model model =
+      render::read_model(model_file(fill.file, folder), folder.inputs(), interrupt_signal);
+  fill.solid = sim::weld(collision_mesh(model, fitted_scale(fill.scale, fill.fit, model)));
+  const sim::MeshDefects defects = sim::MeshTopology(fill.solid).defects();
+  if (!defects.closed())
+    throw render::FileError(fill.file +
+                            ": is not closed, so it has no inside to fill: " + defects.describe());
+  if (defects.inverted)
+    for (sim::Triangle& t : fill.solid.triangles) std::swap(t[1], t[2]);
+  digest += fill.file + " " + mesh_hash(fill.solid) + "\n";
+}
+
 }  // namespace
+
+void read_fills(Scene& scene, const SceneFolder& folder, std::vector<Problem>& errors) {
+  const auto read = [&](std::optional<Fill>& fill, Where where) {
+    auto* mesh = fill ? std::get_if<MeshFill>(&fill->shape) : nullptr;
+    if (!mesh || mesh->file.empty()) return;
+    try {
+      read_fill(folder, scene.fill_digest, *mesh);
+    } catch (const render::FileError& error) {
+      where.path += "/fill/shape/file";
+      errors.push_back({where, error.what()});
+      fill.reset();
+    }
+  };
+  for (Body& body : scene.bodies) read(body.placement.fill, body.where);
+  for (Cloth& cloth : scene.cloths) read(cloth.placement.fill, cloth.where);
+  for (Emitter& emitter : scene.emitters) read(emitter.placement.fill, emitter.where);
+  for (ParticleGroup& group : scene.particles) read(group.fill, group.where);
+}
 
 void read_clouds(Scene& scene, const SceneFolder& folder, std::vector<Problem>& errors) {
   for (ParticleGroup& group : scene.particles) {

@@ -1,5 +1,6 @@
 #pragma once
-/// Articulations from the node trees of model files, and particles from point clouds.
+/// Data of files that decides which objects a scene has: articulations from the node trees of models,
+/// particles from point clouds, and models that are filled.
 
 #include <vector>
 
@@ -14,5 +15,9 @@ void read_links(Scene& scene, const SceneFolder& folder, std::vector<Problem>& e
 
 /// Appends the points of files to the places of their particle groups. Errors are added to `errors`.
 void read_clouds(Scene& scene, const SceneFolder& folder, std::vector<Problem>& errors);
+
+/// Reads the models that fills of bodies, cloths, emitters and particle groups name. Errors are added to
+/// `errors`.
+void read_fills(Scene& scene, const SceneFolder& folder, std::vector<Problem>& errors);
 
 }  // namespace offstage::producer

@@ -140,6 +140,22 @@ void add_to(XXH3_state_t* hash, const render::Model& model) {
   for (const render::Image& texture : model.textures) add_to(hash, texture);
 }
 
+/// Whether a user should know that the parts of a model are not the model.
+bool is_inaccurate(const sim::ConvexDecomposition& parts, const sim::DecompositionSettings& settings) {
+  using Method = sim::ConvexDecomposition::Method;
+  return parts.method == Method::none ||
+         (parts.method == Method::approximate &&
+          (parts.difference > settings.max_error || settings.method == sim::DecompositionMethod::exact));
+}
+
+std::string inaccuracy(const sim::ConvexDecomposition& parts) {
+  if (parts.parts.empty()) return "there are no convex parts, so its triangles collide: " + parts.note;
+  return fmt::format(
+      "its {} convex parts differ from it in {:.1f} % of its volume ({}). More parts come "
+      "nearer: `decomposition.max_parts`",
+      parts.parts.size(), 100 * parts.difference, parts.note);
+}
+
 /// The model file that a look draws, or null.
 const MeshFile* mesh_file(const ParticleLook& look) {
   return look.style == LookStyle::mesh && look.mesh ? std::get_if<MeshFile>(&look.mesh->shape) : nullptr;
@@ -260,6 +276,7 @@ ModelLibrary::ModelLibrary(const Scene& scene, const SceneFolder& folder, const 
       XXH3_128bits_update(hash, place.position.data(), 3 * sizeof(Real));
       XXH3_128bits_update(hash, color.rgba.data(), 4 * sizeof(float));
     }
+  XXH3_128bits_update(hash, scene.fill_digest.data(), scene.fill_digest.size());
   check_sheets(scene, problems);
   if (problems.empty()) read_animations(scene, cache, problems);
   if (problems.empty()) check_cameras_and_lights(scene, *this, problems, warnings);
@@ -329,6 +346,12 @@ void ModelLibrary::check_sheets(const Scene& scene, std::vector<Problem>& proble
   for_each_look(scene, check);
 }
 
+std::string ModelLibrary::parts_key(const MeshFile& mesh) {
+  const sim::DecompositionSettings s = settings_of(mesh.decomposition);
+  return fmt::format("{}\n{} {} {} {} {}", mesh.file, static_cast<int>(s.method), s.max_error, s.max_parts,
+                     s.min_dihedral, s.min_distance);
+}
+
 void ModelLibrary::decompose_models(const Scene& scene, const DecompositionCache& cache,
                                     std::vector<Problem>& warnings, const StepCallback& on_step) {
   const std::map<std::string, Where> needed = bodies_in_parts(scene);
@@ -338,24 +361,44 @@ void ModelLibrary::decompose_models(const Scene& scene, const DecompositionCache
     const auto need = needed.find(body.name);
     if (body.has_animated_shape()) continue;  // its pieces collide
     if (!mesh || need == needed.end()) continue;
-    if (!parts_.contains(mesh->file)) {
+    if (!parts_.contains(parts_key(*mesh))) {
       const std::size_t triangles = model(mesh->file).triangle_count();
       if (on_step)
         on_step(fmt::format("decomposing {} ({} triangles) into convex parts", mesh->file, triangles));
       const auto start = std::chrono::steady_clock::now();
       const auto& parts =
-          parts_.emplace(mesh->file, cache.decompose(sim::weld(collision_mesh(model(mesh->file), 1))))
+          parts_
+              .emplace(parts_key(*mesh), cache.decompose(sim::weld(collision_mesh(model(mesh->file), 1)),
+                                                         settings_of(mesh->decomposition)))
               .first->second;
       const std::chrono::duration<double> time = std::chrono::steady_clock::now() - start;
-      decomposed_.push_back({mesh->file, triangles, parts.parts.size(), time.count()});
+      decomposed_.push_back({mesh->file, triangles, &parts, time.count()});
       if (on_step) on_step("");
     }
-    const sim::ConvexDecomposition& parts = parts_.at(mesh->file);
+    const sim::ConvexDecomposition& parts = parts_.at(parts_key(*mesh));
     // A body that is not dynamic then collides by its triangles.
     const bool matters = body.motion == sim::MotionType::dynamic;
-    if (matters && !parts.note.empty() && warned.insert(mesh->file).second)
-      warnings.push_back({need->second, mesh->file + ": the convex parts are approximate: " + parts.note});
+    if (matters && is_inaccurate(parts, settings_of(mesh->decomposition)) &&
+        warned.insert(parts_key(*mesh)).second)
+      warnings.push_back({need->second, mesh->file + ": " + inaccuracy(parts)});
   }
+}
+
+std::string method_name(sim::ConvexDecomposition::Method method) {
+  using Method = sim::ConvexDecomposition::Method;
+  switch (method) {
+    case Method::convex:
+      return "convex";
+    case Method::exact:
+      return "exact";
+    case Method::approximate:
+      return "approximate";
+    case Method::hull:
+      return "hull";
+    case Method::none:
+      break;
+  }
+  return "none";
 }
 
 sim::ConvexDecomposition scaled(sim::ConvexDecomposition decomposition, double scale) {
@@ -420,6 +463,16 @@ sim::TriangleMesh collision_mesh(const render::Model& model, double scale) {
           {base + part.mesh.indices[i], base + part.mesh.indices[i + 1], base + part.mesh.indices[i + 2]});
   }
   return mesh;
+}
+
+std::string mesh_hash(const sim::TriangleMesh& mesh) {
+  XXH3_state_t* hash = XXH3_createState();
+  XXH3_128bits_reset(hash);
+  add_to(hash, mesh.vertices);
+  add_to(hash, mesh.triangles);
+  const std::string text = hex(XXH3_128bits_digest(hash));
+  XXH3_freeState(hash);
+  return text;
 }
 
 std::string text_hash(const std::string& text) {

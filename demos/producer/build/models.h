@@ -42,8 +42,8 @@ class ModelLibrary {
 
   const render::Model& model(const std::string& file) const { return models_.at(file); }
   /// The unscaled convex parts of a model, or null if they are not needed.
-  const sim::ConvexDecomposition* parts(const std::string& file) const {
-    const auto it = parts_.find(file);
+  const sim::ConvexDecomposition* parts(const MeshFile& mesh) const {
+    const auto it = parts_.find(parts_key(mesh));
     return it == parts_.end() ? nullptr : &it->second;
   }
   /// The colliding pieces of a body with an animated shape.
@@ -54,7 +54,8 @@ class ModelLibrary {
   /// A model that was decomposed into convex parts, and the time this took (short if they were on disk).
   struct Decomposed {
     std::string file;
-    std::size_t triangles = 0, parts = 0;
+    std::size_t triangles = 0;
+    const sim::ConvexDecomposition* parts = nullptr;
     double seconds = 0;
   };
   const std::vector<Decomposed>& decomposed() const { return decomposed_; }
@@ -68,6 +69,7 @@ class ModelLibrary {
   /// Reads the picture of the sky, and returns its pixels for the digest.
   std::vector<float> read_sky(const Scene& scene, const SceneFolder& folder, std::vector<Problem>& problems,
                               std::vector<Problem>& warnings);
+  static std::string parts_key(const MeshFile& mesh);
   static std::string animation_key(const Body& body);
   void read_animations(const Scene& scene, const DecompositionCache& cache, std::vector<Problem>& problems);
   void decompose_models(const Scene& scene, const DecompositionCache& cache, std::vector<Problem>& warnings,
@@ -76,7 +78,7 @@ class ModelLibrary {
   std::map<std::string, render::Model> models_;
   std::map<std::string, render::Image> textures_;
   std::shared_ptr<const render::SkyPicture> sky_;
-  std::map<std::string, sim::ConvexDecomposition> parts_;
+  std::map<std::string, sim::ConvexDecomposition> parts_;     ///< by parts_key()
   std::map<std::string, std::vector<AnimatedPiece>> pieces_;  ///< by animation_key()
   std::vector<Decomposed> decomposed_;
   std::string digest_;
@@ -112,9 +114,14 @@ Real scale_of(const Use& use, const ModelLibrary& models) {
 
 /// All triangles of a model as one mesh for the simulation, scaled.
 sim::TriangleMesh collision_mesh(const render::Model& model, double scale);
+/// "exact", "approximate" ...
+std::string method_name(sim::ConvexDecomposition::Method method);
+
 /// A model's convex parts as those of its scaled mesh.
 sim::ConvexDecomposition scaled(sim::ConvexDecomposition decomposition, double scale);
 
+/// XXH3-128 in hexadecimal of a mesh.
+std::string mesh_hash(const sim::TriangleMesh& mesh);
 /// XXH3-128 in hexadecimal of a text.
 std::string text_hash(const std::string& text);
 

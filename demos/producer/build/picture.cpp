@@ -253,7 +253,7 @@ void Picture::add_shape(const Body& body, const ModelLibrary& models, std::vecto
 
 void Picture::add_convex_parts(const MeshFile& mesh, const Body& body, const ModelLibrary& models,
                                std::vector<DrawnPart>& parts) {
-  const std::vector<sim::ConvexPolyhedron>& convex = models.parts(mesh.file)->parts;
+  const std::vector<sim::ConvexPolyhedron>& convex = models.parts(mesh)->parts;
   const Real scale = scale_of(mesh, models);
   sim::Aabb box;
   for (const sim::ConvexPolyhedron& part : convex) box.extend(part.box());

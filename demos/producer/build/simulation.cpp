@@ -251,7 +251,7 @@ void Simulation::add_pieces(const Body& body, const sim::BodyDef& whole, const M
 }
 
 sim::MeshHandle Simulation::add_mesh(const MeshFile& file, const ModelLibrary& models) {
-  const sim::ConvexDecomposition* parts = models.parts(file.file);
+  const sim::ConvexDecomposition* parts = models.parts(file);
   const Real scale = scale_of(file, models);
   return world_.add_mesh(collision_mesh(models.model(file.file), scale),
                          parts ? std::optional(scaled(*parts, scale)) : std::nullopt);

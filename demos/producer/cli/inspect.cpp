@@ -37,13 +37,10 @@ Json json_of(const V& v) {
 }
 
 Json describe(const sim::ConvexDecomposition& decomposition) {
-  using Method = sim::ConvexDecomposition::Method;
-  static const std::map<Method, const char*> names = {{Method::convex, "convex"},
-                                                      {Method::exact, "exact"},
-                                                      {Method::approximate, "approximate"},
-                                                      {Method::none, "none"}};
-  Json json = {{"method", names.at(decomposition.method)}, {"count", decomposition.parts.size()}};
-  if (decomposition.method == Method::approximate) json["volume_error"] = decomposition.volume_error;
+  Json json = {{"method", method_name(decomposition.method)},
+               {"count", decomposition.parts.size()},
+               {"volume_error", decomposition.volume_error},
+               {"difference", decomposition.difference}};
   if (!decomposition.note.empty()) json["note"] = decomposition.note;
   return json;
 }
@@ -139,6 +136,16 @@ Json describe_model(const std::filesystem::path& path, const DecompositionCache&
   return json;
 }
 
+/// The models that are divided into convex parts.
+Json models_json(const ModelLibrary& models) {
+  Json list = Json::array();
+  for (const ModelLibrary::Decomposed& model : models.decomposed()) {
+    list.push_back({{"file", model.file}, {"triangles", model.triangles}});
+    list.back()["convex_parts"] = describe(*model.parts);
+  }
+  return list;
+}
+
 Json describe_scene(const LoadedScene& loaded, const DecompositionCache& cache) {
   const Scene& scene = loaded.scene;
   std::vector<Problem> warnings;
@@ -159,6 +166,7 @@ Json describe_scene(const LoadedScene& loaded, const DecompositionCache& cache) 
           {"emitters", scene.emitters.size()},
           {"springs", scene.springs.size()},
           {"cloths", scene.cloths.size()},
+          {"models", models_json(models)},
           {"materials", scene.materials.size()},
           {"frames", scene.frame_count()},
           {"fps", fps_json(scene.output.fps)},
@@ -240,7 +248,7 @@ ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
     if (part.seconds > kLong_s && !talk.quiet)
       log("note: it took {} to decompose '{}' ({} triangles) into {} convex parts{}; a simpler model, or a "
           "primitive as its shape, makes every run faster\n",
-          duration_text(part.seconds), part.file, part.triangles, part.parts,
+          duration_text(part.seconds), part.file, part.triangles, part.parts->parts.size(),
           options.no_cache ? "" : ", which are cached for later runs");
   return models;
 }

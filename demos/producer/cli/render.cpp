@@ -39,7 +39,7 @@ namespace {
 struct SimulateOptions {
   SceneOptions scene;
   TalkOptions talk;
-  std::string trace, contacts, cloths, joints, particles, trace_every = "frame", cache, stats;
+  std::string trace, contacts, cloths, cloth_points, joints, particles, trace_every = "frame", cache, stats;
   int threads = 0;
   bool force = false;
 };
@@ -464,8 +464,8 @@ int frame_command(const FrameOptions& options) {
 int simulate_command(const SimulateOptions& options) {
   const LoadedScene loaded = load(options.scene, options.talk.quiet);
   const ModelLibrary models = load_models(loaded, options.scene, options.talk);
-  const std::array files = {options.stats,  options.trace,  options.contacts,
-                            options.cloths, options.joints, options.particles};
+  const std::array files = {options.stats,        options.trace,  options.contacts, options.cloths,
+                            options.cloth_points, options.joints, options.particles};
   for (std::size_t i = 0; i < files.size(); ++i) {
     check_file(files[i], options.force);
     for (std::size_t k = 0; k < i; ++k) check_distinct(files[k], files[i]);
@@ -478,11 +478,13 @@ int simulate_command(const SimulateOptions& options) {
                   .cloths = {},
                   .joints = {},
                   .particles = {},
+                  .cloth_points = {},
                   .trace_every_step = options.trace_every == "step"};
   if (!options.cache.empty()) job.cache = options.cache;
   if (!options.trace.empty()) job.trace = options.trace;
   if (!options.contacts.empty()) job.contacts = options.contacts;
   if (!options.cloths.empty()) job.cloths = options.cloths;
+  if (!options.cloth_points.empty()) job.cloth_points = options.cloth_points;
   if (!options.joints.empty()) job.joints = options.joints;
   if (!options.particles.empty()) job.particles = options.particles;
   RunProgress progress(loaded.scene, models, options.talk);
@@ -577,7 +579,9 @@ Command add_simulate(CLI::App& app) {
                       "CSV of position, orientation and velocities of moving objects");
   command->add_option("--contacts", simulate.contacts,
                       "CSV of the contact points of bodies, with their forces");
-  command->add_option("--cloths", simulate.cloths, "CSV of strain and contacts of cloths");
+  command->add_option("--cloths", simulate.cloths, "CSV of strain, contacts and volume of cloths");
+  command->add_option("--cloth-points", simulate.cloth_points,
+                      "CSV of position and velocity of the vertices of cloths");
   command->add_option("--joints", simulate.joints, "CSV of the loads and positions of joints");
   command->add_option(
       "--particles", simulate.particles,

@@ -135,9 +135,22 @@ std::optional<CostEstimate> tried(const LoadedScene& loaded, const ModelLibrary&
 void print_models(const ModelLibrary& models) {
   constexpr double kSlow_s = 1;
   for (const ModelLibrary::Decomposed& model : models.decomposed())
-    if (model.seconds > kSlow_s)
-      fmt::print("  it took {:.1f} s to decompose {} ({} triangles) into {} convex parts\n", model.seconds,
-                 model.file, model.triangles, model.parts);
+    fmt::print("model {}: {} triangles, convex parts: {}, {}; volume error {:.2g} %, difference {:.2g} %{}\n",
+               model.file, model.triangles, model.parts->parts.size(), method_name(model.parts->method),
+               100 * model.parts->volume_error, 100 * model.parts->difference,
+               model.seconds > kSlow_s ? fmt::format("; made in {:.1f} s", model.seconds) : "");
+}
+
+Json convex_models_json(const ModelLibrary& models) {
+  Json list = Json::array();
+  for (const ModelLibrary::Decomposed& model : models.decomposed())
+    list.push_back({{"file", model.file},
+                    {"triangles", model.triangles},
+                    {"method", method_name(model.parts->method)},
+                    {"parts", model.parts->parts.size()},
+                    {"volume_error", model.parts->volume_error},
+                    {"difference", model.parts->difference}});
+  return list;
 }
 
 int validate_command(const ValidateOptions& options) {
@@ -158,6 +171,7 @@ int validate_command(const ValidateOptions& options) {
     const MostParticles most = most_particles(loaded.scene);
     result["most_particles"] = most.alive;
     result["most_particles_by_name"] = most.by_name;
+    result["models"] = convex_models_json(models);
     if (cost) result["cost"] = cost_json(*cost);
     if (!options.json) {
       print_warnings(loaded.warnings);
@@ -165,7 +179,7 @@ int validate_command(const ValidateOptions& options) {
                  loaded.scene.frame_count(), loaded.scene.bodies.size(), loaded.scene.emitters.size(),
                  most.alive);
       if (cost) print_cost(loaded.scene, *cost);
-      if (cost) print_models(models);
+      print_models(models);
     }
   } catch (const SceneError& error) {
     if (!options.json) throw;

@@ -175,8 +175,11 @@ class Checker : SceneChecker {
     check_material_name(path + "/mesh/material", look.mesh->material);
     check_part_materials(look.mesh->shape);
     if (const auto wrong = problem(look.mesh->shape)) fail(path + "/mesh/shape" + wrong->key, wrong->what);
-    if (const auto* mesh = std::get_if<MeshFile>(&look.mesh->shape))
+    if (const auto* mesh = std::get_if<MeshFile>(&look.mesh->shape)) {
       check_model(path + "/mesh/shape/file", mesh->file);
+      if (mesh->decomposition)
+        fail(path + "/mesh/shape/decomposition", "is for bodies; particles have no convex parts");
+    }
   }
   /// Friction across an axis needs a material that defines it and a body with a friction_axis.
   void check_grain(const Material& material) {
@@ -263,6 +266,9 @@ class Checker : SceneChecker {
            "the parts of a dynamic body cannot be moved by an animation; make the body kinematic, or give it "
            "a simple "
            "shape and draw the file as its `model`");
+    if (body.has_animated_shape() && shape->decomposition)
+      fail(body.where.path + "/shape/decomposition",
+           "has no effect: each moving part of an animated model is divided on its own");
     const std::string& file = body.model ? body.model->file : shape->file;
     if (file.find('#') != std::string::npos)
       fail(path, fmt::format("plays in a whole file; '{}' is one of its nodes", file));

@@ -29,6 +29,8 @@ class ClothChecker {
     if (const auto* mesh = std::get_if<MeshFile>(&cloth.shape)) {
       const std::string wrong = mesh->file.empty() ? "" : folder_.wrong_file(model_file(mesh->file, folder_));
       if (!wrong.empty()) fail(path + "/shape/file", wrong);
+      if (mesh->decomposition)
+        fail(path + "/shape/decomposition", "is for bodies; a cloth has no convex parts");
       return;
     }
     try {

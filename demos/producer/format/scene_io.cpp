@@ -118,6 +118,7 @@ LoadedScene parse_scene(std::string_view text, const std::string& name, const Sc
   std::string canonical = to_text(write_scene(described));
   read_links(described, folder, misplaced);
   read_clouds(described, folder, misplaced);
+  read_fills(described, folder, misplaced);
   LoadedScene loaded{expand(described, misplaced, crowded), folder, {}, std::move(canonical)};
   const Findings findings = check_scene(described, loaded.scene, folder);
   append(errors, misplaced, source);

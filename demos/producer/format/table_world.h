@@ -288,25 +288,59 @@ struct Table<sim::Plane> {
   static Fields<sim::Plane> fields() { return {}; }
 };
 template <>
+struct Names<sim::DecompositionMethod> {
+  static constexpr std::array kNames = {"auto", "exact", "approximate", "hull"};
+};
+template <>
+struct Table<MeshDecomposition> {
+  static constexpr const char* kName = "decomposition";
+  static constexpr const char* kHelp =
+      "How a model is divided into the convex parts with which a dynamic body collides. Its mass is that of "
+      "the model itself.";
+  static Fields<MeshDecomposition> fields() {
+    return {
+        {"method", &MeshDecomposition::method,
+         "`auto`: exact if that takes at most `max_parts`, else approximate; `exact`: with up to 1024 parts, "
+         "else approximate; `approximate`; `hull`: the convex hull as the only part, also of a body that is "
+         "not dynamic"},
+        {"max_error", &MeshDecomposition::max_error,
+         "approximate: accepted volume in which the parts and the model differ, as a share of the model's "
+         "volume; a larger one takes fewer parts",
+         "", between(0.001, 1)},
+        {"max_parts", &MeshDecomposition::max_parts,
+         "greatest number of parts; has priority over `max_error`", "", between(1, 1024)},
+        {"min_angle_deg", &MeshDecomposition::min_angle_deg,
+         "exact: smallest angle between a cut and the faces that it meets; relaxed if no cut satisfies it",
+         "degrees", between(0, 90)},
+        {"min_distance", &MeshDecomposition::min_distance,
+         "exact: smallest distance of a cut from vertices off it, as a share of the mean edge; relaxed if no "
+         "cut satisfies it",
+         "", between(0, 1)}};
+  }
+};
+template <>
 struct Table<MeshFile> {
   static constexpr const char* kName = "mesh";
   static constexpr const char* kHelp =
       "A model file as a collision shape: its triangles collide and determine the mass.";
   static Fields<MeshFile> fields() {
-    return {{"file", &MeshFile::file,
-             "model file relative to the scene, or the name of a model that comes with offstage; FILE#NODE "
-             "selects one node",
-             kRequired},
-            {"scale", &MeshFile::scale,
-             "scale factor of the model; `auto`: from the file's likely unit to metres (docs/models.md; "
-             "`offstage info FILE` "
-             "shows it)",
-             "", kScale},
-            {"fit", &MeshFile::fit,
-             "edges of a box along the model's axes; the model gets the largest size with which it fits, "
-             "whatever "
-             "its unit; `scale` then multiplies that size",
-             "m", kPositive}};
+    return {
+        {"file", &MeshFile::file,
+         "model file relative to the scene, or the name of a model that comes with offstage; FILE#NODE "
+         "selects one node",
+         kRequired},
+        {"scale", &MeshFile::scale,
+         "scale factor of the model; `auto`: from the file's likely unit to metres (docs/models.md; "
+         "`offstage info FILE` "
+         "shows it)",
+         "", kScale},
+        {"fit", &MeshFile::fit,
+         "edges of a box along the model's axes; the model gets the largest size with which it fits, "
+         "whatever "
+         "its unit; `scale` then multiplies that size",
+         "m", kPositive},
+        {"decomposition", &MeshFile::decomposition,
+         "criteria of the convex parts with which a dynamic body collides; not for cloths and particles"}};
   }
 };
 template <>
@@ -472,10 +506,27 @@ struct Table<SphereFill> {
   static Fields<SphereFill> fields() { return {{"radius", &SphereFill::radius, "radius", "m", kPositive}}; }
 };
 template <>
-struct Tags<std::variant<BoxFill, CylinderFill, SphereFill>> {
+struct Table<MeshFill> {
+  static constexpr const char* kName = "mesh_fill";
+  static constexpr const char* kHelp = "The inside of a model that is closed: a jar of its own shape.";
+  static Fields<MeshFill> fields() {
+    return {{"file", &MeshFill::file,
+             "model file relative to the scene, or the name of a model that comes with offstage; FILE#NODE "
+             "selects one node. Its origin is at `position`",
+             kRequired},
+            {"scale", &MeshFill::scale,
+             "scale factor of the model; `auto`: from the file's likely unit to metres", "", kScale},
+            {"fit", &MeshFill::fit,
+             "edges of a box along the model's axes; the model gets the largest size with which it fits; "
+             "`scale` then multiplies that size",
+             "m", kPositive}};
+  }
+};
+template <>
+struct Tags<std::variant<BoxFill, CylinderFill, SphereFill, MeshFill>> {
   static constexpr const char* kName = "fill_shape";
   static constexpr const char* kHelp = "The volume that is filled.";
-  static constexpr std::array kTags = {"box", "cylinder", "sphere"};
+  static constexpr std::array kTags = {"box", "cylinder", "sphere", "mesh"};
   static constexpr bool kRequired = false;
 };
 template <>

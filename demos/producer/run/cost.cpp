@@ -108,7 +108,7 @@ class CostTable {
   void add_body(const Body& body) {
     ObjectCost& cost = entry(body.where, "body", body.name);
     const auto* mesh = std::get_if<MeshFile>(&body.shape);
-    const sim::ConvexDecomposition* parts = mesh ? models_.parts(mesh->file) : nullptr;
+    const sim::ConvexDecomposition* parts = mesh ? models_.parts(*mesh) : nullptr;
     const std::size_t part_count = parts ? parts->parts.size() : 1;
     constexpr std::size_t kPrimitiveTriangles = 500;
     std::size_t triangles = kPrimitiveTriangles;

@@ -343,6 +343,8 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
   if (job.trace) trace.emplace(*job.trace, simulation);
   if (job.contacts) contacts.emplace(*job.contacts, simulation);
   if (job.cloths) cloths.emplace(*job.cloths, simulation);
+  std::optional<ClothPointTrace> cloth_points;
+  if (job.cloth_points) cloth_points.emplace(*job.cloth_points, simulation);
   std::optional<JointTrace> joints;
   if (job.joints) joints.emplace(*job.joints, simulation);
   std::optional<ParticleTable> particles;
@@ -353,6 +355,7 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
       if (trace) trace->record(time);
       if (contacts) contacts->record(time);
       if (cloths) cloths->record(time);
+      if (cloth_points) cloth_points->record(time);
       if (joints) joints->record(time);
     } catch (const CsvFile::NotFinite& error) {
       simulation.fail(error.what());
@@ -389,6 +392,7 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
   if (trace && stats.frames == total) trace->close();
   if (contacts && stats.frames == total) contacts->close();
   if (cloths && stats.frames == total) cloths->close();
+  if (cloth_points && stats.frames == total) cloth_points->close();
   if (joints && stats.frames == total) joints->close();
   if (particles && stats.frames == total) particles->close();
   stats.totals = simulation.totals();

@@ -107,12 +107,13 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
 struct SimulateJob {
   std::optional<std::filesystem::path> cache;  ///< write a snapshot per frame
   bool force = false;
-  std::optional<std::filesystem::path> trace;      ///< CSV of every moving body and placed particle
-  std::optional<std::filesystem::path> contacts;   ///< CSV of the contact points of bodies
-  std::optional<std::filesystem::path> cloths;     ///< CSV of strain and contacts of cloths
-  std::optional<std::filesystem::path> joints;     ///< CSV of the loads and states of joints
-  std::optional<std::filesystem::path> particles;  ///< table of all particles; see particle_table.h
-  bool trace_every_step = false;                   ///< rows for all sub-steps; otherwise once per frame
+  std::optional<std::filesystem::path> trace;              ///< CSV of every moving body and placed particle
+  std::optional<std::filesystem::path> contacts;           ///< CSV of the contact points of bodies
+  std::optional<std::filesystem::path> cloths;             ///< CSV of strain, contacts and volume of cloths
+  std::optional<std::filesystem::path> joints;             ///< CSV of the loads and states of joints
+  std::optional<std::filesystem::path> particles;          ///< table of all particles; see particle_table.h
+  std::optional<std::filesystem::path> cloth_points = {};  ///< CSV of the vertices of cloths
+  bool trace_every_step = false;  ///< rows for all sub-steps; otherwise once per frame
 };
 
 /// Runs only the physics, over all frames.

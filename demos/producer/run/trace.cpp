@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "sim/cloth/cloth_gas.h"
+
 namespace offstage::producer {
 namespace {
 
@@ -9,6 +11,15 @@ void add_state(CsvRows& rows, double time, std::string_view name, const sim::Vec
                const sim::Quat& q, const sim::Vec3& velocity, const sim::Vec3& angular_velocity) {
   rows.number(time).text(name).vector(position).number(q.w()).number(q.x()).number(q.y()).number(q.z());
   rows.vector(velocity).vector(angular_velocity).end_row();
+}
+
+/// Volume inside of a cloth under pressure, with the holes of tears closed; 0 for other cloths. [m^3]
+sim::Real volume_inside(const sim::World& world, sim::ClothHandle handle) {
+  if (world.cloth_def(handle).pressure == 0) return 0;
+  const sim::ClothView cloth = world.cloth(handle);
+  sim::ClothGas gas;
+  gas.assign(cloth.triangles);
+  return gas.volume(cloth.points, cloth.triangles);
 }
 
 }  // namespace
@@ -50,7 +61,7 @@ void Trace::record(double time) {
 ClothTrace::ClothTrace(const std::filesystem::path& path, const Simulation& simulation)
     : file_(path,
             "time,cloth,points,max_strain,mean_strain,contacts,self_contacts,penetration,limited,held_back,"
-            "crossings,torn,unconverged"),
+            "crossings,torn,unconverged,volume"),
       simulation_(simulation) {}
 
 void ClothTrace::record(double time) {
@@ -64,9 +75,23 @@ void ClothTrace::record(double time) {
         .count(r.contacts)
         .count(r.self_contacts)
         .number(r.penetration);
-    rows.count(r.limited).count(r.held_back).count(r.crossings).count(r.torn).count(r.unconverged).end_row();
+    rows.count(r.limited).count(r.held_back).count(r.crossings).count(r.torn).count(r.unconverged);
+    rows.number(volume_inside(world, handle)).end_row();
   }
   file_.write(rows);
+}
+
+ClothPointTrace::ClothPointTrace(const std::filesystem::path& path, const Simulation& simulation)
+    : file_(path, "time,cloth,vertex,x,y,z,vx,vy,vz"), simulation_(simulation) {}
+
+void ClothPointTrace::record(double time) {
+  for (const auto& [name, handle] : simulation_.cloths()) {
+    const sim::ClothView cloth = simulation_.world().cloth(handle);
+    CsvRows rows;
+    for (std::size_t i = 0; i < cloth.points.size(); ++i)
+      rows.number(time).text(name).count(i).vector(cloth.points[i]).vector(cloth.velocities[i]).end_row();
+    file_.write(rows);
+  }
 }
 
 JointTrace::JointTrace(const std::filesystem::path& path, const Simulation& simulation)

@@ -26,12 +26,26 @@ class Trace {
   const Simulation& simulation_;
 };
 
-/// State of cloths: time, cloth, points, strain, contacts and shortened moves.
+/// State of cloths: time, cloth, points, strain, contacts, shortened moves and the volume inside.
 class ClothTrace {
  public:
   ClothTrace(const std::filesystem::path& path, const Simulation& simulation);
 
   /// One row per cloth.
+  void record(double time);
+  void close() { file_.close(); }
+
+ private:
+  CsvFile file_;
+  const Simulation& simulation_;
+};
+
+/// Vertices of cloths: time, cloth, vertex, position, velocity.
+class ClothPointTrace {
+ public:
+  ClothPointTrace(const std::filesystem::path& path, const Simulation& simulation);
+
+  /// One row per vertex of each cloth.
   void record(double time);
   void close() { file_.close(); }
 

@@ -1,6 +1,7 @@
 #include "producer/scene/scene.h"
 
 #include <cmath>
+#include <numbers>
 
 namespace offstage::producer {
 
@@ -14,6 +15,17 @@ int subframes(Quality quality) {
       return 16;
   }
   return 1;
+}
+
+sim::DecompositionSettings settings_of(const std::optional<MeshDecomposition>& decomposition) {
+  sim::DecompositionSettings settings;
+  if (!decomposition) return settings;
+  settings.method = decomposition->method;
+  settings.max_error = decomposition->max_error;
+  settings.max_parts = static_cast<uint32_t>(decomposition->max_parts);
+  settings.min_dihedral = decomposition->min_angle_deg * std::numbers::pi / 180;
+  settings.min_distance = decomposition->min_distance;
+  return settings;
 }
 
 int Scene::frame_count() const {

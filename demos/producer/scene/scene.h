@@ -417,6 +417,7 @@ struct Scene {
   int version = 1;
   std::string name;  ///< default: the name of the file
   std::string description;
+  std::string fill_digest;  ///< after loading: of the models that fills read; empty if there are none
   WorldSettings world;
   std::vector<Material> materials;
   std::vector<ContactRule> contacts;

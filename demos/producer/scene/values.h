@@ -11,6 +11,7 @@
 #include "effects/distribution.h"
 #include "producer/base/error.h"
 #include "sim/core/types.h"
+#include "sim/geometry/convex_decomposition.h"
 #include "sim/geometry/shape.h"
 #include "sim/geometry/solid_mesh.h"
 
@@ -51,11 +52,23 @@ struct ModelScale {
   bool operator==(const ModelScale&) const = default;
 };
 
+/// Criteria of the decomposition of a model into convex parts; see sim::DecompositionSettings for the
+/// defaults.
+struct MeshDecomposition {
+  sim::DecompositionMethod method = sim::DecompositionMethod::automatic;
+  Real max_error = sim::DecompositionSettings().max_error;
+  int max_parts = static_cast<int>(sim::DecompositionSettings().max_parts);
+  Real min_angle_deg = 20;
+  Real min_distance = sim::DecompositionSettings().min_distance;
+};
+sim::DecompositionSettings settings_of(const std::optional<MeshDecomposition>& decomposition);
+
 /// A model file as a shape: its triangles collide and determine the mass; for a cloth, they are the cloth.
 struct MeshFile {
   std::string file;
   ModelScale scale = {};
   std::optional<Vec3> fit = {};  ///< edges of the box that the model just fits into before `scale` [m]
+  std::optional<MeshDecomposition> decomposition = {};  ///< of bodies alone
 };
 
 /// A solid in a compound.
@@ -109,10 +122,17 @@ struct CylinderFill {
 struct SphereFill {
   Real radius = 0.5;
 };
+/// The inside of a closed model, with the model's origin at the centre of the volume.
+struct MeshFill {
+  std::string file;
+  ModelScale scale = {};
+  std::optional<Vec3> fit = {};  ///< see MeshFile::fit
+  sim::TriangleMesh solid = {};  ///< after loading: outward, scaled
+};
 enum class Packing { hexagonal, cubic, random };
 /// Places that fill a volume, each at half the spacing or more from its surface.
 struct Fill {
-  std::variant<BoxFill, CylinderFill, SphereFill> shape = BoxFill{};
+  std::variant<BoxFill, CylinderFill, SphereFill, MeshFill> shape = BoxFill{};
   Vec3 position = Vec3::Zero();  ///< centre: relative to the original, or of particles in the world
   Real spacing = 0;              ///< distance of neighbours; 0: the diameter of the particles
   Packing packing = Packing::hexagonal;

@@ -20,7 +20,10 @@ namespace {
 
 using Method = ConvexDecomposition::Method;
 
-ConvexDecomposition decomposed(const TriangleMesh& mesh, const DecompositionSettings& settings = {}) {
+/// One part suffices where the exact method fails.
+constexpr DecompositionSettings kExactOnly{.method = DecompositionMethod::exact, .max_parts = 1};
+
+ConvexDecomposition decomposed(const TriangleMesh& mesh, const DecompositionSettings& settings = kExactOnly) {
   return decompose(mesh, MeshTopology(mesh), settings);
 }
 
@@ -149,6 +152,51 @@ TEST(Decomposition, PartsShareTheCornersOfACutBitwise) {
   EXPECT_GE(shared, 2);  // at least those of the reflex edge
 }
 
+/// Prism of an L whose caps are cut into ears, as model readers do it: the third ear of each cap is a sliver,
+/// between three corners in a line.
+TriangleMesh l_prism_of_ears() {
+  const std::array<std::array<Real, 2>, 6> outline = {{{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}}};
+  TriangleMesh mesh;
+  for (const Real z : {0.0, 1.0})
+    for (const auto& [x, y] : outline) mesh.vertices.emplace_back(x, y, z);
+  for (const auto& [a, b, c] : {Triangle{1, 2, 3}, Triangle{3, 4, 5}, Triangle{1, 3, 5}, Triangle{0, 1, 5}}) {
+    mesh.triangles.push_back({c, b, a});
+    mesh.triangles.push_back({a + 6, b + 6, c + 6});
+  }
+  for (uint32_t i = 0; i < 6; ++i) {
+    const uint32_t j = (i + 1) % 6;
+    mesh.triangles.push_back({i, j, j + 6});
+    mesh.triangles.push_back({i, j + 6, i + 6});
+  }
+  return mesh;
+}
+
+TEST(Decomposition, SliversOfCapsDoNotMatter) {
+  for (uint64_t pose = 0; pose < 20; ++pose) {
+    SCOPED_TRACE(pose);
+    TriangleMesh mesh = placed_at_random(l_prism_of_ears(), 1, pose);
+    for (Vec3& v : mesh.vertices) v = v.cast<float>().cast<double>();
+    const ConvexDecomposition d = decomposed(mesh);
+    EXPECT_EQ(d.method, Method::exact) << d.note;
+    EXPECT_EQ(d.parts.size(), 2u);
+    EXPECT_NEAR(total_volume(d), 3, 3e-6);
+  }
+}
+
+TEST(Decomposition, FineToriAndBowlsAreExact) {
+  const TriangleMesh torus = torus_mesh(1, 0.3, 64, 32);
+  const ConvexDecomposition ring = decomposed(torus);
+  EXPECT_EQ(ring.method, Method::exact) << ring.note;
+  EXPECT_EQ(ring.parts.size(), 64u);
+  EXPECT_NEAR(total_volume(ring), mass_properties(torus).volume, 1e-6);
+  EXPECT_EQ(decomposed(torus, {}).method, Method::exact);  // within the default number of parts
+  const TriangleMesh shell = bowl(1, 0.8, 24, 8);
+  const ConvexDecomposition pieces = decomposed(shell);
+  EXPECT_EQ(pieces.method, Method::exact) << pieces.note;
+  EXPECT_LE(pieces.parts.size(), 24u * 8u);
+  EXPECT_NEAR(total_volume(pieces), mass_properties(shell).volume, 1e-6);
+}
+
 // Unions of random cubes have many coplanar faces, collinear edges, tunnels and corners that touch.
 TEST(Decomposition, RandomPolycubes) {
   int exact = 0;
@@ -161,7 +209,7 @@ TEST(Decomposition, RandomPolycubes) {
     for (int i = 0; i < 48; ++i) count += filled(i / 12, i / 3 % 4, i % 3);
     const TriangleMesh mesh = placed_at_random(cubes(4, 4, 3, filled), 1, seed);
     if (!MeshTopology(mesh).defects().closed()) continue;  // cubes that touch only along an edge
-    const ConvexDecomposition d = decomposed(mesh, {.resolution = 8});
+    const ConvexDecomposition d = decomposed(mesh);
     if (d.note == "a cavity inside") continue;
     SCOPED_TRACE(seed);
     expect_exact(d, count, extent(mesh));
@@ -252,13 +300,35 @@ Real covered(const TriangleMesh& mesh, const ConvexDecomposition& d, uint64_t po
   return static_cast<Real>(held) / inside;
 }
 
+/// Greatest height of a point of the surface over the part that is nearest, as a share of the mesh's extent.
+Real greatest_gap(const TriangleMesh& mesh, const ConvexDecomposition& d) {
+  Real gap = 0;
+  for (const Triangle& t : mesh.triangles) {
+    const Vec3 &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
+    for (const Vec3& p : {a, Vec3((a + b) / 2), Vec3((a + b + c) / 3)}) {
+      Real least = extent(mesh);
+      for (const ConvexPolyhedron& part : d.parts) least = std::min(least, height_over(part, p));
+      gap = std::max(gap, least);
+    }
+  }
+  return gap / extent(mesh);
+}
+
+/// Trimmed hulls lose at most this share of the solid: rims around hollows, which lie about as far outside of
+/// the hull as the ground of the hollow lies inside. A limit of 0.01 leaves 7.7 % more volume than the model
+/// in the bowl that comes with offstage, and 8.0 % in the goblet; 0.03 leaves 3.3 and 4.3 %.
+constexpr Real kMostUncovered = 0.03;
+/// No rim lies farther outside than this share of the extent.
+constexpr Real kDeepestGap = 0.02;
+
 TEST(ApproximateDecomposition, HolesAreBridgedAndSidesStaySmooth) {
   TriangleMesh mesh = placed_at_random(u_solid(), 1, 4);
   mesh.triangles.pop_back();
-  const ConvexDecomposition d = decomposed(mesh, {.resolution = 32});
+  const ConvexDecomposition d = decomposed(mesh, {.max_error = 0.001, .resolution = 32});
   EXPECT_EQ(d.method, Method::approximate);
   EXPECT_EQ(d.note, "3 border edges");
-  EXPECT_NEAR(total_volume(d), 7, 0.2);
+  EXPECT_EQ(d.parts.size(), 3u);
+  EXPECT_NEAR(total_volume(d), 7, 1e-6);
   EXPECT_GT(covered(mesh, d, 2000), 0.999);
   // The parts keep the corners of the surface, without voxel steps.
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
@@ -269,7 +339,7 @@ TEST(ApproximateDecomposition, HolesAreBridgedAndSidesStaySmooth) {
 
 TEST(ApproximateDecomposition, CubesJoinedAlongAnEdge) {
   const TriangleMesh mesh = cubes(2, 2, 1, [](int i, int j, int) { return i == j; });
-  const ConvexDecomposition d = decomposed(mesh);
+  const ConvexDecomposition d = decomposed(mesh, {});
   EXPECT_EQ(d.method, Method::approximate);
   EXPECT_EQ(d.note, "1 non-manifold edge");
   EXPECT_EQ(d.parts.size(), 2u);
@@ -277,18 +347,22 @@ TEST(ApproximateDecomposition, CubesJoinedAlongAnEdge) {
 }
 
 TEST(ApproximateDecomposition, CavitiesAndTooManyReflexEdges) {
-  const ConvexDecomposition hollow = decomposed(hollow_box(), {.resolution = 24});
+  const ConvexDecomposition hollow = decomposed(hollow_box(), {.max_error = 0.001});
   EXPECT_EQ(hollow.method, Method::approximate);
   EXPECT_EQ(hollow.note, "a cavity inside");
-  EXPECT_LE(hollow.volume_error, 0.03);
+  EXPECT_NEAR(total_volume(hollow), 26, 1e-6);  // cuts along the sides of the cavity
+  EXPECT_LE(hollow.difference, 0.001);
+  expect_tiling(hollow_box(), hollow);
 
   const TriangleMesh torus = torus_mesh(1, 0.3, 24, 16);
-  const ConvexDecomposition ring = decomposed(torus, {.max_reflex_edges = 100, .resolution = 40});
+  const ConvexDecomposition ring = decomposed(torus, {.max_reflex_edges = 100});
   EXPECT_EQ(ring.method, Method::approximate);
   EXPECT_EQ(ring.note, "192 reflex edges, more than 100");
-  EXPECT_LE(ring.parts.size(), 32u);
-  EXPECT_LE(ring.volume_error, 0.06);
-  EXPECT_GT(covered(torus, ring, 2000), 0.999);
+  EXPECT_LE(ring.parts.size(), 16u);
+  EXPECT_LE(ring.difference, 0.05);
+  EXPECT_LE(ring.volume_error, ring.difference);
+  EXPECT_GT(covered(torus, ring, 2000), 1 - kMostUncovered);
+  EXPECT_LE(greatest_gap(torus, ring), kDeepestGap);
 }
 
 TEST(ApproximateDecomposition, SurfacesWithoutInsideHaveNoParts) {
@@ -316,12 +390,125 @@ TEST(ApproximateDecomposition, SurfacesWithoutInsideHaveNoParts) {
 TEST(ApproximateDecomposition, IsTheSameOnAnyNumberOfThreads) {
   TriangleMesh mesh = jack_solid();
   mesh.triangles.pop_back();
-  const DecompositionSettings coarse{.resolution = 24};
+  const DecompositionSettings coarse{.max_parts = 5, .resolution = 24};
   ConvexDecomposition one, many = decomposed(mesh, coarse);
   tbb::task_arena(1).execute([&] { one = decomposed(mesh, coarse); });
   ASSERT_EQ(one.parts.size(), many.parts.size());
   for (std::size_t k = 0; k < one.parts.size(); ++k)
     EXPECT_TRUE(std::ranges::equal(one.parts[k].vertices(), many.parts[k].vertices()));
+}
+
+/// Volume in which the parts and the solid differ, by random points, as a share of the solid's.
+Real sampled_difference(const TriangleMesh& mesh, const ConvexDecomposition& d, uint64_t points) {
+  int inside = 0, different = 0;
+  for (const Vec3& p : scattered_points(mesh, points)) {
+    const bool in_solid = winding(mesh, p) > 0.5;
+    const bool in_parts = std::any_of(d.parts.begin(), d.parts.end(),
+                                      [&](const ConvexPolyhedron& part) { return height_over(part, p) < 0; });
+    inside += in_solid;
+    different += in_solid != in_parts;
+  }
+  return static_cast<Real>(different) / inside;
+}
+
+TEST(ApproximateDecomposition, DiffersAsMuchAsItSays) {
+  const struct {
+    const char* name;
+    TriangleMesh mesh;
+    std::size_t parts;
+  } solids[] = {{"torus", torus_mesh(1, 0.3, 24, 16), 16},
+                {"gear", star_prism(12, 1, 0.7, 0.5), 14},
+                {"thick bowl", bowl(1, 0.8, 24, 12), 48},
+                {"L", l_solid(), 2},
+                {"sponge", sponge(), 12}};
+  for (const auto& solid : solids) {
+    SCOPED_TRACE(solid.name);
+    const TriangleMesh mesh = placed_at_random(solid.mesh, 1, 3);
+    const ConvexDecomposition d = decomposed(mesh, {.method = DecompositionMethod::approximate});
+    EXPECT_EQ(d.method, Method::approximate);
+    EXPECT_LE(d.parts.size(), solid.parts);
+    EXPECT_LE(d.difference, 0.05);
+    EXPECT_LE(d.volume_error, d.difference + 1e-9);
+    EXPECT_LE(sampled_difference(mesh, d, 4000), d.difference + 0.015);  // three standard deviations
+    EXPECT_GT(covered(mesh, d, 4000), 1 - kMostUncovered);
+    EXPECT_LE(greatest_gap(mesh, d), kDeepestGap);
+    for (const ConvexPolyhedron& p : d.parts) EXPECT_LE(concavity(p), 1e-9 * extent(mesh));
+  }
+}
+
+TEST(ApproximateDecomposition, AutomaticIsExactWithinTheMostParts) {
+  const TriangleMesh stair = stairs();
+  EXPECT_EQ(decomposed(stair, {}).method, Method::exact);
+  const ConvexDecomposition few = decomposed(stair, {.max_parts = 3});
+  EXPECT_EQ(few.method, Method::approximate);
+  EXPECT_EQ(few.note, "more than 3 exact parts");
+  EXPECT_LE(few.parts.size(), 3u);
+}
+
+TEST(ApproximateDecomposition, OverlappingSolidsAreMeasuredAsTheirUnion) {
+  TriangleMesh mesh = box_mesh(Vec3(4, 1, 1));
+  const TriangleMesh other = box_mesh(Vec3(1, 4, 1));
+  for (const Vec3& v : other.vertices) mesh.vertices.push_back(v);
+  for (const Triangle& t : other.triangles) mesh.triangles.push_back({t[0] + 8, t[1] + 8, t[2] + 8});
+  EXPECT_EQ(decomposed(mesh, {}).method, Method::exact);
+  const ConvexDecomposition d = decomposed(mesh, {.method = DecompositionMethod::approximate});
+  EXPECT_EQ(d.parts.size(), 2u);
+  EXPECT_LE(d.difference, 0.01);
+}
+
+// A thin shell has hollows that no cut removes; its parts hold it all the same.
+TEST(ApproximateDecomposition, ThinBowlsKeepTheirVolumeAndTheirGround) {
+  const TriangleMesh mesh = placed_at_random(bowl(1, 0.92, 32, 16), 1, 3);
+  const ConvexDecomposition d = decomposed(mesh, {.method = DecompositionMethod::approximate});
+  EXPECT_LE(d.parts.size(), 64u);
+  EXPECT_LE(d.volume_error, 0.05);
+  EXPECT_GT(covered(mesh, d, 8000), 1 - kMostUncovered);
+  EXPECT_LE(greatest_gap(mesh, d), kDeepestGap);
+}
+
+// The water of a fountain: a flat sheet beside the solid, and one through it.
+TEST(ApproximateDecomposition, SheetsBesideASolidDoNotCount) {
+  TriangleMesh mesh = u_solid();
+  const Real volume = mass_properties(mesh).volume;
+  for (const Real z : {0.5, 4.0}) {
+    const auto first = static_cast<uint32_t>(mesh.vertices.size());
+    for (const auto& [x, y] : {std::pair{0.1, 0.1}, std::pair{0.9, 0.1}, std::pair{0.5, 0.8}})
+      mesh.vertices.emplace_back(x, y, z);
+    mesh.triangles.push_back({first, first + 1, first + 2});
+  }
+  const ConvexDecomposition d = decomposed(mesh, {});
+  EXPECT_EQ(d.note, "6 border edges");
+  EXPECT_EQ(d.parts.size(), 3u);
+  EXPECT_NEAR(total_volume(d), volume, 1e-6);
+}
+
+TEST(ApproximateDecomposition, HullIsOnePart) {
+  const ConvexDecomposition d = decomposed(l_solid(), {.method = DecompositionMethod::hull});
+  EXPECT_EQ(d.method, Method::hull);
+  ASSERT_EQ(d.parts.size(), 1u);
+  EXPECT_NEAR(d.volume_error, 0.5 / 3, 1e-9);
+}
+
+// Triangles between random points: open, intersecting, with edges of many faces.
+TEST(ApproximateDecomposition, AnyTrianglesGiveAResult) {
+  for (uint64_t seed = 0; seed < 60; ++seed) {
+    SCOPED_TRACE(seed);
+    const Scatter random{seed};
+    TriangleMesh mesh;
+    const uint64_t points = 5 + seed % 12;
+    for (uint64_t i = 0; i < points; ++i)
+      mesh.vertices.emplace_back(random.uniform(i, 0), random.uniform(i, 1),
+                                 seed % 5 == 0 ? 0 : random.uniform(i, 2));
+    const auto pick = [&](uint64_t t, uint64_t k) {
+      return static_cast<uint32_t>(random.uniform(100 + t, k) * static_cast<Real>(points));
+    };
+    for (uint64_t t = 0; t < 30; ++t) mesh.triangles.push_back({pick(t, 0), pick(t, 1), pick(t, 2)});
+    mesh = weld(mesh);
+    const ConvexDecomposition d = decomposed(mesh, {.max_parts = 6, .resolution = 12});
+    EXPECT_LE(d.parts.size(), 6u);
+    for (const ConvexPolyhedron& p : d.parts) EXPECT_TRUE(p.centre().allFinite());
+    EXPECT_TRUE(std::isfinite(d.difference) && std::isfinite(d.volume_error));
+  }
 }
 
 TriangleMesh read_obj(const std::filesystem::path& file) {
@@ -354,13 +541,17 @@ TEST(LongDecomposition, RealMeshes) {
     if (entry.path().extension() != ".obj") continue;
     SCOPED_TRACE(entry.path().filename().string());
     const TriangleMesh mesh = read_obj(entry.path());
-    const ConvexDecomposition d = decomposed(mesh);
+    const ConvexDecomposition d = decomposed(mesh, {});
     ++read;
     EXPECT_NE(d.method, Method::none) << d.note;
     if (d.method != Method::approximate) continue;
     EXPECT_LE(d.parts.size(), DecompositionSettings().max_parts);
-    EXPECT_GT(covered(mesh, d, 200), 0.99);
-    EXPECT_LE(d.volume_error, 0.35);
+    // Of thin solids about 800 of the points are inside: three standard deviations are 0.02.
+    EXPECT_GT(covered(mesh, d, 8000), 1 - kMostUncovered - 0.02);
+    // Open sheets beside a solid have no parts.
+    const bool closed = MeshTopology(mesh).defects().closed();
+    EXPECT_LE(closed ? greatest_gap(mesh, d) : 0, kDeepestGap);
+    EXPECT_LE(d.volume_error, 0.1);
     for (const ConvexPolyhedron& p : d.parts) EXPECT_LE(concavity(p), 1e-9 * extent(mesh));
   }
   EXPECT_GT(read, 0);

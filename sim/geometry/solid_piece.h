@@ -1,0 +1,56 @@
+#pragma once
+/// Pieces of a solid between cut planes. The surface of a piece is a set of polygons and of caps, which lie
+/// on the cut planes and are known by their outlines alone. Volumes need no more than that, and each cut
+/// closes the surface again, whether or not the surface is connected, manifold or free of self-intersections:
+/// only its edges must cancel, as they do for a closed mesh with consistent winding. Where a surface winds
+/// around a place several times, that place counts several times.
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "sim/geometry/convex_polyhedron.h"
+#include "sim/geometry/mesh.h"
+
+namespace offstage::sim {
+
+struct SolidPiece {
+  using Plane = ConvexPolyhedron::Plane;
+  using Side = std::array<uint32_t, 2>;
+  /// The part of a cut plane that closes the surface; the normal points out of the piece. The sides form
+  /// closed outlines, counter-clockwise seen from the tip of the normal, in any order.
+  struct Cap {
+    Plane plane;
+    std::vector<Side> sides;
+  };
+
+  std::vector<Vec3> points;           ///< [m]
+  std::vector<uint32_t> corners;      ///< of the polygons of the surface, as indices of points
+  std::vector<uint32_t> first = {0};  ///< first corner of each polygon, and the number of corners at the end
+  std::vector<Cap> caps;
+
+  std::size_t polygon_count() const { return first.size() - 1; }
+};
+
+/// The solid that a mesh bounds. The net number of triangles along each edge must be zero.
+SolidPiece solid_piece(const TriangleMesh& mesh);
+/// A convex polyhedron of dimension 3.
+SolidPiece solid_piece(const ConvexPolyhedron& polyhedron);
+
+/// Integrals over a piece or a part of it.
+struct PieceMoments {
+  Real volume = 0;            ///< [m^3]; negative for an inverted surface
+  Vec3 first = Vec3::Zero();  ///< of position, about the frame's origin [m^4]
+};
+PieceMoments moments(const SolidPiece& piece);
+/// Of the part above a plane: equal to moments(cut(...)[0]) within rounding, and faster.
+PieceMoments moments_above(const SolidPiece& piece, const SolidPiece::Plane& plane);
+
+/// The parts of a piece above and below a plane. Points within `tolerance` of the plane count as on it; a
+/// polygon on the plane belongs to the side where the solid is.
+std::array<SolidPiece, 2> cut(const SolidPiece& piece, const SolidPiece::Plane& plane, Real tolerance);
+
+/// Every pair of points that is an edge of a polygon or a side of a cap, once.
+std::vector<SolidPiece::Side> edges(const SolidPiece& piece);
+
+}  // namespace offstage::sim

@@ -1,0 +1,23 @@
+#pragma once
+/// Division of a solid into cells of about the same size and round shape, which thin shells need: their
+/// cost in parts depends on the extent of the cells in all directions, which single cuts do not foresee.
+
+#include <vector>
+
+#include "sim/geometry/solid_piece.h"
+
+namespace offstage::sim {
+
+/// Centres of a centroidal Voronoi tessellation of the surface, by Lloyd's iteration. Du, Faber, Gunzburger,
+/// "Centroidal Voronoi tessellations" (1999). At most `count` [m].
+std::vector<Vec3> spread_centres(const SolidPiece& solid, std::size_t count);
+
+/// Area of the polygons [m^2].
+Real surface_area(const SolidPiece& solid);
+
+/// The parts of the solid that are nearest to each of the centres. The result does not depend on the number
+/// of threads. Distances below `tolerance` count as zero [m].
+std::vector<SolidPiece> voronoi_pieces(const SolidPiece& solid, const std::vector<Vec3>& centres,
+                                       Real tolerance);
+
+}  // namespace offstage::sim
