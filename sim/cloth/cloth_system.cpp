@@ -21,8 +21,8 @@ constexpr Real kBeyondTear = 1.2;
 constexpr Real kMostApproach = 0.1;
 /// Into how many a sub-step is divided for that, at most.
 constexpr Real kMostDivision = 16;
-/// How long a span is, at most [s].
-constexpr Real kSpan = 1.0 / 480;
+/// How far the ends of a spring may move against each other in a sub-step, in lengths of the spring.
+constexpr Real kMostStrain = 1;
 /// A cloth with a point that is faster than this has diverged [m/s]; waves along a thread are ten times
 /// slower.
 constexpr Real kLostSpeed = 5000;
@@ -107,7 +107,6 @@ void ClothSystem::assemble() {
   limit_.assign(std::move(limits), std::move(ties), points_.size());
   self_contacts_.assign(std::move(colliding), points_);
   corner_contacts_.assign(std::move(touching), points_);
-  span_ = 0;
 }
 
 Aabb ClothSystem::reach(Real h) const {
@@ -194,18 +193,20 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
   if (speed > 0)
     longest = std::min(longest, std::max(kMostApproach * corner_contacts_.mean_edge() / speed,
                                          std::min(longest, weather.h) / kMostDivision));
+  // What whips and snaps, such as torn skin, would be held back only when it is far from where it began: then
+  // springs between points that are held and points that are not would gain much more than motion lost.
+  if (const Real rate = fastest_strain_rate(); rate > 0)
+    longest = std::min(longest, std::max(kMostStrain / rate, std::min(longest, weather.h) / kMostDivision));
   const Real parts = std::clamp(std::ceil(weather.h / longest * (1 - 1e-12)), 1.0, kMaxParts);
   const Real dt = weather.h / parts;
   parts_ = parts;
   dt_ = dt;
   time_ = weather.time + weather.h;
-  // Moves of bodies that hang on cloth are shortened within one sub-step.
-  const Real span = carriers_.empty() ? std::max(1.0, std::floor(kSpan / dt * (1 + 1e-9))) : 1;
   Real since_look = 0;  // way of the fastest body [m]
   for (Real k = 0; k < parts; ++k) {
     for (Cloth* cloth : cloths_) cloth->age += dt;
     blow(dt, parts - k);
-    substep(k / parts, (k + 1) / parts, dt, k + 1 == parts || span_ + 1 >= span);
+    substep(k / parts, (k + 1) / parts, dt);
     ClothWeather next = weather;
     next.time += (k + 1) * dt;
     next.h = dt;
@@ -223,10 +224,8 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
   write_back();
 }
 
-/// Contact of cloth with cloth is dearest, and looked at once in a span of several sub-steps.
-void ClothSystem::substep(Real from, Real to, Real dt, bool ends_span) {
+void ClothSystem::substep(Real from, Real to, Real dt) {
   for (ClothBody& body : bodies_) body.begin(from, to, dt);
-  if (span_++ == 0) begin_span();
   points_.start = points_.position;
   cuts_.clear();
   move_held();
@@ -235,31 +234,11 @@ void ClothSystem::substep(Real from, Real to, Real dt, bool ends_span) {
   pull_bodies(dt);
   close_seams(dt);
   limit_.project(points_, carriers_, dt, kick_, cuts_);
-  if (ends_span && !self_contacts_.empty()) push_apart(dt);
+  if (!self_contacts_.empty()) self_contacts_.push_apart(points_, dt);
   touch_bodies(dt);
   push_holders(dt);
-  shorten_moves(dt, ends_span);
+  shorten_moves(dt);
   end_substep(dt);
-  if (ends_span) span_ = 0;
-}
-
-void ClothSystem::begin_span() {
-  span_start_ = points_.position;
-  span_centre_.clear();
-  for (const ClothBody& body : bodies_) span_centre_.push_back(body.centre() - body.move());
-}
-
-/// Pushes layers of cloth apart that came too near in the span. That changes velocities as spread over it.
-void ClothSystem::push_apart(Real dt) {
-  points_.start.swap(span_start_);
-  free_ = points_.position;
-  self_contacts_.find(points_, span_ * dt);
-  self_contacts_.solve(points_);
-  points_.start.swap(span_start_);
-  if (span_ == 1) return;
-  for (uint32_t i = 0; i < points_.size(); ++i)
-    if (points_.position[i] != free_[i])
-      cuts_.push_back({i, (1 - 1.0 / span_) * (points_.position[i] - free_[i])});
 }
 
 /// Bodies push cloth out of their way. Where springs are too long, contacts and springs are solved for
@@ -289,6 +268,19 @@ void ClothSystem::collect_triangles() {
       motion += c.weights[k] * (points_.at(c.points[k]) - points_.start_at(c.points[k]));
     c.gap -= (1 - kTautRecovery) * std::min(c.gap - c.normal.dot(motion), 0.0);
   }
+}
+
+/// The greatest relative speed of both ends of a spring over its length at rest, in cloths with
+/// self-collision [1/s].
+Real ClothSystem::fastest_strain_rate() const {
+  Real fastest2 = 0;
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    if (!cloths_[c]->def.self_collision || cloths_[c]->stopped) continue;
+    for (const ClothSpring& s : springs_of(c))
+      fastest2 = std::max(fastest2, (points_.velocity[s.a] - points_.velocity[s.b]).squaredNorm() /
+                                        (s.rest_length * s.rest_length));
+  }
+  return std::sqrt(fastest2);
 }
 
 void ClothSystem::move_held() {

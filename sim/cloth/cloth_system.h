@@ -76,9 +76,8 @@ class ClothSystem {
     return std::span(all_springs_)
         .subspan(first_spring_[cloth], first_spring_[cloth + 1] - first_spring_[cloth]);
   }
-  void substep(Real from, Real to, Real dt, bool ends_span);
-  void begin_span();
-  void push_apart(Real dt);
+  Real fastest_strain_rate() const;
+  void substep(Real from, Real to, Real dt);
   void move_held();
   void integrate(Real dt);
   void close_seams(Real dt);
@@ -89,13 +88,13 @@ class ClothSystem {
   const ClothBody* near_another(uint32_t point);
   void follow_or_rest(uint32_t point);
   bool find_drifts();
-  void shorten_moves(Real dt, bool ends_span);
+  void shorten_moves(Real dt);
   bool shorten_in_pieces();
   bool shorten_doubtful(Shortened how);
   bool shorten_straight(Shortened how, bool& turned);
   void shorten_carrier(Carrier& carrier, Real share);
-  void add_momenta(Real sign, std::span<const Vec4> from, Real dt);
-  std::vector<Vec4> end_velocities(std::span<const Vec4> from, Real dt) const;
+  void add_momenta(Real sign, Real dt);
+  std::vector<Vec4> end_velocities(Real dt) const;
   std::vector<Real> inner_energies(std::span<const Vec4> velocity);
   std::vector<Real> elastic_gains(std::span<const Vec4> whole);
   void take_gains(std::span<const Vec4> whole, std::span<const Vec4> before, std::span<const Vec4> velocity);
@@ -136,10 +135,6 @@ class ClothSystem {
   ClothContacts contacts_;
   CornerContacts corner_contacts_;
   SelfContacts self_contacts_;
-  std::vector<Vec4> span_start_,
-      free_;           // positions at the start of the span of self-contact; positions before its corrections
-  uint32_t span_ = 0;  // sub-steps of cloth since then
-  std::vector<Vec3> span_centre_;  // of each body, at the start of the span
   std::vector<uint8_t> collides_;
   std::vector<Held> held_;
   std::vector<Carrier> carriers_;  // of the sub-step of the world
