@@ -65,10 +65,6 @@ class ClothSystem {
     Real open_length;  // at the start [m]
   };
 
-  void assemble();
-  void find_held(Real time, std::span<ClothBody> bodies);
-  void carry(uint32_t point, ClothBody& body, const Vec3& place);
-  void set_clamps(std::size_t cloth);
   void adapt_springs();
   void blow(Real dt, Real left);
   uint32_t spring_steps(std::size_t cloth, Real dt) const;
@@ -76,13 +72,28 @@ class ClothSystem {
     return std::span(all_springs_)
         .subspan(first_spring_[cloth], first_spring_[cloth + 1] - first_spring_[cloth]);
   }
+  void begin_step(const ClothWeather& weather, std::span<ClothBody> bodies);
+  Real parts_in(Real h, Real speed) const;
   Real fastest_strain_rate() const;
   void substep(Real from, Real to, Real dt);
-  void move_held();
   void integrate(Real dt);
   void close_seams(Real dt);
+  void end_substep(Real dt);
   void touch_bodies(Real dt);
   void collect_triangles();
+
+  // In cloth_assembly.cpp:
+  void assemble();
+
+  // In cloth_holders.cpp:
+  void find_held(Real time, std::span<ClothBody> bodies);
+  void carry(uint32_t point, ClothBody& body, const Vec3& place);
+  void set_clamps(std::size_t cloth);
+  void move_held();
+  void pull_bodies(Real dt);
+  Real share_at_once(std::size_t cloth, Real dt) const;
+  void push_holders(Real dt);
+
   // In shorten_moves.cpp:
   void find_frames();
   const ClothBody* near_another(uint32_t point);
@@ -106,10 +117,7 @@ class ClothSystem {
   std::vector<std::optional<Vec3>> whole_velocities(std::span<const Real> recoil,
                                                     std::span<const Vec4> velocity) const;
 
-  void end_substep(Real dt);
-  void pull_bodies(Real dt);
-  Real share_at_once(std::size_t cloth, Real dt) const;
-  void push_holders(Real dt);
+  // In cloth_outcome.cpp:
   void write_back();
   bool any_tears() const;
   void tear_within(const ClothWeather& weather, Real fraction);
