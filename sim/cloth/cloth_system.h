@@ -65,10 +65,6 @@ class ClothSystem {
     Real open_length;  // at the start [m]
   };
 
-  void assemble();
-  void find_held(Real time, std::span<ClothBody> bodies);
-  void carry(uint32_t point, ClothBody& body, const Vec3& place);
-  void set_clamps(std::size_t cloth);
   void adapt_springs();
   void blow(Real dt, Real left);
   uint32_t spring_steps(std::size_t cloth, Real dt) const;
@@ -76,26 +72,40 @@ class ClothSystem {
     return std::span(all_springs_)
         .subspan(first_spring_[cloth], first_spring_[cloth + 1] - first_spring_[cloth]);
   }
-  void substep(Real from, Real to, Real dt, bool ends_span);
-  void begin_span();
-  void push_apart(Real dt);
-  void move_held();
+  void begin_step(const ClothWeather& weather, std::span<ClothBody> bodies);
+  Real parts_in(Real h, Real speed) const;
+  Real fastest_strain_rate() const;
+  void substep(Real from, Real to, Real dt);
   void integrate(Real dt);
   void close_seams(Real dt);
+  void end_substep(Real dt);
   void touch_bodies(Real dt);
   void collect_triangles();
+
+  // In cloth_assembly.cpp:
+  void assemble();
+
+  // In cloth_holders.cpp:
+  void find_held(Real time, std::span<ClothBody> bodies);
+  void carry(uint32_t point, ClothBody& body, const Vec3& place);
+  void set_clamps(std::size_t cloth);
+  void move_held();
+  void pull_bodies(Real dt);
+  Real share_at_once(std::size_t cloth, Real dt) const;
+  void push_holders(Real dt);
+
   // In shorten_moves.cpp:
   void find_frames();
   const ClothBody* near_another(uint32_t point);
   void follow_or_rest(uint32_t point);
   bool find_drifts();
-  void shorten_moves(Real dt, bool ends_span);
+  void shorten_moves(Real dt);
   bool shorten_in_pieces();
   bool shorten_doubtful(Shortened how);
   bool shorten_straight(Shortened how, bool& turned);
   void shorten_carrier(Carrier& carrier, Real share);
-  void add_momenta(Real sign, std::span<const Vec4> from, Real dt);
-  std::vector<Vec4> end_velocities(std::span<const Vec4> from, Real dt) const;
+  void add_momenta(Real sign, Real dt);
+  std::vector<Vec4> end_velocities(Real dt) const;
   std::vector<Real> inner_energies(std::span<const Vec4> velocity);
   std::vector<Real> elastic_gains(std::span<const Vec4> whole);
   void take_gains(std::span<const Vec4> whole, std::span<const Vec4> before, std::span<const Vec4> velocity);
@@ -107,10 +117,7 @@ class ClothSystem {
   std::vector<std::optional<Vec3>> whole_velocities(std::span<const Real> recoil,
                                                     std::span<const Vec4> velocity) const;
 
-  void end_substep(Real dt);
-  void pull_bodies(Real dt);
-  Real share_at_once(std::size_t cloth, Real dt) const;
-  void push_holders(Real dt);
+  // In cloth_outcome.cpp:
   void write_back();
   bool any_tears() const;
   void tear_within(const ClothWeather& weather, Real fraction);
@@ -136,10 +143,6 @@ class ClothSystem {
   ClothContacts contacts_;
   CornerContacts corner_contacts_;
   SelfContacts self_contacts_;
-  std::vector<Vec4> span_start_,
-      free_;           // positions at the start of the span of self-contact; positions before its corrections
-  uint32_t span_ = 0;  // sub-steps of cloth since then
-  std::vector<Vec3> span_centre_;  // of each body, at the start of the span
   std::vector<uint8_t> collides_;
   std::vector<Held> held_;
   std::vector<Carrier> carriers_;  // of the sub-step of the world

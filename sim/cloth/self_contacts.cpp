@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <tuple>
 
 #include "sim/geometry/closest_points.h"
 
@@ -32,6 +33,9 @@ constexpr Real kLeft = 0.1, kNearest = 0.02;
 constexpr Real kNoSide = 1e-9;
 /// What is left of a length along a unit vector of single precision.
 constexpr Real kUnit = 1 - 1e-6;
+/// Sweeps over the pairs that would cross, and how much farther apart than they must be they are kept.
+constexpr int kSideSweeps = 8;
+constexpr Real kBeyondLeast = 1.01;
 /// Moves are halved until they are less than this share, and then given up.
 constexpr Real kLeastShare = 0.1;
 
@@ -183,8 +187,9 @@ void SelfContacts::add(const ClothPoints& points, const std::array<uint32_t, 4>&
   const Real nearest = kNearest * thickness;
   if (points.cloth[p[0]] == points.cloth[p[3]]) {
     const Real at_rest = closest(points.rest, p, edges).apart.norm();
-    // The edges of a tear have no side until they have parted: else they would hold each other for ever.
-    if (at_rest < kNoSide && distance < nearest) return;
+    // Parts that a tear divided have no side of each other, as neighbours have none: planes between them
+    // would be so close to both that these could not turn.
+    if (at_rest < kNoSide) return;
     thickness = std::min(thickness, kRestShare * at_rest);
   }
   pairs_.push_back({p, edges, thickness, nearest, distance, 0, (c.apart / distance).head<3>().cast<float>()});
@@ -258,6 +263,24 @@ void SelfContacts::search_again(const ClothPoints& points, Real dt) {
   length_.spend(static_cast<Real>(points.size() + kFitWork * seeking.size()));
 }
 
+/// The points of a pair whose heights above a plane through `origin`, at the places `at(point)`, are lowest
+/// on the first side and highest on the second.
+template <class At>
+SelfContacts::Sides SelfContacts::sides_of(const Pair& pair, const Vec4& normal, const Vec4& origin,
+                                           At&& at) {
+  Sides sides{pair.points[0], pair.points[3], 1e300, -1e300};
+  for (std::size_t k = 0; k < 4; ++k) {
+    const uint32_t i = pair.points[k];
+    const Real height = normal.dot(at(i) - origin);
+    if (k < first_side(pair.edges)) {
+      if (height < sides.low) std::tie(sides.first, sides.low) = std::pair(i, height);
+    } else if (height > sides.high) {
+      std::tie(sides.second, sides.high) = std::pair(i, height);
+    }
+  }
+  return sides;
+}
+
 SelfContacts::Contact SelfContacts::look(const ClothPoints& points, uint32_t k) {
   Pair& pair = pairs_[k];
   const Closest c = closest(points.start, pair.points, pair.edges);
@@ -303,15 +326,20 @@ void SelfContacts::gather(const ClothPoints& points, Real dt, std::span<const Ve
   }
 }
 
-void SelfContacts::find(const ClothPoints& points, Real dt) {
-  gather(points, dt, still_, [](const Pair& pair) { return pair.thickness; });
+void SelfContacts::push_apart(ClothPoints& points, Real dt) {
+  gather(points, dt, still_, [](const Pair& pair) {
+    return std::max(pair.thickness, least_distance(pair.distance, pair.nearest));
+  });
+  keep_thickness(points);
+  keep_sides(points);
 }
 
 void SelfContacts::find_doubtful(const ClothPoints& points, Real dt, std::span<const Vec4> drift) {
   gather(points, dt, drift, [](const Pair& pair) { return least_distance(pair.distance, pair.nearest); });
 }
 
-void SelfContacts::solve(ClothPoints& points) {
+/// One sweep, with friction.
+void SelfContacts::keep_thickness(ClothPoints& points) {
   active_.assign(points.cloth.back() + 1, 0);
   for (const Contact& c : contacts_) {
     if (!c.pushes) continue;
@@ -345,18 +373,38 @@ void SelfContacts::solve(ClothPoints& points) {
   }
 }
 
+/// Keeps pairs from crossing by impulses along the normal of the plane between them, on the point of each
+/// that would go farthest beyond it. What is left to shorten() stops points in all directions, which makes
+/// springs to points that go on gain energy, and jams where many layers press.
+void SelfContacts::keep_sides(ClothPoints& points) const {
+  bool again = true;
+  for (int sweep = 0; again && sweep < kSideSweeps; ++sweep) {
+    again = false;
+    for (const Contact& c : contacts_) {
+      const Pair& pair = pairs_[c.pair];
+      const Sides sides = sides_of(pair, c.normal, points.start[pair.points[0]],
+                                   [&](uint32_t i) -> const Vec4& { return points.position[i]; });
+      const Real push = kBeyondLeast * least_distance(c.distance, pair.nearest) - sides.apart();
+      const Real mobility = points.inverse_mass[sides.first] + points.inverse_mass[sides.second];
+      if (!(push > 0) || !(mobility > 0)) continue;
+      again = true;
+      const Vec4 impulse = push / mobility * c.normal;
+      for (const auto& [i, sign] : {std::pair(sides.first, 1.0), std::pair(sides.second, -1.0)}) {
+        points.position[i] += sign * points.inverse_mass[i] * impulse;
+        if (points.inverse_mass[i] == 0) points.pull[i] += sign * impulse;
+      }
+    }
+  }
+}
+
 bool SelfContacts::shorten(const ClothPoints& points, MoveShares& shares, std::vector<uint32_t>& lowered) {
   bool any = false;
   for (const Contact& c : contacts_) {
     const Pair& pair = pairs_[c.pair];
-    Real first = 1e300, second = -1e300;
-    for (std::size_t k = 0; k < 4; ++k) {
-      const uint32_t i = pair.points[k];
-      const Vec4 end = points.start[i] + shares[i] * (points.position[i] - points.start[i]);
-      const Real height = c.normal.dot(end - points.start[pair.points[0]]);
-      k < first_side(pair.edges) ? first = std::min(first, height) : second = std::max(second, height);
-    }
-    if (first - second >= least_distance(c.distance, pair.nearest)) continue;
+    const Sides sides = sides_of(pair, c.normal, points.start[pair.points[0]], [&](uint32_t i) {
+      return Vec4(points.start[i] + shares[i] * (points.position[i] - points.start[i]));
+    });
+    if (sides.apart() >= least_distance(c.distance, pair.nearest)) continue;
     bool any_here = false;
     for (uint32_t i : pair.points) {
       if (!(points.inverse_mass[i] > 0) || shares[i] == 0) continue;

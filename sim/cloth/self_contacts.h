@@ -25,11 +25,10 @@ class SelfContacts {
   void assign(std::vector<Triangle> triangles, const ClothPoints& points);
   bool empty() const { return triangles_.empty(); }
 
-  /// Finds the pairs that may touch, after points moved freely in a sub-step of length dt. The search is
-  /// repeated only if the known pairs no longer suffice.
-  void find(const ClothPoints& points, Real dt);
-  /// Separates pairs that are closer than their thickness.
-  void solve(ClothPoints& points);
+  /// After points moved freely in a sub-step of length dt: separates pairs that are closer than their
+  /// thickness, and keeps pairs from crossing as far as impulses between two points can. The search for pairs
+  /// is repeated only if the known ones no longer suffice.
+  void push_apart(ClothPoints& points, Real dt);
   /// Finds the pairs that may have crossed with the current moves, or may cross if any move is shortened
   /// towards the drift of its point. Points of one piece have a common drift.
   void find_doubtful(const ClothPoints& points, Real dt, std::span<const Vec4> drift);
@@ -45,7 +44,9 @@ class SelfContacts {
   /// Records the moves of points at the end of the sub-step.
   void end_substep(const ClothPoints& points, Real dt);
 
-  std::span<const uint64_t> active() const { return active_; }  ///< contacts of the last solve(), by cloth
+  std::span<const uint64_t> active() const {
+    return active_;
+  }  ///< contacts of the last push_apart(), by cloth
   /// Points whose moves shorten() shortened, and those of pairs that it could not keep from crossing because
   /// pins hold them; since the last call.
   std::vector<uint32_t> take_held_back() { return std::exchange(held_back_, {}); }
@@ -70,6 +71,18 @@ class SelfContacts {
     bool pushes;                  // false: its neighbours do so
   };
 
+  /// The two points of a pair that are closest to the other side or beyond it, and their heights above a
+  /// plane.
+  struct Sides {
+    uint32_t first, second;
+    Real low, high;
+    Real apart() const { return low - high; }
+  };
+
+  void keep_thickness(ClothPoints& points);
+  void keep_sides(ClothPoints& points) const;
+  template <class At>
+  static Sides sides_of(const Pair& pair, const Vec4& normal, const Vec4& origin, At&& at);
   void predict(const ClothPoints& points, std::size_t i, Real dt);
   void search(const ClothPoints& points, Real dt);
   template <class Wanted>

@@ -96,8 +96,7 @@ bool ClothSystem::find_drifts() {
   if (all_rest()) return false;
   for (Frame& frame : frames_) {
     if (!frame.rests && frame.mass > 0) frame.move /= frame.mass;
-    if (frame.pusher)
-      frame.move = padded(frame.pusher->centre() - span_centre_[frame.pusher - bodies_.data()]);
+    if (frame.pusher) frame.move = padded(frame.pusher->move());
   }
   for (uint32_t i = 0; i < points_.size(); ++i)
     if (!frame_of(i).rests) drift_[i] = frame_of(i).move;
@@ -106,23 +105,21 @@ bool ClothSystem::find_drifts() {
 
 /// Until nothing is too long and nothing crossed. What is held back in a moving frame goes ways that its
 /// pairs were not sought for, and is looked at once more in the world's.
-void ClothSystem::shorten_moves(Real dt, bool ends_span) {
-  const bool self = ends_span && !self_contacts_.empty();
+void ClothSystem::shorten_moves(Real dt) {
+  const bool self = !self_contacts_.empty();
   if (limit_.empty() && !self) return;
-  if (self) points_.start.swap(span_start_);                           // the moves of the whole span
-  const std::vector<Vec4>& from = self ? span_start_ : points_.start;  // of the sub-step
   const auto find_doubtful = [&] {
-    self ? self_contacts_.find_doubtful(points_, span_ * dt, drift_) : self_contacts_.find_none();
+    self ? self_contacts_.find_doubtful(points_, dt, drift_) : self_contacts_.find_none();
   };
   shortened_.assign(points_.size(), kWhole);
   find_doubtful();
   const bool any_drifts = find_drifts();
-  add_momenta(1, from, dt);
+  add_momenta(1, dt);
   const bool any_free = !std::ranges::all_of(frames_, &Frame::anchored);
   std::vector<Vec4> whole, velocity;
   if (any_free) {
     whole = points_.position;
-    velocity = end_velocities(from, dt);
+    velocity = end_velocities(dt);
   }
   if (any_drifts) find_doubtful();
   bool any = any_drifts ? shorten_in_pieces() : shorten_doubtful(kInWorld);
@@ -136,21 +133,15 @@ void ClothSystem::shorten_moves(Real dt, bool ends_span) {
   for (std::size_t i = 0; any && i < points_.size(); ++i) {
     if (shortened_[i] == kWhole) continue;
     ++cloths_[points_.cloth[i]]->report.limited;
-    // Its velocity is that of the shortened move, which in a span is not that of the last sub-step.
-    if (self)
-      kick_[i] =
-          (points_.position[i] - points_.start[i]) / (span_ * dt) - (points_.position[i] - from[i]) / dt;
+    if (self) kick_[i].setZero();  // its velocity is that of the shortened move
   }
   if (self) std::erase_if(cuts_, [&](const VelocityCut& cut) { return shortened_[cut.point] != kWhole; });
   if (any) {
-    if (any_free) take_gains(whole, velocity, end_velocities(from, dt));
-    add_momenta(-1, from, dt);
+    if (any_free) take_gains(whole, velocity, end_velocities(dt));
+    add_momenta(-1, dt);
     give_momenta_back();
   }
-  if (self) {
-    self_contacts_.end_substep(points_, span_ * dt);
-    points_.start.swap(span_start_);
-  }
+  if (self) self_contacts_.end_substep(points_, dt);
   stop_bodies(dt);
 }
 
@@ -175,22 +166,23 @@ bool ClothSystem::shorten_in_pieces() {
   return true;
 }
 
-/// Adds (or takes, with the sign) the momenta of free points at the end of the sub-step that began at `from`.
-void ClothSystem::add_momenta(Real sign, std::span<const Vec4> from, Real dt) {
+/// Adds (or takes, with the sign) the momenta of free points at the end of the sub-step.
+void ClothSystem::add_momenta(Real sign, Real dt) {
   for (uint32_t i = 0; i < points_.size(); ++i)
     if (points_.inverse_mass[i] > 0)
-      frame_of(i).momentum += sign * points_.mass[i] * ((points_.position[i] - from[i]) / dt + kick_[i]);
+      frame_of(i).momentum +=
+          sign * points_.mass[i] * ((points_.position[i] - points_.start[i]) / dt + kick_[i]);
   for (const VelocityCut& cut : cuts_)
     if (points_.inverse_mass[cut.point] > 0)
       frame_of(cut.point).momentum -= sign * points_.mass[cut.point] / dt * cut.move;
 }
 
-/// Of all points at the end of the sub-step that began at `from`.
-std::vector<Vec4> ClothSystem::end_velocities(std::span<const Vec4> from, Real dt) const {
+/// Of all points at the end of the sub-step.
+std::vector<Vec4> ClothSystem::end_velocities(Real dt) const {
   std::vector<Vec4> velocity(points_.size());
   for (uint32_t i = 0; i < points_.size(); ++i)
-    velocity[i] =
-        points_.carried[i] ? points_.velocity[i] : Vec4((points_.position[i] - from[i]) / dt + kick_[i]);
+    velocity[i] = points_.carried[i] ? points_.velocity[i]
+                                     : Vec4((points_.position[i] - points_.start[i]) / dt + kick_[i]);
   for (const VelocityCut& cut : cuts_) velocity[cut.point] -= cut.move / dt;
   return velocity;
 }
@@ -322,7 +314,7 @@ void ClothSystem::shorten_carrier(Carrier& carrier, Real share) {
 /// A cloth that gives no more stops bodies as one with those that it hangs on.
 void ClothSystem::stop_bodies(Real dt) {
   const std::vector<Real> recoil = recoils();
-  const auto whole = whole_velocities(recoil, end_velocities(points_.start, dt));
+  const auto whole = whole_velocities(recoil, end_velocities(dt));
   body_contacts_.clear();
   corner_contacts_.collect(points_, 0, body_contacts_);
   const std::vector<Vec3> taken =

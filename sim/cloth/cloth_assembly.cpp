@@ -1,0 +1,106 @@
+/// The part of ClothSystem that lays out the points and springs of all cloths after each other.
+
+#include <algorithm>
+
+#include "sim/cloth/cloth_system.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Stretch is not limited so that cloth could not tear: the limit is at least this much above.
+constexpr Real kBeyondTear = 1.2;
+
+}  // namespace
+
+void ClothSystem::assign(std::vector<Cloth*> cloths) {
+  cloths_ = std::move(cloths);
+  changed_ = true;
+}
+
+/// Lays out the points and springs of all cloths after each other.
+void ClothSystem::assemble() {
+  changed_ = false;
+  points_ = {};
+  first_.clear();
+  collides_.clear();
+  seams_.clear();
+  all_springs_.clear();
+  first_spring_.clear();
+  std::vector<StretchLimit::Limit> limits, ties;
+  std::vector<Triangle> colliding, touching;  // cloth; bodies
+  for (uint32_t c = 0; c < cloths_.size(); ++c) {
+    Cloth& cloth = *cloths_[c];
+    cloth.assign_bending();
+    if (cloth.def.pressure != 0) cloth.gas.assign(cloth.triangles);
+    const auto first = static_cast<uint32_t>(points_.size());
+    first_.push_back(first);
+    for (std::size_t i = 0; i < cloth.points.size(); ++i) {
+      points_.position.push_back(padded(cloth.points[i]));
+      points_.velocity.push_back(padded(cloth.velocities[i]));
+      points_.rest.push_back(padded(cloth.rest[i]));
+      points_.mass.push_back(cloth.masses[i]);
+      points_.thickness.push_back(cloth.def.thickness);
+      points_.friction.push_back(cloth.def.friction);
+      points_.self_friction.push_back(cloth.def.self_friction);
+      points_.cloth.push_back(c);
+      collides_.push_back(cloth.def.collides && !cloth.stopped);
+    }
+    first_spring_.push_back(all_springs_.size());
+    for (ClothSpring s : cloth.springs) {
+      s.a += first;
+      s.b += first;
+      for (uint32_t& end : s.counterpart) end += first;
+      all_springs_.push_back(s);
+      Real limit = s.kind == SpringKind::stretch ? cloth.def.max_stretch
+                   : s.kind == SpringKind::shear ? cloth.def.max_shear
+                                                 : 0;
+      if (limit > 0 && s.kind == SpringKind::stretch) limit = std::max(limit, kBeyondTear * cloth.def.tear);
+      if (limit > 0) limits.push_back({s.a, s.b, s.rest_length, limit * s.rest_length, cloth.def.tear > 0});
+    }
+    if (cloth.def.collides && !cloth.stopped)
+      for (const Triangle& t : cloth.triangles)
+        touching.push_back({first + t[0], first + t[1], first + t[2]});
+    if (cloth.def.self_collision)
+      for (const Triangle& t : cloth.triangles)
+        colliding.push_back({first + t[0], first + t[1], first + t[2]});
+    for (std::size_t k = 0; k < cloth.def.seams.size(); ++k) {
+      seams_.push_back({c, cloth.seam_lengths[k]});
+      ties.push_back({first + cloth.def.seams[k].a, first + cloth.def.seams[k].b, 0, 0});
+    }
+  }
+  first_spring_.push_back(all_springs_.size());
+  kick_.assign(points_.size(), Vec4::Zero());
+  points_.moves.assign(points_.size(), Vec4::Zero());
+  points_.start = points_.position;
+  points_.outer.assign(points_.size(), Vec4::Zero());
+  points_.acceleration = points_.flow = points_.outer;
+  points_.field_drag.assign(points_.size(), 0);
+  points_.pull.assign(points_.size(), Vec4::Zero());
+  springs_.clear();
+  springs_.resize(cloths_.size());
+  for (std::size_t c = 0; c < cloths_.size(); ++c)
+    if (cloths_[c]->def.integrator == ClothIntegrator::relaxed) springs_[c].assign(springs_of(c), points_);
+  air_.resize(cloths_.size());
+  for (std::size_t c = 0; c < cloths_.size(); ++c) air_[c].assign(*cloths_[c], first_[c]);
+  drift_.assign(points_.size(), Vec4::Zero());
+  pieces_.assign(points_.size());
+  for (const ClothSpring& s : all_springs_) pieces_.join(s.a, s.b);
+  for (const StretchLimit::Limit& t : ties) pieces_.join(t.a, t.b);
+  pieces_.keep();
+  limit_.assign(std::move(limits), std::move(ties), points_.size());
+  self_contacts_.assign(std::move(colliding), points_);
+  corner_contacts_.assign(std::move(touching), points_);
+}
+
+Aabb ClothSystem::reach(Real h) const {
+  Aabb box;
+  for (const Cloth* cloth : cloths_)
+    for (std::size_t i = 0; i < cloth->points.size(); ++i) {
+      const Vec3 around = Vec3::Constant(2 * cloth->def.thickness + 2 * h * cloth->velocities[i].norm());
+      box.extend(Vec3(cloth->points[i] - around));
+      box.extend(Vec3(cloth->points[i] + around));
+    }
+  return box;
+}
+
+}  // namespace offstage::sim

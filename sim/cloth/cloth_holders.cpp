@@ -1,0 +1,127 @@
+/// The part of ClothSystem for points that pins hold: on the world, or on bodies, which feel the pull of the
+/// cloth.
+
+#include <algorithm>
+
+#include "sim/cloth/cloth_system.h"
+
+namespace offstage::sim {
+
+/// What pins hold has no inverse mass in this sub-step of the world.
+void ClothSystem::find_held(Real time, std::span<ClothBody> bodies) {
+  held_.clear();
+  carriers_.clear();
+  points_.holder.assign(points_.size(), nullptr);
+  points_.carried.assign(points_.size(), 0);
+  for (std::size_t i = 0; i < points_.size(); ++i) points_.inverse_mass[i] = 1 / points_.mass[i];
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    Cloth& cloth = *cloths_[c];
+    std::erase_if(cloth.pins, [&](const ClothPin& pin) { return pin.until <= time; });
+    for (const ClothPin& pin : cloth.pins) {
+      const auto point = static_cast<uint32_t>(first_[c]) + pin.vertex;
+      ClothBody* body = nullptr;
+      if (pin.body) {
+        const auto at = std::ranges::lower_bound(bodies, pin.body.index, {},
+                                                 [](const ClothBody& b) { return b.way().body; });
+        if (at == bodies.end() || at->way().body != pin.body.index) continue;
+        body = &*at;
+      }
+      points_.inverse_mass[point] = 0;
+      points_.holder[point] = body;
+      held_.push_back({point, body, pin.position});
+      if (body && body->is_dynamic()) carry(point, *body, pin.position);
+    }
+    set_clamps(c);
+    if (cloth.stopped)
+      std::fill_n(points_.inverse_mass.begin() + static_cast<std::ptrdiff_t>(first_[c]), cloth.points.size(),
+                  0.0);
+  }
+}
+
+void ClothSystem::carry(uint32_t point, ClothBody& body, const Vec3& place) {
+  auto at = std::ranges::find(carriers_, &body, &Carrier::body);
+  if (at == carriers_.end()) at = carriers_.insert(at, {&body, {}, {}});
+  at->points.push_back(point);
+  at->places.push_back(place);
+  points_.carried[point] = 1;
+}
+
+/// Triangles whose corners are all pinned to one body are clamped.
+void ClothSystem::set_clamps(std::size_t c) {
+  Cloth& cloth = *cloths_[c];
+  if (cloth.bending.empty()) return;
+  std::vector<uint32_t> clamp(cloth.points.size(), 0);
+  for (const Held& held : held_)
+    if (points_.cloth[held.point] == c)
+      clamp[held.point - first_[c]] = held.body ? 2 + held.body->way().body : 1;
+  cloth.bending.set_clamps(clamp);
+}
+
+void ClothSystem::move_held() {
+  for (Held& held : held_) {
+    held.from = points_.position[held.point];
+    points_.position[held.point] =
+        padded(held.body ? held.body->end().point_to_world(held.position) : held.position);
+    points_.pull[held.point].setZero();
+  }
+}
+
+/// Bodies feel what hangs on their pins, and move by it as the points of the cloth did: by forces of the
+/// start of the sub-step at once, by those of its end from the next on, by those between half. They carry the
+/// mass of the points: what these need to follow their body is taken from it.
+void ClothSystem::pull_bodies(Real dt) {
+  const auto impulse_on = [&](uint32_t i) {
+    const Vec4 load = points_.pull[i] / dt + dt * points_.mass[i] * points_.acceleration[i];
+    points_.pull[i].setZero();
+    return Vec3(load.head<3>());
+  };
+  for (const Carrier& carrier : carriers_) {
+    ClothBody& body = *carrier.body;
+    Vec6 sum = Vec6::Zero(), moving = Vec6::Zero();
+    for (uint32_t i : carrier.points) {
+      const Vec3 p = points_.at(i), arm = p - body.centre();
+      const Vec3 load = impulse_on(i);
+      const Vec3 lag = points_.mass[i] * (points_.velocity[i].head<3>() - body.velocity(p));
+      const Vec3 impulse = load + lag, early = share_at_once(points_.cloth[i], dt) * load + lag;
+      sum += (Vec6() << impulse, arm.cross(impulse)).finished();
+      moving += (Vec6() << early, arm.cross(early)).finished();
+      points_.velocity[i] = padded(body.velocity(p));
+    }
+    carrier.pull(sum, moving, points_);
+  }
+  for (const Held& held : held_)
+    if (held.body && !held.body->is_dynamic())
+      held.body->load(impulse_on(held.point), points_.at(held.point));
+}
+
+/// Share of the impulses of a cloth's springs that moves bodies already in the sub-step.
+Real ClothSystem::share_at_once(std::size_t cloth, Real dt) const {
+  switch (cloths_[cloth]->def.integrator) {
+    case ClothIntegrator::implicit:
+      return 0;
+    case ClothIntegrator::rk4:
+      return 0.5;
+    case ClothIntegrator::relaxed:
+      return 0.5 + 0.5 / spring_steps(cloth, dt);
+    case ClothIntegrator::symplectic:
+      return 1;
+  }
+  return 1;
+}
+
+/// Bodies feel what contacts and the stretch limit did to the points that they hold.
+void ClothSystem::push_holders(Real dt) {
+  for (const Held& held : held_) {
+    Vec4& pull = points_.pull[held.point];
+    if (!held.body || pull.isZero(0)) continue;
+    const Vec3 impulse = pull.head<3>() / dt;
+    pull.setZero();
+    if (held.body->is_dynamic())
+      held.body->pull(impulse, points_.at(held.point), 1);
+    else
+      held.body->load(impulse, points_.at(held.point));
+  }
+  for (const Carrier& carrier : carriers_) carrier.place(points_);
+}
+
+}  // namespace offstage::sim

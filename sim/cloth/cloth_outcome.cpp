@@ -1,0 +1,141 @@
+/// The part of ClothSystem that hands the result of a step to the cloths: their motion, tears, reports, and
+/// the end of cloths that diverged.
+
+#include <algorithm>
+#include <cmath>
+
+#include "sim/cloth/cloth_system.h"
+#include "sim/cloth/tearing.h"
+
+namespace offstage::sim {
+namespace {
+
+/// A cloth with a point that is faster than this has diverged [m/s]; waves along a thread are ten times
+/// slower.
+constexpr Real kLostSpeed = 5000;
+
+}  // namespace
+
+void ClothSystem::write_back() {
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    Cloth& cloth = *cloths_[c];
+    bool finite = true;
+    for (std::size_t i = 0; i < cloth.points.size(); ++i) {
+      finite &= points_.position[first_[c] + i].allFinite() && points_.velocity[first_[c] + i].allFinite();
+    }
+    if (!finite) {
+      stop(cloth, first_[c]);
+      continue;
+    }
+    for (std::size_t i = 0; i < cloth.points.size(); ++i) {
+      cloth.points[i] = points_.at(first_[c] + i);
+      cloth.velocities[i] = points_.velocity[first_[c] + i].head<3>();
+    }
+    const uint32_t torn = tear_at(c, time_);
+    cloth.report.torn += torn;
+    changed_ |= torn > 0;
+  }
+}
+
+bool ClothSystem::any_tears() const {
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    const Real tear = cloths_[c]->def.tear;
+    if (tear == 0 || cloths_[c]->stopped) continue;
+    for (const ClothSpring& s : springs_of(c)) {
+      const Real longest = tear * s.rest_length;
+      if (s.kind == SpringKind::stretch &&
+          (points_.position[s.a] - points_.position[s.b]).squaredNorm() > longest * longest)
+        return true;
+    }
+  }
+  return false;
+}
+
+/// Tears cloths after a fraction of the world's sub-step, and begins again with what is left of them.
+void ClothSystem::tear_within(const ClothWeather& weather, Real fraction) {
+  time_ = weather.time + fraction * weather.h;
+  write_back();
+  time_ = weather.time + weather.h;
+  if (!changed_) return;
+  assemble();
+  points_.inverse_mass.resize(points_.size());
+  ClothWeather now = weather;
+  now.time += fraction * weather.h;
+  for (std::size_t c = 0; c < cloths_.size(); ++c) add_outer_forces(*cloths_[c], first_[c], now, points_);
+  adapt_springs();
+  find_held(weather.time, bodies_);
+  contacts_.find(points_, collides_, bodies_, weather.h, fraction);
+  corner_contacts_.find(points_, bodies_, weather.h);
+}
+
+/// Tears the threads that are too long, and reports the first tear.
+uint32_t ClothSystem::tear_at(std::size_t c, Real time) {
+  Cloth& cloth = *cloths_[c];
+  ClothTear first{.time = time};
+  first.by_pressure = cloth.def.pressure != 0;
+  first.touches_body = c < contacts_.active().size() && contacts_.active()[c] > 0;
+  const uint32_t torn = tear(cloth, first);
+  cloth.report.first_tear = cloth.first_tear;
+  return torn;
+}
+
+void ClothSystem::count_penetration() {
+  std::vector<Real> deepest(cloths_.size(), 0);
+  contacts_.measure(points_, deepest);
+  for (std::size_t c = 0; c < cloths_.size(); ++c)
+    cloths_[c]->report.penetration = std::max(cloths_[c]->report.penetration, deepest[c]);
+}
+
+void ClothSystem::measure() {
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    Cloth& cloth = *cloths_[c];
+    if (!changed_ && c < springs_.size() && cloth.def.integrator == ClothIntegrator::relaxed) {
+      cloth.report.clamped = springs_[c].clamped();
+      cloth.report.least_stiffness = springs_[c].least_stiffness();
+      cloth.report.spring_steps = spring_steps(c, dt_);
+    }
+    Eigen::ArrayXd length2(cloth.springs.size()), rest(cloth.springs.size());
+    Eigen::Index count = 0;
+    for (const ClothSpring& s : cloth.springs) {
+      if (s.kind != SpringKind::stretch) continue;
+      length2[count] = (cloth.points[s.a] - cloth.points[s.b]).squaredNorm();
+      rest[count++] = s.rest_length;
+    }
+    const Eigen::ArrayXd strain = length2.head(count).sqrt() / rest.head(count) - 1;
+    cloth.report.max_strain = count > 0 ? std::max(cloth.report.max_strain, strain.maxCoeff()) : 0;
+    cloth.report.mean_strain = count > 0 ? strain.abs().mean() : 0;
+    if (c < contacts_.active().size()) cloth.report.contacts = contacts_.active()[c];
+    if (c < self_contacts_.active().size()) cloth.report.self_contacts = self_contacts_.active()[c];
+  }
+}
+
+/// Stops cloths that diverge, before their contacts are sought: in a cloth that is scattered everywhere,
+/// nearly all pairs of triangles may touch, and the search would not end.
+void ClothSystem::stop_lost(Real dt) {
+  const Real farthest2 = kLostSpeed * kLostSpeed * dt * dt;
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    if (cloths_[c]->stopped) continue;
+    bool lost = false;
+    for (std::size_t i = first_[c], end = i + cloths_[c]->points.size(); i < end; ++i)
+      lost |= points_.inverse_mass[i] > 0 &&
+              !((points_.position[i] - points_.start[i]).squaredNorm() <= farthest2);
+    if (lost) stop(*cloths_[c], first_[c]);
+  }
+}
+
+/// A cloth that lost its numbers stays where it last was.
+void ClothSystem::stop(Cloth& cloth, std::size_t first) {
+  cloth.stopped = true;
+  cloth.report.finite = false;
+  for (std::size_t i = 0; i < cloth.points.size(); ++i) {
+    cloth.velocities[i].setZero();
+    points_.position[first + i] = padded(cloth.points[i]);
+    points_.velocity[first + i].setZero();
+    points_.start[first + i] = points_.position[first + i];
+    points_.inverse_mass[first + i] = 0;
+    kick_[first + i].setZero();
+  }
+  changed_ = true;
+}
+
+}  // namespace offstage::sim

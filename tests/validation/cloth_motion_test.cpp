@@ -1,0 +1,127 @@
+/// Cloth that is pinned, touches itself or lies on a turning ball keeps moving. Its moves are shortened in
+/// most sub-steps, which must neither stop it nor give it energy.
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <tuple>
+
+#include <gtest/gtest.h>
+
+#include "effects/cloth.h"
+#include "sim/world.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr uint32_t kMovingCells = 24;
+
+/// A square metre of cloth in a vacuum, horizontal at first and pinned along one edge.
+ClothDef hanging_cloth(const std::string& fabric) {
+  ClothDef def =
+      effects::grid_cloth({1, 1, kMovingCells, kMovingCells}, {}, effects::find_fabric(fabric)->fabric);
+  def.air.density = 0;
+  for (uint32_t i = 0; i <= kMovingCells; ++i) def.pins.push_back({.vertex = i, .position = def.vertices[i]});
+  return def;
+}
+
+/// The same, pinned at two corners alone, between which it swings and folds on itself.
+ClothDef folding_cloth(const std::string& fabric) {
+  ClothDef def = hanging_cloth(fabric);
+  def.pins = {def.pins.front(), def.pins.back()};
+  return def;
+}
+
+struct SwingRecord {
+  Real fall = 0;     // energy of the fall of all points to where they hang straight down [J]
+  Real rise = 0;     // greatest, of the energy over its least value before [J]
+  Real kinetic = 0;  // greatest in the last second [J]
+  uint64_t limited = 0, touches = 0, crossings = 0;
+};
+
+SwingRecord swing_of(const ClothDef& def, Real step) {
+  constexpr Real kSeconds = 3;
+  World world({.max_step = step});
+  const ClothHandle cloth = world.add_cloth(def);
+  SwingRecord motion;
+  for (std::size_t i = 0; i < def.masses.size(); ++i)
+    motion.fall += def.masses[i] * 9.81 * (def.vertices[i].z() - def.vertices[0].z());
+  Real least = world.energy().total();
+  for (int i = 0; i < kSeconds / step; ++i) {
+    world.step(step);
+    const Real now = world.energy().total();
+    motion.rise = std::max(motion.rise, now - least);
+    least = std::min(least, now);
+    motion.limited += world.cloth_report(cloth).limited;
+    motion.touches += world.cloth_report(cloth).self_contacts;
+    motion.crossings += world.cloth_report(cloth).crossings;
+    if (i * step > kSeconds - 1) motion.kinetic = std::max(motion.kinetic, world.energy().kinetic);
+  }
+  return motion;
+}
+
+/// Fabric and step of the world [s].
+class MovingCloth : public testing::TestWithParam<std::tuple<std::string, Real>> {};
+
+TEST_P(MovingCloth, SwingsOnAtItsStretchLimitAndGainsNothing) {
+  const auto [fabric, step] = GetParam();
+  ClothDef def = hanging_cloth(fabric);
+  def.max_stretch = 1.01;
+  const SwingRecord motion = swing_of(def, step);
+  EXPECT_GT(motion.limited, 1000);
+  EXPECT_LT(motion.rise, 0.03 * motion.fall);
+  EXPECT_GT(motion.kinetic, 0.1 * motion.fall);
+  EXPECT_EQ(motion.crossings, 0);
+}
+
+TEST_P(MovingCloth, SwingsOnWhileItTouchesItselfAndGainsNothing) {
+  const auto [fabric, step] = GetParam();
+  const SwingRecord motion = swing_of(folding_cloth(fabric), step);
+  EXPECT_GT(motion.touches, 100);
+  EXPECT_LT(motion.rise, 0.03 * motion.fall);
+  EXPECT_GT(motion.kinetic, 0.1 * motion.fall);
+  EXPECT_EQ(motion.crossings, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Fabrics, MovingCloth,
+                         testing::Combine(testing::Values("silk", "cotton"),
+                                          testing::Values(1.0 / 60, 1.0 / 240)));
+
+/// Self-collision.
+class TurningBall : public testing::TestWithParam<bool> {};
+
+TEST_P(TurningBall, TakesItsClothAlong) {
+  // Friction drags the cloth until it turns as the ball does; its stretch limit is reached.
+  constexpr Real kSpin = 3;
+  ClothDef def =
+      effects::grid_cloth({1, 1, 20, 20}, {Vec3(0, 0.36, 0)}, effects::find_fabric("cotton")->fabric);
+  def.air.density = 0;
+  def.self_collision = GetParam();
+  def.max_stretch = 1.01;
+  World world({.max_step = 1.0 / 240});
+  world.add_body({.shape = Sphere{0.35},
+                  .motion = MotionType::kinematic,
+                  .friction = 1,
+                  .track = {.spin = {0, kSpin, 0}}});
+  const ClothHandle cloth = world.add_cloth(def);
+  uint64_t limited = 0;
+  Real spin = 0, inertia = 0;  // about the axis of the ball
+  for (int i = 0; i < 240; ++i) {
+    world.step(1.0 / 60);
+    limited += world.cloth_report(cloth).limited;
+    if (i < 180) continue;
+    const ClothView view = world.cloth(cloth);
+    for (std::size_t k = 0; k < view.points.size(); ++k) {
+      const Vec3 &p = view.points[k], &v = view.velocities[k];
+      spin += def.masses[k] * (p.z() * v.x() - p.x() * v.z());
+      inertia += def.masses[k] * (p.z() * p.z() + p.x() * p.x());
+    }
+  }
+  EXPECT_GT(limited, 300);
+  EXPECT_NEAR(spin / inertia, kSpin, 0.03 * kSpin);
+}
+
+INSTANTIATE_TEST_SUITE_P(SelfCollision, TurningBall, testing::Bool());
+
+}  // namespace
+}  // namespace offstage::sim
