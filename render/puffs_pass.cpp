@@ -91,91 +91,115 @@ void PuffsPass::measure(const PaintOrder& order, const View& view, float pixel_m
   factor_ = typical_px < kHalf_px ? 1 : typical_px < kQuarter_px ? 2 : 4;
 }
 
-void PuffsPass::make_splats(const PaintOrder& order, const View& view, const PuffLight& light) {
-  const FrameUniforms& frame = light.frame;
-  const float pixel_m = frame.eye.w() * static_cast<float>(factor_);
-  const Vector2f half_size(0.5f * static_cast<float>(width_px_) / static_cast<float>(factor_),
-                           0.5f * static_cast<float>(height_px_) / static_cast<float>(factor_));
+namespace {
 
-  const auto splat_of = [&](uint64_t key) {
-    const PaintOrder::Place at = order.place(PaintOrder::Kind::puffs, key);
-    const PointSet& set = *at.set;
-    const std::size_t i = at.index;
-    const GpuPoint& point = set.points[i];
-    const Vector3f center = point.position.head<3>();
-    const float radius = point.position.w();
-    const bool flame = set.def.style == PointStyle::fire;
+/// The picture that puffs are drawn into.
+struct PuffScreen {
+  const View& view;
+  Vector2f half_size;  // [px]
+  float pixel_m;       // size of a pixel at a depth of 1 m
+};
 
-    Splat s;
-    s.depth = view.depth_of(center);
-    const Vector4f clip = view.clip_from_world * center.homogeneous();
-    s.x = (clip.x() / clip.w() + 1) * half_size.x();
-    s.y = (clip.y() / clip.w() + 1) * half_size.y();
-    const float pixel = pixel_m * s.depth, drawn = std::max(radius, 0.7f * pixel);
-    const float radius_px = drawn / pixel, thinning = radius / drawn;
-    s.inverse_reach = 0.5f / drawn;
-    s.cover = flame ? kFlameCover : set.def.additive ? 0.0f : 1.0f;
-    s.opacity = std::min(point.color.w(), 1.0f) * thinning * thinning *
-                std::clamp(0.5f * (s.depth - view.near_m) / drawn, 0.0f, 1.0f);
+/// Sets everything but the radiance, and returns the axes of the atlas's cell in the world.
+Eigen::Matrix3f place_puff(const PointSet& set, std::size_t i, const PuffScreen& screen,
+                           const PuffAtlas& atlas, Splat& s) {
+  const View& view = screen.view;
+  const GpuPoint& point = set.points[i];
+  const Vector3f center = point.position.head<3>();
+  const float radius = point.position.w();
+  const bool flame = set.def.style == PointStyle::fire;
 
-    // A puff that is near enough to fill the picture fades out before the eye is inside it.
-    const float apart = std::clamp(0.5f * s.depth / radius - 1, 0.0f, 1.0f);
-    s.opacity *= std::max(apart, std::clamp(2 - radius_px / (kNearestPuff * half_size.y()), 0.0f, 1.0f));
+  s.depth = view.depth_of(center);
+  const Vector4f clip = view.clip_from_world * center.homogeneous();
+  s.x = (clip.x() / clip.w() + 1) * screen.half_size.x();
+  s.y = (clip.y() / clip.w() + 1) * screen.half_size.y();
+  const float pixel = screen.pixel_m * s.depth, drawn = std::max(radius, 0.7f * pixel);
+  const float radius_px = drawn / pixel, thinning = radius / drawn;
+  s.inverse_reach = 0.5f / drawn;
+  s.cover = flame ? kFlameCover : set.def.additive ? 0.0f : 1.0f;
+  s.opacity = std::min(point.color.w(), 1.0f) * thinning * thinning *
+              std::clamp(0.5f * (s.depth - view.near_m) / drawn, 0.0f, 1.0f);
 
-    // Axes of the cell on the screen, and the stretch along the motion.
-    const Shape shape(point.velocity.w());
-    const Vector3f velocity = point.velocity.head<3>();
-    Vector2f motion(velocity.dot(view.right), velocity.dot(view.up));
-    const float stretch = 1 + 0.5f * set.def.stretch_s * motion.norm() / drawn;
-    if (flame) motion += 0.2f * Vector2f(view.right.y(), view.up.y());  // flames at rest point upwards
-    const Vector2f along = motion.norm() > 1e-6f ? Vector2f(motion.normalized()) : Vector2f(0, 1);
-    float angle = 2 * std::numbers::pi_v<float> * shape.turn + kSpin * (2 * shape.turn - 1) * set.ages[i];
-    if (flame) angle = std::atan2(along.x(), along.y()) + kFlameWobble * (2 * shape.turn - 1);
-    const float c = std::cos(angle), sine = std::sin(angle);
-    const Vector2f u = (shape.mirrored ? -1.0f : 1.0f) * Vector2f(c, -sine), v(sine, c);
-    const Vector2f u_px = (u - (1 - 1 / stretch) * u.dot(along) * along) / radius_px;
-    const Vector2f v_px = (v - (1 - 1 / stretch) * v.dot(along) * along) / radius_px;
-    s.ux = u_px.x();
-    s.uy = u_px.y();
-    s.vx = v_px.x();
-    s.vy = v_px.y();
-    const Vector2f half =
-        (Vector2f::Ones() + (stretch * stretch - 1) * along.cwiseAbs2()).cwiseSqrt() * radius_px;
-    s.half_x = half.x();
-    s.half_y = half.y();
-    s.cell = atlas_->level(kind_of(set), shape.variant, 2 * radius_px * stretch);
+  // A puff that is near enough to fill the picture fades out before the eye is inside it.
+  const float apart = std::clamp(0.5f * s.depth / radius - 1, 0.0f, 1.0f);
+  s.opacity *= std::max(apart, std::clamp(2 - radius_px / (kNearestPuff * screen.half_size.y()), 0.0f, 1.0f));
 
-    const Vector4f fog = light.fog_to(center);
-    const Vector3f haze = s.cover * fog.head<3>();
-    const Vector3f albedo = point.color.head<3>();
-    PuffRadiance radiance;
-    Eigen::Matrix3f by_cell_normal = Eigen::Matrix3f::Zero();
-    if (flame) {
-      for (int k = 0; k < 3; ++k) {
-        radiance.constant[k] = (0.5f + shape.turn) * kFlameThin[k];
-        by_cell_normal(k, 2) = (0.5f + shape.turn) * kFlameThick[k];
-      }
-    } else if (set.def.lit) {
-      radiance = light.radiance(center, radius, albedo, point.velocity.w(), (view.eye - center).normalized());
-      Eigen::Matrix3f world_from_cell;
-      world_from_cell << u.x() * view.right + u.y() * view.up, v.x() * view.right + v.y() * view.up,
-          -view.forward;
-      by_cell_normal = radiance.slope * world_from_cell;
-    } else {
-      radiance.constant.setOnes();
-    }
+  // Axes of the cell on the screen, and the stretch along the motion.
+  const Shape shape(point.velocity.w());
+  const Vector3f velocity = point.velocity.head<3>();
+  Vector2f motion(velocity.dot(view.right), velocity.dot(view.up));
+  const float stretch = 1 + 0.5f * set.def.stretch_s * motion.norm() / drawn;
+  if (flame) motion += 0.2f * Vector2f(view.right.y(), view.up.y());  // flames at rest point upwards
+  const Vector2f along = motion.norm() > 1e-6f ? Vector2f(motion.normalized()) : Vector2f(0, 1);
+  float angle = 2 * std::numbers::pi_v<float> * shape.turn + kSpin * (2 * shape.turn - 1) * set.ages[i];
+  if (flame) angle = std::atan2(along.x(), along.y()) + kFlameWobble * (2 * shape.turn - 1);
+  const float c = std::cos(angle), sine = std::sin(angle);
+  const Vector2f u = (shape.mirrored ? -1.0f : 1.0f) * Vector2f(c, -sine), v(sine, c);
+  const Vector2f u_px = (u - (1 - 1 / stretch) * u.dot(along) * along) / radius_px;
+  const Vector2f v_px = (v - (1 - 1 / stretch) * v.dot(along) * along) / radius_px;
+  s.ux = u_px.x();
+  s.uy = u_px.y();
+  s.vx = v_px.x();
+  s.vy = v_px.y();
+  const Vector2f half =
+      (Vector2f::Ones() + (stretch * stretch - 1) * along.cwiseAbs2()).cwiseSqrt() * radius_px;
+  s.half_x = half.x();
+  s.half_y = half.y();
+  s.cell = atlas.level(kind_of(set), shape.variant, 2 * radius_px * stretch);
+
+  Eigen::Matrix3f world_from_cell;
+  world_from_cell << u.x() * view.right + u.y() * view.up, v.x() * view.right + v.y() * view.up,
+      -view.forward;
+  return world_from_cell;
+}
+
+/// Sets the radiance of a placed puff.
+void light_puff(const PointSet& set, std::size_t i, const Vector3f& eye,
+                const Eigen::Matrix3f& world_from_cell, const PuffLight& light, Splat& s) {
+  const GpuPoint& point = set.points[i];
+  const Vector3f center = point.position.head<3>();
+  const Vector4f fog = light.fog_to(center);
+  const Vector3f haze = s.cover * fog.head<3>();
+  const Vector3f albedo = point.color.head<3>();
+  PuffRadiance radiance;
+  Eigen::Matrix3f by_cell_normal = Eigen::Matrix3f::Zero();
+  if (set.def.style == PointStyle::fire) {
+    const float turn = Shape(point.velocity.w()).turn;
     for (int k = 0; k < 3; ++k) {
-      s.radiance[k][0] = albedo[k] * fog.w() * radiance.constant[k] + haze[k];
-      for (int j = 0; j < 3; ++j) s.radiance[k][j + 1] = albedo[k] * fog.w() * by_cell_normal(k, j);
+      radiance.constant[k] = (0.5f + turn) * kFlameThin[k];
+      by_cell_normal(k, 2) = (0.5f + turn) * kFlameThick[k];
     }
-    return s;
-  };
+  } else if (set.def.lit) {
+    radiance =
+        light.radiance(center, point.position.w(), albedo, point.velocity.w(), (eye - center).normalized());
+    by_cell_normal = radiance.slope * world_from_cell;
+  } else {
+    radiance.constant.setOnes();
+  }
+  for (int k = 0; k < 3; ++k) {
+    s.radiance[k][0] = albedo[k] * fog.w() * radiance.constant[k] + haze[k];
+    for (int j = 0; j < 3; ++j) s.radiance[k][j + 1] = albedo[k] * fog.w() * by_cell_normal(k, j);
+  }
+}
+
+}  // namespace
+
+void PuffsPass::make_splats(const PaintOrder& order, const View& view, const PuffLight& light) {
+  const auto factor = static_cast<float>(factor_);
+  const PuffScreen screen = {
+      view,
+      {0.5f * static_cast<float>(width_px_) / factor, 0.5f * static_cast<float>(height_px_) / factor},
+      light.frame.eye.w() * factor};
   const std::span<const uint64_t> keys = order.keys(PaintOrder::Kind::puffs);
   splats_.resize(keys.size());
   constexpr std::size_t kBlock = 512;
   tbb::parallel_for(std::size_t{0}, (keys.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
-    for (std::size_t k = block * kBlock; k < std::min(keys.size(), (block + 1) * kBlock); ++k)
-      splats_[k] = splat_of(keys[k]);
+    for (std::size_t k = block * kBlock; k < std::min(keys.size(), (block + 1) * kBlock); ++k) {
+      const PaintOrder::Place at = order.place(PaintOrder::Kind::puffs, keys[k]);
+      Splat& s = splats_[k];
+      const Eigen::Matrix3f world_from_cell = place_puff(*at.set, at.index, screen, *atlas_, s);
+      light_puff(*at.set, at.index, view.eye, world_from_cell, light, s);
+    }
   });
 }
 

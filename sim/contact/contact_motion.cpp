@@ -67,6 +67,7 @@ struct Start {
   const Body &a, &b;
   const Manifold& m;
   Vec3 arm_a, arm_b;
+  Real gap;      // distance of the surfaces at the contact, which is in the middle between them
   Vec3 sliding;  // velocity of a's material at the contact relative to b's
 };
 
@@ -113,8 +114,9 @@ Vec3 turned_normal(const Start& s, const Carried& a, const Carried& b, const Lin
       break;
   }
   // From the point or line of B behind the surface to that of A.
-  const Vec3 core_a = s.arm_a + s.m.radius_a * n, core_b = s.arm_b - s.m.radius_b * n;
-  const Real distance = s.m.radius_a + s.m.radius_b;
+  const Real depth_a = s.gap / 2 + s.m.radius_a, depth_b = s.gap / 2 + s.m.radius_b;
+  const Vec3 core_a = s.arm_a + depth_a * n, core_b = s.arm_b - depth_b * n;
+  const Real distance = depth_a + depth_b;
   Vec3 between = distance * n + (a.turn * core_a - core_a) - (b.turn * core_b - core_b) + a.shift - b.shift;
   if (s.m.source != NormalSource::points) {
     const Vec3& line = s.m.source == NormalSource::edge_of_a ? lines.of_a : lines.of_b;
@@ -140,14 +142,18 @@ bool place_after(const Start& s, Real time, ContactPlace& place) {
   place.normal = turned_normal(s, a, b, lines);
   if (!(place.normal.dot(n) > kPredictable)) return false;
   const Quat &from_a = start_orientation(s.a), &from_b = start_orientation(s.b);
-  const auto arm_of_a = [&] {
-    return turned_arm(s.a, s.arm_a, from_a, -n, a.orientation, Vec3(-place.normal));
+  // The surface moves with its body, and the gap keeps the direction of the normal.
+  const Vec3 to_a = s.gap / 2 * n, to_a_now = s.gap / 2 * place.normal;
+  const auto arm_of_a = [&]() -> Vec3 {
+    return turned_arm(s.a, s.arm_a + to_a, from_a, -n, a.orientation, -place.normal) - to_a_now;
   };
-  const auto arm_of_b = [&] { return turned_arm(s.b, s.arm_b, from_b, n, b.orientation, place.normal); };
+  const auto arm_of_b = [&]() -> Vec3 {
+    return turned_arm(s.b, s.arm_b - to_a, from_b, n, b.orientation, place.normal) + to_a_now;
+  };
   // The contact also moves with the material of the other body, apart from its motion along the first body's
   // surface and the sliding.
   const Vec3 slide = time * s.sliding;
-  const bool by_b = s.m.source == NormalSource::face_of_a || s.m.source == NormalSource::edge_of_a;
+  const bool by_b = moves_with_b(s.m.source);
   place.turn = by_b ? b.turn : a.turn;
   if (by_b) {
     place.arm_b = arm_of_b();
@@ -156,11 +162,11 @@ bool place_after(const Start& s, Real time, ContactPlace& place) {
   }
   place.arm_a = arm_of_a();
   if (s.m.source == NormalSource::edges) {
-    const Vec3 core_a = place.arm_a + s.m.radius_a * place.normal,
-               core_b = arm_of_b() - s.m.radius_b * place.normal;
+    const Real depth_a = s.gap / 2 + s.m.radius_a, depth_b = s.gap / 2 + s.m.radius_b;
+    const Vec3 core_a = place.arm_a + depth_a * place.normal, core_b = arm_of_b() - depth_b * place.normal;
     // Both lines start at the same point.
     const Vec3 from_b_to_a = core_a - core_b - (s.arm_a - s.arm_b) - b.shift + a.shift;
-    place.arm_a = crossing(core_a, from_b_to_a, lines, place.normal) - s.m.radius_a * place.normal;
+    place.arm_a = crossing(core_a, from_b_to_a, lines, place.normal) - depth_a * place.normal;
   }
   place.arm_b = b.turn * s.arm_b + (place.arm_a - a.turn * s.arm_a) + slide;
   return true;
@@ -262,6 +268,10 @@ void set_even_motion(const Start& s, const ContactFrame& frame, Real duration, C
 
 }  // namespace
 
+bool moves_with_b(NormalSource source) {
+  return source == NormalSource::face_of_a || source == NormalSource::edge_of_a;
+}
+
 Vec3 start_centre(const Body& body) {
   return body.is_awake() ? body.start.position : body.start_pose.position;
 }
@@ -303,10 +313,10 @@ Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3&
 }
 
 ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, const ContactFrame& frame,
-                             const Vec3& place, Real duration, Real substep) {
+                             const Vec3& place, Real gap, Real duration, Real substep) {
   const Twist twist_a = twist_of(a), twist_b = twist_of(b);
   const Vec3 arm_a = place - start_centre(a), arm_b = place - start_centre(b);
-  const Start start{a, b, m, arm_a, arm_b, twist_a.at(arm_a) - twist_b.at(arm_b)};
+  const Start start{a, b, m, arm_a, arm_b, gap, twist_a.at(arm_a) - twist_b.at(arm_b)};
   ContactMotion motion;
   motion.frame = frame;
   const bool is_face = m.source == NormalSource::face_of_a || m.source == NormalSource::face_of_b;

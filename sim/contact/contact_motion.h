@@ -34,6 +34,9 @@ struct ContactMotion {
   bool turns = false;  ///< whether any gain differs from 0
 };
 
+/// Whether the feature that defines a contact, and with which it moves, belongs to b.
+bool moves_with_b(NormalSource source);
+
 /// Position of a body's centre of mass at the interval's start; of a kinematic body, its origin.
 Vec3 start_centre(const Body& body);
 
@@ -42,12 +45,13 @@ Vec3 start_centre(const Body& body);
 bool runs_along(const Body& body, Real duration);
 
 /// Predicts the motion of a contact of a manifold. `frame` is the manifold's frame and `place` the contact's
-/// position in the world at the interval's start; `duration` is the length of the interval and `substep` that
+/// position in the world at the interval's start, in the middle between surfaces that are `gap` apart [m]
+/// (negative: they overlap); `duration` is the length of the interval and `substep` that
 /// of the whole sub-step [s]. Contacts of bodies that turn by more than a radian in a sub-step are not
 /// predicted. A normal that turns too fast to be predicted, as between sharp corners that pass each other, is
 /// kept constant, with the arms of the start.
 ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, const ContactFrame& frame,
-                             const Vec3& place, Real duration, Real substep);
+                             const Vec3& place, Real gap, Real duration, Real substep);
 
 /// Arm from the centre of mass to a contact feature of a body after the body has turned from one orientation
 /// to another. Corners turn with the body; points of spheres, caps, rims and round sides stay on the side

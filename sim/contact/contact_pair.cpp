@@ -315,8 +315,8 @@ void ContactPair::find_points(const Pose& a, const Pose& b, Real margin, Real re
   found_.clear();
 }
 
-Real ContactPair::free_way(const PlacedManifold& m, const Vec3& place, Real duration) const {
-  const ContactMotion motion = contact_motion(*a_, *b_, m.manifold, m.frame, place, duration, duration);
+Real ContactPair::free_way(const PlacedManifold& m, const Vec3& place, Real gap, Real duration) const {
+  const ContactMotion motion = contact_motion(*a_, *b_, m.manifold, m.frame, place, gap, duration, duration);
   const Vec3 velocity = free_velocity(*a_, motion.middle.arm_a) - free_velocity(*b_, motion.middle.arm_b);
   return duration * motion.frame.n.dot(velocity);
 }
@@ -339,7 +339,8 @@ bool ContactPair::is_expected(const Vec3& normal, const ContactPoint& at_end, Re
       const ContactPoint& p = m.manifold.points[k];
       if (!is_near(*a_, p.on_a, at_end.on_a, -n, -normal) && !is_near(*b_, p.on_b, at_end.on_b, n, normal))
         continue;
-      if (p.separation + free_way(m, (p.on_a + p.on_b) / 2, duration) < at_end.separation + kExpected)
+      if (p.separation + free_way(m, (p.on_a + p.on_b) / 2, p.separation, duration) <
+          at_end.separation + kExpected)
         return true;
     }
   }
@@ -364,11 +365,16 @@ PlacedManifold ContactPair::brought_back(const Manifold& at_end, Real duration) 
     return turned_arm(body, place - ends.end.position, ends.end.orientation, side * at_end.normal,
                       ends.start.orientation, side * m.normal);
   };
+  // The bodies slide along each other in the interval. The contact moves with the feature that defines it, as
+  // in contact_motion(): a point beside the axis of a thin body would set it spinning.
+  const bool by_b = moves_with_b(m.source);
   for (uint32_t k = 0; k < m.count; ++k) {
     ContactPoint& p = m.points[k];
-    const Vec3 middle =
-        (a.start.position + arm(*a_, a, p.on_a, -1) + b.start.position + arm(*b_, b, p.on_b, 1)) / 2;
-    p.separation -= free_way(placed, middle, duration);
+    const Vec3 on_a = a.start.position + arm(*a_, a, p.on_a, -1),
+               on_b = b.start.position + arm(*b_, b, p.on_b, 1);
+    const Vec3& carrier = by_b ? on_b : on_a;
+    const Vec3 middle = carrier + m.normal.dot((on_a + on_b) / 2 - carrier) * m.normal;
+    p.separation -= free_way(placed, middle, m.normal.dot(on_a - on_b), duration);
     p.on_a = middle + p.separation / 2 * m.normal;
     p.on_b = middle - p.separation / 2 * m.normal;
   }

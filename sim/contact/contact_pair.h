@@ -142,8 +142,9 @@ class alignas(64) ContactPair {
   void inherit(std::vector<Remembered>& points, const Pose& a);
   void reuse(const Pose& a, const Pose& b, const std::vector<Remembered>& points);
   void set_frame(PlacedManifold& m) const;
-  /// Displacement of a relative to b along the normal by the free motion, at a contact of the start [m].
-  Real free_way(const PlacedManifold& m, const Vec3& place, Real duration) const;
+  /// Displacement of a relative to b along the normal by the free motion, at a contact of the start in the
+  /// middle between surfaces that are `gap` apart [m].
+  Real free_way(const PlacedManifold& m, const Vec3& place, Real gap, Real duration) const;
   /// Whether the motion of the existing points already predicts the overlap at `at_end`.
   bool is_expected(const Vec3& normal, const ContactPoint& at_end, Real duration) const;
   PlacedManifold brought_back(const Manifold& at_end, Real duration) const;

@@ -74,12 +74,13 @@ Quat rotation(const Vec3& v) {
 
 /// Turns a body to the orientation in which its angular momentum has the direction that belongs to the
 /// expected angular velocity, if it has more energy by a share of the expected or of the free energy (twice
-/// the energy). If that is far, the body gets the expected angular velocity.
-void agree_with_spin(RigidBody& r, const Vec3& expected, Real free_energy, Real share) {
+/// the energy). If that is farther than `farthest`, the body gets the expected angular velocity [rad].
+void agree_with_spin(RigidBody& r, const Vec3& expected, Real free_energy, Real share, Real farthest) {
   const Vec3 wanted = r.spin_momentum(r.orientation, expected);
   const Real energy = expected.dot(wanted), excess = r.angular_velocity().dot(r.angular_momentum) - energy;
   if (!(excess > share * std::max(free_energy, energy))) return;
-  if (wanted.dot(r.angular_momentum) > kAligned * wanted.norm() * r.angular_momentum.norm())
+  const Real aligned = std::max(kAligned, 1 - farthest * farthest / 2);
+  if (wanted.dot(r.angular_momentum) > aligned * wanted.norm() * r.angular_momentum.norm())
     r.orientation = (rotation_between(wanted, r.angular_momentum) * r.orientation).normalized();
   else
     r.angular_momentum = wanted;
@@ -158,7 +159,8 @@ void add_effect(Body& body, const IntervalEffect& effect) {
   if (effect.turn != Vec3::Zero()) r.orientation = (rotation(effect.turn) * r.orientation).normalized();
   r.momentum += effect.impulse;
   r.angular_momentum += effect.angular_impulse;
-  if (r.is_thin()) agree_with_spin(r, expected, free_energy, effect.share * kSpinExcess);
+  // The time at which the impulses act is uncertain by the interval, and so is the orientation by their turn.
+  if (r.is_thin()) agree_with_spin(r, expected, free_energy, effect.share * kSpinExcess, effect.turn.norm());
   body.pose = r.pose();
 }
 

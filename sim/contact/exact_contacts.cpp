@@ -78,7 +78,7 @@ bool ExactContacts::solve_lcp(ContactWork& work) {
   const JointProblem joints = joints_.problem();
   const std::vector<Vec6> reactions(joints.impulses.begin(), joints.impulses.end());
   if (!solve_by_lcp(bodies_, contacts_, joints, work)) return false;
-  if (is_safe({}, true)) return true;
+  if (is_safe({})) return true;
   ++work.fallbacks;
   bodies_ = free_;
   contacts_ = guesses;
@@ -91,9 +91,9 @@ bool ExactContacts::solve_lcp(ContactWork& work) {
 /// solution; their unbounded impulses nearly cancel, and the rest throws bodies away. The velocity terms of
 /// R9 are wrong if a thin body turns far in a step. Moving surfaces, motors and friction in joints may do
 /// work. All other forces may only dissipate energy, apart from the speed at which overlaps are removed and a
-/// small share for those terms. `brakes_count`: energy that motors and friction take away is counted, too; a
-/// limit against which a motor pushes returns a part of it.
-bool ExactContacts::is_safe(const ContactWork& work, bool brakes_count) const {
+/// small share for those terms. Energy that motors and friction take away is counted, since a limit or a
+/// contact against which a motor pushes returns a part of it.
+bool ExactContacts::is_safe(const ContactWork& work) const {
   if (work.fallbacks > 0 && work.residual > kRough) return false;
   Real energy = added_energy(free_, bodies_, contacts_);
   const auto power = [](const BoundedRow& r, std::span<const ContactBody> bodies) {
@@ -103,9 +103,10 @@ bool ExactContacts::is_safe(const ContactWork& work, bool brakes_count) const {
         u += on->head<3>().dot(bodies[body].velocity) + on->tail<3>().dot(bodies[body].angular_velocity);
     return r.impulse * u;
   };
+  // Limits have one finite bound; motors and friction have two, and motors of any strength none.
   for (const BoundedRow& r : joints_.bounded())
     if (const Real gain = (power(r, free_) + power(r, bodies_)) / 2;
-        !std::isfinite(r.lower) || !std::isfinite(r.upper) || (brakes_count && gain < 0))
+        std::isfinite(r.lower) != std::isfinite(r.upper) || gain < 0)
       energy += gain;
   if (energy <= 0) return true;
 
@@ -150,8 +151,8 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       if (pair.needs_toi && !touches) continue;
       const Vec3 place = (point.on_a + point.on_b) / 2;
       const Vec3 u = in_frame(m.frame, pair.relative_velocity(place) + surface);
-      const ContactMotion motion =
-          contact_motion(pair.a(), pair.b(), m.manifold, m.frame, place, h, interval.substep);
+      const ContactMotion motion = contact_motion(pair.a(), pair.b(), m.manifold, m.frame, place,
+                                                  point.separation, h, interval.substep);
       Contact c{.a = a, .b = b, .frame = motion.frame};
       c.arm_a = motion.middle.arm_a;
       c.arm_b = motion.middle.arm_b;

@@ -37,7 +37,7 @@ class ExactContacts {
   uint32_t add_body(Body& body, const ContactInterval& interval);
   void add_points(ContactPair& pair, const ContactInterval& interval);
   bool solve_lcp(ContactWork& work);
-  bool is_safe(const ContactWork& work, bool brakes_count = false) const;
+  bool is_safe(const ContactWork& work) const;
   void move_bodies(const Island& island, const ContactInterval& interval);
   void close_stops();
   void close_links();

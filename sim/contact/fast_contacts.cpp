@@ -36,15 +36,18 @@ RelaxedBody relaxed(const Body& body, const ContactInterval& interval) {
   return b;
 }
 
-/// Motion of the contact at the patch's centre. The points move with the body that defines the contact.
-void set_motion(ContactPatch& patch, const ContactMotion& motion) {
+/// Motion of the contact at the patch's centre, where the surfaces are `gap` apart. The points move with the
+/// body that defines the contact. They lie at different heights over the other body.
+void set_motion(ContactPatch& patch, const ContactMotion& motion, NormalSource source, Real gap) {
   patch.arm_a = motion.middle.arm_a;
   patch.arm_b = motion.middle.arm_b;
   patch.turns = motion.turns;
   if (!motion.turns) return;
+  const ContactFrame& f = patch.frame;
+  const Real side = moves_with_b(source) ? -1 : 1;
   for (uint32_t i = 0; i < patch.count; ++i) {
     ContactPatch::Point& p = patch.points[i];
-    const Vec3 arm = motion.middle.turn * (p.t * patch.frame.t + p.k * patch.frame.k);
+    const Vec3 arm = motion.middle.turn * (p.t * f.t + p.k * f.k + side * (p.separation - gap) * f.n);
     p.t = motion.frame.t.dot(arm);
     p.k = motion.frame.k.dot(arm);
   }
@@ -62,11 +65,12 @@ void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifol
   const Vec3 centre_a = start_centre(pair.a()), surface = surface_velocity(pair);
   // Only the deepest point of a rim shows where on the rim the contact is.
   const bool runs = runs_along(pair.a(), duration) || runs_along(pair.b(), duration);
-  set_points(patch, m.manifold, m.frame, centre_a, start_centre(pair.b()), runs);
+  const Real gap = set_points(patch, m.manifold, m.frame, centre_a, start_centre(pair.b()), runs);
   const Vec3 place = centre_a + patch.arm_a;
   const Vec3 u = in_frame(m.frame, pair.relative_velocity(place) + surface);
-  set_motion(patch,
-             contact_motion(pair.a(), pair.b(), m.manifold, m.frame, place, duration, interval.substep));
+  const ContactMotion motion =
+      contact_motion(pair.a(), pair.b(), m.manifold, m.frame, place, gap, duration, interval.substep);
+  set_motion(patch, motion, m.manifold.source, gap);
   patch.offset = in_frame(patch.frame, surface);
   std::tie(patch.friction_t, patch.friction_k) = friction(pair.surface(), u);
   patch.rolling = pair.surface().rolling;

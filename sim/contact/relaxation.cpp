@@ -69,19 +69,21 @@ bool jumps(const RelaxedBody& b, const BodyMotion& m, FloatLanes greatest, const
 
 }  // namespace
 
-void set_points(ContactPatch& p, const Manifold& m, const ContactFrame& frame, const Vec3& centre_a,
+Real set_points(ContactPatch& p, const Manifold& m, const ContactFrame& frame, const Vec3& centre_a,
                 const Vec3& centre_b, bool at_deepest) {
   p.frame = frame;
   p.count = m.count;
-  if (m.count == 0) return;
+  if (m.count == 0) return 0;
   const auto middle = [&m](uint32_t i) { return Vec3((m.points[i].on_a + m.points[i].on_b) / 2); };
   Real least = kInfinity;
   for (uint32_t i = 0; i < m.count; ++i) least = std::min(least, m.points[i].separation);
   Vec3 centre = Vec3::Zero();
+  Real separation = 0;
   uint32_t count = 0;
   for (uint32_t i = 0; i < m.count; ++i) {
     if (at_deepest && m.points[i].separation > least + kAsDeep) continue;
     centre += middle(i);
+    separation += m.points[i].separation;
     ++count;
   }
   centre /= count;
@@ -91,6 +93,7 @@ void set_points(ContactPatch& p, const Manifold& m, const ContactFrame& frame, c
     const Vec3 d = middle(i) - centre;
     p.points[i] = {.t = frame.t.dot(d), .k = frame.k.dot(d), .separation = m.points[i].separation};
   }
+  return separation / count;
 }
 
 uint32_t relaxation_substeps(Real duration) {

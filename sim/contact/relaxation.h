@@ -97,8 +97,9 @@ struct ContactPatch {
 
 /// Sets the points of a patch from a manifold, in the manifold's order. Manifold and frame are in world axes,
 /// and the frame's n is the manifold's normal. `centre_a` and `centre_b` are the bodies' centres of mass. The
-/// patch's centre is the centre of all points or, if `at_deepest`, the deepest point.
-void set_points(ContactPatch& patch, const Manifold& m, const ContactFrame& frame, const Vec3& centre_a,
+/// patch's centre is the centre of all points or, if `at_deepest`, the deepest point. Returns the separation
+/// of the surfaces at the patch's centre [m].
+Real set_points(ContactPatch& patch, const Manifold& m, const ContactFrame& frame, const Vec3& centre_a,
                 const Vec3& centre_b, bool at_deepest = false);
 
 /// Number of sub-steps of the fast solver: at least four, and enough that each is at most 1/1920 s. Each

@@ -1,5 +1,9 @@
 // cache.
 
+#include <map>
+#include <memory>
+
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -10,6 +14,13 @@
 
 namespace offstage::producer {
 namespace {
+
+struct CacheOptions {
+  enum class Action { list, verify, clear };
+  Action action = Action::list;
+  std::vector<std::string> folders;
+  bool json = false;
+};
 
 std::string size_text(uint64_t bytes) {
   return bytes < 10'000'000 ? fmt::format("{} kB", (bytes + 999) / 1000)
@@ -71,8 +82,7 @@ int clear_caches(const CacheOptions& options) {
   return code;
 }
 
-}  // namespace
-
+/// Lists, verifies or clears folders of snapshots.
 int cache_command(const CacheOptions& options) {
   switch (options.action) {
     case CacheOptions::Action::list:
@@ -83,6 +93,28 @@ int cache_command(const CacheOptions& options) {
       break;
   }
   return clear_caches(options);
+}
+
+}  // namespace
+
+Command add_cache(CLI::App& app) {
+  const auto options = std::make_shared<CacheOptions>();
+  CacheOptions& given = *options;
+  CLI::App* command =
+      app.add_subcommand("cache", "List, verify or clear folders of snapshots that `simulate --cache` wrote");
+  const std::map<std::string, CacheOptions::Action> actions = {{"list", CacheOptions::Action::list},
+                                                               {"verify", CacheOptions::Action::verify},
+                                                               {"clear", CacheOptions::Action::clear}};
+  command
+      ->add_option("action", given.action,
+                   "list: what is in them; verify: read every snapshot; clear: remove the snapshots")
+      ->required()
+      ->transform(CLI::CheckedTransformer(actions).description("{list,verify,clear}"));
+  command
+      ->add_option("folders", given.folders, "Caches; for `list` and `verify` also folders that hold caches")
+      ->required();
+  command->add_flag("--json", given.json, "Print the list as JSON");
+  return {command, [options] { return cache_command(*options); }};
 }
 
 }  // namespace offstage::producer

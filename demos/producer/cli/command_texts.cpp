@@ -1,5 +1,6 @@
 #include "producer/cli/command_texts.h"
 
+#include <memory>
 #include <stdexcept>
 #include <vector>
 
@@ -7,6 +8,8 @@
 #include <fmt/format.h>
 
 #include "producer/base/version.h"
+#include "producer/cli/command_line.h"
+#include "producer/cli/commands.h"
 
 namespace offstage::producer {
 namespace {
@@ -19,7 +22,7 @@ struct Argument {
   bool takes_value = false, required = false, positional = false, repeated = false;
 };
 
-struct Command {
+struct CommandText {
   std::string name, help;
   std::vector<Argument> options, positionals;
 };
@@ -56,15 +59,15 @@ Argument argument_of(const CLI::Option& option) {
   return a;
 }
 
-Command command_of(const CLI::App& app) {
-  Command c{app.get_name(), in_one_line(app.get_description()), {}, {}};
+CommandText command_of(const CLI::App& app) {
+  CommandText c{app.get_name(), in_one_line(app.get_description()), {}, {}};
   for (const CLI::Option* option : app.get_options())
     (option->get_positional() ? c.positionals : c.options).push_back(argument_of(*option));
   return c;
 }
 
-std::vector<Command> commands_of(const CLI::App& program) {
-  std::vector<Command> all;
+std::vector<CommandText> commands_of(const CLI::App& program) {
+  std::vector<CommandText> all;
   for (const CLI::App* app : program.get_subcommands([](const CLI::App*) { return true; }))
     all.push_back(command_of(*app));
   return all;
@@ -110,9 +113,9 @@ void add_argument(std::string& page, const Argument& a) {
 // --- Shells ---
 
 std::string bash_completion(const CLI::App& program) {
-  const std::vector<Command> all = commands_of(program);
+  const std::vector<CommandText> all = commands_of(program);
   std::string names, values, options;
-  for (const Command& c : all) {
+  for (const CommandText& c : all) {
     names += c.name + " ";
     options += fmt::format("    {}) words={} ;;\n", c.name, shell_word(option_names(c.options)));
     for (const Argument& option : c.options) {
@@ -154,7 +157,7 @@ std::string zsh_completion(const CLI::App& program) {
     return a.choices.empty() ? ":_files" : fmt::format(":({})", fmt::join(a.choices, " "));
   };
   std::string names, cases;
-  for (const Command& c : commands_of(program)) {
+  for (const CommandText& c : commands_of(program)) {
     names += "    " + shell_word(c.name + ":" + text(c.help)) + "\n";
     cases += fmt::format("    {}) _arguments", c.name);
     for (const Argument& option : c.options)
@@ -186,7 +189,7 @@ std::string fish_completion(const CLI::App& program) {
     return "'" + with_replaced(with_replaced(text, "\\", "\\\\"), "'", "\\'") + "'";
   };
   std::string lines = "# Completion of offstage for fish, made by: offstage completion fish\n";
-  for (const Command& c : commands_of(program)) {
+  for (const CommandText& c : commands_of(program)) {
     lines +=
         fmt::format("complete -c offstage -n __fish_use_subcommand -f -a {} -d {}\n", c.name, quote(c.help));
     for (const Argument& option : c.options) {
@@ -211,7 +214,7 @@ std::string manual_page(const CLI::App& program) {
       ".SH SYNOPSIS\n.B offstage\n.I command\n[\\fIoptions\\fR]\n.SH DESCRIPTION\n{}\n"
       "The keys of scene files are described by\n.B offstage schema \\-\\-reference\n.SH COMMANDS\n",
       version(), "films of physically simulated scenes", roff(in_one_line(program.get_description())));
-  for (const Command& c : commands_of(program)) {
+  for (const CommandText& c : commands_of(program)) {
     page += fmt::format(".SS \"offstage {}", c.name);
     for (const Argument& a : c.positionals) {
       const std::string name = a.names[0] + (a.repeated ? "..." : "");
@@ -232,6 +235,25 @@ std::string shell_completion(const CLI::App& program, std::string_view shell) {
   if (shell == "zsh") return zsh_completion(program);
   if (shell == "fish") return fish_completion(program);
   throw std::invalid_argument("there is completion for bash, zsh and fish, not for " + std::string(shell));
+}
+
+Command add_man(CLI::App& app) {
+  return {app.add_subcommand("man", "Print the manual page, for `man -l -`"), [&app] {
+            fmt::print("{}", manual_page(app));
+            return static_cast<int>(kOk);
+          }};
+}
+
+Command add_completion(CLI::App& app) {
+  const auto shell = std::make_shared<std::string>();
+  CLI::App* command = app.add_subcommand("completion", "Print the completion script of a shell");
+  command->add_option("shell", *shell, "bash, zsh or fish")
+      ->required()
+      ->check(CLI::IsMember({"bash", "zsh", "fish"}));
+  return {command, [shell, &app] {
+            fmt::print("{}", shell_completion(app, *shell));
+            return static_cast<int>(kOk);
+          }};
 }
 
 }  // namespace offstage::producer

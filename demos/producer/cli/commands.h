@@ -1,50 +1,48 @@
 #pragma once
-/// The commands of the command line. Each takes its options and returns an exit code; errors are exceptions.
+/// The commands of the command line, and what they share.
 
 #include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 #include <tbb/global_control.h>
 
-#include "producer/build/decomposition_cache.h"
 #include "producer/build/models.h"
+#include "producer/cli/options.h"
 #include "producer/format/scene_io.h"
-#include "producer/format/scene_source.h"
-#include "producer/run/golden.h"
-#include "producer/run/progress.h"
 #include "render/context.h"
 
 namespace offstage::producer {
 
-/// Options of every command that reads a scene.
-struct SceneOptions {
-  std::string file;
-  std::vector<std::string> set;
-  std::optional<std::string> quality, size;
-  std::optional<std::string> fps;  ///< a number, or a fraction such as 30000/1001
-  std::optional<double> duration;
-  std::optional<uint64_t> seed;
-  std::vector<std::string> channels;  ///< depth, normal, id, motion; empty: those of the scene
-  std::optional<std::string> channel_format;
-  std::string camera;              ///< name of the camera to draw; empty: the scene's `camera`
-  std::vector<std::string> allow;  ///< additional folders for the scene's files
-  bool no_cache = false;           ///< convex parts of models are neither read from the disk nor stored
-
-  DecompositionCache decompositions() const {
-    return no_cache ? DecompositionCache() : DecompositionCache::of_user();
-  }
-  /// Returns the shorthands as overrides, then `set`. Throws std::invalid_argument for an invalid one.
-  std::vector<std::string> overrides() const;
-  bool from_standard_input() const { return file == kStandardInput; }
+/// A command in the command line.
+struct Command {
+  CLI::App* arguments;  ///< belongs to the program's command line
+  std::function<int()>
+      run;  ///< with the options that were parsed; returns an exit code, errors are exceptions
 };
 
-struct TalkOptions {
-  ProgressStyle progress = ProgressStyle::automatic;
-  bool quiet = false, verbose = false;
-};
+// Each adds a command with its options to the program's command line.
+Command add_render(CLI::App& app);
+Command add_new(CLI::App& app);
+Command add_encode(CLI::App& app);
+Command add_frame(CLI::App& app);
+Command add_sheet(CLI::App& app);
+Command add_sweep(CLI::App& app);
+Command add_simulate(CLI::App& app);
+Command add_bench(CLI::App& app);
+Command add_export(CLI::App& app);
+Command add_cache(CLI::App& app);
+Command add_farm(CLI::App& app);
+Command add_validate(CLI::App& app);
+Command add_schema(CLI::App& app);
+Command add_presets(CLI::App& app);
+Command add_info(CLI::App& app);
+Command add_compare(CLI::App& app);
+Command add_bless(CLI::App& app);
+Command add_doctor(CLI::App& app);
+Command add_man(CLI::App& app);
+Command add_completion(CLI::App& app);
 
 struct RenderOptions {
   SceneOptions scene;
@@ -67,144 +65,7 @@ int render_command(const RenderOptions& options);
 std::string default_film(const std::string& scene_file);
 /// Renders, and renders again whenever a file of the scene changes, until a signal ends it. Every render runs
 /// in a separate process. A complete result replaces the output; a failed render keeps the last good result.
-/// `render` is the render command that reports its own errors.
-int watch_command(const RenderOptions& options, const std::function<int(const RenderOptions&)>& render);
-
-struct FrameOptions {
-  SceneOptions scene;
-  TalkOptions talk;
-  std::string out;
-  std::optional<int> frame;
-  std::optional<double> at;
-  int threads = 0;
-  bool force = false;
-  render::GlPlatform gl = render::GlPlatform::automatic;
-};
-int frame_command(const FrameOptions& options);
-
-struct SheetOptions {
-  SceneOptions scene;
-  TalkOptions talk;
-  std::string out;
-  int count = 12, columns = 0;  ///< columns 0: chosen by the count
-  int threads = 0;
-  bool force = false;
-  render::GlPlatform gl = render::GlPlatform::automatic;
-};
-int sheet_command(const SheetOptions& options);
-
-struct SweepOptions {
-  SceneOptions scene;
-  std::vector<std::string> vary;
-  std::vector<double> at;  ///< times [s]; empty: the middle of the film
-  std::string out, csv;    ///< csv empty: beside the sheet
-  int columns = 0;         ///< 0: chosen by the variations
-  int threads = 0, jobs = 0;
-  bool resume = false, force = false, quiet = false;
-  render::GlPlatform gl = render::GlPlatform::automatic;
-};
-int sweep_command(const SweepOptions& options);
-
-struct SimulateOptions {
-  SceneOptions scene;
-  TalkOptions talk;
-  std::string trace, contacts, cloths, cloth_points, joints, particles, trace_every = "frame", cache, stats;
-  int threads = 0;
-  bool force = false;
-};
-int simulate_command(const SimulateOptions& options);
-
-struct BenchOptions {
-  SceneOptions scene;
-  std::string csv;
-  int repeat = 1;  ///< runs of each method
-  int threads = 0;
-  bool force = false, quiet = false;
-};
-/// Simulates a scene by each of the algorithms that it can choose from, and prints a table.
-int bench_command(const BenchOptions& options);
-
-struct ExportOptions {
-  SceneOptions scene;
-  TalkOptions talk;
-  std::string out, frames, cache;
-  int threads = 0;
-  bool force = false;
-};
-int export_command(const ExportOptions& options);
-
-struct CacheOptions {
-  enum class Action { list, verify, clear };
-  Action action = Action::list;
-  std::vector<std::string> folders;
-  bool json = false;
-};
-/// Lists, verifies or clears folders of snapshots.
-int cache_command(const CacheOptions& options);
-
-struct FarmOptions {
-  SceneOptions scene;
-  TalkOptions talk;
-  std::string out, work, program, status;
-  bool slurm = false;
-  int local = 0;  ///< number of drawing processes on this machine; 0: none
-  int chunks = 8, retries = 2, threads = 0;
-  std::string partition, account, time;
-  std::vector<std::string> sbatch;  ///< further options of sbatch
-  bool resume = false, force = false, dry_run = false;
-  render::GlPlatform gl = render::GlPlatform::automatic;
-};
-/// Renders a film in steps on many machines, or reports their progress.
-int farm_command(const FarmOptions& options);
-
-struct ValidateOptions {
-  SceneOptions scene;
-  bool json = false;
-  bool no_estimate = false;  ///< no estimate of the cost, which takes a short trial
-  render::GlPlatform gl = render::GlPlatform::automatic;
-};
-int validate_command(const ValidateOptions& options);
-int schema_command(bool reference);
-/// Lists all presets with a line each, or prints the text of one.
-int presets_command(const std::string& name);
-int info_command(const SceneOptions& options, bool json);
-/// Reports GL on every platform, the devices of EGL, encoders, and the processor.
-int doctor_command();
-
-struct EncodeOptions {
-  std::vector<std::string> frames;  ///< one pattern
-  TalkOptions talk;
-  std::string out;
-  std::optional<std::string> fps;  ///< default: that of the manifest beside the frames, or 30
-  bool allow_gaps = false, force = false;
-};
-/// Makes a video of existing frames.
-int encode_command(const EncodeOptions& options);
-
-struct NewOptions {
-  std::string name, from;  ///< file and template; empty template: that of this name, or "basic"
-  bool list = false, force = false;
-};
-/// Writes a first scene, or lists the templates.
-int new_command(const NewOptions& options);
-
-struct CompareOptions {
-  std::vector<std::string> inputs;  ///< scenes, or two pictures, or two folders of frames
-  SceneOptions scene;               ///< options for each scene; its file name is not used
-  std::string golden, report, junit;
-  GoldenStates states;
-  int threads = 0;
-  render::GlPlatform gl = render::GlPlatform::automatic;
-};
-int compare_command(const CompareOptions& options);
-
-struct BlessOptions {
-  std::vector<std::string> scenes, allow;
-  std::string golden, reason;
-  int threads = 0;
-  render::GlPlatform gl = render::GlPlatform::automatic;
-};
-int bless_command(const BlessOptions& options);
+int watch_command(const RenderOptions& options);
 
 struct TuneOptions {
   SceneOptions scene;

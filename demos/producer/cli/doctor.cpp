@@ -3,6 +3,7 @@
 #include <array>
 #include <chrono>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <poll.h>
@@ -115,8 +116,7 @@ Json in_child(const std::function<Json()>& describe) {
                                         : std::string("the driver ended the process")}};
 }
 
-}  // namespace
-
+/// Reports GL on every platform, the devices of EGL, encoders, and the processor.
 int doctor_command() {
   using render::GlPlatform;
   Json json = {{"offstage", version_text()}};
@@ -150,6 +150,14 @@ int doctor_command() {
   }
   print_readable(json);
   return code;
+}
+
+}  // namespace
+
+Command add_doctor(CLI::App& app) {
+  return {
+      app.add_subcommand("doctor", "Report OpenGL backends, video encoders and processor of this machine"),
+      doctor_command};
 }
 
 }  // namespace offstage::producer

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <optional>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -13,6 +15,7 @@
 #include "producer/base/log.h"
 #include "producer/cli/command_line.h"
 #include "producer/cli/commands.h"
+#include "producer/cli/options.h"
 #include "producer/run/frame_sequence.h"
 #include "producer/run/output.h"
 #include "producer/run/progress.h"
@@ -23,6 +26,14 @@
 
 namespace offstage::producer {
 namespace {
+
+struct EncodeOptions {
+  std::vector<std::string> frames;  ///< one pattern
+  TalkOptions talk;
+  std::string out;
+  std::optional<std::string> fps;  ///< default: that of the manifest beside the frames, or 30
+  bool allow_gaps = false, force = false;
+};
 
 namespace fs = std::filesystem;
 
@@ -121,6 +132,9 @@ std::string wrong_frame_rate(const std::string& text) {
          "' is not a frame rate; give a number such as 24 or 29.97, or a fraction such as 30000/1001";
 }
 
+namespace {
+
+/// Makes a video of existing frames.
 int encode_command(const EncodeOptions& options) {
   if (options.frames.size() != 1)
     throw std::invalid_argument(
@@ -153,6 +167,23 @@ int encode_command(const EncodeOptions& options) {
         def.fps.seconds(static_cast<int64_t>(sequence.frames.size())));
   print_output_name(target.path.string());
   return kOk;
+}
+
+}  // namespace
+
+Command add_encode(CLI::App& app) {
+  const auto options = std::make_shared<EncodeOptions>();
+  EncodeOptions& encode = *options;
+  CLI::App* command = app.add_subcommand("encode", "Encode existing PNG frames as a video");
+  command->add_option("frames", encode.frames, "Pattern such as 'frames/####.png', or a folder")->required();
+  command->add_option("-o,--output", encode.out, "Video: .mp4 .webm .mov .mkv .gif .webp .apng .png")
+      ->required();
+  command->add_option("--fps", encode.fps,
+                      "Frames per second: 24, 29.97, 30000/1001 (default: as rendered, or 30)");
+  command->add_flag("--allow-gaps", encode.allow_gaps, "Skip missing frame numbers");
+  command->add_flag("--force", encode.force, "Replace an existing file");
+  add_talk(*command, encode.talk);
+  return {command, [options] { return encode_command(*options); }};
 }
 
 }  // namespace offstage::producer

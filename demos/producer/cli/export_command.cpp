@@ -1,12 +1,15 @@
 // export.
 
 #include <functional>
+#include <memory>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "producer/base/log.h"
 #include "producer/cli/command_line.h"
 #include "producer/cli/commands.h"
+#include "producer/cli/options.h"
 #include "producer/cli/run_progress.h"
 #include "producer/export/film_export.h"
 #include "producer/run/frame_list.h"
@@ -18,14 +21,20 @@
 namespace offstage::producer {
 namespace {
 
+struct ExportOptions {
+  SceneOptions scene;
+  TalkOptions talk;
+  std::string out, frames, cache;
+  int threads = 0;
+  bool force = false;
+};
+
 /// Refuses existing output before the work begins.
 void check_target(const ExportTarget& target, const std::vector<int>& frames, bool force) {
   render::create_parent_folders(target.path);
   if (!target.sequence()) return check_file(target.path.string(), force);
   for (const int frame : frames) check_file(render::frame_path(target.path, frame).string(), force);
 }
-
-}  // namespace
 
 int export_command(const ExportOptions& options) {
   const ExportTarget target = parse_export(options.out);
@@ -52,6 +61,29 @@ int export_command(const ExportOptions& options) {
     for (const std::string& note : film->notes()) log("note: {}\n", note);
   print_output_name(options.out);
   return kOk;
+}
+
+}  // namespace
+
+Command add_export(CLI::App& app) {
+  const auto options = std::make_shared<ExportOptions>();
+  ExportOptions& given = *options;
+  CLI::App* command = app.add_subcommand(
+      "export", "Simulate a scene and write its motion for other programs: USD, glTF, PLY, OBJ or CSV");
+  add_scene(*command, given.scene);
+  command
+      ->add_option("-o,--output", given.out,
+                   "film.usda, film.glb or film.csv; frames/####.ply or frames/####.obj, one file per frame")
+      ->required();
+  add_timing(*command, given.scene);
+  command->add_option("--frames", given.frames,
+                      "Frames to export: 1-30,40,50-90x2 (negative numbers count from the end)");
+  command->add_option("--cache", given.cache,
+                      "Take the snapshots of `simulate --cache` instead of simulating");
+  add_threads(*command, given.threads);
+  command->add_flag("--force", given.force, "Replace existing output");
+  add_talk(*command, given.talk);
+  return {command, [options] { return export_command(*options); }};
 }
 
 }  // namespace offstage::producer

@@ -5,8 +5,10 @@
 
 #include "producer/base/error.h"
 #include "producer/base/interrupt.h"
+#include "producer/base/log.h"
 #include "producer/build/simulation.h"
 #include "producer/cli/command_line.h"
+#include "producer/cli/commands.h"
 #include "producer/run/output.h"
 #include "render/error.h"
 #include "render/file_io.h"
@@ -35,6 +37,34 @@ Failure describe_failure(const std::exception_ptr& error) {
     return {kRunFailed, "out of memory", "offstage: out of memory"};
   } catch (const std::exception& e) {
     return {kRunFailed, "run failed", line(e.what())};
+  }
+}
+
+int reported(const std::function<int()>& command) {
+  try {
+    return command();
+  } catch (const DivergedError& error) {
+    log("offstage: {}\n", error.what());
+    try {
+      log("the last state was saved to {}\n",
+          write_numbered_file("offstage-diverged", ".json", error.state()));
+    } catch (const render::FileError& unsaved) {
+      log("the last state could not be saved: {}\n", unsaved.what());
+    }
+    return kDiverged;
+  } catch (const render::StoppedError&) {
+    log("interrupted\n");
+    return 128 + interrupt_signal();
+  } catch (const Interrupted& interrupted) {
+    log("interrupted\n");
+    return 128 + interrupted.signal();
+  } catch (const std::bad_alloc&) {
+    write_log("offstage: out of memory\n");
+    return kRunFailed;
+  } catch (const std::exception&) {
+    const Failure failure = describe_failure(std::current_exception());
+    log("{}\n", failure.message);
+    return failure.code;
   }
 }
 

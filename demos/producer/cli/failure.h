@@ -1,7 +1,8 @@
 #pragma once
-/// Descriptions of the errors of a command: a message, an exit code and a short name of the kind.
+/// Errors of a command: a message, an exit code and a short name of the kind.
 
 #include <exception>
+#include <functional>
 #include <string>
 
 namespace offstage::producer {
@@ -15,5 +16,8 @@ struct Failure {
 /// Describes any exception except those of an interrupt (Interrupted, render::StoppedError), which are
 /// rethrown.
 Failure describe_failure(const std::exception_ptr& error);
+
+/// Returns the exit code of a command; an exception becomes a message and an exit code of its own.
+int reported(const std::function<int()>& command);
 
 }  // namespace offstage::producer

@@ -5,9 +5,11 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <memory>
 #include <mutex>
 #include <thread>
 
+#include <CLI/CLI.hpp>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -17,6 +19,7 @@
 #include "producer/base/log.h"
 #include "producer/cli/command_line.h"
 #include "producer/cli/commands.h"
+#include "producer/cli/options.h"
 #include "producer/run/farm.h"
 #include "producer/run/output.h"
 #include "producer/run/production.h"
@@ -27,6 +30,19 @@
 
 namespace offstage::producer {
 namespace {
+
+struct FarmOptions {
+  SceneOptions scene;
+  TalkOptions talk;
+  std::string out, work, program, status;
+  bool slurm = false;
+  int local = 0;  ///< number of drawing processes on this machine; 0: none
+  int chunks = 8, retries = 2, threads = 0;
+  std::string partition, account, time;
+  std::vector<std::string> sbatch;  ///< further options of sbatch
+  bool resume = false, force = false, dry_run = false;
+  render::GlPlatform gl = render::GlPlatform::automatic;
+};
 
 namespace fs = std::filesystem;
 
@@ -213,8 +229,7 @@ int print_status(const FarmOptions& options) {
   return state.encoded ? kOk : kRunFailed;
 }
 
-}  // namespace
-
+/// Renders a film in steps on many machines, or reports their progress.
 int farm_command(const FarmOptions& options) {
   if (!options.status.empty()) return print_status(options);
   if (options.scene.file.empty() || options.out.empty())
@@ -225,6 +240,48 @@ int farm_command(const FarmOptions& options) {
   if (options.dry_run) return print_scripts(options, plan);
   prepare_work(options, plan);
   return options.slurm ? submit_to_slurm(options, plan) : run_locally(options, plan);
+}
+
+}  // namespace
+
+Command add_farm(CLI::App& app) {
+  const auto options = std::make_shared<FarmOptions>();
+  FarmOptions& farm = *options;
+  CLI::App* command = app.add_subcommand(
+      "farm", "Simulate once and draw on many machines by Slurm, or by several processes of this one");
+  command->add_option("scene", farm.scene.file, "Scene file");
+  command->add_option("-o,--output", farm.out, "Video, or frames/####.png");
+  command->add_flag("--slurm", farm.slurm,
+                    "Submit the steps to Slurm; the folder must be visible to all nodes");
+  command->add_option("--local", farm.local, "Run the same steps here, with so many drawing processes")
+      ->check(CLI::Range(1, 256));
+  command->add_option("--chunks", farm.chunks, "Parts of the frames")
+      ->check(CLI::Range(1, 10000))
+      ->capture_default_str();
+  command->add_option("--retries", farm.retries, "How often a failed step is tried again")
+      ->check(CLI::Range(0, 100))
+      ->capture_default_str();
+  command->add_option("--work", farm.work,
+                      "Folder of scripts, cache, frames and logs (default: OUTPUT.farm)");
+  command->add_option("--partition", farm.partition, "Partition of Slurm");
+  command->add_option("--account", farm.account, "Account of Slurm");
+  command->add_option("--time", farm.time, "Time limit of each job of Slurm, such as 2:00:00");
+  command
+      ->add_option("--sbatch", farm.sbatch,
+                   "A further option of sbatch, such as --sbatch=--mem=8G (repeatable)")
+      ->allow_extra_args(false);
+  command->add_option("--program", farm.program, "Path of offstage on the nodes (default: this one)");
+  auto* resume = command->add_flag("--resume", farm.resume, "Keep the steps and frames that are done");
+  command->add_flag("--force", farm.force, "Start again, and replace existing output")->excludes(resume);
+  command->add_flag("--dry-run", farm.dry_run, "Print the scripts and write nothing");
+  command->add_option("--status", farm.status, "Report the progress of the farm in this folder");
+  add_overrides(*command, farm.scene);
+  add_picture(*command, farm.scene);
+  add_timing(*command, farm.scene);
+  add_threads(*command, farm.threads);
+  add_gl(*command, farm.gl);
+  add_talk(*command, farm.talk);
+  return {command, [options] { return farm_command(*options); }};
 }
 
 }  // namespace offstage::producer

@@ -4,14 +4,17 @@
 #include <chrono>
 #include <cstdlib>
 #include <exception>
+#include <memory>
 #include <set>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "producer/base/log.h"
 #include "producer/cli/command_line.h"
 #include "producer/cli/commands.h"
 #include "producer/cli/failure.h"
+#include "producer/cli/options.h"
 #include "producer/run/fingerprint.h"
 #include "producer/run/golden.h"
 #include "producer/run/golden_overview.h"
@@ -23,6 +26,22 @@
 
 namespace offstage::producer {
 namespace {
+
+struct BlessOptions {
+  std::vector<std::string> scenes, allow;
+  std::string golden, reason;
+  int threads = 0;
+  render::GlPlatform gl = render::GlPlatform::automatic;
+};
+
+struct CompareOptions {
+  std::vector<std::string> inputs;  ///< scenes, or two pictures, or two folders of frames
+  SceneOptions scene;               ///< options for each scene; its file name is not used
+  std::string golden, report, junit;
+  GoldenStates states;
+  int threads = 0;
+  render::GlPlatform gl = render::GlPlatform::automatic;
+};
 
 namespace fs = std::filesystem;
 
@@ -206,8 +225,6 @@ int compare_with_goldens(const CompareOptions& options) {
   return exit_code(comparisons);
 }
 
-}  // namespace
-
 int compare_command(const CompareOptions& options) {
   const auto is_scene = [](const std::string& input) {
     return input == kStandardInput || fs::path(input).extension() == ".json";
@@ -251,6 +268,49 @@ int bless_command(const BlessOptions& options) {
                asked == golden.scene ? "" : fmt::format(" (of {})", file));
   }
   return kOk;
+}
+
+}  // namespace
+
+Command add_compare(CLI::App& app) {
+  const auto options = std::make_shared<CompareOptions>();
+  CompareOptions& compare = *options;
+  compare.golden = "tests/golden";
+  CLI::App* command = app.add_subcommand(
+      "compare", "Compare scenes with their goldens, or two pictures or folders of frames");
+  command->add_option("inputs", compare.inputs, "Scenes, or two pictures, or two folders of frames")
+      ->required();
+  command->add_option("--golden", compare.golden, "Folder of the goldens")->capture_default_str();
+  command->add_option("--report", compare.report,
+                      "Folder for the expected and actual pictures, their difference and an HTML page; with\n"
+                      "several scenes, a folder for each that differs, and a page about all");
+  command->add_option("--junit", compare.junit,
+                      "Write the results of the scenes to this JUnit XML file, which CI systems read");
+  CLI::Option* keep = command->add_option("--keep-states", compare.states.keep,
+                                          "Write the simulated states of the golden's frames to this folder");
+  command
+      ->add_option(
+          "--states", compare.states.from,
+          "Draw the states written by --keep-states instead of simulating, for example with another --gl")
+      ->excludes(keep);
+  add_overrides(*command, compare.scene);
+  add_threads(*command, compare.threads);
+  add_gl(*command, compare.gl);
+  return {command, [options] { return compare_command(*options); }};
+}
+
+Command add_bless(CLI::App& app) {
+  const auto options = std::make_shared<BlessOptions>();
+  BlessOptions& bless = *options;
+  bless.golden = "tests/golden";
+  CLI::App* command = app.add_subcommand("bless", "Record the goldens of scenes again");
+  command->add_option("scenes", bless.scenes, "Scene files")->required();
+  command->add_option("--golden", bless.golden, "Folder of the goldens")->capture_default_str();
+  command->add_option("--reason", bless.reason, "Why the pictures changed")->required();
+  add_allow(*command, bless.allow);
+  add_threads(*command, bless.threads);
+  add_gl(*command, bless.gl);
+  return {command, [options] { return bless_command(*options); }};
 }
 
 }  // namespace offstage::producer

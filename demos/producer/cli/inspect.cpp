@@ -2,7 +2,9 @@
 
 #include <cerrno>
 #include <map>
+#include <memory>
 
+#include <CLI/CLI.hpp>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -12,6 +14,7 @@
 #include "producer/build/simulation.h"
 #include "producer/cli/command_line.h"
 #include "producer/cli/commands.h"
+#include "producer/cli/options.h"
 #include "producer/run/fingerprint.h"
 #include "producer/run/output.h"
 #include "render/error.h"
@@ -275,10 +278,17 @@ void write_text_file(const std::string& path, const std::string& text) {
   render::write_file_atomically(path, {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
 }
 
-int schema_command(bool reference) {
-  fmt::print("{}", reference ? scene_reference() : scene_schema());
-  return kOk;
+Command add_schema(CLI::App& app) {
+  const auto reference = std::make_shared<bool>(false);
+  CLI::App* command = app.add_subcommand("schema", "Print the JSON Schema of the scene format");
+  command->add_flag("--reference", *reference, "Print the scene reference in Markdown instead");
+  return {command, [reference] {
+            fmt::print("{}", *reference ? scene_reference() : scene_schema());
+            return static_cast<int>(kOk);
+          }};
 }
+
+namespace {
 
 int info_command(const SceneOptions& options, bool json) {
   const bool is_scene =
@@ -291,6 +301,21 @@ int info_command(const SceneOptions& options, bool json) {
   else
     print_readable(info);
   return kOk;
+}
+
+}  // namespace
+
+Command add_info(CLI::App& app) {
+  struct Options {
+    SceneOptions scene;
+    bool json = false;
+  };
+  const auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("info", "Describe a scene or a model file");
+  command->add_option("file", options->scene.file, "Scene (.json) or model file")->required();
+  add_overrides(*command, options->scene);
+  command->add_flag("--json", options->json, "Print as JSON");
+  return {command, [options] { return info_command(options->scene, options->json); }};
 }
 
 }  // namespace offstage::producer

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <memory>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "producer/base/json.h"
@@ -15,6 +17,11 @@
 
 namespace offstage::producer {
 namespace {
+
+struct NewOptions {
+  std::string name, from;  ///< file and template; empty template: that of this name, or "basic"
+  bool list = false, force = false;
+};
 
 constexpr const char* kFirstTemplate = "basic";
 
@@ -67,6 +74,9 @@ std::string scene_from_template(std::string_view text, const std::string& file) 
   return scene;
 }
 
+namespace {
+
+/// Writes a first scene, or lists the templates.
 int new_command(const NewOptions& options) {
   if (options.list || options.name.empty()) {
     fmt::print("{}", list_of_templates());
@@ -94,6 +104,22 @@ int new_command(const NewOptions& options) {
   write_text_file(path.string(), scene_from_template(text, file));
   fmt::print("wrote {}\nrender it:  offstage {}\n", path.string(), file);
   return kOk;
+}
+
+}  // namespace
+
+Command add_new(CLI::App& app) {
+  const auto options = std::make_shared<NewOptions>();
+  NewOptions& given = *options;
+  CLI::App* command = app.add_subcommand("new",
+                                         "Write a commented scene to start from, which can be rendered at "
+                                         "once; without NAME: list the templates");
+  command->add_option("name", given.name, "NAME or NAME.json; - for standard output");
+  command->add_option("--template", given.from,
+                      "Template to use (default: the one called NAME, as in `new rain`, or else `basic`)");
+  command->add_flag("--list", given.list, "List the templates");
+  command->add_flag("--force", given.force, "Replace an existing file");
+  return {command, [options] { return new_command(*options); }};
 }
 
 }  // namespace offstage::producer

@@ -1,7 +1,9 @@
 // presets: the presets that a scene can name.
 
 #include <algorithm>
+#include <memory>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -38,8 +40,7 @@ std::string preset_text(const ArticulationPreset& preset) {
   return to_text(all.as<List>()->front(), 2);
 }
 
-}  // namespace
-
+/// Lists all presets with a line each, or prints the text of one.
 int presets_command(const std::string& name) {
   if (const effects::FabricPreset* preset = effects::find_fabric(name)) {
     const effects::Fabric& f = preset->fabric;
@@ -79,6 +80,16 @@ int presets_command(const std::string& name) {
   for (const ArticulationPreset& preset : articulation_presets())
     fmt::print("{:{}}  {}\n", preset.name, width, preset.help.substr(0, preset.help.find_first_of(".:")));
   return kOk;
+}
+
+}  // namespace
+
+Command add_presets(CLI::App& app) {
+  const auto name = std::make_shared<std::string>();
+  CLI::App* command = app.add_subcommand(
+      "presets", "List the presets, fabrics and articulations for scenes, or print one of them");
+  command->add_option("name", *name, "Preset, fabric or articulation to print");
+  return {command, [name] { return presets_command(*name); }};
 }
 
 }  // namespace offstage::producer

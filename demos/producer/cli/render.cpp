@@ -4,8 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <memory>
 #include <optional>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
@@ -16,6 +18,7 @@
 #include "producer/cli/command_line.h"
 #include "producer/cli/commands.h"
 #include "producer/cli/hidden_folder.h"
+#include "producer/cli/options.h"
 #include "producer/cli/run_progress.h"
 #include "producer/run/fingerprint.h"
 #include "producer/run/frame_list.h"
@@ -32,6 +35,25 @@
 
 namespace offstage::producer {
 namespace {
+
+struct SimulateOptions {
+  SceneOptions scene;
+  TalkOptions talk;
+  std::string trace, contacts, cloths, cloth_points, joints, particles, trace_every = "frame", cache, stats;
+  int threads = 0;
+  bool force = false;
+};
+
+struct FrameOptions {
+  SceneOptions scene;
+  TalkOptions talk;
+  std::string out;
+  std::optional<int> frame;
+  std::optional<double> at;
+  int threads = 0;
+  bool force = false;
+  render::GlPlatform gl = render::GlPlatform::automatic;
+};
 
 namespace fs = std::filesystem;
 
@@ -394,6 +416,8 @@ int render_command(const RenderOptions& given) {
   return render_to_video(plan, models, options);
 }
 
+namespace {
+
 int frame_command(const FrameOptions& options) {
   const LoadedScene loaded = load(options.scene, options.talk.quiet);
   const Scene& scene = loaded.scene;
@@ -470,6 +494,107 @@ int simulate_command(const SimulateOptions& options) {
   if (stats.interrupted_by) return interrupted(stats, loaded.scene.frame_count(), "");
   if (options.stats.empty()) fmt::print("{}", to_json(stats));
   return kOk;
+}
+
+}  // namespace
+
+Command add_render(CLI::App& app) {
+  const auto options = std::make_shared<RenderOptions>();
+  RenderOptions& render = *options;
+  CLI::App* command = app.add_subcommand("render", "Simulate a scene and draw it: frames or a video");
+  add_scene(*command, render.scene);
+  command->add_option(
+      "-o,--output", render.out,
+      "frames/####.png (or .jpg, .exr) or a folder; .mp4 .webm .mov .mkv .gif .webp .apng .png; "
+      "- for standard "
+      "output");
+  command
+      ->add_option("--camera", render.cameras,
+                   "Name of a camera to draw, or `all`; several cameras get files with their names")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  add_picture(*command, render.scene);
+  add_timing(*command, render.scene);
+  command->add_option("--frames", render.frames,
+                      "Frames to render: 1-30,40,50-90x2 (negative numbers count from the end)");
+  command->add_option("--chunk", render.chunk, "i/n: render the i-th of n parts of the frames");
+  command->add_option("--cache", render.cache,
+                      "Draw from the snapshots of `simulate --cache` instead of simulating");
+  command->add_option("--format", render.format, "Format on standard output: rgba or y4m")
+      ->check(CLI::IsMember({"rgba", "y4m"}));
+  add_threads(*command, render.threads);
+  add_gl(*command, render.gl);
+  command->add_option("--jobs", render.jobs, "Frames drawn at the same time (default: half of --threads)")
+      ->check(CLI::Range(1, 64));
+  auto* resume =
+      command->add_flag("--resume", render.resume, "Keep finished frames that have the same settings");
+  add_channels(*command, render.scene);
+  command->add_flag("--force", render.force, "Replace existing output")->excludes(resume);
+  auto* dry_run = command->add_flag("--dry-run", render.dry_run, "Print the plan as JSON and write nothing");
+  command
+      ->add_flag("--watch", render.watch,
+                 "Render again whenever the scene, an include, a model or a texture changes, until "
+                 "Ctrl-C;\nthe output is replaced only by a complete result, never after an error. Changes "
+                 "of cameras,\nlights and looks do not simulate again")
+      ->excludes(resume)
+      ->excludes(dry_run);
+  command->add_option("--stats", render.stats, "Write statistics of the run to this JSON file");
+  command->add_option("--report", render.report,
+                      "Write pictures, plots, settings and hashes of the run to this HTML file");
+  add_talk(*command, render.talk);
+  return {command, [options] {
+            if (options->out.empty()) options->out = default_film(options->scene.file);
+            return options->watch ? watch_command(*options) : render_command(*options);
+          }};
+}
+
+Command add_frame(CLI::App& app) {
+  const auto options = std::make_shared<FrameOptions>();
+  FrameOptions& frame = *options;
+  CLI::App* command = app.add_subcommand("frame", "Draw one frame to a PNG");
+  add_scene(*command, frame.scene);
+  command->add_option("-o,--output", frame.out, "PNG file")->required();
+  auto* number = command->add_option("-n,--frame", frame.frame,
+                                     "Number of the frame (negative numbers count from the end)");
+  command->add_option("--at", frame.at, "Time of the frame in seconds, instead of its number")
+      ->excludes(number);
+  add_camera(*command, frame.scene);
+  add_picture(*command, frame.scene);
+  add_timing(*command, frame.scene);
+  add_threads(*command, frame.threads);
+  add_gl(*command, frame.gl);
+  add_channels(*command, frame.scene);
+  command->add_flag("--force", frame.force, "Replace an existing file");
+  add_talk(*command, frame.talk);
+  return {command, [options] { return frame_command(*options); }};
+}
+
+Command add_simulate(CLI::App& app) {
+  const auto options = std::make_shared<SimulateOptions>();
+  SimulateOptions& simulate = *options;
+  CLI::App* command = app.add_subcommand("simulate", "Simulate without drawing; prints statistics as JSON");
+  add_scene(*command, simulate.scene);
+  add_timing(*command, simulate.scene);
+  command->add_option("--trace", simulate.trace,
+                      "CSV of position, orientation and velocities of moving objects");
+  command->add_option("--contacts", simulate.contacts,
+                      "CSV of the contact points of bodies, with their forces");
+  command->add_option("--cloths", simulate.cloths, "CSV of strain, contacts and volume of cloths");
+  command->add_option("--cloth-points", simulate.cloth_points,
+                      "CSV of position and velocity of the vertices of cloths");
+  command->add_option("--joints", simulate.joints, "CSV of the loads and positions of joints");
+  command->add_option(
+      "--particles", simulate.particles,
+      "Table of all particles, emitted ones included: CSV, or binary if its name ends in .bin");
+  command->add_option("--trace-every", simulate.trace_every, "Interval of the CSV rows: frame or step")
+      ->check(CLI::IsMember({"frame", "step"}));
+  command->add_option("--cache", simulate.cache, "Folder for one snapshot per frame, for `render --cache`");
+  command->add_option("--stats", simulate.stats,
+                      "Write the statistics to this JSON file instead of standard output");
+  add_threads(*command, simulate.threads);
+  command->add_flag("--force", simulate.force, "Replace existing output");
+  add_talk(*command, simulate.talk);
+  return {command, [options] { return simulate_command(*options); }};
 }
 
 }  // namespace offstage::producer

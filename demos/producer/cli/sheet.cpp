@@ -2,13 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "producer/base/log.h"
 #include "producer/base/time_code.h"
 #include "producer/cli/command_line.h"
 #include "producer/cli/commands.h"
+#include "producer/cli/options.h"
 #include "producer/cli/run_progress.h"
 #include "producer/run/contact_sheet.h"
 #include "producer/run/output.h"
@@ -18,6 +21,16 @@
 
 namespace offstage::producer {
 namespace {
+
+struct SheetOptions {
+  SceneOptions scene;
+  TalkOptions talk;
+  std::string out;
+  int count = 12, columns = 0;  ///< columns 0: chosen by the count
+  int threads = 0;
+  bool force = false;
+  render::GlPlatform gl = render::GlPlatform::automatic;
+};
 
 /// Evenly distributed frames from the first to the last; for one frame, the middle.
 std::vector<int> spread_frames(int count, int total) {
@@ -53,6 +66,8 @@ std::string small_size(const Scene& scene, int longer_side_px) {
   return fmt::format("{}x{}", side(size.x()), side(size.y()));
 }
 
+namespace {
+
 int sheet_command(const SheetOptions& options) {
   check_png(options.out);
   check_file(options.out, options.force);
@@ -83,6 +98,29 @@ int sheet_command(const SheetOptions& options) {
                     contact_sheet({heading}, sink.cells, std::min(columns, static_cast<int>(frames.size()))));
   print_output_name(options.out);
   return kOk;
+}
+
+}  // namespace
+
+Command add_sheet(CLI::App& app) {
+  const auto options = std::make_shared<SheetOptions>();
+  SheetOptions& sheet = *options;
+  CLI::App* command = app.add_subcommand(
+      "sheet", "Draw a contact sheet: small frames of the whole film in one PNG, with time codes");
+  add_scene(*command, sheet.scene);
+  command->add_option("-o,--output", sheet.out, "PNG file")->required();
+  command->add_option("--count", sheet.count, "Number of frames, evenly from the first to the last")
+      ->check(CLI::Range(1, 400))
+      ->capture_default_str();
+  command->add_option("--columns", sheet.columns, "Pictures in a row")->check(CLI::Range(1, 100));
+  add_camera(*command, sheet.scene);
+  add_small_picture(*command, sheet.scene);
+  add_timing(*command, sheet.scene);
+  add_threads(*command, sheet.threads);
+  add_gl(*command, sheet.gl);
+  command->add_flag("--force", sheet.force, "Replace an existing file");
+  add_talk(*command, sheet.talk);
+  return {command, [options] { return sheet_command(*options); }};
 }
 
 }  // namespace offstage::producer

@@ -4,11 +4,13 @@
 #include <atomic>
 #include <cmath>
 #include <fstream>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <set>
 #include <thread>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -18,6 +20,7 @@
 #include "producer/base/time_code.h"
 #include "producer/cli/command_line.h"
 #include "producer/cli/commands.h"
+#include "producer/cli/options.h"
 #include "producer/run/contact_sheet.h"
 #include "producer/run/output.h"
 #include "producer/run/production.h"
@@ -29,6 +32,17 @@
 
 namespace offstage::producer {
 namespace {
+
+struct SweepOptions {
+  SceneOptions scene;
+  std::vector<std::string> vary;
+  std::vector<double> at;  ///< times [s]; empty: the middle of the film
+  std::string out, csv;    ///< csv empty: beside the sheet
+  int columns = 0;         ///< 0: chosen by the variations
+  int threads = 0, jobs = 0;
+  bool resume = false, force = false, quiet = false;
+  render::GlPlatform gl = render::GlPlatform::automatic;
+};
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
@@ -348,8 +362,6 @@ std::string table(const Sweep& sweep) {
   return to_csv(rows);
 }
 
-}  // namespace
-
 int sweep_command(const SweepOptions& options) {
   Sweep sweep;
   for (const std::string& text : options.vary) sweep.variations.push_back(parse_variation(text));
@@ -382,6 +394,43 @@ int sweep_command(const SweepOptions& options) {
   int code = kOk;
   for (const Run& run : sweep.runs) code = std::max(code, run.code);
   return code;
+}
+
+}  // namespace
+
+Command add_sweep(CLI::App& app) {
+  const auto options = std::make_shared<SweepOptions>();
+  SweepOptions& sweep = *options;
+  CLI::App* command = app.add_subcommand(
+      "sweep",
+      "Render a scene with different values: one PNG with labelled pictures, and a CSV of statistics");
+  add_scene(*command, sweep.scene);
+  command
+      ->add_option("--vary", sweep.vary,
+                   "Values to try: path=a:b:step or path=x,y,z, such as emitters.0.rate=100:400:50; if "
+                   "given\nseveral times, every combination is run (at most 256)")
+      ->required()
+      ->allow_extra_args(false);
+  command
+      ->add_option("--at", sweep.at, "Times of the pictures in seconds: 1 or 0.5,1,2 (default: the middle)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command->add_option("-o,--output", sweep.out, "PNG file")->required();
+  command->add_option(
+      "--csv", sweep.csv,
+      "CSV with the statistics of every run at the last of the times (default: beside the PNG)");
+  command->add_option("--columns", sweep.columns, "Pictures in a row")->check(CLI::Range(1, 100));
+  add_small_picture(*command, sweep.scene);
+  add_timing(*command, sweep.scene);
+  add_threads(*command, sweep.threads);
+  add_gl(*command, sweep.gl);
+  command->add_option("--jobs", sweep.jobs, "Runs at the same time (default: as --threads, if memory allows)")
+      ->check(CLI::Range(1, 64));
+  auto* resume =
+      command->add_flag("--resume", sweep.resume, "Keep the finished runs of an interrupted sweep");
+  command->add_flag("--force", sweep.force, "Replace existing output")->excludes(resume);
+  command->add_flag("-q,--quiet", sweep.quiet, "Print errors and failed runs only");
+  return {command, [options] { return sweep_command(*options); }};
 }
 
 }  // namespace offstage::producer

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -10,6 +12,7 @@
 #include "producer/build/simulation.h"
 #include "producer/cli/command_line.h"
 #include "producer/cli/commands.h"
+#include "producer/cli/options.h"
 #include "producer/format/scene_check_particles.h"
 #include "producer/run/cost.h"
 #include "producer/run/progress.h"
@@ -17,6 +20,13 @@
 
 namespace offstage::producer {
 namespace {
+
+struct ValidateOptions {
+  SceneOptions scene;
+  bool json = false;
+  bool no_estimate = false;  ///< no estimate of the cost, which takes a short trial
+  render::GlPlatform gl = render::GlPlatform::automatic;
+};
 
 using Json = nlohmann::ordered_json;
 
@@ -143,8 +153,6 @@ Json convex_models_json(const ModelLibrary& models) {
   return list;
 }
 
-}  // namespace
-
 int validate_command(const ValidateOptions& options) {
   const std::string& file = options.scene.file;
   Json result = {{"file", file}, {"valid", true}, {"errors", Json::array()}, {"warnings", Json::array()}};
@@ -180,6 +188,21 @@ int validate_command(const ValidateOptions& options) {
   }
   if (options.json) fmt::print("{}\n", result.dump(2));
   return result["valid"].get<bool>() ? kOk : kSceneInvalid;
+}
+
+}  // namespace
+
+Command add_validate(CLI::App& app) {
+  const auto options = std::make_shared<ValidateOptions>();
+  ValidateOptions& validate = *options;
+  CLI::App* command =
+      app.add_subcommand("validate", "Check a scene, report every problem, and estimate the rendering time");
+  add_scene(*command, validate.scene);
+  command->add_flag("--json", validate.json, "Print the result as JSON");
+  command->add_flag("--no-estimate,--quick", validate.no_estimate,
+                    "Skip the estimate, which takes about two seconds");
+  add_gl(*command, validate.gl);
+  return {command, [options] { return validate_command(*options); }};
 }
 
 }  // namespace offstage::producer

@@ -15,6 +15,7 @@
 #include "producer/base/interrupt.h"
 #include "producer/base/log.h"
 #include "producer/cli/commands.h"
+#include "producer/cli/failure.h"
 #include "producer/cli/hidden_folder.h"
 #include "producer/run/output.h"
 #include "producer/run/watch.h"
@@ -25,7 +26,6 @@ namespace offstage::producer {
 namespace {
 
 namespace fs = std::filesystem;
-using Renderer = std::function<int(const RenderOptions&)>;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kStill{120};  // time without changes before files are read
@@ -33,12 +33,12 @@ constexpr milliseconds kStill{120};  // time without changes before files are re
 /// A render in a separate process, which can be ended at any time and whose crash does not affect the watch.
 class RenderProcess {
  public:
-  RenderProcess(const RenderOptions& options, const Renderer& render) {
+  explicit RenderProcess(const RenderOptions& options) {
     std::fflush(stdout);
     const pid_t parent = getpid();
     pid_ = fork();
     if (pid_ < 0) throw render::FileError("the render could not be started");
-    if (pid_ == 0) become_render(options, render, parent);
+    if (pid_ == 0) become_render(options, parent);
   }
   ~RenderProcess() {
     if (pid_ <= 0) return;
@@ -59,7 +59,7 @@ class RenderProcess {
   }
 
  private:
-  [[noreturn]] static void become_render(const RenderOptions& options, const Renderer& render, pid_t parent) {
+  [[noreturn]] static void become_render(const RenderOptions& options, pid_t parent) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (getppid() != parent) _exit(1);
     // The watch handles Ctrl-C and ends this process. The printed name of its result would be a temporary
@@ -68,7 +68,7 @@ class RenderProcess {
     std::signal(SIGTERM, SIG_IGN);
     if (const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC); nowhere >= 0)
       dup2(nowhere, STDOUT_FILENO);
-    const int code = render(options);
+    const int code = reported([&] { return render_command(options); });
     std::fflush(stdout);
     _exit(code);
   }
@@ -91,8 +91,7 @@ void publish_channels(const fs::path& made, const fs::path& place) {
 
 class Watcher {
  public:
-  Watcher(const RenderOptions& options, const Renderer& render)
-      : options_(options), render_(render), target_(parse_output(options.out)) {
+  explicit Watcher(const RenderOptions& options) : options_(options), target_(parse_output(options.out)) {
     if (options.scene.from_standard_input())
       throw OutputError("--watch needs a scene file that can change; standard input cannot");
     if (target_.kind == OutputKind::pipe)
@@ -129,7 +128,7 @@ class Watcher {
     options.out = (unfinished.path() / target_.path.filename()).string();
     if (states_) options.states = states_->path().string();
     const auto start = std::chrono::steady_clock::now();
-    RenderProcess process(options, render_);
+    RenderProcess process(options);
     std::optional<int> code;
     while (!(code = process.result())) {
       watch.wait(milliseconds(20));
@@ -178,7 +177,6 @@ class Watcher {
   }
 
   const RenderOptions& options_;
-  const Renderer& render_;
   OutputTarget target_;
   std::optional<HiddenFolder> states_;  // of the latest simulation, for renders that change only its look
   std::string rendered_;                // hash of the files of the last render, successful or not
@@ -187,8 +185,8 @@ class Watcher {
 
 }  // namespace
 
-int watch_command(const RenderOptions& options, const std::function<int(const RenderOptions&)>& render) {
-  return Watcher(options, render).run();
+int watch_command(const RenderOptions& options) {
+  return Watcher(options).run();
 }
 
 }  // namespace offstage::producer

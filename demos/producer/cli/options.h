@@ -1,0 +1,62 @@
+#pragma once
+/// Options that several commands share.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "producer/build/decomposition_cache.h"
+#include "producer/format/scene_source.h"
+#include "producer/run/progress.h"
+#include "render/context.h"
+
+namespace CLI {
+class App;
+}
+
+namespace offstage::producer {
+
+/// Options of every command that reads a scene.
+struct SceneOptions {
+  std::string file;
+  std::vector<std::string> set;
+  std::optional<std::string> quality, size;
+  std::optional<std::string> fps;  ///< a number, or a fraction such as 30000/1001
+  std::optional<double> duration;
+  std::optional<uint64_t> seed;
+  std::vector<std::string> channels;  ///< depth, normal, id, motion; empty: those of the scene
+  std::optional<std::string> channel_format;
+  std::string camera;              ///< name of the camera to draw; empty: the scene's `camera`
+  std::vector<std::string> allow;  ///< additional folders for the scene's files
+  bool no_cache = false;           ///< convex parts of models are neither read from the disk nor stored
+
+  DecompositionCache decompositions() const {
+    return no_cache ? DecompositionCache() : DecompositionCache::of_user();
+  }
+  /// Returns the shorthands as overrides, then `set`. Throws std::invalid_argument for an invalid one.
+  std::vector<std::string> overrides() const;
+  bool from_standard_input() const { return file == kStandardInput; }
+};
+
+struct TalkOptions {
+  ProgressStyle progress = ProgressStyle::automatic;
+  bool quiet = false, verbose = false;
+};
+
+// Each adds options to a command, which are parsed into the last argument.
+void add_allow(CLI::App& command, std::vector<std::string>& allow);
+/// Values, seed and folders; `add_scene` adds the file, too.
+void add_overrides(CLI::App& command, SceneOptions& scene);
+void add_scene(CLI::App& command, SceneOptions& scene);
+void add_timing(CLI::App& command, SceneOptions& scene);
+void add_quality(CLI::App& command, SceneOptions& scene);
+/// Quality and size of a picture, and of the small pictures of a sheet.
+void add_picture(CLI::App& command, SceneOptions& scene);
+void add_small_picture(CLI::App& command, SceneOptions& scene);
+void add_talk(CLI::App& command, TalkOptions& talk);
+void add_channels(CLI::App& app, SceneOptions& scene);
+void add_gl(CLI::App& command, render::GlPlatform& gl);
+void add_threads(CLI::App& command, int& threads);
+void add_camera(CLI::App& command, SceneOptions& scene);
+
+}  // namespace offstage::producer

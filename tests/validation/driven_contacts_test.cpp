@@ -1,0 +1,62 @@
+/// Motors that move bodies in contact with others. A motor supplies and takes energy, which is no reason to
+/// distrust a solution.
+
+#include <gtest/gtest.h>
+
+#include "tests/validation/both_solvers.h"
+
+namespace offstage::sim {
+namespace {
+
+class DrivenContacts : public BothSolvers {
+ protected:
+  BodyHandle add_load(World& w, const Vec3& position) const {
+    return w.add_body({.shape = Box{{0.2, 0.2, 0.2}},
+                       .pose = {position, Quat::Identity()},
+                       .density = 500,
+                       .restitution = 0,
+                       .friction = 0.5});
+  }
+};
+
+TEST_P(DrivenContacts, APlatformOfAnyStrengthLiftsItsLoad) {
+  for (const Real step : {1.0 / 240, 1.0 / 60}) {
+    World w(def(step));
+    const BodyHandle platform = w.add_body({.shape = Box{{1, 0.1, 1}},
+                                            .pose = {Vec3(0, 0.05, 0), Quat::Identity()},
+                                            .density = 500,
+                                            .restitution = 0,
+                                            .friction = 0.5});
+    JointDef rail{.type = JointType::prismatic, .a = platform, .anchor = Vec3::Zero()};
+    rail.axis = Vec3::UnitY();
+    rail.motor = {.mode = Motor::Mode::position, .targets = {{0, 0}, {1.5, 0.6}}, .smooth = true};
+    w.add_joint(rail);
+    const BodyHandle lower = add_load(w, {0.1, 0.2, 0}), upper = add_load(w, {0.12, 0.4, 0});
+    const Tally t = run(w, 2, step);
+    EXPECT_EQ(t.exact_fallbacks, 0u) << step;
+    EXPECT_NEAR(w.body(lower).centre.y(), 0.8, 1e-3) << step;
+    EXPECT_NEAR(w.body(upper).centre.y(), 1.0, 1e-3) << step;
+  }
+}
+
+TEST_P(DrivenContacts, AMotorPressesALoadedArmAgainstItsLimit) {
+  World w(def());
+  w.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = 0.5});
+  const BodyHandle base = add_load(w, {0, 0.1, 0}), arm = add_load(w, {0.3, 0.1, 0});
+  const BodyHandle load = add_load(w, {0, 0.3, 0});
+  w.add_joint({.type = JointType::fixed, .a = base, .anchor = Vec3::Zero()});
+  w.add_joint({.type = JointType::fixed, .a = load, .b = base, .anchor = {0, 0.2, 0}});
+  JointDef hinge{.type = JointType::revolute, .a = arm, .b = base, .anchor = {0.15, 0.1, 0}};
+  hinge.axis = Vec3::UnitZ();
+  hinge.lower = -0.2;
+  hinge.upper = 0.3;
+  hinge.motor = {.mode = Motor::Mode::speed, .targets = {{0, 1}}, .max_effort = 50};
+  const JointHandle joint = w.add_joint(hinge);
+  const Tally t = run(w, 2);
+  EXPECT_EQ(t.exact_fallbacks, 0u);
+  EXPECT_NEAR(w.joint(joint).coordinate, 0.3, is_exact() ? 1e-6 : 1e-3);
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, DrivenContacts);
+
+}  // namespace
+}  // namespace offstage::sim
