@@ -138,10 +138,10 @@ StateHash chain(SolverKind solver) {
 constexpr const char* kParticles = "c5bfc404ccb7e022ce9ed6c7eb5cc342";
 constexpr const char* kSlidingExact = "dd732251e043ec037777fcccaae4b8d9";
 constexpr const char* kBouncingExact = "2f1c3cdf0257928ef668a7ebb6dfc2d6";
-constexpr const char* kBouncingFast = "eb1b23678611757101c8e8be769c38fb";
-constexpr const char* kHeapFast = "498ffeb57891db5b1b991ac9961cf168";
-constexpr const char* kChainExact = "d656c0d17cafff73ce69006380df3b45";
-constexpr const char* kChainFast = "d292c745f55bee8c0eca1fe3db974edc";
+constexpr const char* kBouncingFast = "b342e1304dfd8fb7cf9300a015b6a4f6";
+constexpr const char* kHeapFast = "deeac9e49ef6b8e5f4ada2b3fb94a6f0";
+constexpr const char* kChainExact = "1125e425426069a78e4ed903caa56c4f";
+constexpr const char* kChainFast = "36c7538d035d117c75847f1492e6a2e3";
 
 TEST(Determinism, SameHashInEveryBuild) {
   EXPECT_EQ(run().hex(), kParticles);
