@@ -159,8 +159,12 @@ void add_effect(Body& body, const IntervalEffect& effect) {
   if (effect.turn != Vec3::Zero()) r.orientation = (rotation(effect.turn) * r.orientation).normalized();
   r.momentum += effect.impulse;
   r.angular_momentum += effect.angular_impulse;
-  // The time at which the impulses act is uncertain by the interval, and so is the orientation by their turn.
-  if (r.is_thin()) agree_with_spin(r, expected, free_energy, effect.share * kSpinExcess, effect.turn.norm());
+  // The orientation is uncertain by the turn due to the impulses, whose time in the interval is unknown, and
+  // to second order by the whole turn in the interval.
+  if (r.is_thin()) {
+    const Real turned = rotation_vector(body.start.orientation, r.orientation).squaredNorm();
+    agree_with_spin(r, expected, free_energy, effect.share * kSpinExcess, effect.turn.norm() + turned);
+  }
   body.pose = r.pose();
 }
 

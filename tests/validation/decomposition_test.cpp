@@ -21,7 +21,7 @@ TEST(DecompositionValidation, VolumesSumAndPartsAreConvex) {
   for (std::size_t k = 0; k < std::size(solids); ++k) {
     SCOPED_TRACE(k);
     const TriangleMesh mesh = placed_at_random(solids[k], 1, k);
-    const ConvexDecomposition d = decompose(mesh, MeshTopology(mesh));
+    const ConvexDecomposition d = decompose(mesh, MeshTopology(mesh), {.method = DecompositionMethod::exact});
     EXPECT_EQ(d.method, ConvexDecomposition::Method::exact) << d.note;
     Real sum = 0;
     for (const ConvexPolyhedron& p : d.parts) {
