@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <utility>
 
 #include <tbb/parallel_for.h>
 
+#include "sim/core/disjoint_sets.h"
 #include "sim/geometry/winding_number.h"
 
 namespace offstage::sim {
@@ -22,24 +22,6 @@ constexpr Real kHardlyInside = 0.6, kSurelyInside = 0.9;
 constexpr int kSmoothings = 2;
 /// Greatest difference between the volume with closed holes and that of the voxels, as a share.
 constexpr Real kSameSolid = 0.1;
-
-/// Sets of numbers that are joined.
-class Groups {
- public:
-  explicit Groups(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
-  uint32_t find(uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  /// The lower number represents the set.
-  void join(uint32_t i, uint32_t j) {
-    const uint32_t a = find(i), b = find(j);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<uint32_t> parent_;
-};
 
 /// The voxels of a mesh's box, and whether the centre of each is inside.
 class VoxelGrid {
@@ -180,7 +162,7 @@ TriangleMesh with_closed_holes(TriangleMesh mesh) {
       net[{std::min(a, b), std::max(a, b)}] += a < b ? 1 : -1;
     }
   std::erase_if(net, [](const auto& edge) { return edge.second == 0; });
-  Groups holes(mesh.vertices.size());
+  DisjointSets holes(mesh.vertices.size());
   for (const auto& [edge, count] : net) holes.join(edge[0], edge[1]);
   struct Middle {
     Vec3 sum = Vec3::Zero();
@@ -214,7 +196,7 @@ void turn_over(SolidPiece& piece) {
 /// The connected pieces of a surface, each with its own vertices alone. One piece, the surface, if there are
 /// more than `most`.
 std::vector<TriangleMesh> connected_pieces(const TriangleMesh& mesh, std::size_t most) {
-  Groups shells(mesh.vertices.size());
+  DisjointSets shells(mesh.vertices.size());
   for (const Triangle& t : mesh.triangles) {
     shells.join(t[0], t[1]);
     shells.join(t[0], t[2]);

@@ -1,6 +1,8 @@
 #pragma once
-/// Division of a solid into cells of about the same size and round shape, which thin shells need: their
-/// cost in parts depends on the extent of the cells in all directions, which single cuts do not foresee.
+/// Division of a solid into round cells of about the same size, for thin shells. The hull of a piece of a
+/// curved shell is thicker than the shell, by an amount that grows with the longest extent of the piece along
+/// it. A single cut shortens a piece in one direction only, so a search by single cuts gains little and stops
+/// early.
 
 #include <vector>
 

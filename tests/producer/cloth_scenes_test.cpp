@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "cloth_crossings.h"
+#include "cloth_shadow.h"
 #include "producer/build/simulation.h"
 #include "producer/format/scene_io.h"
 #include "sim/collision/distance.h"
@@ -76,34 +77,6 @@ TEST_P(LongClothScene, KeepsClothOutOfBodiesAndOfItself) {
 INSTANTIATE_TEST_SUITE_P(Long, LongClothScene, ::testing::ValuesIn(scenes_with_cloth()),
                          [](const auto& scene) { return scene.param; });
 
-/// Area of the shadow that a cloth throws straight down [m^2], on squares of 0.5 mm around a centre.
-double shadow_area(const sim::ClothView& cloth, const sim::Vec3& centre) {
-  constexpr int kSquares = 640;
-  constexpr double kSquare = 5e-4;
-  std::vector<uint8_t> dark(kSquares * kSquares, 0);
-  for (const sim::Triangle& t : cloth.triangles) {
-    std::array<Eigen::Array2d, 3> p;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const sim::Vec3 place = (cloth.points[t[k]] - centre) / kSquare;
-      p[k] = Eigen::Array2d(place.x(), place.z()) + kSquares / 2.0;
-    }
-    const Eigen::Array2d low = p[0].min(p[1]).min(p[2]).floor().max(0.0);
-    const Eigen::Array2d high = p[0].max(p[1]).max(p[2]).ceil().min(kSquares - 1.0);
-    const auto side = [&](std::size_t k, const Eigen::Array2d& at) {
-      const Eigen::Array2d along = p[(k + 1) % 3] - p[k], across = at - p[k];
-      return along.x() * across.y() - along.y() * across.x();
-    };
-    for (int i = static_cast<int>(low.x()); i <= static_cast<int>(high.x()); ++i)
-      for (int j = static_cast<int>(low.y()); j <= static_cast<int>(high.y()); ++j) {
-        const Eigen::Array2d at(i + 0.5, j + 0.5);
-        const double a = side(0, at), b = side(1, at), c = side(2, at);
-        if (std::min({a, b, c}) >= 0 || std::max({a, b, c}) <= 0)
-          dark[static_cast<std::size_t>(i * kSquares + j)] = 1;
-      }
-  }
-  return kSquare * kSquare * static_cast<double>(std::ranges::count(dark, 1));
-}
-
 TEST(LongSwatches, HaveTheDrapeCoefficientsOfTheirCaption) {
   // (shadow - stand) / (flat - stand): 0 if the cloth hangs straight down from the rim of its stand, 1 if it
   // stays flat (Cusick, 1968).
@@ -123,7 +96,7 @@ TEST(LongSwatches, HaveTheDrapeCoefficientsOfTheirCaption) {
     sim::Vec3 centre = sim::Vec3::Zero();
     for (const Body& body : loaded.scene.bodies)
       if (body.name == "stand_" + cloth.name) centre = body.position;
-    const double drape = 100 * (shadow_area(view, centre) - stand) / (flat - stand);
+    const double drape = 100 * (sim::shadow_area(view, centre) - stand) / (flat - stand);
     const std::size_t at = caption.find(cloth.name + " ");
     ASSERT_NE(at, std::string::npos) << cloth.name;
     EXPECT_NEAR(std::stod(caption.substr(at + cloth.name.size())), drape, 1) << cloth.name;

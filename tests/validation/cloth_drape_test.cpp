@@ -11,6 +11,7 @@
 
 #include "effects/cloth.h"
 #include "sim/world.h"
+#include "tests/cloth_shadow.h"
 
 namespace offstage::sim {
 namespace {
@@ -58,31 +59,6 @@ TriangleMesh disc_of_cells(uint32_t cells, bool alternate) {
   return mesh;
 }
 
-/// Area of the shadow straight down [m^2], on squares of a millimetre.
-Real area_from_above(const ClothView& cloth) {
-  constexpr int kSquares = 320;
-  constexpr Real kSquare = 1e-3;
-  std::vector<uint8_t> dark(kSquares * kSquares, 0);
-  for (const Triangle& t : cloth.triangles) {
-    std::array<Eigen::Array2d, 3> p;
-    for (std::size_t k = 0; k < 3; ++k)
-      p[k] = Eigen::Array2d(cloth.points[t[k]].x(), cloth.points[t[k]].z()) / kSquare + kSquares / 2.0;
-    const Eigen::Array2d low = p[0].min(p[1]).min(p[2]).floor().max(0.0);
-    const Eigen::Array2d high = p[0].max(p[1]).max(p[2]).ceil().min(kSquares - 1.0);
-    const auto side = [&](std::size_t k, const Eigen::Array2d& at) {
-      const Eigen::Array2d along = p[(k + 1) % 3] - p[k], across = at - p[k];
-      return along.x() * across.y() - along.y() * across.x();
-    };
-    for (int i = static_cast<int>(low.x()); i <= static_cast<int>(high.x()); ++i)
-      for (int j = static_cast<int>(low.y()); j <= static_cast<int>(high.y()); ++j) {
-        const Eigen::Array2d at(i + 0.5, j + 0.5);
-        const auto [least, most] = std::minmax({side(0, at), side(1, at), side(2, at)});
-        if (least >= 0 || most <= 0) dark[static_cast<std::size_t>(i * kSquares + j)] = 1;
-      }
-  }
-  return static_cast<Real>(std::ranges::count(dark, 1)) * kSquare * kSquare;
-}
-
 /// (shadow - stand) / (disc - stand) in per cent, mean of the last half second of three.
 Real drape_coefficient(const TriangleMesh& mesh, const std::string& fabric) {
   World world({.max_step = 1.0 / 240});
@@ -96,7 +72,7 @@ Real drape_coefficient(const TriangleMesh& mesh, const std::string& fabric) {
   Real shadow = 0;
   for (int i = 0; i < 72; ++i) {
     world.step(1.0 / 24);
-    if (i >= 60) shadow += area_from_above(world.cloth(cloth)) / 12;
+    if (i >= 60) shadow += shadow_area(world.cloth(cloth), Vec3::Zero()) / 12;
   }
   const Real stand = std::numbers::pi * kStandRadius * kStandRadius;
   return 100 * (shadow - stand) / (std::numbers::pi * kSwatchRadius * kSwatchRadius - stand);
