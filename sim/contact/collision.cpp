@@ -32,9 +32,10 @@ constexpr Real kAcceptedResidual = 1e-6;  ///< share of the velocities: accepted
 /// Share of the velocities: a result with a larger residual is rejected.
 constexpr Real kRoughResidual = 1e-3;
 constexpr uint32_t kCollisionSweeps = 200, kPlasticSweeps = 400, kJointedSweeps = 60;
-/// Limits with bounded effort: contacts still solved by pivoting; updates of single contacts, by sweeps or in
-/// a sequence (60 ns each); solutions in the search for the restitution; cost of a solution with joints [ns].
-constexpr std::size_t kFewContacts = 8, kUpdates = 6'000;
+/// Limits with bounded effort: updates of single contacts, by sweeps or in a sequence (60 ns each), and those
+/// of later solutions of the same cluster; solutions in the search for the restitution; cost of a solution
+/// with joints [ns].
+constexpr std::size_t kUpdates = 4'000, kMoreUpdates = 1'000;
 constexpr int kBoundedSolves = 3;
 constexpr Real kJointBudget = 1e6;
 constexpr Real kResting = 1e-11;  ///< share of the fastest approach of all: slower approaches are ignored
@@ -171,7 +172,7 @@ Real approach(const Contact& c, std::span<const ContactBody> bodies) {
 enum class Effort : uint8_t { full, bounded };
 
 /// Solves few contacts by pivoting and many by sweeps, whose impulses are improved by the proximal method if
-/// necessary and if the effort allows it. With joints only the proximal method is used.
+/// necessary. With joints only the proximal method is used.
 void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, const JointProblem& joints,
                     Effort effort, ContactWork& work) {
   const bool is_bounded = effort == Effort::bounded;
@@ -183,8 +184,7 @@ void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, 
     for (Contact& c : contacts) c.impulse.setZero();
     return work.add({.solves = 1, .fallbacks = 1, .residual = kInfinity});
   }
-  if (contacts.size() <= (is_bounded ? kFewContacts : kDense))
-    return work.add(solve_by_pivoting(bodies, contacts));
+  if (contacts.size() <= kDense) return work.add(solve_by_pivoting(bodies, contacts));
   const std::vector<ContactBody> before(bodies.begin(), bodies.end());
   Real fastest = 0;
   for (Contact& c : contacts) {
@@ -192,11 +192,10 @@ void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, 
     c.is_guessed = true;
     fastest = std::max(fastest, c.relative_velocity(bodies).cwiseAbs().maxCoeff());
   }
-  const auto most = is_bounded ? static_cast<uint32_t>(kUpdates / contacts.size()) : kCollisionSweeps;
-  const uint32_t sweeps = projected_gauss_seidel(bodies, contacts, most, kRounding * fastest);
+  const uint32_t sweeps = projected_gauss_seidel(bodies, contacts, kCollisionSweeps, kRounding * fastest);
   const Real left = residual(bodies, contacts);
   work.add({.solves = 1, .iterations = sweeps, .residual = left});
-  if (is_bounded || left <= kAcceptedResidual * fastest) return;
+  if (left <= kAcceptedResidual * fastest) return;
   std::copy(before.begin(), before.end(), bodies.begin());
   work.add(*ProximalNewton().solve(bodies, contacts));
   --work.solves;
@@ -225,22 +224,39 @@ class Cluster {
 
  private:
   ContactWork solve_with(Real factor) {
-    std::copy(before_.begin(), before_.end(), bodies_.begin());
     fastest_ = 0;
     for (std::size_t i = 0; i < contacts_.size(); ++i) {
       contacts_[i].target = std::max(0.0, -factor * restitution_[i] * velocities_[i].x());
       fastest_ = std::max(fastest_, velocities_[i].norm());
     }
+    if (is_swept()) return go_on_sweeping();
+    std::copy(before_.begin(), before_.end(), bodies_.begin());
     ContactWork work;
     solve_together(bodies_, contacts_, joints_, effort_, work);
     return work;
   }
 
-  /// The residual after a bounded number of sweeps is not a failure, because contacts that still approach
-  /// collide again.
+  /// Whether the effort allows only a number of sweeps. Their residual is not a failure, because contacts
+  /// that still approach collide again.
+  bool is_swept() const {
+    return effort_ == Effort::bounded && joints_.empty() && contacts_.size() > kFewContacts;
+  }
   bool is_solved(const ContactWork& work) const {
-    return work.residual <= kRoughResidual * fastest_ ||
-           (effort_ == Effort::bounded && joints_.empty() && contacts_.size() > kFewContacts);
+    return is_swept() || work.residual <= kRoughResidual * fastest_;
+  }
+
+  /// Sweeps from zero impulses at first, then from those of the last solution.
+  ContactWork go_on_sweeping() {
+    const std::size_t updates = has_swept_ ? kMoreUpdates : kUpdates;
+    if (!has_swept_)
+      for (Contact& c : contacts_) c.impulse.setZero();
+    has_swept_ = true;
+    const uint32_t sweeps =
+        projected_gauss_seidel(bodies_, contacts_, sweeps_of(updates), kRounding * fastest_);
+    return {.solves = 1, .iterations = sweeps, .residual = residual(bodies_, contacts_)};
+  }
+  uint32_t sweeps_of(std::size_t updates) const {
+    return static_cast<uint32_t>(std::max<std::size_t>(updates / contacts_.size(), 1));
   }
 
   /// Scales the restitutions down until no energy is added; `energy` is what they add unscaled. Without
@@ -291,7 +307,9 @@ class Cluster {
       for (Contact& c : contacts_) c.impulse.setZero();
       work.iterations +=
           joints_.empty()
-              ? projected_gauss_seidel(bodies_, contacts_, kPlasticSweeps, kRounding * fastest_)
+              ? projected_gauss_seidel(bodies_, contacts_,
+                                       effort_ == Effort::bounded ? sweeps_of(kUpdates) : kPlasticSweeps,
+                                       kRounding * fastest_)
               : jointed_gauss_seidel(bodies_, contacts_, joints_, kJointedSweeps, kRounding * fastest_);
     }
     if (added_energy() > 0) shrink();
@@ -334,6 +352,7 @@ class Cluster {
   std::vector<ContactBody> before_;
   std::vector<Vec3> velocities_;
   Real fastest_ = 0;  ///< greatest of the velocities [m/s]
+  bool has_swept_ = false;
 };
 
 /// Sums the impulses of several solutions on the joints.

@@ -14,6 +14,7 @@ constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 /// Rows of the awake bodies of a pair.
 struct Link {
   uint32_t a = kNone, b = kNone;
+  bool connects = true;
 
   bool moves() const { return a != kNone || b != kNone; }
 };
@@ -24,21 +25,37 @@ void ContactGraph::forget(uint32_t slot) {
   std::erase_if(entries_, [slot](const Entry& e) { return e.low == slot || e.high == slot; });
 }
 
+bool may_touch(const ContactPair& pair) {
+  return !pair.manifolds().empty();
+}
+
+bool touch_or_push(const ContactPair& pair) {
+  if (pair.touching() > 0) return true;
+  if (pair.needs_toi) return false;  // these are left out of the solution
+  for (const PlacedManifold& m : pair.manifolds())
+    for (uint32_t k = 0; k < m.manifold.count; ++k)
+      if (m.forces[k].now != Vec3::Zero()) return true;
+  return false;
+}
+
 void find_islands(std::span<Body* const> bodies, std::span<ContactPair* const> pairs,
-                  std::span<const std::pair<Body*, Body*>> springs, std::vector<Island>& islands) {
+                  bool (*connect)(const ContactPair&), std::span<const std::pair<Body*, Body*>> springs,
+                  std::vector<Island>& islands) {
   // Bodies and pairs are scattered in memory, so their data are gathered in parallel. The sequential part
   // then uses only their numbers.
   for_each_index(bodies.size(), [&](std::size_t i) { bodies[i]->row = static_cast<uint32_t>(i); });
   const auto link = [](const Body& a, const Body& b) {
-    return Link{a.is_awake() ? a.row : kNone, b.is_awake() ? b.row : kNone};
+    return Link{a.is_awake() ? a.row : kNone, b.is_awake() ? b.row : kNone, true};
   };
   std::vector<Link> links(pairs.size());
   for_each_index(pairs.size(), [&](std::size_t i) {
-    if (!pairs[i]->manifolds().empty()) links[i] = link(pairs[i]->a(), pairs[i]->b());
+    if (pairs[i]->manifolds().empty()) return;
+    links[i] = link(pairs[i]->a(), pairs[i]->b());
+    links[i].connects = connect(*pairs[i]);
   });
   DisjointSets sets(bodies.size());
   const auto join = [&](const Link& l) {
-    if (l.a != kNone && l.b != kNone) sets.join(l.a, l.b);
+    if (l.connects && l.a != kNone && l.b != kNone) sets.join(l.a, l.b);
   };
   for (const Link& l : links) join(l);
   for (const auto& [a, b] : springs) join(link(*a, *b));
@@ -55,8 +72,11 @@ void find_islands(std::span<Body* const> bodies, std::span<ContactPair* const> p
     ++sizes[number[i]].bodies;
   }
   const auto island_of = [&](const Link& l) { return number[l.a != kNone ? l.a : l.b]; };
+  const auto is_within_one = [&](const Link& l) {
+    return l.moves() && (l.a == kNone || l.b == kNone || number[l.a] == number[l.b]);
+  };
   for (const Link& l : links)
-    if (l.moves()) ++sizes[island_of(l)].pairs;
+    if (is_within_one(l)) ++sizes[island_of(l)].pairs;
 
   islands.resize(sizes.size());
   for (std::size_t i = 0; i < islands.size(); ++i) {
@@ -71,7 +91,7 @@ void find_islands(std::span<Body* const> bodies, std::span<ContactPair* const> p
   }
   for (std::size_t i = 0; i < bodies.size(); ++i) islands[number[i]].bodies.push_back(bodies[i]);
   for (std::size_t i = 0; i < pairs.size(); ++i)
-    if (links[i].moves()) islands[island_of(links[i])].pairs.push_back(pairs[i]);
+    if (is_within_one(links[i])) islands[island_of(links[i])].pairs.push_back(pairs[i]);
   for_each_index(bodies.size(), [&](std::size_t i) { bodies[i]->island = number[i]; });
 }
 

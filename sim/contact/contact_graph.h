@@ -52,11 +52,18 @@ class ContactGraph {
   std::vector<Entry> entries_, next_;
 };
 
+/// Whether two bodies may touch in the interval: they have contact points.
+bool may_touch(const ContactPair& pair);
+/// Whether two bodies touch, or push each other in the interval that was solved last.
+bool touch_or_push(const ContactPair& pair);
+
 /// Groups awake bodies, which must be in the order of ranks, by links between them, and sets Body::island.
 /// The islands are in the order of their first bodies, without motion or articulations; their memory is
-/// reused. Pairs without contact points connect nothing and are omitted.
+/// reused. Pairs without contact points are omitted, and so are pairs that do not `connect` their bodies and
+/// are not within one island.
 void find_islands(std::span<Body* const> bodies, std::span<ContactPair* const> pairs,
-                  std::span<const std::pair<Body*, Body*>> springs, std::vector<Island>& islands);
+                  bool (*connect)(const ContactPair&), std::span<const std::pair<Body*, Body*>> springs,
+                  std::vector<Island>& islands);
 
 template <class BodyAt, class SurfaceOf>
 void ContactGraph::update(std::span<const IndexPair> candidates, bool adds, BodyAt&& body_at,

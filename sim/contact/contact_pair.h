@@ -106,6 +106,8 @@ class alignas(64) ContactPair {
   void replace(uint32_t i, const Manifold& m);
   void drop_empty();
 
+  /// Whether the only contact is that of a sphere with a simple shape, found in closed form.
+  bool has_sphere() const { return has_sphere_; }
   /// Whether find() was never called.
   bool is_new() const { return found_margin_ < 0; }
 

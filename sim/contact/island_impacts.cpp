@@ -140,10 +140,12 @@ CollisionOutcome resolve_collisions(const Island& island, const CollisionSetting
         collide_roughly(cluster.bodies, cluster.contacts, cluster.restitution, settings.law, problem);
   else
     outcome.work = collide_reached(cluster, settings.collision_speed, settings.law, problem);
+  // Without joints, only small clusters are factorized with bounded effort.
+  const std::size_t dense =
+      std::min(cluster.contacts.size(), settings.whole || !problem.empty() ? kSmallCluster : kFewContacts);
   outcome.cost = static_cast<Real>(outcome.work.iterations * cluster.contacts.size()) * kContactUpdate +
                  static_cast<Real>(outcome.work.factorizations) *
-                     std::pow(3.0 * static_cast<Real>(std::min(cluster.contacts.size(), kSmallCluster)), 3) *
-                     kDenseProduct;
+                     std::pow(3.0 * static_cast<Real>(dense), 3) * kDenseProduct;
   if (outcome.work.fallbacks > 0)
     if (const auto worst = worst_contact(cluster.bodies, cluster.contacts))
       outcome.rough = cluster.pairs[*worst];

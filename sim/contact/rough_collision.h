@@ -5,6 +5,9 @@
 
 namespace offstage::sim {
 
+/// Without joints, clusters of at most this many contacts are solved by pivoting with bounded effort, too.
+inline constexpr std::size_t kFewContacts = 8;
+
 /// The same as collide(), but with at most about ten thousand operations, so some contacts of a large cluster
 /// may still approach afterwards. Like collide(), it never adds kinetic energy.
 ContactWork collide_roughly(std::span<ContactBody> bodies, std::span<Contact> contacts,

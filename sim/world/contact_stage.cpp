@@ -173,6 +173,7 @@ void World::Impl::collect_pairs(bool again) {
 /// Computes a bound of the speed that an impact in the sub-step can give to each body, propagated from body
 /// to body with decreasing shares.
 void World::Impl::propagate_impact_speeds(Real h) {
+  for (Body* body : awake) body->impact_speed_bound = 0;
   if (is_exact()) return;  // the exact solver resolves each impact at its own time
   struct Approach {
     Body *a, *b;
@@ -183,7 +184,6 @@ void World::Impl::propagate_impact_speeds(Real h) {
     ContactPair& pair = *active_pairs[i];
     approaches[i] = {&pair.a(), &pair.b(), pair.speed_bound()};
   });
-  for (Body* body : awake) body->impact_speed_bound = 0;
   const auto strike = [](Body& body, Real speed) {
     if (body.is_awake()) body.impact_speed_bound = std::max(body.impact_speed_bound, speed);
   };
@@ -252,7 +252,9 @@ void World::Impl::find_points(ContactPair& pair, Real time, Real h) const {
   const bool exact = is_exact();
   // An impact moves a body at most as fast as the body that hits it.
   const Real impact = std::max(pair.a().impact_speed_bound, pair.b().impact_speed_bound) * left;
-  const Real margin = base + std::min(std::max(2 * motion, impact), far);
+  // If no impact of the pair is traced back to any more, only its points keep the bodies apart.
+  const Real most = pair.toi_exhausted ? std::numeric_limits<Real>::infinity() : far;
+  const Real margin = base + std::min(std::max(2 * motion, impact), most);
   // An impact also turns the body.
   const Real turning = pair.turning_speed() * left + (impact > kMargin ? impact : 0);
   const Real reuse = exact ? kExactReuse : std::min(kReuse, kReuseShare * size);
@@ -306,7 +308,8 @@ std::vector<Body*> World::Impl::wake_touched(Real start, Real h) {
   return woken;
 }
 
-void World::Impl::find_moving_islands() {
+/// Groups the awake bodies by joints, springs and the contacts that `connect` them.
+void World::Impl::find_moving_islands(bool (*connect)(const ContactPair&)) {
   std::vector<std::pair<Body*, Body*>> joined;
   if (!springs.empty() || !articulations.empty()) {
     const CouplingGraph connections(*this);
@@ -318,7 +321,7 @@ void World::Impl::find_moving_islands() {
       first[c] = body;
     }
   }
-  find_islands(awake, active_pairs, joined, islands);
+  find_islands(awake, active_pairs, connect, joined, islands);
   for (Island& island : islands) island.motion = motions.front().get();
   for (const auto& articulation : articulations)
     if (const Body& first = *articulation->bodies().front(); first.is_awake())

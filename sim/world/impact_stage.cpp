@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "sim/contact/contact_motion.h"
+#include "sim/contact/contact_terms.h"
 #include "sim/core/parallel_loop.h"
 #include "sim/dynamics/free_body.h"
 #include "sim/world/coupled_system.h"
@@ -18,14 +19,14 @@ namespace {
 
 constexpr uint32_t kMaxImpactsOfPair = 40, kMaxOfTumblingPair = 100;
 constexpr std::size_t kMaxImpacts = 128, kImpactsPerBody = 4;
-/// Limit of the work of impacts in a sub-step, in contact points and bodies that are moved again (about 1 us
-/// each by the fast solver), and in us of the impact solver; the limit for the exact solver is larger by
-/// kExactImpactWork. In a pile each impact moves all bodies and causes hundreds of other impacts.
-constexpr std::size_t kImpactWork = 2500, kExactImpactWork = 8;
-/// Work of a search for the time of impact of a pair, for each piece of its path.
-constexpr std::size_t kLookWork = 2;
+/// Limits of the work of impacts in a sub-step, for the fast and for the exact solver [us]. In a pile each
+/// impact moves many bodies and causes hundreds of other impacts.
+constexpr std::size_t kImpactWork = 2000, kExactImpactWork = 80'000;
+/// Work of an impact for each body and contact point that is moved again, and for each near pair that is not
+/// of two spheres; work of a search for the time of impact of a pair for each piece of its path [us].
+constexpr std::size_t kPointWork = 1, kPairWork = 3, kLookWork = 3;
 /// After this multiple of the limit no more pairs are traced back to in the sub-step.
-constexpr std::size_t kLastWork = 4;
+constexpr std::size_t kLastWork = 3;
 /// Contact points with a smaller separation take part in a collision [m].
 constexpr Real kCluster = 1e-4;
 /// Larger rotations in an interval are divided into pieces of this angle [rad], of which there are at most
@@ -63,12 +64,12 @@ uint32_t pieces_of(Real turn) {
   return static_cast<uint32_t>(std::clamp(std::ceil(turn / kImpactTurn), 1.0, kMostTurns));
 }
 
-/// Work of an impact in an island, see kImpactWork.
+/// Work of moving an island again [us].
 std::size_t impact_work(const Island& island) {
   std::size_t work = island.bodies.size();
   for (const ContactPair* pair : island.pairs)
     for (const PlacedManifold& m : pair->manifolds()) work += m.manifold.count;
-  return work;
+  return kPointWork * work;
 }
 
 /// Change of a body's velocity in its interval if it is due to a steady force; zero if the body was stopped
@@ -103,6 +104,15 @@ Real touching_share(const Impact& impact, const PosePath& a, const PosePath& b) 
   const Real closing = (velocity(b, s.on_b) - velocity(a, s.on_a)).dot(pose.vector_to_world(s.normal));
   if (!(closing > 0)) return impact.share;
   return impact.share + std::min(s.distance / closing, 1 - impact.share);
+}
+
+/// Speed that the forces in the rest of its interval, of this duration, have given to the points of a body
+/// [m/s].
+Real speed_by_forces(const Body& body, Real duration) {
+  const Vec3 shift = body.rigid.position - body.start.position;
+  const Real slip = (shift - duration * body.start_twist.velocity).norm() / duration;
+  const Vec3 turn = rotation_vector(body.start.orientation, body.rigid.orientation);
+  return slip + body.extent * (turn / duration - body.start_twist.angular_velocity).norm();
 }
 
 /// A body in free rotation through its interval.
@@ -252,9 +262,12 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
     return taken;
   };
   std::size_t work = look([](const ContactPair&) { return true; });
+  // An impact moves back only bodies that are connected to it by forces. Most others in an island are merely
+  // near; they join if the impact sends a body their way.
+  if (!impacts.empty()) find_moving_islands(touch_or_push);
 
   const std::size_t most = kMaxImpacts + kImpactsPerBody * awake.size();
-  const std::size_t most_work = (is_exact() ? kExactImpactWork : 1) * kImpactWork;
+  const std::size_t most_work = is_exact() ? kExactImpactWork : kImpactWork;
   for (std::size_t count = 0; !impacts.empty(); ++count) {
     const auto first = std::min_element(impacts.begin(), impacts.end(),
                                         [](const Impact& x, const Impact& y) { return x.time < y.time; });
@@ -276,7 +289,10 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
     }
     ++report.tracebacks;
     work += impact_work(islands[island]);
-    if (work > most_work) suppress_restitution(island, report);
+    if (work > most_work) {
+      join_pending(island, start, impact.time, h, impacts, report);
+      suppress_restitution(island, report);
+    }
     work += collide(island, start, impact.time, h, report);
     // The speculative contacts of these bodies are no longer valid.
     const auto involved = [&](const ContactPair& p) {
@@ -284,6 +300,23 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
     };
     std::erase_if(impacts, [&](const Impact& i) { return involved(*i.pair); });
     work += look(involved);
+  }
+}
+
+/// Merges an island with all that it is about to hit at a time or later, and with those that these hit: one
+/// solution then replaces many impacts.
+void World::Impl::join_pending(uint32_t number, Real start, Real time, Real h,
+                               std::span<const Impact> impacts, StepReport& report) {
+  for (bool grown = true; grown;) {
+    grown = false;
+    for (const Impact& impact : impacts) {
+      const Body &a = impact.pair->a(), &b = impact.pair->b();
+      if (!a.is_awake() || !b.is_awake() || (a.island == number) == (b.island == number)) continue;
+      const uint32_t other = a.island == number ? b.island : a.island;
+      bring_to(islands[other], start, time, h, report);
+      join(number, other);
+      grown = true;
+    }
   }
 }
 
@@ -329,29 +362,37 @@ void World::Impl::join(uint32_t into, uint32_t other) {
 }
 
 /// Collides an island's bodies with each other and with the bodies that they touch at a time, and continues
-/// their motion from there. Returns the work, see kImpactWork.
+/// their motion from there. Returns its work [us].
 std::size_t World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepReport& report) {
-  // Bodies that they touch join the island, and in turn the bodies that those touch.
+  // Bodies that they touch join the island, and in turn the bodies that those touch. The points of a pair are
+  // found again when its second body has joined, because that body was moved back.
+  std::vector<uint8_t> members(active_pairs.size(), 0);
+  std::size_t work = 0;
+  const auto is_member = [&](const Body& body) { return body.is_awake() && body.island == number; };
   for (bool grown = true; grown;) {
     grown = false;
-    Island& island = islands[number];
-    island.pairs.clear();
-    for (ContactPair* pair : active_pairs) {
-      const bool has_a = pair->a().is_awake() && pair->a().island == number,
-                 has_b = pair->b().is_awake() && pair->b().island == number;
-      if (!has_a && !has_b) continue;
-      find_points(*pair, time, h);
-      Body* other = has_a ? &pair->b() : &pair->a();
-      if (has_a != has_b && other->is_awake()) {
-        if (pair->separation() > kTouching) continue;
-        const uint32_t joined = other->island;
-        bring_to(islands[joined], start, time, h, report);
-        join(number, joined);
-        grown = true;
-        break;
-      }
-      if (!pair->manifolds().empty()) island.pairs.push_back(pair);
+    for (std::size_t i = 0; i < active_pairs.size(); ++i) {
+      ContactPair& pair = *active_pairs[i];
+      const bool has_a = is_member(pair.a()), has_b = is_member(pair.b());
+      const auto count = static_cast<uint8_t>(has_a + has_b);
+      if (count == members[i]) continue;
+      members[i] = count;
+      find_points(pair, time, h);
+      const Body& other = has_a ? pair.b() : pair.a();
+      if (count == 2 || !other.is_awake() || pair.separation() > kTouching) continue;
+      const uint32_t joined = other.island;
+      bring_to(islands[joined], start, time, h, report);
+      join(number, joined);
+      grown = true;
     }
+  }
+  islands[number].pairs.clear();
+  for (std::size_t i = 0; i < active_pairs.size(); ++i) {
+    ContactPair& pair = *active_pairs[i];
+    const Body& other = is_member(pair.a()) ? pair.b() : pair.a();
+    if (members[i] > 0 && !pair.has_sphere()) work += kPairWork;
+    if (members[i] == 0 || (members[i] == 1 && other.is_awake()) || pair.manifolds().empty()) continue;
+    islands[number].pairs.push_back(&pair);
   }
   Island& island = islands[number];
   remove_seams(island.pairs, time, h);
@@ -362,20 +403,25 @@ std::size_t World::Impl::collide(uint32_t number, Real start, Real time, Real h,
   add_rough(outcome.rough, report);
   for (Body* body : island.bodies) body->rigid.set_state(body->start);
   if (time < h * (1 - kInstant)) go_on(number, start, time, h, report);
-  return static_cast<std::size_t>(outcome.cost / 1000);
+  return work + static_cast<std::size_t>(outcome.cost / 1000);
 }
 
 /// Continues the motion of an island from an impact to the end of the sub-step. Its velocities have changed,
-/// so other bodies may be in its way and other contacts limit its motion.
+/// so other bodies may be in its way and other contacts limit its motion. If so, they join, and all of them
+/// start again.
 void World::Impl::go_on(uint32_t number, Real start, Real time, Real h, StepReport& report) {
-  do {
+  for (bool joined = true; joined;) {
+    for (Body* body : islands[number].bodies) body->rigid.set_state(body->start);
     islands[number].motion = &move_some(islands[number].bodies, start, time, h - time);
     find_pairs_again(number, start, h, report);
-  } while (join_next(number, start, time, h, report));
-  Island* const one[] = {&islands[number]};
-  if (has_forces(islands[number]))
-    solve(one, {.duration = h - time, .end = start + h, .substep = h, .is_whole = false}, report);
-  find_pairs_again(number, start, h, report);
+    joined = join_next(number, start, time, h, report);
+    if (joined) continue;
+    Island* const one[] = {&islands[number]};
+    if (has_forces(islands[number]))
+      solve(one, {.duration = h - time, .end = start + h, .substep = h, .is_whole = false}, report);
+    find_pairs_again(number, start, h, report);
+    joined = join_overtaken(number, start, time, h, report);
+  }
 }
 
 /// Finds the contacts of an island that continues from `time`. If a body of another island is in its way and
@@ -404,6 +450,34 @@ bool World::Impl::join_next(uint32_t number, Real start, Real time, Real h, Step
   return joined;
 }
 
+/// Merges the islands into which an island has been pushed by its contact forces since `time`, and finds the
+/// contacts that it has not looked for because they were too far away. Returns whether there are any; all
+/// bodies must then be moved again.
+bool World::Impl::join_overtaken(uint32_t number, Real start, Real time, Real h, StepReport& report) {
+  for (Body* body : islands[number].bodies)
+    body->impact_speed_bound = std::max(body->impact_speed_bound, speed_by_forces(*body, h - time));
+  bool joined = false;
+  for (std::size_t i = 0; i < active_pairs.size(); ++i) {
+    ContactPair& pair = *active_pairs[i];
+    const auto is_member = [&](const Body& body) { return body.is_awake() && body.island == number; };
+    const bool has_a = is_member(pair.a()), has_b = is_member(pair.b());
+    if ((!has_a && !has_b) || pair.needs_toi) continue;
+    const Body& other = has_a ? pair.b() : pair.a();
+    const bool is_inside = has_a == has_b || !other.is_awake();
+    // The known points inside have limited the approach.
+    if (is_inside && !pair.manifolds().empty()) continue;
+    if (std::max(pair.a().impact_speed_bound, pair.b().impact_speed_bound) * (h - time) > kTouching)
+      find_points(pair, time, h);
+    if (pair.needs_toi || !overlaps_at_end(pair, time, h)) continue;
+    joined = true;
+    if (is_inside) continue;
+    const uint32_t next = other.island;
+    bring_to(islands[next], start, time, h, report);
+    join(number, next);
+  }
+  return joined;
+}
+
 /// Whether any points of a pair may meet within a time.
 bool World::Impl::closes(const ContactPair& pair, Real left) const {
   for (const PlacedManifold& m : pair.manifolds())
@@ -411,6 +485,21 @@ bool World::Impl::closes(const ContactPair& pair, Real left) const {
       const ContactPoint& point = m.manifold.points[k];
       const Real speed = pair.relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n);
       if (point.separation + 2 * (speed - def.gravity.norm() * left) * left < 0) return true;
+    }
+  return false;
+}
+
+/// Whether the points of a pair at a time overlap at the end of the sub-step.
+bool World::Impl::overlaps_at_end(const ContactPair& pair, Real time, Real h) const {
+  const auto displacement = [&](const Body& body, const Vec3& place) {
+    const Vec3 local = body.placed_at(time, h).point_to_body(place);
+    return Vec3(body.placed_at(h, h).point_to_world(local) - place);
+  };
+  for (const PlacedManifold& m : pair.manifolds())
+    for (uint32_t k = 0; k < m.manifold.count; ++k) {
+      const ContactPoint& point = m.manifold.points[k];
+      const Vec3 approach = displacement(pair.a(), point.on_a) - displacement(pair.b(), point.on_b);
+      if (point.separation + m.frame.n.dot(approach) < -kTouching) return true;
     }
   return false;
 }

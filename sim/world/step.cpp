@@ -110,7 +110,7 @@ void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
   if (!awake.empty() || (!kinematic.empty() && asleep > 0)) {
     do update_pairs(h);
     while (!wake_touched(start, h).empty());
-    find_moving_islands();
+    find_moving_islands(may_touch);
     solve_islands(start, h, report);
     resolve_impacts(start, h, report);
   } else {

@@ -98,7 +98,7 @@ struct World::Impl : WorldState {
   bool move_in_broad_phase(Body& body, bool again);
   void collect_pairs(bool again);
   std::vector<Body*> wake_touched(Real start, Real h);
-  void find_moving_islands();
+  void find_moving_islands(bool (*connect)(const ContactPair&));
   void solve_islands(Real start, Real h, StepReport& report);
   void solve(std::span<Island* const> group, const ContactInterval& interval, StepReport& report);
   void settle_joints(const Island& island, Real end, Real most_energy);
@@ -117,6 +117,8 @@ struct World::Impl : WorldState {
   std::optional<Real> tumbling_impact_time(const ContactPair& pair, Real from, Real h, Real turn,
                                            TestCounts& tests) const;
   std::optional<Real> point_impact_time(const ContactPair& pair, Real h) const;
+  void join_pending(uint32_t number, Real start, Real time, Real h, std::span<const Impact> impacts,
+                    StepReport& report);
   void suppress_restitution(uint32_t island, StepReport& report);
   void bring_to(Island& island, Real start, Real time, Real h, StepReport& report);
   void join(uint32_t into, uint32_t island);
@@ -124,6 +126,8 @@ struct World::Impl : WorldState {
   std::size_t collide(uint32_t island, Real start, Real time, Real h, StepReport& report);
   void go_on(uint32_t island, Real start, Real time, Real h, StepReport& report);
   bool join_next(uint32_t island, Real start, Real time, Real h, StepReport& report);
+  bool join_overtaken(uint32_t number, Real start, Real time, Real h, StepReport& report);
+  bool overlaps_at_end(const ContactPair& pair, Real time, Real h) const;
   bool closes(const ContactPair& pair, Real left) const;
 
   uint32_t surface_number(const std::string& material);

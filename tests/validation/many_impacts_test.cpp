@@ -63,6 +63,44 @@ TEST(ManyImpacts, BallsOfAColumnThatReboundIntoEachOtherDoNotOverlap) {
           }
 }
 
+// The same beyond the number of impacts that are traced back to in a sub-step: the others are plastic, and
+// the balls that are pushed meet balls that were far from them at the start.
+TEST(ManyImpacts, BallsOfALongColumnDoNotPassThroughEachOther) {
+  BallColumn column(SolverKind::fast, 1.0 / 60, 60, 0.5, 0.02, 5);
+  Real deepest = 0;
+  while (column.world.time() < 1.5) {
+    column.world.step(1.0 / 60);
+    deepest = std::max(deepest, column.overlap());
+  }
+  EXPECT_LT(deepest, 0.01);
+}
+
+// A ball rebounds from the floor into one that falls onto it, and both stop. Their impact is not traced back
+// to, because it is plastic: the motion after the first impact must start again with both.
+TEST(ManyImpacts, ABallThatReboundsIntoAnotherStopsWithIt) {
+  for (const SolverKind solver : {SolverKind::fast, SolverKind::automatic})
+    for (const Real gap : {0.001, 0.01, 0.05}) {
+      constexpr Real kStep = 1.0 / 60, kSpeed = 10;
+      World world({.gravity = Vec3::Zero(), .max_step = kStep, .solver = solver, .sleep = false});
+      world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 1, .friction = 0});
+      const auto ball = [&](Real height) {
+        return world.add_body({.shape = Sphere{0.5},
+                               .pose = {Vec3(0, height, 0)},
+                               .velocity = Vec3(0, -kSpeed, 0),
+                               .restitution = 0,
+                               .friction = 0});
+      };
+      const BodyHandle low = ball(0.52), high = ball(1.52 + gap);
+      world.step(kStep);
+      const BodyState a = world.body(low), b = world.body(high);
+      // They meet half-way when the lower one is back where the gap has closed.
+      const Real met = 0.5 + gap / 2;
+      EXPECT_NEAR(a.velocity.y() + b.velocity.y(), 0, 1e-9) << named(solver, kStep) << ", gap " << gap;
+      EXPECT_NEAR(a.centre.y(), met, 1e-4) << named(solver, kStep) << ", gap " << gap;
+      EXPECT_NEAR(b.centre.y() - a.centre.y(), 1, 1e-4) << named(solver, kStep) << ", gap " << gap;
+    }
+}
+
 // The report contains overlaps of the whole step, also those that have disappeared at its end.
 TEST(ManyImpacts, ThePenetrationOfAStepIsTheGreatestInIt) {
   World world({.gravity = Vec3::Zero(), .sleep = false});
