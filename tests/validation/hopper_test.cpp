@@ -152,9 +152,9 @@ TEST_P(Hopper, DischargesAsBeverlooSaysWhateverItsFill) {
   EXPECT_NEAR(rates.back() / rates.front(), 1, 0.1);
 }
 
-INSTANTIATE_TEST_SUITE_P(Short, Hopper, testing::Values(HopperCase{0.07, 0.15, {14}}));
+INSTANTIATE_TEST_SUITE_P(Short, Hopper, testing::Values(HopperCase{0.07, 0.15, {16}}));
 INSTANTIATE_TEST_SUITE_P(Long, Hopper,
-                         testing::Values(HopperCase{0.07, 0.15, {14, 22}}, HopperCase{0.09, 0.18, {16, 24}}));
+                         testing::Values(HopperCase{0.07, 0.15, {18, 28}}, HopperCase{0.09, 0.18, {26, 36}}));
 
 }  // namespace
 }  // namespace offstage::sim
