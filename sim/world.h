@@ -328,6 +328,8 @@ class World {
   ClothView cloth(ClothHandle cloth) const;
   const ClothDef& cloth_def(ClothHandle cloth) const;
   const ClothReport& cloth_report(ClothHandle cloth) const;  ///< of the last step
+  /// The gas inside of a cloth with `pressure` now; zero for other cloths.
+  ClothGasState cloth_gas(ClothHandle cloth) const;
   void for_each_cloth(const std::function<void(ClothHandle)>& f) const;
   std::size_t cloth_count() const;
   void for_each_body(const std::function<void(BodyHandle)>& f) const;

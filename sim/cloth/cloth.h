@@ -172,6 +172,12 @@ struct ClothTear {
   bool touches_body = false;  ///< the cloth touched a body in that sub-step
 };
 
+/// The gas inside of a closed cloth.
+struct ClothGasState {
+  Real volume = 0;    ///< with each hole of a tear closed by a fan of triangles [m^3]
+  Real pressure = 0;  ///< over that outside [Pa], at the height of the first vertex if the gas has a weight
+};
+
 /// Statistics of a cloth. Counts are sums over the sub-steps of the last step; other values are those at its
 /// end.
 struct ClothReport {

@@ -135,10 +135,15 @@ void lift(Run& run, const Vec3& gravity) {
   }
 }
 
+/// The overpressure that acts [Pa]; `lift` adds the weight of the gas.
+Real acting_pressure(const Cloth& cloth) {
+  return cloth.gas.share() * overpressure(cloth);
+}
+
 void inflate(Run& run, const Vec3& gravity) {
   const Cloth& cloth = run.cloth;
   if (cloth.def.pressure == 0) return;
-  push_out(run, cloth.gas.share() * overpressure(cloth));
+  push_out(run, acting_pressure(cloth));
   lift(run, gravity);
 }
 
@@ -171,6 +176,11 @@ void set_inertia(Run& run) {
 }
 
 }  // namespace
+
+ClothGasState gas_state(const Cloth& cloth) {
+  if (cloth.def.pressure == 0) return {};
+  return {cloth.gas.volume(cloth.points, cloth.triangles), acting_pressure(cloth)};
+}
 
 void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather& weather,
                       ClothPoints& points) {

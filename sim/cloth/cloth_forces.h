@@ -17,6 +17,9 @@ struct ClothWeather {
   std::span<const ForceDef* const> forces;
 };
 
+/// The gas inside of a cloth with `pressure`; zero for other cloths.
+ClothGasState gas_state(const Cloth& cloth);
+
 /// Sets the masses of a cloth's points, which begin at index `first`, their accelerations by outer forces,
 /// the velocity of the air there, and the rate of linear drag by fields and hands. Points of a cloth under
 /// pressure that is torn have the mass of the gas that they move, too.

@@ -495,6 +495,18 @@ void ContactPair::remember(std::vector<Remembered>& points) const {
 /// limit.
 void ContactPair::recall(std::vector<Remembered>& points, const Pose& pose) {
   const Frame a(pose);
+  // Two models of many parts have thousands of points, so only those are compared that are near along x or
+  // belong to the same features.
+  static thread_local std::vector<std::pair<Real, uint32_t>> by_x;
+  static thread_local std::vector<std::pair<uint32_t, uint32_t>> by_id;
+  by_x.clear();
+  by_id.clear();
+  for (uint32_t i = 0; i < points.size(); ++i) {
+    by_x.emplace_back(points[i].on_a.x(), i);
+    by_id.emplace_back(points[i].id, i);
+  }
+  std::sort(by_x.begin(), by_x.end());
+  std::sort(by_id.begin(), by_id.end());
   for (PlacedManifold& m : placed_) {
     m.torque = m.mean_torque = 0;
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
@@ -503,12 +515,19 @@ void ContactPair::recall(std::vector<Remembered>& points, const Pose& pose) {
       const Vec3 on_a = a.point_to_body(point.on_a);
       Remembered* best = nullptr;
       Real nearest = kSame * kSame;
-      for (Remembered& p : points) {
+      const auto compare = [&](Remembered& p) {
         const Real distance = (p.on_a - on_a).squaredNorm() * (p.id == point.id ? kSameFeature : 1);
-        if (p.taken || distance >= nearest) continue;
+        // Of equally near points, the first one counts.
+        if (p.taken || distance > nearest || (distance == nearest && (!best || best < &p))) return;
         nearest = distance;
         best = &p;
-      }
+      };
+      for (auto at = std::lower_bound(by_x.begin(), by_x.end(), std::pair(on_a.x() - kSame, 0u));
+           at != by_x.end() && at->first <= on_a.x() + kSame; ++at)
+        compare(points[at->second]);
+      for (auto at = std::lower_bound(by_id.begin(), by_id.end(), std::pair(point.id, 0u));
+           at != by_id.end() && at->first == point.id; ++at)
+        compare(points[at->second]);
       if (!best) continue;
       best->taken = true;
       m.forces[k] = recalled(*best, m.frame, a.axes);
@@ -523,13 +542,17 @@ void ContactPair::recall(std::vector<Remembered>& points, const Pose& pose) {
 /// manifold with a similar normal. They are distributed over its points so that their sum acts where it did,
 /// as far as the points extend.
 void ContactPair::inherit(std::vector<Remembered>& points, const Pose& a) {
-  if (std::all_of(points.begin(), points.end(), [](const Remembered& p) { return p.taken; })) return;
+  std::vector<Remembered*> left;
+  for (Remembered& p : points)
+    if (!p.taken && !(p.last.isZero(0) && p.mean.isZero(0))) left.push_back(&p);
+  if (left.empty()) return;
   for (PlacedManifold& m : placed_) {
     const ContactFrame frame{a.vector_to_body(m.frame.n), a.vector_to_body(m.frame.t),
                              a.vector_to_body(m.frame.k)};
     Vec3 force = Vec3::Zero(), mean = Vec3::Zero(), moment = Vec3::Zero();
     Real pressure = 0;
-    for (Remembered& p : points) {
+    for (Remembered* remembered : left) {
+      Remembered& p = *remembered;
       // Directions are kept in the world, however far a rolling body has turned.
       const Vec3 before = placed_at_.vector_to_world(p.normal);
       if (p.taken || !(before.dot(m.frame.n) > kAlong)) continue;

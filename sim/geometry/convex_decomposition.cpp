@@ -28,6 +28,9 @@ constexpr Real kExact = 1e-6;
 /// Bound of CutLimits::max_work if an approximation will do.
 constexpr Real kQuickWork = 3e7;
 
+/// Least factor by which the number of parts grows if the error is missed.
+constexpr Real kMoreParts = 1.25;
+
 /// Number of points for estimated errors.
 constexpr Real kErrorPoints = 3e4;
 
@@ -215,14 +218,30 @@ Real volume_of(const std::vector<SolidPiece>& solids) {
   return volume;
 }
 
+/// Parts with the accepted error, if a number up to `most_parts` has it. A patch of a shell of the thickness
+/// t whose sides are a and b along the principal curvatures k_a and k_b has a hull that is larger by the
+/// share
+/// (|k_a| a^2 + |k_b| b^2) / (12 t). So the error falls as 1 / n with the number n of parts, and needs at
+/// least sqrt(|k_a k_b|) area / (6 t error) parts.
+CutDecomposition cuts_within(const std::vector<SolidPiece>& solids, const DecompositionSettings& settings) {
+  CutDecomposition best;
+  for (Real count = settings.max_parts;;) {
+    CutDecomposition cuts = decompose_by_cuts(solids, {settings.max_error, static_cast<std::size_t>(count)});
+    if (best.parts.empty() || cuts.error < best.error) best = std::move(cuts);
+    if (best.parts.empty() || best.error <= settings.max_error || count >= settings.most_parts) return best;
+    const Real expected = count * best.error / settings.max_error;
+    count = std::min<Real>(settings.most_parts, std::ceil(std::max(kMoreParts * count, expected)));
+  }
+}
+
 ConvexDecomposition decompose_approximately(const std::vector<SolidPiece>& solids,
                                             const DecompositionSettings& settings, const std::string& why) {
   const Real volume = volume_of(solids);
   if (!(volume > 0)) return no_parts("the surface encloses nothing: " + why);
-  CutDecomposition cuts = decompose_by_cuts(solids, {settings.max_error, settings.max_parts});
+  const CutDecomposition cuts = cuts_within(solids, settings);
   if (cuts.parts.empty()) return no_parts("the surface encloses nothing: " + why);
   const Real error = relative_error(cuts.parts, volume);
-  ConvexDecomposition result{Method::approximate, std::move(cuts.parts), error, cuts.error, why};
+  ConvexDecomposition result{Method::approximate, cuts.parts, error, cuts.error, why};
   if (solids.size() > 1 && may_overlap(solids)) estimate_errors(solids, result);
   return result;
 }

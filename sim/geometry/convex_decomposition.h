@@ -33,8 +33,11 @@ struct DecompositionSettings {
   Real min_distance = 0.1;
   uint32_t max_reflex_edges = 2000;  ///< with more reflex edges the solid is approximated at once
   Real max_error = 0.05;             ///< accepted error of an approximate decomposition, > 0
-  uint32_t max_parts = 64;           ///< has priority over the error, >= 1
-  uint32_t resolution = 64;          ///< voxels along the longest side of a mesh with holes
+  uint32_t max_parts = 64;           ///< wanted greatest number, >= 1
+  /// Greatest number of approximate parts, >= max_parts: where max_parts miss the error, as for thin bent
+  /// shells, more are made, up to this number, which has priority over the error.
+  uint32_t most_parts = 1024;
+  uint32_t resolution = 64;  ///< voxels along the longest side of a mesh with holes
 
   bool operator==(const DecompositionSettings&) const = default;
 };

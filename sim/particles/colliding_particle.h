@@ -21,6 +21,9 @@ struct CollidingParticle {
   Vec3 acceleration;   ///< mean acceleration by forces
   Real from;           ///< start of its path, since the sub-step's start [s]
   Real mass, radius, restitution, friction;
+  /// For a ball that turns: m r^2 / I (kBallTurning) and r times its angular velocity [m/s]; otherwise zero.
+  Real turning;
+  Vec3 surface_spin;
   uint32_t system;          ///< number of its system
   bool internal, external;  ///< see ParticleSystemDef
   bool hits_bodies;
@@ -34,6 +37,13 @@ struct CollidingParticle {
     path_velocity = after + (h - t) / 2 * acceleration;
     from = t;
   }
+  /// Changes the rotation by an impulse where the normal n points from the contact to the centre.
+  void turn(const Vec3& n, const Vec3& impulse) {
+    if (turning > 0) surface_spin -= turning / mass * n.cross(impulse);
+  }
+  /// Angular velocity and inverse moment of inertia [1/(kg m^2)].
+  Vec3 angular_velocity() const { return surface_spin / radius; }
+  Real inverse_inertia() const { return turning / (mass * radius * radius); }
   Vec3 velocity_at(Real t, Real h) const { return velocity - (h - t) * acceleration; }
   /// Velocity at time t, scaled to the energy that the particle has at at(t), which is on a straight path.
   Vec3 arrival(Real t, Real h) const {
@@ -53,6 +63,16 @@ inline Real pair_restitution(const CollidingParticle& a, const CollidingParticle
 }
 inline Real pair_friction(Real a, Real b) {
   return std::sqrt(a * b);
+}
+
+/// Velocity of the surface of `a` against that of `b` where they touch, n from b to a, by their rotation
+/// alone.
+inline Vec3 rolling_velocity(const CollidingParticle& a, const CollidingParticle& b, const Vec3& n) {
+  return n.cross(a.surface_spin + b.surface_spin);
+}
+/// Effective mass of two particles for impulses across their normal.
+inline Real mass_across(const CollidingParticle& a, const CollidingParticle& b) {
+  return 1 / ((1 + a.turning) / a.mass + (1 + b.turning) / b.mass);
 }
 
 /// Time at which two particles meet on their paths before the sub-step's end; n points from b to a.

@@ -81,6 +81,8 @@ CollidingParticle ParticleCollisions::make_particles(const ParticleSystem& syste
   g.radius = p.radius[i];
   g.restitution = p.restitution[i];
   g.friction = p.friction[i];
+  g.turning = system.def.rotates ? kBallTurning : 0;
+  g.surface_spin = system.def.rotates ? Vec3(g.radius * p.angular_velocity[i]) : Vec3::Zero();
   g.system = number;
   g.internal = system.def.internal;
   g.external = system.def.external;
@@ -180,6 +182,7 @@ void ParticleCollisions::scatter(const ParticleStage& stage) {
     ParticleArrays& p = systems_[source.system]->arrays;
     p.position[source.index] = end_[i];
     p.velocity[source.index] = particles_[i].velocity;
+    if (particles_[i].turning > 0) p.angular_velocity[source.index] = particles_[i].angular_velocity();
     outcomes_[source.system].touched[source.index] = touched_[i];
   });
   std::stable_sort(strikes_.begin(), strikes_.end(), [&](const ParticleStrike& a, const ParticleStrike& b) {

@@ -116,6 +116,7 @@ void ParticleContacts::find_pairs(uint32_t i, Found& found) const {
     pair.b = j & kIndex;
     pair.normal_single = normal.cast<float>();
     pair.mass = static_cast<float>(a.mass * b.mass / (a.mass + b.mass));
+    pair.sliding_mass = a.turning > 0 || b.turning > 0 ? static_cast<float>(mass_across(a, b)) : pair.mass;
     pair.target = static_cast<float>(target);
     pair.time = static_cast<float>(time);
     pair.friction = static_cast<float>(pair_friction(a.friction, b.friction));
@@ -166,6 +167,7 @@ void ParticleContacts::add_surface(uint32_t i, const Obstacle& o, const Vec3& no
   s.friction_axis = o.friction_axis_on(normal, 1);
   s.friction = static_cast<float>(pair_friction(g.friction, o.friction));
   s.mass = static_cast<float>(g.mass);
+  s.sliding_mass = static_cast<float>(g.mass / (1 + g.turning));
   const Real speed = (velocity - g.velocity).dot(normal);
   s.is_impact = meets && is_impact(speed, g.acceleration.norm(), *step_);
   Real target = meets ? -speed * (time - g.from) / step_->h : std::min(0.0, -speed - gap / step_->h);

@@ -1,8 +1,9 @@
 #pragma once
 /// Resting contact of particles with each other and with bodies, including the collisions that
 /// ParticleImpacts leaves (physics P6, P7, P8, R10): a complementarity problem on the velocities at the end
-/// of the sub-step with Coulomb's round cone, as for bodies (contact_problem.h). Particles do not rotate, so
-/// a contact's mobility is a number and its solution has a closed form. The problem is solved by projected
+/// of the sub-step with Coulomb's round cone, as for bodies (contact_problem.h). Particles do not rotate, or
+/// are balls, so a contact's mobility is a number along and one across its normal, and its solution has a
+/// closed form. The problem is solved by projected
 /// Gauss-Seidel from the impulses of the previous sub-step; a heap at rest is its own solution. Particles are
 /// in layers (NeighborGrid), two of which make a slab, and contacts of a slab reach no farther than the
 /// layers beside it. All even slabs can therefore be solved at the same time, then all odd ones.
@@ -59,10 +60,11 @@ class ParticleContacts {
   struct Contact {
     Eigen::Vector3f normal_single;
     Eigen::Vector3f impulse_single;
-    float target;    // smallest normal velocity at the end [m/s]
-    float friction;  // Coulomb's coefficient
-    float mass;      // effective mass [kg]
-    float time;      // start of the contact [s]
+    float target;        // smallest normal velocity at the end [m/s]
+    float friction;      // Coulomb's coefficient
+    float mass;          // effective mass [kg]
+    float sliding_mass;  // effective mass for impulses across the normal [kg]
+    float time;          // start of the contact [s]
 
     Vec3 normal() const { return normal_single.cast<Real>(); }
     Vec3 impulse() const { return impulse_single.cast<Real>(); }  // on the first particle, world [N s]
@@ -98,6 +100,11 @@ class ParticleContacts {
   struct Motion {
     Vec3 velocity;
     Real inverse_mass;
+  };
+  /// Rotation of a ball: see CollidingParticle.
+  struct Turn {
+    Vec3 surface_spin;
+    Real by_impulse;  // turning / mass [1/kg]
   };
   /// Two particles whose paths would pass through each other.
   struct Passing {
@@ -139,6 +146,11 @@ class ParticleContacts {
   void solve_clusters(uint32_t most);
   bool is_solved(uint32_t particle) const { return !solved_.empty() && solved_[particle] != 0; }
   // particle_relaxation.cpp
+  void start_motion();
+  Vec3 relative_velocity(const Pair& c) const;
+  Vec3 relative_velocity(const Surface& c) const;
+  void apply(const Pair& c, const Vec3& impulse);
+  void apply(const Surface& c, const Vec3& impulse);
   void relax();
   void displace(std::span<Vec3> end, std::span<uint8_t> touched);
   void push_apart(std::span<Vec3> end);
@@ -169,6 +181,7 @@ class ParticleContacts {
   std::vector<uint32_t> pair_begin_, surface_begin_, pair_begin_before_, surface_begin_before_;
   std::vector<uint32_t> far_;
   std::vector<Motion> motion_;
+  std::vector<Turn> turns_;  // by particle; empty if none turns
   std::vector<Real> slab_change2_;
   // Paths after contact, whether they are long, and the time at which stopped particles stopped.
   std::vector<CollidingParticle> ways_;

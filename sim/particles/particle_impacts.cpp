@@ -136,19 +136,22 @@ void ParticleImpacts::collide_with_obstacle(const Impact& impact) {
   const Real fraction = impact.time / step_->h;
   const Vec3 contact = g.at(impact.time) - g.radius * impact.normal, arm = contact - o.centre_at(fraction);
   const Vec3 surface = o.is_dynamic() ? step_->impulses.velocity(o, arm) : o.velocity_at(contact, fraction);
-  const Vec3 u = g.arrival(impact.time, step_->h) - surface;
+  Vec3 u = g.arrival(impact.time, step_->h) - surface;
+  if (g.turning > 0) u += impact.normal.cross(g.surface_spin);
   // The body may already be moving away. It then stops the particle without an impulse.
   const Vec3 impulse =
       u.dot(impact.normal) < 0
           ? collision_impulse(
                 o, fraction, g.mass, u, impact.normal, std::max(g.restitution, o.restitution),
                 pair_friction(g.friction, o.friction),
-                o.is_dynamic() ? step_->impulses.mobility(o, arm, -impact.normal) : Mat3(Mat3::Zero()))
+                o.is_dynamic() ? step_->impulses.mobility(o, arm, -impact.normal) : Mat3(Mat3::Zero()),
+                g.turning)
           : Vec3(Vec3::Zero());
   if (o.is_dynamic()) {
     step_->impulses.push(reaction(o, contact, fraction, impulse));
     struck_body_[impact.a] = o.body;
   }
+  particles_[impact.a].turn(impact.normal, impulse);
   strike(impact.a, impact.time, impulse / g.mass, impact.normal);
   find_again(impact.a);
 }
@@ -156,10 +159,15 @@ void ParticleImpacts::collide_with_obstacle(const Impact& impact) {
 void ParticleImpacts::collide_particles(const Impact& impact) {
   const std::vector<uint32_t> members = cluster(impact);
   if (members.size() > 2) return collide_cluster(members, impact.time);
-  const CollidingParticle &a = particles_[impact.a], &b = particles_[impact.b];
-  const Vec3 u = a.arrival(impact.time, step_->h) - b.arrival(impact.time, step_->h);
-  const Vec3 impulse = collision_impulse(a.mass * b.mass / (a.mass + b.mass), u, impact.normal,
+  CollidingParticle &a = particles_[impact.a], &b = particles_[impact.b];
+  const bool turn = a.turning > 0 || b.turning > 0;
+  const Real m12 = a.mass * b.mass / (a.mass + b.mass);
+  Vec3 u = a.arrival(impact.time, step_->h) - b.arrival(impact.time, step_->h);
+  if (turn) u += rolling_velocity(a, b, impact.normal);
+  const Vec3 impulse = collision_impulse(m12, turn ? mass_across(a, b) : m12, u, impact.normal,
                                          pair_restitution(a, b), pair_friction(a.friction, b.friction));
+  a.turn(impact.normal, impulse);
+  b.turn(impact.normal, impulse);  // both signs are opposite
   strike(impact.a, impact.time, impulse / a.mass, impact.normal);
   strike(impact.b, impact.time, -impulse / b.mass, -impact.normal);
   find_again(impact.a);
@@ -188,8 +196,10 @@ void ParticleImpacts::collide_cluster(std::span<const uint32_t> members, Real ti
   std::vector<Contact> contacts;
   std::vector<Real> restitution;
   for (const uint32_t m : members)
-    bodies.push_back(
-        {.inverse_mass = 1 / particles_[m].mass, .velocity = particles_[m].arrival(time, step_->h)});
+    bodies.push_back({.inverse_mass = 1 / particles_[m].mass,
+                      .inverse_inertia = particles_[m].inverse_inertia() * Mat3::Identity(),
+                      .velocity = particles_[m].arrival(time, step_->h),
+                      .angular_velocity = particles_[m].angular_velocity()});
   for (uint32_t i = 0; i < members.size(); ++i)
     for (uint32_t j = i + 1; j < members.size(); ++j) {
       const CollidingParticle &a = particles_[members[i]], &b = particles_[members[j]];
@@ -201,6 +211,8 @@ void ParticleImpacts::collide_cluster(std::span<const uint32_t> members, Real ti
       contacts.push_back({.a = i,
                           .b = j,
                           .frame = contact_frame(d / distance),
+                          .arm_a = a.turning > 0 ? Vec3(-a.radius / distance * d) : Vec3::Zero(),
+                          .arm_b = b.turning > 0 ? Vec3(b.radius / distance * d) : Vec3::Zero(),
                           .friction_t = friction,
                           .friction_k = friction});
       restitution.push_back(pair_restitution(a, b));
@@ -214,6 +226,8 @@ void ParticleImpacts::collide_cluster(std::span<const uint32_t> members, Real ti
   }
   for (std::size_t m = 0; m < members.size(); ++m) {
     const Vec3 change = bodies[m].velocity - particles_[members[m]].arrival(time, step_->h);
+    if (CollidingParticle& g = particles_[members[m]]; g.turning > 0)
+      g.surface_spin = g.radius * bodies[m].angular_velocity;
     strike(members[m], time, change, normal[m]);
   }
   for (const uint32_t m : members) find_again(m);

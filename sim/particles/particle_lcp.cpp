@@ -51,7 +51,9 @@ bool ParticleContacts::solve_cluster(const Cluster& cluster, ContactWork& work) 
   for (const uint32_t i : members) {
     bodies.emplace_back();
     bodies.back().inverse_mass = 1 / particles_[i].mass;
+    bodies.back().inverse_inertia = particles_[i].inverse_inertia() * Mat3::Identity();
     bodies.back().velocity = particles_[i].velocity;
+    bodies.back().angular_velocity = particles_[i].angular_velocity();
   }
   const auto row = [&](uint32_t particle) {
     return static_cast<uint32_t>(std::lower_bound(members.begin(), members.end(), particle) -
@@ -63,6 +65,12 @@ bool ParticleContacts::solve_cluster(const Cluster& cluster, ContactWork& work) 
     contact.a = a;
     contact.b = b;
     contact.frame = contact_frame(c.normal().normalized());
+    const auto arm = [&](uint32_t body, Real sign) {
+      const bool turns = body < members.size() && particles_[members[body]].turning > 0;
+      return turns ? Vec3(sign * particles_[members[body]].radius * contact.frame.n) : Vec3::Zero();
+    };
+    contact.arm_a = arm(a, -1);
+    contact.arm_b = arm(b, 1);
     contact.target = c.target;
     contact.friction_t = contact.friction_k = c.friction;
     return contact;

@@ -79,9 +79,13 @@ void limit_loads(std::span<Reaction> reactions, std::map<uint32_t, Load>& loads)
 template <class Contact>
 Vec3 correct(Contact& c, const Vec3& u) {
   const Vec3 before = c.impulse(), normal = c.normal();
-  const Vec3 wanted = before - c.mass * (u - c.target * normal);
+  Vec3 wanted = before - c.mass * (u - c.target * normal);
   const Real pressing = wanted.dot(normal);
   if (pressing > 0) {
+    if (c.sliding_mass != c.mass) {
+      const Vec3 held = before - c.sliding_mass * u;
+      wanted = held + (pressing - held.dot(normal)) * normal;
+    }
     const Vec3 along = c.held(wanted - pressing * normal, c.friction * pressing);
     c.impulse_single = (pressing * normal + along).template cast<float>();
   } else {
@@ -118,22 +122,49 @@ void ParticleContacts::for_each_contact(OnPair&& on_pair, OnSurface&& on_surface
   for (const uint32_t c : far_) on_pair(pairs_[c], 0);
 }
 
-void ParticleContacts::relax() {
+void ParticleContacts::start_motion() {
   motion_.resize(particles_.size());
+  turns_.clear();
+  if (std::ranges::any_of(particles_, [](const CollidingParticle& g) { return g.turning > 0; }))
+    for (const CollidingParticle& g : particles_) turns_.push_back({g.surface_spin, g.turning / g.mass});
   tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
     for (std::size_t i = c * kRelaxationChunk; i < std::min(particles_.size(), (c + 1) * kRelaxationChunk);
          ++i)
       motion_[i] = {particles_[i].velocity, 1 / particles_[i].mass};
   });
-  const auto apply = [&](const Pair& c, const Vec3& impulse) {
-    motion_[c.a].velocity += motion_[c.a].inverse_mass * impulse;
-    motion_[c.b].velocity -= motion_[c.b].inverse_mass * impulse;
-  };
-  const auto press = [&](const Surface& c, const Vec3& impulse) {
-    motion_[c.particle].velocity += motion_[c.particle].inverse_mass * impulse;
-  };
+}
+
+Vec3 ParticleContacts::relative_velocity(const Pair& c) const {
+  const Vec3 u = motion_[c.a].velocity - motion_[c.b].velocity;
+  if (turns_.empty()) return u;
+  return u + c.normal().cross(turns_[c.a].surface_spin + turns_[c.b].surface_spin);
+}
+
+Vec3 ParticleContacts::relative_velocity(const Surface& c) const {
+  const Vec3 u = motion_[c.particle].velocity - c.velocity;
+  return turns_.empty() ? u : Vec3(u + c.normal().cross(turns_[c.particle].surface_spin));
+}
+
+void ParticleContacts::apply(const Pair& c, const Vec3& impulse) {
+  motion_[c.a].velocity += motion_[c.a].inverse_mass * impulse;
+  motion_[c.b].velocity -= motion_[c.b].inverse_mass * impulse;
+  if (turns_.empty()) return;
+  // The arms and the impulses of the two are opposite, so that both turn in the same sense.
+  const Vec3 turn = c.normal().cross(impulse);
+  turns_[c.a].surface_spin -= turns_[c.a].by_impulse * turn;
+  turns_[c.b].surface_spin -= turns_[c.b].by_impulse * turn;
+}
+
+void ParticleContacts::apply(const Surface& c, const Vec3& impulse) {
+  motion_[c.particle].velocity += motion_[c.particle].inverse_mass * impulse;
+  if (turns_.empty()) return;
+  turns_[c.particle].surface_spin -= turns_[c.particle].by_impulse * c.normal().cross(impulse);
+}
+
+void ParticleContacts::relax() {
+  start_motion();
   for_each_contact([&](const Pair& c, std::size_t) { apply(c, c.impulse()); },
-                   [&](const Surface& c, std::size_t) { press(c, c.impulse()); });
+                   [&](const Surface& c, std::size_t) { apply(c, c.impulse()); });
   const std::size_t slabs = (order_.layer_begin.size() - 1) / 2;
   const std::size_t most =
       std::clamp(kMaxContactVisits / std::max(contacts(), std::size_t{1}), kMinSweeps, kMaxSweeps);
@@ -147,14 +178,14 @@ void ParticleContacts::relax() {
     for_each_contact(
         [&](Pair& c, std::size_t slab) {
           if (is_solved(c.a)) return;
-          const Vec3 more = correct(c, motion_[c.a].velocity - motion_[c.b].velocity);
+          const Vec3 more = correct(c, relative_velocity(c));
           apply(c, more);
           note(slab, more, c.mass);
         },
         [&](Surface& c, std::size_t slab) {
           if (is_solved(c.particle)) return;
-          const Vec3 more = correct(c, motion_[c.particle].velocity - c.velocity);
-          press(c, more);
+          const Vec3 more = correct(c, relative_velocity(c));
+          apply(c, more);
           note(slab, more, c.mass);
         });
     change2 = *std::max_element(slab_change2_.begin(), slab_change2_.end());
@@ -180,8 +211,10 @@ void ParticleContacts::displace(std::span<Vec3> end, std::span<uint8_t> touched)
       });
   tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
     for (std::size_t i = c * kRelaxationChunk; i < std::min(particles_.size(), (c + 1) * kRelaxationChunk);
-         ++i)
+         ++i) {
       particles_[i].velocity = motion_[i].velocity;
+      if (!turns_.empty()) particles_[i].surface_spin = turns_[i].surface_spin;
+    }
   });
 }
 

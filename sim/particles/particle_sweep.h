@@ -57,9 +57,10 @@ struct ObstacleHit {
 /// Returns the impulse on a particle that meets an obstacle at a fraction of the sub-step with the relative
 /// velocity u, u.n < 0 (P5, P8). `mobility` is that of the obstacle at the contact; zero if the particle does
 /// not move it. `friction` applies along the obstacle's friction axis, and `cross_friction` times this across
-/// it; with a friction axis each direction sticks or slides separately.
+/// it; with a friction axis each direction sticks or slides separately. `turning` is that of a ball that
+/// turns (CollidingParticle).
 Vec3 collision_impulse(const Obstacle& o, Real fraction, Real particle_mass, const Vec3& u, const Vec3& n,
-                       Real restitution, Real friction, const Mat3& mobility);
+                       Real restitution, Real friction, const Mat3& mobility, Real turning = 0);
 /// Returns the reaction of an impulse on the obstacle.
 Reaction reaction(const Obstacle& o, const Vec3& contact, Real fraction, const Vec3& impulse_on_particle);
 

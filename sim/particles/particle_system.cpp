@@ -66,6 +66,10 @@ uint64_t ParticleSystem::add(const Particle& p, Real elapsed) {
   arrays.restitution.push_back(p.restitution);
   arrays.friction.push_back(p.friction);
   arrays.charge.push_back(p.charge);
+  if (def.rotates) {
+    arrays.angular_velocity.push_back(p.angular_velocity);
+    arrays.orientation.push_back(Quat::Identity());
+  }
   arrays.id.push_back(next_id);
   newborn.push_back(elapsed);
   return next_id++;
@@ -303,6 +307,15 @@ void ParticleSystem::fly_all(const ParticleStage& stage, const ParticleForces& f
   });
 }
 
+/// Turns a particle by its angular velocity over its flight.
+void ParticleSystem::turn(std::size_t i) {
+  const Vec3 angle = duration_[i] * arrays.angular_velocity[i];
+  const Real size = angle.norm();
+  if (size > 0)
+    arrays.orientation[i] =
+        (Quat(Eigen::AngleAxis<Real>(size, angle / size)) * arrays.orientation[i]).normalized();
+}
+
 ParticleTally ParticleSystem::end_step(const ParticleStage& stage, std::span<const uint8_t> touched,
                                        std::span<const uint8_t> trapped) {
   const std::size_t count = arrays.size();
@@ -314,6 +327,7 @@ ParticleTally ParticleSystem::end_step(const ParticleStage& stage, std::span<con
         fate_[i] = Fate::dead;
       else
         end(stage, i, touched[i] && def.dies_on_hit, trapped[i], tallies[chunk]);
+      if (def.rotates) turn(i);
     }
   });
   return sum_up(tallies);
@@ -323,6 +337,7 @@ void ParticleSystem::remove_dead() {
   const auto first_dead = std::find(fate_.begin(), fate_.end(), Fate::dead);
   const auto first = static_cast<std::size_t>(first_dead - fate_.begin());
   const auto compact = [&](auto& array) {
+    if (array.empty()) return;
     std::size_t to = first;
     for (std::size_t i = first; i < array.size(); ++i)
       if (fate_[i] == Fate::alive) array[to++] = array[i];
@@ -332,7 +347,8 @@ void ParticleSystem::remove_dead() {
                        [&] { compact(arrays.mass); }, [&] { compact(arrays.radius); },
                        [&] { compact(arrays.age); }, [&] { compact(arrays.lifespan); },
                        [&] { compact(arrays.restitution); }, [&] { compact(arrays.friction); },
-                       [&] { compact(arrays.charge); }, [&] { compact(arrays.id); });
+                       [&] { compact(arrays.charge); }, [&] { compact(arrays.id); },
+                       [&] { compact(arrays.angular_velocity); }, [&] { compact(arrays.orientation); });
 }
 
 }  // namespace offstage::sim

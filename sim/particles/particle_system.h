@@ -58,7 +58,8 @@ struct ParticleSystem {
   void admit_newborn(const ParticleForces& forces);
   /// Stores the state at the start of the sub-step, for a CoupledGroup that integrates the system.
   void begin_coupled();
-  bool hits_particles() const { return def.internal || def.external; }
+  /// Whether its collisions are those of ParticleCollisions.
+  bool hits_particles() const { return def.internal || def.external || def.rotates; }
   /// For particles that do not collide with particles: integrates, sweeps against bodies, ages and removes.
   /// In a `coupled` system the particles of whole_step() are already integrated.
   ParticleTally step(const ParticleStage& stage, const ParticleForces& forces, bool coupled);
@@ -90,6 +91,7 @@ struct ParticleSystem {
   void conclude(const ParticleStage& stage, std::size_t i, const SweepOutcome& outcome, SweepLog& log,
                 ParticleTally& tally);
   void end(const ParticleStage& stage, std::size_t i, bool spent, bool trapped, ParticleTally& tally);
+  void turn(std::size_t i);
   ParticleTally sum_up(std::span<const ParticleTally> tallies);
 
   void fly(const ParticleForces& forces, Real t, Real h, std::size_t begin, std::size_t end,

@@ -6,12 +6,16 @@
 namespace offstage::sim {
 
 Vec3 collision_impulse(Real m12, const Vec3& u, const Vec3& n, Real restitution, Real friction) {
+  return collision_impulse(m12, m12, u, n, restitution, friction);
+}
+
+Vec3 collision_impulse(Real m12, Real across, const Vec3& u, const Vec3& n, Real restitution, Real friction) {
   const Real approach = -u.dot(n);
   const Vec3 sliding = u + approach * n;
   const Real normal_impulse = (1 + restitution) * m12 * approach;
-  const Real to_stick = m12 * sliding.norm(), limit = friction * normal_impulse;
+  const Real to_stick = across * sliding.norm(), limit = friction * normal_impulse;
   const Real share = to_stick > limit ? limit / to_stick : 1;
-  return normal_impulse * n - share * m12 * sliding;
+  return normal_impulse * n - share * across * sliding;
 }
 
 Vec3 velocity_after_shift(const Vec3& v, const Vec3& a, const Vec3& shift) {

@@ -24,7 +24,8 @@ struct Particle {
   Real lifespan = 1e30;  ///< age at which it is removed [s]
   Real restitution = 0.5;
   Real friction = 0.5;
-  Real charge = 0;  ///< [C]
+  Real charge = 0;                       ///< [C]
+  Vec3 angular_velocity = Vec3::Zero();  ///< world [rad/s]; only in a system that `rotates`
 };
 
 struct ParticleSystemDef {
@@ -36,6 +37,9 @@ struct ParticleSystemDef {
   bool internal = false;      ///< whether its particles collide with each other
   /// Whether its particles collide with those of other systems that also have this flag.
   bool external = false;
+  /// Whether particles are solid balls that contacts turn: friction then acts at their surface, so they roll.
+  /// Otherwise they slide without turning.
+  bool rotates = false;
   bool dies_on_hit = false;        ///< whether particles are removed at their first collision
   bool report_collisions = false;  ///< whether collisions are reported as ParticleEvent
   bool report_deaths = false;      ///< whether deaths of age are reported as ParticleEvent
@@ -59,7 +63,9 @@ struct ParticleEvent {
 struct ParticleArrays {
   std::vector<Vec3> position, velocity;
   std::vector<Real> mass, radius, age, lifespan, restitution, friction, charge;
-  std::vector<uint64_t> id;  ///< unique in its system, ascending, never reused
+  std::vector<uint64_t> id;            ///< unique in its system, ascending, never reused
+  std::vector<Vec3> angular_velocity;  ///< world [rad/s]; empty unless the system `rotates`
+  std::vector<Quat> orientation;       ///< turns the axes at creation into the present ones; likewise
 
   std::size_t size() const { return position.size(); }
 };
@@ -68,6 +74,12 @@ struct ParticleArrays {
 /// - v2 and the unit normal n, u.n < 0 (P5): restitution e along n. It sticks tangentially if the friction
 /// cone allows; otherwise it slides with |P_t| = mu P_n against the sliding direction.
 Vec3 collision_impulse(Real m12, const Vec3& u, const Vec3& n, Real restitution, Real friction);
+/// The same for round bodies that turn, with the effective mass `across` for impulses along the surface.
+Vec3 collision_impulse(Real m12, Real across, const Vec3& u, const Vec3& n, Real restitution, Real friction);
+
+/// m r^2 / I of a solid ball: an impulse across its surface moves the surface 1 + kBallTurning times as much
+/// as the centre.
+inline constexpr Real kBallTurning = 2.5;
 
 /// A velocity scaled to the energy after a displacement by `shift` under an acceleration a: |v|^2 + 2
 /// a.shift. A hit that was found on a straight path, or a surface in the way, puts a particle beside its

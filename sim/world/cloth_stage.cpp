@@ -47,6 +47,10 @@ ClothView World::cloth(ClothHandle cloth) const {
 const ClothDef& World::cloth_def(ClothHandle cloth) const {
   return impl_->cloths[cloth]->def;
 }
+ClothGasState World::cloth_gas(ClothHandle cloth) const {
+  return gas_state(*impl_->cloths[cloth]);
+}
+
 const ClothReport& World::cloth_report(ClothHandle cloth) const {
   return impl_->cloths[cloth]->report;
 }

@@ -72,6 +72,8 @@ StateHash World::state_hash() const {
     for (const auto* v : {&a.position, &a.velocity}) hash.add(*v);
     for (const auto* v : {&a.mass, &a.radius, &a.age, &a.lifespan, &a.restitution, &a.friction}) hash.add(*v);
     hash.add(a.id);
+    if (system.def.rotates) hash.add(a.angular_velocity);
+    for (const Quat& q : a.orientation) hash.add(q);
     // Charges are hashed only if there are any, so that the hash of scenes without charges does not change.
     if (std::any_of(a.charge.begin(), a.charge.end(), [](Real q) { return q != 0; })) hash.add(a.charge);
   });

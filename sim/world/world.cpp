@@ -611,6 +611,9 @@ Energy World::energy() const {
   impl_->systems.for_each([&](auto, const ParticleSystem& s) {
     for (std::size_t i = 0; i < s.arrays.size(); ++i) {
       e.kinetic += s.arrays.mass[i] * s.arrays.velocity[i].squaredNorm() / 2;
+      if (s.def.rotates)
+        e.kinetic += s.arrays.mass[i] / kBallTurning *
+                     (s.arrays.radius[i] * s.arrays.angular_velocity[i]).squaredNorm() / 2;
       if (s.def.gravity) e.potential -= s.arrays.mass[i] * g.dot(s.arrays.position[i]);
     }
   });

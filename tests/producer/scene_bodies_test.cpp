@@ -291,8 +291,9 @@ TEST(ParticleTables, HoldEveryParticleOfEveryFrame) {
   std::filesystem::remove_all(folder);
 }
 
-// Rows of two cloths; the volume of the balloon is that of the mesh of its vertices, the sheet has none.
-TEST(ClothTables, HoldEveryVertexAndTheVolumeInside) {
+// Rows of two cloths; the volume of the balloon is that of the mesh of its vertices, and its gas keeps p V;
+// the sheet has none.
+TEST(ClothTables, HoldEveryVertexAndTheGasInside) {
   const LoadedScene loaded = body_scene(R"("output": {"fps": 10, "duration": 0.5},
     "cloths": [{"name": "sheet", "shape": {"type": "grid", "size": [1, 1], "cells": [2, 2]}, "position": [0, 5, 0]},
                {"name": "balloon", "shape": {"type": "sphere", "radius": 0.1, "divisions": 2}, "position": [3, 5, 0], "fabric": "balloon",
@@ -310,6 +311,13 @@ TEST(ClothTables, HoldEveryVertexAndTheVolumeInside) {
                    .cloth_points = folder / "v.csv"},
                   {});
   Simulation simulation(loaded.scene, models);
+  const auto volume_inside = [&] {
+    const sim::ClothView balloon = simulation.world().cloth(simulation.cloths()[1].handle);
+    return sim::mass_properties({{balloon.points.begin(), balloon.points.end()},
+                                 {balloon.triangles.begin(), balloon.triangles.end()}})
+        .volume;
+  };
+  const Real rest_volume = volume_inside();
   for (int i = 0; i < 5; ++i) simulation.advance();
   const sim::ClothView balloon = simulation.world().cloth(simulation.cloths()[1].handle);
 
@@ -330,15 +338,17 @@ TEST(ClothTables, HoldEveryVertexAndTheVolumeInside) {
       << last;
 
   std::getline(cloths, line);
-  EXPECT_TRUE(line.ends_with(",volume"));
+  EXPECT_TRUE(line.ends_with(",volume,pressure"));
   std::string sheet;
   while (std::getline(cloths, line)) (line.find(",sheet,") != std::string::npos ? sheet : last) = line;
-  EXPECT_TRUE(sheet.ends_with(",0"));
-  const sim::TriangleMesh skin{{balloon.points.begin(), balloon.points.end()},
-                               {balloon.triangles.begin(), balloon.triangles.end()}};
-  const Real volume = sim::mass_properties(skin).volume;
+  EXPECT_TRUE(sheet.ends_with(",0,0"));
+  const Real volume = volume_inside();
   EXPECT_GT(volume, 0.002);  // of the ball: 0.0042 m^3
-  EXPECT_NEAR(std::stod(last.substr(last.rfind(',') + 1)), volume, 1e-9);
+  const std::size_t comma = last.rfind(','), before = last.rfind(',', comma - 1);
+  EXPECT_NEAR(std::stod(last.substr(before + 1)), volume, 1e-9);
+  // The gas is isothermal: p V = p0 V0, and the skin has grown.
+  EXPECT_GT(volume, 1.01 * rest_volume);
+  EXPECT_NEAR(std::stod(last.substr(comma + 1)) * volume, 3000 * rest_volume, 1e-6 * 3000 * rest_volume);
   std::filesystem::remove_all(folder);
 }
 

@@ -156,3 +156,23 @@ def test_the_examples_do_what_they_say(tmp_path, tiny):
     assert film.main(str(tiny), tmp_path / "film", "1-2") == 0
     saved = np.load(tmp_path / "film/0002.npz")
     assert saved["image"].shape == (180, 320, 4) and saved["depth"].dtype == np.float32
+
+
+def test_balls_roll_and_the_books_algorithms_are_keywords():
+    world = offstage.World(narrow_phase="vclip", trees="obb", tree_split="mean", broad_phase="grid", cell_factor=2,
+                           impact_time="bisection", mesh_pairs="triangles", particle_contacts="lcp", particle_cluster=8)
+    world.add_body(offstage.Plane(), motion="static", friction=0.3, restitution=0)
+    balls = world.add_particle_system(rotates=True)
+    world.add_particles(balls, [[0, 0.01, 0]], velocities=[[1.4, 0, 0]], mass=0.1, radius=0.01, restitution=0, friction=0.3)
+    wheel = world.add_body(offstage.Sphere(0.1), position=(0, 5, 0), mass=2)
+    world.add_force("applied", bodies=[wheel], torque=(0, 0.08, 0))
+    for _ in range(60):
+        world.step(1 / 60)
+    state = world.particles(balls)
+    assert state["velocity"][0, 0] == pytest.approx(1, abs=2e-3), "5/7 of its speed"
+    assert state["angular_velocity"][0, 2] == pytest.approx(-100, abs=0.2)
+    assert world.body(wheel)["angular_velocity"][1] == pytest.approx(10, rel=1e-6), "0.08 N m / (0.4 m r^2) * 1 s"
+    with pytest.raises(ValueError, match="particle_cluster"):
+        offstage.World(particle_cluster=100)
+    balloon = world.add_grid_cloth((1, 1), (2, 2))
+    assert world.cloth(balloon)["pressure"] == 0

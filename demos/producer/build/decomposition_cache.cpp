@@ -54,6 +54,7 @@ XXH128_hash_t hash_of(const sim::TriangleMesh& mesh, const sim::DecompositionSet
   add(settings.max_reflex_edges);
   add(settings.max_error);
   add(settings.max_parts);
+  add(settings.most_parts);
   add(settings.resolution);
   const XXH128_hash_t h = XXH3_128bits_digest(hash);
   XXH3_freeState(hash);

@@ -130,6 +130,7 @@ sim::ParticleSystemDef system_def(const std::string& name, const ParticleBehavio
           .collides = b.collides,
           .internal = b.internal,
           .external = b.external,
+          .rotates = b.rotates,
           .dies_on_hit = b.dies_on_hit,
           .integrator = b.integrator};
 }

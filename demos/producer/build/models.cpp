@@ -151,8 +151,9 @@ bool is_inaccurate(const sim::ConvexDecomposition& parts, const sim::Decompositi
 std::string inaccuracy(const sim::ConvexDecomposition& parts) {
   if (parts.parts.empty()) return "there are no convex parts, so its triangles collide: " + parts.note;
   return fmt::format(
-      "its {} convex parts differ from it in {:.1f} % of its volume ({}). More parts come "
-      "nearer: `decomposition.max_parts`",
+      "its {} convex parts differ from it in {:.1f} % of its volume ({}). More parts come nearer, up to "
+      "1024: "
+      "`decomposition.max_parts`",
       parts.parts.size(), 100 * parts.difference, parts.note);
 }
 
@@ -348,8 +349,8 @@ void ModelLibrary::check_sheets(const Scene& scene, std::vector<Problem>& proble
 
 std::string ModelLibrary::parts_key(const MeshFile& mesh) {
   const sim::DecompositionSettings s = settings_of(mesh.decomposition);
-  return fmt::format("{}\n{} {} {} {} {}", mesh.file, static_cast<int>(s.method), s.max_error, s.max_parts,
-                     s.min_dihedral, s.min_distance);
+  return fmt::format("{}\n{} {} {} {} {} {}", mesh.file, static_cast<int>(s.method), s.max_error, s.max_parts,
+                     s.most_parts, s.min_dihedral, s.min_distance);
 }
 
 void ModelLibrary::decompose_models(const Scene& scene, const DecompositionCache& cache,

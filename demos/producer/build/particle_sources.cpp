@@ -60,6 +60,7 @@ LookRamps::LookRamps(const ParticleLook& look, uint64_t seed, const std::string&
              .deviation = look.channel_deviation.cast<float>(),
              .brightness_deviation = static_cast<float>(look.color_deviation)},
       random_(seed, effects::stream_id(name)),
+      oriented_(look.style == LookStyle::mesh),
       turns_(look.turns() && !(is_zero(look.angle_deg) && is_zero(look.spin_deg_per_s))),
       angle_deg_(look.angle_deg),
       spin_deg_per_s_(look.spin_deg_per_s),
@@ -94,6 +95,8 @@ PointSet LookRamps::points(const sim::ParticleArrays& particles, Real time,
     if (color_) p.color = p.color.cwiseProduct(color_->at(age));
     if (glow_) p.color = p.color.cwiseProduct(glow_->at(age));
     if (size_) p.radius *= size_->at(age);
+    if (oriented_ && !particles.orientation.empty())
+      set.orientations.push_back(particles.orientation[i].cast<float>());
     if (!turns_) continue;
     const Real creation = time - particles.age[i];
     const Real angle = effects::sample(angle_deg_, turn_random_.uniform(p.id, kAngle), creation),

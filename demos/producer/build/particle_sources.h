@@ -33,7 +33,7 @@ class LookRamps {
   effects::RandomStream random_;
   std::optional<effects::Ramp<effects::Rgba>> color_, glow_;
   std::optional<effects::Ramp<float>> size_;
-  bool turns_;
+  bool oriented_, turns_;
   Varying angle_deg_, spin_deg_per_s_;
   effects::RandomStream turn_random_;
 };

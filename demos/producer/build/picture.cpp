@@ -359,7 +359,8 @@ render::Channels Picture::channels(const Snapshot& previous, const Snapshot& cur
     if (!meshes_[set].look) continue;
     before.clear();
     points_at(set, previous, current, 0, frame_time, true, before);
-    place_meshes(meshes_[set], before);
+    place_meshes(meshes_[set], before,
+                 orientations_at(previous.point_sets[set], current.point_sets[set], 0, before));
   }
   stage_.store_previous_transforms();
   place(previous, current, 1, frame_time);

@@ -131,7 +131,13 @@ class Picture {
   void points_at(std::size_t set, const Snapshot& previous, const Snapshot& current, float w,
                  double frame_time, bool all, std::vector<render::Point>& points) const;
   void place_points(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
-  void place_meshes(DrawnMeshes& drawn, std::span<const render::Point> points);
+  /// The rotations of some of the set's current points by contacts, at share w of the frame; empty if they
+  /// have none.
+  static std::vector<Eigen::Quaternionf> orientations_at(const PointSet& before, const PointSet& now, float w,
+                                                         std::span<const render::Point> points);
+  /// `orientations`: of each point, or empty.
+  void place_meshes(DrawnMeshes& drawn, std::span<const render::Point> points,
+                    std::span<const Eigen::Quaternionf> orientations);
   /// Time between two sub-frames; 0 if there is only one [s].
   float subframe_time() const;
   void set_balls(std::size_t set, std::span<const render::Point> balls);

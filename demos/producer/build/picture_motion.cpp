@@ -63,12 +63,12 @@ Vector3f direction_of(uint64_t id) {
 }
 
 /// Pose and size of a particle that is drawn as a mesh.
-Affine3f pose_of(const render::Point& point, const LookMesh& look) {
+Affine3f pose_of(const render::Point& point, const Eigen::Quaternionf& by_contacts, const LookMesh& look) {
   const Vector3f axis = look.axis ? Vector3f(look.axis->cast<float>().normalized()) : direction_of(point.id);
   Eigen::Quaternionf turn(Eigen::AngleAxisf(point.angle, axis));
   if (look.along_motion && point.velocity.norm() > 1e-6f)
     turn = sim::rotation_between(Vector3f::UnitY(), point.velocity) * turn;
-  return Eigen::Translation3f(point.position) * turn * Eigen::Scaling(point.radius);
+  return Eigen::Translation3f(point.position) * (by_contacts * turn) * Eigen::Scaling(point.radius);
 }
 
 }  // namespace
@@ -152,7 +152,8 @@ void Picture::place_points(const Snapshot& previous, const Snapshot& current, fl
       points = scratch_;
     }
     if (meshes_[set].look)
-      place_meshes(meshes_[set], points);
+      place_meshes(meshes_[set], points,
+                   orientations_at(previous.point_sets[set], current.point_sets[set], w, points));
     else if (blur_streaks_[set])
       set_balls(set, points);
     else
@@ -181,7 +182,22 @@ void Picture::points_at(std::size_t set, const Snapshot& previous, const Snapsho
   }
 }
 
-void Picture::place_meshes(DrawnMeshes& drawn, std::span<const render::Point> points) {
+std::vector<Eigen::Quaternionf> Picture::orientations_at(const PointSet& before, const PointSet& now, float w,
+                                                         std::span<const render::Point> points) {
+  std::vector<Eigen::Quaternionf> all;
+  if (now.orientations.empty()) return all;
+  std::size_t i = 0, j = 0;
+  for (const render::Point& point : points) {
+    while (now.points[i].id != point.id) ++i;
+    while (j < before.points.size() && before.points[j].id < point.id) ++j;
+    const bool known = j < before.orientations.size() && before.points[j].id == point.id;
+    all.push_back(known ? before.orientations[j].slerp(w, now.orientations[i]) : now.orientations[i]);
+  }
+  return all;
+}
+
+void Picture::place_meshes(DrawnMeshes& drawn, std::span<const render::Point> points,
+                           std::span<const Eigen::Quaternionf> orientations) {
   const std::size_t parts = drawn.parts.size();
   while (drawn.instances.size() < points.size() * parts)
     for (const DrawnMeshes::Part& part : drawn.parts) {
@@ -190,7 +206,10 @@ void Picture::place_meshes(DrawnMeshes& drawn, std::span<const render::Point> po
     }
   for (std::size_t i = 0; i < std::max(points.size(), drawn.shown); ++i) {
     const bool exists = i < points.size();
-    const Affine3f world_from_unit = exists ? pose_of(points[i], *drawn.look) : Affine3f::Identity();
+    const Affine3f world_from_unit =
+        exists ? pose_of(points[i], orientations.empty() ? Eigen::Quaternionf::Identity() : orientations[i],
+                         *drawn.look)
+               : Affine3f::Identity();
     for (std::size_t k = 0; k < parts; ++k) {
       const render::InstanceHandle instance = drawn.instances[i * parts + k];
       stage_.set_visible(instance, exists && points[i].radius > 0);

@@ -12,7 +12,7 @@ namespace {
 using Eigen::Vector3f;
 using Eigen::Vector4f;
 
-constexpr FileKind kSnapshotKind = {"offsnap", 5, "snapshot"};
+constexpr FileKind kSnapshotKind = {"offsnap", 6, "snapshot"};
 
 constexpr std::size_t kBodyBytes = 7 * sizeof(float);
 constexpr std::size_t kRodBytes = 6 * sizeof(float);
@@ -28,6 +28,14 @@ void put(ByteWriter& out, const std::vector<Vector3f>& values) {
 void put(ByteWriter& out, const std::vector<uint32_t>& values) {
   out.put(uint64_t{values.size()});
   for (const uint32_t v : values) out.put(v);
+}
+void put(ByteWriter& out, const std::vector<Eigen::Quaternionf>& values) {
+  out.put(uint64_t{values.size()});
+  for (const Eigen::Quaternionf& q : values) out.put(Vector4f(q.coeffs()));
+}
+void take_bytes(ByteReader& in, std::vector<Eigen::Quaternionf>& values) {
+  values.resize(in.take_count(4 * sizeof(float)));
+  for (Eigen::Quaternionf& q : values) q.coeffs() = in.take<Vector4f>();
 }
 template <class T>
 void take_bytes(ByteReader& in, std::vector<T>& values) {
@@ -73,6 +81,7 @@ std::vector<uint8_t> serialize(const Snapshot& snapshot, std::string_view key) {
     }
     out.put(uint64_t{set.spins.size()});
     for (std::size_t i = 0; i < set.spins.size(); ++i) out.put(set.points[i].angle), out.put(set.spins[i]);
+    put(out, set.orientations);
   }
   out.put(uint64_t{snapshot.cloths.size()});
   for (const ClothSample& cloth : snapshot.cloths) {
@@ -137,6 +146,9 @@ Snapshot deserialize(std::span<const uint8_t> bytes, const std::string& source, 
       set.points[i].angle = in.take<float>();
       set.spins[i] = in.take<float>();
     }
+    take_bytes(in, set.orientations);
+    if (!set.orientations.empty() && set.orientations.size() != set.points.size())
+      throw render::FileError(source + ": is damaged: not all particles of a set have orientations");
   }
   snapshot.cloths.resize(in.take_count(kClothBytes));
   for (ClothSample& cloth : snapshot.cloths) {

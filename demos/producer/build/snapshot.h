@@ -33,6 +33,8 @@ struct PointSet {
   std::vector<render::Point> points;
   std::vector<float> ages;   ///< [s]
   std::vector<float> spins;  ///< rates of Point::angle [rad/s]; empty: none turns
+  /// Rotations by contacts since the creation; empty unless the particles `rotate` and show it.
+  std::vector<Eigen::Quaternionf> orientations;
 };
 
 /// A cloth.

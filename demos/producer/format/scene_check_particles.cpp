@@ -166,6 +166,7 @@ class ParticleChecker {
     const bool hits = b.collides || b.internal || b.external;
     if (!source.on_collision.empty() && !hits)
       warn(path + "/on_collision", "has no effect: its particles do not collide");
+    if (b.rotates && !hits) warn(path + "/rotates", "has no effect: its particles do not collide");
     if (b.dies_on_hit && !hits) warn(path + "/dies_on_hit", "has no effect: its particles do not collide");
   }
 

@@ -136,6 +136,11 @@ struct Table<ParticleBehaviour> {
         {"collides", &T::collides, "particles collide with bodies"},
         {"internal", &T::internal, "particles of this system collide with each other"},
         {"external", &T::external, "particles collide with those of other systems that also have `external`"},
+        {"rotates", &T::rotates,
+         "contacts turn the particles as solid balls, so that they roll and friction acts at their surface; "
+         "otherwise they slide without turning. Objects of the style `mesh` show the rotation. Grains need "
+         "it "
+         "to pour, to flow and to heap as sand does"},
         {"dies_on_hit", &T::dies_on_hit, "a particle is removed at its first collision"},
         {"integrator", &T::integrator,
          "integration method of particles without springs; `leapfrog` is of second order at the cost of one "

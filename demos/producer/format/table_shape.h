@@ -78,7 +78,8 @@ struct Table<MeshDecomposition> {
   static Fields<MeshDecomposition> fields() {
     return {
         {"method", &MeshDecomposition::method,
-         "`auto`: exact if that takes at most `max_parts`, else approximate; `exact`: with up to 1024 parts, "
+         "`auto`: exact if that takes at most `max_parts` (64), else approximate; `exact`: with up to 1024 "
+         "parts, "
          "else approximate; `approximate`; `hull`: the convex hull as the only part, also of a body that is "
          "not dynamic"},
         {"max_error", &MeshDecomposition::max_error,
@@ -86,7 +87,9 @@ struct Table<MeshDecomposition> {
          "volume; a larger one takes fewer parts",
          "", between(0.001, 1)},
         {"max_parts", &MeshDecomposition::max_parts,
-         "greatest number of parts; has priority over `max_error`", "", between(1, 1024)},
+         "greatest number of parts; has priority over `max_error`. Default: 64, and up to 1024 if the error "
+         "needs them, as for thin bent shells",
+         "", between(1, 1024)},
         {"min_angle_deg", &MeshDecomposition::min_angle_deg,
          "exact: smallest angle between a cut and the faces that it meets; relaxed if no cut satisfies it",
          "degrees", between(0, 90)},

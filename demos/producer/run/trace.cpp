@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "sim/cloth/cloth_gas.h"
-
 namespace offstage::producer {
 namespace {
 
@@ -11,15 +9,6 @@ void add_state(CsvRows& rows, double time, std::string_view name, const sim::Vec
                const sim::Quat& q, const sim::Vec3& velocity, const sim::Vec3& angular_velocity) {
   rows.number(time).text(name).vector(position).number(q.w()).number(q.x()).number(q.y()).number(q.z());
   rows.vector(velocity).vector(angular_velocity).end_row();
-}
-
-/// Volume inside of a cloth under pressure, with the holes of tears closed; 0 for other cloths. [m^3]
-sim::Real volume_inside(const sim::World& world, sim::ClothHandle handle) {
-  if (world.cloth_def(handle).pressure == 0) return 0;
-  const sim::ClothView cloth = world.cloth(handle);
-  sim::ClothGas gas;
-  gas.assign(cloth.triangles);
-  return gas.volume(cloth.points, cloth.triangles);
 }
 
 }  // namespace
@@ -61,7 +50,7 @@ void Trace::record(double time) {
 ClothTrace::ClothTrace(const std::filesystem::path& path, const Simulation& simulation)
     : file_(path,
             "time,cloth,points,max_strain,mean_strain,contacts,self_contacts,penetration,limited,held_back,"
-            "crossings,torn,unconverged,volume"),
+            "crossings,torn,unconverged,volume,pressure"),
       simulation_(simulation) {}
 
 void ClothTrace::record(double time) {
@@ -76,7 +65,8 @@ void ClothTrace::record(double time) {
         .count(r.self_contacts)
         .number(r.penetration);
     rows.count(r.limited).count(r.held_back).count(r.crossings).count(r.torn).count(r.unconverged);
-    rows.number(volume_inside(world, handle)).end_row();
+    const sim::ClothGasState gas = world.cloth_gas(handle);
+    rows.number(gas.volume).number(gas.pressure).end_row();
   }
   file_.write(rows);
 }

@@ -64,6 +64,7 @@ struct ParticleBehaviour {
   bool collides = true;   ///< whether they collide with bodies
   bool internal = false;  ///< whether they collide with each other
   bool external = false;  ///< whether they collide with those of other systems that also have this flag
+  bool rotates = false;   ///< whether contacts turn them, as solid balls
   bool dies_on_hit = false;
   sim::IntegratorKind integrator = sim::IntegratorKind::leapfrog;
 };

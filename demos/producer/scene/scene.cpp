@@ -22,7 +22,8 @@ sim::DecompositionSettings settings_of(const std::optional<MeshDecomposition>& d
   if (!decomposition) return settings;
   settings.method = decomposition->method;
   settings.max_error = decomposition->max_error;
-  settings.max_parts = static_cast<uint32_t>(decomposition->max_parts);
+  if (decomposition->max_parts)
+    settings.max_parts = settings.most_parts = static_cast<uint32_t>(*decomposition->max_parts);
   settings.min_dihedral = decomposition->min_angle_deg * std::numbers::pi / 180;
   settings.min_distance = decomposition->min_distance;
   return settings;

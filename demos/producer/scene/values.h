@@ -57,7 +57,7 @@ struct ModelScale {
 struct MeshDecomposition {
   sim::DecompositionMethod method = sim::DecompositionMethod::automatic;
   Real max_error = sim::DecompositionSettings().max_error;
-  int max_parts = static_cast<int>(sim::DecompositionSettings().max_parts);
+  std::optional<int> max_parts;  ///< default: those of sim::DecompositionSettings
   Real min_angle_deg = 20;
   Real min_distance = sim::DecompositionSettings().min_distance;
 };

@@ -127,13 +127,18 @@ class MeshShape: ...
 Shape = Union[Sphere, Box, Capsule, Cylinder, Cone, Plane, MeshShape]
 JointType = Literal["spherical", "fixed", "revolute", "prismatic", "universal", "distance"]
 ForceType = Literal["constant", "point", "wind", "vortex", "turbulence", "gravitation", "coulomb", "lennard_jones", "explosion",
-                    "grab"]
+                    "grab", "applied"]
 
 class World:
     def __init__(self, *, gravity: Triple = ..., wind: Triple = ..., max_step: float = ..., integrator: str = ...,
                  integration_error: float = ..., solver: Literal["exact", "fast", "auto", "lcp"] = ...,
                  impact: Literal["simultaneous", "sequential"] = ..., collision_speed: float = ..., sleep: bool = ...,
-                 bounds: float = ...) -> None: ...
+                 bounds: float = ..., narrow_phase: Literal["gjk", "vclip"] = ...,
+                 broad_phase: Literal["multi_grid", "grid"] = ..., cell_factor: float = ...,
+                 impact_time: Literal["advancement", "bisection"] = ...,
+                 trees: Literal["aabb", "obb", "sphere", "mixed"] = ..., tree_split: Literal["mean", "surface_area"] = ...,
+                 mesh_pairs: Literal["parts", "triangles"] = ..., particle_contacts: Literal["relaxation", "lcp"] = ...,
+                 particle_cluster: int = ...) -> None: ...
     time: float
     body_count: int
     particle_count: int
@@ -149,8 +154,8 @@ class World:
                  keyframes: Sequence[tuple[float, Triple, Quadruple]] = ..., interpolation: str = ..., loop: bool = ...,
                  spin: Triple = ...) -> BodyHandle: ...
     def add_particle_system(self, *, name: str = ..., linear_drag: float = ..., gravity: bool = ..., force: Triple = ...,
-                            collides: bool = ..., internal: bool = ..., external: bool = ..., dies_on_hit: bool = ...,
-                            report_collisions: bool = ..., report_deaths: bool = ..., integrator: str = ...
+                            collides: bool = ..., internal: bool = ..., external: bool = ..., rotates: bool = ...,
+                            dies_on_hit: bool = ..., report_collisions: bool = ..., report_deaths: bool = ..., integrator: str = ...
                             ) -> ParticleSystemHandle: ...
     def add_particles(self, system: ParticleSystemHandle, positions: ArrayLike, *, velocities: ArrayLike = ..., mass: ArrayLike = ...,
                       radius: ArrayLike = ..., lifespan: ArrayLike = ..., restitution: ArrayLike = ..., friction: ArrayLike = ...,
@@ -158,7 +163,7 @@ class World:
     def add_joint(self, type: JointType, a: BodyHandle, b: Optional[BodyHandle] = ..., *, name: str = ..., anchor: Triple = ...,
                   anchor_b: Triple = ..., axis: Triple = ..., second_axis: Triple = ..., lower: float = ..., upper: float = ...,
                   swing: float = ..., friction: float = ..., damping: float = ..., max_force: float = ..., max_torque: float = ...,
-                  collide: bool = ..., motor: Literal["none", "speed", "position"] = ..., motor_target: float = ...,
+                  collide: bool = ..., appear_at: float = ..., remove_at: float = ..., motor: Literal["none", "speed", "position"] = ..., motor_target: float = ...,
                   motor_effort: float = ..., motor_stiffness: float = ..., motor_damping: float = ...) -> JointHandle: ...
     def add_spring(self, a: Any, b: Any, stiffness: float = ..., damping: float = ..., rest_length: Optional[float] = ...
                    ) -> SpringHandle: ...

@@ -29,6 +29,39 @@ const std::map<std::string, sim::SolverKind> kSolvers = {{"exact", sim::SolverKi
                                                          {"lcp", sim::SolverKind::lcp}};
 const std::map<std::string, sim::ImpactLaw> kImpacts = {{"simultaneous", sim::ImpactLaw::simultaneous},
                                                         {"sequential", sim::ImpactLaw::sequential}};
+using Methods = sim::CollisionMethods;
+const std::map<std::string, Methods::NarrowPhase> kNarrowPhases = {{"gjk", Methods::NarrowPhase::gjk},
+                                                                   {"vclip", Methods::NarrowPhase::vclip}};
+const std::map<std::string, Methods::BroadPhase> kBroadPhases = {
+    {"multi_grid", Methods::BroadPhase::multi_grid}, {"grid", Methods::BroadPhase::grid}};
+const std::map<std::string, Methods::ImpactTime> kImpactTimes = {
+    {"advancement", Methods::ImpactTime::advancement}, {"bisection", Methods::ImpactTime::bisection}};
+const std::map<std::string, Methods::Trees> kTrees = {{"aabb", Methods::Trees::aabb},
+                                                      {"obb", Methods::Trees::obb},
+                                                      {"sphere", Methods::Trees::sphere},
+                                                      {"mixed", Methods::Trees::mixed}};
+const std::map<std::string, sim::TreeSplit> kTreeSplits = {{"mean", sim::TreeSplit::mean},
+                                                           {"surface_area", sim::TreeSplit::surface_area}};
+const std::map<std::string, Methods::MeshPairs> kMeshPairs = {{"parts", Methods::MeshPairs::parts},
+                                                              {"triangles", Methods::MeshPairs::triangles}};
+const std::map<std::string, sim::ParticleContactMethod> kParticleContacts = {
+    {"relaxation", sim::ParticleContactMethod::relaxation}, {"lcp", sim::ParticleContactMethod::lcp}};
+
+void take_methods(Keywords& k, sim::WorldDef& def) {
+  k.choose("narrow_phase", kNarrowPhases, def.collision.narrow_phase);
+  k.choose("broad_phase", kBroadPhases, def.collision.broad_phase);
+  k.take("cell_factor", def.collision.cell_factor);
+  k.choose("impact_time", kImpactTimes, def.collision.impact_time);
+  k.choose("trees", kTrees, def.collision.trees);
+  k.choose("tree_split", kTreeSplits, def.collision.tree_split);
+  k.choose("mesh_pairs", kMeshPairs, def.collision.mesh_pairs);
+  k.choose("particle_contacts", kParticleContacts, def.particle_contacts);
+  k.take("particle_cluster", def.particle_cluster);
+  if (!(def.collision.cell_factor > 0)) throw std::invalid_argument("cell_factor: must be > 0");
+  if (def.particle_cluster < 1 || def.particle_cluster > 64)
+    throw std::invalid_argument("particle_cluster: must be 1 to 64");
+}
+
 py::dict to_dict(const sim::StepReport& r) {
   py::dict d;
   d["substeps"] = r.substeps;
@@ -137,6 +170,7 @@ py::dict particle_dict(const LiveWorld& w, sim::ParticleSystemHandle system) {
   d["position"] = rows<double>(p.position);
   d["velocity"] = rows<double>(p.velocity);
   d["id"] = numbers(std::span<const uint64_t>(p.id));
+  d["angular_velocity"] = rows<double>(p.angular_velocity);
   for (const auto& [name, column] :
        {std::pair("mass", &p.mass), std::pair("radius", &p.radius), std::pair("age", &p.age),
         std::pair("lifespan", &p.lifespan), std::pair("charge", &p.charge)})
@@ -157,6 +191,9 @@ py::dict cloth_dict(const LiveWorld& w, sim::ClothHandle cloth) {
   d["sources"] = numbers(c.sources);
   d["version"] = c.version;
   d["max_strain"] = w.world.cloth_report(cloth).max_strain;
+  const sim::ClothGasState gas = w.world.cloth_gas(w.cloth(cloth));
+  d["volume"] = gas.volume;
+  d["pressure"] = gas.pressure;
   return d;
 }
 
@@ -202,6 +239,7 @@ std::unique_ptr<LiveWorld> make_world(const py::kwargs& kwargs) {
   k.choose("solver", kSolvers, def.solver);
   k.choose("impact", kImpacts, def.impact);
   k.take("collision_speed", def.collision_speed);
+  take_methods(k, def);
   k.take("sleep", def.sleep);
   double bounds = def.bounds.max().x();
   k.take("bounds", bounds);
@@ -313,8 +351,14 @@ void bind_world(py::module_& m) {
       "one thread at a time.");
   world.def(
       py::init(&make_world),
-      "Keywords: gravity, wind, max_step, integrator, integration_error, solver ('exact', 'fast', 'auto'),\n"
-      "impact ('simultaneous', 'sequential'), collision_speed, sleep, bounds.");
+      "Keywords: gravity, wind, max_step, integrator, integration_error, solver ('exact', 'fast', 'auto',\n"
+      "'lcp'), impact ('simultaneous', 'sequential'), collision_speed, sleep, bounds; the book's algorithms\n"
+      "beside the default ones: narrow_phase ('gjk', 'vclip'), broad_phase ('multi_grid', 'grid'), "
+      "cell_factor,\n"
+      "impact_time ('advancement', 'bisection'), trees ('aabb', 'obb', 'sphere', 'mixed'), tree_split "
+      "('mean',\n"
+      "'surface_area'), mesh_pairs ('parts', 'triangles'), particle_contacts ('relaxation', 'lcp'), "
+      "particle_cluster.");
   bind_building(world);
   bind_state(world);
   m.def("step_all", &step_all, py::arg("worlds"), py::arg("sampling_time"), py::arg("threads") = 0,

@@ -79,6 +79,7 @@ sim::ParticleSystemHandle add_particle_system(LiveWorld& w, const py::kwargs& kw
   k.take("collides", def.collides);
   k.take("internal", def.internal);
   k.take("external", def.external);
+  k.take("rotates", def.rotates);
   k.take("dies_on_hit", def.dies_on_hit);
   k.take("report_collisions", def.report_collisions);
   k.take("report_deaths", def.report_deaths);
@@ -152,6 +153,8 @@ sim::JointHandle add_joint(LiveWorld& w, const std::string& type, sim::BodyHandl
   k.take("max_force", def.max_force);
   k.take("max_torque", def.max_torque);
   k.take("collide", def.collide);
+  k.take("appear_at", def.appear_at);
+  k.take("remove_at", def.remove_at);
   k.choose("motor", kMotors, def.motor.mode);
   double target = 0;
   k.take("motor_target", target);
@@ -244,6 +247,15 @@ sim::ForceDef::Effect effect_of(const std::string& type, Keywords& k) {
     k.take("point", e.point), k.take("impulse", e.impulse), k.take("radius", e.radius),
         k.take("drop_rate", e.drop_rate);
     return e;
+  }
+  if (type == "applied") {
+    sim::AppliedForce a;
+    sim::AppliedForce::Key key;
+    k.take("force", key.force), k.take("torque", key.torque), k.take("body_axes", a.body_axes);
+    if (const py::object point = k.take_object("point"); !point.is_none())
+      a.point = vec(point.cast<Triple>());
+    a.keys.push_back(key);
+    return a;
   }
   if (type == "grab") {
     sim::Grab g;
@@ -389,8 +401,8 @@ void bind_building(py::class_<LiveWorld>& world) {
            "spinning_friction, surface_velocity, collides, appear_at, remove_at;\n"
            "keyframes [(time, position, orientation)], interpolation, loop, spin of kinematic bodies.")
       .def("add_particle_system", &add_particle_system,
-           "Keywords: name, linear_drag, gravity, force, collides, internal, external, dies_on_hit, "
-           "report_collisions,\n"
+           "Keywords: name, linear_drag, gravity, force, collides, internal, external, rotates, "
+           "dies_on_hit, report_collisions,\n"
            "report_deaths, integrator.")
       .def("add_particles", &add_particles, py::arg("system"), py::arg("positions"),
            "Adds particles at (n, 3) positions and returns their ids. Keywords, a number or n numbers each: "
@@ -402,7 +414,8 @@ void bind_building(py::class_<LiveWorld>& world) {
            "universal, distance, gear, rack, screw, pulley. Keywords: name, anchor, anchor_b, axis, "
            "second_axis, ratio, pulley_a, pulley_b, restitution, stiffness, lower, upper, swing, "
            "friction,\n"
-           "damping, max_force, max_torque, collide; motor ('speed', 'position'), motor_target, "
+           "damping, max_force, max_torque, collide, appear_at, remove_at; motor ('speed', 'position'), "
+           "motor_target, "
            "motor_effort,\n"
            "motor_stiffness, motor_damping.")
       .def("add_spring", &add_spring, py::arg("a"), py::arg("b"), py::arg("stiffness") = 100,

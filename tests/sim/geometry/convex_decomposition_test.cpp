@@ -390,7 +390,7 @@ TEST(ApproximateDecomposition, SurfacesWithoutInsideHaveNoParts) {
 TEST(ApproximateDecomposition, IsTheSameOnAnyNumberOfThreads) {
   TriangleMesh mesh = jack_solid();
   mesh.triangles.pop_back();
-  const DecompositionSettings coarse{.max_parts = 5, .resolution = 24};
+  const DecompositionSettings coarse{.max_parts = 5, .most_parts = 5, .resolution = 24};
   ConvexDecomposition one, many = decomposed(mesh, coarse);
   tbb::task_arena(1).execute([&] { one = decomposed(mesh, coarse); });
   ASSERT_EQ(one.parts.size(), many.parts.size());
@@ -439,7 +439,7 @@ TEST(ApproximateDecomposition, DiffersAsMuchAsItSays) {
 TEST(ApproximateDecomposition, AutomaticIsExactWithinTheMostParts) {
   const TriangleMesh stair = stairs();
   EXPECT_EQ(decomposed(stair, {}).method, Method::exact);
-  const ConvexDecomposition few = decomposed(stair, {.max_parts = 3});
+  const ConvexDecomposition few = decomposed(stair, {.max_parts = 3, .most_parts = 3});
   EXPECT_EQ(few.method, Method::approximate);
   EXPECT_EQ(few.note, "more than 3 exact parts");
   EXPECT_LE(few.parts.size(), 3u);
@@ -459,7 +459,8 @@ TEST(ApproximateDecomposition, OverlappingSolidsAreMeasuredAsTheirUnion) {
 // A thin shell has hollows that no cut removes; its parts hold it all the same.
 TEST(ApproximateDecomposition, ThinBowlsKeepTheirVolumeAndTheirGround) {
   const TriangleMesh mesh = placed_at_random(bowl(1, 0.92, 32, 16), 1, 3);
-  const ConvexDecomposition d = decomposed(mesh, {.method = DecompositionMethod::approximate});
+  const ConvexDecomposition d =
+      decomposed(mesh, {.method = DecompositionMethod::approximate, .most_parts = 64});
   EXPECT_LE(d.parts.size(), 64u);
   EXPECT_LE(d.volume_error, 0.05);
   EXPECT_GT(covered(mesh, d, 8000), 1 - kMostUncovered);
@@ -504,7 +505,7 @@ TEST(ApproximateDecomposition, AnyTrianglesGiveAResult) {
     };
     for (uint64_t t = 0; t < 30; ++t) mesh.triangles.push_back({pick(t, 0), pick(t, 1), pick(t, 2)});
     mesh = weld(mesh);
-    const ConvexDecomposition d = decomposed(mesh, {.max_parts = 6, .resolution = 12});
+    const ConvexDecomposition d = decomposed(mesh, {.max_parts = 6, .most_parts = 6, .resolution = 12});
     EXPECT_LE(d.parts.size(), 6u);
     for (const ConvexPolyhedron& p : d.parts) EXPECT_TRUE(p.centre().allFinite());
     EXPECT_TRUE(std::isfinite(d.difference) && std::isfinite(d.volume_error));
@@ -545,7 +546,7 @@ TEST(LongDecomposition, RealMeshes) {
     ++read;
     EXPECT_NE(d.method, Method::none) << d.note;
     if (d.method != Method::approximate) continue;
-    EXPECT_LE(d.parts.size(), DecompositionSettings().max_parts);
+    EXPECT_LE(d.parts.size(), DecompositionSettings().most_parts);
     // Of thin solids about 300 of the points are inside: three standard deviations are 0.03.
     EXPECT_GT(covered(mesh, d, 3000), 1 - kMostUncovered - 0.03);
     // Open sheets beside a solid have no parts.
