@@ -1,6 +1,7 @@
 #include "sim/cloth/air_drag.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace offstage::sim {
@@ -98,29 +99,32 @@ void AirDrag::drag_points(ClothPoints& points) {
 /// c |u| D of u / (1 + k u t) along u then as well.
 void AirDrag::drag_triangles(ClothPoints& points) {
   const ClothAir& air = cloth_->def.air;
+  const Vec4* const x = points.position.data();
   for (const Triangle& t : cloth_->triangles) {
     const std::size_t i = first_ + t[0], j = first_ + t[1], k = first_ + t[2];
-    const Vec3 a = points.at(i);
-    const Vec3 doubled = (points.at(j) - a).cross(points.at(k) - a);
+    const Vec4 doubled = (x[j] - x[i]).cross3(x[k] - x[i]);
     const Real size = doubled.norm();
     const Vec4 wind = points.flow[i] + points.flow[j] + points.flow[k] - points.velocity[i] -
                       points.velocity[j] - points.velocity[k];
-    const Vec3 u = wind.head<3>() / 3;
+    const Vec4 u = wind / 3;
     const Real speed = u.norm();
     if (!(size > 0) || !(speed > 0)) continue;
-    const Vec3 n = doubled / size;
+    const Vec4 n = doubled / size;
     const Real scale = air.density * size / 4 * speed;  // c |u|
-    const Vec3 along = (air.drag - air.lift) * u + air.lift * u.dot(n) * n;
+    const Vec4 along = (air.drag - air.lift) * u + air.lift * u.dot(n) * n;
     const Real braked =
         kValence * span_ * scale * air.drag / (points.mass[i] + points.mass[j] + points.mass[k]);
     const Real even = braked > 1 ? std::max(share_, 1 - 1 / braked) : share_;
-    Mat3 slope = even * (air.drag - air.lift) * Mat3::Identity() + even * air.lift * n * n.transpose();
-    if (const Real power = u.dot(along); power > 0)
-      slope += (2 * share_ - even) / power * along * along.transpose();
+    const Real power = u.dot(along), rank = power > 0 ? (2 * share_ - even) / power : 0;
+    const Vec4 by_normal = even * air.lift * n, by_along = rank * along;
+    std::array<Vec4, 3> slope;  // columns
+    for (int c = 0; c < 3; ++c) slope[static_cast<std::size_t>(c)] = n[c] * by_normal + along[c] * by_along;
+    for (int c = 0; c < 3; ++c) slope[static_cast<std::size_t>(c)][c] += even * (air.drag - air.lift);
     for (const std::size_t corner : {i, j, k}) {
       const Real third = scale / 3 / points.mass[corner];
-      points.acceleration[corner] += padded(third * along);
-      resistance_[corner - first_].topRows<3>() += third * slope;
+      points.acceleration[corner] += third * along;
+      for (int c = 0; c < 3; ++c)
+        resistance_[corner - first_].col(c) += third * slope[static_cast<std::size_t>(c)];
     }
   }
 }

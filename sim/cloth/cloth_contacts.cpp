@@ -43,6 +43,7 @@ void ClothContacts::find(const ClothPoints& points, std::span<const uint8_t> col
   bodies_ = bodies;
   collides_ = collides;
   active_.assign(points.cloth.empty() ? 0 : points.cloth.back() + 1, 0);
+  touched_.assign(active_.size(), 0);
   h_ = h;
   near_.clear();
   boxes_.clear();
@@ -160,6 +161,7 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
     const std::size_t count = touches_.size();
     if (count == 0) continue;
     active_[points.cloth[point]] += count;
+    touched_[points.cloth[point]] = 1;
     // What is fixed comes last, so that its surface is kept best.
     std::stable_sort(touches_.begin(), touches_.end(), [](const Touch& a, const Touch& b) {
       return a.body->is_dynamic() > b.body->is_dynamic();

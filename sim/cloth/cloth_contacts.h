@@ -53,6 +53,8 @@ class ClothContacts {
     return point < near_several_.size() && near_several_[point];
   }
   std::span<const uint64_t> active() const { return active_; }  ///< contacts of the last solve(), by cloth
+  /// Whether any point of a cloth touched a body since the last find().
+  bool touched(std::size_t cloth) const { return cloth < touched_.size() && touched_[cloth]; }
   /// Raises the greatest penetration of each cloth's points to that at the end of a sub-step [m].
   void measure(const ClothPoints& points, std::span<Real> penetration) const;
 
@@ -88,7 +90,8 @@ class ClothContacts {
   std::vector<Real> seen_reach_;  // distance that each point may move before its search must be repeated
   std::vector<Aabb> boxes_;       // of the bodies' paths
   std::vector<uint64_t> active_;
-  std::vector<Touch> touches_;  // of one point
+  std::vector<uint8_t> touched_;  // of each cloth
+  std::vector<Touch> touches_;    // of one point
 };
 
 }  // namespace offstage::sim

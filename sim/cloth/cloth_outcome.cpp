@@ -73,7 +73,7 @@ uint32_t ClothSystem::tear_at(std::size_t c, Real time) {
   Cloth& cloth = *cloths_[c];
   ClothTear first{.time = time};
   first.by_pressure = cloth.def.pressure != 0;
-  first.touches_body = c < contacts_.active().size() && contacts_.active()[c] > 0;
+  first.touches_body = contacts_.touched(c);
   const uint32_t torn = tear(cloth, first);
   cloth.report.first_tear = cloth.first_tear;
   return torn;

@@ -1,30 +1,29 @@
 #include "sim/cloth/cloth_springs.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstring>
+#include <cstdio>
+#include <cstdlib>
 #include <limits>
 
+#include "sim/cloth/four_vectors.h"
 #include "sim/core/staged_loop.h"
-#include "sim/linear/lanes.h"
 
 namespace offstage::sim {
 namespace {
 
 /// Springs at a time, and from how many on threads are worth their waking.
 constexpr std::size_t kBlock = 2048, kWorthThreads = 60000;
-constexpr uint32_t kMaxColors = 64;
-/// What is too stiff for the step counts as softer. From h^2 k (1/m_a + 1/m_b) = 10 on in a woven sheet,
-/// whose points have four stiff springs, one symmetric sweep leaves so much of the explicit step's excess
-/// that it grows (measured; an exact solution has no such limit). What counts is what all springs of both
-/// points make of it, four times as much there: in a mesh of triangles, where six meet, each may have less.
-constexpr Real kMaxRatio = 6, kMaxRatioOfAll = 24;
+/// What is too stiff for the step counts as softer: one symmetric sweep leaves so much of the explicit step's
+/// excess that it grows. What counts is what all springs of both points make of it. Without damping, a flat
+/// weave bears h^2 k (1/m_a + 1/m_b) = 10, one sheared by 30 degrees 2 to 3, as a mesh of triangles does,
+/// where six springs meet (measured; an exact solution has no such limit). The limits are 3.5 and 2.3.
+constexpr Real kMaxRatio = 6, kMaxRatioOfAll = 14;
 /// Of the step squared times the sum of k e / (l m) of the springs at both points, with the elongation e and
 /// the length l: the explicit step is stable up to 4 (Anderson and Morley, 1985). The rest is for the stretch
 /// that a sub-step of the world adds.
 constexpr Real kMaxAcross = 3;
-/// Up to this length over rest length, kMaxRatioOfAll keeps that limit: 3 / 24 = 1 - 1 / 1.143.
+/// Up to this length over rest length, kMaxRatioOfAll keeps that limit: 3 / 14 > 1 - 1 / 1.14.
 constexpr Real kShortEnough = 1.14;
 /// A spring as soft as this stays as it is.
 constexpr Real kSoftRatio = 0.5;
@@ -36,49 +35,16 @@ constexpr Real kNoMobility = 1e-100;
 /// Of a stiffness that is exactly what the step allows.
 constexpr Real kRounding = 1e-5;
 
-/// Four numbers in one instruction, where Eigen's casts go one by one.
-typedef float Floats __attribute__((vector_size(16)));
+typedef float SpringFloats __attribute__((vector_size(16)));
 
-inline Vec4 widened(const Eigen::Vector4f& v) {
-  Floats from;
-  std::memcpy(&from, v.data(), sizeof(from));
-  const Lanes to = __builtin_convertvector(from, Lanes);
-  Vec4 result;
-  std::memcpy(result.data(), &to, sizeof(to));
-  return result;
+inline Lanes widened(SpringFloats v) {
+  return __builtin_convertvector(v, Lanes);
 }
-
-inline Eigen::Vector4f narrowed(const Vec4& v) {
-  Lanes from;
-  std::memcpy(&from, v.data(), sizeof(from));
-  const Floats to = __builtin_convertvector(from, Floats);
-  Eigen::Vector4f result;
-  std::memcpy(result.data(), &to, sizeof(to));
-  return result;
+inline SpringFloats narrowed(Lanes v) {
+  return __builtin_convertvector(v, SpringFloats);
 }
-
-/// An impulse (times the step) pulls a and b together. What pins hold passes it on.
-inline void give(ClothPoints& points, std::span<Vec4> moves, uint32_t a, uint32_t b, const Vec4& impulse) {
-  const Real wa = points.inverse_mass[a], wb = points.inverse_mass[b];
-  moves[a] -= wa * impulse;
-  moves[b] += wb * impulse;
-  if (wa == 0) points.pull[a] -= impulse;
-  if (wb == 0) points.pull[b] += impulse;
-}
-
-/// Greedy: each spring gets the first colour that neither of its ends has.
-std::vector<uint32_t> colors(std::span<const ClothSpring> springs, std::size_t point_count) {
-  std::vector<uint64_t> used(point_count, 0);
-  std::vector<uint32_t> color(springs.size());
-  for (std::size_t i = 0; i < springs.size(); ++i) {
-    const uint64_t taken = used[springs[i].a] | used[springs[i].b];
-    const uint32_t first = static_cast<uint32_t>(std::countr_one(taken));
-    color[i] = std::min(first, kMaxColors);
-    if (first == kMaxColors) continue;
-    used[springs[i].a] |= uint64_t{1} << first;
-    used[springs[i].b] |= uint64_t{1} << first;
-  }
-  return color;
+inline FourVectors widened(const std::array<SpringFloats, 3>& v) {
+  return {widened(v[0]), widened(v[1]), widened(v[2])};
 }
 
 }  // namespace
@@ -87,40 +53,94 @@ void ClothSprings::assign(std::span<const ClothSpring> springs, const ClothPoint
   std::vector<Real> around(points.size(), 0);  // sum of k / m of the springs at each point
   for (const ClothSpring& s : springs)
     for (uint32_t end : {s.a, s.b}) around[end] += s.stiffness / points.mass[end];
-  const auto most = [&](const ClothSpring& s) {
+  material_.clear();
+  for (const ClothSpring& s : springs) {
     const Real own = s.stiffness * (1 / points.mass[s.a] + 1 / points.mass[s.b]);
-    return std::clamp(kMaxRatioOfAll * own / (around[s.a] + around[s.b]), kSoftRatio, kMaxRatio);
-  };
-  // The last colour takes what finds no other, at points with very many springs. One thread does it.
-  const std::vector<uint32_t> color = colors(springs, points.size());
-  color_start_.assign(kMaxColors + 2, 0);
-  for (uint32_t c : color) ++color_start_[c + 1];
-  for (std::size_t c = 1; c < color_start_.size(); ++c) color_start_[c] += color_start_[c - 1];
-  std::vector<std::size_t> next(color_start_.begin(), color_start_.end());
-  spring_.resize(springs.size());
-  material_.resize(springs.size());
-  for (std::size_t i = 0; i < springs.size(); ++i) {
-    const ClothSpring& s = springs[i];
-    const std::size_t at = next[color[i]]++;
-    spring_[at] = {s.a, s.b, s.counterpart, s.rest_length, 0, s.counterpart_rest};
-    if (s.counterpart_rest == 0) spring_[at].counterpart = {s.a, s.a};
-    const Real fastest = s.stiffness * (1 / points.mass[s.a] + 1 / points.mass[s.b]);
-    material_[at] = {s.stiffness, s.damping, fastest, most(s), most(s)};
+    const Real most = std::clamp(kMaxRatioOfAll * own / (around[s.a] + around[s.b]), kSoftRatio, kMaxRatio);
+    material_.push_back({s.a, s.b, s.stiffness, s.damping, own, most, most});
   }
+  const std::vector<SpringPath> paths = spring_paths(springs, points);
+  const std::vector<uint32_t> color = path_colors(paths, points.size());
+  std::vector<const SpringPath*> order(paths.size());
+  for (std::size_t i = 0; i < paths.size(); ++i) order[i] = &paths[i];
+  const auto color_of = [&](const SpringPath* path) {
+    return color[static_cast<std::size_t>(path - paths.data())];
+  };
+  std::ranges::stable_sort(order, [&](const SpringPath* a, const SpringPath* b) {
+    return color_of(a) != color_of(b) ? color_of(a) < color_of(b) : a->springs.size() > b->springs.size();
+  });
+  row_.clear();
+  elastic_.clear();
+  counterparts_.clear();
+  batch_.clear();
+  std::vector<std::size_t> ends;  // of the batches of each colour
+  for (std::size_t i = 0; i < order.size();) {
+    const uint32_t own = color_of(order[i]);
+    // The last colour takes paths that find no other, at points with very many springs: one at a time.
+    const std::size_t most = own + 1 == kPathColors ? 1 : kLanes;
+    std::size_t end = i;
+    while (end < order.size() && end < i + most && color_of(order[end]) == own) ++end;
+    add_batch(std::span(order).subspan(i, end - i), springs);
+    ends.resize(own, ends.empty() ? 0 : ends.back());
+    ends.resize(own + 1);
+    ends[own] = batch_.size();
+    i = end;
+  }
+  add_stages(ends);
+  prepared_for_ = -1;
   is_stretched_ = false;
   set_longest_step();
-  link_.resize(spring_.size());
-  prepared_for_ = -1;
+}
+
+/// Paths of equal or decreasing length.
+void ClothSprings::add_batch(std::span<const SpringPath* const> paths, std::span<const ClothSpring> springs) {
+  Batch batch{row_.size(), paths[0]->springs.size(), kNone};
+  const auto has_counterpart = [&](uint32_t spring) { return springs[spring].counterpart_rest > 0; };
+  if (std::ranges::any_of(
+          paths, [&](const SpringPath* p) { return std::ranges::any_of(p->springs, has_counterpart); }))
+    batch.counterparts = counterparts_.size();
+  for (std::size_t k = 0; k <= batch.length; ++k) {
+    Row row{};
+    Elastic elastic{};
+    Counterparts counterparts{};
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const SpringPath& path = *paths[std::min(lane, paths.size() - 1)];
+      // Lanes without a path and the ends of shorter ones are read, but have no strength.
+      row.point[lane] = path.points[std::min(k, path.points.size() - 1)];
+      counterparts.a[lane] = counterparts.b[lane] = row.point[lane];
+      elastic.spring[lane] = kNoSpring;
+      if (lane >= paths.size() || k >= path.points.size()) continue;
+      row.count = static_cast<uint32_t>(lane) + 1;
+      if (k == path.springs.size()) continue;
+      const ClothSpring& s = springs[path.springs[k]];
+      elastic.spring[lane] = path.springs[k];
+      elastic.rest[lane] = s.rest_length;
+      if (s.counterpart_rest == 0) continue;
+      counterparts.a[lane] = s.counterpart[0];
+      counterparts.b[lane] = s.counterpart[1];
+      counterparts.rest[lane] = s.counterpart_rest;
+    }
+    row_.push_back(row);
+    elastic_.push_back(elastic);
+    if (batch.counterparts != kNone) counterparts_.push_back(counterparts);
+  }
+  batch_.push_back(batch);
+}
+
+void ClothSprings::add_stages(std::span<const std::size_t> color_ends) {
   pull_.clear();
   relax_.clear();
-  for (auto kind : {Stage::pull, Stage::forward, Stage::backward}) {
-    for (std::size_t c = 0; c + 1 < color_start_.size(); ++c) {
-      const std::size_t k = kind == Stage::backward ? color_start_.size() - 2 - c : c;
-      if (color_start_[k + 1] > color_start_[k])
-        (kind == Stage::pull ? pull_ : relax_)
-            .push_back({kind, color_start_[k], color_start_[k + 1], k == kMaxColors});
-    }
-  }
+  const auto add = [&](std::size_t color, decltype(Stage::kind) kind) {
+    const std::size_t begin = color == 0 ? 0 : color_ends[color - 1], end = color_ends[color];
+    if (begin == end) return;
+    std::size_t longest = 1;
+    for (std::size_t i = begin; i < end; ++i) longest = std::max(longest, batch_[i].length);
+    const std::size_t block = color + 1 == kPathColors ? end - begin : kBlock / (kLanes * longest) + 1;
+    (kind == Stage::pull ? pull_ : relax_).push_back({kind, begin, end, block});
+  };
+  for (std::size_t c = 0; c < color_ends.size(); ++c) add(c, Stage::pull);
+  for (std::size_t c = 0; c < color_ends.size(); ++c) add(c, Stage::forward);
+  for (std::size_t c = color_ends.size(); c-- > 0;) add(c, Stage::backward);
 }
 
 void ClothSprings::set_longest_step() {
@@ -130,37 +150,46 @@ void ClothSprings::set_longest_step() {
 }
 
 void ClothSprings::adapt_to_stretch(const ClothPoints& points) {
-  const auto length2 = [&](const Spring& s) {
-    return (points.position[s.a] - points.position[s.b]).squaredNorm();
-  };
-  const bool is_stretched = std::ranges::any_of(
-      spring_, [&](const Spring& s) { return length2(s) > kShortEnough * kShortEnough * s.rest * s.rest; });
-  if (!is_stretched && !is_stretched_) return;
-  std::vector<Real> across(points.size(), 0);  // sum of k e / (l m) of the springs at each point
-  for (std::size_t i = 0; i < spring_.size(); ++i) {
-    const Spring& s = spring_[i];
-    const Real length = std::sqrt(length2(s));
-    Real elongation = length - s.rest;
-    if (s.counterpart_rest > 0) {
-      const auto [c, d] = s.counterpart;
-      elongation = (elongation - (points.position[c] - points.position[d]).norm() + s.counterpart_rest) / 2;
+  const Vec4* const x = points.position.data();
+  std::vector<Real> across;  // sum of k e / (l m) of the springs at each point
+  // Adds the springs of a row to the sum if `adds`; else returns whether any is too long to be neglected.
+  const auto look = [&](const Batch& batch, std::size_t r, Lanes length2, bool adds) {
+    if (!adds)
+      return _mm256_movemask_pd(length2 >
+                                kShortEnough * kShortEnough * elastic_[r].rest * elastic_[r].rest) != 0;
+    const Lanes length = lane_root(length2), elongation = elongations(batch, r, length, x);
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const uint32_t spring = elastic_[r].spring[lane];
+      if (spring == kNoSpring || !(elongation[lane] > 0)) continue;
+      const Real stiffness = material_[spring].stiffness * elongation[lane] / length[lane];
+      for (uint32_t end : {row_[r].point[lane], row_[r + 1].point[lane]})
+        across[end] += stiffness / points.mass[end];
     }
-    if (!(elongation > 0)) continue;
-    const Real stiffness = material_[i].stiffness * elongation / length;
-    for (uint32_t end : {s.a, s.b}) across[end] += stiffness / points.mass[end];
-  }
-  for (std::size_t i = 0; i < spring_.size(); ++i) {
-    Material& m = material_[i];
-    const Real sum = across[spring_[i].a] + across[spring_[i].b];
+    return true;
+  };
+  const auto any = [&](bool adds) {
+    bool found = false;
+    for (const Batch& batch : batch_) {
+      FourVectors at = FourVectors::of(x, row_[batch.first].point);
+      for (std::size_t r = batch.first, end = r + batch.length; r < end; ++r) {
+        const FourVectors next = FourVectors::of(x, row_[r + 1].point), d = at - next;
+        found |= look(batch, r, d.dot(d), adds);
+        at = next;
+      }
+    }
+    return found;
+  };
+  const bool is_stretched = any(false);
+  if (!is_stretched && !is_stretched_) return;
+  across.assign(points.size(), 0);
+  any(true);
+  for (Material& m : material_) {
+    const Real sum = across[m.a] + across[m.b];
     m.most = sum > 0 ? std::min(m.most_at_rest, kMaxAcross * m.fastest / sum) : m.most_at_rest;
   }
   is_stretched_ = is_stretched;
-  prepared_for_ = -1;
   set_longest_step();
-}
-
-uint32_t ClothSprings::Stage::block_count() const {
-  return whole ? 1 : static_cast<uint32_t>((end - begin + kBlock - 1) / kBlock);
+  if (clamped_ > 0 || prepared_for_ > longest_step_) prepared_for_ = -1;  // else no stiffness changes
 }
 
 void ClothSprings::pull(ClothPoints& points, std::span<Vec4> moves) {
@@ -172,17 +201,14 @@ void ClothSprings::relax(ClothPoints& points, std::span<Vec4> moves) {
 }
 
 void ClothSprings::run(std::span<const Stage> stages, ClothPoints& points, std::span<Vec4> moves) {
-  const uint32_t threads = spring_.size() < kWorthThreads ? 1 : available_threads();
+  const uint32_t threads = material_.size() < kWorthThreads ? 1 : available_threads();
   const auto all = [](const Stage&) { return true; };
   run_stages(stages, threads, all, [&](const Stage& stage, uint32_t block) {
-    const std::size_t begin = stage.begin + block * kBlock;
-    const std::size_t end = stage.whole ? stage.end : std::min(begin + kBlock, stage.end);
-    if (stage.kind == Stage::pull)
-      pull(points, moves, begin, end);
-    else if (stage.kind == Stage::forward)
-      for (std::size_t i = begin; i < end; ++i) relax(points, moves, i);
-    else
-      for (std::size_t i = end; i-- > begin;) relax(points, moves, i);
+    const std::size_t begin = stage.begin + block * stage.block;
+    for (std::size_t i = begin, end = std::min(begin + stage.block, stage.end); i < end; ++i)
+      stage.kind == Stage::pull      ? pull(points, moves, batch_[i])
+      : stage.kind == Stage::forward ? sweep_forward(points, moves, batch_[i])
+                                     : sweep_backward(points, moves, batch_[i]);
   });
 }
 
@@ -195,61 +221,121 @@ void ClothSprings::begin(const ClothPoints& points, Real step) {
   inverse_mass_ = points.inverse_mass;
   clamped_ = 0;
   least_stiffness_ = 1;
-  for (std::size_t i = 0; i < spring_.size(); ++i) {
-    Spring& s = spring_[i];
-    const Material& material = material_[i];
-    const Real mobility = inverse_mass_[s.a] + inverse_mass_[s.b];
-    const Real ratio = h * h * material.stiffness * mobility;
-    if (ratio > material.most * (1 + kRounding)) {
-      ++clamped_;
-      least_stiffness_ = std::min(least_stiffness_, material.most / ratio);
+  for (std::size_t r = 0; r < row_.size(); ++r) {
+    Row& row = row_[r];
+    row.held = 0;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const bool is_there = lane < row.count;
+      row.weight[lane] = is_there ? inverse_mass_[row.point[lane]] : 0;
+      if (is_there && row.weight[lane] == 0) row.held |= 1u << lane;
+      const uint32_t i = elastic_[r].spring[lane];
+      if (i == kNoSpring) continue;
+      const Material& material = material_[i];
+      const Real mobility = inverse_mass_[material.a] + inverse_mass_[material.b];
+      const Real ratio = h * h * material.stiffness * mobility;
+      if (ratio > material.most * (1 + kRounding)) {
+        ++clamped_;
+        least_stiffness_ = std::min(least_stiffness_, material.most / ratio);
+      }
+      const Real stiffness =
+          std::min(h * h * material.stiffness, material.most / std::max(mobility, kNoMobility));
+      elastic_[r].stiffness[lane] = stiffness;
+      const Real resists = stiffness + h * material.damping, forget = 1 / (1 + resists * mobility);
+      row.along[lane] = static_cast<float>(resists * forget);
+      row.forget[lane] = static_cast<float>(forget);
     }
-    s.stiffness = std::min(h * h * material.stiffness, material.most / std::max(mobility, kNoMobility));
-    const Real resists = s.stiffness + h * material.damping, forget = 1 / (1 + resists * mobility);
-    link_[i] = {Eigen::Vector4f(0, 0, 0, static_cast<float>(resists * forget)), static_cast<float>(forget), 0,
-                s.a, s.b};
   }
 }
 
-/// The explicit step, and the directions for the sweeps.
-void ClothSprings::pull(ClothPoints& points, std::span<Vec4> moves, std::size_t begin, std::size_t end) {
-  constexpr std::size_t kLanes = 16;
-  using Batch = Eigen::Array<Real, kLanes, 1>;
+/// Of the springs of a row, whose length is known.
+Lanes ClothSprings::elongations(const Batch& batch, std::size_t r, Lanes length, const Vec4* x) const {
+  const Lanes own = length - elastic_[r].rest;
+  if (batch.counterparts == kNone) return own;
+  const Counterparts& c = counterparts_[batch.counterparts + r - batch.first];
+  const FourVectors d = FourVectors::of(x, c.a) - FourVectors::of(x, c.b);
+  const Lanes none = {};
+  return c.rest > none ? (own - lane_root(d.dot(d)) + c.rest) / 2 : own;
+}
+
+/// Passes impulses on to what pins hold.
+void ClothSprings::pass_on(ClothPoints& points, const Row& row, const FourVectors& impulse) {
+  for (uint32_t lane = 0; lane < row.count; ++lane)
+    if ((row.held >> lane & 1) != 0)
+      points.pull[row.point[lane]] += Vec4(impulse.x[lane], impulse.y[lane], impulse.z[lane], 0);
+}
+
+void ClothSprings::store(std::span<Vec4> moves, const Row& row, const FourVectors& move) {
+  const std::array<Lanes, kLanes> each = move.apart();
+  for (uint32_t lane = 0; lane < row.count; ++lane)
+    _mm256_store_pd(moves[row.point[lane]].data(), each[lane]);
+}
+
+/// The explicit step, and the directions for the sweep.
+void ClothSprings::pull(ClothPoints& points, std::span<Vec4> moves, const Batch& batch) {
   const Vec4* const x = points.start.data();
-  for (std::size_t first = begin; first < end; first += kLanes) {
-    const std::size_t count = std::min(kLanes, end - first);
-    std::array<Vec4, kLanes> direction;
-    Batch length2 = Batch::Ones(), other2 = Batch::Zero();
-    for (std::size_t k = 0; k < count; ++k) {
-      const Spring& s = spring_[first + k];
-      direction[k] = x[s.a] - x[s.b];
-      length2[static_cast<Eigen::Index>(k)] = std::max(direction[k].squaredNorm(), kNoLength2);
-      other2[static_cast<Eigen::Index>(k)] = (x[s.counterpart[0]] - x[s.counterpart[1]]).squaredNorm();
+  FourVectors at = FourVectors::of(x, row_[batch.first].point), before = {};
+  const auto give = [&](const Row& row, const FourVectors& impulse) {
+    const std::array<Lanes, kLanes> each = (impulse * row.weight).apart();
+    for (uint32_t lane = 0; lane < row.count; ++lane) {
+      Real* const move = moves[row.point[lane]].data();
+      _mm256_store_pd(move, _mm256_load_pd(move) + each[lane]);
     }
-    const Batch length = length2.sqrt(), inverse = length.inverse(), other = other2.sqrt();
-    for (std::size_t k = 0; k < count; ++k) {
-      const Spring& s = spring_[first + k];
-      const auto lane = static_cast<Eigen::Index>(k);
-      const Real own = length[lane] - s.rest;
-      const Real elongation = s.counterpart_rest > 0 ? (own - other[lane] + s.counterpart_rest) / 2 : own;
-      give(points, moves, s.a, s.b, s.stiffness * elongation * inverse[lane] * direction[k]);
-      Link& link = link_[first + k];
-      const float along = link.axis[3];
-      link.axis = narrowed(inverse[lane] * direction[k]);
-      link.axis[3] = along;
-      link.impulse = 0;
-    }
+    if (row.held != 0) pass_on(points, row, impulse);
+  };
+  for (std::size_t r = batch.first, end = r + batch.length; r < end; ++r) {
+    Row& row = row_[r];
+    const FourVectors next = FourVectors::of(x, row_[r + 1].point), d = at - next;
+    const Lanes square = d.dot(d), least = kNoLength2 + Lanes{}, length = lane_root(lane_max(square, least));
+    const FourVectors axis = d * (1 / length);
+    const FourVectors impulse = axis * (elastic_[r].stiffness * elongations(batch, r, length, x));
+    give(row, before - impulse);
+    row.axis = {narrowed(axis.x), narrowed(axis.y), narrowed(axis.z)};
+    row.impulse = SpringFloats{};
+    before = impulse;
+    at = next;
   }
+  give(row_[batch.first + batch.length], before);
 }
 
 /// Gauss-Seidel on the impulses, which are zero at first: the equation of a spring is r + impulse / c = 0.
-void ClothSprings::relax(ClothPoints& points, std::span<Vec4> moves, std::size_t spring) {
-  Link& link = link_[spring];
-  const Vec4 u = widened(link.axis).cwiseProduct(Vec4(1, 1, 1, 0));
-  const Real step =
-      Real{link.axis[3]} * u.dot(moves[link.a] - moves[link.b]) - Real{link.forget} * link.impulse;
-  link.impulse += static_cast<float>(step);
-  give(points, moves, link.a, link.b, step * u);
+/// Takes the springs of a row with the moves of their first points and of the next.
+FourVectors ClothSprings::relax(Row& row, const FourVectors& axis, const FourVectors& move,
+                                const FourVectors& next) {
+  const Lanes step = widened(row.along) * axis.dot(move - next) - widened(row.forget) * widened(row.impulse);
+  row.impulse += narrowed(step);
+  return axis * step;
+}
+
+void ClothSprings::sweep_forward(ClothPoints& points, std::span<Vec4> moves, const Batch& batch) {
+  FourVectors at = FourVectors::of(moves.data(), row_[batch.first].point);
+  for (std::size_t r = batch.first, end = r + batch.length; r < end; ++r) {
+    Row &row = row_[r], &after = row_[r + 1];
+    FourVectors next = FourVectors::of(moves.data(), after.point);
+    const FourVectors impulse = relax(row, widened(row.axis), at, next);
+    at = at - impulse * row.weight;
+    next = next + impulse * after.weight;
+    store(moves, row, at);
+    if (row.held != 0) pass_on(points, row, FourVectors{} - impulse);
+    if (after.held != 0) pass_on(points, after, impulse);
+    at = next;
+  }
+  store(moves, row_[batch.first + batch.length], at);
+}
+
+void ClothSprings::sweep_backward(ClothPoints& points, std::span<Vec4> moves, const Batch& batch) {
+  FourVectors next = FourVectors::of(moves.data(), row_[batch.first + batch.length].point);
+  for (std::size_t r = batch.first + batch.length; r-- > batch.first;) {
+    Row &row = row_[r], &after = row_[r + 1];
+    FourVectors at = FourVectors::of(moves.data(), row.point);
+    const FourVectors impulse = relax(row, widened(row.axis), at, next);
+    at = at - impulse * row.weight;
+    next = next + impulse * after.weight;
+    store(moves, after, next);
+    if (row.held != 0) pass_on(points, row, FourVectors{} - impulse);
+    if (after.held != 0) pass_on(points, after, impulse);
+    next = at;
+  }
+  store(moves, row_[batch.first], next);
 }
 
 }  // namespace offstage::sim

@@ -1,10 +1,11 @@
 #pragma once
 /// The springs of cloths by backward Euler, linearised once (Baraff and Witkin, "Large Steps in Cloth
-/// Simulation", 1998), and solved approximately. A few symmetric Gauss-Seidel sweeps correct the explicit
-/// step, which contains every force exactly. In equilibrium the residual is zero, so cloth under a static
-/// load has its true length for any number of sweeps.
+/// Simulation", 1998), and solved approximately. One symmetric Gauss-Seidel sweep corrects the explicit step,
+/// which contains every force exactly. In equilibrium the residual is zero, so cloth under a static load has
+/// its true length.
 ///
-/// Springs of one colour share no point, so a sweep gives identical bits on any number of threads.
+/// The sweep follows paths of springs (spring_paths.h), four at a time, one in each lane of a register. Paths
+/// of one colour share no point, so a sweep gives identical bits on any number of threads.
 
 #include <cstdint>
 #include <span>
@@ -12,16 +13,19 @@
 
 #include "sim/cloth/cloth.h"
 #include "sim/cloth/cloth_points.h"
+#include "sim/cloth/four_vectors.h"
+#include "sim/cloth/spring_paths.h"
+#include "sim/linear/lanes.h"
 
 namespace offstage::sim {
 
 class ClothSprings {
  public:
-  /// Springs of one cloth, between points of all cloths; their order determines the colours.
+  /// Springs of one cloth, between points of all cloths.
   void assign(std::span<const ClothSpring> springs, const ClothPoints& points);
 
   /// Adapts the stable step to the points' present positions: a spring under tension also acts across its
-  /// direction, by its force over its length, and the sweeps do not make that part implicit. To be called
+  /// direction, by its force over its length, and the sweep does not make that part implicit. To be called
   /// where the stretch may have changed much; the result depends on the positions alone.
   void adapt_to_stretch(const ClothPoints& points);
   /// The longest step at which no spring's stiffness is clamped [s].
@@ -39,45 +43,73 @@ class ClothSprings {
   Real least_stiffness() const { return least_stiffness_; }
 
  private:
-  struct Spring {
-    uint32_t a, b;
-    std::array<uint32_t, 2> counterpart;  // a twice if it has none
-    Real rest, stiffness;                 // stiffness times h^2, clamped if necessary
-    Real counterpart_rest;
-  };
+  static constexpr std::size_t kLanes = 4;
+  typedef float Floats __attribute__((vector_size(kLanes * sizeof(float))));
+
   struct Material {
+    uint32_t a, b;
     Real stiffness, damping;
     Real fastest;             // k (1/m_a + 1/m_b)
     Real most, most_at_rest;  // of h^2 `fastest`; at the present stretch, and without stretch
   };
-  /// A spring in the step. It is small because every sweep reads all of them. A relative move d along the
-  /// axis is resisted by the impulse `along` d, less the share `forget` of the impulse of previous sweeps.
-  struct Link {
-    Eigen::Vector4f axis;  // unit, from b to a; the fourth is `along`
-    float forget, impulse;
-    uint32_t a, b;
+  /// The springs between one point of each of four paths and the next, and the first of the two points. It is
+  /// small because every sweep reads all of them. A relative move d along the axis is resisted by the impulse
+  /// `along` d, less the share `forget` of the impulse of the sweep so far.
+  struct Row {
+    Lanes weight;                // inverse masses
+    std::array<Floats, 3> axis;  // unit, from the next point to this one; by x, y and z
+    Floats along, forget, impulse;
+    std::array<uint32_t, kLanes> point;
+    uint32_t count;  // of lanes that have this point
+    uint32_t held;   // bit mask of those whose point is held
   };
+  /// What only the explicit step needs of a row.
+  struct Elastic {
+    Lanes rest, stiffness;  // the latter times h^2, clamped if necessary
+    std::array<uint32_t, kLanes> spring;
+  };
+  /// The other diagonals of springs that have a counterpart.
+  struct Counterparts {
+    std::array<uint32_t, kLanes> a, b;
+    Lanes rest;  // 0: none
+  };
+  /// Up to four paths: rows from the first on, of which the last has points alone.
+  struct Batch {
+    std::size_t first, length;  // number of springs of the longest
+    std::size_t counterparts;   // where those of the first row are; kNone: it has none
+  };
+  static constexpr std::size_t kNone = ~std::size_t{0};
+  static constexpr uint32_t kNoSpring = ~0u;
   struct Stage {
     enum { pull, forward, backward } kind;
-    std::size_t begin, end;
-    bool whole;  // by one thread
+    std::size_t begin, end;  // batches
+    std::size_t block;       // batches of a block
 
-    uint32_t block_count() const;
+    uint32_t block_count() const { return static_cast<uint32_t>((end - begin + block - 1) / block); }
   };
 
+  void add_batch(std::span<const SpringPath* const> paths, std::span<const ClothSpring> springs);
+  void add_stages(std::span<const std::size_t> color_ends);
   void set_longest_step();
   void run(std::span<const Stage> stages, ClothPoints& points, std::span<Vec4> moves);
-  void pull(ClothPoints& points, std::span<Vec4> moves, std::size_t begin, std::size_t end);
-  void relax(ClothPoints& points, std::span<Vec4> moves, std::size_t spring);
+  Lanes elongations(const Batch& batch, std::size_t row, Lanes length, const Vec4* x) const;
+  void pull(ClothPoints& points, std::span<Vec4> moves, const Batch& batch);
+  static void pass_on(ClothPoints& points, const Row& row, const FourVectors& impulse);
+  static void store(std::span<Vec4> moves, const Row& row, const FourVectors& move);
+  static FourVectors relax(Row& row, const FourVectors& axis, const FourVectors& move,
+                           const FourVectors& next);
+  void sweep_forward(ClothPoints& points, std::span<Vec4> moves, const Batch& batch);
+  void sweep_backward(ClothPoints& points, std::span<Vec4> moves, const Batch& batch);
 
-  std::vector<Spring> spring_;            // by colour
-  std::vector<Material> material_;        // of each
-  std::vector<std::size_t> color_start_;  // and the end
-  std::vector<Link> link_;                // of the step
-  std::vector<Stage> pull_, relax_;       // of any step
-  std::vector<Real> inverse_mass_;        // that springs were prepared for
-  bool is_stretched_ = false;             // whether some `most` is not that at rest
-  Real prepared_for_ = -1;                // step [s]; < 0: none
+  std::vector<Material> material_;  // of each spring
+  std::vector<Row> row_;
+  std::vector<Elastic> elastic_;
+  std::vector<Counterparts> counterparts_;
+  std::vector<Batch> batch_;
+  std::vector<Stage> pull_, relax_;  // of any step
+  std::vector<Real> inverse_mass_;   // that springs were prepared for
+  bool is_stretched_ = false;        // whether some `most` is not that at rest
+  Real prepared_for_ = -1;           // step [s]; < 0: none
   Real longest_step_ = 0, least_stiffness_ = 1;
   uint64_t clamped_ = 0;
 };

@@ -397,6 +397,15 @@ void SelfContacts::keep_sides(ClothPoints& points) const {
   }
 }
 
+bool SelfContacts::any_crossed(const ClothPoints& points) const {
+  return std::ranges::any_of(contacts_, [&](const Contact& c) {
+    const Pair& pair = pairs_[c.pair];
+    const Sides sides = sides_of(pair, c.normal, points.start[pair.points[0]],
+                                 [&](uint32_t i) -> const Vec4& { return points.position[i]; });
+    return sides.apart() < least_distance(c.distance, pair.nearest);
+  });
+}
+
 bool SelfContacts::shorten(const ClothPoints& points, MoveShares& shares, std::vector<uint32_t>& lowered) {
   bool any = false;
   for (const Contact& c : contacts_) {

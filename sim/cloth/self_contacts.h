@@ -38,6 +38,8 @@ class SelfContacts {
   void for_doubtful(Visit&& visit) const {
     for (const Contact& c : contacts_) visit(pairs_[c.pair].points);
   }
+  /// Whether any of these pairs crossed.
+  bool any_crossed(const ClothPoints& points) const;
   /// Lowers the shares of the moves of pairs that crossed, and adds their points to `lowered`. Returns
   /// whether there were any.
   bool shorten(const ClothPoints& points, MoveShares& shares, std::vector<uint32_t>& lowered);

@@ -113,6 +113,10 @@ void ClothSystem::shorten_moves(Real dt) {
   };
   shortened_.assign(points_.size(), kWhole);
   find_doubtful();
+  if (!limit_.any_beyond(points_) && !(self && self_contacts_.any_crossed(points_))) {
+    if (self) self_contacts_.end_substep(points_, dt);
+    return;  // most sub-steps: whole moves are allowed, in whatever frame
+  }
   const bool any_drifts = find_drifts();
   add_momenta(1, dt);
   const bool any_free = !std::ranges::all_of(frames_, &Frame::anchored);
@@ -142,7 +146,7 @@ void ClothSystem::shorten_moves(Real dt) {
     give_momenta_back();
   }
   if (self) self_contacts_.end_substep(points_, dt);
-  stop_bodies(dt);
+  if (any) stop_bodies(dt);
 }
 
 /// In the frames of the pieces; whether any.

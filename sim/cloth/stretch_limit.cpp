@@ -63,6 +63,12 @@ bool StretchLimit::any_too_long(const ClothPoints& points) const {
   });
 }
 
+bool StretchLimit::any_beyond(const ClothPoints& points) const {
+  return std::ranges::any_of(limits_, [&](const Limit& l) {
+    return (points.position[l.a] - points.position[l.b]).squaredNorm() > l.longest * l.longest;
+  });
+}
+
 void StretchLimit::project_with(std::span<const BodyContact> contacts, ClothPoints& points,
                                 std::span<const Carrier> carriers, Real dt, std::span<const Vec4> kick,
                                 std::vector<VelocityCut>& cuts) const {

@@ -37,8 +37,10 @@ class StretchLimit {
   /// `kick` and `cuts`: see TautSprings::apply().
   bool project(ClothPoints& points, std::span<const Carrier> carriers, Real dt, std::span<const Vec4> kick,
                std::vector<VelocityCut>& cuts);
-  /// Whether any spring is too long.
+  /// Whether any spring is too long, of those that do not tear before.
   bool any_too_long(const ClothPoints& points) const;
+  /// The same of all springs.
+  bool any_beyond(const ClothPoints& points) const;
   /// Solves for all springs at their limits and these contacts together.
   void project_with(std::span<const BodyContact> contacts, ClothPoints& points,
                     std::span<const Carrier> carriers, Real dt, std::span<const Vec4> kick,

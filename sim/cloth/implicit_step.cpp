@@ -1,0 +1,189 @@
+#include "sim/cloth/cloth_integrators.h"
+#include "sim/cloth/spring_run.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr int kMaxIterations = 300;
+/// Of the residual against the right side, in the preconditioner's norm, squared.
+constexpr Real kTolerance2 = 1e-12;
+
+/// The matrix of backward Euler: of each spring alpha u u^T + beta 1 between its ends, that of bending, and
+/// the masses.
+class ImplicitSystem {
+ public:
+  ImplicitSystem(const ClothPoints& points, const ClothRange& cloth, Real h)
+      : points_(points),
+        cloth_(cloth),
+        bending_(cloth.bending.empty() ? 0 : h * (h + cloth.bending.damping())) {
+    block_.assign(cloth.end - cloth.begin, Mat3::Zero());
+    for (std::size_t i = 0; i < block_.size(); ++i)
+      block_[i].diagonal().setConstant(
+          points.mass[cloth.begin + i] +
+          (bending_ > 0 ? bending_ * cloth.bending.diagonal(static_cast<uint32_t>(i)) : 0));
+    if (!cloth.air.empty()) {
+      for (std::size_t i = 0; i < block_.size(); ++i) {
+        drag_.push_back(h * points.mass[cloth.begin + i] * cloth.air.resistance(i));
+        block_[i] += drag_[i];
+      }
+    }
+    for (const ClothSpring& s : cloth.springs) {
+      const Vec4 d = points.start[s.a] - points.start[s.b];
+      const Real length = d.norm();
+      const Vec4 u = length > 0 ? Vec4(d / length) : Vec4(Vec4::Zero());
+      const Real elongation = s.elongation(length, points.start);
+      const Real sideways = elongation > 0 ? elongation / length : 0;
+      const Real stiff = h * h * s.stiffness;
+      const Link link{u, stiff * (1 - sideways) + h * s.damping, stiff * sideways, s.stiffness * elongation};
+      links_.push_back(link);
+      const Mat3 k = link.along * u.head<3>() * u.head<3>().transpose() + link.across * Mat3::Identity();
+      block_[s.a - cloth.begin] += k;
+      block_[s.b - cloth.begin] += k;
+    }
+    for (Mat3& b : block_) b = b.inverse().eval();
+  }
+
+  /// y = A p, 0 where held.
+  void multiply(const SpringRun& p, SpringRun& y) const {
+    for (std::size_t i = 0; i < p.size(); ++i) y[i] = points_.mass[cloth_.begin + i] * p[i];
+    for (std::size_t i = 0; i < drag_.size(); ++i) y[i] += dragged(i, p[i]);
+    for (std::size_t k = 0; k < links_.size(); ++k) {
+      const ClothSpring& s = cloth_.springs[k];
+      const Link& link = links_[k];
+      const std::size_t a = s.a - cloth_.begin, b = s.b - cloth_.begin;
+      const Vec4 q = p[a] - p[b];
+      const Vec4 f = link.along * link.direction.dot(q) * link.direction + link.across * q;
+      y[a] += f;
+      y[b] -= f;
+    }
+    if (bending_ > 0) cloth_.bending.multiply(p, bending_, y);
+    clear_held(y);
+  }
+
+  /// What the springs do to what is held, when all move with v through the step.
+  void pass_on(ClothPoints& points, const SpringRun& v, Real h) const {
+    if (bending_ > 0) {
+      SpringRun force(v.size(), Vec4::Zero());
+      cloth_.bending.add_forces(cloth_.part(points.start), h * h, force);
+      cloth_.bending.multiply(v, -h * bending_, force);
+      for (std::size_t i = 0; i < force.size(); ++i)
+        if (is_held(points, cloth_.begin + i)) points.pull[cloth_.begin + i] += force[i];
+    }
+    for (std::size_t k = 0; k < links_.size(); ++k) {
+      const ClothSpring& s = cloth_.springs[k];
+      const Link& link = links_[k];
+      const Vec4 q = v[s.a - cloth_.begin] - v[s.b - cloth_.begin];
+      const Vec4 impulse =
+          h * ((h * link.force + link.along * link.direction.dot(q)) * link.direction + link.across * q);
+      if (is_held(points, s.a)) points.pull[s.a] -= impulse;
+      if (is_held(points, s.b)) points.pull[s.b] += impulse;
+    }
+  }
+
+  void precondition(const SpringRun& r, SpringRun& z) const {
+    for (std::size_t i = 0; i < r.size(); ++i) z[i] = padded(block_[i] * r[i].head<3>());
+  }
+
+  /// Impulse of the linear part of the drag on point i at a velocity.
+  Vec4 dragged(std::size_t i, const Vec4& v) const {
+    return drag_.empty() ? Vec4(Vec4::Zero()) : padded(drag_[i] * v.head<3>());
+  }
+
+  /// M v + h (spring forces + M a), 0 where held; drag is that of its velocity, with what is linear added.
+  SpringRun right_side(const SpringRun& v, Real h) const {
+    SpringRun b(v.size());
+    for (std::size_t i = 0; i < b.size(); ++i) {
+      const std::size_t k = cloth_.begin + i;
+      b[i] = points_.mass[k] * (v[i] + h * points_.acceleration[k]);
+    }
+    for (std::size_t i = 0; i < drag_.size(); ++i) b[i] += dragged(i, cloth_.air.from(i));
+    for (std::size_t k = 0; k < links_.size(); ++k) {
+      const Vec4 f = h * links_[k].force * links_[k].direction;
+      b[cloth_.springs[k].a - cloth_.begin] -= f;
+      b[cloth_.springs[k].b - cloth_.begin] += f;
+    }
+    if (bending_ > 0) cloth_.bending.add_forces(cloth_.part(points_.start), h, b);
+    clear_held(b);
+    return b;
+  }
+
+ private:
+  struct Link {
+    Vec4 direction;
+    Real along, across, force;
+  };
+
+  void clear_held(SpringRun& y) const {
+    for (std::size_t i = 0; i < y.size(); ++i)
+      if (is_held(points_, cloth_.begin + i)) y[i].setZero();
+  }
+
+  const ClothPoints& points_;
+  const ClothRange& cloth_;
+  Real bending_;  // factor of its matrix
+  std::vector<Link> links_;
+  std::vector<Mat3> block_;  // inverse
+  std::vector<Mat3> drag_;   // of each point; none without air
+};
+
+Real dot(const SpringRun& a, const SpringRun& b) {
+  Real sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i].dot(b[i]);
+  return sum;
+}
+
+/// Preconditioned conjugate gradients from a guess v, whose held points keep it.
+bool solve(const ImplicitSystem& system, const SpringRun& b, SpringRun& v) {
+  SpringRun r(v.size()), z(v.size()), y(v.size());
+  system.multiply(v, y);
+  for (std::size_t i = 0; i < r.size(); ++i) r[i] = b[i] - y[i];
+  system.precondition(b, z);
+  const Real enough = kTolerance2 * dot(b, z);
+  system.precondition(r, z);
+  SpringRun p = z;
+  Real rz = dot(r, z);
+  for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
+    if (!(rz > enough)) return true;
+    system.multiply(p, y);
+    const Real step = rz / dot(p, y);
+    for (std::size_t i = 0; i < v.size(); ++i) {
+      v[i] += step * p[i];
+      r[i] -= step * y[i];
+    }
+    system.precondition(r, z);
+    const Real next = dot(r, z);
+    for (std::size_t i = 0; i < p.size(); ++i) p[i] = z[i] + next / rz * p[i];
+    rz = next;
+  }
+  return false;
+}
+
+/// What the solution left of the momentum of a cloth that nothing holds, is given to all of it.
+void keep_momentum(const ClothPoints& points, const ClothRange& cloth, const ImplicitSystem& system,
+                   const SpringRun& b, SpringRun& v) {
+  Vec4 lost = Vec4::Zero();
+  Real mass = 0;
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    if (is_held(points, cloth.begin + i)) return;
+    lost += b[i] - points.mass[cloth.begin + i] * v[i] - system.dragged(i, v[i]);
+    mass += points.mass[cloth.begin + i];
+  }
+  for (Vec4& velocity : v) velocity += lost / mass;
+}
+
+}  // namespace
+
+bool step_implicit(ClothPoints& points, const ClothRange& cloth, Real h) {
+  SpringRun x, v;
+  begin_run(points, cloth, h, x, v);
+  const ImplicitSystem system(points, cloth, h);
+  const SpringRun b = system.right_side(v, h);
+  const bool converged = solve(system, b, v);
+  keep_momentum(points, cloth, system, b, v);
+  system.pass_on(points, v, h);
+  for (std::size_t i = 0; i < x.size(); ++i)
+    if (!is_held(points, cloth.begin + i)) points.position[cloth.begin + i] = x[i] + h * v[i];
+  return converged;
+}
+
+}  // namespace offstage::sim
