@@ -134,18 +134,18 @@ void ParticleContacts::start_motion() {
   });
 }
 
-Vec3 ParticleContacts::relative_velocity(const Pair& c) const {
+[[gnu::always_inline]] inline Vec3 ParticleContacts::relative_velocity(const Pair& c) const {
   const Vec3 u = motion_[c.a].velocity - motion_[c.b].velocity;
   if (turns_.empty()) return u;
   return u + c.normal().cross(turns_[c.a].surface_spin + turns_[c.b].surface_spin);
 }
 
-Vec3 ParticleContacts::relative_velocity(const Surface& c) const {
+[[gnu::always_inline]] inline Vec3 ParticleContacts::relative_velocity(const Surface& c) const {
   const Vec3 u = motion_[c.particle].velocity - c.velocity;
   return turns_.empty() ? u : Vec3(u + c.normal().cross(turns_[c.particle].surface_spin));
 }
 
-void ParticleContacts::apply(const Pair& c, const Vec3& impulse) {
+[[gnu::always_inline]] inline void ParticleContacts::apply(const Pair& c, const Vec3& impulse) {
   motion_[c.a].velocity += motion_[c.a].inverse_mass * impulse;
   motion_[c.b].velocity -= motion_[c.b].inverse_mass * impulse;
   if (turns_.empty()) return;
@@ -155,7 +155,7 @@ void ParticleContacts::apply(const Pair& c, const Vec3& impulse) {
   turns_[c.b].surface_spin -= turns_[c.b].by_impulse * turn;
 }
 
-void ParticleContacts::apply(const Surface& c, const Vec3& impulse) {
+[[gnu::always_inline]] inline void ParticleContacts::apply(const Surface& c, const Vec3& impulse) {
   motion_[c.particle].velocity += motion_[c.particle].inverse_mass * impulse;
   if (turns_.empty()) return;
   turns_[c.particle].surface_spin -= turns_[c.particle].by_impulse * c.normal().cross(impulse);
