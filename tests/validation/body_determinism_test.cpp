@@ -87,7 +87,7 @@ class CrowdDeterminism : public BodyDeterminism {
           const Vec3 at(0.22 * (x - 0.5 * (side - 1)), 0.12 + 0.21 * y, 0.22 * (z - 0.5 * (side - 1)));
           add(at, Vec3(-3 * at.x(), -1.5, -3 * at.z()), number % 72 == 20);
         }
-    for (int column = 0; column < (is_exact ? 60 : 30); ++column)
+    for (int column = 0; column < (is_exact ? 60 : 40); ++column)
       for (int y = 0; y < 3; ++y)
         add({1.5 + 0.5 * (column % 6), 0.13 + 0.22 * y, 0.5 * (column / 6)}, {0, -0.5, 0}, column % 8 == 0);
     Outcome outcome;
