@@ -120,7 +120,7 @@ def test_a_cache_is_read_and_described_truly(tiny, program, tmp_path):
     # The header of docs/cache.md.
     file = next((tmp_path / "cache").glob("generation-*/000007.snap"))
     magic, version, zero, size = struct.unpack_from("<8sIIQ", file.read_bytes())
-    assert (magic, version, zero) == (b"offsnap\0", 5, 0) and size > 100
+    assert (magic, version, zero) == (b"offsnap\0", 6, 0) and size > 100
     with pytest.raises(IndexError):
         cache[13]
     with pytest.raises(offstage.FileError):

@@ -1,8 +1,6 @@
 /// Paths of springs: every spring lies in one, consecutive springs share a point and go on straight, and
 /// paths of one colour share no point.
 
-#include "sim/cloth/spring_paths.h"
-
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -10,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "effects/cloth.h"
+#include "sim/cloth/spring_paths.h"
 
 namespace offstage::sim {
 namespace {
