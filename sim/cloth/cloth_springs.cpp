@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <limits>
 
 #include "sim/cloth/four_vectors.h"
@@ -16,8 +14,9 @@ namespace {
 constexpr std::size_t kBlock = 2048, kWorthThreads = 60000;
 /// What is too stiff for the step counts as softer: one symmetric sweep leaves so much of the explicit step's
 /// excess that it grows. What counts is what all springs of both points make of it. Without damping, a flat
-/// weave bears h^2 k (1/m_a + 1/m_b) = 10, one sheared by 30 degrees 2 to 3, as a mesh of triangles does,
-/// where six springs meet (measured; an exact solution has no such limit). The limits are 3.5 and 2.3.
+/// weave is stable up to h^2 k (1/m_a + 1/m_b) = 10. A weave sheared by 30 degrees is stable up to 2 to 3,
+/// and so is a mesh of triangles, where six springs meet (measured; an exact solution has no such limit).
+/// kMaxRatioOfAll limits them to 3.5 and 2.3.
 constexpr Real kMaxRatio = 6, kMaxRatioOfAll = 14;
 /// Of the step squared times the sum of k e / (l m) of the springs at both points, with the elongation e and
 /// the length l: the explicit step is stable up to 4 (Anderson and Morley, 1985). The rest is for the stretch
@@ -247,7 +246,7 @@ void ClothSprings::begin(const ClothPoints& points, Real step) {
   }
 }
 
-/// Of the springs of a row, whose length is known.
+/// Elongations of the springs of a row, whose lengths are known.
 Lanes ClothSprings::elongations(const Batch& batch, std::size_t r, Lanes length, const Vec4* x) const {
   const Lanes own = length - elastic_[r].rest;
   if (batch.counterparts == kNone) return own;
@@ -297,26 +296,29 @@ void ClothSprings::pull(ClothPoints& points, std::span<Vec4> moves, const Batch&
   give(row_[batch.first + batch.length], before);
 }
 
-/// Gauss-Seidel on the impulses, which are zero at first: the equation of a spring is r + impulse / c = 0.
-/// Takes the springs of a row with the moves of their first points and of the next.
-FourVectors ClothSprings::relax(Row& row, const FourVectors& axis, const FourVectors& move,
-                                const FourVectors& next) {
-  const Lanes step = widened(row.along) * axis.dot(move - next) - widened(row.forget) * widened(row.impulse);
+/// Relaxes the springs of a row, whose points have the moves `at` and `next`; `after` is the row of the
+/// latter. Gauss-Seidel on the impulses, which are zero at first: the equation of a spring is
+/// r + impulse / c = 0.
+void ClothSprings::relax(ClothPoints& points, Row& row, const Row& after, FourVectors& at,
+                         FourVectors& next) {
+  const FourVectors axis = widened(row.axis);
+  const Lanes step = widened(row.along) * axis.dot(at - next) - widened(row.forget) * widened(row.impulse);
   row.impulse += narrowed(step);
-  return axis * step;
+  const FourVectors impulse = axis * step;
+  at = at - impulse * row.weight;
+  next = next + impulse * after.weight;
+  if (row.held != 0) pass_on(points, row, FourVectors{} - impulse);
+  if (after.held != 0) pass_on(points, after, impulse);
 }
 
 void ClothSprings::sweep_forward(ClothPoints& points, std::span<Vec4> moves, const Batch& batch) {
   FourVectors at = FourVectors::of(moves.data(), row_[batch.first].point);
   for (std::size_t r = batch.first, end = r + batch.length; r < end; ++r) {
-    Row &row = row_[r], &after = row_[r + 1];
+    Row& row = row_[r];
+    const Row& after = row_[r + 1];
     FourVectors next = FourVectors::of(moves.data(), after.point);
-    const FourVectors impulse = relax(row, widened(row.axis), at, next);
-    at = at - impulse * row.weight;
-    next = next + impulse * after.weight;
+    relax(points, row, after, at, next);
     store(moves, row, at);
-    if (row.held != 0) pass_on(points, row, FourVectors{} - impulse);
-    if (after.held != 0) pass_on(points, after, impulse);
     at = next;
   }
   store(moves, row_[batch.first + batch.length], at);
@@ -325,14 +327,11 @@ void ClothSprings::sweep_forward(ClothPoints& points, std::span<Vec4> moves, con
 void ClothSprings::sweep_backward(ClothPoints& points, std::span<Vec4> moves, const Batch& batch) {
   FourVectors next = FourVectors::of(moves.data(), row_[batch.first + batch.length].point);
   for (std::size_t r = batch.first + batch.length; r-- > batch.first;) {
-    Row &row = row_[r], &after = row_[r + 1];
+    Row& row = row_[r];
+    const Row& after = row_[r + 1];
     FourVectors at = FourVectors::of(moves.data(), row.point);
-    const FourVectors impulse = relax(row, widened(row.axis), at, next);
-    at = at - impulse * row.weight;
-    next = next + impulse * after.weight;
+    relax(points, row, after, at, next);
     store(moves, after, next);
-    if (row.held != 0) pass_on(points, row, FourVectors{} - impulse);
-    if (after.held != 0) pass_on(points, after, impulse);
     next = at;
   }
   store(moves, row_[batch.first], next);

@@ -96,8 +96,7 @@ class ClothSprings {
   void pull(ClothPoints& points, std::span<Vec4> moves, const Batch& batch);
   static void pass_on(ClothPoints& points, const Row& row, const FourVectors& impulse);
   static void store(std::span<Vec4> moves, const Row& row, const FourVectors& move);
-  static FourVectors relax(Row& row, const FourVectors& axis, const FourVectors& move,
-                           const FourVectors& next);
+  static void relax(ClothPoints& points, Row& row, const Row& after, FourVectors& at, FourVectors& next);
   void sweep_forward(ClothPoints& points, std::span<Vec4> moves, const Batch& batch);
   void sweep_backward(ClothPoints& points, std::span<Vec4> moves, const Batch& batch);
 

@@ -15,6 +15,8 @@ namespace {
 constexpr Real kSame = 5e-3;
 /// Factor of the squared distance of points with equal ids, which are preferred.
 constexpr Real kSameFeature = 1.0 / 16;
+/// From more points on, candidates are looked up rather than compared one by one.
+constexpr std::size_t kManyPoints = 16;
 /// Cosine: a contact can continue another one only if their normals are at most this different.
 constexpr Real kAlong = 0.7;
 /// An overlap at an interval's end is expected if it exceeds the prediction of an existing point by less than
@@ -495,18 +497,21 @@ void ContactPair::remember(std::vector<Remembered>& points) const {
 /// limit.
 void ContactPair::recall(std::vector<Remembered>& points, const Pose& pose) {
   const Frame a(pose);
-  // Two models of many parts have thousands of points, so only those are compared that are near along x or
+  // Two models of many parts have thousands of points; then only those are compared that are near along x or
   // belong to the same features.
+  const bool are_many = points.size() > kManyPoints;
   static thread_local std::vector<std::pair<Real, uint32_t>> by_x;
   static thread_local std::vector<std::pair<uint32_t, uint32_t>> by_id;
-  by_x.clear();
-  by_id.clear();
-  for (uint32_t i = 0; i < points.size(); ++i) {
-    by_x.emplace_back(points[i].on_a.x(), i);
-    by_id.emplace_back(points[i].id, i);
+  if (are_many) {
+    by_x.clear();
+    by_id.clear();
+    for (uint32_t i = 0; i < points.size(); ++i) {
+      by_x.emplace_back(points[i].on_a.x(), i);
+      by_id.emplace_back(points[i].id, i);
+    }
+    std::sort(by_x.begin(), by_x.end());
+    std::sort(by_id.begin(), by_id.end());
   }
-  std::sort(by_x.begin(), by_x.end());
-  std::sort(by_id.begin(), by_id.end());
   for (PlacedManifold& m : placed_) {
     m.torque = m.mean_torque = 0;
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
@@ -522,12 +527,16 @@ void ContactPair::recall(std::vector<Remembered>& points, const Pose& pose) {
         nearest = distance;
         best = &p;
       };
-      for (auto at = std::lower_bound(by_x.begin(), by_x.end(), std::pair(on_a.x() - kSame, 0u));
-           at != by_x.end() && at->first <= on_a.x() + kSame; ++at)
-        compare(points[at->second]);
-      for (auto at = std::lower_bound(by_id.begin(), by_id.end(), std::pair(point.id, 0u));
-           at != by_id.end() && at->first == point.id; ++at)
-        compare(points[at->second]);
+      if (are_many) {
+        for (auto at = std::lower_bound(by_x.begin(), by_x.end(), std::pair(on_a.x() - kSame, 0u));
+             at != by_x.end() && at->first <= on_a.x() + kSame; ++at)
+          compare(points[at->second]);
+        for (auto at = std::lower_bound(by_id.begin(), by_id.end(), std::pair(point.id, 0u));
+             at != by_id.end() && at->first == point.id; ++at)
+          compare(points[at->second]);
+      } else {
+        for (Remembered& p : points) compare(p);
+      }
       if (!best) continue;
       best->taken = true;
       m.forces[k] = recalled(*best, m.frame, a.axes);
@@ -542,7 +551,8 @@ void ContactPair::recall(std::vector<Remembered>& points, const Pose& pose) {
 /// manifold with a similar normal. They are distributed over its points so that their sum acts where it did,
 /// as far as the points extend.
 void ContactPair::inherit(std::vector<Remembered>& points, const Pose& a) {
-  std::vector<Remembered*> left;
+  static thread_local std::vector<Remembered*> left;
+  left.clear();
   for (Remembered& p : points)
     if (!p.taken && !(p.last.isZero(0) && p.mean.isZero(0))) left.push_back(&p);
   if (left.empty()) return;

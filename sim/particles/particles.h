@@ -63,9 +63,11 @@ struct ParticleEvent {
 struct ParticleArrays {
   std::vector<Vec3> position, velocity;
   std::vector<Real> mass, radius, age, lifespan, restitution, friction, charge;
-  std::vector<uint64_t> id;            ///< unique in its system, ascending, never reused
-  std::vector<Vec3> angular_velocity;  ///< world [rad/s]; empty unless the system `rotates`
-  std::vector<Quat> orientation;       ///< turns the axes at creation into the present ones; likewise
+  std::vector<uint64_t> id;  ///< unique in its system, ascending, never reused
+  /// In the world [rad/s], and the rotation since the particle's creation; both are empty unless the system
+  /// `rotates`.
+  std::vector<Vec3> angular_velocity;
+  std::vector<Quat> orientation;
 
   std::size_t size() const { return position.size(); }
 };

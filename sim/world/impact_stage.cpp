@@ -59,6 +59,11 @@ bool turns_other_points(const Body& body, Real duration) {
          (std::holds_alternative<Ellipsoid>(body.def.shape) && body.turning_speed() * duration > kTouching);
 }
 
+/// Whether a body moves in the island of this number.
+bool is_in(const Body& body, uint32_t island) {
+  return body.is_awake() && body.island == island;
+}
+
 /// Number of pieces into which a rotation is divided.
 uint32_t pieces_of(Real turn) {
   return static_cast<uint32_t>(std::clamp(std::ceil(turn / kImpactTurn), 1.0, kMostTurns));
@@ -295,9 +300,7 @@ void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
     }
     work += collide(island, start, impact.time, h, report);
     // The speculative contacts of these bodies are no longer valid.
-    const auto involved = [&](const ContactPair& p) {
-      return (p.a().is_awake() && p.a().island == island) || (p.b().is_awake() && p.b().island == island);
-    };
+    const auto involved = [&](const ContactPair& p) { return is_in(p.a(), island) || is_in(p.b(), island); };
     std::erase_if(impacts, [&](const Impact& i) { return involved(*i.pair); });
     work += look(involved);
   }
@@ -368,12 +371,11 @@ std::size_t World::Impl::collide(uint32_t number, Real start, Real time, Real h,
   // found again when its second body has joined, because that body was moved back.
   std::vector<uint8_t> members(active_pairs.size(), 0);
   std::size_t work = 0;
-  const auto is_member = [&](const Body& body) { return body.is_awake() && body.island == number; };
   for (bool grown = true; grown;) {
     grown = false;
     for (std::size_t i = 0; i < active_pairs.size(); ++i) {
       ContactPair& pair = *active_pairs[i];
-      const bool has_a = is_member(pair.a()), has_b = is_member(pair.b());
+      const bool has_a = is_in(pair.a(), number), has_b = is_in(pair.b(), number);
       const auto count = static_cast<uint8_t>(has_a + has_b);
       if (count == members[i]) continue;
       members[i] = count;
@@ -389,7 +391,7 @@ std::size_t World::Impl::collide(uint32_t number, Real start, Real time, Real h,
   islands[number].pairs.clear();
   for (std::size_t i = 0; i < active_pairs.size(); ++i) {
     ContactPair& pair = *active_pairs[i];
-    const Body& other = is_member(pair.a()) ? pair.b() : pair.a();
+    const Body& other = is_in(pair.a(), number) ? pair.b() : pair.a();
     if (members[i] > 0 && !pair.has_sphere()) work += kPairWork;
     if (members[i] == 0 || (members[i] == 1 && other.is_awake()) || pair.manifolds().empty()) continue;
     islands[number].pairs.push_back(&pair);
@@ -432,8 +434,7 @@ bool World::Impl::join_next(uint32_t number, Real start, Real time, Real h, Step
   bool joined = false;
   for (std::size_t i = 0; i < active_pairs.size(); ++i) {
     ContactPair& pair = *active_pairs[i];
-    const auto is_member = [&](const Body& body) { return body.is_awake() && body.island == number; };
-    const bool has_a = is_member(pair.a()), has_b = is_member(pair.b());
+    const bool has_a = is_in(pair.a(), number), has_b = is_in(pair.b(), number);
     if (!has_a && !has_b) continue;
     find_points(pair, time, h);
     const Body& other = has_a ? pair.b() : pair.a();
@@ -459,8 +460,7 @@ bool World::Impl::join_overtaken(uint32_t number, Real start, Real time, Real h,
   bool joined = false;
   for (std::size_t i = 0; i < active_pairs.size(); ++i) {
     ContactPair& pair = *active_pairs[i];
-    const auto is_member = [&](const Body& body) { return body.is_awake() && body.island == number; };
-    const bool has_a = is_member(pair.a()), has_b = is_member(pair.b());
+    const bool has_a = is_in(pair.a(), number), has_b = is_in(pair.b(), number);
     if ((!has_a && !has_b) || pair.needs_toi) continue;
     const Body& other = has_a ? pair.b() : pair.a();
     const bool is_inside = has_a == has_b || !other.is_awake();

@@ -139,8 +139,7 @@ struct Table<ParticleBehaviour> {
         {"rotates", &T::rotates,
          "contacts turn the particles as solid balls, so that they roll and friction acts at their surface; "
          "otherwise they slide without turning. Objects of the style `mesh` show the rotation. Grains need "
-         "it "
-         "to pour, to flow and to heap as sand does"},
+         "it to pour, to flow and to heap as sand does"},
         {"dies_on_hit", &T::dies_on_hit, "a particle is removed at its first collision"},
         {"integrator", &T::integrator,
          "integration method of particles without springs; `leapfrog` is of second order at the cost of one "

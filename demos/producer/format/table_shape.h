@@ -79,8 +79,8 @@ struct Table<MeshDecomposition> {
     return {
         {"method", &MeshDecomposition::method,
          "`auto`: exact if that takes at most `max_parts` (64), else approximate; `exact`: with up to 1024 "
-         "parts, "
-         "else approximate; `approximate`; `hull`: the convex hull as the only part, also of a body that is "
+         "parts, else approximate; `approximate`; `hull`: the convex hull as the only part, also of a body "
+         "that is "
          "not dynamic"},
         {"max_error", &MeshDecomposition::max_error,
          "approximate: accepted volume in which the parts and the model differ, as a share of the model's "
