@@ -35,7 +35,7 @@ struct Body {
   uint32_t surface = 0;     // number of its material, for contact rules
   uint32_t island = 0;  // awake: number of its island in the sub-step; asleep: number of its sleeping island
   uint32_t row = 0;     // index among the bodies of its island
-  uint32_t rank = 0;    // position in the order of the world's bodies; see World::Impl::rank_bodies()
+  uint32_t rank = 0;    // position in the order of the world's bodies; see ActiveBodies
   Real extent = 0;      // reach() of the solid; infinite for a plane
   Real impact_speed_bound = 0;  // greatest speed of a nearby body that may hit it in the sub-step [m/s]
   Pose pose;                    // at the current time

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
+#include <map>
 
 #include "sim/geometry/closest_points.h"
-#include "sim/world/world_impl.h"
+#include "sim/world/cloth_motion.h"
 
 namespace offstage::sim {
 namespace {
@@ -60,15 +60,16 @@ void find_hit(const ClothTriangle& t, const Vec3& p0, const Vec3& p1, Real radiu
 
 }  // namespace
 
-void World::Impl::hit_cloths(Real h) {
+void collide_particles_with_cloths(WorldState& world, Real start, Real h,
+                                   std::vector<ParticleEvent>& events) {
   bool wanted = false;
-  systems.for_each(
+  world.systems.for_each(
       [&](ParticleSystemHandle, ParticleSystem& s) { wanted |= s.def.collides && s.arrays.size() > 0; });
   if (!wanted) return;
   std::vector<ClothTriangle> triangles;
   std::vector<Aabb> boxes;
   std::map<const Cloth*, std::vector<uint8_t>> held;
-  cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
+  world.cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
     if (cloth->absent || !cloth->def.collides) return;
     for (const Triangle& t : cloth->triangles) {
       triangles.push_back({cloth.get(), t});
@@ -80,18 +81,18 @@ void World::Impl::hit_cloths(Real h) {
     for (const ClothPin& pin : cloth->pins) fixed[pin.vertex] = 1;
   });
   const AabbTree tree(boxes);
-  systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {
+  world.systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {
     if (!system.def.collides) return;
     ParticleArrays& p = system.arrays;
     for (std::size_t i = 0; i < p.size(); ++i) {
       if (!system.whole_step(i)) continue;
-      const Vec3 start = p.position[i] - h * p.velocity[i];
-      Aabb around(start.cwiseMin(p.position[i]), start.cwiseMax(p.position[i]));
+      const Vec3 from = p.position[i] - h * p.velocity[i];
+      Aabb around(from.cwiseMin(p.position[i]), from.cwiseMax(p.position[i]));
       around.min().array() -= p.radius[i];
       around.max().array() += p.radius[i];
       ClothHit hit;
       tree.overlapping(around, [&](uint32_t k) {
-        if (boxes[k].intersects(around)) find_hit(triangles[k], start, p.position[i], p.radius[i], hit);
+        if (boxes[k].intersects(around)) find_hit(triangles[k], from, p.position[i], p.radius[i], hit);
       });
       if (hit.fraction > 1) continue;
       Cloth& cloth = *hit.triangle->cloth;
@@ -113,9 +114,8 @@ void World::Impl::hit_cloths(Real h) {
       for (std::size_t k = 0; k < 3; ++k) cloth.velocities[hit.triangle->corners[k]] -= gain[k] * impulse;
       ++cloth.report.particle_hits;
       if (system.def.report_collisions)
-        particle_events.push_back({ParticleEvent::Kind::collision, handle, p.id[i], now + hit.fraction * h,
-                                   p.position[i], p.velocity[i], hit.normal, p.mass[i], p.radius[i],
-                                   p.age[i]});
+        events.push_back({ParticleEvent::Kind::collision, handle, p.id[i], start + hit.fraction * h,
+                          p.position[i], p.velocity[i], hit.normal, p.mass[i], p.radius[i], p.age[i]});
       if (system.def.dies_on_hit) p.lifespan[i] = std::min(p.lifespan[i], p.age[i]);
     }
   });

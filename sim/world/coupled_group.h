@@ -11,7 +11,7 @@
 #include "sim/articulation/articulation.h"
 #include "sim/dynamics/free_body.h"
 #include "sim/dynamics/pair_forces.h"
-#include "sim/world/world_impl.h"
+#include "sim/world/world_state.h"
 
 namespace offstage::sim {
 

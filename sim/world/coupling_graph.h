@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "sim/world/world_impl.h"
+#include "sim/world/world_state.h"
 
 namespace offstage::sim {
 

@@ -1,18 +1,13 @@
-/// Impacts within a sub-step (physics E6, E7, R12). Bodies, with all objects connected to them, are moved
-/// back to the time of impact, collide there, and continue for the rest of the sub-step. Other bodies are not
-/// changed. The work is bounded: if a pair collides too often in a sub-step, or if there are too many
-/// impacts, later ones are left to the contact solver, which also prevents tunnelling. In a pile with too
-/// many impacts the restitution of slower ones is suppressed for the rest of the sub-step.
+#include "sim/world/impact_stage.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "sim/contact/contact_motion.h"
 #include "sim/contact/contact_terms.h"
+#include "sim/contact/island_impacts.h"
 #include "sim/core/parallel_loop.h"
-#include "sim/dynamics/free_body.h"
-#include "sim/world/coupled_system.h"
-#include "sim/world/world_impl.h"
+#include "sim/world/impact_search.h"
+#include "sim/world/moving_islands.h"
 
 namespace offstage::sim {
 namespace {
@@ -29,44 +24,10 @@ constexpr std::size_t kPointWork = 1, kPairWork = 3, kLookWork = 3;
 constexpr std::size_t kLastWork = 3;
 /// Contact points with a smaller separation take part in a collision [m].
 constexpr Real kCluster = 1e-4;
-/// Larger rotations in an interval are divided into pieces of this angle [rad], of which there are at most
-/// kMostTurns.
-constexpr Real kImpactTurn = 0.5, kMostTurns = 512;
-/// With a larger rotation in an interval, the contact forces of its start soon become invalid; the body is
-/// assumed to fly freely [rad].
-constexpr Real kFastSpin = 3;
-
-/// A path that deviates from its chord by more than kStraight [m] is divided into at most kMostArcs pieces. A
-/// force counts as steady if the position at the end agrees with the mean velocity within the share kSteady
-/// of the change of velocity.
-constexpr Real kStraight = 1e-5, kMostArcs = 8, kSteady = 0.05;
-/// Intervals shorter than this share of the sub-step are skipped.
-constexpr Real kInstant = 1e-9;
-
-Real spin(const Body& body) {
-  return body.is_awake() ? body.start_twist.angular_velocity.norm() : 0;
-}
-
-/// Angular speed of the faster turning body of a pair [rad/s].
-Real turn_of(const ContactPair& pair) {
-  return std::max(spin(pair.a()), spin(pair.b()));
-}
-
-/// Whether a body may touch in an interval with points that are not known at its start: the known points of a
-/// rim or of a round side are those that face the other body now.
-bool turns_other_points(const Body& body, Real duration) {
-  return runs_along(body, duration) ||
-         (std::holds_alternative<Ellipsoid>(body.def.shape) && body.turning_speed() * duration > kTouching);
-}
 
 /// Whether a body moves in the island of this number.
 bool is_in(const Body& body, uint32_t island) {
   return body.is_awake() && body.island == island;
-}
-
-/// Number of pieces into which a rotation is divided.
-uint32_t pieces_of(Real turn) {
-  return static_cast<uint32_t>(std::clamp(std::ceil(turn / kImpactTurn), 1.0, kMostTurns));
 }
 
 /// Work of moving an island again [us].
@@ -75,40 +36,6 @@ std::size_t impact_work(const Island& island) {
   for (const ContactPair* pair : island.pairs)
     for (const PlacedManifold& m : pair->manifolds()) work += m.manifold.count;
   return kPointWork * work;
-}
-
-/// Change of a body's velocity in its interval if it is due to a steady force; zero if the body was stopped
-/// on the way, which is seen from its position at the end [m/s].
-Vec3 bend(const Body& body, Real h) {
-  if (!body.is_awake()) return Vec3::Zero();
-  const Vec3 change = body.rigid.velocity() - body.start_twist.velocity;
-  const Vec3 mean = (body.rigid.position - body.start.position) / (h - body.from);
-  const bool steady = (body.start_twist.velocity + change / 2 - mean).norm() < kSteady * change.norm();
-  return steady ? change : Vec3(Vec3::Zero());
-}
-
-/// Pose at a time of its interval, on the parabola of a steady force.
-Pose on_arc(const Body& body, Real time, Real h) {
-  Pose pose = body.placed_at(time, h);
-  if (time > body.from)
-    pose.position -= (time - body.from) * (h - time) / (2 * (h - body.from)) * bend(body, h);
-  return pose;
-}
-
-/// Time at which two bodies touch after conservative advancement has ended within its tolerance: the rest of
-/// the gap closes at the speed of the nearest points. Otherwise bounces would be early by the tolerance, and
-/// the errors would add up.
-Real touching_share(const Impact& impact, const PosePath& a, const PosePath& b) {
-  const Separation& s = impact.separation;
-  if (impact.share == 0 || !(s.distance > 0)) return impact.share;
-  const Pose pose = a.at(impact.share);
-  const auto velocity = [&](const PosePath& path, const Vec3& local) {
-    const Vec3 arm = pose.point_to_world(local) - path.at(impact.share).position;
-    return Vec3(path.velocity() + path.angular_velocity(impact.share).cross(arm));
-  };
-  const Real closing = (velocity(b, s.on_b) - velocity(a, s.on_a)).dot(pose.vector_to_world(s.normal));
-  if (!(closing > 0)) return impact.share;
-  return impact.share + std::min(s.distance / closing, 1 - impact.share);
 }
 
 /// Speed that the forces in the rest of its interval, of this duration, have given to the points of a body
@@ -120,203 +47,79 @@ Real speed_by_forces(const Body& body, Real duration) {
   return slip + body.extent * (turn / duration - body.start_twist.angular_velocity).norm();
 }
 
-/// A body in free rotation through its interval.
-class Tumbling {
- public:
-  /// A body that spins fast flies under gravity; the position of any other body is interpolated on a straight
-  /// line.
-  Tumbling(const Body& body, const WorldDef& def, bool spins_fast, Real h)
-      : body_(body), def_(def), spins_fast_(spins_fast), h_(h), turning_(body.at_start()), now_(body.from) {}
-
-  /// Pose at a time of the sub-step of length h, not before the time of the last call.
-  Pose go_on(Real time) {
-    if (!body_.is_awake()) return body_.placed_at(time, h_);
-    fly(turning_, {def_.gravity, {}}, integrator(def_.integrator), now_, time - now_, work_);
-    now_ = time;
-    if (!spins_fast_) {
-      const Real share = (time - body_.from) / (h_ - body_.from);
-      turning_.position = body_.start.position + share * (body_.rigid.position - body_.start.position);
-    }
-    return turning_.pose();
-  }
-
- private:
-  const Body& body_;
-  const WorldDef& def_;
-  bool spins_fast_;
-  Real h_;
-  RigidBody turning_;
-  Real now_;
-  IntegratorWorkspace work_;
-};
-
 }  // namespace
 
-std::optional<sim::Impact> World::Impl::first_impact(const MovingShape& a, const MovingShape& b) const {
-  return def.collision.impact_time == CollisionMethods::ImpactTime::bisection
-             ? bisected_time_of_impact(a, b, kTouching / 2)
-             : time_of_impact(a, b, kTouching / 2);
-}
-
-/// Time at which the bodies of a pair will touch on their current paths. If they touch already and approach,
-/// it is the current time.
-std::optional<Real> World::Impl::impact_time(const ContactPair& pair, Real h, TestCounts& tests) const {
-  if (pair.toi_exhausted) return std::nullopt;
-  const Body &a = pair.a(), &b = pair.b();
-  const Real from = std::max(a.is_awake() ? a.from : 0, b.is_awake() ? b.from : 0);
-  if (from >= h * (1 - kInstant)) return std::nullopt;
-  const Real turn = turn_of(pair) * (h - from);
-  if (turn > kImpactTurn) return tumbling_impact_time(pair, from, h, turn, tests);
-  if (pair.separation() <= kTouching) {
-    const std::optional<Real> at_points = point_impact_time(pair, h);
-    if (!turns_other_points(a, h - from) && !turns_other_points(b, h - from)) return at_points;
-    const std::optional<Real> beside = tumbling_impact_time(pair, from, h, turn, tests);
-    return at_points && beside ? std::min(at_points, beside) : at_points ? at_points : beside;
+template <class IsWanted>
+std::size_t ImpactStage::search(IsWanted&& is_wanted) {
+  const std::span<ContactPair* const> pairs = contacts_.pairs();
+  const std::vector<std::size_t> events =
+      indices_where(pairs.size(), [&](std::size_t i) { return pairs[i]->needs_toi && is_wanted(*pairs[i]); });
+  report_.impact_searches += events.size();
+  std::vector<std::optional<Real>> times(events.size());
+  std::vector<TestCounts> tests(events.size());
+  for_each_index(events.size(),
+                 [&](std::size_t i) { times[i] = impact_time(*pairs[events[i]], world_.def, h_, tests[i]); });
+  for (const TestCounts& t : tests) {
+    report_.volume_tests += t.volumes;
+    report_.piece_tests += t.pieces;
   }
-  const Real bow = (bend(a, h) - bend(b, h)).norm() * (h - from) / 8;
-  const auto pieces =
-      static_cast<uint32_t>(std::clamp(std::ceil(std::sqrt(bow / kStraight)), 1.0, kMostArcs));
-  for (uint32_t i = 0; i < pieces; ++i) {
-    const Real begin = from + (h - from) * i / pieces, end = from + (h - from) * (i + 1) / pieces;
-    const PosePath path_a(on_arc(a, begin, h), on_arc(a, end, h)),
-        path_b(on_arc(b, begin, h), on_arc(b, end, h));
-    const auto impact =
-        first_impact({pair.impact_shape_a(), path_a, &tests}, {pair.impact_shape_b(), path_b});
-    if (impact) return begin + touching_share(*impact, path_a, path_b) * (end - begin);
+  std::size_t work = 0;
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    if (times[i]) pending_.push_back({*times[i], pairs[events[i]]});
+    work += kLookWork * search_pieces(*pairs[events[i]], h_);
   }
-  return std::nullopt;
+  return work;
 }
 
-/// A path describes at most half a turn, so faster rotations are divided into pieces.
-std::optional<Real> World::Impl::tumbling_impact_time(const ContactPair& pair, Real from, Real h, Real turn,
-                                                      TestCounts& tests) const {
-  const bool spins_fast = turn > kFastSpin;
-  Tumbling body_a(pair.a(), def, spins_fast, h), body_b(pair.b(), def, spins_fast, h);
-  Pose begin_a = body_a.go_on(from), begin_b = body_b.go_on(from);
-  const uint32_t pieces = pieces_of(turn);
-  // Bodies that touch now have just met.
-  const bool touches = pair.separation() <= kTouching;
-  for (uint32_t i = 0; i < pieces; ++i) {
-    const Real begin = from + (h - from) * i / pieces, end = from + (h - from) * (i + 1) / pieces;
-    const PosePath path_a(begin_a, body_a.go_on(end)), path_b(begin_b, body_b.go_on(end));
-    begin_a = path_a.end();
-    begin_b = path_b.end();
-    const MovingShape a{pair.impact_shape_a(), path_a, &tests}, b{pair.impact_shape_b(), path_b};
-    std::optional<sim::Impact> impact;
-    const bool met = (i == 0 && touches) || ((impact = first_impact(a, b)) && impact->share == 0);
-    if (met) impact = time_of_next_impact(a, b, kTouching / 2, def.collision_speed * (end - begin));
-    if (impact) return begin + impact->share * (end - begin);
-    // The effect of the contact has ended by then, or the contact must be found again.
-    if (spins_fast && touches) return end;
-  }
-  return std::nullopt;
-}
-
-/// The same for bodies that touch at some points, by their known points that do not touch.
-std::optional<Real> World::Impl::point_impact_time(const ContactPair& pair, Real h) const {
-  const Body &a = pair.a(), &b = pair.b();
-  const Real from = std::max(a.is_awake() ? a.from : 0, b.is_awake() ? b.from : 0);
-  std::optional<Real> first;
-  for (const PlacedManifold& m : pair.manifolds())
-    for (uint32_t k = 0; k < m.manifold.count; ++k) {
-      const ContactPoint& point = m.manifold.points[k];
-      const Real speed = pair.relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n);
-      if (speed >= -def.collision_speed) continue;
-      if (point.separation <= kTouching) return from;
-      // Both points move with their bodies; the normal turns with the body that defines it.
-      const bool with_b = m.manifold.source == NormalSource::face_of_b;
-      const Pose pose_a = a.placed_at(from, h), pose_b = b.placed_at(from, h);
-      const Vec3 on_a = pose_a.point_to_body(point.on_a), on_b = pose_b.point_to_body(point.on_b);
-      const Vec3 n = with_b ? pose_b.vector_to_body(m.frame.n) : pose_a.vector_to_body(m.frame.n);
-      const auto gap = [&](Real time) {
-        const Pose p = a.placed_at(time, h), q = b.placed_at(time, h);
-        const Vec3 normal = with_b ? q.vector_to_world(n) : p.vector_to_world(n);
-        return normal.dot(p.point_to_world(on_a) - q.point_to_world(on_b));
-      };
-      Real early = from, late = first.value_or(h);
-      if (gap(late) > kTouching / 2) continue;
-      for (int i = 0; i < 40 && late - early > kInstant * h; ++i) {
-        const Real middle = (early + late) / 2;
-        (gap(middle) > kTouching / 2 ? early : late) = middle;
-      }
-      first = late;
-    }
-  return first;
-}
-
-void World::Impl::resolve_impacts(Real start, Real h, StepReport& report) {
-  std::vector<Impact> impacts;
-  const auto look = [&](auto&& is_wanted) {
-    const std::vector<std::size_t> events = indices_where(active_pairs.size(), [&](std::size_t i) {
-      return active_pairs[i]->needs_toi && is_wanted(*active_pairs[i]);
-    });
-    report.impact_searches += events.size();
-    std::vector<std::optional<Real>> times(events.size());
-    std::vector<TestCounts> tests(events.size());
-    for_each_index(events.size(),
-                   [&](std::size_t i) { times[i] = impact_time(*active_pairs[events[i]], h, tests[i]); });
-    for (const TestCounts& t : tests) {
-      report.volume_tests += t.volumes;
-      report.piece_tests += t.pieces;
-    }
-    std::size_t taken = 0;
-    for (std::size_t i = 0; i < events.size(); ++i) {
-      if (times[i]) impacts.push_back({*times[i], active_pairs[events[i]]});
-      taken += kLookWork * pieces_of(turn_of(*active_pairs[events[i]]) * h);
-    }
-    return taken;
-  };
-  std::size_t work = look([](const ContactPair&) { return true; });
+void ImpactStage::resolve() {
+  std::size_t work = search([](const ContactPair&) { return true; });
+  if (pending_.empty()) return;
   // An impact moves back only bodies that are connected to it by forces. Most others in an island are merely
   // near; they join if the impact sends a body their way.
-  if (!impacts.empty()) find_moving_islands(touch_or_push);
+  find_moving_islands(world_, active_.awake(), contacts_.pairs(), touch_or_push, motion_.whole(), islands_);
 
-  const std::size_t most = kMaxImpacts + kImpactsPerBody * awake.size();
-  const std::size_t most_work = is_exact() ? kExactImpactWork : kImpactWork;
-  for (std::size_t count = 0; !impacts.empty(); ++count) {
-    const auto first = std::min_element(impacts.begin(), impacts.end(),
-                                        [](const Impact& x, const Impact& y) { return x.time < y.time; });
-    const Impact impact = *first;
+  const std::size_t most = kMaxImpacts + kImpactsPerBody * active_.awake().size();
+  const std::size_t most_work = world_.is_exact() ? kExactImpactWork : kImpactWork;
+  for (std::size_t count = 0; !pending_.empty(); ++count) {
+    const PendingImpact impact =
+        *std::min_element(pending_.begin(), pending_.end(),
+                          [](const PendingImpact& x, const PendingImpact& y) { return x.time < y.time; });
     ContactPair& pair = *impact.pair;
-    const bool tumbles = turn_of(pair) * h > kImpactTurn;
-    if (++pair.impacts > (tumbles ? kMaxOfTumblingPair : kMaxImpactsOfPair) || count >= most ||
+    if (++pair.impacts > (tumbles(pair, h_) ? kMaxOfTumblingPair : kMaxImpactsOfPair) || count >= most ||
         work > kLastWork * most_work) {
       pair.toi_exhausted = true;
-      ++report.toi_limit_reached;
+      ++report_.toi_limit_reached;
     }
     const uint32_t island = pair.a().is_awake() ? pair.a().island : pair.b().island;
-    if (pair.a().is_awake() && pair.b().is_awake()) {
-      bring_to(islands[pair.a().island], start, impact.time, h, report);
-      bring_to(islands[pair.b().island], start, impact.time, h, report);
+    bring_to(islands_[island], impact.time);
+    if (pair.a().is_awake() && pair.b().is_awake() && pair.b().island != island) {
+      bring_to(islands_[pair.b().island], impact.time);
       join(island, pair.b().island);
-    } else {
-      bring_to(islands[island], start, impact.time, h, report);
     }
-    ++report.tracebacks;
-    work += impact_work(islands[island]);
+    ++report_.tracebacks;
+    work += impact_work(islands_[island]);
     if (work > most_work) {
-      join_pending(island, start, impact.time, h, impacts, report);
-      suppress_restitution(island, report);
+      join_pending(island, impact.time);
+      suppress_restitution(island);
     }
-    work += collide(island, start, impact.time, h, report);
+    work += collide(island, impact.time);
     // The speculative contacts of these bodies are no longer valid.
     const auto involved = [&](const ContactPair& p) { return is_in(p.a(), island) || is_in(p.b(), island); };
-    std::erase_if(impacts, [&](const Impact& i) { return involved(*i.pair); });
-    work += look(involved);
+    std::erase_if(pending_, [&](const PendingImpact& i) { return involved(*i.pair); });
+    work += search(involved);
   }
 }
 
 /// Merges an island with all that it is about to hit at a time or later, and with those that these hit: one
 /// solution then replaces many impacts.
-void World::Impl::join_pending(uint32_t number, Real start, Real time, Real h,
-                               std::span<const Impact> impacts, StepReport& report) {
+void ImpactStage::join_pending(uint32_t number, Real time) {
   for (bool grown = true; grown;) {
     grown = false;
-    for (const Impact& impact : impacts) {
+    for (const PendingImpact& impact : pending_) {
       const Body &a = impact.pair->a(), &b = impact.pair->b();
       if (!a.is_awake() || !b.is_awake() || (a.island == number) == (b.island == number)) continue;
       const uint32_t other = a.island == number ? b.island : a.island;
-      bring_to(islands[other], start, time, h, report);
+      bring_to(islands_[other], time);
       join(number, other);
       grown = true;
     }
@@ -325,24 +128,23 @@ void World::Impl::join_pending(uint32_t number, Real start, Real time, Real h,
 
 /// Suppresses restitution within an island for the rest of this sub-step. Pairs that are so fast that only
 /// tracing back shows where they meet are still traced back to.
-void World::Impl::suppress_restitution(uint32_t island, StepReport& report) {
+void ImpactStage::suppress_restitution(uint32_t island) {
   const auto is_outside = [&](const Body& body) { return body.is_awake() && body.island != island; };
-  for (ContactPair* pair : active_pairs) {
+  for (ContactPair* pair : contacts_.pairs()) {
     if (is_outside(pair->a()) || is_outside(pair->b()) || pair->restitution_suppressed) continue;
     pair->restitution_suppressed = true;
-    report.restitution_suppressed += pair->needs_toi;
+    report_.restitution_suppressed += pair->needs_toi;
   }
 }
 
 /// Moves an island back to a time, with the contact forces until then.
-void World::Impl::bring_to(Island& island, Real start, Real time, Real h, StepReport& report) {
+void ImpactStage::bring_to(Island& island, Real time) {
   if (island.from >= time) return;
   island.motion->restore(island.bodies);
-  move_some(island.bodies, start, island.from, time - island.from);
-  Island* const one[] = {&island};
-  if (has_forces(island))
-    solve(one, {.duration = time - island.from, .end = start + time, .substep = h, .is_whole = false},
-          report);
+  motion_.move_some(island.bodies, start_, island.from, time - island.from);
+  solver_.solve(island,
+                {.duration = time - island.from, .end = start_ + time, .substep = h_, .is_whole = false},
+                report_);
   for (Body* body : island.bodies) {
     body->pose = body->rigid.pose();
     body->begin_interval(time);
@@ -351,9 +153,9 @@ void World::Impl::bring_to(Island& island, Real start, Real time, Real h, StepRe
 }
 
 /// Merges two islands, which must be at the same time.
-void World::Impl::join(uint32_t into, uint32_t other) {
+void ImpactStage::join(uint32_t into, uint32_t other) {
   if (into == other) return;
-  Island &x = islands[into], &y = islands[other];
+  Island &x = islands_[into], &y = islands_[other];
   for (Body* body : y.bodies) body->island = into;
   x.bodies.insert(x.bodies.end(), y.bodies.begin(), y.bodies.end());
   x.pairs.insert(x.pairs.end(), y.pairs.begin(), y.pairs.end());
@@ -366,134 +168,137 @@ void World::Impl::join(uint32_t into, uint32_t other) {
 
 /// Collides an island's bodies with each other and with the bodies that they touch at a time, and continues
 /// their motion from there. Returns its work [us].
-std::size_t World::Impl::collide(uint32_t number, Real start, Real time, Real h, StepReport& report) {
+std::size_t ImpactStage::collide(uint32_t number, Real time) {
+  const std::span<ContactPair* const> pairs = contacts_.pairs();
   // Bodies that they touch join the island, and in turn the bodies that those touch. The points of a pair are
   // found again when its second body has joined, because that body was moved back.
-  std::vector<uint8_t> members(active_pairs.size(), 0);
+  std::vector<uint8_t> members(pairs.size(), 0);
   std::size_t work = 0;
   for (bool grown = true; grown;) {
     grown = false;
-    for (std::size_t i = 0; i < active_pairs.size(); ++i) {
-      ContactPair& pair = *active_pairs[i];
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      ContactPair& pair = *pairs[i];
       const bool has_a = is_in(pair.a(), number), has_b = is_in(pair.b(), number);
       const auto count = static_cast<uint8_t>(has_a + has_b);
       if (count == members[i]) continue;
       members[i] = count;
-      find_points(pair, time, h);
+      contacts_.find_points(pair, time, h_);
       const Body& other = has_a ? pair.b() : pair.a();
       if (count == 2 || !other.is_awake() || pair.separation() > kTouching) continue;
       const uint32_t joined = other.island;
-      bring_to(islands[joined], start, time, h, report);
+      bring_to(islands_[joined], time);
       join(number, joined);
       grown = true;
     }
   }
-  islands[number].pairs.clear();
-  for (std::size_t i = 0; i < active_pairs.size(); ++i) {
-    ContactPair& pair = *active_pairs[i];
+  islands_[number].pairs.clear();
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    ContactPair& pair = *pairs[i];
     const Body& other = is_in(pair.a(), number) ? pair.b() : pair.a();
     if (members[i] > 0 && !pair.has_sphere()) work += kPairWork;
     if (members[i] == 0 || (members[i] == 1 && other.is_awake()) || pair.manifolds().empty()) continue;
-    islands[number].pairs.push_back(&pair);
+    islands_[number].pairs.push_back(&pair);
   }
-  Island& island = islands[number];
-  remove_seams(island.pairs, time, h);
-  const CollisionSettings settings{start + time, kCluster, def.collision_speed, def.impact, is_exact()};
+  Island& island = islands_[number];
+  contacts_.remove_seams(island.pairs, time, h_);
+  const CollisionSettings settings{start_ + time, kCluster, world_.def.collision_speed, world_.def.impact,
+                                   world_.is_exact()};
   const CollisionOutcome outcome = resolve_collisions(island, settings);
-  report.collisions += outcome.bounces;
-  report.impacts.add(outcome.work);
-  add_rough(outcome.rough, report);
+  report_.collisions += outcome.bounces;
+  report_.impacts.add(outcome.work);
+  add_rough(outcome.rough, report_);
   for (Body* body : island.bodies) body->rigid.set_state(body->start);
-  if (time < h * (1 - kInstant)) go_on(number, start, time, h, report);
+  if (time < h_ * (1 - kInstant)) go_on(number, time);
   return work + static_cast<std::size_t>(outcome.cost / 1000);
 }
 
 /// Continues the motion of an island from an impact to the end of the sub-step. Its velocities have changed,
 /// so other bodies may be in its way and other contacts limit its motion. If so, they join, and all of them
 /// start again.
-void World::Impl::go_on(uint32_t number, Real start, Real time, Real h, StepReport& report) {
+void ImpactStage::go_on(uint32_t number, Real time) {
   for (bool joined = true; joined;) {
-    for (Body* body : islands[number].bodies) body->rigid.set_state(body->start);
-    islands[number].motion = &move_some(islands[number].bodies, start, time, h - time);
-    find_pairs_again(number, start, h, report);
-    joined = join_next(number, start, time, h, report);
+    for (Body* body : islands_[number].bodies) body->rigid.set_state(body->start);
+    islands_[number].motion = &motion_.move_some(islands_[number].bodies, start_, time, h_ - time);
+    find_pairs_again(number);
+    joined = join_next(number, time);
     if (joined) continue;
-    Island* const one[] = {&islands[number]};
-    if (has_forces(islands[number]))
-      solve(one, {.duration = h - time, .end = start + h, .substep = h, .is_whole = false}, report);
-    find_pairs_again(number, start, h, report);
-    joined = join_overtaken(number, start, time, h, report);
+    solver_.solve(islands_[number],
+                  {.duration = h_ - time, .end = start_ + h_, .substep = h_, .is_whole = false}, report_);
+    find_pairs_again(number);
+    joined = join_overtaken(number, time);
   }
 }
 
 /// Finds the contacts of an island that continues from `time`. If a body of another island is in its way and
 /// their impact would not be traced back to, that island is merged, and must be moved again; the function
 /// then returns true.
-bool World::Impl::join_next(uint32_t number, Real start, Real time, Real h, StepReport& report) {
-  islands[number].pairs.clear();
+bool ImpactStage::join_next(uint32_t number, Real time) {
+  const std::span<ContactPair* const> pairs = contacts_.pairs();
+  islands_[number].pairs.clear();
   bool joined = false;
-  for (std::size_t i = 0; i < active_pairs.size(); ++i) {
-    ContactPair& pair = *active_pairs[i];
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    ContactPair& pair = *pairs[i];
     const bool has_a = is_in(pair.a(), number), has_b = is_in(pair.b(), number);
     if (!has_a && !has_b) continue;
-    find_points(pair, time, h);
+    contacts_.find_points(pair, time, h_);
     const Body& other = has_a ? pair.b() : pair.a();
     if (has_a == has_b || !other.is_awake()) {
-      if (!pair.manifolds().empty()) islands[number].pairs.push_back(&pair);
-    } else if (!pair.needs_toi && closes(pair, h - time)) {
+      if (!pair.manifolds().empty()) islands_[number].pairs.push_back(&pair);
+    } else if (!pair.needs_toi && closes(pair, h_ - time)) {
       const uint32_t next = other.island;
-      bring_to(islands[next], start, time, h, report);
+      bring_to(islands_[next], time);
       join(number, next);
       joined = true;
     }
   }
-  if (!joined) remove_seams(islands[number].pairs, time, h);
+  if (!joined) contacts_.remove_seams(islands_[number].pairs, time, h_);
   return joined;
 }
 
 /// Merges the islands into which an island has been pushed by its contact forces since `time`, and finds the
 /// contacts that it has not looked for because they were too far away. Returns whether there are any; all
 /// bodies must then be moved again.
-bool World::Impl::join_overtaken(uint32_t number, Real start, Real time, Real h, StepReport& report) {
-  for (Body* body : islands[number].bodies)
-    body->impact_speed_bound = std::max(body->impact_speed_bound, speed_by_forces(*body, h - time));
+bool ImpactStage::join_overtaken(uint32_t number, Real time) {
+  const std::span<ContactPair* const> pairs = contacts_.pairs();
+  for (Body* body : islands_[number].bodies)
+    body->impact_speed_bound = std::max(body->impact_speed_bound, speed_by_forces(*body, h_ - time));
   bool joined = false;
-  for (std::size_t i = 0; i < active_pairs.size(); ++i) {
-    ContactPair& pair = *active_pairs[i];
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    ContactPair& pair = *pairs[i];
     const bool has_a = is_in(pair.a(), number), has_b = is_in(pair.b(), number);
     if ((!has_a && !has_b) || pair.needs_toi) continue;
     const Body& other = has_a ? pair.b() : pair.a();
     const bool is_inside = has_a == has_b || !other.is_awake();
     // The known points inside have limited the approach.
     if (is_inside && !pair.manifolds().empty()) continue;
-    if (std::max(pair.a().impact_speed_bound, pair.b().impact_speed_bound) * (h - time) > kTouching)
-      find_points(pair, time, h);
-    if (pair.needs_toi || !overlaps_at_end(pair, time, h)) continue;
+    if (std::max(pair.a().impact_speed_bound, pair.b().impact_speed_bound) * (h_ - time) > kTouching)
+      contacts_.find_points(pair, time, h_);
+    if (pair.needs_toi || !overlaps_at_end(pair, time)) continue;
     joined = true;
     if (is_inside) continue;
     const uint32_t next = other.island;
-    bring_to(islands[next], start, time, h, report);
+    bring_to(islands_[next], time);
     join(number, next);
   }
   return joined;
 }
 
 /// Whether any points of a pair may meet within a time.
-bool World::Impl::closes(const ContactPair& pair, Real left) const {
+bool ImpactStage::closes(const ContactPair& pair, Real left) const {
   for (const PlacedManifold& m : pair.manifolds())
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       const ContactPoint& point = m.manifold.points[k];
       const Real speed = pair.relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n);
-      if (point.separation + 2 * (speed - def.gravity.norm() * left) * left < 0) return true;
+      if (point.separation + 2 * (speed - world_.def.gravity.norm() * left) * left < 0) return true;
     }
   return false;
 }
 
 /// Whether the points of a pair at a time overlap at the end of the sub-step.
-bool World::Impl::overlaps_at_end(const ContactPair& pair, Real time, Real h) const {
+bool ImpactStage::overlaps_at_end(const ContactPair& pair, Real time) const {
   const auto displacement = [&](const Body& body, const Vec3& place) {
-    const Vec3 local = body.placed_at(time, h).point_to_body(place);
-    return Vec3(body.placed_at(h, h).point_to_world(local) - place);
+    const Vec3 local = body.placed_at(time, h_).point_to_body(place);
+    return Vec3(body.placed_at(h_, h_).point_to_world(local) - place);
   };
   for (const PlacedManifold& m : pair.manifolds())
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
@@ -505,38 +310,34 @@ bool World::Impl::overlaps_at_end(const ContactPair& pair, Real time, Real h) co
 }
 
 /// Bodies that leave their boxes in the broad phase have new neighbours, which may have to be woken.
-void World::Impl::find_pairs_again(uint32_t number, Real start, Real h, StepReport& report) {
-  bool left = false;
-  for (Body* body : islands[number].bodies) left |= move_in_broad_phase(*body, true);
-  if (!left) return;
-  collect_pairs(true);
-  std::vector<ContactPair*> near = islands[number].pairs;
-  for (ContactPair* pair : active_pairs) {
+void ImpactStage::find_pairs_again(uint32_t number) {
+  if (!contacts_.follow(islands_[number].bodies)) return;
+  std::vector<ContactPair*> near = islands_[number].pairs;
+  for (ContactPair* pair : contacts_.pairs()) {
     if (!pair->is_new()) continue;
-    find_points(*pair, std::max(pair->a().from, pair->b().from), h);
+    contacts_.find_points(*pair, std::max(pair->a().from, pair->b().from), h_);
     near.push_back(pair);
   }
-  remove_seams(near, islands[number].from, h);
-  const std::vector<Body*> woken = wake_touched(start, h);
+  contacts_.remove_seams(near, islands_[number].from, h_);
+  const std::vector<Body*> woken = contacts_.wake_touched(motion_, start_, h_);
   if (woken.empty()) return;
-  const auto added = static_cast<uint32_t>(islands.size());
-  islands.emplace_back();
-  islands[added].bodies = woken;
-  islands[added].motion = motions.back().get();
+  const auto added = static_cast<uint32_t>(islands_.size());
+  islands_.emplace_back();
+  islands_[added].bodies = woken;
+  islands_[added].motion = &motion_.last();
   for (Body* body : woken) body->island = added;
-  for (const auto& articulation : articulations)
+  for (const auto& articulation : world_.articulations)
     if (articulation->bodies().front()->is_awake() && articulation->bodies().front()->island == added)
-      islands[added].articulations.push_back(articulation.get());
-  collect_pairs(true);
-  for (ContactPair* pair : active_pairs) {
-    if (pair->is_new()) find_points(*pair, std::max(pair->a().from, pair->b().from), h);
+      islands_[added].articulations.push_back(articulation.get());
+  contacts_.extend();
+  for (ContactPair* pair : contacts_.pairs()) {
+    if (pair->is_new()) contacts_.find_points(*pair, std::max(pair->a().from, pair->b().from), h_);
     const auto outside = [&](const Body& body) { return body.is_awake() && body.island != added; };
     if (outside(pair->a()) || outside(pair->b()) || pair->manifolds().empty()) continue;
-    if (pair->a().is_awake() || pair->b().is_awake()) islands[added].pairs.push_back(pair);
+    if (pair->a().is_awake() || pair->b().is_awake()) islands_[added].pairs.push_back(pair);
   }
-  Island* const one[] = {&islands[added]};
-  if (has_forces(islands[added]))
-    solve(one, {.duration = h, .end = start + h, .substep = h, .is_whole = true}, report);
+  solver_.solve(islands_[added], {.duration = h_, .end = start_ + h_, .substep = h_, .is_whole = true},
+                report_);
 }
 
 }  // namespace offstage::sim

@@ -1,5 +1,5 @@
-/// Bodies, joints and cloths that exist for some time only. Their handles are valid all the time, so that
-/// other objects can refer to them.
+/// Objects that are removed, and bodies, joints and cloths that exist for some time only. The handles of the
+/// latter are valid all the time, so that other objects can refer to them.
 
 #include "sim/world/world_impl.h"
 
@@ -14,14 +14,6 @@ bool has_come(Real time, Real now) {
 }
 
 }  // namespace
-
-bool WorldState::acts(const Spring& spring) const {
-  const auto exists = [&](const Attachment& end) {
-    const auto* point = std::get_if<BodyPoint>(&end);
-    return !point || !bodies[point->body]->absent;
-  };
-  return exists(spring.def.a) && exists(spring.def.b);
-}
 
 bool World::is_present(BodyHandle body) const {
   return !impl_->bodies[body]->absent;
@@ -44,8 +36,8 @@ void World::Impl::update_presence(Real time) {
     cloth->absent = !exists;
   });
   if (!changed) return;
-  wake_all();
-  arrange_cloths();
+  active.wake_all();
+  cloth_motion.arrange();
 }
 
 void World::Impl::appear(Body& body, Real time) {
@@ -54,28 +46,29 @@ void World::Impl::appear(Body& body, Real time) {
   body.type = body.def.motion;
   if (body.is_kinematic()) body.pose = body.def.track.at(time, body.def.pose).pose;
   body.before_step = body.before_substep = body.start_pose = body.pose;
-  if (body.def.collides)
-    broad_phase.insert(body.handle.index, bounds(body.solid, body.pose), !body.is_dynamic());
-  if (body.is_dynamic() || body.is_kinematic()) stepped.push_back(&body);
-  fixed_changed = lists_changed = ranks_changed = joints_changed = pairs_changed = true;
+  contacts.add(body);
+  if (body.is_dynamic() || body.is_kinematic()) active.add_stepped(body);
+  active.note_new_set();
+  joint_groups.note_change();
 }
 
 /// Removes a body from the simulation, with everything that is fastened to it. Its handle stays valid.
 void World::Impl::take_out(Body& body) {
   detach(body);
-  detach_cloths(body.handle);
+  cloth_motion.detach(body.handle);
   joints.for_each([&](JointHandle, const std::unique_ptr<Joint>& joint) {
     if (joint->a != &body && joint->b != &body) return;
     for (Body* end : {joint->a, joint->b})
-      if (end && end != &body) wake(*end);
+      if (end && end != &body) active.wake(*end);
   });
   body.absent = true;
   body.type = MotionType::static_body;
   body.rigid.momentum.setZero();
   body.rigid.angular_momentum.setZero();
-  pending_impulses.erase(body.handle.index);
-  if (broad_phase.contains(body.handle.index)) broad_phase.remove(body.handle.index);
-  fixed_changed = lists_changed = joints_changed = true;
+  reactions.forget(body);
+  contacts.remove(body);
+  active.note_change();
+  joint_groups.note_change();
   remove_dead_springs();
 }
 
@@ -86,11 +79,42 @@ void World::Impl::update_joint_presence(Real time) {
                       exists(joint->a) && exists(joint->b);
     if (acts != joint->is_absent) return;
     for (Body* end : {joint->a, joint->b})
-      if (end) wake(*end);
-    if (acts && now > 0) place(*joint);
+      if (end) active.wake(*end);
+    if (acts && now > 0) place_at_bodies(*joint);
     joint->is_absent = !acts;
-    joints_changed = true;
+    joint_groups.note_change();
   });
+}
+
+void World::Impl::wake_neighbours(Body& body) {
+  contacts.for_each([&](ContactPair& pair) {
+    if (&pair.a() == &body) active.wake(pair.b());
+    if (&pair.b() == &body) active.wake(pair.a());
+  });
+}
+
+/// Wakes the bodies that rest on a body that is removed.
+void World::Impl::detach(Body& body) {
+  active.wake(body);
+  wake_neighbours(body);
+  contacts.forget(body);
+  active.forget(body);
+  islands.clear();
+}
+
+/// Removes springs that have lost an end, and wakes the bodies at their other ends.
+void World::Impl::remove_dead_springs() {
+  std::vector<SpringHandle> dead;
+  springs.for_each([&](SpringHandle handle, const Spring& s) {
+    if (!is_alive(s.def.a) || !is_alive(s.def.b)) dead.push_back(handle);
+  });
+  for (SpringHandle handle : dead) {
+    const SpringDef& def_ = springs[handle].def;
+    for (const Attachment* end : {&def_.a, &def_.b})
+      if (const auto* point = std::get_if<BodyPoint>(end); point && is_alive(*end))
+        active.wake(*bodies[point->body]);
+    springs.erase(handle);
+  }
 }
 
 }  // namespace offstage::sim

@@ -5,7 +5,8 @@
 #include <numeric>
 
 #include "sim/core/parallel_loop.h"
-#include "sim/world/coupled_system.h"
+#include "sim/world/impact_stage.h"
+#include "sim/world/moving_islands.h"
 #include "sim/world/world_impl.h"
 
 namespace offstage::sim {
@@ -20,16 +21,18 @@ bool is_finite(const RigidBody& b) {
          b.angular_velocity().allFinite() && b.angular_momentum.allFinite();
 }
 
+/// Returns the smallest number of equal sub-steps of a duration that are not longer than `longest`. A ratio
+/// that is an integer within rounding is rounded to it.
+uint32_t substep_count(Real duration, Real longest) {
+  const Real ratio = duration / longest;
+  return static_cast<uint32_t>(std::clamp(std::ceil(ratio * (1 - 1e-12)), 1.0, kMaxSubsteps));
+}
+
 bool same(const Pose& a, const Pose& b) {
   return a.position == b.position && a.orientation.coeffs() == b.orientation.coeffs();
 }
 
 }  // namespace
-
-uint32_t substep_count(Real duration, Real longest) {
-  const Real ratio = duration / longest;
-  return static_cast<uint32_t>(std::clamp(std::ceil(ratio * (1 - 1e-12)), 1.0, kMaxSubsteps));
-}
 
 StepReport World::Impl::step(Real sampling, const BeforeSubStep& before) {
   assert(sampling > 0 && std::isfinite(sampling));
@@ -42,11 +45,9 @@ StepReport World::Impl::step(Real sampling, const BeforeSubStep& before) {
   }
   const auto at = [&](Real part) { return base_time + (static_cast<Real>(samplings) + part) * sampling; };
 
-  update_lists();
-  stepped.assign(awake.begin(), awake.end());
-  stepped.insert(stepped.end(), kinematic.begin(), kinematic.end());
-  for_each_index(stepped.size(), [&](std::size_t i) { stepped[i]->before_step = stepped[i]->pose; });
-  begin_cloths();
+  active.update();
+  active.begin_step();
+  cloth_motion.begin_step();
   report.substeps = substep_count(sampling, def.max_step);
   for (uint32_t i = 0; i < report.substeps; ++i) {
     const Real start = now, end = at(static_cast<Real>(i + 1) / report.substeps);
@@ -56,88 +57,115 @@ StepReport World::Impl::step(Real sampling, const BeforeSubStep& before) {
   }
   ++samplings;
   report.particles_born = std::exchange(born, 0);
-  report.bodies_woken = std::exchange(bodies_woken, 0);
-  report.bodies_put_to_sleep = std::exchange(bodies_put_to_sleep, 0);
-  report_cloths(report);
+  active.count(report);
+  cloth_motion.report(report);
   collect_moved();
   return report;
 }
 
 void World::Impl::substep(Real start, Real end, StepReport& report) {
   const Real h = end - start;
-  ++substeps;
   update_presence(start);
-  wake_pushed(start);
+  active.wake_pushed(start);
   explode(start, end);
-  update_articulations();
-  update_lists();
+  update_joints();
+  active.update();
   begin_bodies(start, end);
-  motions.clear();
-  if (awake.empty() && kinematic.empty() && springs.empty() && systems.empty()) {
+  if (!active.awake().empty() || !active.kinematic().empty() || !springs.empty() || !systems.empty()) {
+    // For few bodies a task arena of several threads would cost more than it gains, in particular on a busy
+    // machine.
+    const auto bodies_move = [&] { move_bodies(start, h, report); };
+    if (active.awake().size() < kWorthThreads && !has_pair_forces())
+      serial.execute(bodies_move);
+    else
+      bodies_move();
+    free_motion.count(report);
+    for (const auto& articulation : articulations) articulation->count_turns(end);
+    joint_groups.break_overloaded(h, report);
+    if (!systems.empty()) step_particles(start, h, free_motion.whole(), report);
+  } else {
     islands.clear();
-    active_pairs.clear();
-    pairs_changed = true;
-    count_contacts(report);
-    return step_cloths(start, h);
+    contacts.clear();
+    contacts.count(report);
+    report.islands = 0;
   }
-  // For few bodies a task arena of several threads would cost more than it gains, in particular on a busy
-  // machine.
-  const auto bodies_move = [&] { move_bodies(start, h, report); };
-  if (awake.size() < kWorthThreads && !has_pair_forces())
-    serial.execute(bodies_move);
-  else
-    bodies_move();
-  for (const auto& m : motions) {
-    report.integration.add(m->report());
-    joint_tally.add(m->joint_tally());
-  }
-  report.joint_error = std::max(report.joint_error, joint_tally.error);
-  report.joints_unsolved += joint_tally.unsolved;
-  joint_tally = {};
-  for (const auto& articulation : articulations) articulation->count_turns(end);
-  break_joints(h, report);
-
-  if (!systems.empty()) {
-    update_obstacles(h);
-    step_particles(start, h, *motions.front(), report);
-  }
-  step_cloths(start, h);
+  if (!cloths.empty()) step_cloths(start, h, report);
 }
 
 /// Moves all bodies through a sub-step, with their contacts and impacts.
 void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
-  move_all(start, h);
-  if (!awake.empty() || (!kinematic.empty() && asleep > 0)) {
-    do update_pairs(h);
-    while (!wake_touched(start, h).empty());
-    find_moving_islands(may_touch);
-    solve_islands(start, h, report);
-    resolve_impacts(start, h, report);
+  free_motion.move_all(active.awake(), start, h);
+  if (!active.awake().empty() || (!active.kinematic().empty() && active.asleep() > 0)) {
+    do contacts.find(h);
+    while (!contacts.wake_touched(free_motion, start, h).empty());
+    find_moving_islands(*this, active.awake(), contacts.pairs(), may_touch, free_motion.whole(), islands);
+    contact_solver.solve_all(islands, start, h, report);
+    ImpactStage(*this, active, contacts, contact_solver, free_motion, islands, start, h, report).resolve();
   } else {
     // Islands of the last sub-step with awake bodies must not fall asleep again.
     islands.clear();
-    active_pairs.clear();
-    pairs_changed = true;
+    contacts.clear();
   }
-  for (const std::vector<Body*>* moving : {&awake, &kinematic})
+  for (const std::span<Body* const> moving : {active.awake(), active.kinematic()})
     for (const std::size_t i :
-         indices_where(moving->size(), [&](std::size_t k) { return !is_within_bounds(*(*moving)[k]); }))
-      retire(*(*moving)[i], report);
-  count_contacts(report);
-  put_to_sleep(start, h);
+         indices_where(moving.size(), [&](std::size_t k) { return !is_within_bounds(*moving[k]); }))
+      retire(*moving[i], report);
+  contacts.count(report);
+  report.islands = static_cast<uint32_t>(islands.size());
+  active.put_to_sleep(islands, start, h);
+}
+
+/// Moves the particles, which collide with the moving bodies, with each other and push the bodies.
+void World::Impl::step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report) {
+  if (particle_motion.step(start, h, coupled, report)) remove_dead_springs();
+  reactions.apply(particle_motion.reactions(), start + h, report);
+}
+
+void World::Impl::step_cloths(Real start, Real h, StepReport& report) {
+  reactions.apply(cloth_motion.step(start, h), start + h, report);
+  collide_particles_with_cloths(*this, start, h, particle_motion.events());
+}
+
+/// Time before the film, in which only particles move, among bodies that stay where they are or follow their
+/// keys.
+StepReport World::Impl::prewarm(Real from, Real to, const BeforeSubStep& before) {
+  StepReport report;
+  particle_motion.begin_prewarm(now == 0);
+  active.update();
+  now = from;
+  if (from == to && before) before(from, to);
+  const CoupledSystem still(*this, std::span<Body* const>{});
+  report.substeps = from < to ? substep_count(to - from, def.max_step) : 0;
+  for (uint32_t i = 0; i < report.substeps; ++i) {
+    const Real start = now, share = static_cast<Real>(i + 1) / report.substeps;
+    const Real end = i + 1 < report.substeps ? from + share * (to - from) : to;
+    if (before) before(start, end);
+    begin_kinematic(start, end);
+    step_particles(start, end - start, still, report);
+    now = end;
+  }
+  particle_motion.end_prewarm(to == 0);
+  report.particles_born = std::exchange(born, 0);
+  return report;
+}
+
+void World::Impl::update_joints() {
+  if (joint_groups.update()) contacts.regroup();
 }
 
 /// Begins a sub-step for every moving body; kinematic bodies are moved to its end.
 void World::Impl::begin_bodies(Real start, Real end) {
+  const std::span<Body* const> awake = active.awake();
   for_each_interval(awake, [&](std::size_t i) {
     awake[i]->before_substep = awake[i]->pose;
     awake[i]->begin_interval(0);
   });
   begin_kinematic(start, end);
+  free_motion.begin_substep();
 }
 
 void World::Impl::begin_kinematic(Real start, Real end) {
-  for (Body* body : kinematic) {
+  for (Body* body : active.kinematic()) {
     const Motion motion = body->def.track.at(end, body->def.pose);
     if (body->def.track.jumps(start, end)) {
       // The body jumps to the new pose: nothing is swept along in between.
@@ -160,7 +188,7 @@ void World::Impl::explode(Real start, Real end) {
       if (!def_.acts_on(handle)) return;
       const Wrench impact = impulse(explosion, body->solid, body->pose, body->rigid.position);
       if (impact.force == Vec3::Zero() && impact.torque == Vec3::Zero()) return;
-      wake(*body);
+      active.wake(*body);
       body->rigid.momentum += impact.force;
       body->rigid.angular_momentum += impact.torque;
     });
@@ -178,31 +206,6 @@ void World::Impl::explode(Real start, Real end) {
         cloth->velocities[i] += impulse(explosion, cloth->points[i]) / total;
     });
   });
-}
-
-std::vector<const ForceDef*> World::Impl::active_forces() const {
-  std::vector<const ForceDef*> active;
-  force_defs.for_each([&](ForceHandle, const ForceDef& f) { active.push_back(&f); });
-  return active;
-}
-
-/// Moves all awake bodies, and the particles held by springs, through the sub-step without contacts.
-void World::Impl::move_all(Real start, Real h) {
-  motions.push_back(std::make_unique<CoupledSystem>(*this, active_forces()));
-  CoupledSystem& motion = *motions.back();
-  motion.save();
-  motion.step(integrator(def.integrator), start, h, def.integration_error);
-  for_each_index(awake.size(), [&](std::size_t i) { awake[i]->pose = awake[i]->rigid.pose(); });
-}
-
-/// The same for some bodies and the objects connected to them, over `duration` from `from` on.
-CoupledSystem& World::Impl::move_some(std::span<Body* const> group, Real start, Real from, Real duration) {
-  motions.push_back(std::make_unique<CoupledSystem>(*this, group, active_forces()));
-  CoupledSystem& motion = *motions.back();
-  motion.save();
-  motion.step(integrator(def.integrator), start + from, duration, def.integration_error);
-  for (Body* body : group) body->pose = body->rigid.pose();
-  return motion;
 }
 
 bool World::Impl::is_within_bounds(const Body& body) const {
@@ -226,82 +229,14 @@ void World::Impl::retire(Body& body, StepReport& report) {
   body.rigid.momentum.setZero();
   body.rigid.angular_momentum.setZero();
   body.type = MotionType::static_body;
-  fixed_changed = lists_changed = joints_changed = true;
+  active.note_change();
+  joint_groups.note_change();
   report.bodies_retired.push_back(body.handle);
-}
-
-/// The body as an obstacle that moves through the sub-step of length h.
-Obstacle World::Impl::swept_obstacle(const Body& body, Real h) const {
-  const Pose& from = body.can_move() ? body.before_substep : body.pose;
-  Obstacle o(body.solid, from, body.pose, h, body.def.restitution, body.def.friction);
-  o.body = body.handle.index;
-  if (body.def.cross_friction >= 0 && body.def.friction > 0) {
-    o.friction_axis = body.def.friction_axis;
-    o.cross_friction = std::sqrt(body.def.cross_friction / body.def.friction);
-  }
-  if (!body.is_dynamic() || prewarming) return o;
-  const RigidBody& rigid = body.rigid;
-  const Mat3 axes = rigid.orientation.toRotationMatrix();
-  o.inverse_mass = 1 / rigid.mass;
-  o.inverse_inertia = axes * rigid.inverse_inertia * axes.transpose();
-  o.centre = rigid.centre;
-  o.end_velocity = rigid.velocity();
-  o.end_spin = rigid.angular_velocity();
-  return o;
-}
-
-void World::Impl::update_obstacles(Real h) {
-  std::vector<Obstacle> fixed, moving;
-  bodies.for_each([&](BodyHandle, const std::unique_ptr<Body>& body) {
-    if (!body->collides()) return;
-    if (body->can_move() && !(prewarming && body->is_dynamic()))
-      moving.push_back(swept_obstacle(*body, h));
-    else if (fixed_changed)
-      fixed.push_back(swept_obstacle(*body, h));
-  });
-  moving_obstacles = Obstacles(std::move(moving));
-  if (fixed_changed) fixed_obstacles = Obstacles(std::move(fixed));
-  fixed_changed = false;
-}
-
-void World::Impl::step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report) {
-  for (const auto& articulation : articulations) articulation->begin_impulses(start + h);
-  body_impulses.begin(links);
-  const ParticleStage stage{start, h, fixed_obstacles, moving_obstacles, def.bounds, body_impulses};
-  report.particle_lcp.add(collide_particles(stage, coupled));
-  auto collided = particle_collisions.outcomes().begin();
-  bool removed_any = false;
-  particle_events.clear();
-  systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {
-    if (waits(handle)) return;
-    ParticleTally tally;
-    if (system.hits_particles()) {
-      tally = std::move(collided->tally);
-      tally += system.end_step(stage, collided->touched, collided->trapped);
-      ++collided;
-    } else {
-      tally = system.step(stage, forces(system), coupled.holds(system));
-    }
-    add_events(tally.events);
-    report.particles_expired += tally.expired;
-    report.particles_retired += tally.retired;
-    report.particles_ejected += tally.ejected;
-    report.particles_removed += tally.removed;
-    report.particle_collisions += tally.collisions;
-    report.truncated_sweeps += tally.truncated;
-    removed_any |= tally.expired + tally.retired + tally.removed > 0;
-    if (tally.lost && report.finite) {
-      report.non_finite = *tally.lost;
-      report.non_finite.object = system.def.name;
-    }
-    report.finite &= !tally.lost;
-  });
-  if (removed_any) remove_dead_springs();
-  push_bodies(body_impulses.sums(), start + h);
 }
 
 void World::Impl::collect_moved() {
   moved.clear();
+  const std::span<Body* const> stepped = active.stepped();
   const auto has_moved = [&](std::size_t i) { return !same(stepped[i]->pose, stepped[i]->before_step); };
   for (const std::size_t i : indices_where(stepped.size(), has_moved))
     moved.push_back({stepped[i]->handle, stepped[i]->pose});

@@ -204,81 +204,6 @@ Real pair_energy(const WorldState& world, Real time) {
 
 }  // namespace
 
-uint32_t World::Impl::surface_number(const std::string& material) {
-  const auto at = std::find(materials.begin(), materials.end(), material);
-  if (at == materials.end())
-    return materials.push_back(material), static_cast<uint32_t>(materials.size() - 1);
-  return static_cast<uint32_t>(at - materials.begin());
-}
-
-void World::Impl::wake_neighbours(Body& body) {
-  graph.for_each([&](ContactPair& pair) {
-    if (&pair.a() == &body) wake(pair.b());
-    if (&pair.b() == &body) wake(pair.a());
-  });
-}
-
-/// Wakes the bodies that rest on a body that is removed.
-void World::Impl::detach(Body& body) {
-  wake(body);
-  wake_neighbours(body);
-  graph.forget(body.handle.index);
-  pairs_changed = true;
-  std::erase(stepped, &body);
-  active_pairs.clear();
-  islands.clear();
-}
-
-bool WorldState::is_alive(const Attachment& a) const {
-  if (const auto* b = std::get_if<BodyPoint>(&a)) {
-    const auto* body = bodies.find(b->body);
-    return body && !((*body)->absent && (*body)->was_present);
-  }
-  if (const auto* p = std::get_if<ParticlePoint>(&a)) {
-    const ParticleSystem* system = systems.find(p->system);
-    return system && system->find(p->id);
-  }
-  return true;
-}
-
-ParticleForces WorldState::forces(const ParticleSystem& system) const {
-  std::vector<const ForceDef*> acting;
-  force_defs.for_each([&](ForceHandle, const ForceDef& f) {
-    if (!f.is_explosion() && !f.is_pairwise() && f.acts_on(system.handle)) acting.push_back(&f);
-  });
-  return {system.def, def.gravity, def.wind, std::move(acting)};
-}
-
-bool WorldState::has_pair_forces() const {
-  bool any = false;
-  force_defs.for_each([&](ForceHandle, const ForceDef& f) { any |= f.is_pairwise(); });
-  return any;
-}
-
-Vec3 WorldState::position(const Attachment& a) const {
-  if (const auto* b = std::get_if<BodyPoint>(&a)) return bodies[b->body]->pose.point_to_world(b->position);
-  if (const auto* p = std::get_if<ParticlePoint>(&a)) {
-    const ParticleSystem& system = systems[p->system];
-    return system.arrays.position[*system.find(p->id)];
-  }
-  return std::get<WorldPoint>(a).position;
-}
-
-/// Removes springs that have lost an end, and wakes the bodies at their other ends.
-void World::Impl::remove_dead_springs() {
-  std::vector<SpringHandle> dead;
-  springs.for_each([&](SpringHandle handle, const Spring& s) {
-    if (!is_alive(s.def.a) || !is_alive(s.def.b)) dead.push_back(handle);
-  });
-  for (SpringHandle handle : dead) {
-    const SpringDef& def_ = springs[handle].def;
-    for (const Attachment* end : {&def_.a, &def_.b})
-      if (const auto* point = std::get_if<BodyPoint>(end); point && is_alive(*end))
-        wake(*bodies[point->body]);
-    springs.erase(handle);
-  }
-}
-
 World::World(const WorldDef& def) : impl_(std::make_unique<Impl>()) {
   check_positive("world", "max_step", def.max_step);
   check_finite("world", "gravity", def.gravity);
@@ -290,8 +215,7 @@ World::World(const WorldDef& def) : impl_(std::make_unique<Impl>()) {
     refuse("world", "particle_cluster must be between 1 and 64");
   if (def.bounds.isEmpty()) refuse("world", "bounds are empty");
   impl_->def = def;
-  if (def.collision.broad_phase == CollisionMethods::BroadPhase::grid)
-    impl_->broad_phase = GroupedBroadPhase(GridKind::uniform, def.collision.cell_factor);
+  impl_->contacts.use(def.collision);
 }
 World::~World() = default;
 World::World(World&&) noexcept = default;
@@ -360,15 +284,14 @@ BodyHandle World::add_body(const BodyDef& def) {
   body->before_step = body->before_substep = body->start_pose = body->pose;
   body->extent =
       std::holds_alternative<Plane>(def.shape) ? std::numeric_limits<Real>::infinity() : reach(body->solid);
-  body->surface = impl_->surface_number(def.material);
+  body->surface = impl_->contacts.materials.number(def.material);
   if (def.appear_at > impl_->now) body->absent = true, body->type = MotionType::static_body;
   body->was_present = !body->absent;
   impl_->has_lifetimes |= body->absent || std::isfinite(def.remove_at);
-  impl_->fixed_changed = impl_->lists_changed = impl_->ranks_changed = true;
+  impl_->active.note_new_set();
   const BodyHandle handle = impl_->bodies.insert(std::move(body));
   impl_->bodies[handle]->handle = handle;
-  if (const Body& added = *impl_->bodies[handle]; added.collides())
-    impl_->broad_phase.insert(handle.index, bounds(added.solid, added.pose), !added.is_dynamic());
+  impl_->contacts.add(*impl_->bodies[handle]);
   return handle;
 }
 
@@ -392,14 +315,14 @@ SpringHandle World::add_spring(const SpringDef& def) {
   const Real rest =
       def.rest_length >= 0 ? def.rest_length : (impl_->position(def.a) - impl_->position(def.b)).norm();
   for (const Attachment* end : {&def.a, &def.b})
-    if (const auto* point = std::get_if<BodyPoint>(end)) impl_->wake(*impl_->bodies[point->body]);
+    if (const auto* point = std::get_if<BodyPoint>(end)) impl_->active.wake(*impl_->bodies[point->body]);
   return impl_->springs.insert({def, rest});
 }
 
 ForceHandle World::add_force(const ForceDef& def) {
   const std::string wrong = problem(def);
   if (!wrong.empty()) refuse(quoted("force", def.name), wrong);
-  impl_->wake_all();
+  impl_->active.wake_all();
   return impl_->force_defs.insert(def);
 }
 
@@ -410,51 +333,50 @@ void World::add_contact_rule(const ContactRule& rule) {
   if (rule.static_friction) check_not_negative(object, "static_friction", *rule.static_friction);
   if (rule.rolling_friction) check_not_negative(object, "rolling_friction", *rule.rolling_friction);
   if (rule.spinning_friction) check_not_negative(object, "spinning_friction", *rule.spinning_friction);
-  impl_->rules[std::minmax(impl_->surface_number(rule.a), impl_->surface_number(rule.b))] = rule;
-  impl_->graph.forget_all();
-  impl_->pairs_changed = true;
-  impl_->wake_all();
+  impl_->contacts.materials.add(rule);
+  impl_->contacts.forget_all();
+  impl_->islands.clear();
+  impl_->active.wake_all();
 }
 
 bool World::remove(BodyHandle body) {
   const auto* found = impl_->bodies.find(body);
   if (!found) return false;
   impl_->detach(**found);
-  impl_->detach_cloths(body);
-  impl_->detach_joints(**found);
-  impl_->ranks_changed = true;
+  impl_->cloth_motion.detach(body);
+  impl_->joint_groups.detach(**found, impl_->active);
+  impl_->reactions.forget(**found);
+  impl_->contacts.remove(**found);
   impl_->bodies.erase(body);
-  impl_->pending_impulses.erase(body.index);
-  if (impl_->broad_phase.contains(body.index)) impl_->broad_phase.remove(body.index);
   std::erase_if(impl_->moved, [&](const MovedBody& m) { return m.body == body; });
-  impl_->fixed_changed = impl_->lists_changed = true;
+  impl_->active.note_new_set();
   impl_->remove_dead_springs();
   return true;
 }
 
 bool World::remove(ForceHandle force) {
-  impl_->wake_all();
+  impl_->active.wake_all();
   return impl_->force_defs.erase(force);
 }
 
 void World::set_velocity(BodyHandle handle, const Vec3& velocity, const Vec3& angular_velocity) {
   Body& body = *impl_->bodies[handle];
   if (!body.is_dynamic()) return;
-  impl_->wake(body);
+  impl_->active.wake(body);
   body.rigid.set_velocity(velocity, angular_velocity);
 }
 
 void World::add_impulse(BodyHandle handle, const Vec3& impulse, const Vec3& point) {
   Body& body = *impl_->bodies[handle];
   if (!body.is_dynamic()) return;
-  impl_->wake(body);
+  impl_->active.wake(body);
   body.rigid.momentum += impulse;
   body.rigid.angular_momentum += (point - body.rigid.position).cross(impulse);
 }
 
 bool World::remove(ParticleSystemHandle system) {
   if (!impl_->systems.erase(system)) return false;
-  std::erase_if(impl_->particle_events, [&](const ParticleEvent& e) { return e.system == system; });
+  impl_->particle_motion.forget(system);
   impl_->remove_dead_springs();
   return true;
 }
@@ -462,7 +384,7 @@ bool World::remove(ParticleSystemHandle system) {
 bool World::remove(SpringHandle spring) {
   if (const Spring* s = impl_->springs.find(spring))
     for (const Attachment* end : {&s->def.a, &s->def.b})
-      if (const auto* point = std::get_if<BodyPoint>(end)) impl_->wake(*impl_->bodies[point->body]);
+      if (const auto* point = std::get_if<BodyPoint>(end)) impl_->active.wake(*impl_->bodies[point->body]);
   return impl_->springs.erase(spring);
 }
 
@@ -503,7 +425,7 @@ const ParticleSystemDef& World::particle_system_def(ParticleSystemHandle system)
   return impl_->systems[system].def;
 }
 std::span<const ParticleEvent> World::particle_events() const {
-  return impl_->particle_events;
+  return impl_->particle_motion.events();
 }
 Motion World::body_motion(BodyHandle body, Real time) const {
   return impl_->bodies[body]->motion(impl_->now, time);
@@ -540,7 +462,7 @@ void World::for_each_particle_system(const std::function<void(ParticleSystemHand
 
 std::vector<ContactState> World::contacts() const {
   std::vector<ContactState> states;
-  impl_->graph.for_each([&](const ContactPair& pair) {
+  impl_->contacts.for_each([&](const ContactPair& pair) {
     for (const PlacedManifold& m : pair.manifolds())
       for (uint32_t k = 0; k < m.manifold.count; ++k) {
         const ContactPoint& p = m.manifold.points[k];
@@ -554,7 +476,7 @@ std::vector<ContactState> World::contacts() const {
 }
 
 std::vector<BodyOverlap> World::overlaps(Real least) const {
-  impl_->update_articulations();  // joined bodies do not collide with each other
+  impl_->update_joints();  // joined bodies do not collide with each other
   BroadPhase boxes;
   impl_->bodies.for_each([&](BodyHandle handle, const auto& body) {
     if (body->collides()) boxes.insert(handle.index, bounds(body->solid, body->pose), !body->is_dynamic());
@@ -563,7 +485,7 @@ std::vector<BodyOverlap> World::overlaps(Real least) const {
   for (const IndexPair& pair : boxes.pairs()) {
     Body* a = impl_->bodies[impl_->bodies.at_slot(pair.a)].get();
     Body* b = impl_->bodies[impl_->bodies.at_slot(pair.b)].get();
-    if (impl_->are_jointed(*a, *b)) continue;
+    if (impl_->joint_groups.are_apart(*a, *b)) continue;
     if (a->collision_shape().is_plane()) std::swap(a, b);
     const Pose a_from_b{a->pose.point_to_body(b->pose.position),
                         a->pose.orientation.conjugate() * b->pose.orientation};

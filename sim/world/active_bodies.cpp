@@ -1,10 +1,9 @@
-/// Sleep: groups of bodies that have been almost at rest for some time are not simulated until something
-/// disturbs them.
+#include "sim/world/active_bodies.h"
 
 #include <algorithm>
 #include <array>
 
-#include "sim/world/world_impl.h"
+#include "sim/world/joint_groups.h"
 
 namespace offstage::sim {
 namespace {
@@ -20,104 +19,16 @@ Real fastest_point(const Body& body) {
   return body.rigid.velocity().norm() + body.rigid.angular_velocity().norm() * body.extent;
 }
 
-}  // namespace
-
-/// Solvers and collision tests depend slightly on the order of bodies and contacts, and small differences
-/// grow in a pile. Therefore the order does not depend on when bodies were added: they are ordered by their
-/// initial positions from below, and bodies at the same position by their other properties.
-void World::Impl::rank_bodies() {
-  if (!std::exchange(ranks_changed, false)) return;
-  constexpr std::size_t kKeys = 15;
-  std::vector<std::pair<std::array<Real, kKeys>, Body*>> order;
-  bodies.for_each([&](BodyHandle, const std::unique_ptr<Body>& body) {
-    const BodyDef& d = body->def;
-    const Vec3 &p = d.pose.position, &v = d.velocity, &w = d.angular_velocity;
-    const Eigen::Vector4d& q = d.pose.orientation.coeffs();
-    const Real mass = body->is_dynamic() ? body->rigid.mass : 0;
-    order.push_back({{p.y(), p.x(), p.z(), q[0], q[1], q[2], q[3], v.x(), v.y(), v.z(), w.x(), w.y(), w.z(),
-                      mass, body->extent},
-                     body.get()});
-  });
-  std::stable_sort(order.begin(), order.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
-  for (std::size_t i = 0; i < order.size(); ++i) order[i].second->rank = static_cast<uint32_t>(i);
-}
-
-void World::Impl::update_lists() {
-  if (!std::exchange(lists_changed, false)) return;
-  rank_bodies();
-  pairs_changed = true;
-  awake.clear();
-  kinematic.clear();
-  asleep = 0;
-  bodies.for_each([&](BodyHandle, const std::unique_ptr<Body>& body) {
-    if (body->is_awake()) awake.push_back(body.get());
-    if (body->is_dynamic() && body->asleep) ++asleep;
-    if (body->is_kinematic() && body->def.track.moves()) kinematic.push_back(body.get());
-  });
-  const auto by_rank = [](const Body* a, const Body* b) { return a->rank < b->rank; };
-  std::sort(awake.begin(), awake.end(), by_rank);
-  std::sort(kinematic.begin(), kinematic.end(), by_rank);
-}
-
-/// Wakes a body and all bodies of its sleeping group.
-void World::Impl::wake(Body& body) {
-  body.quiet_time = 0;
-  if (!body.asleep) return;
-  const auto group = sleeping.find(body.island);
-  bodies_woken += group->second.size();
-  for (Body* member : group->second) {
-    member->asleep = false;
-    member->quiet_time = 0;
-    watched -= member->moving_springs.size();
-    member->moving_springs.clear();
-    member->rest_pins.reset();
-    member->before_step = member->before_substep = member->pose;
-    stepped.push_back(member);
-  }
-  sleeping.erase(group);
-  lists_changed = fixed_changed = true;
-}
-
-void World::Impl::wake_all() {
-  while (!sleeping.empty()) wake(*sleeping.begin()->second.front());
-}
-
-/// Stores for bodies that fall asleep the springs whose force can change later: those with the other end at a
-/// kinematic body or a particle.
-void World::Impl::watch_springs(std::span<Body* const> group) {
-  const auto sleeper = [&](const Attachment& end) -> Body* {
-    const auto* point = std::get_if<BodyPoint>(&end);
-    Body* body = point ? bodies[point->body].get() : nullptr;
-    return body && std::find(group.begin(), group.end(), body) != group.end() ? body : nullptr;
-  };
-  const auto moves = [&](const Attachment& end) {
-    if (const auto* point = std::get_if<BodyPoint>(&end)) {
-      const Body& body = *bodies[point->body];
-      return body.is_kinematic() && body.def.track.moves();
-    }
-    return std::holds_alternative<ParticlePoint>(end);
-  };
-  springs.for_each([&](SpringHandle handle, const Spring& s) {
-    if (!acts(s)) return;
-    for (const auto& [own, other] : {std::pair(&s.def.a, &s.def.b), {&s.def.b, &s.def.a}})
-      if (Body* body = moves(*other) ? sleeper(*own) : nullptr) {
-        body->moving_springs.push_back(handle);
-        ++watched;
-      }
-  });
-}
-
 /// Wrench of a spring on a sleeping body at one of its ends.
-Wrench World::Impl::spring_push(const Spring& spring, const Body& body, Real time) const {
+Wrench spring_push(const WorldState& world, const Spring& spring, const Body& body, Real time) {
   const auto motion = [&](const Attachment& end) -> Motion {
     if (const auto* p = std::get_if<ParticlePoint>(&end)) {
-      const ParticleSystem& system = systems[p->system];
+      const ParticleSystem& system = world.systems[p->system];
       const std::size_t i = *system.find(p->id);
       return {{system.arrays.position[i]}, system.arrays.velocity[i]};
     }
     const BodyPoint& point = std::get<BodyPoint>(end);
-    const Motion m = bodies[point.body]->motion(now, time);
+    const Motion m = world.bodies[point.body]->motion(time, time);
     const Vec3 arm = m.pose.vector_to_world(point.position);
     return {{m.pose.position + arm}, m.velocity + m.angular_velocity.cross(arm)};
   };
@@ -135,33 +46,126 @@ Wrench World::Impl::spring_push(const Spring& spring, const Body& body, Real tim
   return {force, (own.pose.position - body.rigid.position).cross(force)};
 }
 
+}  // namespace
+
+/// Solvers and collision tests depend slightly on the order of bodies and contacts, and small differences
+/// grow in a pile. Therefore the order does not depend on when bodies were added: they are ordered by their
+/// initial positions from below, and bodies at the same position by their other properties.
+void ActiveBodies::rank() {
+  if (std::exchange(is_ranked_, true)) return;
+  constexpr std::size_t kKeys = 15;
+  std::vector<std::pair<std::array<Real, kKeys>, Body*>> order;
+  world_.bodies.for_each([&](BodyHandle, const std::unique_ptr<Body>& body) {
+    const BodyDef& d = body->def;
+    const Vec3 &p = d.pose.position, &v = d.velocity, &w = d.angular_velocity;
+    const Eigen::Vector4d& q = d.pose.orientation.coeffs();
+    const Real mass = body->is_dynamic() ? body->rigid.mass : 0;
+    order.push_back({{p.y(), p.x(), p.z(), q[0], q[1], q[2], q[3], v.x(), v.y(), v.z(), w.x(), w.y(), w.z(),
+                      mass, body->extent},
+                     body.get()});
+  });
+  std::stable_sort(order.begin(), order.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (std::size_t i = 0; i < order.size(); ++i) order[i].second->rank = static_cast<uint32_t>(i);
+}
+
+void ActiveBodies::update() {
+  if (std::exchange(is_current_, true)) return;
+  rank();
+  awake_.clear();
+  kinematic_.clear();
+  asleep_ = 0;
+  world_.bodies.for_each([&](BodyHandle, const std::unique_ptr<Body>& body) {
+    if (body->is_awake()) awake_.push_back(body.get());
+    if (body->is_dynamic() && body->asleep) ++asleep_;
+    if (body->is_kinematic() && body->def.track.moves()) kinematic_.push_back(body.get());
+  });
+  const auto by_rank = [](const Body* a, const Body* b) { return a->rank < b->rank; };
+  std::sort(awake_.begin(), awake_.end(), by_rank);
+  std::sort(kinematic_.begin(), kinematic_.end(), by_rank);
+}
+
+void ActiveBodies::begin_step() {
+  stepped_.assign(awake_.begin(), awake_.end());
+  stepped_.insert(stepped_.end(), kinematic_.begin(), kinematic_.end());
+  for_each_index(stepped_.size(), [&](std::size_t i) { stepped_[i]->before_step = stepped_[i]->pose; });
+}
+
+std::vector<Body*> ActiveBodies::wake(Body& body) {
+  body.quiet_time = 0;
+  if (!body.asleep) return {};
+  const auto found = sleeping_.find(body.island);
+  const std::vector<Body*> group = std::move(found->second);
+  sleeping_.erase(found);
+  woken_ += group.size();
+  for (Body* member : group) {
+    member->asleep = false;
+    member->quiet_time = 0;
+    watched_ -= member->moving_springs.size();
+    member->moving_springs.clear();
+    member->rest_pins.reset();
+    member->before_step = member->before_substep = member->pose;
+    stepped_.push_back(member);
+  }
+  note_change();
+  return group;
+}
+
+void ActiveBodies::wake_all() {
+  while (!sleeping_.empty()) wake(*sleeping_.begin()->second.front());
+}
+
+/// Stores for bodies that fall asleep the springs whose force can change later: those with the other end at a
+/// kinematic body or a particle.
+void ActiveBodies::watch_springs(std::span<Body* const> group) {
+  const auto sleeper = [&](const Attachment& end) -> Body* {
+    const auto* point = std::get_if<BodyPoint>(&end);
+    Body* body = point ? world_.bodies[point->body].get() : nullptr;
+    return body && std::find(group.begin(), group.end(), body) != group.end() ? body : nullptr;
+  };
+  const auto moves = [&](const Attachment& end) {
+    if (const auto* point = std::get_if<BodyPoint>(&end)) {
+      const Body& body = *world_.bodies[point->body];
+      return body.is_kinematic() && body.def.track.moves();
+    }
+    return std::holds_alternative<ParticlePoint>(end);
+  };
+  world_.springs.for_each([&](SpringHandle handle, const Spring& s) {
+    if (!world_.acts(s)) return;
+    for (const auto& [own, other] : {std::pair(&s.def.a, &s.def.b), {&s.def.b, &s.def.a}})
+      if (Body* body = moves(*other) ? sleeper(*own) : nullptr) {
+        body->moving_springs.push_back(handle);
+        ++watched_;
+      }
+  });
+}
+
 /// Wrench on a body at rest by the forces that may change with time.
-Wrench World::Impl::changing_push(const Body& body, Real time) const {
+Wrench ActiveBodies::changing_push(const Body& body, Real time) const {
   const RigidMotion at_rest{body.rigid.position, body.rigid.orientation, Vec3::Zero(), Vec3::Zero()};
   Wrench sum;
-  force_defs.for_each([&](ForceHandle, const ForceDef& force) {
+  world_.force_defs.for_each([&](ForceHandle, const ForceDef& force) {
     if (!force.changes() || !force.acts_on(body.handle)) return;
     const Wrench w = wrench(force, time, at_rest, body.rigid.centre, body.rigid.linear_drag);
     sum.force += w.force;
     sum.torque += w.torque;
   });
-  for (const SpringHandle spring : body.moving_springs) sum += spring_push(springs[spring], body, time);
+  for (const SpringHandle spring : body.moving_springs)
+    sum += spring_push(world_, world_.springs[spring], body, time);
   return sum;
 }
 
-/// Whether a wrench differs so much from that at rest that it could move a sleeping body.
-bool World::Impl::is_pushed(const Body& body, const Wrench& push, const Wrench& at_rest) const {
+bool is_pushed(const Body& body, const Wrench& push, const Wrench& at_rest) {
   const Vec3 turn = body.rigid.angular_velocity(body.rigid.orientation, push.torque - at_rest.torque);
   return (push.force - at_rest.force).norm() / body.rigid.mass + turn.norm() * body.extent > kPush;
 }
 
-/// Wakes the bodies that a force or a spring has begun to push, or does not support any more.
-void World::Impl::wake_pushed(Real time) {
+void ActiveBodies::wake_pushed(Real time) {
   bool changing = false;
-  force_defs.for_each([&](ForceHandle, const ForceDef& force) { changing |= force.changes(); });
-  if (!changing && watched == 0) return;
+  world_.force_defs.for_each([&](ForceHandle, const ForceDef& force) { changing |= force.changes(); });
+  if (!changing && watched_ == 0) return;
   std::vector<Body*> pushed;
-  for (const auto& [number, group] : sleeping) {
+  for (const auto& [number, group] : sleeping_) {
     const auto woken = std::find_if(group.begin(), group.end(), [&](const Body* body) {
       return (changing || !body->moving_springs.empty()) &&
              is_pushed(*body, changing_push(*body, time), body->rest_push);
@@ -171,9 +175,9 @@ void World::Impl::wake_pushed(Real time) {
   for (Body* body : pushed) wake(*body);
 }
 
-void World::Impl::put_to_sleep(Real start, Real h) {
-  if (!def.sleep) return;
-  for (Body* body : awake) body->quiet_time = fastest_point(*body) < kQuietSpeed ? body->quiet_time + h : 0;
+void ActiveBodies::put_to_sleep(std::span<const Island> islands, Real start, Real h) {
+  if (!world_.def.sleep) return;
+  for (Body* body : awake_) body->quiet_time = fastest_point(*body) < kQuietSpeed ? body->quiet_time + h : 0;
   for (const Island& island : islands) {
     if (island.bodies.empty()) continue;
     const bool quiet = std::all_of(island.bodies.begin(), island.bodies.end(), [](const Body* body) {
@@ -190,15 +194,20 @@ void World::Impl::put_to_sleep(Real start, Real h) {
     watch_springs(island.bodies);
     for (Body* body : island.bodies) {
       body->asleep = true;
-      body->island = sleeping_groups;
+      body->island = sleeping_groups_;
       body->rest_push = changing_push(*body, start);
       body->rigid.momentum.setZero();
       body->rigid.angular_momentum.setZero();
     }
-    bodies_put_to_sleep += island.bodies.size();
-    sleeping.emplace(sleeping_groups++, island.bodies);
-    lists_changed = fixed_changed = true;
+    put_to_sleep_ += island.bodies.size();
+    sleeping_.emplace(sleeping_groups_++, island.bodies);
+    note_change();
   }
+}
+
+void ActiveBodies::count(StepReport& report) {
+  report.bodies_woken += std::exchange(woken_, 0);
+  report.bodies_put_to_sleep += std::exchange(put_to_sleep_, 0);
 }
 
 }  // namespace offstage::sim

@@ -1,0 +1,73 @@
+#pragma once
+/// The lists of bodies that move, and sleep: groups of bodies that have been almost at rest for some time are
+/// not simulated until something disturbs them.
+
+#include <map>
+#include <span>
+#include <vector>
+
+#include "sim/contact/contact_graph.h"
+#include "sim/world/world_state.h"
+
+namespace offstage::sim {
+
+class ActiveBodies {
+ public:
+  explicit ActiveBodies(const WorldState& world) : world_(world) {}
+
+  /// Awake dynamic bodies, and kinematic bodies that move, by rank. Valid until the next update().
+  std::span<Body* const> awake() const { return awake_; }
+  std::span<Body* const> kinematic() const { return kinematic_; }
+  std::size_t asleep() const { return asleep_; }
+  /// Calls f(body) for each sleeping body.
+  template <class F>
+  void for_each_asleep(F&& f) const {
+    for (const auto& [number, group] : sleeping_)
+      for (Body* body : group) f(*body);
+  }
+
+  /// To be called after a body has been added, removed or taken out, or has appeared.
+  void note_new_set() { is_ranked_ = false, note_change(); }
+  /// To be called after a body has begun or ended to be able to move.
+  void note_change() { is_current_ = false, ++version_; }
+  /// Number of changes so far.
+  uint64_t version() const { return version_; }
+  /// Updates the lists after changes.
+  void update();
+
+  /// Begins a sampling step. From then on all bodies that may have moved in it are collected in stepped().
+  void begin_step();
+  std::span<Body* const> stepped() const { return stepped_; }
+  void add_stepped(Body& body) { stepped_.push_back(&body); }
+  void forget(Body& body) { std::erase(stepped_, &body); }
+
+  /// Wakes a body and all bodies of its sleeping group, which are returned; none if it is awake.
+  std::vector<Body*> wake(Body& body);
+  void wake_all();
+  /// Wakes the bodies that a force or a spring has begun to push, or does not support any more.
+  void wake_pushed(Real time);
+  /// Lets islands fall asleep at the end of a sub-step of length h from `start` on.
+  void put_to_sleep(std::span<const Island> islands, Real start, Real h);
+  /// Adds the counts since the last call.
+  void count(StepReport& report);
+
+ private:
+  void rank();
+  void watch_springs(std::span<Body* const> group);
+  Wrench changing_push(const Body& body, Real time) const;
+
+  const WorldState& world_;
+  bool is_ranked_ = true, is_current_ = false;
+  uint64_t version_ = 0;
+  std::vector<Body*> awake_, kinematic_, stepped_;
+  std::map<uint32_t, std::vector<Body*>> sleeping_;
+  uint32_t sleeping_groups_ = 0;  // number of groups so far
+  std::size_t asleep_ = 0;        // number of sleeping bodies
+  std::size_t watched_ = 0;       // number of springs of sleeping bodies whose other ends can move
+  uint64_t woken_ = 0, put_to_sleep_ = 0;
+};
+
+/// Whether a wrench differs so much from that at rest that it could move a sleeping body.
+bool is_pushed(const Body& body, const Wrench& push, const Wrench& at_rest);
+
+}  // namespace offstage::sim

@@ -1,0 +1,42 @@
+#pragma once
+/// Motion of cloths through a sub-step (physics F6-F8). Cloths move after bodies and particles, among the
+/// bodies on the paths of these. Their effect on the velocities of bodies begins in the next sub-step.
+
+#include <span>
+#include <vector>
+
+#include "sim/cloth/cloth_system.h"
+#include "sim/world/active_bodies.h"
+
+namespace offstage::sim {
+
+class ClothMotion {
+ public:
+  ClothMotion(const WorldState& world, ActiveBodies& active) : world_(world), active_(active) {}
+
+  /// To be called after a cloth has been added or removed, or has appeared.
+  void arrange();
+  /// Releases the cloth that is pinned to a body.
+  void detach(BodyHandle body);
+
+  void begin_step();
+  /// Moves all cloths through a sub-step, and the bodies that they displace. Returns the impulses on bodies.
+  std::vector<Reaction> step(Real start, Real h);
+  /// Adds the statistics of the step.
+  void report(StepReport& report);
+
+ private:
+  std::vector<ClothBody> bodies_near_cloths(Real h) const;
+  void wake_unpinned(std::span<const ClothBody> near);
+  std::vector<Reaction> answer(std::span<const ClothBody> near, Real h);
+
+  const WorldState& world_;
+  ActiveBodies& active_;
+  ClothSystem system_;
+};
+
+/// Collides particles with cloths after both have moved through the sub-step of length h from `start` on.
+/// Adds the collisions of systems that report them.
+void collide_particles_with_cloths(WorldState& world, Real start, Real h, std::vector<ParticleEvent>& events);
+
+}  // namespace offstage::sim

@@ -1,0 +1,322 @@
+#include "sim/world/contact_finder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include "sim/contact/seams.h"
+#include "sim/core/parallel_loop.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Distance of contact points in addition to that by the bodies' motion in the interval: at most kMargin [m]
+/// and at most this share of the smaller body.
+constexpr Real kMargin = 2e-3, kMarginShare = 0.05;
+/// Motion in an interval, as a share of the smaller body, above which the contact points at the start do not
+/// predict later contacts. The limit is larger for the fast solver without restitution, which uses the points
+/// only as limits of the approach.
+constexpr Real kFar = 0.25, kFarWithoutBounce = 1;
+/// Margin of bodies in the broad phase: a share of their size, plus their motion in this many steps.
+constexpr Real kRoom = 0.03, kSteps = 2;
+/// Share of the extent: a greater deviation from the chord occurs only for rotations of more than half a
+/// radian.
+constexpr Real kWide = 0.036;
+/// Greatest relative motion of bodies for which their contact points are reused: at most this length [m] and
+/// at most this share of the smaller body. Until then only the distances of the points are updated in each
+/// step, to second order.
+constexpr Real kReuse = 1e-4, kReuseShare = 2e-4, kExactReuse = 1e-8;
+/// A body that is hit without restitution by a body of the same mass gets this share of its speed; both then
+/// move together. Impacts are propagated kPassedOn times. The next one would have a sixteenth of the speed;
+/// for less than 7.7 m/s this is within kMargin in a step of 1/240 s.
+constexpr Real kPassedShare = 0.5;
+constexpr uint32_t kPassedOn = 3;
+/// Bodies turn if their rotation moves their surfaces by more than this in an interval [m].
+constexpr Real kTurning = 2e-4;
+/// Bodies with more relative motion than this in an interval may touch with other features [m].
+constexpr Real kFastPair = 3e-3;
+Real smaller_extent(const Body& a, const Body& b) {
+  return std::min(a.extent, b.extent);
+}
+
+/// Box around all positions of a body in its interval.
+Aabb swept_bounds(const Body& body) {
+  Aabb box = bounds(body.solid, body.start_pose).merged(bounds(body.solid, body.pose));
+  Real margin = std::min(kMargin, kMarginShare * body.extent);
+  if (!std::holds_alternative<Sphere>(body.def.shape)) {
+    // The deviation of a point from the chord of its path is at most an eighth of its greatest acceleration.
+    // Large rotations use the balls around the start and the end instead.
+    const Real bow = body.path().max_acceleration(body.extent) / 8;
+    margin += bow > kWide * body.extent ? body.extent : bow;
+  }
+  box.min().array() -= margin;
+  box.max().array() += margin;
+  return box;
+}
+
+/// A pair with the ranks of its bodies.
+struct RankedPair {
+  uint32_t low, high;
+  ContactPair* pair;
+};
+
+/// Sorts pairs in ascending order of ranks. There are many pairs, but few of each body.
+void sort_by_rank(std::span<const RankedPair> pairs, std::size_t bodies, std::vector<ContactPair*>& sorted) {
+  std::vector<uint32_t> ends(bodies, 0);
+  for (const RankedPair& p : pairs) ++ends[p.low];
+  for (std::size_t i = 1; i < bodies; ++i) ends[i] += ends[i - 1];
+  std::vector<RankedPair> order(pairs.size());
+  for (std::size_t i = pairs.size(); i-- > 0;) order[--ends[pairs[i].low]] = pairs[i];
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    const RankedPair moved = order[i];
+    std::size_t at = i;
+    for (; at > 0 && order[at - 1].low == moved.low && order[at - 1].high > moved.high; --at)
+      order[at] = order[at - 1];
+    order[at] = moved;
+  }
+  sorted.clear();
+  for (const RankedPair& p : order) sorted.push_back(p.pair);
+}
+
+/// Whether the path is not within the box in the broad phase.
+bool leaves(const Body& body, const Aabb& way) {
+  return body.collides() && !body.swept.contains(way);
+}
+
+}  // namespace
+
+void ContactFinder::use(const CollisionMethods& methods) {
+  if (methods.broad_phase == CollisionMethods::BroadPhase::grid)
+    broad_phase_ = GroupedBroadPhase(GridKind::uniform, methods.cell_factor);
+}
+
+void ContactFinder::add(const Body& body) {
+  if (body.collides())
+    broad_phase_.insert(body.handle.index, bounds(body.solid, body.pose), !body.is_dynamic());
+}
+
+void ContactFinder::remove(const Body& body) {
+  if (broad_phase_.contains(body.handle.index)) broad_phase_.remove(body.handle.index);
+}
+
+void ContactFinder::forget(const Body& body) {
+  graph_.forget(body.handle.index);
+  clear();
+}
+
+void ContactFinder::forget_all() {
+  graph_.forget_all();
+  clear();
+}
+
+void ContactFinder::regroup() {
+  broad_phase_.set_groups(joints_.colliding());
+  is_current_ = false;
+}
+
+void ContactFinder::clear() {
+  pairs_.clear();
+  is_current_ = false;
+}
+
+/// Gives the box of a body's path to the broad phase, enlarged by a margin. If repeated in a sub-step
+/// (`again`), the previous box is included.
+void ContactFinder::move(Body& body, Aabb way, bool again) {
+  // Margin for some more steps like this one.
+  const Vec3 shift = kSteps * (body.pose.position - body.start_pose.position);
+  const Vec3 room = Vec3::Constant(kRoom * body.extent);
+  way.min() += shift.cwiseMin(0) - room;
+  way.max() += shift.cwiseMax(0) + room;
+  if (again) way.extend(body.swept);
+  body.swept = way;
+  broad_phase_.move(body.handle.index, way);
+  is_current_ = false;
+}
+
+/// The same unless the path is within the previous box; returns whether the box was changed.
+bool ContactFinder::move(Body& body, bool again) {
+  const Aabb way = swept_bounds(body);
+  if (!leaves(body, way)) return false;
+  move(body, way, again);
+  return true;
+}
+
+/// Collects the pairs of bodies whose paths come near each other. With `again`, within a sub-step, existing
+/// pairs are kept.
+void ContactFinder::collect(bool again) {
+  if (std::exchange(is_current_, true) && version_ == active_.version()) return;
+  version_ = active_.version();
+  graph_.update(
+      broad_phase_.pairs(), again, [&](uint32_t slot) { return &world_.body_at(slot); },
+      [&](const Body& a, const Body& b) { return materials.surface(a, b, world_.def.collision); });
+  std::vector<RankedPair> ranked;
+  ranked.reserve(graph_.size());
+  graph_.for_each([&](ContactPair& pair) {
+    const Body &a = pair.a(), &b = pair.b();
+    if (joints_.are_apart(a, b)) return;
+    if (a.can_move() || b.can_move())
+      ranked.push_back({std::min(a.rank, b.rank), std::max(a.rank, b.rank), &pair});
+  });
+  sort_by_rank(ranked, world_.bodies.size(), pairs_);
+}
+
+/// Computes a bound of the speed that an impact in the sub-step can give to each body, propagated from body
+/// to body with decreasing shares.
+void ContactFinder::propagate_impact_speeds(Real h) {
+  for (Body* body : active_.awake()) body->impact_speed_bound = 0;
+  if (world_.is_exact()) return;  // the exact solver resolves each impact at its own time
+  struct Approach {
+    Body *a, *b;
+    Real speed;
+  };
+  std::vector<Approach> approaches(pairs_.size());
+  for_each_index(pairs_.size(), [&](std::size_t i) {
+    ContactPair& pair = *pairs_[i];
+    approaches[i] = {&pair.a(), &pair.b(), pair.speed_bound()};
+  });
+  const auto strike = [](Body& body, Real speed) {
+    if (body.is_awake()) body.impact_speed_bound = std::max(body.impact_speed_bound, speed);
+  };
+  Real fastest = 0;
+  for (const auto& [a, b, speed] : approaches) {
+    strike(*a, speed);
+    strike(*b, speed);
+    fastest = std::max(fastest, speed);
+  }
+  for (uint32_t i = 0; i < kPassedOn && fastest * h > kMargin; ++i)
+    for (const auto& [a, b, speed] : approaches) {
+      strike(*a, kPassedShare * b->impact_speed_bound);
+      strike(*b, kPassedShare * a->impact_speed_bound);
+    }
+}
+
+void ContactFinder::find(Real h) {
+  const std::span<Body* const> awake = active_.awake();
+  std::vector<Aabb> ways(awake.size());
+  const std::vector<std::size_t> leaving = indices_where(awake.size(), [&](std::size_t i) {
+    ways[i] = swept_bounds(*awake[i]);
+    return leaves(*awake[i], ways[i]);
+  });
+  for (const std::size_t i : leaving) move(*awake[i], ways[i], false);
+  for (Body* body : active_.kinematic()) move(*body, false);
+  collect(false);
+  propagate_impact_speeds(h);
+  const auto find_contacts = [&](std::size_t i) {
+    // Pairs are scattered in memory.
+    if (i + 6 < pairs_.size()) pairs_[i + 6]->prefetch();
+    if (i + 3 < pairs_.size()) pairs_[i + 3]->prefetch_manifold();
+    pairs_[i]->impacts = 0;
+    pairs_[i]->deepest = 0;
+    pairs_[i]->toi_exhausted = pairs_[i]->restitution_suppressed = false;
+    find_points(*pairs_[i], 0, h);
+  };
+  constexpr std::size_t kManyPairs = 64, kPairsOfTask = 16;
+  if (pairs_.size() < kManyPairs) {
+    for (std::size_t i = 0; i < pairs_.size(); ++i) find_contacts(i);
+  } else {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pairs_.size(), kPairsOfTask),
+                      [&](const auto& range) {
+                        for (std::size_t i = range.begin(); i < range.end(); ++i) find_contacts(i);
+                      });
+  }
+  remove_seams(pairs_, 0, h);
+}
+
+/// Bound of the relative motion of a pair's bodies in the rest of the sub-step, and the motion for which its
+/// contact points are sufficient [m].
+Real ContactFinder::motion_bound(const ContactPair& pair, Real left) const {
+  return (pair.speed_bound() + 2 * world_.def.gravity.norm() * left) * left;
+}
+Real ContactFinder::motion_known(const ContactPair& pair) const {
+  const Real size = smaller_extent(pair.a(), pair.b());
+  const bool bounces = world_.is_exact() || pair.surface().restitution > 0;
+  return std::max(std::min(kMargin, kMarginShare * size), (bounces ? kFar : kFarWithoutBounce) * size);
+}
+
+void ContactFinder::find_points(ContactPair& pair, Real time, Real h) const {
+  const Real left = h - time;
+  const Real size = smaller_extent(pair.a(), pair.b());
+  const Real base = std::min(kMargin, kMarginShare * size);
+  const Real motion = motion_bound(pair, left), far = motion_known(pair);
+  const bool exact = world_.is_exact();
+  // An impact moves a body at most as fast as the body that hits it.
+  const Real impact = std::max(pair.a().impact_speed_bound, pair.b().impact_speed_bound) * left;
+  // If no impact of the pair is traced back to any more, only its points keep the bodies apart.
+  const Real most = pair.toi_exhausted ? std::numeric_limits<Real>::infinity() : far;
+  const Real margin = base + std::min(std::max(2 * motion, impact), most);
+  // An impact also turns the body.
+  const Real turning = pair.turning_speed() * left + (impact > kMargin ? impact : 0);
+  const Real reuse = exact ? kExactReuse : std::min(kReuse, kReuseShare * size);
+  pair.find(pair.a().placed_at(time, h), pair.b().placed_at(time, h), margin, reuse, turning > kTurning);
+
+  const bool is_far = motion > far;
+  const bool is_quick =
+      !exact && time == 0 && !pair.manifolds().empty() && pair.speed_bound() * h > kFastPair;
+  if (is_quick && !is_far && !pair.toi_exhausted) pair.add_speculative_contacts(h);
+  choose_event(pair, is_far, left);
+}
+
+/// Chooses whether a pair's next impact is traced back to. `far`: its motion is too large for its contact
+/// points.
+void ContactFinder::choose_event(ContactPair& pair, bool far, Real left) const {
+  pair.needs_toi = far && !pair.toi_exhausted;
+  const bool bounces = world_.is_exact() || pair.surface().restitution > 0;
+  if (far || pair.toi_exhausted || !bounces || pair.restitution_suppressed) return;
+  for (const PlacedManifold& m : pair.manifolds())
+    for (uint32_t k = 0; k < m.manifold.count; ++k) {
+      const ContactPoint& point = m.manifold.points[k];
+      const Real speed = pair.relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n);
+      if (speed < -world_.def.collision_speed &&
+          point.separation + 2 * (speed - world_.def.gravity.norm() * left) * left < 0)
+        pair.needs_toi = true;
+    }
+}
+
+void ContactFinder::remove_seams(std::span<ContactPair* const> pairs, Real time, Real h) const {
+  for (ContactPair* pair : remove_seam_contacts(pairs, time, h))
+    choose_event(*pair, motion_bound(*pair, h - time) > motion_known(*pair), h - time);
+}
+
+std::vector<Body*> ContactFinder::wake_touched(FreeMotion& motion, Real start, Real h) {
+  if (active_.asleep() == 0) return {};
+  std::vector<Body*> touched;
+  for (ContactPair* pair : pairs_)
+    for (Body* body : {&pair->a(), &pair->b()})
+      if (body->asleep && (!pair->manifolds().empty() || pair->needs_toi)) touched.push_back(body);
+  if (touched.empty()) return {};
+  std::vector<Body*> woken;
+  for (Body* body : touched)
+    for (Body* member : active_.wake(*body)) woken.push_back(member);
+  std::sort(woken.begin(), woken.end(), [](const Body* a, const Body* b) { return a->rank < b->rank; });
+  for (Body* body : woken) body->begin_interval(0);
+  motion.move_some(woken, start, 0, h);
+  for (Body* body : woken) move(*body, false);
+  active_.update();
+  return woken;
+}
+
+bool ContactFinder::follow(std::span<Body* const> bodies) {
+  bool left = false;
+  for (Body* body : bodies) left |= move(*body, true);
+  if (left) collect(true);
+  return left;
+}
+
+void ContactFinder::count(StepReport& report) const {
+  report.bodies_awake = static_cast<uint32_t>(active_.awake().size());
+  report.bodies_asleep = static_cast<uint32_t>(active_.asleep());
+  report.pairs_tested += pairs_.size();
+  report.contacts = 0;
+  for (ContactPair* pair : pairs_) {
+    const TestCounts tests = pair->take_tests();
+    report.volume_tests += tests.volumes;
+    report.piece_tests += tests.pieces;
+    report.contacts += pair->touching();
+    report.speculative_contacts += pair->speculative;
+    report.penetration = std::max(report.penetration, pair->deepest);
+  }
+}
+
+}  // namespace offstage::sim

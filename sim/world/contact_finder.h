@@ -1,0 +1,79 @@
+#pragma once
+/// The pairs of bodies that are near each other in a sub-step, and their contact points (physics E6).
+
+#include <span>
+#include <vector>
+
+#include "sim/collision/grouped_broad_phase.h"
+#include "sim/world/active_bodies.h"
+#include "sim/world/contact_materials.h"
+#include "sim/world/free_motion.h"
+#include "sim/world/joint_groups.h"
+
+namespace offstage::sim {
+
+class ContactFinder {
+ public:
+  ContactFinder(const WorldState& world, ActiveBodies& active, const JointGroups& joints)
+      : world_(world), active_(active), joints_(joints) {}
+
+  ContactMaterials materials;
+
+  void use(const CollisionMethods& methods);
+  /// Adds and removes bodies that collide.
+  void add(const Body& body);
+  void remove(const Body& body);
+  /// Forgets the contacts of a body, and of all bodies.
+  void forget(const Body& body);
+  void forget_all();
+  /// To be called after the groups of joints have changed.
+  void regroup();
+
+  /// Finds the pairs of a sub-step of length h and their contact points, after the bodies have moved freely.
+  void find(Real h);
+  /// No body moves in this sub-step.
+  void clear();
+  /// The pairs with a body that can move, by the ranks of their bodies.
+  std::span<ContactPair* const> pairs() const { return pairs_; }
+  /// Calls f(pair) for all pairs, in the order of the bodies' slots.
+  template <class F>
+  void for_each(F&& f) const {
+    graph_.for_each(f);
+  }
+
+  /// Wakes the sleeping bodies near moving ones, moves them through the sub-step, and returns them.
+  std::vector<Body*> wake_touched(FreeMotion& motion, Real start, Real h);
+  /// Extends the pairs to the changed paths of bodies in the sub-step; existing pairs are kept, because
+  /// impacts and islands refer to them. Returns whether there may be new ones; see ContactPair::is_new().
+  bool follow(std::span<Body* const> bodies);
+  /// Adds the pairs of bodies that have been woken.
+  void extend() { collect(true); }
+  /// Finds the points where a pair's bodies touch at their interval's start, or may touch in the rest of the
+  /// sub-step.
+  void find_points(ContactPair& pair, Real time, Real h) const;
+  /// Removes the contacts at seams of pairs that were found at the same time.
+  void remove_seams(std::span<ContactPair* const> pairs, Real time, Real h) const;
+
+  /// Adds the statistics of the sub-step.
+  void count(StepReport& report) const;
+
+ private:
+  void propagate_impact_speeds(Real h);
+  Real motion_bound(const ContactPair& pair, Real left) const;
+  Real motion_known(const ContactPair& pair) const;
+  void choose_event(ContactPair& pair, bool far, Real left) const;
+  void move(Body& body, Aabb way, bool again);
+  bool move(Body& body, bool again);
+  void collect(bool again);
+
+  const WorldState& world_;
+  ActiveBodies& active_;
+  const JointGroups& joints_;
+  GroupedBroadPhase broad_phase_;  // of the colliding bodies, by slot; articulations are groups
+  ContactGraph graph_;
+  std::vector<ContactPair*> pairs_;
+  bool is_current_ = false;
+  uint64_t version_ = 0;  // of the active bodies that the pairs are for
+};
+
+}  // namespace offstage::sim

@@ -1,0 +1,29 @@
+#pragma once
+/// The materials of bodies and the rules for pairs of them.
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "sim/contact/contact_pair.h"
+#include "sim/world.h"
+
+namespace offstage::sim {
+
+class ContactMaterials {
+ public:
+  /// The number of a material, which is new if its name is.
+  uint32_t number(const std::string& material);
+  void add(const ContactRule& rule) { rules_[std::minmax(number(rule.a), number(rule.b))] = rule; }
+  /// The surface of two bodies that meet: by the rule for their materials, or by their own values. Their
+  /// contacts are found by these methods.
+  PairSurface surface(const Body& a, const Body& b, const CollisionMethods& methods) const;
+
+ private:
+  std::vector<std::string> names_;
+  std::map<std::pair<uint32_t, uint32_t>, ContactRule> rules_;
+};
+
+}  // namespace offstage::sim

@@ -1,0 +1,115 @@
+#include "sim/world/contact_solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include "sim/articulation/joint_energy.h"
+#include "sim/contact/energy_guard.h"
+#include "sim/world/joint_groups.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Share of the kinetic energy of an island with joints that a sub-step may add. A greater excess is removed;
+/// it counts as a fall-back if it is larger than the usual error of the velocity terms.
+constexpr Real kAddedByJoints = 1e-3, kUsualExcess = 0.02;
+
+/// The motion by contacts and limits satisfies the joints only approximately, so it is projected. If links
+/// turn far in a step, the result may have more than the most kinetic energy [J] that the island can have;
+/// the relative velocities of its links are then reduced.
+JointTally settle_joints(const Island& island, Real end, Real most_energy) {
+  JointTally tally;
+  for (Articulation* articulation : island.articulations) {
+    articulation->settle(end, tally);
+    for (Body* body : articulation->bodies()) body->pose = body->rigid.pose();
+  }
+  if (const Real excess = kinetic_energy(island) - most_energy; excess > 0) {
+    Real internal = 0;
+    for (const Articulation* a : island.articulations) internal += internal_energy(*a);
+    for (const Articulation* a : island.articulations)
+      slow_down(*a, std::sqrt(std::max(0.0, 1 - excess / internal)));
+    tally.unsolved += excess > kUsualExcess * most_energy;
+  }
+  return tally;
+}
+
+/// The most kinetic energy that an island may have after its contacts are solved in an interval, which is a
+/// share of the sub-step: contacts and joints dissipate energy, except for the error of their velocity terms.
+Real most_energy(const Island& island, Real share) {
+  if (island.articulations.empty() || can_do_work(island)) return std::numeric_limits<Real>::infinity();
+  return (1 + kAddedByJoints * share) * kinetic_energy(island);
+}
+
+}  // namespace
+
+void ContactSolver::solve_all(std::span<Island> islands, Real start, Real h, StepReport& report) {
+  std::vector<Island*> all;
+  for (Island& island : islands)
+    if (has_forces(island)) all.push_back(&island);
+  if (world_.def.solver == SolverKind::automatic) patience_.begin(all, h);
+  solve(all, {.duration = h, .end = start + h, .substep = h, .is_whole = true}, report);
+}
+
+void ContactSolver::solve(Island& island, const ContactInterval& interval, StepReport& report) {
+  Island* const one[] = {&island};
+  if (has_forces(island)) solve(one, interval, report);
+}
+
+void ContactSolver::solve(std::span<Island* const> group, const ContactInterval& interval,
+                          StepReport& report) {
+  std::vector<const Island*> fast;
+  std::vector<std::pair<Island*, SolverChoice*>> exact;
+  for (Island* island : group) {
+    if (world_.def.solver == SolverKind::fast) {
+      fast.push_back(island);
+      continue;
+    }
+    SolverChoice& choice = choices_[island->bodies.front()->handle.index];
+    if (world_.def.solver == SolverKind::automatic && !choice.is_exact_worth(*island, patience_)) {
+      fast.push_back(island);
+      continue;
+    }
+    if (!choice.exact) choice.exact = std::make_unique<ExactContacts>();
+    exact.emplace_back(island, &choice);
+  }
+  std::vector<Real> most(group.size());
+  for (std::size_t i = 0; i < group.size(); ++i)
+    most[i] = most_energy(*group[i], interval.duration / interval.substep);
+  std::vector<ExactContacts::Outcome> outcomes(exact.size());
+  using Method = ExactContacts::Method;
+  const Method method = world_.def.solver == SolverKind::lcp ? Method::lcp : Method::proximal;
+  const auto run = [&](std::size_t i) {
+    const auto& [island, choice] = exact[i];
+    const Real budget = world_.is_exact() ? std::numeric_limits<Real>::infinity()
+                                          : choice->budget(*island, interval.duration, patience_);
+    outcomes[i] = choice->exact->solve(*island, interval, budget, method);
+  };
+  if (exact.size() < 2) {
+    for (std::size_t i = 0; i < exact.size(); ++i) run(i);
+  } else {
+    tbb::parallel_for(std::size_t{0}, exact.size(), run);
+  }
+  for (std::size_t i = 0; i < exact.size(); ++i) {
+    const auto& [island, choice] = exact[i];
+    const ExactContacts::Outcome& outcome = outcomes[i];
+    report.exact.add(outcome.work);
+    report.lcp.add(outcome.lcp);
+    add_rough(outcome.rough, report);
+    choice->learn(*island, interval.duration, outcome.is_applied, patience_);
+    if (outcome.is_applied) continue;
+    report.exact.over_budget += outcome.work.fallbacks == 0;
+    fast.push_back(island);
+  }
+  if (!fast.empty()) report.fast.add(fast_.solve(fast, interval));
+  for (std::size_t i = 0; i < group.size(); ++i)
+    if (!group[i]->articulations.empty()) count(settle_joints(*group[i], interval.end, most[i]), report);
+}
+
+void add_rough(const ContactPair* pair, StepReport& report) {
+  if (pair) report.rough_contacts.push_back({pair->a().handle, pair->b().handle});
+}
+
+}  // namespace offstage::sim

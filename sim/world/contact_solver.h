@@ -1,0 +1,35 @@
+#pragma once
+/// Contact forces of islands (physics R7-R10): each island is solved by the suitable solver.
+
+#include <map>
+#include <span>
+
+#include "sim/contact/contact_interval.h"
+#include "sim/contact/fast_contacts.h"
+#include "sim/contact/solver_choice.h"
+#include "sim/world/world_state.h"
+
+namespace offstage::sim {
+
+class ContactSolver {
+ public:
+  explicit ContactSolver(const WorldState& world) : world_(world) {}
+
+  /// Solves all islands of a sub-step of length h, over the whole of it.
+  void solve_all(std::span<Island> islands, Real start, Real h, StepReport& report);
+  /// Solves some islands over an interval within a sub-step.
+  void solve(std::span<Island* const> group, const ContactInterval& interval, StepReport& report);
+  /// The same for one island, if any forces can act in it.
+  void solve(Island& island, const ContactInterval& interval, StepReport& report);
+
+ private:
+  const WorldState& world_;
+  std::map<uint32_t, SolverChoice> choices_;  // by the slot of an island's first body
+  ExactSolverBudget patience_;
+  FastContacts fast_;
+};
+
+/// Records a pair whose contacts a solver could not solve to its accuracy; null: none.
+void add_rough(const ContactPair* pair, StepReport& report);
+
+}  // namespace offstage::sim

@@ -1,0 +1,32 @@
+#include "sim/world/free_motion.h"
+
+#include "sim/core/parallel_loop.h"
+#include "sim/world/joint_groups.h"
+
+namespace offstage::sim {
+
+void FreeMotion::move_all(std::span<Body* const> awake, Real start, Real h) {
+  systems_.push_back(std::make_unique<CoupledSystem>(world_, world_.active_forces()));
+  CoupledSystem& system = *systems_.back();
+  system.save();
+  system.step(integrator(world_.def.integrator), start, h, world_.def.integration_error);
+  for_each_index(awake.size(), [&](std::size_t i) { awake[i]->pose = awake[i]->rigid.pose(); });
+}
+
+CoupledSystem& FreeMotion::move_some(std::span<Body* const> group, Real start, Real from, Real duration) {
+  systems_.push_back(std::make_unique<CoupledSystem>(world_, group, world_.active_forces()));
+  CoupledSystem& system = *systems_.back();
+  system.save();
+  system.step(integrator(world_.def.integrator), start + from, duration, world_.def.integration_error);
+  for (Body* body : group) body->pose = body->rigid.pose();
+  return system;
+}
+
+void FreeMotion::count(StepReport& report) const {
+  for (const auto& system : systems_) {
+    report.integration.add(system->report());
+    sim::count(system->joint_tally(), report);
+  }
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,65 @@
+#pragma once
+/// Impacts within a sub-step (physics E6, E7, R12). Bodies, with all objects connected to them, are moved
+/// back to the time of impact, collide there, and continue for the rest of the sub-step. Other bodies are not
+/// changed. The work is bounded: if a pair collides too often in a sub-step, or if there are too many
+/// impacts, later ones are left to the contact solver, which also prevents tunnelling. In a pile with too
+/// many impacts the restitution of slower ones is suppressed for the rest of the sub-step.
+
+#include <vector>
+
+#include "sim/world/contact_finder.h"
+#include "sim/world/contact_solver.h"
+
+namespace offstage::sim {
+
+/// The impacts of one sub-step, of length h from `start` on. Islands and pairs are those of the sub-step
+/// without impacts, and the bodies are at its end.
+class ImpactStage {
+ public:
+  ImpactStage(const WorldState& world, const ActiveBodies& active, ContactFinder& contacts,
+              ContactSolver& solver, FreeMotion& motion, std::vector<Island>& islands, Real start, Real h,
+              StepReport& report)
+      : world_(world),
+        active_(active),
+        contacts_(contacts),
+        solver_(solver),
+        motion_(motion),
+        islands_(islands),
+        start_(start),
+        h_(h),
+        report_(report) {}
+
+  void resolve();
+
+ private:
+  struct PendingImpact {
+    Real time;  // since the sub-step's start
+    ContactPair* pair;
+  };
+
+  template <class IsWanted>
+  std::size_t search(IsWanted&& is_wanted);
+  void bring_to(Island& island, Real time);
+  void join(uint32_t into, uint32_t island);
+  void join_pending(uint32_t number, Real time);
+  void suppress_restitution(uint32_t island);
+  std::size_t collide(uint32_t number, Real time);
+  void go_on(uint32_t number, Real time);
+  bool join_next(uint32_t number, Real time);
+  bool join_overtaken(uint32_t number, Real time);
+  bool closes(const ContactPair& pair, Real left) const;
+  bool overlaps_at_end(const ContactPair& pair, Real time) const;
+  void find_pairs_again(uint32_t number);
+
+  const WorldState& world_;
+  const ActiveBodies& active_;
+  ContactFinder& contacts_;
+  ContactSolver& solver_;
+  FreeMotion& motion_;
+  std::vector<Island>& islands_;
+  Real start_, h_;
+  StepReport& report_;
+  std::vector<PendingImpact> pending_;
+};
+
+}  // namespace offstage::sim

@@ -1,0 +1,56 @@
+#pragma once
+/// The intact joints in groups that are connected by bodies: the articulations (physics A1, A2).
+
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sim/dynamics/body_impulses.h"
+#include "sim/world/active_bodies.h"
+
+namespace offstage::sim {
+
+class JointGroups {
+ public:
+  explicit JointGroups(WorldState& world) : world_(world) {}
+
+  /// To be called after a joint or one of its bodies has been added, removed or broken, or has appeared.
+  void note_change() { is_current_ = false; }
+  /// Updates the articulations after changes. Returns whether there were any.
+  bool update();
+
+  /// For each articulation the slots of its bodies that can collide and move, ordered so that joined bodies
+  /// are adjacent.
+  const std::vector<std::vector<uint32_t>>& colliding() const { return colliding_; }
+  /// Whether two bodies do not collide with each other because of a joint.
+  bool are_apart(const Body& a, const Body& b) const;
+  /// Null for a body without joints.
+  Articulation* articulation_of(uint32_t slot) const;
+  /// By slot.
+  std::span<const BodyImpulses::Link> links() const { return links_; }
+
+  /// Breaks the joints whose load in a sub-step of length h exceeded their limits.
+  void break_overloaded(Real h, StepReport& report);
+  /// Removes the joints of a body that is removed.
+  void detach(const Body& body, ActiveBodies& active);
+
+ private:
+  WorldState& world_;
+  bool is_current_ = true;
+  std::vector<std::vector<uint32_t>> colliding_;
+  std::vector<std::pair<uint32_t, uint32_t>> apart_;  // slots of bodies that do not collide, sorted
+  std::vector<BodyImpulses::Link> links_;             // by slot
+  std::vector<Articulation*> articulation_of_;        // by slot
+};
+
+/// Joins the bodies at their poses, where the definition says.
+void fit(Joint& joint);
+/// Joins the bodies of a joint that appears later at their poses of that time. Anchors and axes have moved
+/// with them: those of a with a, or with b if there is no a.
+void place_at_bodies(Joint& joint);
+/// Whether a joint prevents an island from falling asleep.
+bool is_driven(const Island& island, Real time);
+/// Adds the statistics of joints to those of the step.
+void count(const JointTally& tally, StepReport& report);
+
+}  // namespace offstage::sim

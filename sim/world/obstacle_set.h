@@ -1,0 +1,27 @@
+#pragma once
+/// The bodies as obstacles of particles and cloths in a sub-step.
+
+#include "sim/collision/obstacles.h"
+#include "sim/world/active_bodies.h"
+
+namespace offstage::sim {
+
+/// A body that moves through a sub-step of length h. Impulses can move a dynamic one, unless it `is_fixed`.
+Obstacle swept_obstacle(const Body& body, Real h, bool is_fixed = false);
+
+/// Those that cannot move are prepared again only after a change (physics E9).
+class ObstacleSet {
+ public:
+  /// Prepares a sub-step of length h. `fixes_dynamic`: dynamic bodies do not move in it, which holds while
+  /// particles are prewarmed.
+  void update(const WorldState& world, const ActiveBodies& active, Real h, bool fixes_dynamic);
+  const Obstacles& fixed() const { return fixed_; }
+  const Obstacles& moving() const { return moving_; }
+
+ private:
+  Obstacles fixed_, moving_;
+  bool is_current_ = false, fixes_dynamic_ = false;
+  uint64_t version_ = 0;  // of the active bodies that the fixed ones are for
+};
+
+}  // namespace offstage::sim

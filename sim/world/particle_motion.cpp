@@ -1,0 +1,93 @@
+#include "sim/world/particle_motion.h"
+
+#include <algorithm>
+
+namespace offstage::sim {
+
+void ParticleMotion::begin_prewarm(bool is_first) {
+  is_prewarming_ = true;
+  if (!is_first) return;
+  world_.systems.for_each([&](ParticleSystemHandle handle, const ParticleSystem& system) {
+    if (system.arrays.size() > 0) waiting_.push_back(handle);
+  });
+}
+
+void ParticleMotion::end_prewarm(bool is_last) {
+  if (is_last) {
+    world_.systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {
+      if (!waits(handle)) system.admit_newborn(world_.forces(system));
+    });
+    waiting_.clear();
+  }
+  is_prewarming_ = false;
+}
+
+/// Whether a system is paused while others are prewarmed.
+bool ParticleMotion::waits(ParticleSystemHandle system) const {
+  return is_prewarming_ && std::find(waiting_.begin(), waiting_.end(), system) != waiting_.end();
+}
+
+bool ParticleMotion::step(Real start, Real h, const CoupledSystem& coupled, StepReport& report) {
+  obstacles_.update(world_, active_, h, is_prewarming_);
+  for (const auto& articulation : world_.articulations) articulation->begin_impulses(start + h);
+  impulses_.begin(joints_.links());
+  events_.clear();
+  const ParticleStage stage{start, h, obstacles_.fixed(), obstacles_.moving(), world_.def.bounds, impulses_};
+  report.particle_lcp.add(collide(stage, coupled));
+  auto collided = collisions_.outcomes().begin();
+  bool any_removed = false;
+  world_.systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {
+    if (waits(handle)) return;
+    ParticleTally tally;
+    if (system.hits_particles()) {
+      tally = std::move(collided->tally);
+      tally += system.end_step(stage, collided->touched, collided->trapped);
+      ++collided;
+    } else {
+      tally = system.step(stage, world_.forces(system), coupled.holds(system));
+    }
+    add(tally.events);
+    report.particles_expired += tally.expired;
+    report.particles_retired += tally.retired;
+    report.particles_ejected += tally.ejected;
+    report.particles_removed += tally.removed;
+    report.particle_collisions += tally.collisions;
+    report.truncated_sweeps += tally.truncated;
+    any_removed |= tally.expired + tally.retired + tally.removed > 0;
+    if (tally.lost && report.finite) {
+      report.non_finite = *tally.lost;
+      report.non_finite.object = system.def.name;
+    }
+    report.finite &= !tally.lost;
+  });
+  return any_removed;
+}
+
+/// Moves the particles that collide with particles, of all systems together. Returns the work of pivoting.
+ContactWork ParticleMotion::collide(const ParticleStage& stage, const CoupledSystem& coupled) {
+  std::vector<ParticleSystem*> colliding;
+  world_.systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {
+    if (!system.hits_particles() || waits(handle)) return;
+    system.fly_all(stage, world_.forces(system), coupled.holds(system));
+    colliding.push_back(&system);
+  });
+  if (colliding.empty()) return {};
+  const WorldDef& def = world_.def;
+  const bool by_lcp = def.particle_contacts == ParticleContactMethod::lcp;
+  collisions_.step(colliding, stage, def.impact, def.collision_speed, by_lcp ? def.particle_cluster : 0);
+  return collisions_.lcp_work();
+}
+
+/// Appends the events of a system, ordered by particle.
+void ParticleMotion::add(std::vector<ParticleEvent>& events) {
+  std::stable_sort(events.begin(), events.end(), [](const ParticleEvent& a, const ParticleEvent& b) {
+    return a.id != b.id ? a.id < b.id : a.time < b.time;
+  });
+  events_.insert(events_.end(), events.begin(), events.end());
+}
+
+void ParticleMotion::forget(ParticleSystemHandle system) {
+  std::erase_if(events_, [&](const ParticleEvent& e) { return e.system == system; });
+}
+
+}  // namespace offstage::sim

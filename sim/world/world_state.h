@@ -1,0 +1,48 @@
+#pragma once
+/// The objects of a world. The stages of a sub-step share them; what a stage itself remembers from sub-step
+/// to sub-step is in its own class.
+
+#include <memory>
+#include <vector>
+
+#include "sim/articulation/articulation.h"
+#include "sim/cloth/cloth_system.h"
+#include "sim/core/handle.h"
+#include "sim/dynamics/body.h"
+#include "sim/particles/particle_system.h"
+#include "sim/world.h"
+
+namespace offstage::sim {
+
+struct Spring {
+  SpringDef def;
+  Real rest_length;
+};
+
+struct WorldState {
+  WorldDef def;
+  SlotMap<std::unique_ptr<CollisionMesh>, MeshTag> meshes;
+  SlotMap<std::unique_ptr<Body>, BodyTag> bodies;
+  SlotMap<ParticleSystem, ParticleSystemTag> systems;
+  SlotMap<Spring, SpringTag> springs;
+  SlotMap<ForceDef, ForceTag> force_defs;
+  SlotMap<std::unique_ptr<Cloth>, ClothTag> cloths;
+  SlotMap<std::unique_ptr<Joint>, JointTag> joints;
+  std::vector<std::unique_ptr<Articulation>> articulations;  // the connected components of the intact joints
+
+  Body& body_at(uint32_t slot) const { return *bodies[bodies.at_slot(slot)]; }
+  /// Whether each collision is resolved at its own time, and contacts are solved to rounding.
+  bool is_exact() const { return def.solver == SolverKind::exact || def.solver == SolverKind::lcp; }
+  std::vector<const ForceDef*> active_forces() const;
+  /// Forces on each single particle of a system.
+  ParticleForces forces(const ParticleSystem& system) const;
+  /// Whether there are forces between particles.
+  bool has_pair_forces() const;
+  /// Whether the object of an attachment exists.
+  bool is_alive(const Attachment& a) const;
+  /// Whether both ends of a spring exist at this time.
+  bool acts(const Spring& spring) const;
+  Vec3 position(const Attachment& a) const;
+};
+
+}  // namespace offstage::sim
