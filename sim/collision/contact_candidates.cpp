@@ -9,15 +9,20 @@ namespace {
 /// Returns the point with the largest measure. Among equal points (within a thousandth) the one with the
 /// lowest id is chosen, so that neither rounding nor the order decides.
 template <class Measure>
-const Candidate& most(const Candidates& c, Measure&& measure) {
-  std::array<Real, Candidates::kMax> values;
+const Candidate& most(std::span<const Candidate> c, Measure&& measure) {
   Real largest = -std::numeric_limits<Real>::infinity();
-  for (uint32_t k = 0; k < c.count; ++k) largest = std::max(largest, values[k] = measure(c.points[k]));
+  for (const Candidate& x : c) largest = std::max(largest, measure(x));
   const Real enough = largest - 1e-3 * std::abs(largest);
   const Candidate* best = nullptr;
-  for (uint32_t k = 0; k < c.count; ++k)
-    if (values[k] >= enough && (!best || c.points[k].id < best->id)) best = &c.points[k];
-  return best ? *best : c.points[0];
+  for (const Candidate& x : c)
+    if (measure(x) >= enough && (!best || x.id < best->id)) best = &x;
+  return best ? *best : c.front();
+}
+
+Real least_separation(std::span<const Candidate> c) {
+  Real least = std::numeric_limits<Real>::infinity();
+  for (const Candidate& x : c) least = std::min(least, x.separation);
+  return least;
 }
 
 /// Signed distance of points to the left of the line from p to q, seen against the normal, times the length
@@ -33,17 +38,17 @@ struct LeftOf {
 
 }  // namespace
 
-void reduce(Manifold& m, const Candidates& c, Real slop, Manifold* more) {
+void reduce(Manifold& m, std::span<const Candidate> c, Real slop) {
   m.count = 0;
   const auto keep = [&m](const Candidate& p) {
-    m.points[m.count++] = {p.on_a, p.on_b, p.separation, p.id};
+    m.points[m.count++] = {p.on_a, p.on_b, p.separation, p.id, p.piece};
     return p.on_a;
   };
-  if (c.count <= m.points.size()) {
-    for (uint32_t k = 0; k < c.count; ++k) keep(c.points[k]);
+  if (c.size() <= m.points.size()) {
+    for (const Candidate& x : c) keep(x);
     return;
   }
-  const Real level = c.least_separation() + slop;
+  const Real level = least_separation(c) + slop;
   const Vec3 p = keep(most(c, [&](const Candidate& x) { return x.separation <= level ? 1.0 : 0.0; }));
   const Vec3 q = keep(most(c, [&](const Candidate& x) { return (x.on_a - p).squaredNorm(); }));
   // Among collinear points this term prefers the end away from q.
@@ -57,7 +62,11 @@ void reduce(Manifold& m, const Candidates& c, Real slop, Manifold* more) {
     return -std::min({sense * pq(x.on_a), sense * qr(x.on_a), sense * rp(x.on_a)});
   };
   if (const Candidate& last = most(c, gain); gain(last) > 0) keep(last);
-  if (!more) return;
+}
+
+void reduce(Manifold& m, const Candidates& c, Real slop, Manifold* more) {
+  reduce(m, std::span(c.points).first(c.count), slop);
+  if (!more || c.count <= m.points.size()) return;
   Candidates rest;
   for (uint32_t k = 0; k < c.count; ++k) {
     const auto is_kept = [&](const ContactPoint& x) { return x.id == c.points[k].id; };

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <span>
 
 #include "sim/collision/manifold.h"
 #include "sim/collision/supporting_feature.h"
@@ -61,6 +62,7 @@ struct Candidate {
   Vec3 on_a, on_b;
   Real separation;
   uint32_t id;
+  uint32_t piece = 0;
 };
 
 /// Contact points; no two of them have the same features.
@@ -84,7 +86,8 @@ struct Candidates {
 /// Selects at most four of the points for the manifold, whose normal is known: all of them, or the deepest,
 /// the farthest from it, the one that spans the largest triangle with both, and the one that adds most area
 /// to this triangle. Depths that differ by less than `slop` count as equal. `more`, if not null, gets up to
-/// four of the remaining points.
+/// four of the remaining points, which are distinguished by their ids.
+void reduce(Manifold& m, std::span<const Candidate> c, Real slop);
 void reduce(Manifold& m, const Candidates& c, Real slop, Manifold* more = nullptr);
 
 /// Removes the points whose separation is not greater than `least` [m].

@@ -17,6 +17,8 @@ struct ContactPoint {
   /// Identifies the two features that meet here: a vertex and the other solid, or two edges. It is constant
   /// from step to step while they meet.
   uint32_t id = 0;
+  /// Contact with a mesh by its triangles: the triangle at this point. A manifold may join several.
+  uint32_t piece = 0;
 };
 
 /// Features that define the normal. They determine how the normal turns with the bodies (contact_frame.h).
@@ -37,7 +39,9 @@ struct Manifold {
   /// a cylinder's side, 0 for a sharp edge, a vertex or a face.
   Real radius_a = 0, radius_b = 0;
   uint32_t count = 0;
-  uint32_t piece_a = 0, piece_b = 0;  ///< indices of the pieces of both shapes (CollisionShape::piece())
+  /// Indices of the pieces of both shapes (CollisionShape::piece()). Of several coplanar triangles it is the
+  /// one in the middle.
+  uint32_t piece_a = 0, piece_b = 0;
   /// Whether the surface of A (of B) is known to continue around the points in the plane perpendicular to the
   /// normal. Otherwise other pieces or bodies may be flush with it.
   bool continues_a = false, continues_b = false;

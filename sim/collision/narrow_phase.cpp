@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "sim/collision/box_box.h"
+#include "sim/collision/coplanar_manifolds.h"
 #include "sim/collision/sphere_manifold.h"
 #include "sim/collision/tree_pair.h"
 #include "sim/collision/triangle_contact.h"
@@ -125,6 +126,7 @@ class PiecePair {
       found[k].piece_b = j_;
       found[k].continues_a = continues(shape_a_, i_);
       found[k].continues_b = continues(shape_b_, j_);
+      for (ContactPoint& p : found[k].points) p.piece = mesh_b ? j_ : i_;
     }
   }
 
@@ -364,6 +366,9 @@ void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose
     with_trees(a, b, [&](const auto& tree_a, const auto& tree_b) {
       for_each_pair(tree_a, tree_b, placement(a, b, a_from_b, margin), visit, cache.tests);
     });
+    const CollisionMesh *mesh_a = a.surface(), *mesh_b = b.surface();
+    if (mesh_b && !mesh_a) join_coplanar(manifolds, before, *mesh_b, a_from_b, true);
+    if (mesh_a && !mesh_b) join_coplanar(manifolds, before, *mesh_a, Pose{}, false);
   }
   if (manifolds.size() > before) return;
   if (const auto s = containment(a, b, a_from_b)) {

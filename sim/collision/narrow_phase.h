@@ -71,7 +71,7 @@ bool touching(const CollisionShape& a, const CollisionShape& b, const Pose& a_fr
 /// Appends the manifolds of all pairs of pieces within `margin` [m] of each other, in an order that depends
 /// only on the shapes. For every method, two boxes use the separating axis test, and spheres use closed
 /// forms. If the shapes turn relative to each other (`turning`), points that may touch next are added as
-/// further manifolds (`more` of manifold()).
+/// further manifolds (`more` of manifold()). The manifolds of a piece with coplanar triangles are joined.
 void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b, Real margin,
                     PairCache& cache, DistanceMethod method, std::vector<Manifold>& manifolds,
                     bool turning = false);

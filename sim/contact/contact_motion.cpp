@@ -281,6 +281,13 @@ bool runs_along(const Body& body, Real duration) {
   return is_revolved(body.def.shape) && turn.squaredNorm() > kStraight * kStraight;
 }
 
+Real running_speed(const Body& body, const Vec3& normal) {
+  if (!body.is_awake() || !is_revolved(body.def.shape)) return 0;
+  const Vec3 axis = body.start.orientation * Vec3::UnitY(), lean = normal.cross(axis);
+  if (lean.norm() < kUpright || std::abs(normal.dot(axis)) < kUpright) return 0;
+  return std::abs(body.start_twist.angular_velocity.cross(axis).dot(lean)) / lean.squaredNorm();
+}
+
 Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3& out_from, const Quat& to,
                 const Vec3& out_to) {
   const Shape& shape = body.def.shape;

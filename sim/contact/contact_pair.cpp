@@ -93,7 +93,7 @@ void place(const Manifold& local, const Pose& from, Manifold& m) {
   m.continues_b = local.continues_b;
   for (uint32_t k = 0; k < local.count; ++k) {
     const ContactPoint& p = local.points[k];
-    m.points[k] = {pose.point_to_world(p.on_a), pose.point_to_world(p.on_b), p.separation, p.id};
+    m.points[k] = {pose.point_to_world(p.on_a), pose.point_to_world(p.on_b), p.separation, p.id, p.piece};
   }
 }
 

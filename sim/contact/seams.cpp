@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 #include "sim/collision/distance.h"
 #include "sim/collision/gjk.h"
@@ -68,6 +69,11 @@ struct View {
   Vec3 normal() const { return x_is_a ? m->normal : Vec3(-m->normal); }  ///< towards X
   const Vec3& on_y(uint32_t k) const { return x_is_a ? m->points[k].on_b : m->points[k].on_a; }
   const Vec3& on_x(uint32_t k) const { return x_is_a ? m->points[k].on_a : m->points[k].on_b; }
+  /// The piece of Y at a point.
+  uint32_t piece_at(uint32_t k) const {
+    return y().collision_shape().is_plane() || !y().collision_shape().surface() ? y_piece()
+                                                                                : m->points[k].piece;
+  }
   bool continues() const { return x_is_a ? m->continues_b : m->continues_a; }
   bool is_face() const { return m->source == (x_is_a ? NormalSource::face_of_b : NormalSource::face_of_a); }
   uint32_t deepest() const {
@@ -205,14 +211,15 @@ class BodyContacts {
 
   /// A point of a contact, moved to the surface of Y's piece; clipping can put it slightly outside.
   Vec3 on_surface(const View& v, uint32_t k) const {
-    const SurfaceDistance off = distance(v, v.on_y(k));
+    const SurfaceDistance off = distance(v, v.piece_at(k), v.on_y(k));
     return v.on_y(k) - std::max(0.0, off.distance) * off.normal;
   }
 
-  /// Distance of a place in the world from Y's piece.
-  SurfaceDistance distance(const View& v, const Vec3& place) const {
+  /// Distance of a place in the world from a piece of Y, the one of the contact by default.
+  SurfaceDistance distance(const View& v, const Vec3& place) const { return distance(v, v.y_piece(), place); }
+  SurfaceDistance distance(const View& v, uint32_t piece, const Vec3& place) const {
     const Pose y = pose(v.y(), v.speculative);
-    SurfaceDistance d = piece_distance(v.y().collision_shape(), v.y_piece(), y.point_to_body(place));
+    SurfaceDistance d = piece_distance(v.y().collision_shape(), piece, y.point_to_body(place));
     d.normal = y.vector_to_world(d.normal);
     return d;
   }
@@ -249,7 +256,8 @@ class BodyContacts {
         std::min({0.0, v.m->points[v.deepest()].separation, face.m->points[face.deepest()].separation}) -
         flush_;
     const auto add = [&](const ContactPoint& p) {
-      m.points[m.count++] = v.x_is_a ? p : ContactPoint{p.on_b, p.on_a, p.separation, p.id};
+      const auto& [on_a, on_b] = v.x_is_a ? std::tie(p.on_a, p.on_b) : std::tie(p.on_b, p.on_a);
+      m.points[m.count++] = {on_a, on_b, p.separation, p.id, v.y_piece()};
     };
     for (uint32_t k = 0; k < on_plane.count; ++k) {
       const ContactPoint& p = on_plane.points[k];

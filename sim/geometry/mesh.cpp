@@ -117,6 +117,51 @@ Real signed_volume6(const TriangleMesh& mesh) {
   return volume;
 }
 
+/// Turns faces so that two faces with a common edge run along it in opposite directions, which gives the
+/// surface two sides. In each part of the surface that is joined by such edges the faces with the smaller
+/// area are turned. A part with only one side, such as a Moebius strip, stays as it is.
+void unify_winding(TriangleMesh& mesh) {
+  struct Neighbour {
+    uint32_t face;
+    bool is_opposed;  // it is wound the other way
+  };
+  const std::size_t faces = mesh.triangles.size();
+  std::vector<std::vector<Neighbour>> neighbours(faces);
+  bool any_opposed = false;
+  HalfEdges(mesh).for_each_edge([&](uint32_t, std::span<const HalfEdge> sides) {
+    if (sides.size() != 2) return;
+    const bool is_opposed = sides[0].ascending == sides[1].ascending;
+    any_opposed |= is_opposed;
+    neighbours[sides[0].face].push_back({sides[1].face, is_opposed});
+    neighbours[sides[1].face].push_back({sides[0].face, is_opposed});
+  });
+  if (!any_opposed) return;
+  std::vector<uint8_t> is_seen(faces, 0), is_turned(faces, 0);
+  for (uint32_t first = 0; first < faces; ++first) {
+    if (is_seen[first]) continue;
+    is_seen[first] = 1;
+    std::vector<uint32_t> part = {first};
+    bool has_sides = true;
+    for (std::size_t i = 0; i < part.size(); ++i)
+      for (const Neighbour& n : neighbours[part[i]]) {
+        const uint8_t turned = is_turned[part[i]] ^ static_cast<uint8_t>(n.is_opposed);
+        if (is_seen[n.face]) {
+          has_sides &= is_turned[n.face] == turned;
+          continue;
+        }
+        is_seen[n.face] = 1;
+        is_turned[n.face] = turned;
+        part.push_back(n.face);
+      }
+    if (!has_sides) continue;
+    std::array<Real, 2> area = {0, 0};
+    for (const uint32_t face : part) area[is_turned[face]] += doubled_area(mesh, mesh.triangles[face]).norm();
+    const uint8_t smaller = area[1] > area[0] ? 0 : 1;
+    for (const uint32_t face : part)
+      if (is_turned[face] == smaller) std::swap(mesh.triangles[face][1], mesh.triangles[face][2]);
+  }
+}
+
 }  // namespace
 
 std::string MeshDefects::describe() const {
@@ -157,6 +202,7 @@ TriangleMesh weld(const TriangleMesh& mesh) {
   }
   for (Triangle& t : out.triangles)
     for (uint32_t& v : t) v = renumbered[v];
+  unify_winding(out);
   return out;
 }
 

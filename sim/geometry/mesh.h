@@ -41,7 +41,8 @@ struct MeshDefects {
 };
 
 /// Merges vertices at the same position (bitwise), removes faces that become degenerate, then unused
-/// vertices. Importers split vertices along texture seams; physics needs them joined.
+/// vertices. Importers split vertices along texture seams; physics needs them joined. Faces that are wound
+/// otherwise than most of the surface around them are turned, because a contact is on one side of a surface.
 TriangleMesh weld(const TriangleMesh& mesh);
 
 /// Connectivity and normals of a mesh. Every query is O(1).

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/contact/contact_motion.h"
 #include "sim/contact/contact_terms.h"
 #include "sim/contact/island_impacts.h"
 #include "sim/core/parallel_loop.h"
@@ -22,6 +23,8 @@ constexpr std::size_t kImpactWork = 2000, kExactImpactWork = 80'000;
 constexpr std::size_t kPointWork = 1, kPairWork = 3, kLookWork = 3;
 /// After this multiple of the limit no more pairs are traced back to in the sub-step.
 constexpr std::size_t kLastWork = 3;
+/// A contact that runs around a rim is found anew after each turn by this angle [rad], at most so many times.
+constexpr Real kRunningTurn = 0.1, kMostRunningPieces = 16;
 /// Contact points with a smaller separation take part in a collision [m].
 constexpr Real kCluster = 1e-4;
 
@@ -65,49 +68,86 @@ std::size_t ImpactStage::search(IsWanted&& is_wanted) {
   }
   std::size_t work = 0;
   for (std::size_t i = 0; i < events.size(); ++i) {
-    if (times[i]) pending_.push_back({*times[i], pairs[events[i]]});
+    if (times[i]) pending_.push_back({*times[i], pairs[events[i]], true});
     work += kLookWork * search_pieces(*pairs[events[i]], h_);
   }
   return work;
 }
 
+/// Adds the times at which contacts that run around a rim are found anew.
+void ImpactStage::divide_running() {
+  for (ContactPair* pair : contacts_.pairs()) {
+    if (pair->touching() == 0) continue;
+    Real turn = 0;
+    for (const PlacedManifold& m : pair->manifolds())
+      for (const Body* body : {&pair->a(), &pair->b()})
+        turn = std::max(turn, h_ * running_speed(*body, m.frame.n));
+    const Real pieces = std::min(std::ceil(turn / kRunningTurn), kMostRunningPieces);
+    for (Real i = 1; i < pieces; ++i) pending_.push_back({h_ * i / pieces, pair, false});
+  }
+}
+
 void ImpactStage::resolve() {
   std::size_t work = search([](const ContactPair&) { return true; });
+  divide_running();
   if (pending_.empty()) return;
   // An impact moves back only bodies that are connected to it by forces. Most others in an island are merely
   // near; they join if the impact sends a body their way.
   find_moving_islands(world_, active_.awake(), contacts_.pairs(), touch_or_push, motion_.whole(), islands_);
 
-  const std::size_t most = kMaxImpacts + kImpactsPerBody * active_.awake().size();
   const std::size_t most_work = world_.is_exact() ? kExactImpactWork : kImpactWork;
-  for (std::size_t count = 0; !pending_.empty(); ++count) {
-    const PendingImpact impact =
-        *std::min_element(pending_.begin(), pending_.end(),
-                          [](const PendingImpact& x, const PendingImpact& y) { return x.time < y.time; });
-    ContactPair& pair = *impact.pair;
-    if (++pair.impacts > (tumbles(pair, h_) ? kMaxOfTumblingPair : kMaxImpactsOfPair) || count >= most ||
-        work > kLastWork * most_work) {
-      pair.toi_exhausted = true;
-      ++report_.toi_limit_reached;
+  for (std::size_t count = 0; !pending_.empty();) {
+    const auto next = std::min_element(pending_.begin(), pending_.end(),
+                                       [](const Event& x, const Event& y) { return x.time < y.time; });
+    const Event event = *next;
+    if (event.is_impact) {
+      limit(*event.pair, count++, work);
+    } else {
+      pending_.erase(next);
+      const Body& body = event.pair->a().is_awake() ? event.pair->a() : event.pair->b();
+      if (work > most_work || islands_[body.island].from >= event.time) continue;
     }
-    const uint32_t island = pair.a().is_awake() ? pair.a().island : pair.b().island;
-    bring_to(islands_[island], impact.time);
-    if (pair.a().is_awake() && pair.b().is_awake() && pair.b().island != island) {
-      bring_to(islands_[pair.b().island], impact.time);
-      join(island, pair.b().island);
-    }
-    ++report_.tracebacks;
+    const uint32_t island = gather(*event.pair, event.time);
     work += impact_work(islands_[island]);
-    if (work > most_work) {
-      join_pending(island, impact.time);
-      suppress_restitution(island);
+    if (event.is_impact) {
+      ++report_.tracebacks;
+      if (work > most_work) {
+        join_pending(island, event.time);
+        suppress_restitution(island);
+      }
+      work += collide(island, event.time);
+    } else {
+      go_on(island, event.time);
     }
-    work += collide(island, impact.time);
     // The speculative contacts of these bodies are no longer valid.
     const auto involved = [&](const ContactPair& p) { return is_in(p.a(), island) || is_in(p.b(), island); };
-    std::erase_if(pending_, [&](const PendingImpact& i) { return involved(*i.pair); });
+    std::erase_if(pending_, [&](const Event& e) { return e.is_impact && involved(*e.pair); });
     work += search(involved);
   }
+}
+
+/// Decides whether an impact of a pair is the last one that is traced back to in the sub-step; `count`
+/// impacts came before it.
+void ImpactStage::limit(ContactPair& pair, std::size_t count, std::size_t work) {
+  const std::size_t most = kMaxImpacts + kImpactsPerBody * active_.awake().size();
+  const std::size_t most_work = world_.is_exact() ? kExactImpactWork : kImpactWork;
+  if (++pair.impacts <= (tumbles(pair, h_) ? kMaxOfTumblingPair : kMaxImpactsOfPair) && count < most &&
+      work <= kLastWork * most_work)
+    return;
+  pair.toi_exhausted = true;
+  ++report_.toi_limit_reached;
+}
+
+/// Brings the bodies of a pair, with all that is connected to them, to a time, and merges their islands.
+/// Returns the number of the island.
+uint32_t ImpactStage::gather(const ContactPair& pair, Real time) {
+  const uint32_t island = pair.a().is_awake() ? pair.a().island : pair.b().island;
+  bring_to(islands_[island], time);
+  if (pair.a().is_awake() && pair.b().is_awake() && pair.b().island != island) {
+    bring_to(islands_[pair.b().island], time);
+    join(island, pair.b().island);
+  }
+  return island;
 }
 
 /// Merges an island with all that it is about to hit at a time or later, and with those that these hit: one
@@ -115,7 +155,8 @@ void ImpactStage::resolve() {
 void ImpactStage::join_pending(uint32_t number, Real time) {
   for (bool grown = true; grown;) {
     grown = false;
-    for (const PendingImpact& impact : pending_) {
+    for (const Event& impact : pending_) {
+      if (!impact.is_impact) continue;
       const Body &a = impact.pair->a(), &b = impact.pair->b();
       if (!a.is_awake() || !b.is_awake() || (a.island == number) == (b.island == number)) continue;
       const uint32_t other = a.island == number ? b.island : a.island;

@@ -4,6 +4,9 @@
 /// changed. The work is bounded: if a pair collides too often in a sub-step, or if there are too many
 /// impacts, later ones are left to the contact solver, which also prevents tunnelling. In a pile with too
 /// many impacts the restitution of slower ones is suppressed for the rest of the sub-step.
+///
+/// Contacts that run far around a rim within the sub-step, as under a wobbling coin, divide it in the same
+/// way: their bodies stop at several times to find the contact anew.
 
 #include <vector>
 
@@ -32,13 +35,17 @@ class ImpactStage {
   void resolve();
 
  private:
-  struct PendingImpact {
+  struct Event {
     Real time;  // since the sub-step's start
     ContactPair* pair;
+    bool is_impact;  // otherwise a contact that runs around a rim is found anew
   };
 
   template <class IsWanted>
   std::size_t search(IsWanted&& is_wanted);
+  void divide_running();
+  uint32_t gather(const ContactPair& pair, Real time);
+  void limit(ContactPair& pair, std::size_t count, std::size_t work);
   void bring_to(Island& island, Real time);
   void join(uint32_t into, uint32_t island);
   void join_pending(uint32_t number, Real time);
@@ -59,7 +66,7 @@ class ImpactStage {
   std::vector<Island>& islands_;
   Real start_, h_;
   StepReport& report_;
-  std::vector<PendingImpact> pending_;
+  std::vector<Event> pending_;
 };
 
 }  // namespace offstage::sim

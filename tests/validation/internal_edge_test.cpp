@@ -79,6 +79,13 @@ void add_flat_floor(World& world, const std::string& kind, Real friction) {
   } else if (kind == "a mesh") {
     add(MeshShape{world.add_mesh(triangle_sheet(
         -3, 12, 50, [](int) { return 20; }, flat_height, 0.3))});
+  } else if (kind == "a mesh of mixed winding") {
+    TriangleMesh sheet = triangle_sheet(
+        -3, 12, 50, [](int) { return 20; }, flat_height, 0.3);
+    const Scatter random{11};
+    for (std::size_t i = 0; i < sheet.triangles.size(); ++i)
+      if (random.uniform(i, 0) < 0.4) std::swap(sheet.triangles[i][1], sheet.triangles[i][2]);
+    add(MeshShape{world.add_mesh(sheet)});
   } else if (kind == "T-vertices") {
     add(MeshShape{world.add_mesh(triangle_sheet(
         -3, 12, 40, [](int i) { return 3 + i * 7 % 5; }, flat_height))});
@@ -136,8 +143,8 @@ TEST_P(InternalEdges, DoNotStopSlidingBodies) {
       {"capsule", Capsule{0.1, 0.4}, 0.1, lying_across()},
       {"cylinder", Cylinder{0.2, 0.1}, 0.05},
       {"cone", Cone{0.2, 0.3}, 0.15}};
-  for (const char* floor :
-       {"two triangles", "a mesh", "T-vertices", "tiles", "tiles of mesh", "convex parts"})
+  for (const char* floor : {"two triangles", "a mesh", "a mesh of mixed winding", "T-vertices", "tiles",
+                            "tiles of mesh", "convex parts"})
     for (const Mover& mover : movers)
       for (const Real step : {1.0 / 240, 1.0 / 60}) {
         for (const Real speed : {5.0, 15.0}) {

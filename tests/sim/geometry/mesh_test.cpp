@@ -92,6 +92,34 @@ TEST(Weld, JoinsSplitVerticesIntoAClosedMesh) {
   EXPECT_TRUE(MeshTopology(joined).defects().closed());
 }
 
+TEST(Weld, TurnsFacesThatAreWoundOtherwiseThanMost) {
+  TriangleMesh mesh = box_mesh(Vec3::Ones());
+  for (const std::size_t f : {0u, 3u, 4u, 10u}) std::swap(mesh.triangles[f][1], mesh.triangles[f][2]);
+  EXPECT_FALSE(MeshTopology(mesh).defects().closed());
+  const MeshDefects defects = MeshTopology(weld(mesh)).defects();
+  EXPECT_TRUE(defects.closed());
+  EXPECT_FALSE(defects.inverted);
+}
+
+TEST(Weld, LeavesASurfaceWithOneSideAlone) {
+  // A Moebius strip of six quads.
+  TriangleMesh strip;
+  for (int i = 0; i < 6; ++i)
+    for (const Real r : {0.8, 1.2}) {
+      const Real angle = i * std::numbers::pi / 3, tilt = (r - 1) * std::cos(angle / 2);
+      const Real out = 1 + tilt;
+      strip.vertices.emplace_back(out * std::cos(angle), (r - 1) * std::sin(angle / 2),
+                                  out * std::sin(angle));
+    }
+  for (uint32_t i = 0; i < 6; ++i) {
+    const uint32_t a = 2 * i, b = a + 1, c = i < 5 ? a + 2 : 1, d = i < 5 ? a + 3 : 0;
+    strip.triangles.push_back({a, b, c});
+    strip.triangles.push_back({b, d, c});
+  }
+  ASSERT_EQ(MeshTopology(strip).defects().flipped_edges, 1u);
+  EXPECT_EQ(weld(strip).triangles, strip.triangles);
+}
+
 TEST(Weld, NegativeZeroIsZero) {
   const TriangleMesh mesh = {{Vec3(0.0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(-0.0, 0, 0), Vec3(0, 0, 1)},
                              {{0, 1, 2}, {3, 2, 4}}};
