@@ -129,10 +129,28 @@ bool JointSystem::factorize(Matrix<N>& m) {
   needs_refinement_ = true;
   Real share = kRegularization;
   for (int attempt = 0; attempt < kAttempts; ++attempt, share *= kMore) {
-    for (std::size_t j = 0; j < joints_.size(); ++j) m.diagonal[j].diagonal() *= 1 + share;
+    for (std::size_t j = 0; j < joints_.size(); ++j) {
+      m.diagonal[j].diagonal() *= 1 + share;
+      // Between hubs the block is empty; its share is that of the block without rows for hubs.
+      if (kinds_[j].is_empty) m.diagonal[j].diagonal() += share * own_diagonal<N>(j);
+    }
     if (m.factor.factorize(m.diagonal, m.off)) return true;
   }
   return false;
+}
+
+/// The diagonal of a joint's block of the matrix for impulses: its rows times their responses.
+template <int N>
+Eigen::Matrix<Real, N, 1> JointSystem::own_diagonal(std::size_t joint) const {
+  Eigen::Matrix<Real, N, 1> sum = Eigen::Matrix<Real, N, 1>::Zero();
+  const auto add = [&](uint32_t link, const Mat6& on, const Mat6& response) {
+    if (link == kDriven) return;
+    sum +=
+        on.template leftCols<N>().cwiseProduct(response.template leftCols<N>()).colwise().sum().transpose();
+  };
+  add(joints_[joint].a, rows_[joint].on_a, response_a_[joint]);
+  add(joints_[joint].b, rows_[joint].on_b, response_b_[joint]);
+  return sum;
 }
 
 template <int N>

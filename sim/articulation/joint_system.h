@@ -64,6 +64,8 @@ class JointSystem {
   template <int N>
   bool factorize(Matrix<N>& m);
   template <int N>
+  Eigen::Matrix<Real, N, 1> own_diagonal(std::size_t joint) const;
+  template <int N>
   void solve(Matrix<N>& m, std::span<Vec6> x);
   void solve(std::span<Vec6> x);
   void refine(std::span<const Vec6> change, std::span<Vec6> impulses);

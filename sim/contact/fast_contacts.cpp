@@ -11,6 +11,9 @@
 namespace offstage::sim {
 namespace {
 
+/// Separation of points that do not take part [m].
+constexpr Real kOutOfReach = 1e3;
+
 RelaxedBody relaxed(const Body& body, const ContactInterval& interval) {
   RelaxedBody b;
   const Real duration = interval.duration;
@@ -87,6 +90,13 @@ void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifol
   patch.force_k = last.y();
   patch.torque_n = last.z();
   patch.mean_friction = mean;
+  if (!pair.needs_toi) return;
+  // The next impact of the pair is traced back to, so only the points that touch now push.
+  for (uint32_t k = 0; k < patch.count; ++k) {
+    if (m.manifold.points[k].separation <= kTouching) continue;
+    patch.points[k].separation = kOutOfReach;
+    patch.points[k].force = patch.points[k].mean_force = 0;
+  }
 }
 
 /// Distributes the friction of the patch over the points by their normal forces.

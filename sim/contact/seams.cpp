@@ -182,10 +182,11 @@ class BodyContacts {
       if (const Real height = up.dot(v.on_y(k) - on_face); height < low || height > flush_ + clipped)
         return std::nullopt;
     Vec3 top = on_surface(v, 0);
+    uint32_t top_piece = v.piece_at(0);
     for (uint32_t k = 0; k < v.m->count; ++k) {
       const Vec3 place = on_surface(v, k);
       if (const Real height = up.dot(place - on_face); height < low || height > flush_) return std::nullopt;
-      if (up.dot(place - top) > 0) top = place;
+      if (up.dot(place - top) > 0) top = place, top_piece = v.piece_at(k);
     }
     const Vec3 over = kLookOver * flush_ * up;
     const Vec3 across = (n - n.dot(up) * up).normalized(), over_face = middle(face) + over;
@@ -194,7 +195,7 @@ class BodyContacts {
         !(is_flat(face, over_face, up, across) && is_flat(face, over_face, up, up.cross(across))))
       return std::nullopt;
     const Vec3 over_top = top + std::max(0.0, up.dot(on_face - top)) * up + over;
-    const Vec3 own = distance(v, over_top).normal;
+    const Vec3 own = distance(v, top_piece, over_top).normal;
     if (own.dot(n) > kSameWay) return std::nullopt;
     if (own.dot(up) > kGoesOn) return is_flat(v, over_top, up, across) ? std::optional(up) : std::nullopt;
     const bool is_slope = own.dot(up) > 0 && own.dot(n) > 0 && own.dot(n) < kOwnNormal;

@@ -50,9 +50,10 @@ struct Body {
   RigidBody rigid;   // dynamic bodies only: state at the current time
 
   Pose before_substep, before_step;
-  Aabb swept;             // box around its motion in the sub-step, as given to the broad phase
-  Real quiet_time = 0;    // how long it has been almost at rest [s]
-  bool on_cloth = false;  // touched by cloth in the last sub-step
+  Aabb swept;              // box around its motion in the sub-step, as given to the broad phase
+  Real quiet_time = 0;     // how long it has been almost at rest [s]
+  bool on_cloth = false;   // touched by cloth in the last sub-step
+  bool on_spring = false;  // a spring ends on it in this sub-step
   Wrench rest_push;  // asleep: wrench of the variable forces when it fell asleep, about its centre of mass
   std::vector<SpringHandle> moving_springs;  // asleep: springs whose other end can move independently
   std::optional<Wrench> rest_pins;           // asleep: wrench by pinned cloth when it fell asleep

@@ -3,15 +3,83 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/dynamics/rigid_jacobian.h"
+
 namespace offstage::sim {
 namespace {
+
+/// Below this rotation the Jacobians are linear [rad].
+constexpr Real kSmallAngle = 1e-4;
 
 Interpolation kind(const KeyframeTrack& track, std::size_t i) {
   return track.keys[i].interpolation.value_or(track.interpolation);
 }
 
-Motion on_segment(const KeyframeTrack& track, std::size_t i, Real t) {
+/// Mean angular velocity between the keys i and i + 1, along the shortest arc [rad/s]. Its axis is that of
+/// the rotation, so it is the same in the axes of both keys. A jump has no rate.
+Vec3 turn_rate(const KeyframeTrack& track, std::size_t i) {
   const Keyframe &a = track.keys[i], &b = track.keys[i + 1];
+  if (kind(track, i) == Interpolation::step) return Vec3::Zero();
+  Quat turn = a.pose.orientation.conjugate() * b.pose.orientation;
+  if (turn.w() < 0) turn.coeffs() = -turn.coeffs();
+  const Eigen::AngleAxisd rotation(turn);
+  return rotation.angle() / (b.time - a.time) * rotation.axis();
+}
+
+/// The matrix J of w = J r' for the orientation exp(r), where w is the angular velocity in the axes of the
+/// body, and its inverse.
+Mat3 turn_jacobian(const Vec3& r) {
+  const Real angle = r.norm();
+  if (angle < kSmallAngle) return Mat3::Identity() - cross_matrix(r) / 2;
+  const Mat3 x = cross_matrix(r);
+  return Mat3::Identity() - (1 - std::cos(angle)) / (angle * angle) * x +
+         (angle - std::sin(angle)) / (angle * angle * angle) * x * x;
+}
+Mat3 inverse_turn_jacobian(const Vec3& r) {
+  const Real angle = r.norm();
+  if (angle < kSmallAngle) return Mat3::Identity() + cross_matrix(r) / 2;
+  const Mat3 x = cross_matrix(r);
+  return Mat3::Identity() + x / 2 +
+         (1 / (angle * angle) - std::cos(angle / 2) / (2 * angle * std::sin(angle / 2))) * x * x;
+}
+
+struct TurnSample {
+  Quat orientation;
+  Vec3 angular_velocity;  // world [rad/s]
+};
+
+/// Orientation in segment i: a curve of rotation vectors from its first key, of the same kind as that of
+/// positions. The angular velocities at the keys follow from the mean ones of the segments beside them, so
+/// they do not jump.
+TurnSample turn_on_segment(const KeyframeTrack& track, std::size_t i, Real t) {
+  const Keyframe &a = track.keys[i], &b = track.keys[i + 1];
+  const Real span = b.time - a.time, s = (t - a.time) / span;
+  const Vec3 mean = turn_rate(track, i);
+  Vec3 r = s * span * mean, rate = mean;
+  if (kind(track, i) != Interpolation::linear) {
+    const bool limited = kind(track, i) == Interpolation::monotone;
+    const std::size_t segments = track.keys.size() - 1;
+    const auto tangent = [&](std::size_t before, std::size_t after) -> Vec3 {
+      const auto duration = [&](std::size_t k) { return track.keys[k + 1].time - track.keys[k].time; };
+      return key_tangent<3>(turn_rate(track, before), duration(before), turn_rate(track, after),
+                            duration(after), limited);
+    };
+    const Vec3 whole = span * mean;
+    const Vec3 m0 = i > 0 || track.loop ? tangent((i + segments - 1) % segments, i) : mean;
+    const Vec3 end = i + 1 < segments || track.loop ? tangent(i, (i + 1) % segments) : mean;
+    const Vec3 m1 = inverse_turn_jacobian(whole) * end;
+    const Real s2 = s * s, s3 = s2 * s;
+    r = (3 * s2 - 2 * s3) * whole + (s3 - 2 * s2 + s) * span * m0 + (s3 - s2) * span * m1;
+    rate = (6 * s - 6 * s2) * mean + (3 * s2 - 4 * s + 1) * m0 + (3 * s2 - 2 * s) * m1;
+  }
+  const Real angle = r.norm();
+  const Quat turned = angle > 0 ? Quat(Eigen::AngleAxisd(angle, r / angle)) : Quat::Identity();
+  const Quat orientation = (a.pose.orientation * turned).normalized();
+  return {orientation, orientation * (turn_jacobian(r) * rate)};
+}
+
+Motion on_segment(const KeyframeTrack& track, std::size_t i, Real t) {
+  const Keyframe& a = track.keys[i];
   const auto key = [&](std::size_t k) -> CurveKey<3> {
     return {track.keys[k].time, track.keys[k].pose.position, kind(track, k)};
   };
@@ -23,13 +91,9 @@ Motion on_segment(const KeyframeTrack& track, std::size_t i, Real t) {
     out.pose.orientation = a.pose.orientation;
     return out;
   }
-  // Slerp turns at a constant rate about one axis, along the shortest arc.
-  const Real span = b.time - a.time, s = (t - a.time) / span;
-  Quat turn = b.pose.orientation * a.pose.orientation.conjugate();
-  if (turn.w() < 0) turn.coeffs() = -turn.coeffs();
-  const Eigen::AngleAxisd rotation(turn);
-  out.pose.orientation = a.pose.orientation.slerp(s, b.pose.orientation).normalized();
-  out.angular_velocity = rotation.angle() / span * rotation.axis();
+  const TurnSample turn = turn_on_segment(track, i, t);
+  out.pose.orientation = turn.orientation;
+  out.angular_velocity = turn.angular_velocity;
   return out;
 }
 

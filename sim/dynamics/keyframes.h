@@ -1,6 +1,6 @@
 #pragma once
-/// Keyframed motion of kinematic bodies (physics E8, N6): positions by one of the interpolations,
-/// orientations by slerp, with the matching velocities.
+/// Keyframed motion of kinematic bodies (physics E8, N6): positions and orientations by one of the
+/// interpolations, with the matching velocities.
 
 #include <optional>
 #include <vector>
@@ -26,7 +26,8 @@ struct Motion {
 /// Key poses over time, plus an optional constant spin (for wheels and gears, which would need many keys).
 struct KeyframeTrack {
   std::vector<Keyframe> keys;  ///< strictly increasing times; empty: the body stays at its initial pose
-  /// Interpolation of positions; orientations turn at a constant rate between two keys, or jump with `step`.
+  /// Orientations turn along the shortest arc between two keys if the keys beside them turn about the same
+  /// axis.
   Interpolation interpolation = Interpolation::monotone;
   /// Repeat with the period keys.back().time - keys.front().time; otherwise the end poses are held.
   bool loop = false;

@@ -33,6 +33,8 @@ constexpr Real kReuse = 1e-4, kReuseShare = 2e-4, kExactReuse = 1e-8;
 /// for less than 7.7 m/s this is within kMargin in a step of 1/240 s.
 constexpr Real kPassedShare = 0.5;
 constexpr uint32_t kPassedOn = 3;
+/// Up to so many awake bodies the automatic choice of the solver can afford to resolve each collision.
+constexpr std::size_t kFew = 6;
 /// Bodies turn if their rotation moves their surfaces by more than this in an interval [m].
 constexpr Real kTurning = 2e-4;
 /// Bodies with more relative motion than this in an interval may touch with other features [m].
@@ -166,7 +168,7 @@ void ContactFinder::collect(bool again) {
 /// to body with decreasing shares.
 void ContactFinder::propagate_impact_speeds(Real h) {
   for (Body* body : active_.awake()) body->impact_speed_bound = 0;
-  if (world_.is_exact()) return;  // the exact solver resolves each impact at its own time
+  if (is_exact_) return;  // the exact solver resolves each impact at its own time
   struct Approach {
     Body *a, *b;
     Real speed;
@@ -194,6 +196,7 @@ void ContactFinder::propagate_impact_speeds(Real h) {
 
 void ContactFinder::find(Real h) {
   const std::span<Body* const> awake = active_.awake();
+  is_exact_ = world_.is_exact() || (world_.def.solver == SolverKind::automatic && awake.size() <= kFew);
   std::vector<Aabb> ways(awake.size());
   const std::vector<std::size_t> leaving = indices_where(awake.size(), [&](std::size_t i) {
     ways[i] = swept_bounds(*awake[i]);
@@ -231,7 +234,7 @@ Real ContactFinder::motion_bound(const ContactPair& pair, Real left) const {
 }
 Real ContactFinder::motion_known(const ContactPair& pair) const {
   const Real size = smaller_extent(pair.a(), pair.b());
-  const bool bounces = world_.is_exact() || pair.surface().restitution > 0;
+  const bool bounces = is_exact_ || pair.surface().restitution > 0;
   return std::max(std::min(kMargin, kMarginShare * size), (bounces ? kFar : kFarWithoutBounce) * size);
 }
 
@@ -240,7 +243,7 @@ void ContactFinder::find_points(ContactPair& pair, Real time, Real h) const {
   const Real size = smaller_extent(pair.a(), pair.b());
   const Real base = std::min(kMargin, kMarginShare * size);
   const Real motion = motion_bound(pair, left), far = motion_known(pair);
-  const bool exact = world_.is_exact();
+  const bool exact = is_exact_;
   // An impact moves a body at most as fast as the body that hits it.
   const Real impact = std::max(pair.a().impact_speed_bound, pair.b().impact_speed_bound) * left;
   // If no impact of the pair is traced back to any more, only its points keep the bodies apart.
@@ -262,7 +265,7 @@ void ContactFinder::find_points(ContactPair& pair, Real time, Real h) const {
 /// points.
 void ContactFinder::choose_event(ContactPair& pair, bool far, Real left) const {
   pair.needs_toi = far && !pair.toi_exhausted;
-  const bool bounces = world_.is_exact() || pair.surface().restitution > 0;
+  const bool bounces = is_exact_ || pair.surface().restitution > 0;
   if (far || pair.toi_exhausted || !bounces || pair.restitution_suppressed) return;
   for (const PlacedManifold& m : pair.manifolds())
     for (uint32_t k = 0; k < m.manifold.count; ++k) {

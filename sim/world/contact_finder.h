@@ -54,6 +54,10 @@ class ContactFinder {
   /// Removes the contacts at seams of pairs that were found at the same time.
   void remove_seams(std::span<ContactPair* const> pairs, Real time, Real h) const;
 
+  /// Whether each collision of this sub-step is resolved at its own time: always by the exact solvers, and by
+  /// the automatic choice while few bodies move.
+  bool is_exact() const { return is_exact_; }
+
   /// Adds the statistics of the sub-step.
   void count(StepReport& report) const;
 
@@ -72,7 +76,7 @@ class ContactFinder {
   GroupedBroadPhase broad_phase_;  // of the colliding bodies, by slot; articulations are groups
   ContactGraph graph_;
   std::vector<ContactPair*> pairs_;
-  bool is_current_ = false;
+  bool is_current_ = false, is_exact_ = true;
   uint64_t version_ = 0;  // of the active bodies that the pairs are for
 };
 

@@ -8,6 +8,7 @@
 
 #include "sim/articulation/joint_energy.h"
 #include "sim/contact/energy_guard.h"
+#include "sim/contact/sprung_paths.h"
 #include "sim/world/joint_groups.h"
 
 namespace offstage::sim {
@@ -60,6 +61,7 @@ void ContactSolver::solve(Island& island, const ContactInterval& interval, StepR
 
 void ContactSolver::solve(std::span<Island* const> group, const ContactInterval& interval,
                           StepReport& report) {
+  SprungPaths sprung(group, interval.duration);
   std::vector<const Island*> fast;
   std::vector<std::pair<Island*, SolverChoice*>> exact;
   for (Island* island : group) {
@@ -104,6 +106,7 @@ void ContactSolver::solve(std::span<Island* const> group, const ContactInterval&
     fast.push_back(island);
   }
   if (!fast.empty()) report.fast.add(fast_.solve(fast, interval));
+  sprung.keep_on_contacts();
   for (std::size_t i = 0; i < group.size(); ++i)
     if (!group[i]->articulations.empty()) count(settle_joints(*group[i], interval.end, most[i]), report);
 }

@@ -6,6 +6,12 @@
 namespace offstage::sim {
 
 void FreeMotion::move_all(std::span<Body* const> awake, Real start, Real h) {
+  for (Body* body : awake) body->on_spring = false;
+  world_.springs.for_each([&](SpringHandle, const Spring& spring) {
+    for (const Attachment* end : {&spring.def.a, &spring.def.b})
+      if (const auto* point = std::get_if<BodyPoint>(end); point && world_.acts(spring))
+        world_.bodies[point->body]->on_spring = true;
+  });
   systems_.push_back(std::make_unique<CoupledSystem>(world_, world_.active_forces()));
   CoupledSystem& system = *systems_.back();
   system.save();

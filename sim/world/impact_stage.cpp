@@ -243,7 +243,7 @@ std::size_t ImpactStage::collide(uint32_t number, Real time) {
   Island& island = islands_[number];
   contacts_.remove_seams(island.pairs, time, h_);
   const CollisionSettings settings{start_ + time, kCluster, world_.def.collision_speed, world_.def.impact,
-                                   world_.is_exact()};
+                                   contacts_.is_exact()};
   const CollisionOutcome outcome = resolve_collisions(island, settings);
   report_.collisions += outcome.bounces;
   report_.impacts.add(outcome.work);

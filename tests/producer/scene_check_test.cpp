@@ -387,6 +387,10 @@ TEST(SceneCheck, UnstableDragIsRefused) {
   EXPECT_NE(errors_of(drops).find("/emitters/0/linear_drag"), std::string::npos);
   const std::string body = R"({"bodies": [{"mass": 1, "linear_drag": 1000}]})";
   EXPECT_NE(errors_of(body).find("/bodies/0/linear_drag"), std::string::npos);
+  // A thin rod turns easily about its axis.
+  const std::string rod =
+      R"({"bodies": [{"mass": 2, "shape": {"type": "capsule", "radius": 0.05, "height": 0.6}, "angular_drag": 3}]})";
+  EXPECT_NE(errors_of(rod).find("/bodies/0/angular_drag"), std::string::npos);
 }
 
 TEST(SceneCheck, NothingStartsOutsideTheWorld) {

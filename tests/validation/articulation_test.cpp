@@ -687,5 +687,47 @@ TEST(RemovedBodies, TakeTheirJointsWithThem) {
   EXPECT_NEAR(world.body(chain.links[2]).velocity.y(), -kG * 25 / 240, 0.05);
 }
 
+// A door on several hinges of one axis has redundant rows, from four hinges on at a body with rows of its
+// own.
+TEST(RedundantJoints, HoldADoorAsOneHingeDoes) {
+  for (const int hinges : {1, 3, 4, 8}) {
+    World world({.sleep = false});
+    const BodyHandle door = world.add_body({.shape = Box{{1, 2, 0.05}},
+                                            .pose = {Vec3(0.5, 1, 0), Quat::Identity()},
+                                            .velocity = {0, 0, -0.5},
+                                            .angular_velocity = {0, 1, 0},
+                                            .mass = 20});
+    for (int i = 0; i < hinges; ++i)
+      world.add_joint({.type = JointType::revolute,
+                       .a = door,
+                       .anchor = {0, 0.2 + 1.6 * i / hinges, 0},
+                       .axis = Vec3::UnitY()});
+    uint64_t unsolved = 0;
+    for (int i = 0; i < 60; ++i) unsolved += world.step(1.0 / 60).joints_unsolved;
+    EXPECT_EQ(unsolved, 0u) << hinges;
+    EXPECT_NEAR(world.body(door).pose.position.y(), 1, 1e-6) << hinges;
+    EXPECT_NEAR(world.body(door).angular_velocity.y(), 1, 1e-6) << hinges;
+  }
+}
+
+TEST(RedundantJoints, WeldTwoBoxesByManyJoints) {
+  World world({.gravity = Vec3::Zero(), .sleep = false});
+  const BodyHandle a = world.add_body({.shape = Box{{1, 1, 1}}, .angular_velocity = {0, 0.3, 1}, .mass = 2});
+  const BodyHandle b = world.add_body({.shape = Box{{1, 1, 1}},
+                                       .pose = {Vec3(1.2, 0, 0), Quat::Identity()},
+                                       .velocity = Vec3(0, 0.3, 1).cross(Vec3(1.2, 0, 0)),
+                                       .angular_velocity = {0, 0.3, 1},
+                                       .mass = 2});
+  for (int i = 0; i < 5; ++i)
+    world.add_joint({.type = JointType::fixed, .a = a, .b = b, .anchor = {0.6, 0.1 * i, 0}});
+  const Real before = world.energy().kinetic;
+  uint64_t unsolved = 0;
+  for (int i = 0; i < 60; ++i) unsolved += world.step(1.0 / 60).joints_unsolved;
+  EXPECT_EQ(unsolved, 0u);
+  EXPECT_NEAR(world.energy().kinetic / before, 1, 1e-4);
+  const Pose pa = world.body(a).pose, pb = world.body(b).pose;
+  EXPECT_NEAR((pa.point_to_body(pb.position) - Vec3(1.2, 0, 0)).norm(), 0, 1e-5);
+}
+
 }  // namespace
 }  // namespace offstage::sim

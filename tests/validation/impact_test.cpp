@@ -2,6 +2,7 @@
 /// impacts, all with the full simulation.
 
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "tests/convex_samples.h"
@@ -295,6 +296,63 @@ TEST(FastSolver, BoxesThatRotateIntoContactDoNotOverlap) {
     for (int step = 0; step < 120; ++step) deepest = std::max(deepest, world.step(1.0 / 240).penetration);
   }
   EXPECT_LT(deepest, 1e-3);
+}
+
+class Clatter : public BothSolvers {};
+
+// A nearly flat body touches the floor with one side after the other, several times in a sub-step.
+TEST_P(Clatter, OfAnElasticBodyKeepsItsEnergy) {
+  const struct {
+    const char* name;
+    Shape shape;
+    Real tilt;  // [deg]
+  } cases[] = {{"plate", Box{{0.6, 0.1, 0.4}}, 1},
+               {"plate", Box{{0.6, 0.1, 0.4}}, 3},
+               {"plate", Box{{0.6, 0.1, 0.4}}, 7},
+               {"cube", Box{{0.3, 0.3, 0.3}}, 1},
+               {"cube", Box{{0.3, 0.3, 0.3}}, 3}};
+  for (const Real step : {1.0 / 240, 1.0 / 60})
+    for (const auto& c : cases) {
+      World world(weightless(step));
+      world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 1, .friction = 0});
+      const BodyHandle body = world.add_body(
+          {.shape = c.shape,
+           .pose = {Vec3(0, 0.8, 0), Quat(Eigen::AngleAxisd(c.tilt * std::numbers::pi / 180, Vec3::UnitZ()))},
+           .velocity = {0, -5, 0},
+           .mass = 1,
+           .restitution = 1,
+           .friction = 0});
+      const Real before = world.energy().kinetic;
+      run(world, 0.4, step);
+      EXPECT_NEAR(world.energy().kinetic / before, 1, 1e-3)
+          << c.name << ' ' << c.tilt << " degrees, " << step;
+      EXPECT_GT(world.body(body).velocity.y(), 0);
+    }
+}
+
+OFFSTAGE_ALL_SOLVERS(Solvers, Clatter);
+
+// The free end of a rod is not stopped by the floor, so the impulse at the other end is that of its own
+// impact.
+TEST(AutomaticSolver, ResolvesAnInelasticImpactOfARodAtItsTime) {
+  for (const Real step : {1.0 / 240, 1.0 / 60}) {
+    World world({.gravity = Vec3::Zero(), .max_step = step, .sleep = false});
+    world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .friction = 0});
+    const Real tilt = std::numbers::pi / 4;
+    const Capsule rod{0.02, 1};
+    const BodyHandle body =
+        world.add_body({.shape = rod,
+                        .pose = {Vec3(0, 1, 0), Quat(Eigen::AngleAxisd(tilt, Vec3::UnitZ()))},
+                        .velocity = {0, -5, 0},
+                        .mass = 1,
+                        .restitution = 0,
+                        .friction = 0});
+    const MassProperties unit = mass_properties(Shape{rod});
+    const Real arm = rod.height / 2 * std::sin(tilt),
+               mobility = 1 + arm * arm * unit.volume / unit.inertia(2, 2);
+    run(world, 0.2, step);
+    EXPECT_NEAR(world.body(body).velocity.y(), -5 + 5 / mobility, 1e-3);
+  }
 }
 
 }  // namespace

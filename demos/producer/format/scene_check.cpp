@@ -36,6 +36,13 @@ std::optional<Real> mass_of(const Body& body) {
   return mass ? std::optional(mass->mass) : std::nullopt;
 }
 
+/// The smallest principal moment of inertia of a body; nothing for a mesh, which is not read here.
+std::optional<Real> least_moment_of(const Body& body) {
+  const auto by_shape = mass_by_shape(body);
+  if (!by_shape) return {};
+  return Eigen::SelfAdjointEigenSolver<sim::Mat3>(by_shape->inertia).eigenvalues().minCoeff();
+}
+
 class Checker : SceneChecker {
  public:
   Checker(const Scene& scene, const Scene& flat, const SceneFolder& folder, Findings& findings)
@@ -244,6 +251,8 @@ class Checker : SceneChecker {
     check_place(body.position, path + "/position");
     if (const auto mass = mass_of(body); dynamic && mass && *mass > 0)
       check_drag(scene_.world.integrator, body.linear_drag, *mass, path + "/linear_drag");
+    if (const auto moment = dynamic ? least_moment_of(body) : std::nullopt; moment && *moment > 0)
+      check_drag(scene_.world.integrator, body.angular_drag, *moment, path + "/angular_drag");
     if (!dynamic && !body.velocity.isZero(0))
       warn(path + "/velocity", "has no effect: the body is not dynamic");
     if (!dynamic && !body.angular_velocity.isZero(0))

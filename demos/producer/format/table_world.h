@@ -109,7 +109,8 @@ struct Table<WorldSettings> {
          "m", between(1e-14, 1)},
         {"solver", &T::solver,
          "contact solver: `exact` computes contact forces to rounding and each collision at its own time; "
-         "`fast` does a bounded amount of work; `auto` uses `exact` where it is not slower; `lcp` is as "
+         "`fast` does a bounded amount of work; `auto` uses `exact` where it is not slower, and resolves "
+         "each collision at its own time while at most six bodies are awake; `lcp` is as "
          "`exact`, with forces by Dantzig's and Baraff's pivoting for groups of at most 64 contacts, whose "
          "friction has separate limits along two tangents, and hands other groups to `exact`"},
         {"impact", &T::impact,

@@ -53,6 +53,40 @@ TEST(Keyframes, VelocityIsContinuousAtKeysAndAcrossTheLoop) {
   }
 }
 
+TEST(Keyframes, TurnsAboutOneAxisFollowTheCurveOfPositions) {
+  for (auto kind : {Interpolation::monotone, Interpolation::smooth, Interpolation::linear}) {
+    KeyframeTrack t{.keys = {}, .interpolation = kind};
+    const Vec3 axis = Vec3(1, 2, -2) / 3;
+    for (const auto& [time, angle] : {std::pair(0.0, 0.0), {1.0, 0.5}, {2.5, 0.5}, {3.0, -1.0}, {4.0, 1.5}})
+      t.keys.push_back({time, {Vec3(angle, 0, 0), Quat(Eigen::AngleAxisd(angle, axis))}});
+    for (Real time = 0.05; time < 4; time += 0.1) {
+      const Motion m = t.at(time, {});
+      EXPECT_NEAR(m.pose.orientation.angularDistance(Quat(Eigen::AngleAxisd(m.pose.position.x(), axis))), 0,
+                  1e-7);
+      EXPECT_NEAR((m.angular_velocity - m.velocity.x() * axis).norm(), 0, 1e-12);
+    }
+  }
+}
+
+TEST(Keyframes, AngularVelocityIsContinuousAtKeysOfDifferentAxes) {
+  for (auto kind : {Interpolation::monotone, Interpolation::smooth}) {
+    KeyframeTrack t{.keys = {}, .interpolation = kind, .loop = true};
+    const Vec3 turns[] = {{0, 0, 0}, {1, 0.3, 0}, {0.5, 1.8, -1}, {-1, 2.5, 0.2}, {0, 0, 0}};
+    for (int k = 0; k < 5; ++k)
+      t.keys.push_back(
+          {0.5 * k, {Vec3::Zero(), Quat(Eigen::AngleAxisd(turns[k].norm(), turns[k].stableNormalized()))}});
+    for (Real key : {0.5, 1.0, 1.5, 2.0})
+      EXPECT_NEAR((t.at(key - 1e-9, {}).angular_velocity - t.at(key + 1e-9, {}).angular_velocity).norm(), 0,
+                  1e-6);
+    constexpr Real kD = 1e-5;
+    for (Real time : {0.1, 0.7, 1.3, 1.9}) {
+      const Quat before = t.at(time - kD, {}).pose.orientation, after = t.at(time + kD, {}).pose.orientation;
+      const Eigen::AngleAxisd turn(after * before.conjugate());
+      EXPECT_NEAR((t.at(time, {}).angular_velocity - turn.angle() / (2 * kD) * turn.axis()).norm(), 0, 1e-7);
+    }
+  }
+}
+
 TEST(Keyframes, SmoothMotionReproducesAParabolaOverUnevenKeys) {
   KeyframeTrack t;
   const auto position = [](Real x) { return Vec3(x * x, 3 * x, 1 - 2 * x * x); };

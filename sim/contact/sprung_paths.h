@@ -1,0 +1,47 @@
+#pragma once
+/// Paths of bodies on springs that contacts hold (physics R7). The free motion integrates the force of a
+/// spring along the path of a body without contacts. Where a contact holds the body, the force does not
+/// change in this way, but the position would still have the deviation of the free path from its mean
+/// velocity: a body that a stiff spring presses on the ground would sink.
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "sim/contact/contact_graph.h"
+
+namespace offstage::sim {
+
+class SprungPaths {
+ public:
+  /// Stores the deviations of the free paths. The bodies of the islands have moved freely through an interval
+  /// of this duration [s].
+  SprungPaths(std::span<Island* const> islands, Real duration);
+
+  /// Removes the deviations along the normals of the contacts that pushed in the interval, and along the
+  /// tangents where friction held the bodies.
+  void keep_on_contacts();
+
+ private:
+  struct Path {
+    Body* body;
+    Vec3 shift, turn;  // deviation from the mean velocity times the duration [m], [rad]
+    Vec3 shift_before, turn_before;
+    Mat3 inverse_inertia;  // world axes
+  };
+  struct Held {
+    struct End {
+      Path* path = nullptr;
+      Vec3 direction, turning;  // of the first body: the direction; arm x direction
+    };
+    std::array<End, 2> ends;
+    Real mobility = 0;
+  };
+  Path* path_of(const Body& body);
+  static Held hold(const std::array<Path*, 2>& paths, const Vec3& place, const Vec3& direction);
+
+  std::span<Island* const> islands_;
+  std::vector<Path> paths_;  // by rank of the bodies
+};
+
+}  // namespace offstage::sim
