@@ -25,6 +25,9 @@ constexpr GLuint kVertexBinding = 0, kInstanceBinding = 1, kDetailBinding = 2;
 constexpr GLuint kSecondUv = 6, kColor = 7, kTangent = 8, kBefore = 9;  // attributes
 constexpr GLuint kMaterialBlock = 1;
 constexpr std::array<GLuint, kTextureMaps> kTextureUnits = {1, 2, 3, 14, 15, 16, 17};
+// From so many pixels of the picture per triangle on, it costs less to pass the fields of a frame with each
+// triangle than to read them in each fragment.
+constexpr int64_t kFlatFrom_px = 8;
 constexpr float kSmooth = 0.3f;  // with less roughness, a surface shows a mirror image of the scene
 // The first three rows of a transform.
 using Rows = std::array<Vector4f, 3>;
@@ -192,7 +195,7 @@ bool Instance::is_ball() const {
   return mesh->round && sides.minCoeff() > 0.999f * sides.maxCoeff();
 }
 
-MeshPass::MeshPass() : white_(make_white_texture()) {
+MeshPass::MeshPass(int pixels) : pixels_(pixels), white_(make_white_texture()) {
   // Values for meshes without these attributes.
   glVertexAttrib4f(kColor, 1, 1, 1, 1);
   glVertexAttrib4f(kTangent, 0, 0, 0, 1);
@@ -258,12 +261,13 @@ gl::LazyProgram& MeshPass::surface_program(const Batch& batch, Shading shading) 
   // The relief of a pattern is visible only in mirror images; without them its surface is quick to draw.
   const bool surface = shading == Shading::surface;
   const Pattern pattern = surface && !material.smooth ? Pattern::none : material.pattern;
+  const bool flat = !surface && kFlatFrom_px * batch.triangles() < pixels_;
   const auto key = std::make_tuple(pattern, material.textured, material.detailed, material.triplanar,
-                                   material.glass, batch.mesh->endless, shading, features_);
+                                   material.glass, batch.mesh->endless, flat, shading, features_);
   const auto found = surface_programs_.find(key);
   if (found != surface_programs_.end()) return found->second;
   std::vector<std::string> defines = features_;
-  defines.push_back("FLAT 1");
+  if (flat) defines.push_back("FLAT 1");
   if (surface) defines.push_back("SURFACE 1");
   std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "light.glsl", "material.glsl",
                                             surface ? "surface.glsl" : "traced.glsl"};

@@ -97,7 +97,8 @@ struct Instance {
 
 class MeshPass {
  public:
-  MeshPass();
+  /// `pixels`: of the picture.
+  explicit MeshPass(int pixels);
   /// Sorts the visible instances for this view. The instances must stay in memory until the view is drawn.
   void prepare(std::span<const Instance* const> instances, const View& view, const Features& features);
   enum class Shading {
@@ -126,16 +127,19 @@ class MeshPass {
     GLuint first;  ///< first row of its instances
     GLsizei count;
     float thickness;  ///< thickness of its first instance, in the world
+
+    int64_t triangles() const { return int64_t{count} * mesh->index_count / 3; }
   };
   void draw(const Batch& batch);
   gl::LazyProgram& surface_program(const Batch& batch, Shading shading);
   static void set_facing(const Batch& batch);
   void draw_batch(const Batch& batch, Shading shading, float min_alpha);
 
-  /// Keyed by textured, detailed, triplanar, glass, endless.
-  std::map<std::tuple<Pattern, bool, bool, bool, bool, bool, Shading, Features>, gl::LazyProgram>
+  /// Keyed by textured, detailed, triplanar, glass, endless, flat.
+  std::map<std::tuple<Pattern, bool, bool, bool, bool, bool, bool, Shading, Features>, gl::LazyProgram>
       surface_programs_;
   gl::LazyProgram depth_program_{{"frame.glsl", "mesh.vert"}, {}, {"DEPTH 1"}};
+  const int pixels_;
   Features features_;
   gl::Texture white_;
   gl::StreamBuffer rows_;

@@ -21,7 +21,9 @@ layout(std140, binding = 0) uniform Frame {
 } uniforms;
 
 // llvmpipe's fragment shaders read a uniform lane by lane, with forty instructions (Mesa 22.3), which was half of the
-// cost of shading. Flat inputs are as fast as constants, so these fields are passed with each triangle.
+// cost of shading. Flat inputs are as fast as constants, so these fields are passed with each triangle. Small
+// triangles cost more that way than their few fragments, and surfaces for the tracer need one of the fields alone, so
+// these read them (MeshPass::surface_program).
 #ifndef FLAT
 #define frame uniforms
 #elif defined(FRAGMENT)

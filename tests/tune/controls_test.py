@@ -45,6 +45,30 @@ class Numbers(Case):
             self.assertEqual(self.page.text(), SCENE)
         self.assertAlmostEqual(ratios[0] / ratios[1], 10, delta=1.5)
 
+    def test_the_film_follows_the_pointer_during_a_drag(self):
+        self.page.select('/emitters/0')
+        track = self.track('rate')
+        edits, films = self.driver.execute_async_script('''
+            const [track, done] = arguments, box = track.getBoundingClientRect(), x = box.left + box.width / 2, y = box.top + 2;
+            const canvas = document.getElementById('film'), films = new Set([canvas.dataset.film]), fetch_ = window.fetch;
+            let edits = 0, moves = 0;
+            window.fetch = (...all) => { edits += String(all[0]).endsWith('/edit'); return fetch_(...all); };
+            track.setPointerCapture = () => {};
+            const send = (type, dx) => track.dispatchEvent(new PointerEvent(type, {clientX: x + dx, clientY: y, button: 0, pointerId: 1, bubbles: true}));
+            send('pointerdown', 0);
+            const timer = setInterval(() => {
+              films.add(canvas.dataset.film);
+              send('pointermove', ++moves % 40);
+              if (moves < 150) return;
+              clearInterval(timer);
+              send('pointerup', moves % 40);
+              window.fetch = fetch_;
+              done([edits, films.size - 1]);
+            }, 16);''', track)
+        self.settle()
+        self.assertGreater(films, 2)
+        self.assertGreater(2 * films, edits, 'most changes of a drag had a picture')
+
     def test_arrows_on_a_logarithmic_slider_move_by_a_fixed_ratio(self):
         self.page.select('/emitters/0')
         self.page.js('arguments[0].focus()', self.track('rate'))

@@ -129,10 +129,23 @@ async function drain() {
       job.done(false);
       emit('lost', error);
     }
+    if (job.body.group && waiting[0]?.body.group === job.body.group && !store.doc?.ranges?.length) await firstPicture();
   }
   busy = false;
   emit('idle');
 }
+
+// During a drag, the next change waits for the first picture of the change before, which it would end: so the film
+// follows the pointer. It waits for a limited time, and not after the drag.
+const kLongestWait_ms = 400;
+let endWait = () => {};
+const firstPicture = () => new Promise(done => {
+  endWait = done;
+  setTimeout(done, kLongestWait_ms);
+});
+on('frame', () => endWait());
+addEventListener('pointerup', () => endWait(), true);
+
 export const isIdle = () => !busy && waiting.length === 0;
 
 /** ops: [{set: path, value: JSON text} | {remove: path}]. */
