@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include <tbb/parallel_for.h>
+
 #include "render/tone_map.h"
 
 namespace offstage::render {
@@ -103,8 +105,8 @@ void filter_edges(Image& image) {
   if (image.rgba.empty()) return;
   const Luma luma(image);
   const std::vector<uint8_t> source = image.rgba;
-  std::vector<uint8_t> mark(static_cast<std::size_t>(image.width_px));
-  for (int y = 0; y < image.height_px; ++y) {
+  tbb::parallel_for(0, image.height_px, [&](int y) {
+    std::vector<uint8_t> mark(static_cast<std::size_t>(image.width_px));
     mark_edges(luma, y, image.width_px, mark);
     for (int x = 0; x < image.width_px; ++x) {
       if (!mark[static_cast<std::size_t>(x)]) continue;
@@ -120,7 +122,7 @@ void filter_edges(Image& image) {
         image.rgba[here + c] = static_cast<uint8_t>((value + 128) / 256);
       }
     }
-  }
+  });
 }
 
 }  // namespace offstage::render

@@ -95,9 +95,10 @@ void LightPass::write_light(const Eigen::AlignedBox2i& area_px, const LightBuffe
   write_lamps(area_px, light.lamps, light.highlights);
 }
 
-void LightPass::trace(const LightSources& sources, const View& view, const SampleOffsets& offsets) {
+void LightPass::trace(const LightSources& sources, const View& view, const SampleOffsets& offsets,
+                      const StopTest& stop) {
   read_surfaces(all_px_, surfaces_);
-  LightTracer(scene_, sources).trace(surfaces_, light_view(view, offsets), light_);
+  LightTracer(scene_, sources, stop).trace(surfaces_, light_view(view, offsets), light_);
   sums_ += light_.sums;
   write_light(all_px_, light_);
 }

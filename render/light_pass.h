@@ -23,8 +23,9 @@ class LightPass {
   const LightSums& sums() const { return sums_; }
   /// Binds and clears the targets for drawing surfaces.
   void begin() const;
-  /// Reads the surfaces, traces their light, and binds it for the shaders.
-  void trace(const LightSources& sources, const View& view, const SampleOffsets& offsets);
+  /// Reads the surfaces, traces their light, and binds it for the shaders. `stop`: see Stage::draw.
+  void trace(const LightSources& sources, const View& view, const SampleOffsets& offsets,
+             const StopTest& stop);
   /// After trace(): binds the targets for drawing the surfaces of glass, or of a translucent body, in a part
   /// of the picture. `depth`: the picture's, which hides them behind nearer surfaces. Returns false if no
   /// pixel of the area is in the picture.

@@ -133,7 +133,8 @@ struct Stage::Impl {
   std::vector<const Cloth*> prepare_cloths();
   void prepare_lamps(std::span<PointSet* const> sets);
   void trace_light(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
-                   std::span<PointSet* const> sets, const View& view, const SampleOffsets& offsets);
+                   std::span<PointSet* const> sets, const View& view, const SampleOffsets& offsets,
+                   const StopTest& stop);
   void trace_glass(const View& view, const SampleOffsets& offsets);
   void draw_surfaces(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets);
   void draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets);
@@ -231,8 +232,8 @@ void Stage::Impl::draw_surfaces(std::span<const Cloth* const> sheets, std::span<
 }
 
 void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
-                              std::span<PointSet* const> sets, const View& view,
-                              const SampleOffsets& offsets) {
+                              std::span<PointSet* const> sets, const View& view, const SampleOffsets& offsets,
+                              const StopTest& stop) {
   RayScene& scene = light_pass.scene();
   scene.clear();
   light_sources = {.sun = sun, .sky = sky, .fog = environment.fog};
@@ -262,7 +263,7 @@ void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<
   for (const Lamp& lamp : shining) light_sources.lamps.emplace_back(lamp);
   if (sky.has_bright_part()) light_sources.lamps.emplace_back(sky.turned);
   if (!puffs_pass.grid().empty()) light_sources.smoke = &puffs_pass.grid();
-  light_pass.trace(light_sources, view, offsets);
+  light_pass.trace(light_sources, view, offsets, stop);
 }
 
 // The light of the nearest surfaces of glass. What is behind them is met by rays.
@@ -657,7 +658,7 @@ LightSums Stage::light_sums() const {
   return impl_->light_pass.sums();
 }
 
-void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
+void Stage::draw(const SampleOffsets& offsets, HdrImage& sum, const StopTest& stop) {
   Impl& s = *impl_;
   if (sum.width_px != s.def.width_px || sum.height_px != s.def.height_px ||
       sum.rgba.size() != sum.pixel_count() * 4) {
@@ -681,7 +682,7 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum) {
   s.mesh_pass.prepare(shown, view, s.features);
   const std::vector<const Cloth*> sheets = s.prepare_cloths();
   s.draw_surfaces(sheets, sets);
-  s.trace_light(shown, sheets, sets, view, offsets);
+  s.trace_light(shown, sheets, sets, view, offsets, stop);
   s.draw_opaque(sheets, sets);
   s.trace_glass(view, offsets);
   s.draw_translucent(sheets, sets, view, frame, offsets);

@@ -15,6 +15,7 @@
 
 #include "render/channels.h"
 #include "render/context.h"
+#include "render/file_io.h"
 #include "render/handle.h"
 #include "render/image.h"
 #include "render/model.h"
@@ -216,8 +217,9 @@ class Stage {
   void set_time(float time);
 
   /// Draws one sub-frame and adds it to `sum`, which is sized and cleared first if it does not have the
-  /// stage's size. Throws UnavailableError on a GL error.
-  void draw(const SampleOffsets& offsets, HdrImage& sum);
+  /// stage's size. Throws UnavailableError on a GL error, and StoppedError, without any effect on `sum`, soon
+  /// after `stop` returned true; several threads call it.
+  void draw(const SampleOffsets& offsets, HdrImage& sum, const StopTest& stop = {});
   /// Of all sub-frames drawn so far.
   LightSums light_sums() const;
 

@@ -264,8 +264,7 @@ bool Engine::advance_film() {
       return false;
     }
   } else if (film_->has_state(frame)) {
-    film_->draw_draft(frame);
-    report_frame(frame, Detail::draft);
+    if (film_->draw_draft(frame, [this] { return is_outdated(); })) report_frame(frame, Detail::draft);
     return true;
   } else if (film_->simulated_to() >= frame) {
     film_->restart();
@@ -276,7 +275,7 @@ bool Engine::advance_film() {
     figures_ = film_->physics().figures;
   } else if (Clock::now() - lead_in_shown_ > kGlimpse && film_->lead_in() < 1 &&
              film_->first_missing() == 1) {
-    film_->draw_lead_in();
+    if (!film_->draw_lead_in([this] { return is_outdated(); })) return true;
     report_frame(0, Detail::draft);
     report_film(FilmEvent::Phase::lead_in);
     lead_in_shown_ = Clock::now();
@@ -322,8 +321,8 @@ bool Engine::advance_pinned(const Workshop& workshop) {
   const int frame = pinned_->first_missing();
   if (frame > pinned_->frames()) return false;
   if (pinned_->has_state(frame)) {
-    pinned_->draw_draft(frame);
-    on_event_(FrameEvent{.run = run_, .film = wanted->film, .frame = frame, .figures = {}, .camera = {}});
+    if (pinned_->draw_draft(frame, [this] { return is_outdated(); }))
+      on_event_(FrameEvent{.run = run_, .film = wanted->film, .frame = frame, .figures = {}, .camera = {}});
   } else {
     if (pinned_->simulated_to() >= frame) pinned_->restart();
     pinned_->simulate();

@@ -75,8 +75,8 @@ class Engine {
     uint64_t number = 0;
     std::string film;
   };
-  /// During its lifetime the engine begins no new work, so that the processors are free for the next request:
-  /// work done between the arrival of a change and show() would be useless.
+  /// During its lifetime the engine begins no new work and ends drafts, so that the processors are free for
+  /// the next request: work done between the arrival of a change and show() would be useless.
   class Hold {
    public:
     explicit Hold(Engine& engine) : engine_(engine) { ++engine_.holds_; }
@@ -146,7 +146,11 @@ class Engine {
   void report_frame(int frame, Detail detail);
   void report_film(FilmEvent::Phase phase, const std::string& message = "");
   void fail(const std::string& what);
+  /// Whether there is a request of any kind.
   bool is_stale() const { return ending_ || holds_ > 0 || requested_ != taken_; }
+  /// Whether there is, or soon will be, another version or camera. Other requests, such as those of a film
+  /// that plays, leave a draft its time.
+  bool is_outdated() const { return ending_ || holds_ > 0 || runs_ != run_; }
 
   const EngineSettings settings_;
   const OnEvent on_event_;
@@ -158,7 +162,8 @@ class Engine {
   std::atomic<uint64_t> requested_ = 0;  // increases with every request to the thread
   std::atomic<bool> ending_ = false;
   std::atomic<int> holds_ = 0;
-  uint64_t runs_ = 0, sweeps_ = 0, models_generation_ = 0;
+  std::atomic<uint64_t> runs_ = 0;  // number of the latest run
+  uint64_t sweeps_ = 0, models_generation_ = 0;
   std::optional<FilmDef> wanted_, wanted_pinned_;
   bool pinned_changed_ = false;
   int frame_ = 1;

@@ -168,21 +168,24 @@ producer::Picture& FilmRun::draft_picture() {
   return *picture_;
 }
 
-void FilmRun::draw_draft(int frame) {
+bool FilmRun::draw_draft(int frame, const Stop& stop) {
+  return draw_draft(frame, previous(frame), state(frame), stop);
+}
+
+bool FilmRun::draw_lead_in(const Stop& stop) {
+  const producer::Snapshot now = simulation_->snapshot();
+  return draw_draft(0, now, now, stop);
+}
+
+bool FilmRun::draw_draft(int frame, const producer::Snapshot& before, const producer::Snapshot& now,
+                         const Stop& stop) {
   const auto start = Clock::now();
-  const render::Image image = small_picture(frame);
+  const render::Image image = draft_picture().draw(before, now, stop);
+  if (image.rgba.empty()) return false;
   camera_ = picture_->camera();
   auto jpeg = std::make_shared<const std::string>(workshop_.jpeg.write(image, kDraftQuality));
   workshop_.frames.put(def_.film, frame, {Detail::draft, ms_since(start), std::move(jpeg), camera_});
-}
-
-void FilmRun::draw_lead_in() {
-  const auto start = Clock::now();
-  const producer::Snapshot now = simulation_->snapshot();
-  const render::Image image = draft_picture().draw(now, now);
-  camera_ = picture_->camera();
-  auto jpeg = std::make_shared<const std::string>(workshop_.jpeg.write(image, kDraftQuality));
-  workshop_.frames.put(def_.film, 0, {Detail::draft, ms_since(start), std::move(jpeg), camera_});
+  return true;
 }
 
 bool FilmRun::refine(int frame, Detail detail, const Stop& stop) {

@@ -66,11 +66,12 @@ class FilmRun {
   int simulated_to() const { return simulation_ ? simulation_->frame() : 0; }
   /// Finished share of the work before frame 1.
   double lead_in() const;
+  // These return false, without a picture, if `stop` returned true meanwhile; several threads call it.
   /// Draws a draft of a frame whose state is available, into the store.
-  void draw_draft(int frame);
+  bool draw_draft(int frame, const Stop& stop);
   /// Draws the current state before frame 1 as frame 0.
-  void draw_lead_in();
-  /// Draws a frame whose state is available at full size; returns false if `stop` returned true meanwhile.
+  bool draw_lead_in(const Stop& stop);
+  /// Draws a frame whose state is available at full size.
   bool refine(int frame, Detail detail, const Stop& stop);
   /// Name of the visible object at a position of a frame, or empty. The position is a share of width and
   /// height, from the top left corner. The state must be available.
@@ -90,6 +91,8 @@ class FilmRun {
   };
 
   producer::Picture& draft_picture();
+  bool draw_draft(int frame, const producer::Snapshot& before, const producer::Snapshot& now,
+                  const Stop& stop);
   void make_simulation();
   void add_figures(double sim_ms);
   void finish();

@@ -220,7 +220,7 @@ Reply Session::post(const std::string& what, const nlohmann::json& request, cons
   if (what != "pick" && tabs_.writer() != tab)
     return refused(423, "another tab is editing this scene; take over to edit it here");
   std::optional<Engine::Hold> hold;
-  if (what != "pick" && what != "save") hold.emplace(*engine_);
+  if (what != "pick" && what != "save" && what != "view") hold.emplace(*engine_);
   try {
     return (this->*handler->second)(request);
   } catch (const nlohmann::json::exception& error) {

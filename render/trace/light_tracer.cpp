@@ -1,12 +1,15 @@
 #include "render/trace/light_tracer.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "render/error.h"
 #include "render/frame.h"
 #include "render/trace/light_path.h"
 
@@ -131,8 +134,11 @@ LightBuffer::LightBuffer(int width, int height)
   arriving.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
 }
 
-LightTracer::LightTracer(const RayScene& scene, const LightSources& sources)
-    : scene_(scene), sources_(sources), sun_disc_(sources.sun, sources.sky.sun_direction) {}
+LightTracer::LightTracer(const RayScene& scene, const LightSources& sources, StopTest stop)
+    : scene_(scene),
+      sources_(sources),
+      stop_(std::move(stop)),
+      sun_disc_(sources.sun, sources.sky.sun_direction) {}
 
 Lanes LightTracer::sun_visibility(const LaneVectors& place, IntLanes active,
                                   const SquarePoint<Lanes>& uv) const {
@@ -351,24 +357,24 @@ void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, const
   light.brightness.set_lanes(x, y, around.x + around.y + around.z);
 }
 
-namespace {
-
-void for_light_rows(int height, const auto& each) {
+// Calls each(y) for all rows in parallel. A request to stop is noticed between the tasks of all threads.
+void LightTracer::for_rows(int height, const auto& each) const {
+  std::atomic<bool> stopped = false;
   tbb::parallel_for(tbb::blocked_range<int>(0, height, kRowsPerTask), [&](const auto& rows) {
-    for (int y = rows.begin(); y < rows.end(); ++y) each(y);
+    if (stop_ && !stopped && stop_()) stopped = true;
+    for (int y = rows.begin(); y < rows.end() && !stopped; ++y) each(y);
   });
+  if (stopped) throw StoppedError("the light is no longer needed");
 }
 
-/// `each` gets sums of its own for each row, so that the total does not depend on the threads.
-LightSums sum_over_light_rows(int height, const auto& each) {
+// `each` gets sums of its own for each row, so that the total does not depend on the threads.
+LightSums LightTracer::sum_over_rows(int height, const auto& each) const {
   std::vector<LightSums> rows(static_cast<std::size_t>(height));
-  for_light_rows(height, [&](int y) { each(y, rows[static_cast<std::size_t>(y)]); });
+  for_rows(height, [&](int y) { each(y, rows[static_cast<std::size_t>(y)]); });
   LightSums total;
   for (const LightSums& row : rows) total += row;
   return total;
 }
-
-}  // namespace
 
 void LightTracer::trace(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const {
   trace_arriving(surfaces, view, light);
@@ -394,10 +400,10 @@ void LightTracer::trace_arriving(const SurfaceBuffer& surfaces, const LightView&
   light.has_mirrors = std::ranges::any_of(surfaces.places,
                                           [](const Vector4f& p) { return p.w() >= SurfaceBuffer::kMirrors; });
   if (light.has_mirrors) light.mirrored.resize(pixels);
-  for_light_rows(height, [&](int y) {
+  for_rows(height, [&](int y) {
     for (int x = 0; x < width; x += kLanes) trace_pixels(surfaces, x, y, view, light);
   });
-  light.sums = sum_over_light_rows(light.cells.height_px, [&](int y, LightSums& sums) {
+  light.sums = sum_over_rows(light.cells.height_px, [&](int y, LightSums& sums) {
     for (int x = 0; x < light.cells.width_px; x += kLanes) trace_cells(surfaces, x, y, view, light, sums);
   });
   light.direct.average(light.pixels, light.pixels.filled, nullptr, 1);
@@ -407,7 +413,7 @@ void LightTracer::trace_arriving(const SurfaceBuffer& surfaces, const LightView&
   for (int step = 1; step <= kWidestStep; step *= 2)
     light.around.average(light.cells, light.cells.filled,
                          step <= widest ? &light.reach2 : &light.noisy_reach2, step);
-  for_light_rows(height, [&](int y) {
+  for_rows(height, [&](int y) {
     const std::size_t row = index_of(0, y, width);
     interpolate(light.pixels, light.cells, y, {&light.around, &light.cells.filled},
                 &light.direct.channels()[0], &light.arriving[row]);
@@ -434,7 +440,7 @@ void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& 
     sampler.skip(1 + static_cast<uint32_t>(sources_.lamps.size()));
     return mirrored_light(points.one(i, view.eye), view, sampler, visible, sums);
   };
-  light.sums += sum_over_light_rows(light.cells.height_px, [&](int y, LightSums& sums) {
+  light.sums += sum_over_rows(light.cells.height_px, [&](int y, LightSums& sums) {
     for (int x = 0; x < light.cells.width_px; x += kLanes) {
       const Points points(surfaces, pixels_of_cells(surfaces, x, y, view));
       const IntLanes mirrors = points.mirrors & ~points.own_mirrors;
@@ -448,7 +454,7 @@ void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& 
     }
   });
   for (const int step : {1, 2}) light.mirrors.average(light.cells, light.with_rough_mirror, nullptr, step);
-  light.sums += sum_over_light_rows(surfaces.height_px, [&](int y, LightSums& sums) {
+  light.sums += sum_over_rows(surfaces.height_px, [&](int y, LightSums& sums) {
     Vector4f* row = &light.mirrored[index_of(0, y, width)];
     interpolate(light.pixels, light.cells, y, {&light.mirrors, &light.with_mirror}, nullptr, row);
     for (int x = 0; x < width; x += kLanes) {
@@ -480,7 +486,7 @@ void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, con
   glass.lamps.resize(with_lamps);
   glass.highlights.resize(with_lamps);
   const int width = surfaces.width_px;
-  glass.sums = sum_over_light_rows(surfaces.height_px, [&](int y, LightSums& sums) {
+  glass.sums = sum_over_rows(surfaces.height_px, [&](int y, LightSums& sums) {
     for (int x = 0; x < width; x += kLanes) {
       Points points(surfaces, pixels_of_row(surfaces, x, y));
       points.mirrors = points.visible;  // glass of any roughness

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "render/file_io.h"
 #include "render/trace/light_filter.h"
 #include "render/trace/light_sources.h"
 #include "render/trace/ray_scene.h"
@@ -84,7 +85,8 @@ class VisibleLight {
 
 class LightTracer {
  public:
-  LightTracer(const RayScene& scene, const LightSources& sources);
+  /// `stop` is called by several threads; after it returned true, trace() throws StoppedError.
+  LightTracer(const RayScene& scene, const LightSources& sources, StopTest stop = {});
 
   void trace(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
   /// The same for the surfaces of a translucent body in a part of the picture. `visible`: the opaque objects.
@@ -131,6 +133,8 @@ class LightTracer {
                     LightBuffer& light) const;
   static IntLanes pixels_of_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view);
   void trace_arriving(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
+  void for_rows(int height, const auto& each) const;
+  LightSums sum_over_rows(int height, const auto& each) const;
   void trace_mirrors(const SurfaceBuffer& surfaces, const LightView& view, const VisibleLight& visible,
                      LightBuffer& light) const;
   static void set_guide(const Points& points, int x, int y, const LightView& view, float size_px,
@@ -142,6 +146,7 @@ class LightTracer {
 
   const RayScene& scene_;
   const LightSources& sources_;
+  const StopTest stop_;
   SunDisc sun_disc_;
 };
 

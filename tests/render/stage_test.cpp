@@ -1,8 +1,10 @@
 #include "render/stage.h"
 
+#include <atomic>
 #include <cmath>
 #include <stdexcept>
 
+#include "render/error.h"
 #include "render/tone_map.h"
 #include "tests/render/gl_fixture.h"
 
@@ -29,6 +31,20 @@ TEST(Stage, AnEmptyStageDrawsNothing) {
   const HdrImage picture = s.draw();
   ASSERT_EQ(picture.rgba.size(), 96u * 64u * 4u);
   for (const float value : picture.rgba) ASSERT_EQ(value, 0);
+}
+
+// The request comes while rays are traced. The next drawing does not depend on the one that was ended.
+TEST(Stage, EndsADrawingThatIsNoLongerNeeded) {
+  SmallStage s;
+  s.stage.set_environment({});
+  s.add(make_sphere(1), Material{});
+  const HdrImage whole = s.draw();
+  HdrImage sum;
+  std::atomic<int> asked = 0;
+  EXPECT_THROW(s.stage.draw({}, sum, [&] { return ++asked > 3; }), StoppedError);
+  EXPECT_GT(asked, 3);
+  EXPECT_EQ(brightness(sum), 0);
+  EXPECT_EQ(s.draw().rgba, whole.rgba);
 }
 
 TEST(Stage, EmptyMeshesAndPointSetsAreHarmless) {

@@ -99,6 +99,20 @@ TEST_F(Engines, EndAnOldRunWithinOneFrame) {
   EXPECT_LE(late, 1u);
 }
 
+TEST_F(Engines, KeepNoPictureOfAnEndedDraft) {
+  render::Context context;
+  PhysicsStore physics(1 << 20);
+  FrameStore frames(1 << 20);
+  JpegWriter jpeg;
+  FilmRun run({fountain(100), {}, "film", "physics"}, std::make_shared<const producer::ModelLibrary>(),
+              {physics, frames, context, jpeg, {160, 90}});
+  while (!run.has_state(1)) run.simulate();
+  EXPECT_FALSE(run.draw_draft(1, [] { return true; }));
+  EXPECT_FALSE(run.has_draft(1));
+  EXPECT_TRUE(run.draw_draft(1, {}));
+  EXPECT_TRUE(run.has_draft(1));
+}
+
 TEST_F(Engines, StartNoWorkWhileAChangeIsPending) {
   const Engine::Run run = engine_.show(fountain(100, 60), {});
   ASSERT_TRUE(events_.wait_for<FrameEvent>([&](const FrameEvent& e) { return e.run == run.number; }));

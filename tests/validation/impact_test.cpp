@@ -350,7 +350,7 @@ TEST(AutomaticSolver, ResolvesAnInelasticImpactOfARodAtItsTime) {
     const MassProperties unit = mass_properties(Shape{rod});
     const Real arm = rod.height / 2 * std::sin(tilt),
                mobility = 1 + arm * arm * unit.volume / unit.inertia(2, 2);
-    run(world, 0.2, step);
+    run(world, 0.15, step);
     EXPECT_NEAR(world.body(body).velocity.y(), -5 + 5 / mobility, 1e-3);
   }
 }

@@ -12,6 +12,7 @@
 #include "producer/build/particle_sources.h"
 #include "producer/build/texts.h"
 #include "render/bloom.h"
+#include "render/error.h"
 #include "render/primitives.h"
 #include "render/tone_map.h"
 
@@ -373,14 +374,18 @@ render::Image Picture::draw(const Snapshot& previous, const Snapshot& current,
   const double frame_time = scene_.output.fps.seconds(1);
   std::ranges::fill(sum_.rgba, 0.f);
   for (int i = 0; i < n; ++i) {
-    if (i > 0 && stop && stop()) return {};
+    if (stop && stop()) return {};
     // Sub-frames are in the middle of equal parts of the time during which the shutter is open, which ends at
     // the frame's time.
     const float open =
         to_float(scene_.render.shutter) * (1 - (static_cast<float>(i) + 0.5f) / static_cast<float>(n));
     const float w = n == 1 || &previous == &current ? 1 : 1 - open;
     place(previous, current, w, frame_time);
-    stage_.draw(render::sample_offsets(i, n), sum_);
+    try {
+      stage_.draw(render::sample_offsets(i, n), sum_, stop);
+    } catch (const render::StoppedError&) {
+      return {};
+    }
   }
   const float weight = 1 / static_cast<float>(n), exposed = exposure(current.time, weight);
   latest_scale_ = weight * exposed;

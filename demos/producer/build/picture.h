@@ -32,8 +32,8 @@ class Picture {
 
   /// Draws the frame at `current`. The shutter is open during the last part of the interval from `previous`,
   /// the frame before it (or the same snapshot for the first frame, which has no motion blur). The camera is
-  /// that of the scene in its current state. If `stop` returns true between two sub-frames, the image has no
-  /// pixels.
+  /// that of the scene in its current state. If `stop`, which several threads call, returns true, drawing
+  /// ends soon and the image has no pixels.
   render::Image draw(const Snapshot& previous, const Snapshot& current,
                      const std::function<bool()>& stop = {});
   /// Linear light of the latest frame with its exposure and glow, without tone curve and texts.

@@ -129,10 +129,25 @@ async function drain() {
       job.done(false);
       emit('lost', error);
     }
+    const starts = job.what === 'edit' || job.body.camera;  // a new run
+    if (dragging && starts && !store.doc.errors.length && !store.doc.ranges?.length) await firstPicture();
   }
   busy = false;
   emit('idle');
 }
+
+// During a drag, the next change of a value or of the camera waits for the first picture of the change before, which it
+// would end: so the film follows the pointer. It waits for a limited time, and not after the drag.
+const kLongestWait_ms = 1000;
+let dragging = false, endWait = () => {};
+const firstPicture = () => new Promise(done => {
+  endWait = done;
+  setTimeout(done, kLongestWait_ms);
+});
+on('painted', () => endWait());
+addEventListener('pointerdown', () => { dragging = true; }, true);
+for (const end of ['pointerup', 'pointercancel']) addEventListener(end, () => { dragging = false; endWait(); }, true);
+
 export const isIdle = () => !busy && waiting.length === 0;
 
 /** ops: [{set: path, value: JSON text} | {remove: path}]. */
