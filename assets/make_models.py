@@ -11,7 +11,7 @@ import zlib
 from modelling import (GlbWriter, Material, Mesh, Node, add, circle, cross, cylinder, dot, ellipsoid, extrude, fractal_noise,
                        grid_triangles, hashed, icosphere, lathe, mix, mul, noise, open_edges, ring, rod,
                        rounded, shaded, smoothstep, sub, surface_nets, sweep, turn, union, unit, volume,
-                       welded, write_glb, write_glb_tree, write_mtl, write_obj, write_ply)
+                       welded, write_glb, extend_glb, write_glb_tree, write_mtl, write_obj, write_ply)
 
 MODELS = pathlib.Path(__file__).resolve().parent / "models"
 
@@ -639,11 +639,26 @@ def tentacle():
               clip="sweep", times=times, tracks=tracks)
 
 
+def lantern():
+    """A lantern with the light of its flame, and a camera that looks past it."""
+    base = shaded(lathe([(0, 0), (0.09, 0), (0.09, 0.02), (0.03, 0.04), (0, 0.04)], 24))
+    cap = shaded(lathe([(0.02, 0.22), (0.09, 0.22), (0.02, 0.27), (0, 0.27), (0, 0.22)], 24))
+    post = shaded(lathe([(0, 0.03), (0.008, 0.03), (0.008, 0.23), (0, 0.23)], 8))
+    posts = Mesh().joined(*(post.moved((0.075, 0, 0)).turned("y", 90 * k) for k in range(4)))
+    path = MODELS / "lantern.glb"
+    write_glb(path, [(base.joined(cap, posts), STEEL)])
+    extend_glb(path,
+               {"node": {"name": "eye", "translation": [0.6, 0.45, 1.9], "rotation": [-0.0436, 0.1305, 0.0057, 0.9905]},
+                "value": {"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.01}}},
+               {"node": {"name": "flame", "translation": [0, 0.12, 0]},
+                "value": {"type": "point", "color": [1, 0.72, 0.4], "intensity": 3}})
+
+
 ALL = [
     duck, fountain, sprinkler, t_handle, landscape, gears, crank, connecting_rod, piston, flywheel, robot_arm,
     voussoir, top, marble_run, dishes, parachute,
     hammock, swatch, grass_patch, rock, pot, tree,
-    tentacle
+    tentacle, lantern
 ]
 
 if __name__ == "__main__":

@@ -514,6 +514,26 @@ def write_glb_tree(path, root):
         struct.pack("<I4s", len(blob), b"BIN\0") + blob)
 
 
+def extend_glb(path, camera, light):
+    """Adds a node with a camera and one with a light (KHR_lights_punctual) below the root of a GLB.
+
+    Both are dicts: `node` with the node's name and pose, `value` with the camera or the light."""
+    data = path.read_bytes()
+    size = struct.unpack("<I", data[12:16])[0]
+    tree, rest = json.loads(data[20:20 + size]), data[20 + size:]
+    root = tree["nodes"][tree["scenes"][0]["nodes"][0]]
+    root.setdefault("children", []).extend([len(tree["nodes"]), len(tree["nodes"]) + 1])
+    tree["nodes"] += [{**camera["node"], "camera": 0},
+                      {**light["node"], "extensions": {"KHR_lights_punctual": {"light": 0}}}]
+    tree["cameras"] = [camera["value"]]
+    tree["extensionsUsed"] = [*tree.get("extensionsUsed", []), "KHR_lights_punctual"]
+    tree.setdefault("extensions", {})["KHR_lights_punctual"] = {"lights": [light["value"]]}
+    text = json.dumps(tree, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    path.write_bytes(b"glTF" + struct.pack("<II", 2, 20 + len(text) + len(rest)) + struct.pack("<I", len(text)) +
+                     b"JSON" + text + rest)
+
+
 def write_obj(path, parts, library):
     lines, first = [f"mtllib {library.name}"], 1
     for mesh, material in parts:

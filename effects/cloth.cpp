@@ -35,6 +35,7 @@ void check(const Fabric& f) {
   check("shear_damping", f.shear_damping.value_or(0), true);
   check("bend_spring_damping", f.bend_spring_damping.value_or(0), true);
   check("bend_damping", f.bend_damping, true);
+  check("min_bend_radius", f.min_bend_radius, true);
 }
 
 ClothDef with_fabric(const Fabric& f) {
@@ -44,6 +45,7 @@ ClothDef with_fabric(const Fabric& f) {
   def.self_friction = f.self_friction;
   def.max_stretch = f.max_stretch;
   def.max_shear = f.max_shear;
+  def.min_bend_radius = f.min_bend_radius;
   def.air = {.drag = f.drag, .lift = f.lift};
   if (f.bend_model == BendModel::plate) {
     def.bend = f.bend;

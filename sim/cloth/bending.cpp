@@ -18,6 +18,9 @@ constexpr Real kLargestWeight = 4;
 /// Of the second derivatives by the jumps of gradients against those by recovered gradients: holds what the
 /// latter do not see, which alternates from point to point.
 constexpr Real kJumpShare = 0.05;
+/// Of a rough patch over the curvature that it counts as: hinges on a smooth surface, beside a border or a
+/// crease, can differ from it by as much as its curvature.
+const Real kRoughCounts = 2 * std::sqrt(kJumpShare);
 constexpr int kFilterIterations = 80;
 /// Of a step squared times the square of the fastest frequency: from here on conjugate gradients take so many
 /// iterations that a factorisation is faster, up to a number of points.
@@ -280,6 +283,12 @@ bool has_area(std::span<const Vec3> rest, const Triangle& t) {
   return (rest[t[1]] - rest[t[0]]).cross(rest[t[2]] - rest[t[0]]).norm() > 0;
 }
 
+/// Cross product of two edges of a triangle: twice its area, along its normal.
+Vec3 cross_of(const Triangle& t, std::span<const Vec4> x) {
+  const Vec3 a = x[t[0]].head<3>();
+  return (x[t[1]].head<3>() - a).cross(x[t[2]].head<3>() - a);
+}
+
 Real filter_dot(std::span<const Vec4> a, std::span<const Vec4> b) {
   Real sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i) sum += a[i].dot(b[i]);
@@ -289,15 +298,18 @@ Real filter_dot(std::span<const Vec4> a, std::span<const Vec4> b) {
 }  // namespace
 
 void ClothBending::assign(std::span<const Vec3> rest, std::span<const Triangle> triangles,
-                          std::span<const Real> masses, Real rigidity, Real damping, Real rest_share) {
-  const bool known = rigidity > 0 && rigidity == rigidity_ && rest_share == rest_share_ &&
+                          std::span<const Real> masses, Real rigidity, Real damping, Real rest_share,
+                          bool measures) {
+  const bool needed = rigidity > 0 || measures;
+  const bool known = needed && rigidity == rigidity_ && rest_share == rest_share_ && measures == measures_ &&
                      triangles.size() == triangles_.size() && rest.size() >= rest_.size() &&
                      std::equal(rest_.begin(), rest_.end(), rest.begin());
   if (!known) *this = {};
   rigidity_ = rigidity;
   damping_ = damping;
   rest_share_ = rest_share;
-  if (!(rigidity > 0)) return;
+  measures_ = measures;
+  if (!needed) return;
   if (known && std::ranges::equal(triangles, triangles_) && std::ranges::equal(masses, masses_)) return;
   std::vector<uint8_t> changed(triangles.size(), 1), moved(rest.size(), 0);
   for (std::size_t t = 0; known && t < triangles.size(); ++t) {
@@ -372,8 +384,10 @@ void ClothBending::build(std::span<const uint8_t> changed, std::vector<uint8_t> 
         weights.push_back(w);
         rows[point] = 1;
       }
-      add_patch({.triangle = t, .area = area, .rest = of_kind == &smooth ? rest : Vec3(Vec3::Zero())}, points,
-                weights);
+      const bool is_rough = of_kind == &rough;
+      add_patch(
+          {.triangle = t, .area = area, .rest = is_rough ? Vec3(Vec3::Zero()) : rest, .rough = is_rough},
+          points, weights);
     }
   }
   curved_ = std::ranges::any_of(patches_, [](const Patch& p) { return p.rest != Vec3::Zero(); });
@@ -504,18 +518,50 @@ void ClothBending::add_rest_forces(std::span<const Vec4> x, Real scale, std::spa
   }
 }
 
+/// H x - n b0 of a patch, with the normal of its triangle.
+Mat3 ClothBending::excess_curvature(const Patch& patch, std::span<const Vec4> x, const Vec3& normal) const {
+  const Vec3 a = x[triangles_[patch.triangle][0]].head<3>();
+  Mat3 h = Mat3::Zero();
+  for (uint32_t k = patch.first; k < patch.first + patch.count; ++k)
+    h += (x[points_[k]].head<3>() - a) * weights_[k].transpose();
+  return h - normal * patch.rest.transpose();
+}
+
 Real ClothBending::energy(std::span<const Vec4> x) const {
   Real sum = 0;
   for (const Patch& patch : patches_) {
-    const Triangle& own = triangles_[patch.triangle];
-    const Vec3 a = x[own[0]].head<3>();
-    const Vec3 n = (x[own[1]].head<3>() - a).cross(x[own[2]].head<3>() - a).stableNormalized();
-    Mat3 h = Mat3::Zero();
-    for (uint32_t k = patch.first; k < patch.first + patch.count; ++k)
-      h += (x[points_[k]].head<3>() - a) * weights_[k].transpose();
-    sum += rigidity_ * patch.area / 2 * (h - n * patch.rest.transpose()).squaredNorm();
+    const Vec3 normal = cross_of(triangles_[patch.triangle], x).stableNormalized();
+    sum += rigidity_ * patch.area / 2 * excess_curvature(patch, x, normal).squaredNorm();
   }
   return sum;
+}
+
+Real ClothBending::curvature(std::size_t index, std::span<const Vec4> x) const {
+  const Patch& patch = patches_[index];
+  const bool flat = patch.rest == Vec3::Zero();
+  const Vec3 normal = flat ? Vec3(Vec3::Zero()) : cross_of(triangles_[patch.triangle], x).stableNormalized();
+  const Real norm = excess_curvature(patch, x, normal).norm();
+  return patch.rough ? norm / kRoughCounts : norm;
+}
+
+void ClothBending::add_gradient(std::size_t index, std::span<const Vec4> x,
+                                std::vector<std::pair<uint32_t, Vec4>>& gradient) const {
+  const Patch& patch = patches_[index];
+  const Triangle& own = triangles_[patch.triangle];
+  const Vec3 cross = cross_of(own, x), n = cross.stableNormalized();
+  const Mat3 excess = excess_curvature(patch, x, n);
+  const Real norm = excess.norm();
+  if (!(norm > 0)) return;
+  const Mat3 direction = excess / (patch.rough ? norm * kRoughCounts : norm);
+  for (uint32_t k = patch.first; k < patch.first + patch.count; ++k)
+    gradient.emplace_back(points_[k], padded(direction * weights_[k]));
+  if (patch.rest == Vec3::Zero() || !(cross.squaredNorm() > 0)) return;
+  // By the turning of the normal, as in add_rest_forces().
+  const Vec3 turning = direction * patch.rest;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec3 edge = (x[own[(k + 2) % 3]] - x[own[(k + 1) % 3]]).head<3>();
+    gradient.emplace_back(own[k], padded(n.cross(edge).dot(turning) / cross.norm() * n));
+  }
 }
 
 /// Steps of one rate differ in their last bits: in single precision they are one.

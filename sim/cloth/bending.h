@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <Eigen/SparseCholesky>
@@ -29,8 +30,10 @@ class ClothBending {
   /// `rest_share` of the curvature of `rest` is unstressed; the remainder is as if the cloth had been flat.
   /// Of a cloth that tore, which has other corners of triangles and more points, only the surroundings of the
   /// tears are computed again. Triangles that were clamped stay so until set_clamps().
+  /// `measures`: the curvature can be measured even if there is no rigidity.
   void assign(std::span<const Vec3> rest, std::span<const Triangle> triangles, std::span<const Real> masses,
-              Real rigidity, Real damping, Real rest_share);
+              Real rigidity, Real damping, Real rest_share, bool measures = false);
+  /// Without rigidity; nothing resists bending.
   bool empty() const { return rigidity_ == 0 || patches_.empty(); }
   Real damping() const { return damping_; }
 
@@ -51,6 +54,15 @@ class ClothBending {
   /// The factor of the unit matrix on the diagonal of K for a point [N/m].
   Real diagonal(uint32_t point) const { return diagonal_[point]; }
 
+  /// The curvature is measured by patches, two to a triangle: of its surroundings as a smooth surface, and
+  /// what this does not see, which alternates from point to point and counts half.
+  std::size_t patch_count() const { return patches_.size(); }
+  /// Curvature of a patch beyond that at rest, |H x - n b0| [1/m].
+  Real curvature(std::size_t patch, std::span<const Vec4> x) const;
+  /// Appends the gradient of curvature() by the points. Its sum, and its moment about any point, are zero.
+  void add_gradient(std::size_t patch, std::span<const Vec4> x,
+                    std::vector<std::pair<uint32_t, Vec4>>& gradient) const;
+
   /// Solves (M + stiff K) moves = M moves: what backward Euler leaves of explicit moves. Those of points
   /// without an inverse mass stay. By conjugate gradients, or by a factorisation, which is kept for the next
   /// step, if they would take many iterations. Returns false if they reached the limit of iterations.
@@ -64,6 +76,7 @@ class ClothBending {
     uint32_t first = 0, count = 0;  // of points_ and weights_
     Real area = 0;
     Vec3 rest = Vec3::Zero();  // unstressed curvature
+    bool rough = false;        // of what the smooth one does not see
   };
 
   std::vector<uint8_t> affected(std::span<const uint8_t> changed, std::vector<uint8_t> near) const;
@@ -72,10 +85,11 @@ class ClothBending {
   void build_matrix(std::span<const uint8_t> rows);
   void factorize(std::span<const Real> masses, std::span<const Real> inverse_masses, Real stiff);
   void filter_directly(std::span<const Real> inverse_masses, std::span<Vec4> moves);
+  Mat3 excess_curvature(const Patch& patch, std::span<const Vec4> x, const Vec3& normal) const;
   void add_rest_forces(std::span<const Vec4> x, Real scale, std::span<Vec4> f) const;
 
   Real rigidity_ = 0, damping_ = 0, rest_share_ = 1, fastest_ = 0;
-  bool curved_ = false;
+  bool curved_ = false, measures_ = false;
   std::vector<Triangle> triangles_;
   std::vector<Real> masses_;
   std::vector<Vec3> rest_;

@@ -87,6 +87,7 @@ std::string number_problem(const ClothDef& def) {
                                                        {"ram_pressure", def.ram_pressure},
                                                        {"bend", def.bend},
                                                        {"bend_damping", def.bend_damping},
+                                                       {"min_bend_radius", def.min_bend_radius},
                                                        {"inflate_time", def.inflate_time},
                                                        {"gas_density", def.gas_density.value_or(0)}};
   for (const auto& [field, value] : not_negative)
@@ -155,7 +156,8 @@ Cloth::Cloth(ClothHandle cloth, const ClothDef& definition)
 }
 
 void Cloth::assign_bending() {
-  bending.assign(rest, triangles, masses, def.bend, def.bend_damping, def.rest_curvature);
+  bending.assign(rest, triangles, masses, def.bend, def.bend_damping, def.rest_curvature,
+                 def.min_bend_radius > 0);
 }
 
 }  // namespace offstage::sim

@@ -100,6 +100,10 @@ struct ClothDef {
   Real bend_damping = 0;
   /// Share of the curvature of the unstrained cloth that is without stress, 0 to 1.
   Real rest_curvature = 1;
+  /// Smallest radius to which the cloth bends [m], >= 0; 0: no limit. The curvature beyond that at rest stays
+  /// at most 1 / min_bend_radius (bend_limit.h), for any model of bending and without rigidity, too. On cells
+  /// larger than this radius it has no effect: the mesh itself cannot bend further.
+  Real min_bend_radius = 0;
   std::vector<Real> masses;  ///< of the vertices [kg], > 0
   std::vector<ClothPin> pins;
   std::vector<ClothSeam> seams;
@@ -188,6 +192,8 @@ struct ClothReport {
   Real mean_strain = 0;        ///< of stretch springs, mean |(|d| - L) / L|
   Real penetration = 0;        ///< deepest, of a vertex behind a body's surface, 0 while it is outside [m]
   uint64_t limited = 0;        ///< moves shortened to keep max_stretch and max_shear, or because of held_back
+  uint64_t bend_limited = 0;   ///< cloth sub-steps in which the limit min_bend_radius acted
+  Real max_bend = 0;           ///< greatest curvature times min_bend_radius at the end; 0 without a limit
   uint64_t held_back = 0;      ///< moves shortened because cloth would have passed through cloth
   uint64_t crossings = 0;  ///< pairs that could not be kept from crossing; cloth may pass through cloth there
   uint64_t clamped = 0;    ///< springs whose stiffness the `relaxed` integrator clamped, at the end

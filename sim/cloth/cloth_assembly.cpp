@@ -26,6 +26,7 @@ void ClothSystem::assemble() {
   seams_.clear();
   all_springs_.clear();
   first_spring_.clear();
+  bend_limits_.clear();
   std::vector<StretchLimit::Limit> limits, ties;
   std::vector<Triangle> colliding, touching;  // cloth; bodies
   for (uint32_t c = 0; c < cloths_.size(); ++c) {
@@ -45,6 +46,8 @@ void ClothSystem::assemble() {
       points_.cloth.push_back(c);
       collides_.push_back(cloth.def.collides && !cloth.stopped);
     }
+    if (cloth.def.min_bend_radius > 0 && !cloth.stopped)
+      bend_limits_.emplace_back(c, first, cloth.points.size(), cloth.bending, cloth.def.min_bend_radius);
     first_spring_.push_back(all_springs_.size());
     for (ClothSpring s : cloth.springs) {
       s.a += first;

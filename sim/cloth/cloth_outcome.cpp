@@ -104,6 +104,9 @@ void ClothSystem::measure() {
     const Eigen::ArrayXd strain = length2.head(count).sqrt() / rest.head(count) - 1;
     cloth.report.max_strain = count > 0 ? std::max(cloth.report.max_strain, strain.maxCoeff()) : 0;
     cloth.report.mean_strain = count > 0 ? strain.abs().mean() : 0;
+    if (const auto limit = std::ranges::find(bend_limits_, c, &BendLimit::cloth);
+        !changed_ && limit != bend_limits_.end())
+      cloth.report.max_bend = limit->greatest(points_);
     if (c < contacts_.active().size()) cloth.report.contacts = contacts_.active()[c];
     if (c < self_contacts_.active().size()) cloth.report.self_contacts = self_contacts_.active()[c];
   }

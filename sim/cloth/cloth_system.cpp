@@ -92,6 +92,7 @@ void ClothSystem::substep(Real from, Real to, Real dt) {
   stop_lost(dt);
   pull_bodies(dt);
   close_seams(dt);
+  limit_bending(dt);
   limit_.project(points_, carriers_, dt, kick_, cuts_);
   if (!self_contacts_.empty()) self_contacts_.push_apart(points_, dt);
   touch_bodies(dt);
@@ -179,6 +180,11 @@ void ClothSystem::integrate(Real dt) {
       ++cloths_[c]->report.unconverged;
   }
   for (const Held& held : held_) points_.start[held.point] = held.from;
+}
+
+void ClothSystem::limit_bending(Real dt) {
+  for (BendLimit& limit : bend_limits_)
+    if (limit.project(points_, dt, kick_, cuts_)) ++cloths_[limit.cloth()]->report.bend_limited;
 }
 
 /// Seams draw together evenly in their time and then hold. One that was held up goes on no faster: more than

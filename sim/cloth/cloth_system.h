@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "sim/cloth/air_drag.h"
+#include "sim/cloth/bend_limit.h"
 #include "sim/cloth/cloth_bodies.h"
 #include "sim/cloth/cloth_contacts.h"
 #include "sim/cloth/cloth_forces.h"
@@ -77,6 +78,7 @@ class ClothSystem {
   Real fastest_strain_rate() const;
   void substep(Real from, Real to, Real dt);
   void integrate(Real dt);
+  void limit_bending(Real dt);
   void close_seams(Real dt);
   void end_substep(Real dt);
   void touch_bodies(Real dt);
@@ -137,8 +139,9 @@ class ClothSystem {
   Real parts_ = 1;  // sub-steps of cloth in one of the world
 
   ClothPoints points_;
-  std::vector<ClothSprings> springs_;  // of each `relaxed` cloth
-  std::vector<AirDrag> air_;           // on each cloth
+  std::vector<ClothSprings> springs_;   // of each `relaxed` cloth
+  std::vector<AirDrag> air_;            // on each cloth
+  std::vector<BendLimit> bend_limits_;  // of the cloths that have one
   StretchLimit limit_;
   ClothContacts contacts_;
   CornerContacts corner_contacts_;

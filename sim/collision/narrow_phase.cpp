@@ -1,6 +1,7 @@
 #include "sim/collision/narrow_phase.h"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cmath>
 
@@ -17,6 +18,9 @@ namespace {
 
 /// Triangles that are nearer have no reliable direction between their closest points [m].
 constexpr Real kLeastTriangleDistance = 1e-9;
+/// Of a PairCache: up to so many, all are compared.
+constexpr std::size_t kFewEntries = 8;
+constexpr uint32_t kNoEntry = ~0u;
 
 Pose inverse(const Pose& p) {
   const Quat back = p.orientation.conjugate();
@@ -272,29 +276,53 @@ std::optional<Separation> containment(const CollisionShape& a, const CollisionSh
 
 }  // namespace
 
-std::vector<PairCache::Used>::const_iterator PairCache::place_of(uint32_t piece_a, uint32_t piece_b) const {
-  return std::lower_bound(entries_.begin(), entries_.end(), std::pair(piece_a, piece_b),
-                          [](const Used& e, const std::pair<uint32_t, uint32_t>& key) {
-                            return std::pair(e.piece_a, e.piece_b) < key;
-                          });
+/// The slot of a pair of pieces: the one that holds it, or the free one where it belongs.
+std::size_t PairCache::slot_of(uint32_t piece_a, uint32_t piece_b) const {
+  const std::size_t mask = slots_.size() - 1;
+  // Fibonacci hashing: the high bits of the product depend on all bits of both numbers.
+  const uint64_t key = (uint64_t{piece_a} << 32 | piece_b) * 0x9e3779b97f4a7c15u;
+  for (std::size_t slot = (key >> 32) & mask;; slot = (slot + 1) & mask) {
+    const uint32_t index = slots_[slot];
+    if (index == kNoEntry || (entries_[index].piece_a == piece_a && entries_[index].piece_b == piece_b))
+      return slot;
+  }
+}
+
+uint32_t PairCache::index_of(uint32_t piece_a, uint32_t piece_b) const {
+  if (!slots_.empty()) return slots_[slot_of(piece_a, piece_b)];
+  for (uint32_t k = 0; k < entries_.size(); ++k)
+    if (entries_[k].piece_a == piece_a && entries_[k].piece_b == piece_b) return k;
+  return kNoEntry;
+}
+
+void PairCache::rebuild_slots() {
+  slots_.clear();
+  if (entries_.size() <= kFewEntries) return;
+  slots_.assign(std::bit_ceil(4 * entries_.size()), kNoEntry);
+  for (uint32_t k = 0; k < entries_.size(); ++k)
+    slots_[slot_of(entries_[k].piece_a, entries_[k].piece_b)] = k;
 }
 
 const PairCache::Entry* PairCache::find(uint32_t piece_a, uint32_t piece_b) const {
-  const auto at = place_of(piece_a, piece_b);
-  return at != entries_.end() && at->piece_a == piece_a && at->piece_b == piece_b ? &*at : nullptr;
+  const uint32_t index = index_of(piece_a, piece_b);
+  return index == kNoEntry ? nullptr : &entries_[index];
 }
 
 PairCache::Entry& PairCache::of(uint32_t piece_a, uint32_t piece_b) {
-  const auto at = entries_.begin() + (place_of(piece_a, piece_b) - entries_.cbegin());
-  if (at != entries_.end() && at->piece_a == piece_a && at->piece_b == piece_b) {
-    at->used = true;
-    return *at;
+  if (const uint32_t known = index_of(piece_a, piece_b); known != kNoEntry) {
+    entries_[known].used = true;
+    return entries_[known];
   }
-  return *entries_.insert(at, Used{{.piece_a = piece_a, .piece_b = piece_b}});
+  entries_.push_back(Used{{.piece_a = piece_a, .piece_b = piece_b}});
+  if (entries_.size() > std::max(slots_.size() / 2, kFewEntries))
+    rebuild_slots();
+  else if (!slots_.empty())
+    slots_[slot_of(piece_a, piece_b)] = static_cast<uint32_t>(entries_.size() - 1);
+  return entries_.back();
 }
 
 void PairCache::forget_unused() {
-  std::erase_if(entries_, [](const Used& e) { return !e.used; });
+  if (std::erase_if(entries_, [](const Used& e) { return !e.used; }) > 0) rebuild_slots();
   for (Used& e : entries_) e.used = false;
 }
 

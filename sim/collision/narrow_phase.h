@@ -50,8 +50,14 @@ class PairCache {
   struct Used : Entry {
     bool used = true;
   };
-  std::vector<Used>::const_iterator place_of(uint32_t piece_a, uint32_t piece_b) const;
-  std::vector<Used> entries_;  // ascending by pieces
+  uint32_t index_of(uint32_t piece_a, uint32_t piece_b) const;
+  std::size_t slot_of(uint32_t piece_a, uint32_t piece_b) const;
+  void rebuild_slots();
+
+  std::vector<Used> entries_;  // in the order of their first use
+  /// Hash table with linear probing: entries by their pieces, or kNoEntry. At most half of it is in use.
+  /// Empty while there are so few entries that all are compared.
+  std::vector<uint32_t> slots_;
 };
 
 /// Returns the signed distance of the closest, or deepest, two pieces; none if all are farther than `limit`

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 #include <utility>
 
 #include "sim/collision/sphere_manifold.h"
@@ -500,14 +501,16 @@ void ContactPair::recall(std::vector<Remembered>& points, const Pose& pose) {
   // Two models of many parts have thousands of points; then only those are compared that are near along x or
   // belong to the same features.
   const bool are_many = points.size() > kManyPoints;
+  // Different pairs of parts have points of the same features.
+  const Real same_feature = kSame / std::sqrt(kSameFeature);
   static thread_local std::vector<std::pair<Real, uint32_t>> by_x;
-  static thread_local std::vector<std::pair<uint32_t, uint32_t>> by_id;
+  static thread_local std::vector<std::tuple<uint32_t, Real, uint32_t>> by_id;  // and by x
   if (are_many) {
     by_x.clear();
     by_id.clear();
     for (uint32_t i = 0; i < points.size(); ++i) {
       by_x.emplace_back(points[i].on_a.x(), i);
-      by_id.emplace_back(points[i].id, i);
+      by_id.emplace_back(points[i].id, points[i].on_a.x(), i);
     }
     std::sort(by_x.begin(), by_x.end());
     std::sort(by_id.begin(), by_id.end());
@@ -531,9 +534,11 @@ void ContactPair::recall(std::vector<Remembered>& points, const Pose& pose) {
         for (auto at = std::lower_bound(by_x.begin(), by_x.end(), std::pair(on_a.x() - kSame, 0u));
              at != by_x.end() && at->first <= on_a.x() + kSame; ++at)
           compare(points[at->second]);
-        for (auto at = std::lower_bound(by_id.begin(), by_id.end(), std::pair(point.id, 0u));
-             at != by_id.end() && at->first == point.id; ++at)
-          compare(points[at->second]);
+        for (auto at = std::lower_bound(by_id.begin(), by_id.end(),
+                                        std::tuple(point.id, on_a.x() - same_feature, 0u));
+             at != by_id.end() && std::get<0>(*at) == point.id && std::get<1>(*at) <= on_a.x() + same_feature;
+             ++at)
+          compare(points[std::get<2>(*at)]);
       } else {
         for (Remembered& p : points) compare(p);
       }

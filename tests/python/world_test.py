@@ -68,6 +68,50 @@ def test_a_cloth_hangs_from_its_pins_and_a_mesh_falls():
     assert world.body(box)["mass"] == pytest.approx(500) and world.body(box)["position"][1] == pytest.approx(3 - 9.81 / 8)
 
 
+def test_a_body_can_have_another_centre_and_inertia_than_its_shape():
+    world = offstage.World(gravity=[0, 0, 0])
+    for inertia in ([0.2, 0.3, 0.4], np.diag([0.2, 0.3, 0.4])):
+        body = world.add_body(offstage.Ellipsoid([0.3, 0.2, 0.1]), mass=2, centre=[0, -0.1, 0], inertia=inertia,
+                              position=[0, 5, 0], angular_velocity=[0, 0, 1], velocity=[0, 0, 0], collides=False)
+        # The frame's origin is 0.1 m above the centre of mass, which does not move: the velocity given is that of the centre.
+        world.step(0.1)
+        assert world.body(body)["angular_momentum"] == pytest.approx([0, 0, 0.4])
+        assert world.body(body)["centre"] == pytest.approx([0, 4.9, 0])
+    frustum = world.add_body(offstage.Frustum(0.4, 0.2, 0.3), density=1000)
+    assert world.body(frustum)["mass"] == pytest.approx(1000 * np.pi * 0.3 / 3 * (0.4**2 + 0.4 * 0.2 + 0.2**2))
+    with pytest.raises(ValueError, match="inertia"):
+        world.add_body(offstage.Box(), inertia=[1, 2])
+    with pytest.raises(ValueError, match="inertia"):
+        world.add_body(offstage.Box(), inertia=[1, 1, 3])
+
+
+def test_a_cloth_takes_values_instead_of_those_of_its_fabric():
+    length, radius = 0.3, 0.06
+
+    def hang(**values):
+        world = offstage.World()
+        # The first two columns are clamped.
+        cloth = world.add_grid_cloth([length, 0.04], [30, 4], pins=[c + 31 * r for r in range(5) for c in range(2)],
+                                     self_collision=False, collides=False, bend=1e-6, bend_model="springs", max_stretch=0,
+                                     stretch=3000, air_density=40, stretch_damping=0.2, integrator="implicit", **values)
+        for _ in range(48):
+            world.step(1 / 24)
+        return world.cloth(cloth)
+
+    bent, limp = hang(min_bend_radius=radius), hang()
+    end = bent["position"].reshape(5, 31, 3)[2]
+    assert end[30, 0] - end[1, 0] == pytest.approx(radius, abs=0.008) and bent["max_bend"] < 1.05
+    assert limp["position"].reshape(5, 31, 3)[2, 30, 0] - end[1, 0] < radius / 2 and limp["max_bend"] == 0
+    world = offstage.World()
+    late = world.add_grid_cloth([1, 1], [4, 4], appear_at=0.5, remove_at=1)
+    world.step(0.25)
+    assert len(world.cloth(late)["position"]) == 25
+    with pytest.raises(ValueError, match="min_bend_radius"):
+        world.add_grid_cloth([1, 1], [4, 4], min_bend_radius=-1)
+    with pytest.raises(ValueError, match="bend_model"):
+        world.add_grid_cloth([1, 1], [4, 4], bend_model="hinge")
+
+
 def test_mistakes_are_exceptions_and_never_crashes():
     world, other = offstage.World(), offstage.World()
     ball = world.add_body(offstage.Sphere(1), position=[0, 5, 0])

@@ -134,6 +134,7 @@ effects::Fabric fabric_of(const Cloth& cloth) {
   change(c.max_stretch, f.max_stretch);
   change(c.max_shear, f.max_shear);
   change(c.bend_damping, f.bend_damping);
+  change(c.min_bend_radius, f.min_bend_radius);
   const auto set = [](const std::optional<double>& to, std::optional<double>& value) {
     if (to) value = to;
   };

@@ -55,7 +55,8 @@ int presets_command(const std::string& name) {
                                             {"drag", f.drag},
                                             {"lift", f.lift},
                                             {"max_stretch", f.max_stretch},
-                                            {"max_shear", f.max_shear}};
+                                            {"max_shear", f.max_shear},
+                                            {"min_bend_radius", f.min_bend_radius}};
     fmt::print("{}\n", figures.dump(2));
     return kOk;
   }

@@ -83,6 +83,10 @@ struct Table<FabricChanges> {
         {"max_shear", &T::max_shear,
          "largest length diagonally to the threads relative to the rest length; 0: no limit", "",
          kNotNegative},
+        {"min_bend_radius", &T::min_bend_radius,
+         "smallest radius to which the cloth bends, from its shape at rest; 0: no limit. It is kept with "
+         "either `bend_model`, on any mesh, and has no effect on cells larger than itself",
+         "m", kNotNegative},
     };
   }
 };

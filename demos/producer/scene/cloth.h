@@ -30,7 +30,8 @@ using ClothShape = std::variant<GridShape, MeshFile, SphereCloth>;
 /// Values that replace those of the cloth's fabric.
 struct FabricChanges {
   std::optional<Real> areal_density, stretch, shear, bend, damping, friction, self_friction, thickness, drag,
-      lift, max_stretch, max_shear, bend_damping, stretch_damping, shear_damping, bend_spring_damping;
+      lift, max_stretch, max_shear, bend_damping, stretch_damping, shear_damping, bend_spring_damping,
+      min_bend_radius;
   std::optional<effects::BendModel> bend_model;
 };
 

@@ -18,8 +18,8 @@ if _os.path.isdir(_data):
     _os.environ.setdefault("OFFSTAGE_DATA", _data)
 
 from ._offstage import (  # noqa: E402, F401
-    BodyHandle, Box, Capsule, ClothHandle, Cone, Cylinder, DivergedError, FileError, Film, ForceHandle, Frame, Instance,
-    JointHandle, Material, MeshShape, ParticleSystemHandle, Plane, Points, Problem, Scene, SceneError, Simulation, Snapshot,
+    BodyHandle, Box, Capsule, ClothHandle, Cone, Cylinder, DivergedError, Ellipsoid, FileError, Film, ForceHandle, Frame,
+    Frustum, Instance, JointHandle, Material, MeshShape, ParticleSystemHandle, Plane, Points, Problem, Scene, SceneError, Simulation, Snapshot,
     Sphere, SpringHandle, Stage, UnavailableError, World, __version__, parse_frames, step_all)
 from . import _offstage  # noqa: E402
 

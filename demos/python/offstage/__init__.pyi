@@ -121,11 +121,17 @@ class Cylinder:
 class Cone:
     def __init__(self, radius: float = ..., height: float = ...) -> None: ...
 
+class Frustum:
+    def __init__(self, radius: float = ..., top_radius: float = ..., height: float = ...) -> None: ...
+
+class Ellipsoid:
+    def __init__(self, radii: Triple = ...) -> None: ...
+
 class Plane: ...
 class MeshShape: ...
 
-Shape = Union[Sphere, Box, Capsule, Cylinder, Cone, Plane, MeshShape]
-JointType = Literal["spherical", "fixed", "revolute", "prismatic", "universal", "distance"]
+Shape = Union[Sphere, Box, Capsule, Cylinder, Cone, Frustum, Ellipsoid, Plane, MeshShape]
+JointType = Literal["spherical", "fixed", "revolute", "prismatic", "universal", "distance", "gear", "rack", "screw", "pulley"]
 ForceType = Literal["constant", "point", "wind", "vortex", "turbulence", "gravitation", "coulomb", "lennard_jones", "explosion",
                     "grab", "applied"]
 
@@ -147,7 +153,8 @@ class World:
     def add_mesh(self, vertices: ArrayLike, triangles: ArrayLike) -> MeshShape: ...
     def add_body(self, shape: Shape, *, name: str = ..., motion: Literal["static", "kinematic", "dynamic"] = ...,
                  position: Triple = ..., orientation: Quadruple = ..., velocity: Triple = ..., angular_velocity: Triple = ...,
-                 density: float = ..., mass: float = ..., linear_drag: float = ..., angular_drag: float = ..., material: str = ...,
+                 density: float = ..., mass: float = ..., centre: Triple = ..., inertia: ArrayLike = ..., linear_drag: float = ...,
+                 angular_drag: float = ..., material: str = ...,
                  restitution: float = ..., friction: float = ..., static_friction: float = ..., cross_friction: float = ...,
                  friction_axis: Triple = ..., rolling_friction: float = ..., spinning_friction: float = ...,
                  surface_velocity: Triple = ..., collides: bool = ..., appear_at: float = ..., remove_at: float = ...,
@@ -161,7 +168,8 @@ class World:
                       radius: ArrayLike = ..., lifespan: ArrayLike = ..., restitution: ArrayLike = ..., friction: ArrayLike = ...,
                       charge: ArrayLike = ...) -> NDArray[np.uint64]: ...
     def add_joint(self, type: JointType, a: BodyHandle, b: Optional[BodyHandle] = ..., *, name: str = ..., anchor: Triple = ...,
-                  anchor_b: Triple = ..., axis: Triple = ..., second_axis: Triple = ..., lower: float = ..., upper: float = ...,
+                  anchor_b: Triple = ..., axis: Triple = ..., second_axis: Triple = ..., ratio: float = ...,
+                  pulley_a: Triple = ..., pulley_b: Triple = ..., restitution: float = ..., stiffness: float = ..., lower: float = ..., upper: float = ...,
                   swing: float = ..., friction: float = ..., damping: float = ..., max_force: float = ..., max_torque: float = ...,
                   collide: bool = ..., appear_at: float = ..., remove_at: float = ..., motor: Literal["none", "speed", "position"] = ..., motor_target: float = ...,
                   motor_effort: float = ..., motor_stiffness: float = ..., motor_damping: float = ...) -> JointHandle: ...

@@ -191,6 +191,7 @@ py::dict cloth_dict(const LiveWorld& w, sim::ClothHandle cloth) {
   d["sources"] = numbers(c.sources);
   d["version"] = c.version;
   d["max_strain"] = w.world.cloth_report(cloth).max_strain;
+  d["max_bend"] = w.world.cloth_report(cloth).max_bend;
   const sim::ClothGasState gas = w.world.cloth_gas(w.cloth(cloth));
   d["volume"] = gas.volume;
   d["pressure"] = gas.pressure;
@@ -293,7 +294,7 @@ void bind_state(py::class_<LiveWorld>& world) {
            "Arrays of a system, by the order of creation: position (n, 3), ...")
       .def("particle_events", &event_list, "Events of the last sub-step, of systems that report them.")
       .def("cloth", &cloth_dict, py::arg("cloth"),
-           "position (n, 3), velocity, triangles (t, 3), sources, version, max_strain.")
+           "position (n, 3), velocity, triangles (t, 3), sources, version, max_strain, max_bend.")
       .def("contacts", &contact_list, "Contact points at the end of the last step.")
       .def(
           "overlaps",

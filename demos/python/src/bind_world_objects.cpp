@@ -24,6 +24,14 @@ const std::map<std::string, sim::JointType> kJoints = {
 const std::map<std::string, sim::Motor::Mode> kMotors = {{"none", sim::Motor::Mode::none},
                                                          {"speed", sim::Motor::Mode::speed},
                                                          {"position", sim::Motor::Mode::position}};
+const std::map<std::string, sim::ClothIntegrator> kClothIntegrators = {
+    {"relaxed", sim::ClothIntegrator::relaxed},
+    {"implicit", sim::ClothIntegrator::implicit},
+    {"symplectic", sim::ClothIntegrator::symplectic},
+    {"rk4", sim::ClothIntegrator::rk4}};
+const std::map<std::string, effects::BendModel> kBendModels = {{"plate", effects::BendModel::plate},
+                                                               {"springs", effects::BendModel::springs}};
+
 sim::KeyframeTrack track_of(Keywords& k) {
   sim::KeyframeTrack track;
   const py::object keys = k.take_object("keyframes");  // [(time, position, orientation), ...]
@@ -38,6 +46,24 @@ sim::KeyframeTrack track_of(Keywords& k) {
   return track;
 }
 
+void take_optional(Keywords& k, const char* name, std::optional<sim::Vec3>& value) {
+  std::optional<Triple> numbers;
+  k.take(name, numbers);
+  if (numbers) value = vec(*numbers);
+}
+
+/// Moments about the axes of the body's frame, or a matrix.
+std::optional<sim::Mat3> take_inertia(Keywords& k) {
+  const py::object given = k.take_object("inertia");
+  if (given.is_none()) return {};
+  const auto a = DoubleArray::ensure(given);
+  const bool moments = a && a.ndim() == 1 && a.shape(0) == 3;
+  if (!moments && !(a && a.ndim() == 2 && a.shape(0) == 3 && a.shape(1) == 3))
+    throw std::invalid_argument("inertia: must be 3 moments, or have the shape (3, 3)");
+  if (moments) return sim::Mat3(sim::Vec3(a.data()[0], a.data()[1], a.data()[2]).asDiagonal());
+  return sim::Mat3(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(a.data()));
+}
+
 sim::BodyHandle add_body(LiveWorld& w, const sim::Shape& shape, const py::kwargs& kwargs) {
   Keywords k(kwargs);
   sim::BodyDef def{.shape = shape};
@@ -50,6 +76,8 @@ sim::BodyHandle add_body(LiveWorld& w, const sim::Shape& shape, const py::kwargs
   k.take("angular_velocity", def.angular_velocity);
   k.take("density", def.density);
   k.take("mass", def.mass);
+  take_optional(k, "centre", def.centre);
+  def.inertia = take_inertia(k);
   k.take("linear_drag", def.linear_drag);
   k.take("angular_drag", def.angular_drag);
   k.take("material", def.material);
@@ -294,6 +322,14 @@ sim::ClothHandle finish_cloth(LiveWorld& w, sim::ClothDef def, Keywords& k, cons
   k.take("self_collision", def.self_collision);
   k.take("tear", def.tear);
   k.take("pressure", def.pressure);
+  k.take("inflate_time", def.inflate_time);
+  k.take("gas_density", def.gas_density);
+  k.take("ram_pressure", def.ram_pressure);
+  k.take("air_density", def.air.density);
+  k.choose("integrator", kClothIntegrators, def.integrator);
+  k.take("soften", def.soften);
+  k.take("appear_at", def.appear_at);
+  k.take("remove_at", def.remove_at);
   k.take("substep", def.substep);
   const py::object pins = k.take_object("pins");  // vertices, or (vertex, body)
   if (!pins.is_none())
@@ -315,12 +351,33 @@ sim::ClothHandle finish_cloth(LiveWorld& w, sim::ClothDef def, Keywords& k, cons
   return *w.cloths.insert(w.world.add_cloth(def)).first;
 }
 
-const effects::Fabric& fabric_named(Keywords& k) {
+/// The fabric `fabric`, with the values that are given beside it.
+effects::Fabric take_fabric(Keywords& k) {
   std::string name = "cotton";
   k.take("fabric", name);
   const effects::FabricPreset* preset = effects::find_fabric(name);
   if (!preset) throw std::invalid_argument("fabric: there is none called '" + name + "'");
-  return preset->fabric;
+  effects::Fabric f = preset->fabric;
+  const std::pair<const char*, double*> values[] = {{"areal_density", &f.areal_density},
+                                                    {"stretch", &f.stretch},
+                                                    {"shear", &f.shear},
+                                                    {"bend", &f.bend},
+                                                    {"bend_damping", &f.bend_damping},
+                                                    {"damping", &f.damping},
+                                                    {"friction", &f.friction},
+                                                    {"self_friction", &f.self_friction},
+                                                    {"thickness", &f.thickness},
+                                                    {"drag", &f.drag},
+                                                    {"lift", &f.lift},
+                                                    {"max_stretch", &f.max_stretch},
+                                                    {"max_shear", &f.max_shear},
+                                                    {"min_bend_radius", &f.min_bend_radius}};
+  for (const auto& [key, value] : values) k.take(key, *value);
+  k.take("stretch_damping", f.stretch_damping);
+  k.take("shear_damping", f.shear_damping);
+  k.take("bend_spring_damping", f.bend_spring_damping);
+  k.choose("bend_model", kBendModels, f.bend_model);
+  return f;
 }
 
 sim::Pose take_pose(Keywords& k) {
@@ -333,7 +390,7 @@ sim::Pose take_pose(Keywords& k) {
 sim::ClothHandle add_grid_cloth(LiveWorld& w, std::array<double, 2> size, std::array<uint32_t, 2> cells,
                                 const py::kwargs& kwargs) {
   Keywords k(kwargs);
-  const effects::Fabric& fabric = fabric_named(k);
+  const effects::Fabric fabric = take_fabric(k);
   return finish_cloth(w, effects::grid_cloth({size[0], size[1], cells[0], cells[1]}, take_pose(k), fabric), k,
                       "add_grid_cloth");
 }
@@ -354,7 +411,7 @@ sim::TriangleMesh mesh_of(const DoubleArray& vertices, const IndexArray& triangl
 sim::ClothHandle add_mesh_cloth(LiveWorld& w, const DoubleArray& vertices, const IndexArray& triangles,
                                 const py::kwargs& kwargs) {
   Keywords k(kwargs);
-  const effects::Fabric& fabric = fabric_named(k);
+  const effects::Fabric fabric = take_fabric(k);
   return finish_cloth(w, effects::mesh_cloth(mesh_of(vertices, triangles), take_pose(k), fabric), k,
                       "add_mesh_cloth");
 }
@@ -377,6 +434,15 @@ void bind_shapes(py::module_& m) {
   round(sim::Capsule{}, "Capsule", "Radius, and distance between the centres of the caps [m]; along Y.");
   round(sim::Cylinder{}, "Cylinder", "Radius and height [m]; along Y.");
   round(sim::Cone{}, "Cone", "Radius of the base and height [m]; the apex is at +Y.");
+  py::class_<sim::Frustum>(
+      m, "Frustum", "A cone with its tip cut off: radius of the base, radius of the top and height [m].")
+      .def(py::init([](double radius, double top_radius, double height) {
+             return sim::Frustum{radius, top_radius, height};
+           }),
+           py::arg("radius") = 0.5, py::arg("top_radius") = 0.25, py::arg("height") = 1);
+  py::class_<sim::Ellipsoid>(m, "Ellipsoid", "Half axes along x, y and z [m].")
+      .def(py::init([](const Triple& radii) { return sim::Ellipsoid{vec(radii)}; }),
+           py::arg("radii") = Triple{0.5, 0.25, 0.25});
   py::class_<sim::Plane>(m, "Plane", "The half-space y <= 0 of the body's frame; not for dynamic bodies.")
       .def(py::init<>());
   py::class_<sim::MeshShape>(m, "MeshShape", "A mesh that World.add_mesh registered.");
@@ -394,7 +460,9 @@ void bind_building(py::class_<LiveWorld>& world) {
       .def("add_body", &add_body, py::arg("shape"),
            "Adds a body. Keywords, as in docs/python.md: name, motion ('static', 'kinematic', 'dynamic'), "
            "position,\n"
-           "orientation [w, x, y, z], velocity, angular_velocity, density or mass, linear_drag, "
+           "orientation [w, x, y, z], velocity, angular_velocity, density or mass, centre, inertia (3 "
+           "moments or a "
+           "3 x 3 matrix), linear_drag, "
            "angular_drag, material,\n"
            "restitution, friction, static_friction, cross_friction, friction_axis, "
            "rolling_friction,\n"
@@ -427,7 +495,15 @@ void bind_building(py::class_<LiveWorld>& world) {
       .def("add_grid_cloth", &add_grid_cloth, py::arg("size"), py::arg("cells"),
            "A rectangle of a fabric. Keywords: position, orientation, fabric, pins, name, velocity, "
            "collides,\n"
-           "self_collision, tear, pressure, substep. A pin is a vertex, or (vertex, body).")
+           "self_collision, tear, pressure, inflate_time, gas_density, ram_pressure, air_density, "
+           "integrator, soften,\n"
+           "substep, appear_at, remove_at; instead of the fabric's values: areal_density, stretch, shear, "
+           "bend,\n"
+           "bend_damping, bend_model ('plate', 'springs'), min_bend_radius, damping, stretch_damping, "
+           "shear_damping,\n"
+           "bend_spring_damping, friction, self_friction, thickness, drag, lift, max_stretch, max_shear. "
+           "A pin is a\n"
+           "vertex, or (vertex, body).")
       .def("add_mesh_cloth", &add_mesh_cloth, py::arg("vertices"), py::arg("triangles"),
            "As add_grid_cloth, of a mesh.")
       .def(
