@@ -14,6 +14,11 @@ namespace {
 /// Separation of points that do not take part [m].
 constexpr Real kOutOfReach = 1e3;
 
+bool is_one_piece(Body& body) {
+  const CollisionShape& shape = body.collision_shape();
+  return shape.is_plane() || shape.piece_count() == 1;
+}
+
 RelaxedBody relaxed(const Body& body, const ContactInterval& interval) {
   RelaxedBody b;
   const Real duration = interval.duration;
@@ -90,8 +95,9 @@ void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifol
   patch.force_k = last.y();
   patch.torque_n = last.z();
   patch.mean_friction = mean;
-  if (!pair.needs_toi) return;
-  // The next impact of the pair is traced back to, so only the points that touch now push.
+  // The next impact of the pair is traced back to, so only the points that touch now push. Pieces of which
+  // none is known yet may meet first, so bodies of several pieces keep their limits.
+  if (!pair.needs_toi || !is_one_piece(pair.a()) || !is_one_piece(pair.b())) return;
   for (uint32_t k = 0; k < patch.count; ++k) {
     if (m.manifold.points[k].separation <= kTouching) continue;
     patch.points[k].separation = kOutOfReach;

@@ -40,7 +40,7 @@ std::optional<Real> mass_of(const Body& body) {
 std::optional<Real> least_moment_of(const Body& body) {
   const auto by_shape = mass_by_shape(body);
   if (!by_shape) return {};
-  return Eigen::SelfAdjointEigenSolver<sim::Mat3>(by_shape->inertia).eigenvalues().minCoeff();
+  return sim::diagonalise(by_shape->inertia).moments.minCoeff();
 }
 
 class Checker : SceneChecker {
