@@ -138,10 +138,10 @@ StateHash chain(SolverKind solver) {
 constexpr const char* kParticles = "c5bfc404ccb7e022ce9ed6c7eb5cc342";
 constexpr const char* kSlidingExact = "dd732251e043ec037777fcccaae4b8d9";
 constexpr const char* kBouncingExact = "50fc4596f5b6e105237928cce22ace13";
-constexpr const char* kBouncingFast = "68ded2fcc9bb31edcb98e0205689f3b9";
-constexpr const char* kHeapFast = "deeac9e49ef6b8e5f4ada2b3fb94a6f0";
+constexpr const char* kBouncingFast = "1ed97afe1bd0789d6532de8f729c5cf8";
+constexpr const char* kHeapFast = "b3ae899e89b7df53de42d523cb7893bc";
 constexpr const char* kChainExact = "1125e425426069a78e4ed903caa56c4f";
-constexpr const char* kChainFast = "36c7538d035d117c75847f1492e6a2e3";
+constexpr const char* kChainFast = "248c46b4b36c4fad6bfea6aa99b10daa";
 
 TEST(Determinism, SameHashInEveryBuild) {
   EXPECT_EQ(run().hex(), kParticles);
