@@ -337,7 +337,7 @@ OFFSTAGE_ALL_SOLVERS(Solvers, Clatter);
 TEST(AutomaticSolver, ResolvesAnInelasticImpactOfARodAtItsTime) {
   for (const Real step : {1.0 / 240, 1.0 / 60}) {
     World world({.gravity = Vec3::Zero(), .max_step = step, .sleep = false});
-    world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .friction = 0});
+    world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = 0});
     const Real tilt = std::numbers::pi / 4;
     const Capsule rod{0.02, 1};
     const BodyHandle body =

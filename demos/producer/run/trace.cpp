@@ -50,7 +50,7 @@ void Trace::record(double time) {
 ClothTrace::ClothTrace(const std::filesystem::path& path, const Simulation& simulation)
     : file_(path,
             "time,cloth,points,max_strain,mean_strain,contacts,self_contacts,penetration,limited,held_back,"
-            "crossings,torn,unconverged,volume,pressure,bend_limited,max_bend"),
+            "crossings,torn,unconverged,bend_limited,max_bend,volume,pressure"),
       simulation_(simulation) {}
 
 void ClothTrace::record(double time) {
@@ -66,7 +66,7 @@ void ClothTrace::record(double time) {
         .number(r.penetration);
     rows.count(r.limited).count(r.held_back).count(r.crossings).count(r.torn).count(r.unconverged);
     const sim::ClothGasState gas = world.cloth_gas(handle);
-    rows.number(gas.volume).number(gas.pressure).count(r.bend_limited).number(r.max_bend).end_row();
+    rows.count(r.bend_limited).number(r.max_bend).number(gas.volume).number(gas.pressure).end_row();
   }
   file_.write(rows);
 }
