@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <utility>
+#include <vector>
 
 namespace offstage::sim {
 namespace {
@@ -10,12 +11,16 @@ namespace {
 /// lowest id is chosen, so that neither rounding nor the order decides.
 template <class Measure>
 const Candidate& most(std::span<const Candidate> c, Measure&& measure) {
+  // Most manifolds have few candidates.
+  std::array<Real, Candidates::kMax> few;
+  std::vector<Real> many(c.size() > few.size() ? c.size() : 0);
+  const std::span<Real> values = many.empty() ? std::span<Real>(few).first(c.size()) : std::span<Real>(many);
   Real largest = -std::numeric_limits<Real>::infinity();
-  for (const Candidate& x : c) largest = std::max(largest, measure(x));
+  for (std::size_t k = 0; k < c.size(); ++k) largest = std::max(largest, values[k] = measure(c[k]));
   const Real enough = largest - 1e-3 * std::abs(largest);
   const Candidate* best = nullptr;
-  for (const Candidate& x : c)
-    if (measure(x) >= enough && (!best || x.id < best->id)) best = &x;
+  for (std::size_t k = 0; k < c.size(); ++k)
+    if (values[k] >= enough && (!best || c[k].id < best->id)) best = &c[k];
   return best ? *best : c.front();
 }
 

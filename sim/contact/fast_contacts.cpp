@@ -14,9 +14,11 @@ namespace {
 /// Separation of points that do not take part [m].
 constexpr Real kOutOfReach = 1e3;
 
-bool is_one_piece(Body& body) {
+/// Whether points of a body may be left out if its next impact is traced back to: pieces of which no point is
+/// known yet may meet first, and a thin body may spin far in the rest of the sub-step.
+bool waits_for_impacts(Body& body) {
   const CollisionShape& shape = body.collision_shape();
-  return shape.is_plane() || shape.piece_count() == 1;
+  return (shape.is_plane() || shape.piece_count() == 1) && !(body.is_dynamic() && body.rigid.is_thin());
 }
 
 RelaxedBody relaxed(const Body& body, const ContactInterval& interval) {
@@ -95,9 +97,8 @@ void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifol
   patch.force_k = last.y();
   patch.torque_n = last.z();
   patch.mean_friction = mean;
-  // The next impact of the pair is traced back to, so only the points that touch now push. Pieces of which
-  // none is known yet may meet first, so bodies of several pieces keep their limits.
-  if (!pair.needs_toi || !is_one_piece(pair.a()) || !is_one_piece(pair.b())) return;
+  // The next impact of the pair is traced back to, so only the points that touch now push.
+  if (!pair.needs_toi || !waits_for_impacts(pair.a()) || !waits_for_impacts(pair.b())) return;
   for (uint32_t k = 0; k < patch.count; ++k) {
     if (m.manifold.points[k].separation <= kTouching) continue;
     patch.points[k].separation = kOutOfReach;

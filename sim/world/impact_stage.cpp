@@ -25,6 +25,8 @@ constexpr std::size_t kPointWork = 1, kPairWork = 3, kLookWork = 3;
 constexpr std::size_t kLastWork = 3;
 /// A contact that runs around a rim is found anew after each turn by this angle [rad], at most so many times.
 constexpr Real kRunningTurn = 0.1, kMostRunningPieces = 16;
+/// In larger islands the contacts that run are not found anew: heaps would be solved again for each of them.
+constexpr std::size_t kMostRunning = 8;
 /// Contact points with a smaller separation take part in a collision [m].
 constexpr Real kCluster = 1e-4;
 
@@ -105,7 +107,8 @@ void ImpactStage::resolve() {
     } else {
       pending_.erase(next);
       const Body& body = event.pair->a().is_awake() ? event.pair->a() : event.pair->b();
-      if (work > most_work || islands_[body.island].from >= event.time) continue;
+      const Island& moving = islands_[body.island];
+      if (work > most_work || moving.from >= event.time || moving.bodies.size() > kMostRunning) continue;
     }
     const uint32_t island = gather(*event.pair, event.time);
     work += impact_work(islands_[island]);
