@@ -1,6 +1,7 @@
 #pragma once
 /// The materials of bodies and the rules for pairs of them.
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <string>

@@ -9,6 +9,8 @@
 
 namespace offstage::sim {
 
+class CoupledSystem;
+
 /// Groups the awake bodies by joints, springs and the contacts that `connect` them. `motion` has moved them.
 void find_moving_islands(const WorldState& world, std::span<Body* const> awake,
                          std::span<ContactPair* const> pairs, bool (*connect)(const ContactPair&),

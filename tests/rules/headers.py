@@ -13,7 +13,7 @@ import sys
 
 # The names of the standard library that headers use, by the header that they need. Another may give them as well.
 GIVEN_BY = {
-    "algorithm": "min max clamp copy find_if swap_ranges ranges sort",
+    "algorithm": "min max minmax clamp copy find_if swap_ranges ranges sort",
     "any": "any",
     "array": "array",
     "atomic": "atomic atomic_ref memory_order_relaxed memory_order_release memory_order_acquire",
@@ -56,7 +56,7 @@ GIVEN_BY = {
     "unordered_set": "unordered_set",
     "utility": "move forward swap exchange as_const pair make_pair in_place declval index_sequence",
     "variant": "variant holds_alternative get get_if visit monostate variant_alternative_t",
-    "vector": "vector",
+    "vector": "vector erase",
 }
 NEEDED = {name: header for header, names in GIVEN_BY.items() for name in names.split()}
 # Headers of the standard library that are specified to give names of others.
