@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include "sim/collision/collision_mesh.h"
 #include "sim/collision/contact_candidates.h"
-#include "sim/collision/contact_frame.h"
 #include "sim/geometry/closest_points.h"
 
 namespace offstage::sim {
@@ -24,9 +24,7 @@ constexpr Real kSamePoint = 1e-6;
 class CoplanarGroup {
  public:
   CoplanarGroup(const Manifold& first, const CollisionMesh& mesh, const Pose& mesh_pose, bool of_b)
-      : first_(first), mesh_(mesh), pose_(mesh_pose), of_b_(of_b) {
-    triangles_.push_back(triangle_of(first));
-  }
+      : first_(first), mesh_(mesh), pose_(mesh_pose), of_b_(of_b) {}
 
   bool takes(const Manifold& m) const {
     if (m.source != first_.source || piece_of(m) != piece_of(first_)) return false;
@@ -41,7 +39,6 @@ class CoplanarGroup {
   void add(const Manifold& m) {
     if (points_.empty()) add_points(first_);
     add_points(m);
-    triangles_.push_back(triangle_of(m));
     continues_a_ &= m.continues_a;
     continues_b_ &= m.continues_b;
   }
@@ -63,6 +60,7 @@ class CoplanarGroup {
   const Vec3& on_mesh(const ContactPoint& p) const { return of_b_ ? p.on_b : p.on_a; }
 
   void add_points(const Manifold& m) {
+    triangles_.push_back(triangle_of(m));
     for (uint32_t k = 0; k < m.count; ++k) {
       const ContactPoint& p = m.points[k];
       const bool is_known = std::any_of(points_.begin(), points_.end(), [&](const Candidate& c) {
@@ -72,36 +70,31 @@ class CoplanarGroup {
     }
   }
 
+  const Candidate& farthest_from(const Vec3& place) const {
+    return *std::max_element(points_.begin(), points_.end(), [&](const Candidate& x, const Candidate& y) {
+      return (x.on_a - place).squaredNorm() < (y.on_a - place).squaredNorm();
+    });
+  }
+
   /// The corners of the convex outline of the points, and the deepest point if it is inside. The separation
   /// is linear over a flat part of the piece, so the others add nothing.
   std::vector<Candidate> outline() const {
     if (points_.size() < 2) return points_;
-    const ContactFrame frame = contact_frame(first_.normal);
+    // Along the greatest extent, so that rounding does not decide the order of points on a line.
+    const Vec3& end = farthest_from(points_.front().on_a).on_a;
+    const Vec3 along = (farthest_from(end).on_a - end).normalized(), across = first_.normal.cross(along);
     const auto at = [&](const Candidate& c) {
-      return Eigen::Vector2d(frame.t.dot(c.on_a), frame.k.dot(c.on_a));
+      return Eigen::Vector2d(along.dot(c.on_a), across.dot(c.on_a));
     };
     std::vector<Candidate> sorted = points_;
     std::sort(sorted.begin(), sorted.end(), [&](const Candidate& x, const Candidate& y) {
       const Eigen::Vector2d p = at(x), q = at(y);
       return std::pair(p.x(), p.y()) < std::pair(q.x(), q.y());
     });
-    // Andrew's monotone chain: the lower side, then the upper one.
     std::vector<Candidate> corners;
-    const auto wind = [&](auto begin, auto end) {
-      const std::size_t first = corners.size();
-      for (auto c = begin; c != end; ++c) {
-        const auto is_inside = [&] {
-          const Eigen::Vector2d o = at(corners[corners.size() - 2]), p = at(corners.back()) - o,
-                                q = at(*c) - o;
-          return p.x() * q.y() - p.y() * q.x() <= kSamePoint * q.norm();
-        };
-        while (corners.size() >= first + 2 && is_inside()) corners.pop_back();
-        corners.push_back(*c);
-      }
-      corners.pop_back();  // it begins the other side
-    };
-    wind(sorted.begin(), sorted.end());
-    wind(sorted.rbegin(), sorted.rend());
+    add_side(sorted, at, corners);
+    std::reverse(sorted.begin(), sorted.end());
+    add_side(sorted, at, corners);
     const auto deepest =
         std::min_element(points_.begin(), points_.end(),
                          [](const Candidate& x, const Candidate& y) { return x.separation < y.separation; });
@@ -110,6 +103,22 @@ class CoplanarGroup {
     });
     if (is_deeper) corners.push_back(*deepest);
     return corners;
+  }
+
+  /// Adds one side of the outline of sorted points (Andrew's monotone chain), without its last corner, where
+  /// the other side begins.
+  static void add_side(std::span<const Candidate> sorted, const auto& at, std::vector<Candidate>& corners) {
+    const std::size_t first = corners.size();
+    for (const Candidate& c : sorted) {
+      const auto is_passed = [&] {
+        const Eigen::Vector2d from = at(corners[corners.size() - 2]), p = at(corners.back()) - from,
+                              q = at(c) - from;
+        return p.x() * q.y() - p.y() * q.x() <= kSamePoint * q.norm();
+      };
+      while (corners.size() >= first + 2 && is_passed()) corners.pop_back();
+      corners.push_back(c);
+    }
+    corners.pop_back();
   }
 
   uint32_t triangle_at_middle(const Manifold& m) const {
@@ -143,23 +152,20 @@ void join_coplanar(std::vector<Manifold>& manifolds, std::size_t from, const Col
                    const Pose& mesh_pose, bool of_b) {
   if (manifolds.size() < from + 2) return;
   const NormalSource face = of_b ? NormalSource::face_of_b : NormalSource::face_of_a;
-  std::vector<uint8_t> is_taken(manifolds.size(), 0);
-  std::size_t kept = from;
   for (std::size_t i = from; i < manifolds.size(); ++i) {
-    if (is_taken[i]) continue;
-    Manifold m = manifolds[i];
-    if (m.source == face) {
-      CoplanarGroup group(manifolds[i], mesh, mesh_pose, of_b);
-      for (std::size_t k = i + 1; k < manifolds.size(); ++k)
-        if (!is_taken[k] && group.takes(manifolds[k])) {
-          group.add(manifolds[k]);
-          is_taken[k] = 1;
-        }
-      m = group.joined();
-    }
-    manifolds[kept++] = m;
+    if (manifolds[i].source != face || manifolds[i].count == 0) continue;
+    CoplanarGroup group(manifolds[i], mesh, mesh_pose, of_b);
+    for (std::size_t k = i + 1; k < manifolds.size(); ++k)
+      if (manifolds[k].count > 0 && group.takes(manifolds[k])) {
+        group.add(manifolds[k]);
+        manifolds[k].count = 0;
+      }
+    manifolds[i] = group.joined();
   }
-  manifolds.resize(kept);
+  const auto joined = [](const Manifold& m) { return m.count == 0; };
+  manifolds.erase(
+      std::remove_if(manifolds.begin() + static_cast<std::ptrdiff_t>(from), manifolds.end(), joined),
+      manifolds.end());
 }
 
 }  // namespace offstage::sim

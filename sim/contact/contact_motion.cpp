@@ -281,7 +281,7 @@ bool runs_along(const Body& body, Real duration) {
   return is_revolved(body.def.shape) && turn.squaredNorm() > kStraight * kStraight;
 }
 
-Real running_speed(const Body& body, const Vec3& normal) {
+Real rim_speed(const Body& body, const Vec3& normal) {
   if (!body.is_awake() || !is_revolved(body.def.shape)) return 0;
   const Vec3 axis = body.start.orientation * Vec3::UnitY(), lean = normal.cross(axis);
   if (lean.norm() < kUpright || std::abs(normal.dot(axis)) < kUpright) return 0;

@@ -45,9 +45,9 @@ Vec3 start_centre(const Body& body);
 bool runs_along(const Body& body, Real duration);
 
 /// Angular speed at the interval's start at which the axis of a cylinder, cone or frustum turns about the
-/// normal of a contact [rad/s]: the lowest point of a leaning rim runs around at this speed, as under a coin
-/// that wobbles. 0 if a face or a side lies flat, and for other shapes.
-Real running_speed(const Body& body, const Vec3& normal);
+/// normal of a contact [rad/s]. The lowest point of a tilted rim moves around the rim at this speed, as that
+/// of a wobbling coin does. 0 if a face or a side lies flat, and for other shapes.
+Real rim_speed(const Body& body, const Vec3& normal);
 
 /// Predicts the motion of a contact of a manifold. `frame` is the manifold's frame and `place` the contact's
 /// position in the world at the interval's start, in the middle between surfaces that are `gap` apart [m]

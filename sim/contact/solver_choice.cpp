@@ -7,9 +7,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Islands of at most this many bodies always use the exact solver, in a world whose fast solution takes less
-/// than kSmall [ns].
-constexpr std::size_t kFew = 6;
+/// Islands of at most kFewBodies bodies always use the exact solver, in a world whose fast solution takes
+/// less than this [ns].
 constexpr Real kSmall = 1e5;
 /// Cost of the fast solver per point and sub-step [ns].
 constexpr Real kFastPoint = 60;
@@ -54,20 +53,20 @@ void ExactSolverBudget::begin(std::span<Island* const> islands, Real duration) {
 }
 
 bool SolverChoice::is_exact_worth(const Island& island, const ExactSolverBudget& patience) {
-  if (patience.is_small() && island.bodies.size() <= kFew) return true;
+  if (patience.is_small() && island.bodies.size() <= kFewBodies) return true;
   if (wait_ == 0) return proven_ || patience.left() > kLittle;
   --wait_;
   return false;
 }
 
 Real SolverChoice::budget(const Island& island, Real duration, const ExactSolverBudget& patience) const {
-  if (patience.is_small() && island.bodies.size() <= kFew) return kMostOfFew;
+  if (patience.is_small() && island.bodies.size() <= kFewBodies) return kMostOfFew;
   const Real fast = fast_cost(island, duration), credit = kCredit * fast * (proven_ ? 1 : patience.left());
   return is_quiet(island) ? credit : std::min(credit, kMostOfMoving * std::max(fast, kSmall));
 }
 
 void SolverChoice::learn(const Island& island, Real duration, bool solved, ExactSolverBudget& patience) {
-  if (patience.is_small() && island.bodies.size() <= kFew) return;
+  if (patience.is_small() && island.bodies.size() <= kFewBodies) return;
   const Real fast = fast_cost(island, duration), excess = exact->cost() - kWorth * fast;
   proven_ = solved && excess <= 0;
   patience.spend(excess);

@@ -9,6 +9,10 @@
 
 namespace offstage::sim {
 
+/// Up to so many bodies every solver is fast: in an island, the exact one is always used; in a world, each
+/// collision is resolved at its own time.
+inline constexpr std::size_t kFewBodies = 6;
+
 /// Budget of the exact solver beyond the cost of the fast one, for all islands of a world. A collapsing heap
 /// creates new islands in every sub-step, and each would be expensive.
 class ExactSolverBudget {

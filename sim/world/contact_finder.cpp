@@ -7,6 +7,7 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include "sim/contact/seams.h"
+#include "sim/contact/solver_choice.h"
 #include "sim/core/parallel_loop.h"
 
 namespace offstage::sim {
@@ -33,8 +34,6 @@ constexpr Real kReuse = 1e-4, kReuseShare = 2e-4, kExactReuse = 1e-8;
 /// for less than 7.7 m/s this is within kMargin in a step of 1/240 s.
 constexpr Real kPassedShare = 0.5;
 constexpr uint32_t kPassedOn = 3;
-/// Up to so many awake bodies the automatic choice of the solver can afford to resolve each collision.
-constexpr std::size_t kFew = 6;
 /// Bodies turn if their rotation moves their surfaces by more than this in an interval [m].
 constexpr Real kTurning = 2e-4;
 /// Bodies with more relative motion than this in an interval may touch with other features [m].
@@ -152,7 +151,7 @@ void ContactFinder::collect(bool again) {
   version_ = active_.version();
   graph_.update(
       broad_phase_.pairs(), again, [&](uint32_t slot) { return &world_.body_at(slot); },
-      [&](const Body& a, const Body& b) { return materials.surface(a, b, world_.def.collision); });
+      [&](const Body& a, const Body& b) { return materials_.surface(a, b, world_.def.collision); });
   std::vector<RankedPair> ranked;
   ranked.reserve(graph_.size());
   graph_.for_each([&](ContactPair& pair) {
@@ -196,7 +195,7 @@ void ContactFinder::propagate_impact_speeds(Real h) {
 
 void ContactFinder::find(Real h) {
   const std::span<Body* const> awake = active_.awake();
-  is_exact_ = world_.is_exact() || (world_.def.solver == SolverKind::automatic && awake.size() <= kFew);
+  is_exact_ = world_.is_exact() || (world_.def.solver == SolverKind::automatic && awake.size() <= kFewBodies);
   std::vector<Aabb> ways(awake.size());
   const std::vector<std::size_t> leaving = indices_where(awake.size(), [&](std::size_t i) {
     ways[i] = swept_bounds(*awake[i]);

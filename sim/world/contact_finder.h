@@ -14,10 +14,9 @@ namespace offstage::sim {
 
 class ContactFinder {
  public:
-  ContactFinder(const WorldState& world, ActiveBodies& active, const JointGroups& joints)
-      : world_(world), active_(active), joints_(joints) {}
-
-  ContactMaterials materials;
+  ContactFinder(const WorldState& world, const ContactMaterials& materials, ActiveBodies& active,
+                const JointGroups& joints)
+      : world_(world), materials_(materials), active_(active), joints_(joints) {}
 
   void use(const CollisionMethods& methods);
   /// Adds and removes bodies that collide.
@@ -71,12 +70,13 @@ class ContactFinder {
   void collect(bool again);
 
   const WorldState& world_;
+  const ContactMaterials& materials_;
   ActiveBodies& active_;
   const JointGroups& joints_;
   GroupedBroadPhase broad_phase_;  // of the colliding bodies, by slot; articulations are groups
   ContactGraph graph_;
   std::vector<ContactPair*> pairs_;
-  bool is_current_ = false, is_exact_ = true;
+  bool is_current_ = false, is_exact_ = false;
   uint64_t version_ = 0;  // of the active bodies that the pairs are for
 };
 

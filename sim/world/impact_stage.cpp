@@ -23,10 +23,12 @@ constexpr std::size_t kImpactWork = 2000, kExactImpactWork = 80'000;
 constexpr std::size_t kPointWork = 1, kPairWork = 3, kLookWork = 3;
 /// After this multiple of the limit no more pairs are traced back to in the sub-step.
 constexpr std::size_t kLastWork = 3;
-/// A contact that runs around a rim is found anew after each turn by this angle [rad], at most so many times.
-constexpr Real kRunningTurn = 0.1, kMostRunningPieces = 16;
-/// In larger islands the contacts that run are not found anew: heaps would be solved again for each of them.
-constexpr std::size_t kMostRunning = 8;
+/// If the contact point of a body moves around its rim by more than kRimTurn [rad] in the sub-step, the
+/// sub-step is divided for that body into at most kMostRimPieces pieces, and its contacts are updated after
+/// each piece. Islands with more than kMostRimBodies bodies are not divided, because all of their contacts
+/// would be solved once for each piece.
+constexpr Real kRimTurn = 0.1, kMostRimPieces = 16;
+constexpr std::size_t kMostRimBodies = 8;
 /// Contact points with a smaller separation take part in a collision [m].
 constexpr Real kCluster = 1e-4;
 
@@ -57,41 +59,41 @@ Real speed_by_forces(const Body& body, Real duration) {
 template <class IsWanted>
 std::size_t ImpactStage::search(IsWanted&& is_wanted) {
   const std::span<ContactPair* const> pairs = contacts_.pairs();
-  const std::vector<std::size_t> events =
+  const std::vector<std::size_t> wanted =
       indices_where(pairs.size(), [&](std::size_t i) { return pairs[i]->needs_toi && is_wanted(*pairs[i]); });
-  report_.impact_searches += events.size();
-  std::vector<std::optional<Real>> times(events.size());
-  std::vector<TestCounts> tests(events.size());
-  for_each_index(events.size(),
-                 [&](std::size_t i) { times[i] = impact_time(*pairs[events[i]], world_.def, h_, tests[i]); });
+  report_.impact_searches += wanted.size();
+  std::vector<std::optional<Real>> times(wanted.size());
+  std::vector<TestCounts> tests(wanted.size());
+  for_each_index(wanted.size(),
+                 [&](std::size_t i) { times[i] = impact_time(*pairs[wanted[i]], world_.def, h_, tests[i]); });
   for (const TestCounts& t : tests) {
     report_.volume_tests += t.volumes;
     report_.piece_tests += t.pieces;
   }
   std::size_t work = 0;
-  for (std::size_t i = 0; i < events.size(); ++i) {
-    if (times[i]) pending_.push_back({*times[i], pairs[events[i]], true});
-    work += kLookWork * search_pieces(*pairs[events[i]], h_);
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    if (times[i]) pending_.push_back({*times[i], pairs[wanted[i]], true});
+    work += kLookWork * search_pieces(*pairs[wanted[i]], h_);
   }
   return work;
 }
 
-/// Adds the times at which contacts that run around a rim are found anew.
-void ImpactStage::divide_running() {
+/// Adds the times at which the contacts of pairs whose contact point moves around a rim are updated.
+void ImpactStage::add_rim_updates() {
   for (ContactPair* pair : contacts_.pairs()) {
     if (pair->touching() == 0) continue;
     Real turn = 0;
     for (const PlacedManifold& m : pair->manifolds())
       for (const Body* body : {&pair->a(), &pair->b()})
-        turn = std::max(turn, h_ * running_speed(*body, m.frame.n));
-    const Real pieces = std::min(std::ceil(turn / kRunningTurn), kMostRunningPieces);
+        turn = std::max(turn, h_ * rim_speed(*body, m.frame.n));
+    const Real pieces = std::min(std::ceil(turn / kRimTurn), kMostRimPieces);
     for (Real i = 1; i < pieces; ++i) pending_.push_back({h_ * i / pieces, pair, false});
   }
 }
 
 void ImpactStage::resolve() {
   std::size_t work = search([](const ContactPair&) { return true; });
-  divide_running();
+  add_rim_updates();
   if (pending_.empty()) return;
   // An impact moves back only bodies that are connected to it by forces. Most others in an island are merely
   // near; they join if the impact sends a body their way.
@@ -108,7 +110,7 @@ void ImpactStage::resolve() {
       pending_.erase(next);
       const Body& body = event.pair->a().is_awake() ? event.pair->a() : event.pair->b();
       const Island& moving = islands_[body.island];
-      if (work > most_work || moving.from >= event.time || moving.bodies.size() > kMostRunning) continue;
+      if (work > most_work || moving.from >= event.time || moving.bodies.size() > kMostRimBodies) continue;
     }
     const uint32_t island = gather(*event.pair, event.time);
     work += impact_work(islands_[island]);

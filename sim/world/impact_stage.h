@@ -5,8 +5,8 @@
 /// impacts, later ones are left to the contact solver, which also prevents tunnelling. In a pile with too
 /// many impacts the restitution of slower ones is suppressed for the rest of the sub-step.
 ///
-/// Contacts that run far around a rim within the sub-step, as under a wobbling coin, divide it in the same
-/// way: their bodies stop at several times to find the contact anew.
+/// In the same way, a body whose contact point moves far around its rim within the sub-step, as that of a
+/// wobbling coin does, is moved in several pieces of the sub-step, with its contacts updated between them.
 
 #include <vector>
 
@@ -38,12 +38,12 @@ class ImpactStage {
   struct Event {
     Real time;  // since the sub-step's start
     ContactPair* pair;
-    bool is_impact;  // otherwise a contact that runs around a rim is found anew
+    bool is_impact;  // otherwise the contacts of the pair are updated, because they move around a rim
   };
 
   template <class IsWanted>
   std::size_t search(IsWanted&& is_wanted);
-  void divide_running();
+  void add_rim_updates();
   uint32_t gather(const ContactPair& pair, Real time);
   void limit(ContactPair& pair, std::size_t count, std::size_t work);
   void bring_to(Island& island, Real time);

@@ -284,7 +284,7 @@ BodyHandle World::add_body(const BodyDef& def) {
   body->before_step = body->before_substep = body->start_pose = body->pose;
   body->extent =
       std::holds_alternative<Plane>(def.shape) ? std::numeric_limits<Real>::infinity() : reach(body->solid);
-  body->surface = impl_->contacts.materials.number(def.material);
+  body->surface = impl_->materials.number(def.material);
   if (def.appear_at > impl_->now) body->absent = true, body->type = MotionType::static_body;
   body->was_present = !body->absent;
   impl_->has_lifetimes |= body->absent || std::isfinite(def.remove_at);
@@ -333,7 +333,7 @@ void World::add_contact_rule(const ContactRule& rule) {
   if (rule.static_friction) check_not_negative(object, "static_friction", *rule.static_friction);
   if (rule.rolling_friction) check_not_negative(object, "rolling_friction", *rule.rolling_friction);
   if (rule.spinning_friction) check_not_negative(object, "spinning_friction", *rule.spinning_friction);
-  impl_->contacts.materials.add(rule);
+  impl_->materials.add(rule);
   impl_->contacts.forget_all();
   impl_->islands.clear();
   impl_->active.wake_all();

@@ -56,7 +56,8 @@ struct World::Impl : WorldState {
   ActiveBodies active{*this};
   JointGroups joint_groups{*this};
   FreeMotion free_motion{*this};
-  ContactFinder contacts{*this, active, joint_groups};
+  ContactMaterials materials;
+  ContactFinder contacts{*this, materials, active, joint_groups};
   ContactSolver contact_solver{*this};
   ParticleMotion particle_motion{*this, active, joint_groups};
   ClothMotion cloth_motion{*this, active};

@@ -186,8 +186,8 @@ TEST_P(InternalEdges, DoNotStopRollingBodies) {
     for (const char* floor :
          {"two triangles", "a mesh", "a mesh of mixed winding", "T-vertices", "tiles", "tiles of mesh"})
       for (const Mover& mover : movers) {
-        // At long steps the fast solver is stopped by seams between bodies and at T-vertices.
-        if (step > 0.01 && !is_exact() && floor[0] != 'a' && floor != std::string("two triangles")) continue;
+        // At long steps the fast solver is stopped by seams between bodies.
+        if (step > 0.01 && !is_exact() && std::string(floor).starts_with("tiles")) continue;
         const Real speed = 4;
         World world(def(step));
         add_flat_floor(world, floor, 0.5);
@@ -290,12 +290,8 @@ TEST_P(InternalEdges, OfAValleyDoNotStopBodiesSlidingAlongIt) {
       run(world, 1, step);
       const Motion end = world.body_motion(body, world.time());
       const Vec3 expected(-1.013 + 5 * world.time(), mover.height, 0);
-      // By pivoting a cylinder trembles at the long step, by 0.3 mm/s.
-      const Real tremble = is_lcp() && step > 0.01 ? 100 : 1;
-      EXPECT_LT((end.pose.position - expected).norm(), 10 * tremble * tolerance())
-          << mover.name << ", step " << step;
-      EXPECT_LT((end.velocity - Vec3(5, 0, 0)).norm(), 5 * tremble * tolerance())
-          << mover.name << ", step " << step;
+      EXPECT_LT((end.pose.position - expected).norm(), 10 * tolerance()) << mover.name << ", step " << step;
+      EXPECT_LT((end.velocity - Vec3(5, 0, 0)).norm(), 5 * tolerance()) << mover.name << ", step " << step;
     }
 }
 
