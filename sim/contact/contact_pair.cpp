@@ -325,27 +325,43 @@ Real ContactPair::free_way(const PlacedManifold& m, const Vec3& place, Real gap,
 }
 
 /// The contact of a wheel stays below it while its rim turns. So a point found at the end is the same as one
-/// of the start if it is where the feature of that point moves to, on either body.
+/// of the start if it is where the feature of that point moves to, on either body; or it is between two of
+/// them, because triangles divide the line on which a cylinder lies differently at the end.
 bool ContactPair::is_expected(const Vec3& normal, const ContactPoint& at_end, Real duration) const {
-  const auto is_near = [&](const Body& body, const Vec3& before, const Vec3& after, const Vec3& out_before,
-                           const Vec3& out_after) {
-    const Ends ends(body);
-    const auto distance2 = [&](const Vec3& arm) { return (ends.end.position + arm - after).squaredNorm(); };
-    const Vec3 arm = before - ends.start.position;
-    return distance2(turned_arm(body, arm, ends.start.orientation, out_before, ends.end.orientation,
-                                out_after)) < kNear * kNear;
+  const Ends ends_a(*a_), ends_b(*b_);
+  const auto moved = [](const Body& body, const Ends& ends, const Vec3& place, const Vec3& out_before,
+                        const Vec3& out_after) {
+    return Vec3(ends.end.position + turned_arm(body, place - ends.start.position, ends.start.orientation,
+                                               out_before, ends.end.orientation, out_after));
+  };
+  struct Moved {
+    Vec3 on_a, on_b;
+    Real separation;
   };
   for (const PlacedManifold& m : placed_) {
     const Vec3& n = m.frame.n;
     if (n.dot(normal) < kSameNormal) continue;
+    std::array<Moved, 4> points;
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       const ContactPoint& p = m.manifold.points[k];
-      if (!is_near(*a_, p.on_a, at_end.on_a, -n, -normal) && !is_near(*b_, p.on_b, at_end.on_b, n, normal))
-        continue;
-      if (p.separation + free_way(m, (p.on_a + p.on_b) / 2, p.separation, duration) <
-          at_end.separation + kExpected)
-        return true;
+      points[k] = {moved(*a_, ends_a, p.on_a, -n, -normal), moved(*b_, ends_b, p.on_b, n, normal),
+                   p.separation + free_way(m, (p.on_a + p.on_b) / 2, p.separation, duration)};
     }
+    for (uint32_t k = 0; k < m.manifold.count; ++k)
+      for (uint32_t l = k; l < m.manifold.count; ++l) {
+        const auto is_between = [&](const Vec3& from, const Vec3& to, const Vec3& place) {
+          const Vec3 way = to - from;
+          const Real length2 = way.squaredNorm();
+          const Real share = length2 > 0 ? std::clamp(way.dot(place - from) / length2, 0.0, 1.0) : 0;
+          const Real separation =
+              points[k].separation + share * (points[l].separation - points[k].separation);
+          return (from + share * way - place).squaredNorm() < kNear * kNear &&
+                 separation < at_end.separation + kExpected;
+        };
+        if (is_between(points[k].on_a, points[l].on_a, at_end.on_a) ||
+            is_between(points[k].on_b, points[l].on_b, at_end.on_b))
+          return true;
+      }
   }
   return false;
 }
