@@ -325,10 +325,12 @@ Real ContactPair::free_way(const PlacedManifold& m, const Vec3& place, Real gap,
 }
 
 /// The contact of a wheel stays below it while its rim turns. So a point found at the end is the same as one
-/// of the start if it is where the feature of that point moves to, on either body; or it is between two of
-/// them, because triangles divide the line on which a cylinder lies differently at the end.
+/// of the start if it is where the feature of that point moves to, on either body. On triangles it may be
+/// between two of these places, because the triangles divide the line on which a cylinder lies differently at
+/// the end.
 bool ContactPair::is_expected(const Vec3& normal, const ContactPoint& at_end, Real duration) const {
   const Ends ends_a(*a_), ends_b(*b_);
+  const bool is_on_triangles = a_->collision_shape().surface() || b_->collision_shape().surface();
   const auto moved = [](const Body& body, const Ends& ends, const Vec3& place, const Vec3& out_before,
                         const Vec3& out_after) {
     return Vec3(ends.end.position + turned_arm(body, place - ends.start.position, ends.start.orientation,
@@ -348,7 +350,7 @@ bool ContactPair::is_expected(const Vec3& normal, const ContactPoint& at_end, Re
                    p.separation + free_way(m, (p.on_a + p.on_b) / 2, p.separation, duration)};
     }
     for (uint32_t k = 0; k < m.manifold.count; ++k)
-      for (uint32_t l = k; l < m.manifold.count; ++l) {
+      for (uint32_t l = k; l < (is_on_triangles ? m.manifold.count : k + 1); ++l) {
         const auto is_between = [&](const Vec3& from, const Vec3& to, const Vec3& place) {
           const Vec3 way = to - from;
           const Real length2 = way.squaredNorm();
