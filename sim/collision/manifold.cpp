@@ -153,6 +153,16 @@ bool is_round(const Convex& c) {
          c.core == Core::cone || c.core == Core::ellipsoid;
 }
 
+/// Whether a point is above or below a face; it may be outside of the sides by `slop`.
+bool is_over(const SupportingFeature& face, const Vec3& point, Real slop) {
+  for (uint32_t k = 0; k < face.count; ++k) {
+    const Vec3& corner = face.corners[k].point;
+    const Vec3 side = face.corners[(k + 1) % face.count].point - corner;
+    if (face.normal.cross(side).normalized().dot(point - corner) < -slop) return false;
+  }
+  return true;
+}
+
 /// Contact with a face that gives the normal. `closest` is the closest point on the incident solid; for a rim
 /// it may be deeper than the corners of its polygon. The feature of a round solid is the one that faces the
 /// face; if this is not over the face, there are no points. The line nearest to an edge of the face is not
@@ -181,7 +191,8 @@ void face_manifold(Manifold& m, const Body& reference, const SupportingFeature& 
   part.cut_all(slop);
   for (const Corner& c : part.corners()) add(c.point - incident.convex.radius * n, c.id);
   const bool none = candidates.count == 0;
-  if (none ? !round : n.dot(closest) - offset < candidates.least_separation() - slop)
+  if (none ? !round && is_over(face, closest, slop)
+           : n.dot(closest) - offset < candidates.least_separation() - slop)
     add(closest, closest_id(incident.name));
   reduce(m, candidates, slop, more);
 }

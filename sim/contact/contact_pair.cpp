@@ -325,12 +325,10 @@ Real ContactPair::free_way(const PlacedManifold& m, const Vec3& place, Real gap,
 }
 
 /// The contact of a wheel stays below it while its rim turns. So a point found at the end is the same as one
-/// of the start if it is where the feature of that point moves to, on either body. On triangles it may be
-/// between two of these places, because the triangles divide the line on which a cylinder lies differently at
-/// the end.
-bool ContactPair::is_expected(const Vec3& normal, const ContactPoint& at_end, Real duration) const {
+/// of the start if it is where the feature of that point moves to, on either body.
+bool ContactPair::is_expected(std::span<const PlacedManifold> known, const Vec3& normal,
+                              const ContactPoint& at_end, Real duration, bool between) const {
   const Ends ends_a(*a_), ends_b(*b_);
-  const bool is_on_triangles = a_->collision_shape().surface() || b_->collision_shape().surface();
   const auto moved = [](const Body& body, const Ends& ends, const Vec3& place, const Vec3& out_before,
                         const Vec3& out_after) {
     return Vec3(ends.end.position + turned_arm(body, place - ends.start.position, ends.start.orientation,
@@ -340,7 +338,7 @@ bool ContactPair::is_expected(const Vec3& normal, const ContactPoint& at_end, Re
     Vec3 on_a, on_b;
     Real separation;
   };
-  for (const PlacedManifold& m : placed_) {
+  for (const PlacedManifold& m : known) {
     const Vec3& n = m.frame.n;
     if (n.dot(normal) < kSameNormal) continue;
     std::array<Moved, 4> points;
@@ -350,7 +348,7 @@ bool ContactPair::is_expected(const Vec3& normal, const ContactPoint& at_end, Re
                    p.separation + free_way(m, (p.on_a + p.on_b) / 2, p.separation, duration)};
     }
     for (uint32_t k = 0; k < m.manifold.count; ++k)
-      for (uint32_t l = k; l < (is_on_triangles ? m.manifold.count : k + 1); ++l) {
+      for (uint32_t l = k; l < (between ? m.manifold.count : k + 1); ++l) {
         const auto is_between = [&](const Vec3& from, const Vec3& to, const Vec3& place) {
           const Vec3 way = to - from;
           const Real length2 = way.squaredNorm();
@@ -366,6 +364,12 @@ bool ContactPair::is_expected(const Vec3& normal, const ContactPoint& at_end, Re
       }
   }
   return false;
+}
+
+bool ContactPair::predicts(const Vec3& normal, const ContactPoint& at_end, Real duration,
+                           bool between) const {
+  const std::size_t known = placed_.size() - speculative;
+  return is_expected(std::span(placed_).first(known), normal, at_end, duration, between);
 }
 
 /// Transforms the contacts of the interval's end back to its start, each feature with its body.
@@ -404,18 +408,20 @@ PlacedManifold ContactPair::brought_back(const Manifold& at_end, Real duration) 
 
 void ContactPair::add_speculative_contacts(Real duration) {
   if (has_sphere_) return;
+  const Pose a_from_b = sim::between(a_->pose, b_->pose);
+  // Triangles divide the line on which a cylinder lies differently at the end.
+  const bool between = a_->collision_shape().surface() || b_->collision_shape().surface();
   static thread_local std::vector<Manifold> found;
   found.clear();
   cache_.keeps_sides = false;
-  find_manifolds(a_->collision_shape(), b_->collision_shape(), between(a_->pose, b_->pose), 0, cache_,
-                 surface_.method, found);
+  find_manifolds(a_->collision_shape(), b_->collision_shape(), a_from_b, 0, cache_, surface_.method, found);
   cache_.keeps_sides = true;
   for (Manifold& local : found) {
-    follow_rims(local, *a_, *b_, between(a_->pose, b_->pose));
+    follow_rims(local, *a_, *b_, a_from_b);
     Manifold at_end;
     place(local, a_->pose, at_end);
     const auto is_new = [&](const ContactPoint& p) {
-      return p.separation < -kExpected && !is_expected(at_end.normal, p, duration);
+      return p.separation < -kExpected && !is_expected(placed_, at_end.normal, p, duration, between);
     };
     if (std::none_of(at_end.points.begin(), at_end.points.begin() + at_end.count, is_new)) continue;
     placed_.push_back(brought_back(at_end, duration));

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <tuple>
+#include <utility>
 
 #include "sim/collision/distance.h"
 #include "sim/collision/gjk.h"
@@ -53,6 +54,12 @@ SurfaceDistance piece_distance(const CollisionShape& shape, uint32_t piece, cons
   GjkCache fresh;
   const Separation s = gjk(Convex{}, convex, {-p, Quat::Identity()}, fresh);
   return {s.distance, s.normal};
+}
+
+/// Whether bodies of a shape lie on a line of their surface.
+bool lies_on_lines(const Shape& shape) {
+  return std::holds_alternative<Capsule>(shape) || std::holds_alternative<Cylinder>(shape) ||
+         std::holds_alternative<Cone>(shape) || std::holds_alternative<Frustum>(shape);
 }
 
 /// A manifold seen from body X, which it shares with other manifolds; Y is the other body.
@@ -122,6 +129,10 @@ class BodyContacts {
     };
     std::vector<Hidden> hidden;
     for (std::size_t i = 0; i < views_.size(); ++i) {
+      if (views_[i].speculative && is_predicted(views_[i])) {
+        verdicts.push_back({views_[i].pair, views_[i].index, {}});
+        continue;
+      }
       if (!views_[i].may_be_at_seam()) continue;
       for (std::size_t k = 0; k < views_.size(); ++k)
         if (k != i && !views_[k].speculative)
@@ -158,6 +169,30 @@ class BodyContacts {
     for (uint32_t k = 1; k < v.m->count; ++k)
       if (up.dot(v.on_y(k) - best) > 0) best = v.on_y(k);
     return best;
+  }
+
+  /// Whether the known points of X on flush surfaces predict all points of a speculative contact: X goes on
+  /// from one tile to the next, and the force at its first tile holds it over the second one, too.
+  bool is_predicted(const View& v) const {
+    for (uint32_t k = 0; k < v.m->count; ++k)
+      if (std::none_of(views_.begin(), views_.end(),
+                       [&](const View& known) { return !known.speculative && predicts(known, v, k); }))
+        return false;
+    return true;
+  }
+
+  bool predicts(const View& known, const View& v, uint32_t k) const {
+    const Vec3 up = known.normal();
+    if (known.x_piece() != v.x_piece() || v.normal().dot(up) < kGoesOn) return false;
+    const Body& y = known.y();
+    const Vec3 at_end =
+        pose(y, true).point_to_world(pose(y, false).point_to_body(known.on_y(known.deepest())));
+    if (up.dot(v.on_y(k) - at_end) > flush_) return false;
+    // The tiles divide the line on which X lies differently at the end.
+    const bool between = known.pair != v.pair || lies_on_lines(x_.def.shape);
+    ContactPoint point = v.m->points[k];
+    if (known.x_is_a != v.x_is_a) std::swap(point.on_a, point.on_b);
+    return known.pair->predicts(known.x_is_a ? v.normal() : Vec3(-v.normal()), point, h_ - time_, between);
   }
 
   /// Returns a new normal for a contact that is level with or below a face on which the same piece lies, if

@@ -29,6 +29,9 @@ constexpr std::size_t kLastWork = 3;
 /// would be solved once for each piece.
 constexpr Real kRimTurn = 0.1, kMostRimPieces = 16;
 constexpr std::size_t kMostRimBodies = 8;
+/// Greatest number of times that an island continues again from the same impact for new contacts of the same
+/// bodies.
+constexpr int kMostPasses = 4;
 /// Contact points with a smaller separation take part in a collision [m].
 constexpr Real kCluster = 1e-4;
 
@@ -262,7 +265,15 @@ std::size_t ImpactStage::collide(uint32_t number, Real time) {
 /// so other bodies may be in its way and other contacts limit its motion. If so, they join, and all of them
 /// start again.
 void ImpactStage::go_on(uint32_t number, Real time) {
-  for (bool joined = true; joined;) {
+  std::size_t bodies = 0;
+  int same = 0;  // passes since the last body joined
+  for (bool joined = true; joined; ++same) {
+    if (islands_[number].bodies.size() > bodies) same = 0;
+    bodies = islands_[number].bodies.size();
+    if (same > kMostPasses) {  // the last motion stands
+      ++report_.toi_limit_reached;
+      return;
+    }
     for (Body* body : islands_[number].bodies) body->rigid.set_state(body->start);
     islands_[number].motion = &motion_.move_some(islands_[number].bodies, start_, time, h_ - time);
     find_pairs_again(number);
@@ -309,6 +320,7 @@ bool ImpactStage::join_overtaken(uint32_t number, Real time) {
   for (Body* body : islands_[number].bodies)
     body->impact_speed_bound = std::max(body->impact_speed_bound, speed_by_forces(*body, h_ - time));
   bool joined = false;
+  std::vector<ContactPair*> new_inside;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     ContactPair& pair = *pairs[i];
     const bool has_a = is_in(pair.a(), number), has_b = is_in(pair.b(), number);
@@ -320,13 +332,22 @@ bool ImpactStage::join_overtaken(uint32_t number, Real time) {
     if (std::max(pair.a().impact_speed_bound, pair.b().impact_speed_bound) * (h_ - time) > kTouching)
       contacts_.find_points(pair, time, h_);
     if (pair.needs_toi || !overlaps_at_end(pair, time)) continue;
-    joined = true;
-    if (is_inside) continue;
+    if (is_inside) {
+      new_inside.push_back(&pair);
+      continue;
+    }
     const uint32_t next = other.island;
     bring_to(islands_[next], time);
     join(number, next);
+    joined = true;
   }
-  return joined;
+  if (joined || new_inside.empty()) return joined;
+  // Points at seams do not limit the motion. They would be found and removed again and again.
+  std::vector<ContactPair*> inside = islands_[number].pairs;
+  inside.insert(inside.end(), new_inside.begin(), new_inside.end());
+  contacts_.remove_seams(inside, time, h_);
+  return std::any_of(new_inside.begin(), new_inside.end(),
+                     [](const ContactPair* pair) { return !pair->manifolds().empty() && !pair->needs_toi; });
 }
 
 /// Whether any points of a pair may meet within a time.
