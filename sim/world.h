@@ -21,7 +21,6 @@
 #include "sim/collision/tree_split.h"
 #include "sim/contact/collision.h"
 #include "sim/core/handle.h"
-#include "sim/core/non_finite.h"
 #include "sim/core/types.h"
 #include "sim/dynamics/body_def.h"
 #include "sim/dynamics/force_field.h"
@@ -33,6 +32,7 @@
 #include "sim/geometry/shape.h"
 #include "sim/geometry/solid_mesh.h"
 #include "sim/particles/particles.h"
+#include "sim/step_report.h"
 
 namespace offstage::sim {
 
@@ -127,66 +127,6 @@ struct WorldDef {
   bool sleep = true;               ///< whether islands at rest are not simulated until something reaches them
   Aabb bounds = Aabb(Vec3::Constant(-1000),
                      Vec3::Constant(1000));  ///< objects that leave are retired and reported (E3)
-};
-
-/// Two bodies whose contact forces are approximate: the pair with the greatest error in a group of contacts
-/// that fell back from its intended solver.
-struct RoughContact {
-  BodyHandle a, b;
-};
-
-/// Statistics of a step. Numerical trouble is reported here, never as an exception.
-struct StepReport {
-  uint32_t substeps = 0;
-  uint64_t particles_born = 0;
-  uint64_t particles_expired = 0;  ///< reached their lifespan or died in a collision
-  uint64_t particles_retired = 0;  ///< left the world's bounds
-  uint64_t particles_ejected = 0;  ///< found inside a body and projected out (P4)
-  uint64_t particles_removed = 0;  ///< found inside a body and could not be projected out (P4)
-  uint64_t particle_collisions = 0;
-  uint64_t truncated_sweeps = 0;           ///< particles that reached the limit of collisions in one sub-step
-  std::vector<BodyHandle> bodies_retired;  ///< left the world's bounds: frozen from here on
-
-  // Contacts of bodies. Those of type uint32_t are counts of the last sub-step; the others cover all
-  // sub-steps.
-  uint32_t bodies_awake = 0, bodies_asleep = 0;
-  uint32_t islands = 0;            ///< groups of bodies connected by contacts or joints
-  uint32_t contacts = 0;           ///< contact points
-  Real penetration = 0;            ///< greatest penetration at the starts of sub-steps and at impacts [m]
-  uint64_t pairs_tested = 0;       ///< pairs of bodies with overlapping boxes, of all sub-steps
-  uint64_t impact_searches = 0;    ///< searches for the time of impact of a pair
-  uint64_t volume_tests = 0;       ///< tests of two volumes of the trees of two bodies, of all sub-steps
-  uint64_t piece_tests = 0;        ///< tests of two convex parts or triangles of two bodies
-  uint64_t collisions = 0;         ///< contacts whose speed of approach exceeded WorldDef::collision_speed
-  uint64_t tracebacks = 0;         ///< trace-backs of islands to a time of impact
-  uint64_t toi_limit_reached = 0;  ///< pairs that reached the limit of time-of-impact events in a sub-step;
-                                   ///< their later impacts were not traced back
-  /// Pairs whose restitution was suppressed in a sub-step because their pile had too many impacts.
-  uint64_t restitution_suppressed = 0;
-  uint64_t speculative_contacts = 0;  ///< speculative contacts of the fast solver
-  uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;
-  ContactWork exact, fast, lcp;  ///< work of the solvers of resting contact
-  ContactWork particle_lcp;      ///< contact forces of particles by pivoting
-  ContactWork impacts;           ///< work of the solver of collisions
-  std::vector<RoughContact>
-      rough_contacts;            ///< one for each fall-back of these solvers, in the order of occurrence
-  IntegratorReport integration;  ///< of the motion without contacts
-
-  Real joint_error = 0;  ///< greatest residual of a joint's constraint at the end of a motion [m], [rad]
-  uint64_t joints_unsolved = 0;  ///< failed joint projections, and joint motions of limited energy
-  /// Joints that exceeded their breaking force or torque in this step.
-  std::vector<JointHandle> joints_broken;
-
-  uint64_t cloth_contacts = 0;  ///< of all cloths at the end of the step; for the others see ClothReport
-  uint64_t cloth_self_contacts = 0;
-  uint64_t cloth_springs_clamped = 0;  ///< at the end of the step
-  Real cloth_strain = 0;               ///< greatest
-  Real cloth_penetration = 0;          ///< deepest [m]
-  uint64_t cloth_moves_limited = 0, cloth_moves_held_back = 0, cloth_crossings = 0, cloth_springs_torn = 0;
-  uint64_t cloth_unconverged = 0;
-
-  bool finite = true;    ///< false: a quantity became NaN or infinite
-  NonFinite non_finite;  ///< the first such object, if not finite
 };
 
 /// Mechanical energy [J]: kinetic, potential and elastic. The potential energy is that of gravity (zero at y

@@ -33,7 +33,7 @@ int main() try {
     for (int frame = 0; frame < 30; ++frame) {
       // Emitters run before each sub-step, so that every particle is created at its own time within the step.
       report = world.step(1.0 / 30, [&](double start, double end) { nozzle.emit(world, start, end); });
-      collisions += report.particle_collisions;
+      collisions += report.particles.collisions;
     }
     double top = 0;
     for (const auto& position : world.particles(drops).position) top = std::max(top, position.y());

@@ -414,7 +414,7 @@ void Articulation::residual(Real time, std::span<const Vec6> velocities, std::sp
   }
 }
 
-void Articulation::transmit_impulses(Real time, JointTally& tally) {
+void Articulation::transmit_impulses(Real time, JointFigures& tally) {
   const bool is_settled =
       std::equal(bodies_.begin(), bodies_.end(), settled_.begin(), settled_.end(),
                  [](const Body* body, const Momenta& m) {
@@ -430,7 +430,7 @@ void Articulation::transmit_impulses(Real time, JointTally& tally) {
   if (fastest > kDisturbed) settle(time, tally);
 }
 
-void Articulation::settle(Real time, JointTally& tally) {
+void Articulation::settle(Real time, JointFigures& tally) {
   Real apart = 0;
   std::vector<Pose> before(bodies_.size());  // poses of the centres of mass
   for (int step = 0; step < kMostSteps; ++step) {

@@ -43,17 +43,6 @@ struct Joint {
   bool has_bounded_rows() const;
 };
 
-/// Statistics of joints in a step, for StepReport.
-struct JointTally {
-  uint64_t unsolved = 0;  ///< failed factorizations and projections, motions of limited energy
-  Real error = 0;         ///< greatest residual of a constraint [m]; of angles [rad]
-
-  void add(const JointTally& t) {
-    unsolved += t.unsolved;
-    error = error < t.error ? t.error : error;
-  }
-};
-
 /// Whether the joint's coordinate is an unbounded angle; Joint::coordinate then counts whole turns.
 bool counts_turns(const Joint& joint);
 /// Motion of a body at a time: that of its centre of mass, or of its origin if it is not dynamic.
@@ -80,10 +69,10 @@ class Articulation final : public JointedBodies {
   void add_forces(Real t, std::span<const LinkMotion> motion, std::span<const LinkMobility> mobility,
                   std::span<Vec6> forces);
   /// Propagates impulses that acted on single bodies since the last settle() through the joints.
-  void transmit_impulses(Real time, JointTally& tally);
+  void transmit_impulses(Real time, JointFigures& tally);
   /// Projects the bodies' `rigid` states onto the joint constraints at a time: first the positions, by the
   /// smallest mass-weighted displacement, then the velocities.
-  void settle(Real time, JointTally& tally);
+  void settle(Real time, JointFigures& tally);
 
   /// Evaluates the constraints at the bodies' current `rigid` states or, if `at_start`, at those of their
   /// interval's start.

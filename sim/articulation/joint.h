@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <tuple>
 #include <vector>
 
+#include "sim/core/figures.h"
 #include "sim/core/handle.h"
 #include "sim/core/types.h"
 #include "sim/dynamics/interpolation.h"
@@ -109,6 +111,19 @@ struct JointDef {
     return type != JointType::fixed && !is_coupling() &&
            (type != JointType::distance || has_limits() || motor.mode != Motor::Mode::none);
   }
+};
+
+/// Figures of the joints in a step.
+struct JointFigures {
+  Real error = 0;         ///< greatest residual of a constraint at the end of a motion [m], [rad]
+  uint64_t unsolved = 0;  ///< failed factorizations and projections, and joint motions of limited energy
+
+  static constexpr auto figures() {
+    using T = JointFigures;
+    return std::tuple(Figure("joint_error", &T::error, OverSteps::greatest),
+                      Figure("joints_unsolved", &T::unsolved));
+  }
+  void add(const JointFigures& more) { add_figures(*this, more); }
 };
 
 /// State of a joint.

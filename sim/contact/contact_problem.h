@@ -19,9 +19,11 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include "sim/collision/contact_frame.h"
+#include "sim/core/figures.h"
 #include "sim/core/types.h"
 
 namespace offstage::sim {
@@ -114,16 +116,16 @@ struct ContactWork {
   uint64_t restitution_reduced = 0;
   Real residual = 0;  ///< greatest residual [m/s]
 
-  void add(const ContactWork& w) {
-    solves += w.solves;
-    iterations += w.iterations;
-    factorizations += w.factorizations;
-    fallbacks += w.fallbacks;
-    over_budget += w.over_budget;
-    cluster_truncated += w.cluster_truncated;
-    restitution_reduced += w.restitution_reduced;
-    residual = residual < w.residual ? w.residual : residual;
+  static constexpr auto figures() {
+    using T = ContactWork;
+    return std::tuple(Figure("solves", &T::solves), Figure("iterations", &T::iterations),
+                      Figure("factorizations", &T::factorizations), Figure("fallbacks", &T::fallbacks),
+                      Figure("over_budget", &T::over_budget),
+                      Figure("cluster_truncated", &T::cluster_truncated),
+                      Figure("restitution_reduced", &T::restitution_reduced),
+                      Figure("residual", &T::residual, OverSteps::greatest));
   }
+  void add(const ContactWork& more) { add_figures(*this, more); }
 };
 
 /// Solves the problem by projected Gauss-Seidel, starting at the contacts' impulses, whose effect the bodies'

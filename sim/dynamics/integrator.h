@@ -6,10 +6,12 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include <Eigen/SparseCore>
 
+#include "sim/core/figures.h"
 #include "sim/core/types.h"
 
 namespace offstage::sim {
@@ -49,13 +51,13 @@ struct IntegratorReport {
   /// iteration had not converged.
   uint64_t missed = 0;
 
-  void add(const IntegratorReport& r) {
-    steps += r.steps;
-    rejected += r.rejected;
-    evaluations += r.evaluations;
-    iterations += r.iterations;
-    missed += r.missed;
+  static constexpr auto figures() {
+    using T = IntegratorReport;
+    return std::tuple(Figure("steps", &T::steps), Figure("rejected", &T::rejected),
+                      Figure("evaluations", &T::evaluations), Figure("iterations", &T::iterations),
+                      Figure("missed", &T::missed));
   }
+  void add(const IntegratorReport& more) { add_figures(*this, more); }
 };
 
 /// State that belongs to the caller of an integrator, and buffers. One per thread avoids allocation.

@@ -45,12 +45,7 @@ struct ParticleSystem::Striker {
 };
 
 ParticleTally& ParticleTally::operator+=(const ParticleTally& t) {
-  expired += t.expired;
-  retired += t.retired;
-  ejected += t.ejected;
-  removed += t.removed;
-  collisions += t.collisions;
-  truncated += t.truncated;
+  add(t);
   if (!lost) lost = t.lost;
   events.insert(events.end(), t.events.begin(), t.events.end());
   return *this;

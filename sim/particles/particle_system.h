@@ -16,8 +16,7 @@
 namespace offstage::sim {
 
 /// Results for a system's particles in a sub-step.
-struct ParticleTally {
-  uint64_t expired = 0, retired = 0, ejected = 0, removed = 0, collisions = 0, truncated = 0;
+struct ParticleTally : ParticleFigures {
   /// The first particle whose state became infinite or NaN; the world sets `object`.
   std::optional<NonFinite> lost;
   std::vector<ParticleEvent> events;  ///< if the system reports them

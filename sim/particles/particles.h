@@ -4,8 +4,10 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
+#include "sim/core/figures.h"
 #include "sim/core/handle.h"
 #include "sim/core/types.h"
 #include "sim/dynamics/integrator.h"
@@ -57,6 +59,26 @@ struct ParticleEvent {
   Vec3 velocity = Vec3::Zero();  ///< velocity after the event [m/s]
   Vec3 normal = Vec3::Zero();    ///< normal of the surface hit, towards the particle; zero for a death
   Real mass = 0, radius = 0, age = 0;
+};
+
+/// Figures of the particles in a step.
+struct ParticleFigures {
+  uint64_t born = 0;
+  uint64_t expired = 0;     ///< reached their lifespan or died in a collision
+  uint64_t retired = 0;     ///< left the world's bounds
+  uint64_t ejected = 0;     ///< found inside a body and projected out (P4)
+  uint64_t removed = 0;     ///< found inside a body and could not be projected out (P4)
+  uint64_t collisions = 0;  ///< with bodies and particles
+  uint64_t truncated = 0;   ///< particles that reached the limit of collisions in one sub-step
+
+  static constexpr auto figures() {
+    using T = ParticleFigures;
+    return std::tuple(Figure("particles_born", &T::born), Figure("particles_expired", &T::expired),
+                      Figure("particles_retired", &T::retired), Figure("particles_ejected", &T::ejected),
+                      Figure("particles_removed", &T::removed), Figure("particle_collisions", &T::collisions),
+                      Figure("truncated_sweeps", &T::truncated));
+  }
+  void add(const ParticleFigures& more) { add_figures(*this, more); }
 };
 
 /// The state of one system. All arrays have the same order, that of creation; removal keeps it.

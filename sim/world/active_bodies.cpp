@@ -206,8 +206,8 @@ void ActiveBodies::put_to_sleep(std::span<const Island> islands, Real start, Rea
 }
 
 void ActiveBodies::count(StepReport& report) {
-  report.bodies_woken += std::exchange(woken_, 0);
-  report.bodies_put_to_sleep += std::exchange(put_to_sleep_, 0);
+  report.bodies.woken += std::exchange(woken_, 0);
+  report.bodies.put_to_sleep += std::exchange(put_to_sleep_, 0);
 }
 
 }  // namespace offstage::sim

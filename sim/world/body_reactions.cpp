@@ -30,14 +30,14 @@ void BodyReactions::apply(std::span<const Reaction> reactions, Real time, StepRe
     pushed.push_back(sum.body);
     return true;
   });
-  JointTally tally;
+  JointFigures figures;
   for (const uint32_t slot : pushed) {
     Articulation* articulation = joints_.articulation_of(slot);
     if (!articulation) continue;
-    articulation->transmit_impulses(time, tally);
+    articulation->transmit_impulses(time, figures);
     for (Body* link : articulation->bodies()) link->pose = link->rigid.pose();
   }
-  count(tally, report);
+  report.joints.add(figures);
 }
 
 }  // namespace offstage::sim

@@ -114,16 +114,17 @@ void ClothMotion::report(StepReport& report) {
   system_.measure();
   world_.cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
     const ClothReport& r = cloth->report;
-    report.cloth_contacts += r.contacts;
-    report.cloth_self_contacts += r.self_contacts;
-    report.cloth_springs_clamped += r.clamped;
-    report.cloth_strain = std::max(report.cloth_strain, r.max_strain);
-    report.cloth_penetration = std::max(report.cloth_penetration, r.penetration);
-    report.cloth_moves_limited += r.limited;
-    report.cloth_moves_held_back += r.held_back;
-    report.cloth_crossings += r.crossings;
-    report.cloth_springs_torn += r.torn;
-    report.cloth_unconverged += r.unconverged;
+    ClothFigures& all = report.cloth;
+    all.strain = std::max(all.strain, r.max_strain);
+    all.penetration = std::max(all.penetration, r.penetration);
+    all.contacts += r.contacts;
+    all.self_contacts += r.self_contacts;
+    all.springs_clamped += r.clamped;
+    all.moves_limited += r.limited;
+    all.moves_held_back += r.held_back;
+    all.crossings += r.crossings;
+    all.springs_torn += r.torn;
+    all.unconverged += r.unconverged;
     if (!r.finite && report.finite)
       report.non_finite = {.object = cloth->def.name, .position_before = cloth->points[0]};
     report.finite &= r.finite;

@@ -307,17 +307,17 @@ bool ContactFinder::follow(std::span<Body* const> bodies) {
 }
 
 void ContactFinder::count(StepReport& report) const {
-  report.bodies_awake = static_cast<uint32_t>(active_.awake().size());
-  report.bodies_asleep = static_cast<uint32_t>(active_.asleep());
-  report.pairs_tested += pairs_.size();
-  report.contacts = 0;
+  report.bodies.awake = static_cast<uint32_t>(active_.awake().size());
+  report.bodies.asleep = static_cast<uint32_t>(active_.asleep());
+  report.contacts.pairs_tested += pairs_.size();
+  report.contacts.points = 0;
   for (ContactPair* pair : pairs_) {
     const TestCounts tests = pair->take_tests();
-    report.volume_tests += tests.volumes;
-    report.piece_tests += tests.pieces;
-    report.contacts += pair->touching();
-    report.speculative_contacts += pair->speculative;
-    report.penetration = std::max(report.penetration, pair->deepest);
+    report.contacts.volume_tests += tests.volumes;
+    report.contacts.piece_tests += tests.pieces;
+    report.contacts.points += pair->touching();
+    report.contacts.speculative += pair->speculative;
+    report.contacts.penetration = std::max(report.contacts.penetration, pair->deepest);
   }
 }
 

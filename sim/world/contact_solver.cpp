@@ -21,8 +21,8 @@ constexpr Real kAddedByJoints = 1e-3, kUsualExcess = 0.02;
 /// The motion by contacts and limits satisfies the joints only approximately, so it is projected. If links
 /// turn far in a step, the result may have more than the most kinetic energy [J] that the island can have;
 /// the relative velocities of its links are then reduced.
-JointTally settle_joints(const Island& island, Real end, Real most_energy) {
-  JointTally tally;
+JointFigures settle_joints(const Island& island, Real end, Real most_energy) {
+  JointFigures tally;
   for (Articulation* articulation : island.articulations) {
     articulation->settle(end, tally);
     for (Body* body : articulation->bodies()) body->pose = body->rigid.pose();
@@ -97,18 +97,18 @@ void ContactSolver::solve(std::span<Island* const> group, const ContactInterval&
   for (std::size_t i = 0; i < exact.size(); ++i) {
     const auto& [island, choice] = exact[i];
     const ExactContacts::Outcome& outcome = outcomes[i];
-    report.exact.add(outcome.work);
-    report.lcp.add(outcome.lcp);
+    report.solvers.exact.add(outcome.work);
+    report.solvers.lcp.add(outcome.lcp);
     add_rough(outcome.rough, report);
     choice->learn(*island, interval.duration, outcome.is_applied, patience_);
     if (outcome.is_applied) continue;
-    report.exact.over_budget += outcome.work.fallbacks == 0;
+    report.solvers.exact.over_budget += outcome.work.fallbacks == 0;
     fast.push_back(island);
   }
-  if (!fast.empty()) report.fast.add(fast_.solve(fast, interval));
+  if (!fast.empty()) report.solvers.fast.add(fast_.solve(fast, interval));
   sprung.keep_on_contacts();
   for (std::size_t i = 0; i < group.size(); ++i)
-    if (!group[i]->articulations.empty()) count(settle_joints(*group[i], interval.end, most[i]), report);
+    if (!group[i]->articulations.empty()) report.joints.add(settle_joints(*group[i], interval.end, most[i]));
 }
 
 void add_rough(const ContactPair* pair, StepReport& report) {

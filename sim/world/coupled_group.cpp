@@ -249,7 +249,7 @@ void CoupledGroup::store(std::span<const Real> x, std::span<const Real> p) {
 }
 
 void CoupledGroup::step(const Integrator& integrator, Real t, Real h, IntegratorWorkspace& work) {
-  for (const Jointed& j : articulations_) j.articulation->transmit_impulses(t, joint_tally_);
+  for (const Jointed& j : articulations_) j.articulation->transmit_impulses(t, joint_figures_);
   load(x_, p_);
   // The shortest step that an adaptive integrator found for any member. It is stored in the bodies; without
   // bodies it is unknown.
@@ -349,14 +349,14 @@ void CoupledGroup::advance(const Integrator& integrator, Real t, Real h, int dep
       advance(integrator, t, h / 2, depth + 1, halvings, work);
       return advance(integrator, t + h / 2, h / 2, depth + 1, halvings, work);
     }
-    ++joint_tally_.unsolved;  // the members do not move in this piece
+    ++joint_figures_.unsolved;  // the members do not move in this piece
   }
   for (const Jointed& j : articulations_) {
     // The projection of the joints changes the angular momentum. (After contacts this is wanted: there the
     // projection reverses displacements by the contacts.)
     const bool is_free = !is_held(*j.articulation);
     const CommonMotion common = is_free ? common_motion(j.articulation->bodies()) : CommonMotion{};
-    j.articulation->settle(t + h, joint_tally_);
+    j.articulation->settle(t + h, joint_figures_);
     if (is_free) keep_angular_momentum(j.articulation->bodies(), common);
   }
   load(x_, p_);
@@ -373,7 +373,7 @@ void CoupledGroup::limit_energy(Real most) {
   const Real share = std::sqrt(std::max(0.0, 1 - excess / internal));
   for (const Jointed& j : articulations_) slow_down(*j.articulation, share);
   load(x_, p_);
-  ++joint_tally_.unsolved;
+  ++joint_figures_.unsolved;
 }
 
 void CoupledGroup::save() {

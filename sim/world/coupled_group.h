@@ -38,7 +38,7 @@ class CoupledGroup final : public DynamicSystem {
   /// the first system is used.
   void step(const Integrator& integrator, Real t, Real h, IntegratorWorkspace& work);
 
-  const JointTally& joint_tally() const { return joint_tally_; }
+  const JointFigures& joint_figures() const { return joint_figures_; }
 
   /// Stores the state, and restores the state that was stored last.
   void save();
@@ -137,7 +137,7 @@ class CoupledGroup final : public DynamicSystem {
   std::vector<Group> groups_;
   std::vector<ActiveSpring> springs_;
   std::vector<Jointed> articulations_;
-  JointTally joint_tally_;
+  JointFigures joint_figures_;
   PairForces pair_forces_;
   std::size_t particles_ = 0;
   std::vector<Real> x_, p_, saved_x_, saved_p_, saved_steps_;

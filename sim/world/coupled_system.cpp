@@ -87,9 +87,9 @@ void CoupledSystem::gather(WorldState& world, std::span<Body* const> bodies, boo
   for (GroupMembers& members : networks) networks_.emplace_back(world, std::move(members), forces_);
 }
 
-JointTally CoupledSystem::joint_tally() const {
-  JointTally sum;
-  for (const CoupledGroup& n : networks_) sum.add(n.joint_tally());
+JointFigures CoupledSystem::joint_figures() const {
+  JointFigures sum;
+  for (const CoupledGroup& n : networks_) sum.add(n.joint_figures());
   return sum;
 }
 

@@ -37,7 +37,7 @@ class CoupledSystem {
   /// Statistics of all steps so far.
   const IntegratorReport& report() const { return report_; }
   /// Residuals of joints in all steps so far.
-  JointTally joint_tally() const;
+  JointFigures joint_figures() const;
 
  private:
   void resolve(const WorldState& world, std::span<const ForceDef* const> forces);

@@ -31,7 +31,7 @@ CoupledSystem& FreeMotion::move_some(std::span<Body* const> group, Real start, R
 void FreeMotion::count(StepReport& report) const {
   for (const auto& system : systems_) {
     report.integration.add(system->report());
-    sim::count(system->joint_tally(), report);
+    report.joints.add(system->joint_figures());
   }
 }
 

@@ -64,14 +64,14 @@ std::size_t ImpactStage::search(IsWanted&& is_wanted) {
   const std::span<ContactPair* const> pairs = contacts_.pairs();
   const std::vector<std::size_t> wanted =
       indices_where(pairs.size(), [&](std::size_t i) { return pairs[i]->needs_toi && is_wanted(*pairs[i]); });
-  report_.impact_searches += wanted.size();
+  report_.impacts.searches += wanted.size();
   std::vector<std::optional<Real>> times(wanted.size());
   std::vector<TestCounts> tests(wanted.size());
   for_each_index(wanted.size(),
                  [&](std::size_t i) { times[i] = impact_time(*pairs[wanted[i]], world_.def, h_, tests[i]); });
   for (const TestCounts& t : tests) {
-    report_.volume_tests += t.volumes;
-    report_.piece_tests += t.pieces;
+    report_.contacts.volume_tests += t.volumes;
+    report_.contacts.piece_tests += t.pieces;
   }
   std::size_t work = 0;
   for (std::size_t i = 0; i < wanted.size(); ++i) {
@@ -118,7 +118,7 @@ void ImpactStage::resolve() {
     const uint32_t island = gather(*event.pair, event.time);
     work += impact_work(islands_[island]);
     if (event.is_impact) {
-      ++report_.tracebacks;
+      ++report_.impacts.tracebacks;
       if (work > most_work) {
         join_pending(island, event.time);
         suppress_restitution(island);
@@ -143,7 +143,7 @@ void ImpactStage::limit(ContactPair& pair, std::size_t count, std::size_t work) 
       work <= kLastWork * most_work)
     return;
   pair.toi_exhausted = true;
-  ++report_.toi_limit_reached;
+  ++report_.impacts.toi_limit_reached;
 }
 
 /// Brings the bodies of a pair, with all that is connected to them, to a time, and merges their islands.
@@ -182,7 +182,7 @@ void ImpactStage::suppress_restitution(uint32_t island) {
   for (ContactPair* pair : contacts_.pairs()) {
     if (is_outside(pair->a()) || is_outside(pair->b()) || pair->restitution_suppressed) continue;
     pair->restitution_suppressed = true;
-    report_.restitution_suppressed += pair->needs_toi;
+    report_.impacts.restitution_suppressed += pair->needs_toi;
   }
 }
 
@@ -253,8 +253,8 @@ std::size_t ImpactStage::collide(uint32_t number, Real time) {
   const CollisionSettings settings{start_ + time, kCluster, world_.def.collision_speed, world_.def.impact,
                                    contacts_.is_exact()};
   const CollisionOutcome outcome = resolve_collisions(island, settings);
-  report_.collisions += outcome.bounces;
-  report_.impacts.add(outcome.work);
+  report_.impacts.collisions += outcome.bounces;
+  report_.solvers.impacts.add(outcome.work);
   add_rough(outcome.rough, report_);
   for (Body* body : island.bodies) body->rigid.set_state(body->start);
   if (time < h_ * (1 - kInstant)) go_on(number, time);

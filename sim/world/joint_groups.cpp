@@ -165,11 +165,6 @@ bool is_driven(const Island& island, Real time) {
   });
 }
 
-void count(const JointTally& tally, StepReport& report) {
-  report.joint_error = std::max(report.joint_error, tally.error);
-  report.joints_unsolved += tally.unsolved;
-}
-
 bool JointGroups::are_apart(const Body& a, const Body& b) const {
   return std::binary_search(apart_.begin(), apart_.end(),
                             std::pair<uint32_t, uint32_t>(std::minmax(a.handle.index, b.handle.index)));

@@ -50,7 +50,5 @@ void fit(Joint& joint);
 void place_at_bodies(Joint& joint);
 /// Whether a joint prevents an island from falling asleep.
 bool is_driven(const Island& island, Real time);
-/// Adds the statistics of joints to those of the step.
-void count(const JointTally& tally, StepReport& report);
 
 }  // namespace offstage::sim

@@ -33,7 +33,7 @@ bool ParticleMotion::step(Real start, Real h, const CoupledSystem& coupled, Step
   impulses_.begin(joints_.links());
   events_.clear();
   const ParticleStage stage{start, h, obstacles_.fixed(), obstacles_.moving(), world_.def.bounds, impulses_};
-  report.particle_lcp.add(collide(stage, coupled));
+  report.solvers.particle_lcp.add(collide(stage, coupled));
   auto collided = collisions_.outcomes().begin();
   bool any_removed = false;
   world_.systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {
@@ -47,12 +47,7 @@ bool ParticleMotion::step(Real start, Real h, const CoupledSystem& coupled, Step
       tally = system.step(stage, world_.forces(system), coupled.holds(system));
     }
     add(tally.events);
-    report.particles_expired += tally.expired;
-    report.particles_retired += tally.retired;
-    report.particles_ejected += tally.ejected;
-    report.particles_removed += tally.removed;
-    report.particle_collisions += tally.collisions;
-    report.truncated_sweeps += tally.truncated;
+    report.particles.add(tally);
     any_removed |= tally.expired + tally.retired + tally.removed > 0;
     if (tally.lost && report.finite) {
       report.non_finite = *tally.lost;

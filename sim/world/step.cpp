@@ -50,13 +50,13 @@ StepReport World::Impl::step(Real sampling, const BeforeSubStep& before) {
   cloth_motion.begin_step();
   report.substeps = substep_count(sampling, def.max_step);
   for (uint32_t i = 0; i < report.substeps; ++i) {
-    const Real start = now, end = at(static_cast<Real>(i + 1) / report.substeps);
+    const Real start = now, end = at(static_cast<Real>(i + 1) / static_cast<Real>(report.substeps));
     if (before) before(start, end);
     substep(start, end, report);
     now = end;
   }
   ++samplings;
-  report.particles_born = std::exchange(born, 0);
+  report.particles.born = std::exchange(born, 0);
   active.count(report);
   cloth_motion.report(report);
   collect_moved();
@@ -87,7 +87,7 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
     islands.clear();
     contacts.clear();
     contacts.count(report);
-    report.islands = 0;
+    report.bodies.islands = 0;
   }
   if (!cloths.empty()) step_cloths(start, h, report);
 }
@@ -111,7 +111,7 @@ void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
          indices_where(moving.size(), [&](std::size_t k) { return !is_within_bounds(*moving[k]); }))
       retire(*moving[i], report);
   contacts.count(report);
-  report.islands = static_cast<uint32_t>(islands.size());
+  report.bodies.islands = static_cast<uint32_t>(islands.size());
   active.put_to_sleep(islands, start, h);
 }
 
@@ -137,7 +137,7 @@ StepReport World::Impl::prewarm(Real from, Real to, const BeforeSubStep& before)
   const CoupledSystem still(*this, std::span<Body* const>{});
   report.substeps = from < to ? substep_count(to - from, def.max_step) : 0;
   for (uint32_t i = 0; i < report.substeps; ++i) {
-    const Real start = now, share = static_cast<Real>(i + 1) / report.substeps;
+    const Real start = now, share = static_cast<Real>(i + 1) / static_cast<Real>(report.substeps);
     const Real end = i + 1 < report.substeps ? from + share * (to - from) : to;
     if (before) before(start, end);
     begin_kinematic(start, end);
@@ -145,7 +145,7 @@ StepReport World::Impl::prewarm(Real from, Real to, const BeforeSubStep& before)
     now = end;
   }
   particle_motion.end_prewarm(to == 0);
-  report.particles_born = std::exchange(born, 0);
+  report.particles.born = std::exchange(born, 0);
   return report;
 }
 

@@ -44,9 +44,9 @@ void run(uint32_t cells, bool self_collision, Real rate) {
     const double spent = cpu_seconds() - before;
     total += spent;
     worst = std::max(worst, spent);
-    strain = std::max(strain, report.cloth_strain);
+    strain = std::max(strain, report.cloth.strain);
     mean += world.cloth_report(cloth).mean_strain / kFrames;
-    depth = std::max(depth, report.cloth_penetration);
+    depth = std::max(depth, report.cloth.penetration);
     if (self_collision) crossed = std::max(crossed, crossings(world.cloth(cloth)));
   }
   std::printf(
@@ -79,8 +79,8 @@ void run_peer(uint32_t nodes, Real rate) {
   Real greatest = 0, depth = 0;
   for (int i = 0; i < kSteps; ++i) {
     const StepReport report = world.step(1.0 / 240);
-    greatest = std::max(greatest, report.cloth_strain);
-    depth = std::max(depth, report.cloth_penetration);
+    greatest = std::max(greatest, report.cloth.strain);
+    depth = std::max(depth, report.cloth.penetration);
   }
   const ClothReport& end = world.cloth_report(cloth);
   std::printf(

@@ -16,7 +16,7 @@ constexpr Real kHeapStep = 1.0 / 240, kRadius = 0.005;
 void run_heap(benchmark::State& state, World& world, int warm_up) {
   for (int i = 0; i < warm_up; ++i) world.step(kHeapStep);
   uint64_t collisions = 0;
-  for (auto _ : state) collisions += world.step(kHeapStep).particle_collisions;
+  for (auto _ : state) collisions += world.step(kHeapStep).particles.collisions;
   const auto steps = static_cast<double>(state.iterations());
   state.SetItemsProcessed(state.iterations() * state.range(0));
   state.counters["substeps/s"] = benchmark::Counter(steps, benchmark::Counter::kIsRate);

@@ -29,7 +29,7 @@ World rain(std::size_t count, Real height, ParticleSystemHandle& system) {
 void time_steps(benchmark::State& state, World& world, int warm_up) {
   for (int i = 0; i < warm_up; ++i) world.step(kParticlesStep);
   uint64_t collisions = 0;
-  for (auto _ : state) collisions += world.step(kParticlesStep).particle_collisions;
+  for (auto _ : state) collisions += world.step(kParticlesStep).particles.collisions;
   state.SetItemsProcessed(state.iterations() * state.range(0));
   state.counters["substeps/s"] =
       benchmark::Counter(static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);

@@ -78,22 +78,16 @@ class Engine {
   }
   /// What the solvers did goes to the error output.
   ~Engine() {
-    const StepReport& r = report_;
+    const SolverFigures& s = figures_.solvers;
     std::fprintf(stderr,
                  "exact: %" PRIu64 " solves, %" PRIu64 " iterations, %" PRIu64 " factorizations, %" PRIu64
                  " fall-backs; fast: %" PRIu64 " solves; impacts: %" PRIu64 ", %" PRIu64
                  " fall-backs, %" PRIu64 " trace-backs, %" PRIu64 " cut short\n",
-                 r.exact.solves, r.exact.iterations, r.exact.factorizations, r.exact.fallbacks, r.fast.solves,
-                 r.impacts.solves, r.impacts.fallbacks, r.tracebacks, r.toi_limit_reached);
+                 s.exact.solves, s.exact.iterations, s.exact.factorizations, s.exact.fallbacks, s.fast.solves,
+                 s.impacts.solves, s.impacts.fallbacks, figures_.impacts.tracebacks,
+                 figures_.impacts.toi_limit_reached);
   }
-  void step() {
-    const StepReport r = world_.step(dt_);
-    report_.exact.add(r.exact);
-    report_.fast.add(r.fast);
-    report_.impacts.add(r.impacts);
-    report_.tracebacks += r.tracebacks;
-    report_.toi_limit_reached += r.toi_limit_reached;
-  }
+  void step() { figures_.add(world_.step(dt_)); }
   void sync() {}
   peer::State state(int i) const {
     const BodyState s = world_.body(handles_[static_cast<std::size_t>(i)]);
@@ -106,7 +100,7 @@ class Engine {
   World world_;
   double dt_;
   std::vector<BodyHandle> handles_;
-  StepReport report_;
+  StepFigures figures_;
 };
 
 }  // namespace

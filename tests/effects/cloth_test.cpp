@@ -150,7 +150,7 @@ TEST(Cloth, TearsUnderALoadAndStaysAMesh) {
   World world;
   const ClothHandle cloth = world.add_cloth(def);
   uint64_t torn = 0;
-  for (int i = 0; i < 12; ++i) torn += world.step(1.0 / 24).cloth_springs_torn;
+  for (int i = 0; i < 12; ++i) torn += world.step(1.0 / 24).cloth.springs_torn;
   const ClothView view = world.cloth(cloth);
   EXPECT_GT(torn, 0u);
   EXPECT_GT(view.version, 0u);
@@ -174,7 +174,7 @@ TEST(Cloth, ABallTearsAHole) {
   const BodyHandle ball =
       world.add_body({.shape = Sphere{0.12}, .pose = {{0.01, 1.3, 0.02}}, .velocity = {0, -12, 0}});
   uint64_t torn = 0;
-  for (int i = 0; i < 12; ++i) torn += world.step(1.0 / 24).cloth_springs_torn;
+  for (int i = 0; i < 12; ++i) torn += world.step(1.0 / 24).cloth.springs_torn;
   EXPECT_LT(world.body(ball).pose.position.y(), 0.5);
   EXPECT_GT(torn, 6u);
   EXPECT_LT(torn, 400u);

@@ -88,7 +88,7 @@ Rain rain(int threads, const SubEmitterDef& def) {
                                emitter.emit(world, start, end);
                                splashes.emit(world, start, end);
                              })
-                       .particles_expired;
+                       .particles.expired;
   result.hash = world.state_hash();
   result.report = splashes.report();
   return result;

@@ -419,7 +419,7 @@ class Overlap {
 
   /// Called after each step.
   void add(const World& world, const StepReport& report) {
-    const Real h = kFrame / report.substeps;
+    const Real h = kFrame / static_cast<Real>(report.substeps);
     Motions now;
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
       const RandomScene::Body& body = scene_.bodies[i];
@@ -434,8 +434,8 @@ class Overlap {
                speed = std::max(now.speed(), before_.speed());
     before_ = now;
     Real added = kSolved + turning;
-    if (report.toi_limit_reached + report.restitution_suppressed > 0) added += h * speed;
-    for (uint32_t i = 0; i < report.substeps; ++i) left_ = (1 - kPushedOut) * left_ + added;
+    if (report.impacts.toi_limit_reached + report.impacts.restitution_suppressed > 0) added += h * speed;
+    for (uint64_t i = 0; i < report.substeps; ++i) left_ = (1 - kPushedOut) * left_ + added;
   }
   Real allowed() const { return left_; }
 
@@ -469,8 +469,8 @@ class Overlap {
 
 /// The counted work of a step, in solver operations on the contacts of the scene.
 uint64_t counted_work(const StepReport& r) {
-  return r.exact.iterations + r.exact.factorizations + r.impacts.iterations + r.impacts.factorizations +
-         50 * r.tracebacks;
+  return r.solvers.exact.iterations + r.solvers.exact.factorizations + r.solvers.impacts.iterations +
+         r.solvers.impacts.factorizations + 50 * r.impacts.tracebacks;
 }
 
 }  // namespace
@@ -498,8 +498,8 @@ Findings simulate(const RandomScene& scene) {
       found.gained_at = world.time();
     }
     overlap.add(world, r);
-    if (r.penetration - overlap.allowed() > found.penetration - found.allowed_penetration) {
-      found.penetration = r.penetration;
+    if (r.contacts.penetration - overlap.allowed() > found.penetration - found.allowed_penetration) {
+      found.penetration = r.contacts.penetration;
       found.allowed_penetration = overlap.allowed();
     }
     found.work = std::max(found.work, counted_work(r));

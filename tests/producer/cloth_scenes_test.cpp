@@ -71,7 +71,7 @@ TEST_P(LongClothScene, KeepsClothOutOfBodiesAndOfItself) {
     ASSERT_EQ(inside, 0u) << "frame " << i;
     ASSERT_EQ(crossed_pairs(simulation), 0u) << "frame " << i;
   }
-  EXPECT_EQ(simulation.totals().cloth_penetration, 0);
+  EXPECT_EQ(simulation.totals().cloth.penetration, 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Long, LongClothScene, ::testing::ValuesIn(scenes_with_cloth()),

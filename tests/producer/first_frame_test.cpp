@@ -51,7 +51,7 @@ TEST(FirstFrame, HasABurstAtTheStartTime) {
                         std::to_string(time) + "}]",
                     R"(, "start": )" + std::to_string(start)));
     ASSERT_EQ(film.at(1).size(), 10u) << time;
-    EXPECT_EQ(film.totals().born, 10u);
+    EXPECT_EQ(film.totals().particles.born, 10u);
     for (const render::Point& p : film.at(1)) EXPECT_NEAR(p.position.y(), 6.02, 1e-6);
     const auto& later = film.at(2);
     // Each particle is integrated over the whole first step: 2 m/s upwards for 0.1 s.
@@ -80,7 +80,7 @@ TEST(FirstFrame, HasPrewarmedParticlesWhereAFilmWithAnEarlierStartHasThem) {
   // No particle was below the ground and had to be moved out of it.
   EXPECT_GT(lowest(here), 0.0199);
   prewarmed.at(3);
-  EXPECT_EQ(prewarmed.totals().ejected + prewarmed.totals().removed, 0u);
+  EXPECT_EQ(prewarmed.totals().particles.ejected + prewarmed.totals().particles.removed, 0u);
 }
 
 TEST(FirstFrame, HasSplashesOfPrewarmedParticlesThatDied) {

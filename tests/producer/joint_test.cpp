@@ -88,8 +88,8 @@ TEST(Articulations, StartWithoutOverlapAndHoldWhenTheyFall) {
       EXPECT_LT(simulation.world().body(handle).velocity.norm(), 0.8) << name;
     }
   }
-  EXPECT_LT(simulation.totals().joint_error, 1e-9);
-  EXPECT_EQ(simulation.totals().joints_unsolved, 0u);
+  EXPECT_LT(simulation.totals().joints.error, 1e-9);
+  EXPECT_EQ(simulation.totals().joints.unsolved, 0u);
   for (const auto& [name, handle] : simulation.moving_bodies()) {
     if (name != "ann_0/head") continue;
     EXPECT_LT(simulation.world().body(handle).centre.y(), 1);

@@ -45,9 +45,9 @@ TEST(MethodBench, CountsTheWorkAndTheDeviationOfEachMethod) {
   const MethodResult& first = results.front();
   EXPECT_EQ(first.deviation(first), 0);
   EXPECT_EQ(first.totals.substeps, 29 * 8u);  // the first frame shows time 0
-  EXPECT_GT(first.totals.collisions, 2u);
-  EXPECT_GT(first.totals.impact_searches, 2u);
-  EXPECT_GT(first.totals.pairs_tested, first.totals.impact_searches);
+  EXPECT_GT(first.totals.impacts.collisions, 2u);
+  EXPECT_GT(first.totals.impacts.searches, 2u);
+  EXPECT_GT(first.totals.contacts.pairs_tested, first.totals.impacts.searches);
   for (const MethodResult& r : results) {
     EXPECT_EQ(r.fallbacks(), 0u) << r.name;
     EXPECT_GT(r.steps_per_second(), 0) << r.name;

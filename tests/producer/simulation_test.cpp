@@ -184,14 +184,14 @@ TEST(Simulation, BodiesThatMeetSlowlyDoNotBounce) {
 TEST(Simulation, TheSceneSelectsSolverAndSleep) {
   const std::string materials = R"("materials": [{"name": "floor"}, {"name": "cube"}], "world": )";
   const Simulated fast(cube_on_floor("", "", materials + R"({"solver": "fast"})"));
-  EXPECT_EQ(fast.totals().exact.solves, 0u);
-  EXPECT_GT(fast.totals().fast.solves, 0u);
-  EXPECT_EQ(fast.totals().bodies_asleep, 1u);
+  EXPECT_EQ(fast.totals().solvers.exact.solves, 0u);
+  EXPECT_GT(fast.totals().solvers.fast.solves, 0u);
+  EXPECT_EQ(fast.totals().bodies.asleep, 1u);
   const Simulated exact(cube_on_floor("", "", materials + R"({"solver": "exact", "sleep": false})"));
-  EXPECT_GT(exact.totals().exact.solves, 0u);
-  EXPECT_EQ(exact.totals().fast.solves, 0u);
-  EXPECT_EQ(exact.totals().bodies_asleep, 0u);
-  EXPECT_EQ(exact.totals().contacts, 4u);
+  EXPECT_GT(exact.totals().solvers.exact.solves, 0u);
+  EXPECT_EQ(exact.totals().solvers.fast.solves, 0u);
+  EXPECT_EQ(exact.totals().bodies.asleep, 0u);
+  EXPECT_EQ(exact.totals().contacts.points, 4u);
 }
 
 }  // namespace

@@ -63,8 +63,8 @@ TEST(Sweep, FiguresHaveNoTimesSoThatTheyRepeat) {
   slow.sim.add(7);
   EXPECT_EQ(figures_of(fast), figures_of(slow));
   const std::string table = to_csv({figures_of(fast)});
-  for (const char* name :
-       {"bodies", "contacts", "particles", "born", "removed", "exact_solver.solves", "state_hash"})
+  for (const char* name : {"bodies", "contacts", "particles", "particles_born", "particles_removed",
+                           "exact_solver.solves", "state_hash"})
     EXPECT_NE(table.find(name), std::string::npos) << name;
 }
 

@@ -48,7 +48,7 @@ GIVEN_BY = {
     "string": "string to_string stod stoi",
     "string_view": "string_view",
     "thread": "thread this_thread jthread",
-    "tuple": "tuple tie make_tuple",
+    "tuple": "tuple tie make_tuple apply",
     "type_traits": "is_same_v is_arithmetic_v is_enum_v is_constructible_v is_base_of_v conditional_t "
                    "is_trivially_copyable_v is_integral_v "
                    "remove_reference_t remove_cvref_t enable_if_t decay_t false_type true_type underlying_type_t invoke_result_t",

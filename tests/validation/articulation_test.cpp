@@ -252,7 +252,7 @@ TEST(FourBarLoop, StaysClosedForAMinute) {
   const Real start = world.energy().total();
   for (int i = 0; i < 60 * 240; ++i) {
     const StepReport report = world.step(1.0 / 240);
-    ASSERT_EQ(report.joints_unsolved, 0u);
+    ASSERT_EQ(report.joints.unsolved, 0u);
     ASSERT_LT(worst_gap(world, joints), 1e-6) << world.time();
   }
   // The change is 2.3e-4, and a thirty-second of that at half the step: the fifth-order error of the
@@ -595,7 +595,7 @@ TEST_P(Joints, LieStillOnTheFloorAndSleep) {
     last = joint.a;
   }
   const Tally all = run(world, 5);
-  EXPECT_EQ(all.last.bodies_asleep, 8u);
+  EXPECT_EQ(all.last.bodies.asleep, 8u);
   EXPECT_LT(all.penetration, 1e-3);
   EXPECT_LE(all.exact_fallbacks, 2u);  // when they fall onto the floor
   EXPECT_EQ(all.fast_fallbacks + all.toi_limit_reached, 0u);
@@ -618,7 +618,7 @@ TEST_P(Joints, SleepWhenTheLastKeyOfTheirMotorsIsPast) {
   const Tally all = run(world, 4);
   EXPECT_TRUE(world.is_asleep(hinge.a));
   EXPECT_NEAR(world.joint(joint).coordinate, 0.5, 0.02);
-  EXPECT_EQ(all.last.bodies_asleep, 1u);
+  EXPECT_EQ(all.last.bodies.asleep, 1u);
 }
 
 TEST_P(Joints, MoveTheSameWayForAnyNumberOfThreads) {
@@ -703,7 +703,7 @@ TEST(RedundantJoints, HoldADoorAsOneHingeDoes) {
                        .anchor = {0, 0.2 + 1.6 * i / hinges, 0},
                        .axis = Vec3::UnitY()});
     uint64_t unsolved = 0;
-    for (int i = 0; i < 60; ++i) unsolved += world.step(1.0 / 60).joints_unsolved;
+    for (int i = 0; i < 60; ++i) unsolved += world.step(1.0 / 60).joints.unsolved;
     EXPECT_EQ(unsolved, 0u) << hinges;
     EXPECT_NEAR(world.body(door).pose.position.y(), 1, 1e-6) << hinges;
     EXPECT_NEAR(world.body(door).angular_velocity.y(), 1, 1e-6) << hinges;
@@ -722,7 +722,7 @@ TEST(RedundantJoints, WeldTwoBoxesByManyJoints) {
     world.add_joint({.type = JointType::fixed, .a = a, .b = b, .anchor = {0.6, 0.1 * i, 0}});
   const Real before = world.energy().kinetic;
   uint64_t unsolved = 0;
-  for (int i = 0; i < 60; ++i) unsolved += world.step(1.0 / 60).joints_unsolved;
+  for (int i = 0; i < 60; ++i) unsolved += world.step(1.0 / 60).joints.unsolved;
   EXPECT_EQ(unsolved, 0u);
   EXPECT_NEAR(world.energy().kinetic / before, 1, 1e-4);
   const Pose pa = world.body(a).pose, pb = world.body(b).pose;

@@ -336,7 +336,7 @@ TEST(Gears, ShareATorqueByTheirRatio) {
                    .ratio = 2.5});
   twist(world, a.body, {0, 0, 0.5});
   Real error = 0;
-  for (int i = 0; i < 2400; ++i) error = std::max(error, world.step(1.0 / 240).joint_error);
+  for (int i = 0; i < 2400; ++i) error = std::max(error, world.step(1.0 / 240).joints.error);
   const Real acceleration = 0.5 / (a.inertia + b.inertia / 6.25), w = world.body(a.body).angular_velocity.z();
   EXPECT_NEAR(w / (acceleration * 10), 1, 1e-6);
   EXPECT_GT(w * 10 / 2 / (2 * kPi), 20);  // turns
@@ -508,9 +508,9 @@ FallenRings fallen_rings(const CollisionMethods& methods) {
   FallenRings result;
   while (world.time() < 0.4) {
     const StepReport r = world.step(1.0 / 240);
-    result.volume_tests += r.volume_tests;
-    result.piece_tests += r.piece_tests;
-    result.penetration = std::max(result.penetration, r.penetration);
+    result.volume_tests += r.contacts.volume_tests;
+    result.piece_tests += r.contacts.piece_tests;
+    result.penetration = std::max(result.penetration, r.contacts.penetration);
     result.finite &= r.finite;
   }
   for (const BodyHandle body : bodies) result.heights.push_back(world.body(body).pose.position.y());

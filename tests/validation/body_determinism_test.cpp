@@ -33,7 +33,7 @@ class BodyDeterminism : public testing::TestWithParam<SolverKind> {
       }
     world.add_body({.shape = Sphere{0.2}, .pose = {Vec3(-1, 0.21, 0)}, .velocity = {5, 0, 0}});
     uint64_t tracebacks = 0;
-    for (int i = 0; i < 60; ++i) tracebacks += world.step(1.0 / 60).tracebacks;
+    for (int i = 0; i < 60; ++i) tracebacks += world.step(1.0 / 60).impacts.tracebacks;
     if (restitution > 0) {
       EXPECT_GT(tracebacks, 0u);
     }
@@ -95,8 +95,8 @@ class CrowdDeterminism : public BodyDeterminism {
     uint32_t most_islands = 0;
     for (int i = 0; i < (is_exact ? 6 : 10); ++i) {
       tally.add(world.step(1.0 / 60));
-      EXPECT_GE(tally.last.bodies_awake, 200u);
-      most_islands = std::max(most_islands, tally.last.islands);
+      EXPECT_GE(tally.last.bodies.awake, 200u);
+      most_islands = std::max(most_islands, tally.last.bodies.islands);
       std::set<std::pair<uint32_t, uint32_t>> pairs;
       for (const ContactState& c : world.contacts()) pairs.emplace(c.a.index, c.b.index);
       outcome.touching = std::max(outcome.touching, pairs.size());

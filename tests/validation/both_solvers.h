@@ -61,14 +61,14 @@ struct Tally {
   StepReport last;
 
   void add(const StepReport& r) {
-    penetration = std::max(penetration, r.penetration);
-    collisions += r.collisions;
-    tracebacks += r.tracebacks;
-    toi_limit_reached += r.toi_limit_reached;
-    exact_fallbacks += r.exact.fallbacks + r.impacts.fallbacks;
-    fast_fallbacks += r.fast.fallbacks;
-    lcp_solves += r.lcp.solves;
-    lcp_fallbacks += r.lcp.fallbacks;
+    penetration = std::max(penetration, r.contacts.penetration);
+    collisions += r.impacts.collisions;
+    tracebacks += r.impacts.tracebacks;
+    toi_limit_reached += r.impacts.toi_limit_reached;
+    exact_fallbacks += r.solvers.exact.fallbacks + r.solvers.impacts.fallbacks;
+    fast_fallbacks += r.solvers.fast.fallbacks;
+    lcp_solves += r.solvers.lcp.solves;
+    lcp_fallbacks += r.solvers.lcp.fallbacks;
     finite &= r.finite;
     last = r;
   }

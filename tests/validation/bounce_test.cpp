@@ -72,7 +72,7 @@ TEST(ObliqueImpact, StickAndSlideThroughTheWorld) {
     world.add_particle(system,
                        {.position = {0, 0.1, 0}, .velocity = {2, -3, 0}, .restitution = kE, .friction = mu});
     const StepReport report = world.step(0.1);
-    EXPECT_EQ(report.particle_collisions, 1u);
+    EXPECT_EQ(report.particles.collisions, 1u);
     const Vec3 expected(mu < critical ? 2 - mu * (1 + kE) * 3 : 0, kE * 3, 0);
     EXPECT_NEAR((world.particles(system).velocity[0] - expected).norm(), 0, 1e-12);
     const Real hit = 0.09 / 3;

@@ -15,10 +15,10 @@ TEST(BoundedStep, OfHeapsTakesFewTraceBacksAndFactorizations) {
     for (int step = 0; step < 600; ++step) {
       const StepReport r = world.step(1.0 / 240);
       ASSERT_TRUE(r.finite) << name_of(heap);
-      ASSERT_LE(r.tracebacks, 60u) << name_of(heap) << ", step " << step;
-      ASSERT_LE(r.impacts.iterations, 6000u) << name_of(heap) << ", step " << step;
-      ASSERT_LE(r.exact.iterations, 2500u) << name_of(heap) << ", step " << step;
-      ASSERT_LE(r.exact.factorizations, 600u) << name_of(heap) << ", step " << step;
+      ASSERT_LE(r.impacts.tracebacks, 60u) << name_of(heap) << ", step " << step;
+      ASSERT_LE(r.solvers.impacts.iterations, 6000u) << name_of(heap) << ", step " << step;
+      ASSERT_LE(r.solvers.exact.iterations, 2500u) << name_of(heap) << ", step " << step;
+      ASSERT_LE(r.solvers.exact.factorizations, 600u) << name_of(heap) << ", step " << step;
     }
   }
 }

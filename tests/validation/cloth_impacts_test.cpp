@@ -45,7 +45,7 @@ TEST_P(ClothRebound, LeavesAlongTheAxisOnWhichTheBallCame) {
     const StepReport report = world.step(1.0 / 240);
     const BodyState state = world.body(ball);
     lowest = std::min(lowest, state.pose.position.y() - radius);
-    ASSERT_LT(report.cloth_penetration, fabric.thickness) << i;
+    ASSERT_LT(report.cloth.penetration, fabric.thickness) << i;
     ASSERT_LT(std::hypot(state.velocity.x(), state.velocity.z()), 0.05 * speed) << i;
     // Nothing acts but the cloth, which is at rest at first.
     ASSERT_LE(state.velocity.norm(), speed * (1 + 1e-9)) << i;

@@ -28,8 +28,8 @@ void drop_cloth(World& world, ClothHandle cloth, int frames) {
   for (int i = 0; i < frames; ++i) {
     const StepReport report = world.step(1.0 / 24);
     ASSERT_TRUE(report.finite);
-    ASSERT_EQ(report.cloth_penetration, 0);
-    ASSERT_EQ(report.cloth_crossings, 0u);
+    ASSERT_EQ(report.cloth.penetration, 0);
+    ASSERT_EQ(report.cloth.crossings, 0u);
     ASSERT_EQ(crossings(world.cloth(cloth)), 0u);
   }
 }
@@ -143,7 +143,7 @@ TEST(ClothValidation, AFastBallDoesNotGoThroughAPinnedCloth) {
   const BodyHandle ball =
       world.add_body({.shape = Sphere{0.12}, .pose = {{0, 1.3, 0}}, .velocity = {0, -15, 0}, .mass = 3});
   for (int i = 0; i < 48; ++i) {
-    EXPECT_LT(world.step(1.0 / 24).cloth_penetration, 2 * def.thickness) << i;
+    EXPECT_LT(world.step(1.0 / 24).cloth.penetration, 2 * def.thickness) << i;
     ASSERT_GT(world.body(ball).centre.y(), 0.2) << i;
   }
   EXPECT_EQ(crossings(world.cloth(cloth)), 0u);

@@ -68,7 +68,7 @@ TEST_P(BallDrop, ImpactsWithoutEndTerminate) {
   EXPECT_TRUE(d.tally.finite);
   EXPECT_GE(d.tally.tracebacks, 3u);
   EXPECT_LT(d.tally.tracebacks, 40u);
-  EXPECT_EQ(d.tally.last.tracebacks, 0u);
+  EXPECT_EQ(d.tally.last.impacts.tracebacks, 0u);
   EXPECT_NEAR(d.rest_height, 0, 1e-3);
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, BallDrop);
@@ -293,7 +293,8 @@ TEST(FastSolver, BoxesThatRotateIntoContactDoNotOverlap) {
                       .angular_velocity = 9 * direction(k + 7),
                       .restitution = 0});
     }
-    for (int step = 0; step < 120; ++step) deepest = std::max(deepest, world.step(1.0 / 240).penetration);
+    for (int step = 0; step < 120; ++step)
+      deepest = std::max(deepest, world.step(1.0 / 240).contacts.penetration);
   }
   EXPECT_LT(deepest, 1e-3);
 }

@@ -72,8 +72,8 @@ TEST(LcpSolver, SolvesStacksAndJointsWithoutFallbacks) {
   EXPECT_GT(t.lcp_solves, 400u);
   EXPECT_EQ(t.lcp_fallbacks, 0u);
   EXPECT_EQ(t.exact_fallbacks, 0u);
-  EXPECT_GT(t.last.lcp.iterations, 10u);
-  EXPECT_EQ(t.last.exact.solves, 0u);
+  EXPECT_GT(t.last.solvers.lcp.iterations, 10u);
+  EXPECT_EQ(t.last.solvers.exact.solves, 0u);
   EXPECT_NEAR(world.joint(joint).coordinate, 0.3, 1e-6);
 }
 

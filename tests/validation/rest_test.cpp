@@ -41,10 +41,10 @@ TEST_P(Sleep, ASettledStackCostsNothing) {
   Scene s = sleeping_stack();
   const StateHash before = s.world.state_hash();
   const StepReport r = s.world.step(1.0 / 60);
-  EXPECT_EQ(r.bodies_asleep, 3u);
-  EXPECT_EQ(r.bodies_awake, 0u);
-  EXPECT_EQ(r.islands, 0u);
-  EXPECT_EQ(r.exact.solves + r.fast.solves, 0u);
+  EXPECT_EQ(r.bodies.asleep, 3u);
+  EXPECT_EQ(r.bodies.awake, 0u);
+  EXPECT_EQ(r.bodies.islands, 0u);
+  EXPECT_EQ(r.solvers.exact.solves + r.solvers.fast.solves, 0u);
   EXPECT_TRUE(s.world.moved().empty());
   EXPECT_EQ(s.world.energy().kinetic, 0);
   run(s.world, 1);
@@ -153,7 +153,7 @@ TEST_P(Sleep, ASpringWhoseOtherEndMovesWakesIt) {
     s.world.add_spring({.a = BodyPoint{s.stack[2]}, .b = BodyPoint{hand}, .stiffness = 2000, .damping = 50});
     run(s.world, 0.95);
     EXPECT_TRUE(s.world.is_asleep(s.stack[2]));
-    EXPECT_EQ(s.world.step(1.0 / 240).bodies_awake, 0u);  // no cost until the other end moves
+    EXPECT_EQ(s.world.step(1.0 / 240).bodies.awake, 0u);  // no cost until the other end moves
     run(s.world, 1);
     EXPECT_GT(s.world.body(s.stack[2]).centre.x(), 0.5);
   }
@@ -236,7 +236,7 @@ TEST_P(Overlap, CoincidentBodiesComeApart) {
     bodies.push_back(world.add_body({.shape = s, .restitution = 0}));
   const Tally t = run(world, 2);
   EXPECT_TRUE(t.finite);
-  EXPECT_LT(t.last.penetration, 1e-3);
+  EXPECT_LT(t.last.contacts.penetration, 1e-3);
   for (const BodyHandle b : bodies) EXPECT_LT(world.body(b).velocity.norm(), 2);
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, Overlap);
@@ -292,7 +292,7 @@ TEST_P(Joined, APendulumOnAStiffSpringTransfersItsSpeed) {
       {.a = WorldPoint{{0, kLength, 0}}, .b = BodyPoint{bob}, .stiffness = 1e5, .rest_length = kLength});
   const Real before = world.energy().total();
   uint64_t collisions = 0;
-  for (int i = 0; i < 240 && collisions == 0; ++i) collisions += world.step(1.0 / 240).collisions;
+  for (int i = 0; i < 240 && collisions == 0; ++i) collisions += world.step(1.0 / 240).impacts.collisions;
   ASSERT_EQ(collisions, 1u);
   const Real speed = std::sqrt(2 * kGravity * kLength * (1 - std::cos(kStart)));
   EXPECT_NEAR(world.body(ball).velocity.x() / speed, 1, 0.01);
@@ -345,7 +345,7 @@ TEST_P(Rain, OnBodiesThatMove) {
                                 .radius = 0.005,
                                 .restitution = 0.3});
   const Tally t = run(world, 1.5);
-  EXPECT_EQ(t.last.particles_removed, 0u);
+  EXPECT_EQ(t.last.particles.removed, 0u);
   EXPECT_NEAR(world.body(boxes[2]).centre.y(), 1, 1e-3);
   for (const Vec3& p : world.particles(system).position) {
     for (const BodyHandle b : boxes) {

@@ -62,7 +62,7 @@ TEST_P(Stack, HeavyOnTopStands) {
     const Vec3 drift = world.body(boxes.back()).centre - Vec3(0, 0.7, 0);
     EXPECT_LT(drift.norm(), is_exact() ? 1e-9 : 4e-4) << ratio;
     EXPECT_LT(t.penetration, is_exact() ? 1e-9 : 3e-3) << ratio;
-    EXPECT_LT(t.last.penetration, is_exact() ? 1e-9 : 2e-4) << ratio;
+    EXPECT_LT(t.last.contacts.penetration, is_exact() ? 1e-9 : 2e-4) << ratio;
     EXPECT_EQ(t.exact_fallbacks, 0u) << ratio;
   }
 }
@@ -337,8 +337,8 @@ class Pile : public BothSolvers {
     const Tally t = run(world, seconds, 1.0 / 60);
     EXPECT_TRUE(t.finite);
     EXPECT_LT(t.penetration, deepest);
-    EXPECT_LT(t.last.penetration, 1e-3);
-    EXPECT_EQ(t.last.bodies_asleep, count);
+    EXPECT_LT(t.last.contacts.penetration, 1e-3);
+    EXPECT_EQ(t.last.bodies.asleep, count);
     EXPECT_LT(t.exact_fallbacks, 20 * seconds);
     for (const BodyHandle b : boxes) {
       const Vec3 c = world.body(b).centre;

@@ -8,23 +8,9 @@
 namespace offstage::sim {
 namespace {
 
-struct Decisions {
-  uint64_t woken = 0, put_to_sleep = 0, speculative_contacts = 0, restitution_suppressed = 0;
-  ContactWork exact, fast, impacts;
-
-  void add(const StepReport& r) {
-    woken += r.bodies_woken;
-    put_to_sleep += r.bodies_put_to_sleep;
-    speculative_contacts += r.speculative_contacts;
-    restitution_suppressed += r.restitution_suppressed;
-    exact.add(r.exact);
-    fast.add(r.fast);
-    impacts.add(r.impacts);
-  }
-};
-
-Decisions decisions(World& world, Real seconds) {
-  Decisions all;
+/// The sum of the reports over a time.
+StepFigures figures_of(World& world, Real seconds) {
+  StepFigures all;
   const Real end = world.time() + seconds - 1.0 / 480;
   while (world.time() < end) all.add(world.step(1.0 / 240));
   return all;
@@ -40,17 +26,17 @@ TEST(StepReport, ListsBodiesThatFellAsleepOrWoke) {
   for (int i = 0; i < 2; ++i)
     world.add_body(
         {.shape = Box{{1, 1, 1}}, .pose = {Vec3(0, 0.5 + i, 0), Quat::Identity()}, .restitution = 0});
-  Decisions d = decisions(world, 2);
-  EXPECT_EQ(d.put_to_sleep, 2u);
-  EXPECT_EQ(d.woken, 0u);
+  StepFigures d = figures_of(world, 2);
+  EXPECT_EQ(d.bodies.put_to_sleep, 2u);
+  EXPECT_EQ(d.bodies.woken, 0u);
   world.add_body({.shape = Sphere{0.2}, .pose = {Vec3(0, 3, 0), Quat::Identity()}, .restitution = 0});
-  d = decisions(world, 4);
-  EXPECT_EQ(d.woken, 2u);
-  EXPECT_EQ(d.put_to_sleep, 3u);
+  d = figures_of(world, 4);
+  EXPECT_EQ(d.bodies.woken, 2u);
+  EXPECT_EQ(d.bodies.put_to_sleep, 3u);
 }
 
 // 80 boxes with six or more contacts each fall into a pit: many impacts at once.
-Decisions reported_heap(SolverKind solver, Real restitution) {
+StepFigures reported_heap(SolverKind solver, Real restitution) {
   World world(WorldDef{.solver = solver});
   add_floor(world, restitution);
   for (int side = 0; side < 4; ++side) {
@@ -67,20 +53,20 @@ Decisions reported_heap(SolverKind solver, Real restitution) {
                     .angular_velocity = {3, 1, i % 5 - 2.0},
                     .restitution = restitution});
   }
-  return decisions(world, 2);
+  return figures_of(world, 2);
 }
 
 TEST(StepReport, CountsApproximationsOfEachSolver) {
-  const Decisions fast = reported_heap(SolverKind::fast, 0.3);
-  EXPECT_GT(fast.speculative_contacts, 0u);
-  EXPECT_GT(fast.impacts.cluster_truncated, 0u);
-  EXPECT_GT(fast.fast.solves, 0u);
-  EXPECT_EQ(fast.exact.solves + fast.exact.over_budget, 0u);
-  const Decisions automatic = reported_heap(SolverKind::automatic, 0);
-  EXPECT_GT(automatic.exact.solves, 0u);
-  EXPECT_GT(automatic.fast.solves, 0u);
-  EXPECT_GT(automatic.exact.over_budget, 0u);
-  EXPECT_EQ(automatic.impacts.cluster_truncated, 0u) << "nothing bounces";
+  const StepFigures fast = reported_heap(SolverKind::fast, 0.3);
+  EXPECT_GT(fast.contacts.speculative, 0u);
+  EXPECT_GT(fast.solvers.impacts.cluster_truncated, 0u);
+  EXPECT_GT(fast.solvers.fast.solves, 0u);
+  EXPECT_EQ(fast.solvers.exact.solves + fast.solvers.exact.over_budget, 0u);
+  const StepFigures automatic = reported_heap(SolverKind::automatic, 0);
+  EXPECT_GT(automatic.solvers.exact.solves, 0u);
+  EXPECT_GT(automatic.solvers.fast.solves, 0u);
+  EXPECT_GT(automatic.solvers.exact.over_budget, 0u);
+  EXPECT_EQ(automatic.solvers.impacts.cluster_truncated, 0u) << "nothing bounces";
 }
 
 TEST(StepReport, TheExactSolverMakesNoApproximations) {
@@ -90,10 +76,10 @@ TEST(StepReport, TheExactSolverMakesNoApproximations) {
     world.add_body({.shape = Box{{0.8, 0.8, 0.8}},
                     .pose = {Vec3(0.3 * (i % 2), 1 + i, 0), Quat::Identity()},
                     .restitution = 0.5});
-  const Decisions d = decisions(world, 1);
-  EXPECT_GT(d.impacts.solves, 0u);
-  EXPECT_EQ(d.speculative_contacts, 0u);
-  EXPECT_EQ(d.fast.solves, 0u);
+  const StepFigures d = figures_of(world, 1);
+  EXPECT_GT(d.solvers.impacts.solves, 0u);
+  EXPECT_EQ(d.contacts.speculative, 0u);
+  EXPECT_EQ(d.solvers.fast.solves, 0u);
 }
 
 }  // namespace

@@ -57,7 +57,7 @@ TEST(UniversalJointPose, InOnePlaneKeepsEnergyAndAngularMomentum) {
     Real most = start.energy, least = start.energy;
     while (world.time() < 10) {
       const StepReport report = world.step(1.0 / 60);
-      EXPECT_EQ(report.joints_unsolved, 0u);
+      EXPECT_EQ(report.joints.unsolved, 0u);
       most = std::max(most, world.energy().total());
       least = std::min(least, world.energy().total());
     }

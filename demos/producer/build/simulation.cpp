@@ -66,50 +66,6 @@ nlohmann::ordered_json stats_json(const Vec3& v) {
 
 }  // namespace
 
-void SimulationTotals::add(const sim::StepReport& report) {
-  substeps += report.substeps;
-  born += report.particles_born;
-  expired += report.particles_expired;
-  retired += report.particles_retired;
-  ejected += report.particles_ejected;
-  removed += report.particles_removed;
-  particle_collisions += report.particle_collisions;
-  truncated += report.truncated_sweeps;
-  bodies_awake = report.bodies_awake;
-  bodies_asleep = report.bodies_asleep;
-  islands = report.islands;
-  penetration = std::max(penetration, report.penetration);
-  pairs_tested += report.pairs_tested;
-  impact_searches += report.impact_searches;
-  volume_tests += report.volume_tests;
-  piece_tests += report.piece_tests;
-  collisions += report.collisions;
-  tracebacks += report.tracebacks;
-  toi_limit_reached += report.toi_limit_reached;
-  restitution_suppressed += report.restitution_suppressed;
-  speculative_contacts += report.speculative_contacts;
-  bodies_woken += report.bodies_woken;
-  bodies_put_to_sleep += report.bodies_put_to_sleep;
-  joint_error = std::max(joint_error, report.joint_error);
-  joints_unsolved += report.joints_unsolved;
-  cloth_strain = std::max(cloth_strain, report.cloth_strain);
-  cloth_penetration = std::max(cloth_penetration, report.cloth_penetration);
-  cloth_contacts = report.cloth_contacts;
-  cloth_self_contacts = report.cloth_self_contacts;
-  cloth_springs_clamped = report.cloth_springs_clamped;
-  cloth_moves_limited += report.cloth_moves_limited;
-  cloth_moves_held_back += report.cloth_moves_held_back;
-  cloth_crossings += report.cloth_crossings;
-  cloth_springs_torn += report.cloth_springs_torn;
-  cloth_unconverged += report.cloth_unconverged;
-  exact.add(report.exact);
-  lcp.add(report.lcp);
-  particle_lcp.add(report.particle_lcp);
-  fast.add(report.fast);
-  impacts.add(report.impacts);
-  integration.add(report.integration);
-}
-
 /// Cloths that are softer than they should be, and those that tore.
 void Simulation::note_cloths() {
   world_.for_each_cloth([&](sim::ClothHandle handle) {
@@ -383,7 +339,7 @@ SimulationTotals Simulation::totals() const {
   SimulationTotals all = totals_;
   all.step_s = scene_.world.step;
   for (const sim::BodyOverlap& overlap : world_.overlaps(kRounding))
-    all.penetration = std::max(all.penetration, overlap.depth);
+    all.contacts.penetration = std::max(all.contacts.penetration, overlap.depth);
   return all;
 }
 
@@ -403,8 +359,8 @@ void Simulation::step(double sampling_time) {
 void Simulation::note(const sim::StepReport& report) {
   totals_.add(report);
   note_cloths();
-  totals_.contacts = world_.contacts().size();
-  totals_.most_contacts = std::max(totals_.most_contacts, totals_.contacts);
+  totals_.contacts.points = world_.contacts().size();
+  totals_.most_contacts = std::max(totals_.most_contacts, totals_.contacts.points);
   const ParticleSources::Counts counts = sources_->counts();
   totals_.waiting = counts.waiting;
   totals_.skipped = counts.skipped;

@@ -31,40 +31,19 @@ class DivergedError : public std::runtime_error {
   std::string state_;
 };
 
-/// Sums of the step reports of a run.
-struct SimulationTotals {
-  uint64_t substeps = 0, born = 0, expired = 0, retired = 0, ejected = 0, removed = 0,
-           particle_collisions = 0, truncated = 0;
-  uint64_t waiting = 0, skipped = 0;       ///< counts of the emitters
+/// Figures of a run: those of all steps together, with the contacts and the penetration also at the end of
+/// the run.
+struct SimulationTotals : sim::StepFigures {
+  uint64_t waiting = 0, skipped = 0;  ///< counts of the emitters
+  uint64_t most_contacts = 0;         ///< greatest number of contact points of bodies at the end of a frame
   std::vector<std::string> broken_joints;  ///< in the order of breaking
-  sim::Real joint_error = 0;               ///< greatest residual of a constraint [m], [rad]
-  uint64_t joints_unsolved = 0;            ///< times that joint projection failed
   std::vector<std::string> lost_bodies;    ///< bodies that left the world's bounds and were frozen there
-
-  uint32_t bodies_awake = 0, bodies_asleep = 0, islands = 0;  ///< at the end
-  std::size_t contacts = 0;                                   ///< contact points of bodies at the end
-  std::size_t most_contacts = 0;                              ///< at the end of a frame
-  sim::Real penetration = 0;                                  ///< greatest in the run, and at its end [m]
-  uint64_t pairs_tested = 0, impact_searches = 0, volume_tests = 0, piece_tests = 0;
-  uint64_t collisions = 0, tracebacks = 0, toi_limit_reached = 0, restitution_suppressed = 0,
-           speculative_contacts = 0;
-  uint64_t bodies_woken = 0, bodies_put_to_sleep = 0;
-
-  // Cloths: greatest values in the run, values at its end, and sums.
-  sim::Real cloth_strain = 0, cloth_penetration = 0;
-  uint64_t cloth_contacts = 0, cloth_self_contacts = 0, cloth_springs_clamped = 0;
-  uint64_t cloth_moves_limited = 0, cloth_moves_held_back = 0, cloth_crossings = 0, cloth_springs_torn = 0,
-           cloth_unconverged = 0;
   std::map<std::string, sim::Real> softened_cloths;  ///< least share of its stiffness that a spring had
   std::map<std::string, sim::ClothTear> first_tears;
-  sim::ContactWork exact, fast, lcp, impacts, particle_lcp;
   /// Bodies with approximate contact forces, and how often a solver fell back for them.
   std::map<std::string, uint64_t> rough_bodies;
   double first_rough_s = 0;  ///< time of the first fall-back [s]
   double step_s = 0;         ///< longest internal step [s]
-  sim::IntegratorReport integration;
-
-  void add(const sim::StepReport& report);
 };
 
 class Simulation {

@@ -41,16 +41,16 @@ ResultRow row_of(const MethodResult& r, const MethodResult& first) {
   return {r.name,
           fmt::format("{:.0f}", r.steps_per_second()),
           fmt::format("{}", t.substeps),
-          fmt::format("{}", t.pairs_tested),
-          fmt::format("{}", t.volume_tests),
-          fmt::format("{}", t.piece_tests),
-          fmt::format("{}", t.impact_searches),
-          fmt::format("{}", t.collisions),
+          fmt::format("{}", t.contacts.pairs_tested),
+          fmt::format("{}", t.contacts.volume_tests),
+          fmt::format("{}", t.contacts.piece_tests),
+          fmt::format("{}", t.impacts.searches),
+          fmt::format("{}", t.impacts.collisions),
           fmt::format("{}", r.iterations()),
           fmt::format("{}", r.pivots()),
           fmt::format("{}", r.fallbacks()),
-          fmt::format("{:.3f}", 1000 * t.penetration),
-          fmt::format("{:.1e}", t.joint_error),
+          fmt::format("{:.3f}", 1000 * t.contacts.penetration),
+          fmt::format("{:.1e}", t.joints.error),
           deviation ? fmt::format("{:.4g}", *deviation) : "",
           r.fault};
 }
@@ -90,18 +90,19 @@ double MethodResult::steps_per_second() const {
 }
 
 uint64_t MethodResult::iterations() const {
-  return totals.exact.iterations + totals.fast.iterations + totals.impacts.iterations;
+  return totals.solvers.exact.iterations + totals.solvers.fast.iterations + totals.solvers.impacts.iterations;
 }
 
 uint64_t MethodResult::pivots() const {
-  return totals.lcp.iterations + totals.particle_lcp.iterations;
+  return totals.solvers.lcp.iterations + totals.solvers.particle_lcp.iterations;
 }
 
 uint64_t MethodResult::fallbacks() const {
-  uint64_t sum = totals.toi_limit_reached + totals.restitution_suppressed + totals.joints_unsolved;
-  for (const sim::ContactWork* work :
-       {&totals.exact, &totals.fast, &totals.lcp, &totals.impacts, &totals.particle_lcp})
-    sum += work->fallbacks + work->over_budget;
+  uint64_t sum =
+      totals.impacts.toi_limit_reached + totals.impacts.restitution_suppressed + totals.joints.unsolved;
+  sim::for_each_figure(totals.solvers, [&](std::string_view, const sim::ContactWork& work) {
+    sum += work.fallbacks + work.over_budget;
+  });
   return sum;
 }
 
@@ -165,10 +166,14 @@ std::string to_csv(const std::vector<MethodResult>& results) {
   for (const MethodResult& r : results) {
     const SimulationTotals& t = r.totals;
     CsvRows row;
-    row.text(r.name).number(r.seconds).count(t.substeps).count(t.pairs_tested).count(t.volume_tests);
-    row.count(t.piece_tests).count(t.impact_searches);
-    row.count(t.collisions).count(r.iterations()).count(r.pivots()).count(r.fallbacks());
-    row.number(t.penetration).number(t.joint_error);
+    row.text(r.name)
+        .number(r.seconds)
+        .count(t.substeps)
+        .count(t.contacts.pairs_tested)
+        .count(t.contacts.volume_tests);
+    row.count(t.contacts.piece_tests).count(t.impacts.searches);
+    row.count(t.impacts.collisions).count(r.iterations()).count(r.pivots()).count(r.fallbacks());
+    row.number(t.contacts.penetration).number(t.joints.error);
     if (const std::optional<double> deviation = r.deviation(results.front()))
       row.number(*deviation);
     else

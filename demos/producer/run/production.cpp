@@ -475,66 +475,15 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json report_json(const sim::ContactWork& work) {
-  return {{"solves", work.solves},
-          {"iterations", work.iterations},
-          {"factorizations", work.factorizations},
-          {"fallbacks", work.fallbacks},
-          {"over_budget", work.over_budget},
-          {"cluster_truncated", work.cluster_truncated},
-          {"restitution_reduced", work.restitution_reduced},
-          {"residual", work.residual}};
-}
-Json report_json(const sim::IntegratorReport& report) {
-  return {{"steps", report.steps},
-          {"rejected", report.rejected},
-          {"evaluations", report.evaluations},
-          {"iterations", report.iterations},
-          {"missed", report.missed}};
-}
-
-/// Adds the figures of contacts and their solvers.
-void add_contact_figures(const SimulationTotals& t, Json& json) {
-  json["bodies_awake"] = t.bodies_awake;
-  json["bodies_asleep"] = t.bodies_asleep;
-  json["islands"] = t.islands;
-  json["contacts"] = t.contacts;
-  json["most_contacts"] = t.most_contacts;
-  json["penetration"] = t.penetration;
-  json["pairs_tested"] = t.pairs_tested;
-  json["impact_searches"] = t.impact_searches;
-  json["volume_tests"] = t.volume_tests;
-  json["piece_tests"] = t.piece_tests;
-  json["collisions"] = t.collisions;
-  json["tracebacks"] = t.tracebacks;
-  json["toi_limit_reached"] = t.toi_limit_reached;
-  json["restitution_suppressed"] = t.restitution_suppressed;
-  json["speculative_contacts"] = t.speculative_contacts;
-  json["bodies_woken"] = t.bodies_woken;
-  json["bodies_put_to_sleep"] = t.bodies_put_to_sleep;
-  json["joint_error"] = t.joint_error;
-  json["joints_unsolved"] = t.joints_unsolved;
-  json["broken_joints"] = t.broken_joints;
-  json["exact_solver"] = report_json(t.exact);
-  json["fast_solver"] = report_json(t.fast);
-  json["lcp_solver"] = report_json(t.lcp);
-  json["particle_lcp"] = report_json(t.particle_lcp);
-  json["impact_solver"] = report_json(t.impacts);
-  json["rough_bodies"] = t.rough_bodies;
-  json["integration"] = report_json(t.integration);
-}
-
-Json cloth_figures(const SimulationTotals& t) {
-  return {{"strain", t.cloth_strain},
-          {"penetration", t.cloth_penetration},
-          {"contacts", t.cloth_contacts},
-          {"self_contacts", t.cloth_self_contacts},
-          {"springs_clamped", t.cloth_springs_clamped},
-          {"moves_limited", t.cloth_moves_limited},
-          {"moves_held_back", t.cloth_moves_held_back},
-          {"crossings", t.cloth_crossings},
-          {"springs_torn", t.cloth_springs_torn},
-          {"unconverged", t.cloth_unconverged}};
+/// Adds the figures of a part.
+template <sim::HasFigures Part>
+void add_figures(const Part& part, Json& json) {
+  sim::for_each_figure(part, [&](std::string_view name, const auto& value) {
+    if constexpr (!sim::HasFigures<std::remove_cvref_t<decltype(value)>>)
+      json[std::string(name)] = value;
+    else
+      add_figures(value, name.empty() ? json : json[std::string(name)]);
+  });
 }
 
 }  // namespace
@@ -556,19 +505,13 @@ std::string to_json(const RunStats& stats) {
   json["particles"] = stats.particles;
   json["most_particles"] = stats.most_particles;
   const SimulationTotals& t = stats.totals;
-  json["substeps"] = t.substeps;
-  json["particle_collisions"] = t.particle_collisions;
-  json["born"] = t.born;
-  json["expired"] = t.expired;
-  json["retired"] = t.retired;
-  json["lost_bodies"] = t.lost_bodies;
-  json["ejected"] = t.ejected;
-  json["removed"] = t.removed;
-  json["truncated_sweeps"] = t.truncated;
+  add_figures(t, json);
+  json["most_contacts"] = t.most_contacts;
   json["emitter_waits"] = t.waiting;
   json["emitter_skips"] = t.skipped;
-  add_contact_figures(t, json);
-  json["cloth"] = cloth_figures(t);
+  json["lost_bodies"] = t.lost_bodies;
+  json["broken_joints"] = t.broken_joints;
+  json["rough_bodies"] = t.rough_bodies;
   for (const auto& [name, energy] :
        {std::pair("energy_start", &stats.energy_start), std::pair("energy_end", &stats.energy_end)})
     if (*energy)

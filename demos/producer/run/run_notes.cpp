@@ -30,11 +30,11 @@ std::vector<std::string> notes_of(const SimulationTotals& t) {
                     body));
   for (const std::string& joint : t.broken_joints)
     notes.push_back(fmt::format("note: joint '{}' broke", joint));
-  if (t.joints_unsolved)
+  if (t.joints.unsolved)
     notes.push_back(fmt::format(
         "warning: the motion of joints could not be solved {} times; they may come apart or slow down. "
         "Reduce world.step (now {:g} s).",
-        t.joints_unsolved, t.step_s));
+        t.joints.unsolved, t.step_s));
   for (const auto& [cloth, share] : t.softened_cloths)
     notes.push_back(fmt::format(
         "warning: cloth '{}': the stiffness of springs was reduced to {:.2g} of its value, because they are "
@@ -52,34 +52,34 @@ std::vector<std::string> notes_of(const SimulationTotals& t) {
   const auto add = [&](uint64_t count, const char* what) {
     if (count) notes.push_back(fmt::format(fmt::runtime(what), count));
   };
-  add(t.retired, "note: {} particles left the world (world.bounds) and were removed");
+  add(t.particles.retired, "note: {} particles left the world (world.bounds) and were removed");
   add(t.skipped,
       "warning: {} particles were not released because max_alive was reached; emitters look thinner. "
       "Increase max_alive, or lower the rate or the lifespan.");
   add(t.waiting, "note: {} particles waited for free space on their emitter and were released late");
-  add(t.removed,
+  add(t.particles.removed,
       "warning: {} particles were deep inside a body and were removed. Keep emitters and groups of particles "
       "outside bodies, or reduce world.step.");
-  add(t.truncated,
+  add(t.particles.truncated,
       "note: {} particles reached the limit of collisions per sub-step; the rest of their motion in that "
       "sub-step was dropped");
   if (!t.rough_bodies.empty()) notes.push_back(note_of_rough_contacts(t));
-  if (t.lcp.fallbacks)
+  if (t.solvers.lcp.fallbacks)
     notes.push_back(
         fmt::format("note: world.solver \"lcp\": the exact solver took over {} of {} solutions of groups of "
                     "bodies, which "
                     "pivoting could not solve or which had too many contacts",
-                    t.lcp.fallbacks, t.lcp.solves));
-  if (t.particle_lcp.fallbacks)
+                    t.solvers.lcp.fallbacks, t.solvers.lcp.solves));
+  if (t.solvers.particle_lcp.fallbacks)
     notes.push_back(fmt::format(
         "note: world.particle_contacts \"lcp\": relaxation solved {} of {} clusters of particles, which had "
         "more than world.particle_cluster contacts or which pivoting could not solve",
-        t.particle_lcp.fallbacks, t.particle_lcp.solves));
-  if (t.toi_limit_reached)
+        t.solvers.particle_lcp.fallbacks, t.solvers.particle_lcp.solves));
+  if (t.impacts.toi_limit_reached)
     notes.push_back(fmt::format(
         "warning: pairs of bodies reached the limit of collisions per sub-step {} times; they did "
         "not bounce again in that sub-step. Reduce world.step (now {:g} s).",
-        t.toi_limit_reached, t.step_s));
+        t.impacts.toi_limit_reached, t.step_s));
   return notes;
 }
 

@@ -62,32 +62,24 @@ void take_methods(Keywords& k, sim::WorldDef& def) {
     throw std::invalid_argument("particle_cluster: must be 1 to 64");
 }
 
+/// Adds the figures of a part. The names of parts and figures are joined by an underscore.
+template <sim::HasFigures Part>
+void add_figures(const Part& part, const std::string& prefix, py::dict& d) {
+  sim::for_each_figure(part, [&](std::string_view name, const auto& value) {
+    const std::string key = prefix + std::string(name);
+    if constexpr (sim::HasFigures<std::remove_cvref_t<decltype(value)>>)
+      add_figures(value, name.empty() ? prefix : key + "_", d);
+    else
+      d[py::str(key)] = value;
+  });
+}
+
 py::dict to_dict(const sim::StepReport& r) {
   py::dict d;
-  d["substeps"] = r.substeps;
-  d["particles_born"] = r.particles_born;
-  d["particles_expired"] = r.particles_expired;
-  d["particles_retired"] = r.particles_retired;
-  d["particles_ejected"] = r.particles_ejected;
-  d["particles_removed"] = r.particles_removed;
-  d["particle_collisions"] = r.particle_collisions;
-  d["truncated_sweeps"] = r.truncated_sweeps;
+  add_figures(r, "", d);
   d["bodies_retired"] = r.bodies_retired;
-  d["bodies_awake"] = r.bodies_awake;
-  d["bodies_asleep"] = r.bodies_asleep;
-  d["islands"] = r.islands;
-  d["contacts"] = r.contacts;
-  d["penetration"] = r.penetration;
-  d["collisions"] = r.collisions;
-  d["toi_limit_reached"] = r.toi_limit_reached;
-  d["rough_contacts"] = r.rough_contacts.size();
-  d["joint_error"] = r.joint_error;
-  d["joints_unsolved"] = r.joints_unsolved;
   d["joints_broken"] = r.joints_broken;
-  d["cloth_contacts"] = r.cloth_contacts;
-  d["cloth_strain"] = r.cloth_strain;
-  d["cloth_springs_torn"] = r.cloth_springs_torn;
-  d["cloth_crossings"] = r.cloth_crossings;
+  d["rough_contacts"] = r.rough_contacts.size();
   d["finite"] = r.finite;
   return d;
 }

@@ -48,8 +48,8 @@ TEST(ParticleCollision, AFastMovingBodySweepsParticlesAlongAndLeavesNoneBehind) 
   for (int i = 0; i < 50; ++i)
     world.add_particle(system, {.position = {0.1 * i, 0, 0.01 * i - 0.2}, .radius = 0.005, .restitution = 0});
   StepReport total;
-  for (int i = 0; i < 5; ++i) total.particles_ejected += world.step(kFrame).particles_ejected;
-  EXPECT_EQ(total.particles_ejected, 0u);
+  for (int i = 0; i < 5; ++i) total.particles.ejected += world.step(kFrame).particles.ejected;
+  EXPECT_EQ(total.particles.ejected, 0u);
   for (std::size_t i = 0; i < 50; ++i) {
     const Vec3 x = world.particles(system).position[i], v = world.particles(system).velocity[i];
     const Real wall = -2 + 100 * world.time() + 0.01;
@@ -74,7 +74,7 @@ TEST(ParticleCollision, RestsOnEveryShapeWithoutSinkingOrDrifting) {
   }
   for (int i = 0; i < 300; ++i) world.step(kFrame);
   const auto resting = world.particles(system).position;
-  for (int i = 0; i < 300; ++i) ASSERT_EQ(world.step(kFrame).truncated_sweeps, 0u);
+  for (int i = 0; i < 300; ++i) ASSERT_EQ(world.step(kFrame).particles.truncated, 0u);
   for (std::size_t i = 0; i < shapes.size(); ++i) {
     EXPECT_NEAR(world.particles(system).position[i].y(), 0.26, 1e-9);
     EXPECT_NEAR((world.particles(system).position[i] - resting[i]).norm(), 0, 1e-12);
@@ -117,7 +117,7 @@ TEST(ParticleCollision, ComesToRestInACornerWithoutTruncatedSweeps) {
   world.add_particle(system, {.position = {0.5, 0.5, 0.3}, .mass = 0.01, .radius = 0.01, .friction = 0.1});
   for (int i = 0; i < 600; ++i) world.step(kFrame);
   uint64_t truncated = 0;
-  for (int i = 0; i < 60; ++i) truncated += world.step(kFrame).truncated_sweeps;
+  for (int i = 0; i < 60; ++i) truncated += world.step(kFrame).particles.truncated;
   EXPECT_EQ(truncated, 0u);
   EXPECT_NEAR((world.particles(system).position[0] - Vec3(0.99, 0.01, 0.99)).norm(), 0, 1e-8);
   EXPECT_NEAR(world.particles(system).velocity[0].norm(), 0, 1e-8);
@@ -148,9 +148,9 @@ TEST(ParticleCollision, IsProjectedOutOfABodyAndCounted) {
   const auto system = world.add_particle_system({});
   world.add_particle(system, {.position = {0.2, 0.4, 0}, .radius = 0.05});
   const StepReport report = world.step(kFrame);
-  EXPECT_EQ(report.particles_ejected, 1u);
+  EXPECT_EQ(report.particles.ejected, 1u);
   EXPECT_NEAR((world.particles(system).position[0] - Vec3(0.2, 0.55, 0)).norm(), 0, 1e-9);
-  EXPECT_EQ(world.step(kFrame).particles_ejected, 0u);
+  EXPECT_EQ(world.step(kFrame).particles.ejected, 0u);
 }
 
 TEST(ParticleCollision, IsRemovedAndCountedIfItCannotBeProjectedOut) {
@@ -161,7 +161,7 @@ TEST(ParticleCollision, IsRemovedAndCountedIfItCannotBeProjectedOut) {
                     .pose = {-0.01 * n, rotation_between(Vec3::UnitY(), n)}});
   const auto system = world.add_particle_system({});
   world.add_particle(system, {.radius = 0.05});
-  EXPECT_EQ(world.step(kFrame).particles_removed, 1u);
+  EXPECT_EQ(world.step(kFrame).particles.removed, 1u);
   EXPECT_EQ(world.particle_count(), 0u);
 }
 
@@ -172,7 +172,7 @@ TEST(ParticleCollision, DiesOnItsFirstCollisionIfSet) {
   world.add_particle(system, {.position = {0, 0.02, 0}});
   world.add_particle(system, {.position = {0, 50, 0}});
   uint64_t expired = 0;
-  for (int i = 0; i < 10; ++i) expired += world.step(kFrame).particles_expired;
+  for (int i = 0; i < 10; ++i) expired += world.step(kFrame).particles.expired;
   EXPECT_EQ(expired, 1u);
   EXPECT_EQ(world.particles(system).id, (std::vector<uint64_t>{1}));
 }

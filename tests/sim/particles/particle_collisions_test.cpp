@@ -123,7 +123,7 @@ TEST(ParticlePairs, AGasKeepsMomentumAndWithElasticCollisionsEnergy) {
   const Real energy = elastic.energy().kinetic;
   const Vec3 before = momentum(elastic);
   uint64_t collisions = 0;
-  for (int i = 0; i < 12; ++i) collisions += elastic.step(kFilmFrame).particle_collisions;
+  for (int i = 0; i < 12; ++i) collisions += elastic.step(kFilmFrame).particles.collisions;
   EXPECT_GT(collisions, 100u);
   EXPECT_NEAR(elastic.energy().kinetic, energy, 1e-9 * energy);
   EXPECT_NEAR((momentum(elastic) - before).norm(), 0, 1e-10);
@@ -154,7 +154,7 @@ TEST(ParticlePairs, FastParticlesInALineNeverPassEachOther) {
                                 .restitution = random.uniform(i, 2)});
   uint64_t collisions = 0;
   for (int i = 0; i < 20; ++i) {
-    collisions += world.step(kFilmFrame).particle_collisions;
+    collisions += world.step(kFilmFrame).particles.collisions;
     const auto& x = world.particles(system).position;
     for (std::size_t k = 1; k < x.size(); ++k)
       ASSERT_GT(x[k].x() - x[k - 1].x(), 0.99 * 2 * kRadius) << "step " << i;
@@ -210,7 +210,7 @@ TEST(ParticlePairs, SystemsMayBeEmptyAtAnyTime) {
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
   const auto a = world.add_particle_system({.internal = true});
   world.add_particle_system({.external = true});
-  EXPECT_EQ(world.step(kFilmFrame).particle_collisions, 0u);
+  EXPECT_EQ(world.step(kFilmFrame).particles.collisions, 0u);
   for (const std::size_t count : {300u, 0u, 2u, 0u, 5000u, 0u}) {
     for (std::size_t i = 0; i < count; ++i)
       world.add_particle(a, {.position = {0.1 * static_cast<Real>(i), 1, 0}, .lifespan = 1.5 * kFilmFrame});

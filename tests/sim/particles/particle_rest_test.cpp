@@ -52,7 +52,7 @@ TEST_P(ParticleStack, OfTenBeadsStandsAndItsForcesSumUp) {
     world.add_particle(system,
                        {.position = {0, 0.01 + 0.02 * i, 0}, .mass = 0.1 + 0.1 * (i % 3), .restitution = 0});
   ContactWork work;
-  for (int i = 0; i < 300; ++i) work.add(world.step(kRestFrame).particle_lcp);
+  for (int i = 0; i < 300; ++i) work.add(world.step(kRestFrame).solvers.particle_lcp);
   for (std::size_t i = 0; i < 10; ++i) {
     EXPECT_NEAR(world.particles(system).velocity[i].norm(), 0, 1e-6);
     EXPECT_NEAR(world.particles(system).position[i].y(), 0.01 + 0.02 * Real(i), 5e-4);
@@ -74,7 +74,7 @@ TEST(ParticleRest, RelaxationTakesOverLargeClusters) {
     const auto system = world.add_particle_system({.internal = true});
     for (int i = 0; i < 10; ++i)
       world.add_particle(system, {.position = {0, 0.01 + 0.02 * i, 0}, .mass = 0.1, .restitution = 0});
-    for (int i = 0; i < 20; ++i) work.add(world.step(kRestFrame).particle_lcp);
+    for (int i = 0; i < 20; ++i) work.add(world.step(kRestFrame).solvers.particle_lcp);
     return world.state_hash().hex();
   };
   ContactWork lcp, relaxed;

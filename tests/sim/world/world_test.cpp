@@ -109,7 +109,7 @@ TEST(World, IslandsAreBodiesConnectedByContactsOrSprings) {
     boxes.push_back(world.add_body({.shape = Box{}, .pose = {Vec3(x, 0.5, 0)}, .restitution = 0}));
   const auto rider = world.add_body({.shape = Box{}, .pose = {Vec3(2, 1.5, 0)}, .restitution = 0});
   world.add_spring({.a = BodyPoint{boxes[2]}, .b = BodyPoint{boxes[3]}});
-  EXPECT_EQ(world.step(1.0 / 60).islands, 3u);
+  EXPECT_EQ(world.step(1.0 / 60).bodies.islands, 3u);
   EXPECT_EQ(world.island(boxes[1]), world.island(rider));
   EXPECT_EQ(world.island(boxes[2]), world.island(boxes[3]));
   EXPECT_NE(world.island(boxes[0]), world.island(boxes[1]));
@@ -173,9 +173,9 @@ TEST(World, RemovalTakesSpringsAlongAndKeepsTheOrderOfParticles) {
   const auto dying = world.add_spring({.a = ParticlePoint{system, 3}, .b = WorldPoint{}, .stiffness = 0});
   const auto living = world.add_spring({.a = ParticlePoint{system, 4}, .b = WorldPoint{}, .stiffness = 0});
   const StepReport first = world.step(0.04), second = world.step(0.04);
-  EXPECT_EQ(first.particles_born, 10u);
-  EXPECT_EQ(first.particles_expired, 0u);
-  EXPECT_EQ(second.particles_expired, 4u);
+  EXPECT_EQ(first.particles.born, 10u);
+  EXPECT_EQ(first.particles.expired, 0u);
+  EXPECT_EQ(second.particles.expired, 4u);
   EXPECT_EQ(world.particles(system).id, (std::vector<uint64_t>{1, 2, 4, 5, 7, 8}));
   EXPECT_FALSE(world.remove(dying));
   EXPECT_TRUE(world.remove(living));

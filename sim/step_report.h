@@ -1,0 +1,145 @@
+#pragma once
+/// What World::step() reports. The figures are in parts; each part lists its figures once
+/// (sim/core/figures.h), and sums over steps, the statistics of a run and the dict of Python follow from the
+/// lists. The names are those of docs/output-files.md.
+
+#include <cstdint>
+#include <tuple>
+#include <vector>
+
+#include "sim/articulation/joint.h"
+#include "sim/contact/contact_problem.h"
+#include "sim/core/figures.h"
+#include "sim/core/handle.h"
+#include "sim/core/non_finite.h"
+#include "sim/dynamics/integrator.h"
+#include "sim/particles/particles.h"
+
+namespace offstage::sim {
+
+/// Bodies and their sleep.
+struct BodyFigures {
+  uint32_t awake = 0, asleep = 0;  ///< in the last sub-step
+  uint32_t islands = 0;            ///< groups of bodies connected by contacts or joints in that sub-step
+  uint64_t woken = 0, put_to_sleep = 0;  ///< times that a body woke or fell asleep
+
+  static constexpr auto figures() {
+    using T = BodyFigures;
+    return std::tuple(Figure("bodies_awake", &T::awake, OverSteps::last),
+                      Figure("bodies_asleep", &T::asleep, OverSteps::last),
+                      Figure("islands", &T::islands, OverSteps::last), Figure("bodies_woken", &T::woken),
+                      Figure("bodies_put_to_sleep", &T::put_to_sleep));
+  }
+};
+
+/// Contacts of bodies, and the search for them.
+struct ContactFigures {
+  uint64_t points = 0;        ///< contact points in the last sub-step
+  Real penetration = 0;       ///< greatest penetration at the starts of sub-steps and at impacts [m]
+  uint64_t pairs_tested = 0;  ///< pairs of bodies with overlapping boxes
+  uint64_t volume_tests = 0;  ///< tests of two volumes of the trees of two bodies
+  uint64_t piece_tests = 0;   ///< tests of two convex parts or triangles of two bodies
+  uint64_t speculative = 0;   ///< speculative contacts of the fast solver
+
+  static constexpr auto figures() {
+    using T = ContactFigures;
+    return std::tuple(Figure("contacts", &T::points, OverSteps::last),
+                      Figure("penetration", &T::penetration, OverSteps::greatest),
+                      Figure("pairs_tested", &T::pairs_tested), Figure("volume_tests", &T::volume_tests),
+                      Figure("piece_tests", &T::piece_tests),
+                      Figure("speculative_contacts", &T::speculative));
+  }
+};
+
+/// Impacts of bodies.
+struct ImpactFigures {
+  uint64_t searches = 0;           ///< searches for the time of impact of a pair
+  uint64_t collisions = 0;         ///< contacts that approached faster than WorldDef::collision_speed
+  uint64_t tracebacks = 0;         ///< trace-backs of islands to a time of impact
+  uint64_t toi_limit_reached = 0;  ///< pairs that reached the limit of time-of-impact events in a sub-step;
+                                   ///< their later impacts were not traced back
+  /// Pairs whose restitution was suppressed in a sub-step because their pile had too many impacts.
+  uint64_t restitution_suppressed = 0;
+
+  static constexpr auto figures() {
+    using T = ImpactFigures;
+    return std::tuple(Figure("impact_searches", &T::searches), Figure("collisions", &T::collisions),
+                      Figure("tracebacks", &T::tracebacks),
+                      Figure("toi_limit_reached", &T::toi_limit_reached),
+                      Figure("restitution_suppressed", &T::restitution_suppressed));
+  }
+};
+
+/// All cloths together; for a single one see ClothReport, which describes the figures.
+struct ClothFigures {
+  Real strain = 0;                                                ///< greatest of a thread
+  Real penetration = 0;                                           ///< greatest [m]
+  uint64_t contacts = 0, self_contacts = 0, springs_clamped = 0;  ///< at the end of the step
+  uint64_t moves_limited = 0, moves_held_back = 0, crossings = 0, springs_torn = 0, unconverged = 0;
+
+  static constexpr auto figures() {
+    using T = ClothFigures;
+    return std::tuple(Figure("strain", &T::strain, OverSteps::greatest),
+                      Figure("penetration", &T::penetration, OverSteps::greatest),
+                      Figure("contacts", &T::contacts, OverSteps::last),
+                      Figure("self_contacts", &T::self_contacts, OverSteps::last),
+                      Figure("springs_clamped", &T::springs_clamped, OverSteps::last),
+                      Figure("moves_limited", &T::moves_limited),
+                      Figure("moves_held_back", &T::moves_held_back), Figure("crossings", &T::crossings),
+                      Figure("springs_torn", &T::springs_torn), Figure("unconverged", &T::unconverged));
+  }
+};
+
+/// Work of the contact solvers.
+struct SolverFigures {
+  ContactWork exact, fast, lcp;  ///< of resting contact
+  ContactWork impacts;           ///< of collisions
+  ContactWork particle_lcp;      ///< contact forces of particles by pivoting
+
+  static constexpr auto figures() {
+    using T = SolverFigures;
+    return std::tuple(Figure("exact_solver", &T::exact), Figure("fast_solver", &T::fast),
+                      Figure("lcp_solver", &T::lcp), Figure("impact_solver", &T::impacts),
+                      Figure("particle_lcp", &T::particle_lcp));
+  }
+};
+
+/// The figures of a step, or of several steps. Counts cover all sub-steps unless stated otherwise.
+struct StepFigures {
+  uint64_t substeps = 0;
+  ParticleFigures particles;
+  BodyFigures bodies;
+  ContactFigures contacts;
+  ImpactFigures impacts;
+  JointFigures joints;
+  SolverFigures solvers;
+  ClothFigures cloth;
+  IntegratorReport integration;  ///< of the motion without contacts
+
+  static constexpr auto figures() {
+    using T = StepFigures;
+    return std::tuple(Figure("substeps", &T::substeps), Figure("", &T::particles), Figure("", &T::bodies),
+                      Figure("", &T::contacts), Figure("", &T::impacts), Figure("", &T::joints),
+                      Figure("", &T::solvers), Figure("cloth", &T::cloth),
+                      Figure("integration", &T::integration));
+  }
+  void add(const StepFigures& more) { add_figures(*this, more); }
+};
+
+/// Two bodies whose contact forces are approximate: the pair with the greatest error in a group of contacts
+/// that fell back from its intended solver.
+struct RoughContact {
+  BodyHandle a, b;
+};
+
+/// Statistics of a step. Numerical trouble is reported here, never as an exception.
+struct StepReport : StepFigures {
+  std::vector<BodyHandle> bodies_retired;  ///< left the world's bounds: frozen from here on
+  std::vector<JointHandle> joints_broken;  ///< exceeded their breaking force or torque in this step
+  /// One for each fall-back of a contact solver, in the order of occurrence.
+  std::vector<RoughContact> rough_contacts;
+  bool finite = true;    ///< false: a quantity became NaN or infinite
+  NonFinite non_finite;  ///< the first such object, if not finite
+};
+
+}  // namespace offstage::sim
