@@ -7,17 +7,22 @@
 
 #include <Eigen/Geometry>
 
+#include "producer/build/object_table.h"
 #include "producer/build/snapshot.h"
 
 namespace offstage::producer {
 
 class BodyPlaces {
  public:
-  void add_fixed(const std::string& name, const Eigen::Affine3f& world_from_body) {
-    fixed_[name] = world_from_body;
+  BodyPlaces() = default;
+  explicit BodyPlaces(const ObjectTable& objects) {
+    for (const auto& [body, slot, id] : objects.bodies)
+      if (slot)
+        slots_[body->name] = *slot;
+      else
+        fixed_[body->name] =
+            Eigen::Translation3f(body->position.cast<float>()) * body->orientation.cast<float>();
   }
-  /// `slot`: in Snapshot::bodies.
-  void add_moving(const std::string& name, std::size_t slot) { slots_[name] = slot; }
 
   /// Throws std::out_of_range for an unknown name.
   Eigen::Affine3f at(const std::string& name, const std::vector<BodySample>& moving) const {
@@ -29,7 +34,7 @@ class BodyPlaces {
 
  private:
   std::map<std::string, Eigen::Affine3f> fixed_;
-  std::map<std::string, std::size_t> slots_;
+  std::map<std::string, std::size_t> slots_;  // in Snapshot::bodies
 };
 
 }  // namespace offstage::producer

@@ -174,13 +174,4 @@ sim::ParticleSystemHandle ParticleSources::system(const std::string& name) const
   return it == systems_.end() ? sim::ParticleSystemHandle{} : it->handle;
 }
 
-std::vector<const ParticleLook*> looks_of(const Scene& scene) {
-  std::vector<const ParticleLook*> looks;
-  for (const ParticleGroup& group : scene.particles) looks.push_back(&group.look);
-  for (const Emitter& emitter : scene.emitters)
-    for_each_source(emitter,
-                    [&](const ParticleSource& source, const auto&...) { looks.push_back(&source.look); });
-  return looks;
-}
-
 }  // namespace offstage::producer

@@ -85,7 +85,4 @@ class ParticleSources {
   std::deque<effects::SubEmitter> sub_emitters_;
 };
 
-/// The looks of a scene's point sets, in their order: groups, then sources.
-std::vector<const ParticleLook*> looks_of(const Scene& scene);
-
 }  // namespace offstage::producer

@@ -9,7 +9,6 @@
 #include "producer/build/drawn_objects.h"
 #include "producer/build/lights.h"
 #include "producer/build/line_sketch.h"
-#include "producer/build/particle_sources.h"
 #include "producer/build/texts.h"
 #include "render/bloom.h"
 #include "render/error.h"
@@ -47,57 +46,19 @@ Affine3f into_unit_ball(const std::vector<std::pair<render::Mesh, Affine3f>>& me
   return Eigen::Scaling(1 / std::max(radius, 1e-9f)) * Eigen::Translation3f(-box.center());
 }
 
-std::string name_or(const std::string& name, const char* kind, uint32_t id) {
-  return name.empty() ? kind + (" " + std::to_string(id)) : name;
-}
-
 }  // namespace
-
-render::ObjectNames object_names(const Scene& scene) {
-  render::ObjectNames names;
-  uint32_t id = 0;
-  const auto add = [&](const std::string& name, const char* kind) {
-    ++id;
-    names[id] = name_or(name, kind, id);
-  };
-  for (const Body& body : scene.bodies) add(body.name, "body");
-  for (const Cloth& cloth : scene.cloths) add(cloth.name, "cloth");
-  for (const ParticleGroup& group : scene.particles) add(group.name, "particles");
-  for (const Emitter& emitter : scene.emitters)
-    for_each_source(emitter, [&](const ParticleSource&, const ParticleSource*, const std::string& name,
-                                 const Birth&) { add(name, "particles"); });
-  return names;
-}
 
 Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context& context)
     : scene_(scene),
       library_(models),
       stage_(context, {.width_px = scene.render.size.x(), .height_px = scene.render.size.y()}),
       camera_(scene, models) {
-  std::size_t slot = 0;
-  uint32_t object = 0;
-  for (const Body& body : scene.bodies) add_body(body, models, slot, ++object);
-  // In the order of Snapshot::rods.
-  const auto add_rod = [&](const auto& rod) {
-    rods_.push_back(rod.visible
-                        ? stage_.add_instance(stage_.add_mesh(render::make_cylinder(to_float(rod.radius), 1)),
-                                              material(rod.material, models))
-                        : render::InstanceHandle());
-  };
-  for (const Spring& spring : scene.springs) add_rod(spring);
-  for (const Joint& joint : scene.joints)
-    for (int i = 0; i < rod_count(joint); ++i) add_rod(joint);
-  for (const Cloth& cloth : scene.cloths)
-    for (const ClothCord& cord : cloth.cords)
-      for (int i = 0; i < cord.segments; ++i) add_rod(cord);
-  for (const Cloth& cloth : scene.cloths) {
-    add_cloth(cloth, models);
-    ++object;
-    if (cloths_.back().cloth) stage_.set_object(cloths_.back().cloth, object);
-  }
-  for (const ParticleLook* look : looks_of(scene)) {
-    add_points(*look, models, ++object);
-  }
+  const ObjectTable objects(scene);
+  places_ = BodyPlaces(objects);
+  for (const ObjectTable::BodyEntry& entry : objects.bodies) add_body(entry, models);
+  for (const ObjectTable::RodEntry& entry : objects.rods) add_rod(entry, models);
+  for (const ObjectTable::ClothEntry& entry : objects.cloths) add_cloth(entry, models);
+  for (const ObjectTable::PointsEntry& entry : objects.point_sets) add_points(entry, models);
   add_overlay_lines();
   stage_.set_sun(sun_of(scene, models));
   render::Environment environment = environment_of(scene);
@@ -105,16 +66,24 @@ Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context
   stage_.set_environment(environment);
 }
 
-void Picture::add_points(const ParticleLook& look, const ModelLibrary& models, uint32_t object) {
+void Picture::add_rod(const ObjectTable::RodEntry& rod, const ModelLibrary& models) {
+  rods_.push_back(rod.visible
+                      ? stage_.add_instance(stage_.add_mesh(render::make_cylinder(to_float(rod.radius), 1)),
+                                            material(rod.material, models))
+                      : render::InstanceHandle());
+}
+
+void Picture::add_points(const ObjectTable::PointsEntry& entry, const ModelLibrary& models) {
+  const ParticleLook& look = *entry.look;
   const render::PointsDef def = points_def(look);
   const bool has_picture = look.style == LookStyle::sprite && !look.texture.empty();
   points_.push_back(stage_.add_points(def, has_picture ? models.texture(look.texture) : render::Image{}));
-  stage_.set_object(points_.back(), object);
+  stage_.set_object(points_.back(), entry.id);
   styles_.push_back(def.style);
   ages_within_frame_.push_back(has_picture && look.sheet);
   blur_streaks_.push_back(add_blur_streaks(look));
   meshes_.emplace_back();
-  if (look.style == LookStyle::mesh) add_particle_mesh(look, models, object);
+  if (look.style == LookStyle::mesh) add_particle_mesh(look, models, entry.id);
 }
 
 void Picture::add_particle_mesh(const ParticleLook& look, const ModelLibrary& models, uint32_t object) {
@@ -176,7 +145,8 @@ render::MaterialHandle Picture::cloth_material(const Cloth& cloth, const ModelLi
   return known = stage_.add_material(m, textures);
 }
 
-void Picture::add_cloth(const Cloth& cloth, const ModelLibrary& models) {
+void Picture::add_cloth(const ObjectTable::ClothEntry& entry, const ModelLibrary& models) {
+  const Cloth& cloth = *entry.cloth;
   DrawnCloth drawn;
   drawn.appear_at = cloth.appear_at;
   drawn.remove_at = cloth.remove_at;
@@ -193,6 +163,7 @@ void Picture::add_cloth(const Cloth& cloth, const ModelLibrary& models) {
                                     .texture_size = box.sizes().cwiseMax(1e-6f),
                                     .casts_shadow = cloth.casts_shadow},
                                    cloth_material(cloth, models));
+    stage_.set_object(drawn.cloth, entry.id);
   }
   cloths_.push_back(std::move(drawn));
 }
@@ -268,8 +239,9 @@ void Picture::add_convex_parts(const MeshFile& mesh, const Body& body, const Mod
   }
 }
 
-void Picture::add_body(const Body& body, const ModelLibrary& models, std::size_t& slot, uint32_t object) {
-  DrawnBody drawn{{},
+void Picture::add_body(const ObjectTable::BodyEntry& entry, const ModelLibrary& models) {
+  const Body& body = *entry.body;
+  DrawnBody drawn{entry.slot,
                   affine(body.position, body.orientation),
                   parts_overlay(scene_, body.name),
                   body.appear_at,
@@ -293,15 +265,11 @@ void Picture::add_body(const Body& body, const ModelLibrary& models, std::size_t
   else if (body.visible)
     add_shape(body, models, drawn.parts);
 
-  for (const DrawnPart& part : drawn.parts) stage_.set_object(part.instance, object);
+  for (const DrawnPart& part : drawn.parts) stage_.set_object(part.instance, entry.id);
   if (drawn.animated)
     for (const AnimatedLook::Surface& surface : drawn.animated->surfaces)
-      stage_.set_object(surface.instance, object);
+      stage_.set_object(surface.instance, entry.id);
   place_body(drawn, drawn.world_from_body, 0);
-  if (body.motion == sim::MotionType::static_body)
-    places_.add_fixed(body.name, drawn.world_from_body);
-  else
-    places_.add_moving(body.name, *(drawn.slot = slot++));
   const bool has_lifetime = body.appear_at > 0 || body.remove_at < kForever;
   if (drawn.slot || drawn.overlay || drawn.animated || has_lifetime) bodies_.push_back(std::move(drawn));
 }

@@ -14,6 +14,7 @@
 #include "producer/build/body_places.h"
 #include "producer/build/camera.h"
 #include "producer/build/models.h"
+#include "producer/build/object_table.h"
 #include "producer/build/snapshot.h"
 #include "producer/scene/scene.h"
 #include "render/channels.h"
@@ -21,9 +22,6 @@
 #include "render/stage.h"
 
 namespace offstage::producer {
-
-/// Names of the ids in Channels: bodies, cloths, particles, in scene order from 1.
-render::ObjectNames object_names(const Scene& scene);
 
 class Picture {
  public:
@@ -101,7 +99,7 @@ class Picture {
   };
 
   render::MaterialHandle material(const std::string& name, const ModelLibrary& models);
-  void add_body(const Body& body, const ModelLibrary& models, std::size_t& slot, uint32_t object);
+  void add_body(const ObjectTable::BodyEntry& entry, const ModelLibrary& models);
   /// The parts of a model with their materials, or all with the material `name` unless it is empty.
   std::vector<std::pair<render::MeshHandle, render::MaterialHandle>> model_parts(const std::string& file,
                                                                                  const std::string& name,
@@ -116,7 +114,8 @@ class Picture {
                         std::vector<DrawnPart>& parts);
   template <class Primitive>
   render::MeshHandle primitive(const Primitive& shape);
-  void add_cloth(const Cloth& cloth, const ModelLibrary& models);
+  void add_rod(const ObjectTable::RodEntry& rod, const ModelLibrary& models);
+  void add_cloth(const ObjectTable::ClothEntry& entry, const ModelLibrary& models);
   render::MaterialHandle cloth_material(const Cloth& cloth, const ModelLibrary& models);
   render::PointsHandle add_blur_streaks(const ParticleLook& look);
   void add_overlay_lines();
@@ -124,7 +123,7 @@ class Picture {
   void place(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
   void place_body(const DrawnBody& body, const Eigen::Affine3f& world_from_body, double time);
   void place_rods(const Snapshot& previous, const Snapshot& current, float w);
-  void add_points(const ParticleLook& look, const ModelLibrary& models, uint32_t object);
+  void add_points(const ObjectTable::PointsEntry& entry, const ModelLibrary& models);
   void add_particle_mesh(const ParticleLook& look, const ModelLibrary& models, uint32_t object);
   /// Appends the particles of a set at share w of the frame to `points`. `all`: also those that do not exist
   /// yet, where they would have come from.
@@ -157,6 +156,7 @@ class Picture {
   CameraRig camera_;
   render::Camera latest_camera_;
   std::vector<DrawnBody> bodies_;
+  // Those of the entries of an ObjectTable.
   std::vector<render::InstanceHandle> rods_;  // null if invisible
   std::vector<render::PointsHandle> points_;
   std::vector<render::PointStyle> styles_;  // of the same

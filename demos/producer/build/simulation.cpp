@@ -81,6 +81,7 @@ void Simulation::note_cloths() {
 
 Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
     : scene_(scene),
+      objects_(scene),
       world_({.gravity = scene.world.gravity,
               .wind = scene.world.wind,
               .max_step = scene.world.step,
@@ -123,7 +124,10 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
   std::map<std::pair<std::string, Real>, sim::MeshHandle> meshes;
   std::vector<std::pair<const Body*, sim::BodyDef>> animated;
   std::map<std::vector<float>, sim::MeshHandle> compounds;
-  for (const Body& body : scene.bodies) {
+  moving_.resize(objects_.slots);
+  moving_poses_.resize(objects_.slots);
+  for (const auto& [described, slot, id] : objects_.bodies) {
+    const Body& body = *described;
     sim::BodyDef def{.name = body.name,
                      .motion = body.motion,
                      .pose = {body.position, body.orientation},
@@ -179,10 +183,10 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
       return world_.add_body(def);
     });
     bodies_[body.name] = handle;
-    if (body.motion == sim::MotionType::static_body) continue;
-    slot_of_[handle] = moving_.size();
-    moving_.push_back({body.name, handle});
-    moving_poses_.push_back(world_.body(handle).pose);
+    if (!slot) continue;
+    slot_of_[handle] = *slot;
+    moving_[*slot] = {body.name, handle};
+    moving_poses_[*slot] = world_.body(handle).pose;
   }
   for (const auto& [body, def] : animated) add_pieces(*body, def, models);
 }
@@ -217,8 +221,7 @@ void Simulation::add_particle_groups(const Scene& scene) {
   for (const ParticleGroup& group : scene.particles) {
     const auto system = world_.add_particle_system(system_def(group.name, group.behaviour));
     if (group.appear_at == 0) add_particles(group, system, -1);
-    groups_.push_back({group.name, system});
-    group_looks_.emplace_back(group.look, scene.world.seed, group.name);
+    groups_.push_back({&group, system, LookRamps(group.look, scene.world.seed, group.name)});
   }
 }
 
@@ -240,41 +243,42 @@ void Simulation::add_particles(const ParticleGroup& group, sim::ParticleSystemHa
 
 /// Adds the groups that appear in this sub-step.
 void Simulation::add_late_particles(Real start, Real end) {
-  for (std::size_t i = 0; i < groups_.size(); ++i)
-    if (const ParticleGroup& group = scene_.particles[i];
-        group.appear_at > 0 && group.appear_at >= start && group.appear_at < end)
-      add_particles(group, groups_[i].handle, end - group.appear_at);
+  for (const Group& group : groups_)
+    if (const Real at = group.scene->appear_at; at > 0 && at >= start && at < end)
+      add_particles(*group.scene, group.handle, end - at);
 }
 
 void Simulation::add_springs(const Scene& scene) {
   const auto attachment = [&](const SpringEnd& end) -> sim::Attachment {
     if (!end.body.empty()) return sim::BodyPoint{body_named(end.body), end.position};
     if (!end.particles.empty()) {
-      const auto group = std::ranges::find(groups_, end.particles, &NamedGroup::name);
-      return sim::ParticlePoint{group->handle,
-                                world_.particles(group->handle).id[static_cast<std::size_t>(end.index)]};
+      const sim::ParticleSystemHandle group = system_named(end.particles);
+      return sim::ParticlePoint{group, world_.particles(group).id[static_cast<std::size_t>(end.index)]};
     }
     return sim::WorldPoint{end.position};
   };
-  for (const Spring& spring : scene.springs) {
-    springs_.push_back({.name = spring.name,
-                        .a = attachment(spring.a),
-                        .b = attachment(spring.b),
-                        .stiffness = spring.stiffness,
-                        .damping = spring.damping,
-                        .rest_length = spring.rest_length});
-    at_place(spring.where, [&] { world_.add_spring(springs_.back()); });
+  for (std::size_t i = 0; i < scene.springs.size(); ++i) {
+    const Spring& spring = scene.springs[i];
+    springs_.push_back({{.name = spring.name,
+                         .a = attachment(spring.a),
+                         .b = attachment(spring.b),
+                         .stiffness = spring.stiffness,
+                         .damping = spring.damping,
+                         .rest_length = spring.rest_length},
+                        objects_.rod_of_spring[i]});
+    at_place(spring.where, [&] { world_.add_spring(springs_.back().def); });
   }
 }
 
 void Simulation::add_joints(const Scene& scene) {
-  for (const Joint& joint : scene.joints) {
+  for (std::size_t i = 0; i < scene.joints.size(); ++i) {
+    const Joint& joint = scene.joints[i];
     sim::JointDef def = joint_def(joint);
     def.a = body_named(joint.a);
     def.b = body_named(joint.b);
     at_place(joint.where, [&] {
       const sim::JointHandle handle = world_.add_joint(def);
-      if (rod_count(joint) > 0) rods_.push_back(handle);
+      if (rod_count(joint) > 0) joints_.push_back({handle, objects_.rod_of_joint[i]});
     });
   }
 }
@@ -321,7 +325,8 @@ void Simulation::add_forces(const Scene& scene) {
 }
 
 sim::ParticleSystemHandle Simulation::system_named(const std::string& name) const {
-  const auto group = std::ranges::find(groups_, name, &NamedGroup::name);
+  const auto group =
+      std::ranges::find(groups_, name, [](const Group& g) -> const std::string& { return g.scene->name; });
   return group == groups_.end() ? sources_->system(name) : group->handle;
 }
 
@@ -443,27 +448,29 @@ Snapshot Simulation::snapshot() const {
     }
     return std::get<sim::WorldPoint>(attachment).position.cast<float>();
   };
-  for (const sim::SpringDef& spring : springs_)
-    snapshot.rods.push_back({end_point(spring.a), end_point(spring.b)});
-  for (const sim::JointHandle rod : rods_) {
-    const sim::JointState state = world_.joint(rod);
-    const sim::JointDef& def = world_.joint_def(rod);
+  snapshot.rods.resize(objects_.rods.size());
+  for (const auto& [def, rod] : springs_) snapshot.rods[rod] = {end_point(def.a), end_point(def.b)};
+  for (const auto& [handle, first_rod] : joints_) {
+    const sim::JointState state = world_.joint(handle);
+    const sim::JointDef& def = world_.joint_def(handle);
     std::vector<Vec3> corners = {state.anchor_a, state.anchor_b};
     if (def.type == sim::JointType::pulley)
       corners = {state.anchor_a, def.pulley_a, def.pulley_b, state.anchor_b};
     for (std::size_t i = 0; i + 1 < corners.size(); ++i)
-      snapshot.rods.push_back({corners[i].cast<float>(), corners[state.broken ? i : i + 1].cast<float>()});
+      snapshot.rods[first_rod + i] = {corners[i].cast<float>(),
+                                      corners[state.broken ? i : i + 1].cast<float>()};
   }
-  for (const NamedCloth& cloth : cloths_) {
-    const sim::ClothView view = world_.cloth(cloth.handle);
+  for (std::size_t i = 0; i < cloths_.size(); ++i) {
+    const sim::ClothView view = world_.cloth(cloths_[i].handle);
+    std::size_t rod = objects_.rod_of_cloth[i];
     for (const sim::ClothSpring& s : view.springs)
       if (s.kind == sim::SpringKind::cord)
-        snapshot.rods.push_back({view.points[s.a].cast<float>(), view.points[s.b].cast<float>()});
+        snapshot.rods[rod++] = {view.points[s.a].cast<float>(), view.points[s.b].cast<float>()};
   }
 
-  for (std::size_t i = 0; i < groups_.size(); ++i)
-    snapshot.point_sets.push_back(group_looks_[i].points(world_.particles(groups_[i].handle), world_.time(),
-                                                         &scene_.particles[i].places));
+  for (const Group& group : groups_)
+    snapshot.point_sets.push_back(
+        group.look.points(world_.particles(group.handle), world_.time(), &group.scene->places));
   sources_->add_points(world_, snapshot.point_sets);
   for (const NamedCloth& cloth : cloths_) snapshot.cloths.push_back(cloth_sample(world_.cloth(cloth.handle)));
   snapshot.overlays = overlays_->lines(world_);
@@ -473,10 +480,9 @@ Snapshot Simulation::snapshot() const {
 
 void Simulation::for_each_particle_system(
     const std::function<void(const std::string&, const sim::ParticleArrays&, const PointSet&)>& visit) const {
-  for (std::size_t i = 0; i < groups_.size(); ++i) {
-    const sim::ParticleArrays& particles = world_.particles(groups_[i].handle);
-    visit(groups_[i].name, particles,
-          group_looks_[i].points(particles, world_.time(), &scene_.particles[i].places));
+  for (const Group& group : groups_) {
+    const sim::ParticleArrays& particles = world_.particles(group.handle);
+    visit(group.scene->name, particles, group.look.points(particles, world_.time(), &group.scene->places));
   }
   sources_->for_each_system(
       [&](const std::string& name, sim::ParticleSystemHandle handle, const LookRamps& look) {

@@ -1,7 +1,6 @@
 #pragma once
 /// The simulation side of a scene: builds the world and its emitters, advances them frame by frame, and takes
-/// the snapshots that the drawing needs. The order of bodies, springs and point sets in a snapshot is that of
-/// the scene; picture.h relies on it.
+/// the snapshots that the drawing needs.
 
 #include <functional>
 #include <map>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "producer/build/models.h"
+#include "producer/build/object_table.h"
 #include "producer/build/overlays.h"
 #include "producer/build/particle_sources.h"
 #include "producer/build/snapshot.h"
@@ -76,18 +76,19 @@ class Simulation {
     std::string name;
     sim::BodyHandle handle;
   };
-  /// Bodies that can move, in scene order.
+  /// Bodies that can move, by their slots (see ObjectTable).
   const std::vector<NamedBody>& moving_bodies() const { return moving_; }
-  struct NamedGroup {
-    std::string name;
+  /// A group of particles of the scene.
+  struct Group {
+    const ParticleGroup* scene;
     sim::ParticleSystemHandle handle;
+    LookRamps look;
   };
-  const std::vector<NamedGroup>& particle_groups() const { return groups_; }
+  const std::vector<Group>& particle_groups() const { return groups_; }
   struct NamedCloth {
     std::string name;
     sim::ClothHandle handle;
   };
-  /// In scene order.
   const std::vector<NamedCloth>& cloths() const { return cloths_; }
 
   /// Calls visit(name, particles, as drawn) for each group and each source of particles, in the order of a
@@ -118,18 +119,27 @@ class Simulation {
   int skipped_pieces() const;  // pieces in which the time before output.start is simulated
   void note(const sim::StepReport& report);
 
+  struct DrawnSpring {
+    sim::SpringDef def;
+    std::size_t rod;
+  };
+  struct DrawnJoint {
+    sim::JointHandle handle;
+    std::size_t first_rod;
+  };
+
   const Scene& scene_;
+  const ObjectTable objects_;
   sim::World world_;
   std::optional<ParticleSources> sources_;
   std::vector<NamedBody> moving_;
-  std::vector<NamedGroup> groups_;
+  std::vector<Group> groups_;
   std::vector<NamedCloth> cloths_;
-  std::vector<LookRamps> group_looks_;
   std::map<std::string, sim::BodyHandle> bodies_;
   std::vector<sim::Pose> moving_poses_;             // kept up to date from World::moved()
-  std::map<sim::BodyHandle, std::size_t> slot_of_;  // index in `moving_` by handle
-  std::vector<sim::SpringDef> springs_;
-  std::vector<sim::JointHandle> rods_;  // joints that are drawn
+  std::map<sim::BodyHandle, std::size_t> slot_of_;  // by handle
+  std::vector<DrawnSpring> springs_;
+  std::vector<DrawnJoint> joints_;
   std::optional<Overlays> overlays_;
   std::function<void(double)> on_substep_;
   SimulationTotals totals_;

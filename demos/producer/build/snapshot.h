@@ -54,12 +54,13 @@ struct LineSet {
 
 struct Snapshot {
   int frame = 1;
-  double time = 0;                 ///< [s]
-  std::vector<BodySample> bodies;  ///< moving bodies, in scene order
-  std::vector<RodSample> rods;  ///< springs, distance joints, then segments of cloths' cords, in scene order
-  std::vector<PointSet> point_sets;  ///< particle groups, then emitters, in scene order
-  std::vector<ClothSample> cloths;   ///< in scene order
-  std::vector<LineSet> overlays;     ///< in scene order; empty for those that draw no lines
+  double time = 0;  ///< [s]
+  // ObjectTable says which object of the scene each entry belongs to.
+  std::vector<BodySample> bodies;  ///< moving bodies
+  std::vector<RodSample> rods;
+  std::vector<PointSet> point_sets;
+  std::vector<ClothSample> cloths;
+  std::vector<LineSet> overlays;  ///< for each overlay of the scene; empty for those that draw no lines
   sim::StateHash state_hash;
 
   uint64_t point_count() const;

@@ -9,7 +9,7 @@
 #include "producer/build/cloth_defs.h"
 #include "producer/build/drawn_objects.h"
 #include "producer/build/lights.h"
-#include "producer/build/particle_sources.h"
+#include "producer/build/object_table.h"
 #include "render/primitives.h"
 #include "sim/core/rotation.h"
 
@@ -69,19 +69,14 @@ class FilmParts::Builder {
   Builder(FilmParts& parts, const Scene& scene, const ModelLibrary& models)
       : parts_(parts), scene_(scene), models_(models) {}
 
-  void add_body(const Body& body) {
+  void add_body(const ObjectTable::BodyEntry& entry) {
+    const Body& body = *entry.body;
     FilmBody film{.name = names_(body.name, "body"),
-                  .slot = {},
+                  .slot = entry.slot,
                   .place = {body.position.cast<float>(), body.orientation.cast<float>()},
                   .parts = {},
                   .appear_at = body.appear_at,
                   .remove_at = body.remove_at};
-    if (body.motion == sim::MotionType::static_body) {
-      parts_.places_.add_fixed(body.name, placed(body.position, body.orientation, 1));
-    } else {
-      film.slot = slots_++;
-      parts_.places_.add_moving(body.name, *film.slot);
-    }
     if (!body.visible) return;
     if (body.model)
       add_model(body.model->file,
@@ -92,14 +87,10 @@ class FilmParts::Builder {
     parts_.bodies.push_back(std::move(film));
   }
 
-  template <class Rod>
-  void add_rod(const Rod& rod, const char* kind) {
-    const std::size_t index = rods_++;
+  void add_rod(const ObjectTable::RodEntry& rod, std::size_t index) {
     if (!rod.visible) return;
-    std::string name;
-    if constexpr (requires { rod.name; }) name = rod.name;
     parts_.rods.push_back(
-        {names_(name, kind), index,
+        {names_(rod.name, rod.kind), index,
          mesh({6, to_float(rod.radius)}, [&] { return render::make_cylinder(to_float(rod.radius), 1); }),
          material(rod.material)});
   }
@@ -216,29 +207,20 @@ class FilmParts::Builder {
   std::map<std::string, std::size_t> materials_done_;
   /// By file, and whether the parts have the materials of the file.
   std::map<std::pair<std::string, bool>, std::pair<std::size_t, std::size_t>> models_done_;
-  std::size_t slots_ = 0, rods_ = 0;
 };
 
 FilmParts::FilmParts(const Scene& s, const ModelLibrary& models)
     : scene(s), models_(models), camera_(s, models) {
   Builder builder(*this, s, models);
-  for (const Body& body : s.bodies) builder.add_body(body);
-  for (const Spring& spring : s.springs) builder.add_rod(spring, "spring");
-  for (const Joint& joint : s.joints)
-    for (int i = 0; i < rod_count(joint); ++i) builder.add_rod(joint, "rod");
-  for (const Cloth& cloth : s.cloths)
-    for (const ClothCord& cord : cloth.cords)
-      for (int i = 0; i < cord.segments; ++i) builder.add_rod(cord, "cord");
-  for (std::size_t i = 0; i < s.cloths.size(); ++i) builder.add_cloth(s.cloths[i], i);
-
-  std::vector<std::string> set_names;
-  for (const ParticleGroup& group : s.particles) set_names.push_back(group.name);
-  for (const Emitter& emitter : s.emitters)
-    for_each_source(emitter, [&](const ParticleSource&, const ParticleSource*, const std::string& name,
-                                 const Birth&) { set_names.push_back(name); });
-  const std::vector<const ParticleLook*> looks = looks_of(s);
-  for (std::size_t i = 0; i < set_names.size(); ++i)
-    points.push_back({builder.unique(set_names[i], "particles"), i, !points_def(*looks[i]).lit});
+  const ObjectTable objects(s);
+  places_ = BodyPlaces(objects);
+  for (const ObjectTable::BodyEntry& entry : objects.bodies) builder.add_body(entry);
+  for (std::size_t i = 0; i < objects.rods.size(); ++i) builder.add_rod(objects.rods[i], i);
+  for (std::size_t i = 0; i < objects.cloths.size(); ++i) builder.add_cloth(*objects.cloths[i].cloth, i);
+  for (std::size_t i = 0; i < objects.point_sets.size(); ++i) {
+    const auto& [name, look, id] = objects.point_sets[i];
+    points.push_back({builder.unique(name, "particles"), i, !points_def(*look).lit});
+  }
   for (const std::string& name : lamp_names(s, models)) lamps.push_back(builder.unique(name, "lamp"));
   sun = sun_of(s, models);
 }

@@ -38,11 +38,11 @@ void Trace::record(double time) {
     }
     add_state(rows, time, name, p / mass, upright, v / mass, none);
   }
-  for (const auto& [name, handle] : simulation_.particle_groups()) {
-    const sim::ParticleArrays& particles = world.particles(handle);
+  for (const Simulation::Group& group : simulation_.particle_groups()) {
+    const sim::ParticleArrays& particles = world.particles(group.handle);
     for (std::size_t i = 0; i < particles.size(); ++i)
-      add_state(rows, time, fmt::format("{}/{}", name, particles.id[i]), particles.position[i], upright,
-                particles.velocity[i], none);
+      add_state(rows, time, fmt::format("{}/{}", group.scene->name, particles.id[i]), particles.position[i],
+                upright, particles.velocity[i], none);
   }
   file_.write(rows);
 }

@@ -49,18 +49,16 @@ std::shared_ptr<const SharedScene> parse(const std::string& json, const std::str
 
 std::vector<std::string> names_of_point_sets(const producer::Scene& scene) {
   std::vector<std::string> names;
-  for (const producer::ParticleGroup& group : scene.particles) names.push_back(group.name);
-  for (const producer::Emitter& emitter : scene.emitters)
-    producer::for_each_source(
-        emitter, [&](const producer::ParticleSource&, const producer::ParticleSource*,
-                     const std::string& name, const producer::Birth&) { names.push_back(name); });
+  const producer::ObjectTable objects(scene);
+  for (const auto& [name, look, id] : objects.point_sets) names.push_back(name);
   return names;
 }
 
 std::vector<std::string> names_of_moving_bodies(const producer::Scene& scene) {
-  std::vector<std::string> names;
-  for (const producer::Body& body : scene.bodies)
-    if (body.motion != sim::MotionType::static_body) names.push_back(body.name);
+  const producer::ObjectTable objects(scene);
+  std::vector<std::string> names(objects.slots);
+  for (const auto& [body, slot, id] : objects.bodies)
+    if (slot) names[*slot] = body->name;
   return names;
 }
 
