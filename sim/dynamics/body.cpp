@@ -4,14 +4,14 @@
 
 namespace offstage::sim {
 
-const CollisionShape& Body::collision_shape() {
+const CollisionShape& BodyModel::collision_shape() {
   if (!collision_shape_)
     collision_shape_.emplace(
         solid, CollisionShape::Options{.needs_volume = def.motion == MotionType::dynamic, .tree = tree});
   return *collision_shape_;
 }
 
-const CollisionShape& Body::triangle_shape() {
+const CollisionShape& BodyModel::triangle_shape() {
   if (!triangle_shape_)
     triangle_shape_.emplace(solid, CollisionShape::Options{.by_triangles = true, .tree = tree});
   return *triangle_shape_;

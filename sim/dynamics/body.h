@@ -1,7 +1,8 @@
 #pragma once
-/// A body of the world with its internal state.
+/// A body of the world: its model, which is constant, its state, and what it stores for the current sub-step.
 
 #include <optional>
+#include <vector>
 
 #include "sim/collision/collision_shape.h"
 #include "sim/collision/contact_frame.h"
@@ -18,27 +19,51 @@ namespace offstage::sim {
 /// The motion of the contacts of a body is predicted if it turns by less than this in a sub-step [rad].
 inline constexpr Real kMostPredictedTurn = 1;
 
-/// `solid` has pointers into the body and to its mesh, so a body is never moved or copied.
-struct Body {
-  // The members that contact pairs read come first, close together in memory.
+/// What a body is: constant from World::add_body() on. `solid` has pointers into the body and to its mesh, so
+/// a body is never moved or copied. The members that contact pairs read are the last ones, next to the state
+/// in memory.
+struct BodyModel {
+  BodyDef def;
+  Solid solid;
+
+  /// Created on first use, because a mesh may have to be decomposed for it.
+  const CollisionShape& collision_shape();
+  /// The shape of a mesh by its triangles, for the impacts of two meshes.
+  const CollisionShape& triangle_shape();
+
  private:
   std::optional<CollisionShape> collision_shape_, triangle_shape_;
 
  public:
   BodyHandle handle;
+  TreeChoice tree = {};  // tree of its collision shapes
+  uint32_t surface = 0;  // number of its material, for contact rules
+  Real extent = 0;       // reach() of the solid; infinite for a plane
+};
+
+/// What decides whether a body falls asleep, and what wakes it.
+struct SleepMemory {
+  Real quiet_time = 0;  // how long the body has been almost at rest [s]
+  // While it is asleep:
+  Wrench push;                 // of the variable forces when it fell asleep, about its centre of mass
+  std::optional<Wrench> pins;  // by pinned cloth when it fell asleep
+  std::vector<SpringHandle> moving_springs;  // springs whose other end can move independently
+};
+
+struct Body : BodyModel {
+  // State. The members that contact pairs read come first, close together in memory.
   MotionType type =
       MotionType::dynamic;  // as defined; static while absent and after it left the world's bounds
   bool asleep = false;
-  TreeChoice tree = {};     // tree of its collision shapes
   bool was_present = true;  // whether it has appeared
   bool absent = false;      // it has not appeared yet, or was removed; then `type` is static
-  uint32_t surface = 0;     // number of its material, for contact rules
-  uint32_t island = 0;  // awake: number of its island in the sub-step; asleep: number of its sleeping island
-  uint32_t row = 0;     // index among the bodies of its island
-  uint32_t rank = 0;    // position in the order of the world's bodies; see ActiveBodies
-  Real extent = 0;      // reach() of the solid; infinite for a plane
+  Pose pose;                // at the current time
+
+  // Its place in the lists of the current sub-step.
+  uint32_t island = 0;          // awake: number of its island; asleep: number of its sleeping island
+  uint32_t row = 0;             // index among the bodies of its island
+  uint32_t rank = 0;            // position in the order of the world's bodies; see ActiveBodies
   Real impact_speed_bound = 0;  // greatest speed of a nearby body that may hit it in the sub-step [m/s]
-  Pose pose;                    // at the current time
 
   // The current interval of motion: a whole sub-step, or the rest of it after an impact.
   Real from = 0;  // start of the interval, since the sub-step's start [s]
@@ -47,18 +72,17 @@ struct Body {
   Twist drive;  // kinematic bodies: velocity of the pose's origin and angular velocity, at the interval's end
   Real turning = 0;  // see turning_speed()
   RigidState start;  // dynamic bodies: state at the start of the interval
-  RigidBody rigid;   // dynamic bodies only: state at the current time
 
+  // State of a dynamic body at the current time, with its mass and inertia, which are constant.
+  RigidBody rigid;
+
+  // The current sub-step and sampling time.
   Pose before_substep, before_step;
   Aabb swept;              // box around its motion in the sub-step, as given to the broad phase
-  Real quiet_time = 0;     // how long it has been almost at rest [s]
   bool on_cloth = false;   // touched by cloth in the last sub-step
   bool on_spring = false;  // a spring ends on it in this sub-step
-  Wrench rest_push;  // asleep: wrench of the variable forces when it fell asleep, about its centre of mass
-  std::vector<SpringHandle> moving_springs;  // asleep: springs whose other end can move independently
-  std::optional<Wrench> rest_pins;           // asleep: wrench by pinned cloth when it fell asleep
-  BodyDef def;
-  Solid solid;
+
+  SleepMemory sleep;
 
   /// Prefetches the members that describe the interval.
   void prefetch_interval() const { prefetch(&start_pose, &before_substep); }
@@ -70,10 +94,6 @@ struct Body {
   /// Greatest speed of its surface in the interval due to rotation [m/s]; 0 for a sphere about its centre.
   Real turning_speed() const { return is_awake() || is_kinematic() ? turning : 0; }
   bool can_move() const { return is_awake() || (is_kinematic() && def.track.moves()); }
-  /// Created on first use, because a mesh may have to be decomposed for it.
-  const CollisionShape& collision_shape();
-  /// The shape of a mesh by its triangles, for the impacts of two meshes.
-  const CollisionShape& triangle_shape();
   /// Pose and velocities of the body's origin at a time near `now`.
   Motion motion(Real now, Real time) const;
   /// Begins an interval at this time.

@@ -92,7 +92,7 @@ void ActiveBodies::begin_step() {
 }
 
 std::vector<Body*> ActiveBodies::wake(Body& body) {
-  body.quiet_time = 0;
+  body.sleep.quiet_time = 0;
   if (!body.asleep) return {};
   const auto found = sleeping_.find(body.island);
   const std::vector<Body*> group = std::move(found->second);
@@ -100,10 +100,10 @@ std::vector<Body*> ActiveBodies::wake(Body& body) {
   woken_ += group.size();
   for (Body* member : group) {
     member->asleep = false;
-    member->quiet_time = 0;
-    watched_ -= member->moving_springs.size();
-    member->moving_springs.clear();
-    member->rest_pins.reset();
+    member->sleep.quiet_time = 0;
+    watched_ -= member->sleep.moving_springs.size();
+    member->sleep.moving_springs.clear();
+    member->sleep.pins.reset();
     member->before_step = member->before_substep = member->pose;
     stepped_.push_back(member);
   }
@@ -134,7 +134,7 @@ void ActiveBodies::watch_springs(std::span<Body* const> group) {
     if (!world_.acts(s)) return;
     for (const auto& [own, other] : {std::pair(&s.def.a, &s.def.b), {&s.def.b, &s.def.a}})
       if (Body* body = moves(*other) ? sleeper(*own) : nullptr) {
-        body->moving_springs.push_back(handle);
+        body->sleep.moving_springs.push_back(handle);
         ++watched_;
       }
   });
@@ -150,7 +150,7 @@ Wrench ActiveBodies::changing_push(const Body& body, Real time) const {
     sum.force += w.force;
     sum.torque += w.torque;
   });
-  for (const SpringHandle spring : body.moving_springs)
+  for (const SpringHandle spring : body.sleep.moving_springs)
     sum += spring_push(world_, world_.springs[spring], body, time);
   return sum;
 }
@@ -167,8 +167,8 @@ void ActiveBodies::wake_pushed(Real time) {
   std::vector<Body*> pushed;
   for (const auto& [number, group] : sleeping_) {
     const auto woken = std::find_if(group.begin(), group.end(), [&](const Body* body) {
-      return (changing || !body->moving_springs.empty()) &&
-             is_pushed(*body, changing_push(*body, time), body->rest_push);
+      return (changing || !body->sleep.moving_springs.empty()) &&
+             is_pushed(*body, changing_push(*body, time), body->sleep.push);
     });
     if (woken != group.end()) pushed.push_back(*woken);
   }
@@ -177,11 +177,12 @@ void ActiveBodies::wake_pushed(Real time) {
 
 void ActiveBodies::put_to_sleep(std::span<const Island> islands, Real start, Real h) {
   if (!world_.def.sleep) return;
-  for (Body* body : awake_) body->quiet_time = fastest_point(*body) < kQuietSpeed ? body->quiet_time + h : 0;
+  for (Body* body : awake_)
+    body->sleep.quiet_time = fastest_point(*body) < kQuietSpeed ? body->sleep.quiet_time + h : 0;
   for (const Island& island : islands) {
     if (island.bodies.empty()) continue;
     const bool quiet = std::all_of(island.bodies.begin(), island.bodies.end(), [](const Body* body) {
-      return body->quiet_time >= kQuietTime && body->is_dynamic();
+      return body->sleep.quiet_time >= kQuietTime && body->is_dynamic();
     });
     // A body with changing or missing support is not at rest: at the top of its flight it is quiet only for a
     // moment.
@@ -195,7 +196,7 @@ void ActiveBodies::put_to_sleep(std::span<const Island> islands, Real start, Rea
     for (Body* body : island.bodies) {
       body->asleep = true;
       body->island = sleeping_groups_;
-      body->rest_push = changing_push(*body, start);
+      body->sleep.push = changing_push(*body, start);
       body->rigid.momentum.setZero();
       body->rigid.angular_momentum.setZero();
     }

@@ -74,7 +74,7 @@ std::vector<Reaction> ClothMotion::step(Real start, Real h) {
 void ClothMotion::wake_unpinned(std::span<const ClothBody> near) {
   std::vector<Body*> released;
   active_.for_each_asleep([&](Body& body) {
-    if (!body.rest_pins) return;
+    if (!body.sleep.pins) return;
     const bool is_held = std::any_of(near.begin(), near.end(), [&](const ClothBody& at) {
       return at.way().body == body.handle.index && at.pin_load();
     });
@@ -94,8 +94,8 @@ std::vector<Reaction> ClothMotion::answer(std::span<const ClothBody> near, Real 
     if (left || at.touching_speed > kClothRest) active_.wake(body);
     if (body.asleep && at.pin_load()) {
       const Wrench pull{at.pin_load()->impulse / h, at.pin_load()->angular_impulse / h};
-      if (!body.rest_pins) body.rest_pins = pull;
-      if (is_pushed(body, pull, *body.rest_pins)) active_.wake(body);
+      if (!body.sleep.pins) body.sleep.pins = pull;
+      if (is_pushed(body, pull, *body.sleep.pins)) active_.wake(body);
     }
     if (!at.touched || body.asleep) continue;
     // The body stays where cloth touched it. If it were put back to its position without cloth, it would drag
