@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "sim/core/twist.h"
+
 namespace offstage::sim {
 namespace {
 
@@ -27,11 +29,6 @@ JointRow slide_row(const JointPlace& p, const Vec3& t) {
 /// Both anchors coincide, along the world's axes. Besides the accelerations, d2C/dt2 contains w_a x (w_a x
 /// r_a) - w_b x (w_b x r_b).
 void add_meeting_rows(const JointPlace& p, JointRows& rows) {
-  const auto cross_matrix = [](const Vec3& r) {
-    Mat3 m;
-    m << 0, -r.z(), r.y(), r.z(), 0, -r.x(), -r.y(), r.x(), 0;
-    return m;
-  };
   const Vec3 &wa = p.a.angular_velocity, &wb = p.b.angular_velocity;
   rows.on_a.topLeftCorner<3, 3>().setIdentity();
   rows.on_a.bottomLeftCorner<3, 3>() = cross_matrix(p.arm_a);

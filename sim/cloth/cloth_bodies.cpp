@@ -1,5 +1,7 @@
 #include "sim/cloth/cloth_bodies.h"
 
+#include "sim/core/twist.h"
+
 namespace offstage::sim {
 namespace {
 
@@ -16,8 +18,7 @@ Pose moved(const Pose& pose, const Vec3& centre, const Vec3& shift, const Vec3& 
 
 /// Adds the mass matrix of a point mass at `arm` from the centre.
 void add_point_mass(Real mass, const Vec3& arm, Mat6& matrix) {
-  Mat3 cross;
-  cross << 0, -arm.z(), arm.y(), arm.z(), 0, -arm.x(), -arm.y(), arm.x(), 0;
+  const Mat3 cross = cross_matrix(arm);
   matrix.topLeftCorner<3, 3>().diagonal().array() += mass;
   matrix.topRightCorner<3, 3>() -= mass * cross;
   matrix.bottomLeftCorner<3, 3>() += mass * cross;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/core/twist.h"
+
 namespace offstage::sim {
 namespace {
 
@@ -44,9 +46,7 @@ Vec3 Obstacle::friction_axis_on(const Vec3& n, Real fraction) const {
 }
 
 Mat3 Obstacle::mobility(const Vec3& arm) const {
-  Mat3 cross;
-  cross << 0, -arm.z(), arm.y(), arm.z(), 0, -arm.x(), -arm.y(), arm.x(), 0;
-  return inverse_mass * Mat3::Identity() - cross * inverse_inertia * cross;
+  return point_mobility(inverse_mass, inverse_inertia, arm);
 }
 
 int Obstacle::pieces(Real particle_radius) const {

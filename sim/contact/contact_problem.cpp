@@ -3,16 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sim/contact/friction_limit.h"
+#include "sim/contact/friction_cone.h"
+#include "sim/core/twist.h"
 
 namespace offstage::sim {
 namespace {
-
-Mat3 cross_of(const Vec3& r) {
-  Mat3 m;
-  m << 0, -r.z(), r.y(), r.z(), 0, -r.x(), -r.y(), r.x(), 0;
-  return m;
-}
 
 /// Angular velocity due to a unit angular impulse, in the contact's frame [1/(kg m^2)].
 Mat3 angular_mobility(const Contact& c, std::span<const ContactBody> bodies) {
@@ -98,8 +93,7 @@ Real turn_step(Contact& c, const Vec3& before, const Vec3& u, const Mat3& K, std
 }  // namespace
 
 Mat3 mobility(const ContactBody& body, const Vec3& arm) {
-  const Mat3 x = cross_of(arm);
-  return body.inverse_mass * Mat3::Identity() - x * body.inverse_inertia * x;
+  return point_mobility(body.inverse_mass, body.inverse_inertia, arm);
 }
 
 Mat3 mobility(const Contact& c, std::span<const ContactBody> bodies) {
@@ -167,7 +161,7 @@ uint32_t projected_gauss_seidel(std::span<ContactBody> bodies, std::span<Contact
         change = std::max(change, turn_step(c, before, u, K, bodies));
         continue;
       }
-      const Real k = std::max(K(1, 1), K(2, 2)) + std::abs(K(1, 2));
+      const Real k = tangential_bound(K);
       const Vec3 wanted(c.impulse.x(), before.y() - u.y() / k, before.z() - u.z() / k);
       c.impulse = projected(c, wanted, c.impulse.x());
       const Vec3 step = c.impulse - before;

@@ -139,6 +139,15 @@ Vec3 origin(const Body& body) {
   return body.is_awake() ? body.start.position : body.pose.position;
 }
 
+ContactBody unmoved_body(const Body& body) {
+  ContactBody b;
+  if (body.is_kinematic()) {
+    b.velocity = body.drive.velocity;
+    b.angular_velocity = body.drive.angular_velocity;
+  }
+  return b;
+}
+
 Mat3 inverse_inertia(const RigidBody& body, const Quat& orientation) {
   const Mat3 R = orientation.toRotationMatrix();
   return R * body.inverse_inertia * R.transpose();

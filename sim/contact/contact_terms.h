@@ -6,6 +6,7 @@
 
 #include "sim/collision/contact_frame.h"
 #include "sim/contact/contact_pair.h"
+#include "sim/contact/contact_problem.h"
 
 namespace offstage::sim {
 
@@ -25,6 +26,9 @@ std::pair<Real, Real> friction(const PairSurface& surface, const Vec3& u);
 
 /// Reference point of a body's velocities. For kinematic bodies it is that of the interval's end.
 Vec3 origin(const Body& body);
+
+/// A body that contacts do not move, for the exact solver and that of impacts: asleep, static or kinematic.
+ContactBody unmoved_body(const Body& body);
 
 /// The inverse inertia in world axes at an orientation.
 Mat3 inverse_inertia(const RigidBody& body, const Quat& orientation);

@@ -124,18 +124,12 @@ bool ExactContacts::is_safe(const ContactWork& work) const {
 }
 
 uint32_t ExactContacts::add_body(Body& body, const ContactInterval& interval) {
-  ContactBody b;
-  if (body.is_awake()) {
-    b.inverse_mass = 1 / body.rigid.mass;
-    b.inverse_inertia =
-        inverse_inertia(body.rigid, body.impulse_orientation(interval.duration, interval.substep));
-    b.velocity = body.rigid.velocity();
-    b.angular_velocity = body.rigid.angular_velocity();
-  } else if (body.is_kinematic()) {
-    b.velocity = body.drive.velocity;
-    b.angular_velocity = body.drive.angular_velocity;
-  }
-  bodies_.push_back(b);
+  bodies_.push_back(body.is_awake()
+                        ? ContactBody{1 / body.rigid.mass,
+                                      inverse_inertia(body.rigid, body.impulse_orientation(interval.duration,
+                                                                                           interval.substep)),
+                                      body.rigid.velocity(), body.rigid.angular_velocity()}
+                        : unmoved_body(body));
   return static_cast<uint32_t>(bodies_.size() - 1);
 }
 

@@ -37,11 +37,7 @@ struct CollisionCluster {
   void add(const ContactPair& pair, Real reach, Real collision_speed, ImpactLaw law) {
     const auto row = [&](const Body& body) {
       if (body.is_awake()) return body.row;
-      bodies.push_back({});
-      if (body.is_kinematic()) {
-        bodies.back().velocity = body.drive.velocity;
-        bodies.back().angular_velocity = body.drive.angular_velocity;
-      }
+      bodies.push_back(unmoved_body(body));
       return static_cast<uint32_t>(bodies.size() - 1);
     };
     const uint32_t a = row(pair.a()), b = row(pair.b());

@@ -34,6 +34,16 @@ inline PatchVector friction_limits(const PatchBatch& p) {
   return {p.friction_t * force, p.friction_k * force, lane_min(p.friction_t, p.friction_k) * moment};
 }
 
+/// Impulses along t and k, projected on the limits: a disc if the coefficients of both axes are equal,
+/// otherwise a rectangle.
+inline std::pair<FloatLanes, FloatLanes> projected(const PatchBatch& p, FloatLanes t, FloatLanes k,
+                                                   const PatchVector& limits) {
+  const FloatLanes size = lane_sqrt(t * t + k * k);
+  const FloatLanes scale = size > limits.x ? limits.x / size : float_lanes(1);
+  const auto round = p.friction_t == p.friction_k;
+  return {round ? scale * t : lane_clamp(t, limits.x), round ? scale * k : lane_clamp(k, limits.y)};
+}
+
 /// The impulses of a patch of one point, along t and k, from the velocities u: those that stop the sliding if
 /// they are within the limits. Otherwise it is a projected gradient step: a step against the velocity, short
 /// enough for convergence, projected on the limits. Its fixed point opposes the sliding exactly.
@@ -42,14 +52,10 @@ inline PatchVector coulomb_impulse(const PatchBatch& p, const PatchVector& u, co
   const PatchVector& old = p.friction_impulse;
   const FloatLanes stick_t = old.x - (S.xx * u.x + S.xy * u.y);
   const FloatLanes stick_k = old.y - (S.xy * u.x + S.yy * u.y);
-  const FloatLanes slide_t = old.x - S.zz * u.x, slide_k = old.y - S.zz * u.y;
-  const FloatLanes slide = lane_sqrt(slide_t * slide_t + slide_k * slide_k);
-  const FloatLanes scale = slide > limits.x ? limits.x / slide : float_lanes(1);
+  const auto [held_t, held_k] = projected(p, old.x - S.zz * u.x, old.y - S.zz * u.y, limits);
   const auto round = p.friction_t == p.friction_k;
   const auto sticks = round ? stick_t * stick_t + stick_k * stick_k <= limits.x * limits.x
                             : (lane_abs(stick_t) <= limits.x) & (lane_abs(stick_k) <= limits.y);
-  const FloatLanes held_t = round ? scale * slide_t : lane_clamp(slide_t, limits.x);
-  const FloatLanes held_k = round ? scale * slide_k : lane_clamp(slide_k, limits.y);
   return {sticks ? stick_t : held_t, sticks ? stick_k : held_k, FloatLanes{}};
 }
 
@@ -70,11 +76,7 @@ inline PatchVector separate_impulse(const PatchBatch& p, const PatchVector& u, c
   const PatchSymmetric& K = p.friction_mobility;
   const PatchVector& old = p.friction_impulse;
   const FloatLanes step = lane_inverse(lane_max(K.xx, K.yy) + lane_abs(K.xy));
-  const FloatLanes t = old.x - step * u.x, k = old.y - step * u.y, size = lane_sqrt(t * t + k * k);
-  const FloatLanes scale = size > limits.x ? limits.x / size : float_lanes(1);
-  const auto round = p.friction_t == p.friction_k;
-  const FloatLanes held_t = round ? scale * t : lane_clamp(t, limits.x),
-                   held_k = round ? scale * k : lane_clamp(k, limits.y);
+  const auto [held_t, held_k] = projected(p, old.x - step * u.x, old.y - step * u.y, limits);
   const FloatLanes spin = u.z + K.xz * (held_t - old.x) + K.yz * (held_k - old.y);
   return {held_t, held_k, lane_clamp(old.z - lane_inverse(K.zz) * spin, limits.z)};
 }

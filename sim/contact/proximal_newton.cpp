@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "sim/core/twist.h"
 #include "sim/linear/least_squares.h"
 
 namespace offstage::sim {
@@ -44,12 +45,6 @@ constexpr Real kRegularization = 1e-11;
 constexpr uint32_t kMaxFactorizations = 300;
 /// Cost of operations [ns]: per contact, and per block of the factor.
 constexpr Real kSetUp = 150, kEvaluation = 80, kAssembly = 150, kSolve = 25, kProduct = 80;
-
-Mat3 cross_matrix(const Vec3& r) {
-  Mat3 m;
-  m << 0, -r.z(), r.y(), r.z(), 0, -r.x(), -r.y(), r.x(), 0;
-  return m;
-}
 
 /// A third of the trace of mobility().
 Real mean_mobility(const ContactBody& body, const Vec3& r) {

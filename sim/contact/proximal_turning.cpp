@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sim/contact/friction_limit.h"
 #include "sim/contact/proximal_newton.h"
 
 namespace offstage::sim {

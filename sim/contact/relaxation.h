@@ -26,7 +26,7 @@
 #include "sim/collision/manifold.h"
 #include "sim/contact/contact_coloring.h"
 #include "sim/contact/contact_problem.h"
-#include "sim/contact/friction_limit.h"
+#include "sim/contact/friction_cone.h"
 #include "sim/contact/patch_batch.h"
 #include "sim/contact/relaxed_joints.h"
 #include "sim/core/types.h"

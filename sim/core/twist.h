@@ -1,5 +1,5 @@
 #pragma once
-/// Rigid motions and wrenches.
+/// Rigid motions, wrenches, and how a body responds to impulses.
 
 #include "sim/core/types.h"
 
@@ -23,5 +23,18 @@ struct Wrench {
     return *this;
   }
 };
+
+/// The matrix of v x.
+inline Mat3 cross_matrix(const Vec3& v) {
+  Mat3 m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
+/// Velocity of the point at `arm` from a body's centre of mass due to a unit impulse there [1/kg].
+inline Mat3 point_mobility(Real inverse_mass, const Mat3& inverse_inertia, const Vec3& arm) {
+  const Mat3 cross = cross_matrix(arm);
+  return inverse_mass * Mat3::Identity() - cross * inverse_inertia * cross;
+}
 
 }  // namespace offstage::sim

@@ -1,5 +1,7 @@
 #include "sim/dynamics/rigid_jacobian.h"
 
+#include "sim/core/twist.h"
+
 namespace offstage::sim {
 namespace {
 
@@ -25,12 +27,6 @@ Eigen::Matrix4d turning(const Vec3& w) {
 }
 
 }  // namespace
-
-Mat3 cross_matrix(const Vec3& v) {
-  Mat3 m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
 
 RigidDerivative::RigidDerivative(const RigidStage& stage) : stage_(stage) {
   const Mat3 R = stage.motion.orientation.toRotationMatrix();

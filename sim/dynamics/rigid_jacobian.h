@@ -37,9 +37,6 @@ class RigidDerivative {
   PointDerivative angular_velocity_;
 };
 
-/// The matrix of v x.
-Mat3 cross_matrix(const Vec3& v);
-
 /// Adds a block of derivatives between two objects, coordinates first: 13 numbers for a body, 6 for a
 /// particle.
 void add_block(const Eigen::Ref<const Eigen::MatrixXd>& block, const StateColumns& rows,
