@@ -271,7 +271,7 @@ void ImpactStage::go_on(uint32_t number, Real time) {
     if (islands_[number].bodies.size() > bodies) same = 0;
     bodies = islands_[number].bodies.size();
     if (same > kMostPasses) {  // the last motion stands
-      ++report_.toi_limit_reached;
+      ++report_.impacts.toi_limit_reached;
       return;
     }
     for (Body* body : islands_[number].bodies) body->rigid.set_state(body->start);
