@@ -206,6 +206,19 @@ TEST(Commands, BenchPrintsATableOfMethods) {
   EXPECT_EQ(offstage("bench s.json --csv b.csv", folder.path()).code, 2);
   const Outcome piped = offstage("bench - < s.json", folder.path());
   EXPECT_EQ(piped.code, 0) << piped.err;
+  const Outcome brief =
+      offstage("bench s.json --duration 0.1 --fps 30 --progress plain --csv c.csv", folder.path());
+  EXPECT_EQ(brief.code, 0) << brief.err;
+  EXPECT_NE(brief.err.find("run 1 of 8: scene  "), std::string::npos) << brief.err;
+  std::istringstream table(read_file(folder / "c.csv"));
+  std::string heading, first;
+  std::getline(table, heading);
+  std::getline(table, first);
+  EXPECT_NE(first.find(",16,"), std::string::npos) << first;  // steps: two frames of eight
+  const Outcome cut = offstage("bench s.json --limit 1e-9", folder.path());
+  EXPECT_EQ(cut.code, 0) << cut.err;
+  EXPECT_NE(cut.out.find("stopped by --limit"), std::string::npos) << cut.out;
+  EXPECT_EQ(offstage("bench s.json --limit 0", folder.path()).code, 2);
 }
 
 TEST(Commands, OverridesAreCheckedLikeTheFile) {
