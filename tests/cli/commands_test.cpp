@@ -325,6 +325,18 @@ TEST(Commands, ConvexPartsAreCachedOnDiskUnlessDisabled) {
   EXPECT_EQ(json::parse(first.out)["convex_parts"]["count"], 2);
 }
 
+TEST(Commands, AnLWithCapsOfSixCornersHasTwoExactParts) {
+  const TemporaryFolder folder;
+  write_file(folder / "l.obj",
+             "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 1\nv 2 0 1\nv 2 1 1\nv 1 1 1\nv 1 "
+             "2 1\nv 0 2 1\n"
+             "f 1 6 5 4 3 2\nf 7 8 9 10 11 12\nf 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 10\nf 5 6 12 11\n"
+             "f 6 1 7 12\n");
+  const json parts = json::parse(offstage("info l.obj --json --no-cache", folder.path()).out)["convex_parts"];
+  EXPECT_EQ(parts["method"], "exact");
+  EXPECT_EQ(parts["count"], 2);
+}
+
 TEST(Commands, BodiesThatLeaveTheWorldAreNamed) {
   const TemporaryFolder folder;
   write_file(
