@@ -36,7 +36,7 @@ inline Lanes lane_cross(Lanes a, Lanes b) {
 /// As Eigen adds up a product of vectors of three.
 inline Real lane_dot(Lanes a, Lanes b) {
   const Lanes p = a * b;
-  return p[0] + (p[1] + p[2]);
+  return p[0] + p[1] + p[2];
 }
 inline Vec3 vector_of(Lanes v) {
   return {v[0], v[1], v[2]};
