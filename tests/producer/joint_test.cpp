@@ -64,32 +64,6 @@ TEST(SceneJoints, InvalidValuesAreRefusedWithTheAllowedOnes) {
             "/articulations/0/end: there is no body 'dor'; did you mean 'door'?\n");
 }
 
-TEST(Articulations, AChainWithBendStiffnessSagsAsACantilever) {
-  constexpr Real kLength = 1, kLinks = 10, kRadius = 0.01, kDensity = 2000, kStiffness = 30;  // [N m^2]
-  const LoadedScene loaded = parse(R"("world": {"solver": "exact"}, "output": {"fps": 30, "duration": 3},
-    "articulations": [{"type": "chain", "name": "rod", "from": [0, 1, 0], "to": [1, 1, 0], "links": 10,
-                       "radius": 0.01, "density": 2000, "bend_stiffness": 30, "damping": 4}])");
-  EXPECT_TRUE(loaded.warnings.empty());
-  const ModelLibrary models;
-  Simulation simulation(loaded.scene, models);
-  for (int frame = 1; frame < loaded.scene.frame_count(); ++frame) simulation.advance();
-  const auto& tip = simulation.moving_bodies().back();
-  const sim::Pose pose = simulation.world().body(tip.handle).pose;
-  const Real side = kLength / kLinks;
-  const Real sag = 1 - pose.point_to_world({0, side / 2, 0}).y();
-  const Real weight =
-      kDensity * 9.81 * std::numbers::pi * kRadius * kRadius * (side - 2 * kRadius / 3) / side;
-  const Real expected = weight * std::pow(kLength, 4) / (8 * kStiffness);
-  EXPECT_NEAR(sag, expected, 0.02 * expected);  // with ten links: 1 % more
-}
-
-TEST(Articulations, AChainWithBendStiffnessNeedsTheExactSolver) {
-  const std::string rod = R"("articulations": [{"type": "chain", "bend_stiffness": 1}])";
-  ASSERT_EQ(parse(rod).warnings.size(), 1u);
-  EXPECT_NE(parse(rod).warnings[0].what.find("exact"), std::string::npos);
-  EXPECT_NE(joint_errors(R"("articulations": [{"type": "chain", "bend_stiffness": -1}])"), "");
-}
-
 // No parts of a standing figure overlap, because the solver would push them apart in the first step.
 TEST(Articulations, StartWithoutOverlapAndHoldWhenTheyFall) {
   const LoadedScene loaded = parse(R"(

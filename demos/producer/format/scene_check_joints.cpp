@@ -151,10 +151,6 @@ class JointChecker {
         fail(chain.where.path + "/path/" + std::to_string(i), "must differ from the point before it");
     if (!chain.path.empty() && chain.sag != 1)
       fail(chain.where.path + "/sag", "has no meaning with a \"path\"");
-    if (chain.bend_stiffness > 0 && scene_.world.solver != sim::SolverKind::exact)
-      findings_.warnings.push_back({{"", 0, 0, chain.where.path + "/bend_stiffness"},
-                                    "is too soft with this \"world.solver\", which does not converge for "
-                                    "rows of springs; use \"exact\""});
     const auto is_still = [this](const std::string& end) {
       const auto it = std::ranges::find(flat_.bodies, end, &Body::name);
       return end == "world" || (it != flat_.bodies.end() && it->motion != sim::MotionType::dynamic);

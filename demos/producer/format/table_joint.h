@@ -175,13 +175,6 @@ struct Table<Chain> {
          "name of the body that holds the first link, or `world`; empty: the end is free"},
         {"end", &T::end, "name of the body that holds the last link, or `world`; empty: the end is free"},
         {"swing_deg", &T::swing_deg, "largest angle between neighbouring links", "degrees", between(0, 180)},
-        {"bend_stiffness", &T::bend_stiffness,
-         "flexural rigidity of an elastic rod that is unstressed as it is laid out: the torque of each joint "
-         "per "
-         "angle, times the length of a link. Holders clamp its ends. It needs `world.solver: exact`; the "
-         "others "
-         "make it too soft",
-         "N m^2", kNotNegative},
         {"friction", &T::friction, "dry friction of each joint", "N m", kNotNegative},
         {"damping", &T::damping, "viscous damping of each joint", "N m s", kNotNegative},
         {"max_force", &T::max_force, "force at which a joint breaks; default: never", "N", kPositive}};
