@@ -5,18 +5,11 @@
 /// surface on any mesh, and neither stretching nor the direction of a fold changes it.
 ///
 /// The impulses are along gradients of curvatures, whose sums and moments are zero: momentum and angular
-/// momentum are kept. The limit stops bending as an inelastic impact does, in two parts.
-///
-/// Before the springs act, brace() changes velocities so that free motion would not bend a place too far.
-/// The new velocities are the nearest ones, in the metric of masses, of a convex set that contains rest, so
-/// the kinetic energy does not grow, and the springs store no more than what they take from the motion.
-/// After the springs have acted, project() moves points to take back a tenth of what is left, which the
-/// springs have added: in a hard impact, curvatures can exceed the limit by some percent. These moves stretch
-/// springs, so the less is taken back at once, the less energy they add. They begin with the impulses of the
-/// last sub-step, which hardly differ while a load rests, and add no kinetic energy.
-///
-/// Contacts with bodies and cloth, and the limit of stretch, are solved later in the sub-step and have
-/// precedence: under their pressure the curvature can exceed the limit for that sub-step.
+/// momentum are kept. They begin with those of the last sub-step, which hardly differ while a load rests.
+/// They add no kinetic energy: the limit stops bending as an inelastic impact does. The moves stretch
+/// springs, which store that energy for a moment. Contacts with bodies and cloth, and the limit of stretch,
+/// are solved later in the sub-step and have precedence: under their pressure the curvature can exceed the
+/// limit for that sub-step.
 
 #include <cstdint>
 #include <span>
@@ -36,13 +29,10 @@ class BendLimit {
       : cloth_(cloth), first_(first), count_(count), bending_(&bending), radius_(radius) {}
   uint32_t cloth() const { return cloth_; }
 
-  /// Takes from the velocities at the start of a sub-step of length dt what would bend places too far.
-  void brace(ClothPoints& points, Real dt);
-
   /// Bends back all places that are bent too far at the end of a sub-step of length dt. Returns whether there
-  /// were any. The impulses on held points, also those of brace(), are added to their `pull`. `kick` is the
-  /// velocity of points besides that of their moves; the part of the moves that must not count as velocity is
-  /// appended to `cuts`.
+  /// were any. The impulses on held points are added to their `pull`. `kick` is the velocity of points
+  /// besides that of their moves; the part of the moves that must not count as velocity is appended to
+  /// `cuts`.
   bool project(ClothPoints& points, Real dt, std::span<const Vec4> kick, std::vector<VelocityCut>& cuts);
 
   /// Greatest curvature times the radius.
@@ -61,8 +51,6 @@ class BendLimit {
   std::span<const Vec4> part(const std::vector<Vec4>& of_all) const {
     return std::span(of_all).subspan(first_, count_);
   }
-  bool add_row(const ClothPoints& points, std::size_t patch, std::span<const Vec4> at, Real impulse);
-  bool find_rows_ahead(const ClothPoints& points);
   bool find_rows(const ClothPoints& points);
   void push(const ClothPoints& points, const Row& row, Real impulse);
   void solve(const ClothPoints& points);
@@ -75,8 +63,6 @@ class BendLimit {
   std::vector<Row> rows_;
   std::vector<std::pair<uint32_t, Vec4>> gradient_;  // times the radius, by points of the cloth
   std::vector<Vec4> move_;    // of each point by the impulses; of held ones the impulse
-  std::vector<Vec4> ahead_;   // where points would be at the end of the sub-step without springs
-  std::vector<Vec4> braced_;  // impulses of brace() on held points [kg m]; empty if it did nothing
   std::vector<Real> before_;  // impulses of the last sub-step, of each patch
 };
 

@@ -88,7 +88,6 @@ void ClothSystem::substep(Real from, Real to, Real dt) {
   points_.start = points_.position;
   cuts_.clear();
   move_held();
-  for (BendLimit& limit : bend_limits_) limit.brace(points_, dt);
   integrate(dt);
   stop_lost(dt);
   pull_bodies(dt);
