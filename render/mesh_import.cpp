@@ -16,6 +16,7 @@
 #include "render/gltf_import.h"
 #include "render/model_files.h"
 #include "render/part_builder.h"
+#include "render/polygon_cut.h"
 #include "render/tone_map.h"
 
 namespace offstage::render {
@@ -221,6 +222,36 @@ std::vector<std::string> ignored_by_assimp(const aiScene& scene) {
   return lines;
 }
 
+/// Divides the polygons of more than four corners into triangles, where cut_polygon() can.
+void cut_polygons(aiMesh& mesh) {
+  const std::span faces(mesh.mFaces, mesh.mNumFaces);
+  if (std::ranges::all_of(faces, [](const aiFace& face) { return face.mNumIndices < 5; })) return;
+  std::vector<std::vector<unsigned>> cut;
+  for (const aiFace& face : faces) {
+    const std::span corners(face.mIndices, face.mNumIndices);
+    std::vector<uint32_t> triangles;
+    if (corners.size() > 4) {
+      std::vector<Vector3d> points;
+      for (const unsigned v : corners)
+        points.emplace_back(mesh.mVertices[v].x, mesh.mVertices[v].y, mesh.mVertices[v].z);
+      triangles = cut_polygon(points);
+    }
+    if (triangles.empty()) cut.emplace_back(corners.begin(), corners.end());
+    for (std::size_t i = 0; i < triangles.size(); i += 3)
+      cut.push_back({corners[triangles[i]], corners[triangles[i + 1]], corners[triangles[i + 2]]});
+  }
+  delete[] mesh.mFaces;
+  mesh.mFaces = new aiFace[cut.size()];
+  mesh.mNumFaces = static_cast<unsigned>(cut.size());
+  for (std::size_t f = 0; f < cut.size(); ++f) {
+    aiFace& face = mesh.mFaces[f];
+    face.mNumIndices = static_cast<unsigned>(cut[f].size());
+    face.mIndices = new unsigned[cut[f].size()];
+    std::ranges::copy(cut[f], face.mIndices);
+  }
+  mesh.mPrimitiveTypes |= aiPrimitiveType_TRIANGLE;
+}
+
 Model import_by_assimp(const std::filesystem::path& path, const std::string& node,
                        const InputFolders& folders) {
   Assimp::Importer importer;
@@ -232,6 +263,7 @@ Model import_by_assimp(const std::filesystem::path& path, const std::string& nod
   Model model;
   if (scene) {
     model.warnings = ignored_by_assimp(*scene);
+    for (aiMesh* mesh : std::span(scene->mMeshes, scene->mNumMeshes)) cut_polygons(*mesh);
     scene = importer.ApplyPostProcessing(kSteps);
   }
   if (!scene) throw FileError("cannot be read as a model: " + reason(importer));

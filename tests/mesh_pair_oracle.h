@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "sim/collision/mesh_pair.h"
 #include "sim/collision/volume_pair.h"
+#include "tests/mesh_pair.h"
 #include "tests/meshes.h"
 #include "tests/random.h"
 

@@ -30,6 +30,18 @@ inline Lanes lane_last(Lanes v) {
   return __builtin_shufflevector(v, v, 2, 0, 1, 3);
 }
 
+inline Lanes lane_cross(Lanes a, Lanes b) {
+  return lane_next(a * lane_next(b) - lane_next(a) * b);
+}
+/// As Eigen adds up a product of vectors of three.
+inline Real lane_dot(Lanes a, Lanes b) {
+  const Lanes p = a * b;
+  return p[0] + p[1] + p[2];
+}
+inline Vec3 vector_of(Lanes v) {
+  return {v[0], v[1], v[2]};
+}
+
 /// The columns of a matrix.
 struct LaneColumns {
   Lanes x, y, z;

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "sim/contact/contact_problem.h"
+#include "sim/linear/lanes.h"
 #include "sim/particles/colliding_particle.h"
 #include "sim/particles/particle_impacts.h"
 #include "sim/particles/particle_search.h"
@@ -97,14 +98,15 @@ class ParticleContacts {
              std::clamp(across.dot(along), -most, most) * across;
     }
   };
+  /// In one register: the velocity, and the inverse mass in the fourth lane.
   struct Motion {
-    Vec3 velocity;
-    Real inverse_mass;
+    Lanes velocity;
+    Vec3 at() const { return vector_of(velocity); }
   };
-  /// Rotation of a ball: see CollidingParticle.
+  /// Rotation of a ball (see CollidingParticle): the surface's spin, and turning / mass [1/kg].
   struct Turn {
-    Vec3 surface_spin;
-    Real by_impulse;  // turning / mass [1/kg]
+    Lanes surface_spin;
+    Vec3 at() const { return vector_of(surface_spin); }
   };
   /// Two particles whose paths would pass through each other.
   struct Passing {
@@ -147,10 +149,10 @@ class ParticleContacts {
   bool is_solved(uint32_t particle) const { return !solved_.empty() && solved_[particle] != 0; }
   // particle_relaxation.cpp
   void start_motion();
-  Vec3 relative_velocity(const Pair& c) const;
-  Vec3 relative_velocity(const Surface& c) const;
-  void apply(const Pair& c, const Vec3& impulse);
-  void apply(const Surface& c, const Vec3& impulse);
+  Lanes relative_velocity(const Pair& c, Lanes normal) const;
+  Lanes relative_velocity(const Surface& c, Lanes normal) const;
+  void apply(const Pair& c, Lanes normal, Lanes impulse);
+  void apply(const Surface& c, Lanes normal, Lanes impulse);
   void relax();
   void displace(std::span<Vec3> end, std::span<uint8_t> touched);
   void push_apart(std::span<Vec3> end);

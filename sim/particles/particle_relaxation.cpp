@@ -74,24 +74,46 @@ void limit_loads(std::span<Reaction> reactions, std::map<uint32_t, Load>& loads)
     }
 }
 
+Lanes lanes_of(const Eigen::Vector3f& v) {
+  return Lanes{v[0], v[1], v[2], 0};
+}
+/// In all lanes: that of the fourth one.
+Lanes fourth(Lanes v) {
+  return __builtin_shufflevector(v, v, 3, 3, 3, 3);
+}
+/// x y z 0.
+Lanes without_fourth(Lanes v) {
+  return __builtin_shufflevector(v, Lanes{}, 0, 1, 2, 4);
+}
+
+/// The part of a tangential impulse that friction with this limit can transmit.
+template <class Contact>
+[[gnu::always_inline]] inline Lanes held_lanes(const Contact& c, Lanes along, Real limit) {
+  if constexpr (requires { c.friction_axis; }) {
+    if (!c.friction_axis.isZero()) return lanes(c.held(vector_of(along), limit));
+  }
+  const Real size2 = lane_dot(along, along);
+  return size2 > limit * limit ? limit / std::sqrt(size2) * along : along;
+}
+
 /// Change of the impulse that brings a contact with the relative velocity u to its target, within Coulomb's
 /// cone.
 template <class Contact>
-Vec3 correct(Contact& c, const Vec3& u) {
-  const Vec3 before = c.impulse(), normal = c.normal();
-  Vec3 wanted = before - c.mass * (u - c.target * normal);
-  const Real pressing = wanted.dot(normal);
+[[gnu::always_inline]] inline Lanes correct(Contact& c, Lanes normal, Lanes u) {
+  const Lanes before = lanes_of(c.impulse_single);
+  Lanes wanted = before - static_cast<Real>(c.mass) * (u - static_cast<Real>(c.target) * normal);
+  const Real pressing = lane_dot(wanted, normal);
   if (pressing > 0) {
     if (c.sliding_mass != c.mass) {
-      const Vec3 held = before - c.sliding_mass * u;
-      wanted = held + (pressing - held.dot(normal)) * normal;
+      const Lanes held = before - static_cast<Real>(c.sliding_mass) * u;
+      wanted = held + (pressing - lane_dot(held, normal)) * normal;
     }
-    const Vec3 along = c.held(wanted - pressing * normal, c.friction * pressing);
-    c.impulse_single = (pressing * normal + along).template cast<float>();
+    const Lanes along = held_lanes(c, wanted - pressing * normal, c.friction * pressing);
+    c.impulse_single = vector_of(pressing * normal + along).template cast<float>();
   } else {
     c.impulse_single.setZero();
   }
-  return c.impulse() - before;
+  return lanes_of(c.impulse_single) - before;
 }
 
 }  // namespace
@@ -126,67 +148,77 @@ void ParticleContacts::start_motion() {
   motion_.resize(particles_.size());
   turns_.clear();
   if (std::ranges::any_of(particles_, [](const CollidingParticle& g) { return g.turning > 0; }))
-    for (const CollidingParticle& g : particles_) turns_.push_back({g.surface_spin, g.turning / g.mass});
+    for (const CollidingParticle& g : particles_) {
+      const Vec3& s = g.surface_spin;
+      turns_.push_back({Lanes{s[0], s[1], s[2], g.turning / g.mass}});
+    }
   tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
     for (std::size_t i = c * kRelaxationChunk; i < std::min(particles_.size(), (c + 1) * kRelaxationChunk);
-         ++i)
-      motion_[i] = {particles_[i].velocity, 1 / particles_[i].mass};
+         ++i) {
+      const Vec3& v = particles_[i].velocity;
+      motion_[i].velocity = Lanes{v[0], v[1], v[2], 1 / particles_[i].mass};
+    }
   });
 }
 
-[[gnu::always_inline]] inline Vec3 ParticleContacts::relative_velocity(const Pair& c) const {
-  const Vec3 u = motion_[c.a].velocity - motion_[c.b].velocity;
+[[gnu::always_inline]] inline Lanes ParticleContacts::relative_velocity(const Pair& c, Lanes normal) const {
+  const Lanes u = without_fourth(motion_[c.a].velocity - motion_[c.b].velocity);
   if (turns_.empty()) return u;
-  return u + c.normal().cross(turns_[c.a].surface_spin + turns_[c.b].surface_spin);
+  return u + lane_cross(normal, turns_[c.a].surface_spin + turns_[c.b].surface_spin);
 }
 
-[[gnu::always_inline]] inline Vec3 ParticleContacts::relative_velocity(const Surface& c) const {
-  const Vec3 u = motion_[c.particle].velocity - c.velocity;
-  return turns_.empty() ? u : Vec3(u + c.normal().cross(turns_[c.particle].surface_spin));
+[[gnu::always_inline]] inline Lanes ParticleContacts::relative_velocity(const Surface& c,
+                                                                        Lanes normal) const {
+  const Lanes u = without_fourth(motion_[c.particle].velocity - lanes(c.velocity));
+  return turns_.empty() ? u : u + lane_cross(normal, turns_[c.particle].surface_spin);
 }
 
-[[gnu::always_inline]] inline void ParticleContacts::apply(const Pair& c, const Vec3& impulse) {
-  motion_[c.a].velocity += motion_[c.a].inverse_mass * impulse;
-  motion_[c.b].velocity -= motion_[c.b].inverse_mass * impulse;
+// The fourth lane of normals and impulses is 0, so that masses remain.
+[[gnu::always_inline]] inline void ParticleContacts::apply(const Pair& c, Lanes normal, Lanes impulse) {
+  Lanes &a = motion_[c.a].velocity, &b = motion_[c.b].velocity;
+  a += fourth(a) * impulse;
+  b -= fourth(b) * impulse;
   if (turns_.empty()) return;
   // The arms and the impulses of the two are opposite, so that both turn in the same sense.
-  const Vec3 turn = c.normal().cross(impulse);
-  turns_[c.a].surface_spin -= turns_[c.a].by_impulse * turn;
-  turns_[c.b].surface_spin -= turns_[c.b].by_impulse * turn;
+  const Lanes turn = lane_cross(normal, impulse);
+  Lanes &spin_a = turns_[c.a].surface_spin, &spin_b = turns_[c.b].surface_spin;
+  spin_a -= fourth(spin_a) * turn;
+  spin_b -= fourth(spin_b) * turn;
 }
 
-[[gnu::always_inline]] inline void ParticleContacts::apply(const Surface& c, const Vec3& impulse) {
-  motion_[c.particle].velocity += motion_[c.particle].inverse_mass * impulse;
+[[gnu::always_inline]] inline void ParticleContacts::apply(const Surface& c, Lanes normal, Lanes impulse) {
+  Lanes& v = motion_[c.particle].velocity;
+  v += fourth(v) * impulse;
   if (turns_.empty()) return;
-  turns_[c.particle].surface_spin -= turns_[c.particle].by_impulse * c.normal().cross(impulse);
+  Lanes& spin = turns_[c.particle].surface_spin;
+  spin -= fourth(spin) * lane_cross(normal, impulse);
 }
 
 void ParticleContacts::relax() {
   start_motion();
-  for_each_contact([&](const Pair& c, std::size_t) { apply(c, c.impulse()); },
-                   [&](const Surface& c, std::size_t) { apply(c, c.impulse()); });
+  const auto begin = [&](const auto& c, std::size_t) {
+    apply(c, lanes_of(c.normal_single), lanes_of(c.impulse_single));
+  };
+  for_each_contact(begin, begin);
   const std::size_t slabs = (order_.layer_begin.size() - 1) / 2;
   const std::size_t most =
       std::clamp(kMaxContactVisits / std::max(contacts(), std::size_t{1}), kMinSweeps, kMaxSweeps);
   Real change2 = 1;
   for (sweeps_ = 0; sweeps_ < most && change2 > kTolerance * kTolerance; ++sweeps_) {
     slab_change2_.assign(slabs, 0);
-    const auto note = [&](std::size_t slab, const Vec3& impulse, Real mass) {
-      const Real size2 = impulse.squaredNorm(), mass2 = mass * mass;
+    const auto relax_one = [&](auto& c, std::size_t slab) {
+      const Lanes normal = lanes_of(c.normal_single);
+      const Lanes more = correct(c, normal, relative_velocity(c, normal));
+      apply(c, normal, more);
+      const Real size2 = lane_dot(more, more), mass = c.mass, mass2 = mass * mass;
       if (size2 > slab_change2_[slab] * mass2) slab_change2_[slab] = size2 / mass2;
     };
     for_each_contact(
         [&](Pair& c, std::size_t slab) {
-          if (is_solved(c.a)) return;
-          const Vec3 more = correct(c, relative_velocity(c));
-          apply(c, more);
-          note(slab, more, c.mass);
+          if (!is_solved(c.a)) relax_one(c, slab);
         },
         [&](Surface& c, std::size_t slab) {
-          if (is_solved(c.particle)) return;
-          const Vec3 more = correct(c, relative_velocity(c));
-          apply(c, more);
-          note(slab, more, c.mass);
+          if (!is_solved(c.particle)) relax_one(c, slab);
         });
     change2 = *std::max_element(slab_change2_.begin(), slab_change2_.end());
   }
@@ -212,8 +244,8 @@ void ParticleContacts::displace(std::span<Vec3> end, std::span<uint8_t> touched)
   tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
     for (std::size_t i = c * kRelaxationChunk; i < std::min(particles_.size(), (c + 1) * kRelaxationChunk);
          ++i) {
-      particles_[i].velocity = motion_[i].velocity;
-      if (!turns_.empty()) particles_[i].surface_spin = turns_[i].surface_spin;
+      particles_[i].velocity = motion_[i].at();
+      if (!turns_.empty()) particles_[i].surface_spin = turns_[i].at();
     }
   });
 }

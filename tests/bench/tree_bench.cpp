@@ -8,7 +8,7 @@
 #include <benchmark/benchmark.h>
 #include <fcl/fcl.h>
 
-#include "sim/collision/mesh_pair.h"
+#include "tests/mesh_pair.h"
 #include "tests/meshes.h"
 
 namespace offstage::sim {

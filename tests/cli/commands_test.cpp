@@ -206,6 +206,19 @@ TEST(Commands, BenchPrintsATableOfMethods) {
   EXPECT_EQ(offstage("bench s.json --csv b.csv", folder.path()).code, 2);
   const Outcome piped = offstage("bench - < s.json", folder.path());
   EXPECT_EQ(piped.code, 0) << piped.err;
+  const Outcome brief =
+      offstage("bench s.json --duration 0.1 --fps 30 --progress plain --csv c.csv", folder.path());
+  EXPECT_EQ(brief.code, 0) << brief.err;
+  EXPECT_NE(brief.err.find("run 1 of 8: scene  "), std::string::npos) << brief.err;
+  std::istringstream table(read_file(folder / "c.csv"));
+  std::string heading, first;
+  std::getline(table, heading);
+  std::getline(table, first);
+  EXPECT_NE(first.find(",16,"), std::string::npos) << first;  // steps: two frames of eight
+  const Outcome cut = offstage("bench s.json --limit 1e-9", folder.path());
+  EXPECT_EQ(cut.code, 0) << cut.err;
+  EXPECT_NE(cut.out.find("stopped by --limit"), std::string::npos) << cut.out;
+  EXPECT_EQ(offstage("bench s.json --limit 0", folder.path()).code, 2);
 }
 
 TEST(Commands, OverridesAreCheckedLikeTheFile) {
@@ -310,6 +323,18 @@ TEST(Commands, ConvexPartsAreCachedOnDiskUnlessDisabled) {
   EXPECT_EQ(second.out, without.out);
   EXPECT_EQ(json::parse(first.out)["convex_parts"]["method"], "exact");
   EXPECT_EQ(json::parse(first.out)["convex_parts"]["count"], 2);
+}
+
+TEST(Commands, AnLWithCapsOfSixCornersHasTwoExactParts) {
+  const TemporaryFolder folder;
+  write_file(folder / "l.obj",
+             "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 1\nv 2 0 1\nv 2 1 1\nv 1 1 1\nv 1 "
+             "2 1\nv 0 2 1\n"
+             "f 1 6 5 4 3 2\nf 7 8 9 10 11 12\nf 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 10\nf 5 6 12 11\n"
+             "f 6 1 7 12\n");
+  const json parts = json::parse(offstage("info l.obj --json --no-cache", folder.path()).out)["convex_parts"];
+  EXPECT_EQ(parts["method"], "exact");
+  EXPECT_EQ(parts["count"], 2);
 }
 
 TEST(Commands, BodiesThatLeaveTheWorldAreNamed) {

@@ -25,6 +25,8 @@ LoadedScene falling_cups(const std::vector<std::string>& overrides = {}) {
                      "s", OFFSTAGE_SOURCE_DIR, overrides);
 }
 
+constexpr double kNoLimit = 1e6;  // [s]
+
 TEST(MethodBench, VariesOneChoiceAtATimeAndLastTheBooksTogether) {
   std::vector<std::string> names;
   for (const Method& method : methods_of(falling_cups().scene)) {
@@ -41,7 +43,7 @@ TEST(MethodBench, VariesOneChoiceAtATimeAndLastTheBooksTogether) {
 TEST(MethodBench, CountsTheWorkAndTheDeviationOfEachMethod) {
   std::vector<MethodResult> results;
   for (const Method& method : methods_of(falling_cups().scene))
-    results.push_back(run_method(method.name, falling_cups(method.overrides), ModelLibrary()));
+    results.push_back(run_method(method.name, falling_cups(method.overrides), ModelLibrary(), kNoLimit));
   const MethodResult& first = results.front();
   EXPECT_EQ(first.deviation(first), 0);
   EXPECT_EQ(first.totals.substeps, 29 * 8u);  // the first frame shows time 0
@@ -61,6 +63,19 @@ TEST(MethodBench, CountsTheWorkAndTheDeviationOfEachMethod) {
   EXPECT_EQ(std::ranges::count(csv, '\n'), 1 + static_cast<std::ptrdiff_t>(results.size()));
   EXPECT_EQ(std::ranges::count(text, '\n'), 1 + static_cast<std::ptrdiff_t>(results.size()));
   EXPECT_NE(text.find("collision.narrow_phase=vclip"), std::string::npos);
+}
+
+TEST(MethodBench, ARunThatTakesTooLongEndsEarlyAndSaysSo) {
+  double share = 0;
+  const MethodResult whole = run_method("whole", falling_cups(), ModelLibrary(), kNoLimit);
+  MethodResult cut = run_method("cut", falling_cups(), ModelLibrary(), 0, [&](double s) { share = s; });
+  EXPECT_EQ(cut.totals.substeps, 8u);  // those of one frame
+  EXPECT_EQ(share, 0);
+  EXPECT_NE(cut.fault.find("--limit"), std::string::npos) << cut.fault;
+  EXPECT_FALSE(cut.deviation(whole));
+  MethodResult merged = whole;
+  merge(merged, cut);  // its shorter time is that of fewer steps
+  EXPECT_EQ(merged.seconds, whole.seconds);
 }
 
 }  // namespace

@@ -85,6 +85,36 @@ TEST(ReadModel, GivesFlatFacesToACubeWithoutNormals) {
   for (const Vector3f& normal : mesh.normals) EXPECT_NEAR(normal.cwiseAbs().maxCoeff(), 1, 1e-6f);
 }
 
+TEST(ReadModel, CutsPolygonsWithoutSliversAndGaps) {
+  // Prisms of combs with corners in a line; assimp's ears have no area there.
+  const ScratchFolder folder;
+  for (const int teeth : {1, 2, 5, 100}) {
+    std::vector<std::pair<int, int>> outline = {{0, 0}, {2 * teeth, 0}, {2 * teeth, 1}};
+    for (int i = teeth - 1; i >= 0; --i)
+      outline.insert(outline.end(), {{2 * i + 1, 1}, {2 * i + 1, 2}, {2 * i, 2}, {2 * i, 1}});
+    const std::size_t n = outline.size();
+    std::string obj, bottom = "f", top = "f", sides;
+    for (int z = 0; z < 2; ++z)
+      for (const auto& [x, y] : outline)
+        obj += "v " + std::to_string(x) + " " + std::to_string(y) + " " + std::to_string(z) + "\n";
+    for (std::size_t i = 0; i < n; ++i) {
+      bottom += " " + std::to_string(n - i);
+      top += " " + std::to_string(n + 1 + i);
+      const std::size_t j = (i + 1) % n;
+      sides += "f " + std::to_string(i + 1) + " " + std::to_string(j + 1) + " " + std::to_string(n + j + 1) +
+               " " + std::to_string(n + i + 1) + "\n";
+    }
+    const Model model = read_model(folder.put("comb.obj", obj + bottom + "\n" + top + "\n" + sides));
+    const Mesh& mesh = model.parts.at(0).mesh;
+    EXPECT_EQ(mesh.indices.size() / 3, 2 * (n - 2) + 2 * n);
+    EXPECT_NEAR(signed_volume(mesh), 3 * teeth, 1e-4 * teeth);
+    for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+      const auto at = [&](std::size_t k) -> const Vector3f& { return mesh.positions[mesh.indices[i + k]]; };
+      EXPECT_GT((at(1) - at(0)).cross(at(2) - at(0)).norm(), 0.1f);
+    }
+  }
+}
+
 TEST(ReadModel, PlacesInstancesByTheirNodes) {
   const ScratchFolder folder;
   const Model model = read_model(

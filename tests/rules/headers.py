@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Every header includes what it uses.   headers.py SOURCE_DIR [COMPILER FLAGS...]
 
+A file of the program includes it, beside its own source: what tests alone use is in tests.
 Each name of the standard library and of Eigen that a header uses, and each type of this project, comes from a header that it
 includes, itself or through headers of this project; a type may be declared instead. This is read from the text, in a second.
 With a compiler, each header is also compiled alone, which takes minutes and finds what else is missing.
@@ -129,6 +130,20 @@ def missing_includes(path, headers, homes):
             yield f"{word} needs {' or '.join(sorted(homes[word]))}"
 
 
+def unused_headers(headers):
+    """Headers that no source of the program includes but the one of the same name."""
+    used = set()
+    for folder in ("sim", "effects", "render", "demos"):
+        for at, _, names in os.walk(folder):
+            for name in names:
+                path = os.path.join(at, name)
+                if path.endswith((".h", ".cpp")):
+                    with open(path, encoding="utf-8") as file:
+                        found = re.findall(r'^#include "([^"]+)"', file.read(), re.M)
+                    used |= {p for f in found for p in (f, "demos/" + f) if p[:-2] != path[:-4]}
+    return [path for path in headers if path not in used]
+
+
 def compiled_alone(paths, command):
     """What the compiler says of each header that does not compile alone."""
     def compile_one(path):
@@ -149,6 +164,7 @@ def main():
         for name in header.types:
             homes.setdefault(name, set()).add(path)
     problems = [f"{path}: {problem}" for path in headers for problem in missing_includes(path, headers, homes)]
+    problems += [f"{path}: no source of the program includes it" for path in unused_headers(headers)]
     if len(sys.argv) > 2:
         problems += compiled_alone(list(headers), sys.argv[2:])
     print("\n".join(problems))

@@ -1,10 +1,13 @@
 // bench.
 
+#include <algorithm>
+#include <chrono>
 #include <memory>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "producer/base/log.h"
 #include "producer/cli/command_line.h"
 #include "producer/cli/commands.h"
 #include "producer/cli/options.h"
@@ -16,25 +19,71 @@ namespace {
 struct BenchOptions {
   SceneOptions scene;
   std::string csv;
-  int repeat = 1;  ///< runs of each method
+  int repeat = 1;       ///< runs of each method
+  double limit_s = 60;  ///< longest run
   int threads = 0;
-  bool force = false, quiet = false;
+  bool force = false;
+  TalkOptions talk;
+};
+
+/// Says which method runs: a status line on a terminal, a line for each run in a log file.
+class BenchProgress {
+ public:
+  BenchProgress(const TalkOptions& talk, std::size_t runs)
+      : style_(talk.quiet ? ProgressStyle::none : resolved(talk.progress)), runs_(runs) {}
+
+  void begin(const std::string& method) {
+    ++run_;
+    method_ = method;
+    start_ = std::chrono::steady_clock::now();
+  }
+
+  void operator()(double share) {
+    const auto now = std::chrono::steady_clock::now();
+    if (style_ != ProgressStyle::bar || now - shown_ < std::chrono::milliseconds(100)) return;
+    shown_ = now;
+    const std::string line =
+        fmt::format("run {} of {}: {}  {:.0f} %  {}", run_, runs_, method_, 100 * share, elapsed(now));
+    show_status(line.substr(0, static_cast<std::size_t>(std::max(0, terminal_width() - 1))));
+  }
+
+  void end(const MethodResult& result) {
+    if (style_ == ProgressStyle::bar) show_status("");
+    if (style_ == ProgressStyle::bar || style_ == ProgressStyle::plain)
+      log("run {} of {}: {}  {:.0f} steps/s  {}{}{}\n", run_, runs_, method_, result.steps_per_second(),
+          elapsed(std::chrono::steady_clock::now()), result.fault.empty() ? "" : "  ", result.fault);
+  }
+
+ private:
+  std::string elapsed(std::chrono::steady_clock::time_point now) const {
+    return duration_text(std::chrono::duration<double>(now - start_).count());
+  }
+
+  ProgressStyle style_;
+  std::size_t runs_, run_ = 0;
+  std::string method_;
+  std::chrono::steady_clock::time_point start_, shown_{};
 };
 
 /// Simulates a scene by each of the algorithms that it can choose from, and prints a table.
 int bench_command(const BenchOptions& options) {
-  const LoadedScene loaded = load(options.scene, options.quiet);
+  const LoadedScene loaded = load(options.scene, options.talk.quiet);
   check_file(options.csv, options.force);
-  const ModelLibrary models = load_models(loaded, options.scene, {.quiet = options.quiet});
+  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
   const auto threads = simulation_threads(options.threads);
   const std::vector<Method> methods = methods_of(loaded.scene);
   std::vector<LoadedScene> scenes;
   for (const Method& method : methods) scenes.push_back(load(options.scene, true, method.overrides));
+  BenchProgress progress(options.talk, methods.size() * static_cast<std::size_t>(options.repeat));
   // The methods take turns, so that a busy machine slows all of them alike.
   std::vector<MethodResult> results;
   for (int round = 0; round < options.repeat; ++round)
     for (std::size_t i = 0; i < methods.size(); ++i) {
-      const MethodResult result = run_method(methods[i].name, scenes[i], models);
+      progress.begin(methods[i].name);
+      if (round > 0 && !results[i].fault.empty()) continue;  // it would end early again
+      const MethodResult result = run_method(methods[i].name, scenes[i], models, options.limit_s,
+                                             [&](double share) { progress(share); });
+      progress.end(result);
       if (round == 0)
         results.push_back(result);
       else
@@ -53,15 +102,20 @@ Command add_bench(CLI::App& app) {
   CLI::App* command = app.add_subcommand(
       "bench",
       "Simulate a scene by each choice of solver and collision detection, and print a table of their speed, "
-      "work, fall-backs and errors");
+      "work, fall-backs and errors. The whole film is simulated once for each choice, without pictures; "
+      "--duration shortens it");
   add_scene(*command, bench.scene);
   add_timing(*command, bench.scene);
   command->add_option("--repeat", bench.repeat, "Runs of each method; the fastest one counts (default: 1)")
       ->check(CLI::Range(1, 100));
   command->add_option("--csv", bench.csv, "Write the table to this CSV file, too");
+  command
+      ->add_option("--limit", bench.limit_s,
+                   "Stop a run after this many seconds, and say in the table how far it came (default: 60)")
+      ->check(CLI::PositiveNumber);
   add_threads(*command, bench.threads);
   command->add_flag("--force", bench.force, "Replace an existing file");
-  command->add_flag("-q,--quiet", bench.quiet, "Print no warnings");
+  add_talk(*command, bench.talk);
   return {command, [options] { return bench_command(*options); }};
 }
 

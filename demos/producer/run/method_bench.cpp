@@ -114,21 +114,29 @@ std::optional<double> MethodResult::deviation(const MethodResult& other) const {
   return most;
 }
 
-MethodResult run_method(const std::string& name, const LoadedScene& loaded, const ModelLibrary& models) {
+MethodResult run_method(const std::string& name, const LoadedScene& loaded, const ModelLibrary& models,
+                        double limit_s, const MethodProgress& progress) {
   MethodResult result;
   result.name = name;
   Simulation simulation(loaded.scene, models);
   const int advances = simulation.advances_to(loaded.scene.frame_count());
   const auto start = std::chrono::steady_clock::now();
+  const auto elapsed = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
   try {
-    for (int i = 0; i < advances; ++i) {
+    for (int i = 0; i < advances && result.fault.empty(); ++i) {
       if (const int signal = interrupt_signal()) throw Interrupted(signal);
+      if (progress) progress(static_cast<double>(i) / advances);
       simulation.advance();
+      if (i + 1 < advances && elapsed() > limit_s)
+        result.fault = fmt::format("stopped by --limit after {:.0f} s, at {:.2f} s of {:.2f} s", limit_s,
+                                   simulation.world().time(), loaded.scene.output.duration);
     }
   } catch (const DivergedError& error) {
     result.fault = error.what();
   }
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.seconds = elapsed();
   result.totals = simulation.totals();
   for (const auto& body : simulation.moving_bodies())
     result.positions.push_back(simulation.world().body(body.handle).pose.position);
@@ -136,7 +144,7 @@ MethodResult run_method(const std::string& name, const LoadedScene& loaded, cons
 }
 
 void merge(MethodResult& result, const MethodResult& again) {
-  result.seconds = std::min(result.seconds, again.seconds);
+  if (again.fault.empty()) result.seconds = std::min(result.seconds, again.seconds);
 }
 
 std::string to_text(const std::vector<MethodResult>& results) {

@@ -2,6 +2,7 @@
 /// Compares the algorithms that a scene can choose from: it simulates the film with each of them, and reports
 /// their cost, their work and their errors side by side.
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -28,7 +29,8 @@ struct MethodResult {
   double seconds = 0;                ///< time of the simulation; the shortest of several runs [s]
   SimulationTotals totals;           ///< work and fall-backs
   std::vector<sim::Vec3> positions;  ///< of the moving bodies at the end [m]
-  std::string fault;                 ///< why the simulation diverged; empty if it did not
+  /// Why the simulation ended early: it diverged, or took too long. Empty if it did not end early.
+  std::string fault;
 
   double steps_per_second() const;
   /// Iterations of the exact and the fast solver and of that of impacts: Newton steps, sweeps and pivots.
@@ -39,14 +41,19 @@ struct MethodResult {
   /// limits of impacts, suppressed restitution, and failed projections of joints.
   uint64_t fallbacks() const;
   /// Greatest distance between a body's positions at the end of this run and of another one [m]; nothing if
-  /// either run diverged.
+  /// either run ended early.
   std::optional<double> deviation(const MethodResult& other) const;
 };
 
-/// Simulates all frames with the scene's methods. Throws Interrupted after a signal.
-MethodResult run_method(const std::string& name, const LoadedScene& loaded, const ModelLibrary& models);
+/// Receives the share of a run that is done, 0 .. 1.
+using MethodProgress = std::function<void(double share)>;
 
-/// Keeps the shorter time of two runs of the same method.
+/// Simulates all frames with the scene's methods, or as many as it can in `limit_s` seconds. Throws
+/// Interrupted after a signal.
+MethodResult run_method(const std::string& name, const LoadedScene& loaded, const ModelLibrary& models,
+                        double limit_s, const MethodProgress& progress = {});
+
+/// Keeps the shorter time of two runs of the same method; one that ended early does not count.
 void merge(MethodResult& result, const MethodResult& again);
 
 /// A table in aligned columns, or as CSV. The deviation is that from the first result.

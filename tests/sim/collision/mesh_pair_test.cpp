@@ -1,12 +1,14 @@
-#include "sim/collision/mesh_pair.h"
+#include "tests/mesh_pair.h"
 
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <vector>
 
 #include <fcl/fcl.h>
 #include <gtest/gtest.h>
 
+#include "sim/collision/narrow_phase.h"
 #include "tests/mesh_pair_oracle.h"
 #include "tests/meshes.h"
 
@@ -87,6 +89,36 @@ TEST(MeshPair, ClosestTrianglesAreThoseOfBruteForceColdAndWarm) {
       last = warm->triangles;
     });
   }
+}
+
+TEST(MeshPair, ShapesByTrianglesHaveTheDistanceOfTheirTriangles) {
+  const Shape mesh_shape = MeshShape{};
+  const CollisionMesh mesh_a(bumpy_sphere(12, 8, 1)), mesh_b(torus_mesh(0.8, 0.3, 12, 8));
+  const auto shapes_of = [&](const CollisionMesh& mesh) {
+    std::vector<CollisionShape> shapes;
+    for (const TreeVolume volume : {TreeVolume::aabb, TreeVolume::obb, TreeVolume::sphere})
+      shapes.emplace_back(Solid{&mesh_shape, &mesh},
+                          CollisionShape::Options{.by_triangles = true, .tree = {volume, TreeSplit::mean}});
+    return shapes;
+  };
+  const std::vector<CollisionShape> shapes_a = shapes_of(mesh_a), shapes_b = shapes_of(mesh_b);
+  int apart = 0, meeting = 0;
+  for (uint64_t i = 0; i < 40; ++i) {
+    const Pose pose = random_pose(i, 3);
+    const Real exact = std::sqrt(
+        closest_triangles(mesh_tree(mesh_a.mesh, mesh_a.tree), mesh_tree(mesh_b.mesh, mesh_b.tree), pose)
+            ->points.squared_distance);
+    ++(exact > 0 ? apart : meeting);
+    for (const CollisionShape& a : shapes_a)
+      for (const CollisionShape& b : shapes_b) {
+        ASSERT_EQ(touching(a, b, pose), exact == 0) << i;
+        PairCache cache;
+        const Real distance = separation(a, b, pose, cache)->distance;
+        ASSERT_NEAR(std::max(distance, 0.0), exact, 1e-12) << i;
+      }
+  }
+  EXPECT_GT(apart, 10);
+  EXPECT_GT(meeting, 10);
 }
 
 TEST(MeshPair, EmptyMeshesMeetNothing) {

@@ -4,7 +4,7 @@
 
 #include "meshes.h"
 #include "random.h"
-#include "sim/collision/mesh_pair.h"
+#include "tests/mesh_pair.h"
 
 namespace offstage::sim {
 namespace {

@@ -1,12 +1,41 @@
-#include "sim/collision/mesh_pair.h"
+#pragma once
+/// Pairs of triangles of two meshes that intersect or are close, by the traversal of two trees that the
+/// narrow phase uses (sim/collision/tree_pair.h). All results are in the frame of the first mesh, A;
+/// `a_from_b` places the second one in it.
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <vector>
 
+#include "sim/collision/bounding_tree.h"
 #include "sim/collision/tree_pair.h"
+#include "sim/geometry/closest_points.h"
+#include "sim/geometry/intersection.h"
+#include "sim/geometry/mesh.h"
 
 namespace offstage::sim {
-namespace {
+
+/// A mesh and a tree of its triangles.
+template <class Volume>
+struct MeshTree {
+  const TriangleMesh& mesh;
+  const BoundingTree<Volume>& tree;
+};
+
+/// Indices of a triangle of A and of one of B.
+struct TrianglePair {
+  uint32_t a, b;
+  friend auto operator<=>(const TrianglePair&, const TrianglePair&) = default;
+};
+
+/// Two triangles with their closest points. If they intersect, both points are a common point.
+struct CloseTriangles {
+  TrianglePair triangles;
+  ClosestPoints points;
+};
 
 /// The vertices of the triangles of both meshes in A's frame. The traversal visits a triangle of B with many
 /// of A in a row, so the last one is kept.
@@ -40,8 +69,7 @@ Placement mesh_placement(const MeshTree<A>& a, const MeshTree<B>& b, const Pose&
   return Placement(a_from_b, std::max(a.tree.reach(), b.tree.reach()), margin);
 }
 
-}  // namespace
-
+/// Whether any two triangles intersect. A mesh completely inside another does not.
 template <class A, class B>
 bool surfaces_intersect(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& a_from_b) {
   const Placement place = mesh_placement(a, b, a_from_b);
@@ -51,6 +79,9 @@ bool surfaces_intersect(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& 
   });
 }
 
+/// Appends all pairs of intersecting triangles to `pairs`, each once, in an order that depends on the trees.
+/// They are exactly those for which triangles_intersect() is true after the vertices of B are rounded to A's
+/// frame.
 template <class A, class B>
 void intersecting_triangles(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& a_from_b,
                             std::vector<TrianglePair>& pairs) {
@@ -61,6 +92,7 @@ void intersecting_triangles(const MeshTree<A>& a, const MeshTree<B>& b, const Po
   });
 }
 
+/// Appends all pairs of triangles within `tolerance` [m] of each other to `pairs`.
 template <class A, class B>
 void close_triangles(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& a_from_b, Real tolerance,
                      std::vector<CloseTriangles>& pairs) {
@@ -72,10 +104,14 @@ void close_triangles(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& a_f
   });
 }
 
+/// Returns the closest triangles of two meshes; none if one has no triangles or all are farther than `limit`
+/// [m]. `start` is the pair to test first: the result of the last query, or any pair. It affects how soon the
+/// result is found, not the distance.
 template <class A, class B>
 std::optional<CloseTriangles> closest_triangles(const MeshTree<A>& a, const MeshTree<B>& b,
-                                                const Pose& a_from_b, std::optional<TrianglePair> start,
-                                                Real limit) {
+                                                const Pose& a_from_b,
+                                                std::optional<TrianglePair> start = std::nullopt,
+                                                Real limit = std::numeric_limits<Real>::infinity()) {
   const Placement place = mesh_placement(a, b, a_from_b);
   PlacedTriangles triangles(a.mesh, b.mesh, place);
   std::optional<CloseTriangles> best;
@@ -92,24 +128,5 @@ std::optional<CloseTriangles> closest_triangles(const MeshTree<A>& a, const Mesh
   nearest_pair(a.tree, b.tree, place, nearest, distance);
   return best;
 }
-
-#define OFFSTAGE_MESH_PAIR(A, B)                                                                   \
-  template bool surfaces_intersect(const MeshTree<A>&, const MeshTree<B>&, const Pose&);           \
-  template void intersecting_triangles(const MeshTree<A>&, const MeshTree<B>&, const Pose&,        \
-                                       std::vector<TrianglePair>&);                                \
-  template void close_triangles(const MeshTree<A>&, const MeshTree<B>&, const Pose&, Real,         \
-                                std::vector<CloseTriangles>&);                                     \
-  template std::optional<CloseTriangles> closest_triangles(const MeshTree<A>&, const MeshTree<B>&, \
-                                                           const Pose&, std::optional<TrianglePair>, Real);
-OFFSTAGE_MESH_PAIR(Aabb, Aabb)
-OFFSTAGE_MESH_PAIR(Aabb, Obb)
-OFFSTAGE_MESH_PAIR(Aabb, BoundingSphere)
-OFFSTAGE_MESH_PAIR(Obb, Aabb)
-OFFSTAGE_MESH_PAIR(Obb, Obb)
-OFFSTAGE_MESH_PAIR(Obb, BoundingSphere)
-OFFSTAGE_MESH_PAIR(BoundingSphere, Aabb)
-OFFSTAGE_MESH_PAIR(BoundingSphere, Obb)
-OFFSTAGE_MESH_PAIR(BoundingSphere, BoundingSphere)
-#undef OFFSTAGE_MESH_PAIR
 
 }  // namespace offstage::sim

@@ -1,0 +1,20 @@
+#pragma once
+/// Cuts the polygons of model files into triangles. assimp's ear cutting makes triangles without area between
+/// three corners in a line, which later steps drop: solids then have holes, and cannot be divided into convex
+/// parts exactly.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace offstage::render {
+
+/// Returns the triangles of a simple polygon, three indices of corners each, in the polygon's sense of
+/// rotation. Each has an area; of all ears the one nearest to an equilateral triangle is cut first. Corners
+/// may lie in a line, and the polygon may be slightly bent. Empty if it has no area, crosses itself or has
+/// more than 4096 corners.
+std::vector<uint32_t> cut_polygon(std::span<const Eigen::Vector3d> corners);
+
+}  // namespace offstage::render
