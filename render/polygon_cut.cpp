@@ -11,7 +11,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr std::size_t kMostCorners = 4096;  // the time grows with the square
+constexpr std::size_t kMostCorners = 1024;  // the time grows with the square, in the worst case with the cube
 /// Areas below this share of the square of the polygon's extent count as zero.
 constexpr double kNoArea = 1e-12;
 

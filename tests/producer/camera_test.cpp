@@ -16,8 +16,8 @@ struct Set {
     scene.render.size = {1600, 900};
     scene.bodies = {Body{.name = "still", .shape = sim::Sphere{1}, .position = {-3, 1, 0}},
                     Body{.name = "moving", .shape = sim::Sphere{1}, .position = {3, 1, 0}}};
-    places.add_fixed("still", Eigen::Affine3f(Eigen::Translation3f(-3, 1, 0)));
-    places.add_moving("moving", 0);
+    scene.bodies[0].motion = sim::MotionType::static_body;
+    places = BodyPlaces(ObjectTable(scene));
   }
   render::Camera at(double time, const Vector3f& moving = {3, 1, 0}) {
     std::vector<Problem> warnings;

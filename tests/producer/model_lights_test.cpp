@@ -77,13 +77,7 @@ struct LoadedRoom {
   std::vector<render::Lamp> lamps_at(double time) {
     return lamps_of(loaded.scene, models, time, places(), {});
   }
-  BodyPlaces places() const {
-    const Body& body = loaded.scene.bodies[0];
-    BodyPlaces result;
-    result.add_fixed("room",
-                     Eigen::Translation3f(body.position.cast<float>()) * body.orientation.cast<float>());
-    return result;
-  }
+  BodyPlaces places() const { return BodyPlaces(ObjectTable(loaded.scene)); }
   render::HdrImage draw() {
     static render::Context context;
     Picture picture(loaded.scene, models, context);

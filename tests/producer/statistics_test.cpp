@@ -20,10 +20,10 @@ TEST(Statistics, HaveAllTheirKeysInTheDocuments) {
   const auto expect = [&](const std::string& key) {
     EXPECT_NE(page.find("`" + key + "`"), std::string::npos) << key;
   };
-  const auto json = nlohmann::json::parse(to_json(stats));
-  for (const auto& [key, value] : json.items())
+  const auto figures = nlohmann::json::parse(to_json(stats));
+  for (const auto& [key, value] : figures.items())
     if (key != "cloth") expect(key);
-  for (const auto& [key, value] : json["cloth"].items()) expect("cloth." + key);
+  for (const auto& [key, value] : figures["cloth"].items()) expect("cloth." + key);
 }
 
 }  // namespace
