@@ -249,7 +249,10 @@ void cut_polygons(aiMesh& mesh) {
     face.mIndices = new unsigned[cut[f].size()];
     std::ranges::copy(cut[f], face.mIndices);
   }
+  // assimp stops the program if a mesh that has polygons by its types has none.
   mesh.mPrimitiveTypes |= aiPrimitiveType_TRIANGLE;
+  if (std::ranges::all_of(cut, [](const auto& face) { return face.size() < 4; }))
+    mesh.mPrimitiveTypes &= ~static_cast<unsigned>(aiPrimitiveType_POLYGON);
 }
 
 Model import_by_assimp(const std::filesystem::path& path, const std::string& node,

@@ -115,6 +115,13 @@ TEST(ReadModel, CutsPolygonsWithoutSliversAndGaps) {
   }
 }
 
+TEST(ReadModel, CutsAFileOfPolygonsAlone) {
+  const ScratchFolder folder;
+  const Model model =
+      read_model(folder.put("arrow.obj", "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 1 1 0\nv 0 2 0\nf 1 2 3 4 5\n"));
+  EXPECT_EQ(model.parts.at(0).mesh.indices.size(), 9u);
+}
+
 TEST(ReadModel, PlacesInstancesByTheirNodes) {
   const ScratchFolder folder;
   const Model model = read_model(

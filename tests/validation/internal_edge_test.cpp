@@ -262,8 +262,9 @@ TEST_P(InternalEdges, DoNotStopBodiesInAnyDirection) {
           // Clipping leaves points that are outside of a face by a share of the distance in which contacts
           // are searched, so that by the fast solver the flat end of a fast cylinder may hit a tile that it
           // passes.
+          ++number;
           if (!is_exact() && !rolls && speed > 5 && std::holds_alternative<Cylinder>(c.shape)) continue;
-          const Real heading = 2 * std::numbers::pi * random.uniform(++number, 0);
+          const Real heading = 2 * std::numbers::pi * random.uniform(number, 0);
           const Quat turn(Eigen::AngleAxisd(heading, Vec3::UnitY()));
           const Vec3 start(random.uniform(number, 1), c.radius, random.uniform(number, 2)),
               velocity = turn * Vec3(speed, 0, 0);
@@ -285,7 +286,7 @@ TEST_P(InternalEdges, DoNotStopBodiesInAnyDirection) {
           };
           const Vec3 expected = start + velocity * world.time();
           EXPECT_LT((end.pose.position - expected).norm(), tolerance() * speed) << about();
-          EXPECT_LT((end.velocity - velocity).norm(), tolerance() * speed) << about();
+          EXPECT_NEAR(end.velocity.norm(), speed, tolerance() * speed) << about();
         }
 }
 
