@@ -230,7 +230,8 @@ void cut_polygons(aiMesh& mesh) {
   for (const aiFace& face : faces) {
     const std::span corners(face.mIndices, face.mNumIndices);
     std::vector<uint32_t> triangles;
-    if (corners.size() > 4) {
+    const bool is_valid = std::ranges::all_of(corners, [&](unsigned v) { return v < mesh.mNumVertices; });
+    if (corners.size() > 4 && is_valid) {
       std::vector<Vector3d> points;
       for (const unsigned v : corners)
         points.emplace_back(mesh.mVertices[v].x, mesh.mVertices[v].y, mesh.mVertices[v].z);

@@ -326,8 +326,10 @@ Real ContactPair::free_way(const PlacedManifold& m, const Vec3& place, Real gap,
 
 /// The contact of a wheel stays below it while its rim turns. So a point found at the end is the same as one
 /// of the start if it is where the feature of that point moves to, on either body.
-bool ContactPair::is_expected(std::span<const PlacedManifold> known, const Vec3& normal,
-                              const ContactPoint& at_end, Real duration, bool between) const {
+bool ContactPair::predicts(const PlacedManifold& m, const Vec3& normal, const ContactPoint& at_end,
+                           Real duration, bool between_points) const {
+  const Vec3& n = m.frame.n;
+  if (n.dot(normal) < kSameNormal) return false;
   const Ends ends_a(*a_), ends_b(*b_);
   const auto moved = [](const Body& body, const Ends& ends, const Vec3& place, const Vec3& out_before,
                         const Vec3& out_after) {
@@ -338,38 +340,27 @@ bool ContactPair::is_expected(std::span<const PlacedManifold> known, const Vec3&
     Vec3 on_a, on_b;
     Real separation;
   };
-  for (const PlacedManifold& m : known) {
-    const Vec3& n = m.frame.n;
-    if (n.dot(normal) < kSameNormal) continue;
-    std::array<Moved, 4> points;
-    for (uint32_t k = 0; k < m.manifold.count; ++k) {
-      const ContactPoint& p = m.manifold.points[k];
-      points[k] = {moved(*a_, ends_a, p.on_a, -n, -normal), moved(*b_, ends_b, p.on_b, n, normal),
-                   p.separation + free_way(m, (p.on_a + p.on_b) / 2, p.separation, duration)};
-    }
-    for (uint32_t k = 0; k < m.manifold.count; ++k)
-      for (uint32_t l = k; l < (between ? m.manifold.count : k + 1); ++l) {
-        const auto is_between = [&](const Vec3& from, const Vec3& to, const Vec3& place) {
-          const Vec3 way = to - from;
-          const Real length2 = way.squaredNorm();
-          const Real share = length2 > 0 ? std::clamp(way.dot(place - from) / length2, 0.0, 1.0) : 0;
-          const Real separation =
-              points[k].separation + share * (points[l].separation - points[k].separation);
-          return (from + share * way - place).squaredNorm() < kNear * kNear &&
-                 separation < at_end.separation + kExpected;
-        };
-        if (is_between(points[k].on_a, points[l].on_a, at_end.on_a) ||
-            is_between(points[k].on_b, points[l].on_b, at_end.on_b))
-          return true;
-      }
+  std::array<Moved, 4> points;
+  for (uint32_t k = 0; k < m.manifold.count; ++k) {
+    const ContactPoint& p = m.manifold.points[k];
+    points[k] = {moved(*a_, ends_a, p.on_a, -n, -normal), moved(*b_, ends_b, p.on_b, n, normal),
+                 p.separation + free_way(m, (p.on_a + p.on_b) / 2, p.separation, duration)};
   }
+  for (uint32_t k = 0; k < m.manifold.count; ++k)
+    for (uint32_t l = k; l < (between_points ? m.manifold.count : k + 1); ++l) {
+      const auto is_between = [&](const Vec3& from, const Vec3& to, const Vec3& place) {
+        const Vec3 way = to - from;
+        const Real length2 = way.squaredNorm();
+        const Real share = length2 > 0 ? std::clamp(way.dot(place - from) / length2, 0.0, 1.0) : 0;
+        const Real separation = points[k].separation + share * (points[l].separation - points[k].separation);
+        return (from + share * way - place).squaredNorm() < kNear * kNear &&
+               separation < at_end.separation + kExpected;
+      };
+      if (is_between(points[k].on_a, points[l].on_a, at_end.on_a) ||
+          is_between(points[k].on_b, points[l].on_b, at_end.on_b))
+        return true;
+    }
   return false;
-}
-
-bool ContactPair::predicts(const Vec3& normal, const ContactPoint& at_end, Real duration,
-                           bool between) const {
-  const std::size_t known = placed_.size() - speculative;
-  return is_expected(std::span(placed_).first(known), normal, at_end, duration, between);
 }
 
 /// Transforms the contacts of the interval's end back to its start, each feature with its body.
@@ -408,9 +399,9 @@ PlacedManifold ContactPair::brought_back(const Manifold& at_end, Real duration) 
 
 void ContactPair::add_speculative_contacts(Real duration) {
   if (has_sphere_) return;
-  const Pose a_from_b = sim::between(a_->pose, b_->pose);
+  const Pose a_from_b = between(a_->pose, b_->pose);
   // Triangles divide the line on which a cylinder lies differently at the end.
-  const bool between = a_->collision_shape().surface() || b_->collision_shape().surface();
+  const bool between_points = a_->collision_shape().surface() || b_->collision_shape().surface();
   static thread_local std::vector<Manifold> found;
   found.clear();
   cache_.keeps_sides = false;
@@ -421,7 +412,10 @@ void ContactPair::add_speculative_contacts(Real duration) {
     Manifold at_end;
     place(local, a_->pose, at_end);
     const auto is_new = [&](const ContactPoint& p) {
-      return p.separation < -kExpected && !is_expected(placed_, at_end.normal, p, duration, between);
+      return p.separation < -kExpected &&
+             std::none_of(placed_.begin(), placed_.end(), [&](const PlacedManifold& m) {
+               return predicts(m, at_end.normal, p, duration, between_points);
+             });
     };
     if (std::none_of(at_end.points.begin(), at_end.points.begin() + at_end.count, is_new)) continue;
     placed_.push_back(brought_back(at_end, duration));

@@ -90,10 +90,12 @@ class alignas(64) ContactPair {
   /// at the arms of the start, over `duration` [s], give the separations at the end.
   void add_speculative_contacts(Real duration);
 
-  /// Whether the motion of the points of find() over `duration` [s] predicts an overlap that is at least as
-  /// deep at this point, where the bodies have this normal at the interval's end; with `between`, also if the
-  /// point lies between two of those points. It may belong to another pair of one of the bodies.
-  bool predicts(const Vec3& normal, const ContactPoint& at_end, Real duration, bool between) const;
+  /// Whether the motion of the points of a manifold of this pair over `duration` [s] predicts an overlap that
+  /// is at least as deep at this point, where the bodies have this normal at the interval's end; with
+  /// `between_points`, also if the point lies between two of those points. It may belong to another pair of
+  /// one of the bodies.
+  bool predicts(const PlacedManifold& m, const Vec3& normal, const ContactPoint& at_end, Real duration,
+                bool between_points) const;
 
   /// Prefetches memory for find(): first that of the pair, and a little later that of the first manifold.
   void prefetch() const { sim::prefetch(this, this + 1); }
@@ -152,10 +154,6 @@ class alignas(64) ContactPair {
   /// Displacement of a relative to b along the normal by the free motion, at a contact of the start in the
   /// middle between surfaces that are `gap` apart [m].
   Real free_way(const PlacedManifold& m, const Vec3& place, Real gap, Real duration) const;
-  /// Whether the motion of these manifolds' points predicts the overlap at `at_end`; with `between`, also if
-  /// it is between two of the points.
-  bool is_expected(std::span<const PlacedManifold> known, const Vec3& normal, const ContactPoint& at_end,
-                   Real duration, bool between) const;
   PlacedManifold brought_back(const Manifold& at_end, Real duration) const;
 
   PairSurface surface_;

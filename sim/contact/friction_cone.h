@@ -2,9 +2,8 @@
 /// Coulomb's law of one contact as convex sets for projections:
 /// - the cone of its impulses, (p_t, p_k) within what p_n allows, for the exact solver, which finds p_n and
 ///   friction together. It is round for isotropic friction, and a pyramid if each axis has its own limit;
-/// - the section of the cone at a given normal impulse, a disc or a rectangle, for solvers that relax p_n
-/// first
-///   and then friction;
+/// - the section of the cone at a given normal impulse, a disc or a rectangle, for solvers that relax first
+///   p_n and then friction;
 /// - the limits of spinning and rolling.
 /// The fast solver has the sections of eight patches in SIMD lanes (patch_friction.h).
 

@@ -192,7 +192,8 @@ class BodyContacts {
     const bool between = known.pair != v.pair || lies_on_lines(x_.def.shape);
     ContactPoint point = v.m->points[k];
     if (known.x_is_a != v.x_is_a) std::swap(point.on_a, point.on_b);
-    return known.pair->predicts(known.x_is_a ? v.normal() : Vec3(-v.normal()), point, h_ - time_, between);
+    return known.pair->predicts(known.pair->manifolds()[known.index],
+                                known.x_is_a ? v.normal() : Vec3(-v.normal()), point, h_ - time_, between);
   }
 
   /// Returns a new normal for a contact that is level with or below a face on which the same piece lies, if
