@@ -164,9 +164,10 @@ bool is_over(const SupportingFeature& face, const Vec3& point, Real slop) {
 }
 
 /// Contact with a face that gives the normal. `closest` is the closest point on the incident solid; for a rim
-/// it may be deeper than the corners of its polygon. The feature of a round solid is the one that faces the
-/// face; if this is not over the face, there are no points. The line nearest to an edge of the face is not
-/// used, because the face would push it along its normal although it rolls down to the face.
+/// it may be deeper than the corners of its polygon. Beside the face it is left out. The feature of a round
+/// solid is the one that faces the face; if this is not over the face, there are no points. The line nearest
+/// to an edge of the face is not used, because the face would push it along its normal although it rolls down
+/// to the face.
 void face_manifold(Manifold& m, const Body& reference, const SupportingFeature& face, Body incident,
                    SupportingFeature other, const Vec3& closest, Real margin, Real slack, Real slop,
                    Manifold* more) {
@@ -190,10 +191,9 @@ void face_manifold(Manifold& m, const Body& reference, const SupportingFeature& 
   Clipping part(reference, face, incident, other);
   part.cut_all(slop);
   for (const Corner& c : part.corners()) add(c.point - incident.convex.radius * n, c.id);
-  const bool none = candidates.count == 0;
-  if (none ? !round && is_over(face, closest, slop)
-           : n.dot(closest) - offset < candidates.least_separation() - slop)
-    add(closest, closest_id(incident.name));
+  const bool is_deepest =
+      candidates.count == 0 ? !round : n.dot(closest) - offset < candidates.least_separation() - slop;
+  if (is_deepest && is_over(face, closest, slop)) add(closest, closest_id(incident.name));
   reduce(m, candidates, slop, more);
 }
 

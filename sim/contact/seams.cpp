@@ -56,6 +56,9 @@ SurfaceDistance piece_distance(const CollisionShape& shape, uint32_t piece, cons
   return {s.distance, s.normal};
 }
 
+/// The start and the end of an interval.
+constexpr bool kBothEnds[] = {false, true};
+
 /// Whether bodies of a shape lie on a line of their surface.
 bool lies_on_lines(const Shape& shape) {
   return std::holds_alternative<Capsule>(shape) || std::holds_alternative<Cylinder>(shape) ||
@@ -133,7 +136,11 @@ class BodyContacts {
         verdicts.push_back({views_[i].pair, views_[i].index, {}});
         continue;
       }
-      if (!views_[i].may_be_at_seam()) continue;
+      const auto level = std::find_if(views_.begin(), views_.end(),
+                                      [&](const View& face) { return keeps_apart(face, views_[i]); });
+      if (level != views_.end())
+        hidden.push_back({i, static_cast<std::size_t>(level - views_.begin()), level->normal()});
+      if (level != views_.end() || !views_[i].may_be_at_seam()) continue;
       for (std::size_t k = 0; k < views_.size(); ++k)
         if (k != i && !views_[k].speculative)
           if (const auto normal = normal_instead(views_[i], views_[k])) hidden.push_back({i, k, *normal});
@@ -236,6 +243,35 @@ class BodyContacts {
     if (own.dot(up) > kGoesOn) return is_flat(v, over_top, up, across) ? std::optional(up) : std::nullopt;
     const bool is_slope = own.dot(up) > 0 && own.dot(n) > 0 && own.dot(n) < kOwnNormal;
     return is_slope && is_ramp(v, top, up, across) ? std::optional(own) : std::nullopt;
+  }
+
+  /// Whether a piece of X that lies on a face keeps another piece of X apart from Y: throughout the interval
+  /// the other piece is nowhere lower than the point that lies on the face, and Y's piece is nowhere above
+  /// the plane of the face.
+  bool keeps_apart(const View& face, const View& v) const {
+    if (face.speculative || !face.is_face() || face.x_piece() == v.x_piece() ||
+        v.normal().dot(face.normal()) > kSameWay || v.y().collision_shape().is_plane())
+      return false;
+    const uint32_t deepest = face.deepest();
+    const auto height = [&](const Vec3& place) { return face.normal().dot(place - face.on_y(deepest)); };
+    if (face.m->points[deepest].separation > flush_ || height(v.on_y(0)) > flush_ ||
+        height(v.on_x(0)) < -flush_)
+      return false;
+    const Vec3 up = pose(face.y(), false).vector_to_body(face.normal()),
+               on_face = pose(face.y(), false).point_to_body(face.on_y(deepest)),
+               lying = pose(x_, false).point_to_body(face.on_x(deepest));
+    const auto farthest = [](Body& body, uint32_t piece, const Pose& at, const Vec3& d) {
+      const Convex convex = body.collision_shape().piece(piece);
+      const Vec3 local = at.vector_to_body(d);
+      uint32_t vertex = 0;
+      return at.point_to_world(convex.support(local, vertex) + convex.radius * local);
+    };
+    return std::all_of(std::begin(kBothEnds), std::end(kBothEnds), [&](bool at_end) {
+      const Pose below = pose(face.y(), at_end), x = pose(x_, at_end), y = pose(v.y(), at_end);
+      const Vec3 n = below.vector_to_world(up);
+      return n.dot(farthest(v.y(), v.y_piece(), y, n) - below.point_to_world(on_face)) <= flush_ &&
+             n.dot(farthest(v.x(), v.x_piece(), x, -n) - x.point_to_world(lying)) >= -flush_;
+    });
   }
 
   /// Whether Y is part of the ground, or lies on a face of its own as a wedge does. In a heap a box may stand

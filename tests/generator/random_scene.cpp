@@ -306,6 +306,14 @@ std::string text(const Shape& shape) {
   return out.str();
 }
 
+/// Only the corners of the bounding box tell meshes of one kind apart.
+std::string text(const TriangleMesh& mesh) {
+  Vec3 size = Vec3::Zero();
+  for (const Vec3& v : mesh.vertices) size = size.cwiseMax(2 * v.cwiseAbs());
+  return "{\"type\": \"mesh\", \"vertices\": " + std::to_string(mesh.vertices.size()) +
+         ", \"size\": " + text(size) + '}';
+}
+
 const char* name_of(SolverKind kind) {
   return kind == SolverKind::exact ? "exact" : kind == SolverKind::fast ? "fast" : "auto";
 }
@@ -338,7 +346,7 @@ std::string text(const RandomScene& scene) {
         << (d.motion == MotionType::static_body ? "static"
             : d.motion == MotionType::kinematic ? "kinematic"
                                                 : "dynamic")
-        << "\", \"shape\": " << (body.mesh ? "mesh " + std::to_string(*body.mesh) : text(d.shape))
+        << "\", \"shape\": " << (body.mesh ? text(scene.meshes[*body.mesh]) : text(d.shape))
         << ", \"position\": " << text(d.pose.position) << ", \"orientation\": " << text(d.pose.orientation)
         << ", \"mass\": " << d.mass << ", \"velocity\": " << text(d.velocity)
         << ", \"angular_velocity\": " << text(d.angular_velocity) << ", \"restitution\": " << d.restitution

@@ -186,7 +186,7 @@ TEST_P(InternalEdges, DoNotStopRollingBodies) {
     for (const char* floor :
          {"two triangles", "a mesh", "a mesh of mixed winding", "T-vertices", "tiles", "tiles of mesh"})
       for (const Mover& mover : movers) {
-        // At long steps the fast solver is stopped by seams between meshes.
+        // At long steps seams between meshes take up to 0.4 % of the speed by the fast solver.
         if (step > 0.01 && !is_exact() && std::string(floor) == "tiles of mesh") continue;
         const Real speed = 4;
         World world(def(step));
@@ -259,12 +259,7 @@ TEST_P(InternalEdges, DoNotStopBodiesInAnyDirection) {
     for (const Case& c : cases)
       for (const Real speed : {1.0, 4.0, 10.0})
         for (const bool rolls : {true, false}) {
-          // Clipping leaves points that are outside of a face by a share of the distance in which contacts
-          // are searched, so that by the fast solver the flat end of a fast cylinder may hit a tile that it
-          // passes.
-          ++number;
-          if (!is_exact() && !rolls && speed > 5 && std::holds_alternative<Cylinder>(c.shape)) continue;
-          const Real heading = 2 * std::numbers::pi * random.uniform(number, 0);
+          const Real heading = 2 * std::numbers::pi * random.uniform(++number, 0);
           const Quat turn(Eigen::AngleAxisd(heading, Vec3::UnitY()));
           const Vec3 start(random.uniform(number, 1), c.radius, random.uniform(number, 2)),
               velocity = turn * Vec3(speed, 0, 0);
@@ -290,8 +285,36 @@ TEST_P(InternalEdges, DoNotStopBodiesInAnyDirection) {
         }
 }
 
-/// A torus of flat sides stands on one of them or on a corner. With longer steps its parts still hit seams.
-TEST_P(InternalEdges, DoNotStopARingOfManyParts) {
+// One part lies on a tile, while another one meets the next tile.
+TEST_P(InternalEdges, DoNotStopLyingRingsOfManyParts) {
+  const std::pair<const char*, SolidMesh> rings[] = {{"torus", solid_mesh(Torus{0.3, 0.1})},
+                                                     {"tube", solid_mesh(Tube{0.3, 0.2, 0.1})}};
+  const Scatter random{4};
+  uint64_t number = 0;
+  for (const Real step : {1.0 / 240, 1.0 / 60})
+    for (const auto& [name, ring] : rings)
+      for (const Real speed : {1.0, 4.0, 10.0}) {
+        const Real heading = 2 * std::numbers::pi * random.uniform(++number, 0);
+        const Quat turn(Eigen::AngleAxisd(heading, Vec3::UnitY()));
+        const Vec3 velocity = turn * Vec3(speed, 0, 0);
+        World world(def(step));
+        add_bricks(world, 0);
+        const BodyHandle body =
+            world.add_body({.shape = MeshShape{world.add_compound({ring})},
+                            .pose = {Vec3(random.uniform(number, 1), 0.1, random.uniform(number, 2)), turn},
+                            .velocity = velocity,
+                            .restitution = 0,
+                            .friction = 0});
+        run(world, 0.8, step);
+        const Motion end = world.body_motion(body, world.time());
+        EXPECT_LT((end.velocity - velocity).norm(), tolerance() * speed)
+            << name << " at " << speed << " m/s towards " << heading << ", step " << step;
+        EXPECT_NEAR(end.pose.position.y(), 0.1, 1e-4) << name << ", step " << step;
+      }
+}
+
+// A torus of flat sides stands on one of them or on a corner.
+TEST_P(InternalEdges, DoNotStopAStandingRing) {
   World world(def());
   add_bricks(world, 0);
   const Quat turn(Eigen::AngleAxisd(-0.247, Vec3::UnitY()));
