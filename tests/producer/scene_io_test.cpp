@@ -265,7 +265,7 @@ TEST_F(SceneInclude, JoinsListsAndMergesObjectsAndTheIncluderWins) {
   const Scene& scene = loaded.scene;
   ASSERT_EQ(scene.bodies.size(), 3u);
   EXPECT_EQ(scene.bodies[0].name + scene.bodies[1].name + scene.bodies[2].name, "cbown");
-  EXPECT_EQ(scene.world.step, 0.01);
+  EXPECT_EQ(scene.world.max_step, 0.01);
   EXPECT_EQ(scene.world.gravity, Vec3(0, -1, 0));
   EXPECT_EQ(scene.name, "c");
   EXPECT_EQ(loaded.folder.path(), folder);

@@ -287,7 +287,7 @@ render::Material fabric_look(const std::string& fabric) {
 
 std::optional<std::string> too_stiff(const Scene& scene, const sim::ClothDef& cloth) {
   const sim::StableStep stable = sim::largest_stable_step(cloth);
-  const Real used = std::min({cloth.substep, scene.world.step, scene.output.fps.seconds(1)});
+  const Real used = std::min({cloth.substep, scene.world.max_step, scene.output.fps.seconds(1)});
   if (used < stable.step) return {};
   if (stable.bending)
     return fmt::format(

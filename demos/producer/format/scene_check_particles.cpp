@@ -76,7 +76,7 @@ class ParticleChecker {
                           const Birth&) { claim(name, source.where.path); });
   }
 
-  void check_drag(const ParticleBehaviour& behaviour, Real mass, const std::string& path) {
+  void check_drag(const sim::ParticleSystemDef& behaviour, Real mass, const std::string& path) {
     if (behaviour.integrator == sim::IntegratorKind::leapfrog) return;  // stable for any drag
     if (const auto problem = too_much_drag(scene_, behaviour.integrator, behaviour.linear_drag, mass))
       fail(path + "/linear_drag", *problem);
@@ -162,7 +162,7 @@ class ParticleChecker {
                                     smallest * smallest;
     if (lightest > 0) check_drag(source.behaviour, lightest, path);
     check_lifespan(source);
-    const ParticleBehaviour& b = source.behaviour;
+    const sim::ParticleSystemDef& b = source.behaviour;
     const bool hits = b.collides || b.internal || b.external;
     if (!source.on_collision.empty() && !hits)
       warn(path + "/on_collision", "has no effect: its particles do not collide");
