@@ -283,7 +283,7 @@ void Simulation::add_cloths(const Scene& scene, const ModelLibrary& models) {
       const PinScope& scope = scope_of(selection);
       const std::vector<uint32_t> held =
           at_place(scope.where, [&] { return pinned_vertices(selection, cloth, flat); });
-      if (held.empty()) throw SceneError(scope.where, "selects no vertex of the cloth");
+      if (held.empty()) throw SceneError(scope.where, selects_nothing(flat));
       for (const uint32_t vertex : held) pin(scope.body, vertex, scope.until);
     }
     for (std::size_t i = 0; i < cloth.cords.size(); ++i) {

@@ -219,11 +219,6 @@ class Checker : SceneChecker {
     }
   }
 
-  void check_lifetime(const std::string& path, Real appear_at, Real remove_at) {
-    if (remove_at <= appear_at)
-      fail(path + "/remove_at", fmt::format("must be later than \"appear_at\", {} s", appear_at));
-  }
-
   // --- Bodies ---
 
   void check_body(const Body& body) {
