@@ -46,15 +46,14 @@ TEST(EmitterStatistics, EveryParameterHasItsMeanAndDeviation) {
   const ParticleArrays p =
       release({.name = "all",
                .surface = {.size = {10, 10}},
-               .rate = 0.0,
-               .bursts = {{.count = Real(kDraws)}},
-               .speed = Normal{4, 1},
-               .spread_deg = Uniform{0, 60},
-               .radius = Uniform{0.01, 0.015},
-               .mass = Normal{.mean = 0.5, .deviation = 0.05, .min = 1e-3, .clip = false},
-               .lifespan = Normal{5, 2},
-               .restitution = Uniform{0.2, 0.6},
-               .friction = Normal{0.5, 0.2}});
+               .release = {.rate = 0.0, .bursts = {{.count = Real(kDraws)}}},
+               .particles = {.speed = Normal{4, 1},
+                             .spread_deg = Uniform{0, 60},
+                             .radius = Uniform{0.01, 0.015},
+                             .mass = Normal{.mean = 0.5, .deviation = 0.05, .min = 1e-3, .clip = false},
+                             .lifespan = Normal{5, 2},
+                             .restitution = Uniform{0.2, 0.6},
+                             .friction = Normal{0.5, 0.2}}});
   ASSERT_EQ(p.size(), std::size_t{kDraws});
   const CutNormal cut;
   const Real cut_deviation = std::sqrt(cut.variance), flat = std::sqrt(1.0 / 12);
