@@ -73,7 +73,7 @@ struct ParticleGroup {
   std::string file;                   ///< PLY or OBJ file; empty: none
   ModelScale scale;
   std::optional<Vec3> fit;       ///< see MeshFile::fit
-  Vec3 position = Vec3::Zero();  ///< of the file's origin
+  Vec3 position = Vec3::Zero();  ///< position of the file's origin
   Quat orientation = Quat::Identity();
   int64_t max_points = 1'000'000;
   Real radius = 0.05;
@@ -154,7 +154,7 @@ enum class Face { top, bottom, left, right, front, back };
 struct FaceSurface {
   Face face = Face::top;
   Vec3 position = Vec3::Zero();  ///< centre of the cube
-  Vec3 size = Vec3::Ones();      ///< of the cube
+  Vec3 size = Vec3::Ones();      ///< size of the cube
 };
 using EmitterSurface = std::variant<PlaneSurface, SphereSurface, DiscSurface, MeshSurface, FaceSurface>;
 /// Returns the face of a body's shape, or of the surface's own cube if it is null; none if the shape has no

@@ -344,8 +344,8 @@ struct ModelLights {
   std::string body;
   std::string name;     ///< empty: all of them
   Real intensity = 1;   ///< factor of their intensities
-  Real radius = 0.01;   ///< of point and spot lights
-  Real size_deg = 0.5;  ///< of directional lights
+  Real radius = 0.01;   ///< radius of point and spot lights
+  Real size_deg = 0.5;  ///< apparent size of directional lights
   bool shadows = true;
 };
 using Light = std::variant<SunLight, PointLight, SpotLight, AreaLight, ModelLights>;
