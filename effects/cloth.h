@@ -41,7 +41,7 @@ sim::ClothDef sphere_cloth(Real radius, uint32_t divisions, const sim::Pose& pos
 /// A cord between a vertex of a cloth and a point: masses and springs in a row. With one segment it is a
 /// spring, which pushes, too; with more it buckles when pushed.
 struct Cord {
-  uint32_t vertex = 0;           ///< of the cloth
+  uint32_t vertex = 0;           ///< index of a vertex of the cloth
   Vec3 end = Vec3::Zero();       ///< where the other end is at the start (world) [m]
   Real length = 0;               ///< at rest [m]; 0: the distance
   uint32_t segments = 10;        ///< 1 to 1000

@@ -28,20 +28,22 @@ const EmitterDef& checked_emitter(const EmitterDef& def) {
   const auto require = [&](bool holds, const char* what) {
     if (!holds) throw std::invalid_argument(owner(def) + ": " + what);
   };
-  verify("rate", def.rate, kRates);
-  verify("rate_per_metre", def.rate_per_metre, kRates);
-  require(def.inherit_velocity >= 0 && std::isfinite(def.inherit_velocity), "inherit_velocity must be >= 0");
-  verify("count", def.count, kCounts);
-  verify("interval", def.interval, kIntervals);
-  check_particle(owner(def), def);
-  for (const Burst& b : def.bursts) {
+  verify("rate", def.release.rate, kRates);
+  verify("rate_per_metre", def.release.rate_per_metre, kRates);
+  require(def.release.inherit_velocity >= 0 && std::isfinite(def.release.inherit_velocity),
+          "inherit_velocity must be >= 0");
+  verify("count", def.release.count, kCounts);
+  verify("interval", def.release.interval, kIntervals);
+  check_particles(owner(def), def.particles);
+  for (const Burst& b : def.release.bursts) {
     verify("bursts.count", b.count, kCounts);
     verify("bursts.interval", b.interval, kIntervals);
     require(b.cycles >= 1, "bursts.cycles must be >= 1");
   }
-  for (const TimeWindow& w : def.windows) require(w.start < w.end, "windows must end after they start");
-  require(def.prewarm >= 0 && std::isfinite(def.prewarm), "prewarm must be >= 0");
-  require(def.direction.allFinite(), "direction is not finite");
+  for (const TimeWindow& w : def.release.windows)
+    require(w.start < w.end, "windows must end after they start");
+  require(def.release.prewarm >= 0 && std::isfinite(def.release.prewarm), "prewarm must be >= 0");
+  require(def.release.direction.allFinite(), "direction is not finite");
   return def;
 }
 
@@ -64,7 +66,7 @@ Emitter::Emitter(const EmitterDef& def, sim::ParticleSystemHandle target, Real o
       surface_(surface_of(def)),
       schedule_(def, origin),
       turn_{0, 0, 0} {
-  if (!def_.direction.isZero()) def_.direction.normalize();
+  if (!def_.release.direction.isZero()) def_.release.direction.normalize();
 }
 
 void Emitter::stop(Real time) {
@@ -86,14 +88,15 @@ void Emitter::collect_due(Real end) {
 
 /// Adds the particles of the body's way in this sub-step, which is straight.
 void Emitter::collect_along_way(const sim::World& world, Real start, Real end) {
-  const Real rate = mean(def_.rate_per_metre, start - origin_);
-  if (!def_.body || !(rate > 0) || start < origin_ + def_.start || end > origin_ + def_.end || end > stopped_)
+  const Real rate = mean(def_.release.rate_per_metre, start - origin_);
+  if (!def_.body || !(rate > 0) || start < origin_ + def_.release.start || end > origin_ + def_.release.end ||
+      end > stopped_)
     return;
   const auto place = [&](Real time) {
     return world.body_motion(def_.body, time).pose.point_to_world(def_.surface.pose.position);
   };
   const Real due = rate * (place(end) - place(start)).norm(), total = way_share_ + due;
-  const auto count = static_cast<uint64_t>(std::min(total, static_cast<Real>(def_.max_alive)));
+  const auto count = static_cast<uint64_t>(std::min(total, static_cast<Real>(def_.particles.max_alive)));
   for (uint64_t k = 1; k <= count; ++k) {
     const Real share = std::clamp((static_cast<Real>(k) - way_share_) / due, 0.0, 1.0);
     due_.push_back({start + share * (end - start), 1});
@@ -115,29 +118,30 @@ void Emitter::emit(sim::World& world, Real start, Real end) {
 
 /// Largest diameter of the next `count` particles.
 Real Emitter::largest_diameter(uint64_t count, Real birth) const {
-  Real radius = upper_bound(def_.radius);
+  Real radius = upper_bound(def_.particles.radius);
   if (std::isinf(radius)) {
     radius = 0;
     for (uint64_t k = 0; k < count; ++k)
-      radius = std::max(radius, Draws(random_, number_ + k, birth - origin_)(def_.radius, kRadius));
+      radius = std::max(radius, Draws(random_, number_ + k, birth - origin_)(def_.particles.radius, kRadius));
   }
   return 2 * radius;
 }
 
 void Emitter::release(sim::World& world, const Release& r, Real start, Real end) {
   const uint64_t alive = world.particles(target_).size();
-  const uint64_t allowed = std::min(r.count, def_.max_alive > alive ? def_.max_alive - alive : 0);
+  const uint64_t allowed =
+      std::min(r.count, def_.particles.max_alive > alive ? def_.particles.max_alive - alive : 0);
   if (allowed > 0) {
     // Particles that were due earlier without waiting belong to the prewarming.
     const Real birth = r.waited ? std::max(r.time, start) : r.time;
     const Batch batch{allowed, birth, end, largest_diameter(allowed, birth),
                       def_.body ? world.body_motion(def_.body, std::max(birth, start)) : sim::Motion{}};
-    const uint64_t placed = def_.overlap           ? place_anywhere(world, batch)
+    const uint64_t placed = def_.release.overlap   ? place_anywhere(world, batch)
                             : surface_.has_cells() ? place_in_cells(world, batch)
                                                    : place_apart(world, batch);
     report_.released += placed;
     if (placed < allowed) {
-      const Real speed = std::abs(mean(def_.speed, birth - origin_));
+      const Real speed = std::abs(mean(def_.particles.speed, birth - origin_));
       const Real clearing = std::min(kMaxClearing, batch.diameter / speed);
       if (!r.waited) report_.waited += allowed - placed;
       wait({birth + clearing, allowed - placed, true}, end);
@@ -195,7 +199,7 @@ uint64_t Emitter::place_apart(sim::World& world, const Batch& batch) {
   spacing_.reset(batch.count, batch.diameter);
   for (uint64_t k = 0; k < batch.count; ++k, ++number_) {
     const Draws draw(random_, number_, batch.birth - origin_);
-    const Real radius = draw(def_.radius, kRadius);
+    const Real radius = draw(def_.particles.radius, kRadius);
     Place place;
     uint32_t t = 0;
     do {
@@ -209,22 +213,22 @@ uint64_t Emitter::place_apart(sim::World& world, const Batch& batch) {
 
 /// Adds a particle that touches the surface from outside.
 void Emitter::add(sim::World& world, const Draws& draw, const Place& place, const Batch& batch) {
-  sim::Particle particle = drawn_particle(def_, draw);
+  sim::Particle particle = drawn_particle(def_.particles, draw);
   const sim::Pose &surface = def_.surface.pose, &carrier = batch.carrier.pose;
-  const bool along_normal = def_.direction.isZero(0);
-  const Vec3 axis = along_normal ? place.normal : def_.direction;
+  const bool along_normal = def_.release.direction.isZero(0);
+  const Vec3 axis = along_normal ? place.normal : def_.release.direction;
   Vec3 direction =
-      Cone{axis, along_normal ? place.tangent : perpendicular(axis)}.drawn(def_.spread_deg, draw);
+      Cone{axis, along_normal ? place.tangent : perpendicular(axis)}.drawn(def_.particles.spread_deg, draw);
   if (along_normal) direction = surface.vector_to_world(direction);
 
   particle.position =
       carrier.point_to_world(surface.point_to_world(place.point + particle.radius * place.normal));
-  const Vec3 own = draw(def_.speed, kSpeed) * carrier.vector_to_world(direction);
+  const Vec3 own = draw(def_.particles.speed, kSpeed) * carrier.vector_to_world(direction);
   const Vec3 arm = particle.position - carrier.position;
-  const Real share = def_.inherit_velocity;
+  const Real share = def_.release.inherit_velocity;
   particle.velocity =
       own + share * batch.carrier.velocity + share * batch.carrier.angular_velocity.cross(arm);
-  if (def_.recoil && def_.body) world.add_impulse(def_.body, -particle.mass * own, particle.position);
+  if (def_.release.recoil && def_.body) world.add_impulse(def_.body, -particle.mass * own, particle.position);
   world.add_particle(target_, particle, batch.end - batch.birth);
 }
 

@@ -7,6 +7,7 @@
 
 #include "effects/distribution.h"
 #include "effects/emitter_surface.h"
+#include "effects/new_particles.h"
 #include "sim/world.h"
 
 namespace offstage::effects {
@@ -24,16 +25,12 @@ struct TimeWindow {
   Real start = 0, end = 1e30;
 };
 
-/// Times are on the emitter's clock, which shows 0 at the `origin` given to the Emitter.
-struct EmitterDef {
-  std::string name;  ///< also names its random stream
-  uint64_t seed = 1;
-  EmitterSurface surface;
-  /// Null: fixed in the world; otherwise it moves with the body, and releases nothing while the body does not
-  /// exist.
-  sim::BodyHandle body;
-  Real inherit_velocity = 1;  ///< share of the velocity of the body's point that particles get, >= 0
-  bool recoil = false;        ///< whether particles push a dynamic body back by their momentum relative to it
+/// How and when an emitter releases particles. Times are on the emitter's clock, which shows 0 at the
+/// `origin` given to the Emitter.
+struct EmitterRelease {
+  Vec3 direction = Vec3::Zero();  ///< in the frame of the body or the world; zero: the normal of the surface
+  Real inherit_velocity = 1;      ///< share of the velocity of the body's point that particles get, >= 0
+  bool recoil = false;  ///< whether particles push a dynamic body back by their momentum relative to it
   /// Particles are placed anywhere on the surface and are never postponed; for particles that do not collide
   /// with each other.
   bool overlap = false;
@@ -43,22 +40,22 @@ struct EmitterDef {
   Varying rate_per_metre = 0.0;
   Varying count = 0.0;     ///< particles per release, rounded; 0: no periodic release
   Varying interval = 0.1;  ///< time between releases [s], > 0
-  std::vector<Burst> bursts;
-  Real start = 0;                   ///< start of `rate` and `count` [s]
-  Real end = 1e30;                  ///< end of all releases [s]; existing particles live on
-  std::vector<TimeWindow> windows;  ///< times in which `rate` and `count` release; empty: always
-  Real prewarm = 0;                 ///< how long before `start` they begin [s], >= 0
-  Vec3 direction = Vec3::Zero();   ///< in the frame of the body or the world; zero: the normal of the surface
-  Varying speed = 1.0;             ///< speed along the direction [m/s]
-  Varying spread_deg = 0.0;        ///< angle from the direction [degrees]; azimuth uniform
-  Varying radius = 0.01;           ///< [m], > 0
-  Varying density = 1000.0;        ///< [kg/m^3]; gives the mass unless `mass` is set
-  Varying mass = 0.0;              ///< [kg]; 0: from density and radius
-  Varying lifespan = 5.0;          ///< [s], > 0
-  Varying restitution = 0.3;       ///< in [0, 1]
-  Varying friction = 0.5;          ///< >= 0
-  Varying charge = 0.0;            ///< [C]
-  uint64_t max_alive = 1'000'000;  ///< particles beyond this are not released, but counted
+  std::vector<Burst> bursts = {};
+  Real start = 0;                        ///< start of `rate` and `count` [s]
+  Real end = 1e30;                       ///< end of all releases [s]; existing particles live on
+  std::vector<TimeWindow> windows = {};  ///< times in which `rate` and `count` release; empty: always
+  Real prewarm = 0;                      ///< how long before `start` they begin [s], >= 0
+};
+
+struct EmitterDef {
+  std::string name = {};  ///< also names its random stream
+  uint64_t seed = 1;
+  EmitterSurface surface = {};
+  /// Null: fixed in the world; otherwise it moves with the body, and releases nothing while the body does not
+  /// exist.
+  sim::BodyHandle body = {};
+  EmitterRelease release = {};
+  NewParticles particles = {};
 };
 
 }  // namespace offstage::effects

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "effects/distribution.h"
+#include "effects/new_particles.h"
 
 namespace offstage::effects {
 
@@ -26,17 +27,16 @@ inline constexpr Limits kIntervals{.low = kMinInterval, .low_open = true};
 void check(const std::string& owner, const char* field, const Varying& v, const Limits& limits);
 
 /// Checks the parameters that all new particles have.
-template <class Def>
-void check_particle(const std::string& owner, const Def& def) {
-  check(owner, "speed", def.speed, kAnyNumber);
-  check(owner, "spread_deg", def.spread_deg, kAngle);
-  check(owner, "radius", def.radius, kPositive);
-  check(owner, "mass", def.mass, kNotNegative);
-  if (upper_bound(def.mass) <= 0) check(owner, "density", def.density, kPositive);
-  check(owner, "lifespan", def.lifespan, kPositive);
-  check(owner, "restitution", def.restitution, kFraction);
-  check(owner, "friction", def.friction, kNotNegative);
-  check(owner, "charge", def.charge, kAnyNumber);
+inline void check_particles(const std::string& owner, const NewParticles& particles) {
+  check(owner, "speed", particles.speed, kAnyNumber);
+  check(owner, "spread_deg", particles.spread_deg, kAngle);
+  check(owner, "radius", particles.radius, kPositive);
+  check(owner, "mass", particles.mass, kNotNegative);
+  if (upper_bound(particles.mass) <= 0) check(owner, "density", particles.density, kPositive);
+  check(owner, "lifespan", particles.lifespan, kPositive);
+  check(owner, "restitution", particles.restitution, kFraction);
+  check(owner, "friction", particles.friction, kNotNegative);
+  check(owner, "charge", particles.charge, kAnyNumber);
 }
 
 }  // namespace offstage::effects

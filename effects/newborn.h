@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "effects/distribution.h"
+#include "effects/new_particles.h"
 #include "effects/random.h"
 #include "sim/world.h"
 
@@ -58,9 +59,8 @@ class Draws {
   Real time_;
 };
 
-/// A particle without place and velocity. `Def` has the parameters of physics F2.
-template <class Def>
-sim::Particle drawn_particle(const Def& def, const Draws& draw) {
+/// A particle with random parameters, without position and velocity.
+inline sim::Particle drawn_particle(const NewParticles& def, const Draws& draw) {
   sim::Particle p;
   p.radius = draw(def.radius, kRadius);
   p.lifespan = draw(def.lifespan, kLifespan);

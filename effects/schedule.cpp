@@ -37,18 +37,18 @@ Real curve_birth(const Varying& rate, const Curve& curve, Real t) {
 }  // namespace
 
 Schedule::Schedule(const EmitterDef& def, Real origin)
-    : rate_(def.rate),
-      count_(def.count),
-      interval_(def.interval),
-      bursts_(def.bursts),
-      windows_(def.windows),
+    : rate_(def.release.rate),
+      count_(def.release.count),
+      interval_(def.release.interval),
+      bursts_(def.release.bursts),
+      windows_(def.release.windows),
       random_(def.seed, stream_id(def.name)),
       origin_(origin),
-      start_(origin + (def.start - def.prewarm)),
-      end_(origin + def.end),
-      burst_cycles_(def.bursts.size(), 0) {
+      start_(origin + (def.release.start - def.release.prewarm)),
+      end_(origin + def.release.end),
+      burst_cycles_(def.release.bursts.size(), 0) {
   next_single_ = next_birth(start_);
-  next_periodic_ = upper_bound(def.count) >= 0.5 ? start_ : kNever;
+  next_periodic_ = upper_bound(def.release.count) >= 0.5 ? start_ : kNever;
 }
 
 Real Schedule::draw(const Varying& v, uint64_t number, uint32_t property, Real time) const {

@@ -13,11 +13,11 @@ namespace {
 
 const SubEmitterDef& checked_sub_emitter(const SubEmitterDef& def) {
   const std::string owner = "sub-emitter \"" + def.name + "\"";
-  check(owner, "count", def.count, kCounts);
-  check(owner, "velocity_percent", def.velocity_percent, kAnyNumber);
-  check_particle(owner, def);
+  check(owner, "count", def.release.count, kCounts);
+  check(owner, "velocity_percent", def.release.velocity_percent, kAnyNumber);
+  check_particles(owner, def.particles);
   if (!(def.age >= 0)) throw std::invalid_argument(owner + ": age must be >= 0");
-  if (!(def.probability >= 0 && def.probability <= 1))
+  if (!(def.release.probability >= 0 && def.release.probability <= 1))
     throw std::invalid_argument(owner + ": probability is outside 0 to 1");
   return def;
 }
@@ -74,17 +74,18 @@ void SubEmitter::answer_ages(sim::World& world, Real start, Real end) {
 }
 
 void SubEmitter::answer(sim::World& world, const sim::ParticleEvent& event, Real start, Real end) {
-  if (event.velocity.norm() < def_.min_speed) return;
+  if (event.velocity.norm() < def_.release.min_speed) return;
   // An age is reached only once, and the rounding of its time depends on the frame rate, so the time is not
   // used.
   const uint64_t occasion = def_.trigger == Trigger::age ? 0 : std::bit_cast<uint64_t>(event.time);
   const uint64_t index = combined(event.id, occasion);
   const Draws draw(random_, index, event.time);
-  if (draw.uniform(kChance) > def_.probability) return;
+  if (draw.uniform(kChance) > def_.release.probability) return;
 
-  const uint64_t count = rounded(draw(def_.count, kCount)), alive = world.particles(target_).size();
-  const uint64_t allowed = std::min({count, def_.max_alive > alive ? def_.max_alive - alive : 0,
-                                     def_.max_per_step - std::min(born_, def_.max_per_step)});
+  const uint64_t count = rounded(draw(def_.release.count, kCount)), alive = world.particles(target_).size();
+  const uint64_t allowed =
+      std::min({count, def_.particles.max_alive > alive ? def_.particles.max_alive - alive : 0,
+                def_.release.max_per_step - std::min(born_, def_.release.max_per_step)});
   for (uint64_t k = 0; k < allowed; ++k) {
     const Draws own(random_, combined(index, k + 1), event.time);
     report_.released += add_newborn(world, target_, answer_to(event, own), event.time, start, end);
@@ -95,16 +96,17 @@ void SubEmitter::answer(sim::World& world, const sim::ParticleEvent& event, Real
 }
 
 sim::Particle SubEmitter::answer_to(const sim::ParticleEvent& event, const Draws& draw) const {
-  sim::Particle particle = drawn_particle(def_, draw);
+  sim::Particle particle = drawn_particle(def_.particles, draw);
   const bool hit = !event.normal.isZero(0);
   const Real speed = event.velocity.norm();
-  const Vec3 axis = hit && def_.axis == Axis::normal ? event.normal
-                    : speed > 0                      ? Vec3(event.velocity / speed)
-                                                     : Vec3(Vec3::UnitY());
+  const Vec3 axis = hit && def_.release.axis == Axis::normal ? event.normal
+                    : speed > 0                              ? Vec3(event.velocity / speed)
+                                                             : Vec3(Vec3::UnitY());
   // The particle touches the surface that its parent touched.
   particle.position = event.position + (particle.radius - event.radius) * event.normal;
-  particle.velocity = draw(def_.velocity_percent, kPercent) / 100 * event.velocity +
-                      draw(def_.speed, kSpeed) * Cone{axis, perpendicular(axis)}.drawn(def_.spread_deg, draw);
+  particle.velocity = draw(def_.release.velocity_percent, kPercent) / 100 * event.velocity +
+                      draw(def_.particles.speed, kSpeed) *
+                          Cone{axis, perpendicular(axis)}.drawn(def_.particles.spread_deg, draw);
   return particle;
 }
 

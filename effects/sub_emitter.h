@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "effects/distribution.h"
+#include "effects/new_particles.h"
 #include "effects/offspring.h"
 #include "effects/parent.h"
 
@@ -25,27 +26,24 @@ enum class Axis {
   velocity,  ///< direction of the parent's velocity after the event; upwards for a parent at rest
 };
 
-struct SubEmitterDef {
-  std::string name;  ///< also names its random stream
-  uint64_t seed = 1;
-  Trigger trigger = Trigger::collision;
-  Real age = 1;          ///< age for the trigger `age` [s], >= 0
+/// The particles that an event releases.
+struct EventRelease {
   Real probability = 1;  ///< probability that an event triggers particles, in [0, 1]
   Real min_speed = 0;    ///< smallest speed of the parent after the event [m/s]; slower ones trigger nothing
   Varying count = 5.0;   ///< particles per event, rounded
   Axis axis = Axis::normal;
   Varying velocity_percent = 0.0;  ///< share of the parent's velocity after the event
-  Varying speed = 1.0;             ///< additional speed, about the axis [m/s]
-  Varying spread_deg = 30.0;       ///< angle from the axis [degrees]; Uniform{0, 180} covers all directions
-  Varying radius = 0.005;          ///< [m], > 0
-  Varying density = 1000.0;        ///< [kg/m^3]; gives the mass unless `mass` is set
-  Varying mass = 0.0;              ///< [kg]; 0: from density and radius
-  Varying lifespan = 1.0;          ///< [s], > 0
-  Varying restitution = 0.3;       ///< in [0, 1]
-  Varying friction = 0.5;          ///< >= 0
-  Varying charge = 0.0;            ///< [C]
   uint64_t max_per_step = 10'000;  ///< new particles in one sub-step; more are not released, but counted
-  uint64_t max_alive = 1'000'000;  ///< particles beyond this are not released, but counted
+};
+
+struct SubEmitterDef {
+  std::string name = {};  ///< also names its random stream
+  uint64_t seed = 1;
+  Trigger trigger = Trigger::collision;
+  Real age = 1;  ///< age for the trigger `age` [s], >= 0
+  EventRelease release = {};
+  /// Their speed is added in the directions around the axis.
+  NewParticles particles = {.spread_deg = 30.0, .radius = 0.005, .lifespan = 1.0};
 };
 
 /// Releases particles of one system at the events of another one, or of the same. Random numbers depend on

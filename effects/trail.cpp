@@ -12,12 +12,12 @@ namespace {
 
 const TrailDef& checked_trail(const TrailDef& def) {
   const std::string owner = "trail \"" + def.name + "\"";
-  check(owner, "rate", def.rate, kRates);
-  check(owner, "velocity_percent", def.velocity_percent, kAnyNumber);
-  check_particle(owner, def);
-  if (std::holds_alternative<Curve>(def.rate))
+  check(owner, "rate", def.release.rate, kRates);
+  check(owner, "velocity_percent", def.release.velocity_percent, kAnyNumber);
+  check_particles(owner, def.particles);
+  if (std::holds_alternative<Curve>(def.release.rate))
     throw std::invalid_argument(owner + ": rate must not be a curve");
-  if (!(def.start_age >= 0)) throw std::invalid_argument(owner + ": start_age must be >= 0");
+  if (!(def.release.start_age >= 0)) throw std::invalid_argument(owner + ": start_age must be >= 0");
   return def;
 }
 
@@ -46,21 +46,21 @@ void Trail::emit(sim::World& world, Real start, Real end) {
 void Trail::leave(sim::World& world, std::size_t i, bool is_new, Real start, Real end) {
   const sim::ParticleArrays& p = world.particles(parents_);
   const Draws draw(random_, p.id[i], start);
-  const Real rate = std::min(kMaxRate, draw(def_.rate, kRate)), phase = draw.uniform(kChance);
+  const Real rate = std::min(kMaxRate, draw(def_.release.rate, kRate)), phase = draw.uniform(kChance);
   if (!(rate > 0)) return;
-  const Real age = p.age[i], last_age = std::min(def_.end_age, p.lifespan[i]);
+  const Real age = p.age[i], last_age = std::min(def_.release.end_age, p.lifespan[i]);
   // Particle k is created at the age start_age + (k + phase) / rate.
   const auto left_by_age = [&](Real a) {
     return static_cast<uint64_t>(
-        std::max(0.0, std::floor((std::min(a, last_age) - def_.start_age) * rate - phase) + 1));
+        std::max(0.0, std::floor((std::min(a, last_age) - def_.release.start_age) * rate - phase) + 1));
   };
   const uint64_t first = is_new ? 0 : left_by_age(age), last = left_by_age(age + (end - start));
   for (uint64_t k = first; k < last; ++k) {
-    if (world.particles(target_).size() >= def_.max_alive) {
+    if (world.particles(target_).size() >= def_.particles.max_alive) {
       report_.skipped += last - k;
       return;
     }
-    const Real time = start + (def_.start_age + (static_cast<Real>(k) + phase) / rate - age);
+    const Real time = start + (def_.release.start_age + (static_cast<Real>(k) + phase) / rate - age);
     const Draws own(random_, combined(p.id[i], k + 1), time);
     report_.released +=
         add_newborn(world, target_, left_by(parent_at(world, parents_, i, time), own), time, start, end);
@@ -68,13 +68,13 @@ void Trail::leave(sim::World& world, std::size_t i, bool is_new, Real start, Rea
 }
 
 sim::Particle Trail::left_by(const Parent& parent, const Draws& draw) const {
-  sim::Particle particle = drawn_particle(def_, draw);
+  sim::Particle particle = drawn_particle(def_.particles, draw);
   const Real speed = parent.velocity.norm();
   const Vec3 backwards = speed > 0 ? Vec3(-parent.velocity / speed) : Vec3(Vec3::UnitY());
   particle.position = parent.position;
-  particle.velocity =
-      draw(def_.velocity_percent, kPercent) / 100 * parent.velocity +
-      draw(def_.speed, kSpeed) * Cone{backwards, perpendicular(backwards)}.drawn(def_.spread_deg, draw);
+  particle.velocity = draw(def_.release.velocity_percent, kPercent) / 100 * parent.velocity +
+                      draw(def_.particles.speed, kSpeed) *
+                          Cone{backwards, perpendicular(backwards)}.drawn(def_.particles.spread_deg, draw);
   return particle;
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "effects/distribution.h"
+#include "effects/new_particles.h"
 #include "effects/offspring.h"
 #include "effects/parent.h"
 
@@ -12,23 +13,20 @@ namespace offstage::effects {
 
 class Draws;
 
-struct TrailDef {
-  std::string name;  ///< also names its random stream
-  uint64_t seed = 1;
+/// When parents leave particles of a trail.
+struct TrailRelease {
   Varying rate = 60.0;  ///< particles per second of each parent, drawn once for its life; must not be a curve
   Real start_age = 0;   ///< age of the parent [s], >= 0
   Real end_age = 1e30;  ///< age of the parent [s]
   Varying velocity_percent = 0.0;  ///< share of the parent's velocity
-  Varying speed = 0.0;             ///< additional speed, about the direction opposite to the parent's [m/s]
-  Varying spread_deg = 0.0;        ///< angle from that direction [degrees]
-  Varying radius = 0.005;          ///< [m], > 0
-  Varying density = 1000.0;        ///< [kg/m^3]; gives the mass unless `mass` is set
-  Varying mass = 0.0;              ///< [kg]; 0: from density and radius
-  Varying lifespan = 1.0;          ///< [s], > 0
-  Varying restitution = 0.3;       ///< in [0, 1]
-  Varying friction = 0.5;          ///< >= 0
-  Varying charge = 0.0;            ///< [C]
-  uint64_t max_alive = 1'000'000;  ///< particles beyond this are not released, but counted
+};
+
+struct TrailDef {
+  std::string name = {};  ///< also names its random stream
+  uint64_t seed = 1;
+  TrailRelease release = {};
+  /// Their speed is added in the directions around the one opposite to the parent's velocity.
+  NewParticles particles = {.speed = 0.0, .radius = 0.005, .lifespan = 1.0};
 };
 
 /// Leaves the trails of all parents. Each parent releases particles at regular times, from its position at

@@ -40,12 +40,13 @@ Real highest_rate(const Varying& rate) {
 /// Greatest number of particles released between start and end within any time `window`, ends included,
 /// because an age that is a sum of sub-steps may be slightly less than the lifespan by rounding.
 Real most_released(const EmitterDef& def, Real start, Real end, Real window) {
-  const Real rate = highest_rate(def.rate), interval = lower_bound(def.interval), length = end - start;
+  const Real rate = highest_rate(def.release.rate), interval = lower_bound(def.release.interval),
+             length = end - start;
   Real sum = 0;
   if (length >= 0)
     sum += (rate > 0 ? std::min(down(rate * window) + 1, down(rate * length)) : 0) +
-           most(def.count) * (std::min(down(window / interval), down(length / interval)) + 1);
-  for (const Burst& b : def.bursts) {
+           most(def.release.count) * (std::min(down(window / interval), down(length / interval)) + 1);
+  for (const Burst& b : def.release.bursts) {
     if (b.time > end) continue;
     const Real in_run = std::min<Real>(b.cycles, down((end - b.time) / b.interval) + 1);
     sum += most(b.count) * std::min(in_run, down(window / b.interval) + 1);
@@ -54,16 +55,16 @@ Real most_released(const EmitterDef& def, Real start, Real end, Real window) {
 }
 
 Real largest_release(const EmitterDef& def) {
-  Real count = std::max(1.0, most(def.count));
-  for (const Burst& b : def.bursts) count = std::max(count, most(b.count));
+  Real count = std::max(1.0, most(def.release.count));
+  for (const Burst& b : def.release.bursts) count = std::max(count, most(b.count));
   return count;
 }
 
 /// Whether particles may be postponed for lack of room. On a mesh this is hard to tell, so the answer is yes.
 bool can_wait(const EmitterDef& def) {
-  if (def.overlap) return false;
+  if (def.release.overlap) return false;
   const ReleaseSurface surface(def.surface);
-  const Real radius = upper_bound(def.radius), count = largest_release(def);
+  const Real radius = upper_bound(def.particles.radius), count = largest_release(def);
   if (count <= 1) return false;
   return !surface.has_cells() || std::isinf(radius) ||
          count > static_cast<Real>(surface.cells(2 * radius).count());
@@ -104,18 +105,18 @@ WorstCase bounded_children(const WorstCase& parents, Real children, Real after, 
 }  // namespace
 
 WorstCase worst_case(const EmitterDef& def, Real duration) {
-  const Real start = def.start - def.prewarm, end = std::min(def.end, duration);
-  const Real lifespan = upper_bound(def.lifespan), born = most_released(def, start, end, kEver);
+  const Real start = def.release.start - def.release.prewarm, end = std::min(def.release.end, duration);
+  const Real lifespan = upper_bound(def.particles.lifespan), born = most_released(def, start, end, kEver);
   // Postponed particles may be released together with later ones.
-  if (can_wait(def)) return bounded(born, lifespan, born, 0, def.max_alive);
-  Real at_once = 1 + most(def.count),
-       rate = highest_rate(def.rate) + most(def.count) / lower_bound(def.interval);
-  for (const Burst& b : def.bursts) {
+  if (can_wait(def)) return bounded(born, lifespan, born, 0, def.particles.max_alive);
+  Real at_once = 1 + most(def.release.count),
+       rate = highest_rate(def.release.rate) + most(def.release.count) / lower_bound(def.release.interval);
+  for (const Burst& b : def.release.bursts) {
     at_once += most(b.count);
     if (b.cycles > 1) rate += most(b.count) / b.interval;
   }
-  WorstCase all = bounded(born, lifespan, at_once, rate, def.max_alive);
-  all.alive = std::min(saturated(most_released(def, start, end, lifespan)), def.max_alive);
+  WorstCase all = bounded(born, lifespan, at_once, rate, def.particles.max_alive);
+  all.alive = std::min(saturated(most_released(def, start, end, lifespan)), def.particles.max_alive);
   return all;
 }
 
@@ -138,24 +139,27 @@ WorstCase worst_case(const SplitDef& def, const WorstCase& parents, bool same_sy
 }
 
 WorstCase worst_case(const TrailDef& def, const WorstCase& parents) {
-  const Real rate = highest_rate(def.rate), time = std::min(parents.lifespan, def.end_age) - def.start_age;
+  const Real rate = highest_rate(def.release.rate),
+             time = std::min(parents.lifespan, def.release.end_age) - def.release.start_age;
   if (!(time > 0)) return {};
   // Each parent releases at regular times, and each may release one particle at once.
-  const WorstCase begun = bounded_children(parents, 1, parents.lifespan, 0, def.max_alive);
-  return bounded(static_cast<Real>(parents.born) * up(rate * time), upper_bound(def.lifespan), begun.at_once,
-                 begun.rate + static_cast<Real>(parents.alive) * rate, def.max_alive);
+  const WorstCase begun = bounded_children(parents, 1, parents.lifespan, 0, def.particles.max_alive);
+  return bounded(static_cast<Real>(parents.born) * up(rate * time), upper_bound(def.particles.lifespan),
+                 begun.at_once, begun.rate + static_cast<Real>(parents.alive) * rate,
+                 def.particles.max_alive);
 }
 
 WorstCase worst_case(const SubEmitterDef& def, const WorstCase& parents, Real hits_per_parent) {
-  const Real events = def.probability > 0 ? (def.trigger == Trigger::collision ? hits_per_parent : 1) : 0;
-  return bounded_children(parents, events * most(def.count), parents.lifespan, upper_bound(def.lifespan),
-                          def.max_alive);
+  const Real events =
+      def.release.probability > 0 ? (def.trigger == Trigger::collision ? hits_per_parent : 1) : 0;
+  return bounded_children(parents, events * most(def.release.count), parents.lifespan,
+                          upper_bound(def.particles.lifespan), def.particles.max_alive);
 }
 
 Real highest_clear_rate(const EmitterDef& def) {
   const ReleaseSurface surface(def.surface);
-  const Real diameter = 2 * upper_bound(def.radius);
-  const Real slowest = std::max({0.0, lower_bound(def.speed), -upper_bound(def.speed)});
+  const Real diameter = 2 * upper_bound(def.particles.radius);
+  const Real slowest = std::max({0.0, lower_bound(def.particles.speed), -upper_bound(def.particles.speed)});
   if (!surface.has_cells() || std::isinf(diameter)) return 0;
   return static_cast<Real>(surface.cells(diameter).count()) * slowest / diameter;
 }

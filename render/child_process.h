@@ -42,7 +42,7 @@ class ChildProcess {
   /// Waits for the end of the child. Returns nothing if it succeeded, otherwise "exit code 1" or "signal 9".
   /// A child that does not end after a request to stop is killed (Patience).
   std::optional<std::string> wait(const StopTest& stop = {});
-  /// The same with a time limit, after which the child is killed.
+  /// Waits for at most `limit`, after which the child is killed.
   std::optional<std::string> wait_for(std::chrono::milliseconds limit);
 
  private:

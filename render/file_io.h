@@ -71,7 +71,7 @@ int write_all(int fd, std::span<const uint8_t> bytes, const StopTest& stop = {})
 /// Returns the bytes of a regular file. Named pipes, devices and folders are refused at once. Throws
 /// FileError, also for a file larger than `max_bytes`.
 std::vector<uint8_t> read_file(const std::filesystem::path& path, uint64_t max_bytes);
-/// The same as text.
+/// Reads a whole file as text.
 std::string read_text_file(const std::filesystem::path& path, uint64_t max_bytes);
 
 /// Creates the parent folders of `file`. Throws FileError.

@@ -295,7 +295,7 @@ const std::vector<uint8_t>& GltfFile::buffer(std::size_t index) {
   else if (index == 0 && has_binary_)
     bytes = binary_;
   else
-    throw FileError(entry.place() + ": has no data");
+    throw FileError(entry.place() + ": has no \"uri\", and the file has no binary chunk");
   if (bytes.size() < length)
     throw FileError(entry.place() + ": has " + std::to_string(bytes.size()) + " of " +
                     std::to_string(length) + " bytes");

@@ -111,7 +111,7 @@ void GltfGeometry::read_attributes(const Source& given, GltfPrimitive& result) {
   Mesh& mesh = result.surface.mesh;
   mesh.positions = vectors<3>(source.attribute(file_, "POSITION", 3));
   if (mesh.positions.empty()) {
-    file_.warn(source.primitive.place() + " is left out: it has no positions");
+    file_.warn(source.primitive.place() + " is not drawn: it has no POSITION attribute");
     return;
   }
   source.vertices = mesh.positions.size();

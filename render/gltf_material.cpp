@@ -239,7 +239,7 @@ int GltfMaterials::image(const GltfValue& texture, Alpha alpha) {
   const GltfValue webp = texture.extension("EXT_texture_webp");
   if (webp.exists() && has_webp()) index = webp.index("source", file_.count("images"));
   if (!index) {
-    file_.warn(texture.place() + " is left out: it has no image in a format that can be read");
+    file_.warn(texture.place() + " is ignored: none of its images has a supported format (PNG, JPEG, WebP)");
     return -1;
   }
   const auto [entry, is_new] = images_.try_emplace({*index, alpha}, -1);

@@ -37,7 +37,7 @@ class GltfRig {
   GltfFile& file_;
   GltfGeometry& geometry_;
   ModelRig rig_;
-  std::vector<int> rig_index_;  ///< of each node of the file
+  std::vector<int> rig_index_;  ///< index in the rig of each node of the file
   std::map<std::size_t, int> skins_;
 };
 

@@ -147,7 +147,7 @@ Image decode_image(std::span<const uint8_t> bytes, const std::string& name, uint
   if (is_webp(bytes)) return decode_webp(bytes, name, max_pixels);
   const int size = static_cast<int>(bytes.size());
   if (is_exr(bytes) || stbi_is_hdr_from_memory(bytes.data(), size))
-    throw fail("HDR and EXR pictures are used for environment.picture alone; convert it to PNG");
+    throw fail("HDR and EXR are supported only for environment.picture; convert it to PNG");
   int width = 0, height = 0, channels = 0;
   check_declared_size(bytes, name, max_pixels);
   if (bytes[0] == 'P' && stbi_is_16_bit_from_memory(bytes.data(), size)) {

@@ -19,7 +19,7 @@ inline constexpr uint64_t kMaxTexturePixels = uint64_t{1}
 /// pixels a side; 16-bit samples are converted to 8 bits. The declared size is checked before decoding.
 /// Throws FileError.
 Image read_image(const std::filesystem::path& path, uint64_t max_pixels = kMaxImagePixels);
-/// The same from memory (for textures embedded in model files); `name` is used in messages.
+/// Reads an image from memory (for textures embedded in model files); `name` is used in messages.
 Image decode_image(std::span<const uint8_t> bytes, const std::string& name,
                    uint64_t max_pixels = kMaxImagePixels);
 

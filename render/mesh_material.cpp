@@ -242,7 +242,8 @@ class MaterialImporter {
     const std::filesystem::path path = find_beside(folder_, name);
     if (path.empty()) throw FileError("texture '" + name + "' is not there");
     if (!folders_.contain(path))
-      throw FileError("texture '" + name + "' is outside of the folders that may be read");
+      throw FileError("texture '" + name +
+                      "' is outside of the folders that may be read; allow its folder with --allow DIR");
     return read_image(path, kMaxTexturePixels);
   }
 

@@ -54,7 +54,7 @@ struct MaterialUniforms {
 struct GpuMaterial {
   gl::Buffer uniforms;
   std::array<gl::Texture, kTextureMaps> textures;  ///< in the order of for_each_texture()
-  std::array<Vector3f, 2> texture_rows;            ///< of the colour's texture
+  std::array<Vector3f, 2> texture_rows;            ///< transform of the colour's texture
   Pattern pattern = Pattern::none;
   Weave weave = Weave::plain;
   bool textured = false;

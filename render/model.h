@@ -51,7 +51,7 @@ struct Fabric {
 
 enum class Wrap { repeat, mirror, clamp };
 
-/// A texture of a material and how it is laid on the surface.
+/// A texture of a material and its mapping.
 struct TextureMap {
   int image = -1;  ///< index into Model::textures, -1: none
   int uv_set = 0;  ///< 0: Mesh::uvs, 1: Mesh::second_uvs
@@ -93,7 +93,7 @@ struct Material {
   /// Points with less alpha are holes and all others are opaque (an alpha mask). 0: alpha blends.
   float alpha_cutoff = 0;
   bool unlit = false;          ///< shows its base colour as it is, without light
-  bool thin = false;           ///< of `transmission`: a sheet that does not refract
+  bool thin = false;           ///< whether the surface is a sheet that transmits and does not refract
   bool vertex_colors = false;  ///< Mesh::colors multiply the base colour
   bool vertex_alpha = false;   ///< some vertex colours are translucent
   /// Reflectance of a dielectric that faces the eye; ((n - 1) / (n + 1))^2 of its index of refraction n.

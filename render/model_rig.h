@@ -22,7 +22,7 @@ struct RigNode {
   Vector3f scale = Vector3f::Ones();
   bool has_matrix = false;
   Eigen::Matrix4f matrix = Eigen::Matrix4f::Identity();
-  std::vector<float> weights;  ///< of the morph targets of its mesh
+  std::vector<float> weights;  ///< weights of the morph targets of its mesh
 };
 
 /// One property of one node over time (section 3.11).
@@ -33,7 +33,7 @@ struct RigChannel {
   Path path = Path::translation;
   Interpolation interpolation = Interpolation::linear;
   std::vector<float> times;   ///< not decreasing
-  std::vector<float> values;  ///< of each key; with `cubic`: tangent in, value, tangent out
+  std::vector<float> values;  ///< values of each key; with `cubic`: tangent in, value, tangent out
 };
 
 struct RigClip {
@@ -79,8 +79,8 @@ struct ModelRig {
 
 /// The state of all nodes at a time.
 struct RigPose {
-  std::vector<Eigen::Affine3f> world;       ///< of each node, in the model's frame
-  std::vector<std::vector<float>> weights;  ///< of the morph targets of each node
+  std::vector<Eigen::Affine3f> world;       ///< transform of each node, in the model's frame
+  std::vector<std::vector<float>> weights;  ///< weights of the morph targets of each node
 };
 /// `clip` -1: the rest pose. Before its first and after its last key, each channel keeps its value.
 RigPose pose_at(const ModelRig& rig, int clip, float time);

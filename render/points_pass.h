@@ -28,8 +28,8 @@ struct BlendedPoint {
   GpuPoint point;
   Vector4f style;
   GpuPicture picture;
-  Vector4f light;                       ///< of lamps; w: share of the sun that reaches it
-  Vector2f size_px = Vector2f::Ones();  ///< of its picture
+  Vector4f light;                       ///< light of lamps; w: fraction of the sun's light that reaches it
+  Vector2f size_px = Vector2f::Ones();  ///< size of its picture
 };
 
 struct PointSet {
@@ -44,7 +44,7 @@ struct PointSet {
   gl::StreamBuffer buffer;                         ///< visible balls by depth
   std::size_t seen = 0;                            ///< number of them
   uint32_t object = 0;                             ///< id in Channels
-  std::unique_ptr<const RayMaterial> rays;         ///< of balls, for light rays
+  std::unique_ptr<const RayMaterial> rays;         ///< material of spheres, for light rays
 
   void assign(std::span<const Point> values);
   /// Smoke and fire, which PuffsPass draws; StreaksPass draws streaks.
@@ -102,7 +102,7 @@ class PointsPass {
     std::size_t first;
     GLuint pictures;
   };
-  std::vector<PictureRun> picture_runs_;  ///< of all blended points, in their order
+  std::vector<PictureRun> picture_runs_;  ///< runs of one picture among all blended points, in their order
   SpriteTextures textures_;
   uint32_t sprites_ = 0, flakes_ = 0;  ///< number of each
   std::vector<std::pair<float, uint32_t>> keys_;

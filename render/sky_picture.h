@@ -45,8 +45,9 @@ struct SkyBeam {
 
 class SkyPicture {
  public:
-  static constexpr int kMostColumns = 4096;       ///< of what is seen; larger pictures are reduced
-  static constexpr int kMostLightColumns = 1024;  ///< of the light
+  static constexpr int kMostColumns =
+      4096;  ///< greatest width of the visible picture; larger ones are reduced
+  static constexpr int kMostLightColumns = 1024;  ///< greatest width of the picture that gives light
   static constexpr int kLevels = 5;               ///< prefiltered for the roughness 0, 1/4 ... 1
 
   /// `image`: twice as wide as high; finite values, at least 0. Throws std::invalid_argument otherwise.
@@ -100,8 +101,8 @@ class SkyPicture {
   Packed sharp_;
   std::vector<Packed> background_;
   SkyGrid light_;               ///< both parts
-  std::vector<float> share_;    ///< of the bright part, of the same cells
-  std::vector<float> row_sum_;  ///< of luminance * solid angle of the bright part, up to each row
+  std::vector<float> share_;    ///< fraction of the bright part in the same cells
+  std::vector<float> row_sum_;  ///< sum of luminance * solid angle of the bright part, up to each row
   std::vector<float> sums_;     ///< the same within each row
   float bright_total_ = 0;
   SkyBeam beam_;

@@ -34,7 +34,8 @@ class Slots {
   T& operator[](Handle<Tag> handle) {
     if (handle.index >= slots_.size() || slots_[handle.index].generation != handle.generation ||
         !slots_[handle.index].value) {
-      throw std::logic_error(std::string(noun_) + (handle ? " was removed" : " is null"));
+      throw std::logic_error("the handle of a " + std::string(noun_) +
+                             (handle ? " is stale: it was removed" : " is null"));
     }
     return *slots_[handle.index].value;
   }

@@ -15,7 +15,7 @@ namespace offstage::render {
 
 /// The pictures of a sheet.
 struct SpritePictures {
-  int width_px = 0, height_px = 0;  ///< of each picture
+  int width_px = 0, height_px = 0;  ///< size of each picture
   /// For each picture its mip levels, encoded: RGBA, sRGB colour with premultiplied alpha, rows from the top.
   std::vector<std::vector<std::vector<uint8_t>>> levels;
   bool operator==(const SpritePictures&) const = default;

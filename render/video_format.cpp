@@ -101,7 +101,7 @@ const VideoFormat& video_format(const VideoDef& def) {
   }
   const std::string size = std::to_string(def.width_px) + "x" + std::to_string(def.height_px);
   if (def.width_px <= 0 || def.height_px <= 0 || def.width_px > 16384 || def.height_px > 16384) {
-    throw std::invalid_argument(file + ": size " + size + " is not in 1..16384");
+    throw std::invalid_argument(file + ": size " + size + ": width and height must be 1 to 16384 pixels");
   }
   if (format->needs_even_size && (def.width_px % 2 != 0 || def.height_px % 2 != 0)) {
     const std::string even = std::to_string(def.width_px + def.width_px % 2) + "x" +

@@ -56,8 +56,8 @@ struct ImpactFigures {
   uint64_t searches = 0;           ///< searches for the time of impact of a pair
   uint64_t collisions = 0;         ///< contacts that approached faster than WorldDef::collision_speed
   uint64_t tracebacks = 0;         ///< trace-backs of islands to a time of impact
-  uint64_t toi_limit_reached = 0;  ///< pairs that reached the limit of time-of-impact events in a sub-step;
-                                   ///< their later impacts were not traced back
+  uint64_t toi_limit_reached = 0;  ///< pairs or islands that reached the limit of time-of-impact events, or
+                                   ///< of work for impacts, in a sub-step; later impacts are not traced back
   /// Pairs whose restitution was suppressed in a sub-step because their pile had too many impacts.
   uint64_t restitution_suppressed = 0;
 
@@ -92,8 +92,8 @@ struct ClothFigures {
 
 /// Work of the contact solvers.
 struct SolverFigures {
-  ContactWork exact, fast, lcp;  ///< of resting contact
-  ContactWork impacts;           ///< of collisions
+  ContactWork exact, fast, lcp;  ///< work of the solvers of resting contact
+  ContactWork impacts;           ///< work of the solver of collisions
   ContactWork particle_lcp;      ///< contact forces of particles by pivoting
 
   static constexpr auto figures() {
@@ -114,7 +114,7 @@ struct StepFigures {
   JointFigures joints;
   SolverFigures solvers;
   ClothFigures cloth;
-  IntegratorReport integration;  ///< of the motion without contacts
+  IntegratorReport integration;  ///< integration of the motion without contacts
 
   static constexpr auto figures() {
     using T = StepFigures;

@@ -106,7 +106,7 @@ struct CollisionMethods {
   BroadPhase broad_phase = BroadPhase::multi_grid;
   ImpactTime impact_time = ImpactTime::advancement;
   Trees trees = Trees::aabb;
-  TreeSplit tree_split = TreeSplit::surface_area;  ///< of these trees
+  TreeSplit tree_split = TreeSplit::surface_area;  ///< how these trees are split
   MeshPairs mesh_pairs = MeshPairs::parts;
   /// Width of a cell of the uniform grid in mean diameters of the bodies (the book's k), > 0.
   Real cell_factor = CellSizes::kMeansInCell;
@@ -162,7 +162,7 @@ struct MovedBody {
 struct BodyState {
   Pose pose;              ///< pose of the body's own frame, as given at creation
   Vec3 centre;            ///< centre of mass, world [m]
-  Vec3 velocity;          ///< of the centre of mass [m/s]
+  Vec3 velocity;          ///< velocity of the centre of mass [m/s]
   Vec3 angular_velocity;  ///< world [rad/s]
   Vec3 angular_momentum;  ///< about the centre of mass, world [kg m^2/s]
   Real mass = 0;          ///< [kg]; 0 unless dynamic
@@ -257,7 +257,7 @@ class World {
   /// Motion of a point of a body (world position at its current pose) at a time inside the current sub-step:
   /// exact for kinematic bodies, extrapolated for dynamic bodies.
   Motion body_motion(BodyHandle body, Real time) const;
-  JointState joint(JointHandle joint) const;  ///< of a broken joint: its state when it broke
+  JointState joint(JointHandle joint) const;  ///< a broken joint keeps the state in which it broke
   const JointDef& joint_def(JointHandle joint) const;
   void for_each_joint(const std::function<void(JointHandle)>& f) const;
   const ParticleArrays& particles(ParticleSystemHandle system) const;
@@ -267,7 +267,7 @@ class World {
   std::span<const ParticleEvent> particle_events() const;
   ClothView cloth(ClothHandle cloth) const;
   const ClothDef& cloth_def(ClothHandle cloth) const;
-  const ClothReport& cloth_report(ClothHandle cloth) const;  ///< of the last step
+  const ClothReport& cloth_report(ClothHandle cloth) const;  ///< report of the last step
   /// The gas inside of a cloth with `pressure` now; zero for other cloths.
   ClothGasState cloth_gas(ClothHandle cloth) const;
   void for_each_cloth(const std::function<void(ClothHandle)>& f) const;

@@ -21,11 +21,11 @@ int main() try {
       {.name = "nozzle",
        .seed = 7,
        .surface = {.kind = effects::SurfaceKind::disc, .pose = {.position = {0, 0.3, 0}}, .radius = 0.05},
-       .rate = 2000.0,
-       .speed = effects::Normal{.mean = 6, .deviation = 0.3},  // [m/s]
-       .spread_deg = 8.0,
-       .radius = 0.004,
-       .lifespan = 2.5},
+       .release = {.rate = 2000.0},                                          // [1/s]
+       .particles = {.speed = effects::Normal{.mean = 6, .deviation = 0.3},  // [m/s]
+                     .spread_deg = 8.0,
+                     .radius = 0.004,
+                     .lifespan = 2.5}},
       drops);
   for (int second = 1; second <= 4; ++second) {
     sim::StepReport report;

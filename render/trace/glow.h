@@ -16,8 +16,8 @@ namespace offstage::render {
 struct GlowSample {
   Vector3f towards = Vector3f::UnitY();
   float distance = 0;                    ///< [m]
-  Vector3f radiance = Vector3f::Zero();  ///< of the point
-  float density = 0;                     ///< of the sample, per solid angle; 0: nothing was found
+  Vector3f radiance = Vector3f::Zero();  ///< radiance of the point
+  float density = 0;  ///< probability density of the sample, per solid angle; 0: nothing was found
 };
 
 class Glow {

@@ -41,9 +41,9 @@ struct LightBuffer {
 
   // In between. Light from around is computed for cells of 2x2 pixels.
   LightGuide pixels, cells;
-  LightValues direct;           ///< of the pixels: visible share of the sun, then diffuse light of lamps
-  LightValues glow;             ///< of the pixels: light of glowing meshes; empty: there are none
-  LightValues around, mirrors;  ///< of the cells
+  LightValues direct;           ///< per pixel: visible fraction of the sun, then diffuse light of lamps
+  LightValues glow;             ///< per pixel: light of glowing meshes; empty: there are none
+  LightValues around, mirrors;  ///< per cell: diffuse light from around, and mirrored light
   LightPlane inverse_distance, brightness, reach2, noisy_reach2;  ///< see LightGuide::find_reach
   LightPlane with_mirror, with_rough_mirror;                      ///< cells: 1 or 0
 };

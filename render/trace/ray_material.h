@@ -19,7 +19,7 @@ class RayMaterial {
   float metallic = 0, roughness = 0.5f;
   float transmission = 0;  ///< share of the light that is refracted
   float refraction = 1.5f;
-  float translucency = 0;  ///< of cloth: share of the scattered light that leaves on the other side
+  float translucency = 0;  ///< cloth: fraction of the scattered light that leaves on the other side
   bool thin = false, unlit = false, vertex_colors = false;
 
   /// Colour and opacity at a point. `footprint`: width of what is averaged [m].

@@ -63,15 +63,15 @@ struct Hit {
   float distance = 0;  ///< along the ray [m]
   Vector3f position = Vector3f::Zero();
   Vector3f normal = Vector3f::Zero();  ///< smooth, on the side of the ray's origin
-  Vector3f face = Vector3f::Zero();    ///< of the triangle, unit, on the side of the ray's origin
+  Vector3f face = Vector3f::Zero();    ///< unit normal of the triangle, on the side of the ray's origin
   bool front = true;
   const RayMaterial* material = nullptr;
-  float translucency = 0;                       ///< of a cloth, else 0
+  float translucency = 0;                       ///< translucency of a cloth, else 0
   unsigned object = 0, triangle = 0;            ///< numbers in the scene and in the mesh
   Vector3f object_position = Vector3f::Zero();  ///< for patterns
   Vector3f object_normal = Vector3f::Zero();
   Vector2f uv = {0, 0};
-  Vector4f color = {1, 1, 1, 1};  ///< of the vertices
+  Vector4f color = {1, 1, 1, 1};  ///< interpolated colour of the vertices
 };
 
 class RayScene {

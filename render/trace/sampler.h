@@ -104,8 +104,8 @@ class WeightedChoice {
     if (taken) weight_ = weight;
     return taken;
   }
-  float weight() const { return weight_; }  ///< of the selected item
-  float sum() const { return sum_; }        ///< of all weights
+  float weight() const { return weight_; }  ///< weight of the selected item
+  float sum() const { return sum_; }        ///< sum of all weights
   /// A random number in [0, 1) that does not depend on the selection.
   float rest() const { return random_ < 0 ? 0.0f : random_ < 1 ? random_ : 0x1.fffffep-1f; }
 

@@ -76,7 +76,7 @@ struct JointDef {
   Vec3 axis = Vec3::UnitZ();  ///< axis of rotation or sliding; for a spherical joint, the axis of its twist
   /// Second axis of a universal joint, not parallel to `axis`; axis of b of a gear, direction of a rack.
   Vec3 second_axis = Vec3::UnitX();
-  Real ratio = 1;  ///< of a gear [1], rack [m], screw [m per turn] or pulley [1, > 0]; not 0
+  Real ratio = 1;  ///< ratio of a gear [1], rack [m], screw [m per turn] or pulley [1, > 0]; not 0
   Vec3 pulley_a = Vec3::Zero(),
        pulley_b = Vec3::Zero();  ///< points of the world over which the rope runs [m]
   /// Limits of the free coordinate of a relative to b: the angle of a revolute joint, the displacement of a

@@ -26,7 +26,7 @@ enum class SpringKind : uint8_t {
   stretch,  ///< to direct neighbours; these tear
   shear,    ///< across the diagonals of cells
   bend,     ///< to second neighbours, or across an edge
-  cord,     ///< of a cord that hangs on a vertex; it neither tears nor has a limit
+  cord,     ///< part of a cord at a vertex; it neither tears nor has a limit
 };
 
 /// F = -(k e + c (d'.d)/|d|) d/|d| on vertex a, d from b to a, with the elongation e = |d| - L.
@@ -90,21 +90,21 @@ struct ClothAir {
 
 struct ClothDef {
   std::string name;
-  std::vector<Vec3> vertices;       ///< at the start [m]
-  std::vector<Vec3> rest_vertices;  ///< of the unstrained cloth [m]; empty: as `vertices`
+  std::vector<Vec3> vertices;       ///< positions at the start [m]
+  std::vector<Vec3> rest_vertices;  ///< positions in the unstrained cloth [m]; empty: as `vertices`
   std::vector<Triangle> triangles;
   std::vector<ClothSpring> springs;
   /// Flexural rigidity B of the triangles [N m], >= 0: moment per width at a curvature of 1/m (bending.h).
   Real bend = 0;
   /// Time tau in which bending is damped [s], >= 0: the moment is B (kappa + tau d kappa/dt).
   Real bend_damping = 0;
-  /// Share of the curvature of the unstrained cloth that is without stress, 0 to 1.
+  /// Fraction of the curvature of the unstrained cloth that is free of stress, 0 to 1.
   Real rest_curvature = 1;
   /// Smallest radius to which the cloth bends [m], >= 0; 0: no limit. The curvature beyond that at rest stays
   /// at most 1 / min_bend_radius (bend_limit.h), for any model of bending and without rigidity, too. On cells
   /// larger than this radius it has no effect: the mesh itself cannot bend further.
   Real min_bend_radius = 0;
-  std::vector<Real> masses;  ///< of the vertices [kg], > 0
+  std::vector<Real> masses;  ///< mass of each vertex [kg], > 0
   std::vector<ClothPin> pins;
   std::vector<ClothSeam> seams;
   Real seam_time = 1;  ///< time in which seams close [s], > 0
@@ -119,7 +119,7 @@ struct ClothDef {
   Real thickness = 0.005;      ///< distance kept from bodies, and between two layers [m], > 0
   Real friction =
       0.5;  ///< on bodies: combined with the body's friction by the geometric mean, as between bodies
-  Real self_friction = 0.3;  ///< of cloth on cloth
+  Real self_friction = 0.3;  ///< coefficient of friction of cloth on cloth
 
   Real max_stretch = 0;  ///< greatest length of stretch springs over their rest length, > 1; 0: no limit (F7)
   Real max_shear = 0;    ///< the same of shear springs
@@ -133,10 +133,10 @@ struct ClothDef {
   Real pressure = 0;
   /// Time in which the gas of `pressure` is let in, at a constant rate from 0 [s], >= 0.
   Real inflate_time = 0;
-  /// Density of the gas inside [kg/m^3], >= 0; empty: that of the air. The gas needs `pressure` > 0 and is
-  /// borne by the cloth: with the weight of the displaced air, it makes the pressure inside, less that
-  /// outside, change with the height at the rate (air.density - gas_density) g. Its inertia, and that of the
-  /// air that moves with the cloth, are neglected.
+  /// Density of the gas inside [kg/m^3], >= 0; empty: that of the air. It requires `pressure` > 0. The
+  /// weight of the gas, less that of the displaced air, acts on the cloth: the overpressure changes with the
+  /// height at the rate (air.density - gas_density) g. The inertia of the gas, and that of the air that moves
+  /// with the cloth, are neglected.
   std::optional<Real> gas_density;
   /// For an open cloth such as a parachute: share of the stagnation pressure rho (u.m)^2 / 2 of the air
   /// entering at its mouth that builds up inside, on the side that its normals point away from. 0: none.
@@ -161,7 +161,7 @@ std::string problem(const ClothDef& def);
 /// that limits it: the one with the greatest ratio of stiffness to mass.
 struct StableStep {
   Real step = std::numeric_limits<Real>::infinity();  ///< [s]
-  uint32_t spring = 0;                                ///< of the definition
+  uint32_t spring = 0;                                ///< index of the spring in the definition
   bool bending = false;                               ///< bending limits it, not a spring
 };
 /// Largest stable step of a definition. It is infinite unless the integrator is `symplectic` or `rk4`.
@@ -169,10 +169,10 @@ StableStep largest_stable_step(const ClothDef& def);
 
 /// The first thread of a cloth that tore.
 struct ClothTear {
-  Real time = 0;              ///< of the end of the sub-step [s]
+  Real time = 0;              ///< end of the sub-step in which it tore [s]
   Vec3 place = Vec3::Zero();  ///< [m]
   Real stretch = 0;           ///< its length over its rest length
-  bool by_pressure = false;   ///< of a closed cloth under pressure
+  bool by_pressure = false;   ///< whether the cloth is closed and under pressure
   bool touches_body = false;  ///< the cloth touched a body in that sub-step
 };
 
@@ -185,21 +185,21 @@ struct ClothGasState {
 /// Statistics of a cloth. Counts are sums over the sub-steps of the last step; other values are those at its
 /// end.
 struct ClothReport {
-  uint64_t contacts = 0;       ///< of vertices and bodies' corners with bodies, at the end
-  uint64_t self_contacts = 0;  ///< at the end
-  uint64_t particle_hits = 0;  ///< of all sub-steps
-  Real max_strain = 0;         ///< of stretch springs, greatest (|d| - L) / L
-  Real mean_strain = 0;        ///< of stretch springs, mean |(|d| - L) / L|
-  Real penetration = 0;        ///< deepest, of a vertex behind a body's surface, 0 while it is outside [m]
+  uint64_t contacts = 0;       ///< contacts with bodies at the end: of vertices, and of bodies' corners
+  uint64_t self_contacts = 0;  ///< contacts of cloth with cloth at the end
+  uint64_t particle_hits = 0;  ///< collisions with particles in all sub-steps
+  Real max_strain = 0;         ///< greatest strain of the stretch springs, (|d| - L) / L
+  Real mean_strain = 0;        ///< mean of the absolute strain of the stretch springs
+  Real penetration = 0;        ///< greatest depth of a vertex inside a body [m]; 0: none is inside
   uint64_t limited = 0;        ///< moves shortened to keep max_stretch and max_shear, or because of held_back
   uint64_t bend_limited = 0;   ///< cloth sub-steps in which the limit min_bend_radius acted
   Real max_bend = 0;           ///< greatest curvature times min_bend_radius at the end; 0 without a limit
   uint64_t held_back = 0;      ///< moves shortened because cloth would have passed through cloth
   uint64_t crossings = 0;  ///< pairs that could not be kept from crossing; cloth may pass through cloth there
   uint64_t clamped = 0;    ///< springs whose stiffness the `relaxed` integrator clamped, at the end
-  Real least_stiffness = 1;             ///< least share of its stiffness that a clamped spring has left
+  Real least_stiffness = 1;             ///< least fraction of its stiffness that a clamped spring has left
   uint32_t spring_steps = 1;            ///< steps of the springs in each sub-step of a `relaxed` cloth
-  uint64_t torn = 0;                    ///< springs
+  uint64_t torn = 0;                    ///< number of torn springs
   uint64_t unconverged = 0;             ///< solves of springs or bending that reached the limit of iterations
   std::optional<ClothTear> first_tear;  ///< the first since the start
   bool finite = true;  ///< false: the cloth became non-finite and stays at its last finite state

@@ -36,9 +36,10 @@ class ClothBody {
   bool is_dynamic() const { return way_.is_dynamic(); }
   /// Mass [kg]; infinite for immovable bodies.
   Real mass() const { return 1 / way_.inverse_mass; }
-  const Vec3& centre() const { return centre_; }  ///< of mass, at the end of the cloth's sub-step
+  const Vec3& centre() const { return centre_; }  ///< centre of mass at the end of the cloth's sub-step
 
-  Vec3 move() const { return centre_ - start_.point_to_world(way_.centre); }  ///< of that centre
+  /// Displacement of the centre of mass during the sub-step of cloth.
+  Vec3 move() const { return centre_ - start_.point_to_world(way_.centre); }
 
   /// Displacement of the surface during the sub-step of cloth, at the point that is at `p` (world) at its
   /// end.
@@ -80,8 +81,8 @@ class ClothBody {
     touching_speed = std::max(touching_speed, speed);
   }
 
-  bool touched = false;     ///< by cloth, in this sub-step of the world
-  Real touching_speed = 0;  ///< greatest [m/s]
+  bool touched = false;     ///< whether cloth touched it in this sub-step of the world
+  Real touching_speed = 0;  ///< greatest relative speed of such a contact [m/s]
   bool pinches = false;     ///< whether it pinches cloth against another body in this sub-step of the world
   bool collides = true;     ///< false: it only holds pins
 
@@ -107,16 +108,17 @@ class ClothBody {
 struct Carrier {
   ClothBody* body;
   std::vector<uint32_t> points;
-  std::vector<Vec3> places;  ///< of each, in the body's frame
+  std::vector<Vec3> places;  ///< position of each point, in the body's frame [m]
 
   /// Mass matrix of the points about the body's centre.
   Mat6 carried(const ClothPoints& points) const;
-  /// Puts the points where the body is at the end of the sub-step of cloth.
+  /// Moves the points with the body to the end of the cloth's sub-step.
   void place(ClothPoints& points) const;
-  /// Applies impulses to the body and the points, as ClothBody::pull() does, and moves them.
+  /// Applies an impulse to the body and its points, and moves the points. `moving`: the part of the impulse
+  /// that also displaces the body within the sub-step, as in ClothBody::pull().
   void pull(const Vec6& impulse, const Vec6& moving, ClothPoints& points) const;
-  /// Changes the velocities of the points alone, which are those that their momentum was last paid for. What
-  /// else accelerates the body leaves them behind, until ClothSystem::pull_bodies() takes that from the body.
+  /// Adds a change of the body's velocity to the points, whose momentum it already includes. Other
+  /// accelerations of the body reach the points only in ClothSystem::pull_bodies().
   void accelerate(const Vec3& dv, ClothPoints& points) const;
 };
 

@@ -26,7 +26,7 @@ struct ClothPoints {
   std::vector<Vec4> acceleration;  ///< the same with the drag of the air at a velocity (air_drag.h)
   std::vector<Vec4> flow;          ///< velocity of the air
   std::vector<Vec4> rest;          ///< in the unstrained cloth
-  std::vector<Vec4> moves;         ///< of a step of the springs
+  std::vector<Vec4> moves;         ///< displacements in a step of the springs [m]
   std::vector<Vec4> pull;          ///< impulse of the springs on pinned points, times the sub-step [kg m]
   std::vector<Real> field_drag;    ///< rate of linear drag by fields and hands [1/s]
   std::vector<Real> mass;          ///< [kg]

@@ -29,7 +29,7 @@ struct Cloth {
   uint32_t version = 0;
   bool stopped = false;  ///< it became non-finite and is no longer stepped
   bool absent = false;   ///< it has not appeared yet, or was removed
-  ClothBending bending;  ///< of the triangles
+  ClothBending bending;  ///< bending of the triangles
   std::optional<ClothTear> first_tear;
   ClothReport report;
 

@@ -6,6 +6,8 @@
 #include <numbers>
 #include <numeric>
 
+#include "sim/core/disjoint_sets.h"
+
 namespace offstage::sim {
 namespace {
 
@@ -49,18 +51,13 @@ Real turn(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vecto
 
 /// The number of the connected piece of each triangle: its least point.
 std::vector<uint32_t> pieces(std::span<const Triangle> triangles, std::size_t point_count) {
-  std::vector<uint32_t> parent(point_count);
-  std::iota(parent.begin(), parent.end(), 0u);
-  const auto root = [&](uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
+  DisjointSets sets(point_count);
   for (const Triangle& t : triangles) {
-    const std::array<uint32_t, 3> r = {root(t[0]), root(t[1]), root(t[2])};
-    for (uint32_t k : r) parent[k] = std::min({r[0], r[1], r[2]});
+    sets.join(t[0], t[1]);
+    sets.join(t[1], t[2]);
   }
   std::vector<uint32_t> piece;
-  for (const Triangle& t : triangles) piece.push_back(root(t[0]));
+  for (const Triangle& t : triangles) piece.push_back(sets.find(t[0]));
   return piece;
 }
 

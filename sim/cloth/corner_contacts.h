@@ -19,7 +19,7 @@ class CornerContacts {
   void assign(std::vector<Triangle> triangles, const ClothPoints& points);
   /// Finds the features and triangles that can meet in a sub-step of the world of length h.
   void find(const ClothPoints& points, std::span<ClothBody> bodies, Real h);
-  Real mean_edge() const { return 2 * spacing_; }  ///< of the triangles [m]
+  Real mean_edge() const { return 2 * spacing_; }  ///< mean length of the triangles' edges [m]
   /// Separates features and triangles in a sub-step of cloth of length dt. Appends to `cuts`.
   void solve(ClothPoints& points, Real dt, std::vector<VelocityCut>& cuts);
   /// Contacts of rounded dynamic bodies with triangles as points are now, also of triangles within `reach`

@@ -1,5 +1,5 @@
 #pragma once
-/// Boxes along the axes that move evenly from a start to an end, in single precision and rounded outwards.
+/// Axis-aligned boxes that move linearly from a start to an end, in single precision and rounded outwards.
 
 #include <array>
 #include <cstdint>
@@ -26,7 +26,7 @@ struct MovingBox {
       high[end] = high[end].max(b.high[end]);
     }
   }
-  /// Returns false only if the boxes stay separate along one axis during the whole motion.
+  /// Whether the boxes may overlap. False: they are separate along one axis during the whole motion.
   bool meets(const MovingBox& b) const {
     const Corner over = (low[0] - b.high[0]).min(low[1] - b.high[1]);
     const Corner under = (b.low[0] - high[0]).min(b.low[1] - high[1]);

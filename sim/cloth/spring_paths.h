@@ -16,7 +16,7 @@ namespace offstage::sim {
 /// Consecutive springs: spring i is between points i and i + 1.
 struct SpringPath {
   std::vector<uint32_t> points;
-  std::vector<uint32_t> springs;  ///< of the span given to spring_paths()
+  std::vector<uint32_t> springs;  ///< indices of springs in the span given to spring_paths()
 };
 
 /// Every spring lies in one path. Neighbours in a path are of one kind and meet at an angle of less than 45

@@ -39,7 +39,7 @@ class StretchLimit {
                std::vector<VelocityCut>& cuts);
   /// Whether any spring is too long, of those that do not tear before.
   bool any_too_long(const ClothPoints& points) const;
-  /// The same of all springs.
+  /// As above, for all springs.
   bool any_beyond(const ClothPoints& points) const;
   /// Solves for all springs at their limits and these contacts together.
   void project_with(std::span<const BodyContact> contacts, ClothPoints& points,

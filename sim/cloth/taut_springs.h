@@ -1,7 +1,7 @@
 #pragma once
-/// Springs at their greatest length, and contacts of their points with dynamic bodies, solved for together:
-/// impulses that shorten all springs to what is aimed at and take points out of bodies, linearised. So a
-/// heavy body is stopped by the whole of a taut cloth, not by the points alone that it touches.
+/// Solves one linear complementarity problem for springs at their greatest length and for contacts of cloth
+/// with dynamic bodies: impulses after which springs reach their target length and points leave bodies,
+/// linearised. So the whole of a taut cloth stops a heavy body, and not only the points that it touches.
 ///
 /// With the rows of J the directions of springs and contacts, and W the inverse masses of points and bodies,
 /// the impulses are the lambda >= 0 of the linear complementarity problem J W J^T lambda >= excess. Conjugate
@@ -17,8 +17,8 @@
 
 namespace offstage::sim {
 
-/// Share of the allowed elongation that corrections aim at: at the limit itself every outward move would have
-/// to be taken back whole, and the cloth would freeze there.
+/// Target of corrections as a fraction of the allowed elongation. At the limit itself every outward move
+/// would be taken back, and the cloth would freeze there.
 inline constexpr Real kStretchAim = 0.97;
 
 struct SpringLimit {
@@ -27,21 +27,22 @@ struct SpringLimit {
   bool tears = false;  ///< it tears before, between steps of the world, and stops no body
 };
 
-/// A point of cloth, or a place within a triangle, at a dynamic body.
+/// Contact of a point of cloth, or of a point within a triangle, with a dynamic body.
 struct BodyContact {
-  std::array<uint32_t, 3> points;  ///< a point alone: three times the same
-  std::array<Real, 3> weights;     ///< of them at the place; a point alone: 1, 0, 0
+  std::array<uint32_t, 3> points;  ///< a single point: three times the same
+  std::array<Real, 3> weights;     ///< barycentric weights of the points; a single point: 1, 0, 0
   ClothBody* body;
-  Vec3 normal, on_body;  ///< of the body's surface, and on it [m]
-  Real gap;              ///< by which the place may still approach; negative: it has to move away [m]
+  Vec3 normal;   ///< unit normal of the body's surface, world axes
+  Vec3 on_body;  ///< contact point on the body's surface, world [m]
+  Real gap;      ///< distance to the body [m]; negative: penetration
 };
 
-/// Share of an overlap that is taken back per sub-step where taut cloth stops a body.
+/// Fraction of an overlap that is removed per sub-step where taut cloth stops a body.
 inline constexpr Real kTautRecovery = 0.1;
 
 class TautSprings {
  public:
-  /// The arguments must stay valid.
+  /// Keeps references to the arguments.
   TautSprings(const ClothPoints& points, std::span<const Carrier> carriers);
 
   /// Adds a spring if it is at its limit or near it.

@@ -15,7 +15,7 @@ namespace offstage::sim {
 inline constexpr Real kTriangleDistance = 0.5;
 
 struct TriangleContact {
-  std::array<Real, 3> weights;  ///< of the triangle's corners
+  std::array<Real, 3> weights;  ///< weights of the triangle's corners
   Vec3 on_body;                 ///< in the world, at the end of the sub-step
   Vec3 normal;                  ///< from the body to the triangle
   Real gap;                     ///< to the distance that it keeps [m]; < 0

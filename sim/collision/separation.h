@@ -5,7 +5,8 @@
 
 namespace offstage::sim {
 
-/// Closest points of two solids A and B, or their deepest points if they overlap, in A's frame. Moving A by
+/// Closest points of two solids A and B, or the witness points of the penetration depth if they overlap, in
+/// A's frame. Moving A by
 /// `-distance * normal`, or B by `distance * normal`, brings separate solids into contact, and separates
 /// overlapping ones with the smallest translation (up to the tolerance of the algorithm).
 struct Separation {

@@ -16,14 +16,15 @@ namespace offstage::sim {
 void sphere_triangle_manifold(const Vec3& centre, Real radius, const SurfaceTriangle& triangle,
                               const Pose& mesh_pose, bool of_b, Real margin, Manifold& m);
 
-/// Those pieces of a pair that are triangles.
+/// The triangles of a pair of pieces; empty where the piece is a convex part.
 struct PairTriangles {
   std::optional<SurfaceTriangle> a, b;
 };
 
 /// Appends the manifolds of two pieces, at least one of them a triangle, to `found`; see manifold(). Points
 /// at which the surface around a triangle does not allow the normal are replaced by points in front of the
-/// triangle's face. `turning`: see find_manifolds().
+/// triangle's face. `turning`: whether a body turns by a
+/// large angle in the sub-step; see find_manifolds().
 void find_triangle_manifolds(const Convex& a, const Convex& b, const PairTriangles& triangles,
                              const Pose& a_from_b, const Separation& s, Real margin, bool turning,
                              std::vector<Manifold>& found);

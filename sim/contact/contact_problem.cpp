@@ -33,7 +33,8 @@ Friction friction_step(const Contact& c, const Vec3& u, const Vec3& w, Real norm
                        const Mat3& W) {
   const Real k = tangential_bound(K), arm = spin_arm(c);
   Friction next{
-      projected(c, Vec3(normal, c.impulse.y() - u.y() / k, c.impulse.z() - u.z() / k), normal).tail<2>(),
+      project_on_section(c, Vec3(normal, c.impulse.y() - u.y() / k, c.impulse.z() - u.z() / k), normal)
+          .tail<2>(),
       Vec3::Zero()};
   if (arm > 0) {
     // One step size for all three, so that friction opposes the velocity.
@@ -72,7 +73,7 @@ Real violation(const Contact& c, std::span<const ContactBody> bodies) {
   const Real k = mobility(c, bodies).diagonal().maxCoeff();
   Vec3 u = c.relative_velocity(bodies);
   u.x() -= c.target;
-  const Vec3 p = projected(c, c.impulse - u / k, std::max(c.impulse.x(), 0.0));
+  const Vec3 p = project_on_section(c, c.impulse - u / k, std::max(c.impulse.x(), 0.0));
   return k * (p - c.impulse).cwiseAbs().maxCoeff();
 }
 
@@ -163,7 +164,7 @@ uint32_t projected_gauss_seidel(std::span<ContactBody> bodies, std::span<Contact
       }
       const Real k = tangential_bound(K);
       const Vec3 wanted(c.impulse.x(), before.y() - u.y() / k, before.z() - u.z() / k);
-      c.impulse = projected(c, wanted, c.impulse.x());
+      c.impulse = project_on_section(c, wanted, c.impulse.x());
       const Vec3 step = c.impulse - before;
       if (step == Vec3::Zero()) continue;
       apply(c, step, bodies);

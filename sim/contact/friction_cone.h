@@ -47,7 +47,7 @@ Mat3 cone_derivative(const Contact& c, const Vec3& q, const ConeProjection& proj
 Real cone_lift(const Contact& c, const Vec3& u);
 
 /// The nearest allowed impulse to `p`, with tangential limits from the normal impulse `normal` >= 0.
-inline Vec3 projected(const Contact& c, const Vec3& p, Real normal) {
+inline Vec3 project_on_section(const Contact& c, const Vec3& p, Real normal) {
   Vec3 q(std::max(p.x(), 0.0), p.y(), p.z());
   if (c.is_isotropic()) {
     const Real limit = c.friction_t * normal, length = std::sqrt(p.y() * p.y() + p.z() * p.z());

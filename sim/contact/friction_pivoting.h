@@ -20,8 +20,8 @@ struct DenseContacts {
   std::vector<Eigen::Vector2d> friction;  ///< for each contact, along t and k
   /// Dynamic friction: p_t = -mu p_n and p_k = 0 for any tangential velocities.
   std::vector<uint8_t> slides;
-  /// Optional: rows whose normal impulse is 1 and takes part in nothing, so that the limits of its tangents
-  /// are constant. The rows and columns of these normals in A and b are zero.
+  /// Optional: excluded rows. Their normal impulse is fixed at 1, so that the limits of their tangents are
+  /// constant. The rows and columns of these normals in A and b are zero.
   std::vector<uint8_t> held = {};
 
   std::size_t count() const { return friction.size(); }
@@ -29,7 +29,7 @@ struct DenseContacts {
 
 struct PivotingResult {
   uint32_t pivots = 0;
-  /// False after an unbounded step (the contact jams), cycling, a singular matrix or too many pivots. The
+  /// False after an unbounded step, cycling, a singular matrix or too many pivots. The
   /// impulses then satisfy their limits but are not the solution.
   bool solved = true;
 };

@@ -5,11 +5,11 @@
 
 namespace offstage::sim {
 
-/// Without joints, clusters of at most this many contacts are solved by pivoting with bounded effort, too.
+/// Clusters without joints and with at most this many contacts are solved by pivoting.
 inline constexpr std::size_t kFewContacts = 8;
 
-/// The same as collide(), but with at most about ten thousand operations, so some contacts of a large cluster
-/// may still approach afterwards. Like collide(), it never adds kinetic energy.
+/// Resolves collisions as collide() does, with at most about ten thousand operations. Some contacts of a
+/// large cluster may still approach afterwards. Like collide(), it never adds kinetic energy.
 ContactWork collide_roughly(std::span<ContactBody> bodies, std::span<Contact> contacts,
                             std::span<const Real> restitution, ImpactLaw law, const JointProblem& joints);
 

@@ -10,8 +10,11 @@ namespace offstage::sim {
 
 class DisjointSets {
  public:
-  explicit DisjointSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
+  explicit DisjointSets(std::size_t count = 0) : parent_(count) { separate(); }
 
+  std::size_t size() const { return parent_.size(); }
+  /// Makes every number a set of its own.
+  void separate() { std::iota(parent_.begin(), parent_.end(), 0u); }
   uint32_t find(uint32_t i) {
     while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
     return i;

@@ -20,8 +20,8 @@ class JointedBodies {
  public:
   virtual ~JointedBodies() = default;
   /// Returns the 6 x 6 matrix of the velocities of a link due to unit impulses and angular impulses on it,
-  /// joints included. It is for impulses in about the direction of `push`: limits that are reached act
-  /// against impulses that press on them. May be called from several threads at the same time.
+  /// joints included. It is for impulses in about the direction of `push`: an active limit resists
+  /// only impulses that push against it. May be called from several threads at the same time.
   virtual Mat6 link_mobility(uint32_t link, const Vec6& push) = 0;
   /// Adds the velocities of all links due to an impulse on one link, limits included.
   virtual void respond(uint32_t link, const Vec6& impulse, std::span<Vec6> velocities) = 0;

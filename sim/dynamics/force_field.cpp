@@ -95,31 +95,31 @@ std::string problem(const Everywhere&) {
   return {};
 }
 std::string problem(const SphereRegion& s) {
-  if (!s.centre.allFinite()) return "region.centre is not finite";
+  if (!s.centre.allFinite()) return "region.centre must be finite";
   return is_positive(s.radius) ? "" : "region.radius must be a finite number > 0";
 }
 std::string problem(const BoxRegion& b) {
-  if (!b.centre.allFinite()) return "region.centre is not finite";
+  if (!b.centre.allFinite()) return "region.centre must be finite";
   return b.size.allFinite() && b.size.minCoeff() > 0 ? "" : "region.size must be finite numbers > 0";
 }
 std::string problem(const Region& region) {
   return std::visit([](const auto& r) { return problem(r); }, region);
 }
 std::string problem(const ConstantField& f) {
-  return f.force.allFinite() ? problem(f.region) : "force is not finite";
+  return f.force.allFinite() ? problem(f.region) : "force must be finite";
 }
 std::string problem(const PointField& f) {
-  if (!f.point.allFinite()) return "point is not finite";
-  return std::isfinite(f.force) ? problem(f.region) : "force is not finite";
+  if (!f.point.allFinite()) return "point must be finite";
+  return std::isfinite(f.force) ? problem(f.region) : "force must be finite";
 }
 std::string problem(const WindField& f) {
-  if (!f.wind.allFinite()) return "wind is not finite";
+  if (!f.wind.allFinite()) return "wind must be finite";
   return is_not_negative(f.drag) ? problem(f.region) : "drag must be a finite number >= 0";
 }
 std::string problem(const Vortex& f) {
-  if (!f.point.allFinite()) return "point is not finite";
+  if (!f.point.allFinite()) return "point must be finite";
   if (!f.axis.allFinite() || !(f.axis.norm() > 0)) return "axis must be finite and not 0";
-  if (!std::isfinite(f.circulation)) return "circulation is not finite";
+  if (!std::isfinite(f.circulation)) return "circulation must be finite";
   if (!is_positive(f.radius)) return "radius must be a finite number > 0";
   return is_not_negative(f.drag) ? problem(f.region) : "drag must be a finite number >= 0";
 }
@@ -128,7 +128,7 @@ std::string problem(const Turbulence& f) {
   if (!is_positive(f.scale)) return "scale must be a finite number > 0";
   if (f.octaves < 1 || f.octaves > Turbulence::kMaxOctaves) return "octaves must be 1 to 8";
   if (!is_not_negative(f.lifetime)) return "lifetime must be a finite number >= 0";
-  if (!f.drift.allFinite()) return "drift is not finite";
+  if (!f.drift.allFinite()) return "drift must be finite";
   return is_not_negative(f.drag) ? problem(f.region) : "drag must be a finite number >= 0";
 }
 std::string problem(const MutualGravitation& f) {
@@ -147,11 +147,11 @@ std::string problem(const LennardJones& f) {
   return is_not_negative(f.cut_off) ? problem(f.region) : "cut_off must be a finite number >= 0";
 }
 std::string problem(const Grab& f) {
-  if (!f.point.allFinite()) return "point is not finite";
+  if (!f.point.allFinite()) return "point must be finite";
   if (f.track.keys.empty()) return "track has no keys";
   for (std::size_t i = 0; i < f.track.keys.size(); ++i) {
     const Keyframe& key = f.track.keys[i];
-    if (!key.pose.position.allFinite()) return "track.keys: a position is not finite";
+    if (!key.pose.position.allFinite()) return "track.keys: a position must be finite";
     if (!std::isfinite(key.time) || (i > 0 && !(key.time > f.track.keys[i - 1].time)))
       return "track.keys: times must be finite and strictly increasing";
   }
@@ -161,18 +161,18 @@ std::string problem(const Grab& f) {
 }
 std::string problem(const AppliedForce& f) {
   if (f.keys.empty()) return "keys: there is none, a force needs at least one";
-  if (f.point && !f.point->allFinite()) return "point is not finite";
+  if (f.point && !f.point->allFinite()) return "point must be finite";
   for (std::size_t i = 0; i < f.keys.size(); ++i) {
     const AppliedForce::Key& key = f.keys[i];
-    if (!key.force.allFinite() || !key.torque.allFinite()) return "keys: a force or torque is not finite";
+    if (!key.force.allFinite() || !key.torque.allFinite()) return "keys: a force or torque must be finite";
     if (!std::isfinite(key.time) || (i > 0 && !(key.time > f.keys[i - 1].time)))
       return "keys: times must be finite and strictly increasing";
   }
   return {};
 }
 std::string problem(const Explosion& f) {
-  if (!f.point.allFinite()) return "point is not finite";
-  if (!std::isfinite(f.impulse)) return "impulse is not finite";
+  if (!f.point.allFinite()) return "point must be finite";
+  if (!std::isfinite(f.impulse)) return "impulse must be finite";
   return is_positive(f.radius) ? "" : "radius must be a finite number > 0";
 }
 
@@ -207,7 +207,7 @@ bool ForceDef::changes() const {
 }
 
 std::string problem(const ForceDef& def) {
-  if (!std::isfinite(def.start)) return "start is not finite";
+  if (!std::isfinite(def.start)) return "start must be finite";
   if (!(def.end >= def.start)) return "end must not be before start";
   const bool holds_body = def.bodies.size() == 1 && def.systems.empty();
   const bool holds_particles = def.bodies.empty() && !def.systems.empty();

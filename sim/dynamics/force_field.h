@@ -138,7 +138,7 @@ std::string problem(const ForceDef& def);
 
 /// A body at a stage of an integration.
 struct RigidMotion {
-  Vec3 position;  ///< of the centre of mass
+  Vec3 position;  ///< position of the centre of mass
   Quat orientation;
   Vec3 velocity, angular_velocity;
 };
@@ -151,7 +151,7 @@ Wrench wrench(const ForceDef& def, Real time, const RigidMotion& motion, const V
 /// The impulse of an explosion on a placed solid with its centre of mass at `centre` (world), and the angular
 /// impulse about it.
 Wrench impulse(const Explosion& explosion, const Solid& solid, const Pose& pose, const Vec3& centre);
-/// The same on a particle at a point.
+/// The impulse on a particle at a point.
 Vec3 impulse(const Explosion& explosion, const Vec3& point);
 
 /// Drag by moving air: `drag` is that of the field, `own` that of the object (see WindField).

@@ -1,5 +1,5 @@
 #pragma once
-/// Points sorted into cells, for searching neighbours (physics P2's cut-off, P3). The cells tile a torus:
+/// Points sorted into cells, for searching neighbours (physics P2, P3). The cells tile a torus:
 /// along each axis they repeat with a power of two, so a table with about as many cells as points serves any
 /// extent. Distant points in the same cell of the torus are excluded by their distance.
 

@@ -26,7 +26,7 @@ using Region = std::variant<Everywhere, SphereRegion, BoxRegion>;
 
 /// 1 - |f|/R in a sphere, the smallest 1 - |f_i|/(b_i/2) in a box, to the power `drop_rate`; 0 outside.
 Real strength(const Region& region, uint32_t drop_rate, const Vec3& point);
-/// The same at several points (x y z of each); returns whether any strength is not 0.
+/// The strengths at several points (x y z of each); returns whether any strength is not 0.
 bool strengths(const Region& region, uint32_t drop_rate, std::span<const Real> points, std::span<Real> out);
 /// Strength at a share `depth` of the way from the edge of the region to its middle.
 Real strength_at_depth(Real depth, uint32_t drop_rate);

@@ -12,7 +12,7 @@ namespace offstage::sim {
 struct HulledPiece {
   SolidPiece solid;
   ConvexPolyhedron hull;
-  PieceMoments moments;   ///< of the solid
+  PieceMoments moments;   ///< moments of the solid
   Real excess = 0;        ///< volume of the hull that is empty [m^3]
   uint32_t solid_id = 0;  ///< index of the solid to which the piece belongs
 };

@@ -60,7 +60,7 @@ struct Polyhedron {
 /// solid to `angle` at the face on the right.
 struct Wedge {
   Vec3 along;   ///< unit direction of the edge
-  Vec3 normal;  ///< of the left face
+  Vec3 normal;  ///< normal of the left face
   Vec3 left;    ///< unit direction into the left face
   Real angle;   ///< the interior dihedral angle, in [0, 2 pi) [rad]
 

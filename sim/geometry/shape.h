@@ -31,12 +31,12 @@ struct Cylinder {
 };
 /// Base circle at y = -height/2, apex at y = +height/2.
 struct Cone {
-  Real radius = 0.5;  ///< of the base [m], > 0
+  Real radius = 0.5;  ///< radius of the base [m], > 0
   Real height = 1;    ///< [m], > 0
 };
 /// A cone with its tip cut off: the base circle at y = -height/2, the top circle at y = +height/2.
 struct Frustum {
-  Real radius = 0.5;       ///< of the base [m], > 0
+  Real radius = 0.5;       ///< radius of the base [m], > 0
   Real top_radius = 0.25;  ///< [m], > 0
   Real height = 1;         ///< [m], > 0
 };

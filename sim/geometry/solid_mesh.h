@@ -21,15 +21,15 @@ struct Torus {
 };
 /// A hollow cylinder about Y, open at both ends.
 struct Tube {
-  Real radius = 0.5;     ///< of the outside [m], > thickness
+  Real radius = 0.5;     ///< radius of the outside [m], > thickness
   Real height = 1;       ///< [m], > 0
-  Real thickness = 0.1;  ///< of the wall [m], > 0
+  Real thickness = 0.1;  ///< thickness of the wall [m], > 0
 };
 /// A cuboid without its top at +Y, centred at the origin.
 struct OpenBox {
-  Vec3 size = Vec3::Ones();  ///< of the outside [m], > 0
+  Vec3 size = Vec3::Ones();  ///< size of the outside [m], > 0
   Real thickness =
-      0.05;  ///< of the floor and the walls [m], less than half of the x and z sizes and the height
+      0.05;  ///< thickness of the floor and the walls [m], less than half of the x and z sizes and the height
 };
 
 MassProperties mass_properties(const Torus& torus);

@@ -25,25 +25,25 @@ struct SolidPiece {
   };
 
   std::vector<Vec3> points;           ///< [m]
-  std::vector<uint32_t> corners;      ///< of the polygons of the surface, as indices of points
+  std::vector<uint32_t> corners;      ///< corners of the polygons of the surface, as indices of points
   std::vector<uint32_t> first = {0};  ///< first corner of each polygon, and the number of corners at the end
   std::vector<Cap> caps;
 
   std::size_t polygon_count() const { return first.size() - 1; }
 };
 
-/// The solid that a mesh bounds. The net number of triangles along each edge must be zero.
+/// Converts the solid that a mesh bounds. The net number of triangles along each edge must be zero.
 SolidPiece solid_piece(const TriangleMesh& mesh);
-/// A convex polyhedron of dimension 3.
+/// Converts a convex polyhedron of dimension 3.
 SolidPiece solid_piece(const ConvexPolyhedron& polyhedron);
 
 /// Integrals over a piece or a part of it.
 struct PieceMoments {
   Real volume = 0;            ///< [m^3]; negative for an inverted surface
-  Vec3 first = Vec3::Zero();  ///< of position, about the frame's origin [m^4]
+  Vec3 first = Vec3::Zero();  ///< first moment of the volume about the frame's origin [m^4]
 };
 PieceMoments moments(const SolidPiece& piece);
-/// Of the part above a plane: equal to moments(cut(...)[0]) within rounding, and faster.
+/// Returns the moments of the part above a plane; equal to moments(cut(...)[0]) within rounding, but faster.
 PieceMoments moments_above(const SolidPiece& piece, const SolidPiece::Plane& plane);
 
 /// The parts of a piece above and below a plane. Points within `tolerance` of the plane count as on it; a

@@ -33,9 +33,9 @@ class BlockCholesky {
   using Block = Eigen::Matrix<Real, N, N>;
   using Vector = Eigen::Matrix<Real, N, 1>;
 
-  /// Prepares for matrices whose blocks off the diagonal are at the given pairs of rows, first < second, each
-  /// once and in ascending order. Without kinds all rows are positive. Does nothing if it is already prepared
-  /// for this structure.
+  /// Symbolic analysis of a block sparsity pattern: `pairs` are the rows of the blocks off the diagonal,
+  /// first < second, each once and in ascending order. `kinds`: by default all rows are positive. Does
+  /// nothing if it is already prepared for this structure.
   void analyze(uint32_t rows, std::span<const std::pair<uint32_t, uint32_t>> pairs,
                std::span<const BlockRowKind> kinds = {});
 

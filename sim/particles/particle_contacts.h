@@ -34,7 +34,7 @@ class ParticleContacts {
   struct Order {
     /// First particle of each layer, and the end; the number of layers is even.
     std::span<const uint32_t> layer_begin;
-    std::span<const uint32_t> layer;   ///< of each particle
+    std::span<const uint32_t> layer;   ///< layer of each particle
     std::span<const uint32_t> before;  ///< index of each particle in the previous solution, or kNone
   };
 

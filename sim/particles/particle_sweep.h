@@ -50,8 +50,8 @@ struct SweepLog {
 struct ObstacleHit {
   const Obstacle* obstacle = nullptr;
   Real fraction = 1;  ///< time as a fraction of the sub-step
-  Vec3 position;      ///< of the particle's centre
-  Vec3 normal;        ///< of the obstacle
+  Vec3 position;      ///< position of the particle's centre
+  Vec3 normal;        ///< normal of the obstacle
 };
 
 /// Returns the impulse on a particle that meets an obstacle at a fraction of the sub-step with the relative

@@ -39,8 +39,8 @@ struct ParticleSystemDef {
   bool internal = false;      ///< whether its particles collide with each other
   /// Whether its particles collide with those of other systems that also have this flag.
   bool external = false;
-  /// Whether particles are solid balls that contacts turn: friction then acts at their surface, so they roll.
-  /// Otherwise they slide without turning.
+  /// Whether contacts make particles rotate, as solid spheres: friction acts at their surface, so they roll.
+  /// Otherwise they slide without rotating.
   bool rotates = false;
   bool dies_on_hit = false;        ///< whether particles are removed at their first collision
   bool report_collisions = false;  ///< whether collisions are reported as ParticleEvent
@@ -98,7 +98,7 @@ struct ParticleArrays {
 /// - v2 and the unit normal n, u.n < 0 (P5): restitution e along n. It sticks tangentially if the friction
 /// cone allows; otherwise it slides with |P_t| = mu P_n against the sliding direction.
 Vec3 collision_impulse(Real m12, const Vec3& u, const Vec3& n, Real restitution, Real friction);
-/// The same for round bodies that turn, with the effective mass `across` for impulses along the surface.
+/// The impulse of round bodies that rotate, with the effective mass `across` for impulses along the surface.
 Vec3 collision_impulse(Real m12, Real across, const Vec3& u, const Vec3& n, Real restitution, Real friction);
 
 /// m r^2 / I of a solid ball: an impulse across its surface moves the surface 1 + kBallTurning times as much

@@ -5,6 +5,7 @@
 #include <limits>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "sim/contact/contact_lcp.h"
 #include "sim/dynamics/pair_forces.h"
@@ -123,18 +124,20 @@ void check_body(const std::string& object, const BodyDef& def) {
   check_restitution(object, def.restitution);
   check_finite(object, "friction_axis", def.friction_axis);
   check_finite(object, "surface_velocity", def.surface_velocity);
-  for (const Real friction : {def.static_friction, def.cross_friction})
-    if (!std::isfinite(friction)) refuse(object, "static_friction or cross_friction is not finite");
+  for (const auto& [field, value] :
+       {std::pair("static_friction", def.static_friction), {"cross_friction", def.cross_friction}})
+    if (!std::isfinite(value)) refuse(object, std::string(field) + " must be finite");
   if (def.cross_friction >= 0 && def.friction_axis == Vec3::Zero())
-    refuse(object, "cross_friction needs a friction_axis, allowed is any but 0 0 0");
+    refuse(object, "cross_friction needs a friction_axis that is not 0 0 0");
   if (def.cross_friction > 0 && def.friction == 0)
-    refuse(object, "cross_friction needs a friction along the axis, too, allowed is any but 0");
+    refuse(object, "cross_friction needs friction > 0, the coefficient along the axis");
   if (def.centre) check_finite(object, "centre", *def.centre);
   if (def.inertia) check_inertia(object, *def.inertia);
   check_track(object, def.track);
   if (!(def.appear_at >= 0) || !std::isfinite(def.appear_at) || !(def.remove_at > def.appear_at))
     refuse(object, "appear_at is " + std::to_string(def.appear_at) + " s and remove_at " +
-                       std::to_string(def.remove_at) + " s, allowed are 0 or later, and a later removal");
+                       std::to_string(def.remove_at) +
+                       " s; appear_at must be >= 0 and remove_at later than appear_at");
 }
 
 void check_mesh(const std::string& object, const TriangleMesh& mesh) {

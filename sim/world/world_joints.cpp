@@ -54,14 +54,15 @@ void check(const JointDef& def) {
     refuse(def, "limits are " + std::to_string(def.lower) + " to " + std::to_string(def.upper) +
                     ", allowed is a range that contains 0, where the joint is made");
   check_not_negative(def, "swing", def.swing);
-  if (def.has_limits() && def.type == JointType::fixed) refuse(def, "a fixed joint has nothing to limit");
+  if (def.has_limits() && def.type == JointType::fixed)
+    refuse(def, "limits have no effect on a fixed joint; remove them");
   if (def.swing < JointDef::kFree && def.type != JointType::spherical && def.type != JointType::universal)
-    refuse(def, "swing is for spherical and universal joints only");
+    refuse(def, "swing limits only spherical and universal joints; remove it or change the type");
   check_not_negative(def, "friction", def.friction);
   check_not_negative(def, "damping", def.damping);
   check_not_negative(def, "stiffness", def.stiffness);
   if (def.stiffness > 0 && def.type != JointType::spherical)
-    refuse(def, "stiffness is for spherical joints; use a motor with a stiffness for the others");
+    refuse(def, "stiffness acts only on spherical joints; give other joints a motor with a stiffness");
   check_not_negative(def, "max_force", def.max_force);
   check_not_negative(def, "max_torque", def.max_torque);
   check_not_negative(def, "motor.max_effort", def.motor.max_effort);
@@ -70,11 +71,14 @@ void check(const JointDef& def) {
   const bool can_drive = def.type == JointType::revolute || def.type == JointType::prismatic ||
                          def.type == JointType::distance || def.type == JointType::screw;
   if (def.motor.mode != Motor::Mode::none && !can_drive)
-    refuse(def, "a motor drives revolute, prismatic, screw and distance joints only");
+    refuse(
+        def,
+        "a motor drives only revolute, prismatic, screw and distance joints; remove it or change the type");
   if ((def.friction > 0 || def.damping > 0) && !def.has_free_coordinate())
-    refuse(def,
-           "friction and damping act where a joint may move: not on a fixed one, nor on a rod without "
-           "limits and motor");
+    refuse(
+        def,
+        "friction and damping have no effect on a joint without a free coordinate, such as a fixed joint or "
+        "a rod without limits and motor; remove them");
   for (std::size_t i = 0; i < def.motor.targets.size(); ++i)
     if (const Motor::Key& key = def.motor.targets[i]; !std::isfinite(key.time) ||
                                                       !std::isfinite(key.target) ||

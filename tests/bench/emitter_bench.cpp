@@ -23,19 +23,18 @@ void births(benchmark::State& state) {
     state.PauseTiming();
     sim::World world;
     const auto system = world.add_particle_system({});
-    Emitter emitter({.surface = {.kind = kind, .size = {5, 5}, .radius = 3, .mesh = tetrahedron},
-                     .rate = single ? 1e6 : 0.0,
-                     .count = single ? 0.0 : 4167.0,
-                     .interval = kEmitterStep,
-                     .speed = Normal{5, 2},
-                     .spread_deg = Normal{0, 20},
-                     .radius = Normal{0.01, 0.005},
-                     .lifespan = Normal{5, 2},
-                     .restitution = Uniform{0.1, 0.5},
-                     .friction = Uniform{0.1, 0.5},
-                     .charge = Normal{0, 1e-6},
-                     .max_alive = 100'000'000},
-                    system);
+    Emitter emitter(
+        {.surface = {.kind = kind, .size = {5, 5}, .radius = 3, .mesh = tetrahedron},
+         .release = {.rate = single ? 1e6 : 0.0, .count = single ? 0.0 : 4167.0, .interval = kEmitterStep},
+         .particles = {.speed = Normal{5, 2},
+                       .spread_deg = Normal{0, 20},
+                       .radius = Normal{0.01, 0.005},
+                       .lifespan = Normal{5, 2},
+                       .restitution = Uniform{0.1, 0.5},
+                       .friction = Uniform{0.1, 0.5},
+                       .charge = Normal{0, 1e-6},
+                       .max_alive = 100'000'000}},
+        system);
     state.ResumeTiming();
     for (int i = 0; i < 120; ++i) emitter.emit(world, i * kEmitterStep, (i + 1) * kEmitterStep);
     born += emitter.report().released;
@@ -52,7 +51,9 @@ void trails(benchmark::State& state) {
     const auto stars = world.add_particle_system({}), target = world.add_particle_system({});
     for (int i = 0; i < 10'000; ++i)
       world.add_particle(stars, {.position = {0, 100, 0.1 * i}, .velocity = {9, 9, 0}});
-    Trail trail({.rate = 100.0, .max_alive = 100'000'000}, stars, target);
+    Trail trail({.release = {.rate = 100.0},
+                 .particles = {.speed = 0.0, .radius = 0.005, .lifespan = 1.0, .max_alive = 100'000'000}},
+                stars, target);
     world.step(kEmitterStep, [&](Real start, Real end) { trail.emit(world, start, end); });
     state.ResumeTiming();
     for (int i = 1; i < 60; ++i) trail.emit(world, kEmitterStep, 2 * kEmitterStep);

@@ -15,19 +15,20 @@ using namespace sim;
 
 TEST(Emission, DrawsAreTheSameBitsAtAnyFrameRateOnEverySurface) {
   for (const SurfaceKind kind : {SurfaceKind::sphere, SurfaceKind::disc, SurfaceKind::mesh}) {
-    const EmitterDef def{.name = "busy",
-                         .surface = {.kind = kind, .radius = 0.3, .mesh = torus_mesh(0.5, 0.2, 16, 8)},
-                         .rate = Normal{300, 150},
-                         .count = Uniform{3, 9},
-                         .interval = Normal{0.07, 0.02},
-                         .bursts = {{.time = 0.31, .count = 150.0, .cycles = 3, .interval = 0.21}},
-                         .windows = {{0.1, 0.5}, {0.9, 1.7}},
-                         .prewarm = 0.2,
-                         .speed = Normal{3, 1},
-                         .spread_deg = Normal{0, 20},
-                         .radius = Uniform{0.01, 0.03},
-                         .lifespan = 1e9,
-                         .charge = Normal{1e-6, 1e-7}};
+    const EmitterDef def{
+        .name = "busy",
+        .surface = {.kind = kind, .radius = 0.3, .mesh = torus_mesh(0.5, 0.2, 16, 8)},
+        .release = {.rate = Normal{300, 150},
+                    .count = Uniform{3, 9},
+                    .interval = Normal{0.07, 0.02},
+                    .bursts = {{.time = 0.31, .count = 150.0, .cycles = 3, .interval = 0.21}},
+                    .windows = {{0.1, 0.5}, {0.9, 1.7}},
+                    .prewarm = 0.2},
+        .particles = {.speed = Normal{3, 1},
+                      .spread_deg = Normal{0, 20},
+                      .radius = Uniform{0.01, 0.03},
+                      .lifespan = 1e9,
+                      .charge = Normal{1e-6, 1e-7}}};
     const auto at = [&](int fps, Real max_step) {
       World world = empty_world(max_step);
       const auto system = world.add_particle_system({});
@@ -54,7 +55,9 @@ TEST(Emission, DrawsAreTheSameBitsAtAnyFrameRateOnEverySurface) {
 TEST(Emission, WindowsOpenAndCloseWithoutShiftingTheTimes) {
   World world = empty_world();
   const auto system = world.add_particle_system({});
-  Emitter emitter({.rate = 10.0, .windows = {{0.45, 1.0}, {1.5, 1.75}}, .lifespan = 1e9}, system);
+  Emitter emitter(
+      {.release = {.rate = 10.0, .windows = {{0.45, 1.0}, {1.5, 1.75}}}, .particles = {.lifespan = 1e9}},
+      system);
   run(world, 2, 30, emitter);
   std::vector<Real> times;
   for (const Birth& b : births_of(world, system)) times.push_back(b.time);
@@ -67,11 +70,12 @@ TEST(Emission, WindowsOpenAndCloseWithoutShiftingTheTimes) {
 TEST(Emission, APrewarmedEmitterEqualsOneThatStartedEarlier) {
   World world = empty_world();
   const auto warm = world.add_particle_system({}), early = world.add_particle_system({});
-  EmitterDef def{.rate = 100.0, .spread_deg = Normal{0, 30}, .lifespan = 1.2, .max_alive = 1'000'000};
-  def.prewarm = 1.5;
+  EmitterDef def{.release = {.rate = 100.0},
+                 .particles = {.spread_deg = Normal{0, 30}, .lifespan = 1.2, .max_alive = 1'000'000}};
+  def.release.prewarm = 1.5;
   Emitter prewarmed(def, warm, 2);
-  def.prewarm = 0;
-  def.start = 0.5;
+  def.release.prewarm = 0;
+  def.release.start = 0.5;
   Emitter started(def, early);
   run(world, 2, 60, prewarmed, started);
   EXPECT_NEAR(static_cast<Real>(world.particles(warm).size()), 120, 1);
@@ -82,7 +86,8 @@ TEST(Emission, APrewarmedEmitterEqualsOneThatStartedEarlier) {
 TEST(Emission, PrewarmedParticlesHaveMovedByTheStart) {
   World world({.gravity = Vec3(0, -10, 0)});
   const auto system = world.add_particle_system({});
-  Emitter emitter({.rate = 100.0, .prewarm = 2, .direction = Vec3::UnitX(), .speed = 1.0, .lifespan = 1e9},
+  Emitter emitter({.release = {.direction = Vec3::UnitX(), .rate = 100.0, .prewarm = 2},
+                   .particles = {.speed = 1.0, .lifespan = 1e9}},
                   system);
   run(world, 1.0 / 60, 60, emitter);
   const auto& p = world.particles(system);
@@ -98,9 +103,8 @@ TEST(Emission, StoppingEndsReleasesAndKeepsLivingParticles) {
   World world = empty_world();
   const auto system = world.add_particle_system({});
   Emitter emitter({.surface = {.size = {0.01, 0.01}},
-                   .rate = 100.0,
-                   .bursts = {{.time = 0.4, .count = 1000.0}},
-                   .lifespan = 1e9},
+                   .release = {.rate = 100.0, .bursts = {{.time = 0.4, .count = 1000.0}}},
+                   .particles = {.lifespan = 1e9}},
                   system);
   run(world, 0.5, 60, emitter);
   const uint64_t released = emitter.report().released;
@@ -126,10 +130,8 @@ TEST(Emission, AMovingEmitterLeavesNoClumps) {
     const auto system = world.add_particle_system({.linear_drag = 0});
     Emitter emitter({.surface = {.size = {0.001, 0.001}},
                      .body = body,
-                     .rate = 1111.0,
-                     .speed = 0.0,
-                     .radius = 0.001,
-                     .lifespan = 1e9},
+                     .release = {.rate = 1111.0},
+                     .particles = {.speed = 0.0, .radius = 0.001, .lifespan = 1e9}},
                     system);
     run(world, 1, 24, emitter);
     const auto births = births_of(world, system);
@@ -146,12 +148,10 @@ TEST(Emission, MassAndChargeHaveTheirMeansAndDeviations) {
   const auto system = world.add_particle_system({});
   constexpr int kN = 100'000;
   Emitter emitter({.surface = {.kind = SurfaceKind::sphere, .radius = 5},
-                   .overlap = true,
-                   .rate = 0.0,
-                   .bursts = {{.count = Real(kN)}},
-                   .density = Uniform{500, 1500},
-                   .lifespan = 1e9,
-                   .charge = Normal{.mean = 2e-6, .deviation = 1e-6, .clip = false}},
+                   .release = {.overlap = true, .rate = 0.0, .bursts = {{.count = Real(kN)}}},
+                   .particles = {.density = Uniform{500, 1500},
+                                 .lifespan = 1e9,
+                                 .charge = Normal{.mean = 2e-6, .deviation = 1e-6, .clip = false}}},
                   system);
   run(world, 1.0 / 60, 60, emitter);
   const ParticleArrays& p = world.particles(system);

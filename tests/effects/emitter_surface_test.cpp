@@ -114,11 +114,8 @@ std::vector<Case> surfaces() {
 EmitterDef burst_from(const EmitterSurface& surface, Real count) {
   return {.name = "burst",
           .surface = surface,
-          .rate = 0.0,
-          .bursts = {{.count = count}},
-          .speed = 0.5,
-          .radius = Uniform{0.01, 0.03},
-          .lifespan = 1e9};
+          .release = {.rate = 0.0, .bursts = {{.count = count}}},
+          .particles = {.speed = 0.5, .radius = Uniform{0.01, 0.03}, .lifespan = 1e9}};
 }
 
 TEST(EmitterSurface, NewbornsOfOneReleaseNeverOverlapOnAnySurface) {
@@ -165,9 +162,8 @@ TEST(EmitterSurface, ATinySphereHasNoPreferredDirection) {
   World world = empty_world();
   const auto system = world.add_particle_system({});
   Emitter emitter({.surface = {.kind = SurfaceKind::sphere, .radius = 1e-3},
-                   .rate = 20'000.0,
-                   .radius = 0.01,
-                   .lifespan = 1e9},
+                   .release = {.rate = 20'000.0},
+                   .particles = {.radius = 0.01, .lifespan = 1e9}},
                   system);
   run(world, 1, 60, emitter);
   Vec3 sum = Vec3::Zero(), squares = Vec3::Zero();
@@ -188,7 +184,7 @@ TEST(EmitterSurface, OverlappingReleasesNeedNoRoomAndLieEvenly) {
     World world = empty_world();
     const auto system = world.add_particle_system({});
     EmitterDef def = burst_from(surface, 20'000);
-    def.overlap = true;
+    def.release.overlap = true;
     Emitter emitter(def, system);
     run(world, 1.0 / 30, 30, emitter);
     EXPECT_EQ(emitter.report().waited, 0u);
@@ -209,10 +205,8 @@ TEST(EmitterSurface, AGivenDirectionIsInTheBodysFrame) {
   const auto system = world.add_particle_system({});
   Emitter emitter({.surface = {.kind = SurfaceKind::sphere, .radius = 0.5},
                    .body = body,
-                   .direction = {2, 0, 0},
-                   .speed = 3.0,
-                   .spread_deg = 20.0,
-                   .lifespan = 1e9},
+                   .release = {.direction = {2, 0, 0}},
+                   .particles = {.speed = 3.0, .spread_deg = 20.0, .lifespan = 1e9}},
                   system);
   run(world, 1, 60, emitter);
   for (const Vec3& v : world.particles(system).velocity) {

@@ -39,14 +39,14 @@ std::vector<FirstState> births(const EmitterDef& def, Real seconds, int fps, Rea
 EmitterDef busy() {
   return {.name = "busy",
           .surface = {.size = {1, 1}},
-          .rate = Normal{300, 150},
-          .count = Uniform{3, 9},
-          .interval = Normal{0.07, 0.02},
-          .bursts = {{.time = 0.31, .count = 40.0, .cycles = 3, .interval = 0.21}},
-          .speed = Normal{3, 1},
-          .spread_deg = Normal{0, 20},
-          .radius = Uniform{0.01, 0.02},
-          .lifespan = 1e9};
+          .release = {.rate = Normal{300, 150},
+                      .count = Uniform{3, 9},
+                      .interval = Normal{0.07, 0.02},
+                      .bursts = {{.time = 0.31, .count = 40.0, .cycles = 3, .interval = 0.21}}},
+          .particles = {.speed = Normal{3, 1},
+                        .spread_deg = Normal{0, 20},
+                        .radius = Uniform{0.01, 0.02},
+                        .lifespan = 1e9}};
 }
 
 TEST(Emitter, BirthsAndDrawsAreTheSameAtAnyFrameRateAndSubStep) {
@@ -66,7 +66,7 @@ TEST(Emitter, BirthsAndDrawsAreTheSameAtAnyFrameRateAndSubStep) {
 }
 
 TEST(Emitter, AConstantRateGivesExactlyItsCountAtEvenTimes) {
-  const auto b = births({.rate = 100.0, .lifespan = 1e9}, 3, 60);
+  const auto b = births({.release = {.rate = 100.0}, .particles = {.lifespan = 1e9}}, 3, 60);
   ASSERT_EQ(b.size(), 300u);
   for (std::size_t i = 0; i < b.size(); ++i) ASSERT_NEAR(b[i].time, (Real(i) + 1) / 100, 1e-12);
 }
@@ -74,7 +74,8 @@ TEST(Emitter, AConstantRateGivesExactlyItsCountAtEvenTimes) {
 // The rate rises from 0 to 100 in 2 s and falls to 0 at 4 s. Its integral is 50 t^2 / 2 on the way up and 200
 // in all; it stays 0 for a second before it rises again.
 TEST(Emitter, ACurveOfRatesIsIntegratedExactlyAndZeroDoesNotStall) {
-  const auto b = births({.rate = Curve{{{0, 0}, {2, 100}, {4, 0}, {5, 0}, {5.5, 40}}}, .lifespan = 1e9},
+  const auto b = births({.release = {.rate = Curve{{{0, 0}, {2, 100}, {4, 0}, {5, 0}, {5.5, 40}}}},
+                         .particles = {.lifespan = 1e9}},
                         6 + 1.0 / 30, 30);
   ASSERT_EQ(b.size(), 231u);
   for (std::size_t k = 0; k < 100; ++k) ASSERT_NEAR(b[k].time, std::sqrt((Real(k) + 1) / 25), 1e-9);
@@ -84,13 +85,13 @@ TEST(Emitter, ACurveOfRatesIsIntegratedExactlyAndZeroDoesNotStall) {
 
 TEST(Emitter, ReleasesAndBurstsComeAtTheirTimesWithinTheWindow) {
   const auto b = births({.surface = {.size = {1, 1}},
-                         .rate = 0.0,
-                         .count = 4.0,
-                         .interval = 0.25,
-                         .bursts = {{.time = 0, .count = 7.0, .cycles = 2, .interval = 0.6}},
-                         .start = 0.1,
-                         .end = 0.7,
-                         .lifespan = 1e9},
+                         .release = {.rate = 0.0,
+                                     .count = 4.0,
+                                     .interval = 0.25,
+                                     .bursts = {{.time = 0, .count = 7.0, .cycles = 2, .interval = 0.6}},
+                                     .start = 0.1,
+                                     .end = 0.7},
+                         .particles = {.lifespan = 1e9}},
                         2, 24);
   std::vector<std::pair<Real, int>> expected = {{0, 7}, {0.1, 4}, {0.35, 4}, {0.6, 11}};
   std::size_t i = 0;
@@ -107,11 +108,8 @@ TEST(Emitter, NewbornsOfAReleaseNeverOverlapAndLieOnTheSurface) {
        {Varying(Uniform{0.01, 0.03}),
         Varying(Normal{.mean = 0.02, .deviation = 0.003, .min = 0.001, .clip = false})}) {
     const auto b = births({.surface = {.size = {1.3, 0.7}},
-                           .rate = 0.0,
-                           .bursts = {{.count = 200.0}},
-                           .speed = 0.0,
-                           .radius = radius,
-                           .lifespan = 1e9},
+                           .release = {.rate = 0.0, .bursts = {{.count = 200.0}}},
+                           .particles = {.speed = 0.0, .radius = radius, .lifespan = 1e9}},
                           0.1, 60);
     ASSERT_EQ(b.size(), 200u);
     for (std::size_t i = 0; i < b.size(); ++i) {
@@ -130,11 +128,8 @@ TEST(Emitter, NewbornsOfAReleaseNeverOverlapAndLieOnTheSurface) {
 TEST(Emitter, ParticlesWithoutAFreeCellWaitUntilOneIsClear) {
   EmitterReport report;
   const EmitterDef def = {.surface = {.size = {0.1, 0.1}},
-                          .rate = 0.0,
-                          .bursts = {{.count = 70.0}},
-                          .speed = 2.0,
-                          .radius = 0.01,
-                          .lifespan = 1e9};
+                          .release = {.rate = 0.0, .bursts = {{.count = 70.0}}},
+                          .particles = {.speed = 2.0, .radius = 0.01, .lifespan = 1e9}};
   for (Real step : {1.0 / 240, 1.0 / 2000}) {
     const auto b = births(def, 0.1, 60, step, &report);
     ASSERT_EQ(b.size(), 70u);
@@ -147,8 +142,10 @@ TEST(Emitter, ParticlesWithoutAFreeCellWaitUntilOneIsClear) {
 
 TEST(Emitter, TheLimitOfLivingParticlesSkipsAndCounts) {
   EmitterReport report;
-  const auto b = births({.surface = {.size = {1, 1}}, .rate = 100.0, .lifespan = 1e9, .max_alive = 30}, 1, 60,
-                        1.0 / 240, &report);
+  const auto b = births({.surface = {.size = {1, 1}},
+                         .release = {.rate = 100.0},
+                         .particles = {.lifespan = 1e9, .max_alive = 30}},
+                        1, 60, 1.0 / 240, &report);
   EXPECT_EQ(b.size(), 30u);
   EXPECT_EQ(report.skipped, 70u);
 }
@@ -163,10 +160,8 @@ TEST(Emitter, MovesWithItsBodyAndAddsItsVelocity) {
   const auto system = world.add_particle_system({});
   Emitter emitter({.surface = {.pose = {Vec3(1, 0, 0)}, .size = {0.01, 0.01}},
                    .body = wheel,
-                   .rate = 50.0,
-                   .speed = 3.0,
-                   .radius = 0.01,
-                   .lifespan = 1e9},
+                   .release = {.rate = 50.0},
+                   .particles = {.speed = 3.0, .radius = 0.01, .lifespan = 1e9}},
                   system);
   for (int i = 0; i < 60; ++i)
     world.step(1.0 / 60, [&](Real start, Real end) { emitter.emit(world, start, end); });
@@ -193,13 +188,15 @@ TEST(Emitter, RefusesInvalidDistributions) {
     return std::string();
   };
   EXPECT_EQ(message({}), "");
-  EXPECT_NE(message({.name = "e", .radius = 0.0}).find("emitter \"e\": radius"), std::string::npos);
-  EXPECT_NE(message({.radius = Normal{.mean = 1, .deviation = 0.1, .clip = false}}).find("give it a min"),
+  EXPECT_NE(message({.name = "e", .particles = {.radius = 0.0}}).find("emitter \"e\": radius"),
+            std::string::npos);
+  EXPECT_NE(message({.particles = {.radius = Normal{.mean = 1, .deviation = 0.1, .clip = false}}})
+                .find("give it a min"),
             std::string::npos);
   EXPECT_NE(message({.surface = {.size = {0, 1}}}).find("surface.size"), std::string::npos);
-  EXPECT_NE(message({.restitution = 1.5}).find("restitution"), std::string::npos);
-  EXPECT_EQ(message({.restitution = Normal{0.9, 0.2}}), "");  // truncated at 1
-  EXPECT_NE(message({.rate = Curve{}}).find("without keys"), std::string::npos);
+  EXPECT_NE(message({.particles = {.restitution = 1.5}}).find("restitution"), std::string::npos);
+  EXPECT_EQ(message({.particles = {.restitution = Normal{0.9, 0.2}}}), "");  // truncated at 1
+  EXPECT_NE(message({.release = {.rate = Curve{}}}).find("without keys"), std::string::npos);
 }
 
 }  // namespace

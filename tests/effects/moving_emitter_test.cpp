@@ -33,20 +33,15 @@ struct Ride {
 EmitterDef up(Real speed) {
   return {.name = "e",
           .surface = {.size = {0.1, 0.1}},
-          .overlap = true,
-          .rate = 60.0,
-          .speed = speed,
-          .spread_deg = 0.0,
-          .radius = 0.01,
-          .mass = 0.001,
-          .lifespan = 1e9};
+          .release = {.overlap = true, .rate = 60.0},
+          .particles = {.speed = speed, .spread_deg = 0.0, .radius = 0.01, .mass = 0.001, .lifespan = 1e9}};
 }
 
 TEST(MovingEmitter, InheritsAShareOfTheBodysVelocity) {
   for (const Real share : {0.0, 0.25, 1.0}) {
     Ride ride({4, 0, 0});
     EmitterDef def = up(3);
-    def.inherit_velocity = share;
+    def.release.inherit_velocity = share;
     ride.run(def, 0.5);
     const ParticleArrays& p = ride.world.particles(ride.system);
     ASSERT_GT(p.size(), 20u);
@@ -59,9 +54,9 @@ TEST(MovingEmitter, ReleasesParticlesPerMetreOfItsWay) {
   for (const Real speed : {0.5, 7.0}) {
     Ride ride({speed, 0, 0});
     EmitterDef def = up(0);
-    def.rate = 0.0;
-    def.rate_per_metre = 20.0;
-    def.inherit_velocity = 0;
+    def.release.rate = 0.0;
+    def.release.rate_per_metre = 20.0;
+    def.release.inherit_velocity = 0;
     ride.run(def, 2);
     const ParticleArrays& p = ride.world.particles(ride.system);
     EXPECT_NEAR(static_cast<Real>(p.size()), 20 * 2 * speed, 1);
@@ -75,9 +70,9 @@ TEST(MovingEmitter, ReleasesParticlesPerMetreOfItsWay) {
 TEST(MovingEmitter, RecoilPushesTheBodyBack) {
   Ride ride(Vec3::Zero());
   EmitterDef def = up(5);
-  def.recoil = true;
-  def.inherit_velocity = 0;
-  def.rate = 600.0;
+  def.release.recoil = true;
+  def.release.inherit_velocity = 0;
+  def.release.rate = 600.0;
   ride.run(def, 1);
   const ParticleArrays& p = ride.world.particles(ride.system);
   EXPECT_GT(p.size(), 590u);

@@ -139,7 +139,9 @@ TEST(Split, IsTheSameAtAnyFrameRateAndSubStep) {
   const auto outcome = [](int fps, Real step) {
     World world = empty_world(step);
     const auto system = world.add_particle_system({});
-    Emitter emitter({.rate = 240.0, .end = 0.5, .speed = Normal{3, 1}, .lifespan = 1e9}, system);
+    Emitter emitter(
+        {.release = {.rate = 240.0, .end = 0.5}, .particles = {.speed = Normal{3, 1}, .lifespan = 1e9}},
+        system);
     Splitter splitter({.count = Uniform{0, 3},
                        .age = Normal{0.2, 0.05},
                        .delay = Uniform{0.05, 0.1},

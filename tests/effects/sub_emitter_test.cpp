@@ -16,15 +16,14 @@ using namespace sim;
 TEST(SubEmitter, AnAgeTriggersOnceAtItsTime) {
   World world = empty_world();
   const auto shells = world.add_particle_system({}), stars = world.add_particle_system({});
-  Emitter emitter({.rate = 240.0, .end = 0.5, .speed = 10.0, .lifespan = 1e9}, shells);
-  SubEmitter burst({.trigger = Trigger::age,
-                    .age = 0.3333,
-                    .count = 4.0,
-                    .velocity_percent = 100.0,
-                    .speed = 2.0,
-                    .spread_deg = Uniform{0, 180},
-                    .lifespan = 1e9},
-                   shells, stars);
+  Emitter emitter({.release = {.rate = 240.0, .end = 0.5}, .particles = {.speed = 10.0, .lifespan = 1e9}},
+                  shells);
+  SubEmitter burst(
+      {.trigger = Trigger::age,
+       .age = 0.3333,
+       .release = {.count = 4.0, .velocity_percent = 100.0},
+       .particles = {.speed = 2.0, .spread_deg = Uniform{0, 180}, .radius = 0.005, .lifespan = 1e9}},
+      shells, stars);
   run(world, 2, 24, emitter, burst);
   EXPECT_EQ(burst.report().answered, 120u);
   const auto births = births_of(world, stars), parents = births_of(world, shells);
@@ -44,7 +43,10 @@ TEST(SubEmitter, ADeathTriggersWhereItHappens) {
   for (int i = 0; i < 10; ++i)
     world.add_particle(shells,
                        {.position = {0, 0, Real(i)}, .velocity = {10, 0, 0}, .lifespan = 0.1 + 0.02 * i});
-  SubEmitter burst({.trigger = Trigger::death, .count = 20.0, .speed = 3.0, .lifespan = 1e9}, shells, stars);
+  SubEmitter burst({.trigger = Trigger::death,
+                    .release = {.count = 20.0},
+                    .particles = {.speed = 3.0, .spread_deg = 30.0, .radius = 0.005, .lifespan = 1e9}},
+                   shells, stars);
   run(world, 1, 60, burst);
   EXPECT_EQ(burst.report().answered, 10u);
   ASSERT_EQ(burst.report().released, 200u);
@@ -75,9 +77,8 @@ Rain rain(int threads, const SubEmitterDef& def) {
   Emitter emitter({.surface = {.kind = SurfaceKind::disc,
                                .pose = {Vec3(0, 2, 0), Quat(Eigen::AngleAxisd(M_PI, Vec3::UnitX()))},
                                .radius = 3},
-                   .rate = 2000.0,
-                   .speed = Normal{8, 2},
-                   .radius = Uniform{0.001, 0.002}},
+                   .release = {.rate = 2000.0},
+                   .particles = {.speed = Normal{8, 2}, .radius = Uniform{0.001, 0.002}}},
                   drops);
   SubEmitter splashes(def, drops, splash);
   Rain result{};
@@ -94,13 +95,10 @@ Rain rain(int threads, const SubEmitterDef& def) {
   return result;
 }
 
-const SubEmitterDef kSplash{.name = "splash",
-                            .probability = 0.5,
-                            .count = Uniform{2, 6},
-                            .speed = Normal{1, 0.3},
-                            .spread_deg = Normal{45, 20},
-                            .radius = 0.0005,
-                            .lifespan = 5.0};
+const SubEmitterDef kSplash{
+    .name = "splash",
+    .release = {.probability = 0.5, .count = Uniform{2, 6}},
+    .particles = {.speed = Normal{1, 0.3}, .spread_deg = Normal{45, 20}, .radius = 0.0005, .lifespan = 5.0}};
 
 TEST(SubEmitter, SplashesAreTheSameForAnyNumberOfThreads) {
   const Rain reference = rain(1, kSplash);
@@ -117,7 +115,7 @@ TEST(SubEmitter, TriggersByProbabilityUpToItsLimit) {
   EXPECT_EQ(free.report.skipped, 0u);
 
   SubEmitterDef few = kSplash;
-  few.max_per_step = 3;
+  few.release.max_per_step = 3;
   const Rain bounded = rain(2, few);
   EXPECT_GT(bounded.report.skipped, 100u);
   EXPECT_LE(bounded.report.released, 3u * 240);
@@ -129,7 +127,8 @@ TEST(SubEmitter, EmitsAboutTheNormalFromTheContactPoint) {
   const auto drops = world.add_particle_system({.dies_on_hit = true, .report_collisions = true}),
              splash = world.add_particle_system({});
   world.add_particle(drops, {.position = {0, 1, 0}, .velocity = {3, -9, 0}, .radius = 0.1});
-  SubEmitter splashes({.count = 100.0, .speed = 2.0, .spread_deg = 60.0, .radius = 0.01, .lifespan = 1e9},
+  SubEmitter splashes({.release = {.count = 100.0},
+                       .particles = {.speed = 2.0, .spread_deg = 60.0, .radius = 0.01, .lifespan = 1e9}},
                       drops, splash);
   run(world, 0.2, 60, splashes);
   const auto births = births_of(world, splash);
@@ -143,10 +142,11 @@ TEST(SubEmitter, EmitsAboutTheNormalFromTheContactPoint) {
 
 TEST(SubEmitter, SlowHitsAndImpossibleNumbersAreRefused) {
   SubEmitterDef def = kSplash;
-  def.min_speed = 1000;
+  def.release.min_speed = 1000;
   EXPECT_EQ(rain(2, def).report.answered, 0u);
-  EXPECT_THROW(SubEmitter({.probability = 1.5}, {}, {}), std::invalid_argument);
-  EXPECT_THROW(SubEmitter({.lifespan = 0.0}, {}, {}), std::invalid_argument);
+  EXPECT_THROW(SubEmitter({.release = {.probability = 1.5}}, {}, {}), std::invalid_argument);
+  EXPECT_THROW(SubEmitter({.particles = {.spread_deg = 30.0, .radius = 0.005, .lifespan = 0.0}}, {}, {}),
+               std::invalid_argument);
 }
 
 }  // namespace

@@ -19,13 +19,12 @@ TEST(Trail, OfAFastParentIsEven) {
     World world = empty_world(step);
     const auto stars = world.add_particle_system({}), trail = world.add_particle_system({});
     Emitter emitter({.surface = {.size = {0.001, 0.001}},
-                     .rate = 0.0,
-                     .bursts = {{.time = 0.0123, .count = 1.0}},
-                     .speed = 80.0,
-                     .radius = 0.001,
-                     .lifespan = 0.75},
+                     .release = {.rate = 0.0, .bursts = {{.time = 0.0123, .count = 1.0}}},
+                     .particles = {.speed = 80.0, .radius = 0.001, .lifespan = 0.75}},
                     stars);
-    Trail left({.rate = 777.0, .start_age = 0.05, .lifespan = 1e9}, stars, trail);
+    Trail left({.release = {.rate = 777.0, .start_age = 0.05},
+                .particles = {.speed = 0.0, .radius = 0.005, .lifespan = 1e9}},
+               stars, trail);
     run(world, 1, 24, emitter, left);
     const auto births = births_of(world, trail);
     EXPECT_NEAR(static_cast<Real>(births.size()), 777 * 0.7, 1);
@@ -41,8 +40,12 @@ TEST(Trail, OfAFastParentIsEven) {
 TEST(Trail, StartsAtBirthAndInheritsAShareOfTheVelocity) {
   World world = empty_world();
   const auto stars = world.add_particle_system({}), trail = world.add_particle_system({});
-  Emitter emitter({.rate = 240.0, .end = 0.25, .speed = 20.0, .spread_deg = 40.0, .lifespan = 1e9}, stars);
-  Trail left({.rate = 60.0, .velocity_percent = 25.0, .lifespan = 1e9}, stars, trail);
+  Emitter emitter({.release = {.rate = 240.0, .end = 0.25},
+                   .particles = {.speed = 20.0, .spread_deg = 40.0, .lifespan = 1e9}},
+                  stars);
+  Trail left({.release = {.rate = 60.0, .velocity_percent = 25.0},
+              .particles = {.speed = 0.0, .radius = 0.005, .lifespan = 1e9}},
+             stars, trail);
   run(world, 1, 30, emitter, left);
   // Each star emits sixty times a second from its birth on; the first time of each star is random.
   Real expected = 0;
@@ -58,12 +61,12 @@ TEST(Trail, IsTheSameAtAnyFrameRate) {
     const auto stars = world.add_particle_system({.linear_drag = 1e-3}),
                trail = world.add_particle_system({.linear_drag = 1e-4, .gravity = false});
     Emitter emitter({.surface = {.kind = SurfaceKind::sphere},
-                     .rate = 0.0,
-                     .bursts = {{.time = 0.1, .count = 50.0}},
-                     .speed = Normal{10, 2},
-                     .lifespan = Normal{1, 0.3}},
+                     .release = {.rate = 0.0, .bursts = {{.time = 0.1, .count = 50.0}}},
+                     .particles = {.speed = Normal{10, 2}, .lifespan = Normal{1, 0.3}}},
                     stars);
-    Trail left({.rate = Normal{100, 20}, .speed = 0.1, .spread_deg = Uniform{0, 180}}, stars, trail);
+    Trail left({.release = {.rate = Normal{100, 20}},
+                .particles = {.speed = 0.1, .spread_deg = Uniform{0, 180}, .radius = 0.005, .lifespan = 1.0}},
+               stars, trail);
     run(world, 1, fps, emitter, left);
     return std::pair(world.particles(trail).position, world.particles(trail).velocity);
   };
@@ -81,9 +84,11 @@ TEST(Trail, HasItsLimits) {
   World world = empty_world();
   const auto stars = world.add_particle_system({}), trail = world.add_particle_system({});
   EXPECT_THROW(Trail({}, stars, stars), std::invalid_argument);
-  EXPECT_THROW(Trail({.rate = Curve{{{0, 1}}}}, stars, trail), std::invalid_argument);
+  EXPECT_THROW(Trail({.release = {.rate = Curve{{{0, 1}}}}}, stars, trail), std::invalid_argument);
   world.add_particle(stars, {});
-  Trail left({.rate = 1000.0, .lifespan = 1e9, .max_alive = 100}, stars, trail);
+  Trail left({.release = {.rate = 1000.0},
+              .particles = {.speed = 0.0, .radius = 0.005, .lifespan = 1e9, .max_alive = 100}},
+             stars, trail);
   run(world, 1, 60, left);
   EXPECT_EQ(world.particles(trail).size(), 100u);
   EXPECT_NEAR(static_cast<Real>(left.report().skipped), 900, 1);

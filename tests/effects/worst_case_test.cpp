@@ -30,13 +30,14 @@ Count count(const EmitterDef& def, Real duration) {
 
 TEST(WorstCase, OfConstantParametersIsReached) {
   const std::vector<EmitterDef> defs = {
-      {.rate = 120.0, .lifespan = 0.5},
-      {.surface = {.size = {1, 1}}, .rate = 0.0, .count = 30.0, .interval = 0.25, .lifespan = 0.6},
+      {.release = {.rate = 120.0}, .particles = {.lifespan = 0.5}},
       {.surface = {.size = {1, 1}},
-       .rate = 0.0,
-       .bursts = {{.time = 0.1, .count = 50.0, .cycles = 4, .interval = 0.2}},
-       .lifespan = 0.5},
-      {.rate = 100.0, .start = 0.5, .end = 1.5, .lifespan = 30.0}};
+       .release = {.rate = 0.0, .count = 30.0, .interval = 0.25},
+       .particles = {.lifespan = 0.6}},
+      {.surface = {.size = {1, 1}},
+       .release = {.rate = 0.0, .bursts = {{.time = 0.1, .count = 50.0, .cycles = 4, .interval = 0.2}}},
+       .particles = {.lifespan = 0.5}},
+      {.release = {.rate = 100.0, .start = 0.5, .end = 1.5}, .particles = {.lifespan = 30.0}}};
   for (const EmitterDef& def : defs) {
     const Count real = count(def, 2);
     const WorstCase bound = worst_case(def, 2);
@@ -50,11 +51,11 @@ TEST(WorstCase, BoundsVaryingParameters) {
     const EmitterDef def{.name = "varies",
                          .seed = seed,
                          .surface = {.kind = SurfaceKind::disc, .radius = 0.2},
-                         .rate = Normal{200, 100},
-                         .count = Uniform{0, 40},
-                         .interval = Uniform{0.05, 0.2},
-                         .bursts = {{.time = 0.5, .count = Normal{400, 100}}},
-                         .lifespan = Normal{0.5, 0.3}};
+                         .release = {.rate = Normal{200, 100},
+                                     .count = Uniform{0, 40},
+                                     .interval = Uniform{0.05, 0.2},
+                                     .bursts = {{.time = 0.5, .count = Normal{400, 100}}}},
+                         .particles = {.lifespan = Normal{0.5, 0.3}}};
     const Count real = count(def, 2);
     const WorstCase bound = worst_case(def, 2);
     EXPECT_LE(real.alive, bound.alive);
@@ -67,10 +68,14 @@ TEST(WorstCase, OfDescendantsIsABound) {
   World world = empty_world();
   const auto shells = world.add_particle_system({}), stars = world.add_particle_system({}),
              trail = world.add_particle_system({});
-  const EmitterDef shell{.rate = 20.0, .lifespan = 0.5};
-  const SubEmitterDef burst{.trigger = Trigger::age, .age = 0.4, .count = 10.0, .lifespan = 0.6};
+  const EmitterDef shell{.release = {.rate = 20.0}, .particles = {.lifespan = 0.5}};
+  const SubEmitterDef burst{.trigger = Trigger::age,
+                            .age = 0.4,
+                            .release = {.count = 10.0},
+                            .particles = {.spread_deg = 30.0, .radius = 0.005, .lifespan = 0.6}};
   const SplitDef split{.count = 2.0, .age = 0.2, .delay = 0.2, .depth = 2};
-  const TrailDef tail{.rate = 50.0, .lifespan = 0.3};
+  const TrailDef tail{.release = {.rate = 50.0},
+                      .particles = {.speed = 0.0, .radius = 0.005, .lifespan = 0.3}};
   Emitter emitter(shell, shells);
   SubEmitter sub(burst, shells, stars);
   Splitter splitter(split, stars, stars);
@@ -99,18 +104,20 @@ TEST(WorstCase, OfDescendantsIsABound) {
 
 TEST(WorstCase, Saturates) {
   constexpr uint64_t kAll = std::numeric_limits<uint64_t>::max();
-  EmitterDef many{.rate = Normal{.mean = 1e9, .deviation = 1, .clip = false}, .lifespan = 1e9};
+  EmitterDef many{.release = {.rate = Normal{.mean = 1e9, .deviation = 1, .clip = false}},
+                  .particles = {.lifespan = 1e9}};
   EXPECT_EQ(worst_case(many, 1e12).born, kAll);
-  EXPECT_EQ(worst_case(many, 1e12).alive, many.max_alive);
+  EXPECT_EQ(worst_case(many, 1e12).alive, many.particles.max_alive);
   const SplitDef split{.count = 1000.0, .age = 1e-3, .delay = 1e-3, .depth = 50, .max_alive = kAll};
   EXPECT_EQ(worst_case(split, {1, 1, 10, 1}, true).alive, kAll);
 }
 
 // At the highest rate, the next particle of a cell just touches the previous one and never overlaps it.
 TEST(WorstCase, TheHighestClearRateKeepsSinglesApart) {
-  EmitterDef def{.surface = {.size = {0.1, 0.1}}, .speed = Uniform{2, 2}, .radius = 0.01, .lifespan = 1e9};
+  EmitterDef def{.surface = {.size = {0.1, 0.1}},
+                 .particles = {.speed = Uniform{2, 2}, .radius = 0.01, .lifespan = 1e9}};
   EXPECT_NEAR(highest_clear_rate(def), 25 * 2 / 0.02, 1e-6);
-  def.rate = highest_clear_rate(def);
+  def.release.rate = highest_clear_rate(def);
   World world = empty_world();
   const auto system = world.add_particle_system({});
   Emitter emitter(def, system);

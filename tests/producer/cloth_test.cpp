@@ -59,7 +59,7 @@ TEST(Cloths, WhatCannotBeIsRefusedWithWhatCan) {
   EXPECT_EQ(cloth_errors(R"({"fabric": "denin"})"),
             "/cloths/0/fabric: there is no fabric 'denin'; did you mean 'denim'?\n");
   EXPECT_EQ(cloth_errors(R"({"pins": [{"type": "box", "centre": [0, 5, 0]}]})"),
-            "/cloths/0/pins/0: selects no vertex of the cloth; in its own frame the cloth extends from "
+            "/cloths/0/pins/0: the pin selects no vertex; in its own frame the cloth extends from "
             "(-0.5, 0, -0.5) to (0.5, 0, 0.5)\n");
   EXPECT_EQ(
       cloth_errors(R"({"pins": [{"type": "corners", "body": "hand"}]})", R"(, "bodies": [{"name": "band"}])"),

@@ -79,7 +79,7 @@ TEST(SceneBodies, WrongShapesAndTimesAreRefused) {
             "that along y\n"
             "/bodies/3/shape/parts: is empty; a compound needs at least one part\n"
             "/bodies/4/inertia_products: need \"inertia\"\n"
-            "/bodies/5/remove_at: must be later than \"appear_at\", 2 s\n");
+            "/bodies/5/remove_at: must be later than \"appear_at\" (2 s), got 1 s\n");
   EXPECT_EQ(
       body_scene_errors(
           R"("bodies": [{"name": "b"}], "forces": [{"type": "applied", "bodies": ["b"], "torque": [1, 0, 0],

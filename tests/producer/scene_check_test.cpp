@@ -102,11 +102,12 @@ TEST(SceneCheck, OverlaysNameExistingObjects) {
             "/overlays/4/b: is the same body as \"a\"\n"
             "/overlays/5/b: there is no body ''; known: 'ball', 'floor', 'wall', 'rock'\n"
             "/overlays/6: two planes never have a contact\n");
-  EXPECT_EQ(errors_of(R"({"overlays": [{"type": "tree", "body": "a", "level": -1}, {"body": "a"}]})"),
-            "/overlays/0/body: there is no body 'a'\n"
-            "/overlays/0/level: must be between 0 and 16, got -1\n"
-            "/overlays/1/type: is required: one of \"tree\", \"parts\", \"closest\", \"contacts\", "
-            "\"velocities\", \"islands\", \"joints\", \"cloth\", \"trails\" or \"text\"\n");
+  EXPECT_EQ(
+      errors_of(R"({"overlays": [{"type": "tree", "body": "a", "level": -1}, {"body": "a"}]})"),
+      "/overlays/0/body: there is no body 'a'\n"
+      "/overlays/0/level: must be between 0 and 16, got -1\n"
+      "/overlays/1/type: is required; it must be one of \"tree\", \"parts\", \"closest\", \"contacts\", "
+      "\"velocities\", \"islands\", \"joints\", \"cloth\", \"trails\" or \"text\"\n");
 }
 
 TEST(SceneCheck, FilesMustExist) {

@@ -134,7 +134,7 @@ TEST(SceneIo, DistributionsMustStayInTheirRange) {
   EXPECT_EQ(radius(R"({"range": [0, 1]})"),
             "s:1:37: /emitters/0/radius/range/0: must be greater than 1e-09 and at most 1000000000 m, got 0");
   EXPECT_EQ(radius(R"({"range": [0.02, 0.01]})"),
-            "s:1:36: /emitters/0/radius/range: must have the smaller value first");
+            "s:1:36: /emitters/0/radius/range: must be [low, high] with low <= high, got [0.02, 0.01]");
   EXPECT_EQ(radius(R"({"curve": [[0, 0.01], [1, 0.02], [1, 0.03]]})"),
             "s:1:59: /emitters/0/radius/curve/2: times must increase");
   EXPECT_EQ(radius(R"({"curve": []})"),
@@ -156,7 +156,7 @@ TEST(SceneIo, OmittedTypesHaveDefaultsOrAreReported) {
   EXPECT_TRUE(std::holds_alternative<StaticCamera>(loaded_scene(R"({"camera": {"eye": [0, 1, 9]}})").camera));
   EXPECT_EQ(
       load_errors(R"({"bodies": [{"shape": {"radius": 1}}]})"),
-      "s:1:23: /bodies/0/shape/type: is required: one of \"sphere\", \"box\", \"capsule\", "
+      "s:1:23: /bodies/0/shape/type: is required; it must be one of \"sphere\", \"box\", \"capsule\", "
       "\"cylinder\", \"cone\", "
       "\"plane\", \"mesh\", \"frustum\", \"ellipsoid\", \"torus\", \"tube\", \"open_box\" or \"compound\"");
 }
@@ -265,7 +265,7 @@ TEST_F(SceneInclude, JoinsListsAndMergesObjectsAndTheIncluderWins) {
   const Scene& scene = loaded.scene;
   ASSERT_EQ(scene.bodies.size(), 3u);
   EXPECT_EQ(scene.bodies[0].name + scene.bodies[1].name + scene.bodies[2].name, "cbown");
-  EXPECT_EQ(scene.world.step, 0.01);
+  EXPECT_EQ(scene.world.max_step, 0.01);
   EXPECT_EQ(scene.world.gravity, Vec3(0, -1, 0));
   EXPECT_EQ(scene.name, "c");
   EXPECT_EQ(loaded.folder.path(), folder);

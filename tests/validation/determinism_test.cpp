@@ -30,16 +30,16 @@ StateHash run() {
   world.add_spring(
       {.a = BodyPoint{bob, {0.05, 0.1, 0}}, .b = WorldPoint{{2, 3, 0}}, .stiffness = 80, .damping = 0.5});
   world.add_spring({.a = BodyPoint{bob}, .b = ParticlePoint{bead, id}, .stiffness = 30, .damping = 0.1});
-  Emitter emitter({.name = "spray",
-                   .surface = {.pose = {Vec3(0, 0.05, 0)}, .size = {0.3, 0.3}},
-                   .body = arm,
-                   .rate = Curve{{{0, 200}, {0.5, 3000}}},
-                   .bursts = {{.time = 0.2, .count = 500.0}},
-                   .speed = Normal{3, 1},
-                   .spread_deg = Uniform{0, 40},
-                   .radius = Uniform{0.004, 0.01},
-                   .lifespan = Normal{0.8, 0.3}},
-                  drops);
+  Emitter emitter(
+      {.name = "spray",
+       .surface = {.pose = {Vec3(0, 0.05, 0)}, .size = {0.3, 0.3}},
+       .body = arm,
+       .release = {.rate = Curve{{{0, 200}, {0.5, 3000}}}, .bursts = {{.time = 0.2, .count = 500.0}}},
+       .particles = {.speed = Normal{3, 1},
+                     .spread_deg = Uniform{0, 40},
+                     .radius = Uniform{0.004, 0.01},
+                     .lifespan = Normal{0.8, 0.3}}},
+      drops);
   for (int i = 0; i < 60; ++i)
     world.step(1.0 / 60, [&](Real start, Real end) { emitter.emit(world, start, end); });
   return world.state_hash();

@@ -46,15 +46,14 @@ TEST(EmitterStatistics, EveryParameterHasItsMeanAndDeviation) {
   const ParticleArrays p =
       release({.name = "all",
                .surface = {.size = {10, 10}},
-               .rate = 0.0,
-               .bursts = {{.count = Real(kDraws)}},
-               .speed = Normal{4, 1},
-               .spread_deg = Uniform{0, 60},
-               .radius = Uniform{0.01, 0.015},
-               .mass = Normal{.mean = 0.5, .deviation = 0.05, .min = 1e-3, .clip = false},
-               .lifespan = Normal{5, 2},
-               .restitution = Uniform{0.2, 0.6},
-               .friction = Normal{0.5, 0.2}});
+               .release = {.rate = 0.0, .bursts = {{.count = Real(kDraws)}}},
+               .particles = {.speed = Normal{4, 1},
+                             .spread_deg = Uniform{0, 60},
+                             .radius = Uniform{0.01, 0.015},
+                             .mass = Normal{.mean = 0.5, .deviation = 0.05, .min = 1e-3, .clip = false},
+                             .lifespan = Normal{5, 2},
+                             .restitution = Uniform{0.2, 0.6},
+                             .friction = Normal{0.5, 0.2}}});
   ASSERT_EQ(p.size(), std::size_t{kDraws});
   const CutNormal cut;
   const Real cut_deviation = std::sqrt(cut.variance), flat = std::sqrt(1.0 / 12);
@@ -78,13 +77,12 @@ TEST(EmitterStatistics, EveryParameterHasItsMeanAndDeviation) {
 TEST(EmitterStatistics, CountsFollowTheMeanRateAndTheMeanRelease) {
   World world({.gravity = Vec3::Zero(), .max_step = 1});
   const auto single = world.add_particle_system({}), grouped = world.add_particle_system({});
-  Emitter random_rate({.name = "rate", .rate = Uniform{0, 40}, .lifespan = 1e9}, single);
+  Emitter random_rate({.name = "rate", .release = {.rate = Uniform{0, 40}}, .particles = {.lifespan = 1e9}},
+                      single);
   Emitter random_count({.name = "count",
                         .surface = {.size = {1, 1}},
-                        .rate = 0.0,
-                        .count = Uniform{-0.5, 20.5},
-                        .interval = 0.5,
-                        .lifespan = 1e9},
+                        .release = {.rate = 0.0, .count = Uniform{-0.5, 20.5}, .interval = 0.5},
+                        .particles = {.lifespan = 1e9}},
                        grouped);
   constexpr int kSeconds = 1000;
   for (int i = 0; i < kSeconds; ++i)
@@ -106,12 +104,8 @@ TEST(Sprinkler, HeightAndReach) {
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
   const auto water = world.add_particle_system({.dies_on_hit = true, .integrator = IntegratorKind::midpoint});
   Emitter emitter({.surface = {.size = {0.001, 0.001}},
-                   .rate = 200.0,
-                   .end = 1,
-                   .speed = 8.0,
-                   .spread_deg = 30.0,
-                   .radius = 0.002,
-                   .lifespan = 1e9},
+                   .release = {.rate = 200.0, .end = 1},
+                   .particles = {.speed = 8.0, .spread_deg = 30.0, .radius = 0.002, .lifespan = 1e9}},
                   water);
   Real height = 0, reach = 0;
   while (world.time() < 3) {

@@ -57,7 +57,7 @@ struct Member {
 
 inline Node::Node() = default;  // defined here, because Member must be complete
 
-inline constexpr int kMaxDepth = 64;  ///< of nested lists and objects
+inline constexpr int kMaxDepth = 64;  ///< greatest depth of nested lists and objects
 
 /// Parses one JSON text. `file` is its index in positions, `name` its name in messages. Throws SceneError
 /// with position and reason for a syntax error, nesting deeper than kMaxDepth, an integer that does not fit

@@ -24,7 +24,7 @@ class SceneFolder {
   /// Returns an error message for a file outside of all the folders, with symbolic links resolved; empty if
   /// it is inside.
   std::string wrong_place(const std::filesystem::path& file) const;
-  /// The same, and also an error message if there is no regular file. The path may end in #NODE.
+  /// As above, and also an error message if there is no regular file. The path may end in #NODE.
   std::string wrong_file(const std::filesystem::path& file) const;
 
  private:

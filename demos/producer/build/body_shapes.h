@@ -43,7 +43,7 @@ std::vector<sim::SolidMesh> solids_of(const Shape& shape);
 /// Whether a body collides by the parts or triangles of a mesh: mesh files and the shapes of solids_of().
 bool is_mesh(const Body& body);
 
-/// Numbers that distinguish the solids of such a shape from others.
+/// Key of the solids of a shape: equal keys, equal solids.
 std::vector<float> solids_key(const Shape& shape);
 
 /// The inertia matrix of a body that has `inertia`.

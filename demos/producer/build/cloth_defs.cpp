@@ -285,9 +285,19 @@ render::Material fabric_look(const std::string& fabric) {
   return m;
 }
 
+std::string selects_nothing(const FlatCloth& flat) {
+  sim::Aabb box;
+  for (const Vec3& p : flat.places) box.extend(p);
+  const auto &a = box.min(), &b = box.max();
+  return fmt::format(
+      "the pin selects no vertex; in its own frame the cloth extends from ({:g}, {:g}, {:g}) to ({:g}, {:g}, "
+      "{:g})",
+      a.x(), a.y(), a.z(), b.x(), b.y(), b.z());
+}
+
 std::optional<std::string> too_stiff(const Scene& scene, const sim::ClothDef& cloth) {
   const sim::StableStep stable = sim::largest_stable_step(cloth);
-  const Real used = std::min({cloth.substep, scene.world.step, scene.output.fps.seconds(1)});
+  const Real used = std::min({cloth.substep, scene.world.max_step, scene.output.fps.seconds(1)});
   if (used < stable.step) return {};
   if (stable.bending)
     return fmt::format(

@@ -43,6 +43,8 @@ std::vector<std::string> fabric_names();
 /// cloth that is not a grid.
 std::vector<uint32_t> pinned_vertices(const ClothPin& pin, const Cloth& cloth, const FlatCloth& flat);
 const PinScope& scope_of(const ClothPin& pin);
+/// Error message for a pin that holds no vertex, with the extent of the cloth.
+std::string selects_nothing(const FlatCloth& flat);
 /// Returns the pairs of vertices that a seam joins. Throws std::invalid_argument if its sides differ in
 /// length, or are not those of a grid.
 std::vector<sim::ClothSeam> sewn_vertices(const ClothSeam& seam, const Cloth& cloth, const FlatCloth& flat);

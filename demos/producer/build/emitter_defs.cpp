@@ -9,25 +9,6 @@
 namespace offstage::producer {
 namespace {
 
-/// Sets the parameters that all definitions of new particles have in common.
-template <class Def>
-Def newborn_def(const ParticleSource& source, const std::string& name, uint64_t seed) {
-  Def def;
-  def.name = name;
-  def.seed = seed;
-  def.speed = source.speed;
-  def.spread_deg = source.spread_deg;
-  def.radius = source.radius;
-  def.density = source.density;
-  def.mass = source.mass;
-  def.lifespan = source.lifespan;
-  def.restitution = source.restitution;
-  def.friction = source.friction;
-  def.charge = source.charge;
-  def.max_alive = static_cast<uint64_t>(source.max_alive);
-  return def;
-}
-
 effects::EmitterSurface surface_of(const PlaneSurface& s) {
   return {.kind = effects::SurfaceKind::plane, .pose = {s.position, s.orientation()}, .size = s.size};
 }
@@ -78,7 +59,10 @@ Bounds bounds_of(Def def, const Bounds* parents, More... more) {
       return effects::worst_case(d, *from, more...);
   };
   const effects::WorstCase limited = of(def, parents ? &parents->limited : nullptr);
-  def.max_alive = kNoLimit;
+  if constexpr (requires { def.particles; })
+    def.particles.max_alive = kNoLimit;
+  else
+    def.max_alive = kNoLimit;
   return {of(def, parents ? &parents->possible : nullptr), limited};
 }
 
@@ -90,8 +74,11 @@ effects::WorstCase sum(const effects::WorstCase& a, const effects::WorstCase& b)
 
 Bounds bounds_of_emitter(const Emitter& emitter, Real film_end) {
   effects::EmitterDef def = emitter_def(emitter, 0);
-  for (Varying* v : {&def.rate, &def.count, &def.interval, &def.lifespan, &def.radius}) bound(*v);
-  for (effects::Burst& burst : def.bursts) bound(burst.count);
+  effects::EmitterRelease& release = def.release;
+  for (Varying* v :
+       {&release.rate, &release.count, &release.interval, &def.particles.lifespan, &def.particles.radius})
+    bound(*v);
+  for (effects::Burst& burst : release.bursts) bound(burst.count);
   // The triangles of a model are not read yet. For the count this does not matter; particles on a model may
   // be postponed.
   if (def.surface.kind == effects::SurfaceKind::mesh)
@@ -102,11 +89,11 @@ Bounds bounds_of_emitter(const Emitter& emitter, Real film_end) {
 Bounds bounds_of_child(const ParticleSource& parent, const Birth& birth, const Bounds& parents) {
   if (birth.trail) {
     effects::TrailDef def = trail_def(*birth.trail, "", 0);
-    for (Varying* v : {&def.rate, &def.lifespan}) bound(*v);
+    for (Varying* v : {&def.release.rate, &def.particles.lifespan}) bound(*v);
     return bounds_of(def, &parents);
   }
   effects::SubEmitterDef def = event_def(birth, "", 0);
-  for (Varying* v : {&def.count, &def.lifespan}) bound(*v);
+  for (Varying* v : {&def.release.count, &def.particles.lifespan}) bound(*v);
 
   return bounds_of(def, &parents, expected_hits(parent));
 }
@@ -117,22 +104,15 @@ void add_split(const ParticleSource& source, Bounds& all) {
   for (Varying* v : {&def.count, &def.age, &def.delay, &def.lifespan_percent}) bound(*v);
   const Bounds children = bounds_of(def, &all, true);
   all = {sum(all.possible, children.possible), sum(all.limited, children.limited)};
-  all.limited.alive = std::min(all.limited.alive, static_cast<uint64_t>(source.max_alive));
+  all.limited.alive = std::min(all.limited.alive, source.max_alive);
 }
 
 }  // namespace
 
-sim::ParticleSystemDef system_def(const std::string& name, const ParticleBehaviour& b) {
-  return {.name = name,
-          .linear_drag = b.linear_drag,
-          .gravity = b.gravity,
-          .force = b.force,
-          .collides = b.collides,
-          .internal = b.internal,
-          .external = b.external,
-          .rotates = b.rotates,
-          .dies_on_hit = b.dies_on_hit,
-          .integrator = b.integrator};
+sim::ParticleSystemDef system_def(const std::string& name, const sim::ParticleSystemDef& behaviour) {
+  sim::ParticleSystemDef def = behaviour;
+  def.name = name;
+  return def;
 }
 
 sim::ParticleSystemDef system_def(const std::string& name, const ParticleSource& source) {
@@ -143,62 +123,32 @@ sim::ParticleSystemDef system_def(const std::string& name, const ParticleSource&
 }
 
 effects::EmitterDef emitter_def(const Emitter& emitter, uint64_t seed) {
-  auto def = newborn_def<effects::EmitterDef>(emitter, emitter.name, seed);
-  def.surface = std::visit([](const auto& s) { return surface_of(s); }, emitter.surface);
-  def.overlap = emitter.overlap;
-  def.inherit_velocity = emitter.inherit_velocity;
-  def.recoil = emitter.recoil;
-  def.rate_per_metre = emitter.rate_per_metre;
-  def.rate = emitter.rate;
-  def.count = emitter.count;
-  def.interval = emitter.interval;
-  for (const EmitterBurst& b : emitter.bursts) def.bursts.push_back({b.time, b.count, b.cycles, b.interval});
-  def.start = emitter.start;
-  def.end = emitter.end;
-  def.windows = emitter.windows;
-  def.prewarm = emitter.prewarm;
-  def.direction = emitter.direction;
-  return def;
+  return {.name = emitter.name,
+          .seed = seed,
+          .surface = std::visit([](const auto& s) { return surface_of(s); }, emitter.surface),
+          .release = emitter,
+          .particles = emitter};
 }
 
 effects::SplitDef split_def(const ParticleSource& source, const std::string& name, uint64_t seed) {
-  const Split& s = *source.split;
-  return {.name = name + "/split",
-          .seed = seed,
-          .enabled = s.enabled,
-          .count = s.count,
-          .age = s.age,
-          .delay = s.delay,
-          .depth = s.depth,
-          .velocity_percent = s.velocity_percent,
-          .spread_deg = s.spread_deg,
-          .radius_percent = s.radius_percent,
-          .mass_percent = s.mass_percent,
-          .lifespan_percent = s.lifespan_percent,
-          .max_alive = static_cast<uint64_t>(source.max_alive)};
+  effects::SplitDef def = *source.split;
+  def.name = name + "/split";
+  def.seed = seed;
+  def.max_alive = source.max_alive;
+  return def;
 }
 
 effects::TrailDef trail_def(const TrailSource& trail, const std::string& name, uint64_t seed) {
-  auto def = newborn_def<effects::TrailDef>(trail, name, seed);
-  def.rate = trail.rate;
-  def.start_age = trail.start_age;
-  def.end_age = trail.end_age;
-  def.velocity_percent = trail.velocity_percent;
-  return def;
+  return {.name = name, .seed = seed, .release = trail, .particles = trail};
 }
 
 effects::SubEmitterDef event_def(const Birth& birth, const std::string& name, uint64_t seed) {
-  const EventSource& event = *birth.event;
-  auto def = newborn_def<effects::SubEmitterDef>(event, name, seed);
-  def.trigger = birth.trigger;
-  def.age = birth.age;
-  def.probability = event.probability;
-  def.min_speed = event.min_speed;
-  def.count = event.count;
-  def.axis = event.axis;
-  def.velocity_percent = event.velocity_percent;
-  def.max_per_step = static_cast<uint64_t>(event.max_per_step);
-  return def;
+  return {.name = name,
+          .seed = seed,
+          .trigger = birth.trigger,
+          .age = birth.age,
+          .release = *birth.event,
+          .particles = *birth.event};
 }
 
 void bound_sources(

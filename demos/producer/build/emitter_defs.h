@@ -15,8 +15,9 @@
 
 namespace offstage::producer {
 
-/// The particle system of a source or a group. It reports the events to which its child particles react.
-sim::ParticleSystemDef system_def(const std::string& name, const ParticleBehaviour& behaviour);
+/// The particle system of a group or a source. That of a source reports the events to which its child
+/// particles react.
+sim::ParticleSystemDef system_def(const std::string& name, const sim::ParticleSystemDef& behaviour);
 sim::ParticleSystemDef system_def(const std::string& name, const ParticleSource& source);
 
 /// Without its body and, for a model, without the triangles of its surface.

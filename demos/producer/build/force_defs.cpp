@@ -6,41 +6,9 @@
 namespace offstage::producer {
 namespace {
 
-uint32_t whole_world(int n) {
-  return static_cast<uint32_t>(n);
-}
-
-sim::ConstantField effect_of(const ConstantField& f) {
-  return {f.force, f.region, whole_world(f.drop_rate)};
-}
-sim::PointField effect_of(const PointField& f) {
-  return {f.point, f.force, f.region, whole_world(f.drop_rate)};
-}
-sim::WindField effect_of(const WindField& f) {
-  return {f.wind, f.drag, f.region, whole_world(f.drop_rate)};
-}
-sim::Vortex effect_of(const VortexField& f) {
-  return {f.point, f.axis, f.circulation, f.radius, f.drag, f.region, whole_world(f.drop_rate)};
-}
-sim::Turbulence effect_of(const TurbulenceField& f) {
-  return {.speed = f.speed,
-          .scale = f.scale,
-          .octaves = whole_world(f.octaves),
-          .lifetime = f.lifetime,
-          .drift = f.drift,
-          .seed = whole_world(f.seed),
-          .drag = f.drag,
-          .region = f.region,
-          .drop_rate = whole_world(f.drop_rate)};
-}
-sim::MutualGravitation effect_of(const GravitationForce& f) {
-  return {f.constant, f.softening, f.cut_off, f.region, whole_world(f.drop_rate)};
-}
-sim::Coulomb effect_of(const CoulombForce& f) {
-  return {f.constant, f.softening, f.cut_off, f.region, whole_world(f.drop_rate)};
-}
-sim::LennardJones effect_of(const LennardJonesForce& f) {
-  return {f.epsilon, f.sigma, f.cut_off, f.region, whole_world(f.drop_rate)};
+template <class F>
+typename F::Effect effect_of(const F& force) {
+  return force;
 }
 sim::Grab effect_of(const Grab& f) {
   sim::Grab grab{
@@ -57,10 +25,6 @@ sim::AppliedForce effect_of(const AppliedForce& f) {
   if (applied.keys.empty()) applied.keys.push_back({0, f.force, f.torque});
   return applied;
 }
-sim::Explosion effect_of(const Explosion& f) {
-  return {f.point, f.impulse, f.radius, whole_world(f.drop_rate)};
-}
-
 }  // namespace
 
 sim::ForceDef force_def(const Force& force) {

@@ -21,7 +21,7 @@ namespace offstage::producer {
 /// A part of an animated model that collides on its own: a node with its triangles, or the convex hull of the
 /// skin that follows a bone. Unscaled, in the frame of its node without the node's scale.
 struct AnimatedPiece {
-  std::string name;  ///< of the node
+  std::string name;  ///< name of the node
   int node = 0;      ///< index in the rig
   sim::TriangleMesh mesh;
   sim::ConvexDecomposition parts;

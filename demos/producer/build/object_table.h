@@ -24,7 +24,7 @@ struct ObjectTable {
   };
   /// A cylinder between two points: a spring, a part of a joint's rod or rope, or a segment of a cord.
   struct RodEntry {
-    std::string name;  ///< of the spring or joint; empty for a cord
+    std::string name;  ///< name of the spring or joint; empty for a cord
     const char* kind;  ///< "spring", "rod" or "cord"
     bool visible;
     Real radius;  ///< [m]

@@ -140,7 +140,7 @@ void ParticleSources::add(const Emitter& emitter, const ModelLibrary& models, si
 Real ParticleSources::prewarm() const {
   Real longest = 0;
   for (const effects::Emitter& emitter : emitters_)
-    longest = std::max(longest, emitter.def().prewarm - emitter.def().start);
+    longest = std::max(longest, emitter.def().release.prewarm - emitter.def().release.start);
   return longest;
 }
 

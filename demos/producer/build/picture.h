@@ -125,13 +125,13 @@ class Picture {
   void place_rods(const Snapshot& previous, const Snapshot& current, float w);
   void add_points(const ObjectTable::PointsEntry& entry, const ModelLibrary& models);
   void add_particle_mesh(const ParticleLook& look, const ModelLibrary& models, uint32_t object);
-  /// Appends the particles of a set at share w of the frame to `points`. `all`: also those that do not exist
-  /// yet, where they would have come from.
+  /// Appends the particles of a set at the fraction w (0 to 1) of the frame interval to `points`. `all`: also
+  /// particles that are not yet created, extrapolated back along their paths.
   void points_at(std::size_t set, const Snapshot& previous, const Snapshot& current, float w,
                  double frame_time, bool all, std::vector<render::Point>& points) const;
   void place_points(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
-  /// The rotations of some of the set's current points by contacts, at share w of the frame; empty if they
-  /// have none.
+  /// Returns the rotations of some of the set's current points by contacts, at the fraction w of the frame
+  /// interval; empty if they have none.
   static std::vector<Eigen::Quaternionf> orientations_at(const PointSet& before, const PointSet& now, float w,
                                                          std::span<const render::Point> points);
   /// `orientations`: of each point, or empty.

@@ -405,7 +405,7 @@ Scene expand(const Scene& scene, std::vector<Problem>& errors, std::vector<Probl
   flat.cloths = expand_all(scene.cloths, scene.world.seed, errors, warnings);
   for (ParticleGroup& group : flat.particles) resolve_fill(group, errors);
   for (Emitter& emitter : flat.emitters) {
-    resolve_splits(emitter, scene.world.step);
+    resolve_splits(emitter, scene.world.max_step);
     resolve_face(flat, emitter, errors);
   }
   expand_joints(scene, flat, errors, warnings);

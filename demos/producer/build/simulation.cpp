@@ -80,31 +80,14 @@ void Simulation::note_cloths() {
 }
 
 Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
-    : scene_(scene),
-      objects_(scene),
-      world_({.gravity = scene.world.gravity,
-              .wind = scene.world.wind,
-              .max_step = scene.world.step,
-              .integrator = scene.world.integrator,
-              .integration_error = scene.world.integration_error,
-              .solver = scene.world.solver,
-              .impact = scene.world.impact,
-              .collision_speed = scene.world.collision_speed,
-              .collision = scene.world.collision,
-              .particle_contacts = scene.world.particle_contacts,
-              .particle_cluster = static_cast<uint32_t>(scene.world.particle_cluster),
-              .sleep = scene.world.sleep,
-              .bounds = sim::Aabb(Vec3::Constant(-scene.world.bounds), Vec3::Constant(scene.world.bounds))}) {
+    : scene_(scene), objects_(scene), world_(scene.world) {
   add_bodies(scene, models);
   for (const ContactRule& rule : scene.contacts)
     at_place(rule.where, [&] {
-      world_.add_contact_rule({.a = rule.materials[0],
-                               .b = rule.materials[1],
-                               .restitution = rule.restitution,
-                               .friction = rule.friction,
-                               .static_friction = rule.static_friction,
-                               .rolling_friction = rule.rolling_friction,
-                               .spinning_friction = rule.spinning_friction});
+      sim::ContactRule def = rule;
+      def.a = rule.materials[0];
+      def.b = rule.materials[1];
+      world_.add_contact_rule(def);
     });
   add_particle_groups(scene);
   add_springs(scene);
@@ -300,7 +283,7 @@ void Simulation::add_cloths(const Scene& scene, const ModelLibrary& models) {
       const PinScope& scope = scope_of(selection);
       const std::vector<uint32_t> held =
           at_place(scope.where, [&] { return pinned_vertices(selection, cloth, flat); });
-      if (held.empty()) throw SceneError(scope.where, "selects no vertex of the cloth");
+      if (held.empty()) throw SceneError(scope.where, selects_nothing(flat));
       for (const uint32_t vertex : held) pin(scope.body, vertex, scope.until);
     }
     for (std::size_t i = 0; i < cloth.cords.size(); ++i) {
@@ -342,7 +325,7 @@ void Simulation::prewarm(double from, double to) {
 SimulationTotals Simulation::totals() const {
   constexpr Real kRounding = 1e-9;
   SimulationTotals all = totals_;
-  all.step_s = scene_.world.step;
+  all.step_s = scene_.world.max_step;
   for (const sim::BodyOverlap& overlap : world_.overlaps(kRounding))
     all.contacts.penetration = std::max(all.contacts.penetration, overlap.depth);
   return all;

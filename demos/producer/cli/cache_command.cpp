@@ -31,7 +31,7 @@ std::vector<CacheInfo> caches_in(const std::vector<std::string>& folders) {
   std::vector<CacheInfo> all;
   for (const std::string& folder : folders) {
     std::vector<CacheInfo> found = find_caches(folder);
-    if (found.empty()) log("note: {}: holds no cache\n", folder);
+    if (found.empty()) log("note: {} contains no snapshot cache\n", folder);
     all.insert(all.end(), std::make_move_iterator(found.begin()), std::make_move_iterator(found.end()));
   }
   return all;

@@ -90,7 +90,7 @@ void print_warnings(const std::vector<Problem>& warnings);
 /// Reads the models of a scene, and shows steps that take long. Prints warnings unless quiet. Throws
 /// Interrupted between two models, and the exceptions of ModelLibrary.
 ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const TalkOptions& talk);
-/// The same with the warnings added to `warnings` instead.
+/// Reads the models of a scene, and appends its warnings instead of printing them.
 ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const TalkOptions& talk,
                          std::vector<Problem>& warnings);
 /// JSON as indented "key: value" lines.

@@ -88,7 +88,7 @@ void lay_over_black(render::Image& image) {
 void check_not_a_frame(const EncodeOptions& options, const FrameSequence& sequence) {
   for (const SequenceFrame& frame : sequence.frames)
     if (fs::exists(options.out) && fs::equivalent(options.out, frame.path))
-      throw OutputError(options.out + ": is one of the frames");
+      throw OutputError(options.out + ": is an input frame and would be overwritten; choose another output");
 }
 
 /// Encodes all frames; returns the number of encoded frames, which is smaller if a signal ended it.

@@ -49,7 +49,7 @@ int reported(const std::function<int()>& command) {
       log("the last state was saved to {}\n",
           write_numbered_file("offstage-diverged", ".json", error.state()));
     } catch (const render::FileError& unsaved) {
-      log("the last state could not be saved: {}\n", unsaved.what());
+      log("warning: the state at the divergence was not saved: {}\n", unsaved.what());
     }
     return kDiverged;
   } catch (const render::StoppedError&) {

@@ -128,10 +128,14 @@ Json describe_model(const std::filesystem::path& path, const DecompositionCache&
   if (const std::string hint = size_hint(bounds.sizes().maxCoeff()); !hint.empty()) json["hint"] = hint;
   std::vector<std::string> warnings = model.warnings;
   if (!model.cameras.empty() || !model.lights.empty())
-    warnings.push_back("the cameras and lights are used only by a `camera` or `lights` of the type `model`");
+    warnings.push_back(
+        "the file's cameras and lights are not used unless the scene has a \"camera\" or \"lights\" of the "
+        "type \"model\"");
   for (const render::Model::Light& light : model.lights)
     if (light.range_m > 0)
-      warnings.push_back("the light '" + light.name + "' has a range, which is ignored: light has no end");
+      warnings.push_back(
+          "the light '" + light.name +
+          "': its range is ignored; light decreases with the square of the distance, without an end");
   json["warnings"] = warnings;
   return json;
 }

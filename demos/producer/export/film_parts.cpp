@@ -262,7 +262,7 @@ ClothSurface cloth_surface(const FilmCloth& cloth, const ClothSample& sample) {
 std::vector<std::string> look_notes(const Scene& scene) {
   std::vector<std::string> notes;
   if (scene.environment.picture)
-    notes.push_back("the picture of the sky is not written; load " + scene.environment.picture->file +
+    notes.push_back("the environment picture is not exported; load " + scene.environment.picture->file +
                     " in the other program");
   const bool laid = std::ranges::any_of(scene.materials, [](const Material& m) {
     return !m.texture.empty() && (m.texture_projection == TextureProjection::triplanar ||
@@ -270,8 +270,8 @@ std::vector<std::string> look_notes(const Scene& scene) {
   });
   if (laid)
     notes.push_back(
-        "textures lie by the coordinates of their shapes: texture_projection, texture_scale and "
-        "texture_angle_deg are not written");
+        "texture_projection, texture_scale and texture_angle_deg are not exported; textures use the UV "
+        "coordinates of their shapes");
   return notes;
 }
 

@@ -21,7 +21,7 @@ namespace offstage::producer {
 struct FilmMaterial {
   std::string name;  ///< unique, not empty
   render::Material look;
-  std::optional<render::Image> texture;  ///< of the base colour
+  std::optional<render::Image> texture;  ///< texture of the base colour
 };
 
 /// A mesh in the frame of a body.

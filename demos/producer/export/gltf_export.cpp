@@ -1,6 +1,7 @@
 // glTF 2.0 as one binary file (.glb): Khronos Group, "glTF 2.0 Specification". Bodies are animated nodes,
 // cloths meshes with a morph target per frame.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -199,14 +200,14 @@ class GltfExport : public FilmExport {
   std::vector<std::string> notes() const override {
     std::vector<std::string> notes = look_notes(parts_.scene);
     if (!parts_.points.empty())
-      notes.push_back(
-          fmt::format("glTF has no form for particles: {} set{} left out; .usda, .ply and .csv hold them",
-                      parts_.points.size(), parts_.points.size() == 1 ? " is" : "s are"));
-    for (const render::Lamp& lamp : first_lamps_)
-      if (!lamp.size.isZero(0)) {
-        notes.push_back("glTF has no area lights: they are written as spot lights");
-        break;
-      }
+      notes.push_back(fmt::format(
+          "glTF cannot store particles: {} particle system{} not exported; use .usda, .ply or .csv",
+          parts_.points.size(), parts_.points.size() == 1 ? " is" : "s are"));
+    const auto areas =
+        std::ranges::count_if(first_lamps_, [](const render::Lamp& lamp) { return !lamp.size.isZero(0); });
+    if (areas > 0)
+      notes.push_back(fmt::format("glTF has no area lights: {} {} exported as spot lights", areas,
+                                  areas == 1 ? "is" : "are"));
     if (zooms_)
       notes.push_back("glTF has no animated field of view: the camera keeps that of its first frame");
     if (flickers_) notes.push_back("glTF has no animated intensity: lights keep that of the first frame");

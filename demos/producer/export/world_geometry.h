@@ -14,7 +14,7 @@ namespace offstage::producer {
 struct GeometryGroup {
   std::string object;
   std::size_t material = 0;
-  uint32_t id = 0;  ///< of the object, from 1, in the order bodies, rods, cloths, particles
+  uint32_t id = 0;  ///< number of the object, from 1, in the order bodies, rods, cloths, particles
   std::size_t first_vertex = 0, vertices = 0;
   std::size_t first_index = 0, indices = 0;
 };

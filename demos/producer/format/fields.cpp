@@ -174,7 +174,7 @@ std::optional<std::size_t> Reader::type(const Node& node, std::span<const std::s
   } else if (const Node* type = node.find("type")) {
     within("type", [&] { which = choice(*type, names); });
   } else if (required) {
-    within("type", [&] { fail(node.at, "is required: one of " + quoted(names)); });
+    within("type", [&] { fail(node.at, "is required; it must be one of " + quoted(names)); });
   } else {
     which = 0;
   }

@@ -106,7 +106,7 @@ class Reader {
 
   /// Returns the number in `node` if it is one, within the limits.
   std::optional<Real> number(const Node& node, const Spec& spec);
-  /// The same for an integer; 1e6 and 3.0 are integers.
+  /// Reads an integer; 1e6 and 3.0 are integers.
   std::optional<int64_t> integer(const Node& node, const Spec& spec);
   /// Returns the list in `node` if it is one and has from `least` to `most` items.
   const List* list(const Node& node, std::string_view allowed, std::size_t least = 0,

@@ -169,7 +169,7 @@ void delay(Emitter& emitter, Real by) {
   constexpr Real kNever = 1e29;
   emitter.start += by;
   if (emitter.end < kNever) emitter.end += by;
-  for (EmitterBurst& burst : emitter.bursts) burst.time += by;
+  for (effects::Burst& burst : emitter.bursts) burst.time += by;
   for (effects::TimeWindow& window : emitter.windows) {
     window.start += by;
     if (window.end < kNever) window.end += by;

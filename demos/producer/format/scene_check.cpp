@@ -219,11 +219,6 @@ class Checker : SceneChecker {
     }
   }
 
-  void check_lifetime(const std::string& path, Real appear_at, Real remove_at) {
-    if (remove_at <= appear_at)
-      fail(path + "/remove_at", fmt::format("must be later than \"appear_at\", {} s", appear_at));
-  }
-
   // --- Bodies ---
 
   void check_body(const Body& body) {
@@ -351,7 +346,7 @@ class Checker : SceneChecker {
   void check_stiffness(Real stiffness, Real damping, Real mass, const std::string& path,
                        const std::string& what) {
     const Real largest = largest_stable_step(scene_.world.integrator, stiffness, damping, mass);
-    const Real used = std::min(scene_.world.step, scene_.output.fps.seconds(1));
+    const Real used = std::min(scene_.world.max_step, scene_.output.fps.seconds(1));
     if (used >= largest)
       fail(path, fmt::format(
                      "{} is too stiff for this sub-step: /world/step must be less than {:.3g} s, is {:.3g} s",
@@ -387,11 +382,12 @@ class Checker : SceneChecker {
         fail(force.where.path + "/cloths" + step(i),
              "there is no cloth '" + cloths[i] + "'" + suggestion(cloths[i], names_of(flat_.cloths)));
   }
-  void check_region(const std::string& path, const sim::Region& region, int drop_rate) {
+  void check_region(const std::string& path, const sim::Region& region, uint32_t drop_rate) {
     if (drop_rate > 0 && std::holds_alternative<sim::Everywhere>(region))
       warn(path + "/drop_rate", "has no effect without a region");
   }
-  void check_scope(const FieldScope& field) {
+  template <class E>
+  void check_force(const FieldOf<E>& field) {
     check_pushed(field, field.bodies);
     check_systems(field, field.particles);
     check_cloth_names(field, field.cloths);
@@ -405,11 +401,8 @@ class Checker : SceneChecker {
       return name == body.name || (original && original->where.path == body.where.path);
     });
   }
-  void check_force(const ConstantField& field) { check_scope(field); }
-  void check_force(const PointField& field) { check_scope(field); }
-  void check_force(const VortexField& vortex) { check_scope(vortex); }
-  void check_force(const TurbulenceField& turbulence) { check_scope(turbulence); }
-  void check_force(const PairScope& force) {
+  template <class E>
+  void check_force(const PairForceOf<E>& force) {
     check_systems(force, force.particles);
     check_period(force, force.start, force.end);
     check_region(force.where.path, force.region, force.drop_rate);
@@ -417,7 +410,7 @@ class Checker : SceneChecker {
       warn(force.where.path + "/particles", "has no effect: the list is empty");
   }
   void check_force(const WindField& wind) {
-    check_scope(wind);
+    check_force<sim::WindField>(wind);
     Real lightest = kUnlimited;
     for (const Body& body : flat_.bodies)
       if (names(wind.bodies, body) || (wind.bodies.empty() && wind.particles.empty() && wind.cloths.empty()))
@@ -482,7 +475,7 @@ Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real c, Real m)
 std::optional<std::string> too_much_drag(const Scene& scene, sim::IntegratorKind integrator, Real drag,
                                          Real m) {
   const Real largest = largest_stable_step(integrator, 0, drag, m),
-             used = std::min(scene.world.step, scene.output.fps.seconds(1));
+             used = std::min(scene.world.max_step, scene.output.fps.seconds(1));
   if (drag <= 0 || used < largest) return {};
   return fmt::format(
       "is too large for this mass and sub-step: /world/step must be less than {:.3g} s, is {:.3g} s",
@@ -490,9 +483,9 @@ std::optional<std::string> too_much_drag(const Scene& scene, sim::IntegratorKind
 }
 
 std::optional<std::string> outside(const Scene& scene, const Vec3& position) {
-  if (position.cwiseAbs().maxCoeff() < scene.world.bounds) return {};
+  if (position.cwiseAbs().maxCoeff() < scene.world.bounds.max().x()) return {};
   return fmt::format("is outside the world, which reaches {:g} m from the origin; enlarge /world/bounds",
-                     scene.world.bounds);
+                     scene.world.bounds.max().x());
 }
 
 }  // namespace offstage::producer

@@ -8,14 +8,15 @@
 #include "producer/base/shipped_files.h"
 #include "producer/base/suggest.h"
 #include "producer/build/cloth_defs.h"
+#include "producer/format/scene_checker.h"
 
 namespace offstage::producer {
 namespace {
 
-class ClothChecker {
+class ClothChecker : CheckBase {
  public:
   ClothChecker(const Scene& scene, const Scene& flat, const SceneFolder& folder, Findings& findings)
-      : scene_(scene), flat_(flat), folder_(folder), findings_(findings) {}
+      : CheckBase(findings), scene_(scene), flat_(flat), folder_(folder) {}
 
   void check(const Cloth& cloth) {
     const std::string& path = cloth.where.path;
@@ -24,8 +25,7 @@ class ClothChecker {
                   "there is no fabric '" + cloth.fabric + "'" + suggestion(cloth.fabric, fabric_names()));
     for (const ClothPin& pin : cloth.pins) check_body(scope_of(pin).body, scope_of(pin).where);
     for (const ClothCord& cord : cloth.cords) check_body(cord.body, cord.where);
-    if (cloth.remove_at <= cloth.appear_at)
-      fail(path + "/remove_at", fmt::format("must be later than \"appear_at\", {} s", cloth.appear_at));
+    check_lifetime(path, cloth.appear_at, cloth.remove_at);
     if (const auto* mesh = std::get_if<MeshFile>(&cloth.shape)) {
       const std::string wrong = mesh->file.empty() ? "" : folder_.wrong_file(model_file(mesh->file, folder_));
       if (!wrong.empty()) fail(path + "/shape/file", wrong);
@@ -41,10 +41,6 @@ class ClothChecker {
   }
 
  private:
-  void fail(std::string path, std::string what) {
-    findings_.errors.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
-  }
-
   void check_body(const std::string& body, const Where& where) {
     if (body.empty() || std::ranges::find(flat_.bodies, body, &Body::name) != flat_.bodies.end()) return;
     std::vector<std::string> names;
@@ -57,24 +53,15 @@ class ClothChecker {
       const PinScope& scope = scope_of(pin);
       if (scope.where.path.empty()) continue;  // its type was invalid, and it was not read
       const std::vector<uint32_t> held = pinned_vertices(pin, cloth, flat);
-      if (held.empty()) fail(scope.where.path, "selects no vertex of the cloth; " + extent(flat));
+      if (held.empty()) fail(scope.where.path, selects_nothing(flat));
     }
     if (const std::string what = sim::problem(flat.def); !what.empty()) return fail(cloth.where.path, what);
     if (const auto what = too_stiff(scene_, flat.def)) fail(cloth.where.path, *what);
   }
 
-  static std::string extent(const FlatCloth& flat) {
-    sim::Aabb box;
-    for (const Vec3& p : flat.places) box.extend(p);
-    const auto &a = box.min(), &b = box.max();
-    return fmt::format("in its own frame the cloth extends from ({:g}, {:g}, {:g}) to ({:g}, {:g}, {:g})",
-                       a.x(), a.y(), a.z(), b.x(), b.y(), b.z());
-  }
-
   const Scene& scene_;
   const Scene& flat_;
   const SceneFolder& folder_;
-  Findings& findings_;
 };
 
 }  // namespace

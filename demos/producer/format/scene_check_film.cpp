@@ -137,8 +137,9 @@ class FilmChecker : SceneChecker {
       const bool plain = std::ranges::all_of(
           camera.name, [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; });
       if (camera.name == kMainCamera || camera.name == kAllCameras)
-        fail(path + "/name", fmt::format("'{}' is the name of {}", camera.name,
-                                         camera.name == kMainCamera ? "`camera`" : "all cameras together"));
+        fail(path + "/name", fmt::format("the name '{}' is reserved for {}; choose another name", camera.name,
+                                         camera.name == kMainCamera ? "the scene's \"camera\""
+                                                                    : "the selection of all cameras"));
       else if (!plain || camera.name.size() > kMostLetters)
         fail(path + "/name",
              fmt::format("'{}': the name of a camera is part of file names; it has at most {} "

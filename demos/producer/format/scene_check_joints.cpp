@@ -8,16 +8,17 @@
 
 #include "producer/base/suggest.h"
 #include "producer/build/articulation_defs.h"
+#include "producer/format/scene_checker.h"
 
 namespace offstage::producer {
 namespace {
 
 constexpr Real kMostSteering = 35;  // [degrees]
 
-class JointChecker {
+class JointChecker : CheckBase {
  public:
   JointChecker(const Scene& scene, const Scene& flat, Findings& findings)
-      : scene_(scene), flat_(flat), findings_(findings) {}
+      : CheckBase(findings), scene_(scene), flat_(flat) {}
 
   void run() {
     check_unique();
@@ -31,10 +32,6 @@ class JointChecker {
   }
 
  private:
-  void fail(std::string path, std::string what) {
-    findings_.errors.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
-  }
-
   void check_unique() {
     std::set<std::string> names;
     for (const Joint& joint : flat_.joints)
@@ -65,11 +62,6 @@ class JointChecker {
     check(path, joint.behaviour);
     check_lifetime(path, joint.appear_at, joint.remove_at);
     check_rope(path, joint);
-  }
-
-  void check_lifetime(const std::string& path, Real appear_at, Real remove_at) {
-    if (!(remove_at > appear_at))
-      fail(path + "/remove_at", "must be later than \"appear_at\", " + std::to_string(appear_at) + " s");
   }
 
   void check_rope(const std::string& path, const Joint& joint) {
@@ -207,7 +199,6 @@ class JointChecker {
   }
 
   const Scene &scene_, &flat_;
-  Findings& findings_;
 };
 
 }  // namespace

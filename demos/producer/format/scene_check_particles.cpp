@@ -10,6 +10,7 @@
 
 #include "producer/build/emitter_defs.h"
 #include "producer/build/placement.h"
+#include "producer/format/scene_checker.h"
 
 namespace offstage::producer {
 namespace {
@@ -17,10 +18,6 @@ namespace {
 constexpr Real kMostParticles = 2e7;
 constexpr Real kTolerance = 1.01;  // an ending and a beginning particle at the same time are both counted
 constexpr Real kSmallest = 1e-6;   // radius [m]
-
-std::string index_step(std::size_t i) {
-  return "/" + std::to_string(i);
-}
 
 Real film_end(const Scene& scene) {
   return scene.output.start + scene.output.duration;
@@ -40,10 +37,10 @@ Real spread_of(const EmitterSurface& surface) {
       surface);
 }
 
-class ParticleChecker {
+class ParticleChecker : CheckBase {
  public:
   ParticleChecker(const Scene& scene, const Scene& flat, Findings& findings)
-      : scene_(scene), flat_(flat), findings_(findings) {}
+      : CheckBase(findings), scene_(scene), flat_(flat) {}
 
   void run() {
     for (const ParticleGroup& group : flat_.particles) check_group(group);
@@ -53,13 +50,6 @@ class ParticleChecker {
   }
 
  private:
-  void fail(std::string path, std::string what) {
-    findings_.errors.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
-  }
-  void warn(std::string path, std::string what) {
-    findings_.warnings.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
-  }
-
   /// Groups and sources share one set of names, because forces refer to both.
   void check_names() {
     std::map<std::string, std::string> owners;
@@ -76,7 +66,7 @@ class ParticleChecker {
                           const Birth&) { claim(name, source.where.path); });
   }
 
-  void check_drag(const ParticleBehaviour& behaviour, Real mass, const std::string& path) {
+  void check_drag(const sim::ParticleSystemDef& behaviour, Real mass, const std::string& path) {
     if (behaviour.integrator == sim::IntegratorKind::leapfrog) return;  // stable for any drag
     if (const auto problem = too_much_drag(scene_, behaviour.integrator, behaviour.linear_drag, mass))
       fail(path + "/linear_drag", *problem);
@@ -87,7 +77,7 @@ class ParticleChecker {
   template <class V>
   void check_ages(const std::vector<std::pair<Real, V>>& ramp, const std::string& path) {
     for (std::size_t i = 1; i < ramp.size(); ++i)
-      if (ramp[i].first < ramp[i - 1].first) fail(path + index_step(i), "ages must not decrease");
+      if (ramp[i].first < ramp[i - 1].first) fail(path + step(i), "ages must not decrease");
   }
   void check_pictures(const ParticleLook& look, const std::string& path) {
     if (!look.texture.empty() && look.style != LookStyle::sprite)
@@ -137,14 +127,12 @@ class ParticleChecker {
   void check_group(const ParticleGroup& group) {
     check_look(group.look, group.where.path + "/look");
     check_drag(group.behaviour, group.mass, group.where.path);
-    if (group.remove_at <= group.appear_at)
-      fail(group.where.path + "/remove_at",
-           fmt::format("must be later than \"appear_at\", {} s", group.appear_at));
+    check_lifetime(group.where.path, group.appear_at, group.remove_at);
     for (std::size_t i = 0; i < group.places.size(); ++i)
       if (const auto problem = outside(scene_, group.places[i].position)) {
         // The points of a file have no places in the scene.
         if (!group.file.empty()) return fail(group.where.path + "/file", "a point " + *problem);
-        fail(group.where.path + "/places" + index_step(i) + "/position", *problem);
+        fail(group.where.path + "/places" + step(i) + "/position", *problem);
       }
   }
 
@@ -162,7 +150,7 @@ class ParticleChecker {
                                     smallest * smallest;
     if (lightest > 0) check_drag(source.behaviour, lightest, path);
     check_lifespan(source);
-    const ParticleBehaviour& b = source.behaviour;
+    const sim::ParticleSystemDef& b = source.behaviour;
     const bool hits = b.collides || b.internal || b.external;
     if (!source.on_collision.empty() && !hits)
       warn(path + "/on_collision", "has no effect: its particles do not collide");
@@ -183,9 +171,9 @@ class ParticleChecker {
     if (source.split && source.split->enabled && effects::upper_bound(source.split->count) >= 0.5)
       check_age(effects::lower_bound(source.split->age), "/split/age", "split");
     for (std::size_t i = 0; i < source.trails.size(); ++i)
-      check_age(source.trails[i].start_age, "/trails" + index_step(i) + "/start_age", "leave a trail");
+      check_age(source.trails[i].start_age, "/trails" + step(i) + "/start_age", "leave a trail");
     for (std::size_t i = 0; i < source.on_age.size(); ++i)
-      check_age(source.on_age[i].age, "/on_age" + index_step(i) + "/age", "reach that age");
+      check_age(source.on_age[i].age, "/on_age" + step(i) + "/age", "reach that age");
   }
 
   void check_room(const Emitter& emitter) {
@@ -212,7 +200,7 @@ class ParticleChecker {
       fail(path + "/end", fmt::format("must be later than the start, {} s", emitter.start));
     for (std::size_t i = 0; i < emitter.windows.size(); ++i)
       if (emitter.windows[i].end <= emitter.windows[i].start)
-        fail(path + "/windows" + index_step(i) + "/end", "must be later than the start");
+        fail(path + "/windows" + step(i) + "/end", "must be later than the start");
     const bool moves_along = effects::upper_bound(emitter.rate_per_metre) > 0;
     if (moves_along && emitter.body.empty())
       fail(path + "/rate_per_metre", "is along the way of a body; the emitter needs a \"body\"");
@@ -265,7 +253,6 @@ class ParticleChecker {
 
   const Scene& scene_;
   const Scene& flat_;
-  Findings& findings_;
   bool too_many_ = false;
 };
 

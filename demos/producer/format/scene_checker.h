@@ -33,19 +33,33 @@ inline std::string step(std::size_t i) {
   return "/" + std::to_string(i);
 }
 
-/// Base of the checks. `flat` is the scene with its copies.
-class SceneChecker {
+/// Collects the findings of a check.
+class CheckBase {
  protected:
-  SceneChecker(const Scene& scene, const Scene& flat, const SceneFolder& folder, Findings& findings)
-      : scene_(scene), flat_(flat), folder_(folder), findings_(findings) {
-    for (const Body& body : flat.bodies) bodies_.emplace(body.name, &body);
-  }
+  explicit CheckBase(Findings& findings) : findings_(findings) {}
 
   void fail(std::string path, std::string what) {
     findings_.errors.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
   }
   void warn(std::string path, std::string what) {
     findings_.warnings.push_back({{"", 0, 0, std::move(path)}, std::move(what)});
+  }
+
+  void check_lifetime(const std::string& path, Real appear_at, Real remove_at) {
+    if (!(remove_at > appear_at))
+      fail(path + "/remove_at",
+           fmt::format("must be later than \"appear_at\" ({:g} s), got {:g} s", appear_at, remove_at));
+  }
+
+  Findings& findings_;
+};
+
+/// Base of the checks of several kinds of objects. `flat` is the scene with its copies.
+class SceneChecker : protected CheckBase {
+ protected:
+  SceneChecker(const Scene& scene, const Scene& flat, const SceneFolder& folder, Findings& findings)
+      : CheckBase(findings), scene_(scene), flat_(flat), folder_(folder) {
+    for (const Body& body : flat.bodies) bodies_.emplace(body.name, &body);
   }
 
   template <class T>
@@ -86,7 +100,6 @@ class SceneChecker {
   const Scene& flat_;
   const SceneFolder& folder_;
   std::map<std::string, const Body*> bodies_;  // including copies, by name
-  Findings& findings_;
 };
 
 }  // namespace offstage::producer

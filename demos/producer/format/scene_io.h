@@ -27,7 +27,7 @@ struct LoadedScene {
 LoadedScene load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides = {},
                        const std::vector<std::string>& allowed = {});
 
-/// The same from text; `name` is used as the file name in messages.
+/// Loads a scene from text; `name` is used as the file name in messages.
 LoadedScene parse_scene(std::string_view text, const std::string& name, const SceneFolder& folder,
                         const std::vector<std::string>& overrides = {});
 

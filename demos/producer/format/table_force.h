@@ -70,30 +70,28 @@ struct Table<ForceScope> {
             {"end", &T::end, "time at which the force ends", "s", kNotNegative}};
   }
 };
-template <>
-struct Table<FieldScope> {
-  static Fields<FieldScope> fields() {
-    using T = FieldScope;
-    return Fields<T>{{"region", &T::region, "region in which the force acts"},
-                     {"drop_rate", &T::drop_rate, kDropRateHelp, "", kDropRate}}
-        .with_base<ForceScope>();
-  }
-};
-template <>
-struct Table<PairScope> {
-  static Fields<PairScope> fields() {
-    using T = PairScope;
-    return {{"particles", &T::particles, "names of groups and emitters whose particles act on each other",
-             kRequired},
-            {"cut_off", &T::cut_off,
-             "particles farther apart than this do not act on each other, which saves much time; 0: no limit",
-             "m", kNotNegative},
-            {"region", &T::region, "region in which the force acts"},
-            {"drop_rate", &T::drop_rate, kDropRateHelp, "", kDropRate},
-            {"start", &T::start, "time at which the force starts", "s", kNotNegative},
-            {"end", &T::end, "time at which the force ends", "s", kNotNegative}};
-  }
-};
+/// Adds the keys that fields have besides their own.
+template <class T>
+Fields<T> field_keys(Fields<T> own) {
+  return std::move(own)
+      .then({{"region", &T::region, "region in which the force acts"},
+             {"drop_rate", &T::drop_rate, kDropRateHelp, "", kDropRate}})
+      .template with_base<ForceScope>();
+}
+/// Adds the keys that forces between particles have besides their own.
+template <class T>
+Fields<T> pair_keys(Fields<T> own) {
+  return std::move(own).then(
+      {{"particles", &T::particles, "names of groups and emitters whose particles act on each other",
+        kRequired},
+       {"cut_off", &T::cut_off,
+        "particles farther apart than this do not act on each other, which saves much time; 0: no limit", "m",
+        kNotNegative},
+       {"region", &T::region, "region in which the force acts"},
+       {"drop_rate", &T::drop_rate, kDropRateHelp, "", kDropRate},
+       {"start", &T::start, "time at which the force starts", "s", kNotNegative},
+       {"end", &T::end, "time at which the force ends", "s", kNotNegative}});
+}
 template <>
 struct Table<ConstantField> {
   static constexpr const char* kName = "constant_field";
@@ -101,9 +99,8 @@ struct Table<ConstantField> {
       "The same force on every body, at its centre of mass, and on every particle.";
   static Fields<ConstantField> fields() {
     using T = ConstantField;
-    return Fields<T>{{"name", &T::name, kForceNameHelp},
-                     {"force", &T::force, "force on each body and particle", "N"}}
-        .with_base<FieldScope>();
+    return field_keys(Fields<T>{{"name", &T::name, kForceNameHelp},
+                                {"force", &T::force, "force on each body and particle", "N"}});
   }
 };
 template <>
@@ -112,11 +109,10 @@ struct Table<PointField> {
   static constexpr const char* kHelp = "A force towards a point. On bodies it acts at the centre of mass.";
   static Fields<PointField> fields() {
     using T = PointField;
-    return Fields<T>{
+    return field_keys(Fields<T>{
         {"name", &T::name, kForceNameHelp},
         {"point", &T::point, "point of attraction", "m"},
-        {"force", &T::force, "force on each body and particle; negative: away from the point", "N"}}
-        .with_base<FieldScope>();
+        {"force", &T::force, "force on each body and particle; negative: away from the point", "N"}});
   }
 };
 template <>
@@ -126,10 +122,9 @@ struct Table<WindField> {
       "Moving air: a drag force towards its velocity, in addition to the drag that bodies have.";
   static Fields<WindField> fields() {
     using T = WindField;
-    return Fields<T>{{"name", &T::name, kForceNameHelp},
-                     {"wind", &T::wind, "velocity of the air", "m/s"},
-                     {"drag", &T::drag, kAirDragHelp, "kg/s", kNotNegative}}
-        .with_base<FieldScope>();
+    return field_keys(Fields<T>{{"name", &T::name, kForceNameHelp},
+                                {"wind", &T::wind, "velocity of the air", "m/s"},
+                                {"drag", &T::drag, kAirDragHelp, "kg/s", kNotNegative}});
   }
 };
 template <>
@@ -236,14 +231,13 @@ struct Table<VortexField> {
       "radius^2)).";
   static Fields<VortexField> fields() {
     using T = VortexField;
-    return Fields<T>{
+    return field_keys(Fields<T>{
         {"name", &T::name, kForceNameHelp},
         {"point", &T::point, "a point of the axis", "m"},
         {"axis", &T::axis, "direction of the axis; the air turns by the right-hand rule", "", kDirection},
         {"circulation", &T::circulation, "strength of the vortex; negative: the other direction", "m^2/s"},
         {"radius", &T::radius, "distance from the axis at which the air is fastest", "m", kPositive},
-        {"drag", &T::drag, kAirDragHelp, "kg/s", kNotNegative}}
-        .with_base<FieldScope>();
+        {"drag", &T::drag, kAirDragHelp, "kg/s", kNotNegative}});
   }
 };
 template <>
@@ -252,7 +246,7 @@ struct Table<TurbulenceField> {
   static constexpr const char* kHelp = "Divergence-free turbulent air with eddies of several sizes.";
   static Fields<TurbulenceField> fields() {
     using T = TurbulenceField;
-    return Fields<T>{
+    return field_keys(Fields<T>{
         {"name", &T::name, kForceNameHelp},
         {"speed", &T::speed, "root mean square of the air's speed", "m/s", kNotNegative},
         {"scale", &T::scale, "width of the largest eddies", "m", kPositive},
@@ -262,8 +256,7 @@ struct Table<TurbulenceField> {
         {"drift", &T::drift, "velocity at which the eddies move; the mean wind is not part of this force",
          "m/s"},
         {"seed", &T::seed, "another seed gives other eddies", "", between(0, 1e9)},
-        {"drag", &T::drag, kAirDragHelp, "kg/s", kNotNegative}}
-        .with_base<FieldScope>();
+        {"drag", &T::drag, kAirDragHelp, "kg/s", kNotNegative}});
   }
 };
 template <>
@@ -272,11 +265,11 @@ struct Table<GravitationForce> {
   static constexpr const char* kHelp = "Gravitation between particles.";
   static Fields<GravitationForce> fields() {
     using T = GravitationForce;
-    return Fields<T>{{"name", &T::name, kForceNameHelp},
-                     {"constant", &T::constant, "gravitational constant", "N m^2/kg^2", kNotNegative},
-                     {"softening", &T::softening,
-                      "radius over which masses are spread, which keeps forces finite", "m", kNotNegative}}
-        .with_base<PairScope>();
+    return pair_keys(
+        Fields<T>{{"name", &T::name, kForceNameHelp},
+                  {"constant", &T::constant, "gravitational constant", "N m^2/kg^2", kNotNegative},
+                  {"softening", &T::softening,
+                   "radius over which masses are spread, which keeps forces finite", "m", kNotNegative}});
   }
 };
 template <>
@@ -285,11 +278,11 @@ struct Table<CoulombForce> {
   static constexpr const char* kHelp = "Electrostatic force between charged particles.";
   static Fields<CoulombForce> fields() {
     using T = CoulombForce;
-    return Fields<T>{{"name", &T::name, kForceNameHelp},
-                     {"constant", &T::constant, "Coulomb constant", "N m^2/C^2", kNotNegative},
-                     {"softening", &T::softening,
-                      "radius over which charges are spread, which keeps forces finite", "m", kNotNegative}}
-        .with_base<PairScope>();
+    return pair_keys(
+        Fields<T>{{"name", &T::name, kForceNameHelp},
+                  {"constant", &T::constant, "Coulomb constant", "N m^2/C^2", kNotNegative},
+                  {"softening", &T::softening,
+                   "radius over which charges are spread, which keeps forces finite", "m", kNotNegative}});
   }
 };
 template <>
@@ -300,10 +293,10 @@ struct Table<LennardJonesForce> {
       "attraction beyond.";
   static Fields<LennardJonesForce> fields() {
     using T = LennardJonesForce;
-    return Fields<T>{{"name", &T::name, kForceNameHelp},
-                     {"epsilon", &T::epsilon, "depth of the potential well", "J", kNotNegative},
-                     {"sigma", &T::sigma, "distance at which the potential energy is zero", "m", kPositive}}
-        .with_base<PairScope>();
+    return pair_keys(
+        Fields<T>{{"name", &T::name, kForceNameHelp},
+                  {"epsilon", &T::epsilon, "depth of the potential well", "J", kNotNegative},
+                  {"sigma", &T::sigma, "distance at which the potential energy is zero", "m", kPositive}});
   }
 };
 template <>

@@ -126,9 +126,9 @@ struct Table<ParticleLook> {
   }
 };
 template <>
-struct Table<ParticleBehaviour> {
-  static Fields<ParticleBehaviour> fields() {
-    using T = ParticleBehaviour;
+struct Table<sim::ParticleSystemDef> {
+  static Fields<sim::ParticleSystemDef> fields() {
+    using T = sim::ParticleSystemDef;
     return {
         {"linear_drag", &T::linear_drag, "drag force per speed relative to the air", "kg/s", kNotNegative},
         {"gravity", &T::gravity, "the world's gravity acts on the particles"},
@@ -413,14 +413,14 @@ struct Tags<EmitterSurface> {
   static constexpr bool kRequired = false;
 };
 template <>
-struct Table<EmitterBurst> {
+struct Table<effects::Burst> {
   static constexpr const char* kName = "burst";
   static constexpr const char* kHelp = "Many particles released at once.";
-  static Fields<EmitterBurst> fields() {
-    return {{"time", &EmitterBurst::time, "time of the first release", "s", kNotNegative},
-            {"count", &EmitterBurst::count, "number of particles in each release, rounded", "", kCounts},
-            {"cycles", &EmitterBurst::cycles, "number of releases", "", between(1, 1e6)},
-            {"interval", &EmitterBurst::interval, "time between releases", "s", kPositive}};
+  static Fields<effects::Burst> fields() {
+    return {{"time", &effects::Burst::time, "time of the first release", "s", kNotNegative},
+            {"count", &effects::Burst::count, "number of particles in each release, rounded", "", kCounts},
+            {"cycles", &effects::Burst::cycles, "number of releases", "", between(1, 1e6)},
+            {"interval", &effects::Burst::interval, "time between releases", "s", kPositive}};
   }
 };
 template <>

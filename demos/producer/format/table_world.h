@@ -99,7 +99,7 @@ struct Table<WorldSettings> {
     return {
         {"gravity", &T::gravity, "gravitational acceleration", "m/s^2"},
         {"wind", &T::wind, "velocity of the air; it acts on objects through their drag", "m/s"},
-        {"step", &T::step,
+        {"step", &T::max_step,
          "longest sub-step of the simulation; each frame is divided into the fewest equal sub-steps", "s",
          between(1e-6, 1)},
         {"integrator", &T::integrator,

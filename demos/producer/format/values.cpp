@@ -32,9 +32,9 @@ Spec whole(Spec spec) {
   constexpr bool kSigned = std::is_signed_v<I>;
   constexpr bool kSmall = sizeof(I) < sizeof(int64_t);
   spec.limits = narrowed(spec.limits,
-                         kSmall    ? INT_MIN
-                         : kSigned ? -kInfinity
-                                   : 0,
+                         !kSigned ? 0
+                         : kSmall ? INT_MIN
+                                  : -kInfinity,
                          kSmall ? INT_MAX : kInfinity);
   return spec;
 }
@@ -105,6 +105,16 @@ Description Codec<int>::describe(Catalogue&, const Spec& spec) {
   return describe_whole<int>(spec);
 }
 
+void Codec<uint32_t>::read(Reader& in, const Node& node, const Spec& spec, uint32_t& out) {
+  read_whole(in, node, spec, out);
+}
+Node Codec<uint32_t>::write(const uint32_t& value) {
+  return static_cast<int64_t>(value);
+}
+Description Codec<uint32_t>::describe(Catalogue&, const Spec& spec) {
+  return describe_whole<uint32_t>(spec);
+}
+
 void Codec<int64_t>::read(Reader& in, const Node& node, const Spec& spec, int64_t& out) {
   read_whole(in, node, spec, out);
 }
@@ -123,6 +133,16 @@ Node Codec<uint64_t>::write(const uint64_t& value) {
 }
 Description Codec<uint64_t>::describe(Catalogue&, const Spec& spec) {
   return describe_whole<uint64_t>(spec);
+}
+
+void Codec<sim::Aabb>::read(Reader& in, const Node& node, const Spec& spec, sim::Aabb& out) {
+  if (const auto v = in.number(node, spec)) out = sim::Aabb(Vec3::Constant(-*v), Vec3::Constant(*v));
+}
+Node Codec<sim::Aabb>::write(const sim::Aabb& value) {
+  return value.max().x();
+}
+Description Codec<sim::Aabb>::describe(Catalogue& all, const Spec& spec) {
+  return Codec<Real>::describe(all, spec);
 }
 
 void Codec<render::FrameRate>::read(Reader& in, const Node& node, const Spec& spec, render::FrameRate& out) {

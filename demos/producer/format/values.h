@@ -39,6 +39,12 @@ struct Codec<int> {
   static Description describe(Catalogue& all, const Spec& spec);
 };
 template <>
+struct Codec<uint32_t> {
+  static void read(Reader& in, const Node& node, const Spec& spec, uint32_t& out);
+  static Node write(const uint32_t& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+template <>
 struct Codec<int64_t> {
   static void read(Reader& in, const Node& node, const Spec& spec, int64_t& out);
   static Node write(const int64_t& value);
@@ -62,6 +68,13 @@ template <>
 struct Codec<Color> {
   static void read(Reader& in, const Node& node, const Spec& spec, Color& out);
   static Node write(const Color& value);
+  static Description describe(Catalogue& all, const Spec& spec);
+};
+/// A cube around the origin: half of its edge.
+template <>
+struct Codec<sim::Aabb> {
+  static void read(Reader& in, const Node& node, const Spec& spec, sim::Aabb& out);
+  static Node write(const sim::Aabb& value);
   static Description describe(Catalogue& all, const Spec& spec);
 };
 /// A number, or a fraction such as "30000/1001".

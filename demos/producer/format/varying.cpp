@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include <fmt/format.h>
+
 #include "effects/distribution.h"
 #include "producer/format/values.h"
 
@@ -45,7 +47,7 @@ Normal read_normal(Reader& in, const Node& node, const Spec& spec) {
     if (i == 4) return Codec<bool>::read(in, value, specs.clip, v.clip);
     Codec<Real>::read(in, value, *specs.all()[i], *std::array{&v.mean, &v.deviation, &v.min, &v.max}[i]);
   });
-  if (v.min > v.max) in.fail(node.at, "its min is greater than its max");
+  if (v.min > v.max) in.fail(node.at, fmt::format("min ({:g}) is greater than max ({:g})", v.min, v.max));
   return v;
 }
 
@@ -54,7 +56,9 @@ Uniform read_uniform(Reader& in, const Node& node, const Spec& spec) {
   Eigen::Vector2d ends(0, 0);
   in.keys(node, "range", std::array{&range}, false, [&](std::size_t, const Node& value) {
     Codec<Eigen::Vector2d>::read(in, value, range, ends);
-    if (ends[0] > ends[1]) in.fail(value.at, "must have the smaller value first");
+    if (ends[0] > ends[1])
+      in.fail(value.at,
+              fmt::format("must be [low, high] with low <= high, got [{:g}, {:g}]", ends[0], ends[1]));
   });
   return {ends[0], ends[1]};
 }

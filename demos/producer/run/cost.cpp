@@ -59,7 +59,7 @@ class CostTable {
   CostTable(const Scene& scene, const ModelLibrary& models)
       : scene_(scene),
         models_(models),
-        substeps_(std::ceil(scene.output.fps.seconds(1) / scene.world.step * (1 - 1e-12)) *
+        substeps_(std::ceil(scene.output.fps.seconds(1) / scene.world.max_step * (1 - 1e-12)) *
                   scene.output.fps.per_second()),
         subframes_(subframes(scene.render.quality)),
         pixels_(static_cast<double>(scene.render.size.x()) * scene.render.size.y()) {}
@@ -133,7 +133,7 @@ class CostTable {
     ObjectCost& cost = entry(cloth.where, "cloth", cloth.name);
     const auto* mesh = std::get_if<MeshFile>(&cloth.shape);
     const std::size_t vertices = vertex_count(cloth, mesh ? &models_.model(mesh->file) : nullptr);
-    const double step = std::min(cloth.substep, scene_.world.step);
+    const double step = std::min(cloth.substep, scene_.world.max_step);
     cost.size = fmt::format("{} vertices, steps of {:.2g} ms", with_spaces(vertices), 1e3 * step);
     cost.simulation_s +=
         (cloth.self_collision ? kFoldingVertex_s : kVertex_s) * static_cast<double>(vertices) / step;
@@ -143,7 +143,7 @@ class CostTable {
   }
 
   void add_particles(const Where& where, const std::string& kind, const std::string& name,
-                     const ParticleBehaviour& behaviour, const ParticleLook& look, uint64_t alive) {
+                     const sim::ParticleSystemDef& behaviour, const ParticleLook& look, uint64_t alive) {
     ObjectCost& cost = entry(where, kind, name);
     cost.particles += alive;
     cost.size = fmt::format("up to {} particles at once", with_spaces(cost.particles));

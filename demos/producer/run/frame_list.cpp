@@ -78,7 +78,8 @@ std::vector<int> chunk_of(const std::vector<int>& frames, const std::string& chu
   const bool slash = take(text, '/');
   const auto n = take_number(text);
   if (!i || !slash || !n || !text.empty() || *n < 1 || *i < 1 || *i > *n)
-    throw std::invalid_argument(fmt::format("chunk: '{}' is not i/n with 1 <= i <= n", chunk));
+    throw std::invalid_argument(
+        fmt::format("--chunk '{}': must be I/N with 1 <= I <= N, such as 2/8", chunk));
   const auto at = [&](int part) {
     return static_cast<std::ptrdiff_t>(frames.size() * static_cast<std::size_t>(part) /
                                        static_cast<std::size_t>(*n));

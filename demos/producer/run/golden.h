@@ -69,8 +69,8 @@ struct Verdict {
 /// Compares two goldens: exactly for the same fingerprint, otherwise within the tolerance.
 Verdict judge(const Golden& expected, const Golden& actual);
 
-/// Writes expected, actual and amplified difference of every frame, and a page that shows them; returns the
-/// page.
+/// Writes the expected image, the actual image and the amplified difference of each frame, and an HTML page;
+/// returns the path of the page.
 std::filesystem::path write_report(const std::filesystem::path& folder, const Golden& expected,
                                    const Golden& actual, const Verdict& verdict);
 

@@ -28,7 +28,7 @@ struct MethodResult {
   std::string name;
   double seconds = 0;                ///< time of the simulation; the shortest of several runs [s]
   SimulationTotals totals;           ///< work and fall-backs
-  std::vector<sim::Vec3> positions;  ///< of the moving bodies at the end [m]
+  std::vector<sim::Vec3> positions;  ///< positions of the moving bodies at the end [m]
   /// Why the simulation ended early: it diverged, or took too long. Empty if it did not end early.
   std::string fault;
 

@@ -93,7 +93,8 @@ OutputTarget parse_output(const std::string& out) {
     return std::ranges::find(endings, text) != endings.end();
   };
   if (out.empty() || is_ending(fs::path(out).filename().string()))
-    throw OutputError("'" + out + "': the output has no name");
+    throw OutputError(out.empty() ? "the output needs a name, such as film.mp4"
+                                  : "'" + out + "' is only an extension; give a name such as film" + out);
   const fs::path path = out;
   std::error_code error;
   if (out.ends_with('/') || fs::is_directory(path, error)) return {OutputKind::frames, path / "####.png"};

@@ -51,7 +51,8 @@ struct Manifest {
 /// A frame rate in JSON: a number if it is an integer, else a fraction such as "30000/1001".
 nlohmann::ordered_json fps_json(const render::FrameRate& fps);
 
-/// Channel files: the kinds, and the start of their names, with '#' as in render::frame_path.
+/// Kinds and stem of the channel files; '#' in the stem stands for the frame number, as in
+/// render::frame_path.
 struct ChannelFiles {
   render::ChannelChoice choice;
   std::filesystem::path stem;
@@ -61,7 +62,8 @@ struct ChannelFiles {
   }
 };
 
-/// Start of the names of the channel files beside frames. EXR frames have the plain names for themselves.
+/// Returns the stem of the channel files of a frame pattern. If the frames themselves are EXR files, a suffix
+/// keeps the names distinct.
 std::filesystem::path channels_stem(const std::filesystem::path& pattern);
 
 /// Files of all channels and formats that a frame may have.

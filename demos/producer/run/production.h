@@ -86,15 +86,15 @@ using ProgressCallback = std::function<void(const Progress&)>;
 struct RenderJob {
   std::vector<int> frames;                     ///< frames to draw, ascending
   int threads = 1;                             ///< number of drawing threads, each with a context of its own
-  std::optional<std::filesystem::path> cache;  ///< states are read from here instead of simulating
-  /// States that are drawn are written here, to be read as `cache`.
+  std::optional<std::filesystem::path> cache;  ///< folder of states that replace the simulation
+  /// Folder to which the drawn states are written, in the format of `cache`.
   std::optional<std::filesystem::path> keep;
-  /// If the states take more bytes, or cannot be written, they are not kept, and the run continues. None: all
-  /// of them are kept, and the run fails if they cannot be.
+  /// Limit on the size of `keep` [bytes]. Beyond it, or on a write error, the states are discarded and the
+  /// run continues. Empty: no limit, and a write error ends the run.
   std::optional<uint64_t> keep_at_most;
   bool report = false;             ///< whether figures and pictures are stored
-  render::ChannelChoice channels;  ///< channels to write ...
-  /// ... to these files; '#' as in render::frame_path, or for one frame.
+  render::ChannelChoice channels;  ///< channels to write
+  /// Stem of the channel files; '#' stands for the frame number, as in render::frame_path.
   std::filesystem::path channels_stem;
 };
 

@@ -13,9 +13,9 @@ std::string note_of_rough_contacts(const SimulationTotals& t) {
       *std::ranges::max_element(t.rough_bodies, {}, [](const auto& entry) { return entry.second; });
   const std::size_t others = t.rough_bodies.size() - 1;
   return fmt::format(
-      "warning: body '{}'{}: the solver found no exact contact forces {} times, first at {:.2f} s, and used "
-      "approximate ones; the body may sink in, slide or jitter. Reduce world.step (now {:g} s), or make thin "
-      "shapes thicker.",
+      "warning: body '{}'{}: the contact solver did not converge {} times, first at {:.2f} s, and used "
+      "approximate forces; the body may sink in, slide or jitter. Reduce world.step (now {:g} s), or make "
+      "thin shapes thicker.",
       name, others > 0 ? fmt::format(" (and {} more)", others) : "", count, t.first_rough_s, t.step_s);
 }
 
@@ -25,20 +25,20 @@ std::vector<std::string> notes_of(const SimulationTotals& t) {
   std::vector<std::string> notes;
   for (const std::string& body : t.lost_bodies)
     notes.push_back(
-        fmt::format("warning: body '{}' left the world and does not move any more. Enlarge world.bounds to "
-                    "keep it moving.",
+        fmt::format("warning: body '{}' left world.bounds and was frozen there. Enlarge world.bounds to keep "
+                    "it moving.",
                     body));
   for (const std::string& joint : t.broken_joints)
     notes.push_back(fmt::format("note: joint '{}' broke", joint));
   if (t.joints.unsolved)
     notes.push_back(fmt::format(
-        "warning: the motion of joints could not be solved {} times; they may come apart or slow down. "
+        "warning: the motion of joints did not converge {} times; joints may come apart or slow down. "
         "Reduce world.step (now {:g} s).",
         t.joints.unsolved, t.step_s));
   for (const auto& [cloth, share] : t.softened_cloths)
     notes.push_back(fmt::format(
         "warning: cloth '{}': the stiffness of springs was reduced to {:.2g} of its value, because they are "
-        "too stiff for their step; the cloth stretches up to {:.2g} times as far as `stretch` says. Remove "
+        "too stiff for their step; the cloth stretches up to {:.2g} times as far as \"stretch\" says. Remove "
         "\"soften\", reduce \"substep\" or use \"integrator\": \"implicit\".",
         cloth, share, 1 / share));
   for (const auto& [cloth, tear] : t.first_tears)
@@ -65,21 +65,22 @@ std::vector<std::string> notes_of(const SimulationTotals& t) {
       "sub-step was dropped");
   if (!t.rough_bodies.empty()) notes.push_back(note_of_rough_contacts(t));
   if (t.solvers.lcp.fallbacks)
-    notes.push_back(
-        fmt::format("note: world.solver \"lcp\": the exact solver took over {} of {} solutions of groups of "
-                    "bodies, which "
-                    "pivoting could not solve or which had too many contacts",
-                    t.solvers.lcp.fallbacks, t.solvers.lcp.solves));
+    notes.push_back(fmt::format(
+        "note: world.solver \"lcp\": the exact solver solved {} of {} islands, because pivoting failed "
+        "or they had too many contacts",
+        t.solvers.lcp.fallbacks, t.solvers.lcp.solves));
   if (t.solvers.particle_lcp.fallbacks)
-    notes.push_back(fmt::format(
-        "note: world.particle_contacts \"lcp\": relaxation solved {} of {} clusters of particles, which had "
-        "more than world.particle_cluster contacts or which pivoting could not solve",
-        t.solvers.particle_lcp.fallbacks, t.solvers.particle_lcp.solves));
+    notes.push_back(
+        fmt::format("note: world.particle_contacts \"lcp\": relaxation solved {} of {} clusters of "
+                    "particles, because pivoting "
+                    "failed or they had more than world.particle_cluster contacts",
+                    t.solvers.particle_lcp.fallbacks, t.solvers.particle_lcp.solves));
   if (t.impacts.toi_limit_reached)
-    notes.push_back(fmt::format(
-        "warning: pairs of bodies reached the limit of collisions per sub-step {} times; they did "
-        "not bounce again in that sub-step. Reduce world.step (now {:g} s).",
-        t.impacts.toi_limit_reached, t.step_s));
+    notes.push_back(
+        fmt::format("warning: pairs or islands of bodies reached the limit of time-of-impact events in a "
+                    "sub-step {} times; "
+                    "bodies may overlap briefly. Reduce world.step (now {:g} s).",
+                    t.impacts.toi_limit_reached, t.step_s));
   return notes;
 }
 

@@ -16,7 +16,8 @@ class SnapshotCache {
   /// Version of the folder's layout and of the snapshots in it; another one is refused (docs/cache.md).
   static constexpr int kFormat = 4;
   static constexpr const char* kFile = "cache.json";  ///< which generation is published, and of what
-  static constexpr std::string_view kGenerationPrefix = "generation-";  ///< of the folders with snapshots
+  static constexpr std::string_view kGenerationPrefix =
+      "generation-";  ///< prefix of the folders with snapshots
   /// "000012.snap"
   static std::string file_name(int frame);
 

@@ -23,7 +23,7 @@ struct GridShape {
 /// A closed sphere around the origin of the cloth's frame.
 struct SphereCloth {
   Real radius = 0.1;
-  int divisions = 3;  ///< of the triangles of an icosahedron into four
+  int divisions = 3;  ///< number of divisions of the triangles of an icosahedron into four
 };
 using ClothShape = std::variant<GridShape, MeshFile, SphereCloth>;
 
@@ -86,7 +86,7 @@ struct ClothCord {
   int segments = 10;
   Real stiffness = 50, mass_per_length = 0.002, damping = 0.1;
   bool visible = true;
-  Real radius = 0.002;  ///< of the drawn cord
+  Real radius = 0.002;  ///< radius of the drawn cord
   std::string material;
 };
 

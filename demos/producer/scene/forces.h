@@ -8,10 +8,8 @@
 #include <vector>
 
 #include "producer/scene/values.h"
+#include "sim/dynamics/force_field.h"
 #include "sim/dynamics/interpolation.h"
-#include "sim/dynamics/pair_law.h"
-#include "sim/dynamics/region.h"
-#include "sim/dynamics/turbulence.h"
 
 namespace offstage::producer {
 
@@ -27,60 +25,32 @@ struct ForceScope : NamedForce {
   Real start = 0;
   Real end = 1e30;
 };
-/// Fields also have a region.
-struct FieldScope : ForceScope {
-  sim::Region region;
-  int drop_rate = 0;  ///< exponent of the decrease from 1 in the middle of the region to 0 at its edge
+/// A field of the simulation with the objects on which it acts.
+template <class E>
+struct FieldOf : ForceScope, E {
+  using Effect = E;
 };
-struct ConstantField : FieldScope {
-  Vec3 force = Vec3::Zero();
+struct ConstantField : FieldOf<sim::ConstantField> {};
+struct PointField : FieldOf<sim::PointField> {
+  PointField() { force = 1; }
 };
-struct PointField : FieldScope {
-  Vec3 point = Vec3::Zero();
-  Real force = 1;  ///< towards the point; negative: away from it
+struct WindField : FieldOf<sim::WindField> {
+  WindField() { drag = 1; }
 };
-struct WindField : FieldScope {
-  Vec3 wind = Vec3::Zero();
-  Real drag = 1;
-};
-struct VortexField : FieldScope {
-  Vec3 point = Vec3::Zero();
-  Vec3 axis = Vec3::UnitY();
-  Real circulation = 1;
-  Real radius = 0.1;
-  Real drag = 0;
-};
-struct TurbulenceField : FieldScope {
-  Real speed = 1;
-  Real scale = 1;
-  int octaves = 2;
-  Real lifetime = 0;
-  Vec3 drift = Vec3::Zero();
-  int seed = 0;
-  Real drag = 0;
-};
+struct VortexField : FieldOf<sim::Vortex> {};
+struct TurbulenceField : FieldOf<sim::Turbulence> {};
 
-/// Keys of forces between particles.
-struct PairScope : NamedForce {
+/// A force between particles, with the particles.
+template <class E>
+struct PairForceOf : NamedForce, E {
+  using Effect = E;
   std::vector<std::string> particles;
   Real start = 0;
   Real end = 1e30;
-  Real cut_off = 0;
-  sim::Region region;
-  int drop_rate = 0;
 };
-struct GravitationForce : PairScope {
-  Real constant = 6.672e-11;
-  Real softening = 0;
-};
-struct CoulombForce : PairScope {
-  Real constant = 8.9875e9;
-  Real softening = 0;
-};
-struct LennardJonesForce : PairScope {
-  Real epsilon = 1;
-  Real sigma = 0.01;
-};
+struct GravitationForce : PairForceOf<sim::MutualGravitation> {};
+struct CoulombForce : PairForceOf<sim::Coulomb> {};
+struct LennardJonesForce : PairForceOf<sim::LennardJones> {};
 
 struct HandKey {
   Real time = 0;
@@ -120,15 +90,12 @@ struct AppliedForce : NamedForce {
   Real start = 0;
   Real end = 1e30;
 };
-struct Explosion : NamedForce {
+struct Explosion : NamedForce, sim::Explosion {
+  using Effect = sim::Explosion;
   std::vector<std::string> bodies;
   std::vector<std::string> particles;
   std::vector<std::string> cloths;
   Real time = 0;
-  Vec3 point = Vec3::Zero();
-  Real impulse = 1;
-  Real radius = 1;
-  int drop_rate = 1;
 };
 using Force = std::variant<ConstantField, PointField, WindField, Grab, Explosion, VortexField,
                            TurbulenceField, GravitationForce, CoulombForce, LennardJonesForce, AppliedForce>;

@@ -33,14 +33,14 @@ struct JointMotor {
 struct JointBehaviour {
   sim::JointType type = sim::JointType::spherical;
   Vec3 axis = Vec3::UnitZ();
-  std::optional<Vec3> second_axis;            ///< default: +X, or `axis` for a gear
-  Real ratio = 1;                             ///< of a gear [1], rack [m], screw [m per turn] or pulley [1]
-  std::optional<std::array<Real, 2>> limits;  ///< of sliding and of changes of lengths [m]
+  std::optional<Vec3> second_axis;  ///< default: +X, or `axis` for a gear
+  Real ratio = 1;                   ///< ratio of a gear [1], rack [m], screw [m per turn] or pulley [1]
+  std::optional<std::array<Real, 2>> limits;         ///< limits of sliding and of changes of lengths [m]
   std::optional<std::array<Real, 2>> length_limits;  ///< least and greatest length of a rope [m]
-  std::optional<std::array<Real, 2>> limits_deg;     ///< of rotation
+  std::optional<std::array<Real, 2>> limits_deg;     ///< limits of rotation
   std::optional<Real> swing_deg;
   Real restitution = 0;  ///< at the limits
-  Real stiffness = 0;    ///< of a spherical joint [N m/rad]
+  Real stiffness = 0;    ///< stiffness of a spherical joint [N m/rad]
   Real friction = 0, damping = 0;
   std::optional<JointMotor> motor;
   std::optional<Real> max_force, max_torque;
@@ -59,7 +59,7 @@ struct Joint {
   Real remove_at = 1e30;
   bool collide = false;
   bool visible = true;  ///< whether a rod or rope is drawn
-  Real radius = 0.01;   ///< of the drawn rod or rope [m]
+  Real radius = 0.01;   ///< radius of the drawn rod or rope [m]
   std::string material;
 };
 

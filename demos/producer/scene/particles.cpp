@@ -68,15 +68,11 @@ bool ParticleLook::turns() const {
 }
 
 TrailSource::TrailSource() {
-  speed = 0.0;
-  radius = 0.005;
-  lifespan = 1.0;
+  NewParticles::operator=(effects::TrailDef().particles);
 }
 
 EventSource::EventSource() {
-  spread_deg = 30.0;
-  radius = 0.005;
-  lifespan = 1.0;
+  NewParticles::operator=(effects::SubEmitterDef().particles);
 }
 
 Quat PlaneSurface::orientation() const {

@@ -13,10 +13,12 @@
 
 #include "effects/color.h"
 #include "effects/emitter_def.h"
+#include "effects/split.h"
 #include "effects/sub_emitter.h"
+#include "effects/trail.h"
 #include "producer/scene/values.h"
 #include "render/stage.h"
-#include "sim/dynamics/integrator.h"
+#include "sim/particles/particles.h"
 
 namespace offstage::producer {
 
@@ -56,19 +58,6 @@ struct ParticleLook {
 /// The look for the stage, with the defaults of its style.
 render::PointsDef points_def(const ParticleLook& look);
 
-/// Forces and collisions of the particles of a group or an emitter, besides their individual parameters.
-struct ParticleBehaviour {
-  Real linear_drag = 0;
-  bool gravity = true;
-  Vec3 force = Vec3::Zero();
-  bool collides = true;   ///< whether they collide with bodies
-  bool internal = false;  ///< whether they collide with each other
-  bool external = false;  ///< whether they collide with those of other systems that also have this flag
-  bool rotates = false;   ///< whether contacts turn them, as solid balls
-  bool dies_on_hit = false;
-  sim::IntegratorKind integrator = sim::IntegratorKind::leapfrog;
-};
-
 struct ParticlePlace {
   Vec3 position = Vec3::Zero();
   Vec3 velocity = Vec3::Zero();
@@ -84,7 +73,7 @@ struct ParticleGroup {
   std::string file;                   ///< PLY or OBJ file; empty: none
   ModelScale scale;
   std::optional<Vec3> fit;       ///< see MeshFile::fit
-  Vec3 position = Vec3::Zero();  ///< of the file's origin
+  Vec3 position = Vec3::Zero();  ///< position of the file's origin
   Quat orientation = Quat::Identity();
   int64_t max_points = 1'000'000;
   Real radius = 0.05;
@@ -94,24 +83,14 @@ struct ParticleGroup {
   Real charge = 0;
   Real appear_at = 0;
   Real remove_at = 1e30;
-  ParticleBehaviour behaviour;  ///< its keys are directly in the group
+  sim::ParticleSystemDef behaviour;  ///< its keys are directly in the group; see system_def()
   ParticleLook look;
 };
 
 /// Splitting of particles into others of the same kind, from a given age on. Percentages are those of the
 /// parent's values.
-struct Split {
-  bool enabled = true;
-  Varying count = 2.0;
-  Varying age = 1.0;
-  Varying delay = 0.5;
+struct Split : effects::SplitDef {
   int delay_steps = 0;  ///< in place of `delay`, in sub-steps of world.step
-  int depth = 1;
-  Varying velocity_percent = 100.0;
-  Varying spread_deg = 0.0;
-  Varying radius_percent = 50.0;
-  Varying mass_percent = 0.0;
-  Varying lifespan_percent = 100.0;
 };
 
 struct TrailSource;
@@ -120,20 +99,10 @@ struct AgeSource;
 
 /// The keys common to all sources of particles: properties of the particles, and their child particles. Each
 /// source has a particle system of its own.
-struct ParticleSource {
+struct ParticleSource : effects::NewParticles {
   Where where;
   std::string name;
-  Varying speed = 1.0;
-  Varying spread_deg = 0.0;
-  Varying radius = 0.01;
-  Varying density = 1000.0;
-  Varying mass = 0.0;
-  Varying lifespan = 5.0;
-  Varying restitution = 0.3;
-  Varying friction = 0.5;
-  Varying charge = 0.0;
-  int64_t max_alive = 1'000'000;
-  ParticleBehaviour behaviour;  ///< its keys are directly in the source
+  sim::ParticleSystemDef behaviour;  ///< its keys are directly in the source; see system_def()
   ParticleLook look;
   std::optional<Split> split;
   std::vector<TrailSource> trails;
@@ -142,22 +111,12 @@ struct ParticleSource {
 };
 
 /// Particles that every parent leaves behind.
-struct TrailSource : ParticleSource {
-  Varying rate = 60.0;
-  Real start_age = 0;
-  Real end_age = 1e30;
-  Varying velocity_percent = 0.0;
+struct TrailSource : ParticleSource, effects::TrailRelease {
   TrailSource();
 };
 
 /// Particles that are released at an event of a parent.
-struct EventSource : ParticleSource {
-  Real probability = 1;
-  Real min_speed = 0;
-  Varying count = 5.0;
-  effects::Axis axis = effects::Axis::normal;
-  Varying velocity_percent = 0.0;
-  int64_t max_per_step = 10'000;
+struct EventSource : ParticleSource, effects::EventRelease {
   EventSource();
 };
 struct AgeSource : EventSource {
@@ -195,7 +154,7 @@ enum class Face { top, bottom, left, right, front, back };
 struct FaceSurface {
   Face face = Face::top;
   Vec3 position = Vec3::Zero();  ///< centre of the cube
-  Vec3 size = Vec3::Ones();      ///< of the cube
+  Vec3 size = Vec3::Ones();      ///< size of the cube
 };
 using EmitterSurface = std::variant<PlaneSurface, SphereSurface, DiscSurface, MeshSurface, FaceSurface>;
 /// Returns the face of a body's shape, or of the surface's own cube if it is null; none if the shape has no
@@ -206,30 +165,10 @@ std::optional<EmitterSurface> face_of(const FaceSurface& surface, const struct B
 Vec3& position_of(EmitterSurface& surface);
 const Vec3& position_of(const EmitterSurface& surface);
 
-struct EmitterBurst {
-  Real time = 0;
-  Varying count = 10.0;
-  int cycles = 1;
-  Real interval = 1;
-};
-
-struct Emitter : ParticleSource {
+struct Emitter : ParticleSource, effects::EmitterRelease {
   std::string preset;  ///< already merged into the emitter when a scene is read
   std::string body;    ///< name of the body it moves with; empty: fixed in the world
   EmitterSurface surface = PlaneSurface{};
-  Vec3 direction = Vec3::Zero();  ///< zero: the normal of the surface
-  bool overlap = false;
-  Real inherit_velocity = 1;  ///< share of the body's velocity that particles get
-  bool recoil = false;        ///< particles push the body back
-  Varying rate = 100.0;
-  Varying rate_per_metre = 0.0;
-  Varying count = 0.0;
-  Varying interval = 0.1;
-  std::vector<EmitterBurst> bursts;
-  Real start = 0;
-  Real end = 1e30;
-  std::vector<effects::TimeWindow> windows;
-  Real prewarm = 0;
   Placement placement;
 };
 

@@ -1,7 +1,8 @@
 #pragma once
-/// The scene as plain structs, as described by a file, before anything is built. Every field is a key of the
-/// scene format with the same name. The tables in format/ give each its unit, range and help text, once, for
-/// the loader, the schema and the reference. SI units; angles are in degrees if a name ends in `_deg`.
+/// The scene as plain structs, as described by a file, before anything is built. Where a key means the same
+/// as a field of a definition of the simulation or of the effects, the struct contains that definition. The
+/// tables in format/ give each key its field, unit, range and help text, once, for the loader, the schema and
+/// the reference. SI units; angles are in degrees if a name ends in `_deg`.
 
 #include <array>
 #include <optional>
@@ -33,20 +34,8 @@
 
 namespace offstage::producer {
 
-struct WorldSettings {
-  Vec3 gravity = {0, -9.81, 0};
-  Vec3 wind = Vec3::Zero();
-  Real step = 1.0 / 240;
-  sim::IntegratorKind integrator = sim::IntegratorKind::rk4;
-  Real integration_error = 1e-6;  ///< greatest error per step of the adaptive integrators
-  sim::SolverKind solver = sim::SolverKind::automatic;
-  sim::ImpactLaw impact = sim::ImpactLaw::simultaneous;
-  Real collision_speed = 0.05;  ///< bodies that approach more slowly do not bounce
-  sim::CollisionMethods collision;
-  sim::ParticleContactMethod particle_contacts = sim::ParticleContactMethod::relaxation;
-  int particle_cluster = 24;  ///< greatest number of contacts that `lcp` solves together
-  bool sleep = true;          ///< whether islands at rest are not simulated
-  Real bounds = 1000;         ///< half the edge of the cube that contains all objects
+/// `bounds` is a cube around the origin.
+struct WorldSettings : sim::WorldDef {
   uint64_t seed = 1;
 };
 
@@ -92,10 +81,9 @@ struct Material {
 };
 
 /// Contact properties of two materials, which replace those combined from both.
-struct ContactRule {
+struct ContactRule : sim::ContactRule {
   Where where;
-  std::array<std::string, 2> materials;  ///< names, in any order
-  std::optional<Real> restitution, friction, static_friction, rolling_friction, spinning_friction;
+  std::array<std::string, 2> materials;  ///< names, in any order; they become `a` and `b`
 };
 
 /// A model file that is drawn instead of a body's shape.
@@ -356,8 +344,8 @@ struct ModelLights {
   std::string body;
   std::string name;     ///< empty: all of them
   Real intensity = 1;   ///< factor of their intensities
-  Real radius = 0.01;   ///< of point and spot lights
-  Real size_deg = 0.5;  ///< of directional lights
+  Real radius = 0.01;   ///< radius of point and spot lights
+  Real size_deg = 0.5;  ///< apparent size of directional lights
   bool shadows = true;
 };
 using Light = std::variant<SunLight, PointLight, SpotLight, AreaLight, ModelLights>;

@@ -68,7 +68,7 @@ struct MeshFile {
   std::string file;
   ModelScale scale = {};
   std::optional<Vec3> fit = {};  ///< edges of the box that the model just fits into before `scale` [m]
-  std::optional<MeshDecomposition> decomposition = {};  ///< of bodies alone
+  std::optional<MeshDecomposition> decomposition = {};  ///< only for bodies
 };
 
 /// A solid in a compound.
@@ -80,7 +80,7 @@ struct CompoundPart {
   Vec3 position = Vec3::Zero();  ///< in the body's frame
   Quat orientation = Quat::Identity();
   std::optional<Real> density;  ///< default: the body's
-  std::string material;         ///< of its look; empty: the body's
+  std::string material;         ///< name of its material; empty: the body's
 };
 /// Solids that form one body.
 struct Compound {
@@ -136,7 +136,7 @@ struct Fill {
   Vec3 position = Vec3::Zero();  ///< centre: relative to the original, or of particles in the world
   Real spacing = 0;              ///< distance of neighbours; 0: the diameter of the particles
   Packing packing = Packing::hexagonal;
-  uint64_t seed = 1;  ///< of random places
+  uint64_t seed = 1;  ///< seed of random places
 };
 struct Placement {
   std::optional<Fill> fill;

@@ -415,6 +415,18 @@ sim::ClothHandle add_mesh_cloth(LiveWorld& w, const DoubleArray& vertices, const
   return finish_cloth(w, effects::mesh_cloth(mesh_of(vertices, triangles), take_pose(k), fabric), k,
                       "add_mesh_cloth");
 }
+sim::MeshShape add_mesh(LiveWorld& w, const DoubleArray& vertices, const IndexArray& triangles) {
+  return sim::MeshShape{*w.meshes.insert(w.world.add_mesh(mesh_of(vertices, triangles))).first};
+}
+
+void add_contact_rule(LiveWorld& w, const std::string& a, const std::string& b,
+                      std::optional<double> restitution, std::optional<double> friction,
+                      std::optional<double> static_friction, std::optional<double> rolling_friction,
+                      std::optional<double> spinning_friction) {
+  w.world.add_contact_rule(
+      {a, b, restitution, friction, static_friction, rolling_friction, spinning_friction});
+}
+
 }  // namespace
 
 void bind_shapes(py::module_& m) {
@@ -450,13 +462,8 @@ void bind_shapes(py::module_& m) {
 
 void bind_building(py::class_<LiveWorld>& world) {
   world
-      .def(
-          "add_mesh",
-          [](LiveWorld& w, const DoubleArray& vertices, const IndexArray& triangles) {
-            return sim::MeshShape{*w.meshes.insert(w.world.add_mesh(mesh_of(vertices, triangles))).first};
-          },
-          py::arg("vertices"), py::arg("triangles"),
-          "Registers a mesh: (n, 3) vertices [m], (m, 3) indices. Returns a shape.")
+      .def("add_mesh", &add_mesh, py::arg("vertices"), py::arg("triangles"),
+           "Registers a mesh: (n, 3) vertices [m], (m, 3) indices. Returns a shape.")
       .def("add_body", &add_body, py::arg("shape"),
            "Adds a body. Keywords, as in docs/python.md: name, motion ('static', 'kinematic', 'dynamic'), "
            "position,\n"
@@ -506,17 +513,10 @@ void bind_building(py::class_<LiveWorld>& world) {
            "vertex, or (vertex, body).")
       .def("add_mesh_cloth", &add_mesh_cloth, py::arg("vertices"), py::arg("triangles"),
            "As add_grid_cloth, of a mesh.")
-      .def(
-          "add_contact_rule",
-          [](LiveWorld& w, const std::string& a, const std::string& b, std::optional<double> restitution,
-             std::optional<double> friction, std::optional<double> static_friction,
-             std::optional<double> rolling_friction, std::optional<double> spinning_friction) {
-            w.world.add_contact_rule(
-                {a, b, restitution, friction, static_friction, rolling_friction, spinning_friction});
-          },
-          py::arg("a"), py::arg("b"), py::arg("restitution") = py::none(), py::arg("friction") = py::none(),
-          py::arg("static_friction") = py::none(), py::arg("rolling_friction") = py::none(),
-          py::arg("spinning_friction") = py::none(), "Coefficients for a pair of materials.");
+      .def("add_contact_rule", &add_contact_rule, py::arg("a"), py::arg("b"),
+           py::arg("restitution") = py::none(), py::arg("friction") = py::none(),
+           py::arg("static_friction") = py::none(), py::arg("rolling_friction") = py::none(),
+           py::arg("spinning_friction") = py::none(), "Coefficients for a pair of materials.");
   const auto removal = [&]<class H>(H) {
     world.def(
         "remove", [](LiveWorld& w, H handle) { return w.remove(handle); }, py::arg("object"),
