@@ -21,6 +21,10 @@ bool can_do_work(const Island& island) {
                        return drives(&p->a()) || drives(&p->b()) || p->surface().conveys;
                      }) ||
          std::any_of(island.articulations.begin(), island.articulations.end(), [&](const Articulation* a) {
+           // The joints of an elastic rod return energy: bent to its lowest point, it has next to no kinetic
+           // energy, and would creep back.
+           const auto has_spring = [](const Joint* j) { return j->def.stiffness > 0; };
+           if (std::count_if(a->joints().begin(), a->joints().end(), has_spring) > 1) return true;
            return std::any_of(a->joints().begin(), a->joints().end(), [&](const Joint* j) {
              return j->def.motor.mode != Motor::Mode::none || drives(j->a) || drives(j->b);
            });

@@ -19,6 +19,9 @@ constexpr Real kStiffness = 1e5;
 /// whose bounds may be small, reverses within a velocity of bound / rho, and Newton's method would jump from
 /// kink to kink.
 constexpr Real kBoundedStiffness = 1e3;
+/// Springs that are stiffer than this have no kinks: their rows take part in the matrix with their own
+/// stiffness, up to this multiple of the inertia of the bodies.
+constexpr Real kMostStiffness = 1e8;
 /// Joints transmit the effect of a contact, and a poor initial guess changes which other contacts are closed.
 /// The first iterations then use smaller penalties, each by the factor kStiffen (heaps of chains: a third of
 /// the factorizations, a tenth of the fall-backs).
@@ -306,6 +309,8 @@ void ProximalNewton::set_joints() {
       velocity_[at] += p.multiplier * response;
     }
     p.rho = kBoundedStiffness / mobility;
+    if (std::isinf(r.lower) && std::isinf(r.upper) && r.softness > 0 && p.rho * r.softness < 1)
+      p.rho = std::max(p.rho, std::min(kBoundedStiffness / r.softness, kMostStiffness / mobility));
     bounded_.push_back(p);
   }
   constraints_.clear();

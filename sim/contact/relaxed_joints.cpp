@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include <Eigen/Cholesky>
+
 #include "sim/contact/relaxation.h"
 
 namespace offstage::sim {
@@ -11,6 +13,10 @@ namespace {
 
 /// Rows times links above which the responses of all links are not stored.
 constexpr std::size_t kMostResponses = 20000;
+/// Rows without bounds above which sweeps solve them: the cost of a factor is the cube of their number.
+constexpr std::size_t kMostCoupled = 400;
+/// Sweeps over rows converge fast if the effect of the other rows on each is below this share of its own.
+constexpr Real kWeakCoupling = 0.5;
 /// A row that acts from the interval's end on acts in its last sub-step; share of the interval.
 constexpr Real kInstant = 1e-9;
 /// The contacts of an articulation depend on each other. Passes over them end when none changes a velocity by
@@ -100,9 +106,67 @@ void RelaxedJoints::begin(std::span<const RelaxedBody> bodies, Real duration, ui
 }
 
 void RelaxedJoints::prepare(Part& part, std::span<const RelaxedBody> bodies) {
-  const bool whole = part.bodies.size() * (part.last_row - part.first_row) <= kMostResponses;
+  const std::size_t rows = part.last_row - part.first_row;
+  const bool has_springs = std::ranges::count_if(part.articulation->joints(), [](const Joint* joint) {
+                             return joint->def.stiffness > 0;
+                           }) > 1;
+  const bool whole = part.bodies.size() * rows <= kMostResponses || (has_springs && rows <= kMostCoupled);
   for (uint32_t i = part.first_row; i < part.last_row; ++i)
     prepare_row(part, problem_.bounded[i], rows_[i], bodies, whole);
+  if (whole && has_springs) prepare_coupled(part);
+}
+
+/// Sweeps do not converge for the springs of a stiff rod: a rod of 20 links would sag 14 times too far. Their
+/// equations are linear, so they are solved together.
+void RelaxedJoints::prepare_coupled(Part& part) {
+  for (uint32_t i = part.first_row; i < part.last_row; ++i) {
+    const BoundedRow& r = problem_.bounded[i];
+    if (std::isinf(r.lower) && std::isinf(r.upper) && r.from == 0 && rows_[i].softness > 0)
+      part.coupled.push_back(i);
+  }
+  const auto n = static_cast<Eigen::Index>(part.coupled.size());
+  if (n < 2 || part.coupled.size() > kMostCoupled) return part.coupled.clear();
+  std::vector<std::size_t> place(bodies_.size(), part.bodies.size());
+  for (std::size_t k = 0; k < part.bodies.size(); ++k) place[part.bodies[k]] = k;
+  const auto effect = [&](const Row& row, const BoundedRow& on) {
+    Real u = 0;
+    for (const auto& [body, direction] : {std::pair(on.a, &on.on_a), std::pair(on.b, &on.on_b)})
+      if (body != kUnmoved && place[body] < part.bodies.size())
+        u += direction->dot(row.response[place[body]]);
+    return u;
+  };
+  Eigen::MatrixXd A(n, n);
+  bool is_weak = true;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const Row& row = rows_[part.coupled[static_cast<std::size_t>(j)]];
+    for (Eigen::Index i = 0; i < n; ++i)
+      A(i, j) = effect(row, problem_.bounded[part.coupled[static_cast<std::size_t>(i)]]);
+    A(j, j) += row.softness;
+    is_weak &= A.col(j).cwiseAbs().sum() - A(j, j) < kWeakCoupling * A(j, j);
+  }
+  if (is_weak || Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>(A).info() != Eigen::Success)
+    return part.coupled.clear();
+  part.coupled_factor = std::move(A);
+  for (const uint32_t i : part.coupled) rows_[i].is_coupled = true;
+}
+
+void RelaxedJoints::solve_coupled(Part& part, std::span<BodyMotion> motions, Real elapsed, bool is_last) {
+  Eigen::VectorXd error(static_cast<Eigen::Index>(part.coupled.size()));
+  for (std::size_t k = 0; k < part.coupled.size(); ++k) {
+    const BoundedRow& r = problem_.bounded[part.coupled[k]];
+    const Row& row = rows_[part.coupled[k]];
+    error[static_cast<Eigen::Index>(k)] =
+        speed(r, motions) + (1 - elapsed / duration_) * r.turning - r.target + row.softness * row.impulse;
+  }
+  part.coupled_factor.triangularView<Eigen::Lower>().solveInPlace(error);
+  part.coupled_factor.triangularView<Eigen::Lower>().transpose().solveInPlace(error);
+  for (std::size_t k = 0; k < part.coupled.size(); ++k) {
+    Row& row = rows_[part.coupled[k]];
+    const Real change = -error[static_cast<Eigen::Index>(k)], next = row.impulse + change;
+    push(part, problem_.bounded[part.coupled[k]], row, change, motions);
+    row.sum += is_last ? change : next;
+    row.impulse = next;
+  }
 }
 
 /// `whole`: whether the response of the whole articulation is found, not only that of the row's bodies.
@@ -180,9 +244,11 @@ void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapse
   if (is_last) std::fill(part.now.begin(), part.now.end(), Vec6::Zero());
   for (std::size_t j = 0; j < part.now.size(); ++j) part.now[j] += part.impulses[j];
 
+  if (!part.coupled.empty()) solve_coupled(part, motions, elapsed, is_last);
   for (uint32_t i = part.first_row; i < part.last_row; ++i) {
     const BoundedRow& r = problem_.bounded[i];
     Row& row = rows_[i];
+    if (row.is_coupled) continue;
     row.acts |= elapsed > (r.from - kInstant) * duration_;
     if (!row.acts) continue;
     const Real u = speed(r, motions) + (1 - elapsed / duration_) * r.turning;

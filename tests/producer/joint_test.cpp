@@ -64,6 +64,83 @@ TEST(SceneJoints, InvalidValuesAreRefusedWithTheAllowedOnes) {
             "/articulations/0/end: there is no body 'dor'; did you mean 'door'?\n");
 }
 
+/// Distance by which the tip of a rod along x, of 1 m length, is below its clamp at x = 0, after each frame.
+std::vector<Real> sags_of_rod(int links, const char* solver, Real step, const std::string& rest) {
+  const LoadedScene loaded =
+      parse(R"("output": {"fps": 60, "duration": 2.5}, "world": {"solver": ")" + std::string(solver) +
+            R"(", "step": )" + std::to_string(step) +
+            R"(}, "articulations": [{"type": "chain", "from": [0, 1, 0], "to": [1, 1, 0], "links": )" +
+            std::to_string(links) + ", " + rest + "}]");
+  EXPECT_TRUE(loaded.warnings.empty());
+  const ModelLibrary models;
+  Simulation simulation(loaded.scene, models);
+  std::vector<Real> sags;
+  for (int frame = 1; frame < loaded.scene.frame_count(); ++frame) {
+    simulation.advance();
+    const sim::Pose pose = simulation.world().body(simulation.moving_bodies().back().handle).pose;
+    sags.push_back(1 - pose.point_to_world({0, 0.5 / links, 0}).y());
+  }
+  return sags;
+}
+/// Weight of the rod per length [N/m]. Its links are capsules.
+Real weight_of_rod(int links) {
+  constexpr Real kRadius = 0.01;
+  return 2000 * 9.81 * std::numbers::pi * kRadius * kRadius * (1 - 2 * kRadius / 3 * links);
+}
+
+// A clamped beam under its weight w sags by w L^4 / 8 B, a row of n links by 1 + 1 / n^2 times as much. Here
+// that is about 2 % of its length, for which the terms of second order in the slope are below 1 %.
+TEST(Articulations, AChainWithBendStiffnessSagsAsACantilever) {
+  for (const char* solver : {"auto", "exact", "fast", "lcp"})
+    for (const Real step : {1.0 / 240, 1.0 / 60})
+      for (const int links : {4, 20}) {
+        const Real expected = weight_of_rod(links) / (8 * 30) * (1 + 1.0 / (links * links));
+        EXPECT_NEAR(sags_of_rod(links, solver, step,
+                                R"("radius": 0.01, "density": 2000, "bend_stiffness": 30, "damping": 4)")
+                        .back(),
+                    expected, 0.01 * expected)
+            << solver << " " << step << " " << links;
+      }
+}
+
+// It swings with the angular frequency 3.516 sqrt(B / m L^4) of the first mode, to twice the sag at rest.
+// The springs act at the end of a sub-step, which damps this mode by the share omega h / 2 of the critical
+// damping.
+TEST(Articulations, AChainWithBendStiffnessSwingsAsACantilever) {
+  constexpr int kLinks = 16;
+  const Real omega = 3.516 * std::sqrt(30 * 9.81 / weight_of_rod(kLinks));
+  const Real rest = weight_of_rod(kLinks) / (8 * 30);
+  for (const char* solver : {"auto", "fast"}) {
+    const std::vector<Real> sags =
+        sags_of_rod(kLinks, solver, 1.0 / 480, R"("radius": 0.01, "density": 2000, "bend_stiffness": 30)");
+    const auto end = sags.begin() + static_cast<std::ptrdiff_t>(1.2 * 2 * std::numbers::pi / omega * 60);
+    const auto lowest = std::max_element(sags.begin(), end), highest = std::min_element(lowest, end);
+    EXPECT_NEAR(static_cast<Real>(highest - lowest) / 60, std::numbers::pi / omega, 1.0 / 60) << solver;
+    const Real decay = std::exp(-std::numbers::pi * omega / 480 / 2);  // in half a period
+    EXPECT_NEAR(*lowest, rest * (1 + decay), 0.1 * rest) << solver;
+    EXPECT_NEAR(*highest, rest * (1 - decay * decay), 0.1 * rest) << solver;
+  }
+}
+
+// A light rod that is stiffer than anything else stays straight, also where its own vibrations are far faster
+// than the sub-step.
+TEST(Articulations, AStiffLightChainStaysStraight) {
+  for (const char* solver : {"auto", "exact", "fast"})
+    for (const Real step : {1.0 / 240, 1.0 / 60})
+      for (const Real sag :
+           sags_of_rod(32, solver, step, R"("radius": 0.004, "density": 50, "bend_stiffness": 1e6)"))
+        ASSERT_NEAR(sag, 0, 2e-3) << solver << " " << step;
+}
+
+TEST(Articulations, AChainWithBendStiffnessHasAtMost32Links) {
+  EXPECT_EQ(
+      joint_errors(R"("articulations": [{"type": "chain", "links": 33, "bend_stiffness": 1}])"),
+      "/articulations/0/links: must be at most 32 with \"bend_stiffness\", got 33; the stiffness of the "
+      "chain does not depend on their number\n");
+  EXPECT_EQ(joint_errors(R"("articulations": [{"type": "chain", "links": 33}])"), "");
+  EXPECT_NE(joint_errors(R"("articulations": [{"type": "chain", "bend_stiffness": -1}])"), "");
+}
+
 // No parts of a standing figure overlap, because the solver would push them apart in the first step.
 TEST(Articulations, StartWithoutOverlapAndHoldWhenTheyFall) {
   const LoadedScene loaded = parse(R"(

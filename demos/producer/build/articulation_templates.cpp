@@ -87,6 +87,9 @@ Parts build(const Chain& chain) {
     Joint& j = make.joint("joint_" + std::to_string(i), a, b, nodes[k]);
     j.behaviour.axis = i < chain.links ? nodes[k + 1] - nodes[k] : nodes[k] - nodes[k - 1];
     if (chain.swing_deg < 180) j.behaviour.swing_deg = chain.swing_deg;
+    // A joint stands for the half links beside it; a holder bends no more than the half link that it holds.
+    const Real length = ((i > 0 ? side(k - 1) : 0) + (i < chain.links ? side(k) : 0)) / 2;
+    if (chain.bend_stiffness > 0) j.behaviour.stiffness = chain.bend_stiffness / length;
     j.behaviour.friction = chain.friction;
     j.behaviour.damping = chain.damping;
     j.behaviour.max_force = chain.max_force;

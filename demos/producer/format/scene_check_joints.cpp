@@ -14,6 +14,8 @@ namespace offstage::producer {
 namespace {
 
 constexpr Real kMostSteering = 35;  // [degrees]
+/// The sub-step must be short enough for the free motion of a link, which is faster the shorter it is.
+constexpr int kMostElasticLinks = 32;
 
 class JointChecker : CheckBase {
  public:
@@ -143,6 +145,10 @@ class JointChecker : CheckBase {
         fail(chain.where.path + "/path/" + std::to_string(i), "must differ from the point before it");
     if (!chain.path.empty() && chain.sag != 1)
       fail(chain.where.path + "/sag", "has no meaning with a \"path\"");
+    if (chain.bend_stiffness > 0 && chain.links > kMostElasticLinks)
+      fail(chain.where.path + "/links", "must be at most " + std::to_string(kMostElasticLinks) +
+                                            " with \"bend_stiffness\", got " + std::to_string(chain.links) +
+                                            "; the stiffness of the chain does not depend on their number");
     const auto is_still = [this](const std::string& end) {
       const auto it = std::ranges::find(flat_.bodies, end, &Body::name);
       return end == "world" || (it != flat_.bodies.end() && it->motion != sim::MotionType::dynamic);

@@ -175,6 +175,13 @@ struct Table<Chain> {
          "name of the body that holds the first link, or `world`; empty: the end is free"},
         {"end", &T::end, "name of the body that holds the last link, or `world`; empty: the end is free"},
         {"swing_deg", &T::swing_deg, "largest angle between neighbouring links", "degrees", between(0, 180)},
+        {"bend_stiffness", &T::bend_stiffness,
+         "flexural rigidity (Young's modulus times second moment of area) of an elastic rod that is "
+         "unstressed as it is laid out; twisting has the same stiffness. A joint between links of the length "
+         "l "
+         "resists with this / l per radian, so the rod bends alike for any number of links, at most 32. The "
+         "bodies that hold its ends clamp them",
+         "N m^2", kNotNegative},
         {"friction", &T::friction, "dry friction of each joint", "N m", kNotNegative},
         {"damping", &T::damping, "viscous damping of each joint", "N m s", kNotNegative},
         {"max_force", &T::max_force, "force at which a joint breaks; default: never", "N", kPositive}};

@@ -84,6 +84,7 @@ struct Chain {
   std::string start = "world";  ///< holder of the first link: a body, "world", or nothing
   std::string end;              ///< holder of the last link
   Real swing_deg = 180;
+  Real bend_stiffness = 0;  ///< flexural rigidity [N m^2]
   Real friction = 0, damping = 0;
   std::optional<Real> max_force;
 };
