@@ -136,11 +136,14 @@ class BodyContacts {
         verdicts.push_back({views_[i].pair, views_[i].index, {}});
         continue;
       }
-      const auto level = std::find_if(views_.begin(), views_.end(),
-                                      [&](const View& face) { return keeps_apart(face, views_[i]); });
-      if (level != views_.end())
-        hidden.push_back({i, static_cast<std::size_t>(level - views_.begin()), level->normal()});
-      if (level != views_.end() || !views_[i].may_be_at_seam()) continue;
+      const auto face = std::find_if(views_.begin(), views_.end(),
+                                     [&](const View& other) { return keeps_apart(other, views_[i]); });
+      if (face != views_.end()) {
+        verdicts.push_back({views_[i].pair, views_[i].index, {}});
+        if (!views_[i].speculative) verdicts.back().instead = upright(views_[i], *face);
+        continue;
+      }
+      if (!views_[i].may_be_at_seam()) continue;
       for (std::size_t k = 0; k < views_.size(); ++k)
         if (k != i && !views_[k].speculative)
           if (const auto normal = normal_instead(views_[i], views_[k])) hidden.push_back({i, k, *normal});
@@ -250,7 +253,7 @@ class BodyContacts {
   /// the plane of the face.
   bool keeps_apart(const View& face, const View& v) const {
     if (face.speculative || !face.is_face() || face.x_piece() == v.x_piece() ||
-        v.normal().dot(face.normal()) > kSameWay || v.y().collision_shape().is_plane())
+        v.normal().dot(face.normal()) > kGoesOn || v.y().collision_shape().is_plane())
       return false;
     const uint32_t deepest = face.deepest();
     const auto height = [&](const Vec3& place) { return face.normal().dot(place - face.on_y(deepest)); };
@@ -272,6 +275,27 @@ class BodyContacts {
       return n.dot(farthest(v.y(), v.y_piece(), y, n) - below.point_to_world(on_face)) <= flush_ &&
              n.dot(farthest(v.x(), v.x_piece(), x, -n) - x.point_to_world(lying)) >= -flush_;
     });
+  }
+
+  /// The contact with the normal of a face that keeps_apart(). It still holds a leg that stands on the edge
+  /// of something as high as the face; points below the face are out of reach.
+  Manifold upright(const View& v, const View& face) const {
+    const Vec3 up = face.normal();
+    Manifold m = *v.m;
+    m.normal = v.x_is_a ? up : Vec3(-up);
+    m.source = v.x_is_a ? NormalSource::face_of_b : NormalSource::face_of_a;
+    m.edge_a = m.edge_b = Vec3::Zero();
+    m.radius_a = m.radius_b = 0;
+    m.count = 0;
+    for (uint32_t k = 0; k < v.m->count; ++k) {
+      if (up.dot(v.on_y(k) - face.on_y(face.deepest())) < -flush_) continue;
+      ContactPoint point = v.m->points[k];
+      point.separation = up.dot(v.on_x(k) - v.on_y(k));
+      (v.x_is_a ? point.on_b : point.on_a) = v.on_x(k) - point.separation * up;
+      m.points[m.count++] = point;
+      if (point.separation < m.points[0].separation) std::swap(m.points[0], m.points[m.count - 1]);
+    }
+    return m;
   }
 
   /// Whether Y is part of the ground, or lies on a face of its own as a wedge does. In a heap a box may stand
