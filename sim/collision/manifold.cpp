@@ -164,13 +164,12 @@ bool is_over(const SupportingFeature& face, const Vec3& point, Real slop) {
 }
 
 /// Contact with a face that gives the normal. `closest` is the closest point on the incident solid; for a rim
-/// it may be deeper than the corners of its polygon. `holds_closest`: whether it is used, too, if it is
-/// slightly beside the face, because no other manifold has it. The feature of a round solid is the one that
-/// faces the face; if this is not over the face, there are no points. The line nearest to an edge of the face
-/// is not used, because the face would push it along its normal although it rolls down to the face.
+/// it may be deeper than the corners of its polygon. The feature of a round solid is the one that faces the
+/// face; if this is not over the face, there are no points. The line nearest to an edge of the face is not
+/// used, because the face would push it along its normal although it rolls down to the face.
 void face_manifold(Manifold& m, const Body& reference, const SupportingFeature& face, Body incident,
-                   SupportingFeature other, const Vec3& closest, bool holds_closest, Real margin, Real slack,
-                   Real slop, Manifold* more) {
+                   SupportingFeature other, const Vec3& closest, Real margin, Real slack, Real slop,
+                   Manifold* more) {
   const Vec3 n = face.normal;
   const bool on_a = reference.name == 0, round = is_round(incident.convex);
   m.normal = on_a ? Vec3(-n) : n;
@@ -191,10 +190,9 @@ void face_manifold(Manifold& m, const Body& reference, const SupportingFeature& 
   Clipping part(reference, face, incident, other);
   part.cut_all(slop);
   for (const Corner& c : part.corners()) add(c.point - incident.convex.radius * n, c.id);
-  const bool none = candidates.count == 0,
-             is_closer = n.dot(closest) - offset < candidates.least_separation() - slop;
+  const bool none = candidates.count == 0;
   if (none ? !round && is_over(face, closest, slop)
-           : is_closer && (holds_closest || is_over(face, closest, slop)))
+           : n.dot(closest) - offset < candidates.least_separation() - slop)
     add(closest, closest_id(incident.name));
   reduce(m, candidates, slop, more);
 }
@@ -278,9 +276,9 @@ Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const 
   if (std::min(tilt_a, tilt_b) <= kMaxTilt) {
     Manifold* const left_out = more ? &more->manifolds[0] : nullptr;
     if (by_a)
-      face_manifold(m, body_a, of_a, body_b, of_b, s.on_b, true, margin, slack, slop, left_out);
+      face_manifold(m, body_a, of_a, body_b, of_b, s.on_b, margin, slack, slop, left_out);
     else
-      face_manifold(m, body_b, of_b, body_a, of_a, s.on_a, true, margin, slack, slop, left_out);
+      face_manifold(m, body_b, of_b, body_a, of_a, s.on_a, margin, slack, slop, left_out);
     if (m.count > 0) return m;
     m = {};
     m.normal = s.normal;
@@ -289,9 +287,9 @@ Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const 
   if (!more) return m;
   auto& [face, left_out] = more->manifolds;
   if (is_near(body_a, of_a) && (by_a || !is_near(body_b, of_b)))
-    face_manifold(face, body_a, of_a, body_b, of_b, s.on_b, false, margin, slack, slop, &left_out);
+    face_manifold(face, body_a, of_a, body_b, of_b, s.on_b, margin, slack, slop, &left_out);
   else if (is_near(body_b, of_b))
-    face_manifold(face, body_b, of_b, body_a, of_a, s.on_a, false, margin, slack, slop, &left_out);
+    face_manifold(face, body_b, of_b, body_a, of_a, s.on_a, margin, slack, slop, &left_out);
   for (Manifold& near : more->manifolds) drop_below(near, std::min(0.0, s.distance) + slop);
   return m;
 }

@@ -257,9 +257,7 @@ class BodyContacts {
       return false;
     const uint32_t deepest = face.deepest();
     const auto height = [&](const Vec3& place) { return face.normal().dot(place - face.on_y(deepest)); };
-    if (face.m->points[deepest].separation > flush_ || height(v.on_y(0)) > flush_ ||
-        height(v.on_x(0)) < -flush_)
-      return false;
+    if (face.m->points[deepest].separation > flush_ || height(v.on_x(0)) < -flush_) return false;
     const Vec3 up = pose(face.y(), false).vector_to_body(face.normal()),
                on_face = pose(face.y(), false).point_to_body(face.on_y(deepest)),
                lying = pose(x_, false).point_to_body(face.on_x(deepest));
@@ -288,9 +286,10 @@ class BodyContacts {
     m.radius_a = m.radius_b = 0;
     m.count = 0;
     for (uint32_t k = 0; k < v.m->count; ++k) {
-      if (up.dot(v.on_y(k) - face.on_y(face.deepest())) < -flush_) continue;
+      const Real height = up.dot(v.on_y(k) - face.on_y(face.deepest()));
+      if (height < -flush_) continue;
       ContactPoint point = v.m->points[k];
-      point.separation = up.dot(v.on_x(k) - v.on_y(k));
+      point.separation = up.dot(v.on_x(k) - v.on_y(k)) + std::max(0.0, height);
       (v.x_is_a ? point.on_b : point.on_a) = v.on_x(k) - point.separation * up;
       m.points[m.count++] = point;
       if (point.separation < m.points[0].separation) std::swap(m.points[0], m.points[m.count - 1]);

@@ -344,7 +344,7 @@ TEST(Commands, BodiesThatLeaveTheWorldAreNamed) {
       R"({"version": 1, "world": {"bounds": 2}, "bodies": [{"name": "runaway"}], "output": {"duration": 2}})");
   const Outcome run = offstage("simulate s.json --progress none", folder.path());
   EXPECT_EQ(run.code, 0);
-  EXPECT_NE(run.err.find("'runaway' left the world"), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find("'runaway' left world.bounds"), std::string::npos) << run.err;
   EXPECT_EQ(json::parse(run.out)["lost_bodies"][0], "runaway");
 }
 
