@@ -275,16 +275,22 @@ class BodyContacts {
     });
   }
 
-  /// The contact with the normal of a face that keeps_apart(). It still holds a leg that stands on the edge
-  /// of something as high as the face; points below the face are out of reach.
-  Manifold upright(const View& v, const View& face) const {
-    const Vec3 up = face.normal();
+  /// The manifold of a contact with another normal, towards X, that is fixed in Y.
+  static Manifold without_points(const View& v, const Vec3& normal) {
     Manifold m = *v.m;
-    m.normal = v.x_is_a ? up : Vec3(-up);
+    m.normal = v.x_is_a ? normal : Vec3(-normal);
     m.source = v.x_is_a ? NormalSource::face_of_b : NormalSource::face_of_a;
     m.edge_a = m.edge_b = Vec3::Zero();
     m.radius_a = m.radius_b = 0;
     m.count = 0;
+    return m;
+  }
+
+  /// The contact with the normal of a face that keeps_apart(). It still holds a leg that stands on the edge
+  /// of something as high as the face; points below the face are out of reach.
+  Manifold upright(const View& v, const View& face) const {
+    const Vec3 up = face.normal();
+    Manifold m = without_points(v, up);
     for (uint32_t k = 0; k < v.m->count; ++k) {
       const Real height = up.dot(v.on_y(k) - face.on_y(face.deepest()));
       if (height < -flush_) continue;
@@ -340,12 +346,7 @@ class BodyContacts {
     const Real margin = std::max(0.0, v.m->points[v.deepest()].separation) + kSlopeMargin;
     const Manifold on_plane =
         placed(plane_manifold(v.x().collision_shape().piece(v.x_piece()), plane_from_x, margin), plane);
-    Manifold m = *v.m;
-    m.normal = v.x_is_a ? normal : Vec3(-normal);
-    m.source = v.x_is_a ? NormalSource::face_of_b : NormalSource::face_of_a;
-    m.edge_a = m.edge_b = Vec3::Zero();
-    m.radius_a = m.radius_b = 0;
-    m.count = 0;
+    Manifold m = without_points(v, normal);
     // The piece stands on the face, not in the slope. If it were deeper, the slope would be the corner of a
     // flush object.
     const Real least =

@@ -17,9 +17,10 @@ constexpr Real kFlush = 1e-4, kFlushShare = 1e-3;
 
 /// Removes the contacts at seams from pairs whose contacts were found at one time of a sub-step of length h
 /// [s]. A contact of a convex piece is at a seam if the piece already lies on a face and the other piece does
-/// not rise above that face, or if another piece of the body lies on a face whose plane separates the two
-/// pieces throughout the sub-step. A contact at the foot of a slope gets the slope's normal instead. Pairs
-/// that share a body must be given together. Returns the pairs that have changed, in the order given.
+/// not rise above that face. If another piece of the body lies on a face whose plane separates the two pieces
+/// throughout the sub-step, the contact gets the normal of that face. A contact at the foot of a slope gets
+/// the slope's normal instead. Pairs that share a body must be given together. Returns the pairs that have
+/// changed, in the order given.
 std::vector<ContactPair*> remove_seam_contacts(std::span<ContactPair* const> pairs, Real time, Real h);
 
 }  // namespace offstage::sim

@@ -38,6 +38,18 @@ TEST(SceneCheck, NamesAreUniqueWithinASection) {
             "/bodies/1/name: the name 'a_1' is already used by /bodies/0\n");
 }
 
+TEST(SceneCheck, EmittersThatPushABodyOrGetItsVelocityNeedOne) {
+  EXPECT_EQ(errors_of(R"({"emitters": [{"inherit_velocity": 0.5}]})"),
+            "/emitters/0/inherit_velocity: is a fraction of the velocity of a body; the emitter needs a "
+            "\"body\"\n");
+  EXPECT_EQ(errors_of(R"({"emitters": [{"recoil": true}]})"),
+            "/emitters/0/recoil: pushes a body back; the emitter needs a \"body\"\n");
+  const std::string on_body = R"("emitters": [{"body": "a", "recoil": true, "inherit_velocity": 0.5}]})";
+  EXPECT_EQ(errors_of(R"({"bodies": [{"name": "a", "motion": "static"}], )" + on_body),
+            "/emitters/0/recoil: pushes dynamic bodies only, and \"a\" is not\n");
+  EXPECT_EQ(errors_of(R"({"bodies": [{"name": "a"}], )" + on_body), "");
+}
+
 TEST(SceneCheck, NamesReferToExistingObjects) {
   EXPECT_EQ(errors_of(R"({
     "materials": [{"name": "steel"}],

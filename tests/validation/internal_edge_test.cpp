@@ -298,7 +298,8 @@ TEST_P(InternalEdges, DoNotStopLyingRingsOfManyParts) {
   for (const Real step : {1.0 / 240, 1.0 / 60})
     for (const auto& [name, ring] : rings)
       for (const Real speed : {1.0, 4.0, 10.0}) {
-        // For the same reason, fast rings lose a little of their speed at long steps.
+        // By the fast solver, a face that gets the nearest point of a part beside it takes a little of the
+        // speed of fast rings at long steps.
         ++number;
         if (!is_exact() && step > 0.01 && speed > 5) continue;
         const Real heading = 2 * std::numbers::pi * random.uniform(number, 0);

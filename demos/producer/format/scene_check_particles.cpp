@@ -210,7 +210,7 @@ class ParticleChecker : CheckBase {
     if (emitter.recoil && pushed != flat_.bodies.end() && pushed->motion != sim::MotionType::dynamic)
       fail(path + "/recoil", "pushes dynamic bodies only, and \"" + emitter.body + "\" is not");
     if (emitter.inherit_velocity != 1 && emitter.body.empty())
-      fail(path + "/inherit_velocity", "is a share of the velocity of a body; the emitter needs a \"body\"");
+      fail(path + "/inherit_velocity", "is a fraction of the velocity of a body; the emitter needs a \"body\"");
     check_count(emitter);
   }
 
