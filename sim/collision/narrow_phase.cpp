@@ -86,17 +86,30 @@ Separation plane_separation(const Convex& a, const Pose& a_from_plane) {
   return s;
 }
 
-/// Returns the side of a triangle on which the other piece is. If they are apart, it is the side from which
-/// the triangle is seen, given by `height`, that of the piece's centre over the front. A piece that
-/// penetrates the triangle keeps its previous side or takes the side of a neighbouring triangle.
+/// Side of a triangle on which a piece is that may penetrate it: the previous side, or that of a
+/// neighbouring triangle, or else the side of the piece's centre, given by its height over the front.
 template <class SideOfFace>
-int side_of(const SurfaceTriangle& t, Real height, bool apart, int before, SideOfFace&& side_of_face) {
-  const int seen = height >= 0 ? 1 : -1;
-  if (apart) return seen;
+int side_of_penetrating(const SurfaceTriangle& t, Real height, int before, SideOfFace&& side_of_face) {
   if (before != 0) return before;
   for (const uint32_t next : t.mesh->surface.across(t.face))
     if (const int side = next == kNoFace ? 0 : side_of_face(next)) return side;
-  return seen;
+  return height >= 0 ? 1 : -1;
+}
+
+/// Sets the side of a triangle on which the other piece is. `outward` is the direction from the triangle to
+/// the piece at the triangle's nearest point `point`, and `middle` the piece's centre, in the mesh's frame.
+///
+/// The direction shows the side if the piece is apart from the triangle and the surface faces it there. A
+/// piece that is beside the triangle and penetrates the surface elsewhere is seen from behind.
+template <class SideOfFace>
+void set_side(SurfaceTriangle& t, Real distance, const Vec3& outward, const Vec3& point, const Vec3& middle,
+              int before, SideOfFace&& side_of_face) {
+  constexpr Real kAlongside = 0.01;
+  const Real lean = outward.dot(t.normal());
+  t.side = lean >= 0 ? 1 : -1;
+  if (distance > 0 && std::abs(lean) > kAlongside && t.allows(point, outward)) return;
+  t.side = 1;
+  t.side = side_of_penetrating(t, t.normal().dot(middle - t.corner(0)), before, side_of_face);
 }
 
 /// Two pieces of two shapes that are near each other, for which manifolds are computed.
@@ -185,7 +198,7 @@ class PiecePair {
     triangle.side = height >= 0 ? 1 : -1;
     if (distance2 < sphere.radius * sphere.radius) {
       const auto known = [&](uint32_t face) { return of_b ? known_side_of_b(face) : known_side_of_a(face); };
-      triangle.side = side_of(triangle, height, false, known(triangle.face), known);
+      triangle.side = side_of_penetrating(triangle, height, known(triangle.face), known);
       PairCache::Entry& e = cache_.of(i_, j_);
       if (cache_.keeps_sides) (of_b ? e.side_of_b : e.side_of_a) = static_cast<int8_t>(triangle.side);
     }
@@ -202,24 +215,13 @@ class PiecePair {
       if (*t && (*t)->mesh->surface.is_sliver((*t)->face)) return;
     PairCache::Entry& entry = cache_.of(i_, j_);
     const Separation s = measure(a_, b_, a_from_b_, method, entry);
-    const bool apart = s.distance > 0;
-    // If the normal is along the triangle, the centre of the other piece determines the side.
-    const auto height = [&](const SurfaceTriangle& t, const Vec3& outward, const Vec3& middle) {
-      constexpr Real kAlongside = 0.01;
-      const Real lean = outward.dot(t.normal());
-      return apart && std::abs(lean) > kAlongside ? lean : t.normal().dot(middle - t.corner(0));
-    };
-    if (triangles.b) {
-      const Real h =
-          height(*triangles.b, a_from_b_.vector_to_body(s.normal), a_from_b_.point_to_body(a_.centre()));
-      triangles.b->side =
-          side_of(*triangles.b, h, apart, entry.side_of_b, [&](uint32_t f) { return known_side_of_b(f); });
-    }
-    if (triangles.a) {
-      const Real h = height(*triangles.a, -s.normal, a_from_b_.point_to_world(b_.centre()));
-      triangles.a->side =
-          side_of(*triangles.a, h, apart, entry.side_of_a, [&](uint32_t f) { return known_side_of_a(f); });
-    }
+    if (triangles.b)
+      set_side(*triangles.b, s.distance, a_from_b_.vector_to_body(s.normal), a_from_b_.point_to_body(s.on_b),
+               a_from_b_.point_to_body(a_.centre()), entry.side_of_b,
+               [&](uint32_t f) { return known_side_of_b(f); });
+    if (triangles.a)
+      set_side(*triangles.a, s.distance, -s.normal, s.on_a, a_from_b_.point_to_world(b_.centre()),
+               entry.side_of_a, [&](uint32_t f) { return known_side_of_a(f); });
     if (cache_.keeps_sides) {
       if (triangles.a) entry.side_of_a = static_cast<int8_t>(triangles.a->side);
       if (triangles.b) entry.side_of_b = static_cast<int8_t>(triangles.b->side);

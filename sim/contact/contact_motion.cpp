@@ -38,6 +38,26 @@ Real round_radius(const Shape& shape) {
   return 0;
 }
 
+/// Rotation of the points of a surface of revolution that stay on the side that faces the other body while
+/// the body turns: that of the meridian. See turned_arm() for the arguments. Points elsewhere turn with the
+/// body, and so do all points where the other body is on the axis.
+Quat meridian_turn(const Vec3& arm, const Quat& from, const Vec3& out_from, const Quat& to,
+                   const Vec3& out_to) {
+  const auto radial = [](const Quat& orientation, const Vec3& v) {
+    const Vec3 local = orientation.conjugate() * v;
+    return Vec2(local.x(), local.z());
+  };
+  const Vec2 spoke = radial(from, arm), facing = radial(from, out_from), next = radial(to, out_to);
+  const Real lengths = facing.norm() * next.norm();
+  if (facing.norm() < kUpright || next.norm() < kUpright ||
+      spoke.dot(facing) < kFacing * spoke.norm() * facing.norm())
+    return to * from.conjugate();
+  // Half of the angle about the axis.
+  const Real cosine = std::sqrt(std::max(Real(0), (1 + facing.dot(next) / lengths) / 2));
+  const Real sine = (facing.y() * next.x() - facing.x() * next.y()) / lengths / (2 * cosine);
+  return cosine > 0.1 ? to * Quat(cosine, 0, sine, 0) * from.conjugate() : to * from.conjugate();
+}
+
 /// State of a body at a time after the interval's start, extrapolated by its velocities at the start.
 struct Carried {
   Vec3 shift = Vec3::Zero();  // displacement of the centre of mass, or of the origin
@@ -154,7 +174,13 @@ bool place_after(const Start& s, Real time, ContactPlace& place) {
   // surface and the sliding.
   const Vec3 slide = time * s.sliding;
   const bool by_b = moves_with_b(s.m.source);
-  place.turn = by_b ? b.turn : a.turn;
+  const auto turn_of = [&](const Body& body, const Carried& now, const Vec3& arm, const Vec3& out,
+                           const Vec3& out_now) {
+    if (!is_revolved(body.def.shape)) return now.turn;
+    return meridian_turn(arm, start_orientation(body), out, now.orientation, out_now);
+  };
+  place.turn = by_b ? turn_of(s.b, b, s.arm_b - to_a, n, place.normal)
+                    : turn_of(s.a, a, s.arm_a + to_a, -n, -place.normal);
   if (by_b) {
     place.arm_b = arm_of_b();
     place.arm_a = a.turn * s.arm_a + (place.arm_b - b.turn * s.arm_b) - slide;
@@ -303,20 +329,9 @@ Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3&
     return with_body(arm) + to * (facing(to, out_to) - facing(from, out_from));
   }
   if (!is_revolved(shape)) return with_body(arm);
-  const Vec3 centre = body.is_awake() ? body.rigid.centre : Vec3(Vec3::Zero());
-  const Vec3 local = from.conjugate() * arm + centre;
-  const auto radial = [](const Vec3& v) { return Vec2(v.x(), v.z()); };
-  const Vec2 spoke = radial(local), facing = radial(from.conjugate() * out_from),
-             next = radial(to.conjugate() * out_to);
-  const Real length = spoke.norm();
-  if (facing.norm() < kUpright || next.norm() < kUpright ||
-      spoke.dot(facing) < kFacing * length * facing.norm())
-    return with_body(arm);
-  // The angle from the meridian that faces the other body is kept. It is only the error of the manifold.
-  const Real c = spoke.dot(facing), t = facing.x() * spoke.y() - facing.y() * spoke.x();
-  const Vec2 turned =
-      Vec2(c * next.x() - t * next.y(), t * next.x() + c * next.y()) / (facing.norm() * next.norm());
-  return to * (Vec3(turned.x(), local.y(), turned.y()) - centre);
+  // The centre of mass is on the axis. The angle from the meridian that faces the other body is kept. It is
+  // only the error of the manifold.
+  return meridian_turn(arm, from, out_from, to, out_to) * arm;
 }
 
 ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, const ContactFrame& frame,

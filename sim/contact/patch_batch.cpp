@@ -18,8 +18,8 @@ namespace {
 /// reached. A resting patch takes one round. An impact takes more, because otherwise some points would
 /// penetrate. A patch without an initial guess is solved completely at first, because otherwise it would slip
 /// during the first sweeps.
-constexpr float kSettled = 0.01F, kSolved = 1e-6F;
-constexpr uint32_t kPatchRounds = 20;
+constexpr float kSettled = 0.01F, kAlone = 1e-5F, kSolved = 1e-6F;
+constexpr uint32_t kPatchRounds = 20, kLoneRounds = 60;
 
 /// Shares of the difference between an impulse and its mean: what a sub-step subtracts from the impulse, and
 /// what it adds to the mean. Slow modes with frequencies near the latter are damped most. The mean of a patch
@@ -219,14 +219,15 @@ void set_mobility(PatchBatch& p) {
 // Filling
 
 /// Clears only the members that are used, because a batch is large.
-void clear(PatchBatch& p, const PatchBatch::Index& patches, std::span<const ContactPatch> all) {
+void clear(PatchBatch& p, const PatchBatch::Index& patches, std::span<const ContactPatch> all, bool alone) {
   static_assert(std::is_trivial_v<PatchBatch>);
   uint32_t count = 0;
   for (uint32_t i : patches)
     if (i != ContactColoring::kNone) count = std::max(count, all[i].count);
   std::memset(&p, 0, offsetof(PatchBatch, points) + count * sizeof(PatchBatch::Point));
   p.count = count;
-  p.tolerance = kSettled;
+  p.tolerance = p.settled = alone ? kAlone : kSettled;
+  p.rounds = alone ? kLoneRounds : kPatchRounds;
   p.patch = patches;
 }
 
@@ -518,9 +519,9 @@ void sweep_single(PatchBatch& p, std::span<BodyMotion> motions, const SubstepTim
   bool all = false;
   Single change{};
   if (p.turns && is_coupled(p)) change = solve_single_rolling(p, u, gap, all);
-  const float tolerance = std::exchange(p.tolerance, kSettled);
+  const float tolerance = std::exchange(p.tolerance, p.settled);
   if (!all) {
-    for (uint32_t i = 0; i < kPatchRounds; ++i) {
+    for (uint32_t i = 0; i < p.rounds; ++i) {
       const Single last = u;
       change = change + solve_single_normal(p, u, gap);
       change = change + solve_single_friction(p, u);
@@ -553,8 +554,8 @@ SubstepTime::SubstepTime(Real substep_, uint32_t index, Real duration_)
 }
 
 void prepare(PatchBatch& p, const PatchBatch::Index& patches, std::span<const ContactPatch> all,
-             std::span<const RelaxedBody> bodies, std::span<BodyMotion> motions, Real substep) {
-  clear(p, patches, all);
+             std::span<const RelaxedBody> bodies, std::span<BodyMotion> motions, Real substep, bool alone) {
+  clear(p, patches, all, alone);
   p.a.fill(static_cast<uint32_t>(bodies.size()));
   p.b = p.a;
   for (unsigned lane = 0; lane < kLanes; ++lane) {
@@ -601,8 +602,8 @@ void sweep(PatchBatch& p, std::span<BodyMotion> motions, const SubstepTime& time
   Groups u = relative_now(p, a, b, time);
   const Groups before = u;
   Groups change{};
-  const float tolerance = std::exchange(p.tolerance, kSettled);
-  for (uint32_t i = 0; i < kPatchRounds; ++i) {
+  const float tolerance = std::exchange(p.tolerance, p.settled);
+  for (uint32_t i = 0; i < p.rounds; ++i) {
     const Groups last = u;
     change.normal = change.normal + solve_normal(p, u, gaps);
     if (p.resists_turning) change.normal = change.normal + solve_rolling(p, u);

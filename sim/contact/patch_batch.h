@@ -55,6 +55,8 @@ struct PatchBatch {
   std::array<bool, ContactColoring::kLanes> moves_a, moves_b;
   uint32_t count;   ///< greatest number of points in a lane
   float tolerance;  ///< tolerance of the next sweep's rounds [m/s]
+  float settled;    ///< that of later sweeps [m/s]
+  uint32_t rounds;  ///< greatest number of rounds of a sweep
   Vector n, t, k, arm_a, arm_b;
   Lanes inverse_mass_a, inverse_mass_b;
   Symmetric inverse_inertia_a, inverse_inertia_b;
@@ -99,9 +101,11 @@ struct SubstepTime {
 };
 
 /// Fills a batch and applies the impulses of the patches' initial forces over `substep` [s] to the bodies.
-/// There is one more motion than bodies, for unused lanes.
+/// There is one more motion than bodies, for unused lanes. `alone`: sweeps of other patches do not correct
+/// what the rounds of a patch leave, because a body of the batch touches only bodies that contacts do not
+/// move.
 void prepare(PatchBatch& batch, const PatchBatch::Index& patches, std::span<const ContactPatch> all,
-             std::span<const RelaxedBody> bodies, std::span<BodyMotion> motions, Real substep);
+             std::span<const RelaxedBody> bodies, std::span<BodyMotion> motions, Real substep, bool alone);
 
 /// Ends a sub-step; the next one starts with its impulses.
 void begin_substep(PatchBatch& batch);

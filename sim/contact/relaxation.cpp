@@ -190,7 +190,8 @@ void RelaxationSolver::run(const Range& range, uint32_t block) {
       return each([this](uint32_t i) { start(i); });
     case Stage::prepare:
       return each([this](uint32_t i) {
-        sim::prepare(batches_[i], coloring_.batches()[i], patches_, bodies_, motions_, substep_);
+        sim::prepare(batches_[i], coloring_.batches()[i], patches_, bodies_, motions_, substep_,
+                     has_lone_patch(i));
       });
     case Stage::solve:
       return each([&](uint32_t i) { solve(i, range); });
@@ -235,6 +236,15 @@ void RelaxationSolver::run(const Range& range, uint32_t block) {
     case Stage::report:
       return each([this](uint32_t i) { report(i); });
   }
+}
+
+/// Whether a body of a batch touches only bodies that contacts do not move.
+bool RelaxationSolver::has_lone_patch(uint32_t i) const {
+  const auto is_lone = [this](uint32_t k) {
+    return k != ContactColoring::kNone && !meets_moving_[patches_[k].a] && !meets_moving_[patches_[k].b];
+  };
+  const PatchBatch::Index& patches = coloring_.batches()[i];
+  return std::any_of(patches.begin(), patches.end(), is_lone);
 }
 
 void RelaxationSolver::start(uint32_t i) {
@@ -365,6 +375,9 @@ void RelaxationSolver::set_up() {
   for_each_index(patches_.size(), [&](std::size_t i) {
     links_[i] = {mover(patches_[i].a), mover(patches_[i].b)};
   });
+  meets_moving_.assign(bodies_.size(), 0);
+  for (const auto& [a, b] : links_)
+    if (a != ContactColoring::kNone && b != ContactColoring::kNone) meets_moving_[a] = meets_moving_[b] = 1;
   coloring_.assign(static_cast<uint32_t>(bodies_.size()), links_);
   batches_.resize(coloring_.batches().size());
   motions_.resize(bodies_.size() + 1);

@@ -163,6 +163,7 @@ class RelaxationSolver {
   void push_joints(uint32_t part, const Range& range);
   void strike(const PatchBatch& batch, uint32_t sweep, FloatLanes impact, Real threshold);
   bool is_struck(uint32_t batch, uint32_t since) const;
+  bool has_lone_patch(uint32_t batch) const;
   void advance(uint32_t body);
   void finish(uint32_t body);
   void report(uint32_t batch);
@@ -174,6 +175,7 @@ class RelaxationSolver {
   RelaxedJoints* joints_ = nullptr;  // may be null
   Real substep_ = 0;
   std::vector<ContactColoring::Link> links_;
+  std::vector<uint8_t> meets_moving_;  // by body: whether it touches another body that contacts move
   ContactColoring coloring_;
   std::vector<PatchBatch> batches_;
   std::vector<BodyMotion> motions_;   // one more than bodies, for unused lanes

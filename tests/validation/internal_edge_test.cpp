@@ -339,6 +339,35 @@ TEST_P(InternalEdges, DoNotStopAStandingRing) {
   EXPECT_NEAR(end.pose.position.y(), 0.4, 1e-3);
 }
 
+// A cone on its side rolls around its apex, so that the line of contact turns over seams of all directions.
+TEST_P(InternalEdges, DoNotStopConesThatRollInCircles) {
+  constexpr Real kRadius = 0.1, kHeight = 0.3;
+  const Real angle = std::atan2(kRadius, kHeight);
+  const Vec3 axis(std::cos(angle), std::sin(angle), 0);  // to the base
+  for (const char* kind : {"plane", "two triangles", "a mesh", "slivers", "T-vertices", "tiles",
+                           "tiles of mesh", "convex parts"})
+    for (const Real step : {1.0 / 240, 1.0 / 60})
+      for (const Real spin : {2.0, 6.0}) {
+        World world(def(step));
+        add_flat_floor(world, kind, 0.8);
+        const Vec3 w(spin, 0, 0), centre = 0.75 * kHeight * axis;
+        const BodyHandle body = world.add_body(
+            {.shape = Cone{kRadius, kHeight},
+             .pose = {Vec3(3.013, 0, 0.137) + kHeight / 2 * axis, Quat::FromTwoVectors(Vec3::UnitY(), -axis)},
+             .velocity = w.cross(centre),
+             .angular_velocity = w,
+             .restitution = 0,
+             .friction = 0.8});
+        Real highest = 0;
+        for (int i = 0; i < 240; ++i) {
+          run(world, 1.0 / 60, step);
+          highest = std::max(highest, world.body(body).centre.y());
+        }
+        EXPECT_NEAR(world.body(body).angular_velocity.norm(), spin, 2e-3 * spin) << kind << ", step " << step;
+        EXPECT_LT(highest, centre.y() + 1e-4) << kind << ", step " << step;
+      }
+}
+
 TEST_P(InternalEdges, DoNotChangeTheStoppingDistance) {
   const Real friction = 0.3, speed = 4, distance = speed * speed / (2 * friction * kFallAcceleration);
   for (const char* floor : {"a mesh", "slivers", "T-vertices", "tiles", "tiles of mesh"}) {

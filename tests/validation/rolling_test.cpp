@@ -185,6 +185,48 @@ TEST_P(MovingContact, TheErrorOfPrecessionIsOfTheSecondOrder) {
   EXPECT_LT(fine, 0.35 * coarse + 1e-4);
 }
 
+/// A cone or frustum that rolls on its side around the point on the ground where its side, continued, ends.
+/// It rotates about the line of contact at any speed: the forces along this line supply the torque.
+struct RollingCone {
+  Real radius, top, height;
+
+  void expect_steady(const WorldDef& def, Real spin) const {
+    const Shape shape = top > 0 ? Shape(Frustum{radius, top, height}) : Shape(Cone{radius, height});
+    const Real whole = height * radius / (radius - top), angle = std::atan2(radius, whole);
+    const Vec3 axis(std::cos(angle), std::sin(angle), 0);  // to the base
+    World w(def);
+    w.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = 0.8});
+    BodyDef cone{.shape = shape,
+                 .pose = {(whole - height / 2) * axis, Quat::FromTwoVectors(Vec3::UnitY(), -axis)},
+                 .angular_velocity = Vec3(spin, 0, 0),
+                 .mass = 1,
+                 .restitution = 0,
+                 .friction = 0.8};
+    {
+      World other{WorldDef{}};
+      cone.velocity = cone.angular_velocity.cross(other.body(other.add_body(cone)).centre);
+    }
+    const BodyHandle body = w.add_body(cone);
+    const Real energy = w.energy().total(), y = w.body(body).centre.y();
+    for (int i = 0; i < 240; ++i) {
+      w.step(1.0 / 60);
+      ASSERT_NEAR(w.body(body).centre.y(), y, 2e-5);
+    }
+    EXPECT_NEAR(w.energy().total(), energy, 1e-3 * energy);
+    EXPECT_NEAR(w.body(body).angular_velocity.norm(), spin, 1e-3 * spin);
+  }
+};
+
+TEST_P(MovingContact, ConesOnTheirSidesRollAroundTheirApex) {
+  const WorldDef def{.max_step = step(), .solver = solver(), .sleep = false};
+  for (const Real spin : {2.0, 6.0})
+    for (const RollingCone& cone :
+         {RollingCone{0.05, 0, 0.3}, {0.1, 0, 0.3}, {0.3, 0, 0.3}, {0.1, 0.05, 0.3}, {0.3, 0.15, 0.3}}) {
+      SCOPED_TRACE(std::to_string(cone.radius) + " " + std::to_string(cone.top));
+      cone.expect_steady(def, spin);
+    }
+}
+
 // Each corner carries the normal force of a pressure that grows linearly in the sliding direction, and its
 // friction opposes its own velocity. Integration by a Runge-Kutta method gives 2.816 m, and 2.718 m without
 // the rotation. The exact solver distributes the load over the four corners differently.
