@@ -4,6 +4,8 @@
 
 #include <Eigen/LU>
 
+#include "sim/articulation/joint_rows.h"
+
 namespace offstage::sim {
 namespace {
 
@@ -53,6 +55,27 @@ Real joint_gap(const Articulation& articulation, Real time) {
     gap = std::max(gap, rows.error.cwiseAbs().maxCoeff());
   }
   return gap;
+}
+
+Real spring_energy(const Joint& joint, Real time) {
+  if (joint.is_broken || joint.is_absent) return 0;
+  const JointDef& def = joint.def;
+  const Motor& motor = def.motor;
+  const bool servo = motor.mode == Motor::Mode::position && motor.stiffness > 0 && def.has_free_coordinate();
+  if (!servo && !(def.stiffness > 0)) return 0;
+  const LinkMotion a = link_motion(joint.a, time), b = link_motion(joint.b, time);
+  const JointFrame on_a = link_frame(joint.a, joint.on_a), on_b = link_frame(joint.b, joint.on_b);
+  const JointPlace place(a, on_a, b, on_b);
+  Real energy = 0;
+  if (def.stiffness > 0) energy += def.stiffness * rotation_vector(place).squaredNorm() / 2;
+  if (servo) {
+    const Real coordinate = counts_turns(joint) ? joint.coordinate : free_row(def, place, joint.length).error;
+    // The effort k d grows until it reaches its limit at the distance d = effort / k, and is constant beyond.
+    const Real missing = std::abs(motor.target(time) - coordinate);
+    const Real yielding = std::min(missing, motor.max_effort / motor.stiffness);
+    energy += motor.stiffness * yielding * (missing - yielding / 2);
+  }
+  return energy;
 }
 
 bool is_held(const Articulation& articulation) {

@@ -19,6 +19,9 @@ CommonMotion common_motion(std::span<Body* const> bodies);
 
 /// Returns the greatest constraint error of an articulation's joints at a time [m], [rad].
 Real joint_gap(const Articulation& articulation, Real time);
+/// Elastic energy of a joint's stiffness and of a position motor with a stiffness, which is a spring whose
+/// effort is limited, at a time [J].
+Real spring_energy(const Joint& joint, Real time);
 /// Whether a joint connects it to the world or to a static or kinematic body.
 bool is_held(const Articulation& articulation);
 /// Whether a joint connects it to a kinematic body, which may do work.

@@ -254,11 +254,7 @@ class RowMaker {
   /// The torque -k theta of a spherical joint at the interval's end, for the rotation vector theta of a
   /// relative to b.
   void add_spring() {
-    const Quat turn(Mat3(end_.axes_b.transpose() * end_.axes_a));
-    const Vec3 half = turn.w() < 0 ? Vec3(-turn.vec()) : Vec3(turn.vec());
-    const Real sine = half.norm();
-    const Vec3 theta =
-        sine > 0 ? Vec3(2 * angle_of(sine, std::abs(turn.w())) / sine * half) : Vec3(Vec3::Zero());
+    const Vec3 theta = rotation_vector(end_);
     for (int i = 0; i < 3; ++i) {
       Direction row = turning(i);
       row.end.error = theta[i];

@@ -285,6 +285,14 @@ JointRow swing_row(JointType type, const JointPlace& p) {
   return row;
 }
 
+Vec3 rotation_vector(const JointPlace& place) {
+  const Quat turn(Mat3(place.axes_b.transpose() * place.axes_a));
+  const Vec3 half = turn.w() < 0 ? Vec3(-turn.vec()) : Vec3(turn.vec());
+  const Real sine = half.norm();
+  if (!(sine > 0)) return Vec3::Zero();
+  return 2 * angle_of(sine, std::abs(turn.w())) / sine * half;
+}
+
 Real angle_of(Real y, Real x) {
   const Real r = std::sqrt(x * x + y * y);
   if (r == 0) return 0;

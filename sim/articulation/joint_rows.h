@@ -82,6 +82,9 @@ JointRow swing_row(JointType type, const JointPlace& place);
 /// Row of the rotation of a relative to b about a world axis.
 JointRow turning_row(const Vec3& axis);
 
+/// Rotation vector of a relative to b, in b's axes [rad].
+Vec3 rotation_vector(const JointPlace& place);
+
 /// The angle of (x, y) from the x axis, in [-pi, pi], with the same bits everywhere.
 Real angle_of(Real y, Real x);
 

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "sim/articulation/joint_energy.h"
 #include "sim/contact/contact_lcp.h"
 #include "sim/dynamics/pair_forces.h"
 #include "sim/world/coupled_system.h"
@@ -547,6 +548,8 @@ Energy World::energy() const {
     const Real stretch = (impl_->position(s.def.a) - impl_->position(s.def.b)).norm() - s.rest_length;
     e.elastic += s.def.stiffness * stretch * stretch / 2;
   });
+  impl_->joints.for_each(
+      [&](auto, const std::unique_ptr<Joint>& joint) { e.elastic += spring_energy(*joint, impl_->now); });
   e.potential += pair_energy(*impl_, impl_->now);
   impl_->cloths.for_each([&](auto, const std::unique_ptr<Cloth>& cloth) {
     if (cloth->absent) return;

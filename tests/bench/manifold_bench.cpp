@@ -12,6 +12,7 @@
 #include "sim/collision/narrow_phase.h"
 #include "sim/core/rotation.h"
 #include "sim/geometry/convex_hull.h"
+#include "sim/geometry/solid_mesh.h"
 
 namespace offstage::sim {
 namespace {
@@ -60,6 +61,10 @@ void cylinders(benchmark::State& state) {
 /// A shape for the narrow phase.
 struct Body {
   explicit Body(const Shape& s) : shape(s), collision({&shape, nullptr}, true) {}
+  explicit Body(const SolidMesh& solid)
+      : shape(MeshShape{}),
+        mesh(std::make_unique<CollisionMesh>(std::vector{solid})),
+        collision({&shape, mesh.get()}, true) {}
   explicit Body(const ConvexPolyhedron& p)
       : shape(MeshShape{}),
         mesh(std::make_unique<CollisionMesh>(p.triangles())),
@@ -84,12 +89,16 @@ ConvexPolyhedron icosahedron() {
   return convex_hull(points);
 }
 
-void query(benchmark::State& state, const Body& a, const Body& b, const std::vector<Pose>& at) {
+/// `keep`: the PairCache is kept from query to query, as the world does; otherwise each query begins without.
+void query(benchmark::State& state, const Body& a, const Body& b, const std::vector<Pose>& at,
+           bool keep = true, DistanceMethod method = DistanceMethod::gjk) {
   PairCache cache;
   std::vector<Manifold> manifolds;
   run_manifolds(state, at, [&](std::size_t k) {
     manifolds.clear();
-    find_manifolds(a.collision, b.collision, at[k], 0.01, cache, DistanceMethod::gjk, manifolds);
+    if (!keep) cache = {};
+    find_manifolds(a.collision, b.collision, at[k], 0.01, cache, method, manifolds);
+    cache.forget_unused();
     return manifolds.empty() ? 0 : manifolds[0].count;
   });
 }
@@ -178,6 +187,26 @@ void query_icosahedron_over_ground(benchmark::State& state) {
   query(state, hedron(), ground(), touching(hedron(), ground(), -1e-4));
 }
 
+/// Arguments: whether the cache is kept, and whether V-Clip is used.
+void pair_cache(benchmark::State& state, const Body& a, const Body& b, const std::vector<Pose>& at) {
+  query(state, a, b, at, state.range(0) != 0,
+        state.range(1) != 0 ? DistanceMethod::vclip : DistanceMethod::gjk);
+}
+void pair_cache_icosahedra(benchmark::State& state) {
+  pair_cache(state, hedron(), hedron(), touching(hedron(), hedron(), 1e-4));
+}
+void pair_cache_icosahedra_hovering(benchmark::State& state) {
+  pair_cache(state, hedron(), hedron(), touching(hedron(), hedron(), -1e-4));
+}
+void pair_cache_icosahedra_tumbling(benchmark::State& state) {
+  pair_cache(state, hedron(), hedron(), tumbling(hedron(), hedron(), 1e-4));
+}
+/// Two rings of 48 parts, one on the other.
+void pair_cache_rings(benchmark::State& state) {
+  static const Body ring(solid_mesh(Torus{0.4, 0.1}));
+  pair_cache(state, ring, ring, touching(ring, ring, 1e-4));
+}
+
 struct Counter : btDiscreteCollisionDetectorInterface::Result {
   void setShapeIdentifiersA(int, int) override {}
   void setShapeIdentifiersB(int, int) override {}
@@ -229,6 +258,10 @@ BENCHMARK(query_icosahedra_hovering);
 BENCHMARK(query_icosahedron_on_ground);
 BENCHMARK(query_icosahedron_tumbling_on_ground);
 BENCHMARK(query_icosahedron_over_ground);
+BENCHMARK(pair_cache_icosahedra)->ArgsProduct({{0, 1}, {0, 1}});
+BENCHMARK(pair_cache_icosahedra_hovering)->ArgsProduct({{0, 1}, {0, 1}});
+BENCHMARK(pair_cache_icosahedra_tumbling)->ArgsProduct({{0, 1}, {0, 1}});
+BENCHMARK(pair_cache_rings)->ArgsProduct({{0, 1}, {0, 1}});
 
 }  // namespace
 }  // namespace offstage::sim

@@ -55,6 +55,17 @@ TEST(Cloths, TopIsUpAndTheFrontTowardsTheViewerWhenTurnedByNinetyDegrees) {
   }
 }
 
+TEST(Cloths, DampingOfTheOtherBendModelIsRefused) {
+  EXPECT_EQ(cloth_errors(R"({"bend_spring_damping": 0.1})"),
+            "/cloths/0/bend_spring_damping: is for the bend_model \"springs\"; \"bend_damping\" damps the "
+            "bending of a plate\n");
+  EXPECT_EQ(cloth_errors(R"({"bend_model": "springs", "bend_damping": 0.1})"),
+            "/cloths/0/bend_damping: is for the bend_model \"plate\"; \"bend_spring_damping\" damps the "
+            "springs between second neighbours\n");
+  EXPECT_EQ(cloth_errors(R"({"bend_model": "springs", "bend_spring_damping": 0.1})"), "");
+  EXPECT_EQ(cloth_errors(R"({"bend_damping": 0.1})"), "");
+}
+
 TEST(Cloths, WhatCannotBeIsRefusedWithWhatCan) {
   EXPECT_EQ(cloth_errors(R"({"fabric": "denin"})"),
             "/cloths/0/fabric: there is no fabric 'denin'; did you mean 'denim'?\n");

@@ -64,6 +64,15 @@ TEST(SceneJoints, InvalidValuesAreRefusedWithTheAllowedOnes) {
             "/articulations/0/end: there is no body 'dor'; did you mean 'door'?\n");
 }
 
+TEST(Articulations, AChainHasEitherAPathOrTwoEnds) {
+  const std::string path = R"("path": [[0, 2, 0], [1, 2, 0], [1, 1, 0]])";
+  EXPECT_EQ(joint_errors(R"("articulations": [{"type": "chain", )" + path + "}]"), "");
+  EXPECT_EQ(joint_errors(R"("articulations": [{"type": "chain", "from": [0, 0.5, 0], )" + path + "}]"),
+            "/articulations/0/path: is in place of \"from\" and \"to\"; remove them\n");
+  EXPECT_EQ(joint_errors(R"("articulations": [{"type": "chain", "path": [[0, 2, 0]]}])"),
+            "/articulations/0/path: needs at least two points\n");
+}
+
 /// Distance by which the tip of a rod along x, of 1 m length, is below its clamp at x = 0, after each frame.
 std::vector<Real> sags_of_rod(int links, const char* solver, Real step, const std::string& rest) {
   const LoadedScene loaded =

@@ -2,7 +2,8 @@
 # Documents name files, tests and pages that exist:  docs.sh SOURCE_DIR
 # - relative links of every Markdown page lead to a file,
 # - a code block below a comment `<!-- file: PATH -->` is the text of that file,
-# - source paths in docs/physics.md exist, and so do the tests and scenes that it and docs/book.md name.
+# - source paths in docs/physics.md exist, and so do the tests, scenes, functions and keys that it, docs/book.md and docs/step.md name,
+# - every row of the sections of docs/book.md names a test or a scene.
 set -euo pipefail
 cd "$1"
 failed=0
@@ -36,4 +37,17 @@ done < <(grep -ohE '`[A-Z][A-Za-z0-9]+\.(\*|[A-Z][A-Za-z0-9]+)`' docs/physics.md
 while read -r name; do
   [ -e "demos/scenes/$name.json" ] || problem "docs/book.md: there is no scene '$name'"
 done < <(grep -oE 'scenes? `[a-z_]+`(, `[a-z_]+`)*' docs/book.md | grep -oE '`[a-z_]+`' | tr -d '`' | sort -u)
+
+# Names of functions, classes, keys and scenes; those of one or two letters are mathematics.
+words=$(grep -rhoE '[A-Za-z_][A-Za-z0-9_]+' sim effects render demos --include='*.h' --include='*.cpp' | sort -u)
+scenes=$(basename -s .json demos/scenes/*.json)
+while read -r name; do
+  problem "docs/physics.md, docs/book.md or docs/step.md: there is no '$name' in the sources"
+done < <(sed -E 's/\$`[^`]*`\$//g' docs/physics.md docs/book.md docs/step.md | grep -oE '`[A-Za-z_][A-Za-z0-9_:]{2,}(\(\))?`' | tr -d '`()' | sed 's/.*:://' |
+  sort -u | grep -vxFf <(printf '%s\n%s\n' "$words" "$scenes"))
+
+while read -r row; do
+  cell=$(sed -E 's/ *\|$//; s/.*\| *//' <<<"$row")
+  grep -qE '`([A-Z][A-Za-z0-9]+\.|[a-z_]+`)' <<<"$cell" || problem "docs/book.md: no test and no scene runs '$row'"
+done < <(sed '/^## Measured/,$d' docs/book.md | grep -E '^\| [0-9A-G]')
 exit $failed

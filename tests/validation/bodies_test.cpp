@@ -452,6 +452,38 @@ TEST(JointStiffness, HoldsABarUp) {
   EXPECT_NEAR(40 * theta / (2 * kWeight * 0.5 * std::cos(theta)), 1, 1e-3);
 }
 
+// A torsion pendulum without damping: its energy goes back and forth between motion and the spring of its
+// joint. Joint springs act at the end of a sub-step, which takes about the share omega^2 h t of the energy;
+// the accuracy of the solver adds an error of the same size.
+TEST(JointStiffness, StoresTheEnergyOfATorsionPendulum) {
+  const Real k = 2, start_speed = 0.5, step = 1.0 / 1000;
+  for (const bool by_motor : {false, true}) {
+    World world({.gravity = Vec3::Zero(), .max_step = step, .sleep = false});
+    const BodyHandle disc = add(world, Cylinder{0.5, 0.1}, {0, 0, 0}, 4);
+    JointDef joint{.name = "wire", .a = disc, .axis = Vec3::UnitY()};
+    if (by_motor) {
+      joint.type = JointType::revolute;
+      joint.motor = {.mode = Motor::Mode::position, .stiffness = k};
+    } else {
+      joint.stiffness = k;
+    }
+    world.add_joint(joint);
+    world.set_velocity(disc, Vec3::Zero(), {0, start_speed, 0});
+    const Real inertia = 4 * 0.5 * 0.5 / 2, first = inertia * start_speed * start_speed / 2;
+    const Real omega2 = k / inertia;
+    Real most_elastic = 0;
+    for (int frame = 1; frame <= 60; ++frame) {
+      world.step(1.0 / 20);
+      const Energy energy = world.energy();
+      most_elastic = std::max(most_elastic, energy.elastic);
+      const Real left = energy.total() / first;
+      EXPECT_GT(left, 0.998 - 2 * omega2 * step * world.time()) << by_motor << " " << frame;
+      EXPECT_LT(left, 1.002) << by_motor << " " << frame;
+    }
+    EXPECT_NEAR(most_elastic / first, 1, 0.02) << by_motor;
+  }
+}
+
 // --- Algorithms ---
 
 // The methods of collision detection give the same stack: a drop of polyhedra onto a floor and each other.

@@ -26,6 +26,16 @@ class ClothChecker : CheckBase {
     for (const ClothPin& pin : cloth.pins) check_body(scope_of(pin).body, scope_of(pin).where);
     for (const ClothCord& cord : cloth.cords) check_body(cord.body, cord.where);
     check_lifetime(path, cloth.appear_at, cloth.remove_at);
+    const FabricChanges& changes = cloth.changes;
+    const bool springs = changes.bend_model.value_or(effects::find_fabric(cloth.fabric)->fabric.bend_model) ==
+                         effects::BendModel::springs;
+    if (changes.bend_spring_damping && !springs)
+      fail(path + "/bend_spring_damping",
+           "is for the bend_model \"springs\"; \"bend_damping\" damps the bending of a plate");
+    if (changes.bend_damping && springs)
+      fail(path + "/bend_damping",
+           "is for the bend_model \"plate\"; \"bend_spring_damping\" damps the springs between second "
+           "neighbours");
     if (const auto* mesh = std::get_if<MeshFile>(&cloth.shape)) {
       const std::string wrong = mesh->file.empty() ? "" : folder_.wrong_file(model_file(mesh->file, folder_));
       if (!wrong.empty()) fail(path + "/shape/file", wrong);

@@ -143,6 +143,8 @@ class JointChecker : CheckBase {
     for (std::size_t i = 1; i < chain.path.size(); ++i)
       if ((chain.path[i] - chain.path[i - 1]).norm() < 1e-6)
         fail(chain.where.path + "/path/" + std::to_string(i), "must differ from the point before it");
+    if (!chain.path.empty() && (chain.from != Chain().from || chain.to != Chain().to))
+      fail(chain.where.path + "/path", "is in place of \"from\" and \"to\"; remove them");
     if (!chain.path.empty() && chain.sag != 1)
       fail(chain.where.path + "/sag", "has no meaning with a \"path\"");
     if (chain.bend_stiffness > 0 && chain.links > kMostElasticLinks)
