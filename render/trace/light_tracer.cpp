@@ -315,7 +315,7 @@ void LightTracer::trace_sparse_sun(const SurfaceBuffer& surfaces, int y, const L
     count = 0;
   };
   for (int x = 0; x < surfaces.width_px; ++x) {
-    if (*light.pixels.filled.at(x, y) == 0 || is_gap(light.pixels, x, y)) continue;
+    if (*light.pixels.filled.at(x, y) == 0 || is_gap(Gaps::half, light.pixels, x, y)) continue;
     columns[count] = x;
     at[count++] = y * surfaces.width_px + x;
     if (count == kLanes) trace_collected();
@@ -362,19 +362,23 @@ IntLanes LightTracer::pixels_of_cells(const SurfaceBuffer& surfaces, int x, int 
 void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
                               LightBuffer& light, LightSums& sums) const {
   const int k = view.offsets.index;
+  IntLanes gaps{};
+  for (int i = 0; view.sparse && i < kLanes; ++i)
+    gaps[i] = x + i >= light.cells.width_px || is_gap(Gaps::three_quarters, light.cells, x + i, y) ? -1 : 0;
+  if (!any(~gaps)) return;
   const Points points(surfaces, pixels_of_cells(surfaces, x, y, view));
   if (!view.sparse) set_guide(points, x, y, view, 2, light.cells);
   const Lanes none{};
   const int shift = view.sparse ? 1 : 0;  // numbers of samples without those of gaps
   Sampler<UintLanes> samplers((UintLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<uint32_t>(x)) >> shift,
-                              UintLanes{} + static_cast<uint32_t>(y), k, view.offsets.count);
+                              UintLanes{} + (static_cast<uint32_t>(y) >> shift), k, view.offsets.count);
   const LaneVectors ways = cosine_direction(points.normal, samplers.next());
   LaneVectors around{none, none, none};
   Lanes inverse_distance{};
   for (int i = 0; i < kLanes; ++i) {
-    if (!points.visible[i] || (view.sparse && is_gap(light.cells, x + i, y))) continue;
+    if (!points.visible[i] || gaps[i]) continue;
     const Point point = points.one(i, view.eye);
-    PixelSampler sampler(static_cast<uint32_t>(x + i) >> shift, static_cast<uint32_t>(y), k,
+    PixelSampler sampler(static_cast<uint32_t>(x + i) >> shift, static_cast<uint32_t>(y) >> shift, k,
                          view.offsets.count);
     sampler.skip(1);
     Vector3f way(ways.x[i], ways.y[i], ways.z[i]);
@@ -393,11 +397,11 @@ void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, const
 // Interpolates the light in the gaps of a sparse picture.
 void LightTracer::fill_sparse(LightBuffer& light) {
   LightPlane* const sun[] = {&light.direct.channels()[0]};
-  fill_gaps(light.pixels, sun);
+  fill_gaps(Gaps::half, light.pixels, sun);
   const std::span<LightPlane> around = light.around.channels();
   LightPlane* const cells[] = {&around[0], &around[1], &around[2], &light.inverse_distance,
                                &light.brightness};
-  fill_gaps(light.cells, cells);
+  fill_gaps(Gaps::three_quarters, light.cells, cells);
 }
 
 // Calls each(y) for all rows in parallel. A request to stop is noticed between the tasks of all threads.
