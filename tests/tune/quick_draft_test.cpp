@@ -49,9 +49,11 @@ struct Drafts {
   render::HdrImage exact, quick;
 };
 
-// Traced light is interpolated for every other pixel. Edges of shadows, one pixel wide, may differ.
+// The light from around is traced for a sixteenth of the pixels, that of the sun for a half of them, so edges
+// of shadows may be wrong by a pixel, and noise differs.
 TEST(EnginesQuickDrafts, LookLikeDraftsOfRender) {
-  const Drafts drafts(R"("materials": [{"name": "tiles", "pattern": "checker"}, {"name": "lamp", "emission": [3, 2, 1]},
+  const Drafts drafts(
+      R"("materials": [{"name": "tiles", "pattern": "checker"}, {"name": "lamp", "emission": [3, 2, 1]},
       {"name": "chrome", "metallic": 1, "roughness": 0.1}, {"name": "rough", "metallic": 1, "roughness": 0.6}],
     "bodies": [{"motion": "static", "shape": {"type": "plane"}, "material": "tiles"},
       {"motion": "static", "position": [-1.2, 0.5, 0], "shape": {"type": "sphere", "radius": 0.5}, "material": "chrome"},
@@ -60,15 +62,17 @@ TEST(EnginesQuickDrafts, LookLikeDraftsOfRender) {
       {"motion": "static", "position": [0, 1.6, -1], "shape": {"type": "sphere", "radius": 0.2}, "material": "lamp"}],
     "lights": [{"type": "sun"}, {"type": "point", "position": [1, 3, 2], "intensity": 10}],
     "environment": {"fog": 0.02}, "camera": {"eye": [0, 1.5, 5], "target": [0, 0.6, 0]})");
-  EXPECT_LT(drafts.mean_difference(), 0.01);
+  EXPECT_LT(drafts.mean_difference(), 0.02);
   EXPECT_LT(drafts.share_of_wrong(), 0.005);
 }
 
 // A line across the pixels' diagonals meets either only pixels with traced light, or only others.
 TEST(EnginesQuickDrafts, LightThinLinesInAnyDirection) {
   for (const double x : {0.0, 0.0125, 0.025, 0.0375, 0.05}) {
-    const Drafts drafts(R"("bodies": [{"motion": "static", "orientation": {"axis": [0, 0, 1], "angle_deg": 45},
-        "position": [)" + std::to_string(x) + R"(, 1, 0], "shape": {"type": "capsule", "radius": 0.008, "height": 3}}],
+    const Drafts drafts(
+        R"("bodies": [{"motion": "static", "orientation": {"axis": [0, 0, 1], "angle_deg": 45},
+        "position": [)" +
+        std::to_string(x) + R"(, 1, 0], "shape": {"type": "capsule", "radius": 0.008, "height": 3}}],
       "lights": [{"type": "sun", "direction": [0, 0.3, 1]}], "camera": {"eye": [0, 1, 4], "target": [0, 1, 0]})");
     EXPECT_LT(drafts.share_of_wrong(), 0.001) << "at " << x;
   }
