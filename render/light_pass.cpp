@@ -11,6 +11,8 @@ namespace {
 constexpr GLuint kArrivingUnit = 8, kLampsUnit = 10, kMirroredUnit = 18, kHighlightsUnit = 19;
 // Of shaders/glass.glsl.
 constexpr GLuint kThroughGlassUnit = 20, kMirroredByGlassUnit = 21;
+// Of shaders/plain.frag.
+constexpr GLuint kPlacesUnit = 25, kNormalsUnit = 26, kColorsUnit = 27;
 
 void write_texture(const gl::Texture& texture, GLuint unit, const Eigen::AlignedBox2i& area_px,
                    const std::vector<Vector4f>& values) {
@@ -26,29 +28,42 @@ void clear_surfaces(GLuint framebuffer) {
   glClearNamedFramebufferfv(framebuffer, GL_COLOR, 1, flat.data());
 }
 
-void write_to_both(GLuint framebuffer, const gl::Texture& normals) {
+/// `colors`: 0 if the colours of surfaces are not written.
+void write_to_all(GLuint framebuffer, const gl::Texture& normals, GLuint colors) {
   glNamedFramebufferTexture(framebuffer, GL_COLOR_ATTACHMENT1, normals, 0);
-  const std::array<GLenum, 2> both = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
-  glNamedFramebufferDrawBuffers(framebuffer, 2, both.data());
+  if (colors != 0) glNamedFramebufferTexture(framebuffer, GL_COLOR_ATTACHMENT2, colors, 0);
+  const std::array<GLenum, 3> all = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_COLOR_ATTACHMENT2};
+  glNamedFramebufferDrawBuffers(framebuffer, colors != 0 ? 3 : 2, all.data());
 }
 
 }  // namespace
 
-LightPass::LightPass(int width_px, int height_px, const gl::Texture& depth)
+LightPass::LightPass(int width_px, int height_px, const gl::Texture& depth, bool quick)
     : all_px_(Eigen::Vector2i(0, 0), Eigen::Vector2i(width_px, height_px)),
       light_(width_px, height_px),
+      quick_(quick),
       places_(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)),
       normals_(gl::make_target(GL_RGBA16, width_px, height_px, GL_NEAREST)),
       framebuffer_(gl::make_framebuffer(places_, depth)),
       arriving_(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)),
       mirrored_(gl::make_target(GL_RGBA32F, width_px, height_px, GL_NEAREST)) {
-  write_to_both(framebuffer_, normals_);
+  if (quick_) colors_ = gl::make_target(GL_RGBA16, width_px, height_px, GL_NEAREST);
+  write_to_all(framebuffer_, normals_, colors_);
 }
 
 void LightPass::begin() const {
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
   glViewport(0, 0, all_px_.sizes().x(), all_px_.sizes().y());
   clear_surfaces(framebuffer_);
+  if (!quick_) return;
+  const std::array<float, 4> not_plain = {0, 0, 0, 0};
+  glClearNamedFramebufferfv(framebuffer_, GL_COLOR, 2, not_plain.data());
+}
+
+void LightPass::bind_surfaces() const {
+  glBindTextureUnit(kPlacesUnit, places_);
+  glBindTextureUnit(kNormalsUnit, normals_);
+  glBindTextureUnit(kColorsUnit, colors_);
 }
 
 void LightPass::read_surfaces(const Eigen::AlignedBox2i& area_px, SurfaceBuffer& surfaces) const {
@@ -70,7 +85,7 @@ void LightPass::read_surfaces(const Eigen::AlignedBox2i& area_px, SurfaceBuffer&
 
 LightView LightPass::light_view(const View& view, const SampleOffsets& offsets) const {
   return {view.eye, view.clip_from_world, 2 * view.tan_half.y() / static_cast<float>(all_px_.sizes().y()),
-          offsets};
+          offsets, quick_};
 }
 
 void LightPass::write_lamps(const Eigen::AlignedBox2i& area_px, const std::vector<Vector4f>& lamps,
@@ -110,7 +125,7 @@ bool LightPass::begin_part(GLuint depth, const Eigen::AlignedBox2i& area_px) {
   if (part_framebuffer_ == 0) {
     part_depth_ = gl::make_target(GL_DEPTH_COMPONENT32F, width, height, GL_NEAREST);
     part_framebuffer_ = gl::make_framebuffer(places_, part_depth_);
-    write_to_both(part_framebuffer_, normals_);
+    write_to_all(part_framebuffer_, normals_, 0);
   }
   const int x = part_px_.min().x(), y = part_px_.min().y(), w = part_px_.sizes().x(),
             h = part_px_.sizes().y();

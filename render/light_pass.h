@@ -15,7 +15,8 @@ struct View;
 class LightPass {
  public:
   /// `depth`: the picture's depth, in which the visible surfaces were drawn.
-  LightPass(int width_px, int height_px, const gl::Texture& depth);
+  /// `quick`: see StageDef.
+  LightPass(int width_px, int height_px, const gl::Texture& depth, bool quick);
   /// The scene that rays meet, to be filled and built before trace().
   RayScene& scene() { return scene_; }
   const RayScene& scene() const { return scene_; }
@@ -26,6 +27,8 @@ class LightPass {
   /// Reads the surfaces, traces their light, and binds it for the shaders. `stop`: see Stage::draw.
   void trace(const LightSources& sources, const View& view, const SampleOffsets& offsets,
              const StopTest& stop);
+  /// After trace() of a quick picture: binds the surfaces for shaders/plain.frag.
+  void bind_surfaces() const;
   /// After trace(): binds the targets for drawing the surfaces of glass, or of a translucent body, in a part
   /// of the picture. `depth`: the picture's, which hides them behind nearer surfaces. Returns false if no
   /// pixel of the area is in the picture.
@@ -49,7 +52,9 @@ class LightPass {
   LightSums sums_;
   SurfaceBuffer surfaces_;
   LightBuffer light_;
+  bool quick_;
   gl::Texture places_, normals_;
+  gl::Texture colors_;  ///< of quick pictures
   gl::Framebuffer framebuffer_;
   gl::Texture arriving_, mirrored_;
   bool mirrored_is_filled_ = true;  ///< with anything but zeros

@@ -179,6 +179,8 @@ GpuMaterial make_gpu_material(const Material& material, std::span<const Image> t
                    (material.color.w() < 1 || material.vertex_alpha || (base != nullptr && has_alpha(*base)));
   result.thin = material.thin;
   result.glass = material.transmission > 0 && !result.blended;
+  result.plain = material.pattern == Pattern::none && !result.detailed && !result.blended && !result.glass &&
+                 material.emission.isZero();
   result.smooth = material.roughness < kSmooth || material.metallic > 0.5f;
   return result;
 }
@@ -192,7 +194,7 @@ bool Instance::is_ball() const {
   return mesh->round && sides.minCoeff() > 0.999f * sides.maxCoeff();
 }
 
-MeshPass::MeshPass() : white_(make_white_texture()) {
+MeshPass::MeshPass(bool quick) : quick_(quick), white_(make_white_texture()) {
   // Values for meshes without these attributes.
   glVertexAttrib4f(kColor, 1, 1, 1, 1);
   glVertexAttrib4f(kTangent, 0, 0, 0, 1);
@@ -258,13 +260,15 @@ gl::LazyProgram& MeshPass::surface_program(const Batch& batch, Shading shading) 
   // The relief of a pattern is visible only in mirror images; without them its surface is quick to draw.
   const bool surface = shading == Shading::surface;
   const Pattern pattern = surface && !material.smooth ? Pattern::none : material.pattern;
+  const bool plain = surface && is_plain(batch);
   const auto key = std::make_tuple(pattern, material.textured, material.detailed, material.triplanar,
-                                   material.glass, batch.mesh->endless, shading, features_);
+                                   material.glass, batch.mesh->endless, plain, shading, features_);
   const auto found = surface_programs_.find(key);
   if (found != surface_programs_.end()) return found->second;
   std::vector<std::string> defines = features_;
   defines.push_back("FLAT 1");
   if (surface) defines.push_back("SURFACE 1");
+  if (plain) defines.push_back("PLAIN 1");
   std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "light.glsl", "material.glsl",
                                             surface ? "surface.glsl" : "traced.glsl"};
   if (material.textured) defines.push_back("TEXTURED 1");
@@ -300,7 +304,8 @@ void MeshPass::draw_batch(const Batch& batch, Shading shading, float min_alpha) 
 
 void MeshPass::draw_opaque(Shading shading) {
   constexpr float kOpaqueAlpha = 0.99f;
-  for (const Batch& batch : opaque_) draw_batch(batch, shading, kOpaqueAlpha);
+  for (const Batch& batch : opaque_)
+    if (shading == Shading::surface || !is_plain(batch)) draw_batch(batch, shading, kOpaqueAlpha);
   for (const Batch& batch : translucent_) {
     if (batch.material->blended && batch.material->textured) draw_batch(batch, shading, kOpaqueAlpha);
   }

@@ -66,6 +66,7 @@ struct GpuMaterial {
   bool blended = false;
   bool glass = false;                       ///< light goes through and is refracted
   bool smooth = false;                      ///< mirrors the scene
+  bool plain = false;                       ///< fully described by one colour, roughness and share of metal
   std::unique_ptr<const RayMaterial> rays;  ///< the same for light rays
 
   /// Whether objects behind the surface are visible through it.
@@ -97,12 +98,13 @@ struct Instance {
 
 class MeshPass {
  public:
-  MeshPass();
+  /// `quick`: plain surfaces are not drawn in their light; see Shading::traced and shaders/plain.frag.
+  explicit MeshPass(bool quick);
   /// Sorts the visible instances for this view. The instances must stay in memory until the view is drawn.
   void prepare(std::span<const Instance* const> instances, const View& view, const Features& features);
   enum class Shading {
-    surface,                ///< writes surfaces for the tracer of light
-    traced,                 ///< in the light that was traced
+    surface,  ///< writes surfaces for the tracer of light
+    traced,   ///< in the light that was traced; in quick pictures, only those that are not plain
     traced_with_particles,  ///< the same; glass also shows particles behind it
   };
   /// Draws the opaque instances, and the opaque parts of blended ones.
@@ -128,14 +130,17 @@ class MeshPass {
     float thickness;  ///< thickness of its first instance, in the world
   };
   void draw(const Batch& batch);
+  /// Whether the surface pass writes all that its colour depends on.
+  bool is_plain(const Batch& batch) const { return quick_ && batch.material->plain && !batch.mesh->endless; }
   gl::LazyProgram& surface_program(const Batch& batch, Shading shading);
   static void set_facing(const Batch& batch);
   void draw_batch(const Batch& batch, Shading shading, float min_alpha);
 
-  /// Keyed by textured, detailed, triplanar, glass, endless.
-  std::map<std::tuple<Pattern, bool, bool, bool, bool, bool, Shading, Features>, gl::LazyProgram>
+  /// Keyed by textured, detailed, triplanar, glass, endless, plain.
+  std::map<std::tuple<Pattern, bool, bool, bool, bool, bool, bool, Shading, Features>, gl::LazyProgram>
       surface_programs_;
   gl::LazyProgram depth_program_{{"frame.glsl", "mesh.vert"}, {}, {"DEPTH 1"}};
+  bool quick_;
   Features features_;
   gl::Texture white_;
   gl::StreamBuffer rows_;

@@ -106,7 +106,7 @@ struct Stage::Impl {
   SurfaceProbe surface_probe;
   LinesPass lines_pass;
   std::optional<ChannelsPass> channels_pass;  ///< created on first use
-  std::map<Features, gl::LazyProgram> sky_programs;
+  std::map<Features, gl::LazyProgram> sky_programs, plain_programs;
   gl::VertexArray no_attributes = gl::make_vertex_array();
   gl::StreamBuffer frame_buffer;
   std::vector<float> strip;
@@ -114,7 +114,8 @@ struct Stage::Impl {
   explicit Impl(const StageDef& stage_def)
       : def(stage_def),
         picture(def.width_px, def.height_px),
-        light_pass(def.width_px, def.height_px, picture.depth),
+        light_pass(def.width_px, def.height_px, picture.depth, def.quick),
+        mesh_pass(def.quick),
         puffs_pass(def.width_px, def.height_px),
         streaks_pass(def.width_px, def.height_px),
         surface_probe(def.width_px, def.height_px),
@@ -129,6 +130,7 @@ struct Stage::Impl {
   }
   void prepare_sky();
   void draw_sky();
+  void draw_plain();
   std::vector<PointSet*> prepare_points(const View& view);
   std::vector<const Cloth*> prepare_cloths();
   void prepare_lamps(std::span<PointSet* const> sets);
@@ -176,6 +178,21 @@ void Stage::Impl::draw_sky() {
   const std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "noise.glsl", "sky.frag"};
   sky_programs.try_emplace(defines, vertex, fragment, defines).first->second.use();
   glDepthFunc(GL_EQUAL);
+  glBindVertexArray(no_attributes);
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+}
+
+// The plain surfaces of a quick picture.
+void Stage::Impl::draw_plain() {
+  Features defines = features;
+  defines.push_back("FLAT 1");
+  const std::vector<std::string_view> vertex = {"frame.glsl", "sky.vert"};
+  const std::vector<std::string_view> fragment = {"frame.glsl", "sky.glsl", "light.glsl", "traced.glsl",
+                                                  "plain.frag"};
+  plain_programs.try_emplace(defines, vertex, fragment, defines).first->second.use();
+  light_pass.bind_surfaces();
+  glDisable(GL_CULL_FACE);
+  glDepthFunc(GL_ALWAYS);
   glBindVertexArray(no_attributes);
   glDrawArrays(GL_TRIANGLES, 0, 3);
 }
@@ -290,8 +307,9 @@ void Stage::Impl::trace_glass(const View& view, const SampleOffsets& offsets) {
 void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets) {
   glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
   glViewport(0, 0, def.width_px, def.height_px);
-  glDepthFunc(GL_GEQUAL);  // over themselves
   glDepthMask(GL_FALSE);
+  if (def.quick) draw_plain();
+  glDepthFunc(GL_GEQUAL);  // over themselves
   for (const Cloth* cloth : sheets)
     if (!cloth->is_translucent()) cloth_pass.draw(*cloth, features);
   mesh_pass.draw_opaque(MeshPass::Shading::traced);

@@ -167,6 +167,9 @@ struct LightSums {
 
 struct StageDef {
   int width_px = 1280, height_px = 720;
+  /// Less exact pictures in less time, for looking at a scene while it is edited: the light of the sun and
+  /// from around is traced for a part of the pixels, and interpolated for those in between.
+  bool quick = false;
 };
 
 class Stage {

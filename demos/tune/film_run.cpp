@@ -164,7 +164,7 @@ double FilmRun::lead_in_time() const {
 }
 
 producer::Picture& FilmRun::draft_picture() {
-  if (!picture_) picture_.emplace(scene_, *models_, workshop_.context);
+  if (!picture_) picture_.emplace(scene_, *models_, workshop_.context, true);
   return *picture_;
 }
 

@@ -143,6 +143,9 @@ void main() {
 #ifdef SURFACE
   float mirror = s.metallic > 0.5 ? 10.0 : s.roughness < 0.3 ? 2.0 : 0.0;
   write_surface(position, n, cross(dFdx(position), dFdy(position)), view, s.roughness + mirror);
+#ifdef PLAIN
+  surface_color = vec4(s.albedo, 0.5 + 0.5 * s.metallic);
+#endif
 #else
 #ifdef ENDLESS
   vec4 fog = fog_to(position, horizon_haze(smooth_normal, view));

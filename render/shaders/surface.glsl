@@ -1,6 +1,7 @@
 // Writes a visible surface for the tracer of light, in place of its colour.
 layout(location = 0) out vec4 surface_place;    // position; w: roughness, + 2 if it mirrors, + 4 on cloth, + 8 if it is metal
 layout(location = 1) out vec4 surface_normals;  // smooth normal, normal of the triangle
+layout(location = 2) out vec4 surface_color;    // in quick pictures alone; see plain.frag
 
 vec2 octahedral(vec3 n) {
   n /= abs(n.x) + abs(n.y) + abs(n.z);
@@ -15,4 +16,5 @@ void write_surface(vec3 place, vec3 n, vec3 face, vec3 view, float kind) {
   face = size > 1e-30 ? face * inversesqrt(size) : n;
   surface_place = vec4(place, kind);
   surface_normals = vec4(octahedral(n), octahedral(face));
+  surface_color = vec4(0.0);
 }

@@ -236,6 +236,68 @@ void LightValues::average(const LightGuide& guide, const LightPlane& filled, con
 
 namespace {
 
+using Neighbours = std::array<std::array<int, 2>, 4>;
+constexpr Neighbours kBeside = {{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
+constexpr Neighbours kDiagonal = {{{-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
+
+bool has_any(const LightGuide& guide, int x, int y, const Neighbours& neighbours) {
+  return std::ranges::any_of(neighbours, [&](const auto& way) {
+    const int row = y + way[1];
+    return row >= 0 && row<guide.height_px&& * guide.filled.at(x + way[0], row)> 0;
+  });
+}
+
+/// Fills every other pixel of a row, from the first one on.
+void fill_row(const LightGuide& guide, int first, int y, const Neighbours& neighbours,
+              std::span<LightPlane* const> planes) {
+  constexpr float kLeast = 0.01f;  // weight of a pixel of another surface
+  for (int x = 0; x < guide.width_px; x += kLanes) {
+    const LaneVectors p = lanes_of(guide.place, x, y), n = lanes_of(guide.normal, x, y);
+    const Lanes size2 = guide.inverse_size2.lanes(x, y);
+    std::array<Lanes, 4> weights;
+    Lanes sum{};
+    for (std::size_t k = 0; k < 4; ++k) {
+      const int there = x + neighbours[k][0], row = y + neighbours[k][1];
+      weights[k] = Lanes{};
+      if (row < 0 || row >= guide.height_px) continue;
+      const Lanes off = dot(lanes_of(guide.place, there, row) - p, n);
+      const Lanes facing = larger(dot(n, lanes_of(guide.normal, there, row)), Lanes{});
+      const Lanes f2 = facing * facing, apart = 1 + off * off * size2;
+      weights[k] = guide.filled.lanes(there, row) * (f2 * f2 / (apart * apart) + kLeast);
+      sum += weights[k];
+    }
+    const Lanes scale = 1 / larger(sum, Lanes{} + 1e-20f);
+    for (LightPlane* plane : planes) {
+      Lanes mean{};
+      for (std::size_t k = 0; k < 4; ++k)
+        if (const int row = y + neighbours[k][1]; row >= 0 && row < guide.height_px)
+          mean += weights[k] * plane->lanes(x + neighbours[k][0], row);
+      mean *= scale;
+      for (int i = first; i < kLanes; i += 2)
+        if (sum[i] > 0) *plane->at(x + i, y) = mean[i];
+    }
+  }
+}
+
+}  // namespace
+
+// The gaps of three quarters of the pixels are filled in two steps: first those in both odd rows and odd
+// columns.
+bool is_gap(Gaps gaps, const LightGuide& guide, int x, int y) {
+  if (((x ^ y) & 1) != 0) return has_any(guide, x, y, kBeside);
+  return gaps == Gaps::three_quarters && (x & 1) != 0 && has_any(guide, x, y, kDiagonal);
+}
+
+void fill_gaps(Gaps gaps, const LightGuide& guide, std::span<LightPlane* const> planes) {
+  if (gaps == Gaps::three_quarters)
+    for_filter_rows(guide.height_px / 2, [&](int k) { fill_row(guide, 1, 2 * k + 1, kDiagonal, planes); });
+  // Two sets of rows, since each reads those beside it.
+  for (const int first : {0, 1})
+    for_filter_rows((guide.height_px - first + 1) / 2,
+                    [&](int k) { fill_row(guide, 1 - first, first + 2 * k, kBeside, planes); });
+}
+namespace {
+
 /// The pixels 2c and 2c + 1 of 16 pixels, for eight columns c.
 Lanes even_pixels(const float* pixels) {
   Lanes a, b;

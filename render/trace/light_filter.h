@@ -78,6 +78,16 @@ class LightValues {
   std::vector<float> even_;  ///< by run of pixels and channel: the value if all are equal, else not a number
 };
 
+/// The pixels whose light a sparse picture leaves out.
+enum class Gaps {
+  half,            ///< every other one, as on a chessboard
+  three_quarters,  ///< all in odd rows and columns
+};
+/// Whether a pixel is one of them. Those without a visible neighbour to take their light from are not.
+bool is_gap(Gaps gaps, const LightGuide& guide, int x, int y);
+/// Sets the values of gaps to means of four neighbours, above all of those with a similar place and normal.
+void fill_gaps(Gaps gaps, const LightGuide& guide, std::span<LightPlane* const> planes);
+
 /// Values at half the size, and where they are present.
 struct CoarseValues {
   const LightValues* values;

@@ -279,15 +279,9 @@ void LightTracer::set_guide(const Points& points, int x, int y, const LightView&
   store(guide.normal, x, y, points.normal);
 }
 
-// The light of sun and lamps at eight pixels of a row.
-void LightTracer::trace_pixels(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
-                               LightBuffer& light) const {
-  const Points points(surfaces, pixels_of_row(surfaces, x, y));
-  set_guide(points, x, y, view, 1, light.pixels);
-  const UintLanes columns = UintLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<uint32_t>(x);
-  Sampler<UintLanes> sampler(columns, UintLanes{} + static_cast<uint32_t>(y), view.offsets.index,
-                             view.offsets.count);
-  const SquarePoint<Lanes> on_sun = sampler.next();
+// The visible share of the sun at eight pixels.
+Lanes LightTracer::sun_at(const Points& points, const SquarePoint<Lanes>& on_sun,
+                          const LightView& view) const {
   const LaneVectors to_sun = all_lanes(sources_.sky.sun_direction);
   const Lanes towards_sun = dot(points.normal, to_sun);
   IntLanes sunny = points.visible & (towards_sun > 0.0f);
@@ -302,7 +296,44 @@ void LightTracer::trace_pixels(const SurfaceBuffer& surfaces, int x, int y, cons
   }
   if (sources_.sun.intensity <= 0) sunny = IntLanes{};
   lift(points, sunny & ~points.cloth & (dot(points.face, to_sun) < kGrazing), view, place);
-  light.direct.channels()[0].set_lanes(x, y, sun_visibility(place, sunny, on_sun));
+  return sun_visibility(place, sunny, on_sun);
+}
+
+// The visible share of the sun at a row of a sparse picture, except in its gaps.
+void LightTracer::trace_sparse_sun(const SurfaceBuffer& surfaces, int y, const LightView& view,
+                                   LightBuffer& light) const {
+  LightPlane& sun = light.direct.channels()[0];
+  IntLanes at = IntLanes{} - 1, columns{};
+  int count = 0;
+  const auto trace_collected = [&] {
+    Sampler<UintLanes> sampler(reinterpret_cast<UintLanes>(columns) >> 1,
+                               UintLanes{} + static_cast<uint32_t>(y), view.offsets.index,
+                               view.offsets.count);
+    const Lanes shares = sun_at(Points(surfaces, at), sampler.next(), view);
+    for (int i = 0; i < count; ++i) *sun.at(columns[i], y) = shares[i];
+    at = IntLanes{} - 1;
+    count = 0;
+  };
+  for (int x = 0; x < surfaces.width_px; ++x) {
+    if (*light.pixels.filled.at(x, y) == 0 || is_gap(Gaps::half, light.pixels, x, y)) continue;
+    columns[count] = x;
+    at[count++] = y * surfaces.width_px + x;
+    if (count == kLanes) trace_collected();
+  }
+  if (count > 0) trace_collected();
+}
+
+// The light of sun and lamps at eight pixels of a row.
+void LightTracer::trace_pixels(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
+                               LightBuffer& light) const {
+  const Points points(surfaces, pixels_of_row(surfaces, x, y));
+  set_guide(points, x, y, view, 1, light.pixels);
+  if (view.sparse && sources_.glow.empty() && sources_.lamps.empty()) return;
+  const UintLanes columns = UintLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<uint32_t>(x);
+  Sampler<UintLanes> sampler(columns, UintLanes{} + static_cast<uint32_t>(y), view.offsets.index,
+                             view.offsets.count);
+  const SquarePoint<Lanes> on_sun = sampler.next();
+  if (!view.sparse) light.direct.channels()[0].set_lanes(x, y, sun_at(points, on_sun, view));
   if (!sources_.glow.empty()) store(light.glow.channels(), x, y, trace_glow(points, x, y, view));
   if (sources_.lamps.empty()) return;
   const LampLight lamps = trace_lamps(points, view, sampler);
@@ -331,18 +362,24 @@ IntLanes LightTracer::pixels_of_cells(const SurfaceBuffer& surfaces, int x, int 
 void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
                               LightBuffer& light, LightSums& sums) const {
   const int k = view.offsets.index;
+  IntLanes gaps{};
+  for (int i = 0; view.sparse && i < kLanes; ++i)
+    gaps[i] = x + i >= light.cells.width_px || is_gap(Gaps::three_quarters, light.cells, x + i, y) ? -1 : 0;
+  if (!any(~gaps)) return;
   const Points points(surfaces, pixels_of_cells(surfaces, x, y, view));
-  set_guide(points, x, y, view, 2, light.cells);
+  if (!view.sparse) set_guide(points, x, y, view, 2, light.cells);
   const Lanes none{};
-  Sampler<UintLanes> samplers(UintLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<uint32_t>(x),
-                              UintLanes{} + static_cast<uint32_t>(y), k, view.offsets.count);
+  const int shift = view.sparse ? 1 : 0;  // numbers of samples without those of gaps
+  Sampler<UintLanes> samplers((UintLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<uint32_t>(x)) >> shift,
+                              UintLanes{} + (static_cast<uint32_t>(y) >> shift), k, view.offsets.count);
   const LaneVectors ways = cosine_direction(points.normal, samplers.next());
   LaneVectors around{none, none, none};
   Lanes inverse_distance{};
   for (int i = 0; i < kLanes; ++i) {
-    if (!points.visible[i]) continue;
+    if (!points.visible[i] || gaps[i]) continue;
     const Point point = points.one(i, view.eye);
-    PixelSampler sampler(static_cast<uint32_t>(x + i), static_cast<uint32_t>(y), k, view.offsets.count);
+    PixelSampler sampler(static_cast<uint32_t>(x + i) >> shift, static_cast<uint32_t>(y) >> shift, k,
+                         view.offsets.count);
     sampler.skip(1);
     Vector3f way(ways.x[i], ways.y[i], ways.z[i]);
     if (way.dot(point.face) <= 0) way = reflected(way, point.face);
@@ -355,6 +392,16 @@ void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, const
   store(light.around.channels(), x, y, around);
   light.inverse_distance.set_lanes(x, y, inverse_distance);
   light.brightness.set_lanes(x, y, around.x + around.y + around.z);
+}
+
+// Interpolates the light in the gaps of a sparse picture.
+void LightTracer::fill_sparse(LightBuffer& light) {
+  LightPlane* const sun[] = {&light.direct.channels()[0]};
+  fill_gaps(Gaps::half, light.pixels, sun);
+  const std::span<LightPlane> around = light.around.channels();
+  LightPlane* const cells[] = {&around[0], &around[1], &around[2], &light.inverse_distance,
+                               &light.brightness};
+  fill_gaps(Gaps::three_quarters, light.cells, cells);
 }
 
 // Calls each(y) for all rows in parallel. A request to stop is noticed between the tasks of all threads.
@@ -403,9 +450,17 @@ void LightTracer::trace_arriving(const SurfaceBuffer& surfaces, const LightView&
   for_rows(height, [&](int y) {
     for (int x = 0; x < width; x += kLanes) trace_pixels(surfaces, x, y, view, light);
   });
+  if (view.sparse) {
+    for_rows(light.cells.height_px, [&](int y) {
+      for (int x = 0; x < light.cells.width_px; x += kLanes)
+        set_guide(Points(surfaces, pixels_of_cells(surfaces, x, y, view)), x, y, view, 2, light.cells);
+    });
+    for_rows(height, [&](int y) { trace_sparse_sun(surfaces, y, view, light); });
+  }
   light.sums = sum_over_rows(light.cells.height_px, [&](int y, LightSums& sums) {
     for (int x = 0; x < light.cells.width_px; x += kLanes) trace_cells(surfaces, x, y, view, light, sums);
   });
+  if (view.sparse) fill_sparse(light);
   light.direct.average(light.pixels, light.pixels.filled, nullptr, 1);
   if (glows) light.glow.average(light.pixels, light.pixels.filled, nullptr, 1);
   light.cells.find_reach(light.inverse_distance, light.brightness, light.reach2, light.noisy_reach2);

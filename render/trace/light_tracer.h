@@ -62,6 +62,7 @@ struct LightView {
   Eigen::Matrix4f clip_from_world;
   float pixel_m;  ///< width of a pixel at distance 1
   SampleOffsets offsets;
+  bool sparse = false;  ///< the light of most pixels is interpolated; see Gaps
 };
 
 /// Light of the visible surfaces, for rays that meet them again: it has no noise and costs no further rays.
@@ -131,6 +132,10 @@ class LightTracer {
   LampLight trace_lamps(const Points& points, const LightView& view, Sampler<UintLanes>& sampler) const;
   void trace_pixels(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
                     LightBuffer& light) const;
+  Lanes sun_at(const Points& points, const SquarePoint<Lanes>& on_sun, const LightView& view) const;
+  void trace_sparse_sun(const SurfaceBuffer& surfaces, int y, const LightView& view,
+                        LightBuffer& light) const;
+  static void fill_sparse(LightBuffer& light);
   static IntLanes pixels_of_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view);
   void trace_arriving(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
   void for_rows(int height, const auto& each) const;

@@ -48,10 +48,11 @@ Affine3f into_unit_ball(const std::vector<std::pair<render::Mesh, Affine3f>>& me
 
 }  // namespace
 
-Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context& context)
+Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context& context, bool quick)
     : scene_(scene),
       library_(models),
-      stage_(context, {.width_px = scene.render.size.x(), .height_px = scene.render.size.y()}),
+      stage_(context,
+             {.width_px = scene.render.size.x(), .height_px = scene.render.size.y(), .quick = quick}),
       camera_(scene, models) {
   const ObjectTable objects(scene);
   places_ = BodyPlaces(objects);

@@ -26,7 +26,8 @@ namespace offstage::producer {
 class Picture {
  public:
   /// The context must be current on this thread and outlive the picture.
-  Picture(const Scene& scene, const ModelLibrary& models, render::Context& context);
+  /// `quick`: see render::StageDef.
+  Picture(const Scene& scene, const ModelLibrary& models, render::Context& context, bool quick = false);
 
   /// Draws the frame at `current`. The shutter is open during the last part of the interval from `previous`,
   /// the frame before it (or the same snapshot for the first frame, which has no motion blur). The camera is

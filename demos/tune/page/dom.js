@@ -64,6 +64,24 @@ export function oncePerFrame(f) {
   };
 }
 
+/** Calls f at once, but then only once in `ms`; the last call is never lost. For what follows the arriving frames. */
+export function atMostEvery(ms, f) {
+  let last = -ms, waiting = 0;
+  const run = () => { clearTimeout(waiting); waiting = 0; last = performance.now(); f(); };
+  return () => {
+    if (waiting) return;
+    const rest = last + ms - performance.now();
+    rest <= 0 ? run() : waiting = setTimeout(run, rest);
+  };
+}
+
+/** Sets the size of a canvas to that of its box, in pixels of the screen. A canvas of this size already is only cleared. */
+export function fitCanvas(canvas, box) {
+  const ratio = devicePixelRatio || 1, width = Math.floor(box.width * ratio), height = Math.floor(box.height * ratio);
+  if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
+  else canvas.getContext('2d').clearRect(0, 0, width, height);
+}
+
 /** Follows a drag that began with a pointerdown event: calls move(event, dx, dy) and finally end(). */
 export function drag(event, move, end = () => {}) {
   const target = event.currentTarget, x = event.clientX, y = event.clientY;

@@ -1,6 +1,6 @@
 // Plots of figures over the film's time, and facts about the run.
 
-import {byId, el, clamp, oncePerFrame, toast} from './dom.js';
+import {byId, el, clamp, oncePerFrame, atMostEvery, fitCanvas, toast} from './dom.js';
 import {find} from './jsonc.js';
 import {store, on, emit, get, setValue, frameCount, timeOf, isWriter} from './store.js';
 import {seek} from './viewer.js';
@@ -37,8 +37,7 @@ const draw = oncePerFrame(() => {
   for (const {plot, canvas, value} of boxes) {
     const size = canvas.getBoundingClientRect();
     if (!size.width) continue;
-    canvas.width = size.width * ratio;
-    canvas.height = size.height * ratio;
+    fitCanvas(canvas, size);
     const pen = canvas.getContext('2d'), w = canvas.width, h = canvas.height;
     const series = plot.lines.map(l => store.figures.map(f => f && l.of(f)));
     const all = series.flat().filter(Number.isFinite);
@@ -121,7 +120,8 @@ async function showStatistics(anchor) {
 }
 
 const redraw = oncePerFrame(() => { draw(); drawFacts(); });
-on('figures playhead film document', redraw);
+on('playhead film document', redraw);
+on('figures', atMostEvery(300, redraw));
 new ResizeObserver(draw).observe(byId('plots'));
 matchMedia('(prefers-color-scheme: dark)').addEventListener('change', draw);
 

@@ -1,6 +1,6 @@
 // The time bar below the film: available frames and the playhead.
 
-import {byId, clamp, drag, oncePerFrame} from './dom.js';
+import {byId, clamp, drag, oncePerFrame, atMostEvery, fitCanvas} from './dom.js';
 import {store, on, frameCount} from './store.js';
 import {availability, seek} from './viewer.js';
 
@@ -8,8 +8,7 @@ const bar = byId('scrub'), canvas = byId('scrub-canvas'), pen = canvas.getContex
 
 const draw = oncePerFrame(() => {
   const box = bar.getBoundingClientRect(), ratio = devicePixelRatio || 1, style = getComputedStyle(document.documentElement);
-  canvas.width = box.width * ratio;
-  canvas.height = box.height * ratio;
+  fitCanvas(canvas, box);
   const w = canvas.width, h = canvas.height, n = frameCount(), have = availability(), colour = name => style.getPropertyValue(name);
   pen.fillStyle = colour('--track');
   pen.fillRect(0, h * 0.35, w, h * 0.3);
@@ -39,6 +38,7 @@ bar.addEventListener('pointerdown', event => {
   drag(event, at);
 });
 
-on('playhead frame document', draw);
+on('playhead document', draw);
+on('frame', atMostEvery(300, draw));
 new ResizeObserver(draw).observe(bar);
 matchMedia('(prefers-color-scheme: dark)').addEventListener('change', draw);
