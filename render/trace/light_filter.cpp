@@ -243,7 +243,8 @@ constexpr Neighbours kDiagonal = {{{-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
 bool has_any(const LightGuide& guide, int x, int y, const Neighbours& neighbours) {
   return std::ranges::any_of(neighbours, [&](const auto& way) {
     const int row = y + way[1];
-    return row >= 0 && row<guide.height_px&& * guide.filled.at(x + way[0], row)> 0;
+    if (row < 0 || row >= guide.height_px) return false;
+    return *guide.filled.at(x + way[0], row) > 0;
   });
 }
 
