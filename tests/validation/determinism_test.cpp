@@ -138,10 +138,10 @@ StateHash chain(SolverKind solver) {
 constexpr const char* kParticles = "c5bfc404ccb7e022ce9ed6c7eb5cc342";
 constexpr const char* kSlidingExact = "dd732251e043ec037777fcccaae4b8d9";
 constexpr const char* kBouncingExact = "50fc4596f5b6e105237928cce22ace13";
-constexpr const char* kBouncingFast = "1ed97afe1bd0789d6532de8f729c5cf8";
-constexpr const char* kHeapFast = "8bbb630494f7731498cf937f154baf29";
-constexpr const char* kChainExact = "1125e425426069a78e4ed903caa56c4f";
-constexpr const char* kChainFast = "248c46b4b36c4fad6bfea6aa99b10daa";
+constexpr const char* kBouncingFast = "eb61d98afbd8e3fe41921699910480af";
+constexpr const char* kHeapFast = "bae41e5c3a49b5766d9f342fa1a5cb07";
+constexpr const char* kChainExact = "44ca41c6c7ee2c38c692086428956bc3";
+constexpr const char* kChainFast = "ae42793f500a7a6db89c7f3a957332ff";
 
 TEST(Determinism, SameHashInEveryBuild) {
   EXPECT_EQ(run().hex(), kParticles);
