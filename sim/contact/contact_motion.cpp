@@ -38,9 +38,15 @@ Real round_radius(const Shape& shape) {
   return 0;
 }
 
+/// Vector from the axis of a surface of revolution to the body's centre of mass, in the body's frame. It is
+/// not 0 where a scene gives the centre.
+Vec3 centre_off_axis(const Body& body) {
+  return body.is_awake() ? Vec3(body.rigid.centre.x(), 0, body.rigid.centre.z()) : Vec3(Vec3::Zero());
+}
+
 /// Rotation of the points of a surface of revolution that stay on the side that faces the other body while
-/// the body turns: that of the meridian. See turned_arm() for the arguments. Points elsewhere turn with the
-/// body, and so do all points where the other body is on the axis.
+/// the body turns: that of the meridian. `arm` starts on the axis; see turned_arm() for the other arguments.
+/// Points elsewhere turn with the body, and so do all points where the other body is on the axis.
 Quat meridian_turn(const Vec3& arm, const Quat& from, const Vec3& out_from, const Quat& to,
                    const Vec3& out_to) {
   const auto radial = [](const Quat& orientation, const Vec3& v) {
@@ -177,7 +183,8 @@ bool place_after(const Start& s, Real time, ContactPlace& place) {
   const auto turn_of = [&](const Body& body, const Carried& now, const Vec3& arm, const Vec3& out,
                            const Vec3& out_now) {
     if (!is_revolved(body.def.shape)) return now.turn;
-    return meridian_turn(arm, start_orientation(body), out, now.orientation, out_now);
+    const Quat& from = start_orientation(body);
+    return meridian_turn(arm + from * centre_off_axis(body), from, out, now.orientation, out_now);
   };
   place.turn = by_b ? turn_of(s.b, b, s.arm_b - to_a, n, place.normal)
                     : turn_of(s.a, a, s.arm_a + to_a, -n, -place.normal);
@@ -329,9 +336,9 @@ Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3&
     return with_body(arm) + to * (facing(to, out_to) - facing(from, out_from));
   }
   if (!is_revolved(shape)) return with_body(arm);
-  // The centre of mass is on the axis. The angle from the meridian that faces the other body is kept. It is
-  // only the error of the manifold.
-  return meridian_turn(arm, from, out_from, to, out_to) * arm;
+  // The angle from the meridian that faces the other body is kept. It is only the error of the manifold.
+  const Vec3 off_axis = centre_off_axis(body), from_axis = arm + from * off_axis;
+  return meridian_turn(from_axis, from, out_from, to, out_to) * from_axis - to * off_axis;
 }
 
 ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, const ContactFrame& frame,
