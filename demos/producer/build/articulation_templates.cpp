@@ -42,10 +42,12 @@ std::vector<Vec3> hanging_nodes(const Vec3& from, const Vec3& to, int n, Real si
 
 }  // namespace
 
-/// Points in equal steps along a polyline.
+/// Points in equal steps along a polyline. A polyline without length, which the checks of the scene refuse
+/// later, gives the same point for each step.
 std::vector<Vec3> along_path(const std::vector<Vec3>& path, int steps) {
   Real total = 0;
   for (std::size_t i = 1; i < path.size(); ++i) total += (path[i] - path[i - 1]).norm();
+  if (!(total > 0)) return std::vector<Vec3>(static_cast<std::size_t>(steps) + 1, path.front());
   std::vector<Vec3> points = {path.front()};
   std::size_t piece = 1;
   Real passed = 0;  // length of the pieces before this one
