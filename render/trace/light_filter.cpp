@@ -297,6 +297,7 @@ void fill_gaps(Gaps gaps, const LightGuide& guide, std::span<LightPlane* const> 
     for_filter_rows((guide.height_px - first + 1) / 2,
                     [&](int k) { fill_row(guide, 1 - first, first + 2 * k, kBeside, planes); });
 }
+
 namespace {
 
 /// The pixels 2c and 2c + 1 of 16 pixels, for eight columns c.

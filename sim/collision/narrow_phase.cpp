@@ -96,8 +96,9 @@ int side_of_penetrating(const SurfaceTriangle& t, Real height, int before, SideO
   return height >= 0 ? 1 : -1;
 }
 
-/// Sets the side of a triangle on which the other piece is. `outward` is the direction from the triangle to
-/// the piece at the triangle's nearest point `point`, and `middle` the piece's centre, in the mesh's frame.
+/// Sets the side of a triangle, at first the front, on which the other piece is. `outward` is the direction
+/// from the triangle to the piece at the triangle's nearest point `point`, and `middle` the piece's centre,
+/// in the mesh's frame.
 ///
 /// The direction shows the side if the piece is apart from the triangle and the surface faces it there. A
 /// piece that is beside the triangle and penetrates the surface elsewhere is seen from behind.
@@ -105,11 +106,11 @@ template <class SideOfFace>
 void set_side(SurfaceTriangle& t, Real distance, const Vec3& outward, const Vec3& point, const Vec3& middle,
               int before, SideOfFace&& side_of_face) {
   constexpr Real kAlongside = 0.01;
-  const Real lean = outward.dot(t.normal());
+  const Vec3 front = t.normal();
+  const Real lean = outward.dot(front);
   t.side = lean >= 0 ? 1 : -1;
-  if (distance > 0 && std::abs(lean) > kAlongside && t.allows(point, outward)) return;
-  t.side = 1;
-  t.side = side_of_penetrating(t, t.normal().dot(middle - t.corner(0)), before, side_of_face);
+  const bool is_seen = distance > 0 && std::abs(lean) > kAlongside && t.allows(point, outward);
+  if (!is_seen) t.side = side_of_penetrating(t, front.dot(middle - t.corner(0)), before, side_of_face);
 }
 
 /// Two pieces of two shapes that are near each other, for which manifolds are computed.

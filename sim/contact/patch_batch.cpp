@@ -17,9 +17,17 @@ namespace {
 /// A sweep solves a patch in rounds, until one changes its velocities by less than this [m/s] or the limit is
 /// reached. A resting patch takes one round. An impact takes more, because otherwise some points would
 /// penetrate. A patch without an initial guess is solved completely at first, because otherwise it would slip
-/// during the first sweeps.
+/// during the first sweeps. Where no sweep of another patch corrects what the rounds leave, they go on
+/// longer: the load would jump between the ends of a narrow line of contact, and a coin on its rim would
+/// rock.
 constexpr float kSettled = 0.01F, kAlone = 1e-5F, kSolved = 1e-6F;
 constexpr uint32_t kPatchRounds = 20, kLoneRounds = 60;
+uint32_t rounds(const PatchBatch& p) {
+  return p.alone ? kLoneRounds : kPatchRounds;
+}
+float settled(const PatchBatch& p) {
+  return p.alone ? kAlone : kSettled;
+}
 
 /// Shares of the difference between an impulse and its mean: what a sub-step subtracts from the impulse, and
 /// what it adds to the mean. Slow modes with frequencies near the latter are damped most. The mean of a patch
@@ -226,8 +234,8 @@ void clear(PatchBatch& p, const PatchBatch::Index& patches, std::span<const Cont
     if (i != ContactColoring::kNone) count = std::max(count, all[i].count);
   std::memset(&p, 0, offsetof(PatchBatch, points) + count * sizeof(PatchBatch::Point));
   p.count = count;
-  p.tolerance = p.settled = alone ? kAlone : kSettled;
-  p.rounds = alone ? kLoneRounds : kPatchRounds;
+  p.alone = alone;
+  p.tolerance = settled(p);
   p.patch = patches;
 }
 
@@ -519,9 +527,9 @@ void sweep_single(PatchBatch& p, std::span<BodyMotion> motions, const SubstepTim
   bool all = false;
   Single change{};
   if (p.turns && is_coupled(p)) change = solve_single_rolling(p, u, gap, all);
-  const float tolerance = std::exchange(p.tolerance, p.settled);
+  const float tolerance = std::exchange(p.tolerance, settled(p));
   if (!all) {
-    for (uint32_t i = 0; i < p.rounds; ++i) {
+    for (uint32_t i = 0; i < rounds(p); ++i) {
       const Single last = u;
       change = change + solve_single_normal(p, u, gap);
       change = change + solve_single_friction(p, u);
@@ -602,8 +610,8 @@ void sweep(PatchBatch& p, std::span<BodyMotion> motions, const SubstepTime& time
   Groups u = relative_now(p, a, b, time);
   const Groups before = u;
   Groups change{};
-  const float tolerance = std::exchange(p.tolerance, p.settled);
-  for (uint32_t i = 0; i < p.rounds; ++i) {
+  const float tolerance = std::exchange(p.tolerance, settled(p));
+  for (uint32_t i = 0; i < rounds(p); ++i) {
     const Groups last = u;
     change.normal = change.normal + solve_normal(p, u, gaps);
     if (p.resists_turning) change.normal = change.normal + solve_rolling(p, u);

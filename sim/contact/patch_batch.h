@@ -55,8 +55,7 @@ struct PatchBatch {
   std::array<bool, ContactColoring::kLanes> moves_a, moves_b;
   uint32_t count;   ///< greatest number of points in a lane
   float tolerance;  ///< tolerance of the next sweep's rounds [m/s]
-  float settled;    ///< that of later sweeps [m/s]
-  uint32_t rounds;  ///< greatest number of rounds of a sweep
+  bool alone;       ///< see prepare()
   Vector n, t, k, arm_a, arm_b;
   Lanes inverse_mass_a, inverse_mass_b;
   Symmetric inverse_inertia_a, inverse_inertia_b;
