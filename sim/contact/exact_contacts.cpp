@@ -17,6 +17,9 @@ namespace {
 constexpr Real kPushOut = 0.2, kFastestPush = 0.5;
 /// Points that approach faster than this have closed in the interval, not before [m/s].
 constexpr Real kClosing = 1e-3;
+/// Points of a body that touches only unmoved bodies, and approaches them at a distance faster than this,
+/// close later in the interval, however near they are [m/s].
+constexpr Real kApproaching = 1e-4;
 /// Uncertainty of the approach of a resting contact, as a share of the normal velocity due to rotation in
 /// half an interval.
 constexpr Real kTurningShare = 0.5;
@@ -29,6 +32,13 @@ constexpr Real kOverlap = 1e-6;
 constexpr Real kRough = 1e-2, kEnergyRounding = 1e-9;
 /// Share of the kinetic energy that the velocity terms of a solution may add in a step.
 constexpr Real kTermsShare = 0.02;
+
+/// `linear` is the bias at the end of a contact that does not turn.
+ClosingPoint closing_point(Real gap, const Vec3& surface, const ContactMotion& motion, const Vec3& linear) {
+  if (!motion.turns) return {.gap = gap, .surface = surface, .bias = {Vec3::Zero(), linear, Vec3::Zero()}};
+  const Vec3 &gain = motion.gain, &bow = motion.bow;  // of s = 2 part - 1
+  return {.gap = gap, .surface = surface, .bias = {bow - gain, 2 * gain - 4 * bow, 4 * bow}};
+}
 
 }  // namespace
 
@@ -43,6 +53,9 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
     body->row = static_cast<uint32_t>(bodies_.size());
     add_body(*body, interval);
   }
+  points_.clear();
+  displacement_.reset();
+  is_alone_ = island.bodies.size() == 1 && island.articulations.empty();
   for (ContactPair* pair : island.pairs) add_points(*pair, interval);
   const Island* const one[] = {&island};
   joints_.collect(one, interval);
@@ -54,6 +67,7 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
   if (method == Method::lcp) outcome.is_applied = solve_lcp(outcome.lcp);
   if (!outcome.is_applied) {
     const std::optional<ContactWork> work = newton_.solve(bodies_, contacts_, joints_.problem(), budget);
+    cost_ = newton_.cost();
     if (!work) return outcome;
     outcome.is_applied = is_safe(*work);
     outcome.work = *work;
@@ -61,6 +75,7 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
     if (outcome.work.fallbacks > 0)
       if (const auto worst = worst_contact(bodies_, contacts_)) outcome.rough = pairs_[*worst];
     if (!outcome.is_applied) return outcome;
+    if (has_closing()) divide_at_closings(*island.bodies.front(), interval, outcome.work);
   }
   joints_.store_impulses(interval.duration);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
@@ -123,6 +138,39 @@ bool ExactContacts::is_safe(const ContactWork& work) const {
   return energy <= kTermsShare * kinetic + mass * push * push / 2;
 }
 
+/// Whether a contact that approached pushes, while a contact touches from the interval's start on.
+bool ExactContacts::has_closing() const {
+  bool touches = false, closes = false;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    touches = touches || points_[i].gap == 0;
+    closes = closes || (contacts_[i].impulse.x() > 0 && (points_[i].gap > 0 || approach_[i] > kApproaching));
+  }
+  return touches && closes;
+}
+
+/// Replaces the solution by one that is divided at the times at which contacts close, if that is safe.
+void ExactContacts::divide_at_closings(const Body& body, const ContactInterval& interval, ContactWork& work) {
+  std::vector<ContactBody> start = free_;
+  start[body.row].velocity = body.start_twist.velocity;
+  start[body.row].angular_velocity = body.start_twist.angular_velocity;
+  std::vector<Contact> contacts = contacts_;
+  for (std::size_t i = 0; i < contacts.size(); ++i)
+    contacts[i].impulse = interval.duration * forces_[i]->last;
+  std::optional<ClosingSolution> solution =
+      solve_closing(start, free_, contacts, points_, interval.duration, newton_);
+  if (!solution) return;
+  for (std::size_t i = 0; i < contacts.size(); ++i) contacts[i].impulse = solution->impulses[i];
+  std::swap(bodies_, solution->bodies);
+  std::swap(contacts_, contacts);
+  if (is_safe(solution->work)) {
+    work.add(solution->work);
+    displacement_ = solution->displacements[body.row];
+    return;
+  }
+  std::swap(bodies_, solution->bodies);
+  std::swap(contacts_, contacts);
+}
+
 uint32_t ExactContacts::add_body(Body& body, const ContactInterval& interval) {
   bodies_.push_back(body.is_awake()
                         ? ContactBody{1 / body.rigid.mass,
@@ -141,12 +189,15 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
   for (PlacedManifold& m : pair.manifolds())
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       const ContactPoint& point = m.manifold.points[k];
-      const bool touches = point.separation <= kTouching;
-      if (pair.needs_toi && !touches) continue;
+      if (pair.awaits_impact(m, point)) continue;
       const Vec3 place = (point.on_a + point.on_b) / 2;
       const Vec3 u = in_frame(m.frame, pair.relative_velocity(place) + surface);
       const ContactMotion motion = contact_motion(pair.a(), pair.b(), m.manifold, m.frame, place,
                                                   point.separation, h, interval.substep);
+      // The approach of a rotating contact differs slightly from the prediction of its rotation.
+      const Real approach = std::max(0.0, std::abs(u.x()) - kTurningShare * std::abs(motion.gain.x()));
+      const bool closes_later = is_alone_ && point.separation > 0 && u.x() < 0 && approach > kApproaching;
+      const bool touches = point.separation <= kTouching && !closes_later;
       Contact c{.a = a, .b = b, .frame = motion.frame};
       c.arm_a = motion.middle.arm_a;
       c.arm_b = motion.middle.arm_b;
@@ -165,8 +216,11 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       contacts_.push_back(c);
       pairs_.push_back(&pair);
       forces_.push_back(&m.forces[k]);
-      // The approach of a rotating contact differs slightly from the prediction of its rotation.
-      approach_.push_back(std::max(0.0, std::abs(u.x()) - kTurningShare * std::abs(motion.gain.x())));
+      approach_.push_back(approach);
+      if (is_alone_)
+        points_.push_back(
+            closing_point(touches ? 0 : point.separation, in_frame(c.frame, surface), motion,
+                          motion.turns ? Vec3(Vec3::Zero()) : velocity_bias(pair, m, point, h)));
     }
 }
 
@@ -196,6 +250,11 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
     if (closing_[i]) {
       way = (dv + bodies_[i].velocity - body.start_twist.velocity) / 2;
       turn = (dw + bodies_[i].angular_velocity - body.start_twist.angular_velocity) / 2;
+    }
+    if (displacement_) {
+      way = displacement_->shift / duration - (body.start_twist.velocity + free_[i].velocity) / 2;
+      turn = displacement_->turn / duration -
+             (body.start_twist.angular_velocity + free_[i].angular_velocity) / 2;
     }
     add_effect(body, {body.rigid.mass * dv,
                       body.rigid.spin_momentum(body.impulse_orientation(duration, interval.substep), dw), dw,

@@ -1,8 +1,10 @@
 #pragma once
 /// Solution of the contacts of one island by the exact solver (physics R8, R9, N11).
 
+#include <optional>
 #include <vector>
 
+#include "sim/contact/closing_contacts.h"
 #include "sim/contact/island_joints.h"
 #include "sim/contact/proximal_newton.h"
 
@@ -30,13 +32,16 @@ class ExactContacts {
   /// energy; otherwise the fast solver, whose work is bounded, must solve the island.
   Outcome solve(const Island& island, const ContactInterval& interval, Real budget,
                 Method method = Method::proximal);
-  /// Cost of the last solve() [ns].
-  Real cost() const { return newton_.cost(); }
+  /// Cost of the last solve() [ns], without that of a division at the times at which contacts close, which is
+  /// small.
+  Real cost() const { return cost_; }
 
  private:
   uint32_t add_body(Body& body, const ContactInterval& interval);
   void add_points(ContactPair& pair, const ContactInterval& interval);
   bool solve_lcp(ContactWork& work);
+  bool has_closing() const;
+  void divide_at_closings(const Body& body, const ContactInterval& interval, ContactWork& work);
   bool is_safe(const ContactWork& work) const;
   void move_bodies(const Island& island, const ContactInterval& interval);
   void close_stops();
@@ -49,8 +54,12 @@ class ExactContacts {
   std::vector<PointForce*> forces_;        // force of each contact, in its pair
   // Speed of each contact at the start, as an absolute value, less the part due to rotation [m/s].
   std::vector<Real> approach_;
-  std::vector<uint8_t> closing_;  // by body: whether a contact of it closed in the interval
-  std::vector<Real> rest_;        // by body: share of the interval in which it has its change of velocity
+  std::vector<uint8_t> closing_;      // by body: whether a contact of it closed in the interval
+  std::vector<Real> rest_;            // by body: share of the interval in which it has its change of velocity
+  bool is_alone_ = false;             // whether a single body touches unmoved ones only, without joints
+  std::vector<ClosingPoint> points_;  // of each contact
+  std::optional<Displacement> displacement_;  // of the single body, if the interval was divided
+  Real cost_ = 0;
   IslandJoints joints_;
   ProximalNewton newton_;
 };

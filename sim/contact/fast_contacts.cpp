@@ -97,10 +97,10 @@ void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifol
   patch.force_k = last.y();
   patch.torque_n = last.z();
   patch.mean_friction = mean;
-  // The next impact of the pair is traced back to, so only the points that touch now push.
+  // The next impact of the pair is traced back to, so its point does not push before.
   if (!pair.needs_toi || !waits_for_impacts(pair.a()) || !waits_for_impacts(pair.b())) return;
   for (uint32_t k = 0; k < patch.count; ++k) {
-    if (m.manifold.points[k].separation <= kTouching) continue;
+    if (!pair.awaits_impact(m, m.manifold.points[k])) continue;
     patch.points[k].separation = kOutOfReach;
     patch.points[k].force = patch.points[k].mean_force = 0;
   }
