@@ -1,9 +1,6 @@
-#include "tune/engine.h"
+#include "engine/engine.h"
 
 #include <condition_variable>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <mutex>
 #include <thread>
 
@@ -13,9 +10,8 @@
 #include "producer/run/production.h"
 #include "tests/render/gltf_samples.h"
 #include "tests/render/scratch.h"
-#include "tune/session.h"
 
-namespace offstage::tune {
+namespace offstage::engine {
 namespace {
 
 using producer::LoadedScene;
@@ -106,7 +102,7 @@ TEST_F(Engines, KeepNoPictureOfAnEndedDraft) {
   JpegWriter jpeg;
   FilmRun run({fountain(100), {}, "film", "physics"}, std::make_shared<const producer::ModelLibrary>(),
               {physics, frames, context, jpeg, {160, 90}});
-  while (!run.has_state(1)) run.simulate();
+  while (!run.has_state(1)) run.simulated().simulate();
   EXPECT_FALSE(run.draw_draft(1, [] { return true; }));
   EXPECT_FALSE(run.has_draft(1));
   EXPECT_TRUE(run.draw_draft(1, {}));
@@ -205,18 +201,5 @@ TEST_F(Engines, DrawASheetOfVersionsAndReportMissingOnes) {
   EXPECT_TRUE(engine_.cell(sheet, 0));
 }
 
-TEST(Sessions, ReadFilesOutsideOfTheScenesFolderOnlyIfAllowed) {
-  namespace fs = std::filesystem;
-  std::string name = (fs::temp_directory_path() / "offstage-session-XXXXXX").string();
-  const fs::path folder = mkdtemp(name.data());
-  fs::create_directories(folder / "scene");
-  std::ofstream(folder / "part.json") << R"({"output": {"duration": 0.1}, "render": {"size": [64, 36]}})";
-  const std::string scene = (folder / "scene/s.json").string();
-  std::ofstream(scene) << R"({"include": ["../part.json"]})";
-  EXPECT_EQ(Session(scene, {}).state()["errors"].size(), 1u);
-  EXPECT_EQ(Session(scene, {}, {folder.string()}).state()["errors"].size(), 0u);
-  fs::remove_all(folder);
-}
-
 }  // namespace
-}  // namespace offstage::tune
+}  // namespace offstage::engine

@@ -1,80 +1,30 @@
-// render --watch.
+#include "engine/watch_command.h"
 
+#include <atomic>
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
+#include <thread>
 
-#include <fcntl.h>
-#include <fmt/format.h>
-#include <sys/prctl.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
+#include "engine/simulated_film.h"
 #include "producer/base/interrupt.h"
 #include "producer/base/log.h"
-#include "producer/cli/commands.h"
+#include "producer/cli/command_line.h"
 #include "producer/cli/failure.h"
 #include "producer/cli/hidden_folder.h"
 #include "producer/run/output.h"
 #include "producer/run/watch.h"
 #include "render/error.h"
-#include "render/sink.h"
 
-namespace offstage::producer {
+namespace offstage::engine {
 namespace {
 
 namespace fs = std::filesystem;
+using namespace producer;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kStill{120};  // time without changes before files are read
-
-/// A render in a separate process, which can be ended at any time and whose crash does not affect the watch.
-class RenderProcess {
- public:
-  explicit RenderProcess(const RenderOptions& options) {
-    std::fflush(stdout);
-    const pid_t parent = getpid();
-    pid_ = fork();
-    if (pid_ < 0) throw render::FileError("the render could not be started");
-    if (pid_ == 0) become_render(options, parent);
-  }
-  ~RenderProcess() {
-    if (pid_ <= 0) return;
-    kill(pid_, SIGKILL);
-    waitpid(pid_, nullptr, 0);
-  }
-  RenderProcess(const RenderProcess&) = delete;
-  RenderProcess& operator=(const RenderProcess&) = delete;
-
-  /// Its exit code, or -1 if it crashed; nothing while it runs.
-  std::optional<int> result() {
-    int status = 0;
-    if (waitpid(pid_, &status, WNOHANG) != pid_) return {};
-    pid_ = -1;
-    if (WIFEXITED(status)) return WEXITSTATUS(status);
-    log("offstage: the render was ended by signal {}\n", WTERMSIG(status));
-    return -1;
-  }
-
- private:
-  [[noreturn]] static void become_render(const RenderOptions& options, pid_t parent) {
-    prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (getppid() != parent) _exit(1);
-    // The watch handles Ctrl-C and ends this process. The printed name of its result would be a temporary
-    // one.
-    std::signal(SIGINT, SIG_IGN);
-    std::signal(SIGTERM, SIG_IGN);
-    if (const int nowhere = open("/dev/null", O_WRONLY | O_CLOEXEC); nowhere >= 0)
-      dup2(nowhere, STDOUT_FILENO);
-    const int code = reported([&] { return render_command(options); });
-    std::fflush(stdout);
-    _exit(code);
-  }
-
-  pid_t pid_ = -1;
-};
 
 /// The existing files that the manifest of a folder lists.
 std::set<fs::path> frames_in(const fs::path& pattern) {
@@ -102,7 +52,8 @@ class Watcher {
       throw OutputError(folder().string() + ": already contains frames; replace them with --force");
     }
     check_file(options.stats, options.force);
-    if (options.cache.empty()) states_.emplace(beside(), "states");
+    if (options.cameras.size() > 1 || (options.cameras.size() == 1 && options.cameras.front() == kAllCameras))
+      throw OutputError("--watch draws one camera; name it with --camera");
   }
 
   int run() {
@@ -119,30 +70,54 @@ class Watcher {
   }
 
  private:
-  /// Renders unless the files change meanwhile, which would make the result outdated.
+  /// Renders and publishes the result, unless the files change meanwhile.
   void render_once(FileWatch& watch, const std::string& hash) {
     const HiddenFolder unfinished(beside(), "watch");
-    RenderOptions options = options_;
-    options.watch = false;
-    options.force = true;
-    options.out = (unfinished.path() / target_.path.filename()).string();
-    if (states_) options.states = states_->path().string();
     const auto start = std::chrono::steady_clock::now();
-    RenderProcess process(options);
-    std::optional<int> code;
-    while (!(code = process.result())) {
-      watch.wait(milliseconds(20));
-      if (interrupt_signal() || watch.changed()) return;
-    }
+    const std::optional<int> code = render_into(unfinished.path(), watch);
+    if (!code) return;
     rendered_ = hash;
-    if (*code == 0) publish(unfinished.path());
+    if (*code == kOk) publish(unfinished.path());
     if (options_.talk.quiet) return;
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-    if (*code == 0)
+    if (*code == kOk)
       log("rendered in {:.1f} s; waiting for changes of the scene (Ctrl-C quits)\n", seconds.count());
     else
       log("{}; waiting for changes of the scene (Ctrl-C quits)\n",
           published_ ? "kept the last good result" : "there is no result yet");
+  }
+
+  /// Returns the exit code of the render; nothing if a change or a signal ended it, because its result would
+  /// be outdated.
+  std::optional<int> render_into(const fs::path& folder, FileWatch& watch) {
+    std::atomic<bool> changed = false;
+    RenderOptions options = options_;
+    options.force = true;
+    options.out = (folder / target_.path.filename()).string();
+    options.prints_name = false;
+    options.stop = [&] { return changed || interrupt_signal() != 0; };
+    options.states_of = [this](const LoadedScene& loaded, const ModelLibrary& models, int last) {
+      return std::make_unique<SimulatedFilm>(loaded.scene, models, physics_, simulation_key(loaded, models),
+                                             last);
+    };
+    const std::jthread watching([&](const std::stop_token& finished) {
+      while (!finished.stop_requested() && !changed) {
+        watch.wait(milliseconds(20));
+        changed = watch.changed();
+      }
+    });
+    bool stopped = false;
+    const int code = reported([&] {
+      try {
+        return render_command(options);
+      } catch (const render::StoppedError&) {
+        stopped = true;
+      } catch (const Interrupted&) {
+        stopped = true;
+      }
+      return int{kOk};
+    });
+    return stopped ? std::nullopt : std::optional(code);
   }
 
   /// The output beside which hidden folders are placed.
@@ -178,15 +153,15 @@ class Watcher {
 
   const RenderOptions& options_;
   OutputTarget target_;
-  std::optional<HiddenFolder> states_;  // of the latest simulation, for renders that change only its look
-  std::string rendered_;                // hash of the files of the last render, successful or not
-  bool published_ = false;              // whether this watch has published a result
+  PhysicsStore physics_{kPhysicsBytes};
+  std::string rendered_;    // hash of the files of the last render, successful or not
+  bool published_ = false;  // whether this watch has published a result
 };
 
 }  // namespace
 
-int watch_command(const RenderOptions& options) {
+int watch_command(const producer::RenderOptions& options) {
   return Watcher(options).run();
 }
 
-}  // namespace offstage::producer
+}  // namespace offstage::engine
