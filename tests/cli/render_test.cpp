@@ -254,10 +254,10 @@ std::string watched_scene(const std::string& color, double height, double durati
 
 /// The statistics of a run without its times and its memory.
 nlohmann::json lasting_statistics(const fs::path& file) {
-  auto json = nlohmann::json::parse(read_file(file));
+  auto stats = nlohmann::json::parse(read_file(file));
   for (const char* key : {"wall_s", "startup_s", "sim_ms", "render_ms", "encode_ms", "peak_rss_mb"})
-    json.erase(key);
-  return json;
+    stats.erase(key);
+  return stats;
 }
 
 TEST(Render, WatchWritesTheFilesOfRender) {
