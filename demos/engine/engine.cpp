@@ -20,14 +20,17 @@ constexpr int kBusy = 4;                  // factor of these times until the fil
 constexpr milliseconds kGlimpse{60};      // between two pictures of the time before frame 1
 
 /// The part of a scene that determines which model files are read and how they are processed: everything
-/// except its numbers.
-std::string without_numbers(const std::string& canonical) {
+/// except numbers and colours, which matter only for decompositions, the sky's picture and flip-books.
+std::string used_by_models(const std::string& canonical) {
   auto json = nlohmann::json::parse(canonical);
-  for (const char* key : {"camera", "lights", "environment", "render", "output", "world"}) json.erase(key);
+  for (const char* key : {"name", "description", "render", "output", "world"}) json.erase(key);
   const std::function<void(nlohmann::json&)> clear = [&](nlohmann::json& value) {
-    if (value.is_number()) value = nullptr;
-    if (value.is_structured())
-      for (auto& item : value) clear(item);
+    const bool colour = value.is_string() && value.get_ref<const std::string&>().starts_with('#');
+    if (value.is_number() || colour) value = nullptr;
+    if (!value.is_structured()) return;
+    for (const auto& item : value.items())
+      if (item.key() != "decomposition" && item.key() != "picture" && item.key() != "sheet")
+        clear(item.value());
   };
   clear(json);
   return json.dump();
@@ -221,7 +224,7 @@ std::shared_ptr<const ModelLibrary> Engine::models_for(const FilmDef& def) {
     const std::lock_guard lock(mutex_);
     generation = models_generation_;
   }
-  const std::string key = std::to_string(generation) + without_numbers(def.loaded->canonical);
+  const std::string key = std::to_string(generation) + used_by_models(def.loaded->canonical);
   if (models_ && key == models_key_) return models_;
   std::vector<Problem> warnings;
   const auto on_step = [&](const std::string& step) {

@@ -1,6 +1,6 @@
 #pragma once
 /// Simulated states and their figures, in memory of a bounded size. Those of the least recently used
-/// simulations are removed first.
+/// simulations are removed first. And the collision meshes of the latest simulation, for the next one.
 
 #include <list>
 #include <memory>
@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "producer/build/simulation.h"
 #include "producer/build/snapshot.h"
 #include "producer/run/production.h"
 
@@ -32,6 +33,7 @@ class PhysicsStore {
   std::shared_ptr<Physics> open(const std::string& key);
   void keep(const std::string& key, int frame, std::shared_ptr<const producer::Snapshot> state);
   std::size_t bytes() const { return bytes_; }
+  producer::CollisionMeshes& meshes() { return meshes_; }
 
  private:
   struct Entry {
@@ -42,6 +44,7 @@ class PhysicsStore {
   const std::size_t most_bytes_;
   std::list<Entry> entries_;  // latest first
   std::size_t bytes_ = 0;
+  producer::CollisionMeshes meshes_;
 };
 
 }  // namespace offstage::engine

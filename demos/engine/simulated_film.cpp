@@ -34,7 +34,7 @@ void SimulatedFilm::restart() {
 
 void SimulatedFilm::make_simulation() {
   if (simulation_) return;
-  simulation_.emplace(scene_, models_);
+  simulation_.emplace(scene_, models_, &store_.meshes());
   energy_start_ = simulation_->energy();
 }
 

@@ -148,6 +148,34 @@ TEST_F(Engines, ReuseStatesForAnotherCamera) {
   EXPECT_TRUE(engine_.frame(other.film, 10));
 }
 
+// Models, pictures and decompositions stay in memory while only numbers and colours change.
+TEST_F(Engines, ReadFilesAgainWhenTheSceneUsesThemOtherwise) {
+  render::GltfSample room;
+  const render::ScratchFolder folder;
+  folder.put("room.gltf", room.text());
+  const auto show = [&](const std::string& more) {
+    const std::string text =
+        R"({"bodies": [{"name": "room", "motion": "static", "shape": {"type": "mesh", "file": "room.gltf"}}],
+            "render": {"size": [64, 36]}, "output": {"fps": 20, "duration": 0.1})" +
+        more + "}";
+    return engine_
+        .show(std::make_shared<const LoadedScene>(producer::parse_scene(text, "room", folder.path())), {})
+        .number;
+  };
+  const auto fails = [&](uint64_t run) {
+    bool failed = false;
+    events_.wait_for<FilmEvent>([&](const FilmEvent& e) {
+      failed = e.phase == FilmEvent::Phase::failed;
+      return e.run == run && (failed || e.phase == FilmEvent::Phase::complete);
+    });
+    return failed;
+  };
+  EXPECT_FALSE(fails(show("")));
+  EXPECT_TRUE(fails(show(R"(, "environment": {"picture": {"file": "missing.hdr"}})")));
+  EXPECT_FALSE(fails(show("")));
+  EXPECT_TRUE(fails(show(R"(, "camera": {"type": "model", "body": "room", "name": "missing"})")));
+}
+
 // The lens of the scene's camera remains while the view is moved, wherever its field of view is stated.
 TEST_F(Engines, KeepTheFieldOfViewOfAMovedCamera) {
   render::GltfSample room;

@@ -9,6 +9,7 @@
 #include "producer/format/scene_io.h"
 #include "producer/run/production.h"
 #include "render/error.h"
+#include "tests/render/scratch.h"
 
 namespace offstage::engine {
 namespace {
@@ -83,6 +84,32 @@ TEST(SimulatedFilms, ContinueAfterAStoppedOne) {
   Film next(store);
   EXPECT_TRUE(next.simulated.has_state(4));
   EXPECT_EQ(next.state_hash(), last_state());
+}
+
+TEST(SimulatedFilms, ShareTheMeshesOfModelsWithLaterVersions) {
+  const render::ScratchFolder folder;
+  folder.put("wedge.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+  const auto scene = [&](double height, double scale) {
+    const std::string text = R"({"bodies": [{"name": "wedge", "position": [0, )" + std::to_string(height) +
+                             R"(, 0], "shape": {"type": "mesh", "file": "wedge.obj", "scale": )" +
+                             std::to_string(scale) +
+                             R"(}}, {"name": "floor", "motion": "static", "shape": {"type": "plane"}}],
+      "output": {"fps": 20, "duration": 0.5}})";
+    return producer::parse_scene(text, "wedge", folder.path());
+  };
+  PhysicsStore store(kPhysicsBytes);
+  const auto simulate = [&](const LoadedScene& loaded) {
+    std::vector<Problem> warnings;
+    const ModelLibrary models(loaded.scene, loaded.folder, {}, warnings);
+    SimulatedFilm film(loaded.scene, models, store, loaded.canonical, kFrames);
+    const std::string hash = film.at(kFrames, [] { return true; })->state_hash.hex();
+    EXPECT_EQ(hash, producer::simulate_frames(loaded, models, {}, {}).state_hash);
+    EXPECT_EQ(store.meshes().size(), 1u);
+    return store.meshes().begin()->second;
+  };
+  const auto first = simulate(scene(0.5, 1));
+  EXPECT_EQ(simulate(scene(0.7, 1)), first);
+  EXPECT_NE(simulate(scene(0.7, 0.9)), first);
 }
 
 /// Hashes of the pictures of a film.
