@@ -153,6 +153,7 @@ TEST_F(Engines, ReadFilesAgainWhenTheSceneUsesThemOtherwise) {
   render::GltfSample room;
   const render::ScratchFolder folder;
   folder.put("room.gltf", room.text());
+  folder.put("broken.hdr", "not a picture");
   const auto show = [&](const std::string& more) {
     const std::string text =
         R"({"bodies": [{"name": "room", "motion": "static", "shape": {"type": "mesh", "file": "room.gltf"}}],
@@ -171,7 +172,7 @@ TEST_F(Engines, ReadFilesAgainWhenTheSceneUsesThemOtherwise) {
     return failed;
   };
   EXPECT_FALSE(fails(show("")));
-  EXPECT_TRUE(fails(show(R"(, "environment": {"picture": {"file": "missing.hdr"}})")));
+  EXPECT_TRUE(fails(show(R"(, "environment": {"picture": {"file": "broken.hdr"}})")));
   EXPECT_FALSE(fails(show("")));
   EXPECT_TRUE(fails(show(R"(, "camera": {"type": "model", "body": "room", "name": "missing"})")));
 }
