@@ -4,7 +4,10 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <memory>
 #include <optional>
+#include <set>
+#include <string>
 #include <thread>
 
 #include "engine/simulated_film.h"
@@ -21,14 +24,18 @@ namespace offstage::engine {
 namespace {
 
 namespace fs = std::filesystem;
-using namespace producer;
+using producer::FileWatch;
+using producer::HiddenFolder;
+using producer::OutputError;
+using producer::OutputKind;
+using producer::RenderOptions;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kStill{120};  // time without changes before files are read
 
 /// The existing files that the manifest of a folder lists.
 std::set<fs::path> frames_in(const fs::path& pattern) {
-  const std::vector<fs::path> files = files_of_frames(pattern.parent_path());
+  const std::vector<fs::path> files = producer::files_of_frames(pattern.parent_path());
   return {files.begin(), files.end()};
 }
 
@@ -41,32 +48,35 @@ void publish_channels(const fs::path& made, const fs::path& place) {
 
 class Watcher {
  public:
-  explicit Watcher(const RenderOptions& options) : options_(options), target_(parse_output(options.out)) {
+  explicit Watcher(const RenderOptions& options)
+      : options_(options), target_(producer::parse_output(options.out)) {
     if (options.scene.from_standard_input())
       throw OutputError("--watch needs a scene file that can change; standard input cannot");
     if (target_.kind == OutputKind::pipe)
       throw OutputError("--watch needs an output that can be replaced; standard output cannot");
     if (target_.kind == OutputKind::video) {
-      check_file(target_.path.string(), options.force);
+      producer::check_file(target_.path.string(), options.force);
     } else if (!options.force && fs::exists(folder() / "manifest.json")) {
       throw OutputError(folder().string() + ": already contains frames; replace them with --force");
     }
-    check_file(options.stats, options.force);
-    if (options.cameras.size() > 1 || (options.cameras.size() == 1 && options.cameras.front() == kAllCameras))
+    producer::check_file(options.stats, options.force);
+    if (options.cameras.size() > 1 ||
+        (options.cameras.size() == 1 && options.cameras.front() == producer::kAllCameras))
       throw OutputError("--watch draws one camera; name it with --camera");
   }
 
   int run() {
-    while (!interrupt_signal()) {
-      FileWatch watch(files_of_scene(options_.scene.file, options_.scene.overrides()));
+    while (!producer::interrupt_signal()) {
+      FileWatch watch(producer::files_of_scene(options_.scene.file, options_.scene.overrides()));
       watch.settle(kStill);
       if (watch.changed()) continue;  // the set of files may have changed, too
-      const std::string hash = contents_hash(files_of_scene(options_.scene.file, options_.scene.overrides()));
+      const std::string hash =
+          producer::contents_hash(producer::files_of_scene(options_.scene.file, options_.scene.overrides()));
       if (hash != rendered_) render_once(watch, hash);
-      while (!watch.changed() && !interrupt_signal()) watch.wait(milliseconds(1000));
+      while (!watch.changed() && !producer::interrupt_signal()) watch.wait(milliseconds(1000));
     }
-    if (!options_.talk.quiet) log("the watch has ended\n");
-    return 128 + interrupt_signal();
+    if (!options_.talk.quiet) producer::log("the watch has ended\n");
+    return 128 + producer::interrupt_signal();
   }
 
  private:
@@ -77,14 +87,15 @@ class Watcher {
     const std::optional<int> code = render_into(unfinished.path(), watch);
     if (!code) return;
     rendered_ = hash;
-    if (*code == kOk) publish(unfinished.path());
+    if (*code == producer::kOk) publish(unfinished.path());
     if (options_.talk.quiet) return;
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-    if (*code == kOk)
-      log("rendered in {:.1f} s; waiting for changes of the scene (Ctrl-C quits)\n", seconds.count());
+    if (*code == producer::kOk)
+      producer::log("rendered in {:.1f} s; waiting for changes of the scene (Ctrl-C quits)\n",
+                    seconds.count());
     else
-      log("{}; waiting for changes of the scene (Ctrl-C quits)\n",
-          published_ ? "kept the last good result" : "there is no result yet");
+      producer::log("{}; waiting for changes of the scene (Ctrl-C quits)\n",
+                    published_ ? "kept the last good result" : "there is no result yet");
   }
 
   /// Returns the exit code of the render; nothing if a change or a signal ended it, because its result would
@@ -95,10 +106,11 @@ class Watcher {
     options.force = true;
     options.out = (folder / target_.path.filename()).string();
     options.prints_name = false;
-    options.stop = [&] { return changed || interrupt_signal() != 0; };
-    options.states_of = [this](const LoadedScene& loaded, const ModelLibrary& models, int last) {
-      return std::make_unique<SimulatedFilm>(loaded.scene, models, physics_, simulation_key(loaded, models),
-                                             last);
+    options.stop = [&] { return changed || producer::interrupt_signal() != 0; };
+    options.states_of = [this](const producer::LoadedScene& loaded, const producer::ModelLibrary& models,
+                               int last) {
+      return std::make_unique<SimulatedFilm>(loaded.scene, models, physics_,
+                                             producer::simulation_key(loaded, models), last);
     };
     const std::jthread watching([&](const std::stop_token& finished) {
       while (!finished.stop_requested() && !changed) {
@@ -107,15 +119,15 @@ class Watcher {
       }
     });
     bool stopped = false;
-    const int code = reported([&] {
+    const int code = producer::reported([&] {
       try {
-        return render_command(options);
+        return producer::render_command(options);
       } catch (const render::StoppedError&) {
         stopped = true;
-      } catch (const Interrupted&) {
+      } catch (const producer::Interrupted&) {
         stopped = true;
       }
-      return int{kOk};
+      return int{producer::kOk};
     });
     return stopped ? std::nullopt : std::optional(code);
   }
@@ -128,7 +140,7 @@ class Watcher {
   void publish(const fs::path& made) {
     if (target_.kind == OutputKind::video) {
       // The video, and its folder of channels if it has one; those of an earlier film are removed.
-      remove_channels(channels_folder(target_.path));
+      producer::remove_channels(producer::channels_folder(target_.path));
       for (const auto& entry : fs::directory_iterator(made)) {
         const fs::path place = folder() / entry.path().filename();
         if (entry.is_directory())
@@ -147,12 +159,12 @@ class Watcher {
       for (const fs::path& path : stale) fs::remove(path);
     }
     published_ = true;
-    print_output_name(target_.path.string());
+    producer::print_output_name(target_.path.string());
     std::fflush(stdout);
   }
 
   const RenderOptions& options_;
-  OutputTarget target_;
+  producer::OutputTarget target_;
   PhysicsStore physics_{kPhysicsBytes};
   std::string rendered_;    // hash of the files of the last render, successful or not
   bool published_ = false;  // whether this watch has published a result

@@ -340,6 +340,16 @@ TEST(Render, WatchDrawsANewLookFromTheStatesOfTheLastSimulation) {
     EXPECT_FALSE(entry.path().filename().string().starts_with(".")) << entry.path() << " is left over";
 }
 
+TEST(Render, WatchDrawsOneCamera) {
+  const TemporaryFolder folder;
+  for (const char* cameras : {"all", "near,far"}) {
+    const Outcome run = offstage("render " + tiny_scene() + " -o out/ --watch --camera " + cameras,
+                                 folder.path(), "timeout 60");
+    EXPECT_EQ(run.code, 2) << cameras;
+    EXPECT_NE(run.err.find("--watch draws one camera"), std::string::npos) << run.err;
+  }
+}
+
 TEST(Render, WatchEndsALongFilmWhenTheSceneChanges) {
   const TemporaryFolder folder;
   write_file(folder / "scene.json", watched_scene("#b03020", 1, 3600));
