@@ -2,6 +2,7 @@
 
 #include <malloc.h>
 
+#include "engine/watch_command.h"
 #include "producer/cli/command_line.h"
 #include "tune/tune_command.h"
 
@@ -10,5 +11,5 @@ int main(int argc, char** argv) {
   // take a twentieth of the time of a draft, because each page is cleared again.
   mallopt(M_MMAP_THRESHOLD, 32 << 20);
   mallopt(M_TRIM_THRESHOLD, 256 << 20);
-  return offstage::producer::run(argc, argv, offstage::tune::tune_command);
+  return offstage::producer::run(argc, argv, offstage::tune::tune_command, offstage::engine::watch_command);
 }

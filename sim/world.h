@@ -192,6 +192,10 @@ class World {
   /// sum_of() gives the mass of parts of several densities, for BodyDef. Throws std::invalid_argument as
   /// add_mesh() does, and without solids.
   MeshHandle add_compound(const std::vector<SolidMesh>& solids);
+  /// Registers a mesh of another world. Both share it and all that was computed for it, so this takes no
+  /// time. Throws std::invalid_argument for null.
+  MeshHandle add_shared_mesh(std::shared_ptr<const CollisionMesh> mesh);
+  std::shared_ptr<const CollisionMesh> shared_mesh(MeshHandle mesh) const;
   const MeshTopology& topology(MeshHandle mesh) const;
   const TriangleMesh& mesh(MeshHandle mesh) const;  ///< as registered (welded)
   const CollisionMesh& collision_mesh(MeshHandle mesh) const;

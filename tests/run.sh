@@ -37,7 +37,7 @@ cmake --build build
 
 if [ ${#long[@]} = 0 ]; then
   cmake --preset asan
-  cmake --build build-asan --target test_sim test_effects test_producer test_tune test_render
+  cmake --build build-asan --target test_sim test_effects test_producer test_engine test_tune test_render
   UBSAN_OPTIONS=print_stacktrace=1:halt_on_error=1 ctest --test-dir build-asan -L unit -j "$cores" --output-on-failure || failed=1
   tests/meshes.sh build/meshes
   export OFFSTAGE_MESHES=$PWD/build/meshes

@@ -60,8 +60,10 @@ std::string type_of(const std::string& name) {
   return ends(".jpg") ? "image/jpeg" : "application/octet-stream";
 }
 
-Detail detail_of(const std::string& name) {
-  return name == "draft" ? Detail::draft : name == "preview" ? Detail::preview : Detail::final;
+engine::Detail detail_of(const std::string& name) {
+  return name == "draft"     ? engine::Detail::draft
+         : name == "preview" ? engine::Detail::preview
+                             : engine::Detail::final;
 }
 
 }  // namespace
@@ -197,15 +199,16 @@ struct HttpServer::Impl {
                                                   c.target.x(), c.target.y(), c.target.z(), c.fov_deg));
       send_picture(*picture->jpeg, response);
     });
-    main.Get("/[0-9a-f]+/thumb/([0-9a-f]+)", [this](const httplib::Request& request,
-                                                    httplib::Response& response) {
-      const std::string film = request.matches[1];
-      const auto ranges = session.engine().ranges(film);
-      const auto picture =
-          ranges.empty() ? std::nullopt : session.engine().frame(film, ranges.back().second, Detail::draft);
-      if (!picture) return refuse(response, 404, "No frame of this version is kept.");
-      send_picture(*picture->jpeg, response);
-    });
+    main.Get("/[0-9a-f]+/thumb/([0-9a-f]+)",
+             [this](const httplib::Request& request, httplib::Response& response) {
+               const std::string film = request.matches[1];
+               const auto ranges = session.engine().ranges(film);
+               const auto picture =
+                   ranges.empty() ? std::nullopt
+                                  : session.engine().frame(film, ranges.back().second, engine::Detail::draft);
+               if (!picture) return refuse(response, 404, "No frame of this version is kept.");
+               send_picture(*picture->jpeg, response);
+             });
     main.Get("/[0-9a-f]+/cell/([0-9]{1,18})/([0-9]{1,4})",
              [this](const httplib::Request& request, httplib::Response& response) {
                const auto picture =

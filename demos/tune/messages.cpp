@@ -8,21 +8,21 @@
 namespace offstage::tune {
 namespace {
 
-const char* name_of(Detail detail) {
-  return detail == Detail::draft ? "draft" : detail == Detail::preview ? "preview" : "final";
+const char* name_of(engine::Detail detail) {
+  return detail == engine::Detail::draft ? "draft" : detail == engine::Detail::preview ? "preview" : "final";
 }
 
-const char* name_of(FilmEvent::Phase phase) {
+const char* name_of(engine::FilmEvent::Phase phase) {
   switch (phase) {
-    case FilmEvent::Phase::loading:
+    case engine::FilmEvent::Phase::loading:
       return "loading";
-    case FilmEvent::Phase::lead_in:
+    case engine::FilmEvent::Phase::lead_in:
       return "lead_in";
-    case FilmEvent::Phase::running:
+    case engine::FilmEvent::Phase::running:
       return "running";
-    case FilmEvent::Phase::complete:
+    case engine::FilmEvent::Phase::complete:
       return "complete";
-    case FilmEvent::Phase::failed:
+    case engine::FilmEvent::Phase::failed:
       break;
   }
   return "failed";
@@ -82,7 +82,7 @@ Json figures_json(const producer::FrameFigures& figures) {
   return json;
 }
 
-Json event_json(const FrameEvent& event) {
+Json event_json(const engine::FrameEvent& event) {
   Json json = {{"run", event.run},
                {"film", event.film},
                {"frame", event.frame},
@@ -96,7 +96,7 @@ Json event_json(const FrameEvent& event) {
   return json;
 }
 
-Json event_json(const FilmEvent& event) {
+Json event_json(const engine::FilmEvent& event) {
   Json json = {{"run", event.run},         {"film", event.film},           {"phase", name_of(event.phase)},
                {"lead_in", event.lead_in}, {"simulated", event.simulated}, {"message", event.message},
                {"notes", event.notes}};
@@ -104,19 +104,19 @@ Json event_json(const FilmEvent& event) {
   return json;
 }
 
-Json event_json(const CellEvent& event) {
+Json event_json(const engine::CellEvent& event) {
   return {
       {"sweep", event.sweep}, {"index", event.index}, {"fault", event.fault}, {"particles", event.particles}};
 }
 
-std::string kind_of(const FrameEvent& event) {
+std::string kind_of(const engine::FrameEvent& event) {
   // A pinned film has no camera, and its frames do not belong to the run.
   return event.figures || event.frame == 0 ? "frame" : "other_frame";
 }
-std::string kind_of(const FilmEvent&) {
+std::string kind_of(const engine::FilmEvent&) {
   return "film";
 }
-std::string kind_of(const CellEvent& event) {
+std::string kind_of(const engine::CellEvent& event) {
   return fmt::format("cell:{}", event.index);
 }
 

@@ -8,10 +8,10 @@
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
 
+#include "engine/engine.h"
 #include "producer/base/error.h"
 #include "producer/run/production.h"
 #include "tune/document.h"
-#include "tune/engine.h"
 
 namespace offstage::tune {
 
@@ -29,13 +29,13 @@ Json problems_json(const std::vector<Problem>& problems, const std::string& file
 /// Ranges as pairs of the first and the last number.
 Json ranges_json(const std::vector<std::pair<int, int>>& ranges);
 Json figures_json(const producer::FrameFigures& figures);
-Json event_json(const FrameEvent& event);
-Json event_json(const FilmEvent& event);
-Json event_json(const CellEvent& event);
+Json event_json(const engine::FrameEvent& event);
+Json event_json(const engine::FilmEvent& event);
+Json event_json(const engine::CellEvent& event);
 /// Kind of a message; the next message of the same kind replaces it.
-std::string kind_of(const FrameEvent& event);
-std::string kind_of(const FilmEvent& event);
-std::string kind_of(const CellEvent& event);
+std::string kind_of(const engine::FrameEvent& event);
+std::string kind_of(const engine::FilmEvent& event);
+std::string kind_of(const engine::CellEvent& event);
 
 /// Converts a path in the text without the items at `muted` to the path in the whole text.
 std::string with_muted(const std::string& path, const std::vector<std::string>& muted);

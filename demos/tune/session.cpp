@@ -61,10 +61,10 @@ std::string changed_by(const std::string& text, const nlohmann::json& op) {
 
 }  // namespace
 
-Session::Session(const std::string& file, EngineSettings settings, std::vector<std::string> allowed)
+Session::Session(const std::string& file, engine::EngineSettings settings, std::vector<std::string> allowed)
     : allowed_(std::move(allowed)), document_(file) {
-  engine_ =
-      std::make_unique<Engine>(std::move(settings), [this](const EngineEvent& event) { on_event(event); });
+  engine_ = std::make_unique<engine::Engine>(std::move(settings),
+                                             [this](const engine::EngineEvent& event) { on_event(event); });
   const std::lock_guard lock(mutex_);
   show();
   watcher_ = std::thread([this] { watch_files(); });
@@ -219,7 +219,7 @@ Reply Session::post(const std::string& what, const nlohmann::json& request, cons
   if (handler == handlers.end()) return refused(404, "there is no " + what);
   if (what != "pick" && tabs_.writer() != tab)
     return refused(423, "another tab is editing this scene; take over to edit it here");
-  std::optional<Engine::Hold> hold;
+  std::optional<engine::Engine::Hold> hold;
   if (what != "pick" && what != "save" && what != "view") hold.emplace(*engine_);
   try {
     return (this->*handler->second)(request);
@@ -277,9 +277,10 @@ Reply Session::view(const nlohmann::json& request) {
   if (request.contains("frame"))
     engine_->look_at(request["frame"].get<int>(), request.value("playing", false));
   if (request.contains("camera")) {
-    std::optional<ViewCamera> camera;
+    std::optional<engine::ViewCamera> camera;
     if (!request["camera"].is_null())
-      camera = ViewCamera{vector_of(request["camera"].at("eye")), vector_of(request["camera"].at("target"))};
+      camera = engine::ViewCamera{vector_of(request["camera"].at("eye")),
+                                  vector_of(request["camera"].at("target"))};
     if (camera && !((camera->eye - camera->target).norm() > 1e-6))
       return refused(422, "the camera's eye and target must differ");
     changed |= camera != camera_;
@@ -302,7 +303,7 @@ Reply Session::view(const nlohmann::json& request) {
 Reply Session::pin(const nlohmann::json& request) {
   const std::lock_guard lock(mutex_);
   pinned_ = nullptr;
-  Engine::Loaded loaded;
+  engine::Engine::Loaded loaded;
   if (request.contains("id") && !request["id"].is_null()) {
     const Version* version = document_.find(request["id"].get<uint64_t>());
     if (!version) return refused(404, "this version is no longer kept");
@@ -359,7 +360,7 @@ Reply Session::sweep(const nlohmann::json& request) {
   constexpr std::size_t kMostCells = 36;
   const std::vector<std::string> paths = strings_in(request, "paths"), values = strings_in(request, "values");
   if (values.size() > kMostCells) return refused(422, fmt::format("at most {} values", kMostCells));
-  std::vector<Engine::Loaded> loaded;
+  std::vector<engine::Engine::Loaded> loaded;
   for (const std::string& value : values) {
     std::string text = document_.text();
     for (const std::string& path : paths) text = set_value(text, path, value);
@@ -370,8 +371,8 @@ Reply Session::sweep(const nlohmann::json& request) {
 
 // --- From the engine and the disk ---
 
-void Session::on_event(const EngineEvent& event) {
-  if (const auto* film = std::get_if<FilmEvent>(&event)) {
+void Session::on_event(const engine::EngineEvent& event) {
+  if (const auto* film = std::get_if<engine::FilmEvent>(&event)) {
     const std::lock_guard lock(events_mutex_);
     latest_film_ = event_json(*film);
   }
@@ -379,7 +380,7 @@ void Session::on_event(const EngineEvent& event) {
       [this](const auto& e) {
         Json json = event_json(e);
         // A tab that was too slow for the message of a frame gets its data with the next one.
-        if constexpr (std::is_same_v<std::decay_t<decltype(e)>, FrameEvent>)
+        if constexpr (std::is_same_v<std::decay_t<decltype(e)>, engine::FrameEvent>)
           json["ranges"] = ranges_json(engine_->ranges(e.film));
         tabs_.post(kind_of(e), dump(json));
       },

@@ -13,9 +13,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "engine/engine.h"
 #include "producer/base/error.h"
 #include "tune/document.h"
-#include "tune/engine.h"
 #include "tune/tabs.h"
 
 namespace offstage::tune {
@@ -32,7 +32,7 @@ class Session {
 
   /// Throws SceneError if the file cannot be read; a text that is not a valid scene is shown with its errors.
   /// Its files may be beside it and in the `allowed` folders.
-  Session(const std::string& file, EngineSettings settings, std::vector<std::string> allowed = {});
+  Session(const std::string& file, engine::EngineSettings settings, std::vector<std::string> allowed = {});
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -48,13 +48,13 @@ class Session {
   Reply post(const std::string& what, const nlohmann::json& request, const std::string& tab);
 
   Tabs& tabs() { return tabs_; }
-  Engine& engine() { return *engine_; }
+  engine::Engine& engine() { return *engine_; }
   /// Ends the streams and stops watching files.
   void close();
 
  private:
   struct Parsed {
-    Engine::Loaded loaded;
+    engine::Engine::Loaded loaded;
     std::vector<Problem> errors;
   };
   using Handler = Reply (Session::*)(const nlohmann::json&);
@@ -78,7 +78,7 @@ class Session {
   Reply shown();
   Json document() const;
   void post_document();
-  void on_event(const EngineEvent& event);
+  void on_event(const engine::EngineEvent& event);
   void watch_files();
   void files_changed(const std::string& hash_before, const std::string& hash_now);
 
@@ -86,19 +86,19 @@ class Session {
   std::vector<std::string> allowed_;  // folders in addition to the scene's own
   Document document_;
   Tabs tabs_;
-  Engine::Loaded shown_;  // the latest valid version
+  engine::Engine::Loaded shown_;  // the latest valid version
   std::vector<Problem> errors_, warnings_;
   uint64_t revision_ = 0;  // increases when the document known to the tabs is outdated
-  Engine::Run run_;
+  engine::Engine::Run run_;
   std::map<uint64_t, std::string> films_;  // films of versions
-  std::optional<ViewCamera> camera_;
+  std::optional<engine::ViewCamera> camera_;
   Json overlays_ = Json::array();
   std::set<std::string> muted_;
   Json pinned_;
   std::optional<std::string> theirs_;  // content of the file after a change by another program
   mutable std::mutex events_mutex_;
   Json latest_film_;  // latest progress, for new tabs
-  std::unique_ptr<Engine> engine_;
+  std::unique_ptr<engine::Engine> engine_;
   std::atomic<bool> closing_ = false;
   std::thread watcher_;  // last, so that it ends first
 };

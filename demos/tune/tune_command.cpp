@@ -49,7 +49,7 @@ int tune_command(const producer::TuneOptions& options) {
   if (options.scene.from_standard_input())
     throw std::invalid_argument(
         "tune needs a scene file, because it saves changes; standard input cannot be used");
-  EngineSettings settings;
+  engine::EngineSettings settings;
   settings.draft_px = size_of(options.size);
   settings.decompositions = options.scene.decompositions();
   const auto threads = producer::simulation_threads(options.threads);

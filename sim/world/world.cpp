@@ -244,6 +244,15 @@ MeshHandle World::add_compound(const std::vector<SolidMesh>& solids) {
   return impl_->meshes.insert(std::make_unique<CollisionMesh>(std::move(welded)));
 }
 
+MeshHandle World::add_shared_mesh(std::shared_ptr<const CollisionMesh> mesh) {
+  if (!mesh) refuse("mesh", "there is none");
+  return impl_->meshes.insert(std::move(mesh));
+}
+
+std::shared_ptr<const CollisionMesh> World::shared_mesh(MeshHandle mesh) const {
+  return impl_->meshes[mesh];
+}
+
 const MeshTopology& World::topology(MeshHandle mesh) const {
   return impl_->meshes[mesh]->topology;
 }

@@ -21,7 +21,7 @@ struct Spring {
 
 struct WorldState {
   WorldDef def;
-  SlotMap<std::unique_ptr<CollisionMesh>, MeshTag> meshes;
+  SlotMap<std::shared_ptr<const CollisionMesh>, MeshTag> meshes;  // other worlds may share them
   SlotMap<std::unique_ptr<Body>, BodyTag> bodies;
   SlotMap<ParticleSystem, ParticleSystemTag> systems;
   SlotMap<Spring, SpringTag> springs;

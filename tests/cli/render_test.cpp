@@ -5,8 +5,10 @@
 #include <chrono>
 #include <set>
 #include <thread>
+#include <utility>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 #include <signal.h>
 #include <sys/mount.h>
 #include <sys/wait.h>
@@ -200,24 +202,88 @@ TEST(Render, APrewarmedSceneIsTheSameInChunksFromACacheAndResumed) {
   EXPECT_EQ(frames(folder / "whole"), whole);
 }
 
-/// `offstage render scene.json -o out/ --watch` in the background; the destructor ends it.
+/// `offstage render scene.json --watch` in the background; the destructor ends it.
 class WatchedRender {
  public:
-  explicit WatchedRender(const fs::path& folder) : child_(fork()) {
+  explicit WatchedRender(const fs::path& folder, const std::string& options = "-o out/")
+      : log_(folder / "watch.log") {
+    const std::string command = "exec " OFFSTAGE_BINARY_DIR "/offstage render scene.json --watch " + options +
+                                " > shown.txt 2> watch.log";
+    child_ = fork();
     if (child_ != 0) return;
     if (chdir(folder.c_str()) != 0) _exit(99);
-    execl(OFFSTAGE_BINARY_DIR "/offstage", "offstage", "render", "scene.json", "-o", "out/", "-q", "--watch",
-          nullptr);
+    execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
     _exit(99);
   }
-  ~WatchedRender() {
+  ~WatchedRender() { end(); }
+  /// Waits until a message has come this number of times.
+  bool says(const std::string& message, int times = 1) const {
+    const auto count = [&] {
+      const std::string log = fs::exists(log_) ? read_file(log_) : "";
+      int found = 0;
+      for (auto at = log.find(message); at != std::string::npos; at = log.find(message, at + 1)) ++found;
+      return found;
+    };
+    for (int i = 0; i < 6000 && count() < times; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    return count() >= times;
+  }
+  /// Ends it as Ctrl-C does; returns its exit code.
+  int end() {
+    if (child_ <= 0) return -1;
+    int status = 0;
     kill(child_, SIGINT);
-    waitpid(child_, nullptr, 0);
+    waitpid(std::exchange(child_, -1), &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
 
  private:
-  pid_t child_;
+  const fs::path log_;
+  pid_t child_ = -1;
 };
+
+/// A falling ball and a jet of particles.
+std::string watched_scene(const std::string& color, double height, double duration = 0.3) {
+  return R"({"version": 1, "materials": [{"name": "paint", "color": ")" + color +
+         R"("}], "bodies": [{"shape": {"type": "sphere"}, "material": "paint", "position": [0, )" +
+         std::to_string(height) +
+         R"(, 0]}], "emitters": [{"rate": 3000, "overlap": true}],
+      "render": {"size": [64, 36], "quality": "preview"}, "output": {"duration": )" +
+         std::to_string(duration) + "}}";
+}
+
+/// The statistics of a run without its times and its memory.
+nlohmann::json lasting_statistics(const fs::path& file) {
+  auto stats = nlohmann::json::parse(read_file(file));
+  for (const char* key : {"wall_s", "startup_s", "sim_ms", "render_ms", "encode_ms", "peak_rss_mb"})
+    stats.erase(key);
+  return stats;
+}
+
+TEST(Render, WatchWritesTheFilesOfRender) {
+  for (const std::string output : {"out/####.png", "film.mp4"}) {
+    const TemporaryFolder watched, plain;
+    const std::string options = "--channels depth,id --stats stats.json -o " + output;
+    write_file(watched / "scene.json", watched_scene("#b03020", 1));
+    write_file(plain / "scene.json", watched_scene("#b03020", 1));
+    {
+      WatchedRender watch(watched.path(), options);
+      ASSERT_TRUE(watch.says("rendered in"));
+      EXPECT_EQ(watch.end(), 130);
+    }
+    ASSERT_EQ(offstage("render scene.json -q " + options, plain.path()).code, 0);
+    const std::string shown = read_file(watched / "shown.txt");
+    EXPECT_EQ(shown, output + "\n");
+    EXPECT_EQ(lasting_statistics(watched / "stats.json"), lasting_statistics(plain / "stats.json"));
+    const auto files = [](const TemporaryFolder& folder) {
+      auto all = contents(folder.path());
+      for (const char* name : {"stats.json", "watch.log", "shown.txt"}) all.erase(name);
+      return all;
+    };
+    EXPECT_GT(files(plain).size(), 10u);
+    EXPECT_EQ(files(watched), files(plain));
+  }
+}
 
 TEST(Render, WatchRemovesFramesAndChannelsThatTheNewFilmLacks) {
   const TemporaryFolder folder;
@@ -251,48 +317,69 @@ TEST(Render, WatchRemovesFramesAndChannelsThatTheNewFilmLacks) {
 }
 
 TEST(Render, WatchDrawsANewLookFromTheStatesOfTheLastSimulation) {
-  const TemporaryFolder folder;
-  const auto scene = [](const std::string& color, double height) {
-    return R"({"version": 1, "materials": [{"name": "paint", "color": ")" + color +
-           R"("}], "bodies": [{"shape": {"type": "sphere"}, "material": "paint", "position": [0, )" +
-           std::to_string(height) +
-           R"(, 0]}], "render": {"size": [64, 36], "quality": "preview"}, "output": {"duration": 0.1}})";
-  };
-  const auto states = [&] {  // the published generation
-    for (const auto& entry : fs::directory_iterator(folder.path()))
-      if (entry.path().filename().string().find(".states-") != std::string::npos &&
-          fs::exists(entry.path() / "cache.json"))
-        return read_file(entry.path() / "cache.json");
-    return std::string();
-  };
-  const auto wait_for_frames = [&](const std::map<std::string, std::string>& expected) {
-    for (int i = 0; i < 3000 && frames(folder / "out") != expected; ++i)
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    return frames(folder / "out") == expected;
-  };
-  const auto rendered = [&](const std::string& text) {
-    const TemporaryFolder other;
-    write_file(other / "scene.json", text);
-    EXPECT_EQ(offstage("render scene.json -o out/ -q", other.path()).code, 0);
-    return frames(other / "out");
-  };
-  fs::create_directory(folder / "out");
-  write_file(folder / "scene.json", scene("#b03020", 1));
-  std::string first;
-  {
-    const WatchedRender watch(folder.path());
-    ASSERT_TRUE(wait_for_frames(rendered(scene("#b03020", 1))));
-    first = states();
-    ASSERT_FALSE(first.empty());
-    write_file(folder / "scene.json", scene("#2030b0", 1));
-    EXPECT_TRUE(wait_for_frames(rendered(scene("#2030b0", 1))));
-    EXPECT_EQ(states(), first) << "the colour does not need a new simulation";
-    write_file(folder / "scene.json", scene("#2030b0", 2));
-    EXPECT_TRUE(wait_for_frames(rendered(scene("#2030b0", 2))));
-    EXPECT_NE(states(), first);
-  }
+  const TemporaryFolder folder, other;
+  write_file(folder / "scene.json", watched_scene("#b03020", 1));
+  WatchedRender watch(folder.path(), "-o out/ --stats stats.json");
+  ASSERT_TRUE(watch.says("rendered in"));
+  const auto first = nlohmann::json::parse(read_file(folder / "stats.json"));
+  write_file(folder / "scene.json", watched_scene("#2030b0", 1));
+  ASSERT_TRUE(watch.says("rendered in", 2));
+  const auto second = nlohmann::json::parse(read_file(folder / "stats.json"));
+  EXPECT_LT(second["sim_ms"]["mean"], first["sim_ms"]["mean"].get<double>() / 10)
+      << "the colour does not need a new simulation";
+  write_file(other / "scene.json", watched_scene("#2030b0", 1));
+  ASSERT_EQ(offstage("render scene.json -o out/ -q --stats stats.json", other.path()).code, 0);
+  EXPECT_EQ(frames(folder / "out"), frames(other / "out"));
+  EXPECT_EQ(lasting_statistics(folder / "stats.json"), lasting_statistics(other / "stats.json"));
+  write_file(folder / "scene.json", watched_scene("#2030b0", 2));
+  ASSERT_TRUE(watch.says("rendered in", 3));
+  const auto third = nlohmann::json::parse(read_file(folder / "stats.json"));
+  EXPECT_NE(third["state_hash"], first["state_hash"]);
+  watch.end();
   for (const auto& entry : fs::directory_iterator(folder.path()))
     EXPECT_FALSE(entry.path().filename().string().starts_with(".")) << entry.path() << " is left over";
+}
+
+TEST(Render, WatchDrawsOneCamera) {
+  const TemporaryFolder folder;
+  for (const char* cameras : {"all", "near,far"}) {
+    const Outcome run = offstage("render " + tiny_scene() + " -o out/ --watch --camera " + cameras,
+                                 folder.path(), "timeout 60");
+    EXPECT_EQ(run.code, 2) << cameras;
+    EXPECT_NE(run.err.find("--watch draws one camera"), std::string::npos) << run.err;
+  }
+}
+
+TEST(Render, WatchEndsALongFilmWhenTheSceneChanges) {
+  const TemporaryFolder folder;
+  write_file(folder / "scene.json", watched_scene("#b03020", 1, 3600));
+  WatchedRender watch(folder.path());
+  const auto has_frame = [&] {
+    for (const auto& entry : fs::directory_iterator(folder.path()))
+      if (fs::exists(entry.path() / "0003.png")) return true;
+    return false;
+  };
+  for (int i = 0; i < 6000 && !has_frame(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  ASSERT_TRUE(has_frame());
+  write_file(folder / "scene.json", watched_scene("#b03020", 1, 0.1));
+  ASSERT_TRUE(watch.says("rendered in"));
+  EXPECT_EQ(frames(folder / "out").size(), 3u);
+  EXPECT_EQ(watch.end(), 130);
+}
+
+TEST(Render, WatchKeepsTheLastGoodResultAfterAnError) {
+  const TemporaryFolder folder;
+  write_file(folder / "scene.json", watched_scene("#b03020", 1));
+  WatchedRender watch(folder.path());
+  ASSERT_TRUE(watch.says("rendered in"));
+  const auto good = contents(folder / "out");
+  write_file(folder / "scene.json", R"({"version": 1, "bodies": [)");
+  ASSERT_TRUE(watch.says("kept the last good result"));
+  EXPECT_TRUE(watch.says("scene.json:1:"));
+  EXPECT_EQ(contents(folder / "out"), good);
+  write_file(folder / "scene.json", watched_scene("#b03020", 1, 0.1));
+  ASSERT_TRUE(watch.says("rendered in", 2));
+  EXPECT_EQ(frames(folder / "out").size(), 3u);
 }
 
 TEST(Render, FullDiskIsAnErrorAndLeavesNoBrokenFile) {

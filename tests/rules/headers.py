@@ -71,7 +71,7 @@ ALSO_GIVES = {
 }
 # std::size_t is given by every container, string and view, and move, forward and swap by what no program avoids.
 EVERYWHERE = {"size_t", "ptrdiff_t", "nullptr_t", "move", "forward", "swap"}
-FOLDERS = ("sim", "effects", "render", "demos/producer", "demos/tune")
+FOLDERS = ("sim", "effects", "render", "demos/producer", "demos/engine", "demos/tune")
 
 
 # A type that a header defines in a namespace, and any that it names itself: nested, declared, a parameter of a template.

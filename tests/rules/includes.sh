@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# The dependency rules. Between libraries: sim <- effects <- demos/producer, render <- demos/producer; sim and render never meet.
+# The dependency rules. Between libraries: sim <- effects <- demos/producer, render <- demos/producer <- demos/engine <- demos/tune;
+# sim and render never meet.
 # usage: includes.sh SOURCE_DIR
 cd "$1" || exit 2
 status=0
@@ -21,7 +22,8 @@ forbid render "sim/|effects/|producer/|CLI/|valijson" "render knows something of
 # glTF files are JSON; one header of its reader wraps the library.
 forbid "$(find render -name '*.h' -o -name '*.cpp' | grep -v '^render/gltf_json.h$' | tr '\n' ' ')" nlohmann "JSON is read in render/gltf_json.h alone"
 forbid "$(find render -name '*.h' -o -name '*.cpp' | grep -v '^render/trace/' | tr '\n' ' ')" "embree|glm/" "Embree and GLM are used in render/trace alone"
-forbid demos/producer "tune/|pybind11" "producer includes what is built on it"
+forbid demos/producer "engine/|tune/|pybind11" "producer includes what is built on it"
+forbid demos/engine "tune/|httplib" "engine includes what is built on it"
 # Floors: within a library, a folder includes itself and the folders before it in the list.
 # floors FOLDER PREFIX FLOOR...; "." is the folder's own files.
 floors() {
@@ -65,6 +67,6 @@ only 'stb_image' 'render/image_io'
 only 'libdeflate.h' 'render/png'
 only 'Imf' 'render/exr'
 only 'httplib.h' 'demos/tune/http_server'
-only 'turbojpeg.h' 'demos/tune/jpeg'
+only 'turbojpeg.h' 'demos/engine/jpeg'
 only 'dlfcn.h' 'render/gl_platform'
 exit $status

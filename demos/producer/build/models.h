@@ -41,6 +41,8 @@ class ModelLibrary {
                std::vector<Problem>& warnings, const StepCallback& on_step = {});
 
   const render::Model& model(const std::string& file) const { return models_.at(file); }
+  /// The file and the settings of a model's decomposition.
+  static std::string parts_key(const MeshFile& mesh);
   /// The unscaled convex parts of a model, or null if they are not needed.
   const sim::ConvexDecomposition* parts(const MeshFile& mesh) const {
     const auto it = parts_.find(parts_key(mesh));
@@ -69,7 +71,6 @@ class ModelLibrary {
   /// Reads the picture of the sky, and returns its pixels for the digest.
   std::vector<float> read_sky(const Scene& scene, const SceneFolder& folder, std::vector<Problem>& problems,
                               std::vector<Problem>& warnings);
-  static std::string parts_key(const MeshFile& mesh);
   static std::string animation_key(const Body& body);
   void read_animations(const Scene& scene, const DecompositionCache& cache, std::vector<Problem>& problems);
   void decompose_models(const Scene& scene, const DecompositionCache& cache, std::vector<Problem>& warnings,

@@ -60,6 +60,12 @@ ClothSample cloth_sample(const sim::ClothView& view) {
   return sample;
 }
 
+/// Key of the collision mesh of a model.
+std::string mesh_key(const MeshFile& file, const ModelLibrary& models) {
+  return fmt::format("{}\n{}\n{}\n{:a}", models.digest(), ModelLibrary::parts_key(file),
+                     models.parts(file) ? "parts" : "", scale_of(file, models));
+}
+
 nlohmann::ordered_json stats_json(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
 }
@@ -79,9 +85,9 @@ void Simulation::note_cloths() {
   });
 }
 
-Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
+Simulation::Simulation(const Scene& scene, const ModelLibrary& models, CollisionMeshes* shared)
     : scene_(scene), objects_(scene), world_(scene.world) {
-  add_bodies(scene, models);
+  add_bodies(scene, models, shared);
   for (const ContactRule& rule : scene.contacts)
     at_place(rule.where, [&] {
       sim::ContactRule def = rule;
@@ -103,8 +109,8 @@ Simulation::Simulation(const Scene& scene, const ModelLibrary& models)
   if (prewarm_pieces_ == 0) prewarm(0, 0);
 }
 
-void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
-  std::map<std::pair<std::string, Real>, sim::MeshHandle> meshes;
+void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models, CollisionMeshes* shared) {
+  std::map<std::string, sim::MeshHandle> meshes;
   std::vector<std::pair<const Body*, sim::BodyDef>> animated;
   std::map<std::vector<float>, sim::MeshHandle> compounds;
   moving_.resize(objects_.slots);
@@ -147,7 +153,9 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
       std::visit(
           [&](const auto& shape) {
             if constexpr (std::is_same_v<std::decay_t<decltype(shape)>, MeshFile>) {
-              sim::MeshHandle& mesh = meshes[{shape.file, scale_of(shape, models)}];
+              const std::string key = mesh_key(shape, models);
+              sim::MeshHandle& mesh = meshes[key];
+              if (!mesh && shared && shared->contains(key)) mesh = world_.add_shared_mesh(shared->at(key));
               if (!mesh) mesh = add_mesh(shape, models);
               def.shape = sim::MeshShape{mesh};
             } else if constexpr (!std::is_constructible_v<sim::Shape, std::decay_t<decltype(shape)>>) {
@@ -172,6 +180,9 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models) {
     moving_poses_[*slot] = world_.body(handle).pose;
   }
   for (const auto& [body, def] : animated) add_pieces(*body, def, models);
+  if (!shared) return;
+  shared->clear();
+  for (const auto& [key, mesh] : meshes) shared->emplace(key, world_.shared_mesh(mesh));
 }
 
 /// Adds the pieces of an animated shape as kinematic bodies. They are not among the bodies of the scene.

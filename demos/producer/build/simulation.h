@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -46,11 +47,15 @@ struct SimulationTotals : sim::StepFigures {
   double step_s = 0;         ///< longest internal step [s]
 };
 
+/// Collision meshes of models, by the model's data, its scale and its decomposition.
+using CollisionMeshes = std::map<std::string, std::shared_ptr<const sim::CollisionMesh>>;
+
 class Simulation {
  public:
-  /// Throws SceneError for errors that only building finds: an open mesh as a dynamic body, an emitter with
-  /// invalid parameters.
-  Simulation(const Scene& scene, const ModelLibrary& models);
+  /// Takes the meshes of an earlier simulation from `shared`, unless it is null, and leaves its own there, so
+  /// that the next version of a scene need not compute them. Throws SceneError for errors that only building
+  /// finds: an open mesh as a dynamic body, an emitter with invalid parameters.
+  Simulation(const Scene& scene, const ModelLibrary& models, CollisionMeshes* shared = nullptr);
 
   /// Called at the start of every internal step, with its time, if set: for traces.
   void on_substep(std::function<void(double time)> callback) { on_substep_ = std::move(callback); }
@@ -101,7 +106,7 @@ class Simulation {
   std::string state_dump(const sim::NonFinite& lost) const;
 
  private:
-  void add_bodies(const Scene& scene, const ModelLibrary& models);
+  void add_bodies(const Scene& scene, const ModelLibrary& models, CollisionMeshes* shared);
   sim::MeshHandle add_mesh(const MeshFile& file, const ModelLibrary& models);
   void add_pieces(const Body& body, const sim::BodyDef& whole, const ModelLibrary& models);
   void add_particle_groups(const Scene& scene);

@@ -77,14 +77,14 @@ int flushed(int code) {
   return code == kOk ? kRunFailed : code;
 }
 
-int dispatch(int argc, char** argv, const TuneCommand& tune);
+int dispatch(int argc, char** argv, const TuneCommand& tune, const WatchCommand& watch);
 
 }  // namespace
 
-int run(int argc, char** argv, const TuneCommand& tune) {
+int run(int argc, char** argv, const TuneCommand& tune, const WatchCommand& watch) {
   open_standard_streams();
   install_signal_handlers();
-  return flushed(reported([&] { return dispatch(argc, argv, tune); }));
+  return flushed(reported([&] { return dispatch(argc, argv, tune, watch); }));
 }
 
 namespace {
@@ -138,21 +138,21 @@ Command add_tune(CLI::App& app, const TuneCommand& run) {
 }
 
 /// In the order in which --help lists them.
-std::vector<Command> add_commands(CLI::App& app, const TuneCommand& tune) {
-  return {add_render(app),    add_new(app),     add_tune(app, tune), add_encode(app), add_frame(app),
-          add_sheet(app),     add_sweep(app),   add_simulate(app),   add_bench(app),  add_export(app),
-          add_cache(app),     add_farm(app),    add_validate(app),   add_schema(app), add_presets(app),
-          add_info(app),      add_compare(app), add_bless(app),      add_doctor(app), add_man(app),
+std::vector<Command> add_commands(CLI::App& app, const TuneCommand& tune, const WatchCommand& watch) {
+  return {add_render(app, watch), add_new(app),     add_tune(app, tune), add_encode(app), add_frame(app),
+          add_sheet(app),         add_sweep(app),   add_simulate(app),   add_bench(app),  add_export(app),
+          add_cache(app),         add_farm(app),    add_validate(app),   add_schema(app), add_presets(app),
+          add_info(app),          add_compare(app), add_bless(app),      add_doctor(app), add_man(app),
           add_completion(app)};
 }
 
-int dispatch(int argc, char** argv, const TuneCommand& tune) {
+int dispatch(int argc, char** argv, const TuneCommand& tune, const WatchCommand& watch) {
   CLI::App app{"offstage turns a scene file into a physically simulated film, without a display or a GPU."};
   app.set_version_flag("--version", "offstage " + std::string(version_text()));
   app.require_subcommand(1);
   app.fallthrough(false);
   app.footer(kFooter);
-  const std::vector<Command> commands = add_commands(app, tune);
+  const std::vector<Command> commands = add_commands(app, tune, watch);
 
   std::vector<std::string> names;
   for (const Command& command : commands) names.push_back(command.arguments->get_name());

@@ -20,6 +20,6 @@ enum ExitCode {
 
 /// Parses the arguments and runs the command; returns the exit code. Results go to standard output, messages
 /// to standard error.
-int run(int argc, char** argv, const TuneCommand& tune);
+int run(int argc, char** argv, const TuneCommand& tune, const WatchCommand& watch);
 
 }  // namespace offstage::producer

@@ -2,6 +2,7 @@
 /// The commands of the command line, and what they share.
 
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "producer/build/models.h"
 #include "producer/cli/options.h"
 #include "producer/format/scene_io.h"
+#include "producer/run/state_source.h"
 #include "render/context.h"
 
 namespace offstage::producer {
@@ -22,8 +24,12 @@ struct Command {
       run;  ///< with the options that were parsed; returns an exit code, errors are exceptions
 };
 
+struct RenderOptions;
+/// render --watch is in a library above this one: see engine/watch_command.h.
+using WatchCommand = std::function<int(const RenderOptions&)>;
+
 // Each adds a command with its options to the program's command line.
-Command add_render(CLI::App& app);
+Command add_render(CLI::App& app, const WatchCommand& watch);
 Command add_new(CLI::App& app);
 Command add_encode(CLI::App& app);
 Command add_frame(CLI::App& app);
@@ -52,20 +58,23 @@ struct RenderOptions {
   std::string format = "rgba";  ///< format of standard output
   std::string cache, stats, report;
   std::vector<std::string> cameras;  ///< cameras to draw, or kAllCameras; empty: the scene's `camera`
-  /// Folder of the states, for other cameras and further renders: they are read if it holds those of this
-  /// simulation, otherwise they are written to it. Empty: none.
+  /// Folder of the states for several cameras: they are read if it holds those of this simulation, otherwise
+  /// they are written to it. Empty: none.
   std::string states;
   int threads = 0;  ///< 0: all available
   int jobs = 0;     ///< 0: chosen by `threads`
   bool resume = false, force = false, dry_run = false, watch = false;
   render::GlPlatform gl = render::GlPlatform::automatic;
+
+  // These are set by render --watch.
+  std::function<bool()> stop;  ///< as RenderJob::stop
+  /// Makes RenderJob::states for a film that ends with the frame `last`; empty: none.
+  std::function<std::unique_ptr<StateSource>(const LoadedScene&, const ModelLibrary&, int last)> states_of;
+  bool prints_name = true;  ///< whether the name of the complete output is printed
 };
 int render_command(const RenderOptions& options);
 /// Default output of a scene: SCENE.mp4 in the current folder. Throws OutputError for standard input.
 std::string default_film(const std::string& scene_file);
-/// Renders, and renders again whenever a file of the scene changes, until a signal ends it. Every render runs
-/// in a separate process. A complete result replaces the output; a failed render keeps the last good result.
-int watch_command(const RenderOptions& options);
 
 struct TuneOptions {
   SceneOptions scene;

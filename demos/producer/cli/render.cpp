@@ -57,7 +57,7 @@ struct FrameOptions {
 
 namespace fs = std::filesystem;
 
-constexpr uint64_t kStatesBytes = 4ull << 30;  // most that states for further renders take on the disk
+constexpr uint64_t kStatesBytes = 4ull << 30;  // limit for the states for further cameras, on the disk
 
 void report_run(const RunStats& stats, const TalkOptions& talk, const std::string& stats_file) {
   if (!stats_file.empty()) write_text_file(stats_file, to_json(stats));
@@ -94,14 +94,14 @@ struct Plan {
   ChannelFiles channels;
 };
 
-render::VideoDef video_def(const Plan& plan) {
+render::VideoDef video_def(const Plan& plan, const std::function<bool()>& stop = {}) {
   const Scene& scene = plan.loaded.scene;
   return {.path = plan.target.path,
           .width_px = scene.render.size.x(),
           .height_px = scene.render.size.y(),
           .fps = scene.output.fps,
           .alpha = scene.environment.background == Background::transparent,
-          .stop = [] { return interrupt_signal() != 0; }};
+          .stop = [stop] { return interrupt_signal() != 0 || (stop && stop()); }};
 }
 
 int print_plan(const Plan& plan) {
@@ -201,6 +201,10 @@ RunStats draw(const Plan& plan, const ModelLibrary& models, const RenderOptions&
   }
   job.channels = plan.channels.choice;
   job.channels_stem = plan.channels.stem;
+  job.stop = options.stop;
+  std::unique_ptr<StateSource> states;
+  if (options.states_of) states = options.states_of(plan.loaded, models, job.frames.back());
+  job.states = states.get();
   RunStats stats = render_frames(plan.loaded, models, job, sink, std::ref(progress));
   progress.finish();
   if (job.report) write_text_file(options.report, run_report(plan.loaded, plan.settings, stats));
@@ -242,14 +246,14 @@ int render_to_frames(const Plan& plan, const ModelLibrary& models, const RenderO
     return interrupted(stats, static_cast<int>(plan.frames.size()),
                        options.force ? "; continue with the same command and --resume instead of --force"
                                      : "; continue with the same command and --resume");
-  print_output_name(plan.target.path.string());
+  if (options.prints_name) print_output_name(plan.target.path.string());
   return kOk;
 }
 
 int render_to_video(const Plan& plan, const ModelLibrary& models, const RenderOptions& options) {
   // A part of a film must neither look like the whole film nor replace one, so it gets its name only with all
   // frames.
-  render::VideoDef def = video_def(plan);
+  render::VideoDef def = video_def(plan, options.stop);
   const OutputLock lock = lock_film(plan);
   const fs::path partial = def.path.replace_extension(".partial" + plan.target.path.extension().string());
   if (plan.channels.choice.any()) prepare_channels(plan.channels.stem.parent_path(), options.force);
@@ -262,7 +266,7 @@ int render_to_video(const Plan& plan, const ModelLibrary& models, const RenderOp
   }
   report_run(stats, options.talk, options.stats);
   if (!stats.interrupted_by) {
-    print_output_name(plan.target.path.string());
+    if (options.prints_name) print_output_name(plan.target.path.string());
     return kOk;
   }
   return interrupted(stats, static_cast<int>(plan.frames.size()),
@@ -300,7 +304,6 @@ std::string file_of_camera(const std::string& file, const std::string& camera) {
 /// Draws several cameras one after the other. Only the first one simulates; the states are kept for the
 /// others unless the run is resumed, in which each camera may lack other frames.
 int render_cameras(const RenderOptions& options) {
-  if (options.watch) throw OutputError("--watch draws one camera; name it with --camera");
   const LoadedScene loaded = load(options.scene, true);
   const std::vector<std::string> known = camera_names(loaded.scene);
   std::vector<std::string> names = options.cameras;
@@ -498,7 +501,7 @@ int simulate_command(const SimulateOptions& options) {
 
 }  // namespace
 
-Command add_render(CLI::App& app) {
+Command add_render(CLI::App& app, const WatchCommand& watch) {
   const auto options = std::make_shared<RenderOptions>();
   RenderOptions& render = *options;
   CLI::App* command = app.add_subcommand("render", "Simulate a scene and draw it: frames or a video");
@@ -542,9 +545,9 @@ Command add_render(CLI::App& app) {
   command->add_option("--report", render.report,
                       "Write pictures, plots, settings and hashes of the run to this HTML file");
   add_talk(*command, render.talk);
-  return {command, [options] {
+  return {command, [options, watch] {
             if (options->out.empty()) options->out = default_film(options->scene.file);
-            return options->watch ? watch_command(*options) : render_command(*options);
+            return options->watch ? watch(*options) : render_command(*options);
           }};
 }
 

@@ -19,13 +19,17 @@
 #include "producer/run/particle_table.h"
 #include "producer/run/pipeline.h"
 #include "producer/run/snapshot_cache.h"
+#include "producer/run/state_source.h"
 #include "producer/run/trace.h"
 #include "render/context.h"
+#include "render/error.h"
 
 namespace offstage::producer {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+constexpr const char* kOutdated = "the film is no longer needed";
 
 double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
@@ -90,36 +94,34 @@ class ProgressMeter {
   Clock::time_point simulating_since_ = start_;  // used by the simulating thread
 };
 
-/// Source of snapshots: the simulation or a cache.
-class SnapshotSource {
- public:
-  virtual ~SnapshotSource() = default;
-  /// Returns the state at a frame, or an earlier one if `stop` returned true. Frames must be requested in
-  /// ascending order.
-  virtual Snapshot at(int frame, const std::function<bool()>& stop) = 0;
-  /// Adds further data of the latest state.
-  virtual void describe(FrameJob&) const {}
-};
-
-class LiveSource : public SnapshotSource {
+class LiveSource : public StateSource {
  public:
   /// `kept` receives the requested states, unless it is empty; `keep_at_most` as in RenderJob.
-  LiveSource(Simulation& simulation, ProgressMeter& meter, std::optional<SnapshotCache>& kept,
+  LiveSource(const Scene& scene, const ModelLibrary& models, std::optional<SnapshotCache>& kept,
              std::optional<uint64_t> keep_at_most)
-      : simulation_(simulation), meter_(meter), kept_(kept), keep_at_most_(keep_at_most) {}
-  Snapshot at(int frame, const std::function<bool()>& stop) override {
-    meter_.simulation_goes_on();
-    while (simulation_.frame() < frame && !stop()) {
+      : simulation_(scene, models),
+        energy_start_(simulation_.energy()),
+        kept_(kept),
+        keep_at_most_(keep_at_most) {}
+  int advances_to(int frame) override { return simulation_.advances_to(frame); }
+  std::shared_ptr<const Snapshot> at(int frame, const OnAdvance& on_advance) override {
+    while (simulation_.frame() < frame) {
       simulation_.advance();
-      meter_.simulated_one();
+      if (!on_advance() && simulation_.frame() < frame) return nullptr;
     }
-    Snapshot snapshot = simulation_.snapshot();
-    keep(snapshot);
+    auto snapshot = std::make_shared<const Snapshot>(simulation_.snapshot());
+    keep(*snapshot);
     return snapshot;
   }
   void describe(FrameJob& frame_job) const override {
     frame_job.contacts = simulation_.world().contacts().size();
     frame_job.energy = simulation_.world().energy();
+  }
+  void add_totals(RunStats& stats) const override {
+    stats.bodies = simulation_.body_count();
+    stats.totals = simulation_.totals();
+    stats.energy_start = energy_start_;
+    stats.energy_end = simulation_.energy();
   }
 
  private:
@@ -140,21 +142,31 @@ class LiveSource : public SnapshotSource {
     kept_.reset();
   }
 
-  Simulation& simulation_;
-  ProgressMeter& meter_;
+  Simulation simulation_;
+  const sim::Energy energy_start_;
   std::optional<SnapshotCache>& kept_;
   const std::optional<uint64_t> keep_at_most_;
   uint64_t bytes_ = 0;  // written so far
 };
 
-class CachedSource : public SnapshotSource {
+class CachedSource : public StateSource {
  public:
   explicit CachedSource(SnapshotCache cache) : cache_(std::move(cache)) {}
-  Snapshot at(int frame, const std::function<bool()>&) override { return cache_.read(frame); }
+  int advances_to(int) override { return 0; }
+  std::shared_ptr<const Snapshot> at(int frame, const OnAdvance&) override {
+    return std::make_shared<const Snapshot>(cache_.read(frame));
+  }
 
  private:
   SnapshotCache cache_;
 };
+
+std::unique_ptr<StateSource> cached_source(const LoadedScene& loaded, const ModelLibrary& models,
+                                           const std::filesystem::path& folder) {
+  SnapshotCache cache(folder);
+  cache.open(simulation_key(loaded, models), loaded.scene.frame_count());
+  return std::make_unique<CachedSource>(std::move(cache));
+}
 
 bool is_blank(const render::Image& image) {
   const auto* first = image.rgba.data();
@@ -163,16 +175,17 @@ bool is_blank(const render::Image& image) {
   return true;
 }
 
-void draw_frames(Pipeline& pipeline, const Scene& scene, const ModelLibrary& models, bool channels,
+void draw_frames(Pipeline& pipeline, const Scene& scene, const ModelLibrary& models, const RenderJob& job,
                  bool linear) {
   render::Context context;
   Picture picture(scene, models, context);
   while (auto frame_job = pipeline.take_job()) {
     const auto start = Clock::now();
     const render::LightSums before = picture.light_sums();
-    render::Image image = picture.draw(*frame_job->previous, *frame_job->current);
+    render::Image image = picture.draw(*frame_job->previous, *frame_job->current, job.stop);
+    if (image.rgba.empty()) throw render::StoppedError(kOutdated);
     render::Channels data;
-    if (channels) data = picture.channels(*frame_job->previous, *frame_job->current);
+    if (job.channels.any()) data = picture.channels(*frame_job->previous, *frame_job->current);
     render::HdrImage light;
     if (linear) light = picture.linear();
     render::LightSums sums = picture.light_sums();
@@ -231,26 +244,33 @@ void print_frames(Pipeline& pipeline, render::FrameSink& sink, const Scene& scen
   }
 }
 
-/// Produces the shots on the calling thread.
-void produce_frames(Pipeline& pipeline, SnapshotSource& source, const std::vector<int>& frames,
-                    bool needs_previous, bool report) {
-  const auto stop = [&] { return interrupt_signal() != 0 || pipeline.failed(); };
+/// Produces the states on the calling thread.
+void produce_frames(Pipeline& pipeline, StateSource& source, const RenderJob& job, bool needs_previous,
+                    ProgressMeter& meter) {
+  const auto go_on = [&] { return !interrupt_signal() && !pipeline.failed() && !(job.stop && job.stop()); };
+  const auto state = [&](int frame) {
+    meter.simulation_goes_on();
+    return source.at(frame, [&] {
+      meter.simulated_one();
+      return go_on();
+    });
+  };
   std::shared_ptr<const Snapshot> last;
-  for (std::size_t i = 0; i < frames.size() && !stop(); ++i) {
+  for (std::size_t i = 0; i < job.frames.size() && go_on(); ++i) {
     const auto start = Clock::now();
-    const int frame = frames[i];
+    const int frame = job.frames[i];
     std::shared_ptr<const Snapshot> previous;
-    if (needs_previous && frame > 1)
-      previous = last && last->frame == frame - 1
-                     ? last
-                     : std::make_shared<const Snapshot>(source.at(frame - 1, stop));
-    auto current = std::make_shared<const Snapshot>(source.at(frame, stop));
-    if (current->frame != frame) break;  // stopped on the way
+    if (needs_previous && frame > 1) {
+      previous = last && last->frame == frame - 1 ? last : state(frame - 1);
+      if (!previous) break;
+    }
+    auto current = state(frame);
+    if (!current) break;
     if (!previous) previous = current;
     last = current;
     FrameJob frame_job{
         static_cast<int>(i), frame, std::move(previous), std::move(current), ms_since(start), 0, {}};
-    if (report) source.describe(frame_job);
+    if (job.report) source.describe(frame_job);
     if (!pipeline.push(std::move(frame_job))) return;
   }
   pipeline.no_more_jobs();
@@ -274,34 +294,26 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
                        render::FrameSink& sink, const ProgressCallback& progress) {
   const auto start = Clock::now();
   RunStats stats;
-  std::optional<Simulation> simulation;
   std::optional<SnapshotCache> kept;
-  std::unique_ptr<SnapshotSource> source;
-  std::optional<ProgressMeter> meter;
-  constexpr double kDrawing_ms = 300;
-  const auto frames = static_cast<int>(job.frames.size());
+  std::unique_ptr<StateSource> own;
   if (job.cache) {
-    SnapshotCache cache(*job.cache);
-    cache.open(simulation_key(loaded, models), loaded.scene.frame_count());
-    meter.emplace(progress, frames, 0, kDrawing_ms);
-    source = std::make_unique<CachedSource>(std::move(cache));
-  } else {
-    simulation.emplace(loaded.scene, models);
-    stats.bodies = simulation->body_count();
-    stats.energy_start = simulation->energy();
+    own = cached_source(loaded, models, *job.cache);
+  } else if (!job.states) {
+    own = std::make_unique<LiveSource>(loaded.scene, models, kept, job.keep_at_most);
     if (job.keep)
       kept.emplace(*job.keep).create(simulation_key(loaded, models), loaded.scene.frame_count(), true);
-    meter.emplace(progress, frames, frames > 0 ? simulation->advances_to(job.frames.back()) : 0, kDrawing_ms);
-    source = std::make_unique<LiveSource>(*simulation, *meter, kept, job.keep_at_most);
   }
+  StateSource& source = own ? *own : *job.states;
+  constexpr double kDrawing_ms = 300;
+  const auto frames = static_cast<int>(job.frames.size());
+  ProgressMeter meter(progress, frames, frames > 0 ? source.advances_to(job.frames.back()) : 0, kDrawing_ms);
 
   Pipeline pipeline(job.threads + 2);
   const auto draw = [&] {
-    guarded(pipeline,
-            [&] { draw_frames(pipeline, loaded.scene, models, job.channels.any(), sink.needs_linear()); });
+    guarded(pipeline, [&] { draw_frames(pipeline, loaded.scene, models, job, sink.needs_linear()); });
   };
   const auto print = [&] {
-    guarded(pipeline, [&] { print_frames(pipeline, sink, loaded.scene, job, stats, *meter); });
+    guarded(pipeline, [&] { print_frames(pipeline, sink, loaded.scene, job, stats, meter); });
   };
   {
     std::vector<std::jthread> workers;
@@ -309,20 +321,17 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
     guarded(pipeline, [&] {
       for (int i = 0; i < job.threads; ++i) workers.emplace_back(draw);
       workers.emplace_back(print);
-      produce_frames(pipeline, *source, job.frames,
-                     subframes(loaded.scene.render.quality) > 1 || job.channels.any() || job.keep,
-                     job.report);
+      produce_frames(pipeline, source, job,
+                     subframes(loaded.scene.render.quality) > 1 || job.channels.any() || job.keep, meter);
     });
   }
   pipeline.rethrow_failure();
+  if (stats.frames < frames && job.stop && job.stop()) throw render::StoppedError(kOutdated);
 
   if (stats.frames < frames) stats.interrupted_by = interrupt_signal();
   if (stats.frames > 0) sink.close();
   if (kept && !stats.interrupted_by) kept->publish();
-  if (simulation) {
-    stats.totals = simulation->totals();
-    stats.energy_end = simulation->energy();
-  }
+  source.add_totals(stats);
   stats.wall_s = ms_since(start) / 1000;
   return stats;
 }
@@ -406,39 +415,33 @@ RunStats visit_frames(const LoadedScene& loaded, const ModelLibrary& models, con
                       const std::function<void(const Snapshot&)>& take, const ProgressCallback& progress) {
   const auto start = Clock::now();
   RunStats stats;
-  std::optional<Simulation> simulation;
   std::optional<SnapshotCache> kept;  // stays empty
-  std::unique_ptr<SnapshotSource> source;
-  std::optional<ProgressMeter> meter;
+  const std::unique_ptr<StateSource> source =
+      job.cache ? cached_source(loaded, models, *job.cache)
+                : std::make_unique<LiveSource>(loaded.scene, models, kept, std::nullopt);
   const auto frames = static_cast<int>(job.frames.size());
-  if (job.cache) {
-    SnapshotCache cache(*job.cache);
-    cache.open(simulation_key(loaded, models), loaded.scene.frame_count());
-    meter.emplace(progress, frames, 0, 0);
-    source = std::make_unique<CachedSource>(std::move(cache));
-  } else {
-    simulation.emplace(loaded.scene, models);
-    stats.bodies = simulation->body_count();
-    meter.emplace(progress, frames, frames > 0 ? simulation->advances_to(job.frames.back()) : 0, 0);
-    source = std::make_unique<LiveSource>(*simulation, *meter, kept, std::nullopt);
-  }
+  ProgressMeter meter(progress, frames, frames > 0 ? source->advances_to(job.frames.back()) : 0, 0);
   for (const int frame : job.frames) {
     const auto sim_start = Clock::now();
-    const Snapshot snapshot = source->at(frame, [] { return interrupt_signal() != 0; });
-    if (snapshot.frame != frame) break;  // interrupted on the way
-    stats.sim.add(ms_since(sim_start));
+    meter.simulation_goes_on();
+    const std::shared_ptr<const Snapshot> snapshot = source->at(frame, [&] {
+      meter.simulated_one();
+      return interrupt_signal() == 0;
+    });
+    if (!snapshot) break;  // interrupted on the way
     const double sim_ms = ms_since(sim_start);
+    stats.sim.add(sim_ms);
     const auto take_start = Clock::now();
-    take(snapshot);
+    take(*snapshot);
     stats.encode.add(ms_since(take_start));
     ++stats.frames;
-    stats.particles = snapshot.point_count();
-    stats.state_hash = snapshot.state_hash.hex();
-    meter->finished_one(sim_ms, 0, ms_since(take_start), stats.particles);
+    stats.particles = snapshot->point_count();
+    stats.state_hash = snapshot->state_hash.hex();
+    meter.finished_one(sim_ms, 0, ms_since(take_start), stats.particles);
     if (interrupt_signal()) break;
   }
   if (stats.frames < frames) stats.interrupted_by = interrupt_signal();
-  if (simulation) stats.totals = simulation->totals();
+  source->add_totals(stats);
   stats.wall_s = ms_since(start) / 1000;
   return stats;
 }

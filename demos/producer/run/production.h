@@ -15,6 +15,7 @@
 #include "producer/build/simulation.h"
 #include "producer/build/snapshot.h"
 #include "producer/format/scene_io.h"
+#include "producer/run/state_source.h"
 #include "render/channels.h"
 #include "render/sink.h"
 
@@ -87,6 +88,7 @@ struct RenderJob {
   std::vector<int> frames;                     ///< frames to draw, ascending
   int threads = 1;                             ///< number of drawing threads, each with a context of its own
   std::optional<std::filesystem::path> cache;  ///< folder of states that replace the simulation
+  StateSource* states = nullptr;               ///< replaces the simulation if there is no `cache`
   /// Folder to which the drawn states are written, in the format of `cache`.
   std::optional<std::filesystem::path> keep;
   /// Limit on the size of `keep` [bytes]. Beyond it, or on a write error, the states are discarded and the
@@ -96,6 +98,9 @@ struct RenderJob {
   render::ChannelChoice channels;  ///< channels to write
   /// Stem of the channel files; '#' stands for the frame number, as in render::frame_path.
   std::filesystem::path channels_stem;
+  /// After it returned true the run ends within one frame by render::StoppedError, without output. Several
+  /// threads call it. Empty: never.
+  std::function<bool()> stop = {};
 };
 
 /// Draws the frames into the sink and closes it. After an interrupt it finishes the frames in progress,

@@ -94,7 +94,7 @@ function emitterMark(emitter, path, screen) {
   const speed = typeof emitter.speed === 'number' ? emitter.speed : emitter.speed?.mean ?? 1;
   const from = screen(centre), to = screen(add(centre, emitter.direction?.some(Boolean) ? unit(emitter.direction) : n, 0.15 + 0.05 * speed));
   const shapes = [];
-  if (ring.every(Boolean)) shapes.push(el('polygon', {points: ring.map(p => p.join()).join(' '), class: 'emitter'}));
+  if (!['mesh', 'face'].includes(s.type) && ring.every(Boolean)) shapes.push(el('polygon', {points: ring.map(p => p.join()).join(' '), class: 'emitter'}));
   if (from && to) shapes.push(el('line', {x1: from[0], y1: from[1], x2: to[0], y2: to[1], class: 'emitter'}), el('circle', {cx: to[0], cy: to[1], r: 3, class: 'emitter-tip'}));
   return shapes;
 }

@@ -176,8 +176,9 @@ function references(name, own, node = store.root, steps = []) {
 }
 
 function rename(path) {
-  const item = tree.querySelector(`[data-path="${CSS.escape(path)}"]`), [list, i] = stepsOf(path), before = store.value[list][i].name;
-  if (!item || !isWriter() || renaming) return;
+  const item = tree.querySelector(`[data-path="${CSS.escape(path)}"]`), object = valueOf(find(store.root, path));
+  if (!item || !object || !isWriter() || renaming) return;
+  const before = object.name;
   const input = el('input', {value: before ?? nameOf(path), 'aria-label': 'New name', spellcheck: false});
   renaming = {path, input};
   item.querySelector('.name').replaceChildren(input);
@@ -272,7 +273,7 @@ export function setRowValue(f) { rowValue = f; }
 
 function menu(path, anchor) {
   const many = store.selection.includes(path) && store.selection.length > 1 ? store.selection : [path];
-  const entry = (text, run, title) => el('button', {class: 'entry', title, onclick: () => { close(); run(); }}, text);
+  const entry = (text, run, title) => el('button', {class: 'entry', title, onclick: () => { close(); if (many.every(p => find(store.root, p))) run(); }}, text);  // they may be gone
   const close = popover(anchor, nameOf(path), el('div', {class: 'menu'},
     entry(many.length > 1 ? `Duplicate ${many.length} objects` : 'Duplicate', () => duplicate(many)), entry('Rename', () => rename(path)),
     entry('Copy', () => copyObjects(many), 'As scene JSON (Ctrl+C)'), entry('Paste over', () => fromClipboard(text => pasteOver(many, text)), 'Replace it by the scene JSON in the clipboard (Ctrl+V)'),

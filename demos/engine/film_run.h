@@ -7,15 +7,15 @@
 #include <optional>
 #include <string>
 
+#include "engine/frame_store.h"
+#include "engine/jpeg.h"
+#include "engine/simulated_film.h"
 #include "producer/build/models.h"
 #include "producer/build/picture.h"
-#include "producer/build/simulation.h"
 #include "producer/format/scene_io.h"
 #include "render/context.h"
-#include "tune/frame_store.h"
-#include "tune/jpeg.h"
 
-namespace offstage::tune {
+namespace offstage::engine {
 
 /// A camera that replaces the scene's, to look around.
 struct ViewCamera {
@@ -52,20 +52,13 @@ class FilmRun {
   /// Uses another camera for the same film. The states are kept; `film` is the key of the new pictures.
   void look_from(const std::optional<ViewCamera>& camera, const std::string& film);
 
-  bool has_state(int frame) const;
+  bool has_state(int frame) const { return simulated_.has_state(frame); }
   bool has_draft(int frame) const { return workshop_.frames.has(def_.film, frame, Detail::draft); }
   /// The first frame without a draft; frames() + 1 if there is none.
   int first_missing();
-  bool is_simulated() const { return !physics_->statistics.empty(); }
 
-  /// Makes the next simulate() begin at the start of the film.
-  void restart();
-  /// Simulates one frame, or a part of the time before frame 1. Throws DivergedError.
-  void simulate();
-  /// The latest simulated frame, or 0 before the first.
-  int simulated_to() const { return simulation_ ? simulation_->frame() : 0; }
-  /// Finished share of the work before frame 1.
-  double lead_in() const;
+  SimulatedFilm& simulated() { return simulated_; }
+  const Physics& physics() const { return simulated_.physics(); }
   // These return false, without a picture, if `stop` returned true meanwhile; several threads call it.
   /// Draws a draft of a frame whose state is available, into the store.
   bool draw_draft(int frame, const Stop& stop);
@@ -79,10 +72,7 @@ class FilmRun {
   /// A small picture for a sheet; the state must be available.
   render::Image small_picture(int frame) { return draft_picture().draw(previous(frame), state(frame)); }
 
-  const Physics& physics() const { return *physics_; }
   const producer::Scene& scene() const { return scene_; }
-  /// Time of the state reached before frame 1 [s].
-  double lead_in_time() const;
 
  private:
   struct Refined {
@@ -93,10 +83,7 @@ class FilmRun {
   producer::Picture& draft_picture();
   bool draw_draft(int frame, const producer::Snapshot& before, const producer::Snapshot& now,
                   const Stop& stop);
-  void make_simulation();
-  void add_figures(double sim_ms);
-  void finish();
-  const producer::Snapshot& state(int frame) const;
+  const producer::Snapshot& state(int frame) const { return simulated_.state(frame); }
   const producer::Snapshot& previous(int frame) const {
     return frame > 1 && has_state(frame - 1) ? state(frame - 1) : state(frame);
   }
@@ -105,15 +92,11 @@ class FilmRun {
   std::shared_ptr<const producer::ModelLibrary> models_;
   Workshop workshop_;
   producer::Scene scene_;  // as used for drafts
-  std::shared_ptr<Physics> physics_;
-  std::optional<producer::Simulation> simulation_;
-  std::optional<sim::Energy> energy_start_;
-  std::shared_ptr<const producer::Snapshot> latest_[2];  // also used if the store has no room
+  SimulatedFilm simulated_;
   std::optional<producer::Picture> picture_;
   std::unique_ptr<Refined> refined_;
   render::Camera camera_;
-  int advances_ = 0;
   int missing_hint_ = 1;
 };
 
-}  // namespace offstage::tune
+}  // namespace offstage::engine

@@ -5,7 +5,7 @@
 #include "producer/format/scene_io.h"
 #include "render/context.h"
 
-namespace offstage::tune {
+namespace offstage::engine {
 namespace {
 
 /// The first frame of a scene as the page draws it while it changes, and as `render --quality draft` does.
@@ -79,4 +79,4 @@ TEST(EnginesQuickDrafts, LightThinLinesInAnyDirection) {
 }
 
 }  // namespace
-}  // namespace offstage::tune
+}  // namespace offstage::engine

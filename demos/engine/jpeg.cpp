@@ -1,10 +1,10 @@
-#include "tune/jpeg.h"
+#include "engine/jpeg.h"
 
 #include <stdexcept>
 
 #include <turbojpeg.h>
 
-namespace offstage::tune {
+namespace offstage::engine {
 
 JpegWriter::JpegWriter() : handle_(tjInitCompress()) {
   if (!handle_) throw std::runtime_error(std::string("libturbojpeg: ") + tjGetErrorStr());
@@ -26,4 +26,4 @@ std::string JpegWriter::write(const render::Image& image, int quality) {
   return jpeg;
 }
 
-}  // namespace offstage::tune
+}  // namespace offstage::engine

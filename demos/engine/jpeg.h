@@ -6,7 +6,7 @@
 
 #include "render/image.h"
 
-namespace offstage::tune {
+namespace offstage::engine {
 
 /// One per thread; its buffers are reused.
 class JpegWriter {
@@ -23,4 +23,4 @@ class JpegWriter {
   void* handle_;
 };
 
-}  // namespace offstage::tune
+}  // namespace offstage::engine

@@ -1,9 +1,8 @@
 #pragma once
-/// Simulated states and drawn frames, in memory of a bounded size: states of the latest simulations, and
-/// compressed pictures of the latest versions of a scene. The least recently used ones are removed first.
+/// Drawn frames, in memory of a bounded size: compressed pictures of the latest versions of a scene. Those of
+/// the least recently used version are removed first.
 
 #include <cstdint>
-#include <list>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -11,10 +10,9 @@
 #include <string>
 #include <vector>
 
-#include "producer/build/snapshot.h"
-#include "producer/run/production.h"
+#include "render/stage.h"
 
-namespace offstage::tune {
+namespace offstage::engine {
 
 /// Quality of a frame: draft is small, the others have full size.
 enum class Detail { draft, preview, final };
@@ -59,33 +57,4 @@ class FrameStore {
   uint64_t clock_ = 0;
 };
 
-/// The states of one simulation so far.
-struct Physics {
-  std::vector<std::shared_ptr<const producer::Snapshot>> states;  ///< from frame 1; null: not stored
-  std::vector<producer::FrameFigures> figures;                    ///< from frame 1
-  std::string statistics;                                         ///< JSON, after the film is complete
-  std::vector<std::string> notes;  ///< problems during the simulation, as sentences
-};
-
-/// Simulations by key. The current one is never removed, but its states beyond the bound are not stored; they
-/// are simulated again on request. For one thread.
-class PhysicsStore {
- public:
-  explicit PhysicsStore(std::size_t most_bytes) : most_bytes_(most_bytes) {}
-
-  std::shared_ptr<Physics> open(const std::string& key);
-  void keep(const std::string& key, int frame, std::shared_ptr<const producer::Snapshot> state);
-  std::size_t bytes() const { return bytes_; }
-
- private:
-  struct Entry {
-    std::string key;
-    std::shared_ptr<Physics> physics;
-    std::size_t bytes = 0;
-  };
-  const std::size_t most_bytes_;
-  std::list<Entry> entries_;  // latest first
-  std::size_t bytes_ = 0;
-};
-
-}  // namespace offstage::tune
+}  // namespace offstage::engine

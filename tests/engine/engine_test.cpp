@@ -1,9 +1,6 @@
-#include "tune/engine.h"
+#include "engine/engine.h"
 
 #include <condition_variable>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <mutex>
 #include <thread>
 
@@ -13,9 +10,8 @@
 #include "producer/run/production.h"
 #include "tests/render/gltf_samples.h"
 #include "tests/render/scratch.h"
-#include "tune/session.h"
 
-namespace offstage::tune {
+namespace offstage::engine {
 namespace {
 
 using producer::LoadedScene;
@@ -106,7 +102,7 @@ TEST_F(Engines, KeepNoPictureOfAnEndedDraft) {
   JpegWriter jpeg;
   FilmRun run({fountain(100), {}, "film", "physics"}, std::make_shared<const producer::ModelLibrary>(),
               {physics, frames, context, jpeg, {160, 90}});
-  while (!run.has_state(1)) run.simulate();
+  while (!run.has_state(1)) run.simulated().simulate();
   EXPECT_FALSE(run.draw_draft(1, [] { return true; }));
   EXPECT_FALSE(run.has_draft(1));
   EXPECT_TRUE(run.draw_draft(1, {}));
@@ -150,6 +146,35 @@ TEST_F(Engines, ReuseStatesForAnotherCamera) {
   ASSERT_TRUE(events_.wait_until_complete(other.number));
   EXPECT_EQ(engine_.figures().back().state_hash, state);
   EXPECT_TRUE(engine_.frame(other.film, 10));
+}
+
+// Models, pictures and decompositions stay in memory while only numbers and colours change.
+TEST_F(Engines, ReadFilesAgainWhenTheSceneUsesThemOtherwise) {
+  render::GltfSample room;
+  const render::ScratchFolder folder;
+  folder.put("room.gltf", room.text());
+  folder.put("broken.hdr", "not a picture");
+  const auto show = [&](const std::string& more) {
+    const std::string text =
+        R"({"bodies": [{"name": "room", "motion": "static", "shape": {"type": "mesh", "file": "room.gltf"}}],
+            "render": {"size": [64, 36]}, "output": {"fps": 20, "duration": 0.1})" +
+        more + "}";
+    return engine_
+        .show(std::make_shared<const LoadedScene>(producer::parse_scene(text, "room", folder.path())), {})
+        .number;
+  };
+  const auto fails = [&](uint64_t run) {
+    bool failed = false;
+    events_.wait_for<FilmEvent>([&](const FilmEvent& e) {
+      failed = e.phase == FilmEvent::Phase::failed;
+      return e.run == run && (failed || e.phase == FilmEvent::Phase::complete);
+    });
+    return failed;
+  };
+  EXPECT_FALSE(fails(show("")));
+  EXPECT_TRUE(fails(show(R"(, "environment": {"picture": {"file": "broken.hdr"}})")));
+  EXPECT_FALSE(fails(show("")));
+  EXPECT_TRUE(fails(show(R"(, "camera": {"type": "model", "body": "room", "name": "missing"})")));
 }
 
 // The lens of the scene's camera remains while the view is moved, wherever its field of view is stated.
@@ -205,18 +230,5 @@ TEST_F(Engines, DrawASheetOfVersionsAndReportMissingOnes) {
   EXPECT_TRUE(engine_.cell(sheet, 0));
 }
 
-TEST(Sessions, ReadFilesOutsideOfTheScenesFolderOnlyIfAllowed) {
-  namespace fs = std::filesystem;
-  std::string name = (fs::temp_directory_path() / "offstage-session-XXXXXX").string();
-  const fs::path folder = mkdtemp(name.data());
-  fs::create_directories(folder / "scene");
-  std::ofstream(folder / "part.json") << R"({"output": {"duration": 0.1}, "render": {"size": [64, 36]}})";
-  const std::string scene = (folder / "scene/s.json").string();
-  std::ofstream(scene) << R"({"include": ["../part.json"]})";
-  EXPECT_EQ(Session(scene, {}).state()["errors"].size(), 1u);
-  EXPECT_EQ(Session(scene, {}, {folder.string()}).state()["errors"].size(), 0u);
-  fs::remove_all(folder);
-}
-
 }  // namespace
-}  // namespace offstage::tune
+}  // namespace offstage::engine

@@ -1,4 +1,4 @@
-#include "tune/engine.h"
+#include "engine/engine.h"
 
 #include <algorithm>
 
@@ -7,7 +7,7 @@
 #include "producer/base/error.h"
 #include "producer/run/production.h"
 
-namespace offstage::tune {
+namespace offstage::engine {
 namespace {
 
 using producer::LoadedScene;
@@ -20,14 +20,17 @@ constexpr int kBusy = 4;                  // factor of these times until the fil
 constexpr milliseconds kGlimpse{60};      // between two pictures of the time before frame 1
 
 /// The part of a scene that determines which model files are read and how they are processed: everything
-/// except its numbers.
-std::string without_numbers(const std::string& canonical) {
+/// except numbers and colours, which matter only for decompositions, the sky's picture and flip-books.
+std::string used_by_models(const std::string& canonical) {
   auto json = nlohmann::json::parse(canonical);
-  for (const char* key : {"camera", "lights", "environment", "render", "output", "world"}) json.erase(key);
+  for (const char* key : {"name", "description", "render", "output", "world"}) json.erase(key);
   const std::function<void(nlohmann::json&)> clear = [&](nlohmann::json& value) {
-    if (value.is_number()) value = nullptr;
-    if (value.is_structured())
-      for (auto& item : value) clear(item);
+    const bool colour = value.is_string() && value.get_ref<const std::string&>().starts_with('#');
+    if (value.is_number() || colour) value = nullptr;
+    if (!value.is_structured()) return;
+    for (const auto& item : value.items())
+      if (item.key() != "decomposition" && item.key() != "picture" && item.key() != "sheet")
+        clear(item.value());
   };
   clear(json);
   return json.dump();
@@ -221,7 +224,7 @@ std::shared_ptr<const ModelLibrary> Engine::models_for(const FilmDef& def) {
     const std::lock_guard lock(mutex_);
     generation = models_generation_;
   }
-  const std::string key = std::to_string(generation) + without_numbers(def.loaded->canonical);
+  const std::string key = std::to_string(generation) + used_by_models(def.loaded->canonical);
   if (models_ && key == models_key_) return models_;
   std::vector<Problem> warnings;
   const auto on_step = [&](const std::string& step) {
@@ -258,7 +261,7 @@ bool Engine::advance_film() {
   }
   if (film_->has_draft(frame) || !film_->has_state(frame)) frame = film_->first_missing();
   if (frame > film_->frames()) {
-    if (film_->is_simulated()) {
+    if (film_->simulated().is_complete()) {
       if (!complete_reported_) report_film(FilmEvent::Phase::complete);
       complete_reported_ = true;
       return false;
@@ -266,14 +269,14 @@ bool Engine::advance_film() {
   } else if (film_->has_state(frame)) {
     if (film_->draw_draft(frame, [this] { return is_outdated(); })) report_frame(frame, Detail::draft);
     return true;
-  } else if (film_->simulated_to() >= frame) {
-    film_->restart();
+  } else if (film_->simulated().simulated_to() >= frame) {
+    film_->simulated().restart();
   }
-  film_->simulate();
-  if (film_->simulated_to() > 0) {
+  film_->simulated().simulate();
+  if (film_->simulated().simulated_to() > 0) {
     const std::lock_guard lock(mutex_);
     figures_ = film_->physics().figures;
-  } else if (Clock::now() - lead_in_shown_ > kGlimpse && film_->lead_in() < 1 &&
+  } else if (Clock::now() - lead_in_shown_ > kGlimpse && film_->simulated().lead_in() < 1 &&
              film_->first_missing() == 1) {
     if (!film_->draw_lead_in([this] { return is_outdated(); })) return true;
     report_frame(0, Detail::draft);
@@ -284,7 +287,7 @@ bool Engine::advance_film() {
 }
 
 bool Engine::is_film_drawn() {
-  return film_->is_simulated() && film_->first_missing() > film_->frames();
+  return film_->simulated().is_complete() && film_->first_missing() > film_->frames();
 }
 
 bool Engine::refine_frame() {
@@ -324,8 +327,8 @@ bool Engine::advance_pinned(const Workshop& workshop) {
     if (pinned_->draw_draft(frame, [this] { return is_outdated(); }))
       on_event_(FrameEvent{.run = run_, .film = wanted->film, .frame = frame, .figures = {}, .camera = {}});
   } else {
-    if (pinned_->simulated_to() >= frame) pinned_->restart();
-    pinned_->simulate();
+    if (pinned_->simulated().simulated_to() >= frame) pinned_->simulated().restart();
+    pinned_->simulated().simulate();
   }
   return true;
 }
@@ -356,7 +359,7 @@ bool Engine::advance_sweep(const Workshop& workshop) {
     frame = std::clamp(frame, 1, run.frames());
     while (!run.has_state(frame)) {
       if (is_stale()) return true;
-      run.simulate();
+      run.simulated().simulate();
     }
     picture = std::make_shared<const std::string>(workshop.jpeg.write(run.small_picture(frame), 85));
     event.particles = run.physics().figures.at(static_cast<std::size_t>(frame - 1)).particles;
@@ -384,7 +387,7 @@ void Engine::report_frame(int frame, Detail detail) {
                    .draw_ms = picture->draw_ms,
                    .figures = {},
                    .camera = picture->camera};
-  event.time = frame > 0 ? film_->scene().output.time_of(frame) : film_->lead_in_time();
+  event.time = frame > 0 ? film_->scene().output.time_of(frame) : film_->simulated().time();
   const auto& figures = film_->physics().figures;
   if (frame > 0 && static_cast<std::size_t>(frame) <= figures.size())
     event.figures = figures[static_cast<std::size_t>(frame - 1)];
@@ -396,9 +399,9 @@ void Engine::report_frame(int frame, Detail detail) {
 void Engine::report_film(FilmEvent::Phase phase, const std::string& message) {
   FilmEvent event{.run = run_, .film = def_ ? def_->film : "", .phase = phase, .message = message};
   if (film_) {
-    event.lead_in = film_->lead_in();
+    event.lead_in = film_->simulated().lead_in();
     event.simulated = static_cast<int>(film_->physics().figures.size());
-    event.statistics = film_->physics().statistics;
+    if (const auto& totals = film_->physics().totals) event.statistics = to_json(*totals);
     event.notes = film_->physics().notes;
   }
   on_event_(event);
@@ -409,4 +412,4 @@ void Engine::fail(const std::string& what) {
   report_film(FilmEvent::Phase::failed, what);
 }
 
-}  // namespace offstage::tune
+}  // namespace offstage::engine

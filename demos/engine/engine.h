@@ -14,11 +14,11 @@
 #include <variant>
 #include <vector>
 
+#include "engine/film_run.h"
+#include "engine/frame_store.h"
 #include "producer/build/decomposition_cache.h"
-#include "tune/film_run.h"
-#include "tune/frame_store.h"
 
-namespace offstage::tune {
+namespace offstage::engine {
 
 /// A frame is available in the store. Frame 0 is a picture of the time before frame 1.
 struct FrameEvent {
@@ -54,8 +54,8 @@ using EngineEvent = std::variant<FrameEvent, FilmEvent, CellEvent>;
 
 struct EngineSettings {
   Eigen::Vector2i draft_px = {640, 360};
-  std::size_t frame_bytes = 192u << 20;    ///< limit for compressed pictures
-  std::size_t physics_bytes = 384u << 20;  ///< limit for states
+  std::size_t frame_bytes = 192u << 20;       ///< limit for compressed pictures
+  std::size_t physics_bytes = kPhysicsBytes;  ///< limit for states
   producer::DecompositionCache decompositions;
 };
 
@@ -186,4 +186,4 @@ class Engine {
   std::thread thread_;  // last, so that it ends first
 };
 
-}  // namespace offstage::tune
+}  // namespace offstage::engine

@@ -1,12 +1,11 @@
-#include "tune/film_run.h"
+#include "engine/film_run.h"
 
 #include <algorithm>
 #include <chrono>
 
 #include "producer/build/shown_model.h"
-#include "producer/run/run_notes.h"
 
-namespace offstage::tune {
+namespace offstage::engine {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -62,7 +61,7 @@ FilmRun::FilmRun(FilmDef def, std::shared_ptr<const producer::ModelLibrary> mode
       models_(std::move(models)),
       workshop_(workshop),
       scene_(def_.loaded->scene),
-      physics_(workshop_.physics.open(def_.physics)) {
+      simulated_(def_.loaded->scene, *models_, workshop_.physics, def_.physics, frames()) {
   scene_.render.size = fitted(scene_.render.size, workshop_.draft_px);
   scene_.render.quality = producer::Quality::draft;
   look_with(scene_, def_.loaded->scene, *models_, def_.camera);
@@ -76,91 +75,9 @@ void FilmRun::look_from(const std::optional<ViewCamera>& camera, const std::stri
   if (refined_) look_with(refined_->scene, def_.loaded->scene, *models_, camera);
 }
 
-bool FilmRun::has_state(int frame) const {
-  const auto place = static_cast<std::size_t>(frame - 1);
-  if (frame >= 1 && place < physics_->states.size() && physics_->states[place]) return true;
-  return std::ranges::any_of(latest_, [&](const auto& state) { return state && state->frame == frame; });
-}
-
-const producer::Snapshot& FilmRun::state(int frame) const {
-  for (const auto& state : latest_)
-    if (state && state->frame == frame) return *state;
-  return *physics_->states[static_cast<std::size_t>(frame - 1)];
-}
-
 int FilmRun::first_missing() {
   while (missing_hint_ <= frames() && has_draft(missing_hint_)) ++missing_hint_;
   return missing_hint_;
-}
-
-void FilmRun::restart() {
-  simulation_.reset();
-  advances_ = 0;
-}
-
-void FilmRun::make_simulation() {
-  if (simulation_) return;
-  simulation_.emplace(def_.loaded->scene, *models_);
-  energy_start_ = simulation_->world().energy();
-}
-
-void FilmRun::simulate() {
-  if (simulated_to() >= frames()) restart();
-  make_simulation();
-  const auto start = Clock::now();
-  simulation_->advance();
-  ++advances_;
-  const int frame = simulation_->frame();
-  if (frame < 1) return;
-  if (!has_state(frame)) {
-    auto state = std::make_shared<const producer::Snapshot>(simulation_->snapshot());
-    workshop_.physics.keep(def_.physics, frame, state);
-    latest_[frame % 2] = std::move(state);
-  }
-  add_figures(ms_since(start));
-  if (frame == frames()) finish();
-}
-
-void FilmRun::add_figures(double sim_ms) {
-  const int frame = simulation_->frame();
-  if (physics_->figures.size() >= static_cast<std::size_t>(frame)) return;
-  const sim::World& world = simulation_->world();
-  physics_->figures.push_back({.frame = frame,
-                               .time = scene_.output.time_of(frame),
-                               .sim_ms = sim_ms,
-                               .particles = world.particle_count(),
-                               .contacts = world.contacts().size(),
-                               .energy = world.energy(),
-                               .state_hash = world.state_hash().hex()});
-  constexpr int kEvery = 15;  // number of frames
-  if (frame % kEvery == 0 || frame == frames()) physics_->notes = producer::notes_of(simulation_->totals());
-}
-
-void FilmRun::finish() {
-  producer::RunStats stats;
-  stats.frames = frames();
-  stats.bodies = simulation_->body_count();
-  stats.energy_start = energy_start_;
-  stats.energy_end = simulation_->world().energy();
-  stats.totals = simulation_->totals();
-  for (const producer::FrameFigures& figures : physics_->figures) {
-    stats.sim.add(figures.sim_ms);
-    stats.particles = figures.particles;
-    stats.most_particles = std::max(stats.most_particles, figures.particles);
-    stats.wall_s += figures.sim_ms / 1000;
-  }
-  stats.state_hash = simulation_->world().state_hash().hex();
-  physics_->statistics = to_json(stats);
-}
-
-double FilmRun::lead_in() const {
-  if (!simulation_) return 0;
-  const int before = simulation_->advances_to(0);
-  return before == 0 ? 1 : std::min(1.0, double(advances_) / before);
-}
-
-double FilmRun::lead_in_time() const {
-  return simulation_ ? simulation_->world().time() : 0;
 }
 
 producer::Picture& FilmRun::draft_picture() {
@@ -173,7 +90,7 @@ bool FilmRun::draw_draft(int frame, const Stop& stop) {
 }
 
 bool FilmRun::draw_lead_in(const Stop& stop) {
-  const producer::Snapshot now = simulation_->snapshot();
+  const producer::Snapshot now = simulated_.current();
   return draw_draft(0, now, now, stop);
 }
 
@@ -217,4 +134,4 @@ std::string FilmRun::pick(int frame, double x, double y) {
   return name == names.end() ? "" : name->second;
 }
 
-}  // namespace offstage::tune
+}  // namespace offstage::engine

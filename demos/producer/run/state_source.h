@@ -1,0 +1,32 @@
+#pragma once
+/// Where the frame loop gets the states of a film from: the simulation, a cache on disk, or the memory of
+/// earlier simulations.
+
+#include <functional>
+#include <memory>
+
+#include "producer/build/snapshot.h"
+
+namespace offstage::producer {
+
+struct FrameJob;
+struct RunStats;
+
+class StateSource {
+ public:
+  /// Called after every call of Simulation::advance(). Returns whether the simulation goes on.
+  using OnAdvance = std::function<bool()>;
+
+  virtual ~StateSource() = default;
+  /// Number of calls of Simulation::advance() that at() needs for all frames up to this one.
+  virtual int advances_to(int frame) = 0;
+  /// The state of a frame; null if `on_advance` returned false before. Frames are requested in ascending
+  /// order. Throws DivergedError, and FileError for a cache.
+  virtual std::shared_ptr<const Snapshot> at(int frame, const OnAdvance& on_advance) = 0;
+  /// Adds further data of the latest state.
+  virtual void describe(FrameJob&) const {}
+  /// Adds the figures of the simulation up to the latest state.
+  virtual void add_totals(RunStats&) const {}
+};
+
+}  // namespace offstage::producer
