@@ -25,7 +25,7 @@ struct Fabric {
   Real bend = 1e-4;  ///< flexural rigidity: moment per metre of width at a curvature of 1/m [N m], >= 0
   Real bend_damping = 2e-3;  ///< the moment is bend * (curvature + bend_damping * its rate) [s], >= 0
   BendModel bend_model = BendModel::plate;
-  /// Share of the critical damping of each spring between its two points, >= 0.
+  /// Fraction of the critical damping of each spring between its two points, >= 0.
   Real damping = 0.05;
   /// The same of springs of one kind, >= 0; empty: `damping`. Those that bend are springs only with
   /// BendModel::springs.

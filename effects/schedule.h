@@ -30,7 +30,7 @@ class Schedule {
   void collect_singles(Real end, std::vector<Release>& due);
   void collect_periodic(Real end, std::vector<Release>& due);
   void collect_bursts(Real end, std::vector<Release>& due);
-  Real next_birth(Real last);
+  Real next_birth_time(Real last);
   Real draw(const Varying& v, uint64_t number, uint32_t property, Real time) const;
   bool open(Real time) const;
 

@@ -12,7 +12,7 @@
 
 namespace offstage::render {
 
-/// A primitive as triangles, with what a skin needs.
+/// A primitive as triangles, with the joints and weights for a skin.
 struct GltfPrimitive {
   FileSurface surface;
   std::size_t points = 0, lines = 0;  ///< that it consists of instead; they are not drawn

@@ -30,8 +30,8 @@ class LightPass {
   /// After trace() of a quick picture: binds the surfaces for shaders/plain.frag.
   void bind_surfaces() const;
   /// After trace(): binds the targets for drawing the surfaces of glass, or of a translucent body, in a part
-  /// of the picture. `depth`: the picture's, which hides them behind nearer surfaces. Returns false if no
-  /// pixel of the area is in the picture.
+  /// of the picture. `depth`: the depth of the picture, so that nearer surfaces hide them. Returns false if
+  /// no pixel of the area is in the picture.
   bool begin_part(GLuint depth, const Eigen::AlignedBox2i& area_px);
   /// Traces the light of glass. The picture must show the opaque objects.
   void trace_glass(const LightSources& sources, const View& view, const SampleOffsets& offsets,

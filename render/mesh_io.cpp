@@ -360,7 +360,7 @@ uint64_t checked_size(const std::filesystem::path& path) {
 }
 
 /// Runs `import` with the folders that the model at `path` may read, in a child process whose memory and time
-/// are limited by the sizes of the file and its pictures. Returns what it writes to its descriptor.
+/// are limited by the sizes of the file and its pictures. Returns the bytes that it writes to its descriptor.
 ChildAnswer import_confined(const std::filesystem::path& path, const InputFolders& folders,
                             const StopTest& stop,
                             const std::function<void(int, const InputFolders&)>& import) {

@@ -39,7 +39,7 @@ struct GpuMesh {
   /// Makes the present vertices those from which motion starts.
   void store();
   /// The vertices that replace those of `before`, with as many of them, remember the stored ones.
-  void remember(GpuMesh& before);
+  void store_previous_vertices(GpuMesh& before);
 };
 /// The binding of the vertices from which motion in Channels starts.
 inline constexpr GLuint kBeforeBinding = 3;
@@ -64,9 +64,9 @@ struct GpuMaterial {
   bool thin = false;
   bool two_sided = false;
   bool blended = false;
-  bool glass = false;                       ///< light goes through and is refracted
-  bool smooth = false;                      ///< mirrors the scene
-  bool plain = false;                       ///< fully described by one colour, roughness and share of metal
+  bool glass = false;   ///< light goes through and is refracted
+  bool smooth = false;  ///< mirrors the scene
+  bool plain = false;   ///< fully described by one colour, roughness and fraction of metal
   std::unique_ptr<const RayMaterial> rays;  ///< the same for light rays
 
   /// Whether objects behind the surface are visible through it.

@@ -1,6 +1,6 @@
 #pragma once
-/// What a stage contains, and the passes that draw it. Included by stage.cpp, which changes the contents, and
-/// by stage_drawing.cpp, which draws them.
+/// The contents of a stage, and the passes that draw it. Included by stage.cpp, which changes the contents,
+/// and by stage_drawing.cpp, which draws them.
 
 #include <map>
 #include <memory>

@@ -55,11 +55,11 @@ std::string index_problem(const ClothDef& def) {
   for (std::size_t i = 0; i < def.triangles.size(); ++i) {
     const Triangle& t = def.triangles[i];
     if (std::max({t[0], t[1], t[2]}) >= count)
-      return element("triangles", i) + "names a vertex that is not there";
+      return element("triangles", i) + "refers to a vertex that does not exist";
     if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) return element("triangles", i) + "has a vertex twice";
   }
   for (std::size_t i = 0; i < def.pins.size(); ++i) {
-    if (def.pins[i].vertex >= count) return element("pins", i) + "names a vertex that is not there";
+    if (def.pins[i].vertex >= count) return element("pins", i) + "refers to a vertex that does not exist";
     if (!def.pins[i].position.allFinite()) return element("pins", i) + "position is not finite";
     if (std::isnan(def.pins[i].until)) return element("pins", i) + "until is not a number";
   }

@@ -11,11 +11,11 @@
 namespace offstage::sim {
 namespace {
 
-/// Sine of the angle below which two edges have no axis of their own. The error of omitting it is this share
-/// of their length.
+/// Sine of the angle below which two edges have no axis of their own. The error of omitting it is this
+/// fraction of their length.
 constexpr Real kNoAxis = 1e-10;
 /// Greatest rounding error of the crossing of two edges, or of the gap along their common perpendicular, as a
-/// share of the sizes.
+/// fraction of the sizes.
 constexpr Real kCrossingRounding = 1e-12;
 
 /// One box in the frame of the other.

@@ -10,8 +10,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Share of a ridge's slope by which a face that approaches the ridge may be outside of the ridge's region,
-/// because it may turn into that region within the step.
+/// Fraction of a ridge's slope by which a face that approaches the ridge may be outside of the ridge's
+/// region, because it may turn into that region within the step.
 constexpr Real kGuard = 0.5;
 /// Sine: the surface beyond an edge is a valley if it rises by more than this.
 constexpr Real kValley = 1e-3;

@@ -50,7 +50,7 @@ class ExactContacts {
   // Speed of each contact at the start, as an absolute value, less the part due to rotation [m/s].
   std::vector<Real> approach_;
   std::vector<uint8_t> closing_;  // by body: whether a contact of it closed in the interval
-  std::vector<Real> rest_;        // by body: share of the interval in which it has its change of velocity
+  std::vector<Real> rest_;        // by body: fraction of the interval in which it has its change of velocity
   IslandJoints joints_;
   ProximalNewton newton_;
 };

@@ -1,5 +1,5 @@
 #pragma once
-/// Figures of reports. A struct lists its figures once, each with its name and the way in which it adds over
+/// Figures of reports. A struct lists its figures once, each with its name and the rule by which it adds over
 /// steps; adding and printing follow from the list:
 ///
 ///   struct Work {

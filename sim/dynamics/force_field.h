@@ -122,7 +122,7 @@ struct ForceDef {
   bool acts_on(BodyHandle body) const;
   bool acts_on(ParticleSystemHandle system) const;
   bool acts_on(ClothHandle cloth) const;
-  bool names_nothing() const { return bodies.empty() && systems.empty() && cloths.empty(); }
+  bool is_unrestricted() const { return bodies.empty() && systems.empty() && cloths.empty(); }
   bool is_on(Real time) const { return time >= start && time < end; }
   bool is_explosion() const { return std::holds_alternative<Explosion>(effect); }
   /// Whether it is a force between particles.

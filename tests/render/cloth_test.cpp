@@ -174,7 +174,7 @@ Material sheer(float alpha) {
   return m;
 }
 
-TEST(StageCloth, HidesTheShareOfWhatIsBehindThatItsOpacitySays) {
+TEST(StageCloth, HidesTheFractionOfWhatIsBehindThatItsOpacitySays) {
   for (const int count : {1, 4, 16})
     for (const float alpha : {0.25f, 0.5f, 0.9f}) {
       ClothStage s(sheer(alpha), {0, 0, -1});

@@ -52,7 +52,7 @@ TEST(GltfPicture, AlphaMaskCutsHolesAndIsOpaqueElsewhere) {
   }
 }
 
-TEST(GltfPicture, MasksKeepTheirShareAtADistance) {
+TEST(GltfPicture, MasksKeepTheirFractionAtADistance) {
   std::vector<Vector4f> leaves(64 * 64, {1, 1, 1, 0});
   for (std::size_t y = 0; y < 64; ++y)
     for (std::size_t x = 0; x < 64; ++x)  // irregular, so that reduced levels have all shades

@@ -453,7 +453,7 @@ TEST(ReadModel, RefusesInOneLine) {
   expect(refusal(folder / "none.obj"), "there is no such file");
   expect(refusal(folder.path()), "not a regular file");
   expect(refusal(folder.put("empty.obj", "")), "is empty");
-  expect(refusal(folder.put("a.xyz", "no model at all")), "no format known here");
+  expect(refusal(folder.put("a.xyz", "no model at all")), "its format is not supported");
   expect(refusal(folder.put("index.obj", std::string(kTriangle) + "f 1 2 9\n")), "out of range");
   expect(refusal(folder.put("points.obj", std::string(kTriangle) + "p 1\np 2\np 3\n")), "holds no triangle");
   expect(refusal(folder.put("recursive.gltf", gltf(R"([{"children":[0]}])", R"(,"materials":[{}])"))),

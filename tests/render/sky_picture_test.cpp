@@ -71,7 +71,7 @@ TEST(SkyPicture, OfOneColourIsThatColourEverywhere) {
 // R (1 - sin(r)^2). Edges of 0.35 degrees change the first by 1 %.
 TEST(SkyPicture, DimAndBrightPartAddUpToTheLightOfADisc) {
   const Vector3f middle = Vector3f(0.5f, 0.7f, -0.3f).normalized();
-  const float share = std::pow(std::sin(12 * kPi / 180), 2.0f);
+  const float fraction = std::pow(std::sin(12 * kPi / 180), 2.0f);
   const SkyPicture picture(disc_sky(middle, 12, {20, 40, 10}, 0.5f, 1024));
   ASSERT_TRUE(picture.has_bright_part());
   Vector3f bright = Vector3f::Zero(), mean = Vector3f::Zero();
@@ -82,7 +82,7 @@ TEST(SkyPicture, DimAndBrightPartAddUpToTheLightOfADisc) {
     const SkyPicture::Sample sample = picture.sample(uv);
     EXPECT_GT(sample.direction.dot(middle), std::cos(12.5f * kPi / 180));
     if (sample.direction.dot(middle) > std::cos(11 * kPi / 180)) {  // seen() interpolates at the edge
-      EXPECT_NEAR(picture.bright_share(sample.direction) * picture.seen(sample.direction).y() /
+      EXPECT_NEAR(picture.bright_fraction(sample.direction) * picture.seen(sample.direction).y() /
                       (sample.light.y() * picture.density(sample.direction)),
                   1, 0.01f);
     }
@@ -93,7 +93,7 @@ TEST(SkyPicture, DimAndBrightPartAddUpToTheLightOfADisc) {
   const auto at_middle = [&](const SkyPicture& p) {
     return irradiance_at({std::make_shared<const SkyPicture>(p), 0, 1}, middle);
   };
-  EXPECT_NEAR((bright.y() + at_middle(picture)) / (40 * share + 0.5f * (1 - share)), 1, 0.02f);
+  EXPECT_NEAR((bright.y() + at_middle(picture)) / (40 * fraction + 0.5f * (1 - fraction)), 1, 0.02f);
   EXPECT_NEAR(bright.x() / bright.y(), 0.5f, 1e-3f);
   EXPECT_GT(mean.normalized().dot(middle), 0.9999f);
   EXPECT_GT(picture.beam().direction.dot(middle), 0.9999f);

@@ -453,9 +453,9 @@ TEST(JointStiffness, HoldsABarUp) {
 }
 
 // A torsion pendulum without damping: its energy goes back and forth between motion and the spring of its
-// joint. Joint springs act at the end of a sub-step, which takes at most about the share omega^2 h t of the
-// energy, as backward Euler does. The tolerance of the solver takes as much again from a spherical joint at
-// this step, and more at shorter ones.
+// joint. Joint springs act at the end of a sub-step, which takes at most about the fraction omega^2 h t of
+// the energy, as backward Euler does. The tolerance of the solver takes as much again from a spherical joint
+// at this step, and more at shorter ones.
 TEST(JointStiffness, StoresTheEnergyOfATorsionPendulum) {
   const Real k = 2, start_speed = 0.5, step = 1.0 / 1000;
   for (const bool by_motor : {false, true}) {

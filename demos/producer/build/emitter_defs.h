@@ -23,9 +23,9 @@ sim::ParticleSystemDef system_def(const std::string& name, const ParticleSource&
 /// Without its body and, for a model, without the triangles of its surface.
 effects::EmitterDef emitter_def(const Emitter& emitter, uint64_t seed);
 effects::SplitDef split_def(const ParticleSource& source, const std::string& name, uint64_t seed);
-/// For a child whose birth is a `trail`, or an `event`.
+/// For a child that a trail or an event of its parent emits.
 effects::TrailDef trail_def(const TrailSource& trail, const std::string& name, uint64_t seed);
-effects::SubEmitterDef event_def(const Birth& birth, const std::string& name, uint64_t seed);
+effects::SubEmitterDef event_def(const Emission& emission, const std::string& name, uint64_t seed);
 
 /// Greatest number of particles of a source.
 struct SourceBound {

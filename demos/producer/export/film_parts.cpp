@@ -110,8 +110,8 @@ class FilmParts::Builder {
                    .triangles = flat.triangles(),
                    .uvs = {}};
     for (const Vector2f& uv : flat.uvs) {
-      const Vector2f share = (uv - box.min()).cwiseQuotient(size);
-      film.uvs.push_back({share.x(), 1 - share.y()});
+      const Vector2f fraction = (uv - box.min()).cwiseQuotient(size);
+      film.uvs.push_back({fraction.x(), 1 - fraction.y()});
     }
     parts_.cloths.push_back(std::move(film));
   }

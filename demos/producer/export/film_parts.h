@@ -101,7 +101,7 @@ struct ClothSurface {
 };
 ClothSurface cloth_surface(const FilmCloth& cloth, const ClothSample& sample);
 
-/// What neither USD nor glTF files get of the looks of a scene, one line each.
+/// Returns notes on the features of the scene's looks that USD and glTF files cannot express, one line each.
 std::vector<std::string> look_notes(const Scene& scene);
 
 }  // namespace offstage::producer
