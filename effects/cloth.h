@@ -43,7 +43,7 @@ sim::ClothDef sphere_cloth(Real radius, uint32_t divisions, const sim::Pose& pos
 struct Cord {
   uint32_t vertex = 0;           ///< index of a vertex of the cloth
   Vec3 end = Vec3::Zero();       ///< where the other end is at the start (world) [m]
-  Real length = 0;               ///< at rest [m]; 0: the distance
+  Real length = 0;               ///< length at rest [m]; 0: the distance of the ends
   uint32_t segments = 10;        ///< 1 to 1000
   Real stiffness = 50;           ///< force at a strain of 1 [N], > 0
   Real mass_per_length = 0.002;  ///< [kg/m], > 0

@@ -37,7 +37,7 @@ struct Fabric {
   Real drag = 1;             ///< coefficient of the pressure of air perpendicular to the cloth, >= 0
   Real lift = 0.98;          ///< at most `drag`; drag - lift is the coefficient for air along the cloth
   Real max_stretch = 1.1;    ///< greatest length over rest length along the threads, > 1; 0: no limit
-  Real max_shear = 0;        ///< the same limit for shear
+  Real max_shear = 0;        ///< greatest length of shear springs over their rest length; 0: no limit
   Real min_bend_radius = 0;  ///< smallest radius to which it bends [m], >= 0; 0: no limit
 };
 

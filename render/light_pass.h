@@ -57,7 +57,7 @@ class LightPass {
   gl::Texture colors_;  ///< of quick pictures
   gl::Framebuffer framebuffer_;
   gl::Texture arriving_, mirrored_;
-  bool mirrored_is_filled_ = true;  ///< with anything but zeros
+  bool mirrored_is_filled_ = true;  ///< whether any value is not zero
   gl::Texture lamps_, highlights_;  ///< created when there are lamps
 
   // Created when there is something translucent.

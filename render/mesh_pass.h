@@ -34,7 +34,7 @@ struct GpuMesh {
   std::unique_ptr<const RayMesh> rays;  ///< the same for light rays
 
   bool stored = false;         ///< was there at Stage::store_previous_transforms()
-  gl::Buffer vertices_before;  ///< its vertices then, if they have been replaced; otherwise 0
+  gl::Buffer vertices_before;  ///< previous vertices, if they have been replaced; otherwise 0
 
   /// Makes the present vertices those from which motion starts.
   void store();
@@ -105,7 +105,7 @@ class MeshPass {
   enum class Shading {
     surface,  ///< writes surfaces for the tracer of light
     traced,   ///< in the light that was traced; in quick pictures, only those that are not plain
-    traced_with_particles,  ///< the same; glass also shows particles behind it
+    traced_with_particles,  ///< as `traced`; glass also shows particles behind it
   };
   /// Draws the opaque instances, and the opaque parts of blended ones.
   void draw_opaque(Shading shading);

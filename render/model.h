@@ -148,7 +148,7 @@ struct Model {
   ModelRig rig;  ///< the moving parts of the file, if they were requested
   /// The place of a camera or light in the file.
   struct Place {
-    std::string name;  ///< that of its node, unique among cameras or lights
+    std::string name;  ///< name of the node, unique among cameras or lights
     int node = -1;     ///< index in `rig`, if it was read; -1: none
     Eigen::Matrix4f model_from_place = Eigen::Matrix4f::Identity();  ///< in the rest pose; looks along -z
   };

@@ -155,7 +155,7 @@ SampleOffsets sample_offsets(int i, int n);
 
 /// Sums over the values that rays found for light from the sky and other surfaces, and for mirror images.
 struct LightSums {
-  double arriving = 0;  ///< their luminance
+  double arriving = 0;  ///< luminance of the light of these rays
   double removed = 0;   ///< light that was removed from the brightest rays, which would stay visible as dots
 
   LightSums& operator+=(const LightSums& other) {

@@ -55,7 +55,7 @@ struct LightTracer::Path {
   Vector3f from, direction;
   float cone;  ///< angle that the ray stands for [rad]
   Vector3f fraction = {1, 1, 1};
-  bool mirrored = false;  ///< so far
+  bool mirrored = false;  ///< whether mirrors have reflected the path so far
   /// Whether its directions depend on random numbers. If not, its hits are a part of the picture at any
   /// brightness, and not dots of noise.
   bool by_chance = false;

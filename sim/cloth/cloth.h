@@ -41,7 +41,7 @@ struct ClothSpring {
   Real damping = 0;       ///< c [N s/m], >= 0
   SpringKind kind = SpringKind::stretch;
   std::array<uint32_t, 2> counterpart = {};  ///< vertices of the other diagonal (its counterpart)
-  Real counterpart_rest = 0;                 ///< its rest length [m]; 0: it has no counterpart
+  Real counterpart_rest = 0;                 ///< rest length of the counterpart [m]; 0: there is none
 
   /// e, of a spring of this length, with the positions of vertices in `at`.
   template <class Points>
@@ -122,7 +122,7 @@ struct ClothDef {
   Real self_friction = 0.3;  ///< coefficient of friction of cloth on cloth
 
   Real max_stretch = 0;  ///< greatest length of stretch springs over their rest length, > 1; 0: no limit (F7)
-  Real max_shear = 0;    ///< the same of shear springs
+  Real max_shear = 0;    ///< greatest length of shear springs over their rest length; 0: no limit
   /// Length over rest length at which a stretch spring tears, > 1; 0: never. If it is less than max_stretch,
   /// max_stretch counts as 1.2 of it.
   Real tear = 0;
@@ -171,7 +171,7 @@ StableStep largest_stable_step(const ClothDef& def);
 struct ClothTear {
   Real time = 0;              ///< end of the sub-step in which it tore [s]
   Vec3 place = Vec3::Zero();  ///< [m]
-  Real stretch = 0;           ///< its length over its rest length
+  Real stretch = 0;           ///< length of the thread over its rest length
   bool by_pressure = false;   ///< whether the cloth is closed and under pressure
   bool touches_body = false;  ///< the cloth touched a body in that sub-step
 };

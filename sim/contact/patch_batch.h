@@ -118,7 +118,7 @@ void end_substeps(PatchBatch& batch, Real substep);
 
 /// Parameters of the removal of penetration.
 struct PushOut {
-  SubstepTime time;  ///< that of the sub-step after the last one
+  SubstepTime time;  ///< time of the sub-step after the last one
   Real fraction;     ///< fraction of the depth that one sweep removes
   Real limit;        ///< greatest displacement by push-out in a step [m]
 };

@@ -63,7 +63,7 @@ struct Vortex {
   Vec3 axis = Vec3::UnitY();  ///< direction of the axis, of any length but 0; the rotation is right-handed
   Real circulation = 1;  ///< Gamma, at a large distance [m^2/s]; at the radius the speed is Gamma / (4 pi R)
   Real radius = 0.1;     ///< R, the distance of the greatest speed [m], > 0
-  Real drag = 0;         ///< as WindField's [kg/s]
+  Real drag = 0;         ///< as WindField::drag [kg/s]
   Region region;
   uint32_t drop_rate = 0;
 };

@@ -278,7 +278,7 @@ void ContactFinder::choose_event(ContactPair& pair, bool far, Real left) const {
 
 void ContactFinder::remove_internal_edge_contacts(std::span<ContactPair* const> pairs, Real time,
                                                   Real h) const {
-  for (ContactPair* pair : remove_internal_edge_contacts(pairs, time, h))
+  for (ContactPair* pair : sim::remove_internal_edge_contacts(pairs, time, h))
     choose_event(*pair, motion_bound(*pair, h - time) > motion_known(*pair), h - time);
 }
 

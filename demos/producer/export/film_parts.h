@@ -33,7 +33,7 @@ struct FilmPart {
 struct FilmBody {
   std::string name;
   std::optional<std::size_t> slot;  ///< in Snapshot::bodies; none: it never moves
-  BodySample place;                 ///< at time 0
+  BodySample place;                 ///< pose at time 0
   std::vector<FilmPart> parts;
   Real appear_at = 0, remove_at = 1e30;  ///< times between which it exists [s]
 

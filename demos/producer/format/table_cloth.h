@@ -249,8 +249,8 @@ struct Table<Cloth> {
             {"pressure", &T::pressure,
              "pressure inside a closed cloth above that of the air, at the initial volume", "Pa"},
             {"inflate_time", &T::inflate_time,
-             "time in which the gas of `pressure` is let in, at a constant rate; 0: it is there from the "
-             "start",
+             "time in which the gas of `pressure` is let in, at a constant rate; 0: it is present from "
+             "the start",
              "s", kNotNegative},
             {"gas_density", &T::gas_density,
              "density of the gas of `pressure`, which causes buoyancy: helium has 0.17, hydrogen 0.084; "

@@ -48,7 +48,7 @@ struct ParticleLook {
   std::string texture;  ///< picture of sprites; empty: a soft disc
   std::optional<render::SpriteSheet> sheet;
   std::optional<LookMesh> mesh;  ///< for the style `mesh`, which needs it
-  Varying angle_deg = 0.0;       ///< at creation
+  Varying angle_deg = 0.0;       ///< angle of a new particle
   Varying spin_deg_per_s = 0.0;
 
   /// Whether the angle of a particle is visible.
@@ -83,7 +83,8 @@ struct ParticleGroup {
   Real charge = 0;
   Real appear_at = 0;
   Real remove_at = 1e30;
-  sim::ParticleSystemDef behaviour;  ///< its keys are directly in the group; see system_def()
+  sim::ParticleSystemDef
+      behaviour;  ///< the keys of the behaviour are keys of the group itself; see system_def()
   ParticleLook look;
 };
 
@@ -102,7 +103,8 @@ struct AgeSource;
 struct ParticleSource : effects::NewParticles {
   Where where;
   std::string name;
-  sim::ParticleSystemDef behaviour;  ///< its keys are directly in the source; see system_def()
+  sim::ParticleSystemDef
+      behaviour;  ///< the keys of the behaviour are keys of the source itself; see system_def()
   ParticleLook look;
   std::optional<Split> split;
   std::vector<TrailSource> trails;

@@ -140,7 +140,7 @@ struct Body {
   Vec3 spin = Vec3::Zero();
   Real appear_at = 0;
   Real remove_at = 1e30;
-  Placement placement;  ///< its three keys are directly in the body
+  Placement placement;  ///< the three keys of the placement are keys of the body itself
 
   /// Whether the parts of its shape move by an animation.
   bool has_animated_shape() const { return animation && !model && std::holds_alternative<MeshFile>(shape); }

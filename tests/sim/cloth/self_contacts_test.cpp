@@ -13,7 +13,7 @@ struct Layers {
         points.position.push_back(p);
     points.start = points.rest = points.position;
     points.velocity.assign(6, Vec4::Zero());
-    points.acceleration = points.pull = points.velocity;
+    points.acceleration = points.pin_impulse = points.velocity;
     points.mass.assign(6, 1);
     points.inverse_mass.assign(6, 1);
     points.holder.assign(6, nullptr);
