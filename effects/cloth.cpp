@@ -93,7 +93,7 @@ Real bend_stiffness(Real bend, Real w, Real h) {
   return 16 * bend * w / (h * h * h * kAngle * kAngle);
 }
 
-/// With the circumscribed radius 1.
+/// An icosahedron with the circumscribed radius 1.
 sim::TriangleMesh icosahedron() {
   // Corners of three rectangles whose sides are in the golden ratio.
   const Real golden = (1 + std::sqrt(5.0)) / 2, size = std::sqrt(1 + golden * golden);

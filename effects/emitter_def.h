@@ -25,8 +25,8 @@ struct TimeWindow {
   Real start = 0, end = 1e30;
 };
 
-/// How and when an emitter releases particles. Times are on the emitter's clock, which shows 0 at the
-/// `origin` given to the Emitter.
+/// The directions and times at which an emitter releases particles. Times are on the emitter's clock, which
+/// shows 0 at the `origin` given to the Emitter.
 struct EmitterRelease {
   Vec3 direction = Vec3::Zero();  ///< in the frame of the body or the world; zero: the normal of the surface
   Real inherit_velocity = 1;      ///< fraction of the velocity of the body's point that particles get, >= 0

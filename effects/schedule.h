@@ -1,6 +1,6 @@
 #pragma once
-/// Birth times of the particles of an emitter: when it releases how many. The times depend only on its own
-/// clock, so they are the same at any frame rate.
+/// Birth times of the particles of an emitter: the times of its releases, and their numbers of particles. The
+/// times depend only on its own clock, so they are the same at any frame rate.
 
 #include <algorithm>
 #include <vector>

@@ -13,7 +13,7 @@ namespace offstage::effects {
 
 class Draws;
 
-/// When parents leave particles of a trail.
+/// The times at which parents leave particles of a trail.
 struct TrailRelease {
   Varying rate = 60.0;  ///< particles per second of each parent, drawn once for its life; must not be a curve
   Real start_age = 0;   ///< age of the parent [s], >= 0

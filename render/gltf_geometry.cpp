@@ -46,7 +46,7 @@ void normalize(const GltfValue& accessor, std::vector<float>& values) {
 
 }  // namespace
 
-/// Where the attributes of a primitive come from: accessors, or Draco data with some of them.
+/// The source of a primitive's attributes: accessors, or Draco data for some of them.
 struct GltfGeometry::Source {
   const GltfValue& primitive;
   std::optional<DracoMesh> draco;

@@ -20,7 +20,7 @@ class LightPass {
   /// The scene that rays meet, to be filled and built before trace().
   RayScene& scene() { return scene_; }
   const RayScene& scene() const { return scene_; }
-  /// Of everything that was traced.
+  /// Sums over all traced light.
   const LightSums& sums() const { return sums_; }
   /// Binds and clears the targets for drawing surfaces.
   void begin() const;

@@ -291,7 +291,7 @@ bool is_whole(const Model& model) {
          is_whole(model.rig, model.materials.size());
 }
 
-/// Of the box around a model [m].
+/// Edges of the box around a model [m].
 float longest_side(const Model& model) {
   const Eigen::AlignedBox3f box = model.bounds();
   return box.isEmpty() ? 0 : box.sizes().maxCoeff();

@@ -35,7 +35,7 @@ enum class Pattern {
   water
 };
 
-/// How the threads of a fabric cross. `none`: no threads, as in leather and rubber.
+/// Pattern in which the threads of a fabric cross. `none`: no threads, as in leather and rubber.
 enum class Weave { none, plain, twill, satin };
 
 /// Additional properties of a material for cloth.

@@ -1,6 +1,6 @@
 #pragma once
-/// Private: the back-to-front order of translucent objects: bodies (glass, blended meshes, sheer cloth) and,
-/// between them, the blended particles of all sets.
+/// Private: the back-to-front order of translucent objects: bodies (glass, blended meshes, translucent cloth)
+/// and, between them, the blended particles of all sets.
 
 #include <array>
 #include <cstdint>
@@ -38,7 +38,7 @@ class Region {
 
  private:
   enum class Side { before, behind, neither };
-  /// On which side of this box's faces a body with these corners lies.
+  /// Returns the sides of this box's faces on which a body with these corners lies.
   Side side_of(const Region& other) const;
   bool surface_hides(const Vector3f& place, float depth) const;
 

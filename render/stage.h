@@ -223,7 +223,7 @@ class Stage {
   /// stage's size. Throws UnavailableError on a GL error, and StoppedError, without any effect on `sum`, soon
   /// after `stop` returned true; several threads call it.
   void draw(const SampleOffsets& offsets, HdrImage& sum, const StopTest& stop = {});
-  /// Of all sub-frames drawn so far.
+  /// Sums over all sub-frames drawn so far.
   LightSums light_sums() const;
 
   /// Sets the object id of an instance in Channels; 0, the default: none.

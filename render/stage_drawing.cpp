@@ -27,7 +27,7 @@ void Stage::Impl::prepare_sky() {
   glBindTextureUnit(kSkyBackgroundUnit, sky_background);
 }
 
-// Where nothing was drawn.
+// The depth of pixels without a surface.
 void Stage::Impl::draw_sky() {
   Features defines = {"FLAT 1"};
   for (const std::string& feature : features)

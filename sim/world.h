@@ -69,7 +69,7 @@ struct ContactRule {
   std::optional<Real> rolling_friction = {}, spinning_friction = {};
 };
 
-/// How resting contact is computed (physics N11, N12).
+/// Solver for resting contact (physics N11, N12).
 enum class SolverKind {
   exact,      ///< each collision at its own time, contact forces to rounding: slow for piles of hundreds of
               ///< bodies
@@ -80,7 +80,7 @@ enum class SolverKind {
         ///< both tangents (N9, N10); islands that it does not solve go to the exact solver and are counted
 };
 
-/// How the contact forces of particles are computed (physics P7).
+/// Solver for the contact forces of particles (physics P7).
 enum class ParticleContactMethod : uint8_t {
   relaxation,  ///< Gauss-Seidel with bounded work
   lcp  ///< clusters of at most WorldDef::particle_cluster contacts by Dantzig's and Baraff's pivoting; other

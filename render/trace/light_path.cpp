@@ -177,7 +177,7 @@ bool LightTracer::follow_glass(const Hit& hit, const Vector3f& albedo, PixelSamp
   return true;
 }
 
-// Of sun and lamps, on a white surface.
+// Light of sun and lamps on a white surface.
 Vector3f LightTracer::direct_light(const Hit& hit, const Vector3f& from, PixelSampler& sampler) const {
   Vector3f result = Vector3f::Zero();
   const float towards_sun = hit.normal.dot(sources_.sky.sun_direction);

@@ -62,8 +62,8 @@ struct LightTracer::Path {
   /// Probability density of the direction [1/sr] if the bright part of the sky was sampled, too; else
   /// negative.
   float density = -1;
-  /// Where it left a diffuse surface last, whose light from glowing meshes is also sampled; a normal of zero:
-  /// that of no surface.
+  /// The last point at which it left a diffuse surface, whose light from glowing meshes is also sampled. A
+  /// normal of zero: there was no such surface.
   Vector3f diffuse_place = Vector3f::Zero(), diffuse_normal = Vector3f::Zero();
 
   /// Leaves a diffuse surface.

@@ -57,7 +57,7 @@ struct GlassBuffer {
   LightSums sums;
 };
 
-/// How a picture of the surfaces was taken.
+/// The camera and size of a picture of the surfaces.
 struct LightView {
   Vector3f eye;
   Eigen::Matrix4f clip_from_world;

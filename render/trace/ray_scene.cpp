@@ -176,7 +176,7 @@ struct RayScene::Object {
 
   /// Fraction of the light that passes a sprite along a ray; `behind`: distance of the far side of its ball.
   float transmittance(unsigned sprite, const Vector3f& from, const Vector3f& direction, float& behind) const;
-  /// Where a ray meets a triangle of a mesh, on the surface that the smooth normals suggest.
+  /// The point at which a ray hits a triangle of a mesh, on the surface that the smooth normals suggest.
   Vector3f smoothed(unsigned triangle, const Vector3f& from, const Vector3f& direction) const;
   void describe(unsigned triangle, const Vector3f& from, const Vector3f& direction, Hit& hit) const;
 

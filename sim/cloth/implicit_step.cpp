@@ -8,8 +8,8 @@ constexpr int kMaxIterations = 300;
 /// Square of the accepted residual over the right side, in the preconditioner's norm.
 constexpr Real kTolerance2 = 1e-12;
 
-/// The matrix of backward Euler: of each spring alpha u u^T + beta 1 between its ends, that of bending, and
-/// the masses.
+/// The system of an implicit step of cloth, backward Euler (step_implicit()). Its matrix has a block alpha u
+/// u^T + beta 1 for each spring between its ends, the matrix of bending, and the masses.
 class ImplicitSystem {
  public:
   ImplicitSystem(const ClothPoints& points, const ClothRange& cloth, Real h)

@@ -30,7 +30,7 @@ struct Placed {
 /// Gap between the boxes along each axis; negative where they overlap.
 struct Gaps {
   Lanes a, b;  ///< along the axes of A and of B
-  /// Along the products of A's axes with each of B's, times the sine of the angle between them.
+  /// Gaps along the cross products of A's axes with B's, times the sine of the angle between the axes.
   std::array<Lanes, 3> products;
 
   Gaps(const Vec3& half_a, const Vec3& half_b, const Placed& at) {

@@ -18,7 +18,7 @@ namespace {
 
 /// Triangles that are nearer have no reliable direction between their closest points [m].
 constexpr Real kLeastTriangleDistance = 1e-9;
-/// Of a PairCache: up to so many, all are compared.
+/// Up to this number of entries of a PairCache, all are compared.
 constexpr std::size_t kFewEntries = 8;
 constexpr uint32_t kNoEntry = ~0u;
 

@@ -24,7 +24,7 @@ struct SimplexPoint {
   std::array<uint8_t, 4> corner{};
   std::array<Real, 4> weight{};
 
-  /// The point of A's core from which it results.
+  /// Returns the point of A's core that belongs to this point of A - B.
   Vec3 on_a(const Simplex& s) const;
 };
 

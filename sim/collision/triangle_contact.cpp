@@ -16,8 +16,8 @@ constexpr Real kGuard = 0.5;
 /// Sine: the surface beyond an edge is a valley if it rises by more than this.
 constexpr Real kValley = 1e-3;
 
-/// How far the other solid may be outside of a triangle's sides and still count as in front of its face.
-/// Beyond a valley the plane of the face continues beneath the surface, and stops the solid next.
+/// Distance by which the other solid may be outside of a triangle's sides and still count as in front of its
+/// face. Beyond a valley the plane of the face continues beneath the surface, and stops the solid next.
 std::array<Real, 3> room_beyond(const SurfaceTriangle& t, Real margin) {
   std::array<Real, 3> room{};
   for (std::size_t k = 0; k < 3; ++k)

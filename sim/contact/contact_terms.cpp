@@ -29,7 +29,7 @@ Vec3 core_point(const Body& body, const Vec3& place) {
 }
 
 struct PointRates {
-  /// Of a material point at the start; the acceleration is that without forces, w x (w x r).
+  /// Motion of a material point at the start; the acceleration is that without forces, w x (w x r).
   Vec3 velocity, acceleration;
 };
 

@@ -12,7 +12,7 @@ namespace offstage::sim {
 /// their `start` to `rigid`; the effect of the contacts is added to this motion. Keep one object per island.
 class ExactContacts {
  public:
-  /// How the problem is solved.
+  /// Method of the solution.
   enum class Method : uint8_t {
     proximal,  ///< by the proximal Newton method on the true friction cone
     lcp        ///< by linear complementarity (contact_lcp.h), or else as above

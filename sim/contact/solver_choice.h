@@ -9,8 +9,8 @@
 
 namespace offstage::sim {
 
-/// Up to so many bodies every solver is fast: in an island, the exact one is always used; in a world, each
-/// collision is resolved at its own time.
+/// Up to this number of bodies, every solver is fast: in an island, the exact one is always used; in a world,
+/// each collision is resolved at its own time.
 inline constexpr std::size_t kFewBodies = 6;
 
 /// Budget of the exact solver beyond the cost of the fast one, for all islands of a world. A collapsing heap

@@ -41,7 +41,7 @@ struct BodyModel {
   Real extent = 0;       // reach() of the solid; infinite for a plane
 };
 
-/// What decides whether a body falls asleep, and what wakes it.
+/// Data by which a body falls asleep and wakes.
 struct SleepMemory {
   Real quiet_time = 0;  // how long the body has been almost at rest [s]
   // While it is asleep:

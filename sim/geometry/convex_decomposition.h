@@ -15,7 +15,7 @@
 
 namespace offstage::sim {
 
-/// How a solid is decomposed.
+/// Method and limits of a decomposition.
 enum class DecompositionMethod : uint8_t {
   automatic,    ///< exact if that takes at most `max_parts`, else approximate
   exact,        ///< exact with up to 1024 parts, else approximate

@@ -90,7 +90,7 @@ class ParticleContacts {
     Vec3 velocity;       // velocity of the surface
     Vec3 friction_axis;  // Obstacle::friction_axis_on() of the surface
 
-    /// Along and across the friction axis separately.
+    /// Limits the friction along and across the friction axis separately.
     Vec3 held(const Vec3& along, Real limit) const {
       if (friction_axis.isZero()) return Contact::held(along, limit);
       const Vec3 across = normal().cross(friction_axis);

@@ -77,7 +77,7 @@ void limit_loads(std::span<Reaction> reactions, std::map<uint32_t, Load>& loads)
 Lanes lanes_of(const Eigen::Vector3f& v) {
   return Lanes{v[0], v[1], v[2], 0};
 }
-/// In all lanes: that of the fourth one.
+/// Returns the fourth lane in all lanes.
 Lanes fourth(Lanes v) {
   return __builtin_shufflevector(v, v, 3, 3, 3, 3);
 }

@@ -38,8 +38,8 @@ struct ParticleSystem {
   ParticleSystemDef def;
   ParticleArrays arrays;
   uint64_t next_id = 0;
-  /// For the last particles of the arrays, those added since the last sub-step: time from their creation to
-  /// the end of the sub-step. Negative: the particle exists from the sub-step's start.
+  /// For the last particles of the arrays, those added since the last sub-step: time from their birth to the
+  /// end of the sub-step. Negative: the particle exists from the sub-step's start.
   std::vector<Real> since_birth;
 
   uint64_t add(const Particle& p, Real elapsed);

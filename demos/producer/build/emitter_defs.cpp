@@ -45,7 +45,7 @@ Real expected_hits(const ParticleSource& source) {
   return source.behaviour.dies_on_hit ? 1 : 4;
 }
 
-/// With and without the limits on living particles.
+/// Bounds of an emitter with and without the limits on the number of particles.
 struct Bounds {
   effects::WorstCase possible, limited;
 };

@@ -20,10 +20,10 @@ namespace offstage::producer {
 sim::ParticleSystemDef system_def(const std::string& name, const sim::ParticleSystemDef& behaviour);
 sim::ParticleSystemDef system_def(const std::string& name, const ParticleSource& source);
 
-/// Without its body and, for a model, without the triangles of its surface.
+/// Returns the definition without its body and, for a model, without the triangles of its surface.
 effects::EmitterDef emitter_def(const Emitter& emitter, uint64_t seed);
 effects::SplitDef split_def(const ParticleSource& source, const std::string& name, uint64_t seed);
-/// For a child that a trail or an event of its parent emits.
+/// Returns the definition for a child that a trail or an event of its parent emits.
 effects::TrailDef trail_def(const TrailSource& trail, const std::string& name, uint64_t seed);
 effects::SubEmitterDef event_def(const Emission& emission, const std::string& name, uint64_t seed);
 

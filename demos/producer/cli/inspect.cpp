@@ -45,7 +45,7 @@ Json describe(const sim::ConvexDecomposition& decomposition) {
   return json;
 }
 
-/// What to do about a model that has an unlikely size; empty for a likely one.
+/// Returns advice for a model that has an unlikely size; empty for a likely one.
 std::string size_hint(float largest_side) {
   constexpr float kHuge = 100, kTiny = 0.005f;  // [m]
   if (largest_side > kHuge)

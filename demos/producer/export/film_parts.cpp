@@ -205,7 +205,7 @@ class FilmParts::Builder {
   UniqueNames names_, material_names_;
   std::map<std::vector<float>, std::size_t> meshes_done_;
   std::map<std::string, std::size_t> materials_done_;
-  /// By file, and whether the parts have the materials of the file.
+  /// Parts by file, and by whether they have the materials of the file.
   std::map<std::pair<std::string, bool>, std::pair<std::size_t, std::size_t>> models_done_;
 };
 

@@ -174,8 +174,7 @@ struct Emitter : ParticleSource, effects::EmitterRelease {
   Placement placement;
 };
 
-/// What emits the particles of a source: a trail or an event of its parent. Neither: the source is an
-/// emitter.
+/// The trail or the event of its parent by which a source emits particles. Neither: the source is an emitter.
 struct Emission {
   const TrailSource* trail = nullptr;
   const EventSource* event = nullptr;

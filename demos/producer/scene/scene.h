@@ -166,7 +166,7 @@ struct Spring {
   std::string material;
 };
 
-/// How the lines of an overlay are drawn.
+/// The look of the lines of an overlay.
 struct LineLook {
   Real width = 0.003;  ///< fraction of the picture's height
   Real hidden = 0.3;   ///< opacity of parts behind other objects
