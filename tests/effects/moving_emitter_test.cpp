@@ -49,7 +49,7 @@ TEST(MovingEmitter, InheritsAFractionOfTheBodysVelocity) {
   }
 }
 
-// The number is the way times the rate, whatever the speed, and the places are evenly apart.
+// The number is the length of the path times the rate at any speed, and the places are evenly spaced.
 TEST(MovingEmitter, ReleasesParticlesPerMetreOfItsWay) {
   for (const Real speed : {0.5, 7.0}) {
     Ride ride({speed, 0, 0});

@@ -1,4 +1,4 @@
-// Cameras and lights of glTF files: where they are, what they show, and what is refused.
+// Cameras and lights of glTF files: their places, their pictures, and refused uses.
 
 #include <cmath>
 #include <filesystem>
@@ -181,7 +181,7 @@ TEST(ModelLight, AndCamerasFollowTheAnimationThatTheBodyPlays) {
   }
 }
 
-TEST(ModelLight, WhatCannotBeUsedIsNamed) {
+TEST(ModelLight, UnusableLightsAndCamerasAreNamed) {
   Room room;
   const auto lights = [](const std::string& more) {
     return scene_of(R"(, "lights": [{"type": "model", "body": "room")" + more + "}]");

@@ -1,5 +1,4 @@
-// Shapes, masses, lifetimes, applied forces and fills of a scene: what they build, and which values are
-// refused.
+// Shapes, masses, lifetimes, applied forces and fills of a scene: the resulting objects, and refused values.
 
 #include <algorithm>
 #include <cmath>

@@ -271,7 +271,7 @@ TEST(ReadModel, WarnsOnceOfATextureThatIsNotThere) {
             -1);
 }
 
-TEST(ReadModel, LeavesOutWhatCannotBeDrawnAndSaysSo) {
+TEST(ReadModel, SkipsElementsThatCannotBeDrawnWithAWarning) {
   const ScratchFolder folder;
   const Model model = read_model(folder.put(
       "a.obj", std::string(kTetrahedron) + "v nan 0 0\nv 2 0 0\nf 5 1 2\nf 1 2 6\nf 1 1 2\nl 1 2\n"));
@@ -433,7 +433,7 @@ const char kFullCollada[] = R"(<?xml version="1.0"?>
 </scene>
 </COLLADA>)";
 
-TEST(ReadModel, NamesWhatItIgnoresOfOtherFormats) {
+TEST(ReadModel, NamesIgnoredFeaturesOfOtherFormats) {
   const ScratchFolder folder;
   const Model model = read_model(folder.put("a.dae", kFullCollada));
   EXPECT_EQ(model.triangle_count(), 1u);

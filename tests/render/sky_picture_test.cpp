@@ -149,7 +149,7 @@ Vector3f mean_color(const HdrImage& picture, const Vector2f& place, int half) {
 
 const Material kWhitePlaster{.color = {1, 1, 1, 1}, .roughness = 1};
 
-// The furnace: a white ball in a picture of one colour cannot be told from the picture behind it.
+// The furnace: a white ball in a picture of one colour cannot be distinguished from the picture behind it.
 TEST(StageSkyPicture, AWhiteBallVanishesInAPictureOfOneColour) {
   LitStage s(sky_of([](const Vector3f&) { return Vector3f(Vector3f::Constant(0.35f)); }), 0, true, 2);
   s.add(make_sphere(1), kWhitePlaster);
@@ -294,7 +294,7 @@ float reflectance_of_glass(float roughness, float nv) {
 }
 
 // Black glass shows its mirror image alone: the mean of the sky over the lobe times the reflectance. The
-// bright part is so large that both ways to find it have a weight.
+// bright part is so large that both strategies to find it have a weight.
 TEST(StageSkyPicture, RoughGlassMirrorsTheBrightPartOnce) {
   const Vector3f middle = Vector3f(0, 1, -1).normalized(), view = Vector3f(0, 1, 1).normalized();
   const HdrImage sky = disc_sky(middle, 20, {20, 20, 20}, 0.2f, 512);
@@ -324,7 +324,7 @@ TEST(StageSkyPicture, RoughGlassMirrorsTheBrightPartOnce) {
 }
 
 // A sun of 5000 times the brightness of white is as bright in a mirror, and in a mirror of a mirror, as in
-// the sky. A pane lets through what it does not mirror.
+// the sky. A pane transmits the light that it does not mirror.
 TEST(StageSkyPicture, ABrightSunIsAsBrightInAMirrorAndBehindAPane) {
   const Vector3f sun = Vector3f(0, 1, -1).normalized();
   const HdrImage sky = disc_sky(sun, 4, {5000, 4000, 2000}, 0.1f, 1024);

@@ -217,7 +217,7 @@ TEST_F(TracedLight, ABrightWallColoursTheFloorBesideIt) {
   EXPECT_GT(redness(0.15f), 1.1f * redness(1.9f));
 }
 
-TEST_F(TracedLight, MirrorsShowWhatIsBehindTheCamera) {
+TEST_F(TracedLight, MirrorsShowObjectsBehindTheCamera) {
   s.add(make_box({2, 2, 0.1f}), {.color = {0.9f, 0.9f, 0.9f, 1}, .metallic = 1, .roughness = 0.01f});
   s.add(make_box({3, 3, 0.1f}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {1, 0.5f, 0}}, {0, 0, 8});
   look({.eye = {0, 0, 4}, .target = {0, 0, 0}});
@@ -243,7 +243,7 @@ TEST_F(TracedLight, InAGlowingRoomOfMirrorsIsTheSumOfAllReflections) {
   }
 }
 
-TEST_F(TracedLight, MirrorsShowWhatALampLights) {
+TEST_F(TracedLight, MirrorsShowSurfacesThatALampLights) {
   s.stage.set_lamps(std::array{Lamp{.position = {0, 2, 3}, .intensity = {4, 4, 4}, .radius = 0.05f}});
   s.add(make_ground(20), {.color = {0.5f, 0.5f, 0.5f, 1}, .roughness = 1});
   s.add(make_box({4, 4, 0.1f}), {.color = {1, 1, 1, 1}, .metallic = 1, .roughness = 0.01f}, {0, 2, -0.05f});
@@ -286,7 +286,7 @@ TEST_F(TracedLight, OfACoarseSmoothBallFallsEvenlyTowardsItsTerminator) {
   }
 }
 
-TEST_F(TracedLight, SumsCountWhatIsTakenFromRaysThatFindTooMuch) {
+TEST_F(TracedLight, SumsCountTheLightRemovedFromVeryBrightRays) {
   s.stage.set_environment(even_sky(0.7f));
   s.add(make_ground(20), kPlaster);
   look({.eye = {0, 1, 4}, .target = {0, 0, 0}});

@@ -144,7 +144,7 @@ TEST(ClothGas, FillsABalloonInItsTime) {
 class PoppedBalloon : public testing::TestWithParam<bool> {};
 
 TEST_P(PoppedBalloon, FliesFreelyAndNoFasterThanItsGas) {
-  // By Bernoulli's equation gas of the gauge pressure p leaves at sqrt(2 p / rho); what is left of the skin
+  // By Bernoulli's equation gas of the gauge pressure p leaves at sqrt(2 p / rho); the remains of the skin
   // cannot be pushed faster by it. Its shreds touch, but hardly ever have to be held back.
   ClothDef def = effects::sphere_cloth(0.1, 3, {}, effects::find_fabric("balloon")->fabric);
   def.pressure = 8440;

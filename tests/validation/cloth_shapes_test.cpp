@@ -141,7 +141,7 @@ Real end_to_end(const ClothView& view, uint32_t cells) {
 }
 
 TEST(ClothRestCurvature, IsTheFractionThatIsUnstressed) {
-  // What is free of loads takes the curvature at rest: of a strip of the length l its ends are 2 sin(k l / 2)
+  // A cloth without loads takes the curvature at rest: the ends of a strip of the length l are 2 sin(k l / 2)
   // / k apart.
   constexpr uint32_t kCells = 20;
   constexpr Real kLength = 0.2, kCurvature = 8;

@@ -67,7 +67,7 @@ Real flat_height(Real, Real) {
   return 0;
 }
 
-/// Adds a flat floor at y = 0 from x = -3 to 12; `kind` says what it is made of.
+/// Adds a flat floor at y = 0 from x = -3 to 12; `kind`: the objects that it consists of.
 void add_flat_floor(World& world, const std::string& kind, Real friction) {
   const auto add = [&](const Shape& shape, const Vec3& at = Vec3::Zero()) {
     return world.add_body(fixed_body(shape, at, friction));

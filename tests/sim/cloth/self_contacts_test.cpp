@@ -22,7 +22,7 @@ struct Layers {
     points.cloth = {0, 0, 0, 1, 1, 1};
     contacts.assign({{0, 1, 2}, {3, 4, 5}}, points);
   }
-  /// Both layers move as far towards these ways [m] as they may.
+  /// Moves both layers by these displacements [m], as far as contacts allow.
   void move(const Vec4& lower, const Vec4& upper) {
     make(lower, upper);
     shorten(Vec4::Zero(), MoveFractions(6, 1));
@@ -84,8 +84,8 @@ TEST(SelfContacts, HoldLayersApartInTheFrameOfTheirDrift) {
   EXPECT_GT(layers.least_height(), 0);
 }
 
-// Pairs are sought for the ways that all make, and these two are too far apart for that.
-TEST(SelfContacts, FindWhatAMovingFrameBroughtNearWhenLookedAtOnceMore) {
+// The search covers the displacements of all points, and these two are too far apart for them.
+TEST(SelfContacts, FindPairsThatAMovingFrameBroughtNear) {
   Layers layers(0.03);
   layers.make(Vec4::Zero(), Vec4::Zero());
   layers.shorten(Vec4(0, 0.05, 0, 0), {0, 0, 0, 1, 1, 1});

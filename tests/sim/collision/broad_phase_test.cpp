@@ -74,7 +74,7 @@ Aabb scattered_box(const Scatter& random, uint64_t i) {
 
 // Objects are added, removed, at rest or moving, and the fraction of moving ones changes. All paths of the
 // grid are taken: resting objects settle, become active again, and levels are rebuilt.
-TEST(BroadPhase, FindsExactlyTheMeetingBoxesWhateverHappens) {
+TEST(BroadPhase, FindsExactlyTheOverlappingBoxesAfterAnyChanges) {
   for (const GridKind kind : kKinds) {
     const Scatter random{5};
     Both both(kind);

@@ -419,7 +419,7 @@ TEST(TimeOfNextImpact, ARodThatTouchesMeetsTheGroundAgainWithItsOtherEnd) {
   }
 }
 
-TEST(PairCache, KeepsWhatIsUsed) {
+TEST(PairCache, KeepsUsedEntries) {
   PairCache cache;
   cache.of(3, 1).gjk.size = 7;
   cache.of(1, 2).gjk.size = 8;

@@ -128,7 +128,7 @@ TEST(Explosion, GoesOffOnce) {
   EXPECT_FALSE(bang.explodes(0.75, 1));
 }
 
-TEST(ForceDef, SaysWhatIsWrong) {
+TEST(ForceDef, NamesErrors) {
   EXPECT_EQ(problem(ForceDef{}), "");
   EXPECT_NE(problem({.start = 2, .end = 1}).find("end"), std::string::npos);
   EXPECT_NE(problem({.effect = WindField{.drag = -1}}).find("drag"), std::string::npos);
