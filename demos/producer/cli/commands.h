@@ -52,8 +52,8 @@ struct RenderOptions {
   std::string format = "rgba";  ///< format of standard output
   std::string cache, stats, report;
   std::vector<std::string> cameras;  ///< cameras to draw, or kAllCameras; empty: the scene's `camera`
-  /// Folder of simulated states, for other cameras and further renders. States of this simulation are read
-  /// from it, otherwise they are written to it. Empty: none.
+  /// Folder of the states, for other cameras and further renders: they are read if it holds those of this
+  /// simulation, otherwise they are written to it. Empty: none.
   std::string states;
   int threads = 0;  ///< 0: all available
   int jobs = 0;     ///< 0: chosen by `threads`
