@@ -22,8 +22,8 @@ std::string element(const char* field, std::size_t i) {
 std::string vertex_problem(const ClothDef& def) {
   if (def.vertices.empty()) return "vertices: there are none";
   if (!def.rest_vertices.empty() && def.rest_vertices.size() != def.vertices.size())
-    return "rest_vertices must be as many as vertices, or none";
-  if (def.masses.size() != def.vertices.size()) return "masses must be as many as vertices";
+    return "rest_vertices must be empty or have one position for each vertex";
+  if (def.masses.size() != def.vertices.size()) return "masses must have one value for each vertex";
   for (std::size_t i = 0; i < def.vertices.size(); ++i) {
     if (!def.vertices[i].allFinite()) return element("vertices", i) + "is not finite";
     if (!is_positive(def.masses[i])) return element("masses", i) + "must be a finite number > 0";
