@@ -61,7 +61,7 @@ struct TextureMap {
   /// Transform of the texture coordinates by rows: (u, v, 1) to the place in the image, v downwards.
   std::array<Vector3f, 2> rows = {Vector3f(1, 0, 0), Vector3f(0, 1, 0)};
 
-  bool is_plain() const;  ///< first set, not transformed
+  bool is_plain() const;  ///< whether it uses the first set without a transform
 };
 
 /// Metallic/roughness material, with the parameters of glTF 2.0 and some of its extensions.
