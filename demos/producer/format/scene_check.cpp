@@ -425,7 +425,7 @@ class Checker : SceneChecker {
       fail(path, "needs a \"body\", \"particles\" or \"cloths\"");
     if (!grab.body.empty()) check_pushed(path + "/body", grab.body, named_body(path + "/body", grab.body));
     check_period(grab, grab.start, grab.end);
-    if (grab.keyframes.empty()) fail(path, "needs at least one of \"keyframes\"");
+    if (grab.keyframes.empty()) fail(path, "needs at least one entry in \"keyframes\"");
     check_times(grab.keyframes, path + "/keyframes");
     const auto body = bodies_.find(grab.body);
     const auto mass = body == bodies_.end() ? std::nullopt : mass_of(*body->second);
