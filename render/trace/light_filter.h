@@ -45,9 +45,9 @@ class LightPlane {
 /// The surfaces in a picture, which say how far light may be averaged.
 struct LightGuide {
   LightGuide(int width_px, int height_px);
-  /// From 1 / (distance that a ray went) and the brightness that it found, for each pixel, computes
-  /// 1 / distance^2 over which light may be averaged: a fraction of the mean distance around. `noisy_reach2`
-  /// is that of further steps, which only noisy light needs: light whose variance exceeds the square of its
+  /// From 1 / (distance that a ray went) and the brightness that it found, for each pixel, computes 1 /
+  /// distance^2 over which light may be averaged: a fraction of the mean distance around. `noisy_reach2` is
+  /// that of further steps, which only noisy light needs: light whose variance exceeds the square of its
   /// mean. All are means of the neighbourhood, since a single ray says little.
   void find_reach(const LightPlane& inverse_distance, const LightPlane& brightness, LightPlane& reach2,
                   LightPlane& noisy_reach2) const;

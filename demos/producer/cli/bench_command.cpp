@@ -110,8 +110,9 @@ Command add_bench(CLI::App& app) {
       ->check(CLI::Range(1, 100));
   command->add_option("--csv", bench.csv, "Write the table to this CSV file, too");
   command
-      ->add_option("--limit", bench.limit_s,
-                   "Stop a run after this many seconds; the table then gives the simulated time (default: 60)")
+      ->add_option(
+          "--limit", bench.limit_s,
+          "Stop a run after this many seconds; the table then gives the simulated time (default: 60)")
       ->check(CLI::PositiveNumber);
   add_threads(*command, bench.threads);
   command->add_flag("--force", bench.force, "Replace an existing file");

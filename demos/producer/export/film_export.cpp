@@ -18,7 +18,8 @@ ExportTarget parse_export(const std::string& out) {
   else if (ending == ".csv")
     target.format = ExportFormat::csv;
   else if (ending == ".usdc" || ending == ".usdz")
-    throw std::invalid_argument(out + ": USD is written as text; use the ending .usda (usdcat converts it to .usdc)");
+    throw std::invalid_argument(
+        out + ": USD is written as text; use the ending .usda (usdcat converts it to .usdc)");
   else if (ending == ".gltf")
     throw std::invalid_argument(out + ": glTF is written as one binary file; use the ending .glb");
   else if (ending == ".abc")

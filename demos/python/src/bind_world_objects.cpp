@@ -520,7 +520,8 @@ void bind_building(py::class_<LiveWorld>& world) {
   const auto removal = [&]<class H>(H) {
     world.def(
         "remove", [](LiveWorld& w, H handle) { return w.remove(handle); }, py::arg("object"),
-        "Removes an object; False if it was removed before. Removing a body also removes its springs and joints.");
+        "Removes an object; False if it was removed before. Removing a body also removes its springs and "
+        "joints.");
   };
   removal(sim::BodyHandle{});
   removal(sim::ParticleSystemHandle{});
