@@ -58,10 +58,9 @@ class alignas(64) ContactPair {
   bool has_narrow_ = false;
 
  public:
-  uint32_t impacts = 0;     ///< number in this sub-step
-  uint8_t speculative = 0;  ///< number of manifolds that add_speculative_contacts() added
-  bool toi_exhausted =
-      false;  ///< the limit of impacts is reached: the pair is not traced back again in this sub-step
+  uint32_t impacts = 0;        ///< number in this sub-step
+  uint8_t speculative = 0;     ///< number of manifolds that add_speculative_contacts() added
+  bool toi_exhausted = false;  ///< limit of impacts reached: not traced back again in this sub-step
   /// Its contacts have no restitution in this sub-step; they only limit the approach.
   bool restitution_suppressed = false;
   Real deepest = 0;  ///< deepest overlap that find() has seen in this sub-step [m]
