@@ -103,7 +103,7 @@ class ClothSystem {
   bool find_drifts();
   void shorten_moves(Real dt);
   bool shorten_in_pieces();
-  bool shorten_unchecked(Shortened how);
+  bool shorten_until_valid(Shortened how);
   bool shorten_straight(Shortened how, bool& turned);
   void shorten_carrier(Carrier& carrier, Real fraction);
   void add_momenta(Real sign, Real dt);

@@ -16,7 +16,7 @@ constexpr Real kMargin = 0.8;
 /// The same for pairs that are searched again while the other points keep their predicted paths; these may
 /// deviate by a quarter.
 constexpr Real kStrayMargin = 1.5 * kMargin;
-/// Up to this fraction of all points, only their own pairs are searched again.
+/// Up to one in this many points, only their own pairs are searched again.
 constexpr std::size_t kFew = 3;
 /// Work of fitting a triangle's box, of testing a pair, and of finding its closest points, relative to
 /// checking a known pair in a sub-step (measured).

@@ -16,7 +16,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Greatest number of rounds of shortening moves. Points that still violate a limit are then moved back to
+/// Greatest number of rounds of shortening moves. If a limit is violated after them, all points return to
 /// their start.
 constexpr int kMaxRounds = 64;
 /// Greatest number of rounds for bodies that turn.
@@ -128,12 +128,12 @@ void ClothSystem::shorten_moves(Real dt) {
     velocity = end_velocities(dt);
   }
   if (any_drifts) find_doubtful();
-  bool any = any_drifts ? shorten_in_pieces() : shorten_unchecked(kInWorld);
+  bool any = any_drifts ? shorten_in_pieces() : shorten_until_valid(kInWorld);
   if (any_drifts) {
     self_contacts_.take_crossed();  // in the world's frame none has to
     drift_.assign(points_.size(), Vec4::Zero());
     if (any && self) find_doubtful();
-    if (any && self) shorten_unchecked(kInWorld);
+    if (any && self) shorten_until_valid(kInWorld);
   }
   for (uint32_t i : self_contacts_.take_crossed()) ++cloths_[points_.cloth[i]]->report.crossings;
   for (std::size_t i = 0; any && i < points_.size(); ++i) {
@@ -157,7 +157,7 @@ bool ClothSystem::shorten_in_pieces() {
     for (std::size_t i = 0; i < points_.size(); ++i) points_.start[i] += sign * drift_[i];
   };
   shift_starts(1);
-  const bool any = shorten_unchecked(kInPiece);
+  const bool any = shorten_until_valid(kInPiece);
   shift_starts(-1);
   if (!any) return false;
   // A free piece as a whole moves on as it would have.
@@ -265,7 +265,7 @@ void ClothSystem::restore_momenta() {
 
 /// Shortens moves relative to the points' starts; returns whether any was shortened. Records `how` for these
 /// points.
-bool ClothSystem::shorten_unchecked(Shortened how) {
+bool ClothSystem::shorten_until_valid(Shortened how) {
   bool any = false, turned = false;
   // The points of a body that turns do not move straight, so they are checked again.
   for (int pass = 0; pass < kMaxPasses; ++pass) {
