@@ -137,7 +137,7 @@ Command add_tune(CLI::App& app, const TuneCommand& run) {
   return {command, [options, run] { return run(*options); }};
 }
 
-/// The commands in the order in which --help lists them.
+/// In the order in which --help lists them.
 std::vector<Command> add_commands(CLI::App& app, const TuneCommand& tune) {
   return {add_render(app),    add_new(app),     add_tune(app, tune), add_encode(app), add_frame(app),
           add_sheet(app),     add_sweep(app),   add_simulate(app),   add_bench(app),  add_export(app),
