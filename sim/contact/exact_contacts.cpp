@@ -13,22 +13,22 @@
 namespace offstage::sim {
 namespace {
 
-/// Fraction of a penetration that a step removes, and the greatest speed of the removal [m/s].
+/// Share of a penetration that a step removes, and the greatest speed of the removal [m/s].
 constexpr Real kPushOut = 0.2, kFastestPush = 0.5;
 /// Points that approach faster than this have closed in the interval, not before [m/s].
 constexpr Real kClosing = 1e-3;
-/// Uncertainty of the approach of a resting contact, as a fraction of the normal velocity due to rotation in
+/// Uncertainty of the approach of a resting contact, as a share of the normal velocity due to rotation in
 /// half an interval.
-constexpr Real kTurningFraction = 0.5;
+constexpr Real kTurningShare = 0.5;
 /// A stopped body also stops its neighbours where they would overlap by more than kOverlap [m]; this is
 /// repeated for their neighbours, in at most kBlockPasses passes.
 constexpr int kBlockPasses = 20;
 constexpr Real kOverlap = 1e-6;
 /// The result of a fall-back is rejected if its residual is larger than kRough [m/s], or if it adds energy
-/// beyond the rounding fraction.
+/// beyond the rounding share.
 constexpr Real kRough = 1e-2, kEnergyRounding = 1e-9;
-/// Fraction of the kinetic energy that the velocity terms of a solution may add in a step.
-constexpr Real kTermsFraction = 0.02;
+/// Share of the kinetic energy that the velocity terms of a solution may add in a step.
+constexpr Real kTermsShare = 0.02;
 
 }  // namespace
 
@@ -91,7 +91,7 @@ bool ExactContacts::solve_lcp(ContactWork& work) {
 /// solution; their unbounded impulses nearly cancel, and the rest throws bodies away. The velocity terms of
 /// R9 are wrong if a thin body turns far in a step. Moving surfaces, motors and friction in joints may do
 /// work. All other forces may only dissipate energy, apart from the speed at which overlaps are removed and a
-/// small fraction for those terms. Energy that motors and friction take away is counted, since a limit or a
+/// small share for those terms. Energy that motors and friction take away is counted, since a limit or a
 /// contact against which a motor pushes returns a part of it.
 bool ExactContacts::is_safe(const ContactWork& work) const {
   if (work.fallbacks > 0 && work.residual > kRough) return false;
@@ -120,7 +120,7 @@ bool ExactContacts::is_safe(const ContactWork& work) const {
                body.angular_velocity.dot(body.inverse_inertia.inverse() * body.angular_velocity) / 2;
   }
   if (work.fallbacks > 0) return energy <= kEnergyRounding * kinetic;
-  return energy <= kTermsFraction * kinetic + mass * push * push / 2;
+  return energy <= kTermsShare * kinetic + mass * push * push / 2;
 }
 
 uint32_t ExactContacts::add_body(Body& body, const ContactInterval& interval) {
@@ -166,7 +166,7 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       pairs_.push_back(&pair);
       forces_.push_back(&m.forces[k]);
       // The approach of a rotating contact differs slightly from the prediction of its rotation.
-      approach_.push_back(std::max(0.0, std::abs(u.x()) - kTurningFraction * std::abs(motion.gain.x())));
+      approach_.push_back(std::max(0.0, std::abs(u.x()) - kTurningShare * std::abs(motion.gain.x())));
     }
 }
 
@@ -192,14 +192,14 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
     Body& body = *island.bodies[i];
     const Vec3 dv = bodies_[i].velocity - free_[i].velocity,
                dw = bodies_[i].angular_velocity - free_[i].angular_velocity;
-    Vec3 displacement = rest_[i] * dv, turn = rest_[i] * dw;
+    Vec3 way = rest_[i] * dv, turn = rest_[i] * dw;
     if (closing_[i]) {
-      displacement = (dv + bodies_[i].velocity - body.start_twist.velocity) / 2;
+      way = (dv + bodies_[i].velocity - body.start_twist.velocity) / 2;
       turn = (dw + bodies_[i].angular_velocity - body.start_twist.angular_velocity) / 2;
     }
     add_effect(body, {body.rigid.mass * dv,
                       body.rigid.spin_momentum(body.impulse_orientation(duration, interval.substep), dw), dw,
-                      duration * displacement, duration * turn, duration / interval.substep});
+                      duration * way, duration * turn, duration / interval.substep});
   }
 }
 
@@ -207,7 +207,7 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
 /// half of the change of velocity in the interval. If this would cause an overlap, the other body counts as
 /// stopped, too.
 void ExactContacts::close_neighbors(const Island& island, Real duration) {
-  const auto displacement_of = [&](uint32_t i, const Vec3& arm) {
+  const auto way = [&](uint32_t i, const Vec3& arm) {
     const Vec3 end = bodies_[i].velocity_at(arm);
     if (i >= island.bodies.size() || closing_[i]) return Vec3(duration * end);
     return Vec3(duration / 2 * (end + island.bodies[i]->start_twist.at(arm)));
@@ -218,9 +218,7 @@ void ExactContacts::close_neighbors(const Island& island, Real duration) {
     for (const Contact& c : contacts_) {
       if (closing_[c.a] == closing_[c.b]) continue;
       const Real separation = std::max(0.0, -c.target * duration);
-      if (separation + c.frame.n.dot(displacement_of(c.a, c.arm_a) - displacement_of(c.b, c.arm_b)) >
-          -kOverlap)
-        continue;
+      if (separation + c.frame.n.dot(way(c.a, c.arm_a) - way(c.b, c.arm_b)) > -kOverlap) continue;
       closing_[c.a] = closing_[c.b] = 1;
       changed = true;
     }

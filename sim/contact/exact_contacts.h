@@ -12,7 +12,7 @@ namespace offstage::sim {
 /// their `start` to `rigid`; the effect of the contacts is added to this motion. Keep one object per island.
 class ExactContacts {
  public:
-  /// Method of the solution.
+  /// How the problem is solved.
   enum class Method : uint8_t {
     proximal,  ///< by the proximal Newton method on the true friction cone
     lcp        ///< by linear complementarity (contact_lcp.h), or else as above
@@ -50,7 +50,7 @@ class ExactContacts {
   // Speed of each contact at the start, as an absolute value, less the part due to rotation [m/s].
   std::vector<Real> approach_;
   std::vector<uint8_t> closing_;  // by body: whether a contact of it closed in the interval
-  std::vector<Real> rest_;        // by body: fraction of the interval in which it has its change of velocity
+  std::vector<Real> rest_;        // by body: share of the interval in which it has its change of velocity
   IslandJoints joints_;
   ProximalNewton newton_;
 };
