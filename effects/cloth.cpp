@@ -64,7 +64,7 @@ void spread_mass(ClothDef& def, Real areal_density) {
   }
 }
 
-/// Share of the critical damping of springs of a kind.
+/// Fraction of the critical damping of springs of a kind.
 Real damping_of(const Fabric& f, SpringKind kind) {
   const std::optional<Real>& own = kind == SpringKind::stretch ? f.stretch_damping
                                    : kind == SpringKind::shear ? f.shear_damping
@@ -72,7 +72,7 @@ Real damping_of(const Fabric& f, SpringKind kind) {
   return own.value_or(f.damping);
 }
 
-/// Adds a spring with its share of the critical damping of its two points, if it has any stiffness.
+/// Adds a spring with its fraction of the critical damping of its two points, if it has any stiffness.
 void add_spring(ClothDef& def, uint32_t a, uint32_t b, Real stiffness, const Fabric& fabric, SpringKind kind,
                 std::array<uint32_t, 2> counterpart = {}) {
   const auto distance = [&](uint32_t i, uint32_t j) { return (def.vertices[i] - def.vertices[j]).norm(); };
@@ -93,7 +93,7 @@ Real bend_stiffness(Real bend, Real w, Real h) {
   return 16 * bend * w / (h * h * h * kAngle * kAngle);
 }
 
-/// With the circumscribed radius 1.
+/// An icosahedron with the circumscribed radius 1.
 sim::TriangleMesh icosahedron() {
   // Corners of three rectangles whose sides are in the golden ratio.
   const Real golden = (1 + std::sqrt(5.0)) / 2, size = std::sqrt(1 + golden * golden);
@@ -250,7 +250,7 @@ uint32_t add_cord(ClothDef& def, const Cord& cord) {
   check("mass_per_length of a cord", cord.mass_per_length, false);
   check("damping of a cord", cord.damping, true);
   if (cord.segments < 1 || cord.segments > 1000) refuse("segments of a cord must be 1 to 1000");
-  if (cord.vertex >= def.vertices.size()) refuse("a cord begins at a vertex that is not there");
+  if (cord.vertex >= def.vertices.size()) refuse("a cord begins at a vertex that does not exist");
   const Vec3 start = def.vertices[cord.vertex], across = cord.end - start;
   const Real distance = across.norm(), length = cord.length > 0 ? cord.length : distance;
   if (!(length > 0)) refuse("the ends of a cord are at one place, and it has no length");

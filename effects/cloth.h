@@ -43,15 +43,15 @@ sim::ClothDef sphere_cloth(Real radius, uint32_t divisions, const sim::Pose& pos
 struct Cord {
   uint32_t vertex = 0;           ///< index of a vertex of the cloth
   Vec3 end = Vec3::Zero();       ///< where the other end is at the start (world) [m]
-  Real length = 0;               ///< at rest [m]; 0: the distance
+  Real length = 0;               ///< length at rest [m]; 0: the distance of the ends
   uint32_t segments = 10;        ///< 1 to 1000
   Real stiffness = 50;           ///< force at a strain of 1 [N], > 0
   Real mass_per_length = 0.002;  ///< [kg/m], > 0
-  Real damping = 0.1;            ///< share of the critical damping of each spring, >= 0
+  Real damping = 0.1;            ///< fraction of the critical damping of each spring, >= 0
 };
 /// Adds a cord to a cloth and returns the index of its last vertex, for a pin. A cord that is longer than the
 /// distance of its ends hangs in two straight parts of equal length, in the direction of -Y as far as its
-/// ends let it. Throws std::invalid_argument for a value out of range.
+/// ends allow. Throws std::invalid_argument for a value out of range.
 uint32_t add_cord(sim::ClothDef& def, const Cord& cord);
 
 }  // namespace offstage::effects

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "effects/limits.h"
-#include "effects/newborn.h"
+#include "effects/particle_draws.h"
 
 namespace offstage::effects {
 namespace {
@@ -86,8 +86,8 @@ void Emitter::collect_due(Real end) {
                    [](const Release& a, const Release& b) { return a.time < b.time; });
 }
 
-/// Adds the particles of the body's way in this sub-step, which is straight.
-void Emitter::collect_along_way(const sim::World& world, Real start, Real end) {
+/// Adds the particles along the body's path in this sub-step, which is straight.
+void Emitter::collect_along_path(const sim::World& world, Real start, Real end) {
   const Real rate = mean(def_.release.rate_per_metre, start - origin_);
   if (!def_.body || !(rate > 0) || start < origin_ + def_.release.start || end > origin_ + def_.release.end ||
       end > stopped_)
@@ -95,19 +95,19 @@ void Emitter::collect_along_way(const sim::World& world, Real start, Real end) {
   const auto place = [&](Real time) {
     return world.body_motion(def_.body, time).pose.point_to_world(def_.surface.pose.position);
   };
-  const Real due = rate * (place(end) - place(start)).norm(), total = way_share_ + due;
+  const Real due = rate * (place(end) - place(start)).norm(), total = path_fraction_ + due;
   const auto count = static_cast<uint64_t>(std::min(total, static_cast<Real>(def_.particles.max_alive)));
   for (uint64_t k = 1; k <= count; ++k) {
-    const Real share = std::clamp((static_cast<Real>(k) - way_share_) / due, 0.0, 1.0);
-    due_.push_back({start + share * (end - start), 1});
+    const Real fraction = std::clamp((static_cast<Real>(k) - path_fraction_) / due, 0.0, 1.0);
+    due_.push_back({start + fraction * (end - start), 1});
   }
-  way_share_ = total - std::floor(total);
+  path_fraction_ = total - std::floor(total);
 }
 
 void Emitter::emit(sim::World& world, Real start, Real end) {
   if (def_.body && !world.is_present(def_.body)) return;
   collect_due(end);
-  collect_along_way(world, start, end);
+  collect_along_path(world, start, end);
   std::stable_sort(due_.begin(), due_.end(),
                    [](const Release& a, const Release& b) { return a.time < b.time; });
   // The list grows during the loop, because the rest of a release may still be due in this sub-step.
@@ -117,12 +117,13 @@ void Emitter::emit(sim::World& world, Real start, Real end) {
 }
 
 /// Largest diameter of the next `count` particles.
-Real Emitter::largest_diameter(uint64_t count, Real birth) const {
+Real Emitter::largest_diameter(uint64_t count, Real birth_time) const {
   Real radius = upper_bound(def_.particles.radius);
   if (std::isinf(radius)) {
     radius = 0;
     for (uint64_t k = 0; k < count; ++k)
-      radius = std::max(radius, Draws(random_, number_ + k, birth - origin_)(def_.particles.radius, kRadius));
+      radius =
+          std::max(radius, Draws(random_, number_ + k, birth_time - origin_)(def_.particles.radius, kRadius));
   }
   return 2 * radius;
 }
@@ -133,18 +134,18 @@ void Emitter::release(sim::World& world, const Release& r, Real start, Real end)
       std::min(r.count, def_.particles.max_alive > alive ? def_.particles.max_alive - alive : 0);
   if (allowed > 0) {
     // Particles that were due earlier without waiting belong to the prewarming.
-    const Real birth = r.waited ? std::max(r.time, start) : r.time;
-    const Batch batch{allowed, birth, end, largest_diameter(allowed, birth),
-                      def_.body ? world.body_motion(def_.body, std::max(birth, start)) : sim::Motion{}};
+    const Real birth_time = r.waited ? std::max(r.time, start) : r.time;
+    const Batch batch{allowed, birth_time, end, largest_diameter(allowed, birth_time),
+                      def_.body ? world.body_motion(def_.body, std::max(birth_time, start)) : sim::Motion{}};
     const uint64_t placed = def_.release.overlap   ? place_anywhere(world, batch)
                             : surface_.has_cells() ? place_in_cells(world, batch)
                                                    : place_apart(world, batch);
     report_.released += placed;
     if (placed < allowed) {
-      const Real speed = std::abs(mean(def_.particles.speed, birth - origin_));
+      const Real speed = std::abs(mean(def_.particles.speed, birth_time - origin_));
       const Real clearing = std::min(kMaxClearing, batch.diameter / speed);
       if (!r.waited) report_.waited += allowed - placed;
-      wait({birth + clearing, allowed - placed, true}, end);
+      wait({birth_time + clearing, allowed - placed, true}, end);
     }
   }
   // Particles over the limit use up their numbers, too, so that the random numbers of the others do not
@@ -164,7 +165,7 @@ void Emitter::wait(const Release& rest, Real end) {
 
 uint64_t Emitter::place_anywhere(sim::World& world, const Batch& batch) {
   for (uint64_t k = 0; k < batch.count; ++k) {
-    const Draws draw(random_, number_++, batch.birth - origin_);
+    const Draws draw(random_, number_++, batch.birth_time - origin_);
     add(world, draw, surface_.anywhere(draw.uniforms(kPlace)), batch);
   }
   return batch.count;
@@ -176,7 +177,7 @@ uint64_t Emitter::place_in_cells(sim::World& world, const Batch& batch) {
   const Permutation shuffled(n, def_.seed);
   begin_cells(cells, placed);
   for (uint64_t k = 0; k < placed; ++k) {
-    const Draws draw(random_, number_++, batch.birth - origin_);
+    const Draws draw(random_, number_++, batch.birth_time - origin_);
     add(world, draw, surface_.cell(cells, shuffled(cell_cursor_++ % n), turn_), batch);
   }
   return placed;
@@ -198,7 +199,7 @@ void Emitter::begin_cells(const Cells& cells, uint64_t count) {
 uint64_t Emitter::place_apart(sim::World& world, const Batch& batch) {
   spacing_.reset(batch.count, batch.diameter);
   for (uint64_t k = 0; k < batch.count; ++k, ++number_) {
-    const Draws draw(random_, number_, batch.birth - origin_);
+    const Draws draw(random_, number_, batch.birth_time - origin_);
     const Real radius = draw(def_.particles.radius, kRadius);
     Place place;
     uint32_t t = 0;
@@ -225,11 +226,11 @@ void Emitter::add(sim::World& world, const Draws& draw, const Place& place, cons
       carrier.point_to_world(surface.point_to_world(place.point + particle.radius * place.normal));
   const Vec3 own = draw(def_.particles.speed, kSpeed) * carrier.vector_to_world(direction);
   const Vec3 arm = particle.position - carrier.position;
-  const Real share = def_.release.inherit_velocity;
+  const Real fraction = def_.release.inherit_velocity;
   particle.velocity =
-      own + share * batch.carrier.velocity + share * batch.carrier.angular_velocity.cross(arm);
+      own + fraction * batch.carrier.velocity + fraction * batch.carrier.angular_velocity.cross(arm);
   if (def_.release.recoil && def_.body) world.add_impulse(def_.body, -particle.mass * own, particle.position);
-  world.add_particle(target_, particle, batch.end - batch.birth);
+  world.add_particle(target_, particle, batch.end - batch.birth_time);
 }
 
 }  // namespace offstage::effects

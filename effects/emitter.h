@@ -18,7 +18,7 @@ class Draws;
 struct EmitterReport {
   uint64_t released = 0;
   uint64_t skipped = 0;  ///< not released because max_alive was reached
-  uint64_t waiting = 0;  ///< due, but without room on the surface; released later
+  uint64_t waiting = 0;  ///< particles that were due, but had no room on the surface; they are released later
   uint64_t waited = 0;   ///< total number of particles that were postponed
 };
 
@@ -45,16 +45,16 @@ class Emitter {
   /// A release in progress.
   struct Batch {
     uint64_t count;
-    Real birth, end;
+    Real birth_time, end;
     Real diameter;  // largest diameter of its particles
     sim::Motion carrier;
   };
 
-  void collect_along_way(const sim::World& world, Real start, Real end);
+  void collect_along_path(const sim::World& world, Real start, Real end);
   void collect_due(Real end);
   void release(sim::World& world, const Release& r, Real start, Real end);
   void wait(const Release& rest, Real end);
-  Real largest_diameter(uint64_t count, Real birth) const;
+  Real largest_diameter(uint64_t count, Real birth_time) const;
   uint64_t place_anywhere(sim::World& world, const Batch& batch);
   uint64_t place_in_cells(sim::World& world, const Batch& batch);
   uint64_t place_apart(sim::World& world, const Batch& batch);
@@ -70,7 +70,7 @@ class Emitter {
   Spacing spacing_;
   EmitterReport report_;
   uint64_t number_ = 0;        // number of the next particle, on which its random numbers depend
-  Real way_share_ = 0;         // particles of rate_per_metre due since the last one, below 1
+  Real path_fraction_ = 0;     // particles of rate_per_metre due since the last one, below 1
   uint64_t cell_cursor_ = 0;   // position in the shuffled sequence of cells
   std::array<Real, 3> turn_;   // rotation of the cells for one round
   uint64_t turned_round_ = 0;  // which round that is, from 1

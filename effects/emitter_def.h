@@ -25,17 +25,17 @@ struct TimeWindow {
   Real start = 0, end = 1e30;
 };
 
-/// How and when an emitter releases particles. Times are on the emitter's clock, which shows 0 at the
-/// `origin` given to the Emitter.
+/// The directions and times at which an emitter releases particles. Times are on the emitter's clock, which
+/// shows 0 at the `origin` given to the Emitter.
 struct EmitterRelease {
   Vec3 direction = Vec3::Zero();  ///< in the frame of the body or the world; zero: the normal of the surface
-  Real inherit_velocity = 1;      ///< share of the velocity of the body's point that particles get, >= 0
+  Real inherit_velocity = 1;      ///< fraction of the velocity of the body's point that particles get, >= 0
   bool recoil = false;  ///< whether particles push a dynamic body back by their momentum relative to it
   /// Particles are placed anywhere on the surface and are never postponed; for particles that do not collide
   /// with each other.
   bool overlap = false;
   Varying rate = 100.0;  ///< particles per second, released one by one; 0: only `count` and bursts
-  /// Particles per metre of the way of the body's point at the surface's origin [1/m], >= 0; spread evenly
+  /// Particles per metre of the path of the body's point at the surface's origin [1/m], >= 0; spread evenly
   /// along it.
   Varying rate_per_metre = 0.0;
   Varying count = 0.0;     ///< particles per release, rounded; 0: no periodic release

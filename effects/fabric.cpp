@@ -51,7 +51,7 @@ const std::array<FabricPreset, 6> kPresets = {{
       .drag = 1,
       .lift = 0.98}},
     {"leather",
-     "of garments, soft and heavy, few large folds",
+     "for garments: soft and heavy, few large folds",
      {.areal_density = 0.6,
       .stretch = 9000,
       .shear = 2500,

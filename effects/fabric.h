@@ -25,7 +25,7 @@ struct Fabric {
   Real bend = 1e-4;  ///< flexural rigidity: moment per metre of width at a curvature of 1/m [N m], >= 0
   Real bend_damping = 2e-3;  ///< the moment is bend * (curvature + bend_damping * its rate) [s], >= 0
   BendModel bend_model = BendModel::plate;
-  /// Share of the critical damping of each spring between its two points, >= 0.
+  /// Fraction of the critical damping of each spring between its two points, >= 0.
   Real damping = 0.05;
   /// The same of springs of one kind, >= 0; empty: `damping`. Those that bend are springs only with
   /// BendModel::springs.
@@ -37,7 +37,7 @@ struct Fabric {
   Real drag = 1;             ///< coefficient of the pressure of air perpendicular to the cloth, >= 0
   Real lift = 0.98;          ///< at most `drag`; drag - lift is the coefficient for air along the cloth
   Real max_stretch = 1.1;    ///< greatest length over rest length along the threads, > 1; 0: no limit
-  Real max_shear = 0;        ///< the same limit for shear
+  Real max_shear = 0;        ///< greatest length of shear springs over their rest length; 0: no limit
   Real min_bend_radius = 0;  ///< smallest radius to which it bends [m], >= 0; 0: no limit
 };
 

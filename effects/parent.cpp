@@ -19,10 +19,10 @@ Parent parent_at(const sim::World& world, sim::ParticleSystemHandle system, std:
           p.friction[i], p.charge[i]};
 }
 
-const std::vector<std::size_t>& Newcomers::find(const sim::ParticleArrays& particles) {
+const std::vector<std::size_t>& NewParents::find(const sim::ParticleArrays& particles) {
   found_.clear();
-  waiting_.swap(unborn_);
-  unborn_.clear();
+  waiting_.swap(age_zero_ids_);
+  age_zero_ids_.clear();
   const uint64_t oldest = waiting_.empty() ? next_ : std::min(next_, waiting_.front());
   const auto first = std::lower_bound(particles.id.begin(), particles.id.end(), oldest);
   auto known = waiting_.begin();
@@ -32,7 +32,7 @@ const std::vector<std::size_t>& Newcomers::find(const sim::ParticleArrays& parti
     const bool is_new = id >= next_ || (known != waiting_.end() && *known == id);
     if (!is_new) continue;
     if (particles.age[i] == 0)
-      unborn_.push_back(id);
+      age_zero_ids_.push_back(id);
     else if (begun_)
       found_.push_back(i);
   }

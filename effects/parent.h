@@ -22,7 +22,7 @@ Parent parent_at(const sim::World& world, sim::ParticleSystemHandle system, std:
 
 /// Finds the particles of a system that have been stepped for the first time. Before this, the time of
 /// creation of a new particle is unknown.
-class Newcomers {
+class NewParents {
  public:
   /// Returns the indices of the particles whose age has become greater than 0 since the last call, ascending.
   /// The first call omits older particles.
@@ -30,9 +30,9 @@ class Newcomers {
 
  private:
   bool begun_ = false;
-  uint64_t next_ = 0;              // first id that was not seen yet
-  std::vector<uint64_t> unborn_;   // ids seen at age 0, ascending
-  std::vector<uint64_t> waiting_;  // of the last call
+  uint64_t next_ = 0;                   // first id that was not seen yet
+  std::vector<uint64_t> age_zero_ids_;  // ids seen at age 0, ascending
+  std::vector<uint64_t> waiting_;       // of the last call
   std::vector<std::size_t> found_;
 };
 

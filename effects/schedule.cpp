@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "effects/limits.h"
-#include "effects/newborn.h"
+#include "effects/particle_draws.h"
 
 namespace offstage::effects {
 namespace {
@@ -18,7 +18,7 @@ constexpr Real kRateWindow = 0.1;
 constexpr int kMaxIdleWindows = 100'000;
 
 /// Time at which the integral of a rate over time, from t on, reaches 1.
-Real curve_birth(const Varying& rate, const Curve& curve, Real t) {
+Real curve_birth_time(const Varying& rate, const Curve& curve, Real t) {
   const auto at = [&](Real time) { return std::max(0.0, sample(rate, 0.5, time)); };
   Real need = 1;
   for (const auto& [key, value] : curve.keys) {
@@ -47,7 +47,7 @@ Schedule::Schedule(const EmitterDef& def, Real origin)
       start_(origin + (def.release.start - def.release.prewarm)),
       end_(origin + def.release.end),
       burst_cycles_(def.release.bursts.size(), 0) {
-  next_single_ = next_birth(start_);
+  next_single_ = next_birth_time(start_);
   next_periodic_ = upper_bound(def.release.count) >= 0.5 ? start_ : kNever;
 }
 
@@ -62,11 +62,11 @@ bool Schedule::open(Real time) const {
 }
 
 /// Time of the next particle of `rate` after that at `last`.
-Real Schedule::next_birth(Real last) {
+Real Schedule::next_birth_time(Real last) {
   if (const auto* constant = std::get_if<Real>(&rate_))
     return *constant > 0 ? start_ + static_cast<Real>(singles_ + 1) / *constant : kNever;
   if (const auto* curve = std::get_if<Curve>(&rate_))
-    return origin_ + curve_birth(rate_, *curve, last - origin_);
+    return origin_ + curve_birth_time(rate_, *curve, last - origin_);
   Real need = 1, t = last;
   for (int idle = 0; idle < kMaxIdleWindows; ++idle) {
     const Real window_end = start_ + static_cast<Real>(rate_window_ + 1) * kRateWindow;
@@ -80,7 +80,7 @@ Real Schedule::next_birth(Real last) {
 }
 
 void Schedule::collect_singles(Real end, std::vector<Release>& due) {
-  for (; next_single_ <= end; next_single_ = next_birth(next_single_)) {
+  for (; next_single_ <= end; next_single_ = next_birth_time(next_single_)) {
     ++singles_;
     if (open(next_single_)) due.push_back({next_single_, 1});
   }

@@ -1,6 +1,6 @@
 #pragma once
-/// Birth times of the particles of an emitter: when it releases how many. The times depend only on its own
-/// clock, so they are the same at any frame rate.
+/// Birth times of the particles of an emitter: the times of its releases, and their numbers of particles. The
+/// times depend only on its own clock, so they are the same at any frame rate.
 
 #include <algorithm>
 #include <vector>
@@ -30,7 +30,7 @@ class Schedule {
   void collect_singles(Real end, std::vector<Release>& due);
   void collect_periodic(Real end, std::vector<Release>& due);
   void collect_bursts(Real end, std::vector<Release>& due);
-  Real next_birth(Real last);
+  Real next_birth_time(Real last);
   Real draw(const Varying& v, uint64_t number, uint32_t property, Real time) const;
   bool open(Real time) const;
 

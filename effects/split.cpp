@@ -5,7 +5,7 @@
 
 #include "effects/emitter_surface.h"
 #include "effects/limits.h"
-#include "effects/newborn.h"
+#include "effects/particle_draws.h"
 
 namespace offstage::effects {
 namespace {
@@ -39,7 +39,7 @@ Splitter::Splitter(const SplitDef& def, sim::ParticleSystemHandle parents, sim::
 
 void Splitter::emit(sim::World& world, Real start, Real end) {
   if (!def_.enabled || def_.depth == 0) return;
-  enter_newcomers(world, start);
+  enter_new_particles(world, start);
   while (!due_.empty() && due_.top().time <= end) {
     const Due due = due_.top();
     due_.pop();
@@ -49,9 +49,9 @@ void Splitter::emit(sim::World& world, Real start, Real end) {
 
 /// New particles that are not children are numbered in order of creation, independently of the children
 /// between them.
-void Splitter::enter_newcomers(const sim::World& world, Real now) {
+void Splitter::enter_new_particles(const sim::World& world, Real now) {
   const sim::ParticleArrays& p = world.particles(parents_);
-  for (std::size_t i : newcomers_.find(p)) {
+  for (std::size_t i : new_parents_.find(p)) {
     const auto own = std::lower_bound(own_children_.begin(), own_children_.end(), p.id[i]);
     if (own != own_children_.end() && *own == p.id[i]) continue;
     const auto before = static_cast<uint64_t>(own - own_children_.begin());
@@ -59,8 +59,8 @@ void Splitter::enter_newcomers(const sim::World& world, Real now) {
   }
 }
 
-void Splitter::enter(uint64_t id, uint64_t line, Real birth, int left) {
-  if (left > 0) due_.push({birth + Draws(random_, line, birth)(def_.age, kAge), id, line, left, 0});
+void Splitter::enter(uint64_t id, uint64_t line, Real birth_time, int left) {
+  if (left > 0) due_.push({birth_time + Draws(random_, line, birth_time)(def_.age, kAge), id, line, left, 0});
 }
 
 void Splitter::split(sim::World& world, const Due& due, Real start, Real end) {
@@ -77,7 +77,7 @@ void Splitter::split(sim::World& world, const Due& due, Real start, Real end) {
   for (uint64_t k = 0; k < allowed; ++k) {
     const uint64_t line = combined(this_split, k + 1);
     const sim::Particle child = child_of(parent, Draws(random_, line, due.time));
-    if (!add_newborn(world, children_, child, due.time, start, end)) continue;
+    if (!add_new_particle(world, children_, child, due.time, start, end)) continue;
     ++report_.released;
     if (children_ != parents_) continue;
     own_children_.push_back(world.particles(children_).id.back());
@@ -92,18 +92,18 @@ void Splitter::split(sim::World& world, const Due& due, Real start, Real end) {
 sim::Particle Splitter::child_of(const Parent& parent, const Draws& draw) const {
   const auto part = [&](const Varying& percent, uint32_t property) { return draw(percent, property) / 100; };
   const Real size = part(def_.radius_percent, kRadius), mass = part(def_.mass_percent, kMass);
-  const Real share = mass > 0 ? mass : size * size * size;
+  const Real fraction = mass > 0 ? mass : size * size * size;
   const Real speed = parent.velocity.norm();
   const Vec3 axis = speed > 0 ? Vec3(parent.velocity / speed) : kNoDirection;
   const Vec3 direction = Cone{axis, perpendicular(axis)}.drawn(def_.spread_deg, draw);
   return {.position = parent.position,
           .velocity = part(def_.velocity_percent, kPercent) * speed * direction,
-          .mass = share * parent.mass,
+          .mass = fraction * parent.mass,
           .radius = size * parent.radius,
           .lifespan = part(def_.lifespan_percent, kLifespan) * parent.lifespan,
           .restitution = parent.restitution,
           .friction = parent.friction,
-          .charge = share * parent.charge};
+          .charge = fraction * parent.charge};
 }
 
 }  // namespace offstage::effects

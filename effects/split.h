@@ -1,5 +1,5 @@
 #pragma once
-/// Splitting particles (physics F3): from a given age on, each releases children that get a share of its
+/// Splitting particles (physics F3): from a given age on, each releases children that get a fraction of its
 /// velocity, size and lifespan.
 
 #include <functional>
@@ -61,15 +61,15 @@ class Splitter {
     }
   };
 
-  void enter_newcomers(const sim::World& world, Real now);
-  void enter(uint64_t id, uint64_t line, Real birth, int left);
+  void enter_new_particles(const sim::World& world, Real now);
+  void enter(uint64_t id, uint64_t line, Real birth_time, int left);
   void split(sim::World& world, const Due& due, Real start, Real end);
   sim::Particle child_of(const Parent& parent, const Draws& draw) const;
 
   SplitDef def_;
   sim::ParticleSystemHandle parents_, children_;
   RandomStream random_;
-  Newcomers newcomers_;
+  NewParents new_parents_;
   std::priority_queue<Due, std::vector<Due>, std::greater<>> due_;
   std::vector<uint64_t> own_children_;  // ids of children in the system of their parents, ascending
   OffspringReport report_;

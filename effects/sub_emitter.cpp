@@ -6,7 +6,7 @@
 
 #include "effects/emitter_surface.h"
 #include "effects/limits.h"
-#include "effects/newborn.h"
+#include "effects/particle_draws.h"
 
 namespace offstage::effects {
 namespace {
@@ -49,7 +49,7 @@ void SubEmitter::answer_events(sim::World& world, Real start, Real end) {
 void SubEmitter::answer_ages(sim::World& world, Real start, Real end) {
   // Particles that are added to the parents' own system are appended after the existing ones.
   const std::size_t count = world.particles(parents_).size();
-  const std::vector<std::size_t>& fresh = newcomers_.find(world.particles(parents_));
+  const std::vector<std::size_t>& fresh = new_parents_.find(world.particles(parents_));
   auto next = fresh.begin();
   for (std::size_t i = 0; i < count; ++i) {
     const sim::ParticleArrays& p = world.particles(parents_);
@@ -88,7 +88,7 @@ void SubEmitter::answer(sim::World& world, const sim::ParticleEvent& event, Real
                 def_.release.max_per_step - std::min(born_, def_.release.max_per_step)});
   for (uint64_t k = 0; k < allowed; ++k) {
     const Draws own(random_, combined(index, k + 1), event.time);
-    report_.released += add_newborn(world, target_, answer_to(event, own), event.time, start, end);
+    report_.released += add_new_particle(world, target_, answer_to(event, own), event.time, start, end);
   }
   born_ += allowed;
   report_.skipped += count - allowed;

@@ -32,7 +32,7 @@ struct EventRelease {
   Real min_speed = 0;    ///< smallest speed of the parent after the event [m/s]; slower ones trigger nothing
   Varying count = 5.0;   ///< particles per event, rounded
   Axis axis = Axis::normal;
-  Varying velocity_percent = 0.0;  ///< share of the parent's velocity after the event
+  Varying velocity_percent = 0.0;  ///< fraction of the parent's velocity after the event
   uint64_t max_per_step = 10'000;  ///< new particles in one sub-step; more are not released, but counted
 };
 
@@ -69,7 +69,7 @@ class SubEmitter {
   SubEmitterDef def_;
   sim::ParticleSystemHandle parents_, target_;
   RandomStream random_;
-  Newcomers newcomers_;
+  NewParents new_parents_;
   OffspringReport report_;
   uint64_t born_ = 0;  // number in this sub-step
 };

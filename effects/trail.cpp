@@ -5,7 +5,7 @@
 
 #include "effects/emitter_surface.h"
 #include "effects/limits.h"
-#include "effects/newborn.h"
+#include "effects/particle_draws.h"
 
 namespace offstage::effects {
 namespace {
@@ -31,7 +31,7 @@ Trail::Trail(const TrailDef& def, sim::ParticleSystemHandle parents, sim::Partic
 
 void Trail::emit(sim::World& world, Real start, Real end) {
   const sim::ParticleArrays& p = world.particles(parents_);
-  const std::vector<std::size_t>& fresh = newcomers_.find(p);
+  const std::vector<std::size_t>& fresh = new_parents_.find(p);
   auto next = fresh.begin();
   for (std::size_t i = 0; i < p.size(); ++i) {
     const bool is_new = next != fresh.end() && *next == i;
@@ -63,7 +63,7 @@ void Trail::leave(sim::World& world, std::size_t i, bool is_new, Real start, Rea
     const Real time = start + (def_.release.start_age + (static_cast<Real>(k) + phase) / rate - age);
     const Draws own(random_, combined(p.id[i], k + 1), time);
     report_.released +=
-        add_newborn(world, target_, left_by(parent_at(world, parents_, i, time), own), time, start, end);
+        add_new_particle(world, target_, left_by(parent_at(world, parents_, i, time), own), time, start, end);
   }
 }
 

@@ -13,12 +13,12 @@ namespace offstage::effects {
 
 class Draws;
 
-/// When parents leave particles of a trail.
+/// The times at which parents leave particles of a trail.
 struct TrailRelease {
   Varying rate = 60.0;  ///< particles per second of each parent, drawn once for its life; must not be a curve
   Real start_age = 0;   ///< age of the parent [s], >= 0
   Real end_age = 1e30;  ///< age of the parent [s]
-  Varying velocity_percent = 0.0;  ///< share of the parent's velocity
+  Varying velocity_percent = 0.0;  ///< fraction of the parent's velocity
 };
 
 struct TrailDef {
@@ -50,7 +50,7 @@ class Trail {
   TrailDef def_;
   sim::ParticleSystemHandle parents_, target_;
   RandomStream random_;
-  Newcomers newcomers_;
+  NewParents new_parents_;
   OffspringReport report_;
 };
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "effects/limits.h"
-#include "effects/newborn.h"
+#include "effects/particle_draws.h"
 
 namespace offstage::effects {
 namespace {
@@ -60,7 +60,8 @@ Real largest_release(const EmitterDef& def) {
   return count;
 }
 
-/// Whether particles may be postponed for lack of room. On a mesh this is hard to tell, so the answer is yes.
+/// Whether particles may be postponed for lack of room. On a mesh this is hard to determine, so the result is
+/// true.
 bool can_wait(const EmitterDef& def) {
   if (def.release.overlap) return false;
   const ReleaseSurface surface(def.surface);

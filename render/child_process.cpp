@@ -97,8 +97,8 @@ void ChildProcess::kill() {
 
 std::optional<std::string> ChildProcess::wait(const StopTest& stop) {
   if (pid_ <= 0) return std::nullopt;
-  Patience patience(stop);
-  while (stop && !wait_for_end(pid_, std::chrono::milliseconds(Patience::kInterval_ms)))
+  StopDeadline patience(stop);
+  while (stop && !wait_for_end(pid_, std::chrono::milliseconds(StopDeadline::kInterval_ms)))
     if (patience.exhausted()) kill();
   int status = 0;
   pid_t ended = -1;

@@ -40,7 +40,7 @@ class ChildProcess {
   int error() const { return error_; }
   void kill();
   /// Waits for the end of the child. Returns nothing if it succeeded, otherwise "exit code 1" or "signal 9".
-  /// A child that does not end after a request to stop is killed (Patience).
+  /// A child that does not end after a request to stop is killed (StopDeadline).
   std::optional<std::string> wait(const StopTest& stop = {});
   /// Waits for at most `limit`, after which the child is killed.
   std::optional<std::string> wait_for(std::chrono::milliseconds limit);

@@ -66,8 +66,8 @@ void ClothPass::draw_depth(const Cloth& cloth) {
 
 gl::LazyProgram& ClothPass::program(const GpuMaterial& material, const Features& features) {
   const bool textured = material.textures[0] != 0;
-  const bool sheer = material.lets_through();
-  const auto key = std::make_tuple(material.weave, material.pattern, textured, sheer, features);
+  const bool translucent = material.lets_through();
+  const auto key = std::make_tuple(material.weave, material.pattern, textured, translucent, features);
   const auto found = programs_.find(key);
   if (found != programs_.end()) return found->second;
   std::vector<std::string> defines = features;
@@ -80,7 +80,7 @@ gl::LazyProgram& ClothPass::program(const GpuMaterial& material, const Features&
     defines.push_back("PATTERN " + std::to_string(static_cast<int>(material.pattern)));
     fragment.push_back("pattern.glsl");
   }
-  if (sheer) {
+  if (translucent) {
     defines.push_back("SHEER 1");
     fragment.push_back("sheer.glsl");
   }

@@ -49,7 +49,7 @@ class ClothPass {
   gl::LazyProgram& program(const GpuMaterial& material, const Features& features);
 
   std::map<std::tuple<Weave, Pattern, bool, bool, Features>, gl::LazyProgram>
-      programs_;  ///< keyed also by textured, sheer
+      programs_;  ///< keyed also by textured, translucent
   gl::LazyProgram depth_, surface_, sheer_surface_, textured_sheer_surface_;
 };
 

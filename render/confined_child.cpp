@@ -98,7 +98,7 @@ class Standstill {
 int wait_status(pid_t child, const ConfinedWork& work) {
   Standstill standstill(child, work.standstill);
   bool stopped = false, still = false;
-  while (!wait_for_end(child, std::chrono::milliseconds(Patience::kInterval_ms))) {
+  while (!wait_for_end(child, std::chrono::milliseconds(StopDeadline::kInterval_ms))) {
     stopped = work.stop && work.stop();
     still = standstill.reached();
     if (stopped || still) ::kill(child, SIGKILL);

@@ -24,7 +24,7 @@ void throw_file_error(const std::filesystem::path& path, const std::string& what
   throw FileError(path.string() + ": " + what + ": " + system_reason(error));
 }
 
-bool Patience::exhausted() {
+bool StopDeadline::exhausted() {
   constexpr std::chrono::seconds kGrace(3);
   const auto now = std::chrono::steady_clock::now();
   if (!asked_ && stop_ && stop_()) {
@@ -35,7 +35,7 @@ bool Patience::exhausted() {
 }
 
 int write_all(int fd, std::span<const uint8_t> bytes, const StopTest& stop) {
-  Patience patience(stop);
+  StopDeadline patience(stop);
   while (!bytes.empty()) {
     const ssize_t written = ::write(fd, bytes.data(), bytes.size());
     if (written >= 0) {
@@ -44,7 +44,7 @@ int write_all(int fd, std::span<const uint8_t> bytes, const StopTest& stop) {
     } else if (errno == EAGAIN) {  // the descriptor is non-blocking
       if (patience.exhausted()) return ECANCELED;
       pollfd ready{fd, POLLOUT, 0};
-      ::poll(&ready, 1, Patience::kInterval_ms);
+      ::poll(&ready, 1, StopDeadline::kInterval_ms);
     } else if (errno != EINTR) {
       return errno;
     }

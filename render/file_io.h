@@ -49,11 +49,11 @@ using StopTest = std::function<bool()>;
 
 /// Limits the wait for another program: after a request to stop, the program has three seconds to make
 /// progress.
-class Patience {
+class StopDeadline {
  public:
   static constexpr int kInterval_ms = 100;  ///< time between two polls
 
-  explicit Patience(const StopTest& stop) : stop_(stop) {}
+  explicit StopDeadline(const StopTest& stop) : stop_(stop) {}
   /// Call when the other program has read or written something.
   void progressed() { asked_ = false; }
   bool exhausted();
@@ -65,7 +65,7 @@ class Patience {
 };
 
 /// Writes all bytes; returns the error number, or 0. Waits if the descriptor is non-blocking; returns
-/// ECANCELED if Patience ended the wait.
+/// ECANCELED if StopDeadline ended the wait.
 int write_all(int fd, std::span<const uint8_t> bytes, const StopTest& stop = {});
 
 /// Returns the bytes of a regular file. Named pipes, devices and folders are refused at once. Throws

@@ -170,18 +170,18 @@ SampleOffsets sample_offsets(int i, int n) {
     return Vector2f(static_cast<float>(k) / static_cast<float>(n) + half_cell - 0.5f,
                     std::min(inverse + half_cell, 1.0f) - 0.5f);
   };
-  const auto coprime_near = [n](double share) {
+  const auto coprime_near = [n](double fraction) {
     const auto common_divisor_is_one = [n](int a) {
       int b = n;
       while (b != 0) a = std::exchange(b, a % b);
       return a == 1;
     };
-    int stride = std::max(1, static_cast<int>(share * n));
+    int stride = std::max(1, static_cast<int>(fraction * n));
     while (!common_divisor_is_one(stride)) ++stride;
     return stride;
   };
-  const auto permuted = [i, n, &coprime_near](double share, int shift) {
-    return static_cast<int>((static_cast<int64_t>(i) * coprime_near(share) + shift) % n);
+  const auto permuted = [i, n, &coprime_near](double fraction, int shift) {
+    return static_cast<int>((static_cast<int64_t>(i) * coprime_near(fraction) + shift) % n);
   };
   return {.pixel = hammersley(permuted(0.618, 0)),
           .lens = hammersley(permuted(0.414, n / 3)),

@@ -26,7 +26,8 @@ const std::vector<std::string>& frame_endings();
 struct FrameFile {
   int width_px = 0, height_px = 0;
   bool alpha = false;
-  std::string settings;  ///< those it was written with; empty if offstage did not write it as part of a film
+  std::string settings;  ///< settings that the file was written with; empty if offstage did not write it as
+                         ///< part of a film
 };
 /// Inspects a file without decoding it. Nothing if it cannot be read, is not of the format of its ending, or
 /// is cut short.

@@ -77,7 +77,7 @@ Framebuffer make_framebuffer(GLuint color, GLuint depth) {
   if (status != GL_FRAMEBUFFER_COMPLETE) {
     if (status == 0) throw UnavailableError("no GL context is current on this thread");
     throw UnavailableError("GL framebuffer is not complete (status " + std::to_string(status) +
-                           "): the size may be more than this driver can do");
+                           "): the size may exceed the limit of this driver");
   }
   return framebuffer;
 }

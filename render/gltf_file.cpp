@@ -387,7 +387,7 @@ template <class T>
 std::vector<T> GltfFile::read(const GltfValue& accessor, const Layout& form,
                               T (*convert)(const uint8_t*, std::size_t, bool)) {
   if (!accessor.has("bufferView") && form.count * form.width > kMaxGltfZeros)
-    throw accessor.wrong("count", "is too large for data that is not there");
+    throw accessor.wrong("count", "is too large for an accessor without data");
   if (accessor.has("bufferView") && form.count > 0) {  // before memory is taken for it
     const std::size_t source = *accessor.index("bufferView", count("bufferViews"));
     if (form.count > view(source).size()) throw FileError(accessor.place() + ": goes beyond its buffer view");

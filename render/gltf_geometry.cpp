@@ -46,7 +46,7 @@ void normalize(const GltfValue& accessor, std::vector<float>& values) {
 
 }  // namespace
 
-/// Where the attributes of a primitive come from: accessors, or Draco data with some of them.
+/// The source of a primitive's attributes: accessors, or Draco data for some of them.
 struct GltfGeometry::Source {
   const GltfValue& primitive;
   std::optional<DracoMesh> draco;
@@ -170,7 +170,7 @@ void GltfGeometry::read_triangles(const Source& source, GltfPrimitive& result) {
 
 void GltfGeometry::read_joints(const Source& source, GltfPrimitive& result) {
   constexpr int kMostSets = 4;
-  constexpr uint32_t kNoJoint = 0xffffffff;  // posed() skips what is not in the skin
+  constexpr uint32_t kNoJoint = 0xffffffff;  // posed() skips indices outside of the skin
   const std::size_t n = result.surface.mesh.positions.size();
   std::vector<GltfNumbers> joints, weights;
   for (int k = 0; k < kMostSets; ++k) {

@@ -12,13 +12,14 @@
 
 namespace offstage::render {
 
-/// A primitive as triangles, with what a skin needs.
+/// A primitive as triangles, with the joints and weights for a skin.
 struct GltfPrimitive {
   FileSurface surface;
-  std::size_t points = 0, lines = 0;  ///< that it consists of instead; they are not drawn
-  std::vector<uint32_t> joints;       ///< `influences` per vertex, of the skin's list
-  std::vector<float> weights;         ///< as long as `joints`
-  std::size_t influences = 0;         ///< joints per vertex
+  std::size_t points = 0,
+              lines = 0;  ///< number of points and lines of a primitive without triangles; they are not drawn
+  std::vector<uint32_t> joints;  ///< `influences` per vertex, of the skin's list
+  std::vector<float> weights;    ///< as long as `joints`
+  std::size_t influences = 0;    ///< joints per vertex
 };
 
 class GltfGeometry {

@@ -190,7 +190,7 @@ class GltfImporter {
     const std::vector<Affine3d> joints = skin ? joints_of(*skin) : std::vector<Affine3d>{};
     for (std::size_t k = 0; k < geometry_->primitive_count(mesh); ++k) {
       const GltfPrimitive& primitive = geometry_->primitive(mesh, k);
-      builder_.leave_out(primitive.points, primitive.lines);
+      builder_.count_skipped(primitive.points, primitive.lines);
       if (primitive.surface.mesh.indices.empty()) continue;
       std::optional<FileSurface> own = geometry_->morphed(mesh, k, node);
       if (skin && primitive.influences > 0)

@@ -16,7 +16,7 @@ constexpr int kNearest = 9728, kLinear = 9729, kNearestMipNearest = 9984, kNeare
 constexpr int kClamp = 33071, kMirror = 33648;
 constexpr double kBrightestEmission = 1e4;
 
-float share(double value) {
+float fraction(double value) {
   return static_cast<float>(std::clamp(value, 0.0, 1.0));
 }
 
@@ -82,7 +82,7 @@ Material GltfMaterials::material(const GltfValue& source, GltfUvSets& sets) {
   look.normal_scale =
       static_cast<float>(std::clamp(source.child("normalTexture").number("scale", 1), -1e3, 1e3));
   look.occlusion_texture = map(source, "occlusionTexture", Alpha::drop, sets);
-  look.occlusion_strength = share(source.child("occlusionTexture").number("strength", 1));
+  look.occlusion_strength = fraction(source.child("occlusionTexture").number("strength", 1));
   look.unlit = source.extension("KHR_materials_unlit").exists();
   read_transmission(source, look, sets);
   read_layers(source, look, sets);
@@ -104,8 +104,8 @@ void GltfMaterials::read_metallic(const GltfValue& source, Material& look, GltfU
   const GltfValue pbr = source.child("pbrMetallicRoughness");
   look.color =
       pbr.numbers<4>("baseColorFactor", Eigen::Vector4d::Ones()).cwiseMax(0).cwiseMin(1).cast<float>();
-  look.metallic = share(pbr.number("metallicFactor", 1));
-  look.roughness = share(pbr.number("roughnessFactor", 1));
+  look.metallic = fraction(pbr.number("metallicFactor", 1));
+  look.roughness = fraction(pbr.number("roughnessFactor", 1));
   const bool uses_alpha = look.alpha_cutoff > 0 || source.text("alphaMode", "OPAQUE") == "BLEND";
   look.base_color_texture = map(pbr, "baseColorTexture", uses_alpha ? Alpha::keep : Alpha::drop, sets);
   look.metallic_roughness_texture = map(pbr, "metallicRoughnessTexture", Alpha::drop, sets);
@@ -117,7 +117,7 @@ void GltfMaterials::read_glossiness(const GltfValue& source, Material& look, Glt
   look.color = pbr.numbers<4>("diffuseFactor", Eigen::Vector4d::Ones()).cwiseMax(0).cwiseMin(1).cast<float>();
   look.metallic = 0;
   look.specular = color_of(pbr, "specularFactor", 1);
-  look.glossiness = share(pbr.number("glossinessFactor", 1));
+  look.glossiness = fraction(pbr.number("glossinessFactor", 1));
   look.roughness = 1 - look.glossiness;
   const bool uses_alpha = look.alpha_cutoff > 0 || source.text("alphaMode", "OPAQUE") == "BLEND";
   look.base_color_texture = map(pbr, "diffuseTexture", uses_alpha ? Alpha::keep : Alpha::drop, sets);
@@ -131,10 +131,10 @@ void GltfMaterials::read_transmission(const GltfValue& source, Material& look, G
   if (index.exists() && look.glossiness < 0) {
     const double n = index.number("ior", 1.5);
     const double f0 = n == 0 ? 1 : std::pow((n - 1) / (n + 1), 2);  // 0 stands for infinity
-    look.specular = Vector3f::Constant(share(f0));
+    look.specular = Vector3f::Constant(fraction(f0));
     look.refraction = static_cast<float>(n == 0 ? 3 : std::clamp(n, 1.0, 3.0));
   }
-  look.transmission = share(transmission.number("transmissionFactor", 0));
+  look.transmission = fraction(transmission.number("transmissionFactor", 0));
   if (look.transmission == 0) return;
   if (source.text("alphaMode") == "BLEND")
     file_.warn(source.place() + ": transmission is ignored where alphaMode BLEND is translucent");
@@ -146,7 +146,8 @@ void GltfMaterials::read_transmission(const GltfValue& source, Material& look, G
   if (distance > 0) {  // absorption over the nominal thickness tints the transmitted light
     const Vector3f color = color_of(volume, "attenuationColor", 1);
     for (int k = 0; k < 3; ++k)
-      look.color[k] *= 1 - look.transmission * (1 - share(std::pow(double{color[k]}, thickness / distance)));
+      look.color[k] *=
+          1 - look.transmission * (1 - fraction(std::pow(double{color[k]}, thickness / distance)));
   }
   file_.warn("KHR_materials_volume is approximated by the thickness of the whole part");
   warn_of_textures(volume, {"thicknessTexture"});
@@ -156,8 +157,8 @@ void GltfMaterials::read_layers(const GltfValue& source, Material& look, GltfUvS
   const GltfValue coat = source.extension("KHR_materials_clearcoat"),
                   sheen = source.extension("KHR_materials_sheen");
   const GltfValue specular = source.extension("KHR_materials_specular");
-  look.clearcoat = share(coat.number("clearcoatFactor", 0));
-  look.clearcoat_roughness = share(coat.number("clearcoatRoughnessFactor", 0));
+  look.clearcoat = fraction(coat.number("clearcoatFactor", 0));
+  look.clearcoat_roughness = fraction(coat.number("clearcoatRoughnessFactor", 0));
   warn_of_textures(coat, {"clearcoatTexture", "clearcoatRoughnessTexture", "clearcoatNormalTexture"});
   look.sheen_color = color_of(sheen, "sheenColorFactor", 0);
   if (sheen.exists() && sheen.number("sheenRoughnessFactor", 0) != 0.5)
@@ -165,14 +166,15 @@ void GltfMaterials::read_layers(const GltfValue& source, Material& look, GltfUvS
   warn_of_textures(sheen, {"sheenColorTexture", "sheenRoughnessTexture"});
   if (!specular.exists() || look.glossiness >= 0) return;
   const Vector3f tint = color_of(specular, "specularColorFactor", 1, 100);
-  look.specular = share(specular.number("specularFactor", 1)) * look.specular.cwiseProduct(tint).cwiseMin(1);
+  look.specular =
+      fraction(specular.number("specularFactor", 1)) * look.specular.cwiseProduct(tint).cwiseMin(1);
   look.specular_texture = map(specular, "specularColorTexture", Alpha::drop, sets);
   warn_of_textures(specular, {"specularTexture"});
 }
 
 void GltfMaterials::read_iridescence(const GltfValue& source, Material& look) {
   const GltfValue film = source.extension("KHR_materials_iridescence");
-  const float strength = share(film.number("iridescenceFactor", 0));
+  const float strength = fraction(film.number("iridescenceFactor", 0));
   if (strength == 0) return;
   const double n = std::clamp(film.number("iridescenceIor", 1.3), 1.0, 5.0);
   const double thickness_nm = std::clamp(film.number("iridescenceThicknessMaximum", 400), 0.0, 1e5);

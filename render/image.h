@@ -39,7 +39,7 @@ struct ImageDifference {
   int max_delta = 0;
   double mean_delta = 0;
   std::size_t pixels_over = 0;  ///< pixels with a channel off by more than 2
-  double fraction_over = 0;     ///< the same as a share of all pixels
+  double fraction_over = 0;     ///< `pixels_over` as a fraction of all pixels
   double total_delta = 0;       ///< sum of all absolute channel differences
 
   /// Tolerance for goldens of another fingerprint class: at most 0.05 % of the pixels differ by more than 2

@@ -25,7 +25,7 @@ Image decode_image(std::span<const uint8_t> bytes, const std::string& name,
 
 inline constexpr uint64_t kMaxLightPixels = uint64_t{1} << 25;  ///< limit for pictures of light: 8192 x 4096
 
-/// Linear light of a picture, with what was repaired.
+/// Linear light of a picture, and notes on repaired values.
 struct LightImage {
   HdrImage image;  ///< finite values, at least 0; alpha is 1
   std::vector<std::string> warnings;

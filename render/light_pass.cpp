@@ -9,9 +9,9 @@ namespace {
 
 // Texture units of shaders/traced.glsl.
 constexpr GLuint kArrivingUnit = 8, kLampsUnit = 10, kMirroredUnit = 18, kHighlightsUnit = 19;
-// Of shaders/glass.glsl.
+// Texture units of shaders/glass.glsl.
 constexpr GLuint kThroughGlassUnit = 20, kMirroredByGlassUnit = 21;
-// Of shaders/plain.frag.
+// Texture units of shaders/plain.frag.
 constexpr GLuint kPlacesUnit = 25, kNormalsUnit = 26, kColorsUnit = 27;
 
 void write_texture(const gl::Texture& texture, GLuint unit, const Eigen::AlignedBox2i& area_px,

@@ -20,7 +20,7 @@ class LightPass {
   /// The scene that rays meet, to be filled and built before trace().
   RayScene& scene() { return scene_; }
   const RayScene& scene() const { return scene_; }
-  /// Of everything that was traced.
+  /// Sums over all traced light.
   const LightSums& sums() const { return sums_; }
   /// Binds and clears the targets for drawing surfaces.
   void begin() const;
@@ -30,8 +30,8 @@ class LightPass {
   /// After trace() of a quick picture: binds the surfaces for shaders/plain.frag.
   void bind_surfaces() const;
   /// After trace(): binds the targets for drawing the surfaces of glass, or of a translucent body, in a part
-  /// of the picture. `depth`: the picture's, which hides them behind nearer surfaces. Returns false if no
-  /// pixel of the area is in the picture.
+  /// of the picture. `depth`: the depth of the picture, so that nearer surfaces hide them. Returns false if
+  /// no pixel of the area is in the picture.
   bool begin_part(GLuint depth, const Eigen::AlignedBox2i& area_px);
   /// Traces the light of glass. The picture must show the opaque objects.
   void trace_glass(const LightSources& sources, const View& view, const SampleOffsets& offsets,
@@ -57,7 +57,7 @@ class LightPass {
   gl::Texture colors_;  ///< of quick pictures
   gl::Framebuffer framebuffer_;
   gl::Texture arriving_, mirrored_;
-  bool mirrored_is_filled_ = true;  ///< with anything but zeros
+  bool mirrored_is_filled_ = true;  ///< whether any value is not zero
   gl::Texture lamps_, highlights_;  ///< created when there are lamps
 
   // Created when there is something translucent.

@@ -107,11 +107,11 @@ LoopSubdivision::LoopSubdivision(std::span<const uint32_t> triangles,
       continue;
     }
     const float n = static_cast<float>(valence);
-    const float share = on_boundary ? 1.0f / 8 : valence == 3 ? 3.0f / 16 : 3.0f / (8 * n);
-    terms_.push_back({v, 1 - share * (on_boundary ? 2 : n)});
+    const float fraction = on_boundary ? 1.0f / 8 : valence == 3 ? 3.0f / 16 : 3.0f / (8 * n);
+    terms_.push_back({v, 1 - fraction * (on_boundary ? 2 : n)});
     for (uint32_t k = first_edge[v]; k < first_edge[v + 1]; ++k) {
       const Edge& e = edges[edges_of[k]];
-      if (!on_boundary || e.boundary) terms_.push_back({e.a == v ? e.b : e.a, share});
+      if (!on_boundary || e.boundary) terms_.push_back({e.a == v ? e.b : e.a, fraction});
     }
   }
   for (const Edge& e : edges) {

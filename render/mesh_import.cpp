@@ -58,7 +58,7 @@ Model::UnitSource unit_source_of(const std::filesystem::path& path) {
   return has_ending(path, ".stl") || has_ending(path, ".3mf") ? Source::millimetres : Source::none;
 }
 
-/// The unit of a file in words, with what was assumed where the format has none.
+/// The unit of a file in words; for formats without units, the assumed one.
 std::string unit_of(const aiScene& scene, const std::filesystem::path& path) {
   if (is_gltf(path)) return "1 m, as the format defines (glTF)";
   if (has_ending(path, ".dae")) return "stated by the file (Collada) and converted to metres";
@@ -67,7 +67,7 @@ std::string unit_of(const aiScene& scene, const std::filesystem::path& path) {
     std::snprintf(text, sizeof text, "%.6g m, as the file states (FBX)", metres_per_unit(scene));
     return text;
   }
-  return "none in this format; taken as 1 m";
+  return "none in this format; 1 m is assumed";
 }
 
 /// assimp's v increases upwards for every format.
@@ -84,8 +84,8 @@ Vector4f linear_color(const aiColor4D& c) {
 
 /// assimp gives the bytes of Blender's files as signed numbers: 255 is -1.
 aiColor4D from_bytes(const aiColor4D& c) {
-  const auto share = [](ai_real value) { return (value < 0 ? value + 256 : value) / 255; };
-  return {share(c.r), share(c.g), share(c.b), share(c.a)};
+  const auto fraction = [](ai_real value) { return (value < 0 ? value + 256 : value) / 255; };
+  return {fraction(c.r), fraction(c.g), fraction(c.b), fraction(c.a)};
 }
 
 /// Converts the meshes of assimp's scene, each when it is used first.
@@ -113,7 +113,7 @@ class AssimpSurfaces {
     builder_.add(surface, world_from_mesh);
     const auto points = static_cast<std::size_t>(std::count_if(
         mesh.mFaces, mesh.mFaces + mesh.mNumFaces, [](const aiFace& face) { return face.mNumIndices == 1; }));
-    builder_.leave_out(points, mesh.mNumFaces - surface.mesh.indices.size() / 3 - points);
+    builder_.count_skipped(points, mesh.mNumFaces - surface.mesh.indices.size() / 3 - points);
   }
 
  private:
@@ -198,7 +198,7 @@ void place_nodes(const aiScene& scene, const std::string& wanted, AssimpSurfaces
 std::string reason(const Assimp::Importer& importer) {
   const std::string error = one_line(importer.GetErrorString());
   if (error == "std::bad_alloc") throw std::bad_alloc();
-  if (error.starts_with("No suitable reader")) return "it is in no format known here";
+  if (error.starts_with("No suitable reader")) return "its format is not supported";
   return error.empty() ? "no reason given" : error;
 }
 

@@ -291,7 +291,7 @@ bool is_whole(const Model& model) {
          is_whole(model.rig, model.materials.size());
 }
 
-/// Of the box around a model [m].
+/// Edges of the box around a model [m].
 float longest_side(const Model& model) {
   const Eigen::AlignedBox3f box = model.bounds();
   return box.isEmpty() ? 0 : box.sizes().maxCoeff();
@@ -360,7 +360,7 @@ uint64_t checked_size(const std::filesystem::path& path) {
 }
 
 /// Runs `import` with the folders that the model at `path` may read, in a child process whose memory and time
-/// are limited by the sizes of the file and its pictures. Returns what it writes to its descriptor.
+/// are limited by the sizes of the file and its pictures. Returns the bytes that it writes to its descriptor.
 ChildAnswer import_confined(const std::filesystem::path& path, const InputFolders& folders,
                             const StopTest& stop,
                             const std::function<void(int, const InputFolders&)>& import) {

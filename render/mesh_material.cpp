@@ -84,7 +84,7 @@ class MaterialImporter {
     }
     if (!gltf && material.color.w() < 1e-3f) {  // many programs write the transparency here instead
       material.color.w() = 1;
-      model_.warnings.push_back("material '" + material.name + "': opacity 0 taken as opaque");
+      model_.warnings.push_back("material '" + material.name + "': opacity 0 is read as opaque");
     }
     name_ignored(source, material.name);
     model_.materials.push_back(std::move(material));

@@ -116,7 +116,7 @@ void GpuMesh::store() {
   if (vertices != 0) glVertexArrayVertexBuffer(vertex_array, kBeforeBinding, vertices, 0, sizeof(Vertex));
 }
 
-void GpuMesh::remember(GpuMesh& before) {
+void GpuMesh::store_previous_vertices(GpuMesh& before) {
   if (!before.stored || before.vertex_count != vertex_count || vertex_count == 0 || vertices == 0) return;
   stored = true;
   vertices_before = std::move(before.vertices_before != 0 ? before.vertices_before : before.vertices);

@@ -34,12 +34,12 @@ struct GpuMesh {
   std::unique_ptr<const RayMesh> rays;  ///< the same for light rays
 
   bool stored = false;         ///< was there at Stage::store_previous_transforms()
-  gl::Buffer vertices_before;  ///< its vertices then, if they have been replaced; otherwise 0
+  gl::Buffer vertices_before;  ///< previous vertices, if they have been replaced; otherwise 0
 
   /// Makes the present vertices those from which motion starts.
   void store();
   /// The vertices that replace those of `before`, with as many of them, remember the stored ones.
-  void remember(GpuMesh& before);
+  void store_previous_vertices(GpuMesh& before);
 };
 /// The binding of the vertices from which motion in Channels starts.
 inline constexpr GLuint kBeforeBinding = 3;
@@ -64,9 +64,9 @@ struct GpuMaterial {
   bool thin = false;
   bool two_sided = false;
   bool blended = false;
-  bool glass = false;                       ///< light goes through and is refracted
-  bool smooth = false;                      ///< mirrors the scene
-  bool plain = false;                       ///< fully described by one colour, roughness and share of metal
+  bool glass = false;   ///< light goes through and is refracted
+  bool smooth = false;  ///< mirrors the scene
+  bool plain = false;   ///< fully described by one colour, roughness and fraction of metal
   std::unique_ptr<const RayMaterial> rays;  ///< the same for light rays
 
   /// Whether objects behind the surface are visible through it.
@@ -105,7 +105,7 @@ class MeshPass {
   enum class Shading {
     surface,  ///< writes surfaces for the tracer of light
     traced,   ///< in the light that was traced; in quick pictures, only those that are not plain
-    traced_with_particles,  ///< the same; glass also shows particles behind it
+    traced_with_particles,  ///< as `traced`; glass also shows particles behind it
   };
   /// Draws the opaque instances, and the opaque parts of blended ones.
   void draw_opaque(Shading shading);

@@ -35,7 +35,7 @@ enum class Pattern {
   water
 };
 
-/// How the threads of a fabric cross. `none`: no threads, as in leather and rubber.
+/// Pattern in which the threads of a fabric cross. `none`: no threads, as in leather and rubber.
 enum class Weave { none, plain, twill, satin };
 
 /// Additional properties of a material for cloth.
@@ -45,7 +45,7 @@ struct Fabric {
   float relief = 0.5f;    ///< how strongly threads stand out, in [0, 1]
   float sheen = 0.2f;  ///< strength of the light scattered by protruding fibres at grazing angles, in [0, 1]
   Vector3f sheen_color = {1, 1, 1};
-  float translucency = 0.15f;               ///< share of the diffuse light that passes through, in [0, 1]
+  float translucency = 0.15f;               ///< fraction of the diffuse light that passes through, in [0, 1]
   std::optional<Vector3f> back_color = {};  ///< colour of the back; empty: the same as the front
 };
 
@@ -61,7 +61,7 @@ struct TextureMap {
   /// Transform of the texture coordinates by rows: (u, v, 1) to the place in the image, v downwards.
   std::array<Vector3f, 2> rows = {Vector3f(1, 0, 0), Vector3f(0, 1, 0)};
 
-  bool is_plain() const;  ///< first set, not transformed
+  bool is_plain() const;  ///< whether it uses the first set without a transform
 };
 
 /// Metallic/roughness material, with the parameters of glTF 2.0 and some of its extensions.
@@ -71,7 +71,7 @@ struct Material {
   float metallic = 0;                      ///< in [0, 1]
   float roughness = 0.5f;                  ///< in [0, 1]
   Vector3f emission = Vector3f::Zero();    ///< radiance [arbitrary units, 1 = sunlit white]
-  float transmission = 0;   ///< share of the light that enters the surface and passes through, in [0, 1]
+  float transmission = 0;   ///< fraction of the light that enters the surface and passes through, in [0, 1]
   float refraction = 1.5f;  ///< index of refraction, in [1, 3]
   Pattern pattern = Pattern::none;
   Vector3f pattern_color = {0.4f, 0.4f, 0.4f};  ///< second colour of the pattern
@@ -85,7 +85,7 @@ struct Material {
   TextureMap metallic_roughness_texture = {};  ///< G: roughness, B: metallic, times the factors
   TextureMap emission_texture = {};            ///< sRGB, times `emission`
   TextureMap normal_texture = {};              ///< tangent space, X towards +u, Y towards -v of the image
-  TextureMap occlusion_texture = {};           ///< R: share of the sky that is visible
+  TextureMap occlusion_texture = {};           ///< R: fraction of the sky that is visible
   TextureMap transmission_texture = {};        ///< R, times `transmission`
   TextureMap specular_texture = {};            ///< sRGB, times `specular`; alpha: see `glossiness`
   float normal_scale = 1;                      ///< factor of the slope of `normal_texture`
@@ -139,16 +139,16 @@ struct Model {
   std::vector<Node> nodes;  ///< parents first
   std::vector<Material> materials;
   std::vector<Image> textures;
-  /// The animations of the file that can be played.
+  /// An animation of the file that a body can play.
   struct Clip {
     std::string name;
     float duration = 0;  ///< [s]
   };
   std::vector<Clip> clips;
-  ModelRig rig;  ///< its moving parts, if they were asked for
+  ModelRig rig;  ///< the moving parts of the file, if they were requested
   /// The place of a camera or light in the file.
   struct Place {
-    std::string name;  ///< that of its node, unique among cameras or lights
+    std::string name;  ///< name of the node, unique among cameras or lights
     int node = -1;     ///< index in `rig`, if it was read; -1: none
     Eigen::Matrix4f model_from_place = Eigen::Matrix4f::Identity();  ///< in the rest pose; looks along -z
   };

@@ -59,10 +59,10 @@ void OpacityGrid::deposit(const Vector3f& place, float depth) {
                          .cwiseMin(1.0f);
   for (int k = 0; k < 2; ++k) {
     for (int j = 0; j < 2; ++j) {
-      const float share = depth * (k != 0 ? f.z() : 1 - f.z()) * (j != 0 ? f.y() : 1 - f.y());
+      const float fraction = depth * (k != 0 ? f.z() : 1 - f.z()) * (j != 0 ? f.y() : 1 - f.y());
       float* row = amounts_.data() + (static_cast<std::ptrdiff_t>(z + k) * ny_ + y + j) * nx_ + x;
-      row[0] += share * (1 - f.x());
-      row[1] += share * f.x();
+      row[0] += fraction * (1 - f.x());
+      row[1] += fraction * f.x();
     }
   }
 }

@@ -57,7 +57,7 @@ OutputFile::OutputFile(const std::filesystem::path& target) : target_(target) {
     if (::flock(file_.fd(), LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK)
       if (::fstat(file_.fd(), &info) == 0 && info.st_nlink > 0) return;
   }
-  throw FileError(target_.string() + ": cannot be created: no name for a temporary file is free");
+  throw FileError(target_.string() + ": cannot be created: all names for a temporary file are in use");
 }
 
 OutputFile::~OutputFile() {

@@ -1,6 +1,6 @@
 #pragma once
-/// Private: the back-to-front order of translucent objects: bodies (glass, blended meshes, sheer cloth) and,
-/// between them, the blended particles of all sets.
+/// Private: the back-to-front order of translucent objects: bodies (glass, blended meshes, translucent cloth)
+/// and, between them, the blended particles of all sets.
 
 #include <array>
 #include <cstdint>
@@ -19,8 +19,8 @@ class Region {
   Region(const Eigen::AlignedBox3f& box, const Eigen::Affine3f& world_from_box, bool round, const View& view);
 
   /// Whether the body can hide a place in the world, at this depth along the view axis, and the place cannot
-  /// hide the body. A place within the body is behind its surface. Of places on one line of sight, all from
-  /// one on are behind.
+  /// hide the body. A place within the body is behind its surface. On one line of sight, every place behind a
+  /// hidden one is hidden, too.
   bool hides(const Vector3f& place, float depth) const;
   /// Whether this body can hide the other one. Decided by a face of either box that separates the two, else
   /// by the distance of their centres.
@@ -38,7 +38,7 @@ class Region {
 
  private:
   enum class Side { before, behind, neither };
-  /// On which side of this box's faces a body with these corners lies.
+  /// Returns the sides of this box's faces on which a body with these corners lies.
   Side side_of(const Region& other) const;
   bool surface_hides(const Vector3f& place, float depth) const;
 

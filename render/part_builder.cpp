@@ -96,7 +96,7 @@ std::vector<std::string> PartBuilder::left_out() const {
   add(bad_index_, " faces left out: their indices are out of range");
   add(not_finite_, " faces left out: a vertex is not finite");
   add(no_area_, " faces left out: they have no area");
-  add(bad_normals_, " normals are no directions; they are replaced by the mean of their faces");
+  add(bad_normals_, " normals have no direction; they are replaced by the mean normal of their faces");
   return lines;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 /// Private: collects the surfaces of a model file, transformed by their nodes, in one part per material and
-/// kind of vertex, and leaves out what cannot be drawn.
+/// kind of vertex, and skips elements that cannot be drawn.
 
 #include <map>
 #include <set>
@@ -24,7 +24,7 @@ class PartBuilder {
 
   void add(const FileSurface& surface, const Eigen::Affine3d& world_from_mesh);
   /// Records elements that are left out, because only triangles are drawn.
-  void leave_out(std::size_t points, std::size_t lines) {
+  void count_skipped(std::size_t points, std::size_t lines) {
     points_ += points;
     lines_ += lines;
   }

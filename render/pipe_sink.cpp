@@ -54,7 +54,7 @@ class StandardOutput {
     const SigpipeBlock block;
     const int error = write_all(own_ ? own_.fd() : STDOUT_FILENO, bytes, stop_);
     if (error == EPIPE) throw FileError("standard output: the program that reads the frames has ended");
-    if (error == ECANCELED) throw StoppedError("standard output: nobody reads the frames");
+    if (error == ECANCELED) throw StoppedError("standard output: no program reads the frames");
     if (error != 0) throw_file_error("standard output", "cannot be written", error);
   }
 

@@ -58,7 +58,7 @@ std::vector<uint8_t> encode_png(const PngPixels& pixels) {
                                 static_cast<std::size_t>(pixels.channels * pixels.bits / 8);
   if (pixels.width_px <= 0 || pixels.height_px <= 0 ||
       pixels.samples.size() != row_bytes * static_cast<std::size_t>(pixels.height_px))
-    throw std::invalid_argument("encode_png: the image's size and its pixels do not agree");
+    throw std::invalid_argument("encode_png: the number of samples does not match the size of the image");
 
   std::vector<uint8_t> png = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
   std::vector<uint8_t> header;

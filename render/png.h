@@ -22,9 +22,9 @@ struct PngPixels {
 /// Throws std::invalid_argument if the sizes are inconsistent.
 std::vector<uint8_t> encode_png(const PngPixels& pixels);
 
+inline constexpr std::size_t kPngHeadBytes = 512;  ///< enough of a PNG file for settings_in_png()
 /// Reads PngPixels::settings from the first kPngHeadBytes of a file made by encode_png; empty if there are
 /// none.
-inline constexpr std::size_t kPngHeadBytes = 512;
 std::string settings_in_png(std::span<const uint8_t> head);
 
 }  // namespace offstage::render

@@ -162,8 +162,7 @@ PlyHeader read_ply_header(Text& text) {
       seen = true;
       const std::optional<double> count = next_number(words);
       if (!count || *count < 0 || *count > static_cast<double>(kMostCloudPoints))
-        throw FileError("has more than " + std::to_string(kMostCloudPoints) +
-                        " vertices, or no number of them");
+        throw FileError("its number of vertices must be from 0 to " + std::to_string(kMostCloudPoints));
       header.count = static_cast<std::size_t>(*count);
     } else if (first == "property" && in_vertices) {
       const std::string_view type = next_field(words);
@@ -227,12 +226,13 @@ PointCloud parse_ply_points(std::span<const uint8_t> bytes) {
       values[k] = *value;
     }
     std::optional<Vector4f> color;
-    const auto share = [&](std::size_t k) {
+    const auto fraction = [&](std::size_t k) {
       return static_cast<float>(values[k]) / full_color(header.properties[k].type);
     };
     if (columns.color) {
       const auto& [r, g, b] = *columns.color;
-      color = Vector4f(share(r), share(g), share(b), columns.alpha ? share(*columns.alpha) : 1.0f);
+      color =
+          Vector4f(fraction(r), fraction(g), fraction(b), columns.alpha ? fraction(*columns.alpha) : 1.0f);
     }
     const auto& [x, y, z] = columns.position;
     add_point(Eigen::Vector3d(values[x], values[y], values[z]).cast<float>(), color, cloud);

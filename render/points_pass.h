@@ -19,8 +19,8 @@ struct GpuPoint {
   Vector4f position, velocity, color;
 };
 
-/// Rotation and pictures of a sprite or flake: angle [rad], two pictures of its sheet, and the share of the
-/// second one. In a BlendedPoint, the pictures are layers of the texture.
+/// Rotation and pictures of a sprite or flake: angle [rad], two pictures of its sheet, and the fraction of
+/// the second one. In a BlendedPoint, the pictures are layers of the texture.
 using GpuPicture = Vector4f;
 
 /// A sprite or flake of any set.

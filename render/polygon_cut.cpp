@@ -12,7 +12,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr std::size_t kMostCorners = 1024;  // the time grows with the square, in the worst case with the cube
-/// Areas below this share of the square of the polygon's extent count as zero.
+/// Areas below this fraction of the square of the polygon's extent count as zero.
 constexpr double kNoArea = 1e-12;
 
 /// Twice the area of a triangle; > 0 if it is counter-clockwise.
@@ -21,7 +21,7 @@ double doubled_area(const Vector2d& a, const Vector2d& b, const Vector2d& c) {
   return u.x() * v.y() - u.y() * v.x();
 }
 
-/// What is left of a polygon while its ears are cut off.
+/// The remaining polygon while its ears are cut off.
 class EarCutter {
  public:
   explicit EarCutter(std::vector<Vector2d> corners) : at_(std::move(corners)), left_(at_.size()) {

@@ -8,7 +8,7 @@ namespace offstage::render {
 namespace {
 
 // Sunlight scattered in smoke at an optical depth: once, a few times and many times.
-float sun_share(float depth, float albedo) {
+float sun_fraction(float depth, float albedo) {
   return 0.68f * std::exp(-depth) +
          albedo * (0.3f * std::exp(-0.35f * depth) + 0.12f * albedo * std::exp(-0.1f * depth));
 }
@@ -43,16 +43,16 @@ PuffRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vect
   const float white = albedo.maxCoeff();
   const float steepness = slope.norm();
   const float change = std::min(radius * steepness, 3.0f);
-  const float middle = sun_share(depth, white), direct = std::exp(-depth);
-  const float light = sun_share(std::max(depth - change, 0.0f), white),
-              dark = sun_share(depth + change, white);
+  const float middle = sun_fraction(depth, white), direct = std::exp(-depth);
+  const float light = sun_fraction(std::max(depth - change, 0.0f), white),
+              dark = sun_fraction(depth + change, white);
   const float forward = std::max(-to_sun.dot(to_eye), 0.0f), forward2 = forward * forward;
   const Vector3f sun = air.sun(place, radius, number) * frame.sun_radiance.head<3>();
-  const float sky_share = 0.25f + 0.75f * std::exp(-0.6f * above);
+  const float sky_fraction = 0.25f + 0.75f * std::exp(-0.6f * above);
 
   PuffRadiance result;
   result.constant = sun * (0.68f * middle + 0.9f * direct * forward2 * forward2 * forward2) +
-                    sky_share * frame.irradiance_at(0);
+                    sky_fraction * frame.irradiance_at(0);
   Vector3f towards_light = 0.36f * direct * to_sun;
   if (steepness > 1e-6f) towards_light -= 0.65f * (light - dark) / steepness * slope;
   result.slope = sun * towards_light.transpose();
@@ -60,9 +60,9 @@ PuffRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vect
     result.constant += 0.3f * lamp;
     result.slope += 0.3f * lamp * towards.transpose();
   });
-  result.slope.col(0) += sky_share * frame.irradiance_at(3);
-  result.slope.col(1) += sky_share * frame.irradiance_at(1);
-  result.slope.col(2) += sky_share * frame.irradiance_at(2);
+  result.slope.col(0) += sky_fraction * frame.irradiance_at(3);
+  result.slope.col(1) += sky_fraction * frame.irradiance_at(1);
+  result.slope.col(2) += sky_fraction * frame.irradiance_at(2);
   return result;
 }
 

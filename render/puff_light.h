@@ -35,7 +35,7 @@ struct PuffLight {
   /// this roughness, as in shaders/sky.glsl.
   Vector3f ambient(const Vector3f& normal) const;
   Vector3f sky_reflection(const Vector3f& direction, float roughness) const;
-  /// Light that fog adds on the way to the eye, and in w the share that arrives, as fog_to in
+  /// Light that fog adds on the way to the eye, and in w the fraction that arrives, as fog_to in
   /// shaders/sky.glsl.
   Vector4f fog_to(const Vector3f& place) const;
 };

@@ -13,7 +13,7 @@ namespace {
 constexpr GLuint kColorUnit = 6, kLowDepthUnit = 7;
 constexpr float kMostOpaque = 0.98f;  // greatest opacity of one puff, so that its optical depth is finite
 constexpr double kHalf_px = 8, kQuarter_px = 64;  // radii from which the picture is reduced
-constexpr float kNearestPuff = 1.2f;  // radius from which a puff fades out, as a share of half the height
+constexpr float kNearestPuff = 1.2f;  // radius from which a puff fades out, as a fraction of half the height
 constexpr float kTolerance = 0.25f;   // depth in typical radii over which puffs change little
 constexpr float kFlameCover = 0.6f;   // soot: deep flames glow, but do not add up without limit
 constexpr float kFlameWobble = 0.5f;  // [rad]
@@ -39,7 +39,7 @@ struct Shape {
 // The sun's disc blurs the shadow of a drop to nothing within a few tens of its widths, so drops are treated
 // as mist.
 void add_drops(const PointSet& set, std::vector<OpacityGrid::Absorber>& absorbers) {
-  constexpr float kLost = 0.6f;  // share of the light on a drop that is removed
+  constexpr float kLost = 0.6f;  // fraction of the light on a drop that is removed
   for (const GpuPoint& point : set.points) {
     const float radius = point.position.w();
     const float length = std::max(set.def.stretch_s * point.velocity.head<3>().norm(), 2 * radius);

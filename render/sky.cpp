@@ -7,7 +7,7 @@
 namespace offstage::render {
 
 SkyModel make_sky(const Sun& sun, const Environment& environment) {
-  constexpr float kGlow = 0.12f;  // share of the sun's radiance
+  constexpr float kGlow = 0.12f;  // fraction of the sun's radiance
   const Vector3f direction = sun.direction.normalized();
   const float risen = std::clamp(0.5f + 5 * direction.y(), 0.0f, 1.0f);
   SkyModel sky{.sun_direction = direction,

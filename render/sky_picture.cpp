@@ -154,8 +154,8 @@ Vector3f SkyGrid::at(const Vector3f& direction) const {
 }
 
 SkyGrid resampled(const SkyGrid& grid, int columns, int rows) {
-  // First within each row, then over rows with the solid angle of what each contributes.
-  const auto share_of = [](int from, int to, int k, int j) {  // of cell k of `from` in cell j of `to`
+  // Sums within each row, then over rows with the solid angle of each row's contribution.
+  const auto fraction_of = [](int from, int to, int k, int j) {  // of cell k of `from` in cell j of `to`
     const double a = static_cast<double>(j) * from / to, b = static_cast<double>(j + 1) * from / to;
     return std::max(std::min<double>(k + 1, b) - std::max<double>(k, a), 0.0);
   };
@@ -172,7 +172,7 @@ SkyGrid resampled(const SkyGrid& grid, int columns, int rows) {
       Eigen::Vector3d sum = Eigen::Vector3d::Zero();
       double weights = 0;
       for (int k = first; k <= last; ++k) {
-        const double weight = share_of(grid.columns, columns, k, x);
+        const double weight = fraction_of(grid.columns, columns, k, x);
         sum += weight * grid.cell(k, y).cast<double>();
         weights += weight;
       }
@@ -188,7 +188,7 @@ SkyGrid resampled(const SkyGrid& grid, int columns, int rows) {
       double weights = 0;
       for (int k = first; k <= last; ++k) {
         const double weight =
-            share_of(grid.rows, rows, k, y) * std::sin(std::numbers::pi * (k + 0.5) / grid.rows);
+            fraction_of(grid.rows, rows, k, y) * std::sin(std::numbers::pi * (k + 0.5) / grid.rows);
         sum += weight * wide.cell(x, k).cast<double>();
         weights += weight;
       }
@@ -235,7 +235,7 @@ void SkyPicture::split() {
     }
     limit = kTimesMean * mean;
   }
-  share_.assign(light_.values.size(), 0.0f);
+  fraction_.assign(light_.values.size(), 0.0f);
   sums_.assign(light_.values.size(), 0.0f);
   row_sum_.assign(static_cast<std::size_t>(light_.rows), 0.0f);
   double total = 0;
@@ -245,8 +245,8 @@ void SkyPicture::split() {
       const double luminance = kSkyLuminance.dot(light_.cell(x, y));
       const std::size_t k = sky_cell(x, y, light_.columns);
       if (luminance > limit) {
-        share_[k] = static_cast<float>(1 - limit / luminance);
-        row += share_[k] * luminance * light_.solid_angle(y);
+        fraction_[k] = static_cast<float>(1 - limit / luminance);
+        row += fraction_[k] * luminance * light_.solid_angle(y);
       }
       sums_[k] = static_cast<float>(row);
     }
@@ -262,8 +262,8 @@ void SkyPicture::find_beam() {
   for (int y = 0; y < light_.rows && has_bright_part(); ++y) {
     for (int x = 0; x < light_.columns; ++x) {
       const std::size_t k = sky_cell(x, y, light_.columns);
-      if (share_[k] == 0) continue;
-      const Eigen::Vector3d bright = (share_[k] * light_.solid_angle(y) * light_.values[k]).cast<double>();
+      if (fraction_[k] == 0) continue;
+      const Eigen::Vector3d bright = (fraction_[k] * light_.solid_angle(y) * light_.values[k]).cast<double>();
       const double weight = kSkyLuminance.cast<double>().dot(bright);
       light += bright;
       direction += weight * sky_direction(light_, x, y).cast<double>();
@@ -287,17 +287,17 @@ Vector3f SkyPicture::unpacked_at(const Vector3f& direction) const {
 
 Vector3f SkyPicture::dim(const Vector3f& direction) const {
   const std::size_t k = sky_cell_at(light_, direction);
-  return (1 - share_[k]) * light_.values[k];
+  return (1 - fraction_[k]) * light_.values[k];
 }
 
-float SkyPicture::bright_share(const Vector3f& direction) const {
-  return share_[sky_cell_at(light_, direction)];
+float SkyPicture::bright_fraction(const Vector3f& direction) const {
+  return fraction_[sky_cell_at(light_, direction)];
 }
 
 float SkyPicture::density(const Vector3f& direction) const {
   if (!has_bright_part()) return 0;
   const std::size_t k = sky_cell_at(light_, direction);
-  return share_[k] * kSkyLuminance.dot(light_.values[k]) / bright_total_;
+  return fraction_[k] * kSkyLuminance.dot(light_.values[k]) / bright_total_;
 }
 
 SkyPicture::Sample SkyPicture::sample(const Vector2f& uv) const {
@@ -331,7 +331,7 @@ void SkyPicture::find_irradiance() {
     for (int x = 0; x < light_.columns; ++x) {
       const std::size_t k = sky_cell(x, y, light_.columns);
       const Vector3f d = sky_direction(light_, x, y);
-      const Vector3f light = ((1 - share_[k]) * light_.solid_angle(y) / kSkyPi) * light_.values[k];
+      const Vector3f light = ((1 - fraction_[k]) * light_.solid_angle(y) / kSkyPi) * light_.values[k];
       irradiance_.constant += 0.25f * light;
       irradiance_.slope += 0.5f * light * d.transpose();
       const Eigen::Matrix3f square = 3 * d * d.transpose() - Eigen::Matrix3f::Identity();
@@ -345,7 +345,7 @@ void SkyPicture::find_irradiance() {
 // seen along its normal (B. Karis, "Real Shading in Unreal Engine 4", 2013).
 void SkyPicture::prefilter() {
   SkyGrid dim_part = light_;
-  for (std::size_t k = 0; k < dim_part.values.size(); ++k) dim_part.values[k] *= 1 - share_[k];
+  for (std::size_t k = 0; k < dim_part.values.size(); ++k) dim_part.values[k] *= 1 - fraction_[k];
   constexpr int kColumns = 256;
   levels_[0] = resampled(dim_part, kColumns, kColumns / 2);
   const SkyGrid source = resampled(dim_part, kColumns / 2, kColumns / 4);
@@ -385,9 +385,9 @@ void SkyPicture::prefilter() {
 Vector3f SkyPicture::mirrored(const Vector3f& direction, float roughness) const {
   const float level = std::clamp(roughness, 0.0f, 1.0f) * (kLevels - 1);
   const auto low = static_cast<std::size_t>(level);
-  const float share = level - static_cast<float>(low);
+  const float fraction = level - static_cast<float>(low);
   const Vector3f value = levels_[low].at(direction);
-  return share > 0 ? Vector3f((1 - share) * value + share * levels_[low + 1].at(direction)) : value;
+  return fraction > 0 ? Vector3f((1 - fraction) * value + fraction * levels_[low + 1].at(direction)) : value;
 }
 
 std::vector<SkyPicture::Packed> SkyPicture::levels() const {

@@ -70,8 +70,8 @@ class SkyPicture {
   const Irradiance& irradiance() const { return irradiance_; }
 
   bool has_bright_part() const { return bright_total_ > 0; }
-  /// Share of the luminance from a direction that belongs to the bright part.
-  float bright_share(const Vector3f& direction) const;
+  /// Fraction of the luminance from a direction that belongs to the bright part.
+  float bright_fraction(const Vector3f& direction) const;
   /// Probability density of sample() [1/sr].
   float density(const Vector3f& direction) const;
   struct Sample {
@@ -100,10 +100,10 @@ class SkyPicture {
 
   Packed sharp_;
   std::vector<Packed> background_;
-  SkyGrid light_;               ///< both parts
-  std::vector<float> share_;    ///< fraction of the bright part in the same cells
-  std::vector<float> row_sum_;  ///< sum of luminance * solid angle of the bright part, up to each row
-  std::vector<float> sums_;     ///< the same within each row
+  SkyGrid light_;                ///< both parts
+  std::vector<float> fraction_;  ///< fraction of the bright part in the same cells
+  std::vector<float> row_sum_;   ///< sum of luminance * solid angle of the bright part, up to each row
+  std::vector<float> sums_;      ///< the same within each row
   float bright_total_ = 0;
   SkyBeam beam_;
   Irradiance irradiance_;

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kTileWidth_px = 64, kTileHeight_px = 16;
 constexpr int kTilePixels = kTileWidth_px * kTileHeight_px;
-constexpr float kHidden = 1.0f / 512;  // below this share the background counts as hidden
+constexpr float kHidden = 1.0f / 512;  // below this fraction the background counts as hidden
 constexpr int kCheckEvery = 24;
 
 struct Tile {
@@ -278,7 +278,7 @@ bool StreakBands::any(int bottom, int left, int right, uint32_t first) const {
   return false;
 }
 
-void StreakBands::lay_over(const Strip& strip, const Eigen::Vector2f& distance, uint32_t first) {
+void StreakBands::blend_over(const Strip& strip, const Eigen::Vector2f& distance, uint32_t first) {
   const auto [x0, x1] = columns_px(strip.left, strip.left + strip.width);
   const int columns = (x1 - x0 + kTileWidth_px - 1) / kTileWidth_px, first_column = x0 / kTileWidth_px;
   const int first_row = strip.bottom / kTileHeight_px,

@@ -23,7 +23,7 @@ struct Splat {
       vy;  ///< Position in the atlas's cell, in [-1, 1]: u = ux * dx + uy * dy, v = vx * dx + vy * dy.
   float depth, inverse_reach;  ///< along the view axis [m]; 1 / (2 * radius)
   float opacity;               ///< opacity where the cell's cover is 1
-  float cover;  ///< share of its opacity that hides the background: 1 for smoke, 0 only adds light
+  float cover;  ///< fraction of its opacity that hides the background: 1 for smoke, 0 only adds light
   /// Radiance of red, green and blue where the normal is n: r[0] + r[1] n.x + r[2] n.y + r[3] n.z.
   float radiance[3][4];
   PuffAtlas::Level cell;
@@ -48,7 +48,7 @@ struct StreakSplat {
   const StreakLight* light;
 };
 
-/// Target picture of splats: premultiplied colour, and the remaining share of the background.
+/// Target picture of splats: premultiplied colour, and the remaining fraction of the background.
 struct SplatPicture {
   int width_px = 0, height_px = 0;
   std::vector<float> depth;  ///< depth of the scene along the view axis [m], one value per pixel
@@ -93,7 +93,7 @@ class StreakBands {
   bool any(int bottom, int left, int right, uint32_t first) const;
   /// Draws the streaks from `first` on that were not drawn yet over a strip. The distance along the view axis
   /// is x / (depth + y) of `distance`.
-  void lay_over(const Strip& strip, const Eigen::Vector2f& distance, uint32_t first);
+  void blend_over(const Strip& strip, const Eigen::Vector2f& distance, uint32_t first);
 
  private:
   std::span<const uint32_t> rest_of(int tile_x, int tile_y, uint32_t first) const;

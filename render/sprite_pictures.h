@@ -29,7 +29,7 @@ SpritePictures sprite_pictures(const Image& sheet, int columns, int rows);
 
 class SpriteTextures {
  public:
-  /// Where the pictures of a sheet are: consecutive layers, in their upper left corner.
+  /// The place of a sheet's pictures: consecutive layers, in their upper left corner.
   struct Place {
     GLuint texture = 0;
     int first_layer = 0;

@@ -20,7 +20,7 @@ MeshHandle Stage::add_mesh(const Mesh& mesh) {
 void Stage::set_mesh(MeshHandle handle, const Mesh& mesh) {
   GpuMesh& known = *impl_->meshes[handle];
   GpuMesh next(mesh);
-  next.remember(known);
+  next.store_previous_vertices(known);
   known = std::move(next);
   gl::check_error("uploading a mesh");
 }

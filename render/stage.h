@@ -49,7 +49,7 @@ struct Lamp {
   Vector2f size = {0, 0};             ///< size of a rectangle [m]; otherwise zero
   Vector3f direction = {0, -1, 0};    ///< unit direction of cones and rectangles
   float cone_deg = 0;                 ///< full angle of a cone; otherwise zero
-  float softness = 0.3f;              ///< share of the cone over which its edge fades
+  float softness = 0.3f;              ///< fraction of the cone over which its edge fades
   bool squared_edge =
       false;  ///< fades with the square (KHR_lights_punctual), not in proportion to the cosine
   bool shadows = true;
@@ -63,7 +63,7 @@ struct Environment {
   float intensity = 1;                      ///< scales sky and ambient together
   /// Albedo of the ground, which reflects the light of sun and sky; replaces `ground`.
   std::optional<Vector3f> ground_albedo = {};
-  float clouds = 0;  ///< share of the sky covered by clouds
+  float clouds = 0;  ///< fraction of the sky covered by clouds
   /// Density [1/m]; transmittance exp(-fog * distance). 0: nothing fades with distance.
   float fog = 0;
   bool visible = true;  ///< false: transparent background; it still lights the scene
@@ -111,10 +111,10 @@ struct PointsDef {
   bool additive = false;     ///< adds light instead of covering: fire, sparks
   bool lit = true;           ///< lit by sun and sky; false: its colour is its radiance
   bool casts_shadow = true;  ///< casts a shadow on the scene; smoke also on other smoke
-  float softness = 0.5f;     ///< width of the fade at the rim, as a share of the radius, in [0, 1]
+  float softness = 0.5f;     ///< width of the fade at the rim, as a fraction of the radius, in [0, 1]
   /// Length of streaks is velocity * stretch_s; other styles except balls are longer by this [s].
   float stretch_s = 1.0f / 60;
-  /// Share by which a streak fades towards its tail, in [0, 1]: 0 for a drop, 1 for a spark.
+  /// Fraction by which a streak fades towards its tail, in [0, 1]: 0 for a drop, 1 for a spark.
   float taper = 0;
   float metallic = 0, roughness = 0.3f;  ///< for spheres
   SpriteSheet sheet = {};                ///< division of the picture of sprites
@@ -129,7 +129,7 @@ struct Line {
 };
 
 struct LinesDef {
-  float width = 0.0025f;  ///< share of the picture's height, so that large and small pictures look alike
+  float width = 0.0025f;  ///< fraction of the picture's height, so that large and small pictures look alike
   float hidden = 0;       ///< opacity of the parts hidden by opaque objects, in [0, 1]
 };
 
@@ -155,8 +155,8 @@ SampleOffsets sample_offsets(int i, int n);
 
 /// Sums over the values that rays found for light from the sky and other surfaces, and for mirror images.
 struct LightSums {
-  double arriving = 0;  ///< their luminance
-  double removed = 0;   ///< what was taken from the brightest of them, which would stay visible as dots
+  double arriving = 0;  ///< luminance of the light of these rays
+  double removed = 0;   ///< light that was removed from the brightest rays, which would stay visible as dots
 
   LightSums& operator+=(const LightSums& other) {
     arriving += other.arriving;
@@ -223,7 +223,7 @@ class Stage {
   /// stage's size. Throws UnavailableError on a GL error, and StoppedError, without any effect on `sum`, soon
   /// after `stop` returned true; several threads call it.
   void draw(const SampleOffsets& offsets, HdrImage& sum, const StopTest& stop = {});
-  /// Of all sub-frames drawn so far.
+  /// Sums over all sub-frames drawn so far.
   LightSums light_sums() const;
 
   /// Sets the object id of an instance in Channels; 0, the default: none.

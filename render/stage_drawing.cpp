@@ -1,4 +1,4 @@
-/// How a stage draws a sub-frame: the surfaces, their light, and what is seen through other objects.
+/// Draws a sub-frame of a stage: the surfaces, their light, and the objects that are visible through others.
 
 #include <algorithm>
 
@@ -27,7 +27,7 @@ void Stage::Impl::prepare_sky() {
   glBindTextureUnit(kSkyBackgroundUnit, sky_background);
 }
 
-// Where nothing was drawn.
+// The depth of pixels without a surface.
 void Stage::Impl::draw_sky() {
   Features defines = {"FLAT 1"};
   for (const std::string& feature : features)
@@ -141,7 +141,7 @@ void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<
   light_pass.trace(light_sources, view, offsets, stop);
 }
 
-// The light of the nearest surfaces of glass. What is behind them is met by rays.
+// The light of the nearest surfaces of glass. Rays find the surfaces behind them.
 void Stage::Impl::trace_glass(const View& view, const SampleOffsets& offsets) {
   ScreenArea area(view, 0);
   for (const Instance* instance : mesh_pass.translucent()) {
@@ -359,7 +359,7 @@ void Stage::Impl::add_picture(const FrameUniforms& frame, HdrImage& sum) {
   for (int bottom = 0; bottom < sum.height_px; bottom += StreakBands::kRows) {
     const int rows = std::min(StreakBands::kRows, sum.height_px - bottom);
     glReadPixels(0, bottom, sum.width_px, rows, GL_RGBA, GL_FLOAT, strip.data());
-    streaks_pass.lay_over(bottom, rows, frame, strip);
+    streaks_pass.blend_over(bottom, rows, frame, strip);
     for (int y = 0; y < rows; ++y) {
       const float* in = strip.data() + static_cast<std::size_t>(y) * row;
       float* out = sum.rgba.data() + static_cast<std::size_t>(sum.height_px - 1 - bottom - y) * row;

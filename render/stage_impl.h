@@ -1,6 +1,6 @@
 #pragma once
-/// What a stage contains, and the passes that draw it. Included by stage.cpp, which changes the contents, and
-/// by stage_drawing.cpp, which draws them.
+/// The contents of a stage, and the passes that draw it. Included by stage.cpp, which changes the contents,
+/// and by stage_drawing.cpp, which draws them.
 
 #include <map>
 #include <memory>
@@ -37,8 +37,8 @@ struct Stage::Impl {
   struct Picture {
     gl::Texture color, depth;
     gl::Framebuffer framebuffer;
-    PictureCopy depth_copy;  ///< for particles
-    PictureCopy behind;      ///< with particles that are seen through glass
+    PictureCopy depth_copy;  ///< depth of the picture, for particles
+    PictureCopy behind;      ///< picture with the particles that are visible through glass
     gl::Texture bodies;      ///< the picture without particles; created when they may be behind glass
     gl::Framebuffer bodies_framebuffer;
 
@@ -76,7 +76,7 @@ struct Stage::Impl {
   Sun sun;
   Environment environment;
   SkyModel sky;                                    ///< of this sub-frame
-  std::shared_ptr<const SkyPicture> uploaded_sky;  ///< whose picture is in the textures
+  std::shared_ptr<const SkyPicture> uploaded_sky;  ///< sky picture that the textures contain
   gl::Texture sky_levels, sky_background;
   std::vector<Lamp> lamps;
   std::vector<Lamp> shining;  ///< lamps and fires of this sub-frame

@@ -7,7 +7,7 @@
 namespace offstage::render {
 namespace {
 
-// Radius from which a streak near the lens fades out, as a share of half the picture.
+// Radius from which a streak near the lens fades out, as a fraction of half the picture.
 constexpr float kNearestStreak = 0.016f;
 constexpr float kThinnest_px = 0.6f;  // radius; thinner streaks are drawn with this radius and fainter
 
@@ -139,18 +139,18 @@ Eigen::AlignedBox2i StreaksPass::lay_behind(const Eigen::AlignedBox2i& area_px, 
     rgba_.resize(std::max(rgba_.size(), 4 * pixels));
     glReadPixels(left, bottom, width, rows, GL_DEPTH_COMPONENT, GL_FLOAT, depth_.data());
     glReadPixels(left, bottom, width, rows, GL_RGBA, GL_FLOAT, rgba_.data());
-    bands_.lay_over({left, bottom, width, rows, depth_, rgba_}, frame.depth.head<2>(), first_behind_);
+    bands_.blend_over({left, bottom, width, rows, depth_, rgba_}, frame.depth.head<2>(), first_behind_);
     glTextureSubImage2D(color, 0, left, bottom, width, rows, GL_RGBA, GL_FLOAT, rgba_.data());
     changed.extend(Eigen::Vector2i(left, bottom)).extend(Eigen::Vector2i(right, bottom + rows));
   }
   return changed;
 }
 
-void StreaksPass::lay_over(int bottom, int rows, const FrameUniforms& frame, std::span<float> rgba) {
+void StreaksPass::blend_over(int bottom, int rows, const FrameUniforms& frame, std::span<float> rgba) {
   if (splats_.empty() || !bands_.any(bottom, 0, width_px_, 0)) return;
   depth_.resize(std::max(depth_.size(), static_cast<std::size_t>(width_px_) * StreakBands::kRows));
   glReadPixels(0, bottom, width_px_, rows, GL_DEPTH_COMPONENT, GL_FLOAT, depth_.data());
-  bands_.lay_over({0, bottom, width_px_, rows, depth_, rgba}, frame.depth.head<2>(), 0);
+  bands_.blend_over({0, bottom, width_px_, rows, depth_, rgba}, frame.depth.head<2>(), 0);
 }
 
 }  // namespace offstage::render

@@ -30,7 +30,7 @@ class StreaksPass {
                                  GLuint color);
   /// Draws the remaining streaks over a band of the picture (see StreakBands). For both functions, the
   /// picture's framebuffer must be bound for reading.
-  void lay_over(int bottom, int rows, const FrameUniforms& frame, std::span<float> rgba);
+  void blend_over(int bottom, int rows, const FrameUniforms& frame, std::span<float> rgba);
 
  private:
   std::vector<StreakSplat> splats_;  ///< nearest first

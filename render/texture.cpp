@@ -58,7 +58,7 @@ Image half_size(const Image& image, TextureContent content, const ChannelTable& 
   return half;
 }
 
-/// Share of the pixels whose alpha, times `factor`, reaches the cutoff.
+/// Fraction of the pixels whose alpha, times `factor`, reaches the cutoff.
 double coverage_of(const Image& image, float cutoff, float factor) {
   std::size_t count = 0;
   for (std::size_t i = 3; i < image.rgba.size(); i += 4)
@@ -66,14 +66,14 @@ double coverage_of(const Image& image, float cutoff, float factor) {
   return static_cast<double>(count) / static_cast<double>(std::max<std::size_t>(image.pixel_count(), 1));
 }
 
-/// Scales alpha so that about the share `coverage` of the pixels reaches the cutoff.
+/// Scales alpha so that about the fraction `coverage` of the pixels reaches the cutoff.
 Image with_coverage(const Image& image, float cutoff, double coverage) {
   float low = 0.1f, high = 16;  // at the lower factor too little is covered, at the higher one too much
   for (int k = 0; k < 16; ++k) {
     const float middle = std::sqrt(low * high);
     (coverage_of(image, cutoff, middle) < coverage ? low : high) = middle;
   }
-  // A level of few pixels cannot have every share; the nearer of both sides is taken.
+  // A level of few pixels cannot have every fraction; the nearer of both sides is taken.
   const double below = coverage - coverage_of(image, cutoff, low),
                above = coverage_of(image, cutoff, high) - coverage;
   const float factor = below < above ? low : high;

@@ -16,7 +16,7 @@ double reflectance_between(double n1, double n2) {
   return r * r;
 }
 
-/// Index of refraction against air of a surface that reflects a share below 1.
+/// Index of refraction against air of a surface that reflects a fraction below 1.
 double index_of_refraction(double reflectance) {
   const double root = std::sqrt(std::clamp(reflectance, 0.0, 0.9999));
   return (1 + root) / (1 - root);

@@ -86,7 +86,7 @@ struct FrameChannel {
 /// Sends all bytes; returns the error number, or 0. ECANCELED after a request to stop, EAGAIN for a stuck
 /// encoder.
 int send_all(int socket, std::span<const uint8_t> bytes, const StopTest& stop) {
-  Patience patience(stop);
+  StopDeadline patience(stop);
   auto last = std::chrono::steady_clock::now();
   while (!bytes.empty()) {
     const ssize_t sent = ::send(socket, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
@@ -98,7 +98,7 @@ int send_all(int socket, std::span<const uint8_t> bytes, const StopTest& stop) {
       if (patience.exhausted()) return ECANCELED;
       if (std::chrono::steady_clock::now() - last > kStall) return EAGAIN;
       pollfd ready{socket, POLLOUT, 0};
-      ::poll(&ready, 1, Patience::kInterval_ms);
+      ::poll(&ready, 1, StopDeadline::kInterval_ms);
     } else if (errno != EINTR) {
       return errno;
     }

@@ -1,5 +1,5 @@
 #pragma once
-/// What World::step() reports. The figures are in parts; each part lists its figures once
+/// The report of World::step(). The figures are in parts; each part lists its figures once
 /// (sim/core/figures.h), and sums over steps, the statistics of a run and the dict of Python follow from the
 /// lists. The names are those of docs/output-files.md.
 
@@ -72,7 +72,7 @@ struct ImpactFigures {
 
 /// All cloths together; for a single one see ClothReport, which describes the figures.
 struct ClothFigures {
-  Real strain = 0;                                                ///< greatest of a thread
+  Real strain = 0;                                                ///< greatest strain of a thread
   Real penetration = 0;                                           ///< greatest [m]
   uint64_t contacts = 0, self_contacts = 0, springs_clamped = 0;  ///< at the end of the step
   uint64_t moves_limited = 0, moves_held_back = 0, crossings = 0, springs_torn = 0, unconverged = 0;

@@ -69,7 +69,7 @@ struct ContactRule {
   std::optional<Real> rolling_friction = {}, spinning_friction = {};
 };
 
-/// How resting contact is computed (physics N11, N12).
+/// Solver for resting contact (physics N11, N12).
 enum class SolverKind {
   exact,      ///< each collision at its own time, contact forces to rounding: slow for piles of hundreds of
               ///< bodies
@@ -80,7 +80,7 @@ enum class SolverKind {
         ///< both tangents (N9, N10); islands that it does not solve go to the exact solver and are counted
 };
 
-/// How the contact forces of particles are computed (physics P7).
+/// Solver for the contact forces of particles (physics P7).
 enum class ParticleContactMethod : uint8_t {
   relaxation,  ///< Gauss-Seidel with bounded work
   lcp  ///< clusters of at most WorldDef::particle_cluster contacts by Dantzig's and Baraff's pivoting; other
@@ -93,8 +93,8 @@ struct CollisionMethods {
   /// Volumes of the trees over the parts and triangles of meshes (H1-H3). `mixed`: spheres for dynamic bodies
   /// and axis-aligned boxes for the others, so that trees of two kinds meet.
   enum class Trees : uint8_t { aabb, obb, sphere, mixed };
-  /// What the time of an impact of two meshes is found by: their convex parts, or their triangles as in
-  /// section 2.4 (R3). Contact points are those of the parts in either case.
+  /// The pieces by which the time of an impact of two meshes is found: their convex parts, or their triangles
+  /// as in section 2.4 (R3). Contact points are those of the parts in either case.
   enum class MeshPairs : uint8_t { parts, triangles };
   /// Distance of convex polyhedra: GJK, or V-Clip (physics R4). Round shapes use GJK in either case.
   enum class NarrowPhase : uint8_t { gjk, vclip };
@@ -228,7 +228,7 @@ class World {
   /// connect to it share it in the next sub-step.
   void add_impulse(BodyHandle body, const Vec3& impulse, const Vec3& point);
 
-  /// Adds a particle and returns its id. `elapsed` is the time from its birth to the end of the coming
+  /// Adds a particle and returns its id. `elapsed` is the time from its birth time to the end of the coming
   /// sub-step [s]; the particle is integrated over that part only. If `elapsed` is longer than the sub-step,
   /// the particle ignores bodies during the time before the sub-step. If it is negative, the particle exists
   /// now and is advanced through the whole sub-step.
@@ -242,7 +242,7 @@ class World {
   /// `to`. Particles collide with each other and with bodies. Dynamic bodies, cloths, springs and the
   /// particles that existed before do not move. Kinematic bodies follow their tracks. Forces are those of
   /// time 0, and forces between particles do not act. With from = to = 0, `before` is called once, and
-  /// particles born at that time exist from then on. Throws std::invalid_argument for other times.
+  /// particles created at that time exist from then on. Throws std::invalid_argument for other times.
   StepReport prewarm(Real from, Real to, const BeforeSubStep& before = {});
 
   /// Advances by `sampling_time` in the fewest equal sub-steps not longer than WorldDef::max_step.

@@ -94,7 +94,7 @@ class Engine {
   std::string film_of(const producer::LoadedScene& scene) const;
   /// Sets a second version whose frames are kept and, in idle time, completed; null: none.
   void pin(Loaded scene);
-  /// Sets the frame that is looked at. It is drawn first, and refined when nothing changes or plays.
+  /// Sets the frame that the user sees. It is drawn first, and refined when nothing changes or plays.
   void look_at(int frame, bool playing);
   /// Reads model files again after they have changed.
   void forget_models();
@@ -168,7 +168,7 @@ class Engine {
   bool pinned_changed_ = false;
   int frame_ = 1;
   bool playing_ = false;
-  Clock::time_point changed_ = Clock::now();  // last change of the version or the frame that is looked at
+  Clock::time_point changed_ = Clock::now();  // last change of the version or of the visible frame
   std::deque<Pick> picks_;
   Sweep sweep_;
   std::shared_ptr<const Physics> shown_physics_;

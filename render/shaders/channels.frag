@@ -16,6 +16,6 @@ void main() {
 #endif
   normal_id = vec4(normalize(gl_FrontFacing ? normal : -normal), half_size_id.z);
   // A point behind the eye has no previous position in the picture.
-  vec2 way = before.w > 0.0 ? now.xy / now.w - before.xy / before.w : vec2(0.0);
-  motion_depth = vec4(half_size_id.xy * way, now.w, 0.0);
+  vec2 motion = before.w > 0.0 ? now.xy / now.w - before.xy / before.w : vec2(0.0);
+  motion_depth = vec4(half_size_id.xy * motion, now.w, 0.0);
 }

@@ -18,6 +18,6 @@ void main() {
   vec4 before = clip_before_from_world * vec4(hit - half_size_id_time.w * velocity, 1.0);
   gl_FragDepth = now.z / now.w;
   normal_id = vec4(offset / ball.w, half_size_id_time.z);
-  vec2 way = before.w > 0.0 ? now.xy / now.w - before.xy / before.w : vec2(0.0);
-  motion_depth = vec4(half_size_id_time.xy * way, now.w, 0.0);
+  vec2 motion = before.w > 0.0 ? now.xy / now.w - before.xy / before.w : vec2(0.0);
+  motion_depth = vec4(half_size_id_time.xy * motion, now.w, 0.0);
 }

@@ -64,15 +64,15 @@ vec3 shade_fabric(Surface s, vec3 through, vec3 normal, vec3 view, Light light) 
 
   // Light that enters on one side is scattered until it leaves on either side, so it wraps softly around the shadow's
   // edge.
-  float share = material.back.w, wrap = 0.35 * share, norm = 1.0 / ((1.0 + wrap) * (1.0 + wrap));
+  float fraction = material.back.w, wrap = 0.35 * fraction, norm = 1.0 / ((1.0 + wrap) * (1.0 + wrap));
   float front = saturate((cosine + wrap) * norm), behind = saturate((wrap - cosine) * norm);
-  vec3 sun = diffuse * (1.0 - fresnel) * ((1.0 - share) * front) + through * (share * behind) +
+  vec3 sun = diffuse * (1.0 - fresnel) * ((1.0 - fraction) * front) + through * (fraction * behind) +
              nl * (lobe * fresnel + sheen * sheen_sun);
 
   vec3 reflectance = sky_reflectance(f0, s.roughness, nv);
   vec3 above = light.around + light.lamps, below = ambient(-normal) * light.open;
   vec3 mirrored = reflected_light(view, normal, s.roughness, light);
-  vec3 sky = diffuse * (1.0 - reflectance) * (1.0 - share) * above + through * share * below + mirrored * reflectance +
+  vec3 sky = diffuse * (1.0 - reflectance) * (1.0 - fraction) * above + through * fraction * below + mirrored * reflectance +
              sheen * sheen_sky * above;
   return frame.sun_radiance.rgb * light.sun * sun + sky + s.emission;
 }

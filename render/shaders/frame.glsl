@@ -9,7 +9,7 @@
   qualifier vec4 zenith;            /* w: fog density */ \
   qualifier vec4 horizon; \
   qualifier vec4 ground;            /* w: intensity of the sky's picture */ \
-  qualifier vec4 glow;              /* w: turn of the sky's picture, as a share of a full turn */ \
+  qualifier vec4 glow;              /* w: turn of the sky's picture, as a fraction of a full turn */ \
   qualifier vec4 irradiance[7];     /* ambient light of a white surface: see ambient() */
 
 layout(std140, binding = 0) uniform Frame {
@@ -17,7 +17,7 @@ layout(std140, binding = 0) uniform Frame {
   FRAME_FIELDS(NONE)
   vec4 ray_center, ray_x, ray_y;  // direction through a point of the screen: center + x * ndc.x + y * ndc.y
   vec4 depth;             // distance along the view axis = x / (depth + y); z: near plane
-  vec4 air;               // time [s], share of clouds, number of sub-frames
+  vec4 air;               // time [s], fraction of clouds, number of sub-frames
 } uniforms;
 
 // llvmpipe's fragment shaders read a uniform lane by lane, with forty instructions (Mesa 22.3), which was half of the

@@ -1,5 +1,5 @@
 // Light through a piece of glass, which was traced for this sub-frame (render/trace).
-layout(binding = 20) uniform sampler2D traced_through;  // w: visible share of the sun
+layout(binding = 20) uniform sampler2D traced_through;  // w: visible fraction of the sun
 layout(binding = 21) uniform sampler2D traced_by_glass; // mirror image
 #ifdef PARTICLES
 // The tracer does not know sprites, streaks and smoke. Behind glass they are taken from the picture: it is compared with
@@ -10,8 +10,8 @@ layout(binding = 22) uniform sampler2D behind_without_particles;
 
 vec3 particles_behind(vec3 position, vec3 n, vec3 view) {
   vec3 inside = refract(-view, n, material.glass.y);
-  float way = thickness * max(-dot(inside, n), 0.0);
-  vec3 far_side = position + way * inside, out_normal = normalize(far_side - (position - 0.5 * thickness * n));
+  float path_length = thickness * max(-dot(inside, n), 0.0);
+  vec3 far_side = position + path_length * inside, out_normal = normalize(far_side - (position - 0.5 * thickness * n));
   vec3 leaving = refract(inside, -out_normal, 1.0 / material.glass.y);
   if (thickness <= 0.0) leaving = -view;  // a sheet with parallel sides does not turn the ray
   else if (dot(leaving, leaving) < 0.5) leaving = inside;  // total reflection inside

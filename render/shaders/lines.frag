@@ -8,7 +8,7 @@ void main() {
   float along = clamp(place.x, 0.0, stroke.x);
   float radius = mix(stroke.y, stroke.z, stroke.x > 0.0 ? along / stroke.x : 0.0);
   float d = distance(place, vec2(along, 0.0));
-  // Share of a pixel's width that the line covers, so that thin lines get fainter instead of jagged.
+  // Fraction of a pixel's width that the line covers, so that thin lines get fainter instead of jagged.
   float alpha = color.a * opacity * saturate(min(d + 0.5, radius) - max(d - 0.5, -radius));
   result = vec4(color.rgb * alpha, alpha);
 }

@@ -5,7 +5,7 @@ layout(std140, binding = 1) uniform Material {
   vec4 surface;        // metallic, roughness; of fabric: width of a thread [m], relief
   vec4 back;           // of fabric: colour of its back; w: translucency
   vec4 sheen;          // of fabric: colour; w: 1 if the back has a colour of its own
-  vec4 glass;  // share of transmitted light, 1 / index of refraction
+  vec4 glass;  // fraction of transmitted light, 1 / index of refraction
 #ifdef DETAILED
   vec4 specular;  // reflectance of a dielectric that faces the eye; w: glossiness, negative if not used
   vec4 coat;      // strength and roughness of the lacquer; scale of the normal map; strength of the occlusion

@@ -50,10 +50,10 @@ vec3 mapped_normal(vec3 n) {
   return normalize(facing * (texel.x * along_u + texel.y * against_v) + max(texel.z, 0.01) * n);
 }
 
-// Share of the mirrored light where an occlusion map leaves a share of the light around: rough surfaces reflect from all
+// Fraction of the mirrored light where an occlusion map leaves a fraction of the light around: rough surfaces reflect from all
 // around, smooth ones from one direction, which is the less hidden the more directly it is seen (S. Lagarde and C. de
 // Rousiers, "Moving Frostbite to Physically Based Rendering", 2014). 1 without occlusion.
-float mirrored_share_of(float occlusion, float roughness, float nv) {
+float mirrored_fraction_of(float occlusion, float roughness, float nv) {
   return saturate(pow(nv + occlusion, exp2(-16.0 * roughness - 1.0)) - 1.0 + occlusion);
 }
 
@@ -164,7 +164,7 @@ void main() {
   light.around *= occlusion;
   light.open *= occlusion;
 #ifdef DETAILED
-  if (occlusion < 1.0) light.mirrored.rgb *= mirrored_share_of(occlusion, s.roughness, max(abs(dot(n, view)), 1e-3));
+  if (occlusion < 1.0) light.mirrored.rgb *= mirrored_fraction_of(occlusion, s.roughness, max(abs(dot(n, view)), 1e-3));
 #endif
   vec3 radiance = shade(s, n, view, light) + highlights_of_lamps(mix(dielectric_f0, s.albedo, s.metallic));
 #ifdef GLASS

@@ -7,7 +7,7 @@ layout(location = 3) flat in vec2 lobe;
 #endif
 layout(location = 4) flat in vec2 rim;  // softness, additive
 #ifdef PICTURES
-layout(location = 5) flat in vec3 picture;  // two layers, share of the second one
+layout(location = 5) flat in vec3 picture;  // two layers, fraction of the second one
 layout(location = 6) in vec3 haze;
 layout(binding = 1) uniform sampler2DArray pictures;  // premultiplied
 #endif
@@ -24,8 +24,8 @@ void main() {
   vec3 radiance = light.rgb;
 #ifdef PICTURES
   vec4 texel = mix(texture(pictures, vec3(place.xy, picture.x)), texture(pictures, vec3(place.xy, picture.y)), picture.z);
-  float share = light.a * depth_fade(reach);
-  color = vec4((light.rgb * texel.rgb + haze * texel.a) * share, texel.a * share * (1.0 - rim.y));
+  float fraction = light.a * depth_fade(reach);
+  color = vec4((light.rgb * texel.rgb + haze * texel.a) * fraction, texel.a * fraction * (1.0 - rim.y));
 }
 #else
 #if STYLE == 5

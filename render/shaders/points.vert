@@ -4,8 +4,8 @@ layout(location = 1) in vec4 in_velocity;  // w: random number in [0, 1)
 layout(location = 2) in vec4 in_color;
 #if STYLE != 2
 layout(location = 3) in vec4 style;       // softness, stretch [s], lit, additive
-layout(location = 4) in vec4 in_picture;  // angle, two layers of the sheet, share of the second one
-layout(location = 5) in vec4 in_light;    // of lamps; w: share of the sun that reaches the particle
+layout(location = 4) in vec4 in_picture;  // angle, two layers of the sheet, fraction of the second one
+layout(location = 5) in vec4 in_light;    // of lamps; w: fraction of the sun that reaches the particle
 #ifdef PICTURES
 layout(location = 6) in vec2 in_size;     // of the picture, which is in the corner of its layer [px]
 #endif
@@ -29,7 +29,7 @@ layout(location = 3) flat out vec2 lobe;     // direction of a flake's first cor
 #endif
 layout(location = 4) flat out vec2 rim;      // softness, additive
 #ifdef PICTURES
-layout(location = 5) flat out vec3 picture;  // two layers, share of the second one
+layout(location = 5) flat out vec3 picture;  // two layers, fraction of the second one
 layout(location = 6) out vec3 haze;          // fog between eye and particle
 layout(binding = 1) uniform sampler2DArray pictures;
 #endif

@@ -4,7 +4,7 @@
 layout(location = 0) uniform vec3 scale;
 layout(location = 1) uniform ivec4 region;  // texels with content: first, last
 layout(binding = 4) uniform sampler2D scene_depth;
-layout(binding = 6) uniform sampler2D puffs;  // w: remaining share of the scene
+layout(binding = 6) uniform sampler2D puffs;  // w: remaining fraction of the scene
 layout(binding = 7) uniform sampler2D puff_depth;
 layout(location = 0) out vec4 color;
 
@@ -17,9 +17,9 @@ void main() {
   for (int k = 0; k < 4; ++k) {
     vec2 corner = vec2(float(k & 1), float(k >> 1));
     ivec2 texel = clamp(ivec2(base + corner), region.xy, region.zw);
-    vec2 share = mix(1.0 - f, f, corner);
+    vec2 fraction = mix(1.0 - f, f, corner);
     float off = (texelFetch(puff_depth, texel, 0).r - depth) / scale.y;
-    float weight = (share.x * share.y + 1e-4) / (1.0 + off * off);
+    float weight = (fraction.x * fraction.y + 1e-4) / (1.0 + off * off);
     sum += weight * texelFetch(puffs, texel, 0);
     weights += weight;
   }

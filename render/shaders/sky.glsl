@@ -51,7 +51,7 @@ vec3 horizon_color(vec3 direction) {
   return sky_gradient(level.y) + frame.glow.rgb * glow_profile(level);
 }
 
-// Light added on the way from a point to the eye, and in w the share of the point's own light that arrives, through fog
+// Light added on the way from a point to the eye, and in w the fraction of the point's own light that arrives, through fog
 // and an additional optical depth.
 vec4 fog_to(vec3 position, float more) {
   vec3 ray = position - frame.eye.xyz;

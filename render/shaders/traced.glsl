@@ -1,5 +1,5 @@
 // Light of surfaces, which was traced for this sub-frame (render/trace).
-layout(binding = 8) uniform sampler2D traced_arriving;    // from the sky and other surfaces; w: visible share of the sun
+layout(binding = 8) uniform sampler2D traced_arriving;    // from the sky and other surfaces; w: visible fraction of the sun
 layout(binding = 10) uniform sampler2D traced_lamps;      // diffuse light of lamps
 layout(binding = 18) uniform sampler2D traced_mirrored;   // w: 1 where it was computed
 layout(binding = 19) uniform sampler2D traced_highlights; // lobes of lamps; w: their Fresnel factor

@@ -38,10 +38,10 @@ float AirLight::sun(const Vector3f& center, float radius, float number) const {
 }
 
 Vector3f AirLight::lamps_around(const Vector3f& center, float radius, float number) const {
-  constexpr float kShare = 0.3f;
+  constexpr float kFraction = 0.3f;
   Vector3f sum = Vector3f::Zero();
   for_each_lamp(center, radius, number, [&](const Vector3f& light, const Vector3f&) { sum += light; });
-  return kShare * sum;
+  return kFraction * sum;
 }
 
 }  // namespace offstage::render

@@ -12,7 +12,7 @@ class AirLight {
   AirLight(const RayScene& scene, const LightSources& sources, const SampleOffsets& offsets)
       : scene_(scene), sources_(sources), disc_(sources.sun, sources.sky.sun_direction), offsets_(offsets) {}
 
-  /// Share of the sun's light that objects let through to a ball; smoke is not counted. `number`: one in
+  /// Fraction of the sun's light that objects let through to a ball; smoke is not counted. `number`: one in
   /// [0, 1) that the ball keeps, which selects the rays.
   float sun(const Vector3f& center, float radius, float number) const;
   /// Calls each(radiance of a white surface that faces the lamp, unit vector to the lamp) for all lamps that
@@ -23,7 +23,7 @@ class AirLight {
     PixelSampler sampler = sampler_of(number);
     for (const RayLamp& lamp : sources_.lamps) {
       const LampPoint<float> point = lamp.point(from_eigen(center), sampler.next());
-      if (!(point.share > 0)) continue;
+      if (!(point.fraction > 0)) continue;
       const Vector3f towards = to_eigen(point.towards);
       Vector3f light = to_eigen(point.arriving);
       if (lamp.def().shadows && point.distance > radius)

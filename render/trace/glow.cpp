@@ -33,9 +33,9 @@ void Glow::limit() {
 
 // In proportion to power over distance squared; nothing if all of the source is below the surface's horizon.
 float Glow::estimate(const Source& source, const Vector3f& place, const Vector3f& normal) {
-  const Vector3f way = source.center - place;
-  if (way.dot(normal) < -source.radius) return 0;
-  return source.power / std::max(way.squaredNorm(), source.radius * source.radius);
+  const Vector3f offset = source.center - place;
+  if (offset.dot(normal) < -source.radius) return 0;
+  return source.power / std::max(offset.squaredNorm(), source.radius * source.radius);
 }
 
 float Glow::Source::area_per_chance(unsigned triangle) const {
@@ -50,16 +50,16 @@ float Glow::Source::cap(const Vector3f& place) const {
 
 // A direction in the cone that contains the ball.
 GlowSample Glow::Source::sample_ball(const Vector3f& place, const SquarePoint<float>& uv) const {
-  const Vector3f way = center - place;
-  const float wide = cap(place), distance = way.norm();
+  const Vector3f offset = center - place;
+  const float wide = cap(place), distance = offset.norm();
   if (wide <= 0) return {};
   const float cosine = 1 - wide * uv.x, sine = std::sqrt(std::max(1 - cosine * cosine, 0.0f));
   const float turn = kTwoPi * uv.y;
   Three<float> a, b;
-  make_basis(from_eigen(way / distance), a, b);
+  make_basis(from_eigen(offset / distance), a, b);
   GlowSample result;
   result.towards =
-      (cosine * way / distance + sine * (std::cos(turn) * to_eigen(a) + std::sin(turn) * to_eigen(b)))
+      (cosine * offset / distance + sine * (std::cos(turn) * to_eigen(a) + std::sin(turn) * to_eigen(b)))
           .normalized();
   const float half2 = radius * radius - distance * distance * (1 - cosine * cosine);
   result.distance = distance * cosine - std::sqrt(std::max(half2, 0.0f));
@@ -74,16 +74,16 @@ GlowSample Glow::Source::sample_area(const Vector3f& place, float choice,
   const std::array<Vector3f, 3> p = mesh->corners(triangle, world_from_mesh);
   const float root = std::sqrt(uv.x);
   const Vector2f b(root * (1 - uv.y), root * uv.y);  // even over the triangle
-  const Vector3f way = p[0] + b.x() * (p[1] - p[0]) + b.y() * (p[2] - p[0]) - place;
+  const Vector3f offset = p[0] + b.x() * (p[1] - p[0]) + b.y() * (p[2] - p[0]) - place;
   const Vector3f normal = (p[1] - p[0]).cross(p[2] - p[0]);
   GlowSample result;
-  result.distance = way.norm();
+  result.distance = offset.norm();
   if (!(result.distance > 0) || !(normal.norm() > 0)) return {};
-  result.towards = way / result.distance;
+  result.towards = offset / result.distance;
   const float cosine = std::abs(result.towards.dot(normal.normalized()));
   if (cosine < 1e-4f) return {};
   result.radiance = material->emission_at(mesh->uv_at(triangle, b));
-  result.density = way.squaredNorm() / (cosine * area_per_chance(triangle));
+  result.density = offset.squaredNorm() / (cosine * area_per_chance(triangle));
   return result;
 }
 
@@ -117,9 +117,9 @@ float Glow::density(const Vector3f& place, const Vector3f& normal, const Hit& hi
     const float wide = met->cap(place);
     return wide > 0 ? weight / (sum * kTwoPi * wide) : 0;
   }
-  const Vector3f way = hit.position - place;
-  const float cosine = std::max(std::abs(way.normalized().dot(hit.face)), 1e-4f);
-  return weight / sum * way.squaredNorm() / (cosine * met->area_per_chance(hit.triangle));
+  const Vector3f offset = hit.position - place;
+  const float cosine = std::max(std::abs(offset.normalized().dot(hit.face)), 1e-4f);
+  return weight / sum * offset.squaredNorm() / (cosine * met->area_per_chance(hit.triangle));
 }
 
 }  // namespace offstage::render

@@ -33,7 +33,8 @@ class Glow {
   /// proportion to its area, or to its solid angle if it is a ball.
   GlowSample sample(const Vector3f& place, const Vector3f& normal, float random,
                     const SquarePoint<float>& uv) const;
-  /// The density with which sample() chooses what a ray from `place` met. 0: it is not a source.
+  /// The density with which sample() chooses the point that a ray from `place` hit; 0 if it is not on a
+  /// source.
   float density(const Vector3f& place, const Vector3f& normal, const Hit& hit) const;
 
   static constexpr std::size_t kMost = 64;
@@ -49,7 +50,7 @@ class Glow {
     bool is_ball;
     float power;
 
-    /// Area of a triangle in the world over the chance to choose it, which is its share of the mesh.
+    /// Area of a triangle in the world over the chance to choose it, which is its fraction of the mesh.
     float area_per_chance(unsigned triangle) const;
     /// Solid angle of a ball over 2 pi, or 0 from within.
     float cap(const Vector3f& place) const;

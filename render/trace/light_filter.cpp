@@ -11,10 +11,10 @@ namespace offstage::render {
 namespace {
 
 constexpr int kRowsPerFilterTask = 16;
-// Shares of the mean distance around over which light is taken as even: all light, and noisy light.
-constexpr float kShareOfReach = 0.3f, kNoisyShareOfReach = 0.2f;
-// Least distance around noisy light, as a share of the height and in pixels; less leaves noise in corners.
-constexpr float kLeastNoisyShare = 0.1f, kLeastNoisy_px = 36;
+// Fractions of the mean distance around over which light is taken as even: all light, and noisy light.
+constexpr float kFractionOfReach = 0.3f, kNoisyFractionOfReach = 0.2f;
+// Least distance around noisy light, as a fraction of the height and in pixels; less leaves noise in corners.
+constexpr float kLeastNoisyFraction = 0.1f, kLeastNoisy_px = 36;
 constexpr float kNoReach = 1e30f;  // 1 / distance^2: nothing is averaged
 constexpr int kRun = 32;           // pixels that are averaged together
 
@@ -93,7 +93,7 @@ class BlockSums {
 void LightGuide::find_reach(const LightPlane& inverse_distance, const LightPlane& brightness,
                             LightPlane& reach2, LightPlane& noisy_reach2) const {
   const BlockSums blocks(*this, brightness);
-  const float least_px = std::min(kLeastNoisyShare * static_cast<float>(height_px), kLeastNoisy_px);
+  const float least_px = std::min(kLeastNoisyFraction * static_cast<float>(height_px), kLeastNoisy_px);
   for_filter_rows(height_px, [&](int y) {
     for (int x = 0; x < width_px; x += kLanes) {
       Lanes sum{}, count{};
@@ -108,10 +108,10 @@ void LightGuide::find_reach(const LightPlane& inverse_distance, const LightPlane
       const Lanes mean = sum / larger(count, Lanes{} + 1);
       const Lanes most = square_root(inverse_size2.lanes(x, y)) * (1 / least_px);
       const Lanes inverse = mean + noisy * (smaller(mean, most) - mean);
-      const float noisy_share = kNoisyShareOfReach * noisy;
-      reach2.set_lanes(x, y, inverse * inverse * (1 / (kShareOfReach * kShareOfReach)));
+      const float noisy_fraction = kNoisyFractionOfReach * noisy;
+      reach2.set_lanes(x, y, inverse * inverse * (1 / (kFractionOfReach * kFractionOfReach)));
       noisy_reach2.set_lanes(
-          x, y, noisy > 0 ? inverse * inverse * (1 / (noisy_share * noisy_share)) : Lanes{} + kNoReach);
+          x, y, noisy > 0 ? inverse * inverse * (1 / (noisy_fraction * noisy_fraction)) : Lanes{} + kNoReach);
     }
   });
 }
@@ -184,10 +184,10 @@ void LightValues::Averaging::average_lanes(int x, int y) {
   for (int row = y - step_; row <= y + step_; row += step_) {
     if (row < 0 || row >= guide_.height_px) continue;
     for (int there = x - step_; there <= x + step_; there += step_) {
-      const LaneVectors way = lanes_of(guide_.place, there, row) - p;
-      const Lanes off = dot(way, n), facing = larger(dot(n, lanes_of(guide_.normal, there, row)), Lanes{});
+      const LaneVectors offset = lanes_of(guide_.place, there, row) - p;
+      const Lanes off = dot(offset, n), facing = larger(dot(n, lanes_of(guide_.normal, there, row)), Lanes{});
       const Lanes f2 = facing * facing, f4 = f2 * f2, f8 = f4 * f4;
-      const Lanes spread = (1 + off * off * size2) * (1 + dot(way, way) * reach2);
+      const Lanes spread = (1 + off * off * size2) * (1 + dot(offset, offset) * reach2);
       const float kernel = (there == x ? 2.0f : 1.0f) * (row == y ? 2.0f : 1.0f);
       const Lanes weight = kernel * filled_.lanes(there, row) * f8 * f8 / (spread * spread);
       sum_of_weights += weight;
@@ -241,10 +241,10 @@ constexpr Neighbours kBeside = {{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
 constexpr Neighbours kDiagonal = {{{-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
 
 bool has_any(const LightGuide& guide, int x, int y, const Neighbours& neighbours) {
-  return std::ranges::any_of(neighbours, [&](const auto& way) {
-    const int row = y + way[1];
+  return std::ranges::any_of(neighbours, [&](const auto& step) {
+    const int row = y + step[1];
     if (row < 0 || row >= guide.height_px) return false;
-    return *guide.filled.at(x + way[0], row) > 0;
+    return *guide.filled.at(x + step[0], row) > 0;
   });
 }
 
@@ -327,11 +327,12 @@ void interpolate(const LightGuide& fine, const LightGuide& coarse, int y, const 
       LaneVectors sum{};
       for (int k = 0; k < 4; ++k) {
         const int there = x0 / 2 + (k & 1) * (side == 0 ? -1 : 1), q = k < 2 ? near_row : far_row;
-        const float share = ((k & 1) == 0 ? 0.75f : 0.25f) * (k < 2 ? 0.75f : 0.25f) + 0.002f;
-        const LaneVectors way = lanes_of(coarse.place, there, q) - p, m = lanes_of(coarse.normal, there, q);
-        const Lanes off = dot(way, n), facing = larger(dot(n, m), Lanes{});
+        const float fraction = ((k & 1) == 0 ? 0.75f : 0.25f) * (k < 2 ? 0.75f : 0.25f) + 0.002f;
+        const LaneVectors offset = lanes_of(coarse.place, there, q) - p,
+                          m = lanes_of(coarse.normal, there, q);
+        const Lanes off = dot(offset, n), facing = larger(dot(n, m), Lanes{});
         const Lanes f2 = facing * facing, apart = 1 + off * off * size2;
-        const Lanes weight = share * from.filled->lanes(there, q) * (f2 * f2 + 1e-4f) / (apart * apart);
+        const Lanes weight = fraction * from.filled->lanes(there, q) * (f2 * f2 + 1e-4f) / (apart * apart);
         sum_of_weights += weight;
         sum = sum + lanes_of(from.values->channels(), there, q) * weight;
       }

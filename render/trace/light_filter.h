@@ -1,8 +1,8 @@
 #pragma once
 /// Private: averages the noise of traced light over neighbouring pixels of the same surface: an edge-avoiding
 /// a-trous filter (H. Dammertz et al., 2010), guided by normals and positions, and for the light from all
-/// around by the distance of what was met (the error bound of G. Ward et al., "A Ray Tracing Solution for
-/// Diffuse Interreflection", 1988), so that dark corners stay narrow.
+/// around by the hit distances (the error bound of G. Ward et al., "A Ray Tracing Solution for Diffuse
+/// Interreflection", 1988), so that dark corners stay narrow.
 
 #include <array>
 #include <span>
@@ -45,8 +45,8 @@ class LightPlane {
 /// The surfaces in a picture, which say how far light may be averaged.
 struct LightGuide {
   LightGuide(int width_px, int height_px);
-  /// From 1 / (distance that a ray went) and the brightness that it found, for each pixel, computes
-  /// 1 / distance^2 over which light may be averaged: a share of the mean distance around. `noisy_reach2` is
+  /// From 1 / (distance that a ray went) and the brightness that it found, for each pixel, computes 1 /
+  /// distance^2 over which light may be averaged: a fraction of the mean distance around. `noisy_reach2` is
   /// that of further steps, which only noisy light needs: light whose variance exceeds the square of its
   /// mean. All are means of the neighbourhood, since a single ray says little.
   void find_reach(const LightPlane& inverse_distance, const LightPlane& brightness, LightPlane& reach2,

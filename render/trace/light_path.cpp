@@ -25,7 +25,7 @@ float refraction_ratio(const Hit& hit) {
 
 }  // namespace
 
-float mirrored_share(const Hit& hit, const Vector3f& direction) {
+float mirrored_fraction(const Hit& hit, const Vector3f& direction) {
   return fresnel_of_glass(std::min(-hit.normal.dot(direction), 1.0f), refraction_ratio(hit));
 }
 
@@ -68,28 +68,29 @@ Vector3f LightTracer::sky_seen(const Vector3f& direction) const {
   if (direction.y() >= 0 || sources_.sky.turned.picture) return sky_radiance(sources_.sky, direction);
   const Vector3f level = Vector3f(direction.x(), 0, direction.z()).normalized();
   const Vector3f haze = level.allFinite() ? sky_radiance(sources_.sky, level) : sources_.sky.horizon;
-  const float x = std::clamp((-direction.y() - 0.03f) / 0.47f, 0.0f, 1.0f), share = x * x * (3 - 2 * x);
-  return haze + share * (sources_.sky.ground - haze);
+  const float x = std::clamp((-direction.y() - 0.03f) / 0.47f, 0.0f, 1.0f), fraction = x * x * (3 - 2 * x);
+  return haze + fraction * (sources_.sky.ground - haze);
 }
 
-// What a ray meets that leaves the scene. The bright part of a picture also arrives as a lamp at diffuse
-// surfaces, so that paths from there meet its dim part alone; `density`: see Path.
+// The radiance for a ray that leaves the scene. The bright part of a picture also arrives as a lamp at
+// diffuse surfaces, so that paths from there meet its dim part alone; `density`: see Path.
 Vector3f LightTracer::sky_met(const Vector3f& direction, bool sharp, float density) const {
   const TurnedSky& turned = sources_.sky.turned;
   if (!turned.picture) return sharp ? sky_seen(direction) : sky_radiance(sources_.sky, direction);
   const Vector3f there = turned.to_picture(direction);
   if (!sharp && density < 0) return turned.intensity * turned.picture->dim(there);
-  float share = 1;
+  float fraction = 1;
   if (density >= 0)
-    share -= turned.picture->bright_share(there) * share_of_way(turned.picture->density(there), density);
-  return share * turned.intensity * turned.picture->seen(there);
+    fraction -=
+        turned.picture->bright_fraction(there) * power_heuristic(turned.picture->density(there), density);
+  return fraction * turned.intensity * turned.picture->seen(there);
 }
 
 float LightTracer::sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const {
   const Sun& sun = sources_.sun;
-  float share = sources_.smoke != nullptr ? std::exp(-sources_.smoke->depth(place)) : 1.0f;
-  if (!sun.shadows) return share;
-  return share * scene_.transmittance(place, sun_disc_.direction(uv), kFar).mean();
+  float fraction = sources_.smoke != nullptr ? std::exp(-sources_.smoke->depth(place)) : 1.0f;
+  if (!sun.shadows) return fraction;
+  return fraction * scene_.transmittance(place, sun_disc_.direction(uv), kFar).mean();
 }
 
 // One lamp is chosen in proportion to its light without shadows.
@@ -155,28 +156,28 @@ bool LightTracer::follow_glass(const Hit& hit, const Vector3f& albedo, PixelSamp
   if (hit.front && material.transmission < 1) {
     const Vector3f light =
         direct_light(hit, off_surface(hit.position, hit.face), sampler) + sky_met(hit.normal, false, -1);
-    found.noisy += (1 - material.transmission) * path.share.cwiseProduct(albedo).cwiseProduct(light);
-    path.share *= material.transmission;
+    found.noisy += (1 - material.transmission) * path.fraction.cwiseProduct(albedo).cwiseProduct(light);
+    path.fraction *= material.transmission;
   }
-  const float mirrored = mirrored_share(hit, path.direction);
-  const Vector3f mirrored_way = reflected(path.direction, hit.normal);
+  const float mirrored = mirrored_fraction(hit, path.direction);
+  const Vector3f mirrored_direction = reflected(path.direction, hit.normal);
   if (mirrored >= 0.1f && sampler.next().x < mirrored) {
-    path.turn(mirrored_way, hit);
-    path.by_chance |= mirrored < 0.5f;  // the likelier of both ways causes no bright dots
+    path.turn(mirrored_direction, hit);
+    path.by_chance |= mirrored < 0.5f;  // the likelier of both choices causes no bright dots
     return true;
   }
   const bool came_by_chance = path.by_chance;
   path.by_chance |= mirrored >= 0.5f || is_rough_glass(material);
   if (mirrored < 0.1f && hit.front) {
     (came_by_chance ? found.noisy : found.certain) +=
-        mirrored * path.share.cwiseProduct(sky_radiance(sources_.sky, mirrored_way));
-    path.share *= 1 - mirrored;
+        mirrored * path.fraction.cwiseProduct(sky_radiance(sources_.sky, mirrored_direction));
+    path.fraction *= 1 - mirrored;
   }
-  path.share = path.share.cwiseProduct(enter(hit, albedo, sampler, path.from, path.direction));
+  path.fraction = path.fraction.cwiseProduct(enter(hit, albedo, sampler, path.from, path.direction));
   return true;
 }
 
-// Of sun and lamps, on a white surface.
+// Light of sun and lamps on a white surface.
 Vector3f LightTracer::direct_light(const Hit& hit, const Vector3f& from, PixelSampler& sampler) const {
   Vector3f result = Vector3f::Zero();
   const float towards_sun = hit.normal.dot(sources_.sky.sun_direction);
@@ -207,7 +208,7 @@ bool LightTracer::follow_smooth(const Hit& hit, const Vector3f& albedo, PixelSam
     const float a = std::max(material.roughness * material.roughness, scattered ? 0.04f : 1e-4f);
     path.by_chance |= a >= kSharp;
     path.turn(reflected(path.direction, visible_facet(hit.normal, -path.direction, a, sampler.next())), hit);
-    path.share = path.share.cwiseProduct(albedo + (Vector3f::Ones() - albedo) * grazing);
+    path.fraction = path.fraction.cwiseProduct(albedo + (Vector3f::Ones() - albedo) * grazing);
     return true;
   }
   if (sharp) {  // in a mirror image, a varnished surface mirrors the sky alone
@@ -215,22 +216,23 @@ bool LightTracer::follow_smooth(const Hit& hit, const Vector3f& albedo, PixelSam
     Path sky = path;
     sky.turn(reflected(path.direction, hit.normal), hit);
     (path.by_chance ? light.noisy : light.certain) +=
-        fresnel * path.share.cwiseProduct(sky_seen(sky.direction))
+        fresnel * path.fraction.cwiseProduct(sky_seen(sky.direction))
                       .cwiseProduct(scene_.transmittance(sky.from, sky.direction, kFar));
-    path.share *= 1 - fresnel;
+    path.fraction *= 1 - fresnel;
   }
   return false;
 }
 
-// Radiance that arrives along a path. `met`, if not null, gets the distance of what it meets first, and is
-// unchanged if it meets nothing. Mirrors and glass are followed sharply until the first diffuse surface.
+// Radiance that arrives along a path. `met`, if not null, gets the distance of the first hit, and is
+// unchanged without a hit. Mirrors and glass are followed sharply until the first diffuse surface.
 LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, const VisibleLight* visible,
                                               float* met) const {
   FoundLight light;
   Vector3f& sum = light.noisy;
-  // Adds what the path meets; the sky of a path with a density has a weight in place of a limit.
-  const auto meet = [&](const Vector3f& radiance) {
-    (path.by_chance && path.density < 0 ? light.noisy : light.certain) += path.share.cwiseProduct(radiance);
+  // Adds radiance at the end of the path; the sky of a path with a density has a weight in place of a limit.
+  const auto add_source = [&](const Vector3f& radiance) {
+    (path.by_chance && path.density < 0 ? light.noisy : light.certain) +=
+        path.fraction.cwiseProduct(radiance);
   };
   float travelled = 0;
   bool sharp = path.cone < 0.1f;
@@ -238,13 +240,13 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
   for (int step = 0; step < kMostSteps; ++step) {
     Hit hit;
     if (!scene_.first_hit(path.from, path.direction, kFar, hit)) {
-      meet(sky_met(path.direction, sharp, path.density));
+      add_source(sky_met(path.direction, sharp, path.density));
       return light;
     }
     if (step == 0 && met != nullptr) *met = hit.distance;
     const int pixel = visible != nullptr && sharp ? visible->find(hit) : -1;
     if (pixel >= 0 && visible->has_picture() && !path.mirrored) {
-      meet(visible->color(pixel));
+      add_source(visible->color(pixel));
       return light;
     }
     travelled += hit.distance;
@@ -252,8 +254,8 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
       const float clear = std::exp(-sources_.fog * hit.distance);
       const Vector3f haze = sources_.sky.turned.picture ? horizon_color(sources_.sky, path.direction)
                                                         : sky_seen(path.direction);
-      sum += path.share.cwiseProduct(haze) * (1 - clear);
-      path.share *= clear;
+      sum += path.fraction.cwiseProduct(haze) * (1 - clear);
+      path.fraction *= clear;
     }
     const RayMaterial& material = *hit.material;
     const Vector4f color = material.color(hit, travelled * path.cone);
@@ -264,23 +266,24 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
     }
     const Vector3f albedo = color.head<3>();
     if (material.unlit) {
-      sum += path.share.cwiseProduct(albedo);
+      sum += path.fraction.cwiseProduct(albedo);
       return light;
     }
     // Of glass, as on the screen, only the side towards the eye glows.
     if ((hit.front || material.transmission <= 0) && !material.mean_emission().isZero())
       (path.by_chance ? light.noisy : light.certain) +=
-          path.share_of_glow(hit, sources_.glow) * path.share.cwiseProduct(material.emission_at(hit.uv));
+          path.fraction_of_glow(hit, sources_.glow) *
+          path.fraction.cwiseProduct(material.emission_at(hit.uv));
     if (follow_glass(hit, albedo, sampler, path, light)) continue;
     path.from = off_surface(hit.position, hit.face);
     if (follow_smooth(hit, albedo, sampler, sharp, bounces > 0, path, light)) continue;
-    path.share = path.share.cwiseProduct(albedo);
+    path.fraction = path.fraction.cwiseProduct(albedo);
     if (pixel >= 0) {
       const Vector4f arriving = visible->arriving(pixel);
       const float cosine = hit.normal.dot(sources_.sky.sun_direction);
       const float sun = sources_.sun.intensity * (std::max((1 - hit.translucency) * cosine, 0.0f) +
                                                   std::max(-hit.translucency * cosine, 0.0f));
-      sum += path.share.cwiseProduct(arriving.head<3>() + sun * arriving.w() * sources_.sun.color);
+      sum += path.fraction.cwiseProduct(arriving.head<3>() + sun * arriving.w() * sources_.sun.color);
       return light;
     }
     if (hit.translucency > 0 && sampler.next().x < hit.translucency) {  // light from the other side
@@ -288,13 +291,13 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
       hit.face = -hit.face;
       path.from = off_surface(hit.position, hit.face);
     }
-    sum += path.share.cwiseProduct(direct_light(hit, path.from, sampler));
+    sum += path.fraction.cwiseProduct(direct_light(hit, path.from, sampler));
     // Paths end at random in proportion to the light that they can still carry.
-    const float survives = std::min(path.share.maxCoeff(), 0.95f);
+    const float survives = std::min(path.fraction.maxCoeff(), 0.95f);
     if (++bounces >= kMostBounces || sampler.next().x >= survives) return light;
-    path.share /= survives;
-    const Vector3f way = to_eigen(cosine_direction(from_eigen(hit.normal), sampler.next()));
-    path.scatter(hit.normal, way.dot(hit.face) > 0 ? way : reflected(way, hit.face));
+    path.fraction /= survives;
+    const Vector3f outgoing = to_eigen(cosine_direction(from_eigen(hit.normal), sampler.next()));
+    path.scatter(hit.normal, outgoing.dot(hit.face) > 0 ? outgoing : reflected(outgoing, hit.face));
     sharp = false;
     path.cone = 0.5f;
   }

@@ -16,15 +16,15 @@ inline std::size_t index_of(int x, int y, int width) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
 }
 
-/// Share of the light along a ray that a surface of glass mirrors.
-float mirrored_share(const Hit& hit, const Vector3f& direction);
+/// Fraction of the light along a ray that a surface of glass mirrors.
+float mirrored_fraction(const Hit& hit, const Vector3f& direction);
 
 /// Whether rays that enter a piece of glass are scattered at random.
 bool is_rough_glass(const RayMaterial& material);
 
-/// Moves a ray through a surface of glass, which it refracts; returns the share of the light that the colour
-/// leaves. A solid piece takes half of its colour, as a factor, where the ray enters, and half where it
-/// leaves.
+/// Moves a ray through a surface of glass, which it refracts; returns the fraction of the light that the
+/// colour leaves. A solid piece takes half of its colour, as a factor, where the ray enters, and half where
+/// it leaves.
 Vector3f enter(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Vector3f& from,
                Vector3f& direction);
 
@@ -47,46 +47,46 @@ T mirror_density(T a, T nv, T nh) {
 /// Weight of a direction that was found with density a, and could have been found in another way with density
 /// b: the power heuristic (E. Veach, "Robust Monte Carlo Methods", 1997).
 template <class T>
-T share_of_way(T a, T b) {
+T power_heuristic(T a, T b) {
   return a * a / (a * a + b * b + 1e-30f);
 }
 
 struct LightTracer::Path {
   Vector3f from, direction;
   float cone;  ///< angle that the ray stands for [rad]
-  Vector3f share = {1, 1, 1};
-  bool mirrored = false;  ///< so far
-  /// Whether its directions depend on random numbers. If not, what it meets is a part of the picture, however
-  /// bright, and not a dot of noise.
+  Vector3f fraction = {1, 1, 1};
+  bool mirrored = false;  ///< whether mirrors have reflected the path so far
+  /// Whether its directions depend on random numbers. If not, its hits are a part of the picture at any
+  /// brightness, and not dots of noise.
   bool by_chance = false;
   /// Probability density of the direction [1/sr] if the bright part of the sky was sampled, too; else
   /// negative.
   float density = -1;
-  /// Where it left a diffuse surface last, whose light from glowing meshes is also sampled; a normal of zero:
-  /// that of no surface.
+  /// The last point at which it left a diffuse surface, whose light from glowing meshes is also sampled. A
+  /// normal of zero: there was no such surface.
   Vector3f diffuse_place = Vector3f::Zero(), diffuse_normal = Vector3f::Zero();
 
   /// Leaves a diffuse surface.
-  void scatter(const Vector3f& normal, const Vector3f& way) {
+  void scatter(const Vector3f& normal, const Vector3f& outgoing) {
     diffuse_place = from;
     diffuse_normal = normal;
-    direction = way;
+    direction = outgoing;
     by_chance = true;
     density = -1;
   }
-  /// The share of the glow of what is met that is not found by sampling.
-  float share_of_glow(const Hit& hit, const Glow& glow) const {
+  /// The fraction of the glow at a hit that sampling does not find.
+  float fraction_of_glow(const Hit& hit, const Glow& glow) const {
     if (glow.empty() || diffuse_normal.isZero()) return 1;
-    const Vector3f way = (hit.position - diffuse_place).normalized();
-    const float own = std::max(way.dot(diffuse_normal), 1e-3f) / std::numbers::pi_v<float>;
+    const Vector3f outgoing = (hit.position - diffuse_place).normalized();
+    const float own = std::max(outgoing.dot(diffuse_normal), 1e-3f) / std::numbers::pi_v<float>;
     return own / (own + glow.density(diffuse_place, diffuse_normal, hit));
   }
   /// Leaves a surface in a mirrored direction.
-  void turn(const Vector3f& way, const Hit& hit) {
+  void turn(const Vector3f& outgoing, const Hit& hit) {
     mirrored = true;
     density = -1;
     diffuse_normal.setZero();
-    direction = way.dot(hit.face) > 0 ? way : reflected(way, hit.face);
+    direction = outgoing.dot(hit.face) > 0 ? outgoing : reflected(outgoing, hit.face);
     from = off_surface(hit.position, hit.face);
   }
 };

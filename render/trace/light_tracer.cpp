@@ -58,7 +58,7 @@ Lanes lobe_of(Lanes a, Lanes nl, Lanes nv, Lanes nh, Lanes most) {
 
 }  // namespace
 
-/// Limits what was found by chance, and adds all to the sums.
+/// Limits light that was found by chance, and adds all light to the sums.
 Vector3f LightTracer::FoundLight::limited(LightSums& sums) const {
   const Vector3f kept = noisy.cwiseMin(kBrightest);
   const Vector3f luminance(0.2126f, 0.7152f, 0.0722f);
@@ -142,14 +142,14 @@ LightTracer::LightTracer(const RayScene& scene, const LightSources& sources, Sto
 
 Lanes LightTracer::sun_visibility(const LaneVectors& place, IntLanes active,
                                   const SquarePoint<Lanes>& uv) const {
-  Lanes share = active ? Lanes{} + 1 : Lanes{};
+  Lanes fraction = active ? Lanes{} + 1 : Lanes{};
   if (sources_.smoke != nullptr) {
     for (int i = 0; i < kLanes; ++i)
-      if (active[i]) share[i] = std::exp(-sources_.smoke->depth({place.x[i], place.y[i], place.z[i]}));
+      if (active[i]) fraction[i] = std::exp(-sources_.smoke->depth({place.x[i], place.y[i], place.z[i]}));
   }
-  if (!sources_.sun.shadows) return share;
+  if (!sources_.sun.shadows) return fraction;
   const LaneVectors light = scene_.transmittance(place, sun_disc_.direction(uv), Lanes{} + kFar, active);
-  return share * ((light.x + light.y + light.z) * (1.0f / 3));
+  return fraction * ((light.x + light.y + light.z) * (1.0f / 3));
 }
 
 LaneVectors LightTracer::trace_glow(const Points& points, int x, int y, const LightView& view) const {
@@ -210,7 +210,7 @@ LightTracer::LampLight LightTracer::trace_lamps(const Points& points, const Ligh
   for (const RayLamp& lamp : sources_.lamps) {
     const LampPoint<Lanes> point = lamp.point(points.place, sampler.next());
     const Lanes nl = dot(n, point.towards);
-    const IntLanes lit = points.visible & (nl > 0.0f) & (point.share > 0.0f);
+    const IntLanes lit = points.visible & (nl > 0.0f) & (point.fraction > 0.0f);
     if (!any(lit)) continue;
     LaneVectors arriving = point.arriving * (lit ? nl : none);
     if (lamp.def().shadows) {
@@ -223,14 +223,15 @@ LightTracer::LampLight LightTracer::trace_lamps(const Points& points, const Ligh
     const LaneVectors h = normalized(point.towards + to_eye);
     const Lanes wide = 0.5f * lamp.def().radius / larger(point.distance, none + 1e-6f) + 0.002f;
     const Lanes m = 1 - clamped_to(dot(to_eye, h), 0, 1);
-    // A lamp is a single bright point in the mirror; what rays meet, too, has a weight in place of a limit.
+    // A lamp is a single bright point in the mirror; lamps that rays hit therefore also have a weight in
+    // place of a limit.
     const Lanes most = point.density > 0.0f ? none + 1e12f : none + 40;
     const Lanes lobe =
         lobe_of(smaller(larger(rough * rough, wide), none + 1), nl, nv, clamped_to(dot(n, h), 0, 1), most);
     // The traced mirror image has the rest of the weight.
     const Lanes by_mirror = mirror_density(rough * rough, nv, clamped_to(dot(n, h), 0, 1));
     const Lanes weight =
-        (points.mirrors & (point.density > 0.0f)) ? share_of_way(point.density, by_mirror) : none + 1;
+        (points.mirrors & (point.density > 0.0f)) ? power_heuristic(point.density, by_mirror) : none + 1;
     const LaneVectors bright = arriving * (lit ? lobe * weight : none);
     lobes = lobes + bright;
     const Lanes m2 = m * m;
@@ -254,12 +255,12 @@ Vector3f LightTracer::mirrored_light(const Point& point, const LightView& view, 
   const float a = point.roughness * point.roughness;
   const Vector3f facet =
       a < 1e-4f ? point.normal : visible_facet(point.normal, point.view, a, sampler.next());
-  Vector3f way = reflected(-point.view, facet);
-  if (way.dot(point.face) <= 0) way = reflected(way, point.face);
+  Vector3f outgoing = reflected(-point.view, facet);
+  if (outgoing.dot(point.face) <= 0) outgoing = reflected(outgoing, point.face);
   const float nv = std::max(point.normal.dot(point.view), 1e-3f);
-  const float nh = std::clamp(point.normal.dot((way + point.view).normalized()), 0.0f, 1.0f);
+  const float nh = std::clamp(point.normal.dot((outgoing + point.view).normalized()), 0.0f, 1.0f);
   const Path path{.from = point.place,
-                  .direction = way,
+                  .direction = outgoing,
                   .cone = std::max(a, view.pixel_m),
                   .mirrored = true,
                   .by_chance = a >= kSharp,
@@ -267,7 +268,8 @@ Vector3f LightTracer::mirrored_light(const Point& point, const LightView& view, 
   return radiance(path, sampler, &visible).limited(sums);
 }
 
-// Positions and normals of eight pixels, which guide the filter. `size_px`: width of what a value stands for.
+// Positions and normals of eight pixels, which guide the filter. `size_px`: width of the area that a value
+// represents.
 void LightTracer::set_guide(const Points& points, int x, int y, const LightView& view, float size_px,
                             LightGuide& guide) {
   const Lanes none{};
@@ -279,7 +281,7 @@ void LightTracer::set_guide(const Points& points, int x, int y, const LightView&
   store(guide.normal, x, y, points.normal);
 }
 
-// The visible share of the sun at eight pixels.
+// The visible fraction of the sun at eight pixels.
 Lanes LightTracer::sun_at(const Points& points, const SquarePoint<Lanes>& on_sun,
                           const LightView& view) const {
   const LaneVectors to_sun = all_lanes(sources_.sky.sun_direction);
@@ -299,7 +301,7 @@ Lanes LightTracer::sun_at(const Points& points, const SquarePoint<Lanes>& on_sun
   return sun_visibility(place, sunny, on_sun);
 }
 
-// The visible share of the sun at a row of a sparse picture, except in its gaps.
+// The visible fraction of the sun at a row of a sparse picture, except in its gaps.
 void LightTracer::trace_sparse_sun(const SurfaceBuffer& surfaces, int y, const LightView& view,
                                    LightBuffer& light) const {
   LightPlane& sun = light.direct.channels()[0];
@@ -309,8 +311,8 @@ void LightTracer::trace_sparse_sun(const SurfaceBuffer& surfaces, int y, const L
     Sampler<UintLanes> sampler(reinterpret_cast<UintLanes>(columns) >> 1,
                                UintLanes{} + static_cast<uint32_t>(y), view.offsets.index,
                                view.offsets.count);
-    const Lanes shares = sun_at(Points(surfaces, at), sampler.next(), view);
-    for (int i = 0; i < count; ++i) *sun.at(columns[i], y) = shares[i];
+    const Lanes fractions = sun_at(Points(surfaces, at), sampler.next(), view);
+    for (int i = 0; i < count; ++i) *sun.at(columns[i], y) = fractions[i];
     at = IntLanes{} - 1;
     count = 0;
   };
@@ -372,7 +374,7 @@ void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, const
   const int shift = view.sparse ? 1 : 0;  // numbers of samples without those of gaps
   Sampler<UintLanes> samplers((UintLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<uint32_t>(x)) >> shift,
                               UintLanes{} + (static_cast<uint32_t>(y) >> shift), k, view.offsets.count);
-  const LaneVectors ways = cosine_direction(points.normal, samplers.next());
+  const LaneVectors directions = cosine_direction(points.normal, samplers.next());
   LaneVectors around{none, none, none};
   Lanes inverse_distance{};
   for (int i = 0; i < kLanes; ++i) {
@@ -381,11 +383,11 @@ void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, const
     PixelSampler sampler(static_cast<uint32_t>(x + i) >> shift, static_cast<uint32_t>(y) >> shift, k,
                          view.offsets.count);
     sampler.skip(1);
-    Vector3f way(ways.x[i], ways.y[i], ways.z[i]);
-    if (way.dot(point.face) <= 0) way = reflected(way, point.face);
+    Vector3f outgoing(directions.x[i], directions.y[i], directions.z[i]);
+    if (outgoing.dot(point.face) <= 0) outgoing = reflected(outgoing, point.face);
     float met = kFar;
-    Path path{.from = point.place, .direction = way, .cone = 0.5f};
-    path.scatter(point.normal, way);
+    Path path{.from = point.place, .direction = outgoing, .cone = 0.5f};
+    path.scatter(point.normal, outgoing);
     set_lane(around, i, radiance(path, sampler, nullptr, &met).limited(sums));
     inverse_distance[i] = 1 / std::max(met, 8 * view.pixel_m * (point.place - view.eye).norm());
   }
@@ -527,9 +529,9 @@ Vector3f LightTracer::light_through(const Point& point, PixelSampler& sampler, c
   Hit hit;
   if (!scene_.first_hit(path.from, path.direction, kFar, hit)) return sky_seen(path.direction);
   const Vector3f albedo = hit.material->color(hit, 0).head<3>();
-  path.share *= 1 - mirrored_share(hit, path.direction);
+  path.fraction *= 1 - mirrored_fraction(hit, path.direction);
   path.by_chance = is_rough_glass(*hit.material);
-  path.share = path.share.cwiseProduct(enter(hit, albedo, sampler, path.from, path.direction));
+  path.fraction = path.fraction.cwiseProduct(enter(hit, albedo, sampler, path.from, path.direction));
   return radiance(path, sampler, &visible).limited(sums);
 }
 

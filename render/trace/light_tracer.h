@@ -32,7 +32,7 @@ struct LightBuffer {
 
   // Results, rows from the bottom up.
   std::vector<Vector4f>
-      arriving;  ///< light from the sky and other surfaces; w: share of the sun that is visible
+      arriving;  ///< light from the sky and other surfaces; w: fraction of the sun that is visible
   std::vector<Vector4f> mirrored;    ///< light from the mirrored direction; w: 1 where it was computed
   bool has_mirrors = false;          ///< if not, `mirrored` is not up to date
   std::vector<Vector4f> lamps;       ///< diffuse light of lamps; empty: there are none
@@ -50,13 +50,14 @@ struct LightBuffer {
 
 /// Light at the glass surfaces in a part of the picture, rows from the bottom up.
 struct GlassBuffer {
-  std::vector<Vector4f> through;  ///< light that comes through the glass; w: share of the sun that is visible
+  std::vector<Vector4f>
+      through;  ///< light that comes through the glass; w: fraction of the sun that is visible
   std::vector<Vector4f> mirrored;           ///< light from the mirrored direction; w: 1
   std::vector<Vector4f> lamps, highlights;  ///< as in LightBuffer
   LightSums sums;
 };
 
-/// How a picture of the surfaces was taken.
+/// The camera and size of a picture of the surfaces.
 struct LightView {
   Vector3f eye;
   Eigen::Matrix4f clip_from_world;
@@ -75,7 +76,7 @@ class VisibleLight {
   int find(const Hit& hit) const;
   bool has_picture() const { return !picture_.empty(); }
   Vector3f color(int pixel) const { return picture_[static_cast<std::size_t>(pixel)].head<3>(); }
-  /// Light from the sky, other surfaces and lamps; w: share of the sun that is visible.
+  /// Light from the sky, other surfaces and lamps; w: fraction of the sun that is visible.
   Vector4f arriving(int pixel) const;
 
  private:
@@ -106,7 +107,7 @@ class LightTracer {
   /// Light that a path found.
   struct FoundLight {
     Vector3f noisy = Vector3f::Zero();    ///< by random directions
-    Vector3f certain = Vector3f::Zero();  ///< by a way without random directions, or weighted against a lamp
+    Vector3f certain = Vector3f::Zero();  ///< found without random directions, or weighted against a lamp
     Vector3f limited(LightSums& sums) const;
   };
   FoundLight radiance(Path path, PixelSampler& sampler, const VisibleLight* visible = nullptr,

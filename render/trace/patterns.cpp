@@ -15,7 +15,7 @@ namespace offstage::render {
 namespace {
 namespace glsl {
 
-// What the shaders have from other files.
+// Functions that the shaders take from other files.
 using namespace glm;
 inline float saturate(float x) {
   return clamp(x, 0.0f, 1.0f);
@@ -28,7 +28,7 @@ struct Uniforms {
 struct MaterialColors {
   vec4 color, pattern_color, surface;
 };
-/// What the functions of a shader read besides their arguments.
+/// Inputs of a shader's functions besides their arguments.
 struct Inputs {
   Uniforms uniforms;
   MaterialColors material;

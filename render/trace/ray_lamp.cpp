@@ -45,17 +45,17 @@ LampPoint<T> RayLamp::point_of(const Three<T>& place, const SquarePoint<T>& uv) 
     along = {d.x * def_.radius, d.y * def_.radius};
     softening = T{} + 0.25f * def_.radius * def_.radius;
   }
-  const Three<T> way = middle + a * along.x + b * along.y - place;
+  const Three<T> offset = middle + a * along.x + b * along.y - place;
   LampPoint<T> result;
-  result.distance = square_root(dot(way, way));
-  result.towards = way * (1.0f / larger(result.distance, T{} + 1e-12f));
+  result.distance = square_root(dot(offset, offset));
+  result.towards = offset * (1.0f / larger(result.distance, T{} + 1e-12f));
   const T cosine = -dot(result.towards, everywhere(def_.direction));
-  T share = T{} + 1.0f;
-  if (rectangle) share = larger(cosine, T{});
-  if (def_.cone_deg > 0) share = clamped_to(cone_factor_ * cosine + cone_offset_, 0, 1);
-  if (def_.squared_edge) share = share * share;
-  result.share = share / (result.distance * result.distance + softening + 1e-12f);
-  result.arriving = everywhere(def_.intensity) * result.share;
+  T fraction = T{} + 1.0f;
+  if (rectangle) fraction = larger(cosine, T{});
+  if (def_.cone_deg > 0) fraction = clamped_to(cone_factor_ * cosine + cone_offset_, 0, 1);
+  if (def_.squared_edge) fraction = fraction * fraction;
+  result.fraction = fraction / (result.distance * result.distance + softening + 1e-12f);
+  result.arriving = everywhere(def_.intensity) * result.fraction;
   result.density = T{};
   return result;
 }
@@ -76,7 +76,7 @@ LampPoint<Lanes> RayLamp::point(const LaneVectors& place, const SquarePoint<Lane
     set(result.towards, one.towards);
     set(result.arriving, one.arriving);
     result.distance[i] = one.distance;
-    result.share[i] = one.share;
+    result.fraction[i] = one.fraction;
     result.density[i] = one.density;
   }
   return result;

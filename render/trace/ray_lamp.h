@@ -10,10 +10,10 @@ namespace offstage::render {
 /// A point of a lamp as seen from one place, or from eight.
 template <class T>
 struct LampPoint {
-  Three<T> towards;   ///< unit direction from the place to the point
-  T distance;         ///< [m]
-  T share;            ///< share of the lamp's intensity that arrives at a surface there that faces the point
-  Three<T> arriving;  ///< the same times the intensity: radiance of a white surface
+  Three<T> towards;  ///< unit direction from the place to the point
+  T distance;        ///< [m]
+  T fraction;  ///< fraction of the lamp's intensity that arrives at a surface there that faces the point
+  Three<T> arriving;  ///< the fraction times the intensity: radiance of a white surface
   T density;  ///< probability density of the direction, if rays meet the lamp, too; otherwise 0 [1/sr]
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-/// Private: materials as light rays see them. Primary surfaces are shaded by the shaders; what a ray meets
-/// after them is shaded with the values from here.
+/// Private: materials as light rays see them. Primary surfaces are shaded by the shaders; later hits of a ray
+/// are shaded with the values from here.
 
 #include <memory>
 #include <span>
@@ -17,19 +17,19 @@ class RayMaterial {
   explicit RayMaterial(const Material& material, std::span<const Image> textures);
 
   float metallic = 0, roughness = 0.5f;
-  float transmission = 0;  ///< share of the light that is refracted
+  float transmission = 0;  ///< fraction of the light that is refracted
   float refraction = 1.5f;
   float translucency = 0;  ///< cloth: fraction of the scattered light that leaves on the other side
   bool thin = false, unlit = false, vertex_colors = false;
 
-  /// Colour and opacity at a point. `footprint`: width of what is averaged [m].
+  /// Colour and opacity at a point. `footprint`: width of the averaged area [m].
   Vector4f color(const Hit& hit, float footprint) const;
   /// Radiance that the surface itself emits, and its mean.
   Vector3f emission_at(const Vector2f& uv) const;
   const Vector3f& mean_emission() const { return mean_emission_; }
   /// Whether no light passes anywhere.
   bool is_opaque() const { return opaque_; }
-  /// Share of the light that passes through the surface along a shadow ray.
+  /// Fraction of the light that passes through the surface along a shadow ray.
   Vector3f transmittance(const Hit& hit, const Vector3f& direction) const;
 
  private:

@@ -174,9 +174,9 @@ struct RayScene::Object {
   std::size_t stride = 0;
   float softness = -1;  ///< of sprites; negative: not sprites
 
-  /// Share of the light that passes a sprite along a ray; `behind`: distance of the far side of its ball.
+  /// Fraction of the light that passes a sprite along a ray; `behind`: distance of the far side of its ball.
   float transmittance(unsigned sprite, const Vector3f& from, const Vector3f& direction, float& behind) const;
-  /// Where a ray meets a triangle of a mesh, on the surface that the smooth normals suggest.
+  /// The point at which a ray hits a triangle of a mesh, on the surface that the smooth normals suggest.
   Vector3f smoothed(unsigned triangle, const Vector3f& from, const Vector3f& direction) const;
   void describe(unsigned triangle, const Vector3f& from, const Vector3f& direction, Hit& hit) const;
 
@@ -365,7 +365,7 @@ float RayScene::Object::transmittance(unsigned sprite, const Vector3f& from, con
   return 1 - opacity * (1 - x * x * (3 - 2 * x));
 }
 
-const RayScene::Object* RayScene::meet(RTCRayHit& ray) const {
+const RayScene::Object* RayScene::first_object(RTCRayHit& ray) const {
   ray.hit.geomID = ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   embree::intersect(tree_.get(), ray);
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return nullptr;
@@ -375,7 +375,7 @@ const RayScene::Object* RayScene::meet(RTCRayHit& ray) const {
 bool RayScene::first_hit(const Vector3f& from, const Vector3f& direction, float length, Hit& hit) const {
   RTCRayHit ray;
   set_ray(ray.ray, from, direction, length, kAll);
-  const Object* object = meet(ray);
+  const Object* object = first_object(ray);
   if (object == nullptr) return false;
   hit = {};
   hit.object = static_cast<unsigned>(object - objects_.data());
@@ -385,13 +385,13 @@ bool RayScene::first_hit(const Vector3f& from, const Vector3f& direction, float 
 }
 
 Vector3f RayScene::smooth_place(const Vector3f& eye, const Vector3f& place) const {
-  const Vector3f way = place - eye;
-  const float length = way.norm();
+  const Vector3f offset = place - eye;
+  const float length = offset.norm();
   RTCRayHit ray;
-  set_ray(ray.ray, eye, way / length, 1.001f * length, kAll);
-  const Object* object = meet(ray);
+  set_ray(ray.ray, eye, offset / length, 1.001f * length, kAll);
+  const Object* object = first_object(ray);
   if (object == nullptr || object->mesh == nullptr || ray.ray.tfar < 0.999f * length) return place;
-  return object->smoothed(ray.hit.primID, eye, way / length);
+  return object->smoothed(ray.hit.primID, eye, offset / length);
 }
 
 Vector3f RayScene::transmittance(const Vector3f& from, const Vector3f& direction, float length) const {
@@ -437,43 +437,43 @@ LaneVectors RayScene::transmittance(const LaneVectors& from, const LaneVectors& 
   const Lanes none{};
   const IntLanes free = active & ~blocked(tree_.get(), from, direction, length, active, kOpaqueCaster);
   const Lanes open = free ? none + 1 : none;
-  LaneVectors share{open, open, open};
-  if (!has_translucent_) return share;
+  LaneVectors fraction{open, open, open};
+  if (!has_translucent_) return fraction;
   const IntLanes dimmed = blocked(tree_.get(), from, direction, length, free, kTranslucentCaster | kSprite);
   for (int i = 0; i < kLanes; ++i) {
     if (!dimmed[i]) continue;
     const Vector3f one = through_translucent({from.x[i], from.y[i], from.z[i]},
                                              {direction.x[i], direction.y[i], direction.z[i]}, length[i]);
-    share.x[i] = one.x();
-    share.y[i] = one.y();
-    share.z[i] = one.z();
+    fraction.x[i] = one.x();
+    fraction.y[i] = one.y();
+    fraction.z[i] = one.z();
   }
-  return share;
+  return fraction;
 }
 
 Vector3f RayScene::through_translucent(const Vector3f& from, const Vector3f& direction, float length) const {
-  Vector3f share = Vector3f::Ones(), place = from;
+  Vector3f fraction = Vector3f::Ones(), place = from;
   for (int layer = 0; has_translucent_ && layer < kMostPassed && length > 0; ++layer) {
     RTCRayHit hit_ray;
     set_ray(hit_ray.ray, place, direction, length, kTranslucentCaster | kSprite);
-    const Object* object = meet(hit_ray);
+    const Object* object = first_object(hit_ray);
     if (object == nullptr) break;
-    float way = 0;
+    float advance = 0;
     if (object->softness >= 0) {
-      share *= object->transmittance(hit_ray.hit.primID, place, direction, way);
-      way = std::max(way, 0.0f) + 1e-6f * place.cwiseAbs().maxCoeff() + 1e-7f;
-      place += way * direction;
+      fraction *= object->transmittance(hit_ray.hit.primID, place, direction, advance);
+      advance = std::max(advance, 0.0f) + 1e-6f * place.cwiseAbs().maxCoeff() + 1e-7f;
+      place += advance * direction;
     } else {
       Hit hit;
       object->describe(hit_ray.hit.primID, place, direction, hit);
-      share = share.cwiseProduct(hit.material->transmittance(hit, direction));
-      way = std::max(hit.distance, 0.0f);
+      fraction = fraction.cwiseProduct(hit.material->transmittance(hit, direction));
+      advance = std::max(hit.distance, 0.0f);
       place = off_surface(hit.position, -hit.face);
     }
-    if (share.maxCoeff() < 1e-3f) return Vector3f::Zero();
-    length -= way;
+    if (fraction.maxCoeff() < 1e-3f) return Vector3f::Zero();
+    length -= advance;
   }
-  return share;
+  return fraction;
 }
 
 }  // namespace offstage::render

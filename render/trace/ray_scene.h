@@ -33,7 +33,7 @@ std::string ray_library();
 /// A mesh with its hierarchy, which is built on first use.
 class RayMesh {
  public:
-  /// Copies what rays need. `normals`: as many as positions.
+  /// Copies the data that rays need. `normals`: as many as positions.
   RayMesh(const Mesh& mesh, const std::vector<Vector3f>& normals);
   RTCSceneTy* tree() const;
   /// Corners of a triangle in the world.
@@ -58,7 +58,7 @@ class RayMesh {
   mutable std::vector<float> area_up_to_;  ///< sums over the triangles; computed on first use
 };
 
-/// What a ray meets first.
+/// The first hit of a ray.
 struct Hit {
   float distance = 0;  ///< along the ray [m]
   Vector3f position = Vector3f::Zero();
@@ -101,7 +101,7 @@ class RayScene {
   void build();
 
   bool empty() const { return objects_.empty(); }
-  /// Share of the light that arrives along a segment: 0 behind an opaque object, and the product of the
+  /// Fraction of the light that arrives along a segment: 0 behind an opaque object, and the product of the
   /// transmittances of translucent ones. `direction` is a unit vector.
   Vector3f transmittance(const Vector3f& from, const Vector3f& direction, float length) const;
   /// The same for the segments whose `active` is -1; the others get 0.
@@ -115,7 +115,7 @@ class RayScene {
 
  private:
   struct Object;
-  const Object* meet(RTCRayHit& ray) const;
+  const Object* first_object(RTCRayHit& ray) const;
   Vector3f through_translucent(const Vector3f& from, const Vector3f& direction, float length) const;
   unsigned attach(RTCGeometryTy* geometry, Object object, bool casts_shadow);
 

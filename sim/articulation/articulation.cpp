@@ -375,7 +375,7 @@ void Articulation::place(Real time, bool at_start) {
   system_.factorize(rows_, mobility_);
 }
 
-void Articulation::place_within(Real time, Real duration, Real share, Real substep) {
+void Articulation::place_within(Real time, Real duration, Real fraction, Real substep) {
   read_bodies();
   start_motion_.resize(bodies_.size());
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
@@ -384,7 +384,7 @@ void Articulation::place_within(Real time, Real duration, Real share, Real subst
     mobility_[i] = mobility_of(bodies_[i]->rigid, acting.toRotationMatrix());
   }
   end_motion_ = motion_;
-  before_ = (1 - share) * duration;
+  before_ = (1 - fraction) * duration;
   for (LinkMotion& m : motion_) {
     m.position -= before_ * m.velocity;
     m.axes = rotation(m.angular_velocity, -before_).toRotationMatrix() * m.axes;

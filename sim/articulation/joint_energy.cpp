@@ -98,12 +98,12 @@ Real internal_energy(const Articulation& articulation) {
   return sum;
 }
 
-void slow_down(const Articulation& articulation, Real share) {
+void slow_down(const Articulation& articulation, Real fraction) {
   const CommonMotion common = frame_of(articulation);
   for (Body* body : articulation.bodies()) {
     RigidBody& r = body->rigid;
     const Vec3 v = common.velocity_at(r.position), w = common.angular_velocity;
-    r.set_velocity(v + share * (r.velocity() - v), w + share * (r.angular_velocity() - w));
+    r.set_velocity(v + fraction * (r.velocity() - v), w + fraction * (r.angular_velocity() - w));
   }
 }
 

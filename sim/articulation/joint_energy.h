@@ -30,9 +30,9 @@ bool has_kinematic_end(const Articulation& articulation);
 /// Kinetic energy of the links relative to their common motion; if the articulation is held, all kinetic
 /// energy [J].
 Real internal_energy(const Articulation& articulation);
-/// Multiplies the velocities relative to the common motion by a share, 0 to 1. The result still satisfies the
-/// constraints, and an articulation that is not held keeps its momentum and angular momentum.
-void slow_down(const Articulation& articulation, Real share);
+/// Multiplies the velocities relative to the common motion by a fraction, 0 to 1. The result still satisfies
+/// the constraints, and an articulation that is not held keeps its momentum and angular momentum.
+void slow_down(const Articulation& articulation, Real fraction);
 /// Rotates the velocities of all bodies together to restore the angular momentum of `before`, after
 /// corrections have displaced the bodies.
 void keep_angular_momentum(std::span<Body* const> bodies, const CommonMotion& before);

@@ -8,7 +8,7 @@ namespace offstage::sim {
 namespace {
 
 constexpr Real kInfinite = std::numeric_limits<Real>::infinity();
-/// Share of the violation of a limit that a step removes, and the greatest speed of the removal [rad/s],
+/// Fraction of the violation of a limit that a step removes, and the greatest speed of the removal [rad/s],
 /// [m/s].
 constexpr Real kPushOut = 0.2, kFastestPush = 2;
 /// A limit within kNear of the coordinate has a row; limits within kReached take part in collisions [rad],
@@ -66,7 +66,7 @@ class RowMaker {
     const auto look = [&](const Direction& row, Real lower, Real upper) {
       if (lower == upper) return;
       for (const auto& [limit, side] : {std::pair(lower, 1), std::pair(upper, -1)})
-        if (const auto at = stop(row, limit, side)) first = std::min(first.value_or(1), at->share);
+        if (const auto at = stop(row, limit, side)) first = std::min(first.value_or(1), at->fraction);
     };
     if (def_.has_free_coordinate()) look(free(), def_.lower, def_.upper);
     if (def_.swing < kInfinite) look(swing(), least_swing(), def_.swing);
@@ -145,8 +145,8 @@ class RowMaker {
 
   /// The impact at a limit that the free motion reaches in this interval.
   struct Stop {
-    Real share;   ///< share of the interval before it
-    Real target;  ///< speed away from the limit at the interval's end
+    Real fraction;  ///< fraction of the interval before it
+    Real target;    ///< speed away from the limit at the interval's end
   };
   /// The speed with which the coordinate reaches the limit is reversed, and the acceleration of the free
   /// motion acts in the rest of the interval; a joint without restitution stays at its limit. `side` is 1 for
@@ -154,12 +154,12 @@ class RowMaker {
   std::optional<Stop> stop(const Direction& row, Real limit, int side) const {
     const Real gap = side * (row.start.error - limit), left = side * (row.end.error - limit);
     if (!(left < 0) || gap < 0) return std::nullopt;
-    const Real before = side * speed_at_start(row), after = side * speed(row), share = gap / (gap - left);
-    const Real impact = before + share * (after - before);
+    const Real before = side * speed_at_start(row), after = side * speed(row), fraction = gap / (gap - left);
+    const Real impact = before + fraction * (after - before);
     const Real restitution = impact < -JointDef::kBounceSpeed ? def_.restitution : 0;
     // A joint that rests at its limit approaches it by as much as the forces of an interval make it.
     if (restitution == 0 && !(impact < -std::max(kClosing, std::abs(after - before)))) return std::nullopt;
-    return Stop{share, std::max(0.0, (1 - share) * (after - before) - restitution * impact)};
+    return Stop{fraction, std::max(0.0, (1 - fraction) * (after - before) - restitution * impact)};
   }
 
   bool add_stop_within(const Direction& row, std::size_t slot, Real limit, int side) {
@@ -169,7 +169,7 @@ class RowMaker {
     r.lower = side > 0 ? 0 : -kInfinite;
     r.upper = side > 0 ? kInfinite : 0;
     r.target = side * at->target;
-    r.from = at->share;
+    r.from = at->fraction;
     add(r, slot, false);
     return true;
   }

@@ -19,8 +19,8 @@ struct BoundedOrigin {
   bool closes;
 };
 
-/// The share of an interval that ends at `time` after which the free motion of an articulation first reaches
-/// a limit, after its place_within(); none if it reaches no limit.
+/// The fraction of an interval that ends at `time` after which the free motion of an articulation first
+/// reaches a limit, after its place_within(); none if it reaches no limit.
 std::optional<Real> first_stop(const Articulation& articulation, Real duration, Real time);
 
 /// Appends the bounded rows of an articulation, after its place_within(), for an interval that ends at

@@ -28,8 +28,8 @@ struct BoundedRow {
   Real softness = 0;          ///< [1/kg] or [1/(kg m^2)], >= 0
   Real lower = 0, upper = 0;  ///< bounds of the impulse [N s] or [N m s]
   Real impulse = 0;           ///< in: a guess; out: the solution
-  // For the fast solver: the share of the interval after which the row acts, and how much greater `offset` is
-  // at the interval's start, decreasing linearly [m/s] or [rad/s].
+  // For the fast solver: the fraction of the interval after which the row acts, and how much greater `offset`
+  // is at the interval's start, decreasing linearly [m/s] or [rad/s].
   Real from = 0, turning = 0;
 };
 

@@ -145,9 +145,9 @@ JointRow coupling_row(const JointDef& def, const JointPlace& p, Real length) {
 /// Length of the rope of a pulley from its fixed point to a body's anchor: the part of the row on this body.
 Real add_strand(const LinkMotion& link, const Vec3& arm, const Vec3& from, Real factor, Vec6& on,
                 JointRow& row) {
-  const Vec3 way = link.position + arm - from;
-  const Real length = way.norm();
-  const Vec3 n = length > 0 ? Vec3(way / length) : Vec3(-Vec3::UnitY());
+  const Vec3 offset = link.position + arm - from;
+  const Real length = offset.norm();
+  const Vec3 n = length > 0 ? Vec3(offset / length) : Vec3(-Vec3::UnitY());
   const Vec3 turning = link.angular_velocity.cross(arm), rate = link.velocity + turning;
   const Real across = rate.squaredNorm() - std::pow(n.dot(rate), 2);
   on = factor * concatenate(n, arm.cross(n));

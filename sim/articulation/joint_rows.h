@@ -36,7 +36,7 @@ struct JointFrame {
   Mat3 axes = Mat3::Identity();
 };
 
-/// Both ends of a joint at a time.
+/// State of both ends of a joint at one time.
 struct JointPlace {
   JointPlace(const LinkMotion& a, const JointFrame& on_a, const LinkMotion& b, const JointFrame& on_b);
 

@@ -7,10 +7,10 @@ namespace {
 
 /// Links with more joints than this get rows of their own.
 constexpr uint32_t kFewJoints = 3;
-/// Share of the diagonal that is added if the matrix is not plain; kMore times that if it is not enough. At
-/// the stages of an integrator loops are not closed exactly, and dependent constraints contradict each other
-/// by about the square of the gap. The added share must be larger than this, or their impulses would grow
-/// against each other.
+/// Fraction of the diagonal that is added if the matrix is not plain; kMore times that if it is not enough.
+/// At the stages of an integrator loops are not closed exactly, and dependent constraints contradict each
+/// other by about the square of the gap. The added fraction must be larger than this, or their impulses would
+/// grow against each other.
 constexpr Real kRegularization = 1e-6, kMore = 100;
 constexpr int kAttempts = 3, kRefinements = 8;
 /// Refinement ends at a residual of kExact times the requested change; a step is at most kLongest times the
@@ -127,12 +127,12 @@ bool JointSystem::factorize(Matrix<N>& m) {
   needs_refinement_ = !is_plain();
   if (!needs_refinement_ && m.factor.factorize(m.diagonal, m.off)) return true;
   needs_refinement_ = true;
-  Real share = kRegularization;
-  for (int attempt = 0; attempt < kAttempts; ++attempt, share *= kMore) {
+  Real fraction = kRegularization;
+  for (int attempt = 0; attempt < kAttempts; ++attempt, fraction *= kMore) {
     for (std::size_t j = 0; j < joints_.size(); ++j) {
-      m.diagonal[j].diagonal() *= 1 + share;
-      // Between hubs the block is empty; its share is that of the block without rows for hubs.
-      if (kinds_[j].is_empty) m.diagonal[j].diagonal() += share * own_diagonal<N>(j);
+      m.diagonal[j].diagonal() *= 1 + fraction;
+      // Between hubs the block is empty; its fraction is that of the block without rows for hubs.
+      if (kinds_[j].is_empty) m.diagonal[j].diagonal() += fraction * own_diagonal<N>(j);
     }
     if (m.factor.factorize(m.diagonal, m.off)) return true;
   }

@@ -2,7 +2,7 @@
 /// The linear system of an articulation's joints (physics A1). With M the masses of its links and J its
 /// constraints, A = J M^-1 J^T has a block row for each joint and couples joints that share a link. A link
 /// with many joints would couple all of them; it gets a row of its own instead, so that any tree costs O(n).
-/// If joints form loops, rows may be linearly dependent. A small share of the diagonal is then added, and
+/// If joints form loops, rows may be linearly dependent. A small fraction of the diagonal is then added, and
 /// conjugate gradients remove the error that this causes.
 
 #include <array>

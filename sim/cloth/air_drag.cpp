@@ -7,11 +7,12 @@
 namespace offstage::sim {
 namespace {
 
-/// Product of the rate at which the air changes velocities and the time for which a linearisation holds.
+/// Greatest product of the rate at which the air changes velocities and the time for which a linearisation is
+/// kept.
 constexpr Real kMostChange = 0.1;
-/// The longest time for which one holds: normals turn [s].
+/// Longest time for which a linearisation is kept, because normals turn [s].
 constexpr Real kLongestHold = 1.0 / 240;
-/// Triangles meet at a point of a regular mesh.
+/// Number of triangles at a point of a regular mesh.
 constexpr Real kValence = 6;
 
 }  // namespace
@@ -53,9 +54,9 @@ void AirDrag::renew(ClothPoints& points, Real dt, uint32_t substeps, uint32_t st
   const uint32_t held = std::min(substeps, substeps_until_change(points, dt));
   left_ = held - 1;
   span_ = held * dt;
-  // N implicit steps of a linear force -J v let v fall by J t (1 - share J t (N + 1) / 2N): of second order
-  // with this share of J.
-  share_ = static_cast<Real>(held) * steps / (static_cast<Real>(held) * steps + 1);
+  // N implicit steps of a linear force -J v let v fall by J t (1 - fraction J t (N + 1) / 2N): of second
+  // order with this fraction of J.
+  fraction_ = static_cast<Real>(held) * steps / (static_cast<Real>(held) * steps + 1);
   for (std::size_t k = first_; k < first_ + n; ++k) points.acceleration[k] = points.outer[k];
   const ClothDef& def = cloth_->def;
   const bool blows = def.air.density > 0 && (def.air.drag > 0 || def.ram_pressure > 0);
@@ -88,15 +89,15 @@ void AirDrag::drag_points(ClothPoints& points) {
   for (std::size_t i = 0; i < from_.size(); ++i) {
     const Real rate = points.field_drag[first_ + i];
     points.acceleration[first_ + i] -= rate * from_[i];
-    resistance_[i].topRows<3>().diagonal().setConstant(share_ * rate);
+    resistance_[i].topRows<3>().diagonal().setConstant(fraction_ * rate);
   }
 }
 
-/// F = c |u| D u with D = (C_D - C_L) 1 + C_L n n^T, a third to each corner. Its derivative is
-/// c (|u| D + D u u^T / |u|); with D u u^T D / u.D u in place of D u u^T it is symmetric, and exact for air
-/// along the normal and along the cloth. The implicit share of the first term is raised where air stops the
-/// triangle within the time of the linearisation, so that nothing is thrown back. Together they are the exact
-/// c |u| D of u / (1 + k u t) along u then as well.
+/// F = c |u| D u with D = (C_D - C_L) 1 + C_L n n^T, a third to each corner. Its derivative is c (|u| D + D u
+/// u^T / |u|); with D u u^T D / u.D u in place of D u u^T it is symmetric, and exact for air along the normal
+/// and along the cloth. The implicit fraction of the first term is raised where air stops the triangle within
+/// the time of the linearisation, so that nothing is thrown back. Together they are the exact c |u| D of u /
+/// (1 + k u t) along u then as well.
 void AirDrag::drag_triangles(ClothPoints& points) {
   const ClothAir& air = cloth_->def.air;
   const Vec4* const x = points.position.data();
@@ -114,8 +115,8 @@ void AirDrag::drag_triangles(ClothPoints& points) {
     const Vec4 along = (air.drag - air.lift) * u + air.lift * u.dot(n) * n;
     const Real braked =
         kValence * span_ * scale * air.drag / (points.mass[i] + points.mass[j] + points.mass[k]);
-    const Real even = braked > 1 ? std::max(share_, 1 - 1 / braked) : share_;
-    const Real power = u.dot(along), rank = power > 0 ? (2 * share_ - even) / power : 0;
+    const Real even = braked > 1 ? std::max(fraction_, 1 - 1 / braked) : fraction_;
+    const Real power = u.dot(along), rank = power > 0 ? (2 * fraction_ - even) / power : 0;
     const Vec4 by_normal = even * air.lift * n, by_along = rank * along;
     std::array<Vec4, 3> slope;  // columns
     for (int c = 0; c < 3; ++c) slope[static_cast<std::size_t>(c)] = n[c] * by_normal + along[c] * by_along;
@@ -129,10 +130,10 @@ void AirDrag::drag_triangles(ClothPoints& points) {
   }
 }
 
-/// An open cloth that faces the air stops what comes in at its mouth: inside of it the pressure of stagnation
-/// builds up, everywhere the same. A fan over its border would close the surface, whose area vectors then
-/// add up to zero: that of the mouth is the opposite of the cloth's. The pressure follows the mean velocity;
-/// each corner has the part of its slope that belongs to its area.
+/// An open cloth that faces the air stops the air that enters its mouth. Inside, the stagnation pressure
+/// builds up, everywhere the same. A fan over its border would close the surface, whose area vectors then add
+/// up to zero: the area vector of the mouth is the opposite of the cloth's. The pressure follows the mean
+/// velocity; each corner has the part of its slope that belongs to its area.
 void AirDrag::catch_air(ClothPoints& points) {
   const ClothDef& def = cloth_->def;
   Vec3 cap = Vec3::Zero();
@@ -157,7 +158,7 @@ void AirDrag::catch_air(ClothPoints& points) {
   const Real speed = m.dot(stream.head<3>()) / mass;
   if (!(speed > 0)) return;
   const Real slope = def.ram_pressure * def.air.density / 2 * speed, pressure = slope * speed;
-  const Mat3 along = 2 * share_ * slope * mouth / total * m * m.transpose();
+  const Mat3 along = 2 * fraction_ * slope * mouth / total * m * m.transpose();
   for (const Triangle& t : cloth_->triangles) {
     const Vec3 area = area_of(t);
     for (const uint32_t corner : t) {

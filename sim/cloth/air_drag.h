@@ -23,18 +23,18 @@ class AirDrag {
   /// accelerations of the points to those by outer forces and by air at their present velocities. `substeps`
   /// of the world's sub-step are left, each with `steps` steps of the integrator.
   void renew(ClothPoints& points, Real dt, uint32_t substeps, uint32_t steps);
-  /// Whether the velocities have no influence.
+  /// Returns whether the velocities have no influence.
   bool empty() const { return !is_active_; }
 
   /// To be called before steps of length h.
   void begin(Real h);
-  /// Change of the acceleration of the cloth's point i, because its velocity is v now.
+  /// Returns the change of the acceleration of the cloth's point i if its velocity is v.
   Vec4 change(std::size_t i, const Vec4& v) const { return -times(resistance_[i], v - from_[i]); }
-  /// What drag leaves of a change of velocity in a step: (1 + h R)^-1 dv.
+  /// Returns the part of a change of velocity dv that remains after the drag of a step, (1 + h R)^-1 dv.
   Vec4 respond(std::size_t i, const Vec4& dv) const { return times(response_[i], dv); }
-  /// R: by how much the acceleration decreases with the velocity [1/s].
+  /// Returns R, the decrease of the acceleration per velocity [1/s].
   Mat3 resistance(std::size_t i) const { return resistance_[i].topRows<3>(); }
-  /// Velocity at which the acceleration of the points holds.
+  /// Returns the velocity for which the accelerations of the points were computed.
   const Vec4& from(std::size_t i) const { return from_[i]; }
 
  private:
@@ -50,10 +50,10 @@ class AirDrag {
 
   const Cloth* cloth_ = nullptr;
   std::size_t first_ = 0;
-  Real lightness_ = 0;  // greatest area per mass of a point [m^2/kg]
-  uint32_t left_ = 0;   // sub-steps for which the linearisation still holds
-  Real span_ = 0;       // time for which it holds in all [s]
-  Real share_ = 0.5;    // of the linear part that is implicit
+  Real lightness_ = 0;   // greatest area per mass of a point [m^2/kg]
+  uint32_t left_ = 0;    // number of sub-steps for which the linearisation is still kept
+  Real span_ = 0;        // total time for which it is kept [s]
+  Real fraction_ = 0.5;  // fraction of the linear part that is implicit
   bool is_active_ = false;
   std::vector<Columns> resistance_, response_;
   std::vector<Vec4> from_;

@@ -6,13 +6,14 @@
 namespace offstage::sim {
 namespace {
 
-/// Places from this share of the limit on may be bent too far by the impulses of others.
+/// The impulses of other places may bend a place too far if it is above this fraction of the limit.
 constexpr Real kNearBendLimit = 0.8;
-/// Of the limit: sweeps end when none changes a curvature by more than this, or after so many.
+/// Sweeps end when none changes a curvature by more than this fraction of the limit, or after this number of
+/// sweeps.
 constexpr Real kBendTolerance = 1e-4;
 constexpr int kMaxBendSweeps = 60;
-/// Share of its excess that a place keeps if it began the sub-step with it: springs, which the limit does not
-/// know, would take back a sudden correction in the next sub-step, and the cloth would buzz.
+/// Fraction of its excess that a place keeps if it began the sub-step with it: springs, which the limit does
+/// not consider, would undo a sudden correction in the next sub-step, and the cloth would vibrate.
 constexpr Real kKeepsOfExcess = 0.5;
 
 }  // namespace
@@ -37,7 +38,7 @@ Real BendLimit::greatest(const ClothPoints& points) const {
   return radius_ * curvature;
 }
 
-/// The places near their limit; whether any is beyond it.
+/// Collects the places near their limit; returns whether any is beyond it.
 bool BendLimit::find_rows(const ClothPoints& points) {
   rows_.clear();
   gradient_.clear();
@@ -73,7 +74,7 @@ void BendLimit::push(const ClothPoints& points, const Row& row, Real impulse) {
   }
 }
 
-/// Begins with the impulses of the last sub-step.
+/// Applies the impulses of the last sub-step as the initial guess.
 void BendLimit::solve(const ClothPoints& points) {
   move_.assign(count_, Vec4::Zero());
   for (const Row& row : rows_)
@@ -95,8 +96,8 @@ void BendLimit::solve(const ClothPoints& points) {
   }
 }
 
-/// Moves the points by the impulses. Velocities change by the greatest share of them that adds no kinetic
-/// energy: a place that was bent too far before is bent back without a speed.
+/// Moves the points by the impulses. Velocities change by the greatest fraction of them that adds no kinetic
+/// energy: a place that was bent too far before gets no velocity from its correction.
 void BendLimit::apply(ClothPoints& points, Real dt, std::span<const Vec4> kick,
                       std::vector<VelocityCut>& cuts) {
   std::vector<Vec4> cut(count_, Vec4::Zero());
@@ -110,15 +111,15 @@ void BendLimit::apply(ClothPoints& points, Real dt, std::span<const Vec4> kick,
     work += impulse.dot(points.position[k] - points.start[k] + dt * kick[k] - cut[i]);
     if (!is_held) inertial += impulse.dot(move_[i]);
   }
-  const Real share = inertial > 0 ? std::clamp(-2 * work / inertial, 0.0, 1.0) : 1;
+  const Real fraction = inertial > 0 ? std::clamp(-2 * work / inertial, 0.0, 1.0) : 1;
   for (std::size_t i = 0; i < count_; ++i) {
     const auto k = static_cast<uint32_t>(first_ + i);
     if (points.inverse_mass[k] == 0) {
-      points.pull[k] += share * move_[i];
+      points.pin_impulse[k] += fraction * move_[i];
       continue;
     }
     points.position[k] += move_[i];
-    if (share < 1 && !move_[i].isZero(0)) cuts.push_back({k, (1 - share) * move_[i]});
+    if (fraction < 1 && !move_[i].isZero(0)) cuts.push_back({k, (1 - fraction) * move_[i]});
   }
 }
 

@@ -23,14 +23,14 @@ namespace offstage::sim {
 
 class BendLimit {
  public:
-  /// Of the cloth with this number, which has `count` points from `first` on. `bending` must stay valid and
+  /// For the cloth with this number, which has `count` points from `first` on. `bending` must stay valid and
   /// measure the curvature. `radius` > 0 [m].
   BendLimit(uint32_t cloth, std::size_t first, std::size_t count, const ClothBending& bending, Real radius)
       : cloth_(cloth), first_(first), count_(count), bending_(&bending), radius_(radius) {}
   uint32_t cloth() const { return cloth_; }
 
   /// Bends back all places that are bent too far at the end of a sub-step of length dt. Returns whether there
-  /// were any. The impulses on held points are added to their `pull`. `kick` is the velocity of points
+  /// were any. The impulses on held points are added to their `pin_impulse`. `kick` is the velocity of points
   /// besides that of their moves; the part of the moves that must not count as velocity is appended to
   /// `cuts`.
   bool project(ClothPoints& points, Real dt, std::span<const Vec4> kick, std::vector<VelocityCut>& cuts);
@@ -43,7 +43,7 @@ class BendLimit {
   struct Row {
     std::size_t patch;
     std::size_t first, end;  // in gradient_
-    Real excess;             // of the curvature times the radius: what is to be taken back
+    Real excess;             // excess of the curvature times the radius, which is to be removed
     Real compliance;         // of the curvature times the radius, for an impulse of this row alone [1/kg]
     Real impulse = 0;        // [kg m], >= 0
   };

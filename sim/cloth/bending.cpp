@@ -15,18 +15,18 @@ namespace {
 /// Greatest weight of a gradient times the size of the fan: beyond it, its points lie so near to a conic that
 /// they do not determine a quadratic polynomial.
 constexpr Real kLargestWeight = 4;
-/// Of the second derivatives by the jumps of gradients against those by recovered gradients: holds what the
-/// latter do not see, which alternates from point to point.
-constexpr Real kJumpShare = 0.05;
-/// Of a rough patch over the curvature that it counts as: hinges on a smooth surface, beside a border or a
-/// crease, can differ from it by as much as its curvature.
-const Real kRoughCounts = 2 * std::sqrt(kJumpShare);
+/// Weight of the second derivatives by the jumps of gradients, relative to those by recovered gradients. The
+/// former resist shapes that alternate from point to point, which the latter miss.
+constexpr Real kJumpFraction = 0.05;
+/// Curvature of a patch by jumps over the curvature that it counts as. Beside a border or a crease of a
+/// smooth surface, the two can differ by as much as the curvature itself.
+const Real kRoughCounts = 2 * std::sqrt(kJumpFraction);
 constexpr int kFilterIterations = 80;
-/// Of a step squared times the square of the fastest frequency: from here on conjugate gradients take so many
-/// iterations that a factorisation is faster, up to a number of points.
+/// If the square of the step times the fastest frequency is above this, conjugate gradients take so many
+/// iterations that a factorisation is faster, up to this number of points.
 constexpr Real kManyIterations = 20;
 constexpr std::size_t kMostFactorized = 30000;
-/// Of the residual against the right side, squared.
+/// Square of the accepted residual over the right side.
 constexpr Real kFilterTolerance2 = 1e-14;
 /// Curvature times size below which a triangle is flat at rest.
 constexpr Real kFlatAtRest = 1e-7;
@@ -152,7 +152,7 @@ struct Recovered {
   GradientWeights weights;
 };
 
-/// The weights of points in the gradient at the first of the quadratic polynomial nearest to all; none if
+/// The weights of points in the gradient at the first of the quadratic polynomial nearest to all; empty if
 /// they do not determine one.
 std::optional<GradientWeights> polynomial_gradient(std::span<const FlatPoint> points) {
   if (points.size() < 6) return {};
@@ -247,7 +247,7 @@ HessianWeights jump_hessian(const Unfolding& unfolding, const FlatTriangle& own,
     const Vec2 edge = own.corners[(k + 1) % 3] - own.corners[k], outward(edge.y(), -edge.x());
     GradientWeights jump;
     const FlatTriangle other = unfolding.unfold(u, own, k);
-    // The other side may be wound the other way.
+    // The triangle on the other side may have the opposite winding.
     add_gradient(triangles[u], other.corners, 1 / doubled, jump);
     add_gradient(triangles[own.triangle], own.corners, -1 / doubled, jump);
     for (const auto& [point, w] : jump) add_outer_product(outward, w, point, weights);
@@ -255,7 +255,7 @@ HessianWeights jump_hessian(const Unfolding& unfolding, const FlatTriangle& own,
   return weights;
 }
 
-/// The two patches of a triangle: of recovered gradients, and of what these do not see.
+/// The two patches of a triangle: by recovered gradients, and by jumps of gradients.
 struct TrianglePatches {
   Real area;
   Vec3 rest;  // unstressed curvature, of the first
@@ -263,7 +263,7 @@ struct TrianglePatches {
 };
 
 TrianglePatches triangle_patches(const Unfolding& unfolding, std::span<const Vec3> rest,
-                                 std::span<const Triangle> triangles, Real rest_share, uint32_t t,
+                                 std::span<const Triangle> triangles, Real rest_fraction, uint32_t t,
                                  std::span<const std::optional<Recovered>> recovered) {
   const Triangle& own = triangles[t];
   const Vec3 normal = (rest[own[1]] - rest[own[0]]).cross(rest[own[2]] - rest[own[0]]);
@@ -271,11 +271,11 @@ TrianglePatches triangle_patches(const Unfolding& unfolding, std::span<const Vec
   TrianglePatches result{normal.norm() / 2, Vec3::Zero(), recovered_hessian(flat, own, recovered),
                          jump_hessian(unfolding, flat, triangles)};
   for (const auto& [point, w] : result.smooth) {
-    result.rest += rest_share * normal.normalized().dot(rest[point] - rest[own[0]]) * w;
+    result.rest += rest_fraction * normal.normalized().dot(rest[point] - rest[own[0]]) * w;
     result.rough.try_emplace(point, Vec3::Zero()).first->second -= w;
   }
   if (result.rest.norm() * std::sqrt(result.area) < kFlatAtRest) result.rest.setZero();
-  for (auto& [point, w] : result.rough) w *= std::sqrt(kJumpShare);
+  for (auto& [point, w] : result.rough) w *= std::sqrt(kJumpFraction);
   return result;
 }
 
@@ -298,16 +298,16 @@ Real filter_dot(std::span<const Vec4> a, std::span<const Vec4> b) {
 }  // namespace
 
 void ClothBending::assign(std::span<const Vec3> rest, std::span<const Triangle> triangles,
-                          std::span<const Real> masses, Real rigidity, Real damping, Real rest_share,
+                          std::span<const Real> masses, Real rigidity, Real damping, Real rest_fraction,
                           bool measures) {
   const bool needed = rigidity > 0 || measures;
-  const bool known = needed && rigidity == rigidity_ && rest_share == rest_share_ && measures == measures_ &&
-                     triangles.size() == triangles_.size() && rest.size() >= rest_.size() &&
-                     std::equal(rest_.begin(), rest_.end(), rest.begin());
+  const bool known = needed && rigidity == rigidity_ && rest_fraction == rest_fraction_ &&
+                     measures == measures_ && triangles.size() == triangles_.size() &&
+                     rest.size() >= rest_.size() && std::equal(rest_.begin(), rest_.end(), rest.begin());
   if (!known) *this = {};
   rigidity_ = rigidity;
   damping_ = damping;
-  rest_share_ = rest_share;
+  rest_fraction_ = rest_fraction;
   measures_ = measures;
   if (!needed) return;
   if (known && std::ranges::equal(triangles, triangles_) && std::ranges::equal(masses, masses_)) return;
@@ -375,7 +375,7 @@ void ClothBending::build(std::span<const uint8_t> changed, std::vector<uint8_t> 
     for (uint32_t corner : triangles_[t])
       if (!recovered[corner]) recovered[corner] = recover(unfolding, triangles_, clamped_, corner);
     const auto [area, rest, smooth, rough] =
-        triangle_patches(unfolding, rest_, triangles_, rest_share_, t, recovered);
+        triangle_patches(unfolding, rest_, triangles_, rest_fraction_, t, recovered);
     for (const HessianWeights* of_kind : {&smooth, &rough}) {
       std::vector<uint32_t> points;
       std::vector<Vec3> weights;
@@ -465,7 +465,8 @@ void ClothBending::build_matrix(std::span<const uint8_t> rows) {
 
 void ClothBending::multiply(std::span<const Vec4> p, Real scale, std::span<Vec4> y) const {
   for (std::size_t i = 0; i + 1 < row_.size(); ++i) {
-    // Differences: the same of a cloth wherever it is. Four sums, or each addition would wait for the last.
+    // Differences make the result independent of the cloth's place. There are four sums, because otherwise
+    // each addition would wait for the previous one.
     const Vec4 own = p[i];
     Vec4 a = Vec4::Zero(), b = a, c = a, d = a;
     std::size_t k = row_[i];
@@ -493,8 +494,8 @@ void ClothBending::add_damped_forces(std::span<const Vec4> x, std::span<const Ve
   if (curved_) add_rest_forces(x, 1, f);
 }
 
-/// Of -n b0 in the energy: along the normal at all points of a patch, and at the triangle's own by the
-/// turning of its normal.
+/// Forces by the term -n b0 of the energy: along the normal at all points of a patch, and at the triangle's
+/// own corners by the rotation of its normal.
 void ClothBending::add_rest_forces(std::span<const Vec4> x, Real scale, std::span<Vec4> f) const {
   for (const Patch& patch : patches_) {
     if (patch.rest == Vec3::Zero()) continue;
@@ -556,7 +557,7 @@ void ClothBending::add_gradient(std::size_t index, std::span<const Vec4> x,
   for (uint32_t k = patch.first; k < patch.first + patch.count; ++k)
     gradient.emplace_back(points_[k], padded(direction * weights_[k]));
   if (patch.rest == Vec3::Zero() || !(cross.squaredNorm() > 0)) return;
-  // By the turning of the normal, as in add_rest_forces().
+  // By the rotation of the normal, as in add_rest_forces().
   const Vec3 turning = direction * patch.rest;
   for (std::size_t k = 0; k < 3; ++k) {
     const Vec3 edge = (x[own[(k + 2) % 3]] - x[own[(k + 1) % 3]]).head<3>();
@@ -607,7 +608,7 @@ bool ClothBending::filter(std::span<const Real> masses, std::span<const Real> in
     return true;
   }
   Real scale = 0, rr = 0;
-  // By the masses alone: so each iteration keeps the momentum, however many there are.
+  // Preconditioned by the masses alone, so that every iteration keeps the momentum.
   const auto precondition = [&](const Vec4& r, std::size_t i) { return Vec4(r / masses[i]); };
   for (std::size_t i = 0; i < n; ++i) {
     if (!(inverse_masses[i] > 0)) residual_[i].setZero();

@@ -27,12 +27,12 @@ namespace offstage::sim {
 class ClothBending {
  public:
   /// `rigidity` B [N m]; 0: no bending. `damping`: time tau [s]; the moment is B (kappa + tau d kappa/dt).
-  /// `rest_share` of the curvature of `rest` is unstressed; the remainder is as if the cloth had been flat.
-  /// Of a cloth that tore, which has other corners of triangles and more points, only the surroundings of the
-  /// tears are computed again. Triangles that were clamped stay so until set_clamps().
-  /// `measures`: the curvature can be measured even if there is no rigidity.
+  /// `rest_fraction` of the curvature of `rest` is unstressed; the remainder is as if the cloth had been
+  /// flat. Of a cloth that tore, which has other corners of triangles and more points, only the surroundings
+  /// of the tears are computed again. Triangles that were clamped stay so until set_clamps(). `measures`: the
+  /// curvature can be measured even if there is no rigidity.
   void assign(std::span<const Vec3> rest, std::span<const Triangle> triangles, std::span<const Real> masses,
-              Real rigidity, Real damping, Real rest_share, bool measures = false);
+              Real rigidity, Real damping, Real rest_fraction, bool measures = false);
   /// Without rigidity; nothing resists bending.
   bool empty() const { return rigidity_ == 0 || patches_.empty(); }
   Real damping() const { return damping_; }
@@ -54,8 +54,9 @@ class ClothBending {
   /// The factor of the unit matrix on the diagonal of K for a point [N/m].
   Real diagonal(uint32_t point) const { return diagonal_[point]; }
 
-  /// The curvature is measured by patches, two to a triangle: of its surroundings as a smooth surface, and
-  /// what this does not see, which alternates from point to point and counts half.
+  /// The curvature is measured by patches, two to a triangle: one measures the surroundings as a smooth
+  /// surface; the other measures shapes that alternate from point to point, which the first misses, and
+  /// counts half.
   std::size_t patch_count() const { return patches_.size(); }
   /// Curvature of a patch beyond that at rest, |H x - n b0| [1/m].
   Real curvature(std::size_t patch, std::span<const Vec4> x) const;
@@ -63,9 +64,10 @@ class ClothBending {
   void add_gradient(std::size_t patch, std::span<const Vec4> x,
                     std::vector<std::pair<uint32_t, Vec4>>& gradient) const;
 
-  /// Solves (M + stiff K) moves = M moves: what backward Euler leaves of explicit moves. Those of points
-  /// without an inverse mass stay. By conjugate gradients, or by a factorisation, which is kept for the next
-  /// step, if they would take many iterations. Returns false if they reached the limit of iterations.
+  /// Solves (M + stiff K) moves = M moves, which turns explicit moves into those of backward Euler. Those of
+  /// points without an inverse mass stay. By conjugate gradients, or by a factorisation, which is kept for
+  /// the next step, if they would take many iterations. Returns false if they reached the limit of
+  /// iterations.
   bool filter(std::span<const Real> masses, std::span<const Real> inverse_masses, Real stiff,
               std::span<Vec4> moves);
 
@@ -76,7 +78,7 @@ class ClothBending {
     uint32_t first = 0, count = 0;  // of points_ and weights_
     Real area = 0;
     Vec3 rest = Vec3::Zero();  // unstressed curvature
-    bool rough = false;        // of what the smooth one does not see
+    bool rough = false;        // by jumps of gradients
   };
 
   std::vector<uint8_t> affected(std::span<const uint8_t> changed, std::vector<uint8_t> near) const;
@@ -88,7 +90,7 @@ class ClothBending {
   Mat3 excess_curvature(const Patch& patch, std::span<const Vec4> x, const Vec3& normal) const;
   void add_rest_forces(std::span<const Vec4> x, Real scale, std::span<Vec4> f) const;
 
-  Real rigidity_ = 0, damping_ = 0, rest_share_ = 1, fastest_ = 0;
+  Real rigidity_ = 0, damping_ = 0, rest_fraction_ = 1, fastest_ = 0;
   bool curved_ = false, measures_ = false;
   std::vector<Triangle> triangles_;
   std::vector<Real> masses_;

@@ -22,8 +22,8 @@ std::string element(const char* field, std::size_t i) {
 std::string vertex_problem(const ClothDef& def) {
   if (def.vertices.empty()) return "vertices: there are none";
   if (!def.rest_vertices.empty() && def.rest_vertices.size() != def.vertices.size())
-    return "rest_vertices must be as many as vertices, or none";
-  if (def.masses.size() != def.vertices.size()) return "masses must be as many as vertices";
+    return "rest_vertices must be empty or have one position for each vertex";
+  if (def.masses.size() != def.vertices.size()) return "masses must have one value for each vertex";
   for (std::size_t i = 0; i < def.vertices.size(); ++i) {
     if (!def.vertices[i].allFinite()) return element("vertices", i) + "is not finite";
     if (!is_positive(def.masses[i])) return element("masses", i) + "must be a finite number > 0";
@@ -55,11 +55,11 @@ std::string index_problem(const ClothDef& def) {
   for (std::size_t i = 0; i < def.triangles.size(); ++i) {
     const Triangle& t = def.triangles[i];
     if (std::max({t[0], t[1], t[2]}) >= count)
-      return element("triangles", i) + "names a vertex that is not there";
+      return element("triangles", i) + "refers to a vertex that does not exist";
     if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) return element("triangles", i) + "has a vertex twice";
   }
   for (std::size_t i = 0; i < def.pins.size(); ++i) {
-    if (def.pins[i].vertex >= count) return element("pins", i) + "names a vertex that is not there";
+    if (def.pins[i].vertex >= count) return element("pins", i) + "refers to a vertex that does not exist";
     if (!def.pins[i].position.allFinite()) return element("pins", i) + "position is not finite";
     if (std::isnan(def.pins[i].until)) return element("pins", i) + "until is not a number";
   }

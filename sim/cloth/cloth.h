@@ -32,7 +32,7 @@ enum class SpringKind : uint8_t {
 /// F = -(k e + c (d'.d)/|d|) d/|d| on vertex a, d from b to a, with the elongation e = |d| - L.
 ///
 /// The two diagonals of a woven cell can be each other's counterpart. Then e is half the difference of their
-/// elongations: the cell resists being sheared, but a pull along its threads leaves the diagonals without
+/// elongations: the cell resists being sheared, but a load along its threads leaves the diagonals without
 /// force, so that `stretch` alone determines its length under a load.
 struct ClothSpring {
   uint32_t a = 0, b = 0;  ///< vertices
@@ -40,8 +40,8 @@ struct ClothSpring {
   Real stiffness = 100;   ///< k [N/m], > 0
   Real damping = 0;       ///< c [N s/m], >= 0
   SpringKind kind = SpringKind::stretch;
-  std::array<uint32_t, 2> counterpart = {};  ///< vertices of the other diagonal
-  Real counterpart_rest = 0;                 ///< its rest length [m]; 0: it has no counterpart
+  std::array<uint32_t, 2> counterpart = {};  ///< vertices of the other diagonal (its counterpart)
+  Real counterpart_rest = 0;                 ///< rest length of the counterpart [m]; 0: there is none
 
   /// e, of a spring of this length, with the positions of vertices in `at`.
   template <class Points>
@@ -52,7 +52,7 @@ struct ClothSpring {
   }
 };
 
-/// Holds a vertex at a point of the world or of a body. The body feels the pull of the cloth.
+/// Holds a vertex at a point of the world or of a body. The cloth exerts a force on the body.
 struct ClothPin {
   uint32_t vertex = 0;
   BodyHandle body;                                     ///< null: the world
@@ -122,7 +122,7 @@ struct ClothDef {
   Real self_friction = 0.3;  ///< coefficient of friction of cloth on cloth
 
   Real max_stretch = 0;  ///< greatest length of stretch springs over their rest length, > 1; 0: no limit (F7)
-  Real max_shear = 0;    ///< the same of shear springs
+  Real max_shear = 0;    ///< greatest length of shear springs over their rest length; 0: no limit
   /// Length over rest length at which a stretch spring tears, > 1; 0: never. If it is less than max_stretch,
   /// max_stretch counts as 1.2 of it.
   Real tear = 0;
@@ -138,7 +138,7 @@ struct ClothDef {
   /// height at the rate (air.density - gas_density) g. The inertia of the gas, and that of the air that moves
   /// with the cloth, are neglected.
   std::optional<Real> gas_density;
-  /// For an open cloth such as a parachute: share of the stagnation pressure rho (u.m)^2 / 2 of the air
+  /// For an open cloth such as a parachute: fraction of the stagnation pressure rho (u.m)^2 / 2 of the air
   /// entering at its mouth that builds up inside, on the side that its normals point away from. 0: none.
   Real ram_pressure = 0;
 
@@ -171,7 +171,7 @@ StableStep largest_stable_step(const ClothDef& def);
 struct ClothTear {
   Real time = 0;              ///< end of the sub-step in which it tore [s]
   Vec3 place = Vec3::Zero();  ///< [m]
-  Real stretch = 0;           ///< its length over its rest length
+  Real stretch = 0;           ///< length of the thread over its rest length
   bool by_pressure = false;   ///< whether the cloth is closed and under pressure
   bool touches_body = false;  ///< the cloth touched a body in that sub-step
 };
@@ -197,10 +197,10 @@ struct ClothReport {
   uint64_t held_back = 0;      ///< moves shortened because cloth would have passed through cloth
   uint64_t crossings = 0;  ///< pairs that could not be kept from crossing; cloth may pass through cloth there
   uint64_t clamped = 0;    ///< springs whose stiffness the `relaxed` integrator clamped, at the end
-  Real least_stiffness = 1;             ///< least fraction of its stiffness that a clamped spring has left
-  uint32_t spring_steps = 1;            ///< steps of the springs in each sub-step of a `relaxed` cloth
-  uint64_t torn = 0;                    ///< number of torn springs
-  uint64_t unconverged = 0;             ///< solves of springs or bending that reached the limit of iterations
+  Real least_stiffness = 1;   ///< least fraction of its stiffness that a clamped spring has left
+  uint32_t spring_steps = 1;  ///< number of steps of the springs in each sub-step of a `relaxed` cloth
+  uint64_t torn = 0;          ///< number of torn springs
+  uint64_t unconverged = 0;   ///< solves of springs or bending that reached the limit of iterations
   std::optional<ClothTear> first_tear;  ///< the first since the start
   bool finite = true;  ///< false: the cloth became non-finite and stays at its last finite state
 };
@@ -212,7 +212,8 @@ struct ClothView {
   std::span<const Triangle> triangles;
   /// For each point, the vertex of the definition that it comes from. Points are added where cloth tears.
   std::span<const uint32_t> sources;
-  /// Those that hold. Springs of the kind `cord` are as many as in the definition, in its order.
+  /// The springs that are not broken. Springs of the kind `cord` are as many as in the definition, in its
+  /// order.
   std::span<const ClothSpring> springs;
   uint32_t version = 0;  ///< grows when triangles or the number of points change
 };

@@ -7,7 +7,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Stretch is not limited so that cloth could not tear: the limit is at least this much above.
+/// The stretch limit is at least this factor above the tear limit, because otherwise cloth could not tear.
 constexpr Real kBeyondTear = 1.2;
 
 }  // namespace
@@ -78,7 +78,7 @@ void ClothSystem::assemble() {
   points_.outer.assign(points_.size(), Vec4::Zero());
   points_.acceleration = points_.flow = points_.outer;
   points_.field_drag.assign(points_.size(), 0);
-  points_.pull.assign(points_.size(), Vec4::Zero());
+  points_.pin_impulse.assign(points_.size(), Vec4::Zero());
   springs_.clear();
   springs_.resize(cloths_.size());
   for (std::size_t c = 0; c < cloths_.size(); ++c)

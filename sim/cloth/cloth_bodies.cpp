@@ -27,43 +27,46 @@ void add_point_mass(Real mass, const Vec3& arm, Mat6& matrix) {
 
 }  // namespace
 
-ClothBody::ClothBody(const Obstacle& way, Real h, const Vec3& velocity, const Vec3& angular_velocity,
+ClothBody::ClothBody(const Obstacle& obstacle, Real h, const Vec3& velocity, const Vec3& angular_velocity,
                      const Vec3& surface_velocity)
-    : way_(way),
+    : obstacle_(obstacle),
       h_(h),
       velocity_(velocity),
       angular_velocity_(angular_velocity),
       surface_velocity_(surface_velocity),
-      reaction_{way.body, Vec3::Zero(), Vec3::Zero()} {}
+      reaction_{obstacle.body, Vec3::Zero(), Vec3::Zero()} {}
 
 void ClothBody::fall_along_parabola(const Vec3& gravity) {
-  const Vec3 mean = (way_.end.point_to_world(way_.centre) - way_.start.point_to_world(way_.centre)) / h_;
+  const Vec3 mean =
+      (obstacle_.end.point_to_world(obstacle_.centre) - obstacle_.start.point_to_world(obstacle_.centre)) /
+      h_;
   const Vec3 bow = (velocity_ - mean) * h_;
   // A greater change of velocity is an impact.
   if (bow.norm() <= gravity.norm() * h_ * h_) bow_ = bow;
 }
 
-/// The pose that the world gave, before anything that cloth does.
-Pose ClothBody::on_way(Real fraction) const {
-  Pose pose = way_.at(fraction);
+/// The pose on the path that the world computed, without the displacement due to cloth.
+Pose ClothBody::on_path(Real fraction) const {
+  Pose pose = obstacle_.at(fraction);
   pose.position -= fraction * (1 - fraction) * bow_;
   return pose;
 }
 
 void ClothBody::begin(Real from, Real to, Real dt) {
-  start_ = from > 0 ? end_ : moved(on_way(from), way_.centre, shift_, turn_);
+  start_ = from > 0 ? end_ : moved(on_path(from), obstacle_.centre, shift_, turn_);
   shift_ += dt * gained_;
   turn_ += dt * gained_spin_;
-  end_ = moved(on_way(to), way_.centre, shift_, turn_);
-  centre_ = end_.point_to_world(way_.centre);
+  end_ = moved(on_path(to), obstacle_.centre, shift_, turn_);
+  centre_ = end_.point_to_world(obstacle_.centre);
   dt_ = dt;
   to_ = to;
 }
 
 Vec3 ClothBody::surface_motion(const Vec3& p) const {
   Vec3 motion = p - start_.point_to_world(end_.point_to_body(p));
-  if (way_.turn == 0 && way_.angular_velocity != Vec3::Zero())  // a sphere, whose turning its way leaves out
-    motion += dt_ * way_.angular_velocity.cross(p - end_.position);
+  if (obstacle_.turn == 0 &&
+      obstacle_.angular_velocity != Vec3::Zero())  // a sphere, whose path leaves out its turning
+    motion += dt_ * obstacle_.angular_velocity.cross(p - end_.position);
   if (surface_velocity_ != Vec3::Zero()) motion += dt_ * end_.vector_to_world(surface_velocity_);
   return motion;
 }
@@ -71,40 +74,40 @@ Vec3 ClothBody::surface_motion(const Vec3& p) const {
 Real ClothBody::mobility(const Vec3& p, const Vec3& n) const {
   if (!is_dynamic()) return 0;
   const Vec3 turning = (p - centre_).cross(n);
-  return way_.inverse_mass + turning.dot(way_.inverse_inertia * turning);
+  return obstacle_.inverse_mass + turning.dot(obstacle_.inverse_inertia * turning);
 }
 
-void ClothBody::push(const Vec3& impulse, const Vec3& p) {
+void ClothBody::apply_impulse(const Vec3& impulse, const Vec3& p) {
   touched = true;
   if (!is_dynamic()) return;
   const Vec3 turning = (p - centre_).cross(impulse);
   reaction_.impulse += impulse;
   reaction_.angular_impulse += turning;
-  accelerate(way_.inverse_mass * impulse, way_.inverse_inertia * turning);
+  accelerate(obstacle_.inverse_mass * impulse, obstacle_.inverse_inertia * turning);
 }
 
-void ClothBody::load(const Vec3& impulse, const Vec3& p) {
-  if (!pin_load_) pin_load_ = Reaction{way_.body, Vec3::Zero(), Vec3::Zero()};
+void ClothBody::record_pin_impulse(const Vec3& impulse, const Vec3& p) {
+  if (!pin_load_) pin_load_ = Reaction{obstacle_.body, Vec3::Zero(), Vec3::Zero()};
   pin_load_->impulse += impulse;
   pin_load_->angular_impulse += (p - centre_).cross(impulse);
 }
 
-void ClothBody::pull(const Vec3& impulse, const Vec3& p, Real share) {
+void ClothBody::apply_contact_impulse(const Vec3& impulse, const Vec3& p, Real fraction) {
   const Vec3 gained = gained_, gained_spin = gained_spin_;
-  push(impulse, p);
-  shift_ += share * dt_ * (gained_ - gained);
-  turn_ += share * dt_ * (gained_spin_ - gained_spin);
-  end_ = moved(on_way(to_), way_.centre, shift_, turn_);
+  apply_impulse(impulse, p);
+  shift_ += fraction * dt_ * (gained_ - gained);
+  turn_ += fraction * dt_ * (gained_spin_ - gained_spin);
+  end_ = moved(on_path(to_), obstacle_.centre, shift_, turn_);
 }
 
 Mat6 ClothBody::mobility(const Mat6& carried) const {
   Mat6 own = Mat6::Zero();
-  own.topLeftCorner<3, 3>().diagonal().setConstant(way_.inverse_mass);
-  own.bottomRightCorner<3, 3>() = way_.inverse_inertia;
+  own.topLeftCorner<3, 3>().diagonal().setConstant(obstacle_.inverse_mass);
+  own.bottomRightCorner<3, 3>() = obstacle_.inverse_inertia;
   return (Mat6::Identity() + own * carried).partialPivLu().solve(own);
 }
 
-Vec6 ClothBody::pull(const Vec6& impulse, const Vec6& moving, const Mat6& carried) {
+Vec6 ClothBody::apply_pin_impulses(const Vec6& impulse, const Vec6& moving, const Mat6& carried) {
   const Mat6 response = mobility(carried);
   const Vec6 change = response * impulse, shift = dt_ * response * moving;
   const Vec6 own = impulse - carried * change;
@@ -114,8 +117,8 @@ Vec6 ClothBody::pull(const Vec6& impulse, const Vec6& moving, const Mat6& carrie
   accelerate(change.head<3>(), change.tail<3>());
   shift_ += shift.head<3>();
   turn_ += shift.tail<3>();
-  end_ = moved(end_, way_.centre, shift.head<3>(), shift.tail<3>());
-  centre_ = end_.point_to_world(way_.centre);
+  end_ = moved(end_, obstacle_.centre, shift.head<3>(), shift.tail<3>());
+  centre_ = end_.point_to_world(obstacle_.centre);
   return change;
 }
 
@@ -126,19 +129,19 @@ void ClothBody::accelerate(const Vec3& dv, const Vec3& dw) {
   gained_spin_ += dw;
 }
 
-Vec3 ClothBody::shorten(Real share, const Vec3& drift) {
-  const Vec3 way = move() - drift;
+Vec3 ClothBody::shorten(Real fraction, const Vec3& drift) {
+  const Vec3 displacement = move() - drift;
   const Quat turned = end_.orientation * start_.orientation.conjugate();
   const Vec3 turn = 2 * (turned.w() < 0 ? -1 : 1) * turned.vec();  // small
-  const Vec3 lost = (1 - share) * way, lost_turn = (1 - share) * turn;
+  const Vec3 lost = (1 - fraction) * displacement, lost_turn = (1 - fraction) * turn;
   shift_ -= lost;
   turn_ -= lost_turn;
-  end_ = moved(start_, way_.centre, drift + share * way, share * turn);
-  centre_ = end_.point_to_world(way_.centre);
+  end_ = moved(start_, obstacle_.centre, drift + fraction * displacement, fraction * turn);
+  centre_ = end_.point_to_world(obstacle_.centre);
   const Vec3 dv = -lost / dt_, dw = -lost_turn / dt_;
   touched = true;
-  reaction_.impulse += dv / way_.inverse_mass;
-  reaction_.angular_impulse += way_.inverse_inertia.inverse() * dw;
+  reaction_.impulse += dv / obstacle_.inverse_mass;
+  reaction_.angular_impulse += obstacle_.inverse_inertia.inverse() * dw;
   accelerate(dv, dw);
   return dv;
 }
@@ -149,9 +152,9 @@ Mat6 Carrier::carried(const ClothPoints& cloth) const {
   return matrix;
 }
 
-void Carrier::pull(const Vec6& impulse, const Vec6& moving, ClothPoints& cloth) const {
+void Carrier::apply_impulses(const Vec6& impulse, const Vec6& moving, ClothPoints& cloth) const {
   const Vec3 centre = body->centre();  // before it moves
-  const Vec6 change = body->pull(impulse, moving, carried(cloth));
+  const Vec6 change = body->apply_pin_impulses(impulse, moving, carried(cloth));
   for (uint32_t i : points)
     cloth.velocity[i] += padded(change.head<3>() + change.tail<3>().cross(cloth.at(i) - centre));
   place(cloth);

@@ -18,28 +18,28 @@ class ClothBody {
  public:
   /// `velocity` and `angular_velocity` are the body's at the end of the sub-step of length h [s];
   /// `surface_velocity` is against the body, in its frame.
-  ClothBody(const Obstacle& way, Real h, const Vec3& velocity, const Vec3& angular_velocity,
+  ClothBody(const Obstacle& obstacle, Real h, const Vec3& velocity, const Vec3& angular_velocity,
             const Vec3& surface_velocity);
 
   /// Makes a body that carries cloth fall along a parabola within the sub-step of the world, as it does where
-  /// nothing hits it. Along the straight way, on which cloth meets bodies, a body that hangs at rest would
-  /// sag in each sub-step. `gravity` [m/s^2].
+  /// nothing hits it. Along the straight path on which cloth meets bodies, a body that hangs at rest
+  /// would sag in each sub-step. `gravity` [m/s^2].
   void fall_along_parabola(const Vec3& gravity);
   /// Begins a sub-step of cloth, which covers the fractions `from` to `to` of the world's sub-step and lasts
   /// dt [s].
   void begin(Real from, Real to, Real dt);
-  Real duration() const { return dt_; }         ///< of that sub-step [s]
+  Real duration() const { return dt_; }         ///< duration of that sub-step [s]
   const Pose& start() const { return start_; }  ///< of that sub-step
   const Pose& end() const { return end_; }
-  const Solid& solid() const { return way_.solid; }
-  const Obstacle& way() const { return way_; }
-  bool is_dynamic() const { return way_.is_dynamic(); }
+  const Solid& solid() const { return obstacle_.solid; }
+  const Obstacle& obstacle() const { return obstacle_; }
+  bool is_dynamic() const { return obstacle_.is_dynamic(); }
   /// Mass [kg]; infinite for immovable bodies.
-  Real mass() const { return 1 / way_.inverse_mass; }
+  Real mass() const { return 1 / obstacle_.inverse_mass; }
   const Vec3& centre() const { return centre_; }  ///< centre of mass at the end of the cloth's sub-step
 
   /// Displacement of the centre of mass during the sub-step of cloth.
-  Vec3 move() const { return centre_ - start_.point_to_world(way_.centre); }
+  Vec3 move() const { return centre_ - start_.point_to_world(obstacle_.centre); }
 
   /// Displacement of the surface during the sub-step of cloth, at the point that is at `p` (world) at its
   /// end.
@@ -47,29 +47,30 @@ class ClothBody {
   /// Velocity of the body's material point at `p` at the end of the world's sub-step, including the changes
   /// due to cloth.
   Vec3 velocity(const Vec3& p) const { return velocity_ + angular_velocity_.cross(p - centre_); }
-  const Vec3& angular_velocity() const { return angular_velocity_; }  ///< the same [rad/s]
+  const Vec3& angular_velocity() const {
+    return angular_velocity_;
+  }  ///< angular velocity at the same time [rad/s]
   /// Velocity that a unit impulse along n (unit) at p gives to the point there, along n [1/kg].
   Real mobility(const Vec3& p, const Vec3& n) const;
   /// Applies an impulse at a point [N s].
-  void push(const Vec3& impulse, const Vec3& p);
-  /// Applies the impulse of a contact. It moves the body already in this sub-step of cloth, by `share` of the
-  /// displacement that its change of velocity causes in one sub-step. A delayed response of the body would
-  /// gain energy.
-  void pull(const Vec3& impulse, const Vec3& p, Real share);
-  /// Applies impulses and angular impulses about centre(), in this order, to a body that carries the mass of
-  /// what is pinned to it: that mass takes its part of them. The body moves already in this sub-step of cloth
-  /// by `moving`, the part of the impulses that acts from its start on. `carried` is the 6x6 mass matrix of
-  /// what it carries, about centre() [kg, kg m, kg m^2].
-  /// Returns the change of velocity.
-  Vec6 pull(const Vec6& impulse, const Vec6& moving, const Mat6& carried);
-  /// Change of velocity by a unit impulse and angular impulse, with what it carries.
+  void apply_impulse(const Vec3& impulse, const Vec3& p);
+  /// Applies the impulse of a contact. It moves the body already in this sub-step of cloth, by `fraction` of
+  /// the displacement that its change of velocity causes in one sub-step. A delayed response of the body
+  /// would gain energy.
+  void apply_contact_impulse(const Vec3& impulse, const Vec3& p, Real fraction);
+  /// Applies impulses and angular impulses about centre(), in this order, to a body together with the mass of
+  /// the points pinned to it. The body moves already in this sub-step of cloth by `moving`, the part of the
+  /// impulses that acts from its start on. `carried` is the 6x6 mass matrix of these points about centre()
+  /// [kg, kg m, kg m^2]. Returns the change of velocity.
+  Vec6 apply_pin_impulses(const Vec6& impulse, const Vec6& moving, const Mat6& carried);
+  /// Change of velocity by a unit impulse and angular impulse, together with the mass that it carries.
   Mat6 mobility(const Mat6& carried) const;
-  /// Makes the body go only a share of its way beyond `drift` in this sub-step of cloth, and changes its
-  /// velocity accordingly. Returns its change of velocity [m/s].
-  Vec3 shorten(Real share, const Vec3& drift);
+  /// Reduces the body's displacement relative to `drift` in this sub-step of cloth to a fraction, and changes
+  /// its velocity accordingly. Returns its change of velocity [m/s].
+  Vec3 shorten(Real fraction, const Vec3& drift);
 
   /// Records the impulse of a pin on a sleeping body, which it does not move.
-  void load(const Vec3& impulse, const Vec3& p);
+  void record_pin_impulse(const Vec3& impulse, const Vec3& p);
   /// Sum of the impulses and angular impulses of pins in this sub-step of the world; empty if no pin holds
   /// the body.
   const std::optional<Reaction>& pin_load() const { return pin_load_; }
@@ -88,9 +89,9 @@ class ClothBody {
 
  private:
   void accelerate(const Vec3& dv, const Vec3& dw);
-  Pose on_way(Real fraction) const;
+  Pose on_path(Real fraction) const;
 
-  Obstacle way_;
+  Obstacle obstacle_;
   Real h_;
   Vec3 velocity_, angular_velocity_;  // of the centre of mass, at the end
   Vec3 surface_velocity_;
@@ -98,7 +99,8 @@ class ClothBody {
   Vec3 shift_ = Vec3::Zero(), turn_ = Vec3::Zero();          // by that, of the centre
   Vec3 centre_ = Vec3::Zero();                               // of mass, at the end of cloth's sub-step
   Pose start_, end_;                                         // of that sub-step
-  Vec3 bow_ = Vec3::Zero();  // of the way: half the acceleration times the square of the world's sub-step
+  Vec3 bow_ = Vec3::Zero();  // deviation of the path from a line: half the acceleration times the square of
+                             // the world's sub-step
   Real dt_ = 0, to_ = 0;     // of cloth's sub-step
   Reaction reaction_;
   std::optional<Reaction> pin_load_;
@@ -115,10 +117,10 @@ struct Carrier {
   /// Moves the points with the body to the end of the cloth's sub-step.
   void place(ClothPoints& points) const;
   /// Applies an impulse to the body and its points, and moves the points. `moving`: the part of the impulse
-  /// that also displaces the body within the sub-step, as in ClothBody::pull().
-  void pull(const Vec6& impulse, const Vec6& moving, ClothPoints& points) const;
+  /// that also displaces the body within the sub-step, as in ClothBody::apply_pin_impulses().
+  void apply_impulses(const Vec6& impulse, const Vec6& moving, ClothPoints& points) const;
   /// Adds a change of the body's velocity to the points, whose momentum it already includes. Other
-  /// accelerations of the body reach the points only in ClothSystem::pull_bodies().
+  /// accelerations of the body reach the points only in ClothSystem::apply_pin_impulses_to_bodies().
   void accelerate(const Vec3& dv, ClothPoints& points) const;
 };
 

@@ -12,28 +12,28 @@ namespace offstage::sim {
 namespace {
 
 constexpr std::size_t kChunk = 1024;
-/// Share of an overlap that is taken back per sub-step of the world where a body lies on cloth that lies on
-/// something: gently, because the world moves the body only a sub-step later.
+/// Fraction of an overlap that is taken back per sub-step of the world where a body lies on cloth that is
+/// supported: it is small, because the world moves the body only a sub-step later.
 constexpr Real kStabilization = 0.3;
-/// Two normals with a cosine below this face each other: what lies between is pinched.
+/// Two normals with a cosine below this face each other: cloth between them is pinched.
 constexpr Real kFacing = -0.5;
 constexpr int kStopSweeps = 30;
 
 }  // namespace
 
-/// Near is what a point can come to within twice the way that it and the body make at their present speeds.
+/// A body is near a point that can reach it within twice the distance that both move at their present speeds.
 void ClothContacts::look(const ClothPoints& points, uint32_t i, std::vector<Near>& found) const {
   const Vec3 p = points.at(i);
   const Vec3 v = points.velocity[i].head<3>();
   for (uint32_t b = 0; b < bodies_.size(); ++b) {
     if (!bodies_[b].collides) continue;
-    const Obstacle& way = bodies_[b].way();
+    const Obstacle& obstacle = bodies_[b].obstacle();
     const Real reach = seen_reach_[i];
     if (boxes_[b].squaredExteriorDistance(p) > (reach + points.thickness[i]) * (reach + points.thickness[i]))
       continue;
     const Vec3 place = bodies_[b].end().point_to_body(p);
-    const SurfaceDistance s = signed_distance(way.solid, place);
-    const Real relative = (v - way.velocity_at(p, 0)).norm() * h_;
+    const SurfaceDistance s = signed_distance(obstacle.solid, place);
+    const Real relative = (v - obstacle.velocity_at(p, 0)).norm() * h_;
     if (s.distance < points.thickness[i] + 2 * relative + reach) found.push_back({i, b, place, s.distance});
   }
 }
@@ -49,7 +49,7 @@ void ClothContacts::find(const ClothPoints& points, std::span<const uint8_t> col
   boxes_.clear();
   for (ClothBody& body : bodies) {
     body.begin(at, at, 0);
-    boxes_.push_back(body.way().swept_bounds());
+    boxes_.push_back(body.obstacle().swept_bounds());
   }
   seen_at_.resize(points.size());
   seen_reach_.resize(points.size());
@@ -57,7 +57,7 @@ void ClothContacts::find(const ClothPoints& points, std::span<const uint8_t> col
   const auto chunk = [&](std::size_t c) {
     for (std::size_t i = c * kChunk, end = std::min(points.size(), i + kChunk); i < end; ++i) {
       seen_at_[i] = points.at(i);
-      // What acceleration may add; gravity alone makes 0.2 mm in 1/240 s.
+      // Distance that acceleration may add; gravity alone causes 0.2 mm in 1/240 s.
       seen_reach_[i] = points.thickness[i] + 2 * h * points.velocity[i].norm();
       if (collides[i]) look(points, static_cast<uint32_t>(i), found[c]);
     }
@@ -73,7 +73,7 @@ Real ClothContacts::fastest_approach(const ClothPoints& points) const {
     const ClothBody& body = bodies_[near.body];
     if (!body.is_dynamic()) continue;
     const Vec3 velocity = points.velocity[near.point].head<3>();
-    fastest = std::max(fastest, (velocity - body.way().velocity_at(points.at(near.point), 0)).norm());
+    fastest = std::max(fastest, (velocity - body.obstacle().velocity_at(points.at(near.point), 0)).norm());
   }
   return fastest;
 }
@@ -135,7 +135,7 @@ void ClothContacts::collect(const ClothPoints& points, std::vector<BodyContact>&
     Touch t;
     if (!body.is_dynamic() || !(points.inverse_mass[near.point] > 0)) continue;
     if (!touch(points, near, points.thickness[near.point], t)) continue;
-    // An overlap of the start is taken back slowly: the correction counts as velocity.
+    // An initial overlap is removed slowly, because the correction counts as velocity.
     const Vec3 motion = points.at(near.point) - points.start_at(near.point) - body.surface_motion(t.on_body);
     const Real before = std::min(t.gap - t.normal.dot(motion), 0.0);
     found.push_back({{near.point, near.point, near.point},
@@ -162,7 +162,7 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
     if (count == 0) continue;
     active_[points.cloth[point]] += count;
     touched_[points.cloth[point]] = 1;
-    // What is fixed comes last, so that its surface is kept best.
+    // Fixed bodies come last, so that their surfaces are kept best.
     std::stable_sort(touches_.begin(), touches_.end(), [](const Touch& a, const Touch& b) {
       return a.body->is_dynamic() > b.body->is_dynamic();
     });
@@ -173,8 +173,8 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
         supported = true;
         if (a < b && (touches_[a].body->is_dynamic() || touches_[b].body->is_dynamic()))
           pinch(touches_[a], touches_[b],
-                std::sqrt(points.friction[point] *
-                          std::min(touches_[a].body->way().friction, touches_[b].body->way().friction)));
+                std::sqrt(points.friction[point] * std::min(touches_[a].body->obstacle().friction,
+                                                            touches_[b].body->obstacle().friction)));
       }
       if (points.inverse_mass[point] == 0) block(touches_[a], points.holder[point]);
       press(points, touches_[a], dt, parts, supported && touches_[a].body->is_dynamic(), cuts);
@@ -182,8 +182,8 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
   }
 }
 
-/// Two bodies with a point between them push each other, on velocities: they must not come nearer. The point
-/// hands friction on, too, which is more than its own mass could.
+/// Two bodies with a point between them push each other by velocities: they must not approach. The point also
+/// transmits friction between them, which is more than its own mass could.
 void ClothContacts::pinch(Touch& a, Touch& b, Real friction) {
   const Vec3 n = (a.normal - b.normal).normalized();
   const Real mobility = a.body->mobility(a.on_body, n) + b.body->mobility(b.on_body, n);
@@ -193,8 +193,8 @@ void ClothContacts::pinch(Touch& a, Touch& b, Real friction) {
   const Real impulse = (approach + kStabilization * overlap / h_) / mobility;
   a.body->pinches = b.body->pinches = true;
   if (!(impulse > 0)) return;
-  a.body->push(-impulse * n, a.on_body);
-  b.body->push(impulse * n, b.on_body);
+  a.body->apply_impulse(-impulse * n, a.on_body);
+  b.body->apply_impulse(impulse * n, b.on_body);
   a.near->pressed += impulse;
   b.near->pressed += impulse;
   const Vec3 relative = a.body->velocity(a.on_body) - b.body->velocity(b.on_body);
@@ -204,11 +204,11 @@ void ClothContacts::pinch(Touch& a, Touch& b, Real friction) {
   const Vec3 along = slip / speed;
   const Real stick = speed / (a.body->mobility(a.on_body, along) + b.body->mobility(b.on_body, along));
   const Real held = std::min(stick, friction * impulse);
-  a.body->push(-held * along, a.on_body);
-  b.body->push(held * along, b.on_body);
+  a.body->apply_impulse(-held * along, a.on_body);
+  b.body->apply_impulse(held * along, b.on_body);
 }
 
-/// A body meets a point that a pin of the world or of another body holds.
+/// Contact of a body with a point that is pinned to the world or to another body.
 void ClothContacts::block(Touch& t, ClothBody* holder) {
   if (holder == t.body) return;
   const Real mobility =
@@ -218,8 +218,8 @@ void ClothContacts::block(Touch& t, ClothBody* holder) {
   const Real approach = t.normal.dot(t.body->velocity(t.on_body) - held);
   const Real impulse = (approach - kStabilization * t.gap / h_) / mobility;
   if (!(impulse > 0)) return;
-  t.body->push(-impulse * t.normal, t.on_body);
-  if (holder) holder->push(impulse * t.normal, t.on_body);
+  t.body->apply_impulse(-impulse * t.normal, t.on_body);
+  if (holder) holder->apply_impulse(impulse * t.normal, t.on_body);
   t.near->pressed += impulse;
 }
 
@@ -233,9 +233,10 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
     Real speed;  // of the cloth there along the normal [m/s]
     Real depth;  // of the overlap, at most the thickness [m]
     uint32_t cloth;
-    bool moves = true;  // in this sub-step; a body that holds cloth would take that along beyond its limits
-    Real share = 1;     // of the body's contacts here, whose impulses are found at the same time
-    Real recoil = 0;    // of the cloth by one impulse at all of its contacts, times the share [1/kg]
+    bool moves = true;  // whether it moves in this sub-step; a body that holds cloth would move that cloth
+                        // beyond its limits
+    Real fraction = 1;  // part of each of the body's contacts, whose impulses are found at the same time
+    Real recoil = 0;    // of the cloth by one impulse at all of its contacts, times the fraction [1/kg]
     Real impulse = 0;   // so far [N s]
     Real change = 0;    // in this sweep
   };
@@ -250,8 +251,8 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
                        Real depth, uint32_t point) {
     const uint32_t cloth = points.cloth[point];
     Real speed = normal.dot(velocity);
-    // The cloth stops the body as a whole, which has no part in how its light points vibrate: a body that
-    // took their speed would gain energy.
+    // The cloth stops the body as a whole. The body does not follow the vibration of the cloth's light
+    // points, because it would gain energy.
     if (whole_velocity[cloth]) speed = std::max(speed, normal.dot(*whole_velocity[cloth]));
     stops.push_back({&body, normal, on_body, speed, std::min(depth, points.thickness[point]), cloth});
     const auto [at, is_new] = on_bodies.try_emplace(&body);
@@ -280,25 +281,26 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
     add(*c.body, c.normal, c.on_body, mean, -c.gap, c.points[0]);
   }
   for (Stop& s : stops) {
-    s.share = 1 / on_bodies[s.body].contacts;
-    s.recoil = s.share * on_cloths[s.cloth] * recoil[s.cloth];
+    s.fraction = 1 / on_bodies[s.body].contacts;
+    s.recoil = s.fraction * on_cloths[s.cloth] * recoil[s.cloth];
     s.moves = !on_bodies[s.body].holds_cloth;
   }
   std::vector<Vec3> taken(recoil.size(), Vec3::Zero());
   // Projected Jacobi iteration: all contacts stop a body together. One after the other, the first would turn
-  // it aside. The body moves by the change of its velocity already in this sub-step: if it went on to the end
-  // of it, a fast one would be behind the cloth.
+  // it aside. The body moves by the change of its velocity already in this sub-step: otherwise a fast body
+  // would be behind the cloth at its end.
   for (int sweep = 0; sweep < kStopSweeps && !stops.empty(); ++sweep) {
     for (Stop& s : stops) {
       const Real speed = s.speed + recoil[s.cloth] * s.normal.dot(taken[s.cloth]);
       const Real approach = s.normal.dot(s.body->velocity(s.on_body)) - speed + kStabilization * s.depth / h_;
       const Real mobility = s.body->mobility(s.on_body, s.normal) + s.recoil;
-      s.change = std::max(-s.impulse, s.share * approach / mobility);
+      s.change = std::max(-s.impulse, s.fraction * approach / mobility);
     }
     for (Stop& s : stops) {
       s.impulse += s.change;
       const Vec3 impulse = -s.change * s.normal;
-      s.moves ? s.body->pull(impulse, s.on_body, 1) : s.body->push(impulse, s.on_body);
+      s.moves ? s.body->apply_contact_impulse(impulse, s.on_body, 1)
+              : s.body->apply_impulse(impulse, s.on_body);
       taken[s.cloth] += s.change * s.normal;
     }
   }
@@ -322,7 +324,7 @@ void ClothContacts::press(ClothPoints& points, Touch& t, Real dt, Real parts, bo
     const Real push = -t.gap / (w + body.mobility(t.on_body, n));
     pressed += push;
     correction = push * n;
-    // What it was in already is taken back without motion, of the point or of the body.
+    // The initial penetration is removed without a velocity of the point or the body.
     if (already < 0) {
       recovery = std::min(-already / w, push) * n;
       cuts.push_back({i, padded(w * recovery)});
@@ -331,13 +333,13 @@ void ClothContacts::press(ClothPoints& points, Touch& t, Real dt, Real parts, bo
   const Vec3 slip = motion - n.dot(motion) * n;
   const Real length = slip.norm();
   if (length > 0) {
-    const Real friction = std::sqrt(points.friction[i] * body.way().friction);
+    const Real friction = std::sqrt(points.friction[i] * body.obstacle().friction);
     const Vec3 along = slip / length;
     const Real stick = length / (w + body.mobility(t.on_body, along));
     correction -= std::min(stick, friction * pressed) * along;
   }
   points.position[i] += padded(w * correction);
-  body.pull((recovery - correction) / dt, t.on_body, 1);
+  body.apply_contact_impulse((recovery - correction) / dt, t.on_body, 1);
 }
 
 void ClothContacts::measure(const ClothPoints& points, std::span<Real> penetration) const {

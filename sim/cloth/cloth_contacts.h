@@ -18,8 +18,8 @@ namespace offstage::sim {
 
 class ClothContacts {
  public:
-  /// Finds the bodies that points can touch in a sub-step of the world of length h. `collides` tells for each
-  /// point whether it collides.
+  /// Finds the bodies that points can touch in a sub-step of the world of length h. `collides`: for each
+  /// point, whether it collides.
   void find(const ClothPoints& points, std::span<const uint8_t> collides, std::span<ClothBody> bodies, Real h,
             Real at = 0);
   /// Greatest speed of points against dynamic bodies that they can touch [m/s].
@@ -29,16 +29,15 @@ class ClothContacts {
   /// Moves points out of the bodies in a sub-step of cloth of length dt, which is one of `parts` equal parts
   /// of the world's sub-step. Appends to `cuts`.
   void solve(ClothPoints& points, Real dt, Real parts, std::vector<VelocityCut>& cuts);
-  /// Contacts with dynamic bodies as points are now, also of points that are closer than twice the distance
-  /// that they keep.
+  /// Returns the contacts with dynamic bodies at the points' current positions, including points that are
+  /// closer than twice the distance that they keep.
   void collect(const ClothPoints& points, std::vector<BodyContact>& found);
-  /// Stops bodies that press into cloth whose moves were shortened, which are those of points with a non-zero
-  /// `shortened`, and takes back the part of their moves that goes on against it. `triangles` are their
-  /// contacts with triangles. The result does not depend on the order of the contacts. `recoil` is the
-  /// inverse mass of each cloth with the bodies that hold it: 0 if it is pinned to the world.
-  /// `whole_velocity` is their velocity, or that of what it is pinned to, if that is one; `kick` is the
-  /// velocity of points besides that of their moves. Returns for each cloth the impulse that it absorbs [N
-  /// s].
+  /// Stops bodies that press into cloth whose moves were shortened, that is, moves of points with a non-zero
+  /// `shortened`, and removes the part of the bodies' moves towards the cloth. `triangles` are their contacts
+  /// with triangles. The result does not depend on the order of the contacts. `recoil` is the inverse mass of
+  /// each cloth with the bodies that hold it: 0 if it is pinned to the world. `whole_velocity` is their
+  /// common velocity, or that of the single object that the cloth is pinned to; `kick` is the velocity of
+  /// points besides that of their moves. Returns for each cloth the impulse that it absorbs [N s].
   std::vector<Vec3> stop_bodies(const ClothPoints& points, std::span<const uint8_t> shortened,
                                 std::span<const Vec4> kick, std::span<const Real> recoil,
                                 std::span<const std::optional<Vec3>> whole_velocity,
@@ -53,7 +52,7 @@ class ClothContacts {
     return point < near_several_.size() && near_several_[point];
   }
   std::span<const uint64_t> active() const { return active_; }  ///< contacts of the last solve(), by cloth
-  /// Whether any point of a cloth touched a body since the last find().
+  /// Returns whether any point of a cloth touched a body since the last find().
   bool touched(std::size_t cloth) const { return cloth < touched_.size() && touched_[cloth]; }
   /// Raises the greatest penetration of each cloth's points to that at the end of a sub-step [m].
   void measure(const ClothPoints& points, std::span<Real> penetration) const;

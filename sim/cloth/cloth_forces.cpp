@@ -10,8 +10,8 @@ namespace {
 
 constexpr Real kAirDensity = 1.2;  // of leaking gas without a density of its own [kg/m^3]
 
-/// Volume inside, at least a tenth of that at rest: a cloth that is crushed flat does not burst, and what is
-/// left of a torn one does not keep its gas because it has no inside [m^3].
+/// Volume inside, at least a tenth of that at rest: a cloth that is crushed flat does not burst, and the
+/// remains of a torn cloth, which enclose nothing, do not keep their gas [m^3].
 Real gas_volume(const Cloth& cloth) {
   return std::max(cloth.gas.volume(cloth.points, cloth.triangles), 0.1 * cloth.rest_volume);
 }
@@ -29,7 +29,7 @@ Real gas_density(const Cloth& cloth) {
 
 /// Whether gas flows out of a tear.
 bool leaks(const Cloth& cloth) {
-  return cloth.def.pressure != 0 && cloth.version > 0 && cloth.gas.share() > 0 && !cloth.stopped;
+  return cloth.def.pressure != 0 && cloth.version > 0 && cloth.gas.remaining_fraction() > 0 && !cloth.stopped;
 }
 
 /// The points of one cloth as their accelerations are made.
@@ -42,9 +42,9 @@ struct Run {
 
   std::size_t size() const { return cloth.points.size(); }
   Vec3 at(std::size_t i) const { return points.at(first + i); }
-  /// A force on the whole cloth gives each point its share by mass.
+  /// A force on the whole cloth gives each point its fraction by mass.
   void accelerate(std::size_t i, const Vec3& force) { points.outer[first + i] += padded(force / total_mass); }
-  /// The same of a force `drag` times (velocity - that of the point) (air_drag.h).
+  /// Adds a force `drag` times (velocity - the point's velocity) (air_drag.h).
   void drag(std::size_t i, Real drag, const Vec3& velocity) {
     accelerate(i, drag * velocity);
     points.field_drag[first + i] += drag / total_mass;
@@ -59,11 +59,11 @@ Vec3 direction(const Vec3& v) {
 template <class Field, class Flow>
 void blow(const Field& f, Run& run, Flow&& flow) {
   for (std::size_t i = 0; i < run.size(); ++i) {
-    const Real share = strength(f.region, f.drop_rate, run.at(i));
-    if (!(share > 0)) continue;
+    const Real fraction = strength(f.region, f.drop_rate, run.at(i));
+    if (!(fraction > 0)) continue;
     const Vec3 air = flow(i);
-    run.points.flow[run.first + i] += padded(share * air);
-    if (f.drag > 0) run.drag(i, share * f.drag, air);
+    run.points.flow[run.first + i] += padded(fraction * air);
+    if (f.drag > 0) run.drag(i, fraction * f.drag, air);
   }
 }
 
@@ -117,12 +117,13 @@ void push_out(Run& run, Real pressure) {
 }
 
 /// The pressure of a gas at rest grows downwards by its weight, and so does that of the air. The corners of a
-/// triangle get what a pressure that is linear over it gives, so that the force of a closed cloth is that of
-/// Archimedes exactly, and acts at the centre of the volume.
+/// triangle get the forces of a pressure that is linear over it. The force on a closed cloth is then exactly
+/// that of Archimedes, and acts at the centre of the volume.
 void lift(Run& run, const Vec3& gravity) {
   const Cloth& cloth = run.cloth;
   if (!cloth.def.gas_density) return;
-  const Vec3 slope = cloth.gas.share() * (*cloth.def.gas_density - cloth.def.air.density) * gravity;
+  const Vec3 slope =
+      cloth.gas.remaining_fraction() * (*cloth.def.gas_density - cloth.def.air.density) * gravity;
   if (slope.isZero(0)) return;
   const Vec3 origin = run.at(0);
   for (const Triangle& t : cloth.triangles) {
@@ -137,7 +138,7 @@ void lift(Run& run, const Vec3& gravity) {
 
 /// The overpressure that acts [Pa]; `lift` adds the weight of the gas.
 Real acting_pressure(const Cloth& cloth) {
-  return cloth.gas.share() * overpressure(cloth);
+  return cloth.gas.remaining_fraction() * overpressure(cloth);
 }
 
 void inflate(Run& run, const Vec3& gravity) {
@@ -148,12 +149,11 @@ void inflate(Run& run, const Vec3& gravity) {
 }
 
 /// Mass of the gas and the air that a skin of unit area moves when it bursts [kg/m^2]: that of a sphere of
-/// radius R in air that moves to and fro, rho_air R / 2, and of the gas in it, rho_gas R (Lamb,
-/// Hydrodynamics, art. 92). It is ten times that of the skin of a balloon, which without it would fly off
-/// faster than the gas.
+/// radius R that oscillates in air, rho_air R / 2, and of the gas in it, rho_gas R (Lamb, Hydrodynamics, art.
+/// 92). It is ten times that of the skin of a balloon, which without it would fly off faster than the gas.
 Real moved_with_skin(const Cloth& cloth) {
   const Real radius = std::cbrt(3 * cloth.rest_volume / (4 * std::numbers::pi));
-  return cloth.gas.share() * radius * (cloth.def.air.density / 2 + gas_density(cloth));
+  return cloth.gas.remaining_fraction() * radius * (cloth.def.air.density / 2 + gas_density(cloth));
 }
 
 /// Sets the points' masses. Those of a torn skin move the gas, too.
@@ -169,9 +169,9 @@ void set_inertia(Run& run) {
   }
   for (std::size_t i = 0; i < run.size(); ++i) {
     run.points.mass[run.first + i] = inertia[i];
-    const Real share = run.cloth.masses[i] / inertia[i];
-    run.points.outer[run.first + i] *= share;
-    run.points.field_drag[run.first + i] *= share;
+    const Real fraction = run.cloth.masses[i] / inertia[i];
+    run.points.outer[run.first + i] *= fraction;
+    run.points.field_drag[run.first + i] *= fraction;
   }
 }
 

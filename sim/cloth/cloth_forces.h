@@ -21,8 +21,8 @@ struct ClothWeather {
 ClothGasState gas_state(const Cloth& cloth);
 
 /// Sets the masses of a cloth's points, which begin at index `first`, their accelerations by outer forces,
-/// the velocity of the air there, and the rate of linear drag by fields and hands. Points of a cloth under
-/// pressure that is torn have the mass of the gas that they move, too.
+/// the velocity of the air there, and the rate of linear drag by fields and hands. The mass of the points of
+/// a torn cloth under pressure includes the gas that they move.
 void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather& weather,
                       ClothPoints& points);
 

@@ -7,7 +7,7 @@
 namespace offstage::sim {
 namespace {
 
-/// A smaller share of the overpressure counts as none.
+/// A smaller remaining fraction of the overpressure counts as none.
 constexpr Real kLeastGas = 1e-3;
 
 }  // namespace
@@ -67,13 +67,13 @@ Real ClothGas::hole_area(std::span<const Vec3> points) const {
 }
 
 void ClothGas::leak(std::span<const Vec3> points, Real volume, Real pressure, Real density, Real h) {
-  if (holes_.empty() || !(volume > 0) || !(share_ > 0)) return;
-  // The share s falls as ds/dt = -s Q / V with the flow Q = kDischarge A sqrt(2 p s / density). Over a step
-  // in which area and volume stay, 1 / sqrt(s) grows linearly with the time.
+  if (holes_.empty() || !(volume > 0) || !(remaining_fraction_ > 0)) return;
+  // The fraction s falls as ds/dt = -s Q / V with the flow Q = kDischarge A sqrt(2 p s / density). Over a
+  // step in which area and volume stay, 1 / sqrt(s) grows linearly with the time.
   const Real flow = kDischarge * hole_area(points) * std::sqrt(2 * std::abs(pressure) / density);
-  const Real root = 1 / (1 / std::sqrt(share_) + h * flow / (2 * volume));
-  share_ = root * root;
-  if (share_ < kLeastGas) share_ = 0;
+  const Real root = 1 / (1 / std::sqrt(remaining_fraction_) + h * flow / (2 * volume));
+  remaining_fraction_ = root * root;
+  if (remaining_fraction_ < kLeastGas) remaining_fraction_ = 0;
 }
 
 }  // namespace offstage::sim

@@ -18,14 +18,14 @@ class ClothGas {
 
   /// Volume inside, with each hole closed by a fan around the centre of its border [m^3].
   Real volume(std::span<const Vec3> points, std::span<const Triangle> triangles) const;
-  /// Sum of the areas of the holes: of each the length of its area vector [m^2].
+  /// Sum of the areas of the holes, each the length of its area vector [m^2].
   Real hole_area(std::span<const Vec3> points) const;
 
-  /// Share of its overpressure at a given volume that the gas still has, 0 to 1.
-  Real share() const { return share_; }
+  /// Fraction of its overpressure at a given volume that the gas still has, 0 to 1.
+  Real remaining_fraction() const { return remaining_fraction_; }
   /// Lets gas flow out for a time h [s]. `pressure` is the overpressure at the volume as it would be without
   /// a loss [Pa], `density` that of the gas [kg/m^3], > 0. By Bernoulli's equation the gas leaves at the
-  /// speed sqrt(2 p / density) through a share of the holes (kDischarge).
+  /// speed sqrt(2 p / density) through a fraction of the holes (kDischarge).
   void leak(std::span<const Vec3> points, Real volume, Real pressure, Real density, Real h);
 
   /// Coefficient of discharge of a hole with a sharp edge (Batchelor, An Introduction to Fluid
@@ -44,7 +44,7 @@ class ClothGas {
 
   std::vector<Edge> edges_;  // by hole
   std::vector<Hole> holes_;
-  Real share_ = 1;
+  Real remaining_fraction_ = 1;
 };
 
 }  // namespace offstage::sim

@@ -1,4 +1,4 @@
-/// The part of ClothSystem for points that pins hold: on the world, or on bodies, which feel the pull of the
+/// The part of ClothSystem for points that pins hold: on the world, or on bodies, which feel the force of the
 /// cloth.
 
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 namespace offstage::sim {
 
-/// What pins hold has no inverse mass in this sub-step of the world.
+/// Pinned points have no inverse mass in this sub-step of the world.
 void ClothSystem::find_held(Real time, std::span<ClothBody> bodies) {
   held_.clear();
   carriers_.clear();
@@ -22,14 +22,14 @@ void ClothSystem::find_held(Real time, std::span<ClothBody> bodies) {
       ClothBody* body = nullptr;
       if (pin.body) {
         const auto at = std::ranges::lower_bound(bodies, pin.body.index, {},
-                                                 [](const ClothBody& b) { return b.way().body; });
-        if (at == bodies.end() || at->way().body != pin.body.index) continue;
+                                                 [](const ClothBody& b) { return b.obstacle().body; });
+        if (at == bodies.end() || at->obstacle().body != pin.body.index) continue;
         body = &*at;
       }
       points_.inverse_mass[point] = 0;
       points_.holder[point] = body;
       held_.push_back({point, body, pin.position});
-      if (body && body->is_dynamic()) carry(point, *body, pin.position);
+      if (body && body->is_dynamic()) attach(point, *body, pin.position);
     }
     set_clamps(c);
     if (cloth.stopped)
@@ -38,7 +38,7 @@ void ClothSystem::find_held(Real time, std::span<ClothBody> bodies) {
   }
 }
 
-void ClothSystem::carry(uint32_t point, ClothBody& body, const Vec3& place) {
+void ClothSystem::attach(uint32_t point, ClothBody& body, const Vec3& place) {
   auto at = std::ranges::find(carriers_, &body, &Carrier::body);
   if (at == carriers_.end()) at = carriers_.insert(at, {&body, {}, {}});
   at->points.push_back(point);
@@ -53,7 +53,7 @@ void ClothSystem::set_clamps(std::size_t c) {
   std::vector<uint32_t> clamp(cloth.points.size(), 0);
   for (const Held& held : held_)
     if (points_.cloth[held.point] == c)
-      clamp[held.point - first_[c]] = held.body ? 2 + held.body->way().body : 1;
+      clamp[held.point - first_[c]] = held.body ? 2 + held.body->obstacle().body : 1;
   cloth.bending.set_clamps(clamp);
 }
 
@@ -62,17 +62,18 @@ void ClothSystem::move_held() {
     held.from = points_.position[held.point];
     points_.position[held.point] =
         padded(held.body ? held.body->end().point_to_world(held.position) : held.position);
-    points_.pull[held.point].setZero();
+    points_.pin_impulse[held.point].setZero();
   }
 }
 
-/// Bodies feel what hangs on their pins, and move by it as the points of the cloth did: by forces of the
-/// start of the sub-step at once, by those of its end from the next on, by those between half. They carry the
-/// mass of the points: what these need to follow their body is taken from it.
-void ClothSystem::pull_bodies(Real dt) {
+/// Applies the impulses at pins to the bodies. A body moves by them as the points of the cloth did: by forces
+/// at the start of the sub-step at once, by those at its end from the next sub-step on, and by those between
+/// by half. Bodies carry the mass of their pinned points, so they also provide the impulse that accelerates
+/// these points.
+void ClothSystem::apply_pin_impulses_to_bodies(Real dt) {
   const auto impulse_on = [&](uint32_t i) {
-    const Vec4 load = points_.pull[i] / dt + dt * points_.mass[i] * points_.acceleration[i];
-    points_.pull[i].setZero();
+    const Vec4 load = points_.pin_impulse[i] / dt + dt * points_.mass[i] * points_.acceleration[i];
+    points_.pin_impulse[i].setZero();
     return Vec3(load.head<3>());
   };
   for (const Carrier& carrier : carriers_) {
@@ -82,20 +83,20 @@ void ClothSystem::pull_bodies(Real dt) {
       const Vec3 p = points_.at(i), arm = p - body.centre();
       const Vec3 load = impulse_on(i);
       const Vec3 lag = points_.mass[i] * (points_.velocity[i].head<3>() - body.velocity(p));
-      const Vec3 impulse = load + lag, early = share_at_once(points_.cloth[i], dt) * load + lag;
+      const Vec3 impulse = load + lag, early = fraction_at_once(points_.cloth[i], dt) * load + lag;
       sum += (Vec6() << impulse, arm.cross(impulse)).finished();
       moving += (Vec6() << early, arm.cross(early)).finished();
       points_.velocity[i] = padded(body.velocity(p));
     }
-    carrier.pull(sum, moving, points_);
+    carrier.apply_impulses(sum, moving, points_);
   }
   for (const Held& held : held_)
     if (held.body && !held.body->is_dynamic())
-      held.body->load(impulse_on(held.point), points_.at(held.point));
+      held.body->record_pin_impulse(impulse_on(held.point), points_.at(held.point));
 }
 
-/// Share of the impulses of a cloth's springs that moves bodies already in the sub-step.
-Real ClothSystem::share_at_once(std::size_t cloth, Real dt) const {
+/// Fraction of the impulses of a cloth's springs that moves bodies already in the sub-step.
+Real ClothSystem::fraction_at_once(std::size_t cloth, Real dt) const {
   switch (cloths_[cloth]->def.integrator) {
     case ClothIntegrator::implicit:
       return 0;
@@ -109,17 +110,17 @@ Real ClothSystem::share_at_once(std::size_t cloth, Real dt) const {
   return 1;
 }
 
-/// Bodies feel what contacts and the stretch limit did to the points that they hold.
+/// Applies to bodies the impulses of contacts and of the stretch limit on the points that they hold.
 void ClothSystem::push_holders(Real dt) {
   for (const Held& held : held_) {
-    Vec4& pull = points_.pull[held.point];
-    if (!held.body || pull.isZero(0)) continue;
-    const Vec3 impulse = pull.head<3>() / dt;
-    pull.setZero();
+    Vec4& pin_impulse = points_.pin_impulse[held.point];
+    if (!held.body || pin_impulse.isZero(0)) continue;
+    const Vec3 impulse = pin_impulse.head<3>() / dt;
+    pin_impulse.setZero();
     if (held.body->is_dynamic())
-      held.body->pull(impulse, points_.at(held.point), 1);
+      held.body->apply_contact_impulse(impulse, points_.at(held.point), 1);
     else
-      held.body->load(impulse, points_.at(held.point));
+      held.body->record_pin_impulse(impulse, points_.at(held.point));
   }
   for (const Carrier& carrier : carriers_) carrier.place(points_);
 }

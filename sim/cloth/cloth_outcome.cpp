@@ -1,5 +1,5 @@
-/// The part of ClothSystem that hands the result of a step to the cloths: their motion, tears, reports, and
-/// the end of cloths that diverged.
+/// The part of ClothSystem that stores the result of a step in the cloths: motion, tears and reports. It also
+/// stops cloths that diverged.
 
 #include <algorithm>
 #include <cmath>
@@ -51,7 +51,7 @@ bool ClothSystem::any_tears() const {
   return false;
 }
 
-/// Tears cloths after a fraction of the world's sub-step, and begins again with what is left of them.
+/// Tears cloths after a fraction of the world's sub-step, and continues with the torn cloths.
 void ClothSystem::tear_within(const ClothWeather& weather, Real fraction) {
   time_ = weather.time + fraction * weather.h;
   write_back();
@@ -112,9 +112,9 @@ void ClothSystem::measure() {
   }
 }
 
-/// Stops cloths that diverge, before their contacts are sought: in a cloth that is scattered everywhere,
-/// nearly all pairs of triangles may touch, and the search would not end.
-void ClothSystem::stop_lost(Real dt) {
+/// Stops cloths that diverge, before the search for their contacts: in a scattered cloth, nearly all pairs of
+/// triangles may touch, and the search would take too long.
+void ClothSystem::stop_diverged(Real dt) {
   const Real farthest2 = kLostSpeed * kLostSpeed * dt * dt;
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     if (cloths_[c]->stopped) continue;
@@ -126,7 +126,7 @@ void ClothSystem::stop_lost(Real dt) {
   }
 }
 
-/// A cloth that lost its numbers stays where it last was.
+/// A cloth with non-finite numbers stays at its last finite state.
 void ClothSystem::stop(Cloth& cloth, std::size_t first) {
   cloth.stopped = true;
   cloth.report.finite = false;

@@ -23,18 +23,18 @@ struct ClothPoints {
   std::vector<Vec4> start;         ///< position at the start of the cloth's sub-step
   std::vector<Vec4> velocity;      ///< mean of the last sub-step of the cloth
   std::vector<Vec4> outer;         ///< acceleration by everything but springs, contacts and drag
-  std::vector<Vec4> acceleration;  ///< the same with the drag of the air at a velocity (air_drag.h)
+  std::vector<Vec4> acceleration;  ///< acceleration including the drag of the air at a velocity (air_drag.h)
   std::vector<Vec4> flow;          ///< velocity of the air
   std::vector<Vec4> rest;          ///< in the unstrained cloth
   std::vector<Vec4> moves;         ///< displacements in a step of the springs [m]
-  std::vector<Vec4> pull;          ///< impulse of the springs on pinned points, times the sub-step [kg m]
+  std::vector<Vec4> pin_impulse;   ///< impulse of the springs on pinned points, times the sub-step [kg m]
   std::vector<Real> field_drag;    ///< rate of linear drag by fields and hands [1/s]
   std::vector<Real> mass;          ///< [kg]
   std::vector<Real> inverse_mass;  ///< 0 for pinned points
   std::vector<ClothBody*> holder;  ///< the body whose pin holds it; null: none, or the world
   std::vector<uint8_t> carried;    ///< whether that body is dynamic, so that the point moves with it
   std::vector<Real> thickness, friction, self_friction;
-  std::vector<uint32_t> cloth;  ///< which it belongs to
+  std::vector<uint32_t> cloth;  ///< index of the cloth of each point
 
   std::size_t size() const { return position.size(); }
   Vec3 at(std::size_t i) const { return position[i].head<3>(); }

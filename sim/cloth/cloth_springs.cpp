@@ -10,28 +10,28 @@
 namespace offstage::sim {
 namespace {
 
-/// Springs at a time, and from how many on threads are worth their waking.
+/// Number of springs in a block, and the least number for which several threads are faster.
 constexpr std::size_t kBlock = 2048, kWorthThreads = 60000;
-/// What is too stiff for the step counts as softer: one symmetric sweep leaves so much of the explicit step's
-/// excess that it grows. What counts is what all springs of both points make of it. Without damping, a flat
-/// weave is stable up to h^2 k (1/m_a + 1/m_b) = 10. A weave sheared by 30 degrees is stable up to 2 to 3,
-/// and so is a mesh of triangles, where six springs meet (measured; an exact solution has no such limit).
-/// kMaxRatioOfAll limits them to 3.5 and 2.3.
+/// Springs that are too stiff for the step are clamped, because one symmetric sweep would leave so much of
+/// the explicit step's excess that it grows. The ratio depends on all springs at both points. Without
+/// damping, a flat weave is stable up to h^2 k (1/m_a + 1/m_b) = 10. A weave sheared by 30 degrees is stable
+/// up to 2 to 3, and so is a mesh of triangles, where six springs meet (measured; an exact solution has no
+/// such limit). kMaxRatioOfAll limits them to 3.5 and 2.3.
 constexpr Real kMaxRatio = 6, kMaxRatioOfAll = 14;
-/// Of the step squared times the sum of k e / (l m) of the springs at both points, with the elongation e and
-/// the length l: the explicit step is stable up to 4 (Anderson and Morley, 1985). The rest is for the stretch
-/// that a sub-step of the world adds.
+/// Limit of the step squared times the sum of k e / (l m) of the springs at both points, with the elongation
+/// e and the length l: the explicit step is stable up to 4 (Anderson and Morley, 1985). The remainder up to 4
+/// is a reserve for the stretch that a sub-step of the world adds.
 constexpr Real kMaxAcross = 3;
 /// Up to this length over rest length, kMaxRatioOfAll keeps that limit: 3 / 14 > 1 - 1 / 1.14.
 constexpr Real kShortEnough = 1.14;
-/// A spring as soft as this stays as it is.
+/// A spring softer than this is never clamped.
 constexpr Real kSoftRatio = 0.5;
 /// Points as near as this have no direction between them [m^2].
 constexpr Real kNoLength2 = 1e-24;
 /// Between two points that are held [1/kg].
 constexpr Real kNoMobility = 1e-100;
 
-/// Of a stiffness that is exactly what the step allows.
+/// Rounding of a stiffness that equals the limit of the step.
 constexpr Real kRounding = 1e-5;
 
 typedef float SpringFloats __attribute__((vector_size(16)));
@@ -75,7 +75,8 @@ void ClothSprings::assign(std::span<const ClothSpring> springs, const ClothPoint
   std::vector<std::size_t> ends;  // of the batches of each colour
   for (std::size_t i = 0; i < order.size();) {
     const uint32_t own = color_of(order[i]);
-    // The last colour takes paths that find no other, at points with very many springs: one at a time.
+    // The last colour gets the paths for which no other colour is left, at points with very many springs.
+    // They are swept one at a time.
     const std::size_t most = own + 1 == kPathColors ? 1 : kLanes;
     std::size_t end = i;
     while (end < order.size() && end < i + most && color_of(order[end]) == own) ++end;
@@ -127,7 +128,7 @@ void ClothSprings::add_batch(std::span<const SpringPath* const> paths, std::span
 }
 
 void ClothSprings::add_stages(std::span<const std::size_t> color_ends) {
-  pull_.clear();
+  apply_.clear();
   relax_.clear();
   const auto add = [&](std::size_t color, decltype(Stage::kind) kind) {
     const std::size_t begin = color == 0 ? 0 : color_ends[color - 1], end = color_ends[color];
@@ -135,9 +136,9 @@ void ClothSprings::add_stages(std::span<const std::size_t> color_ends) {
     std::size_t longest = 1;
     for (std::size_t i = begin; i < end; ++i) longest = std::max(longest, batch_[i].length);
     const std::size_t block = color + 1 == kPathColors ? end - begin : kBlock / (kLanes * longest) + 1;
-    (kind == Stage::pull ? pull_ : relax_).push_back({kind, begin, end, block});
+    (kind == Stage::apply ? apply_ : relax_).push_back({kind, begin, end, block});
   };
-  for (std::size_t c = 0; c < color_ends.size(); ++c) add(c, Stage::pull);
+  for (std::size_t c = 0; c < color_ends.size(); ++c) add(c, Stage::apply);
   for (std::size_t c = 0; c < color_ends.size(); ++c) add(c, Stage::forward);
   for (std::size_t c = color_ends.size(); c-- > 0;) add(c, Stage::backward);
 }
@@ -188,11 +189,11 @@ void ClothSprings::adapt_to_stretch(const ClothPoints& points) {
   }
   is_stretched_ = is_stretched;
   set_longest_step();
-  if (clamped_ > 0 || prepared_for_ > longest_step_) prepared_for_ = -1;  // else no stiffness changes
+  if (clamped_ > 0 || prepared_for_ > longest_step_) prepared_for_ = -1;  // otherwise no stiffness changes
 }
 
-void ClothSprings::pull(ClothPoints& points, std::span<Vec4> moves) {
-  run(pull_, points, moves);
+void ClothSprings::apply(ClothPoints& points, std::span<Vec4> moves) {
+  run(apply_, points, moves);
 }
 
 void ClothSprings::relax(ClothPoints& points, std::span<Vec4> moves) {
@@ -205,14 +206,14 @@ void ClothSprings::run(std::span<const Stage> stages, ClothPoints& points, std::
   run_stages(stages, threads, all, [&](const Stage& stage, uint32_t block) {
     const std::size_t begin = stage.begin + block * stage.block;
     for (std::size_t i = begin, end = std::min(begin + stage.block, stage.end); i < end; ++i)
-      stage.kind == Stage::pull      ? pull(points, moves, batch_[i])
+      stage.kind == Stage::apply     ? apply(points, moves, batch_[i])
       : stage.kind == Stage::forward ? sweep_forward(points, moves, batch_[i])
                                      : sweep_backward(points, moves, batch_[i]);
   });
 }
 
-/// What depends on the step and on what pins hold alone. Steps of one rate differ in their last bits, as
-/// differences of times do: in single precision they are one.
+/// Prepares the values that depend only on the step and on which points are pinned. Steps of one rate differ
+/// in their last bits, as differences of times do: in single precision they are one.
 void ClothSprings::begin(const ClothPoints& points, Real step) {
   const Real h = static_cast<float>(step);
   if (h == prepared_for_ && points.inverse_mass == inverse_mass_) return;
@@ -256,11 +257,11 @@ Lanes ClothSprings::elongations(const Batch& batch, std::size_t r, Lanes length,
   return c.rest > none ? (own - lane_root(d.dot(d)) + c.rest) / 2 : own;
 }
 
-/// Passes impulses on to what pins hold.
+/// Adds impulses to pinned points.
 void ClothSprings::pass_on(ClothPoints& points, const Row& row, const FourVectors& impulse) {
   for (uint32_t lane = 0; lane < row.count; ++lane)
     if ((row.held >> lane & 1) != 0)
-      points.pull[row.point[lane]] += Vec4(impulse.x[lane], impulse.y[lane], impulse.z[lane], 0);
+      points.pin_impulse[row.point[lane]] += Vec4(impulse.x[lane], impulse.y[lane], impulse.z[lane], 0);
 }
 
 void ClothSprings::store(std::span<Vec4> moves, const Row& row, const FourVectors& move) {
@@ -270,7 +271,7 @@ void ClothSprings::store(std::span<Vec4> moves, const Row& row, const FourVector
 }
 
 /// The explicit step, and the directions for the sweep.
-void ClothSprings::pull(ClothPoints& points, std::span<Vec4> moves, const Batch& batch) {
+void ClothSprings::apply(ClothPoints& points, std::span<Vec4> moves, const Batch& batch) {
   const Vec4* const x = points.start.data();
   FourVectors at = FourVectors::of(x, row_[batch.first].point), before = {};
   const auto give = [&](const Row& row, const FourVectors& impulse) {

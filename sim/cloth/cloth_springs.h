@@ -33,12 +33,13 @@ class ClothSprings {
   /// To be called before steps of length h.
   void begin(const ClothPoints& points, Real h);
   /// Applies the forces of the springs at the points' start to `moves`, the displacements of points in a
-  /// step. The moves of pinned points are kept, and the impulses on them are added to their `pull`.
-  void pull(ClothPoints& points, std::span<Vec4> moves);
-  /// Then makes the moves implicit, by one symmetric sweep.
+  /// step. The moves of pinned points are kept, and the impulses on them are added to their `pin_impulse`.
+  void apply(ClothPoints& points, std::span<Vec4> moves);
+  /// Makes the moves of apply() implicit, by one symmetric sweep.
   void relax(ClothPoints& points, std::span<Vec4> moves);
 
-  /// Number of springs whose stiffness was clamped, and the least share of its stiffness that any has left.
+  /// Number of springs whose stiffness was clamped, and the least fraction of its stiffness that any has
+  /// left.
   uint64_t clamped() const { return clamped_; }
   Real least_stiffness() const { return least_stiffness_; }
 
@@ -54,7 +55,7 @@ class ClothSprings {
   };
   /// The springs between one point of each of four paths and the next, and the first of the two points. It is
   /// small because every sweep reads all of them. A relative move d along the axis is resisted by the impulse
-  /// `along` d, less the share `forget` of the impulse of the sweep so far.
+  /// `along` d, less the fraction `forget` of the impulse of the sweep so far.
   struct Row {
     Lanes weight;                // inverse masses
     std::array<Floats, 3> axis;  // unit, from the next point to this one; by x, y and z
@@ -63,7 +64,7 @@ class ClothSprings {
     uint32_t count;  // of lanes that have this point
     uint32_t held;   // bit mask of those whose point is held
   };
-  /// What only the explicit step needs of a row.
+  /// Values of a row that only the explicit step needs.
   struct Elastic {
     Lanes rest, stiffness;  // the latter times h^2, clamped if necessary
     std::array<uint32_t, kLanes> spring;
@@ -76,12 +77,12 @@ class ClothSprings {
   /// Up to four paths: rows from the first on, of which the last has points alone.
   struct Batch {
     std::size_t first, length;  // number of springs of the longest
-    std::size_t counterparts;   // where those of the first row are; kNone: it has none
+    std::size_t counterparts;   // index of the counterparts of the first row; kNone: it has none
   };
   static constexpr std::size_t kNone = ~std::size_t{0};
   static constexpr uint32_t kNoSpring = ~0u;
   struct Stage {
-    enum { pull, forward, backward } kind;
+    enum { apply, forward, backward } kind;
     std::size_t begin, end;  // batches
     std::size_t block;       // batches of a block
 
@@ -93,7 +94,7 @@ class ClothSprings {
   void set_longest_step();
   void run(std::span<const Stage> stages, ClothPoints& points, std::span<Vec4> moves);
   Lanes elongations(const Batch& batch, std::size_t row, Lanes length, const Vec4* x) const;
-  void pull(ClothPoints& points, std::span<Vec4> moves, const Batch& batch);
+  void apply(ClothPoints& points, std::span<Vec4> moves, const Batch& batch);
   static void pass_on(ClothPoints& points, const Row& row, const FourVectors& impulse);
   static void store(std::span<Vec4> moves, const Row& row, const FourVectors& move);
   static void relax(ClothPoints& points, Row& row, const Row& after, FourVectors& at, FourVectors& next);
@@ -105,10 +106,10 @@ class ClothSprings {
   std::vector<Elastic> elastic_;
   std::vector<Counterparts> counterparts_;
   std::vector<Batch> batch_;
-  std::vector<Stage> pull_, relax_;  // of any step
-  std::vector<Real> inverse_mass_;   // that springs were prepared for
-  bool is_stretched_ = false;        // whether some `most` is not that at rest
-  Real prepared_for_ = -1;           // step [s]; < 0: none
+  std::vector<Stage> apply_, relax_;  // of any step
+  std::vector<Real> inverse_mass_;    // that springs were prepared for
+  bool is_stretched_ = false;         // whether some `most` is not that at rest
+  Real prepared_for_ = -1;            // step [s]; < 0: none
   Real longest_step_ = 0, least_stiffness_ = 1;
   uint64_t clamped_ = 0;
 };

@@ -20,8 +20,8 @@ struct Cloth {
   std::vector<Real> masses;
   std::vector<uint32_t> sources;
   std::vector<Triangle> triangles;
-  std::vector<ClothSpring> springs;  ///< those that hold
-  std::vector<ClothPin> pins;        ///< those that hold
+  std::vector<ClothSpring> springs;  ///< those that are not broken or released
+  std::vector<ClothPin> pins;        ///< those that are not broken or released
   std::vector<Real> seam_lengths;    ///< at the start [m]
   Real rest_volume = 0;              ///< inside of a closed one [m^3]
   ClothGas gas;                      ///< inside of a closed one under pressure

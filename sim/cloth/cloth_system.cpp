@@ -8,15 +8,15 @@
 namespace offstage::sim {
 namespace {
 
-/// Solutions for contacts with bodies and the stretch limit together.
+/// Number of solutions for contacts with bodies and the stretch limit together.
 constexpr int kMaxTurns = 16;
-/// Substeps of cloth in one of the world.
+/// Greatest number of sub-steps of cloth in one of the world.
 constexpr Real kMaxParts = 1000;
-/// How far a body that pushes cloth may come towards it in a sub-step, in edges of triangles.
+/// Greatest distance that a body may approach cloth in a sub-step, in edges of triangles.
 constexpr Real kMostApproach = 0.1;
-/// How far the ends of a spring may move against each other in a sub-step, in lengths of the spring.
+/// Greatest relative displacement of the ends of a spring in a sub-step, in lengths of the spring.
 constexpr Real kMostStrain = 1;
-/// Into how many a sub-step is divided for these, at most.
+/// Greatest number of parts into which a sub-step is divided for these two limits.
 constexpr Real kMostDivision = 16;
 
 }  // namespace
@@ -28,18 +28,18 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
   parts_ = parts_in(weather.h, speed);
   dt_ = weather.h / parts_;
   time_ = weather.time + weather.h;
-  Real since_look = 0;  // way of the fastest body [m]
+  Real since_look = 0;  // distance moved by the fastest body [m]
   for (Real k = 0; k < parts_; ++k) {
     for (Cloth* cloth : cloths_) cloth->age += dt_;
-    blow(dt_, parts_ - k);
+    apply_air(dt_, parts_ - k);
     substep(k / parts_, (k + 1) / parts_, dt_);
     ClothWeather next = weather;
     next.time += (k + 1) * dt_;
     next.h = dt_;
     for (std::size_t c = 0; c < cloths_.size(); ++c)
       if (step_leak(*cloths_[c], first_[c], next, points_)) air_[c].expire();
-    // A body that goes by more than an edge of the cloth in a sub-step of the world must find the holes that
-    // it tears.
+    // A body that moves by more than an edge of the cloth in a sub-step of the world must meet the holes that
+    // it has torn.
     since_look += speed * dt_;
     if (since_look > corner_contacts_.mean_edge() && k + 1 < parts_) {
       since_look = 0;
@@ -50,7 +50,8 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
   write_back();
 }
 
-/// What stays the same in a sub-step of the world: outer forces, pins, and bodies that points may touch.
+/// Prepares the values that are constant in a sub-step of the world: outer forces, pins, and bodies that
+/// points may touch.
 void ClothSystem::begin_step(const ClothWeather& weather, std::span<ClothBody> bodies) {
   if (changed_) assemble();
   bodies_ = bodies;
@@ -69,15 +70,16 @@ void ClothSystem::begin_step(const ClothWeather& weather, std::span<ClothBody> b
   corner_contacts_.find(points_, bodies, weather.h);
 }
 
-/// Into how many sub-steps of cloth one of the world is divided, with bodies that approach it at a speed.
+/// Returns the number of sub-steps of cloth in one of the world, if bodies approach it at `speed`.
 Real ClothSystem::parts_in(Real h, Real speed) const {
   Real longest = h;
   for (const Cloth* cloth : cloths_) longest = std::min(longest, cloth->def.substep);
   const Real shortest = longest / kMostDivision;
   if (speed > 0)
     longest = std::min(longest, std::max(kMostApproach * corner_contacts_.mean_edge() / speed, shortest));
-  // Cloth that whips and snaps, such as torn skin, would be held back only far from where it began. Springs
-  // between points that are held and points that are not would then gain much more energy than motion loses.
+  // In one long sub-step, the moves of fast cloth such as torn skin would be shortened only far from where
+  // they began. Springs between points with and without shortened moves would then gain much more energy than
+  // motion loses.
   if (const Real rate = fastest_strain_rate(); rate > 0)
     longest = std::min(longest, std::max(kMostStrain / rate, shortest));
   return std::clamp(std::ceil(h / longest * (1 - 1e-12)), 1.0, kMaxParts);
@@ -89,8 +91,8 @@ void ClothSystem::substep(Real from, Real to, Real dt) {
   cuts_.clear();
   move_held();
   integrate(dt);
-  stop_lost(dt);
-  pull_bodies(dt);
+  stop_diverged(dt);
+  apply_pin_impulses_to_bodies(dt);
   close_seams(dt);
   limit_bending(dt);
   limit_.project(points_, carriers_, dt, kick_, cuts_);
@@ -101,9 +103,9 @@ void ClothSystem::substep(Real from, Real to, Real dt) {
   end_substep(dt);
 }
 
-/// Bodies push cloth out of their way. Where springs are too long, contacts and springs are solved for
-/// together, and linearised again in each turn. That includes bodies that cloth does not touch in this
-/// sub-step but soon may: cloth under a body often flies ahead of it for a sub-step.
+/// Bodies push cloth off their path. Where springs are too long, contacts and springs are solved together,
+/// and linearised again in each iteration. That includes bodies that cloth does not touch in this sub-step
+/// but soon may: cloth under a body often flies ahead of it for a sub-step.
 void ClothSystem::touch_bodies(Real dt) {
   contacts_.find_runaways(points_);
   corner_contacts_.solve(points_, dt, cuts_);
@@ -117,8 +119,8 @@ void ClothSystem::touch_bodies(Real dt) {
   }
 }
 
-/// Triangles at dynamic bodies. An overlap of the start is taken back slowly: the correction counts as
-/// velocity.
+/// Contacts of triangles with dynamic bodies. An initial overlap is removed slowly, because the correction
+/// counts as velocity.
 void ClothSystem::collect_triangles() {
   const std::size_t first = body_contacts_.size();
   corner_contacts_.collect(points_, 1, body_contacts_);
@@ -148,8 +150,9 @@ void ClothSystem::adapt_springs() {
     if (cloths_[c]->def.integrator == ClothIntegrator::relaxed) springs_[c].adapt_to_stretch(points_);
 }
 
-/// Before a sub-step, with as many `left` in that of the world.
-void ClothSystem::blow(Real dt, Real left) {
+/// Updates the drag of the air before a sub-step of length `dt`; `left` sub-steps of the world's sub-step
+/// remain.
+void ClothSystem::apply_air(Real dt, Real left) {
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     const bool relaxed = cloths_[c]->def.integrator == ClothIntegrator::relaxed;
     air_[c].renew(points_, dt, static_cast<uint32_t>(left), relaxed ? spring_steps(c, dt) : 1);
@@ -164,7 +167,8 @@ uint32_t ClothSystem::spring_steps(std::size_t cloth, Real dt) const {
 }
 
 void ClothSystem::integrate(Real dt) {
-  // Springs begin where bodies are, which they have pulled since points were put on them.
+  // Springs have moved the bodies since the pinned points were placed on them, so the points are placed
+  // again.
   for (const Held& held : held_)
     if (held.body) points_.start[held.point] = padded(held.body->start().point_to_world(held.position));
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
@@ -187,8 +191,8 @@ void ClothSystem::limit_bending(Real dt) {
     if (limit.project(points_, dt, kick_, cuts_)) ++cloths_[limit.cloth()]->report.bend_limited;
 }
 
-/// Seams draw together evenly in their time and then hold. One that was held up goes on no faster: more than
-/// the cloth beside it can follow in a sub-step would only be taken back.
+/// Seams draw together evenly in their time and then hold. A delayed seam does not close faster, because the
+/// stretch limit would remove any motion that the cloth beside it cannot follow.
 void ClothSystem::close_seams(Real dt) {
   for (std::size_t k = 0; k < seams_.size(); ++k) {
     const Cloth& cloth = *cloths_[seams_[k].cloth];

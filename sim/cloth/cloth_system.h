@@ -51,14 +51,14 @@ class ClothSystem {
   /// moves are shortened.
   struct Frame {
     bool rests = false;                 // in the world
-    bool anchored = false;              // something fixed holds it
-    bool carries = false;               // dynamic bodies hang on it
+    bool anchored = false;              // a fixed object holds it
+    bool carries = false;               // dynamic bodies are pinned to it
     const ClothBody* leader = nullptr;  // the only body that holds it, if that is not dynamic
     const ClothBody* pusher = nullptr;  // the only body that it touches or is near, if that is dynamic
-    Vec4 move = Vec4::Zero();           // mean, of the leader's points or of all and bodies
-    Real mass = 0;                      // of the same
-    Vec4 momentum = Vec4::Zero();       // lost by shortening
-    Vec4 velocity = Vec4::Zero();       // mean, of points and bodies
+    Vec4 move = Vec4::Zero();           // mean move of the leader's points, or of all points and bodies
+    Real mass = 0;                      // mass of the same points and bodies
+    Vec4 momentum = Vec4::Zero();       // momentum lost by shortening
+    Vec4 velocity = Vec4::Zero();       // mean velocity of points and bodies
     Real total_mass = 0;                // of points and bodies
   };
   struct Seam {
@@ -67,7 +67,7 @@ class ClothSystem {
   };
 
   void adapt_springs();
-  void blow(Real dt, Real left);
+  void apply_air(Real dt, Real left);
   uint32_t spring_steps(std::size_t cloth, Real dt) const;
   std::span<const ClothSpring> springs_of(std::size_t cloth) const {
     return std::span(all_springs_)
@@ -89,29 +89,30 @@ class ClothSystem {
 
   // In cloth_holders.cpp:
   void find_held(Real time, std::span<ClothBody> bodies);
-  void carry(uint32_t point, ClothBody& body, const Vec3& place);
+  void attach(uint32_t point, ClothBody& body, const Vec3& place);
   void set_clamps(std::size_t cloth);
   void move_held();
-  void pull_bodies(Real dt);
-  Real share_at_once(std::size_t cloth, Real dt) const;
+  void apply_pin_impulses_to_bodies(Real dt);
+  Real fraction_at_once(std::size_t cloth, Real dt) const;
   void push_holders(Real dt);
 
   // In shorten_moves.cpp:
   void find_frames();
-  const ClothBody* near_another(uint32_t point);
-  void follow_or_rest(uint32_t point);
+  const ClothBody* nearby_other_body(uint32_t point);
+  void choose_frame(uint32_t point);
   bool find_drifts();
   void shorten_moves(Real dt);
   bool shorten_in_pieces();
-  bool shorten_doubtful(Shortened how);
+  bool shorten_until_valid(Shortened how);
   bool shorten_straight(Shortened how, bool& turned);
-  void shorten_carrier(Carrier& carrier, Real share);
+  void shorten_carrier(Carrier& carrier, Real fraction);
   void add_momenta(Real sign, Real dt);
   std::vector<Vec4> end_velocities(Real dt) const;
   std::vector<Real> inner_energies(std::span<const Vec4> velocity);
   std::vector<Real> elastic_gains(std::span<const Vec4> whole);
-  void take_gains(std::span<const Vec4> whole, std::span<const Vec4> before, std::span<const Vec4> velocity);
-  void give_momenta_back();
+  void remove_energy_gains(std::span<const Vec4> whole, std::span<const Vec4> before,
+                           std::span<const Vec4> velocity);
+  void restore_momenta();
   Frame& frame_of(uint32_t point) { return frames_[pieces_.of(point)]; }
   void stop_bodies(Real dt);
   std::vector<const Carrier*> carriers_of(std::size_t cloth) const;
@@ -125,14 +126,14 @@ class ClothSystem {
   void tear_within(const ClothWeather& weather, Real fraction);
   uint32_t tear_at(std::size_t cloth, Real time);
   void stop(Cloth& cloth, std::size_t first);
-  void stop_lost(Real dt);
+  void stop_diverged(Real dt);
   void count_penetration();
 
   std::vector<Cloth*> cloths_;
   std::vector<std::size_t> first_;         // point of each cloth
   std::vector<ClothSpring> all_springs_;   // by cloth, between points of all
   std::vector<std::size_t> first_spring_;  // of each cloth, and the end
-  std::vector<Vec4> kick_;                 // of velocities at the end of a sub-step, beside their moves
+  std::vector<Vec4> kick_;  // difference of the velocities at the end of a sub-step from those of the moves
   bool changed_ = false;
   Real dt_ = 0;     // sub-step of cloth [s]
   Real time_ = 0;   // at the end of the world's sub-step [s]
@@ -154,10 +155,10 @@ class ClothSystem {
   std::vector<BodyContact> body_contacts_;
   ClothPieces pieces_;
   std::vector<Vec4> drift_;  // the move of the frame in which each point's move is shortened
-  MoveShares shares_;
+  MoveFractions fractions_;
   std::vector<Frame> frames_;       // of the pieces
   std::vector<uint8_t> shortened_;  // how each point's move was shortened in the sub-step
-  std::vector<uint32_t> lowered_;   // points whose shares were lowered in a round
+  std::vector<uint32_t> lowered_;   // points whose fractions were lowered in a round
   std::span<ClothBody> bodies_;
 };
 

@@ -14,10 +14,10 @@ namespace {
 /// A patch is flat enough if all its normals have at least this cosine with a common direction.
 constexpr Real kLeaning = 0.3;
 
-/// And the triangles around a point, if they have this one: an angle a then is seen as one of at most
-/// 2 atan(tan(a / 2) / cosine) < a / cosine.
+/// The same for the triangles around a point: an angle a then appears as at most 2 atan(tan(a / 2) / cosine)
+/// < a / cosine.
 constexpr Real kStarLeaning = 0.7;
-/// How much a triangle's angles may grow by strain.
+/// Factor by which strain may increase a triangle's angles.
 constexpr Real kStrainedAngle = 1.15;
 
 constexpr uint32_t kNone = ~0u;
@@ -61,7 +61,7 @@ std::vector<uint32_t> pieces(std::span<const Triangle> triangles, std::size_t po
   return piece;
 }
 
-/// Least and greatest of a triangle's unit normals at both ends of its way.
+/// Least and greatest of a triangle's unit normals at both ends of its path.
 std::array<Vec4, 2> normal_bounds(const Triangle& t, std::span<const Vec4> from, std::span<const Vec4> to) {
   const auto unit_normal = [&](std::span<const Vec4> x) {
     const Vec3 n = (x[t[1]] - x[t[0]]).head<3>().cross((x[t[2]] - x[t[0]]).head<3>());
@@ -151,7 +151,7 @@ void ClothTree::fit_star(Star& star) const {
 
 /// Whether the outline of a patch, seen along its mean normal, crosses itself: sweeps over its segments.
 bool ClothTree::outline_crosses(std::span<const Vec4> points, const Node& node) const {
-  if (node.count <= EightBoxes::kCount) return true;  // no dearer to look at its triangles
+  if (node.count <= EightBoxes::kCount) return true;  // testing its triangles one by one costs no more
   const Vec3 normal = (node.normal_low + node.normal_high).head<3>().normalized();
   const Vec3 u = normal.unitOrthogonal(), v = normal.cross(u);
   struct Segment {
@@ -262,7 +262,7 @@ void ClothTree::fit_node(uint32_t at) {
   node.leans = node.connected && lean(node.normal_low, node.normal_high, kLeaning);
 }
 
-/// What is above fresh triangles, children before their parents.
+/// The nodes above newly fitted triangles, children before their parents.
 void ClothTree::fit_above() {
   for (auto k = static_cast<uint32_t>(nodes_.size()); k-- > 0;) {
     Node& node = nodes_[k];

@@ -33,7 +33,7 @@ class ClothTree {
   /// must be those of that call.
   template <class Visit>
   void pairs(std::span<const Vec4> points, Visit&& visit) const;
-  /// Calls visit(triangle) for triangles whose moving boxes meet a box at rest.
+  /// Calls visit(triangle) for triangles whose moving boxes overlap a box at rest.
   template <class Visit>
   void overlapping(const Aabb& bounds, Visit&& visit) const;
 
@@ -83,7 +83,7 @@ class ClothTree {
   std::vector<uint32_t> piece_;                  // connected piece of each triangle
   std::vector<std::array<uint32_t, 3>> beside_;  // triangle across each edge from a corner to the next
   std::vector<MovingBox> boxes_;                 // in the order of order_, as the next
-  std::vector<std::array<Vec4, 2>> normals_;     // bounds of the unit normals at both ends of the way
+  std::vector<std::array<Vec4, 2>> normals_;     // bounds of the unit normals at both ends of the path
   std::vector<Star> stars_;                      // of each point
   std::vector<uint32_t> around_;
   std::vector<Node> nodes_;
@@ -115,7 +115,7 @@ void ClothTree::look(const Node& own, uint32_t lane, const Node& other, uint32_t
   if ((own.fresh >> lane & 1) == 0) lanes &= other.fresh;
   if (lanes == 0) return;
   const uint32_t a = order_[own.first + lane];
-  for (lanes &= leaves_[other.leaf].meeting(boxes_[own.first + lane]); lanes != 0; lanes &= lanes - 1) {
+  for (lanes &= leaves_[other.leaf].overlapping(boxes_[own.first + lane]); lanes != 0; lanes &= lanes - 1) {
     const uint32_t b = order_[other.first + static_cast<uint32_t>(std::countr_zero(lanes))];
     if (!in_leaning_star(triangles_[a], triangles_[b])) visit(a, b);
   }
@@ -124,7 +124,7 @@ void ClothTree::look(const Node& own, uint32_t lane, const Node& other, uint32_t
 template <class Visit>
 void ClothTree::between(uint32_t at_a, uint32_t at_b, Visit& visit) const {
   const Node &a = nodes_[at_a], &b = nodes_[at_b];
-  if ((a.fresh | b.fresh) == 0 || !a.box.meets(b.box)) return;
+  if ((a.fresh | b.fresh) == 0 || !a.box.may_overlap(b.box)) return;
   if (a.second == 0 && b.second == 0) {
     for (uint32_t i = 0; i < a.count; ++i) look(a, i, b, ~0u, visit);
     return;
@@ -148,13 +148,13 @@ void ClothTree::overlapping(const Aabb& bounds, Visit&& visit) const {
     const uint32_t at = open.back();
     const Node& node = nodes_[at];
     open.pop_back();
-    if (!node.box.meets(box)) continue;
+    if (!node.box.may_overlap(box)) continue;
     if (node.second != 0) {
       open.push_back(node.second);
       open.push_back(at + 1);
       continue;
     }
-    for (uint32_t lanes = leaves_[node.leaf].meeting(box); lanes != 0; lanes &= lanes - 1)
+    for (uint32_t lanes = leaves_[node.leaf].overlapping(box); lanes != 0; lanes &= lanes - 1)
       visit(order_[node.first + static_cast<uint32_t>(std::countr_zero(lanes))]);
   }
 }

@@ -9,7 +9,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Triangles steeper than this against what points out of a feature do not lie over it.
+/// Triangles that are steeper than this against a feature's outward direction do not lie over it.
 constexpr Real kLeastCosine = 0.3;
 constexpr int kMaxSamples = 32;            // of an edge
 constexpr std::size_t kMaxCorners = 2000;  // of a mesh
@@ -41,7 +41,7 @@ std::vector<CornerContacts::Corner> CornerContacts::corners(const Solid& solid) 
   const auto rim = [&](Real radius, Real y, Real up, Real depth) {
     const int count = std::max(8, 2 * samples(std::numbers::pi * radius, spacing_, 4));
     for (int k = 0; k < count; ++k) {
-      // Of a quarter by the tangent of half the angle, nearly evenly; needs no sine.
+      // Samples of a quarter circle by the tangent of half the angle: nearly even, and without a sine.
       const Real t = 4.0 * k / count, quarter = std::floor(t), s = t - quarter;
       const Real half = s * (std::numbers::sqrt2 - 1), d = 1 + half * half;  // tan of half the angle
       Vec3 around((1 - half * half) / d, 0, 2 * half / d);
@@ -102,11 +102,12 @@ void CornerContacts::find(const ClothPoints& points, std::span<ClothBody> bodies
   };
   for (uint32_t b = 0; b < bodies.size(); ++b) {
     if (!bodies[b].collides) continue;
-    const Obstacle& way = bodies[b].way();
-    if (RoundContacts::concerns(way.solid, longest_, thinnest_))
-      seek(way.swept_bounds(), [&](uint32_t t) { round_.add(t, b); });
-    for (const Corner& corner : corners(way.solid)) {
-      const Vec3 from = way.start.point_to_world(corner.place), to = way.end.point_to_world(corner.place);
+    const Obstacle& obstacle = bodies[b].obstacle();
+    if (RoundContacts::concerns(obstacle.solid, longest_, thinnest_))
+      seek(obstacle.swept_bounds(), [&](uint32_t t) { round_.add(t, b); });
+    for (const Corner& corner : corners(obstacle.solid)) {
+      const Vec3 from = obstacle.start.point_to_world(corner.place),
+                 to = obstacle.end.point_to_world(corner.place);
       const Real depth = std::min(corner.depth, 2 * spacing_);
       Aabb box(from.cwiseMin(to), from.cwiseMax(to));
       box.min().array() -= depth;

@@ -22,8 +22,8 @@ class CornerContacts {
   Real mean_edge() const { return 2 * spacing_; }  ///< mean length of the triangles' edges [m]
   /// Separates features and triangles in a sub-step of cloth of length dt. Appends to `cuts`.
   void solve(ClothPoints& points, Real dt, std::vector<VelocityCut>& cuts);
-  /// Contacts of rounded dynamic bodies with triangles as points are now, also of triangles within `reach`
-  /// thicknesses of the cloth more than the distance that they keep.
+  /// Returns the contacts of rounded dynamic bodies with triangles at the points' current positions,
+  /// including triangles that are up to `reach` thicknesses of the cloth beyond the distance that they keep.
   void collect(const ClothPoints& points, Real reach, std::vector<BodyContact>& found) {
     round_.collect(triangles_, points, bodies_, reach, found);
   }

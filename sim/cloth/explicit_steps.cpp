@@ -7,7 +7,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Accelerations at positions and velocities of a run; 0 of what is held.
+/// Accelerations at positions and velocities of a run; 0 for pinned points.
 void accelerate(const ClothPoints& points, const ClothRange& cloth, const SpringRun& x, const SpringRun& v,
                 SpringRun& a) {
   std::fill(a.begin(), a.end(), Vec4::Zero());
@@ -41,7 +41,7 @@ void drag_gains(const ClothRange& cloth, const SpringRun& v, Real h, SpringRun& 
     gain[i] = cloth.air.respond(i, gain[i] + h * cloth.air.change(i, v[i]));
 }
 
-/// What springs do to what is held, over the time h.
+/// Adds the impulses of springs on pinned points over the time h.
 void pass_on(ClothPoints& points, const ClothRange& cloth, const SpringRun& x, const SpringRun& v, Real h,
              Real dt) {
   if (!cloth.bending.empty()) {
@@ -49,7 +49,7 @@ void pass_on(ClothPoints& points, const ClothRange& cloth, const SpringRun& x, c
     cloth.bending.add_forces(x, 1, force);
     if (cloth.bending.damping() > 0) cloth.bending.multiply(v, -cloth.bending.damping(), force);
     for (std::size_t i = 0; i < force.size(); ++i)
-      if (is_held(points, cloth.begin + i)) points.pull[cloth.begin + i] += h * dt * force[i];
+      if (is_held(points, cloth.begin + i)) points.pin_impulse[cloth.begin + i] += h * dt * force[i];
   }
   for (const ClothSpring& s : cloth.springs) {
     const bool a = is_held(points, s.a), b = is_held(points, s.b);
@@ -62,7 +62,7 @@ void pass_on(ClothPoints& points, const ClothRange& cloth, const SpringRun& x, c
                          (s.stiffness * s.elongation(length, x, cloth.begin) +
                           s.damping * u.dot(v[s.a - cloth.begin] - v[s.b - cloth.begin])) *
                          u;
-    a ? points.pull[s.a] -= impulse : points.pull[s.b] += impulse;
+    a ? points.pin_impulse[s.a] -= impulse : points.pin_impulse[s.b] += impulse;
   }
 }
 
@@ -84,7 +84,7 @@ void step_rk4(ClothPoints& points, const ClothRange& cloth, Real h, std::span<Ve
   SpringRun x, v;
   begin_run(points, cloth, h, x, v);
   const std::size_t n = x.size();
-  const std::array<Real, 4> at = {0, h / 2, h / 2, h}, share = {h / 6, h / 3, h / 3, h / 6};
+  const std::array<Real, 4> at = {0, h / 2, h / 2, h}, fraction = {h / 6, h / 3, h / 3, h / 6};
   SpringRun dx(v), dv(n, Vec4::Zero()), stage_x(n), stage_v(n), move(n, Vec4::Zero()), gain(n, Vec4::Zero());
   for (std::size_t k = 0; k < 4; ++k) {
     for (std::size_t i = 0; i < n; ++i) {
@@ -92,11 +92,11 @@ void step_rk4(ClothPoints& points, const ClothRange& cloth, Real h, std::span<Ve
       stage_v[i] = v[i] + at[k] * dv[i];
     }
     accelerate(points, cloth, stage_x, stage_v, dv);
-    pass_on(points, cloth, stage_x, stage_v, share[k], h);
+    pass_on(points, cloth, stage_x, stage_v, fraction[k], h);
     dx = stage_v;
     for (std::size_t i = 0; i < n; ++i) {
-      move[i] += share[k] * dx[i];
-      gain[i] += share[k] * dv[i];
+      move[i] += fraction[k] * dx[i];
+      gain[i] += fraction[k] * dv[i];
     }
   }
   const SpringRun free = gain;

@@ -5,11 +5,11 @@ namespace offstage::sim {
 namespace {
 
 constexpr int kMaxIterations = 300;
-/// Of the residual against the right side, in the preconditioner's norm, squared.
+/// Square of the accepted residual over the right side, in the preconditioner's norm.
 constexpr Real kTolerance2 = 1e-12;
 
-/// The matrix of backward Euler: of each spring alpha u u^T + beta 1 between its ends, that of bending, and
-/// the masses.
+/// The system of an implicit step of cloth, backward Euler (step_implicit()). Its matrix has a block alpha u
+/// u^T + beta 1 for each spring between its ends, the matrix of bending, and the masses.
 class ImplicitSystem {
  public:
   ImplicitSystem(const ClothPoints& points, const ClothRange& cloth, Real h)
@@ -43,7 +43,7 @@ class ImplicitSystem {
     for (Mat3& b : block_) b = b.inverse().eval();
   }
 
-  /// y = A p, 0 where held.
+  /// y = A p, 0 for pinned points.
   void multiply(const SpringRun& p, SpringRun& y) const {
     for (std::size_t i = 0; i < p.size(); ++i) y[i] = points_.mass[cloth_.begin + i] * p[i];
     for (std::size_t i = 0; i < drag_.size(); ++i) y[i] += dragged(i, p[i]);
@@ -60,14 +60,14 @@ class ImplicitSystem {
     clear_held(y);
   }
 
-  /// What the springs do to what is held, when all move with v through the step.
+  /// Adds the impulses of springs on pinned points, if all points move with v through the step.
   void pass_on(ClothPoints& points, const SpringRun& v, Real h) const {
     if (bending_ > 0) {
       SpringRun force(v.size(), Vec4::Zero());
       cloth_.bending.add_forces(cloth_.part(points.start), h * h, force);
       cloth_.bending.multiply(v, -h * bending_, force);
       for (std::size_t i = 0; i < force.size(); ++i)
-        if (is_held(points, cloth_.begin + i)) points.pull[cloth_.begin + i] += force[i];
+        if (is_held(points, cloth_.begin + i)) points.pin_impulse[cloth_.begin + i] += force[i];
     }
     for (std::size_t k = 0; k < links_.size(); ++k) {
       const ClothSpring& s = cloth_.springs[k];
@@ -75,8 +75,8 @@ class ImplicitSystem {
       const Vec4 q = v[s.a - cloth_.begin] - v[s.b - cloth_.begin];
       const Vec4 impulse =
           h * ((h * link.force + link.along * link.direction.dot(q)) * link.direction + link.across * q);
-      if (is_held(points, s.a)) points.pull[s.a] -= impulse;
-      if (is_held(points, s.b)) points.pull[s.b] += impulse;
+      if (is_held(points, s.a)) points.pin_impulse[s.a] -= impulse;
+      if (is_held(points, s.b)) points.pin_impulse[s.b] += impulse;
     }
   }
 
@@ -89,7 +89,8 @@ class ImplicitSystem {
     return drag_.empty() ? Vec4(Vec4::Zero()) : padded(drag_[i] * v.head<3>());
   }
 
-  /// M v + h (spring forces + M a), 0 where held; drag is that of its velocity, with what is linear added.
+  /// M v + h (spring forces + M a), 0 for pinned points. The drag is that of its velocity, plus the linear
+  /// terms.
   SpringRun right_side(const SpringRun& v, Real h) const {
     SpringRun b(v.size());
     for (std::size_t i = 0; i < b.size(); ++i) {
@@ -158,7 +159,7 @@ bool solve(const ImplicitSystem& system, const SpringRun& b, SpringRun& v) {
   return false;
 }
 
-/// What the solution left of the momentum of a cloth that nothing holds, is given to all of it.
+/// The error of the solution in the momentum of a free cloth is distributed over all of its points.
 void keep_momentum(const ClothPoints& points, const ClothRange& cloth, const ImplicitSystem& system,
                    const SpringRun& b, SpringRun& v) {
   Vec4 lost = Vec4::Zero();

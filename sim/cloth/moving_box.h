@@ -27,7 +27,7 @@ struct MovingBox {
     }
   }
   /// Whether the boxes may overlap. False: they are separate along one axis during the whole motion.
-  bool meets(const MovingBox& b) const {
+  bool may_overlap(const MovingBox& b) const {
     const Corner over = (low[0] - b.high[0]).min(low[1] - b.high[1]);
     const Corner under = (b.low[0] - high[0]).min(b.low[1] - high[1]);
     return over.max(under).maxCoeff() <= 0;
@@ -63,8 +63,8 @@ class EightBoxes {
         high_[end][axis][lane] = box.high[end][static_cast<Eigen::Index>(axis)];
       }
   }
-  /// Bit mask of the boxes that `box` meets.
-  uint32_t meeting(const MovingBox& box) const {
+  /// Bit mask of the boxes that `box` may overlap.
+  uint32_t overlapping(const MovingBox& box) const {
     __m256 apart = gap(box, 0);
     for (std::size_t axis : {1u, 2u}) apart = _mm256_max_ps(apart, gap(box, axis));
     return static_cast<uint32_t>(_mm256_movemask_ps(_mm256_cmp_ps(apart, _mm256_setzero_ps(), _CMP_LE_OQ)));

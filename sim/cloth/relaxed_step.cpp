@@ -7,8 +7,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Of a step squared times the square of the fastest frequency of bending, damping included: up to this,
-/// bending is as stable as an explicit force.
+/// Up to this value of the square of the step times the fastest frequency of bending, damping included,
+/// bending is stable as an explicit force.
 constexpr Real kSoftBending = 0.25;
 
 /// Bending in a sub-step of step_relaxed().
@@ -20,13 +20,13 @@ class RelaxedBending {
     is_stiff_ = dt * (dt + damping_) * bending.fastest() > kSoftBending;
     force_.assign(cloth.end - cloth.begin, Vec4::Zero());
     if (is_stiff_) return;
-    // Once for the whole sub-step.
+    // Called once for the whole sub-step.
     bending.add_damped_forces(cloth.part(points.start), cloth.part(points.velocity), force_);
   }
   bool is_stiff() const { return is_stiff_; }
 
-  /// Adds what it does in a step to the moves, and to the pull of what is held.
-  void pull(ClothPoints& points, std::span<Vec4> moves) {
+  /// Adds the effect of a step to the moves, and to the `pin_impulse` of pinned points.
+  void apply(ClothPoints& points, std::span<Vec4> moves) {
     if (is_stiff_) {
       std::fill(force_.begin(), force_.end(), Vec4::Zero());
       cloth_.bending.add_forces(cloth_.part(points.start), 1, force_);
@@ -34,7 +34,7 @@ class RelaxedBending {
     give(points, moves);
   }
 
-  /// Takes out of the moves what stiff bending does not allow; whether to tolerance.
+  /// Removes the motion that stiff bending does not allow; returns whether the tolerance was reached.
   bool filter(ClothPoints& points, std::span<Vec4> moves) {
     const Real stiff = h_ * (h_ + damping_);
     const std::span<Vec4> own = moves.subspan(cloth_.begin, force_.size());
@@ -43,7 +43,7 @@ class RelaxedBending {
     std::fill(force_.begin(), force_.end(), Vec4::Zero());
     cloth_.bending.multiply(own, -stiff, force_);
     for (std::size_t i = 0; i < force_.size(); ++i)
-      if (is_held(points, cloth_.begin + i)) points.pull[cloth_.begin + i] += force_[i];
+      if (is_held(points, cloth_.begin + i)) points.pin_impulse[cloth_.begin + i] += force_[i];
     return done;
   }
 
@@ -52,7 +52,7 @@ class RelaxedBending {
     for (std::size_t i = 0; i < force_.size(); ++i) {
       const std::size_t k = cloth_.begin + i;
       const Vec4 impulse = h_ * h_ * force_[i];
-      is_held(points, k) ? points.pull[k] += impulse : moves[k] += points.inverse_mass[k] * impulse;
+      is_held(points, k) ? points.pin_impulse[k] += impulse : moves[k] += points.inverse_mass[k] * impulse;
     }
   }
 
@@ -89,8 +89,8 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
       moves[k] = is_held(points, k) ? velocity[i] : Vec4(velocity[i] + h * h * points.acceleration[k]);
       if (drags && !is_held(points, k)) moves[k] += h * h * cloth.air.change(i, velocity[i] / h);
     }
-    if (bends) bending->pull(points, moves);
-    springs.pull(points, moves);
+    if (bends) bending->apply(points, moves);
+    springs.apply(points, moves);
     for (std::size_t i = 0; drags && i < n; ++i)
       if (Vec4& move = moves[cloth.begin + i]; !is_held(points, cloth.begin + i))
         move = velocity[i] + cloth.air.respond(i, move - velocity[i]);
@@ -104,7 +104,7 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
   for (std::size_t i = 0; i < n; ++i) {
     const std::size_t k = cloth.begin + i;
     if (is_held(points, k)) {
-      points.pull[k] *= steps;  // impulses times the whole sub-step
+      points.pin_impulse[k] *= steps;  // impulses times the whole sub-step
     } else {
       points.position[k] = points.start[k];
       if (steps > 1) kick[k] = velocity[i] / h - (points.position[k] - from[i]) / dt;

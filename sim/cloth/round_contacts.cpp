@@ -8,12 +8,12 @@
 namespace offstage::sim {
 namespace {
 
-/// A sample of a way every this share of the radius, so that nothing passes between two of them.
+/// A path is sampled every this fraction of the radius, so that nothing passes between two of them.
 constexpr Real kSampleSpacing = 0.5;
-constexpr int kMaxWaySamples = 256;
-/// Steps to the place of a triangle that is nearest to an axis.
+constexpr int kMaxPathSamples = 256;
+/// Number of iterations of the search for the point of a triangle that is nearest to an axis.
 constexpr int kMaxAxisSteps = 8;
-/// A contact nearer to a corner than this is that of the point.
+/// A contact nearer to a corner than this is left to the contacts of points.
 constexpr Real kWithin = 0.99;
 
 /// The segment from -half to half along y around which a shape is rounded, and its radius.
@@ -31,7 +31,7 @@ std::optional<Rounding> rounding(const Solid& solid) {
   return {};
 }
 
-/// The place of a triangle nearest to the segment, by projections from one to the other in turns.
+/// The point of a triangle nearest to the segment, by alternating projections.
 TrianglePoint nearest_to_axis(const Rounding& shape, const std::array<Vec3, 3>& t) {
   const auto on_axis = [&](const Vec3& p) { return Vec3(0, std::clamp(p.y(), -shape.half, shape.half), 0); };
   Vec3 axis = on_axis((t[0] + t[1] + t[2]) / 3);
@@ -66,7 +66,7 @@ std::optional<TriangleContact> RoundContacts::touch(const Triangle& t, const Clo
     longest = std::max(longest, (to[k] - from[k]).norm());
   }
   const Real samples = std::ceil(longest / (kSampleSpacing * (shape->radius + keeps)));
-  const int count = std::clamp(static_cast<int>(std::min(samples, 1e6)), 1, kMaxWaySamples);
+  const int count = std::clamp(static_cast<int>(std::min(samples, 1e6)), 1, kMaxPathSamples);
   for (int i = 1; i <= count; ++i) {
     const Real s = static_cast<Real>(i) / count;
     std::array<Vec3, 3> at;

@@ -1,7 +1,7 @@
 #pragma once
 /// Contact of rounded bodies (spheres, capsules, cylinders, cones) with triangles of cloth. Points alone keep
 /// a triangle out of a body whose radius is large against the triangle; a thin rod or a small ball would pass
-/// between them. The place of a triangle that is nearest to the body's axis is swept along the way of both.
+/// between them. The place of a triangle that is nearest to the body's axis is swept along the path of both.
 
 #include <optional>
 #include <span>
@@ -16,17 +16,17 @@ namespace offstage::sim {
 class RoundContacts {
  public:
   /// Whether triangles with edges of up to `edge` at the distance `thickness` of their points from the shape
-  /// may come too near to it, or pass it by, between these.
+  /// may come too near to the shape between these points, or let it pass.
   static bool concerns(const Solid& solid, Real edge, Real thickness);
 
   void clear() { near_.clear(); }
   /// A triangle and a body that can meet in the sub-step of the world.
   void add(uint32_t triangle, uint32_t body) { near_.push_back({triangle, body}); }
-  /// Takes triangles out of the bodies in a sub-step of cloth of length dt. Appends to `cuts`.
+  /// Moves triangles out of the bodies in a sub-step of cloth of length dt. Appends to `cuts`.
   void solve(std::span<const Triangle> triangles, ClothPoints& points, std::span<ClothBody> bodies, Real dt,
              std::vector<VelocityCut>& cuts) const;
-  /// Contacts with dynamic bodies as points are now, also of triangles within `reach` thicknesses of the
-  /// cloth more than the distance that they keep.
+  /// Returns the contacts with dynamic bodies at the points' current positions, including triangles that are
+  /// up to `reach` thicknesses of the cloth beyond the distance that they keep.
   void collect(std::span<const Triangle> triangles, const ClothPoints& points, std::span<ClothBody> bodies,
                Real reach, std::vector<BodyContact>& found) const;
 

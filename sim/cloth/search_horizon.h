@@ -1,8 +1,8 @@
 #pragma once
-/// Chooses for how many sub-steps a search of self-contact pairs is meant to suffice. A search for a long
-/// time finds many pairs, of which all have to be watched, and points leave their predicted paths before its
-/// end; a search for a short time has to be repeated soon. Which is cheaper depends on the motion, so the
-/// work for each second is counted, and neighbouring lengths are tried from time to time. The counts are
+/// Chooses the number of sub-steps for which a search for self-contact pairs is to suffice. A search for many
+/// sub-steps finds many pairs, which all have to be checked, and points leave their predicted paths before
+/// its end. A search for few sub-steps has to be repeated soon. Which is cheaper depends on the motion, so
+/// the work for each second is counted, and neighbouring lengths are tried from time to time. The counts are
 /// numbers of operations, not times: the choice is the same in every run.
 
 #include <array>
@@ -14,9 +14,9 @@ namespace offstage::sim {
 
 class SearchHorizon {
  public:
-  /// Counts operations that the search of pairs or watching them took.
-  void spend(Real work) { work_ += work; }
-  /// Ends a period, which lasted so long [s], and begins the next one with a new search. Returns for how many
+  /// Counts operations of the search for pairs, or of checking them.
+  void add_work(Real work) { work_ += work; }
+  /// Ends a period of this duration [s], and begins the next one with a new search. Returns for how many
   /// sub-steps this is to suffice.
   uint32_t next(Real lasted) {
     if (!(lasted > 0)) return kLengths[tried_];  // searched twice in one sub-step: the period goes on
@@ -31,9 +31,9 @@ class SearchHorizon {
 
  private:
   static constexpr std::array<uint32_t, 7> kLengths = {1, 2, 3, 4, 6, 8, 12};
-  /// Periods between two trials, and after one that was worth it.
+  /// Number of periods between two trials, and after a successful trial.
   static constexpr uint32_t kWait = 8, kWaitAfterGain = 2;
-  /// Share of the work that another length must at most take to be chosen.
+  /// Fraction of the work that another length must at most take to be chosen.
   static constexpr Real kWorthIt = 0.95;
 
   uint32_t neighbour() const {
@@ -48,7 +48,7 @@ class SearchHorizon {
     periods_ = 0;
   }
 
-  std::array<Real, kLengths.size()> rate_ = {};  // work a second; 0: unknown
+  std::array<Real, kLengths.size()> rate_ = {};  // work per second of simulated time; 0: unknown
   Real work_ = 0;
   uint32_t level_ = 4, tried_ = 4, periods_ = 0, wait_ = kWait;
   bool up_ = false;

@@ -10,34 +10,37 @@
 namespace offstage::sim {
 namespace {
 
-/// Pairs are sought this much farther than they touch, in thicknesses; half of it is how far points may stray
-/// from the predicted paths.
+/// The search finds pairs up to this distance beyond contact, in thicknesses. Points may deviate from their
+/// predicted paths by half of it.
 constexpr Real kMargin = 0.8;
-/// The same of pairs sought while others keep their predicted paths, of which these may stray by a quarter
-/// now.
+/// The same for pairs that are searched again while the other points keep their predicted paths; these may
+/// deviate by a quarter.
 constexpr Real kStrayMargin = 1.5 * kMargin;
-/// Up to this part of all points are sought again alone.
+/// Up to one in this many points, only their own pairs are searched again.
 constexpr std::size_t kFew = 3;
-/// How much work fitting a triangle's box, looking at a pair, and finding its closest points are against
-/// watching a pair in a sub-step (measured).
+/// Work of fitting a triangle's box, of testing a pair, and of finding its closest points, relative to
+/// checking a known pair in a sub-step (measured).
 constexpr std::size_t kFitWork = 10;
 constexpr Real kPairWork = 3, kClosestWork = 8;
-/// What is near at rest in the cloth itself, is not pushed farther apart than this share of it.
-constexpr Real kRestShare = 0.8;
-/// Share of an overlap that is taken back per sub-step, so that layers do not fly apart.
+/// Pairs that are near each other in the cloth at rest are not pushed apart beyond this fraction of their
+/// distance there.
+constexpr Real kRestFraction = 0.8;
+/// Fraction of an overlap that is removed per sub-step, so that layers do not fly apart.
 constexpr Real kSelfRecovery = 0.05;
-/// What must be left of the distance, so that there always is a plane between. What is nearer than this share
-/// of its thickness comes no nearer: else its distance would soon be lost in rounding, and its side with it.
+/// Fraction of the distance that must remain, so that a plane always separates a pair. A pair that is nearer
+/// than this fraction of its thickness does not approach further, because its distance, and with it its side,
+/// would soon be lost in rounding.
 constexpr Real kLeft = 0.1, kNearest = 0.02;
-/// Distance below which no normal can be told [m].
+/// Distance below which the normal is undefined [m].
 constexpr Real kNoSide = 1e-9;
-/// What is left of a length along a unit vector of single precision.
+/// Least length that remains along a unit vector in single precision.
 constexpr Real kUnit = 1 - 1e-6;
-/// Sweeps over the pairs that would cross, and how much farther apart than they must be they are kept.
+/// Number of sweeps over the pairs that would cross, and the factor by which their kept distance exceeds the
+/// necessary one.
 constexpr int kSideSweeps = 8;
 constexpr Real kBeyondLeast = 1.01;
-/// Moves are halved until they are less than this share, and then given up.
-constexpr Real kLeastShare = 0.1;
+/// Moves are halved until they are below this fraction, and then set to 0.
+constexpr Real kLeastFraction = 0.1;
 
 Vec3 place(std::span<const Vec4> points, uint32_t i) {
   return points[i].head<3>();
@@ -66,8 +69,8 @@ Closest closest(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool 
   return {{1 - s, s, t - 1, -t}, padded(q.on_a - q.on_b), inner};
 }
 
-/// Whether the boxes of both are farther apart than `reach`, along the same axis at the start and at the end:
-/// quick, and true of most.
+/// Whether the boxes of both are more than `reach` apart along the same axis at the start and at the end. The
+/// test is fast and succeeds for most pairs.
 bool boxes_apart(std::span<const Vec4> start, std::span<const Vec4> end, const std::array<uint32_t, 4>& p,
                  bool edges, Real reach) {
   Vec4 over = Vec4::Constant(1e300), under = over;
@@ -171,7 +174,7 @@ void SelfContacts::add(const ClothPoints& points, const std::array<uint32_t, 4>&
   const auto first = std::span(p).first(first_side(edges)), second = std::span(p).subspan(first_side(edges));
   for (uint32_t i : first)
     if (std::ranges::find(second, i) != second.end()) return;
-  length_.spend(kPairWork);
+  length_.add_work(kPairWork);
   Real thickness = (points.thickness[p[0]] + points.thickness[p[3]]) / 2;
   const Real near = thickness * (1 + slack);
   if (boxes_apart(points.start, predicted_to_, p, edges, near)) return;
@@ -180,23 +183,23 @@ void SelfContacts::add(const ClothPoints& points, const std::array<uint32_t, 4>&
   };
   if (separates(middle_to_middle(points.start, p, edges))) return;
   if (separates(common_normal(points.start, p, edges))) return;
-  length_.spend(kClosestWork);
+  length_.add_work(kClosestWork);
   const Closest c = closest(points.start, p, edges);
   const Real distance = c.apart.norm();
   if (!(distance > kNoSide) || separates(c.apart)) return;
   const Real nearest = kNearest * thickness;
   if (points.cloth[p[0]] == points.cloth[p[3]]) {
     const Real at_rest = closest(points.rest, p, edges).apart.norm();
-    // Parts that a tear divided have no side of each other, as neighbours have none: planes between them
-    // would be so close to both that these could not turn.
+    // Parts that a tear has just divided are ignored like neighbours: a plane between them would be so close
+    // to both that they could not turn.
     if (at_rest < kNoSide) return;
-    thickness = std::min(thickness, kRestShare * at_rest);
+    thickness = std::min(thickness, kRestFraction * at_rest);
   }
   pairs_.push_back({p, edges, thickness, nearest, distance, 0, (c.apart / distance).head<3>().cast<float>()});
   pairs_.back().travel = travelled(pairs_.back());
 }
 
-/// That a point goes on until the horizon at the velocity that it has in this sub-step.
+/// Predicts that a point keeps its velocity in this sub-step until the horizon.
 void SelfContacts::predict(const ClothPoints& points, std::size_t i, Real dt) {
   const Vec4 velocity = (points.position[i] - points.start[i]) / dt;
   predicted_velocity_[i] = velocity;
@@ -213,19 +216,19 @@ void SelfContacts::search(const ClothPoints& points, Real dt) {
   tree_.pairs(points.start, [&](uint32_t ta, uint32_t tb) {
     add_pairs(points, ta, tb, kMargin, [](const auto&) { return true; });
   });
-  length_.spend(kFitWork * static_cast<Real>(triangles_.size()));
+  length_.add_work(kFitWork * static_cast<Real>(triangles_.size()));
 }
 
 bool SelfContacts::expired(Real dt) const {
   return since_ + dt > horizon_ * (1 + 1e-9);
 }
 
-/// How far a point is from its predicted path.
+/// Distance of a point from its predicted path.
 Vec4 SelfContacts::off_course(const ClothPoints& points, std::size_t i, Real dt) const {
   return points.position[i] - predicted_from_[i] - (since_ + dt) * predicted_velocity_[i];
 }
 
-/// Whether any point is farther from its predicted path than the pairs known are good for.
+/// Whether any point is so far from its predicted path that the known pairs no longer suffice.
 bool SelfContacts::strayed(const ClothPoints& points, Real dt) const {
   if (expired(dt)) return true;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -235,8 +238,8 @@ bool SelfContacts::strayed(const ClothPoints& points, Real dt) const {
   return false;
 }
 
-/// From where all were at the start of the sub-step, at the velocities they now have in it. While the horizon
-/// lasts and few strayed, only the pairs of those are sought again, over what is left of it.
+/// Searches from the positions at the start of the sub-step, with the velocities in it. If only a few points
+/// deviated before the horizon, only their pairs are searched again, up to the horizon.
 void SelfContacts::search_again(const ClothPoints& points, Real dt) {
   if (expired(dt)) return search(points, dt);
   std::vector<uint8_t> strays(points.size(), 0);
@@ -260,7 +263,7 @@ void SelfContacts::search_again(const ClothPoints& points, Real dt) {
   std::erase_if(pairs_, [&](const Pair& pair) { return is_stray(pair.points); });
   tree_.pairs(points.start,
               [&](uint32_t ta, uint32_t tb) { add_pairs(points, ta, tb, kStrayMargin, is_stray); });
-  length_.spend(static_cast<Real>(points.size() + kFitWork * seeking.size()));
+  length_.add_work(static_cast<Real>(points.size() + kFitWork * seeking.size()));
 }
 
 /// The points of a pair whose heights above a plane through `origin`, at the places `at(point)`, are lowest
@@ -291,8 +294,8 @@ SelfContacts::Contact SelfContacts::look(const ClothPoints& points, uint32_t k) 
   return {k, c.weights, normal, pair.distance, c.inner};
 }
 
-/// The distance that any parts of the moves made now leave a pair along the direction in which it was apart
-/// when last looked at, or less: no more than is left in truth.
+/// Lower bound of the distance of a pair, along its separating direction at the last check, if its points
+/// make any fractions of their current moves.
 Real SelfContacts::left_between(const ClothPoints& points, const Pair& pair, std::span<const Vec4> drift) {
   const Vec4 normal = padded(pair.normal.cast<Real>());
   const Vec4& origin = points.start[pair.points[0]];
@@ -306,11 +309,12 @@ Real SelfContacts::left_between(const ClothPoints& points, const Pair& pair, std
   return (first - second) * kUnit;
 }
 
-/// The pairs that any parts of the moves made now, beyond the drifts, may bring nearer than `reach(pair)`.
+/// The pairs that may come nearer than `reach(pair)` if points make any fractions of their moves beyond the
+/// drifts.
 template <class Reach>
 void SelfContacts::gather(const ClothPoints& points, Real dt, std::span<const Vec4> drift, Reach&& reach) {
   if (strayed(points, dt)) search_again(points, dt);
-  length_.spend(static_cast<Real>(pairs_.size()));
+  length_.add_work(static_cast<Real>(pairs_.size()));
   for (std::size_t i = 0; i < move_.size(); ++i)
     move_[i] = (points.position[i] - points.start[i] - drift[i]).norm();
   contacts_.clear();
@@ -368,14 +372,14 @@ void SelfContacts::keep_thickness(ClothPoints& points) {
       const uint32_t i = pair.points[k];
       const Vec4 impulse = (c.weights[k] / mobility) * move;
       points.position[i] += points.inverse_mass[i] * impulse;
-      if (points.inverse_mass[i] == 0) points.pull[i] += impulse;
+      if (points.inverse_mass[i] == 0) points.pin_impulse[i] += impulse;
     }
   }
 }
 
 /// Keeps pairs from crossing by impulses along the normal of the plane between them, on the point of each
-/// that would go farthest beyond it. What is left to shorten() stops points in all directions, which makes
-/// springs to points that go on gain energy, and jams where many layers press.
+/// that would go farthest beyond it. Pairs that are left to shorten() have their points stopped in all
+/// directions. Springs to points that still move then gain energy, and many pressed layers jam.
 void SelfContacts::keep_sides(ClothPoints& points) const {
   bool again = true;
   for (int sweep = 0; again && sweep < kSideSweeps; ++sweep) {
@@ -391,7 +395,7 @@ void SelfContacts::keep_sides(ClothPoints& points) const {
       const Vec4 impulse = push / mobility * c.normal;
       for (const auto& [i, sign] : {std::pair(sides.first, 1.0), std::pair(sides.second, -1.0)}) {
         points.position[i] += sign * points.inverse_mass[i] * impulse;
-        if (points.inverse_mass[i] == 0) points.pull[i] += sign * impulse;
+        if (points.inverse_mass[i] == 0) points.pin_impulse[i] += sign * impulse;
       }
     }
   }
@@ -406,18 +410,19 @@ bool SelfContacts::any_crossed(const ClothPoints& points) const {
   });
 }
 
-bool SelfContacts::shorten(const ClothPoints& points, MoveShares& shares, std::vector<uint32_t>& lowered) {
+bool SelfContacts::shorten(const ClothPoints& points, MoveFractions& fractions,
+                           std::vector<uint32_t>& lowered) {
   bool any = false;
   for (const Contact& c : contacts_) {
     const Pair& pair = pairs_[c.pair];
     const Sides sides = sides_of(pair, c.normal, points.start[pair.points[0]], [&](uint32_t i) {
-      return Vec4(points.start[i] + shares[i] * (points.position[i] - points.start[i]));
+      return Vec4(points.start[i] + fractions[i] * (points.position[i] - points.start[i]));
     });
     if (sides.apart() >= least_distance(c.distance, pair.nearest)) continue;
     bool any_here = false;
     for (uint32_t i : pair.points) {
-      if (!(points.inverse_mass[i] > 0) || shares[i] == 0) continue;
-      shares[i] = shares[i] / 2 < kLeastShare ? 0 : shares[i] / 2;
+      if (!(points.inverse_mass[i] > 0) || fractions[i] == 0) continue;
+      fractions[i] = fractions[i] / 2 < kLeastFraction ? 0 : fractions[i] / 2;
       held_back_.push_back(i);
       lowered.push_back(i);
       any_here = true;

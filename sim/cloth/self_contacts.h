@@ -2,9 +2,9 @@
 /// Contact of cloth with cloth: of points with triangles, and of edges with edges, at the cloths' thickness
 /// and with friction.
 ///
-/// Cloth that was not crossing stays so. Pairs whose moves together are shorter than their distance cannot
-/// have crossed. For the others a plane separates the two at the start of the sub-step; if no plane with the
-/// same normal separates them at its end, their moves are shortened.
+/// Cloth that does not cross itself stays so. Pairs whose moves together are shorter than their distance
+/// cannot have crossed. For the others a plane separates the two at the start of the sub-step; if no plane
+/// with the same normal separates them at its end, their moves are shortened.
 
 #include <array>
 #include <cstdint>
@@ -40,9 +40,9 @@ class SelfContacts {
   }
   /// Whether any of these pairs crossed.
   bool any_crossed(const ClothPoints& points) const;
-  /// Lowers the shares of the moves of pairs that crossed, and adds their points to `lowered`. Returns
+  /// Lowers the fractions of the moves of pairs that crossed, and adds their points to `lowered`. Returns
   /// whether there were any.
-  bool shorten(const ClothPoints& points, MoveShares& shares, std::vector<uint32_t>& lowered);
+  bool shorten(const ClothPoints& points, MoveFractions& fractions, std::vector<uint32_t>& lowered);
   /// Records the moves of points at the end of the sub-step.
   void end_substep(const ClothPoints& points, Real dt);
 
@@ -61,9 +61,9 @@ class SelfContacts {
     bool edges;
     Real thickness;
     Real nearest;            // the pair is kept at least this far apart, unless it is already closer
-    Real distance;           // when last looked at
-    Real travel;             // of all four together until then
-    Eigen::Vector3f normal;  // from the second to the first then
+    Real distance;           // distance at the last check
+    Real travel;             // motion of all four points together until then
+    Eigen::Vector3f normal;  // direction from the second to the first at that time
   };
   struct Contact {
     uint32_t pair;

@@ -1,9 +1,9 @@
 /// The part of ClothSystem that shortens the moves of a sub-step until no spring is too long and no cloth has
 /// passed through cloth.
 ///
-/// Moves are shortened in the frame of a piece of cloth: that of its mean velocity, or what flies and falls
-/// would be held back in the air. Shortening is the work of forces within the piece. So a piece that hangs on
-/// nothing but dynamic bodies keeps its momentum, together with them.
+/// Moves are shortened in the frame of a piece of cloth, which moves with its mean velocity: otherwise flying
+/// and falling cloth would be slowed down in the air. Shortening acts like forces within the piece, so a
+/// piece that only dynamic bodies hold keeps its momentum together with them.
 
 #include <algorithm>
 #include <cmath>
@@ -16,9 +16,10 @@
 namespace offstage::sim {
 namespace {
 
-/// Rounds of shortening moves; what is not right then is put back to where it started.
+/// Greatest number of rounds of shortening moves. If a limit is violated after them, all points return to
+/// their start.
 constexpr int kMaxRounds = 64;
-/// Of shortening the moves of bodies that turn.
+/// Greatest number of rounds for bodies that turn.
 constexpr int kMaxPasses = 6;
 
 }  // namespace
@@ -49,8 +50,8 @@ void ClothSystem::find_frames() {
   }
 }
 
-/// A body that a point may soon touch, other than those that its piece hangs on; or null.
-const ClothBody* ClothSystem::near_another(uint32_t point) {
+/// Returns a body that the point may soon touch and that does not hold its piece, or null.
+const ClothBody* ClothSystem::nearby_other_body(uint32_t point) {
   const ClothBody* near = contacts_.near_to(point);
   if (!near) return nullptr;
   if (contacts_.is_near_several(point)) return near;
@@ -60,11 +61,11 @@ const ClothBody* ClothSystem::near_another(uint32_t point) {
   return carrier == carriers_.end() || &frame_of(carrier->points[0]) != &frame ? near : nullptr;
 }
 
-/// A piece that nothing holds and that one free body pushes goes with that body: held back in the world, it
-/// would be left behind within a body that flies on.
-void ClothSystem::follow_or_rest(uint32_t point) {
+/// A free piece that a single free body pushes gets the frame of that body: in the world's frame, it would be
+/// left behind inside the body.
+void ClothSystem::choose_frame(uint32_t point) {
   Frame& frame = frame_of(point);
-  const ClothBody* near = frame.rests ? nullptr : near_another(point);
+  const ClothBody* near = frame.rests ? nullptr : nearby_other_body(point);
   if (!near) return;
   const bool is_loose = !frame.anchored && !frame.carries && near->is_dynamic();
   const bool is_one = !contacts_.is_near_several(point) && (!frame.pusher || frame.pusher == near);
@@ -74,8 +75,8 @@ void ClothSystem::follow_or_rest(uint32_t point) {
     frame.rests = true;
 }
 
-/// The move of each frame: that of the body which leads it, or the mean one of the piece with the bodies that
-/// hang on it, or that of the one body that pushes it; none if it is near another body. Whether any moves.
+/// Finds the move of each frame: that of its leader, of its pusher, or the mean move of the piece and the
+/// bodies that hang on it; zero if the piece is near another body. Returns whether any frame moves.
 bool ClothSystem::find_drifts() {
   find_frames();
   const auto all_rest = [&] { return std::ranges::all_of(frames_, &Frame::rests); };
@@ -86,7 +87,7 @@ bool ClothSystem::find_drifts() {
   };
   for (uint32_t i = 0; i < points_.size(); ++i) {
     Frame& frame = frame_of(i);
-    follow_or_rest(i);
+    choose_frame(i);
     if (!frame.leader || points_.holder[i] == frame.leader)
       add(frame, points_.mass[i], points_.position[i] - points_.start[i]);
   }
@@ -103,8 +104,9 @@ bool ClothSystem::find_drifts() {
   return true;
 }
 
-/// Until nothing is too long and nothing crossed. What is held back in a moving frame goes ways that its
-/// pairs were not sought for, and is looked at once more in the world's.
+/// Shortens moves until no spring is too long and no pair has crossed. A move that was shortened in a moving
+/// frame follows a path that the search for pairs did not consider, so it is checked again in the world's
+/// frame.
 void ClothSystem::shorten_moves(Real dt) {
   const bool self = !self_contacts_.empty();
   if (limit_.empty() && !self) return;
@@ -126,12 +128,12 @@ void ClothSystem::shorten_moves(Real dt) {
     velocity = end_velocities(dt);
   }
   if (any_drifts) find_doubtful();
-  bool any = any_drifts ? shorten_in_pieces() : shorten_doubtful(kInWorld);
+  bool any = any_drifts ? shorten_in_pieces() : shorten_until_valid(kInWorld);
   if (any_drifts) {
-    self_contacts_.take_crossed();  // in the world's frame nothing has to
+    self_contacts_.take_crossed();  // in the world's frame none has to
     drift_.assign(points_.size(), Vec4::Zero());
     if (any && self) find_doubtful();
-    if (any && self) shorten_doubtful(kInWorld);
+    if (any && self) shorten_until_valid(kInWorld);
   }
   for (uint32_t i : self_contacts_.take_crossed()) ++cloths_[points_.cloth[i]]->report.crossings;
   for (std::size_t i = 0; any && i < points_.size(); ++i) {
@@ -141,24 +143,24 @@ void ClothSystem::shorten_moves(Real dt) {
   }
   if (self) std::erase_if(cuts_, [&](const VelocityCut& cut) { return shortened_[cut.point] != kWhole; });
   if (any) {
-    if (any_free) take_gains(whole, velocity, end_velocities(dt));
+    if (any_free) remove_energy_gains(whole, velocity, end_velocities(dt));
     add_momenta(-1, dt);
-    give_momenta_back();
+    restore_momenta();
   }
   if (self) self_contacts_.end_substep(points_, dt);
   if (any) stop_bodies(dt);
 }
 
-/// In the frames of the pieces; whether any.
+/// Shortens moves in the frames of the pieces; returns whether any was shortened.
 bool ClothSystem::shorten_in_pieces() {
   const auto shift_starts = [&](Real sign) {
     for (std::size_t i = 0; i < points_.size(); ++i) points_.start[i] += sign * drift_[i];
   };
   shift_starts(1);
-  const bool any = shorten_doubtful(kInPiece);
+  const bool any = shorten_until_valid(kInPiece);
   shift_starts(-1);
   if (!any) return false;
-  // A piece that nothing holds goes on as a whole as it would have.
+  // A free piece as a whole moves on as it would have.
   const auto is_loose = [](const Frame& frame) {
     return !frame.rests && !frame.leader && !frame.pusher && !frame.carries;
   };
@@ -170,7 +172,7 @@ bool ClothSystem::shorten_in_pieces() {
   return true;
 }
 
-/// Adds (or takes, with the sign) the momenta of free points at the end of the sub-step.
+/// Adds the momenta of free points at the end of the sub-step, times `sign`, to their frames.
 void ClothSystem::add_momenta(Real sign, Real dt) {
   for (uint32_t i = 0; i < points_.size(); ++i)
     if (points_.inverse_mass[i] > 0)
@@ -181,7 +183,7 @@ void ClothSystem::add_momenta(Real sign, Real dt) {
       frame_of(cut.point).momentum -= sign * points_.mass[cut.point] / dt * cut.move;
 }
 
-/// Of all points at the end of the sub-step.
+/// Velocities of all points at the end of the sub-step.
 std::vector<Vec4> ClothSystem::end_velocities(Real dt) const {
   std::vector<Vec4> velocity(points_.size());
   for (uint32_t i = 0; i < points_.size(); ++i)
@@ -191,8 +193,8 @@ std::vector<Vec4> ClothSystem::end_velocities(Real dt) const {
   return velocity;
 }
 
-/// Of each piece that nothing fixed holds, twice the kinetic energy of its points against the mean velocity,
-/// which the frames get: of the points and the bodies that hang on them.
+/// Returns for each piece that no fixed object holds twice the kinetic energy of its points relative to the
+/// mean velocity of the points and of the bodies that hang on them, which is stored in the frames.
 std::vector<Real> ClothSystem::inner_energies(std::span<const Vec4> velocity) {
   for (Frame& frame : frames_) frame.velocity.setZero();
   const auto add = [](Frame& frame, Real mass, const Vec4& v) {
@@ -210,10 +212,10 @@ std::vector<Real> ClothSystem::inner_energies(std::span<const Vec4> velocity) {
   return energy;
 }
 
-/// Of each piece that moves freely, twice the energy of the springs at points whose moves were shortened,
-/// less what it was when points were at `whole`; at least 0. Where a piece hangs on or lies on anything else,
-/// moves are shortened in each sub-step, and taking these gains from its motion each time would stop a flag
-/// in the wind or cloth on a turning ball.
+/// Returns for each free piece twice the energy that springs gained by shortening, at least 0: their energy
+/// now less that with the points at `whole`. Other pieces get 0: their moves are shortened in each sub-step,
+/// and removing the gain from their motion each time would stop a flag in the wind or cloth on a turning
+/// ball.
 std::vector<Real> ClothSystem::elastic_gains(std::span<const Vec4> whole) {
   std::vector<Real> gain(frames_.size(), 0);
   for (const ClothSpring& s : all_springs_) {
@@ -231,11 +233,11 @@ std::vector<Real> ClothSystem::elastic_gains(std::span<const Vec4> whole) {
   return gain;
 }
 
-/// Points that make different shares of their moves move against each other, even if all moved alike before,
-/// and compress springs between them; and the piece gets its momentum back. So motion within it is slowed to
-/// the energy that it had when points were at `whole` with the velocity `before`, less what springs gained.
-void ClothSystem::take_gains(std::span<const Vec4> whole, std::span<const Vec4> before,
-                             std::span<const Vec4> velocity) {
+/// Different fractions of equal moves compress the springs between points, and the momentum of the piece is
+/// restored. Both add energy. This slows the motion within the piece to the energy that it had with the
+/// points at `whole` and the velocity `before`, less the energy that springs gained.
+void ClothSystem::remove_energy_gains(std::span<const Vec4> whole, std::span<const Vec4> before,
+                                      std::span<const Vec4> velocity) {
   const std::vector<Real> first = inner_energies(before), now = inner_energies(velocity);
   const std::vector<Real> elastic = elastic_gains(whole);
   for (uint32_t i = 0; i < points_.size(); ++i) {
@@ -246,9 +248,9 @@ void ClothSystem::take_gains(std::span<const Vec4> whole, std::span<const Vec4> 
   }
 }
 
-/// What pieces and the bodies that hang on them lost by shortening. Pieces that hang on anything fixed lost
-/// it to that.
-void ClothSystem::give_momenta_back() {
+/// Restores the momentum that pieces and the bodies that hang on them lost by shortening. Pieces that a fixed
+/// object holds lost it to that object.
+void ClothSystem::restore_momenta() {
   for (uint32_t i = 0; i < points_.size(); ++i)
     if (const Frame& frame = frame_of(i); !frame.anchored && points_.inverse_mass[i] > 0)
       kick_[i] += frame.momentum / frame.total_mass;
@@ -256,15 +258,16 @@ void ClothSystem::give_momenta_back() {
     const Frame& frame = frame_of(carrier.points[0]);
     if (frame.anchored) continue;
     const Vec3 gain = (frame.momentum / frame.total_mass).head<3>();
-    carrier.body->push(carrier.body->mass() * gain, carrier.body->centre());
+    carrier.body->apply_impulse(carrier.body->mass() * gain, carrier.body->centre());
     carrier.accelerate(gain, points_);
   }
 }
 
-/// Shortens moves from where points started; whether any. Notes `how` of the points.
-bool ClothSystem::shorten_doubtful(Shortened how) {
+/// Shortens moves relative to the points' starts; returns whether any was shortened. Records `how` for these
+/// points.
+bool ClothSystem::shorten_until_valid(Shortened how) {
   bool any = false, turned = false;
-  // The points of a body that turns go no straight ways: they are looked at again.
+  // The points of a body that turns do not move straight, so they are checked again.
   for (int pass = 0; pass < kMaxPasses; ++pass) {
     turned = false;
     if (!shorten_straight(how, turned)) break;
@@ -274,48 +277,48 @@ bool ClothSystem::shorten_doubtful(Shortened how) {
   return any;
 }
 
-/// The same, as if all ways were straight. `turned` gets whether moves of bodies were shortened.
+/// The same with straight paths. `turned` gets whether moves of bodies were shortened.
 bool ClothSystem::shorten_straight(Shortened how, bool& turned) {
-  shares_.assign(points_.size(), 1);
+  fractions_.assign(points_.size(), 1);
   bool again = true, any = false;
   for (int round = 0; again && round < kMaxRounds; ++round) {
-    again = round == 0 ? limit_.shorten_whole_moves(points_, carriers_, shares_, lowered_)
-                       : limit_.shorten(points_, carriers_, shares_, lowered_);
-    again |= self_contacts_.shorten(points_, shares_, lowered_);
+    again = round == 0 ? limit_.shorten_whole_moves(points_, carriers_, fractions_, lowered_)
+                       : limit_.shorten(points_, carriers_, fractions_, lowered_);
+    again |= self_contacts_.shorten(points_, fractions_, lowered_);
     any |= again;
   }
   if (!any) return false;
   for (uint32_t i : self_contacts_.take_held_back()) ++cloths_[points_.cloth[i]]->report.held_back;
   any = false;
-  const auto share_of = [&](std::size_t i) { return again ? 0 : shares_[i]; };
+  const auto fraction_of = [&](std::size_t i) { return again ? 0 : fractions_[i]; };
   for (std::size_t i = 0; i < points_.size(); ++i) {
-    const Real share = share_of(i);
-    if (share == 1 || !(points_.inverse_mass[i] > 0)) continue;
-    points_.position[i] = points_.start[i] + share * (points_.position[i] - points_.start[i]);
+    const Real fraction = fraction_of(i);
+    if (fraction == 1 || !(points_.inverse_mass[i] > 0)) continue;
+    points_.position[i] = points_.start[i] + fraction * (points_.position[i] - points_.start[i]);
     shortened_[i] = how;
     any = true;
   }
   for (Carrier& carrier : carriers_)
-    if (const Real share = share_of(carrier.points[0]); share < 1) {
-      shorten_carrier(carrier, share);
+    if (const Real fraction = fraction_of(carrier.points[0]); fraction < 1) {
+      shorten_carrier(carrier, fraction);
       any = turned = true;
     }
   return any;
 }
 
-/// A body that hangs on cloth which can get no longer goes only a share of its way.
-void ClothSystem::shorten_carrier(Carrier& carrier, Real share) {
+/// A body that hangs on cloth at its stretch limit makes only a fraction of its displacement.
+void ClothSystem::shorten_carrier(Carrier& carrier, Real fraction) {
   ClothBody& body = *carrier.body;
   const uint32_t first = carrier.points[0];
   Real mass = body.mass();
   for (uint32_t i : carrier.points) mass += points_.mass[i];
-  const Vec3 change = body.shorten(share, drift_[first].head<3>());
+  const Vec3 change = body.shorten(fraction, drift_[first].head<3>());
   frame_of(first).momentum -= mass * padded(change);
   carrier.accelerate(change, points_);
   carrier.place(points_);
 }
 
-/// A cloth that gives no more stops bodies as one with those that it hangs on.
+/// A cloth at its limit stops bodies as one rigid whole with the bodies that it hangs on.
 void ClothSystem::stop_bodies(Real dt) {
   const std::vector<Real> recoil = recoils();
   const auto whole = whole_velocities(recoil, end_velocities(dt));
@@ -329,7 +332,7 @@ void ClothSystem::stop_bodies(Real dt) {
     for (std::size_t i = first_[c], end = i + cloths_[c]->points.size(); i < end; ++i)
       if (points_.inverse_mass[i] > 0) kick_[i] += padded(gain);
     for (const Carrier* carrier : carriers_of(c)) {
-      carrier->body->push(carrier->body->mass() * gain, carrier->body->centre());
+      carrier->body->apply_impulse(carrier->body->mass() * gain, carrier->body->centre());
       carrier->accelerate(gain, points_);
     }
   }
@@ -344,8 +347,8 @@ std::vector<const Carrier*> ClothSystem::carriers_of(std::size_t cloth) const {
   return found;
 }
 
-/// Of each cloth the inverse of its mass and of that of the bodies which hold it; 0 if anything fixed does,
-/// which takes up what it is pushed.
+/// Returns for each cloth the inverse of its mass together with that of the bodies that hold it; 0 if a fixed
+/// object holds it.
 std::vector<Real> ClothSystem::recoils() const {
   std::vector<Real> mass;
   for (const Cloth* cloth : cloths_)
@@ -360,8 +363,8 @@ std::vector<Real> ClothSystem::recoils() const {
   return recoil;
 }
 
-/// Of each cloth the mean velocity, with the bodies that hold it, or that of what is fixed and holds it; none
-/// if several such things do, or one that turns.
+/// Returns for each cloth its mean velocity together with the bodies that hold it, or that of the immovable
+/// body that holds it; empty if several such bodies hold it, or one that turns.
 std::vector<std::optional<Vec3>> ClothSystem::whole_velocities(std::span<const Real> recoil,
                                                                std::span<const Vec4> velocity) const {
   std::vector<std::optional<Vec3>> whole(cloths_.size(), Vec3(Vec3::Zero()));

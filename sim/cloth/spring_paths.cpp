@@ -7,7 +7,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Of the angle between two springs that go on straight.
+/// Least cosine of the angle between consecutive springs of a path.
 constexpr Real kStraight = 0.7;
 constexpr uint32_t kPathEnd = ~0u;
 
@@ -35,7 +35,7 @@ uint32_t other_end(const ClothSpring& s, uint32_t point) {
   return s.a == point ? s.b : s.a;
 }
 
-/// For each spring, the one with which it goes on at either end; kPathEnd: it ends there.
+/// For each end of a spring, the next spring of its path; kPathEnd: the path ends there.
 using Continuations = std::vector<std::array<uint32_t, 2>>;
 
 uint32_t& at_end(Continuations& next, std::span<const ClothSpring> springs, uint32_t spring, uint32_t point) {

@@ -1,7 +1,7 @@
 #pragma once
-/// Springs in paths: each goes on at its ends with the spring that lies most nearly straight ahead of it, as
-/// the threads of a weave do. Sweeps follow the paths, so that each point is loaded once for two springs, and
-/// several paths are swept at a time (cloth_springs.h).
+/// Divides springs into paths. At each end, a spring is followed by the one that continues it most nearly
+/// straight, as in the threads of a weave. Sweeps follow the paths, so that each point is loaded once for two
+/// springs, and several paths are swept at a time (cloth_springs.h).
 
 #include <array>
 #include <cstdint>

@@ -1,5 +1,5 @@
 #pragma once
-/// What the integrators of cloth share: positions or velocities of the points of one cloth within a sub-step.
+/// Positions or velocities of the points of one cloth within a sub-step, for the integrators of cloth.
 
 #include <vector>
 
@@ -13,12 +13,12 @@ inline bool is_held(const ClothPoints& points, std::size_t i) {
   return !(points.inverse_mass[i] > 0);
 }
 
-/// Velocity of what is held through the sub-step.
+/// Velocity of a pinned point through the sub-step.
 inline Vec4 held_velocity(const ClothPoints& points, std::size_t i, Real h) {
   return (points.position[i] - points.start[i]) / h;
 }
 
-/// Where a run starts, with the velocity of what is held.
+/// State at the start of a run, with the velocities of pinned points.
 inline void begin_run(const ClothPoints& points, const ClothRange& cloth, Real h, SpringRun& x,
                       SpringRun& v) {
   x.assign(points.start.begin() + static_cast<std::ptrdiff_t>(cloth.begin),

@@ -8,13 +8,13 @@ namespace offstage::sim {
 namespace {
 
 constexpr uint8_t kSweeps = 8;
-/// Solutions for all springs that are too long, each linearised where the last one left them.
+/// Number of solutions for all springs that are too long, each linearised at the result of the previous one.
 constexpr int kSolves = 4;
-/// Slack of the check against rounding; far below what is promised.
+/// Slack of the check against rounding, far below the guaranteed accuracy.
 constexpr Real kSlack = 1e-12;
 
 /// The greatest s in [0, 1] with |k1 + s k2| <= longest; 0 if there is none.
-Real greatest_share(const Vec4& k1, const Vec4& k2, Real longest) {
+Real greatest_fraction(const Vec4& k1, const Vec4& k2, Real longest) {
   const Real a = k2.squaredNorm(), b = k1.dot(k2), c = k1.squaredNorm() - longest * longest;
   const Real root = b * b - a * c;
   if (!(a > 0) || !(root >= 0)) return 0;
@@ -44,7 +44,7 @@ bool StretchLimit::project(ClothPoints& points, std::span<const Carrier> carrier
   bool all_hold = true;
   if (!sweep(points, all_hold)) return false;
   if (carriers.empty())
-    return true;  // points alone are light: the sweeps and the shortening of moves suffice
+    return true;  // points without bodies are light, so the sweeps and the shortening of moves suffice
   for (int round = 0; round < kSolves && !all_hold; ++round) {
     TautSprings taut(points, carriers);
     for (const auto* some : {&limits_, &ties_})
@@ -80,8 +80,8 @@ void StretchLimit::project_with(std::span<const BodyContact> contacts, ClothPoin
   taut.apply(points, dt, kick, cuts);
 }
 
-/// Whether any spring was too long. `all_hold` gets whether none is any more, as far as bodies do not have to
-/// move for that.
+/// Whether any spring was too long. `all_hold` gets whether all limits now hold, apart from those for which
+/// bodies have to move.
 bool StretchLimit::sweep(ClothPoints& points, bool& all_hold) const {
   Vec4* const x = points.position.data();
   const Real* const w = points.inverse_mass.data();
@@ -90,7 +90,7 @@ bool StretchLimit::sweep(ClothPoints& points, bool& all_hold) const {
   for (uint8_t sweep = 1; sweep <= kSweeps && again; ++sweep) {
     again = false;
     const auto draw = [&](const Limit& l) {
-      // Where nothing moved since, it is as it was found.
+      // The result is unchanged where no point has moved since.
       if (sweep > 1 && moved_in[l.a] < sweep - 1 && moved_in[l.b] < sweep - 1) return;
       const Vec4 d = x[l.a] - x[l.b];
       const Real length2 = d.squaredNorm();
@@ -108,8 +108,8 @@ bool StretchLimit::sweep(ClothPoints& points, bool& all_hold) const {
       x[l.a] -= w[l.a] * move;
       x[l.b] += w[l.b] * move;
       moved_in[l.a] = moved_in[l.b] = sweep;
-      if (w[l.a] == 0) points.pull[l.a] -= move;
-      if (w[l.b] == 0) points.pull[l.b] += move;
+      if (w[l.a] == 0) points.pin_impulse[l.a] -= move;
+      if (w[l.b] == 0) points.pin_impulse[l.b] += move;
     };
     std::for_each(limits_.begin(), limits_.end(), draw);
     std::for_each(ties_.begin(), ties_.end(), draw);
@@ -119,79 +119,79 @@ bool StretchLimit::sweep(ClothPoints& points, bool& all_hold) const {
 }
 
 bool StretchLimit::shorten_whole_moves(const ClothPoints& points, std::span<const Carrier> carriers,
-                                       MoveShares& shares, std::vector<uint32_t>& lowered) const {
+                                       MoveFractions& fractions, std::vector<uint32_t>& lowered) const {
   lowered.clear();
   for (const Limit& l : limits_) {
-    const bool whole = shares[l.a] == 1 && shares[l.b] == 1;
+    const bool whole = fractions[l.a] == 1 && fractions[l.b] == 1;
     if (whole && (points.position[l.a] - points.position[l.b]).squaredNorm() <= l.longest * l.longest)
       continue;
-    look(l, points, shares, lowered);
+    look(l, points, fractions, lowered);
   }
-  even_ties(points, shares, lowered);
-  even_carriers(carriers, shares, lowered);
+  even_ties(points, fractions, lowered);
+  even_carriers(carriers, fractions, lowered);
   return !lowered.empty();
 }
 
-bool StretchLimit::shorten(const ClothPoints& points, std::span<const Carrier> carriers, MoveShares& shares,
-                           std::vector<uint32_t>& lowered) {
+bool StretchLimit::shorten(const ClothPoints& points, std::span<const Carrier> carriers,
+                           MoveFractions& fractions, std::vector<uint32_t>& lowered) {
   std::vector<uint32_t> now;
   ++round_;
   for (const uint32_t i : lowered)
     for (uint32_t k = first_at_[i]; k < first_at_[i + 1]; ++k)
       if (std::exchange(looked_in_[limits_at_[k]], round_) != round_)
-        look(limits_[limits_at_[k]], points, shares, now);
+        look(limits_[limits_at_[k]], points, fractions, now);
   lowered = std::move(now);
-  even_ties(points, shares, lowered);
-  even_carriers(carriers, shares, lowered);
+  even_ties(points, fractions, lowered);
+  even_carriers(carriers, fractions, lowered);
   return !lowered.empty();
 }
 
-void StretchLimit::even_ties(const ClothPoints& points, MoveShares& shares,
+void StretchLimit::even_ties(const ClothPoints& points, MoveFractions& fractions,
                              std::vector<uint32_t>& lowered) const {
   for (const Limit& t : ties_) {
-    if (shares[t.a] == shares[t.b]) continue;
-    const uint32_t ahead = shares[t.a] > shares[t.b] ? t.a : t.b;
+    if (fractions[t.a] == fractions[t.b]) continue;
+    const uint32_t ahead = fractions[t.a] > fractions[t.b] ? t.a : t.b;
     if (points.inverse_mass[ahead] == 0 && !points.carried[ahead]) continue;
-    shares[ahead] = std::min(shares[t.a], shares[t.b]);
+    fractions[ahead] = std::min(fractions[t.a], fractions[t.b]);
     lowered.push_back(ahead);
   }
 }
 
-void StretchLimit::even_carriers(std::span<const Carrier> carriers, MoveShares& shares,
+void StretchLimit::even_carriers(std::span<const Carrier> carriers, MoveFractions& fractions,
                                  std::vector<uint32_t>& lowered) {
   for (const Carrier& carrier : carriers) {
     Real least = 1;
-    for (uint32_t i : carrier.points) least = std::min(least, shares[i]);
+    for (uint32_t i : carrier.points) least = std::min(least, fractions[i]);
     for (uint32_t i : carrier.points)
-      if (std::exchange(shares[i], least) != least) lowered.push_back(i);
+      if (std::exchange(fractions[i], least) != least) lowered.push_back(i);
   }
 }
 
-void StretchLimit::look(const Limit& l, const ClothPoints& points, MoveShares& shares,
+void StretchLimit::look(const Limit& l, const ClothPoints& points, MoveFractions& fractions,
                         std::vector<uint32_t>& lowered) const {
   const Vec4 move_a = points.position[l.a] - points.start[l.a];
   const Vec4 move_b = points.position[l.b] - points.start[l.b];
   const Vec4 d = points.start[l.a] - points.start[l.b];
-  const Vec4 move = shares[l.a] * move_a - shares[l.b] * move_b;
-  // What began too long may at least get no longer.
+  const Vec4 move = fractions[l.a] * move_a - fractions[l.b] * move_b;
+  // A spring that began too long must not get longer.
   const Real allowed2 = std::max(l.longest * l.longest, d.squaredNorm());
   if ((d + move).squaredNorm() <= allowed2 * (1 + kSlack)) return;
   const auto can_shorten = [&](uint32_t i) {
-    return (points.inverse_mass[i] > 0 || (points.carried[i] && !l.tears)) && shares[i] > 0;
+    return (points.inverse_mass[i] > 0 || (points.carried[i] && !l.tears)) && fractions[i] > 0;
   };
   const bool free_a = can_shorten(l.a), free_b = can_shorten(l.b);
   if (!free_a && !free_b) return;
   Vec4 k1 = d, k2 = Vec4::Zero();
-  free_a ? k2 += shares[l.a]* move_a : k1 += shares[l.a] * move_a;
-  free_b ? k2 -= shares[l.b]* move_b : k1 -= shares[l.b] * move_b;
-  Real s = greatest_share(k1, k2, std::sqrt(std::max(allowed2, k1.squaredNorm())));
+  free_a ? k2 += fractions[l.a]* move_a : k1 += fractions[l.a] * move_a;
+  free_b ? k2 -= fractions[l.b]* move_b : k1 -= fractions[l.b] * move_b;
+  Real s = greatest_fraction(k1, k2, std::sqrt(std::max(allowed2, k1.squaredNorm())));
   if (s > 1 - 1e-9) s = 0;  // no progress to rounding
   if (free_a) {
-    shares[l.a] *= s;
+    fractions[l.a] *= s;
     lowered.push_back(l.a);
   }
   if (free_b) {
-    shares[l.b] *= s;
+    fractions[l.b] *= s;
     lowered.push_back(l.b);
   }
 }

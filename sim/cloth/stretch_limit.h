@@ -14,16 +14,16 @@
 
 namespace offstage::sim {
 
-/// Share of its move of a sub-step that each point makes.
-using MoveShares = std::vector<Real>;
+/// Fraction of its displacement in a sub-step that each point makes.
+using MoveFractions = std::vector<Real>;
 
 class StretchLimit {
  public:
   using Limit = SpringLimit;
 
   /// Sets the limits and the ties, such as seams. Ties are shortened together with the limits, but no move is
-  /// shortened because a tie is too long. Both ends of a tie make the same share of their moves, so that no
-  /// tie opens.
+  /// shortened because a tie is too long. Both ends of a tie make the same fraction of their moves, so that
+  /// no tie opens.
   void assign(std::vector<Limit> limits, std::vector<Limit> ties, std::size_t point_count);
   bool empty() const { return limits_.empty(); }
   /// Length of a tie at the start of the sub-step, and its allowed length from now on [m].
@@ -37,7 +37,7 @@ class StretchLimit {
   /// `kick` and `cuts`: see TautSprings::apply().
   bool project(ClothPoints& points, std::span<const Carrier> carriers, Real dt, std::span<const Vec4> kick,
                std::vector<VelocityCut>& cuts);
-  /// Whether any spring is too long, of those that do not tear before.
+  /// Whether any spring is too long, not counting those that tear first.
   bool any_too_long(const ClothPoints& points) const;
   /// As above, for all springs.
   bool any_beyond(const ClothPoints& points) const;
@@ -46,29 +46,30 @@ class StretchLimit {
                     std::span<const Carrier> carriers, Real dt, std::span<const Vec4> kick,
                     std::vector<VelocityCut>& cuts) const;
 
-  /// Lowers shares of moves where a limit does not hold, and returns whether it did. This ends, because with
-  /// shares of 0 the lengths are those at the start, where the limits held. Points that a dynamic body
-  /// carries make the same share of their moves; other pinned points always make their whole move. On entry
-  /// `lowered` holds the points whose shares were lowered since their last check, and only their limits are
-  /// checked; while all shares are 1, all limits are. On return it holds the points that this call lowered.
-  bool shorten(const ClothPoints& points, std::span<const Carrier> carriers, MoveShares& shares,
+  /// Lowers fractions of moves where a limit does not hold, and returns whether it did. This ends, because
+  /// with fractions of 0 the lengths are those at the start, where the limits held. Points that a dynamic
+  /// body carries make the same fraction of their moves; other pinned points always make their whole move. On
+  /// entry `lowered` holds the points whose fractions were lowered since their last check, and only their
+  /// limits are checked; while all fractions are 1, all limits are. On return it holds the points that this
+  /// call lowered.
+  bool shorten(const ClothPoints& points, std::span<const Carrier> carriers, MoveFractions& fractions,
                std::vector<uint32_t>& lowered);
-  bool shorten_whole_moves(const ClothPoints& points, std::span<const Carrier> carriers, MoveShares& shares,
-                           std::vector<uint32_t>& lowered) const;
+  bool shorten_whole_moves(const ClothPoints& points, std::span<const Carrier> carriers,
+                           MoveFractions& fractions, std::vector<uint32_t>& lowered) const;
 
  private:
-  void look(const Limit& limit, const ClothPoints& points, MoveShares& shares,
+  void look(const Limit& limit, const ClothPoints& points, MoveFractions& fractions,
             std::vector<uint32_t>& lowered) const;
 
-  void even_ties(const ClothPoints& points, MoveShares& shares, std::vector<uint32_t>& lowered) const;
-  static void even_carriers(std::span<const Carrier> carriers, MoveShares& shares,
+  void even_ties(const ClothPoints& points, MoveFractions& fractions, std::vector<uint32_t>& lowered) const;
+  static void even_carriers(std::span<const Carrier> carriers, MoveFractions& fractions,
                             std::vector<uint32_t>& lowered);
   bool sweep(ClothPoints& points, bool& all_hold) const;
 
   std::vector<Limit> limits_, ties_;
   std::vector<uint32_t> limits_at_,
       first_at_;                     // of each point, one point's after another's; where they begin
-  std::vector<uint32_t> looked_in_;  // the round in which each limit was looked at last
+  std::vector<uint32_t> looked_in_;  // round in which each limit was last checked
   uint32_t round_ = 0;
 };
 

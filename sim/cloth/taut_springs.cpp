@@ -6,12 +6,13 @@
 namespace offstage::sim {
 namespace {
 
-/// Share of its elongation beyond the aim that a spring keeps if it began the sub-step there: a body that
-/// hangs on it is stopped, and not thrown back.
+/// Fraction of its elongation beyond the target that a spring keeps if it began the sub-step there. A body
+/// that hangs on it is stopped, but not thrown back.
 constexpr Real kKeepsBeyondAim = 0.9;
-/// Springs from this share of the allowed elongation on may become too long by what shortens others.
+/// The impulses of other springs may make a spring too long if it is above this fraction of the allowed
+/// elongation.
 constexpr Real kNearLimit = 0.3;
-/// Of the greatest excess: what may be left of it.
+/// Accepted fraction of the greatest excess.
 constexpr Real kLeftOfExcess = 3e-3;
 constexpr int kMaxSets = 12, kMaxTautIterations = 200;
 
@@ -50,7 +51,7 @@ uint32_t TautSprings::mean_place(const BodyContact& contact) {
 Real TautSprings::compliance_at(uint32_t place, const Vec4& direction) const {
   const Place& at = places_[place];
   if (at.point == kNone && at.body == kNone) {
-    // Corners on one body count as if they moved it alone: the value only scales and preconditions.
+    // Corners on one body are treated as independent, because the value only scales and preconditions.
     const MeanPlace& mean = *std::ranges::find(mean_places_, place, &MeanPlace::place);
     Real sum = 0;
     for (std::size_t k = 0; k < 3; ++k)
@@ -170,7 +171,8 @@ bool TautSprings::solve_acting() {
   return false;
 }
 
-/// Takes out rows that act the wrong way, and takes in those with an excess; whether there were any.
+/// Removes rows that act in the wrong direction from the set, and adds those with an excess; returns whether
+/// the set changed.
 bool TautSprings::change_set() {
   bool changed = false;
   for (std::size_t k = 0; k < rows_.size(); ++k)
@@ -193,8 +195,8 @@ void TautSprings::solve() {
   for (int set = 0; set < kMaxSets; ++set)
     if (!solve_acting() || !change_set()) break;
   for (Real& impulse : lambda_) impulse = std::max(impulse, 0.0);
-  // What the limits of sets and iterations left unsolved must not add energy: the best length along the
-  // result.
+  // A solution that reached the limit of sets or iterations must not add energy, so the best length along it
+  // is used.
   multiply(lambda_, image_);
   Real gain = 0, curvature = 0;
   for (std::size_t k = 0; k < rows_.size(); ++k) {
@@ -208,9 +210,9 @@ void TautSprings::solve() {
 /// The greatest c from 0 to 1 for which c times the gathered impulses p adds no kinetic energy to the
 /// velocities v: c p.v + c^2 p.W p / 2 <= 0, where W is the inverse mass matrix. Without it, impulses that
 /// correct an error of earlier sub-steps (a spring that was already too long, an overlap that already
-/// existed) would add energy. Moving pins may add energy, because whatever moves them does work.
-Real TautSprings::velocity_share(Real dt, std::span<const Vec4> kick,
-                                 std::span<const VelocityCut> cuts) const {
+/// existed) would add energy. Moving pins may add energy, because the object that moves them does work.
+Real TautSprings::velocity_fraction(Real dt, std::span<const Vec4> kick,
+                                    std::span<const VelocityCut> cuts) const {
   Real work = 0, inertial = 0;
   std::vector<Vec4> cut(places_.size(), Vec4::Zero());
   for (const VelocityCut& c : cuts)
@@ -234,22 +236,22 @@ Real TautSprings::velocity_share(Real dt, std::span<const Vec4> kick,
 void TautSprings::apply(ClothPoints& points, Real dt, std::span<const Vec4> kick,
                         std::vector<VelocityCut>& cuts) {
   gather(lambda_);
-  const Real share = velocity_share(dt, kick, cuts);
+  const Real fraction = velocity_fraction(dt, kick, cuts);
   for (std::size_t k = 0; k < places_.size(); ++k) {
     const Place& at = places_[k];
     if (at.body != kNone || at.point == kNone) continue;
     const Vec4 move = points.inverse_mass[at.point] * moves_[k];
     points.position[at.point] += move;
-    if (share < 1 && !move.isZero(0)) cuts.push_back({at.point, (1 - share) * move});
-    if (points.inverse_mass[at.point] == 0) points.pull[at.point] += share * moves_[k];
+    if (fraction < 1 && !move.isZero(0)) cuts.push_back({at.point, (1 - fraction) * move});
+    if (points.inverse_mass[at.point] == 0) points.pin_impulse[at.point] += fraction * moves_[k];
   }
   for (std::size_t b = 0; b < bodies_.size(); ++b) {
     if (impulses_[b] == Vec6::Zero()) continue;
-    const Vec6 moving = impulses_[b] / dt, impulse = share * moving;
+    const Vec6 moving = impulses_[b] / dt, impulse = fraction * moving;
     if (bodies_[b].carrier)
-      bodies_[b].carrier->pull(impulse, moving, points);
+      bodies_[b].carrier->apply_impulses(impulse, moving, points);
     else
-      bodies_[b].body->pull(impulse, moving, bodies_[b].carried);
+      bodies_[b].body->apply_pin_impulses(impulse, moving, bodies_[b].carried);
   }
 }
 

@@ -1,12 +1,12 @@
 #pragma once
 /// Solves one linear complementarity problem for springs at their greatest length and for contacts of cloth
 /// with dynamic bodies: impulses after which springs reach their target length and points leave bodies,
-/// linearised. So the whole of a taut cloth stops a heavy body, and not only the points that it touches.
+/// linearised. So the whole taut cloth stops a heavy body, not only the points that it touches.
 ///
 /// With the rows of J the directions of springs and contacts, and W the inverse masses of points and bodies,
 /// the impulses are the lambda >= 0 of the linear complementarity problem J W J^T lambda >= excess. Conjugate
-/// gradients on the set of rows that act, which changes until none acts the wrong way and none outside is
-/// left with an excess.
+/// gradients on the set of rows that act, which changes until none acts in the wrong direction and none
+/// outside is left with an excess.
 
 #include <array>
 #include <span>
@@ -24,7 +24,7 @@ inline constexpr Real kStretchAim = 0.97;
 struct SpringLimit {
   uint32_t a, b;       ///< points
   Real rest, longest;  ///< [m]
-  bool tears = false;  ///< it tears before, between steps of the world, and stops no body
+  bool tears = false;  ///< it tears first, between steps of the world, and does not stop a body
 };
 
 /// Contact of a point of cloth, or of a point within a triangle, with a dynamic body.
@@ -51,9 +51,9 @@ class TautSprings {
   bool any_too_long() const { return any_too_long_; }
   void solve();
   /// Moves points and bodies by the impulses; they act through a sub-step of length dt. The impulses on
-  /// points that are pinned to anything else are added to their `pull`. Velocities change by the greatest
-  /// share of that which adds no kinetic energy; the rest of the moves of points is appended to `cuts`.
-  /// `kick` is the velocity of points besides that of their moves. The sum of momenta is kept.
+  /// points that are pinned to anything else are added to their `pin_impulse`. Velocities change by the
+  /// greatest fraction of that which adds no kinetic energy; the rest of the moves of points is appended to
+  /// `cuts`. `kick` is the velocity of points besides that of their moves. The sum of momenta is kept.
   void apply(ClothPoints& points, Real dt, std::span<const Vec4> kick, std::vector<VelocityCut>& cuts);
 
  private:
@@ -64,7 +64,7 @@ class TautSprings {
     const Carrier* carrier;  // or null
     Mat6 carried, mobility;
   };
-  /// What a row acts on: a point, which a body may carry, a spot on a body, or a mean place.
+  /// One end of a row: a point, which a body may carry, a point of a body, or a weighted mean of points.
   struct Place {
     uint32_t point, body;
     Vec3 arm;  // from the body's centre
@@ -79,7 +79,7 @@ class TautSprings {
   struct Row {
     uint32_t first, second;  // places
     Vec4 direction;
-    Real excess;      // what is to be gained along the direction [m]
+    Real excess;      // displacement to be gained along the direction [m]
     Real compliance;  // J W J^T of the row alone [1/kg]
     bool acts;        // in the set
   };
@@ -89,7 +89,7 @@ class TautSprings {
   Real compliance_at(uint32_t place, const Vec4& direction) const;
   void add_row(uint32_t first, uint32_t second, const Vec4& direction, Real excess);
   void gather(std::span<const Real> impulses);
-  Real velocity_share(Real dt, std::span<const Vec4> kick, std::span<const VelocityCut> cuts) const;
+  Real velocity_fraction(Real dt, std::span<const Vec4> kick, std::span<const VelocityCut> cuts) const;
   void multiply(std::span<const Real> x, std::span<Real> y);
   bool solve_acting();
   bool change_set();
@@ -98,7 +98,7 @@ class TautSprings {
   std::vector<MovedBody> bodies_;
   std::vector<Vec6> impulses_;   // on the bodies
   std::vector<uint32_t> place_;  // of each point; kNone: none yet
-  std::vector<Place> places_;    // of a mean place: neither point nor body
+  std::vector<Place> places_;    // number of a weighted mean, which is neither point nor body
   std::vector<MeanPlace> mean_places_;
   std::vector<Vec4> moves_;  // impulses, then moves, of each place
   std::vector<Row> rows_;

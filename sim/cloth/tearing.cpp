@@ -6,7 +6,7 @@
 namespace offstage::sim {
 namespace {
 
-/// How far a tear relieves the cloth around it in a step, in lengths of the spring that broke.
+/// Distance to which a tear relieves the cloth around it in a step, in lengths of the broken spring.
 constexpr Real kRelief = 2;
 
 struct Broken {
@@ -26,7 +26,7 @@ std::vector<uint32_t> triangles_around(const Cloth& cloth, uint32_t point) {
   return around;
 }
 
-/// The points beside one, once for each triangle.
+/// The neighbours of a point, once for each triangle.
 std::vector<uint32_t> points_around(const Cloth& cloth, uint32_t point) {
   std::vector<uint32_t> around;
   for (uint32_t t : triangles_around(cloth, point))
@@ -43,7 +43,7 @@ bool is_at_border(const Cloth& cloth, uint32_t point) {
                      [&](uint32_t i) { return std::count(around.begin(), around.end(), i) == 1; });
 }
 
-/// Over the limit, in the order in which they break.
+/// Returns the springs over the limit, in the order in which they break.
 std::vector<Broken> overstretched(const Cloth& cloth) {
   std::vector<Broken> broken;
   for (uint32_t i = 0; i < cloth.springs.size(); ++i) {
@@ -83,7 +83,7 @@ struct Fan {
     for (uint32_t t : triangles) sum += rest_area(cloth, cloth.triangles[t]);
     return sum;
   }
-  /// How much a direction from the point leads into one of the triangles.
+  /// Measures to which degree a direction from the point leads into one of the triangles.
   Real faces(const Cloth& cloth, uint32_t point, const Vec3& direction) const {
     Real most = -1;
     for (uint32_t t : triangles)
@@ -93,7 +93,8 @@ struct Fan {
   }
 };
 
-/// The fans at a point, if edges across the plane through it with this normal join nothing. Zero: no plane.
+/// Returns the fans at a point, if edges across the plane through it with this normal do not connect
+/// triangles. Zero: no plane.
 std::vector<Fan> fans_at(const Cloth& cloth, uint32_t point, const Vec3& normal) {
   std::vector<uint32_t> left = triangles_around(cloth, point);
   const auto is_beyond = [&](uint32_t t) {
@@ -136,7 +137,7 @@ void part(Cloth& cloth, uint32_t point, const std::vector<Fan>& fans) {
            std::none_of(a.begin(), a.end(), [&](std::size_t f) { return std::ranges::count(b, f) > 0; });
   });
 
-  // A cell that comes apart has no counterparts any more.
+  // The diagonals of a separated cell are no longer counterparts.
   for (ClothSpring& s : cloth.springs)
     if (s.a == point || s.b == point || std::ranges::count(s.counterpart, point) > 0) s.counterpart_rest = 0;
 
@@ -145,9 +146,9 @@ void part(Cloth& cloth, uint32_t point, const std::vector<Fan>& fans) {
   const Real mass = cloth.masses[point];
   std::vector<uint32_t> own(fans.size(), point);  // the point of each fan
   for (std::size_t f = 0; f < fans.size(); ++f) {
-    const Real share = area > 0 ? fans[f].area(cloth) / area : 1.0 / static_cast<Real>(fans.size());
+    const Real fraction = area > 0 ? fans[f].area(cloth) / area : 1.0 / static_cast<Real>(fans.size());
     if (f == 0) {
-      cloth.masses[point] = share * mass;
+      cloth.masses[point] = fraction * mass;
       continue;
     }
     own[f] = static_cast<uint32_t>(cloth.points.size());
@@ -156,7 +157,7 @@ void part(Cloth& cloth, uint32_t point, const std::vector<Fan>& fans) {
     cloth.velocities.push_back(cloth.velocities[point]);
     cloth.rest.push_back(cloth.rest[point]);
     cloth.sources.push_back(cloth.sources[point]);
-    cloth.masses.push_back(share * mass);
+    cloth.masses.push_back(fraction * mass);
   }
 
   const std::size_t count = cloth.springs.size();
@@ -173,7 +174,7 @@ void part(Cloth& cloth, uint32_t point, const std::vector<Fan>& fans) {
       with.push_back(
           static_cast<std::size_t>(std::max_element(fans.begin(), fans.end(), less) - fans.begin()));
     }
-    // Both sides of a tear along an edge have their half of its threads.
+    // A tear along an edge gives each side half of its threads.
     s.stiffness /= static_cast<Real>(with.size());
     s.damping /= static_cast<Real>(with.size());
     for (std::size_t j = 0; j < with.size(); ++j) {
@@ -190,7 +191,8 @@ void part(Cloth& cloth, uint32_t point, const std::vector<Fan>& fans) {
   ++cloth.version;
 }
 
-/// Parts the cloth at a point, and what that leaves joined to it by a point. False: all is on one side.
+/// Separates the cloth at a point, and then parts that only a single point connects. Returns false if all
+/// triangles are on one side.
 bool split(Cloth& cloth, uint32_t point, const Vec3& normal) {
   const std::vector<Fan> fans = fans_at(cloth, point, normal);
   if (fans.size() < 2) return false;
@@ -228,7 +230,7 @@ uint32_t tear(Cloth& cloth, ClothTear first_tear) {
     const uint32_t first = a_first ? s.a : s.b, second = a_first ? s.b : s.a;
     const Vec3 along = cloth.rest[second] - cloth.rest[first];
     if (split(cloth, first, along) || split(cloth, second, -along)) continue;
-    // A lone thread: nothing but the spring parts.
+    // A thread without triangles: only the spring breaks.
     std::erase_if(cloth.springs,
                   [&](const ClothSpring& k) { return k.a == s.a && k.b == s.b && k.kind == s.kind; });
   }

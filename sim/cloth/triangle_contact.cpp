@@ -6,7 +6,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Share of an overlap at the start that is taken back per sub-step.
+/// Fraction of an initial overlap that is removed per sub-step.
 constexpr Real kTriangleRecovery = 0.2;
 
 }  // namespace
@@ -27,19 +27,19 @@ void separate(const TriangleContact& c, const Triangle& t, ClothPoints& points, 
   const Vec3 slip = motion - c.normal.dot(motion) * c.normal;
   const Real length = slip.norm();
   if (length > 0) {
-    const Real friction = std::sqrt(points.friction[t[0]] * body.way().friction);
+    const Real friction = std::sqrt(points.friction[t[0]] * body.obstacle().friction);
     impulse -= std::min(length, friction * push) / (total * length) * slip;
   }
-  // What takes back an overlap of the start gives neither side a velocity.
+  // The removal of an initial overlap gives neither side a velocity.
   const Vec3 recovery = std::min(push, -kTriangleRecovery * before) / total * c.normal;
   for (std::size_t k = 0; k < 3; ++k) {
     const Real w = points.inverse_mass[t[k]];
     points.position[t[k]] += padded(w * c.weights[k] * impulse);
-    if (w == 0) points.pull[t[k]] += padded(c.weights[k] * (impulse - recovery));
+    if (w == 0) points.pin_impulse[t[k]] += padded(c.weights[k] * (impulse - recovery));
     if (before < 0) cuts.push_back({t[k], padded(w * c.weights[k] * recovery)});
   }
   body.touch(0);
-  body.pull((recovery - impulse) / dt, c.on_body, 1);
+  body.apply_contact_impulse((recovery - impulse) / dt, c.on_body, 1);
 }
 
 }  // namespace offstage::sim

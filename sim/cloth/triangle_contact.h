@@ -10,8 +10,8 @@
 
 namespace offstage::sim {
 
-/// Of the cloth's thickness, which its points keep, the distance that places within triangles keep: flat
-/// parts of bodies do not feel them at all.
+/// Distance that points within triangles keep from bodies, as a fraction of the cloth's thickness, which its
+/// vertices keep. Flat parts of bodies therefore touch only vertices.
 inline constexpr Real kTriangleDistance = 0.5;
 
 struct TriangleContact {
@@ -22,7 +22,7 @@ struct TriangleContact {
 };
 
 /// Moves the triangle's points and the body apart in a sub-step of cloth of length dt, with Coulomb friction.
-/// An overlap of its start is taken back slowly, and without giving velocities. Appends to `cuts`.
+/// An initial overlap is removed slowly, and without a velocity. Appends to `cuts`.
 void separate(const TriangleContact& contact, const Triangle& t, ClothPoints& points, ClothBody& body,
               Real dt, std::vector<VelocityCut>& cuts);
 

@@ -11,11 +11,11 @@
 namespace offstage::sim {
 namespace {
 
-/// Sine of the angle below which two edges have no axis of their own. The error of omitting it is this share
-/// of their length.
+/// Sine of the angle below which two edges have no axis of their own. The error of omitting it is this
+/// fraction of their length.
 constexpr Real kNoAxis = 1e-10;
 /// Greatest rounding error of the crossing of two edges, or of the gap along their common perpendicular, as a
-/// share of the sizes.
+/// fraction of the sizes.
 constexpr Real kCrossingRounding = 1e-12;
 
 /// One box in the frame of the other.
@@ -30,7 +30,7 @@ struct Placed {
 /// Gap between the boxes along each axis; negative where they overlap.
 struct Gaps {
   Lanes a, b;  ///< along the axes of A and of B
-  /// Along the products of A's axes with each of B's, times the sine of the angle between them.
+  /// Gaps along the cross products of A's axes with B's, times the sine of the angle between the axes.
   std::array<Lanes, 3> products;
 
   Gaps(const Vec3& half_a, const Vec3& half_b, const Placed& at) {

@@ -12,12 +12,12 @@
 
 namespace offstage::sim {
 
-/// Shares of the margin within which solids count as touching. kTilt: how much the gap along the normal of a
-/// face may be smaller than the separation, and how far parallel edges may pass each other. kRim: how far a
+/// Fractions of the margin within which solids count as touching. kTilt: how much the gap along the normal of
+/// a face may be smaller than the separation, and how far parallel edges may pass each other. kRim: how far a
 /// point may lie outside of a face, and how much the true deepest point of a rim may be deeper than that of
 /// its polygon.
 inline constexpr Real kTilt = 0.05, kRim = 0.001;
-/// Accuracy of separations, as a share of the solids' size.
+/// Accuracy of separations, as a fraction of the solids' size.
 inline constexpr Real kSeparationRounding = 1e-9;
 /// Sine: a face whose normal is tilted more than this from the separation's normal never gives the contact
 /// normal.

@@ -10,8 +10,8 @@ namespace {
 
 // With at most this many vertices, checking all of them is faster than climbing.
 constexpr std::size_t kScanned = 24;
-// Share of the polyhedron's size by which it may fail to be convex, because hulls merge faces that are this
-// close to one plane.
+// Fraction of the polyhedron's size by which it may fail to be convex, because hulls merge faces that are
+// this close to one plane.
 constexpr Real kLevel = 1e-9;
 
 uint32_t highest(const ConvexPolyhedron& p, const Vec3& d) {

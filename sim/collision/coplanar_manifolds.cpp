@@ -80,7 +80,8 @@ class CoplanarGroup {
   /// is linear over a flat part of the piece, so the others add nothing.
   std::vector<Candidate> outline() const {
     if (points_.size() < 2) return points_;
-    // Along the greatest extent, so that rounding does not decide the order of points on a line.
+    // Orders points along the greatest extent, so that rounding does not decide the order of points on a
+    // line.
     const Vec3& end = farthest_from(points_.front().on_a).on_a;
     const Vec3 along = (farthest_from(end).on_a - end).normalized(), across = first_.normal.cross(along);
     const auto at = [&](const Candidate& c) {

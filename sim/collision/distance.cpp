@@ -245,7 +245,8 @@ SurfaceDistance mesh_distance(const CollisionMesh& m, const Vec3& p, Real limit2
 
 SurfaceDistance signed_distance(const CollisionMesh& m, const Vec3& p) {
   if (m.solids.empty()) return mesh_distance(m, p, kInfinity);
-  // Of a union: the smallest distance. Outside it is exact, and inside the surface is at least as deep.
+  // The distance to a union is the smallest one. It is exact outside; inside, the surface is at least as
+  // deep.
   SurfaceDistance nearest;
   for (const auto& solid : m.solids)
     if (const SurfaceDistance d = mesh_distance(*solid, p, kInfinity); d.distance < nearest.distance)

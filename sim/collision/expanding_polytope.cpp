@@ -10,10 +10,10 @@ constexpr std::size_t kMaxPoints = 128;
 constexpr std::size_t kMaxFaces = 2 * kMaxPoints;  // a closed surface of n points has 2 n - 4 triangles
 // Tolerance of heights over a face, in units of the rounding of a point.
 constexpr Real kHeightTolerance = 64;
-constexpr Real kCurvedTolerance = 1e-10;  // the same for curved cores, as a share of the size
-// Share of the size: at greater depth the point gives the direction of the normal.
+constexpr Real kCurvedTolerance = 1e-10;  // the same for curved cores, as a fraction of the size
+// Fraction of the size: at greater depth the point gives the direction of the normal.
 constexpr Real kDeep = 1e-6;
-// Share of the size: an early end with a smaller gap between the bounds is accepted.
+// Fraction of the size: an early end with a smaller gap between the bounds is accepted.
 constexpr Real kAcceptedGap = 1e-9;
 
 using Index = uint16_t;
@@ -244,7 +244,7 @@ class TetrahedronMaker {
   }
 
  private:
-  // Share of the size: corners nearer than this to the line or plane of others are replaced.
+  // Fraction of the size: corners nearer than this to the line or plane of others are replaced.
   static constexpr Real kWide = 1e-6;
 
   const Vec3& w(std::size_t i) const { return s_.points[i].w; }

@@ -12,10 +12,10 @@ constexpr int kMaxGjkIterations = 100;
 constexpr Real kTolerance = 4;
 // In units of the rounding of a point; the direction between nearer cores is undefined.
 constexpr Real kTouchingRoundings = 64;
-// Share of the size: if GJK stalls at a smaller distance, the expanding polytope decides.
+// Fraction of the size: if GJK stalls at a smaller distance, the expanding polytope decides.
 constexpr Real kNear = 1e-9;
 constexpr Real kGjkLevel = 1 + 1e-14;  // ratio of squares that differ by rounding
-constexpr Real kAccepted = 1e-12;      // share of the size: with a smaller gap a stalled query is accepted
+constexpr Real kAccepted = 1e-12;      // fraction of the size: with a smaller gap a stalled query is accepted
 
 /// Start direction: the last normal, or from the centre of B to that of A.
 Vec3 start_direction(const MinkowskiDifference& m, const GjkCache& cache) {
@@ -35,7 +35,7 @@ Simplex first_simplex(const MinkowskiDifference& m, const GjkCache& cache) {
   return s;
 }
 
-void remember(const Simplex& s, const Vec3& direction, GjkCache& cache) {
+void store(const Simplex& s, const Vec3& direction, GjkCache& cache) {
   cache.size = static_cast<uint32_t>(s.size);
   for (std::size_t k = 0; k < s.size; ++k) cache.from[k] = s.points[k].from;
   cache.direction = direction;
@@ -53,7 +53,7 @@ Separation around_cores(const MinkowskiDifference& m, Real distance, const Vec3&
 
 Separation overlapping(const MinkowskiDifference& m, Simplex& s, GjkCache& cache, int iterations) {
   const DeepestPoint deepest = deepest_point(m, s, start_direction(m, cache));
-  remember(s, deepest.normal, cache);
+  store(s, deepest.normal, cache);
   Separation result = around_cores(m, deepest.distance, deepest.normal, deepest.on_a);
   result.iterations = iterations + deepest.iterations;
   result.converged = deepest.converged;
@@ -99,7 +99,7 @@ Separation gjk(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache&
     reduce(s, nearest);
   }
   const Vec3 normal = nearest.v / distance;
-  remember(s, normal, cache);
+  store(s, normal, cache);
   Separation result = around_cores(m, distance, normal, nearest.on_a(s));
   result.iterations = iterations;
   result.converged = converged;
@@ -129,7 +129,7 @@ bool overlap(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache& c
     const SupportPoint p = m.lowest(d, hint);
     hint = p.from;
     if (const Real along = d.dot(p.w); along > 0 && along * along > radius2 * d.squaredNorm()) {
-      remember({1, {p}}, d.normalized(), cache);
+      store({1, {p}}, d.normalized(), cache);
       return false;
     }
     s.points[s.size++] = p;
@@ -140,7 +140,7 @@ bool overlap(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache& c
     d = nearest.v;
     if (nearest.size == 4 || nearest.squared <= radius2) break;
   }
-  remember(s, cache.direction, cache);
+  store(s, cache.direction, cache);
   return true;
 }
 

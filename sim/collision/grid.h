@@ -58,7 +58,7 @@ class Grid {
 
   /// The objects that cells can hold, from the finest to the coarsest level.
   std::span<const CellRange> ranges() const { return ranges_; }
-  /// The objects that are too large or too far away.
+  /// The objects that are too large, or too far away, for the cells.
   std::span<const uint32_t> large() const { return large_; }
 
   /// For a grid at rest: builds the complete tables that are needed for pairs with the objects of `moving`

@@ -9,14 +9,14 @@
 namespace offstage::sim {
 namespace {
 
-/// Share of the square of its longest edge: a triangle of less area has no reliable normal.
+/// Fraction of the square of its longest edge: a triangle of less area has no reliable normal.
 constexpr Real kSliver = 1e-5;
 /// Greatest number of slivers in a row that are skipped.
 constexpr int kMostSlivers = 16;
 /// Sine: normals that are outside of a region by less than this are allowed, because normals are not more
 /// accurate.
 constexpr Real kOff = 1e-5;
-/// Share of the longest edge: points this near to an edge or a vertex are on it.
+/// Fraction of the longest edge: points this near to an edge or a vertex are on it.
 constexpr Real kOnFeature = 1e-6;
 
 bool is_thin(const TriangleMesh& mesh, const Triangle& t) {

@@ -48,7 +48,7 @@ struct SurfaceTriangle {
   /// positive at a ridge, negative in a valley, 0 where the surface is flat or ends.
   Real fall(std::size_t k) const;
   /// Whether a contact at a point of the triangle can push along the unit vector `n` on this side. With
-  /// `guard`, 0 to 1, normals outside of the region of a ridge by less than this share of its slope are
+  /// `guard`, 0 to 1, normals outside of the region of a ridge by less than this fraction of its slope are
   /// allowed, too.
   bool allows(const Vec3& point, const Vec3& n, Real guard = 0) const;
 

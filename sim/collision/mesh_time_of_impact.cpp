@@ -92,19 +92,19 @@ Real volume_reach(const BoundingSphere& sphere) {
 /// Two shapes at one time of their motions.
 class Instant {
  public:
-  Instant(const MovingShape& a, const MovingShape& b, Real share, Real tolerance)
+  Instant(const MovingShape& a, const MovingShape& b, Real fraction, Real tolerance)
       : a_(a),
         b_(b),
-        share_(share),
+        fraction_(fraction),
         tolerance_(tolerance),
-        pose_a_(a.path.at(share)),
-        pose_b_(b.path.at(share)),
+        pose_a_(a.path.at(fraction)),
+        pose_b_(b.path.at(fraction)),
         a_from_b_{pose_a_.point_to_body(pose_b_.position),
                   pose_a_.orientation.conjugate() * pose_b_.orientation},
         placement_(a_from_b_, a.shape.hull().reach() + b.shape.hull().reach(), 0),
         closing_(pose_a_.vector_to_body(b.path.velocity() - a.path.velocity())),
-        spin_a_(pose_a_.vector_to_body(a.path.angular_velocity(share))),
-        spin_b_(pose_a_.vector_to_body(b.path.angular_velocity(share))) {}
+        spin_a_(pose_a_.vector_to_body(a.path.angular_velocity(fraction))),
+        spin_b_(pose_a_.vector_to_body(b.path.angular_velocity(fraction))) {}
 
   const Pose& a_from_b() const { return a_from_b_; }
   /// The closest two pieces, if any are in contact at this time.
@@ -173,12 +173,12 @@ class Instant {
       if (!contact_ || s.distance < contact_->distance) contact_ = s;
       return 0;
     }
-    return closing_gap({p, a_.path}, {q, b_.path}, share_, s.distance, pose_a_.vector_to_world(s.normal))
+    return closing_gap({p, a_.path}, {q, b_.path}, fraction_, s.distance, pose_a_.vector_to_world(s.normal))
         .time_to(tolerance_ / 2);
   }
 
   const MovingShape &a_, &b_;
-  Real share_, tolerance_;
+  Real fraction_, tolerance_;
   Pose pose_a_, pose_b_, a_from_b_;
   Placement placement_;
   Vec3 closing_, spin_a_, spin_b_;  // A's frame
@@ -194,21 +194,21 @@ Real unevenness(const MovingShape& s) {
 }
 
 /// Velocity of the material point that is at `place` [m per step].
-Vec3 velocity(const PosePath& path, Real share, const Vec3& place) {
-  return path.velocity() + path.angular_velocity(share).cross(place - path.at(share).position);
+Vec3 velocity(const PosePath& path, Real fraction, const Vec3& place) {
+  return path.velocity() + path.angular_velocity(fraction).cross(place - path.at(fraction).position);
 }
 
 }  // namespace
 
 std::optional<Impact> bisected_time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance) {
   constexpr int kMostHalvings = 60;
-  const auto a_from_b = [&](Real share) {
-    const Pose at_a = a.path.at(share), at_b = b.path.at(share);
+  const auto a_from_b = [&](Real fraction) {
+    const Pose at_a = a.path.at(fraction), at_b = b.path.at(fraction);
     return Pose{at_a.point_to_body(at_b.position), at_a.orientation.conjugate() * at_b.orientation};
   };
   TestCounts uncounted;
   TestCounts& counts = a.counts ? *a.counts : uncounted;
-  const auto touch_at = [&](Real share) { return touching(a.shape, b.shape, a_from_b(share), counts); };
+  const auto touch_at = [&](Real fraction) { return touching(a.shape, b.shape, a_from_b(fraction), counts); };
   if (!touch_at(1)) return std::nullopt;
   // Bound of the relative speed of any two points [m per step].
   const auto fastest = [](const MovingShape& s) {
@@ -216,7 +216,7 @@ std::optional<Impact> bisected_time_of_impact(const MovingShape& a, const Moving
                               : s.path.velocity().norm() + s.path.turn() * s.shape.hull().reach();
   };
   const Real speed = fastest(a) + fastest(b);
-  Impact impact{.share = 0, .separation = {}};
+  Impact impact{.fraction = 0, .separation = {}};
   Real low = 0, high = 1;
   if (!touch_at(0))
     while ((high - low) * speed > tolerance / 2 && impact.advances < kMostHalvings) {
@@ -226,7 +226,7 @@ std::optional<Impact> bisected_time_of_impact(const MovingShape& a, const Moving
     }
   else
     high = 0;
-  impact.share = low;
+  impact.fraction = low;
   impact.converged = (high - low) * speed <= tolerance / 2;
   PairCache none;
   if (const auto s = separation(a.shape, b.shape, a_from_b(low), none)) impact.separation = *s;
@@ -247,13 +247,13 @@ std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b,
 
   Impact impact{0, {}};
   for (impact.advances = 1;; ++impact.advances) {
-    Instant instant(a, b, impact.share, tolerance);
-    const Real time = instant.time_to_contact(1 - impact.share);
+    Instant instant(a, b, impact.fraction, tolerance);
+    const Real time = instant.time_to_contact(1 - impact.fraction);
     if (instant.contact()) {
       impact.separation = *instant.contact();
       return impact;
     }
-    if (impact.share == 0) {
+    if (impact.fraction == 0) {
       PairCache none;
       const auto s = separation(a.shape, b.shape, instant.a_from_b(), none, DistanceMethod::gjk, 0);
       if (s) {
@@ -261,13 +261,13 @@ std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b,
         return impact;
       }
     }
-    if (impact.share + time >= 1) return std::nullopt;
-    impact.share += time;
+    if (impact.fraction + time >= 1) return std::nullopt;
+    impact.fraction += time;
     if (impact.advances == kMaxMeshAdvances) break;
   }
   impact.converged = false;
   PairCache none;
-  if (const auto s = separation(a.shape, b.shape, Instant(a, b, impact.share, tolerance).a_from_b(), none))
+  if (const auto s = separation(a.shape, b.shape, Instant(a, b, impact.fraction, tolerance).a_from_b(), none))
     impact.separation = *s;
   return impact;
 }
@@ -277,20 +277,20 @@ std::optional<Impact> time_of_next_impact(const MovingShape& a, const MovingShap
   PairCache cache;
   const Real least = speed + unevenness(a) + unevenness(b);
   for (int look = 1; look < kLooks; ++look) {
-    const Real share = Real(look) / kLooks;
-    const Pose pose_a = a.path.at(share), pose_b = b.path.at(share);
+    const Real fraction = Real(look) / kLooks;
+    const Pose pose_a = a.path.at(fraction), pose_b = b.path.at(fraction);
     const Pose a_from_b{pose_a.point_to_body(pose_b.position),
                         pose_a.orientation.conjugate() * pose_b.orientation};
     const auto s = separation(a.shape, b.shape, a_from_b, cache, DistanceMethod::gjk, tolerance);
     if (!s) {
       const PosePath rest_a(pose_a, a.path.end()), rest_b(pose_b, b.path.end());
       auto impact = time_of_impact({a.shape, rest_a}, {b.shape, rest_b}, tolerance);
-      if (impact) impact->share = share + impact->share * (1 - share);
+      if (impact) impact->fraction = fraction + impact->fraction * (1 - fraction);
       return impact;
     }
     const Vec3 at_a = pose_a.point_to_world(s->on_a), at_b = pose_a.point_to_world(s->on_b);
-    const Vec3 approach = velocity(b.path, share, at_b) - velocity(a.path, share, at_a);
-    if (approach.dot(pose_a.vector_to_world(s->normal)) > least) return Impact{share, *s, look, true};
+    const Vec3 approach = velocity(b.path, fraction, at_b) - velocity(a.path, fraction, at_a);
+    if (approach.dot(pose_a.vector_to_world(s->normal)) > least) return Impact{fraction, *s, look, true};
   }
   return std::nullopt;
 }

@@ -18,7 +18,7 @@ namespace {
 
 /// Triangles that are nearer have no reliable direction between their closest points [m].
 constexpr Real kLeastTriangleDistance = 1e-9;
-/// Of a PairCache: up to so many, all are compared.
+/// Up to this number of entries of a PairCache, all are compared.
 constexpr std::size_t kFewEntries = 8;
 constexpr uint32_t kNoEntry = ~0u;
 
@@ -149,7 +149,7 @@ class PiecePair {
   }
 
  private:
-  /// Round surfaces have no seams. A triangle whose surroundings are all known has none either.
+  /// Round surfaces have no internal edges. A triangle whose surroundings are all known has none either.
   static bool continues(const CollisionShape& shape, uint32_t piece) {
     if (const CollisionMesh* mesh = shape.surface()) return !mesh->surface.is_at_border(piece);
     return std::holds_alternative<Sphere>(*shape.solid().shape) ||
@@ -361,14 +361,14 @@ bool touching(const CollisionShape& a, const CollisionShape& b, const Pose& a_fr
   assert(!a.is_plane());
   if (b.is_plane()) return plane_separation(a.hull(), a_from_b).distance <= 0;
   const bool as_triangles = are_triangles(a, b);
-  const auto are_apart = [&](uint32_t i, uint32_t j) {
+  const auto is_collision_disabled = [&](uint32_t i, uint32_t j) {
     const Convex p = a.piece(i), q = b.piece(j);
     if (as_triangles) return !triangles_intersect(vertices_of(p), placed_vertices(q, a_from_b));
     GjkCache fresh;
     return !overlap(p, q, a_from_b, fresh);
   };
   const bool apart = with_trees(a, b, [&](const auto& tree_a, const auto& tree_b) {
-    return for_each_pair(tree_a, tree_b, placement(a, b, a_from_b, 0), are_apart, counts);
+    return for_each_pair(tree_a, tree_b, placement(a, b, a_from_b, 0), is_collision_disabled, counts);
   });
   return !apart || containment(a, b, a_from_b);
 }

@@ -89,7 +89,7 @@ struct MovingShape {
   TestCounts* counts = nullptr;  ///< if given for the first shape, tests are added to it
 };
 
-/// Returns the time, as a share of the step, at which the shapes are within `tolerance` [m], > 0, of each
+/// Returns the time, as a fraction of the step, at which the shapes are within `tolerance` [m], > 0, of each
 /// other. Before it they are never within half of that distance. None if they stay more than half of it
 /// apart. For shapes that are within it at the start, or one inside the other, the time is 0. The method is
 /// conservative advancement over both trees at once, with a bound on the motion per node: Tang, Kim, Manocha,

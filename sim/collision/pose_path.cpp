@@ -4,7 +4,7 @@
 
 namespace offstage::sim {
 
-// Let f be half the angle and a(s) half the angle turned at share s. Then
+// Let f be half the angle and a(s) half the angle turned at fraction s. Then
 //   tan a = s sin f / ((1 - s) + s cos f),  da/ds = sin f / D,  D = 1 - 2 s (1 - s) (1 - cos f).
 // The angular speed 2 da/ds has its maximum 4 tan(f/2) at s = 1/2, and its rate is at most 16 tan^3(f/2). A
 // point at distance 1 from the axis has the centripetal acceleration (2 da/ds)^2 and the tangential
@@ -26,17 +26,17 @@ Real PosePath::turn() const {
   return sine_ > 0 ? 2 * std::atan2(sine_, cosine_) : 0;
 }
 
-Pose PosePath::at(Real share) const {
+Pose PosePath::at(Real fraction) const {
   Pose pose = start_;
-  pose.position += share * velocity_;
+  pose.position += fraction * velocity_;
   if (sine_ > 0)
     pose.orientation.coeffs() =
-        ((1 - share) * start_.orientation.coeffs() + share * end_.orientation.coeffs()).normalized();
+        ((1 - fraction) * start_.orientation.coeffs() + fraction * end_.orientation.coeffs()).normalized();
   return pose;
 }
 
-Vec3 PosePath::angular_velocity(Real share) const {
-  return 2 * sine_ / (1 - 2 * share * (1 - share) * (1 - cosine_)) * axis_;
+Vec3 PosePath::angular_velocity(Real fraction) const {
+  return 2 * sine_ / (1 - 2 * fraction * (1 - fraction) * (1 - cosine_)) * axis_;
 }
 
 }  // namespace offstage::sim

@@ -2,7 +2,7 @@
 /// Path of a solid from one pose to another during a step. The origin of its frame moves on a straight line
 /// at constant speed. Its orientation follows the shortest arc, by normalized linear interpolation of the two
 /// quaternions: a rotation about a fixed axis that needs no trigonometry. The rate of rotation is constant
-/// within 6 % for a quarter turn, and within angle^2 / 48 for small angles. Time is the share of the step,
+/// within 6 % for a quarter turn, and within angle^2 / 48 for small angles. Time is the fraction of the step,
 /// from 0 to 1, so velocities are per step.
 
 #include "sim/core/types.h"
@@ -15,14 +15,14 @@ class PosePath {
   /// A path that stays at a pose.
   explicit PosePath(const Pose& pose) : PosePath(pose, pose) {}
 
-  Pose at(Real share) const;
+  Pose at(Real fraction) const;
   const Pose& start() const { return start_; }
   const Pose& end() const { return end_; }
 
   /// Velocity of the origin, world [m per step].
   const Vec3& velocity() const { return velocity_; }
   /// Angular velocity, world [rad per step].
-  Vec3 angular_velocity(Real share) const;
+  Vec3 angular_velocity(Real fraction) const;
   /// Whether the orientations differ, and the angle between them, 0 to pi [rad].
   bool turns() const { return sine_ > 0; }
   Real turn() const;

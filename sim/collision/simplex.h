@@ -20,11 +20,11 @@ struct Simplex {
 struct SimplexPoint {
   Vec3 v = Vec3::Zero();
   Real squared = std::numeric_limits<Real>::infinity();  ///< |v|^2
-  std::size_t size = 0;                                  ///< 4: the origin is inside
+  std::size_t size = 0;                                  ///< number of corners; 4: the origin is inside
   std::array<uint8_t, 4> corner{};
   std::array<Real, 4> weight{};
 
-  /// The point of A's core from which it results.
+  /// Returns the point of A's core that belongs to this point of A - B.
   Vec3 on_a(const Simplex& s) const;
 };
 

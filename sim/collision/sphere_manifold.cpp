@@ -10,7 +10,7 @@ namespace {
 
 using Core = Convex::Core;
 
-/// Share of the size: nearer to a core than this, the direction from it is undefined.
+/// Fraction of the size: nearer to a core than this, the direction from it is undefined.
 constexpr Real kNoDirection = 1e-12;
 
 /// The nearest point on the surface of a core, in the core's frame.

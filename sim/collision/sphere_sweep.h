@@ -9,7 +9,7 @@
 namespace offstage::sim {
 
 struct SweepHit {
-  Real fraction;  ///< share of the path from a to b
+  Real fraction;  ///< fraction of the path from a to b
   /// Distance of the centre from the surface at that point: the sphere's radius, or less if it started
   /// closer.
   Real distance;

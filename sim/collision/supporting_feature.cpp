@@ -10,9 +10,9 @@ namespace {
 
 constexpr uint32_t kMaxFeatureCorners = SupportingFeature::kMaxCorners;
 
-/// Share of the solid's size: vertices that are less than this below the plane of a face belong to the face.
-/// Coordinates from files are seldom more accurate, and flat faces are often given as triangles that are not
-/// exactly coplanar.
+/// Fraction of the solid's size: vertices that are less than this below the plane of a face belong to the
+/// face. Coordinates from files are seldom more accurate, and flat faces are often given as triangles that
+/// are not exactly coplanar.
 constexpr Real kFlat = 1e-5;
 /// Cosine: edges and directions closer to a right angle than this count as perpendicular. Normals of round
 /// solids are accurate to the square root of the accuracy of distances.
@@ -39,8 +39,8 @@ const std::array<Eigen::Vector2d, kMaxFeatureCorners>& circle() {
   return points;
 }
 
-/// Share of a length that lies within `slack`, if its far end rises by `rise`.
-Real share_within(Real slack, Real rise) {
+/// Fraction of a length that lies within `slack`, if its far end rises by `rise`.
+Real fraction_within(Real slack, Real rise) {
   return rise > slack ? slack / rise : 1;
 }
 
@@ -64,7 +64,7 @@ SupportingFeature segment_feature(const Vec3& p, uint32_t p_tag, const Vec3& q, 
 
 Vec3 box_extent(const Vec3& half, const Vec3& d, Real slack) {
   Vec3 extent = 2 * half;
-  for (int i = 0; i < 3; ++i) extent[i] *= share_within(slack, extent[i] * std::abs(d[i]));
+  for (int i = 0; i < 3; ++i) extent[i] *= fraction_within(slack, extent[i] * std::abs(d[i]));
   return extent;
 }
 
@@ -136,7 +136,7 @@ SupportingFeature triangle_edge(const Convex& c, const Vec3& d, Real slack) {
     const Vec3 edge = c.vertex(other) - top;
     const SupportingFeature f = segment_feature(top, corner, c.vertex(other), other, d);
     const Real length = f.edge != Vec3::Zero() ? std::numeric_limits<Real>::infinity()
-                                               : share_within(slack, -d.dot(edge)) * edge.norm();
+                                               : fraction_within(slack, -d.dot(edge)) * edge.norm();
     if (!(edge.squaredNorm() > 0) || length <= best_length) continue;
     best = f;
     best_length = length;
@@ -197,7 +197,7 @@ SupportingFeature flat_part(const ConvexPolyhedron& p, uint32_t face) {
 /// Part of the edge from one vertex to another that is within `slack` of the first one along d.
 Vec3 part_within(const ConvexPolyhedron& p, uint32_t from, uint32_t to, const Vec3& d, Real slack) {
   const Vec3 edge = p.vertex(to) - p.vertex(from);
-  return share_within(slack, -d.dot(edge)) * edge;
+  return fraction_within(slack, -d.dot(edge)) * edge;
 }
 
 SupportingFeature polyhedron_edge(const ConvexPolyhedron& p, const Vec3& d, Real slack, uint32_t v) {
@@ -306,8 +306,8 @@ bool rests_on_disc(const Convex& c, const RoundSide& side, const Vec3& d, Real s
   const bool up = d.y() > 0;
   if (up && c.core == Convex::Core::cone && !(c.half.z() > 0)) return false;
   const Real R = disc_radius(c, up), lean = d.dot(outward(d)), length = (side.to - side.from).norm();
-  const Real disc_within = 2 * R * share_within(slack, 2 * R * lean) * std::abs(d.y()),
-             line_within = length * share_within(slack, d.dot(side.from - side.to)) * d.dot(side.normal);
+  const Real disc_within = 2 * R * fraction_within(slack, 2 * R * lean) * std::abs(d.y()),
+             line_within = length * fraction_within(slack, d.dot(side.from - side.to)) * d.dot(side.normal);
   return disc_within > line_within;
 }
 

@@ -22,17 +22,17 @@ Real extent(const Convex& shape, const Quat& orientation, const Vec3& d) {
   return local.dot(shape.support(local, start)) + shape.radius * local.norm();
 }
 
-/// Advances until the solids are within the tolerance. `gap_at(share, separation)` measures the gap and
+/// Advances until the solids are within the tolerance. `gap_at(fraction, separation)` measures the gap and
 /// writes the separation. Each advance aims at half the tolerance, so their number is finite.
 template <class GapAt>
 std::optional<Impact> advance(const GapAt& gap_at, Real tolerance) {
   Impact impact{0, {}};
   for (impact.advances = 1; impact.advances <= kMaxAdvances; ++impact.advances) {
-    const Gap gap = gap_at(impact.share, impact.separation);
+    const Gap gap = gap_at(impact.fraction, impact.separation);
     if (gap.distance <= tolerance) return impact;
-    const Real next = impact.share + gap.time_to(tolerance / 2);
+    const Real next = impact.fraction + gap.time_to(tolerance / 2);
     if (!(next < 1)) return std::nullopt;
-    impact.share = next;
+    impact.fraction = next;
   }
   impact.converged = false;
   return impact;
@@ -49,15 +49,18 @@ Real Gap::time_to(Real target) const {
   return acceleration > 0 ? (root - rate) / acceleration : kInfinity;
 }
 
-Gap closing_gap(const MovingConvex& a, const MovingConvex& b, Real share, Real distance, const Vec3& normal) {
+Gap closing_gap(const MovingConvex& a, const MovingConvex& b, Real fraction, Real distance,
+                const Vec3& normal) {
   Gap gap{distance, normal.dot(b.path.velocity() - a.path.velocity()), 0};
   // -n.(w x r) = r.(w x n) for the points of A, and n.(w x r) = r.(n x w) for those of B.
   if (a.path.turns()) {
-    gap.rate += extent(a.shape, a.path.at(share).orientation, a.path.angular_velocity(share).cross(normal));
+    gap.rate +=
+        extent(a.shape, a.path.at(fraction).orientation, a.path.angular_velocity(fraction).cross(normal));
     gap.acceleration += a.path.max_acceleration(a.shape.reach());
   }
   if (b.path.turns()) {
-    gap.rate += extent(b.shape, b.path.at(share).orientation, normal.cross(b.path.angular_velocity(share)));
+    gap.rate +=
+        extent(b.shape, b.path.at(fraction).orientation, normal.cross(b.path.angular_velocity(fraction)));
     gap.acceleration += b.path.max_acceleration(b.shape.reach());
   }
   return gap;
@@ -65,10 +68,10 @@ Gap closing_gap(const MovingConvex& a, const MovingConvex& b, Real share, Real d
 
 std::optional<Impact> time_of_impact(const MovingConvex& a, const MovingConvex& b, Real tolerance) {
   GjkCache cache;
-  const auto gap_at = [&](Real share, Separation& s) {
-    const Pose pose = a.path.at(share);
-    s = gjk(a.shape, b.shape, relative(pose, b.path.at(share)), cache);
-    return closing_gap(a, b, share, s.distance, pose.vector_to_world(s.normal));
+  const auto gap_at = [&](Real fraction, Separation& s) {
+    const Pose pose = a.path.at(fraction);
+    s = gjk(a.shape, b.shape, relative(pose, b.path.at(fraction)), cache);
+    return closing_gap(a, b, fraction, s.distance, pose.vector_to_world(s.normal));
   };
   return advance(gap_at, tolerance);
 }
@@ -84,10 +87,10 @@ std::optional<Impact> time_of_plane_impact(const MovingConvex& a, const PosePath
       reach + std::sqrt(std::max((a.path.start().position - plane.start().position).squaredNorm(),
                                  (a.path.end().position - plane.end().position).squaredNorm()));
   const Vec3 travel = a.path.velocity() - plane.velocity();
-  const auto gap_at = [&](Real share, Separation& s) {
-    const Pose pose = a.path.at(share), ground = plane.at(share);
-    const Vec3 up = ground.vector_to_world(Vec3::UnitY()), w = plane.angular_velocity(share),
-               spin = a.path.angular_velocity(share);
+  const auto gap_at = [&](Real fraction, Separation& s) {
+    const Pose pose = a.path.at(fraction), ground = plane.at(fraction);
+    const Vec3 up = ground.vector_to_world(Vec3::UnitY()), w = plane.angular_velocity(fraction),
+               spin = a.path.angular_velocity(fraction);
     const Vec3 down = pose.vector_to_body(-up);
     uint32_t start = 0;
     const Vec3 deepest = a.shape.support(down, start) + a.shape.radius * down;

@@ -18,10 +18,10 @@
 namespace offstage::sim {
 
 struct Impact {
-  Real share;             ///< share of the step, in [0, 1]
+  Real fraction;          ///< fraction of the step, in [0, 1]
   Separation separation;  ///< separation at that time, in A's frame
   int advances = 0;       ///< number of distance queries
-  bool converged = true;  ///< false: the bounded advancement ended early, at a share that is still safe
+  bool converged = true;  ///< false: the bounded advancement ended early, at a fraction that is still safe
 };
 
 /// A convex solid with its path.
@@ -30,9 +30,9 @@ struct MovingConvex {
   const PosePath& path;
 };
 
-/// Returns a time, as a share of the step, at which A and B are within `tolerance` [m], > 0, of each other,
-/// and before which they are never within half of it. None if they stay more than half of it apart to the
-/// end. For solids that are within it at the start, the time is 0.
+/// Returns a time, as a fraction of the step, at which A and B are within `tolerance` [m], > 0, of each
+/// other, and before which they are never within half of it. None if they stay more than half of it apart to
+/// the end. For solids that are within it at the start, the time is 0.
 std::optional<Impact> time_of_impact(const MovingConvex& a, const MovingConvex& b, Real tolerance);
 
 /// The same for the half-space below a plane, which is the xz plane of its path's frame. The normal is that
@@ -51,6 +51,7 @@ struct Gap {
 
 /// Bounds of how fast two solids can approach along `normal` (unit, world, from B to A) at a time of their
 /// motions.
-Gap closing_gap(const MovingConvex& a, const MovingConvex& b, Real share, Real distance, const Vec3& normal);
+Gap closing_gap(const MovingConvex& a, const MovingConvex& b, Real fraction, Real distance,
+                const Vec3& normal);
 
 }  // namespace offstage::sim

@@ -10,14 +10,14 @@
 namespace offstage::sim {
 namespace {
 
-/// Share of a ridge's slope by which a face that approaches the ridge may be outside of the ridge's region,
-/// because it may turn into that region within the step.
+/// Fraction of a ridge's slope by which a face that approaches the ridge may be outside of the ridge's
+/// region, because it may turn into that region within the step.
 constexpr Real kGuard = 0.5;
 /// Sine: the surface beyond an edge is a valley if it rises by more than this.
 constexpr Real kValley = 1e-3;
 
-/// How far the other solid may be outside of a triangle's sides and still count as in front of its face.
-/// Beyond a valley the plane of the face continues beneath the surface, and stops the solid next.
+/// Distance by which the other solid may be outside of a triangle's sides and still count as in front of its
+/// face. Beyond a valley the plane of the face continues beneath the surface, and stops the solid next.
 std::array<Real, 3> room_beyond(const SurfaceTriangle& t, Real margin) {
   std::array<Real, 3> room{};
   for (std::size_t k = 0; k < 3; ++k)

@@ -14,10 +14,11 @@ namespace {
 using Kind = Feature::Kind;
 constexpr uint32_t kNone = 0xffffffff;
 
-/// Share of the coordinates' size: rounding error of a computed height over a plane. A feature is left only
-/// for a neighbour that is better by more than this, so that rounding seldom makes the walk go in circles.
+/// Fraction of the coordinates' size: rounding error of a computed height over a plane. A feature is left
+/// only for a neighbour that is better by more than this, so that rounding seldom makes the walk go in
+/// circles.
 constexpr Real kVClipRounding = 1e-14;
-/// Share of the coordinates' size: if two points are closer than this, their difference does not define a
+/// Fraction of the coordinates' size: if two points are closer than this, their difference does not define a
 /// normal.
 constexpr Real kVClipTouching = 1e-12;
 

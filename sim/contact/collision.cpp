@@ -10,10 +10,10 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
+#include "sim/contact/bounded_collision.h"
 #include "sim/contact/friction_lcp.h"
 #include "sim/contact/jointed_sweeps.h"
 #include "sim/contact/proximal_newton.h"
-#include "sim/contact/rough_collision.h"
 
 namespace offstage::sim {
 namespace {
@@ -26,10 +26,10 @@ constexpr int kArcs = 64;
 constexpr int kHalvings = 60;  ///< bisection steps: to the last bit
 /// Solutions of a cluster in the search for the restitution that conserves the energy.
 constexpr int kSolves = 20;
-constexpr Real kKeptEnergy = 1e-9;  ///< share of the energy added by restitution that may be lost instead
+constexpr Real kKeptEnergy = 1e-9;  ///< fraction of the energy added by restitution that may be lost instead
 constexpr std::size_t kDense = 24;  ///< clusters of at most this many contacts are solved by pivoting
-constexpr Real kAcceptedResidual = 1e-6;  ///< share of the velocities: accepted residual of an impact
-/// Share of the velocities: a result with a larger residual is rejected.
+constexpr Real kAcceptedResidual = 1e-6;  ///< fraction of the velocities: accepted residual of an impact
+/// Fraction of the velocities: a result with a larger residual is rejected.
 constexpr Real kRoughResidual = 1e-3;
 constexpr uint32_t kCollisionSweeps = 200, kPlasticSweeps = 400, kJointedSweeps = 60;
 /// Limits with bounded effort: updates of single contacts, by sweeps or in a sequence (60 ns each), and those
@@ -38,8 +38,8 @@ constexpr uint32_t kCollisionSweeps = 200, kPlasticSweeps = 400, kJointedSweeps 
 constexpr std::size_t kUpdates = 4'000, kMoreUpdates = 1'000;
 constexpr int kBoundedSolves = 3;
 constexpr Real kJointBudget = 1e6;
-constexpr Real kResting = 1e-11;  ///< share of the fastest approach of all: slower approaches are ignored
-/// Share of the fastest remaining approach: contacts that differ by less collide together.
+constexpr Real kResting = 1e-11;  ///< fraction of the fastest approach of all: slower approaches are ignored
+/// Fraction of the fastest remaining approach: contacts that differ by less collide together.
 constexpr Real kTie = 1e-6;
 /// Limits of the number of impulses per contact of a sequence; with joints each impulse takes a solution of
 /// the whole system.
@@ -409,7 +409,7 @@ class Sequence {
         return work_;
       }
       work_.iterations += next_.size();
-      if (joints_.empty() && are_apart())
+      if (joints_.empty() && is_collision_disabled())
         for (const std::size_t i : next_) collide_alone(i);
       else
         collide_together();
@@ -429,7 +429,7 @@ class Sequence {
   }
 
   /// Whether no two of the next contacts share a movable body, so that each is solved in closed form.
-  bool are_apart() {
+  bool is_collision_disabled() {
     hit_.clear();
     for (const std::size_t i : next_)
       for (const uint32_t body : {contacts_[i].a, contacts_[i].b})
@@ -518,7 +518,7 @@ ContactWork collide(std::span<ContactBody> bodies, std::span<Contact> contacts,
   return collide_with(bodies, contacts, restitution, law, joints, Effort::full);
 }
 
-ContactWork collide_roughly(std::span<ContactBody> bodies, std::span<Contact> contacts,
+ContactWork collide_bounded(std::span<ContactBody> bodies, std::span<Contact> contacts,
                             std::span<const Real> restitution, ImpactLaw law, const JointProblem& joints) {
   return collide_with(bodies, contacts, restitution, law, joints, Effort::bounded);
 }

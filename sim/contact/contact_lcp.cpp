@@ -18,23 +18,24 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Share of the diagonal that is added to it, so that redundant contacts share their load in a unique way.
-constexpr Real kShare = 1e-7;
-/// Greatest residual of a solution, as a share of the greatest velocity, or velocity by one impulse alone.
+/// Fraction of the diagonal that is added to it, so that redundant contacts share their load in a unique way.
+constexpr Real kFraction = 1e-7;
+/// Greatest residual of a solution, as a fraction of the greatest velocity, or velocity by one impulse alone.
 constexpr Real kLcpAccepted = 1e-8;
-/// The same for the constraints of joints, and the share of the diagonal that makes redundant ones solvable.
+/// The same for the constraints of joints, and the fraction of the diagonal that makes redundant ones
+/// solvable.
 constexpr Real kConstraintAccepted = 1e-9, kConstraintSoftness = 1e-11;
 constexpr int kRefinements = 3;
-/// Share of the mobility without joints below which a row's mobility is only rounding.
+/// Fraction of the mobility without joints below which a row's mobility is only rounding.
 constexpr Real kImmobile = 1e-10;
-/// A tangential impulse within this share of its limit slides.
+/// A tangential impulse within this fraction of its limit slides.
 constexpr Real kAtLimit = 1e-9;
 /// Orders of the contacts that are tried.
 constexpr std::size_t kOrders = 2;
 /// Stands for a bound of a joint's impulse that does not exist; larger than any impulse [N s].
 constexpr Real kUnbounded = 1e15;
 
-/// What a row of three of the pivoting stands for: a contact, or a bounded row of a joint.
+/// The source of three rows of the pivoting: a contact, or a bounded row of a joint.
 struct RowOrigin {
   uint32_t index;
   bool is_joint;
@@ -172,8 +173,8 @@ void IslandLcp::set_rows() {
 }
 
 /// With S = G M^-1 G^T, the constraints answer impulses p by -S^-1 G M^-1 J^T p, which reduces the mobility
-/// to J M^-1 J^T - (G M^-1 J^T)^T S^-1 (G M^-1 J^T). Redundant constraints make S singular; a small share of
-/// its diagonal and a few refinements give one of its solutions.
+/// to J M^-1 J^T - (G M^-1 J^T)^T S^-1 (G M^-1 J^T). Redundant constraints make S singular; a small fraction
+/// of its diagonal and a few refinements give one of its solutions.
 bool IslandLcp::eliminate_constraints() {
   Index rows = 0;
   for (const JointConstraint& c : joints_.constraints) rows += c.rows->count;
@@ -255,7 +256,7 @@ bool IslandLcp::solve_without_friction(ContactWork& work) {
 
 bool IslandLcp::pivot_all(ContactWork& work) {
   DenseContacts soft = problem_;
-  soft.A.diagonal() *= 1 + kShare;
+  soft.A.diagonal() *= 1 + kFraction;
   for (std::size_t k = 0; k < kOrders; ++k) {
     const PivotingResult result = pivot(soft, k * origins_.size() / kOrders, p_);
     work.iterations += result.pivots;
@@ -268,9 +269,9 @@ bool IslandLcp::pivot_all(ContactWork& work) {
   return false;
 }
 
-/// Removes the error by kShare: the rows whose velocity must be zero are solved again with the same softness,
-/// from the impulses found, so that only the remaining error is softened. Sliding tangents follow their
-/// normals.
+/// Removes the error by kFraction: the rows whose velocity must be zero are solved again with the same
+/// softness, from the impulses found, so that only the remaining error is softened. Sliding tangents follow
+/// their normals.
 void IslandLcp::refine() {
   const VectorXd u = problem_.A * p_ + problem_.b;
   std::vector<Index> active;
@@ -303,7 +304,7 @@ void IslandLcp::refine() {
   for (Index k = 0; k < count; ++k) {
     const Index row = active[static_cast<std::size_t>(k)];
     K.row(k) = all.row(row);
-    K(k, k) += kShare * problem_.A(row, row);
+    K(k, k) += kFraction * problem_.A(row, row);
     wrong[k] = -u[row];
   }
   const VectorXd before = p_;

@@ -355,7 +355,8 @@ ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, co
   const Real most2 = std::max(turn2(a), turn2(b));
   const ContactPlace at_start{m.normal, start.arm_a, start.arm_b, Quat::Identity()};
   motion.middle = at_start;
-  if (const Real share = duration / substep; most2 > share * share * kMostPredictedTurn * kMostPredictedTurn)
+  if (const Real fraction = duration / substep;
+      most2 > fraction * fraction * kMostPredictedTurn * kMostPredictedTurn)
     return motion;
   if (is_face && most2 < kStraight * kStraight) {
     // One body slides along the face of the other.
@@ -366,9 +367,10 @@ ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, co
     return motion;
   }
   if (m.source == NormalSource::points && is_sphere(a) && is_sphere(b)) {
-    const Vec3 way = duration * (twist_a.velocity - twist_b.velocity);
-    const Real distance = m.radius_a + m.radius_b, along = m.normal.dot(way), least = kStraight * distance;
-    if (way.squaredNorm() - along * along < least * least) return motion;
+    const Vec3 displacement = duration * (twist_a.velocity - twist_b.velocity);
+    const Real distance = m.radius_a + m.radius_b, along = m.normal.dot(displacement),
+               least = kStraight * distance;
+    if (displacement.squaredNorm() - along * along < least * least) return motion;
     const ContactPlace end = between_spheres(start, duration);
     if (!(end.normal.dot(m.normal) > kPredictable)) return motion;
     motion.middle = between_spheres(start, duration / 2);
@@ -379,14 +381,14 @@ ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, co
   const bool by_a = m.source == NormalSource::face_of_b;
   if (is_face && is_sphere(by_a ? a : b) && turn2(by_a ? b : a) < kStraight * kStraight) {
     // A ball on a face that does not turn: only the motion of its centre moves the contact.
-    const Vec3 way =
+    const Vec3 displacement =
         duration / 2 *
         (start.sliding -
          (by_a ? 1 : -1) * (by_a ? twist_a : twist_b).angular_velocity.cross(by_a ? arm_a : arm_b));
     if (by_a)
-      motion.middle.arm_b += way;
+      motion.middle.arm_b += displacement;
     else
-      motion.middle.arm_a -= way;
+      motion.middle.arm_a -= displacement;
     return motion;
   }
   const Shape& carrier = (m.source == NormalSource::face_of_a ? b : a).def.shape;

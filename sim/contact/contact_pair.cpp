@@ -23,7 +23,7 @@ constexpr Real kAlong = 0.7;
 /// An overlap at an interval's end is expected if it exceeds the prediction of an existing point by less than
 /// kExpected. The point must be within kNear, and its normal must differ by less than this cosine [m].
 constexpr Real kSameNormal = 0.999, kNear = 0.02, kExpected = 2e-4;
-/// Share of the spread of points that is added to make it invertible.
+/// Fraction of the spread of points that is added to make it invertible.
 constexpr Real kFlat = 1e-6;
 
 Pose between(const Pose& a, const Pose& b) {
@@ -98,8 +98,8 @@ void place(const Manifold& local, const Pose& from, Manifold& m) {
   }
 }
 
-/// Shares of the points of a force at `centre`, in a's frame like `frame`. Their sum is 1, and if `centre` is
-/// among the points, their weighted mean is `centre`: they are linear over the plane of the points.
+/// Fractions of the points of a force at `centre`, in a's frame like `frame`. Their sum is 1, and if `centre`
+/// is among the points, their weighted mean is `centre`: they are linear over the plane of the points.
 using Weights = std::array<Real, 4>;
 Weights weights(const Manifold& m, const ContactFrame& frame, const Pose& a, const Vec3& centre) {
   const uint32_t count = m.count;
@@ -157,7 +157,7 @@ class LeaningRim {
   }
 
  private:
-  /// Cosine of half the angle between corners; sine of the smallest lean; share of the radius.
+  /// Cosine of half the angle between corners; sine of the smallest lean; fraction of the radius.
   static constexpr Real kNearest = 0.9951847, kLeast = 0.02, kSameHeight = 1e-6;
   Real towards(const Vec3& local) const { return local.x() * facing_.x() + local.z() * facing_.y(); }
 
@@ -289,11 +289,11 @@ void ContactPair::find_points(const Pose& a, const Pose& b, Real margin, Real re
     return find_one_point(a, b, margin);
   }
   // Pairs are processed in parallel, so the buffers belong to the threads.
-  static thread_local std::vector<Remembered> before;
+  static thread_local std::vector<StoredPoint> before;
   static thread_local std::vector<Manifold> found;
   const Pose a_from_b = between(a, b);
   before.clear();
-  remember(before);
+  store_points(before);
   const Real reach_b = is_on_plane_ ? a_->extent + a_from_b.position.norm() : b_->extent;
   if (found_margin_ >= margin && found_margin_ <= 4 * margin && reuse_within > 0 &&
       difference(a_from_b, a_from_b_, reach_b) <= reuse_within) {
@@ -312,13 +312,14 @@ void ContactPair::find_points(const Pose& a, const Pose& b, Real margin, Real re
     place(found[i], a, placed_[i].manifold);
     set_frame(placed_[i]);
   }
-  recall(before, a);
+  restore_forces(before, a);
   inherit(before, a);
   placed_at_ = a;
   found_.clear();
 }
 
-Real ContactPair::free_way(const PlacedManifold& m, const Vec3& place, Real gap, Real duration) const {
+Real ContactPair::free_displacement(const PlacedManifold& m, const Vec3& place, Real gap,
+                                    Real duration) const {
   const ContactMotion motion = contact_motion(*a_, *b_, m.manifold, m.frame, place, gap, duration, duration);
   const Vec3 velocity = free_velocity(*a_, motion.middle.arm_a) - free_velocity(*b_, motion.middle.arm_b);
   return duration * motion.frame.n.dot(velocity);
@@ -344,16 +345,17 @@ bool ContactPair::predicts(const PlacedManifold& m, const Vec3& normal, const Co
   for (uint32_t k = 0; k < m.manifold.count; ++k) {
     const ContactPoint& p = m.manifold.points[k];
     points[k] = {moved(*a_, ends_a, p.on_a, -n, -normal), moved(*b_, ends_b, p.on_b, n, normal),
-                 p.separation + free_way(m, (p.on_a + p.on_b) / 2, p.separation, duration)};
+                 p.separation + free_displacement(m, (p.on_a + p.on_b) / 2, p.separation, duration)};
   }
   for (uint32_t k = 0; k < m.manifold.count; ++k)
     for (uint32_t l = k; l < (between_points ? m.manifold.count : k + 1); ++l) {
       const auto is_between = [&](const Vec3& from, const Vec3& to, const Vec3& place) {
-        const Vec3 way = to - from;
-        const Real length2 = way.squaredNorm();
-        const Real share = length2 > 0 ? std::clamp(way.dot(place - from) / length2, 0.0, 1.0) : 0;
-        const Real separation = points[k].separation + share * (points[l].separation - points[k].separation);
-        return (from + share * way - place).squaredNorm() < kNear * kNear &&
+        const Vec3 segment = to - from;
+        const Real length2 = segment.squaredNorm();
+        const Real fraction = length2 > 0 ? std::clamp(segment.dot(place - from) / length2, 0.0, 1.0) : 0;
+        const Real separation =
+            points[k].separation + fraction * (points[l].separation - points[k].separation);
+        return (from + fraction * segment - place).squaredNorm() < kNear * kNear &&
                separation < at_end.separation + kExpected;
       };
       if (is_between(points[k].on_a, points[l].on_a, at_end.on_a) ||
@@ -364,7 +366,7 @@ bool ContactPair::predicts(const PlacedManifold& m, const Vec3& normal, const Co
 }
 
 /// Transforms the contacts of the interval's end back to its start, each feature with its body.
-PlacedManifold ContactPair::brought_back(const Manifold& at_end, Real duration) const {
+PlacedManifold ContactPair::moved_back(const Manifold& at_end, Real duration) const {
   const Ends a(*a_), b(*b_);
   const auto back = [](const Ends& body, const Vec3& v) {
     return Vec3(body.start.vector_to_world(body.end.vector_to_body(v)));
@@ -390,7 +392,7 @@ PlacedManifold ContactPair::brought_back(const Manifold& at_end, Real duration) 
                on_b = b.start.position + arm(*b_, b, p.on_b, 1);
     const Vec3& carrier = by_b ? on_b : on_a;
     const Vec3 middle = carrier + m.normal.dot((on_a + on_b) / 2 - carrier) * m.normal;
-    p.separation -= free_way(placed, middle, m.normal.dot(on_a - on_b), duration);
+    p.separation -= free_displacement(placed, middle, m.normal.dot(on_a - on_b), duration);
     p.on_a = middle + p.separation / 2 * m.normal;
     p.on_b = middle - p.separation / 2 * m.normal;
   }
@@ -418,7 +420,7 @@ void ContactPair::add_speculative_contacts(Real duration) {
              });
     };
     if (std::none_of(at_end.points.begin(), at_end.points.begin() + at_end.count, is_new)) continue;
-    placed_.push_back(brought_back(at_end, duration));
+    placed_.push_back(moved_back(at_end, duration));
     ++speculative;
     at_end_.push_back(at_end);
     has_narrow_ |= is_narrow(placed_.back().manifold);
@@ -444,7 +446,7 @@ void ContactPair::find_one_point(const Pose& a, const Pose& b, Real margin) {
 }
 
 /// The normal force is kept along the new normal however far the bodies have turned, because they may roll.
-PointForce ContactPair::recalled(const Remembered& p, const ContactFrame& frame, const Mat3& a_axes) {
+PointForce ContactPair::stored_force(const StoredPoint& p, const ContactFrame& frame, const Mat3& a_axes) {
   const auto force = [&](const Vec3& before) -> Vec3 {
     const Real normal = before.dot(p.normal);
     const Vec3 tangential = a_axes * (before - normal * p.normal);
@@ -455,7 +457,7 @@ PointForce ContactPair::recalled(const Remembered& p, const ContactFrame& frame,
 }
 
 /// The points keep their positions on their bodies; the normal keeps its direction in a.
-void ContactPair::reuse(const Pose& a, const Pose& b, const std::vector<Remembered>& points) {
+void ContactPair::reuse(const Pose& a, const Pose& b, const std::vector<StoredPoint>& points) {
   if (found_.empty()) {
     found_.resize(placed_.size());
     const Pose to_a = between(placed_at_, Pose{});
@@ -478,7 +480,7 @@ void ContactPair::reuse(const Pose& a, const Pose& b, const std::vector<Remember
       const Vec3 middle = (on_a + on_b) / 2;
       m.points[k].on_a = middle + m.points[k].separation / 2 * m.normal;
       m.points[k].on_b = middle - m.points[k].separation / 2 * m.normal;
-      placed.forces[k] = recalled(points[next++], placed.frame, frame_a.axes);
+      placed.forces[k] = stored_force(points[next++], placed.frame, frame_a.axes);
     }
   }
   placed_at_ = a;
@@ -497,7 +499,7 @@ void ContactPair::set_frame(PlacedManifold& m) const {
 }
 
 /// Forces are stored in a's frame. (The tangents of a frame can jump although its normal hardly moves.)
-void ContactPair::remember(std::vector<Remembered>& points) const {
+void ContactPair::store_points(std::vector<StoredPoint>& points) const {
   if (placed_.empty()) return;
   const Frame at(placed_at_);
   for (const PlacedManifold& m : placed_) {
@@ -514,7 +516,7 @@ void ContactPair::remember(std::vector<Remembered>& points) const {
 /// Points that existed before keep their forces; they are identified by their ids, or else by distance. Each
 /// stored force is used once, otherwise the forces of a pair that is found repeatedly would grow without
 /// limit.
-void ContactPair::recall(std::vector<Remembered>& points, const Pose& pose) {
+void ContactPair::restore_forces(std::vector<StoredPoint>& points, const Pose& pose) {
   const Frame a(pose);
   // Two models of many parts have thousands of points; then only those are compared that are near along x or
   // belong to the same features.
@@ -539,9 +541,9 @@ void ContactPair::recall(std::vector<Remembered>& points, const Pose& pose) {
       m.forces[k] = {};
       const ContactPoint& point = m.manifold.points[k];
       const Vec3 on_a = a.point_to_body(point.on_a);
-      Remembered* best = nullptr;
+      StoredPoint* best = nullptr;
       Real nearest = kSame * kSame;
-      const auto compare = [&](Remembered& p) {
+      const auto compare = [&](StoredPoint& p) {
         const Real distance = (p.on_a - on_a).squaredNorm() * (p.id == point.id ? kSameFeature : 1);
         // Of equally near points, the first one counts.
         if (p.taken || distance > nearest || (distance == nearest && (!best || best < &p))) return;
@@ -558,11 +560,11 @@ void ContactPair::recall(std::vector<Remembered>& points, const Pose& pose) {
              ++at)
           compare(points[std::get<2>(*at)]);
       } else {
-        for (Remembered& p : points) compare(p);
+        for (StoredPoint& p : points) compare(p);
       }
       if (!best) continue;
       best->taken = true;
-      m.forces[k] = recalled(*best, m.frame, a.axes);
+      m.forces[k] = stored_force(*best, m.frame, a.axes);
       m.torque = best->torque;
       m.mean_torque = best->mean_torque;
     }
@@ -573,10 +575,10 @@ void ContactPair::recall(std::vector<Remembered>& points, const Pose& pose) {
 /// may have different corners in every step, but their load does not change. The forces go to the first
 /// manifold with a similar normal. They are distributed over its points so that their sum acts where it did,
 /// as far as the points extend.
-void ContactPair::inherit(std::vector<Remembered>& points, const Pose& a) {
-  static thread_local std::vector<Remembered*> left;
+void ContactPair::inherit(std::vector<StoredPoint>& points, const Pose& a) {
+  static thread_local std::vector<StoredPoint*> left;
   left.clear();
-  for (Remembered& p : points)
+  for (StoredPoint& p : points)
     if (!p.taken && !(p.last.isZero(0) && p.mean.isZero(0))) left.push_back(&p);
   if (left.empty()) return;
   for (PlacedManifold& m : placed_) {
@@ -584,8 +586,8 @@ void ContactPair::inherit(std::vector<Remembered>& points, const Pose& a) {
                              a.vector_to_body(m.frame.k)};
     Vec3 force = Vec3::Zero(), mean = Vec3::Zero(), moment = Vec3::Zero();
     Real pressure = 0;
-    for (Remembered* remembered : left) {
-      Remembered& p = *remembered;
+    for (StoredPoint* remembered : left) {
+      StoredPoint& p = *remembered;
       // Directions are kept in the world, however far a rolling body has turned.
       const Vec3 before = placed_at_.vector_to_world(p.normal);
       if (p.taken || !(before.dot(m.frame.n) > kAlong)) continue;
@@ -602,10 +604,10 @@ void ContactPair::inherit(std::vector<Remembered>& points, const Pose& a) {
       pressure += normal;
     }
     if (pressure == 0) continue;
-    const Weights shares = weights(m.manifold, frame, a, moment / pressure);
+    const Weights fractions = weights(m.manifold, frame, a, moment / pressure);
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
-      m.forces[k].last += shares[k] * frame_vector(frame, force);
-      m.forces[k].mean += shares[k] * frame_vector(frame, mean);
+      m.forces[k].last += fractions[k] * frame_vector(frame, force);
+      m.forces[k].mean += fractions[k] * frame_vector(frame, mean);
     }
   }
 }

@@ -60,7 +60,7 @@ class alignas(64) ContactPair {
  public:
   uint32_t impacts = 0;        ///< number in this sub-step
   uint8_t speculative = 0;     ///< number of manifolds that add_speculative_contacts() added
-  bool toi_exhausted = false;  ///< the limit of impacts is reached: no more trace-backs in this sub-step
+  bool toi_exhausted = false;  ///< limit of impacts reached: not traced back again in this sub-step
   /// Its contacts have no restitution in this sub-step; they only limit the approach.
   bool restitution_suppressed = false;
   Real deepest = 0;  ///< deepest overlap that find() has seen in this sub-step [m]
@@ -112,7 +112,7 @@ class alignas(64) ContactPair {
     if (!placed_.empty()) sim::prefetch(placed_.data(), placed_.data() + 1);
   }
 
-  /// Whether some manifold is a line or a point (is_narrow()), where there may be a seam.
+  /// Whether some manifold is a line or a point (is_narrow()), which may lie on an internal edge.
   bool has_narrow() const { return has_narrow_; }
   /// The i-th manifold added by add_speculative_contacts(), with its points at their positions at the
   /// interval's end.
@@ -146,24 +146,24 @@ class alignas(64) ContactPair {
     return surface_.by_triangles ? body.triangle_shape() : body.collision_shape();
   }
   /// A point with its forces, all in a's frame.
-  struct Remembered {
+  struct StoredPoint {
     Vec3 on_a, last, mean, normal;
     Real torque, mean_torque;
     uint32_t id;
     bool taken = false;  ///< whether it was matched with a current point
   };
-  static PointForce recalled(const Remembered& p, const ContactFrame& frame, const Mat3& a_axes);
+  static PointForce stored_force(const StoredPoint& p, const ContactFrame& frame, const Mat3& a_axes);
   void find_points(const Pose& a, const Pose& b, Real margin, Real reuse, bool turning);
   void find_one_point(const Pose& a, const Pose& b, Real margin);
-  void remember(std::vector<Remembered>& points) const;
-  void recall(std::vector<Remembered>& points, const Pose& a);
-  void inherit(std::vector<Remembered>& points, const Pose& a);
-  void reuse(const Pose& a, const Pose& b, const std::vector<Remembered>& points);
+  void store_points(std::vector<StoredPoint>& points) const;
+  void restore_forces(std::vector<StoredPoint>& points, const Pose& a);
+  void inherit(std::vector<StoredPoint>& points, const Pose& a);
+  void reuse(const Pose& a, const Pose& b, const std::vector<StoredPoint>& points);
   void set_frame(PlacedManifold& m) const;
   /// Displacement of a relative to b along the normal by the free motion, at a contact of the start in the
   /// middle between surfaces that are `gap` apart [m].
-  Real free_way(const PlacedManifold& m, const Vec3& place, Real gap, Real duration) const;
-  PlacedManifold brought_back(const Manifold& at_end, Real duration) const;
+  Real free_displacement(const PlacedManifold& m, const Vec3& place, Real gap, Real duration) const;
+  PlacedManifold moved_back(const Manifold& at_end, Real duration) const;
 
   PairSurface surface_;
   bool is_on_plane_;

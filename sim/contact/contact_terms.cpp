@@ -10,7 +10,7 @@ namespace {
 
 /// Below this sliding speed, static friction applies [m/s].
 constexpr Real kSlip = 1e-3;
-/// Share of the energy of rotation by which the result of a sub-step may exceed the expectation for a thin
+/// Fraction of the energy of rotation by which the result of a sub-step may exceed the expectation for a thin
 /// body.
 constexpr Real kSpinExcess = 1e-3;
 /// Cosine of the greatest angle by which a body is turned to agree with its angular momentum.
@@ -29,7 +29,7 @@ Vec3 core_point(const Body& body, const Vec3& place) {
 }
 
 struct PointRates {
-  /// Of a material point at the start; the acceleration is that without forces, w x (w x r).
+  /// Motion of a material point at the start; the acceleration is that without forces, w x (w x r).
   Vec3 velocity, acceleration;
 };
 
@@ -73,12 +73,12 @@ Quat rotation(const Vec3& v) {
 }
 
 /// Turns a body to the orientation in which its angular momentum has the direction that belongs to the
-/// expected angular velocity, if it has more energy by a share of the expected or of the free energy (twice
-/// the energy). If that is farther than `farthest`, the body gets the expected angular velocity [rad].
-void agree_with_spin(RigidBody& r, const Vec3& expected, Real free_energy, Real share, Real farthest) {
+/// expected angular velocity, if it has more energy by a fraction of the expected or of the free energy
+/// (twice the energy). If that is farther than `farthest`, the body gets the expected angular velocity [rad].
+void agree_with_spin(RigidBody& r, const Vec3& expected, Real free_energy, Real fraction, Real farthest) {
   const Vec3 wanted = r.spin_momentum(r.orientation, expected);
   const Real energy = expected.dot(wanted), excess = r.angular_velocity().dot(r.angular_momentum) - energy;
-  if (!(excess > share * std::max(free_energy, energy))) return;
+  if (!(excess > fraction * std::max(free_energy, energy))) return;
   const Real aligned = std::max(kAligned, 1 - farthest * farthest / 2);
   if (wanted.dot(r.angular_momentum) > aligned * wanted.norm() * r.angular_momentum.norm())
     r.orientation = (rotation_between(wanted, r.angular_momentum) * r.orientation).normalized();
@@ -172,7 +172,7 @@ void add_effect(Body& body, const IntervalEffect& effect) {
   // to second order by the whole turn in the interval.
   if (r.is_thin()) {
     const Real turned = rotation_vector(body.start.orientation, r.orientation).squaredNorm();
-    agree_with_spin(r, expected, free_energy, effect.share * kSpinExcess, effect.turn.norm() + turned);
+    agree_with_spin(r, expected, free_energy, effect.fraction * kSpinExcess, effect.turn.norm() + turned);
   }
   body.pose = r.pose();
 }

@@ -41,7 +41,7 @@ struct IntervalEffect {
   Vec3 impulse, angular_impulse;  ///< [N s], [N m s]
   Vec3 spin;                      ///< expected change of the angular velocity [rad/s]
   Vec3 shift, turn;               ///< displacement [m] and small rotation vector [rad]
-  Real share;                     ///< fraction of the sub-step that the interval is
+  Real fraction;                  ///< fraction of the sub-step that the interval is
 };
 
 /// Adds the effect of an interval to a body in its state at the end of the free motion.

@@ -7,7 +7,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Share of the kinetic energy that the velocity terms may add in a step.
+/// Fraction of the kinetic energy that the velocity terms may add in a step.
 constexpr Real kAdded = 0.02;
 
 }  // namespace
@@ -40,7 +40,7 @@ Real kinetic_energy(const Island& island) {
   return sum;
 }
 
-Real kept_share(const Island& island, std::span<const RelaxedBody> relaxed) {
+Real kept_fraction(const Island& island, std::span<const RelaxedBody> relaxed) {
   // Energy with s times the impulses: kinetic + first s + second s^2.
   Real kinetic = 0, first = 0, second = 0;
   for (std::size_t i = 0; i < island.bodies.size(); ++i) {

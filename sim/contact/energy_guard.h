@@ -19,6 +19,6 @@ Real kinetic_energy(const Island& island);
 /// joints dissipate energy, except for the error of their velocity terms over a step, which is unbounded for
 /// a thin body that turns far in a step. Scaling all impulses by one factor conserves the momenta. The factor
 /// is 1 for an island driven by a kinematic body, a conveyor or a motor.
-Real kept_share(const Island& island, std::span<const RelaxedBody> relaxed);
+Real kept_fraction(const Island& island, std::span<const RelaxedBody> relaxed);
 
 }  // namespace offstage::sim

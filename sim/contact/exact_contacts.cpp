@@ -5,10 +5,10 @@
 #include <optional>
 #include <tuple>
 
+#include "sim/contact/bounded_collision.h"
 #include "sim/contact/contact_lcp.h"
 #include "sim/contact/contact_motion.h"
 #include "sim/contact/contact_terms.h"
-#include "sim/contact/rough_collision.h"
 
 namespace offstage::sim {
 namespace {

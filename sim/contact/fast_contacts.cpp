@@ -112,13 +112,13 @@ void store_forces(const ContactPatch& patch, const ContactInterval& interval, Pl
   for (uint32_t k = 0; k < patch.count; ++k) sum += patch.points[k].force;
   for (uint32_t k = 0; k < patch.count; ++k) {
     const ContactPatch::Point& p = patch.points[k];
-    const Real share = sum > 0 ? p.force / sum : 1.0 / patch.count;
+    const Real fraction = sum > 0 ? p.force / sum : 1.0 / patch.count;
     PointForce& f = m.forces[k];
-    f.now = Vec3(p.impulse, share * patch.friction_impulse.x(), share * patch.friction_impulse.y()) /
+    f.now = Vec3(p.impulse, fraction * patch.friction_impulse.x(), fraction * patch.friction_impulse.y()) /
             interval.duration;
     if (!interval.is_whole) continue;
-    f.last = {p.force, share * patch.force_t, share * patch.force_k};
-    f.mean = {p.mean_force, share * patch.mean_friction.x(), share * patch.mean_friction.y()};
+    f.last = {p.force, fraction * patch.force_t, fraction * patch.force_k};
+    f.mean = {p.mean_force, fraction * patch.mean_friction.x(), fraction * patch.mean_friction.y()};
   }
   if (!interval.is_whole) return;
   m.torque = patch.torque_n;
@@ -199,10 +199,10 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
   for (const Island* island : islands) {
     const std::span<RelaxedBody> own = std::span(bodies_).subspan(first, island->bodies.size());
     first += own.size();
-    const Real share = kept_share(*island, own);
-    if (share == 1) continue;
+    const Real fraction = kept_fraction(*island, own);
+    if (fraction == 1) continue;
     ++work.restitution_reduced;
-    for (RelaxedBody& b : own) b.scale(share);
+    for (RelaxedBody& b : own) b.scale(fraction);
   }
   for_each_interval(std::span(members_).first(moved_), [&](std::size_t i) {
     const RelaxedBody& b = bodies_[i];

@@ -53,8 +53,8 @@ ConeProjection project_on_cone(const Contact& c, const Vec3& q) {
   const Real mu = c.friction_t, length = std::sqrt(q.y() * q.y() + q.z() * q.z());
   if (q.x() >= 0 && length <= mu * q.x()) return {q, ConeRegion::inside};
   if (mu * length <= -q.x()) return {Vec3::Zero(), ConeRegion::apex};
-  const Real normal = (q.x() + mu * length) / (1 + mu * mu), share = mu * normal / length;
-  return {{normal, share * q.y(), share * q.z()}, ConeRegion::surface};
+  const Real normal = (q.x() + mu * length) / (1 + mu * mu), fraction = mu * normal / length;
+  return {{normal, fraction * q.y(), fraction * q.z()}, ConeRegion::surface};
 }
 
 Mat3 cone_derivative(const Contact& c, const Vec3& q, const ConeProjection& projection) {

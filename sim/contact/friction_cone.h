@@ -36,8 +36,9 @@ struct ConeProjection {
   ConeRegion region;
 };
 
-/// Projects a point on the cone of a contact. The apex itself counts as inside, so that all contacts of a
-/// stack at rest close at once and not from the bottom up.
+/// Projects an impulse q = (n, t, k) [N s] on Coulomb's friction cone of a contact. The apex itself counts as
+/// inside, so that all contacts of a stack at rest close together, and not one after the other from the
+/// bottom up.
 ConeProjection project_on_cone(const Contact& c, const Vec3& q);
 
 /// Derivative of the projection at a point q. It is symmetric, with eigenvalues between 0 and 1.

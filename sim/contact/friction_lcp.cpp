@@ -19,14 +19,15 @@ using Eigen::VectorXd;
 
 using Mat36 = Eigen::Matrix<Real, 3, 6>;
 
-// Bounds of residuals and speeds, as shares of the greatest velocity.
+// Bounds of residuals and speeds, as fractions of the greatest velocity.
 constexpr Real kAccurate = 1e-12;   ///< residual of a solution that is exact to rounding
 constexpr Real kAccepted = 1e-10;   ///< greatest residual at which pivoting ends; else other methods continue
 constexpr Real kGoodEnough = 1e-5;  ///< greatest residual of the other methods; else the fall-back solves
 constexpr Real kSliding = 1e-9;     ///< slowest tangential speed that counts as sliding
-constexpr Real kRank = 1e-11;  ///< share of the greatest pivot: redundant contacts make the matrix singular
-/// Share of the diagonal that is added to it for pivoting, so that redundant contacts share their load in a
-/// unique way.
+constexpr Real kRank =
+    1e-11;  ///< fraction of the greatest pivot: redundant contacts make the matrix singular
+/// Fraction of the diagonal that is added to it for pivoting, so that redundant contacts share their load in
+/// a unique way.
 constexpr Real kSoftness = 1e-7;
 constexpr std::size_t kRounds = 4;  ///< number of rounds of pivoting, with other tangents and another order
 constexpr int kNewtonSteps = 25, kStepsInVain = 10, kStepHalvings = 6, kFallbacks = 4;
@@ -272,7 +273,7 @@ void FrictionSolver::set_impulses(const VectorXd& p) {
 
 void FrictionSolver::solve_by_rounds(ContactWork& work) {
   p_.setZero(problem_.b.size());
-  // Direction of sliding without contact forces; for most contacts it is right at once.
+  // Direction of sliding without contact forces; for most contacts this guess is correct.
   for (std::size_t i = 0; i < problem_.count(); ++i)
     if (is_round(i)) turn(i, problem_.b.segment<2>(static_cast<Index>(3 * i + 1)));
   Real least = evaluate(p_, false);

@@ -14,8 +14,8 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr Real kSatisfied = 1e-11;  ///< share of the greatest |b|
-constexpr Real kNoise = 1e-12;      ///< share of the greatest rate: smaller rates count as zero
+constexpr Real kSatisfied = 1e-11;  ///< fraction of the greatest |b|
+constexpr Real kNoise = 1e-12;      ///< fraction of the greatest rate: smaller rates count as zero
 constexpr Real kDependent = UpdatedCholesky::kDependent;
 constexpr int kAttempts = 4;
 constexpr uint8_t kMoves = 4;  ///< changes of one row in steps of no length after which it counts as a cycle
@@ -51,7 +51,7 @@ class Pivoting {
   bool is_held(Index row) const {
     return !contacts_.held.empty() && contacts_.held[static_cast<std::size_t>(row / 3)] != 0;
   }
-  Real share(Index tangent) const;
+  Real fraction(Index tangent) const;
   Real entry(Index row, Index column) const;
 
   Outcome bring_in(Index m);
@@ -105,7 +105,7 @@ Pivoting::Pivoting(const DenseContacts& contacts, VectorXd& F)
 
 /// F_t / F_n if the normal force determines it. The normal's column then contains this multiple of the
 /// tangent's column.
-Real Pivoting::share(Index tangent) const {
+Real Pivoting::fraction(Index tangent) const {
   switch (state(tangent)) {
     case State::high:
       return friction(tangent);
@@ -120,7 +120,7 @@ Real Pivoting::share(Index tangent) const {
 
 Real Pivoting::entry(Index row, Index j) const {
   if (j % 3 != 0) return A_(row, j);
-  return A_(row, j) + share(j + 1) * A_(row, j + 1) + share(j + 2) * A_(row, j + 2);
+  return A_(row, j) + fraction(j + 1) * A_(row, j + 1) + fraction(j + 2) * A_(row, j + 2);
 }
 
 bool Pivoting::find_direction(Index m, Real sign) {
@@ -132,7 +132,7 @@ bool Pivoting::find_direction(Index m, Real sign) {
   for (std::size_t k = 0; k < columns_.size(); ++k) dF_[columns_[k]] = x_[static_cast<Index>(k)];
   for (Index n = 0; n < dF_.size(); n += 3)
     for (const Index t : {n + 1, n + 2})
-      if (share(t) != 0) dF_[t] = share(t) * dF_[n];
+      if (fraction(t) != 0) dF_[t] = fraction(t) * dF_[n];
   da_.noalias() = A_ * dF_;
   noise_ = kNoise * dF_.cwiseAbs().maxCoeff();
   return true;
@@ -209,7 +209,7 @@ void Pivoting::leave(Index row) {
   columns_.erase(c);
 }
 
-/// Updates the column of a normal after a change of its tangents' shares.
+/// Updates the column of a normal after a change of its tangents' fractions.
 void Pivoting::update_normal(Index normal) {
   const auto c = std::find(columns_.begin(), columns_.end(), normal);
   if (c == columns_.end()) return;
@@ -228,7 +228,7 @@ void Pivoting::move_tangent(Index t, State to) {
   if (to == State::free)
     enter(t);
   else
-    F_[t] = share(t) * F_[n];
+    F_[t] = fraction(t) * F_[n];
 }
 
 void Pivoting::open(Index n) {
@@ -272,7 +272,7 @@ bool Pivoting::is_settled(Index m) {
   return state(m) != State::fixed;
 }
 
-/// Whether the row that has just changed would change back at once. Sliding friction can make principal
+/// Whether the row that has just changed would immediately change back. Sliding friction can make principal
 /// minors negative. The path of solutions, with F_m as its parameter, then reverses its direction, and so
 /// does F_m.
 bool Pivoting::turns_back(const Block& last, State before) const {

@@ -5,9 +5,9 @@
 #include <tuple>
 #include <vector>
 
+#include "sim/contact/bounded_collision.h"
 #include "sim/contact/contact_terms.h"
 #include "sim/contact/island_joints.h"
-#include "sim/contact/rough_collision.h"
 
 namespace offstage::sim {
 namespace {
@@ -93,7 +93,7 @@ ContactWork collide_reached(CollisionCluster& cluster, Real speed, ImpactLaw law
       restitution.push_back(cluster.restitution[i]);
     }
     cluster.bodies = before;
-    const ContactWork one = collide_roughly(cluster.bodies, contacts, restitution, law, joints);
+    const ContactWork one = collide_bounded(cluster.bodies, contacts, restitution, law, joints);
     work.add(one);
     work.solves = 1;
     work.fallbacks = one.fallbacks;
@@ -133,7 +133,7 @@ CollisionOutcome resolve_collisions(const Island& island, const CollisionSetting
     outcome.work = collide(cluster.bodies, cluster.contacts, cluster.restitution, settings.law, problem);
   else if (cluster.contacts.size() <= kSmallCluster)
     outcome.work =
-        collide_roughly(cluster.bodies, cluster.contacts, cluster.restitution, settings.law, problem);
+        collide_bounded(cluster.bodies, cluster.contacts, cluster.restitution, settings.law, problem);
   else
     outcome.work = collide_reached(cluster, settings.collision_speed, settings.law, problem);
   // Without joints, only small clusters are factorized with bounded effort.

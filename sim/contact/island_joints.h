@@ -30,7 +30,7 @@ class IslandJoints {
   void store_impulses(Real duration);
 
   std::span<Articulation* const> articulations() const { return articulations_; }
-  /// The share of the interval after which the impulses of an articulation act.
+  /// The fraction of the interval after which the impulses of an articulation act.
   Real acting_from(std::size_t articulation) const { return stops_[articulation].value_or(kMiddle); }
   /// Removes the parts of the velocities at the interval's end that violate the constraints of the time when
   /// a limit is reached: the joint forces that would have turned the velocities afterwards end with the
@@ -55,7 +55,7 @@ class IslandJoints {
   std::vector<BoundedOrigin> origins_;
   std::vector<uint32_t> bounded_ends_;
   std::vector<std::optional<Real>>
-      stops_;  // by articulation: share of the interval before a limit is reached
+      stops_;  // by articulation: fraction of the interval before a limit is reached
   std::vector<Vec6> impulses_;
 };
 

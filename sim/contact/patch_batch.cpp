@@ -29,11 +29,11 @@ float settled(const PatchBatch& p) {
   return p.alone ? kAlone : kSettled;
 }
 
-/// Shares of the difference between an impulse and its mean: what a sub-step subtracts from the impulse, and
-/// what it adds to the mean. Slow modes with frequencies near the latter are damped most. The mean of a patch
-/// without an initial guess is its impulse.
+/// Fractions of the difference between an impulse and its mean: what a sub-step subtracts from the impulse,
+/// and what it adds to the mean. Slow modes with frequencies near the latter are damped most. The mean of a
+/// patch without an initial guess is its impulse.
 constexpr float kReturn = 0.03F, kRenewal = 0.01F;
-/// Up to this share of its limit, squared, friction sticks; from the second share on it slides.
+/// Up to this fraction of its limit, squared, friction sticks; from the second fraction on it slides.
 constexpr float kHolds = 0.96F, kSlides = 0.999F;
 /// Greatest factor by which sliding friction follows a later increase of the normal impulses. A larger one
 /// could reverse the sliding.
@@ -374,9 +374,9 @@ Vector solve_normal(PatchBatch& p, Groups& u, const Gaps& gaps) {
   return change;
 }
 
-/// Moves the impulses a fixed share towards their running means, and updates the means. The change
-/// of an impulse is limited to the same share of the impulse, or of Coulomb's limit for friction. Without the
-/// limit, the mean impulse of an impact would lift the body that the impact has stopped. The friction of
+/// Moves the impulses a fixed fraction towards their running means, and updates the means. The change
+/// of an impulse is limited to the same fraction of the impulse, or of Coulomb's limit for friction. Without
+/// the limit, the mean impulse of an impact would lift the body that the impact has stopped. The friction of
 /// sliding points is set to the limit given by the present normal impulses, so the sums over the sub-steps
 /// obey Coulomb's law however the load shifts between points. Returns the change.
 Groups return_to_mean(PatchBatch& p) {
@@ -451,7 +451,7 @@ Groups turning_velocity(const PatchBatch& p, const SubstepTime& time) {
   return {s * p.gain.normal + Vector{s2 * p.bow.x, FloatLanes{}, FloatLanes{}},
           s * p.gain.friction + Vector{s2 * p.bow.y, s2 * p.bow.z, FloatLanes{}}};
 }
-Vector turning_way(const PatchBatch& p, const SubstepTime& time) {
+Vector turning_displacement(const PatchBatch& p, const SubstepTime& time) {
   return _mm256_set1_ps(time.s_sum) * p.gain.normal +
          Vector{_mm256_set1_ps(time.s2_sum) * p.bow.x, FloatLanes{}, FloatLanes{}};
 }
@@ -468,7 +468,7 @@ Groups relative_now(const PatchBatch& p, const LaneTwist& a, const LaneTwist& b,
 
 /// Whether friction changes the normal velocity noticeably in any lane. Between balls it does not.
 bool is_coupled(const PatchBatch& p) {
-  constexpr float kNoticeable = 1e-4F;  // squared share
+  constexpr float kNoticeable = 1e-4F;  // squared fraction
   const FloatLanes &x = p.coupling.x.x, &y = p.coupling.y.x, &K = p.normal_mobility.xx;
   return _mm256_movemask_ps(FloatLanes(x * x + y * y > kNoticeable * K * K)) != 0;
 }
@@ -506,7 +506,7 @@ Vector moved_normal(const PatchBatch& p, std::span<const BodyMotion> motions, co
   const Vector& v = p.approach.normal;
   const Vector moved =
       relative(p, a, b).normal + float_lanes(time.elapsed) * Vector{v.x - p.conveyed, v.y, v.z};
-  return p.turns ? moved + turning_way(p, time) : moved;
+  return p.turns ? moved + turning_displacement(p, time) : moved;
 }
 
 void sweep_single(PatchBatch& p, std::span<BodyMotion> motions, const SubstepTime& time) {
@@ -514,7 +514,7 @@ void sweep_single(PatchBatch& p, std::span<BodyMotion> motions, const SubstepTim
                   moved_b = gather<&BodyMotion::shift>(motions, p.b);
   FloatLanes separation = p.points[0].start + dot(p.n, relative_velocity(p, moved_a, moved_b)) +
                           float_lanes(time.elapsed) * (p.approach.normal.x - p.conveyed);
-  if (p.turns) separation += turning_way(p, time).x;
+  if (p.turns) separation += turning_displacement(p, time).x;
   const FloatLanes gap = float_lanes(1 / time.substep) * lane_max(separation, FloatLanes{});
   LaneTwist a = gather<&BodyMotion::velocity>(motions, p.a), b = gather<&BodyMotion::velocity>(motions, p.b);
   Single u = in_frame(p, relative_velocity(p, a, b)) +
@@ -645,13 +645,13 @@ FloatLanes push_out(PatchBatch& p, std::span<BodyMotion> motions, const PushOut&
   FloatLanes farthest{};
   for (uint32_t i = 0; i < p.count; ++i) {
     PatchBatch::Point& q = p.points[i];
-    const FloatLanes way = float_lanes(-push.share) * (q.start + point_part(q, moved));
+    const FloatLanes move = float_lanes(-push.fraction) * (q.start + point_part(q, moved));
     const FloatLanes next =
-        lane_min(lane_max(q.push + q.mass * way, FloatLanes{}), q.mass * float_lanes(push.limit));
+        lane_min(lane_max(q.push + q.mass * move, FloatLanes{}), q.mass * float_lanes(push.limit));
     const FloatLanes d = next - q.push;
     q.push = next;
     q.shift += d;
-    farthest = d != FloatLanes{} ? lane_max(farthest, lane_abs(way)) : farthest;
+    farthest = d != FloatLanes{} ? lane_max(farthest, lane_abs(move)) : farthest;
     const Vector f = point_wrench(q, d);
     change = change + f;
     moved = moved + p.normal_mobility * f;

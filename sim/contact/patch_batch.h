@@ -79,7 +79,7 @@ struct PatchBatch {
   /// Sum of the normal impulses with which the friction was computed, if the patch slides; else 0 [N s].
   Lanes pressure;
   Lanes holds;     ///< all ones where friction was well within its limit in the last sweep, else 0
-  Lanes renewal;   ///< share of the difference by which means follow their impulses
+  Lanes renewal;   ///< fraction of the difference by which means follow their impulses
   Lanes residual;  ///< change of the velocity of the centre in the last sweep [m/s]
   bool turns;      ///< whether `gain` is used
   std::array<Point, 4> points;
@@ -118,8 +118,8 @@ void end_substeps(PatchBatch& batch, Real substep);
 
 /// Parameters of the removal of penetration.
 struct PushOut {
-  SubstepTime time;  ///< that of the sub-step after the last one
-  Real share;        ///< share of the depth that one sweep removes
+  SubstepTime time;  ///< time of the sub-step after the last one
+  Real fraction;     ///< fraction of the depth that one sweep removes
   Real limit;        ///< greatest displacement by push-out in a step [m]
 };
 /// Separates overlapping bodies by moving them without changing their velocities. Where previous push-out

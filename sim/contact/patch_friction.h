@@ -161,7 +161,7 @@ inline PatchVector rolling_impulse(const PatchBatch& p, const PatchVector& u) {
       k{p.coupling.x.z, p.coupling.y.z, p.coupling.z.z};
   const PatchVector St = p.friction_stiffness * t, Sk = p.friction_stiffness * k;
   const FloatLanes sticks = p.pressure > zero ? zero : float_lanes(1);
-  // The friction's share of the mobility is at most nearly all of it.
+  // The friction's fraction of the mobility is at most nearly all of it.
   const FloatLanes yy = K.yy - sticks * dot(t, St), yz = K.yz - sticks * dot(t, Sk),
                    zz = K.zz - sticks * dot(k, Sk);
   const FloatLanes scale = lane_inverse(yy * zz - yz * yz);
@@ -170,10 +170,11 @@ inline PatchVector rolling_impulse(const PatchBatch& p, const PatchVector& u) {
   const FloatLanes step = lane_inverse(lane_max(K.yy, K.zz) + lane_abs(K.yz));
   const FloatLanes y = p.rolling_impulse.y - step * u.y, z = p.rolling_impulse.z - step * u.z;
   const FloatLanes limit = p.rolling * pressure(p), size = lane_sqrt(y * y + z * z);
-  const FloatLanes share = size > limit ? limit / size : float_lanes(1);
+  const FloatLanes fraction = size > limit ? limit / size : float_lanes(1);
   const auto stops = stop_y * stop_y + stop_z * stop_z <= limit * limit;
   const auto resists = p.rolling > zero;
-  return {zero, resists ? (stops ? stop_y : share * y) : zero, resists ? (stops ? stop_z : share * z) : zero};
+  return {zero, resists ? (stops ? stop_y : fraction * y) : zero,
+          resists ? (stops ? stop_z : fraction * z) : zero};
 }
 
 }  // namespace offstage::sim

@@ -33,17 +33,17 @@ constexpr Real kStiffen = 10, kFarOff = 1e-3;
 /// size, because redundant contacts then share their load in a way that the next steps can keep (a wall of
 /// 1000 takes 62 factorizations in 4 s instead of 3100).
 constexpr Real kSoft = 1e-2, kWrong = 1;
-constexpr Real kTolerance = 3e-8, kSmallest = 1e-11;  // share of the velocities, and lower bound [m/s]
+constexpr Real kTolerance = 3e-8, kSmallest = 1e-11;  // fraction of the velocities, and lower bound [m/s]
 constexpr Real kCoarse = 1e-5;
 constexpr uint32_t kPatience = 4;
-/// An iteration that leaves more than this share of the error is slow.
+/// An iteration that leaves more than this fraction of the error is slow.
 constexpr Real kSlow = 0.2;
 constexpr uint32_t kMaxOuter = 120, kMaxNewton = 40, kMaxHalvings = 25, kMaxSweeps = 200;
-/// An earlier matrix is reused while each step leaves less than this share of the gradient.
+/// An earlier matrix is reused while each step leaves less than this fraction of the gradient.
 constexpr Real kStale = 0.2;
 constexpr Real kMeritRounding = 1e-11;
 constexpr std::size_t kMixed = 5;
-/// Share of the mobility of a joint's constraints; makes dependent constraints solvable.
+/// Fraction of the mobility of a joint's constraints; makes dependent constraints solvable.
 constexpr Real kRegularization = 1e-11;
 constexpr uint32_t kMaxFactorizations = 300;
 /// Cost of operations [ns]: per contact, and per block of the factor.
@@ -638,9 +638,9 @@ void ProximalNewton::mix_lifts(bool slow) {
     of_lift.col(k) = lift - before.lift;
     of_rise.col(k) = rise - before.rise;
   }
-  const Eigen::VectorXd share = least_squares(of_rise, rise);
-  if (!share.allFinite()) return;
-  const Eigen::VectorXd mixed = lift - of_lift * share;
+  const Eigen::VectorXd fraction = least_squares(of_rise, rise);
+  if (!fraction.allFinite()) return;
+  const Eigen::VectorXd mixed = lift - of_lift * fraction;
   for (Eigen::Index i = 0; i < n; ++i) points_[static_cast<std::size_t>(i)].lift = std::max(mixed[i], 0.0);
 }
 

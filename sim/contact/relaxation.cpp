@@ -11,11 +11,11 @@
 namespace offstage::sim {
 namespace {
 
-/// Share of the penetration that a step removes, and the greatest speed of the removal [m/s]. Moving one
-/// patch opens the gaps of others, whose forces are then missing until they close. With shares of 0.65 and
+/// Fraction of the penetration that a step removes, and the greatest speed of the removal [m/s]. Moving one
+/// patch opens the gaps of others, whose forces are then missing until they close. With fractions of 0.65 and
 /// 0.8 a wall of 1000 bricks trembled (0.2 and 2 J after 4 s instead of 0.001), with 1 it fell. With 0.3 the
 /// greatest overlap in heaps was the same.
-constexpr Real kPushShare = 0.5, kMaxPush = 3;
+constexpr Real kPushFraction = 0.5, kMaxPush = 3;
 
 /// With fewer batches a second thread does not pay.
 constexpr std::size_t kSerialBatches = 48;
@@ -273,7 +273,7 @@ void RelaxationSolver::solve(uint32_t i, const Range& range) {
 
 void RelaxationSolver::push(uint32_t i, const Range& range, Real threshold) {
   PatchBatch& p = batches_[i];
-  const PushOut how{times_.back(), kPushShare, kMaxPush * def_.duration};
+  const PushOut how{times_.back(), kPushFraction, kMaxPush * def_.duration};
   strike(p, range.sweep, push_out(p, motions_, how), threshold);
 }
 

@@ -7,7 +7,7 @@
 ///
 /// One sweep leaves an error, which acts on the next sub-step as a change of velocity. The forces of a tall
 /// stack therefore behave like the springs of a spurious oscillator: a mode whose error a sweep reduces by
-/// the share e oscillates at sqrt(e) per sub-step and is damped only by e / 2. After its solution a patch
+/// the fraction e oscillates at sqrt(e) per sub-step and is damped only by e / 2. After its solution a patch
 /// therefore moves its forces slightly towards their mean over the last tenth of a second, which adds
 /// damping. Forces at rest equal their mean, and errors that one sweep can remove are removed again, so
 /// neither is changed by this.
@@ -50,11 +50,11 @@ struct RelaxedBody {
   Vec3 displacement = Vec3::Zero(), rotation_vector = Vec3::Zero();
 
   /// Scales the effect of contacts and joints.
-  void scale(Real share) {
-    impulse *= share;
-    angular_impulse *= share;
-    displacement *= share;
-    rotation_vector *= share;
+  void scale(Real fraction) {
+    impulse *= fraction;
+    angular_impulse *= fraction;
+    displacement *= fraction;
+    rotation_vector *= fraction;
   }
 };
 

@@ -15,9 +15,9 @@ namespace {
 constexpr std::size_t kMostResponses = 20000;
 /// Rows without bounds above which sweeps solve them: the cost of a factor is the cube of their number.
 constexpr std::size_t kMostCoupled = 400;
-/// Sweeps over rows converge fast if the effect of the other rows on each is below this share of its own.
+/// Sweeps over rows converge fast if the effect of the other rows on each is below this fraction of its own.
 constexpr Real kWeakCoupling = 0.5;
-/// A row that acts from the interval's end on acts in its last sub-step; share of the interval.
+/// A row that acts from the interval's end on acts in its last sub-step; fraction of the interval.
 constexpr Real kInstant = 1e-9;
 /// The contacts of an articulation depend on each other. Passes over them end when none changes a velocity by
 /// more than kSettled [m/s].
@@ -94,13 +94,13 @@ void RelaxedJoints::begin(std::span<const RelaxedBody> bodies, Real duration, ui
   bodies_ = bodies;
   duration_ = duration;
   substep_ = duration / substeps;
-  const Real share = 1.0 / substeps;
+  const Real fraction = 1.0 / substeps;
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     const BoundedRow& r = problem_.bounded[i];
-    rows_[i].impulse = share * r.impulse;
-    rows_[i].lower = share * r.lower;
-    rows_[i].upper = share * r.upper;
-    rows_[i].softness = r.softness / share;
+    rows_[i].impulse = fraction * r.impulse;
+    rows_[i].lower = fraction * r.lower;
+    rows_[i].upper = fraction * r.upper;
+    rows_[i].softness = r.softness / fraction;
   }
   for (Part& part : parts_) prepare(part, bodies);
 }

@@ -18,9 +18,9 @@ constexpr Real kFastJoint = 200;
 /// this is a debt, of at most kCredit steps of the fast solver. The exact solver is expensive for a new
 /// island, and cheap afterwards.
 constexpr Real kWorth = 2.5, kCredit = 120;
-/// After exceeding the credit, it pauses until the debt is this share of the fast solver's cost.
-constexpr Real kShare = 0.25, kLongestWait = 2400;
-/// With less than this share of the credit left, only islands whose last attempt was cheap are tried.
+/// After exceeding the credit, it pauses until the debt is this fraction of the fast solver's cost.
+constexpr Real kFraction = 0.25, kLongestWait = 2400;
+/// With less than this fraction of the credit left, only islands whose last attempt was cheap are tried.
 constexpr Real kLittle = 0.05;
 /// Greatest cost of an attempt: in a small world [ns], and as a multiple of the fast solver's cost if bodies
 /// move. If no body is faster than kQuiet [m/s], an attempt may use the whole credit, because the island will
@@ -48,31 +48,32 @@ void ExactSolverBudget::begin(std::span<Island* const> islands, Real duration) {
   Real fast = 0;
   for (const Island* island : islands) fast += fast_cost(*island, duration);
   small_ = fast < kSmall;
-  debt_ = std::max(0.0, debt_ - kShare * fast);
+  debt_ = std::max(0.0, debt_ - kFraction * fast);
   left_ = std::max(0.0, 1 - debt_ / (kCredit * std::max(fast, kSmall)));
 }
 
-bool SolverChoice::is_exact_worth(const Island& island, const ExactSolverBudget& patience) {
-  if (patience.is_small() && island.bodies.size() <= kFewBodies) return true;
-  if (wait_ == 0) return proven_ || patience.left() > kLittle;
+bool SolverChoice::should_try_exact(const Island& island, const ExactSolverBudget& shared) {
+  if (shared.is_small() && island.bodies.size() <= kFewBodies) return true;
+  if (wait_ == 0) return proven_ || shared.left() > kLittle;
   --wait_;
   return false;
 }
 
-Real SolverChoice::budget(const Island& island, Real duration, const ExactSolverBudget& patience) const {
-  if (patience.is_small() && island.bodies.size() <= kFewBodies) return kMostOfFew;
-  const Real fast = fast_cost(island, duration), credit = kCredit * fast * (proven_ ? 1 : patience.left());
+Real SolverChoice::budget(const Island& island, Real duration, const ExactSolverBudget& shared) const {
+  if (shared.is_small() && island.bodies.size() <= kFewBodies) return kMostOfFew;
+  const Real fast = fast_cost(island, duration), credit = kCredit * fast * (proven_ ? 1 : shared.left());
   return is_quiet(island) ? credit : std::min(credit, kMostOfMoving * std::max(fast, kSmall));
 }
 
-void SolverChoice::learn(const Island& island, Real duration, bool solved, ExactSolverBudget& patience) {
-  if (patience.is_small() && island.bodies.size() <= kFewBodies) return;
+void SolverChoice::record_attempt(const Island& island, Real duration, bool solved,
+                                  ExactSolverBudget& shared) {
+  if (shared.is_small() && island.bodies.size() <= kFewBodies) return;
   const Real fast = fast_cost(island, duration), excess = exact->cost() - kWorth * fast;
   proven_ = solved && excess <= 0;
-  patience.spend(excess);
+  shared.spend(excess);
   debt_ = std::max(0.0, debt_ + excess);
   if (solved && debt_ <= kCredit * fast) return;
-  wait_ = static_cast<uint32_t>(std::clamp(debt_ / (kShare * fast), 1.0, kLongestWait));
+  wait_ = static_cast<uint32_t>(std::clamp(debt_ / (kFraction * fast), 1.0, kLongestWait));
   debt_ = 0;
 }
 

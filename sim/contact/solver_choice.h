@@ -9,8 +9,8 @@
 
 namespace offstage::sim {
 
-/// Up to so many bodies every solver is fast: in an island, the exact one is always used; in a world, each
-/// collision is resolved at its own time.
+/// Up to this number of bodies, every solver is fast: in an island, the exact one is always used; in a world,
+/// each collision is resolved at its own time.
 inline constexpr std::size_t kFewBodies = 6;
 
 /// Budget of the exact solver beyond the cost of the fast one, for all islands of a world. A collapsing heap
@@ -21,7 +21,7 @@ class ExactSolverBudget {
   void begin(std::span<Island* const> islands, Real duration);
   /// Records the excess cost of an attempt on an island [ns].
   void spend(Real cost) { debt_ += cost; }
-  /// Remaining share of the credit, from 0 to 1.
+  /// Remaining fraction of the credit, from 0 to 1.
   Real left() const { return left_; }
   /// Whether the world is so small that every solver is fast.
   bool is_small() const { return small_; }
@@ -37,12 +37,12 @@ class ExactSolverBudget {
 class SolverChoice {
  public:
   /// Returns whether to try the exact solver in this sub-step.
-  bool is_exact_worth(const Island& island, const ExactSolverBudget& patience);
-  /// Greatest allowed cost of the attempt [ns]. It keeps the cost of all attempts below a share of the fast
-  /// solver's cost.
-  Real budget(const Island& island, Real duration, const ExactSolverBudget& patience) const;
+  bool should_try_exact(const Island& island, const ExactSolverBudget& shared);
+  /// Greatest allowed cost of the attempt [ns]. It keeps the cost of all attempts below a fraction of the
+  /// fast solver's cost.
+  Real budget(const Island& island, Real duration, const ExactSolverBudget& shared) const;
   /// Records the result of the attempt.
-  void learn(const Island& island, Real duration, bool solved, ExactSolverBudget& patience);
+  void record_attempt(const Island& island, Real duration, bool solved, ExactSolverBudget& shared);
 
   std::unique_ptr<ExactContacts> exact;
 

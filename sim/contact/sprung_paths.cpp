@@ -12,7 +12,7 @@ namespace {
 /// Passes over the contacts, and the deviation at a contact at which they end [m].
 constexpr int kPasses = 30;
 constexpr Real kEnough = 1e-9;
-/// Friction below this share of its limit holds the bodies [1].
+/// Friction below this fraction of its limit holds the bodies [1].
 constexpr Real kHolds = 0.99;
 
 bool sticks(const PairSurface& surface, const Vec3& force) {

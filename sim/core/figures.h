@@ -1,5 +1,5 @@
 #pragma once
-/// Figures of reports. A struct lists its figures once, each with its name and the way in which it adds over
+/// Figures of reports. A struct lists its figures once, each with its name and the rule by which it adds over
 /// steps; adding and printing follow from the list:
 ///
 ///   struct Work {
@@ -22,7 +22,7 @@
 
 namespace offstage::sim {
 
-/// How a figure of several steps follows from those of the steps.
+/// The rule by which a figure of several steps follows from those of the steps.
 enum class OverSteps : uint8_t { sum, greatest, last };
 
 template <class Part, class Value>

@@ -104,9 +104,9 @@ void StepDoubling::attempt(const DynamicSystem& system, Real t, Real h, std::spa
 
 void StepDoubling::accept(IntegratorWorkspace& work) const {
   // To leading order, the error of the whole step is 2^order times that of the two halves.
-  const Real share = 1.0 / ((1 << inner_.order()) - 1);
-  array(work.next_x) += share * array(work.error_x);
-  array(work.next_p) += share * array(work.error_p);
+  const Real fraction = 1.0 / ((1 << inner_.order()) - 1);
+  array(work.next_x) += fraction * array(work.error_x);
+  array(work.next_p) += fraction * array(work.error_p);
 }
 
 namespace {

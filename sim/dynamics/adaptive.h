@@ -10,7 +10,7 @@ namespace offstage::sim {
 
 class AdaptiveIntegrator : public Integrator {
  public:
-  /// Shortest step, as a share of the given time. It bounds the number of steps.
+  /// Shortest step, as a fraction of the given time. It bounds the number of steps.
   static constexpr Real kShortest = 1.0 / 16384;
 
   void step(const DynamicSystem& system, Real t, Real h, std::span<Real> x, std::span<Real> p,

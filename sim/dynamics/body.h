@@ -1,5 +1,5 @@
 #pragma once
-/// A body of the world: its model, which is constant, its state, and what it stores for the current sub-step.
+/// A body of the world: its model, which is constant, its state, and its data of the current sub-step.
 
 #include <optional>
 #include <vector>
@@ -19,9 +19,9 @@ namespace offstage::sim {
 /// The motion of the contacts of a body is predicted if it turns by less than this in a sub-step [rad].
 inline constexpr Real kMostPredictedTurn = 1;
 
-/// What a body is: constant from World::add_body() on. `solid` has pointers into the body and to its mesh, so
-/// a body is never moved or copied. The members that contact pairs read are the last ones, next to the state
-/// in memory.
+/// The definition of a body, constant from World::add_body() on. `solid` has pointers into the body and to
+/// its mesh, so a body is never moved or copied. The members that contact pairs read are the last ones, next
+/// to the state in memory.
 struct BodyModel {
   BodyDef def;
   Solid solid;
@@ -41,7 +41,7 @@ struct BodyModel {
   Real extent = 0;       // reach() of the solid; infinite for a plane
 };
 
-/// What decides whether a body falls asleep, and what wakes it.
+/// Data by which a body falls asleep and wakes.
 struct SleepMemory {
   Real quiet_time = 0;  // how long the body has been almost at rest [s]
   // While it is asleep:

@@ -185,13 +185,13 @@ Vec3 velocity(const Vortex& vortex, const Vec3& point) {
 }
 
 bool ForceDef::acts_on(BodyHandle body) const {
-  return names_nothing() || std::find(bodies.begin(), bodies.end(), body) != bodies.end();
+  return is_unrestricted() || std::find(bodies.begin(), bodies.end(), body) != bodies.end();
 }
 bool ForceDef::acts_on(ParticleSystemHandle system) const {
   return std::find(systems.begin(), systems.end(), system) != systems.end();
 }
 bool ForceDef::acts_on(ClothHandle cloth) const {
-  return (names_nothing() && !is_pairwise()) ||
+  return (is_unrestricted() && !is_pairwise()) ||
          std::find(cloths.begin(), cloths.end(), cloth) != cloths.end();
 }
 bool ForceDef::is_pairwise() const {
@@ -245,13 +245,13 @@ Wrench impulse(const Explosion& explosion, const Solid& solid, const Pose& pose,
 }
 
 Vec3 impulse(const Explosion& explosion, const Vec3& point) {
-  const Vec3 way = point - explosion.point;
-  return explosion.impulse * strength_at_depth(1 - way.norm() / explosion.radius, explosion.drop_rate) *
-         direction(way);
+  const Vec3 offset = point - explosion.point;
+  return explosion.impulse * strength_at_depth(1 - offset.norm() / explosion.radius, explosion.drop_rate) *
+         direction(offset);
 }
 
 bool ActiveForce::acts_on(const RigidBody& body) const {
-  if (def->bodies.empty()) return def->names_nothing();
+  if (def->bodies.empty()) return def->is_unrestricted();
   return std::binary_search(only.begin(), only.end(), &body);
 }
 

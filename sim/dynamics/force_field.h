@@ -63,7 +63,7 @@ struct Vortex {
   Vec3 axis = Vec3::UnitY();  ///< direction of the axis, of any length but 0; the rotation is right-handed
   Real circulation = 1;  ///< Gamma, at a large distance [m^2/s]; at the radius the speed is Gamma / (4 pi R)
   Real radius = 0.1;     ///< R, the distance of the greatest speed [m], > 0
-  Real drag = 0;         ///< as WindField's [kg/s]
+  Real drag = 0;         ///< as WindField::drag [kg/s]
   Region region;
   uint32_t drop_rate = 0;
 };
@@ -122,7 +122,7 @@ struct ForceDef {
   bool acts_on(BodyHandle body) const;
   bool acts_on(ParticleSystemHandle system) const;
   bool acts_on(ClothHandle cloth) const;
-  bool names_nothing() const { return bodies.empty() && systems.empty() && cloths.empty(); }
+  bool is_unrestricted() const { return bodies.empty() && systems.empty() && cloths.empty(); }
   bool is_on(Real time) const { return time >= start && time < end; }
   bool is_explosion() const { return std::holds_alternative<Explosion>(effect); }
   /// Whether it is a force between particles.

@@ -97,9 +97,9 @@ enum class IntegratorKind {
 /// k.
 struct DampedKick {
   DampedKick(Real h, Real k) {
-    const Real z = h * k, share = h / (1 + z + z * z / 2);
-    end = share * (1 + z / 2);
-    mean = share * (1 + z) / 2;
+    const Real z = h * k, fraction = h / (1 + z + z * z / 2);
+    end = fraction * (1 + z / 2);
+    mean = fraction * (1 + z) / 2;
   }
   Real end, mean;
 };

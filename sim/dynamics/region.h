@@ -28,7 +28,7 @@ using Region = std::variant<Everywhere, SphereRegion, BoxRegion>;
 Real strength(const Region& region, uint32_t drop_rate, const Vec3& point);
 /// The strengths at several points (x y z of each); returns whether any strength is not 0.
 bool strengths(const Region& region, uint32_t drop_rate, std::span<const Real> points, std::span<Real> out);
-/// Strength at a share `depth` of the way from the edge of the region to its middle.
+/// Strength at a fraction `depth` of the distance from the edge of the region to its middle.
 Real strength_at_depth(Real depth, uint32_t drop_rate);
 
 }  // namespace offstage::sim

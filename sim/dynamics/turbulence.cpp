@@ -51,22 +51,22 @@ Floats product_sum(Floats a, Floats b, Floats c) {
 /// One axis at eight points: for the low and the high corner of their cells the distance from it, its weight,
 /// and half the derivative of the weight.
 struct Axis {
-  Floats way[2], weight[2], slope[2];
+  Floats offset[2], weight[2], slope[2];
   Words index[2];
 
   Axis(const Real* x, Real cells, Real origin) {
-    Lanes share[2], cell[2];
+    Lanes fraction[2], cell[2];
     for (int half = 0; half < 2; ++half, x += 12) {
       const Lanes u = Lanes{x[0], x[3], x[6], x[9]} * cells - origin;
       const Lanes low = _mm256_floor_pd(u), tile = _mm256_floor_pd(low * (1 / kTile));
-      share[half] = u - low;
+      fraction[half] = u - low;
       cell[half] = low - kTile * tile;
     }
-    const Floats t = narrowed(share[0], share[1]), edge = t * (t - 1);
+    const Floats t = narrowed(fraction[0], fraction[1]), edge = t * (t - 1);
     index[0] = whole(cell[0], cell[1]);
     index[1] = (index[0] + 1) & (static_cast<uint32_t>(kTile) - 1);
-    way[0] = t;
-    way[1] = t - 1;
+    offset[0] = t;
+    offset[1] = t - 1;
     weight[1] = t * t * t * (10 + t * (6 * t - 15));
     weight[0] = 1 - weight[1];
     slope[1] = 15 * edge * edge;
@@ -86,7 +86,8 @@ std::array<Floats, 3> corner_velocity(const EddyLattice& o, Words x, Words y, Wo
     h = (h ^ (h >> 15)) * 0x846ca68bu;
     h ^= h >> 16;
     for (Floats& v : a) {
-      v = product_sum(Floats{} + o.share[tick], __builtin_convertvector(Ints(h & (kLevels - 1)), Floats), v);
+      v = product_sum(Floats{} + o.fraction[tick], __builtin_convertvector(Ints(h & (kLevels - 1)), Floats),
+                      v);
       h >>= 10;
     }
   }
@@ -112,11 +113,11 @@ TurbulentFlow::TurbulentFlow(const Turbulence& f, Real time) : octave_count_(f.o
     o.origin = time * cells * f.drift;
     for (int i = 0; i < 3; ++i)
       o.origin[i] += mixed(stream + 1 + static_cast<uint32_t>(i)) * (kTile / 0x1p32);
-    // The squares of the shares have a constant sum, so the air does not calm down between two ticks.
+    // The squares of the fractions have a constant sum, so the air does not calm down between two ticks.
     const Real norm = speed / std::sqrt(late * late + early * early);
     o.key = {mixed(stream ^ mixed(tick)), mixed(stream ^ mixed(tick + 1))};
-    o.share = {static_cast<float>(norm * early), static_cast<float>(norm * late)};
-    o.bias = -(o.share[0] + o.share[1]) * (kLevels - 1) / 2;
+    o.fraction = {static_cast<float>(norm * early), static_cast<float>(norm * late)};
+    o.bias = -(o.fraction[0] + o.fraction[1]) * (kLevels - 1) / 2;
     speed *= kCascade;
     cells *= 2;
     rate /= kCascade * kCascade;
@@ -132,7 +133,7 @@ void TurbulentFlow::velocity8(const Real* points, Real* out) const {
 #pragma GCC unroll 8
     for (int corner = 0; corner < 8; ++corner) {
       const int i = corner & 1, j = (corner >> 1) & 1, l = corner >> 2;
-      const Floats dx = x.way[i], dy = y.way[j], dz = z.way[l];
+      const Floats dx = x.offset[i], dy = y.offset[j], dz = z.offset[l];
       const std::array<Floats, 3> a = corner_velocity(o, x.index[i], y.index[j], z.index[l]);
       const Floats xy = x.weight[i] * y.weight[j];
       const Floats grad_x = x.slope[i] * y.weight[j] * z.weight[l],

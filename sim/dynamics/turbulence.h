@@ -34,8 +34,8 @@ struct EddyLattice {
   Vec3 origin;  ///< [cells]
   /// Keys of the hashes that give the corners' velocities, at the ticks before and after this time.
   std::array<uint32_t, 2> key;
-  std::array<float, 2> share;  ///< shares of these ticks
-  float bias;                  ///< makes the mean of the hashes 0
+  std::array<float, 2> fraction;  ///< fractions of these ticks
+  float bias;                     ///< makes the mean of the hashes 0
 };
 
 /// The velocity of turbulent air at a time. It is periodic in space with 1024 eddies, and not periodic in

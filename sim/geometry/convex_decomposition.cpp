@@ -19,10 +19,10 @@
 namespace offstage::sim {
 namespace {
 
-/// Distances below this share of a mesh's diagonal count as zero. Files store coordinates in single
+/// Distances below this fraction of a mesh's diagonal count as zero. Files store coordinates in single
 /// precision, so faces that were modelled flat are flat within 1e-7.
 constexpr Real kSamePlace = 2e-7;
-/// Accepted difference between the volume of the exact parts and that of the solid, as a share.
+/// Accepted difference between the volume of the exact parts and that of the solid, as a fraction.
 constexpr Real kExact = 1e-6;
 
 /// Bound of CutLimits::max_work if an approximation will do.
@@ -194,8 +194,8 @@ void estimate_errors(const std::vector<SolidPiece>& solids, ConvexDecomposition&
     Count& count = layers[static_cast<std::size_t>(z)];
     for (int y = 0; y < counts.y(); ++y)
       for (int x = 0; x < counts.x(); ++x) {
-        const Vec3 share((x + 0.5) / counts.x(), (y + 0.5) / counts.y(), (z + 0.5) / counts.z());
-        const Vec3 p = box.min() + box.sizes().cwiseProduct(share);
+        const Vec3 fraction((x + 0.5) / counts.x(), (y + 0.5) / counts.y(), (z + 0.5) / counts.z());
+        const Vec3 p = box.min() + box.sizes().cwiseProduct(fraction);
         const bool in_solid = std::any_of(windings.begin(), windings.end(),
                                           [&](const BoundedWinding& w) { return w.contains(p); });
         const bool in_parts = std::any_of(result.parts.begin(), result.parts.end(),
@@ -220,9 +220,8 @@ Real volume_of(const std::vector<SolidPiece>& solids) {
 
 /// Parts with the accepted error, if a number up to `most_parts` has it. A patch of a shell of the thickness
 /// t whose sides are a and b along the principal curvatures k_a and k_b has a hull that is larger by the
-/// share
-/// (|k_a| a^2 + |k_b| b^2) / (12 t). So the error falls as 1 / n with the number n of parts, and needs at
-/// least sqrt(|k_a k_b|) area / (6 t error) parts.
+/// fraction (|k_a| a^2 + |k_b| b^2) / (12 t). So the error falls as 1 / n with the number n of parts, and
+/// needs at least sqrt(|k_a k_b|) area / (6 t error) parts.
 CutDecomposition cuts_within(const std::vector<SolidPiece>& solids, const DecompositionSettings& settings) {
   CutDecomposition best;
   for (Real count = settings.max_parts;;) {

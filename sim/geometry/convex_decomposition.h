@@ -15,7 +15,7 @@
 
 namespace offstage::sim {
 
-/// How a solid is decomposed.
+/// Method and limits of a decomposition.
 enum class DecompositionMethod : uint8_t {
   automatic,    ///< exact if that takes at most `max_parts`, else approximate
   exact,        ///< exact with up to 1024 parts, else approximate
@@ -28,8 +28,8 @@ struct DecompositionSettings {
   /// Smallest angle between an exact cut and the faces that it meets [rad], 20 degrees; relaxed if no cut
   /// satisfies it.
   Real min_dihedral = 20 * std::numbers::pi / 180;
-  /// Smallest distance of an exact cut from vertices off it, as a share of the mean edge. Relaxed if no cut
-  /// satisfies it.
+  /// Smallest distance of an exact cut from vertices off it, as a fraction of the mean edge. Relaxed if no
+  /// cut satisfies it.
   Real min_distance = 0.1;
   uint32_t max_reflex_edges = 2000;  ///< with more reflex edges the solid is approximated at once
   Real max_error = 0.05;             ///< accepted error of an approximate decomposition, > 0
@@ -54,7 +54,7 @@ struct ConvexDecomposition {
   std::vector<ConvexPolyhedron> parts;
   /// |volume of the parts - volume of the solid| / volume of the solid.
   Real volume_error = 0;
-  /// Upper bound of the volume in which the parts and the solid differ, as a share of the solid's volume;
+  /// Upper bound of the volume in which the parts and the solid differ, as a fraction of the solid's volume;
   /// DecompositionSettings::max_error limits it. 0 for exact parts. For several surfaces that may overlap, an
   /// estimate with an accuracy of about 1 %, as is `volume_error`.
   Real difference = 0;

@@ -17,8 +17,8 @@ extern "C" {
 namespace offstage::sim {
 namespace {
 
-constexpr Real kFlat = 1e-9;       // share of the extent: a thinner set counts as flat
-constexpr Real kCoplanar = 1e-10;  // share of the extent: a nearer point counts as on a face's plane
+constexpr Real kFlat = 1e-9;       // fraction of the extent: a thinner set counts as flat
+constexpr Real kCoplanar = 1e-10;  // fraction of the extent: a nearer point counts as on a face's plane
 
 using Loops = std::vector<std::vector<uint32_t>>;
 

@@ -15,9 +15,9 @@
 namespace offstage::sim {
 namespace {
 
-/// Distances below this share of the solid's diagonal count as zero.
+/// Distances below this fraction of the solid's diagonal count as zero.
 constexpr Real kOnCutPlane = 2e-7;
-/// Trimming moves faces by at most this share of the solid's diagonal.
+/// Trimming moves faces by at most this fraction of the solid's diagonal.
 constexpr Real kTrim = 0.02;
 /// More pieces than wanted parts are cut before mergers, by these factors: of whole solids, of Voronoi cells.
 constexpr Real kMorePieces = 1.5, kMoreCells = 1.25;
@@ -59,8 +59,8 @@ class SolidCutter {
     for (const SolidPiece& solid : solids_) total += areas.emplace_back(surface_area(solid));
     std::vector<HulledPiece> cells;
     for (uint32_t k = 0; k < solids_.size(); ++k) {
-      const Real share = areas[k] / total * static_cast<Real>(goal_.max_parts);
-      const auto count = static_cast<std::size_t>(std::max(1.0, std::floor(share)));
+      const Real fraction = areas[k] / total * static_cast<Real>(goal_.max_parts);
+      const auto count = static_cast<std::size_t>(std::max(1.0, std::floor(fraction)));
       std::vector<SolidPiece> made =
           voronoi_pieces(solids_[k], spread_centres(solids_[k], count), tolerance_);
       const std::size_t first = cells.size();

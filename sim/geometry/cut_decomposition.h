@@ -22,8 +22,8 @@ struct CutGoal {
 
 struct CutDecomposition {
   std::vector<ConvexPolyhedron> parts;
-  /// Volume in which each part differs from its piece of the solid, summed over the parts, as a share of the
-  /// volume: an upper bound of the volume in which all parts together differ from the solid.
+  /// Volume in which each part differs from its piece of the solid, summed over the parts, as a fraction of
+  /// the volume: an upper bound of the volume in which all parts together differ from the solid.
   Real error = 0;
 };
 

@@ -159,7 +159,7 @@ class CutSearch {
     return best;
   }
 
-  /// Volume of the two hulls, plus a share of the excess that is larger the less compact the sides are.
+  /// Volume of the two hulls, plus a fraction of the excess that is larger the less compact the sides are.
   Real cost(const SearchPlane& plane) const {
     std::array<std::vector<Vec3>, 2> sides;
     std::vector<Real> height;
@@ -187,7 +187,7 @@ class CutSearch {
            kCompact * piece_.excess * (1 - compactness(plane));
   }
 
-  /// Share of the piece's spread that the cut removes: the distance of the centres of the sides.
+  /// Fraction of the piece's spread that the cut removes: the distance of the centres of the sides.
   Real compactness(const SearchPlane& plane) const {
     const PieceMoments &all = piece_.moments, above = moments_above(solid_, plane);
     const Real f = above.volume / all.volume;

@@ -22,7 +22,7 @@ constexpr uint32_t kSeveral = 0xffffffff;
 constexpr std::size_t kManyVertices = 192;
 /// Faces of a hull by which another is cut.
 constexpr std::size_t kMainPlanes = 96;
-/// Distances below this share of a hull's extent count as zero.
+/// Distances below this fraction of a hull's extent count as zero.
 constexpr Real kOnPlane = 1e-9;
 
 ConvexPolyhedron common_hull(const ConvexPolyhedron& a, const ConvexPolyhedron& b) {

@@ -16,13 +16,13 @@ using TrimPlane = SolidPiece::Plane;
 constexpr int kDepths = 6;
 /// Most faces of one hull that are moved.
 constexpr int kMostTrims = 24;
-/// A face that the surface covers by more than this share does not bridge a hollow.
+/// A face that the surface covers by more than this fraction does not bridge a hollow.
 constexpr Real kCovered = 0.5;
-/// A face moves by at most this share of the hull's extent along its normal.
+/// A face moves by at most this fraction of the hull's extent along its normal.
 constexpr Real kMostOfHull = 0.25;
-/// Most of the pieces' volume that may be lost outside of their hull, as a share.
+/// Most of the pieces' volume that may be lost outside of their hull, as a fraction.
 constexpr Real kMostLost = 0.03;
-/// Distances below this share of the hull's extent count as zero.
+/// Distances below this fraction of the hull's extent count as zero.
 constexpr Real kOnFace = 1e-6;
 
 ConvexPolyhedron below(const ConvexPolyhedron& hull, const TrimPlane& plane) {

@@ -17,9 +17,9 @@ namespace {
 constexpr Real kFlatFace = 1e-6;
 /// Factors by which the limits are relaxed, one after the other.
 constexpr std::array<Real, 5> kRelaxed = {1, 0.5, 0.25, 0.1, 0};
-/// Shares of the dihedral angle at which cuts are tried, after the planes of neighbouring faces and edges
+/// Fractions of the dihedral angle at which cuts are tried, after the planes of neighbouring faces and edges
 /// (F.2).
-constexpr std::array<Real, 5> kShares = {0.25, 0.5, 0.75, 0.375, 0.625};
+constexpr std::array<Real, 5> kFractions = {0.25, 0.5, 0.75, 0.375, 0.625};
 constexpr std::size_t kMaxCandidates = 12;
 /// Angles are ordered in steps of this size, so that rounding does not order equal ones [rad].
 constexpr Real kSameAngle = 1e-4;
@@ -47,7 +47,7 @@ class Candidates {
         add(theta);
         add(theta < std::numbers::pi ? theta + std::numbers::pi : theta - std::numbers::pi);
       });
-    for (Real share : kShares) add(share * wedge_.angle);
+    for (Real fraction : kFractions) add(fraction * wedge_.angle);
   }
 
   const std::vector<Real>& angles() const { return angles_; }

@@ -13,7 +13,7 @@ namespace offstage::sim {
 /// Initial limits of a cut, relaxed in steps, at last to zero, if no cut satisfies them; and a bound.
 struct CutLimits {
   Real dihedral = 0;  ///< smallest angle between the cut and a face it meets [rad]
-  /// Smallest distance of the cut from vertices off it, as a share of the mean edge.
+  /// Smallest distance of the cut from vertices off it, as a fraction of the mean edge.
   Real distance = 0;
   // The method fails beyond these bounds.
   std::size_t max_parts = 1024;

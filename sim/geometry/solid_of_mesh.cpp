@@ -20,7 +20,7 @@ using Index3 = Eigen::Array3i;
 constexpr Real kHardlyInside = 0.6, kSurelyInside = 0.9;
 /// Number of times that the surface of voxels is smoothed.
 constexpr int kSmoothings = 2;
-/// Greatest difference between the volume with closed holes and that of the voxels, as a share.
+/// Greatest difference between the volume with closed holes and that of the voxels, as a fraction.
 constexpr Real kSameSolid = 0.1;
 
 /// The voxels of a mesh's box, and whether the centre of each is inside.

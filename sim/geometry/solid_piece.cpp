@@ -62,7 +62,7 @@ class HalfBuilder {
   /// Closes the surface on the cut plane, and removes unused points.
   SolidPiece finish(const CutBy& outward) {
     SolidPiece::Cap cap{outward, {}};
-    // In the order of the keys, so that the result does not depend on the hash table.
+    // Visited in the order of the keys, so that the result does not depend on the hash table.
     std::vector<std::pair<uint64_t, int>> open(net_.begin(), net_.end());
     std::sort(open.begin(), open.end());
     for (const auto& [key, net] : open) {

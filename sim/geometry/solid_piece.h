@@ -50,7 +50,7 @@ PieceMoments moments_above(const SolidPiece& piece, const SolidPiece::Plane& pla
 /// polygon on the plane belongs to the side where the solid is.
 std::array<SolidPiece, 2> cut(const SolidPiece& piece, const SolidPiece::Plane& plane, Real tolerance);
 
-/// Every pair of points that is an edge of a polygon or a side of a cap, once.
+/// Returns each edge of a polygon and each side of a cap once, as a pair of points.
 std::vector<SolidPiece::Side> edges(const SolidPiece& piece);
 
 }  // namespace offstage::sim

@@ -73,8 +73,8 @@ std::size_t nearest(const std::vector<Vec3>& centres, const Vec3& p) {
   return best;
 }
 
-/// The cell of one centre: bisectors with the other centres, nearest first, cut off all that is nearer to
-/// these.
+/// The cell of one centre: bisectors with the other centres, nearest first, cut off all points that are
+/// nearer to those.
 SolidPiece cell_of(const SolidPiece& solid, const std::vector<Vec3>& centres, std::size_t k, Real tolerance) {
   const Vec3& centre = centres[k];
   std::vector<std::pair<Real, std::size_t>> others;

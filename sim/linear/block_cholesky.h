@@ -22,7 +22,7 @@ using Vec6 = Eigen::Matrix<Real, 6, 1>;
 
 /// Properties of a row of blocks that are known before the factorization.
 struct BlockRowKind {
-  bool is_negative = false;  ///< its sign in S
+  bool is_negative = false;  ///< whether its sign in S is negative
   bool is_empty = false;     ///< its diagonal block is zero: its neighbours are eliminated first
   friend bool operator==(const BlockRowKind&, const BlockRowKind&) = default;
 };

@@ -1,6 +1,6 @@
 #pragma once
-/// Vectors of three numbers in three registers, so that the same arithmetic is done for several contacts at
-/// once. A register holds doubles (Lanes) or floats (FloatLanes).
+/// Vectors of three numbers in three registers, so that one instruction computes several contacts. A register
+/// holds doubles (Lanes) or floats (FloatLanes).
 
 #include <type_traits>
 

@@ -33,7 +33,7 @@ inline Lanes lane_last(Lanes v) {
 inline Lanes lane_cross(Lanes a, Lanes b) {
   return lane_next(a * lane_next(b) - lane_next(a) * b);
 }
-/// As Eigen adds up a product of vectors of three.
+/// Dot product of two vectors of three, summed in the order of Eigen.
 inline Real lane_dot(Lanes a, Lanes b) {
   const Lanes p = a * b;
   return p[0] + p[1] + p[2];

@@ -12,8 +12,8 @@ namespace {
 
 using Eigen::Index;
 
-constexpr Real kLcpSatisfied = 1e-11;  ///< share of the greatest |b|: smaller accelerations count as zero
-/// Share of the greatest |b|: with a larger residual the fall-back is used.
+constexpr Real kLcpSatisfied = 1e-11;  ///< fraction of the greatest |b|: smaller accelerations count as zero
+/// Fraction of the greatest |b|: with a larger residual the fall-back is used.
 constexpr Real kAccurateLcp = 1e-9;
 constexpr Real kLcpNoise = 1e-12;  ///< relative: smaller rates count as zero
 constexpr int kLcpAttempts = 4;

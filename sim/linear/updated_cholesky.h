@@ -14,7 +14,7 @@ namespace offstage::sim {
 /// is O(n^2).
 class UpdatedCholesky {
  public:
-  /// A row whose pivot is less than this share of its diagonal counts as a linear combination of the rows
+  /// A row whose pivot is less than this fraction of its diagonal counts as a linear combination of the rows
   /// before.
   static constexpr Real kDependent = 1e-10;
 

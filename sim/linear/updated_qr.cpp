@@ -5,7 +5,7 @@
 namespace offstage::sim {
 namespace {
 
-/// A diagonal element below this share of the greatest one counts as zero.
+/// A diagonal element below this fraction of the greatest one counts as zero.
 constexpr Real kSingular = 1e-13;
 
 }  // namespace

@@ -67,14 +67,14 @@ CollidingParticle ParticleCollisions::make_particles(const ParticleSystem& syste
   const ParticleArrays& p = system.arrays;
   const ParticleSystem::Flight flight = system.flight(i);
   const Real duration = flight.duration;
-  const Vec3 way = p.position[i] - flight.position;
+  const Vec3 displacement = p.position[i] - flight.position;
   CollidingParticle g;
   g.position = flight.position;
   g.velocity = p.velocity[i];
   g.acceleration = duration > 0 ? Vec3((g.velocity - flight.velocity) / duration) : Vec3::Zero();
-  g.path_velocity = duration > 0 ? Vec3(way / duration) : g.velocity;
+  g.path_velocity = duration > 0 ? Vec3(displacement / duration) : g.velocity;
   // A difference by rounding does not count.
-  if ((way - duration * g.velocity).norm() <= 1e-14 * (1 + p.position[i].norm()))
+  if ((displacement - duration * g.velocity).norm() <= 1e-14 * (1 + p.position[i].norm()))
     g.path_velocity = g.velocity;
   g.from = h - duration;
   g.mass = p.mass[i];

@@ -101,8 +101,8 @@ void ParticleContacts::find_pairs(uint32_t i, Found& found) const {
       // The normal is that at half of the motion, which does not reverse if the particles press into each
       // other. For fast particles that pass each other, it is that at the end.
       const Real from = std::max(a.from, b.from), reach = a.radius + b.radius;
-      const Vec3 d = a.at(h) - b.at(h), way = (h - from) * u;
-      const Vec3 middle = way.squaredNorm() < reach * reach / 64 ? Vec3(d - way / 2) : d;
+      const Vec3 d = a.at(h) - b.at(h), displacement = (h - from) * u;
+      const Vec3 middle = displacement.squaredNorm() < reach * reach / 64 ? Vec3(d - displacement / 2) : d;
       const Real size = middle.norm();
       if (!(size > 0)) continue;
       normal = middle / size;

@@ -27,7 +27,8 @@ namespace offstage::sim {
 class ParticleContacts {
  public:
   static constexpr uint32_t kNone = ~0u;
-  /// Gaps below this share of the radii count as contact, because the impulses of a sub-step may close them.
+  /// Gaps below this fraction of the radii count as contact, because the impulses of a sub-step may close
+  /// them.
   static constexpr Real kMargin = 0.1;
 
   /// The particles ordered by layers.
@@ -89,7 +90,7 @@ class ParticleContacts {
     Vec3 velocity;       // velocity of the surface
     Vec3 friction_axis;  // Obstacle::friction_axis_on() of the surface
 
-    /// Along and across the friction axis separately.
+    /// Limits the friction along and across the friction axis separately.
     Vec3 held(const Vec3& along, Real limit) const {
       if (friction_axis.isZero()) return Contact::held(along, limit);
       const Vec3 across = normal().cross(friction_axis);
@@ -158,7 +159,7 @@ class ParticleContacts {
   void push_apart(std::span<Vec3> end);
   // tunneling_guard.cpp
   void stop_passing(std::span<Vec3> end);
-  bool set_out(std::span<const Vec3> end);
+  bool predict_paths(std::span<const Vec3> end);
   void find_passing();
   void list_near();
   template <class Add>
@@ -186,10 +187,10 @@ class ParticleContacts {
   std::vector<Turn> turns_;  // by particle; empty if none turns
   std::vector<Real> slab_change2_;
   // Paths after contact, whether they are long, and the time at which stopped particles stopped.
-  std::vector<CollidingParticle> ways_;
+  std::vector<CollidingParticle> paths_;
   std::vector<uint8_t> is_long_;
   std::vector<Real> stop_;
-  ParticleSearch way_search_;
+  ParticleSearch path_search_;
   // For each particle, the particles whose paths may come near its own, if one of the two paths is long.
   std::vector<uint32_t> near_begin_, near_;
   Real h_before_ = 0;

@@ -38,25 +38,25 @@ struct Run {
 /// Calls f(block, strengths) for each block of particles with at least one particle in the field's region.
 template <class Field, class F>
 void for_each_block(const Field& field, const Run& run, F&& f) {
-  std::array<Real, kBlock> share;
+  std::array<Real, kBlock> fraction;
   for (std::size_t begin = 0; begin < run.size(); begin += kBlock) {
     const Run block = run.part(begin, std::min(kBlock, run.size() - begin));
-    const std::span s = std::span(share).first(block.size());
+    const std::span s = std::span(fraction).first(block.size());
     if (strengths(field.region, field.drop_rate, block.x, s)) f(block, std::span<const Real>(s));
   }
 }
 
 void add(const ConstantField& f, const Run& run) {
-  for_each_block(f, run, [&](const Run& b, std::span<const Real> share) {
-    for (std::size_t i = 0; i < b.size(); ++i) b.push(i, share[i] * f.force);
+  for_each_block(f, run, [&](const Run& b, std::span<const Real> fraction) {
+    for (std::size_t i = 0; i < b.size(); ++i) b.push(i, fraction[i] * f.force);
   });
 }
 void add(const PointField& f, const Run& run) {
-  for_each_block(f, run, [&](const Run& b, std::span<const Real> share) {
+  for_each_block(f, run, [&](const Run& b, std::span<const Real> fraction) {
     for (std::size_t i = 0; i < b.size(); ++i) {
-      const Vec3 way = f.point - b.position(i);
-      const Real distance = way.norm();
-      if (distance > 0) b.push(i, share[i] * f.force / distance * way);
+      const Vec3 offset = f.point - b.position(i);
+      const Real distance = offset.norm();
+      if (distance > 0) b.push(i, fraction[i] * f.force / distance * offset);
     }
   });
 }
@@ -64,13 +64,13 @@ void add(const PointField& f, const Run& run) {
 /// `blow(block, air)` writes the velocity of the air at each particle of a block.
 template <class Field, class Blow>
 void add_air(const Field& f, const Run& run, Blow&& blow) {
-  for_each_block(f, run, [&](const Run& b, std::span<const Real> share) {
+  for_each_block(f, run, [&](const Run& b, std::span<const Real> fraction) {
     std::array<Real, 3 * kBlock> air;
     blow(b, std::span(air).first(3 * b.size()));
     for (std::size_t i = 0; i < b.size(); ++i) {
-      b.push(i,
-             share[i] * air_drag(f.drag, b.own_drag, vec3(std::span<const Real>(air), 3 * i), b.velocity(i)));
-      b.damp(i, share[i] * f.drag);
+      b.push(i, fraction[i] *
+                    air_drag(f.drag, b.own_drag, vec3(std::span<const Real>(air), 3 * i), b.velocity(i)));
+      b.damp(i, fraction[i] * f.drag);
     }
   });
 }
@@ -132,7 +132,8 @@ void ParticleForces::accelerate(Real t, std::span<const Real> x, std::span<const
   }
 }
 
-void ParticleForces::leap(Real h, std::span<Vec3> x, std::span<Vec3> v, std::span<const Real> mass) const {
+void ParticleForces::leapfrog_step(Real h, std::span<Vec3> x, std::span<Vec3> v,
+                                   std::span<const Real> mass) const {
   for (std::size_t i = 0; i < mass.size(); ++i) {
     const Vec3 a = acceleration(v[i], mass[i]);
     const DampedKick kick(h, drag / mass[i]);

@@ -31,7 +31,7 @@ struct ParticleForces {
   void accelerate(Real t, std::span<const Real> x, std::span<const Real> v, std::span<const Real> mass,
                   std::span<Real> dv, std::span<Real> damping = {}) const;
   /// One step of IntegratorKind::leapfrog for consecutive particles on which no field acts.
-  void leap(Real h, std::span<Vec3> x, std::span<Vec3> v, std::span<const Real> mass) const;
+  void leapfrog_step(Real h, std::span<Vec3> x, std::span<Vec3> v, std::span<const Real> mass) const;
   /// Appends the derivatives of (dx/dt, dv/dt) of consecutive particles by (x, v), which begin at the rows
   /// and columns `at_x` and `at_v`. The change of fields with position is omitted, because it does not make a
   /// system stiff.

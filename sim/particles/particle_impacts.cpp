@@ -15,7 +15,7 @@ constexpr std::size_t kMaxImpacts = 5000;
 /// A particle with this many neighbours at small gaps is in a crowd.
 constexpr uint32_t kCrowd = 4;
 constexpr Real kNeighbourGap = 0.1;
-/// Particles touch if their gap is below this share of the distance of their centres.
+/// Particles touch if their gap is below this fraction of the distance of their centres.
 constexpr Real kTouching = 1e-6;
 /// A larger cluster is left to resting contact.
 constexpr std::size_t kMaxCluster = 16;
@@ -67,7 +67,7 @@ void ParticleImpacts::count_neighbours() {
 }
 
 /// Whether a collision is left to resting contact: it is in a crowd, and slow enough.
-bool ParticleImpacts::is_left(uint32_t i, uint32_t j, Real speed) const {
+bool ParticleImpacts::is_left_to_resting_contact(uint32_t i, uint32_t j, Real speed) const {
   return std::max(neighbours_[i], neighbours_[j]) >= kCrowd &&
          speed * step_->h < particles_[i].radius + particles_[j].radius;
 }
@@ -97,7 +97,8 @@ void ParticleImpacts::find_with(uint32_t i, uint32_t j, Add&& add) const {
   if (!met) return;
   const Real speed =
       -(a.velocity_at(met->time, step_->h) - b.velocity_at(met->time, step_->h)).dot(met->normal);
-  if (!is_impact(speed, greater_acceleration(a, b), *step_) || is_left(i, j, speed)) return;
+  if (!is_impact(speed, greater_acceleration(a, b), *step_) || is_left_to_resting_contact(i, j, speed))
+    return;
   add(Impact{met->time, i, j, stamp_[i], stamp_[j], met->normal, nullptr});
 }
 
@@ -113,7 +114,7 @@ void ParticleImpacts::find_obstacle(uint32_t i, NearObstacles& near, Add&& add) 
   const Real time = hit.fraction * step_->h;
   const Vec3 u = g.velocity_at(time, step_->h) - hit.obstacle->velocity_at(hit.position, hit.fraction);
   const Real speed = -u.dot(hit.normal);
-  if (!is_impact(speed, g.acceleration.norm(), *step_) || is_left(i, i, speed)) return;
+  if (!is_impact(speed, g.acceleration.norm(), *step_) || is_left_to_resting_contact(i, i, speed)) return;
   add(Impact{time, i, kNone, stamp_[i], 0, hit.normal, hit.obstacle});
 }
 

@@ -45,7 +45,7 @@ class ParticleImpacts {
   };
 
   void count_neighbours();
-  bool is_left(uint32_t i, uint32_t j, Real speed) const;
+  bool is_left_to_resting_contact(uint32_t i, uint32_t j, Real speed) const;
   void find_first();
   template <class Add>
   void find_with(uint32_t i, uint32_t j, Add&& add) const;

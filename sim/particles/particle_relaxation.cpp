@@ -33,7 +33,7 @@ struct Load {
   Vec3 impulse = Vec3::Zero(), angular_impulse = Vec3::Zero();
   Real arm = 0;                ///< greatest lever arm of its parts [m]
   Real brought = 0, mass = 0;  ///< of the particles that load it, see Heap
-  Real share = 1;
+  Real fraction = 1;
 };
 
 /// Particles that touch each other.
@@ -65,19 +65,19 @@ void limit_loads(std::span<Reaction> reactions, std::map<uint32_t, Load>& loads)
     const Real most = load.brought + load.mass * o.end_velocity.norm();
     Real bears = size > 0 ? most / size : 1;
     if (turn > 0) bears = std::min(bears, most * load.arm / turn);
-    load.share = std::min(1.0, stops + bears);
+    load.fraction = std::min(1.0, stops + bears);
   }
   for (Reaction& r : reactions)
     if (const auto load = loads.find(r.body); load != loads.end()) {
-      r.impulse *= load->second.share;
-      r.angular_impulse *= load->second.share;
+      r.impulse *= load->second.fraction;
+      r.angular_impulse *= load->second.fraction;
     }
 }
 
 Lanes lanes_of(const Eigen::Vector3f& v) {
   return Lanes{v[0], v[1], v[2], 0};
 }
-/// In all lanes: that of the fourth one.
+/// Returns the fourth lane in all lanes.
 Lanes fourth(Lanes v) {
   return __builtin_shufflevector(v, v, 3, 3, 3, 3);
 }

@@ -90,12 +90,12 @@ void ParticleSearch::list_partners(std::span<const CollidingParticle> particles)
   list(particles, [&](const SizeClass& own, std::size_t place, auto&& add) {
     const Ball& b = own.balls[own.grid.at(place)];
     own.grid.for_each_pair(place, b.radius + own.radius, [&](uint32_t k) {
-      if (meets(b, own.balls[k])) add(own.member[k]);
+      if (overlap(b, own.balls[k])) add(own.member[k]);
     });
     for (const SizeClass& coarser : classes_) {
       if (coarser.size <= own.size) continue;
       coarser.grid.for_each_near(b.centre, b.radius + coarser.radius, [&](uint32_t k) {
-        if (meets(b, coarser.balls[k])) add(coarser.member[k]);
+        if (overlap(b, coarser.balls[k])) add(coarser.member[k]);
       });
     }
   });

@@ -28,7 +28,7 @@ class ParticleSearch {
     const Ball b = ball(particle);
     for (const SizeClass& c : classes_)
       c.grid.for_each_near(b.centre, b.radius + c.radius, [&](uint32_t k) {
-        if (meets(b, c.balls[k])) f(c.member[k]);
+        if (overlap(b, c.balls[k])) f(c.member[k]);
       });
   }
 
@@ -65,13 +65,13 @@ class ParticleSearch {
   template <class ForEachPartner>
   void list(std::span<const CollidingParticle> particles, ForEachPartner&& for_each_partner);
 
-  static bool meets(const Ball& a, const Ball& b) {
+  static bool overlap(const Ball& a, const Ball& b) {
     const Real reach = a.radius + b.radius;
     return (a.centre - b.centre).squaredNorm() <= reach * reach;
   }
   Ball ball(const CollidingParticle& g) const {
-    const Vec3 way = (h_ - g.from) / 2 * (g.path_velocity - drift_);
-    return {g.position - g.from * drift_ + way, way.norm() + g.radius + margin_ / 2};
+    const Vec3 displacement = (h_ - g.from) / 2 * (g.path_velocity - drift_);
+    return {g.position - g.from * drift_ + displacement, displacement.norm() + g.radius + margin_ / 2};
   }
   int size_class(Real radius) const { return std::ilogb(radius / unit_); }
 

@@ -100,11 +100,11 @@ ObstacleHit NearObstacles::first_hit(const Vec3& a, const Vec3& b, Real radius, 
 ObstacleHit NearObstacles::hit(const Obstacle& o, const Vec3& a, const Vec3& b, Real radius, Real from,
                                Real latest) {
   const int pieces = o.pieces(radius);
-  const Vec3 way = b - a;
+  const Vec3 displacement = b - a;
   Vec3 p = o.at(from).point_to_body(a);
   for (int k = 0; k < pieces; ++k) {
-    const Real share = static_cast<Real>(k + 1) / pieces, before = static_cast<Real>(k) / pieces;
-    const Vec3 q = o.at(from + share * (1 - from)).point_to_body(a + share * way);
+    const Real end_of_piece = static_cast<Real>(k + 1) / pieces, before = static_cast<Real>(k) / pieces;
+    const Vec3 q = o.at(from + end_of_piece * (1 - from)).point_to_body(a + end_of_piece * displacement);
     if (const auto hit = sweep_sphere(o.solid, p, q, radius + kSkin / 2)) {
       const Real fraction = from + (before + hit->fraction / pieces) * (1 - from);
       if (fraction >= latest) return {};

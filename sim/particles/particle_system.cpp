@@ -66,7 +66,7 @@ uint64_t ParticleSystem::add(const Particle& p, Real elapsed) {
     arrays.orientation.push_back(Quat::Identity());
   }
   arrays.id.push_back(next_id);
-  newborn.push_back(elapsed);
+  since_birth.push_back(elapsed);
   return next_id++;
 }
 
@@ -90,7 +90,8 @@ void ParticleSystem::fly(const ParticleForces& forces, Real t, Real h, std::size
   scratch.velocity.assign(v.begin(), v.end());
   const auto mass = part(arrays.mass, begin, end);
   t = std::max(t, 0.0);
-  if (def.integrator == IntegratorKind::leapfrog && forces.fields.empty()) return forces.leap(h, x, v, mass);
+  if (def.integrator == IntegratorKind::leapfrog && forces.fields.empty())
+    return forces.leapfrog_step(h, x, v, mass);
   // Otherwise the previous particle, and thus the threads, would affect the result.
   scratch.integrator.next_step = 0;
   integrator(def.integrator).step(FreeFlight(forces, mass), t, h, flat(x), flat(v), scratch.integrator);
@@ -107,11 +108,11 @@ void ParticleSystem::fly_before(const ParticleForces& forces, Real t, std::size_
   arrays.age[i] += duration;
 }
 
-void ParticleSystem::admit_newborn(const ParticleForces& forces) {
+void ParticleSystem::admit_new_particles(const ParticleForces& forces) {
   Scratch scratch;
-  const std::size_t old = arrays.size() - newborn.size();
-  for (std::size_t i = old; i < arrays.size(); ++i) fly_before(forces, 0, i, newborn[i - old], scratch);
-  newborn.clear();
+  const std::size_t old = arrays.size() - since_birth.size();
+  for (std::size_t i = old; i < arrays.size(); ++i) fly_before(forces, 0, i, since_birth[i - old], scratch);
+  since_birth.clear();
 }
 
 /// Integrates every particle, and then calls make_landing(chunk)(i, flight, integrated). `integrated` means
@@ -120,7 +121,7 @@ void ParticleSystem::admit_newborn(const ParticleForces& forces) {
 template <class MakeLanding>
 void ParticleSystem::fly_each(const ParticleStage& stage, const ParticleForces& forces, bool coupled,
                               MakeLanding&& make_landing) {
-  const std::size_t count = arrays.size(), old = count - newborn.size();
+  const std::size_t count = arrays.size(), old = count - since_birth.size();
   tbb::enumerable_thread_specific<Scratch> scratches;
   tbb::parallel_for(std::size_t{0}, chunk_count(old), [&](std::size_t chunk) {
     const std::size_t begin = chunk * kChunk, end = std::min(old, begin + kChunk);
@@ -133,14 +134,14 @@ void ParticleSystem::fly_each(const ParticleStage& stage, const ParticleForces& 
   });
 
   // Each new particle has a flight time of its own.
-  tbb::parallel_for(std::size_t{0}, chunk_count(newborn.size()), [&](std::size_t chunk) {
+  tbb::parallel_for(std::size_t{0}, chunk_count(since_birth.size()), [&](std::size_t chunk) {
     const std::size_t begin = old + chunk * kChunk, end = std::min(count, begin + kChunk);
     auto land = make_landing(chunk_count(old) + chunk);
     Scratch& scratch = scratches.local();
     for (std::size_t i = begin; i < end; ++i) {
       const bool integrated = coupled && whole_step(i);
-      fly_before(forces, stage.time, i, newborn[i - old] - stage.h, scratch);
-      const Real duration = whole_step(i) ? stage.h : std::min(newborn[i - old], stage.h);
+      fly_before(forces, stage.time, i, since_birth[i - old] - stage.h, scratch);
+      const Real duration = whole_step(i) ? stage.h : std::min(since_birth[i - old], stage.h);
       if (!integrated) fly(forces, stage.time + (stage.h - duration), duration, i, i + 1, scratch);
       const Vec3 x0 = integrated ? start_position_[i] : scratch.position[0];
       const Vec3 v0 = integrated ? start_velocity_[i] : scratch.velocity[0];
@@ -213,7 +214,7 @@ ParticleEvent ParticleSystem::collision_event(const ParticleStage& stage, std::s
 }
 
 ParticleTally ParticleSystem::sum_up(std::span<const ParticleTally> tallies) {
-  newborn.clear();
+  since_birth.clear();
   ParticleTally sum;
   for (const ParticleTally& t : tallies) sum += t;
   if (sum.expired + sum.retired + sum.removed > 0) remove_dead();
@@ -221,9 +222,9 @@ ParticleTally ParticleSystem::sum_up(std::span<const ParticleTally> tallies) {
 }
 
 ParticleTally ParticleSystem::step(const ParticleStage& stage, const ParticleForces& forces, bool coupled) {
-  const std::size_t old = arrays.size() - newborn.size();
+  const std::size_t old = arrays.size() - since_birth.size();
   fate_.resize(arrays.size());
-  std::vector<ParticleTally> tallies(chunk_count(old) + chunk_count(newborn.size()));
+  std::vector<ParticleTally> tallies(chunk_count(old) + chunk_count(since_birth.size()));
   std::vector<SweepLog> logs(tallies.size());
   std::vector<std::vector<Striker>> strikers(tallies.size());
   fly_each(stage, forces, coupled, [&](std::size_t chunk) {
@@ -248,7 +249,7 @@ ParticleTally ParticleSystem::step(const ParticleStage& stage, const ParticleFor
           return;
         }
       }
-      conclude(stage, i, outcome, log, tally);
+      finish_sweep(stage, i, outcome, log, tally);
     };
   });
   std::vector<Striker> all;
@@ -274,12 +275,12 @@ void ParticleSystem::strike_bodies(const ParticleStage& stage, const ParticleFor
     const SweepOutcome outcome = sweep(stage, forces, obstacles, s.particle, s.flight, s.integrated);
     for (const Reaction& r : log.reactions) stage.impulses.push(r);
     log.reactions.clear();
-    conclude(stage, s.particle, outcome, log, tally);
+    finish_sweep(stage, s.particle, outcome, log, tally);
   }
 }
 
-void ParticleSystem::conclude(const ParticleStage& stage, std::size_t i, const SweepOutcome& outcome,
-                              SweepLog& log, ParticleTally& tally) {
+void ParticleSystem::finish_sweep(const ParticleStage& stage, std::size_t i, const SweepOutcome& outcome,
+                                  SweepLog& log, ParticleTally& tally) {
   tally.collisions += outcome.collisions;
   tally.ejected += outcome.ejected;
   tally.truncated += outcome.truncated;

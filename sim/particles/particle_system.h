@@ -38,9 +38,9 @@ struct ParticleSystem {
   ParticleSystemDef def;
   ParticleArrays arrays;
   uint64_t next_id = 0;
-  /// For the last particles of the arrays, those added since the last sub-step: time from their creation to
-  /// the end of the sub-step. Negative: the particle exists from the sub-step's start.
-  std::vector<Real> newborn;
+  /// For the last particles of the arrays, those added since the last sub-step: time from their birth to the
+  /// end of the sub-step. Negative: the particle exists from the sub-step's start.
+  std::vector<Real> since_birth;
 
   uint64_t add(const Particle& p, Real elapsed);
   /// Index of a particle in the arrays; empty if it does not exist any more.
@@ -48,13 +48,13 @@ struct ParticleSystem {
 
   /// Whether a particle exists during the whole next sub-step.
   bool whole_step(std::size_t i) const {
-    const std::size_t old = arrays.size() - newborn.size();
-    return i < old || newborn[i - old] < 0;
+    const std::size_t old = arrays.size() - since_birth.size();
+    return i < old || since_birth[i - old] < 0;
   }
 
   /// Adds the particles created since the last sub-step in their current state. Each flies for its age so
   /// far, and exists during the whole next sub-step.
-  void admit_newborn(const ParticleForces& forces);
+  void admit_new_particles(const ParticleForces& forces);
   /// Stores the state at the start of the sub-step, for a CoupledGroup that integrates the system.
   void begin_coupled();
   /// Whether its collisions are those of ParticleCollisions.
@@ -87,8 +87,8 @@ struct ParticleSystem {
   struct Striker;
   void strike_bodies(const ParticleStage& stage, const ParticleForces& forces, std::vector<Striker> strikers,
                      ParticleTally& tally);
-  void conclude(const ParticleStage& stage, std::size_t i, const SweepOutcome& outcome, SweepLog& log,
-                ParticleTally& tally);
+  void finish_sweep(const ParticleStage& stage, std::size_t i, const SweepOutcome& outcome, SweepLog& log,
+                    ParticleTally& tally);
   void end(const ParticleStage& stage, std::size_t i, bool spent, bool trapped, ParticleTally& tally);
   void turn(std::size_t i);
   ParticleTally sum_up(std::span<const ParticleTally> tallies);

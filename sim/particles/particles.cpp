@@ -14,8 +14,8 @@ Vec3 collision_impulse(Real m12, Real across, const Vec3& u, const Vec3& n, Real
   const Vec3 sliding = u + approach * n;
   const Real normal_impulse = (1 + restitution) * m12 * approach;
   const Real to_stick = across * sliding.norm(), limit = friction * normal_impulse;
-  const Real share = to_stick > limit ? limit / to_stick : 1;
-  return normal_impulse * n - share * across * sliding;
+  const Real fraction = to_stick > limit ? limit / to_stick : 1;
+  return normal_impulse * n - fraction * across * sliding;
 }
 
 Vec3 velocity_after_shift(const Vec3& v, const Vec3& a, const Vec3& shift) {

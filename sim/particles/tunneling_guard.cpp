@@ -14,28 +14,28 @@
 namespace offstage::sim {
 namespace {
 
-/// Two particles whose paths are shorter than this share of their radii cannot pass each other.
+/// Two particles whose paths are shorter than this fraction of their radii cannot pass each other.
 constexpr Real kShort = 0.5;
-/// Distance at which particles stop, as a share of their initial distance or of that at which they touch:
+/// Distance at which particles stop, as a fraction of their initial distance or of that at which they touch:
 /// smaller than contact allows.
 constexpr Real kNearest = 0.992;
 
 }  // namespace
 
 /// Sets the paths to the ends; returns whether any is long, in the frame that moves with the mean.
-bool ParticleContacts::set_out(std::span<const Vec3> end) {
+bool ParticleContacts::predict_paths(std::span<const Vec3> end) {
   const std::size_t n = particles_.size();
   const Real h = step_->h;
-  ways_.resize(n);
+  paths_.resize(n);
   is_long_.resize(n);
   Vec3 drift = Vec3::Zero();
   for (std::size_t i = 0; i < n; ++i) drift += (end[i] - particles_[i].position) / static_cast<Real>(n);
   tbb::parallel_for(std::size_t{0}, chunk_count(), [&](std::size_t c) {
     for (std::size_t i = c * ParticleSearch::kChunk; i < std::min(n, (c + 1) * ParticleSearch::kChunk); ++i) {
-      CollidingParticle& g = ways_[i] = particles_[i];
-      const Vec3 way = end[i] - g.position;
-      g.path_velocity = g.from < h ? Vec3(way / (h - g.from)) : Vec3::Zero();
-      is_long_[i] = (way - drift).norm() > kShort * g.radius;
+      CollidingParticle& g = paths_[i] = particles_[i];
+      const Vec3 displacement = end[i] - g.position;
+      g.path_velocity = g.from < h ? Vec3(displacement / (h - g.from)) : Vec3::Zero();
+      is_long_[i] = (displacement - drift).norm() > kShort * g.radius;
     }
   });
   return std::find(is_long_.begin(), is_long_.end(), 1) != is_long_.end();
@@ -44,7 +44,7 @@ bool ParticleContacts::set_out(std::span<const Vec3> end) {
 /// Finds when two particles come too near each other after a time, given where they stop as far as known.
 template <class Add>
 void ParticleContacts::find_passing(uint32_t i, uint32_t j, Real after, Add&& add) const {
-  const CollidingParticle &a = ways_[i], &b = ways_[j];
+  const CollidingParticle &a = paths_[i], &b = paths_[j];
   if (!may_collide(a, b)) return;
   const Real from = std::max({a.from, b.from, after});
   const Vec3 d = a.at(std::min(from, stop_[i])) - b.at(std::min(from, stop_[j]));
@@ -63,7 +63,7 @@ void ParticleContacts::find_passing() {
     const auto add = [&](const Passing& p) { passing.push_back(p); };
     const std::size_t end = std::min(particles_.size(), (c + 1) * ParticleSearch::kChunk);
     for (auto i = static_cast<uint32_t>(c * ParticleSearch::kChunk); i < end; ++i)
-      for (const uint32_t j : way_search_.partners(i)) find_passing(i, j, 0, add);
+      for (const uint32_t j : path_search_.partners(i)) find_passing(i, j, 0, add);
   });
 }
 
@@ -72,7 +72,7 @@ void ParticleContacts::list_near() {
   near_begin_.assign(n + 1, 0);
   const auto for_each = [&](auto&& f) {
     for (uint32_t i = 0; i < n; ++i)
-      for (const uint32_t j : way_search_.partners(i)) f(i, j);
+      for (const uint32_t j : path_search_.partners(i)) f(i, j);
   };
   for_each([&](uint32_t i, uint32_t j) { ++near_begin_[i], ++near_begin_[j]; });
   uint32_t sum = 0;
@@ -89,7 +89,7 @@ void ParticleContacts::stop(const Passing& p) {
   stop_[p.a] = std::min(stop_[p.a], p.time);
   stop_[p.b] = std::min(stop_[p.b], p.time);
   CollidingParticle &a = particles_[p.a], &b = particles_[p.b];
-  const Vec3 d = ways_[p.a].at(stop_[p.a]) - ways_[p.b].at(stop_[p.b]);
+  const Vec3 d = paths_[p.a].at(stop_[p.a]) - paths_[p.b].at(stop_[p.b]);
   const Real approach = -(a.velocity - b.velocity).dot(d);
   if (!(approach > 0)) return;
   const Vec3 impulse = a.mass * b.mass / (a.mass + b.mass) * approach / d.squaredNorm() * d;
@@ -98,9 +98,9 @@ void ParticleContacts::stop(const Passing& p) {
 }
 
 void ParticleContacts::stop_passing(std::span<Vec3> end) {
-  if (!set_out(end)) return;
-  way_search_.build(ways_, step_->h, 0);
-  way_search_.list_partners(ways_, is_long_);
+  if (!predict_paths(end)) return;
+  path_search_.build(paths_, step_->h, 0);
+  path_search_.list_partners(paths_, is_long_);
   find_passing();
   list_near();
   std::priority_queue<Passing, std::vector<Passing>, std::greater<>> queue;
@@ -114,7 +114,7 @@ void ParticleContacts::stop_passing(std::span<Vec3> end) {
     stop(p);
     for (const uint32_t i : {p.a, p.b}) {
       if (i == p.a ? p.a_stands : p.b_stands) continue;
-      end[i] = ways_[i].at(p.time);
+      end[i] = paths_[i].at(p.time);
       for (uint32_t n = near_begin_[i]; n < near_begin_[i + 1]; ++n)
         if (!stands(near_[n])) find_passing(i, near_[n], p.time, add);
     }

@@ -141,7 +141,7 @@ void ActiveBodies::watch_springs(std::span<Body* const> group) {
 }
 
 /// Wrench on a body at rest by the forces that may change with time.
-Wrench ActiveBodies::changing_push(const Body& body, Real time) const {
+Wrench ActiveBodies::time_dependent_wrench(const Body& body, Real time) const {
   const RigidMotion at_rest{body.rigid.position, body.rigid.orientation, Vec3::Zero(), Vec3::Zero()};
   Wrench sum;
   world_.force_defs.for_each([&](ForceHandle, const ForceDef& force) {
@@ -168,7 +168,7 @@ void ActiveBodies::wake_pushed(Real time) {
   for (const auto& [number, group] : sleeping_) {
     const auto woken = std::find_if(group.begin(), group.end(), [&](const Body* body) {
       return (changing || !body->sleep.moving_springs.empty()) &&
-             is_pushed(*body, changing_push(*body, time), body->sleep.push);
+             is_pushed(*body, time_dependent_wrench(*body, time), body->sleep.push);
     });
     if (woken != group.end()) pushed.push_back(*woken);
   }
@@ -196,7 +196,7 @@ void ActiveBodies::put_to_sleep(std::span<const Island> islands, Real start, Rea
     for (Body* body : island.bodies) {
       body->asleep = true;
       body->island = sleeping_groups_;
-      body->sleep.push = changing_push(*body, start);
+      body->sleep.push = time_dependent_wrench(*body, start);
       body->rigid.momentum.setZero();
       body->rigid.angular_momentum.setZero();
     }

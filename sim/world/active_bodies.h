@@ -54,7 +54,7 @@ class ActiveBodies {
  private:
   void rank();
   void watch_springs(std::span<Body* const> group);
-  Wrench changing_push(const Body& body, Real time) const;
+  Wrench time_dependent_wrench(const Body& body, Real time) const;
 
   const WorldState& world_;
   bool is_ranked_ = true, is_current_ = false;

@@ -45,18 +45,18 @@ std::vector<ClothBody> ClothMotion::bodies_near_cloths(Real h) const {
   std::vector<ClothBody> near;
   world_.bodies.for_each([&](BodyHandle handle, const std::unique_ptr<Body>& body) {
     if (body->absent || (!body->def.collides && !holds[handle.index])) return;
-    Obstacle way = swept_obstacle(*body, h);
-    if (!holds[handle.index] && !std::holds_alternative<Plane>(*way.solid.shape) &&
-        !way.swept_bounds().intersects(around))
+    Obstacle obstacle = swept_obstacle(*body, h);
+    if (!holds[handle.index] && !std::holds_alternative<Plane>(*obstacle.solid.shape) &&
+        !obstacle.swept_bounds().intersects(around))
       return;
-    Vec3 velocity = way.velocity, spin = way.angular_velocity;
+    Vec3 velocity = obstacle.velocity, spin = obstacle.angular_velocity;
     if (body->is_awake()) {
       velocity = body->rigid.velocity();
       spin = body->rigid.angular_velocity();
     } else {
-      way.inverse_mass = 0;  // asleep: cloth does not move it until the body wakes
+      obstacle.inverse_mass = 0;  // asleep: cloth does not move it until the body wakes
     }
-    near.emplace_back(way, h, velocity, spin, body->def.surface_velocity);
+    near.emplace_back(obstacle, h, velocity, spin, body->def.surface_velocity);
     near.back().collides = body->def.collides;
   });
   return near;
@@ -76,7 +76,7 @@ void ClothMotion::wake_unpinned(std::span<const ClothBody> near) {
   active_.for_each_asleep([&](Body& body) {
     if (!body.sleep.pins) return;
     const bool is_held = std::any_of(near.begin(), near.end(), [&](const ClothBody& at) {
-      return at.way().body == body.handle.index && at.pin_load();
+      return at.obstacle().body == body.handle.index && at.pin_load();
     });
     if (!is_held) released.push_back(&body);
   });
@@ -87,7 +87,7 @@ void ClothMotion::wake_unpinned(std::span<const ClothBody> near) {
 std::vector<Reaction> ClothMotion::answer(std::span<const ClothBody> near, Real h) {
   std::vector<Reaction> reactions;
   for (const ClothBody& at : near) {
-    Body& body = world_.body_at(at.way().body);
+    Body& body = world_.body_at(at.obstacle().body);
     const bool left = std::exchange(body.on_cloth, at.touched) && !at.touched;
     if (!body.is_dynamic()) continue;
     // It sleeps while the cloth below it is at rest, and wakes when that moves or goes away.

@@ -1,6 +1,6 @@
 /// Collisions of particles with cloth in both directions (physics F6). After both have moved, a particle that
-/// is beyond a triangle, or nearer than its radius, is put back and exchanges an impulse with the triangle's
-/// corners.
+/// is beyond a triangle, or nearer than its radius, is moved back and exchanges an impulse with the
+/// triangle's corners.
 
 #include <algorithm>
 #include <cmath>

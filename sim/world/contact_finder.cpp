@@ -6,7 +6,7 @@
 
 #include <oneapi/tbb/parallel_for.h>
 
-#include "sim/contact/seams.h"
+#include "sim/contact/internal_edges.h"
 #include "sim/contact/solver_choice.h"
 #include "sim/core/parallel_loop.h"
 
@@ -14,25 +14,25 @@ namespace offstage::sim {
 namespace {
 
 /// Distance of contact points in addition to that by the bodies' motion in the interval: at most kMargin [m]
-/// and at most this share of the smaller body.
-constexpr Real kMargin = 2e-3, kMarginShare = 0.05;
-/// Motion in an interval, as a share of the smaller body, above which the contact points at the start do not
-/// predict later contacts. The limit is larger for the fast solver without restitution, which uses the points
-/// only as limits of the approach.
+/// and at most this fraction of the smaller body.
+constexpr Real kMargin = 2e-3, kMarginFraction = 0.05;
+/// Motion in an interval, as a fraction of the smaller body, above which the contact points at the start do
+/// not predict later contacts. The limit is larger for the fast solver without restitution, which uses the
+/// points only as limits of the approach.
 constexpr Real kFar = 0.25, kFarWithoutBounce = 1;
-/// Margin of bodies in the broad phase: a share of their size, plus their motion in this many steps.
+/// Margin of bodies in the broad phase: a fraction of their size, plus their motion in this many steps.
 constexpr Real kRoom = 0.03, kSteps = 2;
-/// Share of the extent: a greater deviation from the chord occurs only for rotations of more than half a
+/// Fraction of the extent: a greater deviation from the chord occurs only for rotations of more than half a
 /// radian.
 constexpr Real kWide = 0.036;
 /// Greatest relative motion of bodies for which their contact points are reused: at most this length [m] and
-/// at most this share of the smaller body. Until then only the distances of the points are updated in each
+/// at most this fraction of the smaller body. Until then only the distances of the points are updated in each
 /// step, to second order.
-constexpr Real kReuse = 1e-4, kReuseShare = 2e-4, kExactReuse = 1e-8;
-/// A body that is hit without restitution by a body of the same mass gets this share of its speed; both then
-/// move together. Impacts are propagated kPassedOn times. The next one would have a sixteenth of the speed;
-/// for less than 7.7 m/s this is within kMargin in a step of 1/240 s.
-constexpr Real kPassedShare = 0.5;
+constexpr Real kReuse = 1e-4, kReuseFraction = 2e-4, kExactReuse = 1e-8;
+/// A body that is hit without restitution by a body of the same mass gets this fraction of its speed; both
+/// then move together. Impacts are propagated kPassedOn times. The next one would have a sixteenth of the
+/// speed; for less than 7.7 m/s this is within kMargin in a step of 1/240 s.
+constexpr Real kPassedFraction = 0.5;
 constexpr uint32_t kPassedOn = 3;
 /// Bodies turn if their rotation moves their surfaces by more than this in an interval [m].
 constexpr Real kTurning = 2e-4;
@@ -45,7 +45,7 @@ Real smaller_extent(const Body& a, const Body& b) {
 /// Box around all positions of a body in its interval.
 Aabb swept_bounds(const Body& body) {
   Aabb box = bounds(body.solid, body.start_pose).merged(bounds(body.solid, body.pose));
-  Real margin = std::min(kMargin, kMarginShare * body.extent);
+  Real margin = std::min(kMargin, kMarginFraction * body.extent);
   if (!std::holds_alternative<Sphere>(body.def.shape)) {
     // The deviation of a point from the chord of its path is at most an eighth of its greatest acceleration.
     // Large rotations use the balls around the start and the end instead.
@@ -82,8 +82,8 @@ void sort_by_rank(std::span<const RankedPair> pairs, std::size_t bodies, std::ve
 }
 
 /// Whether the path is not within the box in the broad phase.
-bool leaves(const Body& body, const Aabb& way) {
-  return body.collides() && !body.swept.contains(way);
+bool leaves(const Body& body, const Aabb& swept_box) {
+  return body.collides() && !body.swept.contains(swept_box);
 }
 
 }  // namespace
@@ -112,7 +112,7 @@ void ContactFinder::forget_all() {
   clear();
 }
 
-void ContactFinder::regroup() {
+void ContactFinder::update_joint_groups() {
   broad_phase_.set_groups(joints_.colliding());
   is_current_ = false;
 }
@@ -124,23 +124,23 @@ void ContactFinder::clear() {
 
 /// Gives the box of a body's path to the broad phase, enlarged by a margin. If repeated in a sub-step
 /// (`again`), the previous box is included.
-void ContactFinder::move(Body& body, Aabb way, bool again) {
+void ContactFinder::move(Body& body, Aabb swept_box, bool again) {
   // Margin for some more steps like this one.
   const Vec3 shift = kSteps * (body.pose.position - body.start_pose.position);
   const Vec3 room = Vec3::Constant(kRoom * body.extent);
-  way.min() += shift.cwiseMin(0) - room;
-  way.max() += shift.cwiseMax(0) + room;
-  if (again) way.extend(body.swept);
-  body.swept = way;
-  broad_phase_.move(body.handle.index, way);
+  swept_box.min() += shift.cwiseMin(0) - room;
+  swept_box.max() += shift.cwiseMax(0) + room;
+  if (again) swept_box.extend(body.swept);
+  body.swept = swept_box;
+  broad_phase_.move(body.handle.index, swept_box);
   is_current_ = false;
 }
 
 /// The same unless the path is within the previous box; returns whether the box was changed.
 bool ContactFinder::move(Body& body, bool again) {
-  const Aabb way = swept_bounds(body);
-  if (!leaves(body, way)) return false;
-  move(body, way, again);
+  const Aabb swept_box = swept_bounds(body);
+  if (!leaves(body, swept_box)) return false;
+  move(body, swept_box, again);
   return true;
 }
 
@@ -156,7 +156,7 @@ void ContactFinder::collect(bool again) {
   ranked.reserve(graph_.size());
   graph_.for_each([&](ContactPair& pair) {
     const Body &a = pair.a(), &b = pair.b();
-    if (joints_.are_apart(a, b)) return;
+    if (joints_.is_collision_disabled(a, b)) return;
     if (a.can_move() || b.can_move())
       ranked.push_back({std::min(a.rank, b.rank), std::max(a.rank, b.rank), &pair});
   });
@@ -164,7 +164,7 @@ void ContactFinder::collect(bool again) {
 }
 
 /// Computes a bound of the speed that an impact in the sub-step can give to each body, propagated from body
-/// to body with decreasing shares.
+/// to body with decreasing fractions.
 void ContactFinder::propagate_impact_speeds(Real h) {
   for (Body* body : active_.awake()) body->impact_speed_bound = 0;
   if (is_exact_) return;  // the exact solver resolves each impact at its own time
@@ -188,20 +188,20 @@ void ContactFinder::propagate_impact_speeds(Real h) {
   }
   for (uint32_t i = 0; i < kPassedOn && fastest * h > kMargin; ++i)
     for (const auto& [a, b, speed] : approaches) {
-      strike(*a, kPassedShare * b->impact_speed_bound);
-      strike(*b, kPassedShare * a->impact_speed_bound);
+      strike(*a, kPassedFraction * b->impact_speed_bound);
+      strike(*b, kPassedFraction * a->impact_speed_bound);
     }
 }
 
 void ContactFinder::find(Real h) {
   const std::span<Body* const> awake = active_.awake();
   is_exact_ = world_.is_exact() || (world_.def.solver == SolverKind::automatic && awake.size() <= kFewBodies);
-  std::vector<Aabb> ways(awake.size());
+  std::vector<Aabb> swept_boxes(awake.size());
   const std::vector<std::size_t> leaving = indices_where(awake.size(), [&](std::size_t i) {
-    ways[i] = swept_bounds(*awake[i]);
-    return leaves(*awake[i], ways[i]);
+    swept_boxes[i] = swept_bounds(*awake[i]);
+    return leaves(*awake[i], swept_boxes[i]);
   });
-  for (const std::size_t i : leaving) move(*awake[i], ways[i], false);
+  for (const std::size_t i : leaving) move(*awake[i], swept_boxes[i], false);
   for (Body* body : active_.kinematic()) move(*body, false);
   collect(false);
   propagate_impact_speeds(h);
@@ -223,7 +223,7 @@ void ContactFinder::find(Real h) {
                         for (std::size_t i = range.begin(); i < range.end(); ++i) find_contacts(i);
                       });
   }
-  remove_seams(pairs_, 0, h);
+  remove_internal_edge_contacts(pairs_, 0, h);
 }
 
 /// Bound of the relative motion of a pair's bodies in the rest of the sub-step, and the motion for which its
@@ -234,23 +234,23 @@ Real ContactFinder::motion_bound(const ContactPair& pair, Real left) const {
 Real ContactFinder::motion_known(const ContactPair& pair) const {
   const Real size = smaller_extent(pair.a(), pair.b());
   const bool bounces = is_exact_ || pair.surface().restitution > 0;
-  return std::max(std::min(kMargin, kMarginShare * size), (bounces ? kFar : kFarWithoutBounce) * size);
+  return std::max(std::min(kMargin, kMarginFraction * size), (bounces ? kFar : kFarWithoutBounce) * size);
 }
 
 void ContactFinder::find_points(ContactPair& pair, Real time, Real h) const {
   const Real left = h - time;
   const Real size = smaller_extent(pair.a(), pair.b());
-  const Real base = std::min(kMargin, kMarginShare * size);
+  const Real base = std::min(kMargin, kMarginFraction * size);
   const Real motion = motion_bound(pair, left), far = motion_known(pair);
   const bool exact = is_exact_;
   // An impact moves a body at most as fast as the body that hits it.
   const Real impact = std::max(pair.a().impact_speed_bound, pair.b().impact_speed_bound) * left;
-  // If no impact of the pair is traced back to any more, only its points keep the bodies apart.
+  // If the pair is not traced back again, only its contact points keep the bodies apart.
   const Real most = pair.toi_exhausted ? std::numeric_limits<Real>::infinity() : far;
   const Real margin = base + std::min(std::max(2 * motion, impact), most);
   // An impact also turns the body.
   const Real turning = pair.turning_speed() * left + (impact > kMargin ? impact : 0);
-  const Real reuse = exact ? kExactReuse : std::min(kReuse, kReuseShare * size);
+  const Real reuse = exact ? kExactReuse : std::min(kReuse, kReuseFraction * size);
   pair.find(pair.a().placed_at(time, h), pair.b().placed_at(time, h), margin, reuse, turning > kTurning);
 
   const bool is_far = motion > far;
@@ -277,8 +277,9 @@ void ContactFinder::choose_event(ContactPair& pair, bool far, Real left) const {
     }
 }
 
-void ContactFinder::remove_seams(std::span<ContactPair* const> pairs, Real time, Real h) const {
-  for (ContactPair* pair : remove_seam_contacts(pairs, time, h))
+void ContactFinder::remove_internal_edge_contacts(std::span<ContactPair* const> pairs, Real time,
+                                                  Real h) const {
+  for (ContactPair* pair : sim::remove_internal_edge_contacts(pairs, time, h))
     choose_event(*pair, motion_bound(*pair, h - time) > motion_known(*pair), h - time);
 }
 
@@ -294,7 +295,7 @@ std::vector<Body*> ContactFinder::wake_touched(FreeMotion& motion, Real start, R
     for (Body* member : active_.wake(*body)) woken.push_back(member);
   std::sort(woken.begin(), woken.end(), [](const Body* a, const Body* b) { return a->rank < b->rank; });
   for (Body* body : woken) body->begin_interval(0);
-  motion.move_some(woken, start, 0, h);
+  motion.move_group(woken, start, 0, h);
   for (Body* body : woken) move(*body, false);
   active_.update();
   return woken;

@@ -26,7 +26,7 @@ class ContactFinder {
   void forget(const Body& body);
   void forget_all();
   /// To be called after the groups of joints have changed.
-  void regroup();
+  void update_joint_groups();
 
   /// Finds the pairs of a sub-step of length h and their contact points, after the bodies have moved freely.
   void find(Real h);
@@ -50,8 +50,8 @@ class ContactFinder {
   /// Finds the points where a pair's bodies touch at their interval's start, or may touch in the rest of the
   /// sub-step.
   void find_points(ContactPair& pair, Real time, Real h) const;
-  /// Removes the contacts at seams of pairs that were found at the same time.
-  void remove_seams(std::span<ContactPair* const> pairs, Real time, Real h) const;
+  /// Removes the contacts at internal edges of pairs that were found at the same time.
+  void remove_internal_edge_contacts(std::span<ContactPair* const> pairs, Real time, Real h) const;
 
   /// Whether each collision of this sub-step is resolved at its own time: always by the exact solvers, and by
   /// the automatic choice while few bodies move.
@@ -65,7 +65,7 @@ class ContactFinder {
   Real motion_bound(const ContactPair& pair, Real left) const;
   Real motion_known(const ContactPair& pair) const;
   void choose_event(ContactPair& pair, bool far, Real left) const;
-  void move(Body& body, Aabb way, bool again);
+  void move(Body& body, Aabb swept_box, bool again);
   bool move(Body& body, bool again);
   void collect(bool again);
 

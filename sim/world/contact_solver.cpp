@@ -14,8 +14,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Share of the kinetic energy of an island with joints that a sub-step may add. A greater excess is removed;
-/// it counts as a fall-back if it is larger than the usual error of the velocity terms.
+/// Fraction of the kinetic energy of an island with joints that a sub-step may add. A greater excess is
+/// removed; it counts as a fall-back if it is larger than the usual error of the velocity terms.
 constexpr Real kAddedByJoints = 1e-3, kUsualExcess = 0.02;
 
 /// The motion by contacts and limits satisfies the joints only approximately, so it is projected. If links
@@ -38,10 +38,11 @@ JointFigures settle_joints(const Island& island, Real end, Real most_energy) {
 }
 
 /// The most kinetic energy that an island may have after its contacts are solved in an interval, which is a
-/// share of the sub-step: contacts and joints dissipate energy, except for the error of their velocity terms.
-Real most_energy(const Island& island, Real share) {
+/// fraction of the sub-step: contacts and joints dissipate energy, except for the error of their velocity
+/// terms.
+Real most_energy(const Island& island, Real fraction) {
   if (island.articulations.empty() || can_do_work(island)) return std::numeric_limits<Real>::infinity();
-  return (1 + kAddedByJoints * share) * kinetic_energy(island);
+  return (1 + kAddedByJoints * fraction) * kinetic_energy(island);
 }
 
 }  // namespace
@@ -70,7 +71,7 @@ void ContactSolver::solve(std::span<Island* const> group, const ContactInterval&
       continue;
     }
     SolverChoice& choice = choices_[island->bodies.front()->handle.index];
-    if (world_.def.solver == SolverKind::automatic && !choice.is_exact_worth(*island, patience_)) {
+    if (world_.def.solver == SolverKind::automatic && !choice.should_try_exact(*island, patience_)) {
       fast.push_back(island);
       continue;
     }
@@ -99,8 +100,8 @@ void ContactSolver::solve(std::span<Island* const> group, const ContactInterval&
     const ExactContacts::Outcome& outcome = outcomes[i];
     report.solvers.exact.add(outcome.work);
     report.solvers.lcp.add(outcome.lcp);
-    add_rough(outcome.rough, report);
-    choice->learn(*island, interval.duration, outcome.is_applied, patience_);
+    record_rough_contact(outcome.rough, report);
+    choice->record_attempt(*island, interval.duration, outcome.is_applied, patience_);
     if (outcome.is_applied) continue;
     report.solvers.exact.over_budget += outcome.work.fallbacks == 0;
     fast.push_back(island);
@@ -111,7 +112,7 @@ void ContactSolver::solve(std::span<Island* const> group, const ContactInterval&
     if (!group[i]->articulations.empty()) report.joints.add(settle_joints(*group[i], interval.end, most[i]));
 }
 
-void add_rough(const ContactPair* pair, StepReport& report) {
+void record_rough_contact(const ContactPair* pair, StepReport& report) {
   if (pair) report.rough_contacts.push_back({pair->a().handle, pair->b().handle});
 }
 

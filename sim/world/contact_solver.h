@@ -30,6 +30,6 @@ class ContactSolver {
 };
 
 /// Records a pair whose contacts a solver could not solve to its accuracy; null: none.
-void add_rough(const ContactPair* pair, StepReport& report);
+void record_rough_contact(const ContactPair* pair, StepReport& report);
 
 }  // namespace offstage::sim

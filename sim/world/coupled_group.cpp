@@ -12,10 +12,10 @@ namespace {
 /// fastest swinging in a piece [rad], and greatest number of pieces.
 constexpr Real kTurn = 0.12, kSwing = 1, kSpin = 1, kMostPieces = 64;
 /// A piece is halved if a joint error exceeds kGap [m], [rad], or if the change of the kinetic energy differs
-/// from the work of the forces by more than these shares of the kinetic energy, of the work, and of the work
-/// that the forces would do on free bodies at rest. Halvings are bounded in depth and, per sub-step, in
+/// from the work of the forces by more than these fractions of the kinetic energy, of the work, and of the
+/// work that the forces would do on free bodies at rest. Halvings are bounded in depth and, per sub-step, in
 /// number.
-constexpr Real kGap = 1e-4, kEnergyShare = 1e-4, kWorkShare = 1e-2;
+constexpr Real kGap = 1e-4, kEnergyFraction = 1e-4, kWorkFraction = 1e-2;
 constexpr int kMostHalvings = 128, kDeepestHalving = 8;
 
 }  // namespace
@@ -333,9 +333,9 @@ void CoupledGroup::advance(const Integrator& integrator, Real t, Real h, int dep
   }
   const Real done = h / 2 * (before.power + after.power);
   const Real allowed =
-      kEnergyShare * before.kinetic + kWorkShare * h *
-                                          (std::max(std::abs(before.power), std::abs(after.power)) +
-                                           h * std::max(before.from_rest, after.from_rest));
+      kEnergyFraction * before.kinetic + kWorkFraction * h *
+                                             (std::max(std::abs(before.power), std::abs(after.power)) +
+                                              h * std::max(before.from_rest, after.from_rest));
   const bool is_finite = after.kinetic <= kInfinity;
   const bool follows =
       gap <= kGap && (!keeps_energy || std::abs(after.kinetic - before.kinetic - done) <= allowed);
@@ -370,8 +370,8 @@ void CoupledGroup::limit_energy(Real most) {
   if (!(excess > 0)) return;
   Real internal = 0;
   for (const Jointed& j : articulations_) internal += internal_energy(*j.articulation);
-  const Real share = std::sqrt(std::max(0.0, 1 - excess / internal));
-  for (const Jointed& j : articulations_) slow_down(*j.articulation, share);
+  const Real fraction = std::sqrt(std::max(0.0, 1 - excess / internal));
+  for (const Jointed& j : articulations_) slow_down(*j.articulation, fraction);
   load(x_, p_);
   ++joint_figures_.unsolved;
 }

@@ -6,7 +6,7 @@
 
 namespace offstage::sim {
 
-/// How a spring's end depends on the state of its object, and how a force there changes that object's rates.
+/// Derivatives of a spring's end by the state of its object, and of that object's rates by a force there.
 struct CoupledGroup::EndDerivative {
   using Matrix3X = Eigen::Matrix<Real, 3, Eigen::Dynamic, 0, 3, 13>;
   using MatrixX3 = Eigen::Matrix<Real, Eigen::Dynamic, 3, 0, 13, 3>;

@@ -99,7 +99,7 @@ bool CoupledSystem::holds(const ParticleSystem& system) const {
 }
 
 void CoupledSystem::step(const Integrator& integrator, Real t, Real h, Real tolerance) {
-  fly_lone(integrator, t, h, tolerance);
+  fly_uncoupled(integrator, t, h, tolerance);
   std::vector<IntegratorReport> reports(networks_.size());
   tbb::parallel_for(std::size_t{0}, networks_.size(), [&](std::size_t i) {
     IntegratorWorkspace work{.tolerance = tolerance};
@@ -110,7 +110,7 @@ void CoupledSystem::step(const Integrator& integrator, Real t, Real h, Real tole
   for (const IntegratorReport& r : reports) report_.add(r);
 }
 
-void CoupledSystem::fly_lone(const Integrator& integrator, Real t, Real h, Real tolerance) {
+void CoupledSystem::fly_uncoupled(const Integrator& integrator, Real t, Real h, Real tolerance) {
   const auto fly_range = [&](std::size_t begin, std::size_t end, IntegratorWorkspace& work) {
     for (std::size_t i = begin; i < end; ++i) fly(lone_[i]->rigid, forces_, integrator, t, h, work);
   };

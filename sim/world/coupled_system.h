@@ -30,7 +30,7 @@ class CoupledSystem {
 
   /// Stores the state of all members.
   void save();
-  /// Restores the state of bodies, and of what is connected to them, at the last save().
+  /// Restores the state of bodies, and of the objects connected to them, at the last save().
   void restore(std::span<Body* const> bodies);
   void restore();
 
@@ -42,7 +42,7 @@ class CoupledSystem {
  private:
   void resolve(const WorldState& world, std::span<const ForceDef* const> forces);
   void gather(WorldState& world, std::span<Body* const> bodies, bool all_systems);
-  void fly_lone(const Integrator& integrator, Real t, Real h, Real tolerance);
+  void fly_uncoupled(const Integrator& integrator, Real t, Real h, Real tolerance);
 
   bool begins_substep_;
   std::vector<ActiveForce> active_;

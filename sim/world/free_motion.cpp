@@ -19,7 +19,7 @@ void FreeMotion::move_all(std::span<Body* const> awake, Real start, Real h) {
   for_each_index(awake.size(), [&](std::size_t i) { awake[i]->pose = awake[i]->rigid.pose(); });
 }
 
-CoupledSystem& FreeMotion::move_some(std::span<Body* const> group, Real start, Real from, Real duration) {
+CoupledSystem& FreeMotion::move_group(std::span<Body* const> group, Real start, Real from, Real duration) {
   systems_.push_back(std::make_unique<CoupledSystem>(world_, group, world_.active_forces()));
   CoupledSystem& system = *systems_.back();
   system.save();

@@ -18,9 +18,9 @@ class FreeMotion {
   void begin_substep() { systems_.clear(); }
   /// Moves the bodies, which are all that are awake, and the particles held by springs through a sub-step.
   void move_all(std::span<Body* const> awake, Real start, Real h);
-  /// Moves some bodies, with what is connected to them, for `duration` from `from` on, which is a time since
-  /// the sub-step's start.
-  CoupledSystem& move_some(std::span<Body* const> group, Real start, Real from, Real duration);
+  /// Moves some bodies, with the objects connected to them, for `duration` from `from` on, which is a time
+  /// since the sub-step's start.
+  CoupledSystem& move_group(std::span<Body* const> group, Real start, Real from, Real duration);
   /// The system of all bodies in this sub-step.
   CoupledSystem& whole() const { return *systems_.front(); }
   /// The system that was used last.

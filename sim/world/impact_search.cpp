@@ -19,8 +19,8 @@ constexpr Real kImpactTurn = 0.5, kMostTurns = 512;
 constexpr Real kFastSpin = 3;
 
 /// A path that deviates from its chord by more than kStraight [m] is divided into at most kMostArcs pieces. A
-/// force counts as steady if the position at the end agrees with the mean velocity within the share kSteady
-/// of the change of velocity.
+/// force counts as steady if the position at the end agrees with the mean velocity within the fraction
+/// kSteady of the change of velocity.
 constexpr Real kStraight = 1e-5, kMostArcs = 8, kSteady = 0.05;
 Real spin(const Body& body) {
   return body.is_awake() ? body.start_twist.angular_velocity.norm() : 0;
@@ -44,7 +44,7 @@ uint32_t pieces_of(Real turn) {
 }
 
 /// Change of a body's velocity in its interval if it is due to a steady force; zero if the body was stopped
-/// on the way, which is seen from its position at the end [m/s].
+/// within the interval, which is seen from its position at the end [m/s].
 Vec3 bend(const Body& body, Real h) {
   if (!body.is_awake()) return Vec3::Zero();
   const Vec3 change = body.rigid.velocity() - body.start_twist.velocity;
@@ -64,17 +64,17 @@ Pose on_arc(const Body& body, Real time, Real h) {
 /// Time at which two bodies touch after conservative advancement has ended within its tolerance: the rest of
 /// the gap closes at the speed of the nearest points. Otherwise bounces would be early by the tolerance, and
 /// the errors would add up.
-Real touching_share(const Impact& impact, const PosePath& a, const PosePath& b) {
+Real touching_fraction(const Impact& impact, const PosePath& a, const PosePath& b) {
   const Separation& s = impact.separation;
-  if (impact.share == 0 || !(s.distance > 0)) return impact.share;
-  const Pose pose = a.at(impact.share);
+  if (impact.fraction == 0 || !(s.distance > 0)) return impact.fraction;
+  const Pose pose = a.at(impact.fraction);
   const auto velocity = [&](const PosePath& path, const Vec3& local) {
-    const Vec3 arm = pose.point_to_world(local) - path.at(impact.share).position;
-    return Vec3(path.velocity() + path.angular_velocity(impact.share).cross(arm));
+    const Vec3 arm = pose.point_to_world(local) - path.at(impact.fraction).position;
+    return Vec3(path.velocity() + path.angular_velocity(impact.fraction).cross(arm));
   };
   const Real closing = (velocity(b, s.on_b) - velocity(a, s.on_a)).dot(pose.vector_to_world(s.normal));
-  if (!(closing > 0)) return impact.share;
-  return impact.share + std::min(s.distance / closing, 1 - impact.share);
+  if (!(closing > 0)) return impact.fraction;
+  return impact.fraction + std::min(s.distance / closing, 1 - impact.fraction);
 }
 
 /// A body in free rotation through its interval.
@@ -86,13 +86,13 @@ class Tumbling {
       : body_(body), def_(def), spins_fast_(spins_fast), h_(h), turning_(body.at_start()), now_(body.from) {}
 
   /// Pose at a time of the sub-step of length h, not before the time of the last call.
-  Pose go_on(Real time) {
+  Pose continue_from(Real time) {
     if (!body_.is_awake()) return body_.placed_at(time, h_);
     fly(turning_, {def_.gravity, {}}, integrator(def_.integrator), now_, time - now_, work_);
     now_ = time;
     if (!spins_fast_) {
-      const Real share = (time - body_.from) / (h_ - body_.from);
-      turning_.position = body_.start.position + share * (body_.rigid.position - body_.start.position);
+      const Real fraction = (time - body_.from) / (h_ - body_.from);
+      turning_.position = body_.start.position + fraction * (body_.rigid.position - body_.start.position);
     }
     return turning_.pose();
   }
@@ -118,20 +118,20 @@ std::optional<Real> tumbling_impact_time(const ContactPair& pair, const WorldDef
                                          Real turn, TestCounts& tests) {
   const bool spins_fast = turn > kFastSpin;
   Tumbling body_a(pair.a(), def, spins_fast, h), body_b(pair.b(), def, spins_fast, h);
-  Pose begin_a = body_a.go_on(from), begin_b = body_b.go_on(from);
+  Pose begin_a = body_a.continue_from(from), begin_b = body_b.continue_from(from);
   const uint32_t pieces = pieces_of(turn);
   // Bodies that touch now have just met.
   const bool touches = pair.separation() <= kTouching;
   for (uint32_t i = 0; i < pieces; ++i) {
     const Real begin = from + (h - from) * i / pieces, end = from + (h - from) * (i + 1) / pieces;
-    const PosePath path_a(begin_a, body_a.go_on(end)), path_b(begin_b, body_b.go_on(end));
+    const PosePath path_a(begin_a, body_a.continue_from(end)), path_b(begin_b, body_b.continue_from(end));
     begin_a = path_a.end();
     begin_b = path_b.end();
     const MovingShape a{pair.impact_shape_a(), path_a, &tests}, b{pair.impact_shape_b(), path_b};
     std::optional<Impact> impact;
-    const bool met = (i == 0 && touches) || ((impact = first_impact(a, b, def)) && impact->share == 0);
+    const bool met = (i == 0 && touches) || ((impact = first_impact(a, b, def)) && impact->fraction == 0);
     if (met) impact = time_of_next_impact(a, b, kTouching / 2, def.collision_speed * (end - begin));
-    if (impact) return begin + impact->share * (end - begin);
+    if (impact) return begin + impact->fraction * (end - begin);
     // The effect of the contact has ended by then, or the contact must be found again.
     if (spins_fast && touches) return end;
   }
@@ -194,12 +194,12 @@ std::optional<Real> impact_time(const ContactPair& pair, const WorldDef& def, Re
         path_b(on_arc(b, begin, h), on_arc(b, end, h));
     const auto impact =
         first_impact({pair.impact_shape_a(), path_a, &tests}, {pair.impact_shape_b(), path_b}, def);
-    if (impact) return begin + touching_share(*impact, path_a, path_b) * (end - begin);
+    if (impact) return begin + touching_fraction(*impact, path_a, path_b) * (end - begin);
   }
   return std::nullopt;
 }
 
-bool tumbles(const ContactPair& pair, Real h) {
+bool turns_fast(const ContactPair& pair, Real h) {
   return turn_of(pair) * h > kImpactTurn;
 }
 

@@ -8,7 +8,7 @@
 
 namespace offstage::sim {
 
-/// Intervals shorter than this share of the sub-step are skipped.
+/// Intervals shorter than this fraction of the sub-step are skipped.
 inline constexpr Real kInstant = 1e-9;
 
 /// Time at which the bodies of a pair will touch on their current paths in a sub-step of length h, since its
@@ -16,7 +16,7 @@ inline constexpr Real kInstant = 1e-9;
 std::optional<Real> impact_time(const ContactPair& pair, const WorldDef& def, Real h, TestCounts& tests);
 
 /// Whether a body of the pair turns so fast in the time h that its rotation is divided into pieces.
-bool tumbles(const ContactPair& pair, Real h);
+bool turns_fast(const ContactPair& pair, Real h);
 /// Number of pieces of the rotation.
 uint32_t search_pieces(const ContactPair& pair, Real h);
 

@@ -21,7 +21,7 @@ constexpr std::size_t kImpactWork = 2000, kExactImpactWork = 80'000;
 /// Work of an impact for each body and contact point that is moved again, and for each near pair that is not
 /// of two spheres; work of a search for the time of impact of a pair for each piece of its path [us].
 constexpr std::size_t kPointWork = 1, kPairWork = 3, kLookWork = 3;
-/// After this multiple of the limit no more pairs are traced back to in the sub-step.
+/// After this multiple of the limit, no pair is traced back in the rest of the sub-step.
 constexpr std::size_t kLastWork = 3;
 /// If the contact point of a body moves around its rim by more than kRimTurn [rad] in the sub-step, the
 /// sub-step is divided for that body into at most kMostRimPieces pieces, and its contacts are updated after
@@ -125,7 +125,7 @@ void ImpactStage::resolve() {
       }
       work += collide(island, event.time);
     } else {
-      go_on(island, event.time);
+      continue_from(island, event.time);
     }
     // The speculative contacts of these bodies are no longer valid.
     const auto involved = [&](const ContactPair& p) { return is_in(p.a(), island) || is_in(p.b(), island); };
@@ -139,7 +139,7 @@ void ImpactStage::resolve() {
 void ImpactStage::limit(ContactPair& pair, std::size_t count, std::size_t work) {
   const std::size_t most = kMaxImpacts + kImpactsPerBody * active_.awake().size();
   const std::size_t most_work = world_.is_exact() ? kExactImpactWork : kImpactWork;
-  if (++pair.impacts <= (tumbles(pair, h_) ? kMaxOfTumblingPair : kMaxImpactsOfPair) && count < most &&
+  if (++pair.impacts <= (turns_fast(pair, h_) ? kMaxOfTumblingPair : kMaxImpactsOfPair) && count < most &&
       work <= kLastWork * most_work)
     return;
   pair.toi_exhausted = true;
@@ -150,9 +150,9 @@ void ImpactStage::limit(ContactPair& pair, std::size_t count, std::size_t work) 
 /// Returns the number of the island.
 uint32_t ImpactStage::gather(const ContactPair& pair, Real time) {
   const uint32_t island = pair.a().is_awake() ? pair.a().island : pair.b().island;
-  bring_to(islands_[island], time);
+  trace_back(islands_[island], time);
   if (pair.a().is_awake() && pair.b().is_awake() && pair.b().island != island) {
-    bring_to(islands_[pair.b().island], time);
+    trace_back(islands_[pair.b().island], time);
     join(island, pair.b().island);
   }
   return island;
@@ -168,7 +168,7 @@ void ImpactStage::join_pending(uint32_t number, Real time) {
       const Body &a = impact.pair->a(), &b = impact.pair->b();
       if (!a.is_awake() || !b.is_awake() || (a.island == number) == (b.island == number)) continue;
       const uint32_t other = a.island == number ? b.island : a.island;
-      bring_to(islands_[other], time);
+      trace_back(islands_[other], time);
       join(number, other);
       grown = true;
     }
@@ -187,10 +187,10 @@ void ImpactStage::suppress_restitution(uint32_t island) {
 }
 
 /// Moves an island back to a time, with the contact forces until then.
-void ImpactStage::bring_to(Island& island, Real time) {
+void ImpactStage::trace_back(Island& island, Real time) {
   if (island.from >= time) return;
   island.motion->restore(island.bodies);
-  motion_.move_some(island.bodies, start_, island.from, time - island.from);
+  motion_.move_group(island.bodies, start_, island.from, time - island.from);
   solver_.solve(island,
                 {.duration = time - island.from, .end = start_ + time, .substep = h_, .is_whole = false},
                 report_);
@@ -235,7 +235,7 @@ std::size_t ImpactStage::collide(uint32_t number, Real time) {
       const Body& other = has_a ? pair.b() : pair.a();
       if (count == 2 || !other.is_awake() || pair.separation() > kTouching) continue;
       const uint32_t joined = other.island;
-      bring_to(islands_[joined], time);
+      trace_back(islands_[joined], time);
       join(number, joined);
       grown = true;
     }
@@ -249,22 +249,22 @@ std::size_t ImpactStage::collide(uint32_t number, Real time) {
     islands_[number].pairs.push_back(&pair);
   }
   Island& island = islands_[number];
-  contacts_.remove_seams(island.pairs, time, h_);
+  contacts_.remove_internal_edge_contacts(island.pairs, time, h_);
   const CollisionSettings settings{start_ + time, kCluster, world_.def.collision_speed, world_.def.impact,
                                    contacts_.is_exact()};
   const CollisionOutcome outcome = resolve_collisions(island, settings);
   report_.impacts.collisions += outcome.bounces;
   report_.solvers.impacts.add(outcome.work);
-  add_rough(outcome.rough, report_);
+  record_rough_contact(outcome.rough, report_);
   for (Body* body : island.bodies) body->rigid.set_state(body->start);
-  if (time < h_ * (1 - kInstant)) go_on(number, time);
+  if (time < h_ * (1 - kInstant)) continue_from(number, time);
   return work + static_cast<std::size_t>(outcome.cost / 1000);
 }
 
 /// Continues the motion of an island from an impact to the end of the sub-step. Its velocities have changed,
 /// so other bodies may be in its way and other contacts limit its motion. If so, they join, and all of them
 /// start again.
-void ImpactStage::go_on(uint32_t number, Real time) {
+void ImpactStage::continue_from(uint32_t number, Real time) {
   std::size_t bodies = 0;
   int same = 0;  // passes since the last body joined
   for (bool joined = true; joined; ++same) {
@@ -275,7 +275,7 @@ void ImpactStage::go_on(uint32_t number, Real time) {
       return;
     }
     for (Body* body : islands_[number].bodies) body->rigid.set_state(body->start);
-    islands_[number].motion = &motion_.move_some(islands_[number].bodies, start_, time, h_ - time);
+    islands_[number].motion = &motion_.move_group(islands_[number].bodies, start_, time, h_ - time);
     find_pairs_again(number);
     joined = join_next(number, time);
     if (joined) continue;
@@ -303,18 +303,18 @@ bool ImpactStage::join_next(uint32_t number, Real time) {
       if (!pair.manifolds().empty()) islands_[number].pairs.push_back(&pair);
     } else if (!pair.needs_toi && closes(pair, h_ - time)) {
       const uint32_t next = other.island;
-      bring_to(islands_[next], time);
+      trace_back(islands_[next], time);
       join(number, next);
       joined = true;
     }
   }
-  if (!joined) contacts_.remove_seams(islands_[number].pairs, time, h_);
+  if (!joined) contacts_.remove_internal_edge_contacts(islands_[number].pairs, time, h_);
   return joined;
 }
 
 /// Merges the islands into which an island has been pushed by its contact forces since `time`, and finds the
-/// contacts that it has not looked for because they were too far away. Returns whether there are any; all
-/// bodies must then be moved again.
+/// contacts that were too far away for the first search. Returns whether there are any; all bodies must then
+/// be moved again.
 bool ImpactStage::join_overtaken(uint32_t number, Real time) {
   const std::span<ContactPair* const> pairs = contacts_.pairs();
   for (Body* body : islands_[number].bodies)
@@ -337,15 +337,15 @@ bool ImpactStage::join_overtaken(uint32_t number, Real time) {
       continue;
     }
     const uint32_t next = other.island;
-    bring_to(islands_[next], time);
+    trace_back(islands_[next], time);
     join(number, next);
     joined = true;
   }
   if (joined || new_inside.empty()) return joined;
-  // Points at seams do not limit the motion. They would be found and removed again and again.
+  // Points at internal edges do not limit the motion. They would be found and removed again and again.
   std::vector<ContactPair*> inside = islands_[number].pairs;
   inside.insert(inside.end(), new_inside.begin(), new_inside.end());
-  contacts_.remove_seams(inside, time, h_);
+  contacts_.remove_internal_edge_contacts(inside, time, h_);
   return std::any_of(new_inside.begin(), new_inside.end(),
                      [](const ContactPair* pair) { return !pair->manifolds().empty() && !pair->needs_toi; });
 }
@@ -385,7 +385,7 @@ void ImpactStage::find_pairs_again(uint32_t number) {
     contacts_.find_points(*pair, std::max(pair->a().from, pair->b().from), h_);
     near.push_back(pair);
   }
-  contacts_.remove_seams(near, islands_[number].from, h_);
+  contacts_.remove_internal_edge_contacts(near, islands_[number].from, h_);
   const std::vector<Body*> woken = contacts_.wake_touched(motion_, start_, h_);
   if (woken.empty()) return;
   const auto added = static_cast<uint32_t>(islands_.size());

@@ -46,12 +46,12 @@ class ImpactStage {
   void add_rim_updates();
   uint32_t gather(const ContactPair& pair, Real time);
   void limit(ContactPair& pair, std::size_t count, std::size_t work);
-  void bring_to(Island& island, Real time);
+  void trace_back(Island& island, Real time);
   void join(uint32_t into, uint32_t island);
   void join_pending(uint32_t number, Real time);
   void suppress_restitution(uint32_t island);
   std::size_t collide(uint32_t number, Real time);
-  void go_on(uint32_t number, Real time);
+  void continue_from(uint32_t number, Real time);
   bool join_next(uint32_t number, Real time);
   bool join_overtaken(uint32_t number, Real time);
   bool closes(const ContactPair& pair, Real left) const;

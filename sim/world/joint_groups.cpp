@@ -165,7 +165,7 @@ bool is_driven(const Island& island, Real time) {
   });
 }
 
-bool JointGroups::are_apart(const Body& a, const Body& b) const {
+bool JointGroups::is_collision_disabled(const Body& a, const Body& b) const {
   return std::binary_search(apart_.begin(), apart_.end(),
                             std::pair<uint32_t, uint32_t>(std::minmax(a.handle.index, b.handle.index)));
 }

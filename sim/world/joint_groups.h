@@ -23,7 +23,7 @@ class JointGroups {
   /// are adjacent.
   const std::vector<std::vector<uint32_t>>& colliding() const { return colliding_; }
   /// Whether two bodies do not collide with each other because of a joint.
-  bool are_apart(const Body& a, const Body& b) const;
+  bool is_collision_disabled(const Body& a, const Body& b) const;
   /// Null for a body without joints.
   Articulation* articulation_of(uint32_t slot) const;
   /// By slot.

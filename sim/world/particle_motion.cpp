@@ -15,7 +15,7 @@ void ParticleMotion::begin_prewarm(bool is_first) {
 void ParticleMotion::end_prewarm(bool is_last) {
   if (is_last) {
     world_.systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {
-      if (!waits(handle)) system.admit_newborn(world_.forces(system));
+      if (!waits(handle)) system.admit_new_particles(world_.forces(system));
     });
     waiting_.clear();
   }

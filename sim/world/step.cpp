@@ -137,8 +137,8 @@ StepReport World::Impl::prewarm(Real from, Real to, const BeforeSubStep& before)
   const CoupledSystem still(*this, std::span<Body* const>{});
   report.substeps = from < to ? substep_count(to - from, def.max_step) : 0;
   for (uint32_t i = 0; i < report.substeps; ++i) {
-    const Real start = now, share = static_cast<Real>(i + 1) / static_cast<Real>(report.substeps);
-    const Real end = i + 1 < report.substeps ? from + share * (to - from) : to;
+    const Real start = now, fraction = static_cast<Real>(i + 1) / static_cast<Real>(report.substeps);
+    const Real end = i + 1 < report.substeps ? from + fraction * (to - from) : to;
     if (before) before(start, end);
     begin_kinematic(start, end);
     step_particles(start, end - start, still, report);
@@ -150,7 +150,7 @@ StepReport World::Impl::prewarm(Real from, Real to, const BeforeSubStep& before)
 }
 
 void World::Impl::update_joints() {
-  if (joint_groups.update()) contacts.regroup();
+  if (joint_groups.update()) contacts.update_joint_groups();
 }
 
 /// Begins a sub-step for every moving body; kinematic bodies are moved to its end.
@@ -200,7 +200,7 @@ void World::Impl::explode(Real start, Real end) {
     });
     cloths.for_each([&](ClothHandle handle, const std::unique_ptr<Cloth>& cloth) {
       if (!def_.acts_on(handle)) return;
-      // Each point gets its share of the impulse on the whole cloth, by mass.
+      // Each point gets its fraction of the impulse on the whole cloth, by mass.
       const Real total = std::accumulate(cloth->masses.begin(), cloth->masses.end(), 0.0);
       for (std::size_t i = 0; i < cloth->points.size(); ++i)
         cloth->velocities[i] += impulse(explosion, cloth->points[i]) / total;

@@ -498,7 +498,7 @@ std::vector<BodyOverlap> World::overlaps(Real least) const {
   for (const IndexPair& pair : boxes.pairs()) {
     Body* a = impl_->bodies[impl_->bodies.at_slot(pair.a)].get();
     Body* b = impl_->bodies[impl_->bodies.at_slot(pair.b)].get();
-    if (impl_->joint_groups.are_apart(*a, *b)) continue;
+    if (impl_->joint_groups.is_collision_disabled(*a, *b)) continue;
     if (a->collision_shape().is_plane()) std::swap(a, b);
     const Pose a_from_b{a->pose.point_to_body(b->pose.position),
                         a->pose.orientation.conjugate() * b->pose.orientation};

@@ -1,6 +1,7 @@
 #pragma once
 /// Implementation of the World: its objects, and the stages of a sub-step (docs/step.md). Each stage is a
-/// class that keeps what it remembers from sub-step to sub-step; step.cpp calls one after the other.
+/// class with the data that it keeps from sub-step to sub-step; step.cpp calls the stages one after the
+/// other.
 
 #include <vector>
 

@@ -100,8 +100,8 @@ Real Motor::target(Real time) const {
       targets.size(), [&](std::size_t k) { return targets[k].time; }, time);
   const Key &from = targets[i], &to = targets[i + 1];
   if (smooth && from.interpolation == Interpolation::monotone) {
-    const Real share = (time - from.time) / (to.time - from.time);
-    return from.target + share * share * (3 - 2 * share) * (to.target - from.target);
+    const Real fraction = (time - from.time) / (to.time - from.time);
+    return from.target + fraction * fraction * (3 - 2 * fraction) * (to.target - from.target);
   }
   return sample_segment<1>(targets.size(), key, false, i, time).value[0];
 }

@@ -1,6 +1,6 @@
 #pragma once
-/// The objects of a world. The stages of a sub-step share them; what a stage itself remembers from sub-step
-/// to sub-step is in its own class.
+/// The objects of a world. The stages of a sub-step share them; data that a single stage keeps from sub-step
+/// to sub-step is in the class of that stage.
 
 #include <memory>
 #include <vector>

@@ -21,7 +21,7 @@ namespace {
 
 constexpr uint32_t kSpheres = 100'000;
 
-/// The spheres and how they move: to and fro by up to a centimetre and a half a step.
+/// The spheres and their motion: back and forth by up to 1.5 cm per step.
 class Crowd {
  public:
   /// `partners` is the mean number of spheres whose boxes one sphere's box meets.

@@ -1,5 +1,5 @@
-/// Births per second: an emitter of a million particles per second with every parameter drawn, on each
-/// surface, and what is born from particles. The world does nothing but take them in.
+/// Particles created per second: by an emitter of a million particles per second with random parameters on
+/// each surface, and by trails. The world only stores them.
 
 #include <benchmark/benchmark.h>
 
@@ -11,14 +11,14 @@ namespace {
 
 constexpr Real kEmitterStep = 1.0 / 240;
 
-/// A million births a second, one by one (range 1: 0) or in a burst each sub-step (1), from a kind of surface
-/// (range 0).
-void births(benchmark::State& state) {
+/// A million particles a second, one by one (range 1: 0) or in a burst each sub-step (1), from a kind of
+/// surface (range 0).
+void emission(benchmark::State& state) {
   const auto kind = static_cast<SurfaceKind>(state.range(0));
   const sim::TriangleMesh tetrahedron{{{0, 0, 0}, {9, 0, 0}, {0, 9, 0}, {0, 0, 9}},
                                       {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
   const bool single = state.range(1) == 0;
-  uint64_t born = 0;
+  uint64_t created = 0;
   for (auto _ : state) {
     state.PauseTiming();
     sim::World world;
@@ -37,14 +37,15 @@ void births(benchmark::State& state) {
         system);
     state.ResumeTiming();
     for (int i = 0; i < 120; ++i) emitter.emit(world, i * kEmitterStep, (i + 1) * kEmitterStep);
-    born += emitter.report().released;
+    created += emitter.report().released;
   }
-  state.counters["births/s"] = benchmark::Counter(static_cast<double>(born), benchmark::Counter::kIsRate);
+  state.counters["particles/s"] =
+      benchmark::Counter(static_cast<double>(created), benchmark::Counter::kIsRate);
 }
 
 /// Ten thousand stars that leave a hundred particles a second each.
 void trails(benchmark::State& state) {
-  uint64_t born = 0;
+  uint64_t created = 0;
   for (auto _ : state) {
     state.PauseTiming();
     sim::World world;
@@ -57,12 +58,13 @@ void trails(benchmark::State& state) {
     world.step(kEmitterStep, [&](Real start, Real end) { trail.emit(world, start, end); });
     state.ResumeTiming();
     for (int i = 1; i < 60; ++i) trail.emit(world, kEmitterStep, 2 * kEmitterStep);
-    born += trail.report().released;
+    created += trail.report().released;
   }
-  state.counters["births/s"] = benchmark::Counter(static_cast<double>(born), benchmark::Counter::kIsRate);
+  state.counters["particles/s"] =
+      benchmark::Counter(static_cast<double>(created), benchmark::Counter::kIsRate);
 }
 
-BENCHMARK(births)
+BENCHMARK(emission)
     ->ArgNames({"surface", "burst"})
     ->ArgsProduct({{0, 1, 2, 3}, {0, 1}})
     ->Unit(benchmark::kMillisecond);

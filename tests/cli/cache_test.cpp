@@ -36,7 +36,7 @@ TEST_F(Caches, AreListedAndVerified) {
   EXPECT_GT(list[0]["bytes"], 1000);
   const Outcome whole = cache("verify caches/one");
   EXPECT_EQ(whole.code, 0);
-  EXPECT_EQ(whole.out, "caches/one: 12 frames, all whole\n");
+  EXPECT_EQ(whole.out, "caches/one: 12 frames, all valid\n");
 }
 
 TEST_F(Caches, DamageIsFoundInEachFrame) {

@@ -131,7 +131,7 @@ TEST(Cloth, KeepsItsStretchLimitExactly) {
   }
 }
 
-TEST(Cloth, RefusesWhatIsWrongByNameAndPlace) {
+TEST(Cloth, RefusesErrorsByNameAndPlace) {
   ClothDef def = thread(2, 1, 1, 1, 0);
   def.springs[1].stiffness = -1;
   EXPECT_NE(problem(def).find("springs[1] stiffness"), std::string::npos);
@@ -182,7 +182,8 @@ TEST(Cloth, ABallTearsAHole) {
   for (uint32_t i = 0; i < view.points.size(); ++i) EXPECT_EQ(fan_count(view.triangles, i), 1) << i;
 }
 
-// Let go while its threads are at their limit, it falls as anything does, whatever else hangs in the world.
+// A cloth that is released while its threads are at their limit falls freely, independently of other cloths
+// in the world.
 TEST(Cloth, FallsFreelyAtItsStretchLimitBesideOneThatHangs) {
   const effects::Fabric cotton = effects::find_fabric("cotton")->fabric;
   World world;

@@ -118,7 +118,7 @@ EmitterDef burst_from(const EmitterSurface& surface, Real count) {
           .particles = {.speed = 0.5, .radius = Uniform{0.01, 0.03}, .lifespan = 1e9}};
 }
 
-TEST(EmitterSurface, NewbornsOfOneReleaseNeverOverlapOnAnySurface) {
+TEST(EmitterSurface, ParticlesOfOneReleaseNeverOverlapOnAnySurface) {
   for (const auto& [name, surface] : surfaces()) {
     SCOPED_TRACE(name);
     World world = empty_world();

@@ -103,7 +103,7 @@ TEST(Emitter, ReleasesAndBurstsComeAtTheirTimesWithinTheWindow) {
   EXPECT_EQ(i, b.size());
 }
 
-TEST(Emitter, NewbornsOfAReleaseNeverOverlapAndLieOnTheSurface) {
+TEST(Emitter, ParticlesOfAReleaseNeverOverlapAndLieOnTheSurface) {
   for (const Varying& radius :
        {Varying(Uniform{0.01, 0.03}),
         Varying(Normal{.mean = 0.02, .deviation = 0.003, .min = 0.001, .clip = false})}) {

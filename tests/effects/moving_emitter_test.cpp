@@ -1,4 +1,4 @@
-// Emitters that move with a body: the share of its velocity that particles get, particles per metre, and
+// Emitters that move with a body: the fraction of its velocity that particles get, particles per metre, and
 // recoil.
 
 #include <gtest/gtest.h>
@@ -37,19 +37,19 @@ EmitterDef up(Real speed) {
           .particles = {.speed = speed, .spread_deg = 0.0, .radius = 0.01, .mass = 0.001, .lifespan = 1e9}};
 }
 
-TEST(MovingEmitter, InheritsAShareOfTheBodysVelocity) {
-  for (const Real share : {0.0, 0.25, 1.0}) {
+TEST(MovingEmitter, InheritsAFractionOfTheBodysVelocity) {
+  for (const Real fraction : {0.0, 0.25, 1.0}) {
     Ride ride({4, 0, 0});
     EmitterDef def = up(3);
-    def.release.inherit_velocity = share;
+    def.release.inherit_velocity = fraction;
     ride.run(def, 0.5);
     const ParticleArrays& p = ride.world.particles(ride.system);
     ASSERT_GT(p.size(), 20u);
-    for (const Vec3& v : p.velocity) EXPECT_LT((v - Vec3(4 * share, 3, 0)).norm(), 1e-12);
+    for (const Vec3& v : p.velocity) EXPECT_LT((v - Vec3(4 * fraction, 3, 0)).norm(), 1e-12);
   }
 }
 
-// The number is the way times the rate, whatever the speed, and the places are evenly apart.
+// The number is the length of the path times the rate at any speed, and the places are evenly spaced.
 TEST(MovingEmitter, ReleasesParticlesPerMetreOfItsWay) {
   for (const Real speed : {0.5, 7.0}) {
     Ride ride({speed, 0, 0});

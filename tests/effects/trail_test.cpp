@@ -37,7 +37,7 @@ TEST(Trail, OfAFastParentIsEven) {
   }
 }
 
-TEST(Trail, StartsAtBirthAndInheritsAShareOfTheVelocity) {
+TEST(Trail, StartsAtBirthAndInheritsAFractionOfTheVelocity) {
   World world = empty_world();
   const auto stars = world.add_particle_system({}), trail = world.add_particle_system({});
   Emitter emitter({.release = {.rate = 240.0, .end = 0.25},

@@ -28,7 +28,7 @@ struct Drafts {
   static float brightness(const render::HdrImage& image, std::size_t pixel) {
     return image.rgba[4 * pixel] + image.rgba[4 * pixel + 1] + image.rgba[4 * pixel + 2];
   }
-  /// Mean over the picture of the difference, as a share of the mean brightness.
+  /// Mean over the picture of the difference, as a fraction of the mean brightness.
   double mean_difference() const {
     double difference = 0, total = 0;
     for (std::size_t i = 0; i < exact.pixel_count(); ++i) {
@@ -37,8 +37,8 @@ struct Drafts {
     }
     return difference / total;
   }
-  /// Share of the pixels that differ by more than a factor of two.
-  double share_of_wrong() const {
+  /// Fraction of the pixels that differ by more than a factor of two.
+  double fraction_of_wrong() const {
     std::size_t wrong = 0;
     for (std::size_t i = 0; i < exact.pixel_count(); ++i) {
       const float a = brightness(quick, i), b = brightness(exact, i);
@@ -63,7 +63,7 @@ TEST(EnginesQuickDrafts, LookLikeDraftsOfRender) {
     "lights": [{"type": "sun"}, {"type": "point", "position": [1, 3, 2], "intensity": 10}],
     "environment": {"fog": 0.02}, "camera": {"eye": [0, 1.5, 5], "target": [0, 0.6, 0]})");
   EXPECT_LT(drafts.mean_difference(), 0.02);
-  EXPECT_LT(drafts.share_of_wrong(), 0.005);
+  EXPECT_LT(drafts.fraction_of_wrong(), 0.005);
 }
 
 // A line across the pixels' diagonals meets either only pixels with traced light, or only others.
@@ -74,7 +74,7 @@ TEST(EnginesQuickDrafts, LightThinLinesInAnyDirection) {
         "position": [)" +
         std::to_string(x) + R"(, 1, 0], "shape": {"type": "capsule", "radius": 0.008, "height": 3}}],
       "lights": [{"type": "sun", "direction": [0, 0.3, 1]}], "camera": {"eye": [0, 1, 4], "target": [0, 1, 0]})");
-    EXPECT_LT(drafts.share_of_wrong(), 0.001) << "at " << x;
+    EXPECT_LT(drafts.fraction_of_wrong(), 0.001) << "at " << x;
   }
 }
 

@@ -28,14 +28,14 @@ class Prim:
         after = min((t for t in samples if t >= time), default=max(samples))
         if before == after or self.types[attribute + ".timeSamples"].startswith(("int", "bool", "token", "string")):
             return samples[before]
-        share = (time - before) / (after - before)
-        return blend(samples[before], samples[after], share)
+        fraction = (time - before) / (after - before)
+        return blend(samples[before], samples[after], fraction)
 
 
-def blend(a, b, share):
+def blend(a, b, fraction):
     if isinstance(a, (tuple, list)):
-        return type(a)(blend(x, y, share) for x, y in zip(a, b)) if len(a) == len(b) else a
-    return a + share * (b - a) if isinstance(a, float) else a
+        return type(a)(blend(x, y, fraction) for x, y in zip(a, b)) if len(a) == len(b) else a
+    return a + fraction * (b - a) if isinstance(a, float) else a
 
 
 class UsdText:

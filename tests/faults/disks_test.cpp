@@ -73,17 +73,17 @@ TEST_P(FilmOnAFullDisk, IsWholeOrAnErrorThatLeavesNothing) {
   for (int i = 0; i <= tries; ++i) {
     // Sizes from half of the film to all of it. Most of them lack only the last part, whose loss ffmpeg does
     // not report.
-    const double share = i == 0 ? 0.5 : 0.9 + 0.2 * (i - 1) / std::max(tries - 1, 1);
+    const double fraction = i == 0 ? 0.5 : 0.9 + 0.2 * (i - 1) / std::max(tries - 1, 1);
     const SmallDisk disk(folder / "disk",
-                         static_cast<std::uintmax_t>(share * static_cast<double>(whole.size())));
+                         static_cast<std::uintmax_t>(fraction * static_cast<double>(whole.size())));
     const Outcome run = encode(folder / ("disk/" + film), disk.limit());
     const auto left = contents(folder / "disk");
     if (run.code == 0) {
-      EXPECT_EQ(left.at(film), whole) << "share " << share;
+      EXPECT_EQ(left.at(film), whole) << "fraction " << fraction;
     } else {
       ++failed;
       EXPECT_EQ(run.code, 1) << run.err;
-      EXPECT_TRUE(left.empty()) << "share " << share << ": " << left.begin()->first;
+      EXPECT_TRUE(left.empty()) << "fraction " << fraction << ": " << left.begin()->first;
     }
   }
   EXPECT_GT(failed, 0) << "half of the film's size is not enough";

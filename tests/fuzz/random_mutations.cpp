@@ -115,7 +115,7 @@ std::vector<Bytes> read_corpus(const char* folder) {
   return corpus;
 }
 
-/// A file that holds the input which is running, whatever becomes of the process.
+/// A file with the current input, which remains if the process crashes.
 class RunningInput {
  public:
   explicit RunningInput(const char* path) : path_(path), fd_(::open(path, O_RDWR | O_CREAT | O_TRUNC, 0600)) {

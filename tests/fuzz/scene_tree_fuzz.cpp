@@ -1,5 +1,5 @@
 // Scenes of the gallery with changed values: keys and structure stay those of a scene, numbers, texts and
-// places in lists change. What is accepted is simulated for a few frames; a state that is not finite must be
+// places in lists change. Accepted scenes are simulated for a few frames; a state that is not finite must be
 // reported.
 
 #include <algorithm>

@@ -306,7 +306,7 @@ std::string text(const Shape& shape) {
   return out.str();
 }
 
-/// Only the corners of the bounding box tell meshes of one kind apart.
+/// Meshes of one kind differ only in the corners of their bounding boxes.
 std::string text(const TriangleMesh& mesh) {
   Vec3 size = Vec3::Zero();
   for (const Vec3& v : mesh.vertices) size = size.cwiseMax(2 * v.cwiseAbs());

@@ -66,7 +66,7 @@ TEST(Cloths, DampingOfTheOtherBendModelIsRefused) {
   EXPECT_EQ(cloth_errors(R"({"bend_damping": 0.1})"), "");
 }
 
-TEST(Cloths, WhatCannotBeIsRefusedWithWhatCan) {
+TEST(Cloths, RefusalsNameTheAllowedValues) {
   EXPECT_EQ(cloth_errors(R"({"fabric": "denin"})"),
             "/cloths/0/fabric: there is no fabric 'denin'; did you mean 'denim'?\n");
   EXPECT_EQ(cloth_errors(R"({"pins": [{"type": "box", "centre": [0, 5, 0]}]})"),

@@ -69,7 +69,7 @@ TEST(DecompositionCache, AFileOfAnotherMeshIsNotTaken) {
   EXPECT_TRUE(equal(cache.decompose(mesh), made));
 }
 
-TEST(DecompositionCache, WorksWhereNothingCanBeWritten) {
+TEST(DecompositionCache, WorksInAReadOnlyFolder) {
   const DecompositionCache cache("/proc/offstage");
   EXPECT_GT(cache.decompose(sim::box_mesh(sim::Vec3(1, 2, 3))).parts.size(), 0u);
 }

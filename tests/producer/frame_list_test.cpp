@@ -18,7 +18,7 @@ TEST(FrameList, RangesStepsAndNumbersFromTheEnd) {
   EXPECT_EQ(parse_frames("5,1-2,2", 10), (Frames{1, 2, 5}));
 }
 
-TEST(FrameList, WrongTextSaysWhatIsAllowed) {
+TEST(FrameList, RefusalsNameTheAllowedText) {
   for (const char* text :
        {"a", "1-", "1..5", "3-1", "0", "11", "1-11", "1-4x0", "1,,2", "-11", "1 2", "99999999999"})
     EXPECT_THROW(parse_frames(text, 10), std::invalid_argument) << text;

@@ -68,7 +68,7 @@ TEST(Articulations, AChainHasEitherAPathOrTwoEnds) {
   const std::string path = R"("path": [[0, 2, 0], [1, 2, 0], [1, 1, 0]])";
   EXPECT_EQ(joint_errors(R"("articulations": [{"type": "chain", )" + path + "}]"), "");
   EXPECT_EQ(joint_errors(R"("articulations": [{"type": "chain", "from": [0, 0.5, 0], )" + path + "}]"),
-            "/articulations/0/path: is in place of \"from\" and \"to\"; remove them\n");
+            "/articulations/0/path: replaces \"from\" and \"to\"; remove them\n");
   EXPECT_EQ(joint_errors(R"("articulations": [{"type": "chain", "path": [[0, 2, 0]]}])"),
             "/articulations/0/path: needs at least two points\n");
 }
@@ -113,7 +113,7 @@ TEST(Articulations, AChainWithBendStiffnessSagsAsACantilever) {
 }
 
 // It swings with the angular frequency 3.516 sqrt(B / m L^4) of the first mode, to twice the sag at rest.
-// The springs act at the end of a sub-step, which damps this mode by the share omega h / 2 of the critical
+// The springs act at the end of a sub-step, which damps this mode by the fraction omega h / 2 of the critical
 // damping.
 TEST(Articulations, AChainWithBendStiffnessSwingsAsACantilever) {
   constexpr int kLinks = 16;

@@ -67,7 +67,7 @@ TEST(Json, ReadsEveryKindOfValue) {
   EXPECT_EQ(*list[7].as<int64_t>(), std::numeric_limits<int64_t>::max());
 }
 
-TEST(Json, SyntaxErrorsSayWhatAndWhere) {
+TEST(Json, SyntaxErrorsHaveAReasonAndAPlace) {
   EXPECT_EQ(error_of("{\"a\": [1, 2,\n]}"), "f:1:12: trailing comma before ']'; remove it");
   EXPECT_EQ(error_of("{\n\"a\": 1,\n}"), "f:2:7: trailing comma before '}'; remove it");
   EXPECT_EQ(error_of(""), "f:1:1: the file is empty");

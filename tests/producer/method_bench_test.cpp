@@ -66,12 +66,12 @@ TEST(MethodBench, CountsTheWorkAndTheDeviationOfEachMethod) {
 }
 
 TEST(MethodBench, ARunThatTakesTooLongEndsEarlyAndSaysSo) {
-  double share = 0;
+  double fraction = 0;
   const MethodResult whole = run_method("whole", falling_cups(), ModelLibrary(), kNoLimit);
-  MethodResult cut = run_method("cut", falling_cups(), ModelLibrary(), 0, [&](double s) { share = s; });
+  MethodResult cut = run_method("cut", falling_cups(), ModelLibrary(), 0, [&](double s) { fraction = s; });
   EXPECT_EQ(cut.totals.substeps, 0u);  // the first frame is that of the start
   EXPECT_GT(whole.totals.substeps, 0u);
-  EXPECT_EQ(share, 0);
+  EXPECT_EQ(fraction, 0);
   EXPECT_NE(cut.fault.find("--limit"), std::string::npos) << cut.fault;
   EXPECT_FALSE(cut.deviation(whole));
   MethodResult merged = whole;

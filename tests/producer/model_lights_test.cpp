@@ -1,4 +1,4 @@
-// Cameras and lights of glTF files: where they are, what they show, and what is refused.
+// Cameras and lights of glTF files: their places, their pictures, and refused uses.
 
 #include <cmath>
 #include <filesystem>
@@ -150,9 +150,9 @@ TEST(ModelLightPicture, SpotsFadeAsTheExtensionDefines) {
   const float pixels_per_m = 48 / (5 * std::tan(0.25f));
   for (const float angle : {0.0f, 0.15f, 0.25f, 0.35f}) {
     const float x = 2 * std::tan(angle), fall = std::cos(angle),
-                share =
+                fraction =
                     std::clamp((fall - std::cos(outer)) / (std::cos(inner) - std::cos(outer)), 0.0f, 1.0f);
-    const float expected = 400 / (kPi * 4) * fall * fall * fall * share * share;
+    const float expected = 400 / (kPi * 4) * fall * fall * fall * fraction * fraction;
     const float seen = pixel(picture, 48, static_cast<int>(48 - pixels_per_m * x)).x();
     EXPECT_NEAR(seen, expected, 0.06f * 400 / (kPi * 4)) << angle;
   }
@@ -181,7 +181,7 @@ TEST(ModelLight, AndCamerasFollowTheAnimationThatTheBodyPlays) {
   }
 }
 
-TEST(ModelLight, WhatCannotBeUsedIsNamed) {
+TEST(ModelLight, UnusableLightsAndCamerasAreNamed) {
   Room room;
   const auto lights = [](const std::string& more) {
     return scene_of(R"(, "lights": [{"type": "model", "body": "room")" + more + "}]");

@@ -1,4 +1,4 @@
-// Pictures on surfaces and of the sky: what a scene may say, and what reaches the drawing.
+// Pictures on surfaces and of the sky: allowed keys of a scene, and the resulting drawing.
 
 #include <gtest/gtest.h>
 

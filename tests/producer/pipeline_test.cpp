@@ -54,7 +54,7 @@ struct Relay {
           if (!pipeline.push({.index = i, .frame = i + 1})) return;
           most_ahead = std::max(most_ahead, ++pushed - taken);
         }
-        pipeline.no_more_jobs();
+        pipeline.finish_jobs();
       });
     }
     try {

@@ -137,7 +137,7 @@ TEST(Placement, KindsMultiplyAndEachGroupScattersByItself) {
   EXPECT_NE(at[4] - at[0], Vec3(20, 0, 0)) << "two groups are scattered alike";
 }
 
-TEST(Placement, TooManyCopiesAreAnErrorWhateverTheProduct) {
+TEST(Placement, TooManyCopiesAreAnErrorForAnyProduct) {
   const std::string scene =
       R"({"bodies": [{"repeat": {"count": 100000}, "grid": {"count": [100000, 100000, 2]}}]})";
   try {

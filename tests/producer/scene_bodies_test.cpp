@@ -1,5 +1,4 @@
-// Shapes, masses, lifetimes, applied forces and fills of a scene: what they build, and which values are
-// refused.
+// Shapes, masses, lifetimes, applied forces and fills of a scene: the resulting objects, and refused values.
 
 #include <algorithm>
 #include <cmath>
@@ -100,7 +99,7 @@ TEST(SceneBodies, InvalidCouplingsAreRefused) {
             "/joints/2/ratio: must be greater than 0 for a pulley\n"
             "/joints/3/length_limits: must be a range that contains the length at time 0, 1.000000 m\n"
             "/joints/4/stiffness: is for spherical joints; use a motor with a \"stiffness\"\n"
-            "/joints/5/restitution: is that of impacts at limits, and the joint has none\n");
+            "/joints/5/restitution: has no effect: it is for impacts at limits, and the joint has none\n");
 }
 
 // The rope of 2 m lets its load fall by 1 m.
@@ -135,11 +134,11 @@ TEST(Fills, HoldAllBallsAtTheirDistance) {
       const Real volume = shape.index() == 0   ? 0.63
                           : shape.index() == 1 ? std::numbers::pi / 4 * 0.8
                                                : std::numbers::pi / 6;
-      const Real share = static_cast<Real>(places.size()) * std::numbers::pi / 6 * d * d * d / volume;
+      const Real fraction = static_cast<Real>(places.size()) * std::numbers::pi / 6 * d * d * d / volume;
       // Less than the ideal 0.74, 0.52 and 0.38 by the layer at the walls.
       const Real ideal = packing == Packing::hexagonal ? 0.7405 : packing == Packing::cubic ? 0.5236 : 0.385;
-      EXPECT_LT(share, ideal + 1e-9);
-      EXPECT_GT(share, 0.6 * ideal) << static_cast<int>(packing) << " " << shape.index();
+      EXPECT_LT(fraction, ideal + 1e-9);
+      EXPECT_GT(fraction, 0.6 * ideal) << static_cast<int>(packing) << " " << shape.index();
     }
 }
 
@@ -163,10 +162,10 @@ TEST(Fills, HoldBallsInsideAModel) {
     // The places fill that tube at the density of their packing: 1 or sqrt(2) per cube of d for the lattices,
     // whose ten rows cover 0.96 of the tube's section, and less than the limit of random sequential addition,
     // 0.384 * 6 / pi = 0.733, for random places.
-    const Real share = static_cast<Real>(places.size()) * d * d * d /
-                       (2 * std::numbers::pi * std::numbers::pi * free * free);
-    EXPECT_GT(share, packing == Packing::random ? 0.55 : packing == Packing::hexagonal ? 1.25 : 0.9);
-    EXPECT_LT(share, packing == Packing::random ? 0.733 : packing == Packing::hexagonal ? 1.5 : 1.1);
+    const Real fraction = static_cast<Real>(places.size()) * d * d * d /
+                          (2 * std::numbers::pi * std::numbers::pi * free * free);
+    EXPECT_GT(fraction, packing == Packing::random ? 0.55 : packing == Packing::hexagonal ? 1.25 : 0.9);
+    EXPECT_LT(fraction, packing == Packing::random ? 0.733 : packing == Packing::hexagonal ? 1.5 : 1.1);
   }
 }
 

@@ -151,7 +151,7 @@ TEST(SceneCheck, CameraAndSunAreValid) {
       "/lights/0/direction: the sun must be above the horizon: y must be greater than 0\n"
       "/lights/1: a scene has at most one sun\n");
   EXPECT_EQ(errors_of(R"({"camera": {"type": "keyframes"}})"),
-            "/camera: needs at least one of \"keyframes\"\n");
+            "/camera: needs at least one entry in \"keyframes\"\n");
 }
 
 TEST(SceneCheck, AFilmHasAtLeastOneFrame) {
@@ -215,7 +215,7 @@ TEST(SceneCheck, ForcesNameExistingObjects) {
                {"type": "explosion", "name": "force_0"}, {"type": "field"}]})"),
             "/forces/0/bodies/1: there is no body 'bal'; did you mean 'ball'?\n"
             "/forces/1/end: must be later than the start, 0 s\n"
-            "/forces/2: needs at least one of \"keyframes\"\n"
+            "/forces/2: needs at least one entry in \"keyframes\"\n"
             "/forces/3/keyframes/1/time: times must increase, got 1 after 1\n"
             "/forces/4/name: the name 'force_0' is already used by /forces/0\n"
             "/forces/5/type: must be one of \"constant\", \"point\", \"wind\", \"grab\", \"explosion\", "

@@ -50,7 +50,7 @@ TEST(Sweep, CombinationsAreTheProductTheLastVaryingFastest) {
                std::invalid_argument);
 }
 
-TEST(Sweep, TheTableHasTheColumnsOfAllRunsAndQuotesWhatNeedsIt) {
+TEST(Sweep, TheTableHasTheColumnsOfAllRunsAndQuotesTextWhereNeeded) {
   EXPECT_EQ(to_csv({{{"p", "[0,1]"}, {"n", "3"}}, {{"p", "say \"x\""}, {"fault", "two\nlines"}}}),
             "p,n,fault\n\"[0,1]\",3,\n\"say \"\"x\"\"\",,\"two\nlines\"\n");
 }

@@ -126,7 +126,7 @@ def test_mistakes_are_exceptions_and_never_crashes():
         world.add_particles(world.add_particle_system(), np.zeros((4, 2)))
     with pytest.raises(ValueError, match="> 0"):
         world.step(0)
-    with pytest.raises(ValueError, match="not one of this world"):
+    with pytest.raises(ValueError, match="does not belong to this world"):
         other.body(ball)
     joint = world.add_joint("spherical", ball, anchor=[0, 6, 0])
     assert world.remove(ball) and not world.remove(ball)

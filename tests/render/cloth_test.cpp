@@ -100,7 +100,7 @@ TEST(ClothSurface, NormalsOfABallAreItsRadii) {
   EXPECT_GT(worst, std::cos(0.06f)) << "within half of a coarse facet's angle";
 }
 
-TEST(ClothSurface, RefusesWhatIsNoMeshAndHidesWhatIsNotFinite) {
+TEST(ClothSurface, RefusesInvalidMeshesAndHidesNonFiniteOnes) {
   ClothSurface surface;
   const std::vector<Vector2f> uvs(3, Vector2f(0, 0));
   EXPECT_THROW(surface.set_mesh(std::array<uint32_t, 3>{0, 1, 3}, uvs), std::invalid_argument);
@@ -148,7 +148,7 @@ TEST(StageCloth, SheetInGrazingLightDoesNotShadowItself) {
       EXPECT_NEAR(pixel(picture, x, y).x(), middle, 0.25f * middle) << x << " " << y;
 }
 
-TEST(StageCloth, ThrowsItsShadowOnWhatIsBehind) {
+TEST(StageCloth, ThrowsItsShadowOnObjectsBehind) {
   ClothStage s(plain(), {0, 0.6f, 1}, {0, -3, 4});
   s.add(make_box({8, 8, 0.1f}), {.color = {1, 1, 1, 1}, .roughness = 1}, {0, 0, -1});
   const auto below = [&] { return pixel(s.draw(), 48, 58).x(); };
@@ -174,7 +174,7 @@ Material sheer(float alpha) {
   return m;
 }
 
-TEST(StageCloth, HidesTheShareOfWhatIsBehindThatItsOpacitySays) {
+TEST(StageCloth, HidesTheBackgroundByItsOpacity) {
   for (const int count : {1, 4, 16})
     for (const float alpha : {0.25f, 0.5f, 0.9f}) {
       ClothStage s(sheer(alpha), {0, 0, -1});
@@ -192,7 +192,7 @@ TEST(StageCloth, TransmissionLetsThroughAsAlphaDoes) {
   EXPECT_NEAR(mean_red(s, 4), 0.7f, 0.03f);
 }
 
-TEST(StageCloth, TwoLayersHideMoreThanOneInWhateverOrder) {
+TEST(StageCloth, TwoLayersHideMoreThanOneInAnyOrder) {
   for (const float second : {-0.5f, 0.5f}) {
     ClothStage s(sheer(0.5f), {0, 0, -1});
     s.add(make_box({8, 8, 0.1f}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {1, 1, 1}}, {0, 0, -1});
@@ -251,7 +251,7 @@ TEST(StageCloth, TornSheetHasItsNewTrianglesAndIsOpenBetween) {
 }
 
 // In a crumpled thick sheet one surface may be just in front of another; the hidden one must not be visible.
-TEST(StageCloth, IsDrawnTheSameWhateverWasDrawnBefore) {
+TEST(StageCloth, IsDrawnTheSameAfterAnyOtherPicture) {
   ClothStage s(plain(), {0.3f, 0.5f, 1});
   Sheet sheet(12);
   for (std::size_t i = 0; i < sheet.points.size(); ++i) {

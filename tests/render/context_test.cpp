@@ -87,7 +87,7 @@ TEST(Context, IsLlvmpipeWithGl45) {
   EXPECT_TRUE(info.glsl.starts_with("4.50")) << info.glsl;
 }
 
-TEST(Context, PinningRemovesWhatWouldChangeThePicture) {
+TEST(Context, PinningRemovesVariablesThatWouldChangeThePicture) {
   setenv("MESA_GL_VERSION_OVERRIDE", "3.0", 1);
   setenv("GALLIUM_DRIVER", "softpipe", 1);
   pin_environment(1);

@@ -43,8 +43,8 @@ bool is_sound(const Mesh& mesh) {
 /// The poses of all animations, at several times, are finite.
 bool moves_soundly(const ModelRig& rig) {
   for (std::size_t clip = 0; clip < rig.clips.size(); ++clip)
-    for (const float share : {0.0f, 0.3f, 1.0f}) {
-      const RigPose pose = pose_at(rig, static_cast<int>(clip), share * rig.clips[clip].duration);
+    for (const float fraction : {0.0f, 0.3f, 1.0f}) {
+      const RigPose pose = pose_at(rig, static_cast<int>(clip), fraction * rig.clips[clip].duration);
       for (const RigSurface& surface : rig.surfaces)
         for (const Vector3f& p : deformed(rig, surface, pose).positions)
           if (!p.allFinite()) return false;

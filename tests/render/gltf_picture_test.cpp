@@ -52,7 +52,7 @@ TEST(GltfPicture, AlphaMaskCutsHolesAndIsOpaqueElsewhere) {
   }
 }
 
-TEST(GltfPicture, MasksKeepTheirShareAtADistance) {
+TEST(GltfPicture, MasksKeepTheirFractionAtADistance) {
   std::vector<Vector4f> leaves(64 * 64, {1, 1, 1, 0});
   for (std::size_t y = 0; y < 64; ++y)
     for (std::size_t x = 0; x < 64; ++x)  // irregular, so that reduced levels have all shades
@@ -171,8 +171,8 @@ const std::vector<TextureUse> kTextureUses = {
        return s.extension("KHR_materials_pbrSpecularGlossiness")["specularGlossinessTexture"];
      }}};
 
-// For each texture, `texCoord` and that of KHR_texture_transform choose the set, whatever the other set
-// holds.
+// For each texture, `texCoord` and that of KHR_texture_transform choose the set, independently of the other
+// set.
 TEST(GltfPicture, EveryTextureUsesTheSetThatItNames) {
   const std::vector<float> across = {0, 1, 1, 1, 1, 0, 0, 0},
                            at_a_point = {0.1f, 0.1f, 0.1f, 0.1f, 0.1f, 0.1f, 0.1f, 0.1f};
@@ -343,7 +343,7 @@ TEST(GltfPicture, EmissiveStrengthScalesTheGlow) {
   expect_color(picture.color_at(0, 0), {0.75f, 1.5f, 3});
 }
 
-TEST(GltfPicture, TransmissionShowsWhatIsBehind) {
+TEST(GltfPicture, TransmissionShowsTheBackground) {
   GltfSample sample;
   sample.pbr() = {{"baseColorFactor", {1, 0.5, 1, 1}}, {"metallicFactor", 0}, {"roughnessFactor", 0}};
   sample.extension("KHR_materials_transmission")["transmissionFactor"] = 1;

@@ -75,8 +75,8 @@ TEST(StageLight, LampsCastShadowsWhereGeometryPredicts) {
 }
 
 TEST(StageLight, SkyLightIsHiddenBesideABlackWall) {
-  // A long black wall of height h: at distance x from its foot, it hides the share (1 - x / sqrt(x^2 + h^2))
-  // / 2 of the cosine-weighted sky. The highlight, 4 % of the light, is not hidden.
+  // A long black wall of height h: at distance x from its foot, it hides the fraction (1 - x / sqrt(x^2 +
+  // h^2)) / 2 of the cosine-weighted sky. The highlight, 4 % of the light, is not hidden.
   Floor floor({.zenith = {1, 1, 1}, .horizon = {1, 1, 1}, .ground = {0, 0, 0}, .visible = false});
   floor.s.add(make_box({0.1f, 1, 30}), {.color = {0, 0, 0, 1}, .roughness = 1}, {-0.05f, 0.5f, 0});
   const auto visible = [](float x) { return 1 - 0.96f * 0.5f * (1 - x / std::sqrt(x * x + 1)); };
@@ -95,8 +95,8 @@ TEST(StageLight, ShadowsAreSharperNearTheirCaster) {
     const float open = floor.at(3, 0);
     int partial = 0;
     for (float x = -height - 0.6f; x < -height + 0.6f; x += 0.04f) {
-      const float share = floor.mean_at(x, 0) / open;
-      partial += share > 0.1f && share < 0.9f;
+      const float fraction = floor.mean_at(x, 0) / open;
+      partial += fraction > 0.1f && fraction < 0.9f;
     }
     return partial;
   };

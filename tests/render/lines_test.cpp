@@ -61,7 +61,7 @@ TEST(StageLines, DotIsADiscAndATaperedLineATriangle) {
   EXPECT_NEAR(covered(scene.draw(arrow)), 0.5 * 50 * 20 + 0.5 * 3.1416 * 100, 15);
 }
 
-TEST(StageLines, ThinLinesKeepTheirShareOfLight) {
+TEST(StageLines, ThinLinesKeepTheirFractionOfLight) {
   const Line line{{-1, 0.137f, 0}, {1, 0.291f, 0}, kRed};
   const double wide = covered(LinesScene(1).draw(line));
   EXPECT_NEAR(covered(LinesScene(0.25f).draw(line)) / wide, 0.25, 0.01);
@@ -69,12 +69,12 @@ TEST(StageLines, ThinLinesKeepTheirShareOfLight) {
 
 TEST(StageLines, LookAlikeInLargeAndSmallPictures) {
   const Line line{{-1, 0, 0}, {1, 0.3f, 0}, kRed};
-  const auto share = [&](int scale) {
+  const auto fraction = [&](int scale) {
     SmallStage s(kWidth * scale, kHeight * scale);
     s.stage.set_lines(s.stage.add_lines({.width = 0.04f}), std::span(&line, 1));
     return covered(s.draw()) / (scale * scale);
   };
-  EXPECT_NEAR(share(4) / share(1), 1, 0.02);
+  EXPECT_NEAR(fraction(4) / fraction(1), 1, 0.02);
 }
 
 TEST(StageLines, AreOccludedOrShowFaintlyThroughSurfaces) {

@@ -271,7 +271,7 @@ TEST(ReadModel, WarnsOnceOfATextureThatIsNotThere) {
             -1);
 }
 
-TEST(ReadModel, LeavesOutWhatCannotBeDrawnAndSaysSo) {
+TEST(ReadModel, SkipsElementsThatCannotBeDrawnWithAWarning) {
   const ScratchFolder folder;
   const Model model = read_model(folder.put(
       "a.obj", std::string(kTetrahedron) + "v nan 0 0\nv 2 0 0\nf 5 1 2\nf 1 2 6\nf 1 1 2\nl 1 2\n"));
@@ -433,7 +433,7 @@ const char kFullCollada[] = R"(<?xml version="1.0"?>
 </scene>
 </COLLADA>)";
 
-TEST(ReadModel, NamesWhatItIgnoresOfOtherFormats) {
+TEST(ReadModel, NamesIgnoredFeaturesOfOtherFormats) {
   const ScratchFolder folder;
   const Model model = read_model(folder.put("a.dae", kFullCollada));
   EXPECT_EQ(model.triangle_count(), 1u);
@@ -453,7 +453,7 @@ TEST(ReadModel, RefusesInOneLine) {
   expect(refusal(folder / "none.obj"), "there is no such file");
   expect(refusal(folder.path()), "not a regular file");
   expect(refusal(folder.put("empty.obj", "")), "is empty");
-  expect(refusal(folder.put("a.xyz", "no model at all")), "no format known here");
+  expect(refusal(folder.put("a.xyz", "no model at all")), "its format is not supported");
   expect(refusal(folder.put("index.obj", std::string(kTriangle) + "f 1 2 9\n")), "out of range");
   expect(refusal(folder.put("points.obj", std::string(kTriangle) + "p 1\np 2\np 3\n")), "holds no triangle");
   expect(refusal(folder.put("recursive.gltf", gltf(R"([{"children":[0]}])", R"(,"materials":[{}])"))),

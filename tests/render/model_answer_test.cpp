@@ -55,7 +55,7 @@ TEST(ModelAnswer, ComesBackUnchanged) {
   EXPECT_EQ(back.warnings, model.warnings);
 }
 
-TEST(ModelAnswer, ThatRefersToWhatIsNotThereIsRefused) {
+TEST(ModelAnswer, WithReferencesToMissingObjectsIsRefused) {
   const auto refused_with = [](auto change) {
     Model model = small_model();
     change(model);

@@ -106,8 +106,8 @@ TEST(Splatter, PuffFadesEvenlyAsAPlaneCutsThroughIt) {
   const float all = shown_at(10);  // the puff has its centre at 2 m and a radius of 0.25 m
   EXPECT_GT(all, 0.3f);
   for (int k = 0; k <= 10; ++k) {
-    const float share = 0.1f * static_cast<float>(k);
-    EXPECT_NEAR(shown_at(1.75f + 0.5f * share), share * all, 0.01f * all) << share;
+    const float fraction = 0.1f * static_cast<float>(k);
+    EXPECT_NEAR(shown_at(1.75f + 0.5f * fraction), fraction * all, 0.01f * all) << fraction;
   }
 }
 
@@ -138,7 +138,7 @@ TEST(Splatter, StreakCoversAsMuchAsItsStroke) {
     for (int bottom = 0; bottom < 120; bottom += StreakBands::kRows) {
       const int rows = std::min(StreakBands::kRows, 120 - bottom);
       std::vector<float> rgba(150 * StreakBands::kRows * 4, 0.0f);
-      bands.lay_over({0, bottom, 150, rows, depth, rgba}, {9, 0}, 0);
+      bands.blend_over({0, bottom, 150, rows, depth, rgba}, {9, 0}, 0);
       for (std::size_t i = 3; i < rgba.size(); i += 4) area += static_cast<double>(rgba[i]);
     }
     // The soft rim counts half: 2 * 60 * 2.25, plus the ends.
@@ -183,7 +183,7 @@ TEST(Bloom, LeavesPixelsBelowTheThresholdUnchanged) {
   }
 }
 
-TEST(Bloom, SpreadsItsShareOfALightAroundIt) {
+TEST(Bloom, SpreadsItsFractionOfALightAroundIt) {
   HdrImage image = picture_of(0);
   float* p = image.rgba.data() + 4 * (35 * 90 + 45);
   p[0] = 20;

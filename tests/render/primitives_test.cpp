@@ -91,7 +91,7 @@ TEST(Primitives, HaveTheAreaVolumeAndBoundsOfTheirShape) {
   }
 }
 
-TEST(Primitives, NormalsAreUnitAndFaceTheSameWayAsTheirTriangles) {
+TEST(Primitives, NormalsAreUnitAndFaceTheSameSideAsTheirTriangles) {
   for (const Named& shape : closed_primitives()) {
     const Mesh& mesh = shape.mesh;
     ASSERT_EQ(mesh.normals.size(), mesh.positions.size()) << shape.name;

@@ -63,14 +63,14 @@ class RoomReference {
 
   // The lamp radiates downwards with its intensity per unit of solid angle times the cosine.
   Vector3d arriving(Vector3d at, Vector3d normal) {
-    Vector3d sum = Vector3d::Zero(), share = Vector3d::Ones();
+    Vector3d sum = Vector3d::Zero(), fraction = Vector3d::Ones();
     for (int bounce = 0; bounce < 60; ++bounce) {
       at += 1e-7 * normal;
       const Vector3d lamp(kHalfLamp * signed_random(), kLampHeight, kHalfLamp * signed_random());
       const Vector3d way = lamp - at;
       const double distance = way.norm(), towards = normal.dot(way) / distance, down = way.y() / distance;
       if (towards > 0 && down > 0 && meet_room(at, way / distance).distance > distance)
-        sum += share * (towards * down / (distance * distance));
+        sum += fraction * (towards * down / (distance * distance));
       const double angle = 2 * std::numbers::pi * random(), r2 = random(), r = std::sqrt(r2);
       const Vector3d a = normal.unitOrthogonal(), b = normal.cross(a);
       const Vector3d direction =
@@ -78,10 +78,10 @@ class RoomReference {
       const RoomMeeting next = meet_room(at, direction);
       at += next.distance * direction;
       normal = next.normal;
-      share = share.cwiseProduct(next.albedo);
-      if (share.maxCoeff() < 0.05) {
+      fraction = fraction.cwiseProduct(next.albedo);
+      if (fraction.maxCoeff() < 0.05) {
         if (random() > 0.5) return sum;
-        share *= 2;
+        fraction *= 2;
       }
     }
     return sum;

@@ -71,7 +71,7 @@ TEST(SkyPicture, OfOneColourIsThatColourEverywhere) {
 // R (1 - sin(r)^2). Edges of 0.35 degrees change the first by 1 %.
 TEST(SkyPicture, DimAndBrightPartAddUpToTheLightOfADisc) {
   const Vector3f middle = Vector3f(0.5f, 0.7f, -0.3f).normalized();
-  const float share = std::pow(std::sin(12 * kPi / 180), 2.0f);
+  const float fraction = std::pow(std::sin(12 * kPi / 180), 2.0f);
   const SkyPicture picture(disc_sky(middle, 12, {20, 40, 10}, 0.5f, 1024));
   ASSERT_TRUE(picture.has_bright_part());
   Vector3f bright = Vector3f::Zero(), mean = Vector3f::Zero();
@@ -82,7 +82,7 @@ TEST(SkyPicture, DimAndBrightPartAddUpToTheLightOfADisc) {
     const SkyPicture::Sample sample = picture.sample(uv);
     EXPECT_GT(sample.direction.dot(middle), std::cos(12.5f * kPi / 180));
     if (sample.direction.dot(middle) > std::cos(11 * kPi / 180)) {  // seen() interpolates at the edge
-      EXPECT_NEAR(picture.bright_share(sample.direction) * picture.seen(sample.direction).y() /
+      EXPECT_NEAR(picture.bright_fraction(sample.direction) * picture.seen(sample.direction).y() /
                       (sample.light.y() * picture.density(sample.direction)),
                   1, 0.01f);
     }
@@ -93,7 +93,7 @@ TEST(SkyPicture, DimAndBrightPartAddUpToTheLightOfADisc) {
   const auto at_middle = [&](const SkyPicture& p) {
     return irradiance_at({std::make_shared<const SkyPicture>(p), 0, 1}, middle);
   };
-  EXPECT_NEAR((bright.y() + at_middle(picture)) / (40 * share + 0.5f * (1 - share)), 1, 0.02f);
+  EXPECT_NEAR((bright.y() + at_middle(picture)) / (40 * fraction + 0.5f * (1 - fraction)), 1, 0.02f);
   EXPECT_NEAR(bright.x() / bright.y(), 0.5f, 1e-3f);
   EXPECT_GT(mean.normalized().dot(middle), 0.9999f);
   EXPECT_GT(picture.beam().direction.dot(middle), 0.9999f);
@@ -149,7 +149,7 @@ Vector3f mean_color(const HdrImage& picture, const Vector2f& place, int half) {
 
 const Material kWhitePlaster{.color = {1, 1, 1, 1}, .roughness = 1};
 
-// The furnace: a white ball in a picture of one colour cannot be told from the picture behind it.
+// The furnace: a white ball in a picture of one colour cannot be distinguished from the picture behind it.
 TEST(StageSkyPicture, AWhiteBallVanishesInAPictureOfOneColour) {
   LitStage s(sky_of([](const Vector3f&) { return Vector3f(Vector3f::Constant(0.35f)); }), 0, true, 2);
   s.add(make_sphere(1), kWhitePlaster);
@@ -294,7 +294,7 @@ float reflectance_of_glass(float roughness, float nv) {
 }
 
 // Black glass shows its mirror image alone: the mean of the sky over the lobe times the reflectance. The
-// bright part is so large that both ways to find it have a weight.
+// bright part is so large that both strategies to find it have a weight.
 TEST(StageSkyPicture, RoughGlassMirrorsTheBrightPartOnce) {
   const Vector3f middle = Vector3f(0, 1, -1).normalized(), view = Vector3f(0, 1, 1).normalized();
   const HdrImage sky = disc_sky(middle, 20, {20, 20, 20}, 0.2f, 512);
@@ -324,7 +324,7 @@ TEST(StageSkyPicture, RoughGlassMirrorsTheBrightPartOnce) {
 }
 
 // A sun of 5000 times the brightness of white is as bright in a mirror, and in a mirror of a mirror, as in
-// the sky. A pane lets through what it does not mirror.
+// the sky. A pane transmits the light that it does not mirror.
 TEST(StageSkyPicture, ABrightSunIsAsBrightInAMirrorAndBehindAPane) {
   const Vector3f sun = Vector3f(0, 1, -1).normalized();
   const HdrImage sky = disc_sky(sun, 4, {5000, 4000, 2000}, 0.1f, 1024);

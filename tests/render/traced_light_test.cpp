@@ -59,20 +59,20 @@ TEST_F(TracedLight, AWhiteBallVanishesInAnEvenSky) {
     for (int x = 0; x < 160; ++x) EXPECT_NEAR(pixel(picture, x, y).y(), 0.7f, 0.007f) << x << ", " << y;
 }
 
-// In a closed room whose walls glow with e and reflect a share r, the radiance is e + r e + r^2 e + ... =
+// In a closed room whose walls glow with e and reflect a fraction r, the radiance is e + r e + r^2 e + ... =
 // e / (1 - r) everywhere. (A rough dielectric reflects a little more than its colour, as in sunlight.)
 TEST_F(TracedLight, InAGlowingRoomIsTheSumOfAllReflections) {
-  for (const float share : {0.2f, 0.5f, 0.8f}) {
+  for (const float fraction : {0.2f, 0.5f, 0.8f}) {
     SmallStage room(96, 64);
     room.stage.set_environment(kNoLight);
     room.stage.set_sun({.intensity = 0, .shadows = false});
     room.stage.set_camera({.eye = {0.2f, 0.1f, 0.4f}, .target = {1, 0.3f, 0}});
-    room.add(make_box({4, 3, 5}), {.color = {share, share, share, 1},
+    room.add(make_box({4, 3, 5}), {.color = {fraction, fraction, fraction, 1},
                                    .roughness = 1,
                                    .emission = Vector3f::Constant(0.3f),
                                    .two_sided = true});
     const HdrImage picture = mean_of(room, 16);
-    EXPECT_NEAR(mean_around(picture, {48, 32}, 25) * (1 - share) / 0.3f, 1, 0.03f) << share;
+    EXPECT_NEAR(mean_around(picture, {48, 32}, 25) * (1 - fraction) / 0.3f, 1, 0.03f) << fraction;
   }
 }
 
@@ -96,15 +96,15 @@ TEST_F(TracedLight, OfAGlowingDiscFollowsItsFormFactor) {
 }
 
 // Small and bright: rays in random directions would hardly ever meet it. A ball of radius r at distance d
-// lights a white surface that faces it with the share r^2 / d^2 of its radiance; a small face of area A with
-// A / (pi d^2). One sub-frame already shows it without noise, and halves of the floor agree.
+// lights a white surface that faces it with the fraction r^2 / d^2 of its radiance; a small face of area A
+// with A / (pi d^2). One sub-frame already shows it without noise, and halves of the floor agree.
 TEST_F(TracedLight, OfASmallGlowingMeshHasNoNoise) {
   const float radius = 0.04f, height = 2, radiance = 500;
   const Material glow{
       .color = {0, 0, 0, 1}, .roughness = 1, .emission = Vector3f::Constant(radiance), .two_sided = true};
   struct Case {
     Mesh mesh;
-    float share;
+    float fraction;
   };
   const float side = 0.08f;
   for (const Case& c :
@@ -120,7 +120,7 @@ TEST_F(TracedLight, OfASmallGlowingMeshHasNoNoise) {
     const HdrImage picture = mean_of(scene, 16);
     const Vector2f below = project(low, {0, 0, 0}, 160, 120);
     const float middle = mean_around(picture, below, 4);
-    EXPECT_NEAR(middle / (radiance * c.share), 1, 0.05f);
+    EXPECT_NEAR(middle / (radiance * c.fraction), 1, 0.05f);
     for (int dx = -4; dx <= 4; ++dx)
       EXPECT_NEAR(pixel(picture, static_cast<int>(below.x()) + dx, static_cast<int>(below.y())).y() / middle,
                   1, 0.1f);
@@ -169,8 +169,8 @@ TEST_F(TracedLight, ReachesParticlesAndPanesOnlyWhereNothingIsInTheWay) {
 }
 
 // A wide screen with a straight edge at height h, and the sun overhead, whose disc has the radius w = h
-// tan(s) on the floor: at distance x from the edge's shadow, a segment of the disc is visible, with the share
-// 1/2 + (u sqrt(1 - u^2) + asin u) / pi, u = x / w.
+// tan(s) on the floor: at distance x from the edge's shadow, a segment of the disc is visible, with the
+// fraction 1/2 + (u sqrt(1 - u^2) + asin u) / pi, u = x / w.
 TEST_F(TracedLight, PenumbraOfTheSunIsTheVisiblePartOfItsDisc) {
   const float height = 2, size_deg = 12;
   const float width = height * std::tan(0.5f * size_deg * std::numbers::pi_v<float> / 180);
@@ -217,7 +217,7 @@ TEST_F(TracedLight, ABrightWallColoursTheFloorBesideIt) {
   EXPECT_GT(redness(0.15f), 1.1f * redness(1.9f));
 }
 
-TEST_F(TracedLight, MirrorsShowWhatIsBehindTheCamera) {
+TEST_F(TracedLight, MirrorsShowObjectsBehindTheCamera) {
   s.add(make_box({2, 2, 0.1f}), {.color = {0.9f, 0.9f, 0.9f, 1}, .metallic = 1, .roughness = 0.01f});
   s.add(make_box({3, 3, 0.1f}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {1, 0.5f, 0}}, {0, 0, 8});
   look({.eye = {0, 0, 4}, .target = {0, 0, 0}});
@@ -226,24 +226,24 @@ TEST_F(TracedLight, MirrorsShowWhatIsBehindTheCamera) {
   EXPECT_NEAR(seen.y(), 0.45f, 0.02f);
 }
 
-// In a closed room of metal that glows with e and reflects a share r, the radiance is e / (1 - r). Seen at a
-// right angle, since metal reflects more at grazing angles.
+// In a closed room of metal that glows with e and reflects a fraction r, the radiance is e / (1 - r). Seen at
+// a right angle, since metal reflects more at grazing angles.
 TEST_F(TracedLight, InAGlowingRoomOfMirrorsIsTheSumOfAllReflections) {
-  for (const float share : {0.3f, 0.6f}) {
+  for (const float fraction : {0.3f, 0.6f}) {
     SmallStage room(96, 64);
     room.stage.set_environment(kNoLight);
     room.stage.set_sun({.intensity = 0, .shadows = false});
     room.stage.set_camera({.eye = {0.2f, 0.1f, 0.4f}, .target = {2, 0.1f, 0.4f}, .fov_deg = 10});
-    room.add(make_box({4, 3, 5}), {.color = {share, share, share, 1},
+    room.add(make_box({4, 3, 5}), {.color = {fraction, fraction, fraction, 1},
                                    .metallic = 1,
                                    .roughness = 0.01f,
                                    .emission = Vector3f::Constant(0.3f),
                                    .two_sided = true});
-    EXPECT_NEAR(mean_around(mean_of(room, 4), {48, 32}, 25) * (1 - share) / 0.3f, 1, 0.02f) << share;
+    EXPECT_NEAR(mean_around(mean_of(room, 4), {48, 32}, 25) * (1 - fraction) / 0.3f, 1, 0.02f) << fraction;
   }
 }
 
-TEST_F(TracedLight, MirrorsShowWhatALampLights) {
+TEST_F(TracedLight, MirrorsShowSurfacesThatALampLights) {
   s.stage.set_lamps(std::array{Lamp{.position = {0, 2, 3}, .intensity = {4, 4, 4}, .radius = 0.05f}});
   s.add(make_ground(20), {.color = {0.5f, 0.5f, 0.5f, 1}, .roughness = 1});
   s.add(make_box({4, 4, 0.1f}), {.color = {1, 1, 1, 1}, .metallic = 1, .roughness = 0.01f}, {0, 2, -0.05f});
@@ -286,7 +286,7 @@ TEST_F(TracedLight, OfACoarseSmoothBallFallsEvenlyTowardsItsTerminator) {
   }
 }
 
-TEST_F(TracedLight, SumsCountWhatIsTakenFromRaysThatFindTooMuch) {
+TEST_F(TracedLight, SumsCountTheLightRemovedFromVeryBrightRays) {
   s.stage.set_environment(even_sky(0.7f));
   s.add(make_ground(20), kPlaster);
   look({.eye = {0, 1, 4}, .target = {0, 0, 0}});

@@ -218,7 +218,7 @@ TEST(AppliedForces, ActAtAPointInTheBodysAxes) {
                    .bodies = {spinning},
                    .effect = AppliedForce{.keys = {{.force = {2, 0, 0}}}, .body_axes = true}});
   run(other, 1.0);
-  // The velocity is the integral of (cos wt, sin wt): zero after one turn; the way is t / w along y.
+  // The velocity is the integral of (cos wt, sin wt): zero after one turn; the displacement is t / w along y.
   EXPECT_LT(other.body(spinning).velocity.norm(), 1e-6);
   EXPECT_NEAR(other.body(spinning).pose.position.y(), 1 / (2 * kPi), 1e-6);
 }
@@ -275,7 +275,7 @@ TEST(Lifetimes, RemovalWakesWhatRestedOnTheBody) {
   EXPECT_NEAR(world.body(body).pose.position.y(), 0.2 - kWeight / 2 * 0.25, 2e-3);
 }
 
-// A joint that appears later holds the bodies where they are then; one that is removed lets go.
+// A joint that appears later holds the bodies where they are then; one that is removed releases them.
 TEST(Lifetimes, OfJointsAndSprings) {
   World world(sleepless());
   const BodyHandle a = add(world, Sphere{0.1}, {0, 0, 0}), b = add(world, Sphere{0.1}, {3, 0, 0}, 1);
@@ -411,8 +411,8 @@ TEST(Pulleys, AreAtwoodsMachines) {
 
 // --- Limits ---
 
-// A slider falls on its limit and rebounds with e of its speed: to e^2 of the height, within the way of one
-// sub-step.
+// A slider falls on its limit and rebounds with e of its speed: to e^2 of the height, within the distance of
+// one sub-step.
 TEST(JointLimits, HaveARestitution) {
   for (const Real e : {0.5, 0.9}) {
     World world(sleepless());
@@ -453,9 +453,9 @@ TEST(JointStiffness, HoldsABarUp) {
 }
 
 // A torsion pendulum without damping: its energy goes back and forth between motion and the spring of its
-// joint. Joint springs act at the end of a sub-step, which takes at most about the share omega^2 h t of the
-// energy, as backward Euler does. The tolerance of the solver takes as much again from a spherical joint at
-// this step, and more at shorter ones.
+// joint. Joint springs act at the end of a sub-step, which takes at most about the fraction omega^2 h t of
+// the energy, as backward Euler does. The tolerance of the solver takes as much again from a spherical joint
+// at this step, and more at shorter ones.
 TEST(JointStiffness, StoresTheEnergyOfATorsionPendulum) {
   const Real k = 2, start_speed = 0.5, step = 1.0 / 1000;
   for (const bool by_motor : {false, true}) {

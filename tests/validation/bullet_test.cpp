@@ -53,9 +53,9 @@ TEST(Bullet, NeverPassesAPlate) {
     // are also hit.
     const Vec3 target(0.6 * u(0), 0, 0.6 * u(1)),
         direction = Vec3(u(2), -0.3 - std::abs(u(3)), u(4)).normalized();
-    const Real share = 0.02 + 0.96 * random.uniform(i, 5);
+    const Real fraction = 0.02 + 0.96 * random.uniform(i, 5);
     const Vec3 way = kBulletSpeed * kBulletStep * direction;
-    const PosePath flight({target - share * way, turned(10)}, {target + (1 - share) * way, turned(14)});
+    const PosePath flight({target - fraction * way, turned(10)}, {target + (1 - fraction) * way, turned(14)});
     const bool moving = i % 2 == 1;
     const Pose rest;
     const Pose tilted{Vec3(0.01 * u(6), 0.01 * u(7), 0.01 * u(8)),
@@ -65,7 +65,7 @@ TEST(Bullet, NeverPassesAPlate) {
         time_of_impact(MovingShape{bullet.collision, flight}, MovingShape{plate.collision, standing}, 1e-5);
     // At the impact, the bullet is still in front of the plate, and near it.
     const bool hit =
-        impact && flight.at(impact->share).position.dot(direction) < target.dot(direction) + 0.05;
+        impact && flight.at(impact->fraction).position.dot(direction) < target.dot(direction) + 0.05;
     misses += !hit;
     stalled += impact && !impact->converged;
   }

@@ -1,4 +1,4 @@
-/// Cloth in air: decay, terminal speeds and static loads, whatever the step.
+/// Cloth in air: decay, terminal speeds and static loads, for any step.
 
 #include <algorithm>
 #include <cmath>

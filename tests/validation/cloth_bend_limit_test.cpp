@@ -141,7 +141,7 @@ struct Crumpled {
       points.mass.push_back(0.5 + scatter.uniform(i, 3));
       points.inverse_mass.push_back(1 / points.mass.back());
     }
-    points.pull.assign(points.size(), Vec4::Zero());
+    points.pin_impulse.assign(points.size(), Vec4::Zero());
     kick.assign(points.size(), Vec4::Zero());
     bending.assign(def.vertices, def.triangles, points.mass, 0, 0, 1, true);
   }

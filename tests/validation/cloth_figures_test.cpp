@@ -63,15 +63,15 @@ struct HangingStrip {
   ClothHandle cloth;
 };
 
-/// Fabric, share of the load at its limit, and step of the world.
+/// Fabric, fraction of the load at its limit, and step of the world.
 class ClothUnderALoad : public testing::TestWithParam<std::tuple<std::string, Real, Real>> {};
 
 TEST_P(ClothUnderALoad, StretchesByItsStiffness) {
   // (weight + half its own weight) / (stiffness * width) of its length.
-  const auto [name, share, step] = GetParam();
+  const auto [name, fraction, step] = GetParam();
   const effects::Fabric fabric = effects::find_fabric(name)->fabric;
   const Real limit = fabric.max_stretch - 1;
-  const Real mass = share * limit * fabric.stretch * 0.2 / kFiguresGravity;
+  const Real mass = fraction * limit * fabric.stretch * 0.2 / kFiguresGravity;
   const Real expected = (mass + fabric.areal_density * 0.2 / 2) * kFiguresGravity / (fabric.stretch * 0.2);
   HangingStrip strip(fabric, mass, expected, step, ClothIntegrator::relaxed);
   EXPECT_NEAR(strip.mean_elongation(2), expected, 0.02 * expected);
@@ -226,8 +226,8 @@ INSTANTIATE_TEST_SUITE_P(Shapes, ClothHangs,
 /// Whether a sheet is sheared, or stretched along its threads.
 class ClothDamping : public testing::TestWithParam<bool> {};
 
-TEST_P(ClothDamping, OfEachKindOfSpringIsItsShareOfTheCriticalOne) {
-  // Vertices of two cells have several masses. Each spring has the share of its kind.
+TEST_P(ClothDamping, OfEachKindOfSpringIsItsFractionOfTheCriticalOne) {
+  // Vertices of two cells have several masses. Each spring has the fraction of its kind.
   const bool sheared = GetParam();
   constexpr Real kZeta = 0.05, kOther = 0.8;
   effects::Fabric fabric = effects::find_fabric("cotton")->fabric;
@@ -238,10 +238,10 @@ TEST_P(ClothDamping, OfEachKindOfSpringIsItsShareOfTheCriticalOne) {
   const ClothDef def = effects::grid_cloth({0.2, 0.1, 2, 1}, {}, fabric);
   for (const ClothSpring& s : def.springs) {
     const Real ma = def.masses[s.a], mb = def.masses[s.b];
-    const Real share = s.kind == SpringKind::bend                 ? 0.3
-                       : (s.kind == SpringKind::shear) == sheared ? kZeta
-                                                                  : kOther;
-    EXPECT_NEAR(s.damping, 2 * share * std::sqrt(s.stiffness * ma * mb / (ma + mb)), 1e-12);
+    const Real fraction = s.kind == SpringKind::bend                 ? 0.3
+                          : (s.kind == SpringKind::shear) == sheared ? kZeta
+                                                                     : kOther;
+    EXPECT_NEAR(s.damping, 2 * fraction * std::sqrt(s.stiffness * ma * mb / (ma + mb)), 1e-12);
   }
   // A pair of them swings as q'' + 2 zeta omega q' + omega^2 q = 0.
   const ClothSpring& s =

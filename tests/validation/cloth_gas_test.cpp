@@ -31,7 +31,7 @@ TEST(ClothGas, LeavesThroughTheHolesOfATear) {
   constexpr Real kPressure = 300, kDensity = 1.2, kTime = 5;
   for (int i = 0; i < 500; ++i) gas.leak(mesh.vertices, closed, kPressure, kDensity, kTime / 500);
   const Real flow = ClothGas::kDischarge * area * std::sqrt(2 * kPressure / kDensity);
-  EXPECT_NEAR(gas.share(), 1 / std::pow(1 + kTime * flow / (2 * closed), 2), 1e-9);
+  EXPECT_NEAR(gas.remaining_fraction(), 1 / std::pow(1 + kTime * flow / (2 * closed), 2), 1e-9);
 }
 
 TEST(ClothGas, ABalloonHitByADartTearsAndShrinks) {
@@ -130,8 +130,8 @@ TEST(ClothGas, FillsABalloonInItsTime) {
       const Real length = (view.points[s.a] - view.points[s.b]).norm();
       virial += s.stiffness * (length - s.rest_length) * length;
     }
-    const Real share = std::min(1.0, i / 40.0);
-    EXPECT_NEAR(virial, share * filled, 0.02 * filled) << "after " << i / 20.0 << " s";
+    const Real fraction = std::min(1.0, i / 40.0);
+    EXPECT_NEAR(virial, fraction * filled, 0.02 * filled) << "after " << i / 20.0 << " s";
   }
   // Blown up from 20 to 30 cm, it has the pressure of a balloon.
   const ClothView view = world.cloth(cloth);
@@ -144,7 +144,7 @@ TEST(ClothGas, FillsABalloonInItsTime) {
 class PoppedBalloon : public testing::TestWithParam<bool> {};
 
 TEST_P(PoppedBalloon, FliesFreelyAndNoFasterThanItsGas) {
-  // By Bernoulli's equation gas of the gauge pressure p leaves at sqrt(2 p / rho); what is left of the skin
+  // By Bernoulli's equation gas of the gauge pressure p leaves at sqrt(2 p / rho); the remains of the skin
   // cannot be pushed faster by it. Its shreds touch, but hardly ever have to be held back.
   ClothDef def = effects::sphere_cloth(0.1, 3, {}, effects::find_fabric("balloon")->fabric);
   def.pressure = 8440;

@@ -25,7 +25,7 @@ Vec3 momentum(const ClothDef& def, const ClothView& view) {
 }
 
 TEST(ClothAir, AFlatSheetFallsAtItsTerminalSpeed) {
-  // Square to the air: m g = rho A C_D v^2 / 2, and on the way v = v_t tanh(g t / v_t).
+  // Square to the air: m g = rho A C_D v^2 / 2, and before that v = v_t tanh(g t / v_t).
   World world;
   const ClothDef def = effects::grid_cloth({1, 1, 10, 10}, {}, cotton());
   const ClothHandle cloth = world.add_cloth(def);

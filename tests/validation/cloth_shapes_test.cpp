@@ -140,23 +140,23 @@ Real end_to_end(const ClothView& view, uint32_t cells) {
   return (view.points[cells] - view.points[0]).norm();
 }
 
-TEST(ClothRestCurvature, IsTheShareThatIsUnstressed) {
-  // What is free of loads takes the curvature at rest: of a strip of the length l its ends are 2 sin(k l / 2)
+TEST(ClothRestCurvature, IsTheFractionThatIsUnstressed) {
+  // A cloth without loads takes the curvature at rest: the ends of a strip of the length l are 2 sin(k l / 2)
   // / k apart.
   constexpr uint32_t kCells = 20;
   constexpr Real kLength = 0.2, kCurvature = 8;
   effects::Fabric fabric = effects::find_fabric("denim")->fabric;
   fabric.bend_damping = 0.1;  // 0.7 of the critical damping
-  for (Real share : {0.0, 0.5, 1.0}) {
+  for (Real fraction : {0.0, 0.5, 1.0}) {
     ClothDef def = bent_strip(fabric, kCells, kLength, kCurvature);
-    def.rest_curvature = share;
+    def.rest_curvature = fraction;
     World world({.gravity = Vec3::Zero()});
     const ClothHandle cloth = world.add_cloth(def);
     for (int i = 0; i < 24; ++i) world.step(1.0 / 24);
-    const Real k = share * kCurvature;
+    const Real k = fraction * kCurvature;
     const Real expected = k > 0 ? 2 * std::sin(k * kLength / 2) / k : kLength;
     // The difference to the flat strip is 0.02 m of 0.2 m.
-    EXPECT_NEAR(end_to_end(world.cloth(cloth), kCells), expected, 0.002) << share;
+    EXPECT_NEAR(end_to_end(world.cloth(cloth), kCells), expected, 0.002) << fraction;
   }
 }
 

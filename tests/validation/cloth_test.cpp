@@ -1,4 +1,4 @@
-/// Validation rows on cloth: among bodies, with itself, both ways.
+/// Validation rows on cloth: with bodies, in both directions, and with itself.
 
 #include "effects/cloth.h"
 

@@ -354,14 +354,14 @@ class Dome : public BothSolvers {
   /// A ball of radius 1 m moves down a sphere of radius 9 m. It starts near the top with the speed that it
   /// would have gained from there, rolling if there is friction. In flight v_x stays constant, and at the
   /// point of departure v_x^2 = g (R + r) cos^3.
-  static Flight leave(Real max_step, Real friction, Real share) {
+  static Flight leave(Real max_step, Real friction, Real fraction) {
     constexpr Real kSphere = 9, kBall = 1, kWay = kSphere + kBall, kStart = 0.1;
     World world(def(max_step));
     world.add_body({.shape = Sphere{kSphere},
                     .motion = MotionType::static_body,
                     .restitution = 0,
                     .friction = friction});
-    const Real speed = std::sqrt(2 * share * kFrictionGravity * kWay * (1 - std::cos(kStart)));
+    const Real speed = std::sqrt(2 * fraction * kFrictionGravity * kWay * (1 - std::cos(kStart)));
     const auto ball = world.add_body({.shape = Sphere{kBall},
                                       .pose = {kWay * Vec3(std::sin(kStart), std::cos(kStart), 0)},
                                       .velocity = speed * Vec3(std::cos(kStart), -std::sin(kStart), 0),
@@ -382,17 +382,17 @@ class Dome : public BothSolvers {
   }
 };
 
-// The ball leaves where v^2 = g (R + r) cos, with v^2 = 2 share g (R + r) (1 - cos); the rotation of a
+// The ball leaves where v^2 = g (R + r) cos, with v^2 = 2 fraction g (R + r) (1 - cos); the rotation of a
 // rolling ball takes two sevenths of the energy. With a friction coefficient of 50 it slips only below a
 // cosine of 0.59. The scene is too coarse for the fast solver at a tenth of this size: its cosine would be
 // 1.3 % off, and 1.0 % at 1/960 s.
 TEST_P(Dome, BallLeavesWhereTheNormalForceVanishes) {
   struct Case {
-    Real friction, share, cosine;
+    Real friction, fraction, cosine;
   };
   for (const Case& c : {Case{0, 1, 2.0 / 3}, Case{50, 5.0 / 7, 10.0 / 17}})
     for (const Real max_step : {1.0 / 240, 1.0 / 960}) {
-      const Flight f = leave(max_step, c.friction, c.share);
+      const Flight f = leave(max_step, c.friction, c.fraction);
       EXPECT_NEAR(f.cosine / c.cosine, 1, max_step > 1.0 / 900 ? 0.01 : 0.002)
           << c.friction << ", " << max_step;
       EXPECT_LT(std::abs(f.energy), 0.002) << c.friction << ", " << max_step;

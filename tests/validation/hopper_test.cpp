@@ -135,7 +135,7 @@ struct HopperCase {
 
 class Hopper : public testing::TestWithParam<HopperCase> {};
 
-// The grains in the way of the flow, and those that the walls carry, make the rate independent of the fill.
+// Grains that jam above the hole, and those that the walls carry, make the rate independent of the fill.
 TEST_P(Hopper, DischargesAsBeverlooSaysWhateverItsFill) {
   std::vector<Real> rates;
   for (const int layers : GetParam().layers) {

@@ -67,7 +67,7 @@ Real flat_height(Real, Real) {
   return 0;
 }
 
-/// Adds a flat floor at y = 0 from x = -3 to 12; `kind` says what it is made of.
+/// Adds a flat floor at y = 0 from x = -3 to 12; `kind`: the objects that it consists of.
 void add_flat_floor(World& world, const std::string& kind, Real friction) {
   const auto add = [&](const Shape& shape, const Vec3& at = Vec3::Zero()) {
     return world.add_body(fixed_body(shape, at, friction));
@@ -113,8 +113,8 @@ void add_flat_floor(World& world, const std::string& kind, Real friction) {
     Aabb box;
     for (const Vec3& v : floor.vertices) box.extend(v);
     for (Vec3& v : floor.vertices) {
-      const Vec3 share = (v - box.min()).cwiseQuotient(box.sizes());
-      v = Vec3(-3 + 15 * share.x(), -0.5 * (1 - share.y()), -1 + 2 * share.z());
+      const Vec3 fraction = (v - box.min()).cwiseQuotient(box.sizes());
+      v = Vec3(-3 + 15 * fraction.x(), -0.5 * (1 - fraction.y()), -1 + 2 * fraction.z());
     }
     add(MeshShape{world.add_mesh(floor)});
   }
@@ -366,8 +366,8 @@ TEST_P(InternalEdges, DoNotStopConesThatRollInCircles) {
         // Each tile predicts the turn of the line by itself, with an error of second order, and the friction
         // of two tiles opposes the difference: by the fast solver 2e-4 at 1/240 s, 7e-3 at 1/60 s.
         const bool tiled = std::string(kind).starts_with("tiles");
-        const Real share = !is_exact() && tiled && step > 0.01 ? 1e-2 : 2e-3;
-        EXPECT_NEAR(world.body(body).angular_velocity.norm(), spin, share * spin)
+        const Real fraction = !is_exact() && tiled && step > 0.01 ? 1e-2 : 2e-3;
+        EXPECT_NEAR(world.body(body).angular_velocity.norm(), spin, fraction * spin)
             << kind << ", step " << step;
         EXPECT_LT(highest, centre.y() + 1e-4) << kind << ", step " << step;
       }
@@ -443,9 +443,9 @@ TriangleMesh cone_mesh(Real radius, Real height, uint32_t around, uint32_t rings
   m.vertices.emplace_back(0, height, 0);
   for (uint32_t k = 1; k <= rings; ++k)
     for (uint32_t i = 0; i < around; ++i) {
-      const Real angle = 2 * std::numbers::pi * i / around, share = static_cast<Real>(k) / rings;
-      m.vertices.emplace_back(share * radius * std::cos(angle), (1 - share) * height,
-                              share * radius * std::sin(angle));
+      const Real angle = 2 * std::numbers::pi * i / around, fraction = static_cast<Real>(k) / rings;
+      m.vertices.emplace_back(fraction * radius * std::cos(angle), (1 - fraction) * height,
+                              fraction * radius * std::sin(angle));
     }
   const auto at = [&](uint32_t ring, uint32_t i) { return 1 + (ring - 1) * around + i % around; };
   for (uint32_t i = 0; i < around; ++i) {

@@ -1,5 +1,5 @@
-/// The book's contact forces at each step (physics R8, R9): what it solves by itself, what it hands over, and
-/// how its pyramid of friction differs from Coulomb's cone.
+/// The book's contact forces at each step (physics R8, R9): islands that it solves itself, islands that it
+/// leaves to the exact solver, and the difference of its friction pyramid from Coulomb's cone.
 
 #include <cmath>
 #include <numbers>

@@ -71,8 +71,8 @@ TEST_P(TurningFriction, ARollingBodyDeceleratesAndStopsWhereComputed) {
 
 TEST_P(TurningFriction, ABallStaysOnAGentleInclineAndRollsOnASteepOne) {
   constexpr Real kRho = 0.03;
-  for (const Real share : {0.9, 2.0}) {
-    const Real angle = std::atan(share * kRho / kRadius);
+  for (const Real fraction : {0.9, 2.0}) {
+    const Real angle = std::atan(fraction * kRho / kRadius);
     World w = world();
     BodyDef slope = ground(0.8);
     slope.pose.orientation = Quat(Eigen::AngleAxisd(-angle, Vec3::UnitZ()));
@@ -83,7 +83,7 @@ TEST_P(TurningFriction, ABallStaysOnAGentleInclineAndRollsOnASteepOne) {
     const BodyHandle body = w.add_body(ball);
     run(w, 2);
     const Real way = (w.body(body).centre - start).norm();
-    if (share < 1) {
+    if (fraction < 1) {
       EXPECT_LT(way, 1e-4);
     } else {
       const Real a = kGravity * (std::sin(angle) - kRho / kRadius * std::cos(angle)) / (1 + kBall);

@@ -178,9 +178,9 @@ TEST_P(Rocking, LosesTheEnergyOfHousnersFormulaAtEachImpact) {
     kept.push_back(now / before);
     before = now;
   }
-  const Real share = 1 - 1.5 * std::pow(std::sin(slenderness), 2);
+  const Real fraction = 1 - 1.5 * std::pow(std::sin(slenderness), 2);
   ASSERT_EQ(kept.size(), 5u);
-  for (const Real k : kept) EXPECT_NEAR(k, share * share, 0.003);
+  for (const Real k : kept) EXPECT_NEAR(k, fraction * fraction, 0.003);
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, Rocking);
 
@@ -188,12 +188,12 @@ class Cards : public BothSolvers {
  protected:
   /// Two cards lean against a post between them. Post and cards are frictionless, so only the friction of the
   /// floor holds a card: m g (L/2 sin a - t/2 cos a) = mu m g L cos a about its lower edge.
-  static Real height_after(Real share_of_bound, Real seconds) {
+  static Real height_after(Real fraction_of_bound, Real seconds) {
     constexpr Real kLength = 0.4, kThick = 0.01, kTilt = 20 * std::numbers::pi / 180, kPost = 0.02;
     const Real bound =
         (kLength * std::sin(kTilt) - kThick * std::cos(kTilt)) / (2 * kLength * std::cos(kTilt));
     World world(def());
-    add_ground(world, share_of_bound * bound);
+    add_ground(world, fraction_of_bound * bound);
     world.add_contact_rule({.a = "card", .b = "post", .friction = 0});
     world.add_body({.shape = Box{{kPost, 0.5, 0.3}},
                     .pose = {Vec3(0, 0.25, 0)},
@@ -213,7 +213,7 @@ class Cards : public BothSolvers {
                              .mass = 0.1,
                              .material = "card",
                              .restitution = 0,
-                             .friction = share_of_bound * bound});
+                             .friction = fraction_of_bound * bound});
     }
     const Real start = world.body(card).centre.y();
     run(world, seconds);

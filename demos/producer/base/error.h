@@ -17,7 +17,7 @@ struct Where {
 /// Greatest number of problems that are listed; the rest are only counted.
 inline constexpr std::size_t kMostProblems = 50;
 
-/// One problem: "file:line:col: /path: what is wrong; what is allowed".
+/// One problem: "file:line:col: /path: the error; the allowed values".
 struct Problem {
   Where where;
   std::string what;

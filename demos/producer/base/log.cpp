@@ -43,7 +43,7 @@ void show_status(std::string_view line) {
   status_shown = !line.empty();
 }
 
-void keep_status() {
+void end_status_line() {
   const std::lock_guard lock(talk_mutex);
   if (std::exchange(status_shown, false)) write_to_stderr("\n");
 }

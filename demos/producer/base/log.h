@@ -24,7 +24,7 @@ void write_log(std::string_view lines);
 /// than terminal_width(). An empty text removes it.
 void show_status(std::string_view line);
 /// Keeps the status line visible and continues below it.
-void keep_status();
+void end_status_line();
 
 /// Columns of the terminal at standard error; 80 if unknown.
 int terminal_width();

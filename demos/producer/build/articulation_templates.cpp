@@ -89,7 +89,7 @@ Parts build(const Chain& chain) {
     Joint& j = make.joint("joint_" + std::to_string(i), a, b, nodes[k]);
     j.behaviour.axis = i < chain.links ? nodes[k + 1] - nodes[k] : nodes[k] - nodes[k - 1];
     if (chain.swing_deg < 180) j.behaviour.swing_deg = chain.swing_deg;
-    // A joint stands for the half links beside it; a holder bends no more than the half link that it holds.
+    // A joint represents the half links beside it; a joint at an end bends at most as far as its half link.
     const Real length = ((i > 0 ? side(k - 1) : 0) + (i < chain.links ? side(k) : 0)) / 2;
     if (chain.bend_stiffness > 0) j.behaviour.stiffness = chain.bend_stiffness / length;
     j.behaviour.friction = chain.friction;
@@ -132,7 +132,7 @@ Parts build(const Bridge& bridge) {
   return std::move(make.parts);
 }
 
-/// Lengths are shares of the height; x points to the figure's left, z to its front.
+/// Lengths are fractions of the height; x points to the figure's left, z to its front.
 Parts build(const Ragdoll& doll) {
   ArticulationBuilder make(doll.where, doll.name);
   const Real H = doll.height;
@@ -151,30 +151,30 @@ Parts build(const Ragdoll& doll) {
   const auto limb = [&](Real top, Real bottom, Real radius) {
     return sim::Capsule{H * radius, H * (top - bottom - 2 * radius)};
   };
-  // The volume of all parts is kVolume H^3. The dry friction of a limp joint can bear the share kLimp of the
-  // torque that would hold the whole figure horizontally at its feet.
+  // The volume of all parts is kVolume H^3. The dry friction of a limp joint can bear the fraction kLimp of
+  // the torque that would hold the whole figure horizontally at its feet.
   constexpr Real kVolume = 0.0098, kLimp = 0.004, kGravity = 9.81;
   // The knees lie in front of the legs' axes, so that the weight bends them: with all joints in one line, the
   // figure would stand by their friction.
   constexpr Real kKnee = 0.025;
   const Real torque = doll.stiffness * kLimp * kVolume * doll.density * H * H * H * kGravity * H;
   const auto join = [&](const std::string& a, const std::string& b, const Vec3& anchor, const Vec3& axis,
-                        Real share) -> Joint& {
+                        Real fraction) -> Joint& {
     Joint& j = make.joint(a, make.own(a), make.own(b), place(anchor));
     j.behaviour.axis = doll.orientation * axis;
-    j.behaviour.friction = share * torque;
-    j.behaviour.damping = 0.05 * share * torque;
+    j.behaviour.friction = fraction * torque;
+    j.behaviour.damping = 0.05 * fraction * torque;
     return j;
   };
   const auto ball = [&](const std::string& a, const std::string& b, const Vec3& anchor, const Vec3& axis,
-                        Real swing, Real twist, Real share) {
-    Joint& j = join(a, b, anchor, axis, share);
+                        Real swing, Real twist, Real fraction) {
+    Joint& j = join(a, b, anchor, axis, fraction);
     j.behaviour.swing_deg = swing;
     j.behaviour.limits_deg = std::array{-twist, twist};
   };
   const auto hinge = [&](const std::string& a, const std::string& b, const Vec3& anchor, const Vec3& axis,
-                         Real low, Real high, Real share) {
-    Joint& j = join(a, b, anchor, axis, share);
+                         Real low, Real high, Real fraction) {
+    Joint& j = join(a, b, anchor, axis, fraction);
     j.behaviour.type = sim::JointType::revolute;
     j.behaviour.limits_deg = std::array{low, high};
   };

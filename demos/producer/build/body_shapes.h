@@ -53,8 +53,8 @@ std::optional<sim::Mat3> inertia_of(const Body& body);
 /// inertia in place of these if it has them. None for a mesh file, which is not read here, and for a plane.
 std::optional<sim::BodyMass> mass_by_shape(const Body& body);
 
-/// Returns what is wrong with the sizes of a shape or of its parts, with the key relative to the shape; empty
-/// if nothing.
+/// Returns the first error in the sizes of a shape or of its parts, with the key relative to the shape; empty
+/// if there is none.
 struct ShapeProblem {
   std::string key, what;
 };

@@ -295,7 +295,7 @@ std::string selects_nothing(const FlatCloth& flat) {
       a.x(), a.y(), a.z(), b.x(), b.y(), b.z());
 }
 
-std::optional<std::string> too_stiff(const Scene& scene, const sim::ClothDef& cloth) {
+std::optional<std::string> instability_of(const Scene& scene, const sim::ClothDef& cloth) {
   const sim::StableStep stable = sim::largest_stable_step(cloth);
   const Real used = std::min({cloth.substep, scene.world.max_step, scene.output.fps.seconds(1)});
   if (used < stable.step) return {};

@@ -54,6 +54,6 @@ render::Material fabric_look(const std::string& fabric);
 
 /// Returns why an explicit integrator is unstable for a cloth of this scene, with the spring and the longest
 /// step.
-std::optional<std::string> too_stiff(const Scene& scene, const sim::ClothDef& cloth);
+std::optional<std::string> instability_of(const Scene& scene, const sim::ClothDef& cloth);
 
 }  // namespace offstage::producer

@@ -45,7 +45,7 @@ Real expected_hits(const ParticleSource& source) {
   return source.behaviour.dies_on_hit ? 1 : 4;
 }
 
-/// With and without the limits on living particles.
+/// Bounds of an emitter with and without the limits on the number of particles.
 struct Bounds {
   effects::WorstCase possible, limited;
 };
@@ -86,13 +86,13 @@ Bounds bounds_of_emitter(const Emitter& emitter, Real film_end) {
   return bounds_of(def, nullptr, film_end);
 }
 
-Bounds bounds_of_child(const ParticleSource& parent, const Birth& birth, const Bounds& parents) {
-  if (birth.trail) {
-    effects::TrailDef def = trail_def(*birth.trail, "", 0);
+Bounds bounds_of_child(const ParticleSource& parent, const Emission& emission, const Bounds& parents) {
+  if (emission.trail) {
+    effects::TrailDef def = trail_def(*emission.trail, "", 0);
     for (Varying* v : {&def.release.rate, &def.particles.lifespan}) bound(*v);
     return bounds_of(def, &parents);
   }
-  effects::SubEmitterDef def = event_def(birth, "", 0);
+  effects::SubEmitterDef def = event_def(emission, "", 0);
   for (Varying* v : {&def.release.count, &def.particles.lifespan}) bound(*v);
 
   return bounds_of(def, &parents, expected_hits(parent));
@@ -142,13 +142,13 @@ effects::TrailDef trail_def(const TrailSource& trail, const std::string& name, u
   return {.name = name, .seed = seed, .release = trail, .particles = trail};
 }
 
-effects::SubEmitterDef event_def(const Birth& birth, const std::string& name, uint64_t seed) {
+effects::SubEmitterDef event_def(const Emission& emission, const std::string& name, uint64_t seed) {
   return {.name = name,
           .seed = seed,
-          .trigger = birth.trigger,
-          .age = birth.age,
-          .release = *birth.event,
-          .particles = *birth.event};
+          .trigger = emission.trigger,
+          .age = emission.age,
+          .release = *emission.event,
+          .particles = *emission.event};
 }
 
 void bound_sources(
@@ -156,9 +156,9 @@ void bound_sources(
     const std::function<void(const ParticleSource&, const std::string&, const SourceBound&)>& visit) {
   std::map<const ParticleSource*, Bounds> known;
   for_each_source(emitter, [&](const ParticleSource& source, const ParticleSource* parent,
-                               const std::string& name, const Birth& birth) {
+                               const std::string& name, const Emission& emission) {
     Bounds all =
-        parent ? bounds_of_child(*parent, birth, known.at(parent)) : bounds_of_emitter(emitter, film_end);
+        parent ? bounds_of_child(*parent, emission, known.at(parent)) : bounds_of_emitter(emitter, film_end);
     add_split(source, all);
     known[&source] = all;
     visit(source, name, {all.possible, all.limited.alive});

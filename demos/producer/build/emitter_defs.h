@@ -20,17 +20,17 @@ namespace offstage::producer {
 sim::ParticleSystemDef system_def(const std::string& name, const sim::ParticleSystemDef& behaviour);
 sim::ParticleSystemDef system_def(const std::string& name, const ParticleSource& source);
 
-/// Without its body and, for a model, without the triangles of its surface.
+/// Returns the definition without its body and, for a model, without the triangles of its surface.
 effects::EmitterDef emitter_def(const Emitter& emitter, uint64_t seed);
 effects::SplitDef split_def(const ParticleSource& source, const std::string& name, uint64_t seed);
-/// For a child whose birth is a `trail`, or an `event`.
+/// Returns the definition for a child that a trail or an event of its parent emits.
 effects::TrailDef trail_def(const TrailSource& trail, const std::string& name, uint64_t seed);
-effects::SubEmitterDef event_def(const Birth& birth, const std::string& name, uint64_t seed);
+effects::SubEmitterDef event_def(const Emission& emission, const std::string& name, uint64_t seed);
 
 /// Greatest number of particles of a source.
 struct SourceBound {
   effects::WorstCase possible;  ///< without regard to max_alive
-  uint64_t alive = 0;           ///< with max_alive
+  uint64_t alive = 0;           ///< number of particles at once, limited by max_alive
 };
 /// Calls visit(source, name, bound) for an emitter and all of its child particles in a film that ends at
 /// `film_end` [s]. Distributions without bounds are bounded at four deviations.

@@ -9,7 +9,7 @@
 
 namespace offstage::producer {
 
-/// Without the objects on which it acts.
+/// Returns the definition without the objects on which it acts.
 sim::ForceDef force_def(const Force& force);
 
 /// Names of the objects on which a force acts.

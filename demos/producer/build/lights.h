@@ -13,7 +13,7 @@ namespace offstage::producer {
 
 /// The sun, which may be a light of a model file; without one, a sun of intensity 0.
 render::Sun sun_of(const Scene& scene, const ModelLibrary& models);
-/// Without the picture of the sky, which the caller sets.
+/// Returns the environment without the picture of the sky, which the caller sets.
 render::Environment environment_of(const Scene& scene);
 /// The other lights at a time, in scene order.
 std::vector<render::Lamp> lamps_of(const Scene& scene, const ModelLibrary& models, double time,

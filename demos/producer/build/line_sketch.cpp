@@ -11,7 +11,7 @@ using sim::Vec3;
 namespace {
 
 constexpr float kHeadWidth = 5;     // width of an arrow's head, in widths of its shaft
-constexpr Real kHeadLength = 0.35;  // length of the head as a share of the arrow
+constexpr Real kHeadLength = 0.35;  // length of the head as a fraction of the arrow
 
 }  // namespace
 

@@ -83,7 +83,7 @@ Parts build(const Vehicle& car) {
   make.join(fixed, "body", "body", "chassis", {0, over, 0});
   make.join(fixed, "cabin", "cabin", "body", {0, over + body_height, -0.08 * L});
 
-  const Real w = 2 * std::numbers::pi * car.suspension_hz, load = sprung / 4, kShare = 0.35;
+  const Real w = 2 * std::numbers::pi * car.suspension_hz, load = sprung / 4, kFraction = 0.35;
   const Real stiffness = load * w * w;
   for (const bool front : {true, false})
     for (const bool left : {true, false}) {
@@ -103,7 +103,7 @@ Parts build(const Vehicle& car) {
       spring.behaviour.motor = JointMotor{.mode = sim::Motor::Mode::position,
                                           .target = -load * kGravity / stiffness,
                                           .stiffness = stiffness,
-                                          .damping = 2 * kShare * load * w};
+                                          .damping = 2 * kFraction * load * w};
       if (front) {
         inside(make.box(knuckle, car.trim, size, hub_mass, centre));
         Joint& steering = make.join(revolute, knuckle, knuckle, hub, centre);

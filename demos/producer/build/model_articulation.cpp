@@ -39,8 +39,7 @@ void read_fill(const SceneFolder& folder, std::string& digest, MeshFill& fill) {
   fill.solid = sim::weld(collision_mesh(model, fitted_scale(fill.scale, fill.fit, model)));
   const sim::MeshDefects defects = sim::MeshTopology(fill.solid).defects();
   if (!defects.closed())
-    throw render::FileError(fill.file +
-                            ": is not closed, so it has no inside to fill: " + defects.describe());
+    throw render::FileError(fill.file + ": is not closed, so it cannot be filled: " + defects.describe());
   if (defects.inverted)
     for (sim::Triangle& t : fill.solid.triangles) std::swap(t[1], t[2]);
   digest += fill.file + " " + mesh_hash(fill.solid) + "\n";

@@ -94,10 +94,10 @@ struct ChosenScale {
   std::string reason;
 };
 /// The factor that brings a model from its file's likely unit to metres: 1, 0.01 (centimetres) or 0.001
-/// (millimetres). `largest_side`: of the box around all of the file, with the unit that was read or assumed
-/// [m].
+/// (millimetres). `largest_side`: longest edge of the box around the file's content, in the unit that was
+/// read or assumed [m].
 ChosenScale automatic_scale(Real largest_side, render::Model::UnitSource unit);
-/// Needs Model::file_size.
+/// The same for a model as it was read, whose Model::file_size must be known.
 ChosenScale automatic_scale(const render::Model& model);
 
 /// Scale factor that brings a model to the size of its use: `scale` times the factor that fits its bounding

@@ -12,7 +12,7 @@ ObjectTable::ObjectTable(const Scene& scene) {
   for (const ParticleGroup& group : scene.particles) point_sets.push_back({group.name, &group.look, ++id});
   for (const Emitter& emitter : scene.emitters)
     for_each_source(emitter, [&](const ParticleSource& source, const ParticleSource*, const std::string& name,
-                                 const Birth&) {
+                                 const Emission&) {
       point_sets.push_back({name, &source.look, ++id});
     });
 

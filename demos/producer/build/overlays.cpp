@@ -284,14 +284,14 @@ LineSet Overlays::draw(const TreeLines& tree, const sim::World& world) {
   const sim::Pose pose = world.body(tree.body).pose;
   const Real shown = effects::mean(tree.overlay->level, world.time());
   const int upper = static_cast<int>(std::floor(shown));
-  const auto lower_share = static_cast<float>(shown - upper);
+  const auto lower_fraction = static_cast<float>(shown - upper);
   LineSketch sketch;
   for (std::size_t i = 0; i < tree.volumes.size(); ++i) {
     const TreeLines::Volume& volume = tree.volumes[i];
     const auto belongs = [&](int level) {
       return volume.level == level || (volume.leaf && volume.level < level);
     };
-    const float alpha = (belongs(upper) ? 1 - lower_share : 0) + (belongs(upper + 1) ? lower_share : 0);
+    const float alpha = (belongs(upper) ? 1 - lower_fraction : 0) + (belongs(upper + 1) ? lower_fraction : 0);
     if (alpha <= 0) continue;
     Vector4f color;
     color << hue_color(0.07 + 0.13 * volume.level), alpha;
@@ -440,9 +440,9 @@ LineSet Overlays::draw(const ClothLines& cloths, const sim::World& world) {
         if (a > b) continue;  // only one of the two triangles at an edge draws it
         const Real length = (rest[cloth.sources[a]] - rest[cloth.sources[b]]).norm();
         const Real strain = (cloth.points[a] - cloth.points[b]).norm() / length - 1;
-        const Real share = std::clamp(strain / cloths.overlay->strain, 0.0, 1.0);
+        const Real fraction = std::clamp(strain / cloths.overlay->strain, 0.0, 1.0);
         Vector4f color;
-        color << hue_color(0.7 * (1 - share) + 0.06), 1;
+        color << hue_color(0.7 * (1 - fraction) + 0.06), 1;
         sketch.object((uint64_t{handle.index} << 48) + 3 * t + k);
         sketch.line(cloth.points[a], cloth.points[b], light(color));
       }

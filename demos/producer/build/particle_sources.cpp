@@ -98,9 +98,9 @@ PointSet LookRamps::points(const sim::ParticleArrays& particles, Real time,
     if (oriented_ && !particles.orientation.empty())
       set.orientations.push_back(particles.orientation[i].cast<float>());
     if (!turns_) continue;
-    const Real creation = time - particles.age[i];
-    const Real angle = effects::sample(angle_deg_, turn_random_.uniform(p.id, kAngle), creation),
-               spin = effects::sample(spin_deg_per_s_, turn_random_.uniform(p.id, kSpin), creation);
+    const Real birth_time = time - particles.age[i];
+    const Real angle = effects::sample(angle_deg_, turn_random_.uniform(p.id, kAngle), birth_time),
+               spin = effects::sample(spin_deg_per_s_, turn_random_.uniform(p.id, kSpin), birth_time);
     p.angle = static_cast<float>(kRadians * std::fmod(angle + spin * particles.age[i], kTurn_deg));
     set.spins.push_back(static_cast<float>(kRadians * spin));
   }
@@ -116,7 +116,7 @@ void ParticleSources::add(const Emitter& emitter, const ModelLibrary& models, si
                           const FindBody& body, uint64_t seed) {
   std::map<const ParticleSource*, sim::ParticleSystemHandle> handles;
   for_each_source(emitter, [&](const ParticleSource& source, const ParticleSource* parent,
-                               const std::string& name, const Birth& birth) {
+                               const std::string& name, const Emission& emission) {
     const auto system = world.add_particle_system(system_def(name, source));
     handles[&source] = system;
     systems_.push_back({name, system, LookRamps(source.look, seed, name)});
@@ -127,10 +127,10 @@ void ParticleSources::add(const Emitter& emitter, const ModelLibrary& models, si
         if (const auto* mesh = std::get_if<MeshSurface>(&emitter.surface))
           def.surface.mesh = collision_mesh(models.model(mesh->file), scale_of(*mesh, models));
         emitters_.emplace_back(def, system);
-      } else if (birth.trail) {
-        trails_.emplace_back(trail_def(*birth.trail, name, seed), handles.at(parent), system);
+      } else if (emission.trail) {
+        trails_.emplace_back(trail_def(*emission.trail, name, seed), handles.at(parent), system);
       } else {
-        sub_emitters_.emplace_back(event_def(birth, name, seed), handles.at(parent), system);
+        sub_emitters_.emplace_back(event_def(emission, name, seed), handles.at(parent), system);
       }
       if (source.split) splitters_.emplace_back(split_def(source, name, seed), system, system);
     });

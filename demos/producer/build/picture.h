@@ -157,7 +157,7 @@ class Picture {
   CameraRig camera_;
   render::Camera latest_camera_;
   std::vector<DrawnBody> bodies_;
-  // Those of the entries of an ObjectTable.
+  // Objects of the stage for the entries of an ObjectTable.
   std::vector<render::InstanceHandle> rods_;  // null if invisible
   std::vector<render::PointsHandle> points_;
   std::vector<render::PointStyle> styles_;  // of the same

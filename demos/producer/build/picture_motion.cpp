@@ -26,8 +26,8 @@ BodySample interpolate(const BodySample& a, const BodySample& b, float w) {
   return {a.position + w * (b.position - a.position), a.orientation.slerp(w, b.orientation)};
 }
 
-/// Position of a particle at share w of the interval `dt` between two states: the cubic through both states
-/// if it flew freely; a straight line if it bounced in between, which a cubic would overshoot.
+/// Position of a particle at fraction w of the interval `dt` between two states: the cubic through both
+/// states if it flew freely; a straight line if it bounced in between, which a cubic would overshoot.
 Vector3f interpolate(const render::Point& a, const render::Point& b, float w, float dt) {
   const Vector3f step = b.position - a.position;
   const Vector3f mean_velocity = 0.5f * (a.velocity + b.velocity);
@@ -84,13 +84,14 @@ void Picture::set_balls(std::size_t set, std::span<const render::Point> balls) {
   std::vector<render::Point> still;
   scratch_blur_streaks_.clear();
   for (const render::Point& ball : balls) {
-    const float way = subframe_time() * ball.velocity.norm();
-    if (way < ball.radius) {
+    const float path_length = subframe_time() * ball.velocity.norm();
+    if (path_length < ball.radius) {
       still.push_back(ball);
       continue;
     }
     scratch_blur_streaks_.push_back(ball);
-    scratch_blur_streaks_.back().color.w() *= 1 / (1 + way * 2 / (std::numbers::pi_v<float> * ball.radius));
+    scratch_blur_streaks_.back().color.w() *=
+        1 / (1 + path_length * 2 / (std::numbers::pi_v<float> * ball.radius));
   }
   stage_.set_points(points_[set], still);
   stage_.set_points(blur_streaks_[set], scratch_blur_streaks_);

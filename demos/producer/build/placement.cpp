@@ -61,8 +61,8 @@ class Scatterer {
   std::optional<std::pair<Pose, Real>> place(uint64_t i, const Vec3& position) {
     for (uint64_t attempt = 0; attempt < kAttempts; ++attempt) {
       const uint64_t index = i * kAttempts + attempt;
-      const Vector2d share(random_.uniform(index, kX) - 0.5, random_.uniform(index, kZ) - 0.5);
-      const Vector2d p = share.cwiseProduct(scatter_.size);
+      const Vector2d fraction(random_.uniform(index, kX) - 0.5, random_.uniform(index, kZ) - 0.5);
+      const Vector2d p = fraction.cwiseProduct(scatter_.size);
       if (scatter_.min_distance > 0 && !claim(p)) continue;
       const Quat q =
           scatter_.turn ? turn(random_.uniform(index, kTurn) * 2 * std::numbers::pi) : Quat::Identity();

@@ -301,7 +301,7 @@ void Simulation::add_cloths(const Scene& scene, const ModelLibrary& models) {
       const ClothCord& cord = cloth.cords[i];
       if (cord.held) pin(cord.body, flat.cord_ends[i], cord.until);
     }
-    if (const auto what = too_stiff(scene, flat.def)) throw SceneError(cloth.where, *what);
+    if (const auto what = instability_of(scene, flat.def)) throw SceneError(cloth.where, *what);
     at_place(cloth.where, [&] { cloths_.push_back({cloth.name, world_.add_cloth(flat.def)}); });
   }
 }

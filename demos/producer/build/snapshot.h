@@ -33,7 +33,7 @@ struct PointSet {
   std::vector<render::Point> points;
   std::vector<float> ages;   ///< [s]
   std::vector<float> spins;  ///< rates of Point::angle [rad/s]; empty: none turns
-  /// Rotations by contacts since the creation; empty unless the particles `rotate` and show it.
+  /// Rotations by contacts since the birth time; empty unless the particles `rotate` and show it.
   std::vector<Eigen::Quaternionf> orientations;
 };
 

@@ -38,12 +38,12 @@ class BenchProgress {
     start_ = std::chrono::steady_clock::now();
   }
 
-  void operator()(double share) {
+  void operator()(double fraction) {
     const auto now = std::chrono::steady_clock::now();
     if (style_ != ProgressStyle::bar || now - shown_ < std::chrono::milliseconds(100)) return;
     shown_ = now;
     const std::string line =
-        fmt::format("run {} of {}: {}  {:.0f} %  {}", run_, runs_, method_, 100 * share, elapsed(now));
+        fmt::format("run {} of {}: {}  {:.0f} %  {}", run_, runs_, method_, 100 * fraction, elapsed(now));
     show_status(line.substr(0, static_cast<std::size_t>(std::max(0, terminal_width() - 1))));
   }
 
@@ -82,7 +82,7 @@ int bench_command(const BenchOptions& options) {
       progress.begin(methods[i].name);
       if (round > 0 && !results[i].fault.empty()) continue;  // it would end early again
       const MethodResult result = run_method(methods[i].name, scenes[i], models, options.limit_s,
-                                             [&](double share) { progress(share); });
+                                             [&](double fraction) { progress(fraction); });
       progress.end(result);
       if (round == 0)
         results.push_back(result);
@@ -110,8 +110,9 @@ Command add_bench(CLI::App& app) {
       ->check(CLI::Range(1, 100));
   command->add_option("--csv", bench.csv, "Write the table to this CSV file, too");
   command
-      ->add_option("--limit", bench.limit_s,
-                   "Stop a run after this many seconds, and say in the table how far it came (default: 60)")
+      ->add_option(
+          "--limit", bench.limit_s,
+          "Stop a run after this many seconds; the table then gives the simulated time (default: 60)")
       ->check(CLI::PositiveNumber);
   add_threads(*command, bench.threads);
   command->add_flag("--force", bench.force, "Replace an existing file");

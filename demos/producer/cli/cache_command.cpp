@@ -60,7 +60,7 @@ int verify_caches(const CacheOptions& options) {
   for (const CacheInfo& cache : caches_in(options.folders)) {
     const std::vector<std::string> problems = verify_cache(cache);
     if (problems.empty()) {
-      fmt::print("{}: {} frames, all whole\n", cache.folder.string(), cache.frames);
+      fmt::print("{}: {} frames, all valid\n", cache.folder.string(), cache.frames);
       continue;
     }
     code = kRunFailed;
@@ -107,7 +107,7 @@ Command add_cache(CLI::App& app) {
                                                                {"clear", CacheOptions::Action::clear}};
   command
       ->add_option("action", given.action,
-                   "list: what is in them; verify: read every snapshot; clear: remove the snapshots")
+                   "list: print their contents; verify: read every snapshot; clear: remove the snapshots")
       ->required()
       ->transform(CLI::CheckedTransformer(actions).description("{list,verify,clear}"));
   command

@@ -1,5 +1,5 @@
 #pragma once
-/// The commands of the command line, and what they share.
+/// The commands of the command line, and their common functions.
 
 #include <functional>
 #include <memory>

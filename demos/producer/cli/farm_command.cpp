@@ -253,12 +253,14 @@ Command add_farm(CLI::App& app) {
   command->add_option("-o,--output", farm.out, "Video, or frames/####.png");
   command->add_flag("--slurm", farm.slurm,
                     "Submit the steps to Slurm; the folder must be visible to all nodes");
-  command->add_option("--local", farm.local, "Run the same steps here, with so many drawing processes")
+  command
+      ->add_option("--local", farm.local,
+                   "Run the same steps on this machine, with this number of drawing processes")
       ->check(CLI::Range(1, 256));
   command->add_option("--chunks", farm.chunks, "Parts of the frames")
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
-  command->add_option("--retries", farm.retries, "How often a failed step is tried again")
+  command->add_option("--retries", farm.retries, "Number of retries of a failed step")
       ->check(CLI::Range(0, 100))
       ->capture_default_str();
   command->add_option("--work", farm.work,

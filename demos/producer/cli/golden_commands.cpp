@@ -306,7 +306,8 @@ Command add_bless(CLI::App& app) {
   CLI::App* command = app.add_subcommand("bless", "Record the goldens of scenes again");
   command->add_option("scenes", bless.scenes, "Scene files")->required();
   command->add_option("--golden", bless.golden, "Folder of the goldens")->capture_default_str();
-  command->add_option("--reason", bless.reason, "Why the pictures changed")->required();
+  command->add_option("--reason", bless.reason, "Reason for the change, which the golden records")
+      ->required();
   add_allow(*command, bless.allow);
   add_threads(*command, bless.threads);
   add_gl(*command, bless.gl);

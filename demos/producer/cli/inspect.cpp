@@ -45,7 +45,7 @@ Json describe(const sim::ConvexDecomposition& decomposition) {
   return json;
 }
 
-/// What to do about a model that has an unlikely size; empty for a likely one.
+/// Returns advice for a model that has an unlikely size; empty for a likely one.
 std::string size_hint(float largest_side) {
   constexpr float kHuge = 100, kTiny = 0.005f;  // [m]
   if (largest_side > kHuge)
@@ -275,7 +275,7 @@ std::string write_numbered_file(const std::string& stem, const std::string& endi
     write_text_file(name, text);
     return name;
   }
-  throw render::FileError(stem + ending + ": and all further names are taken");
+  throw render::FileError(stem + ending + ": this name and those with numbers from 2 on are in use");
 }
 
 void write_text_file(const std::string& path, const std::string& text) {

@@ -183,7 +183,7 @@ OutputLock lock_film(const Plan& plan) {
   std::error_code error;
   if (film.has_parent_path()) fs::create_directories(film.parent_path(), error);
   if (error)
-    throw render::FileError(film.parent_path().string() + ": cannot make the folder: " + error.message());
+    throw render::FileError(film.parent_path().string() + ": cannot create the folder: " + error.message());
   return OutputLock(OutputLock::beside(film), film.string());
 }
 

@@ -18,11 +18,12 @@ ExportTarget parse_export(const std::string& out) {
   else if (ending == ".csv")
     target.format = ExportFormat::csv;
   else if (ending == ".usdc" || ending == ".usdz")
-    throw std::invalid_argument(out + ": USD is written as text; name it .usda (usdcat makes a .usdc of it)");
+    throw std::invalid_argument(
+        out + ": USD is written as text; use the ending .usda (usdcat converts it to .usdc)");
   else if (ending == ".gltf")
-    throw std::invalid_argument(out + ": glTF is written as one binary file; name it .glb");
+    throw std::invalid_argument(out + ": glTF is written as one binary file; use the ending .glb");
   else if (ending == ".abc")
-    throw std::invalid_argument(out + ": Alembic cannot be written; .usda holds the same");
+    throw std::invalid_argument(out + ": Alembic is not supported; use .usda, which holds the same data");
   else
     throw std::invalid_argument(out + ": the name must end in .usda, .glb, .ply, .obj or .csv");
   const bool per_frame = target.format == ExportFormat::ply || target.format == ExportFormat::obj;

@@ -110,8 +110,8 @@ class FilmParts::Builder {
                    .triangles = flat.triangles(),
                    .uvs = {}};
     for (const Vector2f& uv : flat.uvs) {
-      const Vector2f share = (uv - box.min()).cwiseQuotient(size);
-      film.uvs.push_back({share.x(), 1 - share.y()});
+      const Vector2f fraction = (uv - box.min()).cwiseQuotient(size);
+      film.uvs.push_back({fraction.x(), 1 - fraction.y()});
     }
     parts_.cloths.push_back(std::move(film));
   }
@@ -205,7 +205,7 @@ class FilmParts::Builder {
   UniqueNames names_, material_names_;
   std::map<std::vector<float>, std::size_t> meshes_done_;
   std::map<std::string, std::size_t> materials_done_;
-  /// By file, and whether the parts have the materials of the file.
+  /// Parts by file, and by whether they have the materials of the file.
   std::map<std::pair<std::string, bool>, std::pair<std::size_t, std::size_t>> models_done_;
 };
 

@@ -33,7 +33,7 @@ struct FilmPart {
 struct FilmBody {
   std::string name;
   std::optional<std::size_t> slot;  ///< in Snapshot::bodies; none: it never moves
-  BodySample place;                 ///< at time 0
+  BodySample place;                 ///< pose at time 0
   std::vector<FilmPart> parts;
   Real appear_at = 0, remove_at = 1e30;  ///< times between which it exists [s]
 
@@ -101,7 +101,7 @@ struct ClothSurface {
 };
 ClothSurface cloth_surface(const FilmCloth& cloth, const ClothSample& sample);
 
-/// What neither USD nor glTF files get of the looks of a scene, one line each.
+/// Returns notes on the features of the scene's looks that USD and glTF files cannot express, one line each.
 std::vector<std::string> look_notes(const Scene& scene);
 
 }  // namespace offstage::producer

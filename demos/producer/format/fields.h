@@ -46,7 +46,7 @@ struct Limits {
 };
 inline constexpr Limits kPositive{.low = 0, .open_low = true};
 inline constexpr Limits kNotNegative{.low = 0};
-inline constexpr Limits kShare{.low = 0, .high = 1};
+inline constexpr Limits kFraction{.low = 0, .high = 1};
 inline constexpr Limits kDirection{.nonzero = true};
 constexpr Limits between(Real low, Real high) {
   return {.low = low, .high = high};

@@ -116,7 +116,7 @@ class Layer {
                       suggestion(part, parts));
     Node base = (*emitters->as<List>())[static_cast<std::size_t>(it - parts.begin())];
     erase(base, "name");
-    lay_over(base, std::move(emitter));
+    merge(base, std::move(emitter));
     emitter = std::move(base);
   }
 
@@ -130,7 +130,7 @@ class Layer {
     for (Node item : *items->as<List>()) {
       const std::string name = text_of(item.find("name"));
       std::erase(unused, name);
-      if (const Node* over = overrides ? overrides->find(name) : nullptr) lay_over(item, *over);
+      if (const Node* over = overrides ? overrides->find(name) : nullptr) merge(item, *over);
       target->push_back(std::move(item));
     }
     return items->as<List>()->size();

@@ -282,7 +282,7 @@ class Checker : SceneChecker {
     if (const auto problem = outside(scene_, position)) fail(path, *problem);
   }
   void check_drag(sim::IntegratorKind integrator, Real drag, Real m, const std::string& path) {
-    if (const auto problem = too_much_drag(scene_, integrator, drag, m)) fail(path, *problem);
+    if (const auto problem = drag_problem(scene_, integrator, drag, m)) fail(path, *problem);
   }
 
   void check_emitter(const Emitter& emitter) {
@@ -425,7 +425,7 @@ class Checker : SceneChecker {
       fail(path, "needs a \"body\", \"particles\" or \"cloths\"");
     if (!grab.body.empty()) check_pushed(path + "/body", grab.body, named_body(path + "/body", grab.body));
     check_period(grab, grab.start, grab.end);
-    if (grab.keyframes.empty()) fail(path, "needs at least one of \"keyframes\"");
+    if (grab.keyframes.empty()) fail(path, "needs at least one entry in \"keyframes\"");
     check_times(grab.keyframes, path + "/keyframes");
     const auto body = bodies_.find(grab.body);
     const auto mass = body == bodies_.end() ? std::nullopt : mass_of(*body->second);
@@ -472,8 +472,8 @@ Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real c, Real m)
   return std::min(by_stiffness, by_damping);
 }
 
-std::optional<std::string> too_much_drag(const Scene& scene, sim::IntegratorKind integrator, Real drag,
-                                         Real m) {
+std::optional<std::string> drag_problem(const Scene& scene, sim::IntegratorKind integrator, Real drag,
+                                        Real m) {
   const Real largest = largest_stable_step(integrator, 0, drag, m),
              used = std::min(scene.world.max_step, scene.output.fps.seconds(1));
   if (drag <= 0 || used < largest) return {};

@@ -26,8 +26,8 @@ Findings check_scene(const Scene& scene, const Scene& flat, const SceneFolder& f
 Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real c, Real m);
 
 /// Returns an error message if a drag [kg/s] is too large for m, a mass or a moment of inertia.
-std::optional<std::string> too_much_drag(const Scene& scene, sim::IntegratorKind integrator, Real drag,
-                                         Real m);
+std::optional<std::string> drag_problem(const Scene& scene, sim::IntegratorKind integrator, Real drag,
+                                        Real m);
 /// Returns an error message if a position is outside of the world.
 std::optional<std::string> outside(const Scene& scene, const Vec3& position);
 

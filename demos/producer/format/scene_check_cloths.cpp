@@ -66,7 +66,7 @@ class ClothChecker : CheckBase {
       if (held.empty()) fail(scope.where.path, selects_nothing(flat));
     }
     if (const std::string what = sim::problem(flat.def); !what.empty()) return fail(cloth.where.path, what);
-    if (const auto what = too_stiff(scene_, flat.def)) fail(cloth.where.path, *what);
+    if (const auto what = instability_of(scene_, flat.def)) fail(cloth.where.path, *what);
   }
 
   const Scene& scene_;

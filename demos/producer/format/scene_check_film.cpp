@@ -95,7 +95,7 @@ class FilmChecker : SceneChecker {
     check_view(camera.eye, camera.target, path);
   }
   void check_view(const KeyframedCamera& camera, const std::string& path) {
-    if (camera.keyframes.empty()) fail(path, "needs at least one of \"keyframes\"");
+    if (camera.keyframes.empty()) fail(path, "needs at least one entry in \"keyframes\"");
     check_times(camera.keyframes, path + "/keyframes");
     for (std::size_t i = 0; i < camera.keyframes.size(); ++i)
       check_view(camera.keyframes[i].eye, camera.keyframes[i].target, path + "/keyframes" + step(i));

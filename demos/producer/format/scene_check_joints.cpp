@@ -100,7 +100,7 @@ class JointChecker : CheckBase {
     if (joint.ratio == 0) fail(path + "/ratio", "must not be 0");
     if (joint.restitution > 0 && !joint.limits && !joint.length_limits && !joint.limits_deg &&
         joint.type != pulley)
-      fail(path + "/restitution", "is that of impacts at limits, and the joint has none");
+      fail(path + "/restitution", "has no effect: it is for impacts at limits, and the joint has none");
     if (is_coupling && (joint.limits || joint.limits_deg || joint.motor))
       fail(path, "a gear or rack has no limits and no motor; give them to the joints of its bodies");
     if (joint.limits && !slides)
@@ -108,8 +108,7 @@ class JointChecker : CheckBase {
     if (joint.limits_deg && slides) fail(path + "/limits_deg", "is for joints that rotate; use \"limits\"");
     check_limits(path + "/limits", joint.limits);
     check_limits(path + "/limits_deg", joint.limits_deg);
-    if (joint.limits_deg && joint.type == fixed)
-      fail(path + "/limits_deg", "has no meaning for a fixed joint");
+    if (joint.limits_deg && joint.type == fixed) fail(path + "/limits_deg", "has no effect on a fixed joint");
     if (joint.swing_deg && joint.type != spherical && joint.type != universal)
       fail(path + "/swing_deg", "is for spherical and universal joints");
     Joint whole;
@@ -117,8 +116,7 @@ class JointChecker : CheckBase {
     if (!joint_def(whole).has_free_coordinate())
       for (const auto& [key, value] : {std::pair("/friction", joint.friction), {"/damping", joint.damping}})
         if (value > 0)
-          fail(path + key,
-               "acts where a joint may move: not on a fixed one, nor on a rod without limits and motor");
+          fail(path + key, "has no effect: a fixed joint, or a rod without limits and motor, does not move");
     if (!joint.motor) return;
     if (joint.type != revolute && joint.type != prismatic && joint.type != distance && joint.type != screw)
       fail(path + "/motor", "drives revolute, prismatic, screw and distance joints only");
@@ -144,9 +142,9 @@ class JointChecker : CheckBase {
       if ((chain.path[i] - chain.path[i - 1]).norm() < 1e-6)
         fail(chain.where.path + "/path/" + std::to_string(i), "must differ from the point before it");
     if (!chain.path.empty() && (chain.from != Chain().from || chain.to != Chain().to))
-      fail(chain.where.path + "/path", "is in place of \"from\" and \"to\"; remove them");
+      fail(chain.where.path + "/path", "replaces \"from\" and \"to\"; remove them");
     if (!chain.path.empty() && chain.sag != 1)
-      fail(chain.where.path + "/sag", "has no meaning with a \"path\"");
+      fail(chain.where.path + "/sag", "cannot be combined with a \"path\"; remove it");
     if (chain.bend_stiffness > 0 && chain.links > kMostElasticLinks)
       fail(chain.where.path + "/links", "must be at most " + std::to_string(kMostElasticLinks) +
                                             " with \"bend_stiffness\", got " + std::to_string(chain.links) +

@@ -63,12 +63,12 @@ class ParticleChecker : CheckBase {
     for (const Emitter& emitter : flat_.emitters)
       for_each_source(emitter,
                       [&](const ParticleSource& source, const ParticleSource*, const std::string& name,
-                          const Birth&) { claim(name, source.where.path); });
+                          const Emission&) { claim(name, source.where.path); });
   }
 
   void check_drag(const sim::ParticleSystemDef& behaviour, Real mass, const std::string& path) {
     if (behaviour.integrator == sim::IntegratorKind::leapfrog) return;  // stable for any drag
-    if (const auto problem = too_much_drag(scene_, behaviour.integrator, behaviour.linear_drag, mass))
+    if (const auto problem = drag_problem(scene_, behaviour.integrator, behaviour.linear_drag, mass))
       fail(path + "/linear_drag", *problem);
   }
 
@@ -203,14 +203,16 @@ class ParticleChecker : CheckBase {
         fail(path + "/windows" + step(i) + "/end", "must be later than the start");
     const bool moves_along = effects::upper_bound(emitter.rate_per_metre) > 0;
     if (moves_along && emitter.body.empty())
-      fail(path + "/rate_per_metre", "is along the way of a body; the emitter needs a \"body\"");
+      fail(path + "/rate_per_metre",
+           "releases particles along the path of a body; the emitter needs a \"body\"");
     if (emitter.recoil && emitter.body.empty())
       fail(path + "/recoil", "pushes a body back; the emitter needs a \"body\"");
     const auto pushed = std::ranges::find(flat_.bodies, emitter.body, &Body::name);
     if (emitter.recoil && pushed != flat_.bodies.end() && pushed->motion != sim::MotionType::dynamic)
       fail(path + "/recoil", "pushes dynamic bodies only, and \"" + emitter.body + "\" is not");
     if (emitter.inherit_velocity != 1 && emitter.body.empty())
-      fail(path + "/inherit_velocity", "is a fraction of the velocity of a body; the emitter needs a \"body\"");
+      fail(path + "/inherit_velocity",
+           "is a fraction of the velocity of a body; the emitter needs a \"body\"");
     check_count(emitter);
   }
 
@@ -272,7 +274,7 @@ std::vector<std::string> particle_names(const Scene& scene) {
   for (const ParticleGroup& group : scene.particles) names.push_back(group.name);
   for (const Emitter& emitter : scene.emitters)
     for_each_source(emitter, [&](const ParticleSource&, const ParticleSource*, const std::string& name,
-                                 const Birth&) { names.push_back(name); });
+                                 const Emission&) { names.push_back(name); });
   return names;
 }
 

@@ -20,7 +20,7 @@ struct ParticleBound {
   std::string name;
   uint64_t alive = 0;
 };
-/// For each particle system of a flat scene.
+/// Bounds for each particle system of a flat scene.
 std::vector<ParticleBound> particle_bounds(const Scene& scene);
 
 }  // namespace offstage::producer

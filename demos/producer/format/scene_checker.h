@@ -1,5 +1,6 @@
 #pragma once
-/// What the checks of a scene share: the scene, the findings, and the checks of names, files and times.
+/// The common part of the checks of a scene: the scene, the findings, and the checks of names, files and
+/// times.
 
 #include <algorithm>
 #include <map>

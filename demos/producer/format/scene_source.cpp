@@ -211,7 +211,7 @@ void merge(Node& base, Node top, bool at_root) {
 
 }  // namespace
 
-void lay_over(Node& base, Node top) {
+void merge(Node& base, Node top) {
   merge(base, std::move(top), false);
 }
 

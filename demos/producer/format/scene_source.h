@@ -40,7 +40,7 @@ const std::string& standard_input();
 SceneSource read_source(std::string_view text, const std::string& name, const SceneFolder& folder);
 
 /// Merges `top` into `base`, object by object; an object with a "type" replaces one of another type.
-void lay_over(Node& base, Node top);
+void merge(Node& base, Node top);
 
 /// Sets "path=value" in the tree. The value is JSON or else a string; the path is as /emitters/0/rate or
 /// emitters.rain.rate. Missing parts of the tree are created, lists with their content in `defaults`. Adds to

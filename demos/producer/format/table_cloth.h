@@ -61,13 +61,13 @@ struct Table<FabricChanges> {
          "`plate`: a thin plate, whose flexural rigidity is `bend` on any mesh; `springs`: the book's "
          "springs "
          "between second neighbours, which resist sharp folds but hardly a slight curvature"},
-        {"damping", &T::damping, "share of the critical damping of a spring", "", between(0, 10)},
+        {"damping", &T::damping, "fraction of the critical damping of a spring", "", between(0, 10)},
         {"stretch_damping", &T::stretch_damping,
-         "the same of springs along the threads; default of this and the next two keys: `damping`", "",
+         "the same for springs along the threads; default of this and the next two keys: `damping`", "",
          between(0, 10)},
-        {"shear_damping", &T::shear_damping, "the same of springs across the cells", "", between(0, 10)},
+        {"shear_damping", &T::shear_damping, "the same for springs across the cells", "", between(0, 10)},
         {"bend_spring_damping", &T::bend_spring_damping,
-         "the same of springs between second neighbours, with the `bend_model` `springs`", "",
+         "the same for springs between second neighbours, with the `bend_model` `springs`", "",
          between(0, 10)},
         {"friction", &T::friction,
          "coefficient of friction against bodies; of cloth and body the geometric mean is used", "",
@@ -207,7 +207,7 @@ struct Table<ClothCord> {
         {"segments", &T::segments, "number of its segments", "", between(1, 1000)},
         {"stiffness", &T::stiffness, "force at a strain of 1", "N", kPositive},
         {"mass_per_length", &T::mass_per_length, "mass per length", "kg/m", kPositive},
-        {"damping", &T::damping, "share of the critical damping of a segment", "", between(0, 10)},
+        {"damping", &T::damping, "fraction of the critical damping of a segment", "", between(0, 10)},
         {"visible", &T::visible, "is drawn"},
         {"radius", &T::radius, "radius of the drawn cord", "m", kPositive},
         {"material", &T::material, "name of a material; empty: the default material"}};
@@ -227,7 +227,7 @@ struct Table<Cloth> {
   static Fields<Cloth> fields() {
     using T = Cloth;
     return Fields<T>{
-        {"name", &T::name, "unique name; empty: cloth_ and its index"},
+        {"name", &T::name, "unique name; default: cloth_N, where N is the index in the list"},
         {"shape", &T::shape, "shape of the flat cloth"},
         {"fabric", &T::fabric, "name of the fabric; `offstage presets` lists them"},
     }
@@ -249,15 +249,15 @@ struct Table<Cloth> {
             {"pressure", &T::pressure,
              "pressure inside a closed cloth above that of the air, at the initial volume", "Pa"},
             {"inflate_time", &T::inflate_time,
-             "time in which the gas of `pressure` is let in, at a constant rate; 0: it is there from the "
-             "start",
+             "time in which the gas of `pressure` is let in, at a constant rate; 0: it is present from "
+             "the start",
              "s", kNotNegative},
             {"gas_density", &T::gas_density,
              "density of the gas of `pressure`, which causes buoyancy: helium has 0.17, hydrogen 0.084; "
              "default: `air_density`",
              "kg/m^3", kNotNegative},
             {"ram_pressure", &T::ram_pressure,
-             "share of the stagnation pressure of the air at the mouth of an open cloth that builds up "
+             "fraction of the stagnation pressure of the air at the mouth of an open cloth that builds up "
              "inside: about 1 for a parachute",
              "", kNotNegative},
             {"air_density", &T::air_density, "density of the surrounding air; 0: no air", "kg/m^3",
@@ -272,7 +272,7 @@ struct Table<Cloth> {
              "s", over(0, 1)},
             {"soften", &T::soften,
              "with the integrator `relaxed`: one step of the springs in each `substep`, which is faster. The "
-             "stiffness of springs that are too stiff for it is reduced, and a warning tells by how much"},
+             "stiffness of springs that are too stiff for it is reduced, and a warning gives the factor"},
             {"appear_at", &T::appear_at, "time at which the cloth appears, with its shape of time 0", "s",
              kNotNegative},
             {"remove_at", &T::remove_at, "time at which the cloth is removed; must be later than `appear_at`",

@@ -18,12 +18,12 @@ struct Table<FabricLook> {
   static Fields<FabricLook> fields() {
     using T = FabricLook;
     return {
-        {"weave", &T::weave, "how the threads cross; `none`: a film, such as leather"},
+        {"weave", &T::weave, "weave of the threads; `none`: a film, such as leather"},
         {"thread", &T::thread, "width of a thread", "m", kPositive},
-        {"relief", &T::relief, "how far the threads stand out", "", kShare},
-        {"sheen", &T::sheen, "light scattered by fibres, visible at grazing angles", "", kShare},
+        {"relief", &T::relief, "depth of the pattern of the threads", "", kFraction},
+        {"sheen", &T::sheen, "light scattered by fibres, visible at grazing angles", "", kFraction},
         {"sheen_color", &T::sheen_color, "colour of the sheen"},
-        {"translucency", &T::translucency, "share of the light that shines through", "", kShare},
+        {"translucency", &T::translucency, "fraction of the light that shines through", "", kFraction},
         {"back_color", &T::back_color, "colour of the back; default: that of the front"},
     };
   }

@@ -178,10 +178,11 @@ struct Table<SpotLight> {
   static constexpr const char* kHelp = "A cone of light.";
   static Fields<SpotLight> fields() {
     using T = SpotLight;
-    return Fields<T>{{"target", &T::target, "point that the light aims at", "m"},
-                     {"angle_deg", &T::angle_deg, "full angle of the cone", "degrees", between(1, 150)},
-                     {"softness", &T::softness, "share of the cone over which its edge fades", "", kShare},
-                     {"radius", &T::radius, "radius of the lamp; larger: softer shadows", "m", kPositive}}
+    return Fields<T>{
+        {"target", &T::target, "point that the light aims at", "m"},
+        {"angle_deg", &T::angle_deg, "full angle of the cone", "degrees", between(1, 150)},
+        {"softness", &T::softness, "fraction of the cone over which its edge fades", "", kFraction},
+        {"radius", &T::radius, "radius of the lamp; larger: softer shadows", "m", kPositive}}
         .with_base<LampBase>();
   }
 };
@@ -271,10 +272,10 @@ struct Table<EnvironmentSettings> {
             {"intensity", &T::intensity, "factor of the sky's brightness and of the ambient light", "",
              kNotNegative},
             {"fog", &T::fog,
-             "density of the fog: the share exp(-fog * distance) of the light passes. 0: no fog, but an "
+             "density of the fog: the fraction exp(-fog * distance) of the light passes. 0: no fog, but an "
              "infinite plane still blends into the sky in the last quarter of a degree below its horizon",
              "1/m", kNotNegative},
-            {"clouds", &T::clouds, "share of the sky that is covered by clouds", "", kShare},
+            {"clouds", &T::clouds, "fraction of the sky that is covered by clouds", "", kFraction},
             {"background", &T::background,
              "`sky` draws the sky, and frames have no alpha channel; `transparent` draws none, and all "
              "frames have an alpha channel"},
@@ -306,13 +307,13 @@ struct Table<RenderSettings> {
          between(16, 16384)},
         {"quality", &T::quality, "number of sub-frames per frame: `draft` 1, `preview` 4, `final` 16"},
         {"shutter", &T::shutter,
-         "share of the frame time during which the shutter is open; gives motion blur", "", kShare},
+         "fraction of the frame time during which the shutter is open; gives motion blur", "", kFraction},
         {"exposure", &T::exposure, "brightness factor of the whole picture; a number or a curve over time",
          "", kPositive},
         {"metering", &T::metering,
          "`fixed` uses `exposure` unchanged; `automatic` also brings each frame to the same average "
          "brightness"},
-        {"bloom", &T::bloom, "share of very bright light that spreads as glow; 0: none", "", kNotNegative},
+        {"bloom", &T::bloom, "fraction of very bright light that spreads as glow; 0: none", "", kNotNegative},
         {"tone_curve", &T::tone_curve, "mapping from light to picture values"}};
   }
 };

@@ -50,12 +50,15 @@ inline constexpr const char* kDropRateHelp =
 inline constexpr const char* kParticlesHelp =
     "names of particle groups, emitters, or child particles, such as rain/splash";
 inline constexpr const char* kClothsHelp =
-    "names of cloths, of one copy or of all; moving air acts on each triangle, other forces act on the whole "
+    "names of cloths: of one copy, or of all copies; moving air acts on each triangle, other forces act on "
+    "the whole "
     "cloth, distributed by mass";
 inline constexpr const char* kBodiesHelp =
-    "names of the bodies that it acts on, of one copy or of all; if this and the next two keys are empty, it "
+    "names of the bodies that it acts on: of one copy, or of all copies; if this and the next two keys are "
+    "empty, it "
     "acts on all dynamic bodies and all cloths";
-inline constexpr const char* kForceNameHelp = "unique name; empty: force_ and its index";
+inline constexpr const char* kForceNameHelp =
+    "unique name; default: force_N, where N is the index in the list";
 inline constexpr const char* kAirDragHelp =
     "drag force per speed relative to this air; 0: it acts only through the drag that each object has";
 
@@ -188,7 +191,7 @@ struct Table<AppliedForce> {
     using T = AppliedForce;
     return {
         {"name", &T::name, kForceNameHelp},
-        {"bodies", &T::bodies, "names of the dynamic bodies that it acts on, of one copy or of all",
+        {"bodies", &T::bodies, "names of the dynamic bodies that it acts on: of one copy, or of all copies",
          kRequired},
         {"point", &T::point, "point of application in the body's frame; default: the centre of mass", "m"},
         {"axes", &T::axes,
@@ -199,8 +202,8 @@ struct Table<AppliedForce> {
          "force and torque over time, instead of `force` and `torque`; constant before the first and after "
          "the last"},
         {"interpolation", &T::interpolation, kInterpolationHelp},
-        {"start", &T::start, "time from which on it acts", "s", kNotNegative},
-        {"end", &T::end, "time from which on it no longer acts", "s", kNotNegative}};
+        {"start", &T::start, "time at which it starts to act", "s", kNotNegative},
+        {"end", &T::end, "time at which it stops acting", "s", kNotNegative}};
   }
 };
 template <>

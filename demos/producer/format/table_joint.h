@@ -101,7 +101,7 @@ struct Table<JointBehaviour> {
         {"restitution", &T::restitution,
          "coefficient of restitution at `limits`, `length_limits`, `limits_deg` and `swing_deg`, for speeds "
          "above 0.05 m/s or rad/s",
-         "", kShare},
+         "", kFraction},
         {"stiffness", &T::stiffness,
          "spherical joint: torque per angle of rotation from the pose of time 0, about any axis; for the "
          "other types use a "
@@ -126,7 +126,7 @@ struct Table<Joint> {
       "no copies.";
   static Fields<Joint> fields() {
     using T = Joint;
-    return Fields<T>{{"name", &T::name, "unique name; empty: joint_ and its index"},
+    return Fields<T>{{"name", &T::name, "unique name; default: joint_N, where N is the index in the list"},
                      {"a", &T::a, "name of a body", kRequired},
                      {"b", &T::b, "name of a body; empty: the world"},
                      {"anchor", &T::anchor, "point at which the bodies are joined", "m"},
@@ -157,7 +157,7 @@ struct Table<Chain> {
   static Fields<Chain> fields() {
     using T = Chain;
     return {
-        {"name", &T::name, "unique name; empty: articulation_ and its index"},
+        {"name", &T::name, "unique name; default: articulation_N, where N is the index in the list"},
         {"from", &T::from, "start of the chain", "m"},
         {"to", &T::to, "end of the chain", "m"},
         {"path", &T::path,
@@ -195,17 +195,18 @@ struct Table<Ragdoll> {
       "upper_arm_left and so on, with joints that bend as those of people.";
   static Fields<Ragdoll> fields() {
     using T = Ragdoll;
-    return Fields<T>{{"name", &T::name, "unique name; empty: articulation_ and its index"},
-                     {"position", &T::position, "point on the ground between the feet", "m"},
-                     {"orientation", &T::orientation, "orientation of the figure, about `position`"},
-                     {"velocity", &T::velocity, "velocity of the figure at time 0", "m/s"},
-                     {"height", &T::height, "height of the figure", "m", between(0.1, 10)},
-                     {"density", &T::density, "density of the body parts", "kg/m^3", kPositive},
-                     {"stiffness", &T::stiffness,
-                      "dry friction of the joints: 0 rotates freely, 1 is a limp adult", "", kNotNegative},
-                     {"skin", &T::skin, "name of the material of head, hands and feet; empty: grey"},
-                     {"shirt", &T::shirt, "name of the material of trunk and arms; empty: grey"},
-                     {"trousers", &T::trousers, "name of the material of pelvis and legs; empty: grey"}}
+    return Fields<T>{
+        {"name", &T::name, "unique name; default: articulation_N, where N is the index in the list"},
+        {"position", &T::position, "point on the ground between the feet", "m"},
+        {"orientation", &T::orientation, "orientation of the figure, about `position`"},
+        {"velocity", &T::velocity, "velocity of the figure at time 0", "m/s"},
+        {"height", &T::height, "height of the figure", "m", between(0.1, 10)},
+        {"density", &T::density, "density of the body parts", "kg/m^3", kPositive},
+        {"stiffness", &T::stiffness, "dry friction of the joints: 0 rotates freely, 1 is a limp adult", "",
+         kNotNegative},
+        {"skin", &T::skin, "name of the material of head, hands and feet; empty: grey"},
+        {"shirt", &T::shirt, "name of the material of trunk and arms; empty: grey"},
+        {"trousers", &T::trousers, "name of the material of pelvis and legs; empty: grey"}}
         .with(&T::placement);
   }
 };
@@ -217,7 +218,7 @@ struct Table<Bridge> {
   static Fields<Bridge> fields() {
     using T = Bridge;
     return {
-        {"name", &T::name, "unique name; empty: articulation_ and its index"},
+        {"name", &T::name, "unique name; default: articulation_N, where N is the index in the list"},
         {"from", &T::from, "start of the bridge", "m"},
         {"to", &T::to, "end of the bridge", "m"},
         {"planks", &T::planks, "number of planks", "", between(1, 1000)},
@@ -239,7 +240,7 @@ struct Table<Vehicle> {
   static Fields<Vehicle> fields() {
     using T = Vehicle;
     return Fields<T>{
-        {"name", &T::name, "unique name; empty: articulation_ and its index"},
+        {"name", &T::name, "unique name; default: articulation_N, where N is the index in the list"},
         {"position", &T::position, "point on the ground at the centre of the wheels", "m"},
         {"orientation", &T::orientation, "orientation of the car, about `position`"},
         {"velocity", &T::velocity, "velocity of the car at time 0", "m/s"},
@@ -268,7 +269,7 @@ struct Table<Crane> {
   static Fields<Crane> fields() {
     using T = Crane;
     return Fields<T>{
-        {"name", &T::name, "unique name; empty: articulation_ and its index"},
+        {"name", &T::name, "unique name; default: articulation_N, where N is the index in the list"},
         {"position", &T::position, "foot of the mast", "m"},
         {"orientation", &T::orientation, "orientation of the crane, about `position`"},
         {"height", &T::height, "height of the mast", "m", kPositive},
@@ -304,24 +305,25 @@ struct Table<ModelTree> {
       "connects it to the nearest such node above it. `offstage info FILE` lists the nodes.";
   static Fields<ModelTree> fields() {
     using T = ModelTree;
-    return Fields<T>{{"name", &T::name, "unique name; empty: articulation_ and its index"},
-                     {"file", &T::file, "model file", kRequired},
-                     {"position", &T::position, "position of the model's origin", "m"},
-                     {"orientation", &T::orientation, "orientation of the model, about `position`"},
-                     {"velocity", &T::velocity, "velocity of all links at time 0", "m/s"},
-                     {"scale", &T::scale,
-                      "scale factor of the model; `auto`: from the file's likely unit to metres "
-                      "(docs/models.md; `offstage info FILE` "
-                      "shows it)",
-                      "", kPositive},
-                     {"density", &T::density, "density of the links", "kg/m^3", kPositive},
-                     {"base", &T::base,
-                      "name of the body that holds the uppermost nodes, or `world`; empty: they are free"},
-                     {"material", &T::material, "name of a material; empty: the materials of the file"},
-                     {"collides", &T::collides, "links collide with all objects that they are not joined to"},
-                     {"joints", &T::joints, "joints that are not spherical, or have a motor or limits"},
-                     {"friction", &T::friction, "dry friction of the other joints", "N m", kNotNegative},
-                     {"damping", &T::damping, "viscous damping of the other joints", "N m s", kNotNegative}}
+    return Fields<T>{
+        {"name", &T::name, "unique name; default: articulation_N, where N is the index in the list"},
+        {"file", &T::file, "model file", kRequired},
+        {"position", &T::position, "position of the model's origin", "m"},
+        {"orientation", &T::orientation, "orientation of the model, about `position`"},
+        {"velocity", &T::velocity, "velocity of all links at time 0", "m/s"},
+        {"scale", &T::scale,
+         "scale factor of the model; `auto`: from the file's likely unit to metres "
+         "(docs/models.md; `offstage info FILE` "
+         "shows it)",
+         "", kPositive},
+        {"density", &T::density, "density of the links", "kg/m^3", kPositive},
+        {"base", &T::base,
+         "name of the body that holds the uppermost nodes, or `world`; empty: they are free"},
+        {"material", &T::material, "name of a material; empty: the materials of the file"},
+        {"collides", &T::collides, "links collide with all objects that they are not joined to"},
+        {"joints", &T::joints, "joints that are not spherical, or have a motor or limits"},
+        {"friction", &T::friction, "dry friction of the other joints", "N m", kNotNegative},
+        {"damping", &T::damping, "viscous damping of the other joints", "N m s", kNotNegative}}
         .with(&T::placement);
   }
 };

@@ -10,9 +10,9 @@ namespace offstage::producer {
 template <>
 struct Table<LineLook> {
   static Fields<LineLook> fields() {
-    return {{"width", &LineLook::width, "width of the lines, as a share of the picture's height", "",
+    return {{"width", &LineLook::width, "width of the lines, as a fraction of the picture's height", "",
              over(0, 0.1)},
-            {"hidden", &LineLook::hidden, "opacity of lines behind an object", "", kShare}};
+            {"hidden", &LineLook::hidden, "opacity of lines behind an object", "", kFraction}};
   }
 };
 
@@ -46,11 +46,12 @@ struct Table<PartsOverlay> {
       "The convex parts of a body with a mesh, each in its own colour, drawn instead of the body.";
   static Fields<PartsOverlay> fields() {
     using T = PartsOverlay;
-    return {{"body", &T::body, "name of a body with a mesh", kRequired},
-            {"explode", &T::explode,
-             "outward displacement of the parts, as a share of their distance from the centre; a number or a "
-             "curve over time",
-             "", between(0, 100)}};
+    return {
+        {"body", &T::body, "name of a body with a mesh", kRequired},
+        {"explode", &T::explode,
+         "outward displacement of the parts, as a fraction of their distance from the centre; a number or a "
+         "curve over time",
+         "", between(0, 100)}};
   }
 };
 template <>
@@ -113,7 +114,7 @@ struct Table<IslandsOverlay> {
       "Islands of dynamic bodies that contacts connect: a box around each body in the colour of its island.";
   static Fields<IslandsOverlay> fields() {
     using T = IslandsOverlay;
-    return Fields<T>{{"asleep", &T::asleep, "brightness of sleeping bodies", "", kShare}}
+    return Fields<T>{{"asleep", &T::asleep, "brightness of sleeping bodies", "", kFraction}}
         .with_base<LineLook>();
   }
 };
@@ -172,7 +173,7 @@ struct Table<TextOverlay> {
              "ASCII text; {time}, {frame}, {bodies} and {particles} are replaced by their values, a line "
              "break starts a new line"},
             {"place", &T::place, "place in the picture"},
-            {"size", &T::size, "height of a line, as a share of the picture's height", "", over(0, 0.5)},
+            {"size", &T::size, "height of a line, as a fraction of the picture's height", "", over(0, 0.5)},
             {"color", &T::color, "colour of the letters"},
             {"from", &T::from, "time at which the text appears", "s"},
             {"until", &T::until, "time at which the text disappears; default: it stays", "s"}};

@@ -55,8 +55,8 @@ template <>
 struct Table<LookMesh> {
   static constexpr const char* kName = "look_mesh";
   static constexpr const char* kHelp =
-      "A shape or a model file that is drawn for each particle. It is scaled so that it just fits into the "
-      "particle's ball, whatever its own size.";
+      "A shape or a model file that is drawn for each particle. It is scaled to fit into the particle's "
+      "ball; its own size has no effect.";
   static Fields<LookMesh> fields() {
     using T = LookMesh;
     return {
@@ -83,15 +83,15 @@ struct Table<ParticleLook> {
         {"style", &T::style, "kind of picture drawn for each particle"},
         {"color", &T::color, "base colour; alpha is the opacity"},
         {"color_over_age", &T::color_over_age,
-         "multiplies `color`; age 0 is the creation, 1 the end of the lifespan"},
+         "multiplies `color`; age 0 is the birth time, 1 the end of the lifespan"},
         {"temperature_over_age", &T::temperature_over_age,
-         "multiplies both by the colour of a black body of this temperature, and by its brightness relative "
+         "multiplies both by the colour of a black body of this temperature and its brightness relative "
          "to the hottest key",
          "K", kTemperature},
         {"size_over_age", &T::size_over_age, "multiplies the drawn radius", "", kNotNegative},
         {"ramp", &T::ramp, "interpolation between the keys over age"},
         {"color_deviation", &T::color_deviation, "standard deviation of the brightness between particles", "",
-         kShare},
+         kFraction},
         {"channel_deviation", &T::channel_deviation,
          "standard deviations of red, green, blue and opacity between particles", "", kNotNegative},
         {"additive", &T::additive, "adds light instead of covering; default: true for sparks and fire"},
@@ -100,17 +100,18 @@ struct Table<ParticleLook> {
          "fire"},
         {"casts_shadow", &T::casts_shadow,
          "casts a shadow; default: true for sprites, streaks, spheres and smoke"},
-        {"softness", &T::softness, "width of the soft rim as a share of the radius; default: 0.5", "",
-         kShare},
+        {"softness", &T::softness, "width of the soft rim as a fraction of the radius; default: 0.5", "",
+         kFraction},
         {"stretch", &T::stretch,
-         "a streak is as long as its particle's motion in this time; smoke, fire and flakes are lengthened "
-         "by the same, and sprites, too; default: 1/60, for sparks 1/40, for fire 0.1, for smoke and sprites "
+         "a streak is as long as its particle's motion in this time; smoke, fire, flakes and sprites are "
+         "lengthened by the same distance; default: 1/60, for sparks 1/40, for fire 0.1, for smoke and "
+         "sprites "
          "0",
          "s", kNotNegative},
-        {"taper", &T::taper, "share by which a streak fades towards its tail; default: 0, for sparks 1", "",
-         kShare},
-        {"metallic", &T::metallic, "for spheres: 0 is a dielectric, 1 a metal; default: 0", "", kShare},
-        {"roughness", &T::roughness, "for spheres: 0 is a mirror, 1 is dull; default: 0.3", "", kShare},
+        {"taper", &T::taper, "fraction by which a streak fades towards its tail; default: 0, for sparks 1",
+         "", kFraction},
+        {"metallic", &T::metallic, "for spheres: 0 is a dielectric, 1 a metal; default: 0", "", kFraction},
+        {"roughness", &T::roughness, "for spheres: 0 is a mirror, 1 is dull; default: 0.3", "", kFraction},
         {"texture", &T::texture,
          "image file that is drawn for each sprite, times its colour; empty: a soft disc. The longer side is "
          "the particle's diameter"},
@@ -138,8 +139,9 @@ struct Table<sim::ParticleSystemDef> {
         {"external", &T::external, "particles collide with those of other systems that also have `external`"},
         {"rotates", &T::rotates,
          "contacts turn the particles as solid balls, so that they roll and friction acts at their surface; "
-         "otherwise they slide without turning. Objects of the style `mesh` show the rotation. Grains need "
-         "it to pour, to flow and to heap as sand does"},
+         "otherwise they slide without turning. Objects of the style `mesh` show the rotation. Sand and "
+         "other "
+         "granular materials need it to flow and heap"},
         {"dies_on_hit", &T::dies_on_hit, "a particle is removed at its first collision"},
         {"integrator", &T::integrator,
          "integration method of particles without springs; `leapfrog` is of second order at the cost of one "
@@ -167,7 +169,7 @@ struct Table<ParticleGroup> {
   static Fields<ParticleGroup> fields() {
     using T = ParticleGroup;
     return Fields<T>{
-        {"name", &T::name, "unique name; empty: particles_ and its index"},
+        {"name", &T::name, "unique name; default: particles_N, where N is the index in the list"},
         {"places", &T::places, "one entry for each particle"},
         {"fill", &T::fill, "volume that is filled with further particles"},
         {"file", &T::file,
@@ -182,12 +184,12 @@ struct Table<ParticleGroup> {
          kPositive},
         {"position", &T::position, "position of the file's origin", "m"},
         {"orientation", &T::orientation, "orientation of the file's axes"},
-        {"max_points", &T::max_points, "of a file with more points, so many are taken, evenly", "",
-         between(1, 2e7)},
+        {"max_points", &T::max_points, "greatest number of points; a file with more is thinned out evenly",
+         "", between(1, 2e7)},
         {"radius", &T::radius, "radius of each particle", "m", kPositive},
         {"mass", &T::mass, "mass of each particle", "kg", kPositive},
         {"restitution", &T::restitution,
-         "coefficient of restitution; of particle and body the larger value is used", "", kShare},
+         "coefficient of restitution; of particle and body the larger value is used", "", kFraction},
         {"friction", &T::friction,
          "coefficient of dynamic friction; of particle and body the geometric mean is used", "",
          kNotNegative},
@@ -217,14 +219,14 @@ struct Table<Split> {
         {"age", &T::age, "age of a particle at its first split", "s", kPositive},
         {"delay", &T::delay, "time to its next split", "s", kPositive},
         {"delay_steps", &T::delay_steps,
-         "in place of `delay`: time to its next split as a number of sub-steps of `world.step`; 0: `delay` "
+         "instead of `delay`: time to its next split as a number of sub-steps of `world.step`; 0: `delay` "
          "applies",
          "", between(0, 1e6)},
         {"depth", &T::depth,
          "largest number of splits in the history of a particle, including those of its ancestors", "",
          between(1, 16)},
-        {"velocity_percent", &T::velocity_percent, "share of the parent's velocity that a child starts with",
-         "%"},
+        {"velocity_percent", &T::velocity_percent,
+         "fraction of the parent's velocity that a child starts with", "%"},
         {"spread_deg", &T::spread_deg, "angle between a child's direction and the parent's", "degrees",
          kAngles},
         {"radius_percent", &T::radius_percent, "radius of a child, relative to the parent's", "%", kPositive},
@@ -247,7 +249,7 @@ struct Table<ParticleSource> {
         {"mass", &T::mass, "mass of a particle; 0: computed from density and radius", "kg", kNotNegative},
         {"lifespan", &T::lifespan, "age at which a particle is removed", "s", kPositive},
         {"restitution", &T::restitution,
-         "coefficient of restitution; of particle and body the larger value is used", "", kShare},
+         "coefficient of restitution; of particle and body the larger value is used", "", kFraction},
         {"friction", &T::friction,
          "coefficient of dynamic friction; of particle and body the geometric mean is used", "",
          kNotNegative},
@@ -276,12 +278,15 @@ struct Table<TrailSource> {
   static Fields<TrailSource> fields() {
     using T = TrailSource;
     return with_offspring(Fields<T>{
-        {"name", &T::name, "name after the parent's name and a slash; empty: trails_ and its index"},
+        {"name", &T::name,
+         "name, which follows the parent's name and a slash; default: trails_N, where N is the index in the "
+         "list"},
         {"rate", &T::rate, "particles released per second by each parent", "1/s", between(0, 1e5)},
         {"start_age", &T::start_age, "age of the parent at which the trail starts", "s", kNotNegative},
         {"end_age", &T::end_age, "age of the parent at which the trail ends", "s", kNotNegative},
         {"velocity_percent", &T::velocity_percent,
-         "share of the parent's velocity that a new particle starts with; `speed` is added backwards", "%"},
+         "fraction of the parent's velocity that a new particle starts with; `speed` is added backwards",
+         "%"},
     }
                               .with_base<ParticleSource>());
   }
@@ -294,7 +299,7 @@ struct Names<effects::Axis> {
 template <class T>
 Fields<T> event_fields() {
   return with_offspring(Fields<T>{
-      {"probability", &T::probability, "probability that an event creates particles", "", kShare},
+      {"probability", &T::probability, "probability that an event creates particles", "", kFraction},
       {"min_speed", &T::min_speed,
        "least speed of the parent after the event; slower parents create no particles", "m/s", kNotNegative},
       {"count", &T::count, "number of particles for each event, rounded", "", kCounts},
@@ -302,7 +307,7 @@ Fields<T> event_fields() {
        "axis of the release: `normal` is the normal of the surface that was hit (without a collision, as "
        "`velocity`); `velocity` is the parent's velocity"},
       {"velocity_percent", &T::velocity_percent,
-       "share of the parent's velocity that a new particle starts with; `speed` is added along the axis",
+       "fraction of the parent's velocity that a new particle starts with; `speed` is added along the axis",
        "%"},
       {"max_per_step", &T::max_per_step, "largest number of particles created in one sub-step", "",
        between(1, 1e6)},
@@ -315,9 +320,9 @@ struct Table<EventSource> {
   static constexpr const char* kHelp = "Particles that are created by a collision or by the end of a parent.";
   static Fields<EventSource> fields() {
     using T = EventSource;
-    return Fields<T>{
-        {"name", &T::name,
-         "name after the parent's name and a slash; empty: on_collision_ or on_death_ and its index"}}
+    return Fields<T>{{"name", &T::name,
+                      "name, which follows the parent's name and a slash; empty: on_collision_N or "
+                      "on_death_N, where N is the index in the list"}}
         .then(event_fields<T>());
   }
 };
@@ -327,9 +332,10 @@ struct Table<AgeSource> {
   static constexpr const char* kHelp = "Particles that are created when a parent reaches an age.";
   static Fields<AgeSource> fields() {
     using T = AgeSource;
-    return Fields<T>{
-        {"name", &T::name, "name after the parent's name and a slash; empty: on_age_ and its index"},
-        {"age", &T::age, "age of the parent", "s", kNotNegative}}
+    return Fields<T>{{"name", &T::name,
+                      "name, which follows the parent's name and a slash; default: on_age_N, where N is the "
+                      "index in the list"},
+                     {"age", &T::age, "age of the parent", "s", kNotNegative}}
         .then(event_fields<T>());
   }
 };
@@ -440,7 +446,8 @@ struct Table<Emitter> {
     using T = Emitter;
     return with_offspring(Fields<T>{
         {"name", &T::name,
-         "unique name, which also selects the random numbers; empty: emitter_ and its index"},
+         "unique name, which also selects the random numbers; default: emitter_N, where N is the index in "
+         "the list"},
         {"preset", &T::preset,
          "preset whose first emitter provides all keys that are not given here; \"preset/emitter\" names "
          "another of its emitters; empty: none"},
@@ -449,7 +456,7 @@ struct Table<Emitter> {
         {"direction", &T::direction,
          "direction of release, in the frame of the body or in the world; zero: the normal of the surface"},
         {"inherit_velocity", &T::inherit_velocity,
-         "share of the velocity of the body's point that a new particle gets, in addition to its own", "",
+         "fraction of the velocity of the body's point that a new particle gets, in addition to its own", "",
          kNotNegative},
         {"recoil", &T::recoil,
          "each new particle pushes the body back with its momentum relative to the body; dynamic bodies "
@@ -459,7 +466,7 @@ struct Table<Emitter> {
          "other"},
         {"rate", &T::rate, "number of particles released one by one per second", "1/s", between(0, 1e9)},
         {"rate_per_metre", &T::rate_per_metre,
-         "number of particles released evenly along each metre of the way of the body, in addition to the "
+         "number of particles released evenly along each metre of the path of the body, in addition to the "
          "others; needs a "
          "`body`",
          "1/m", between(0, 1e9)},

@@ -73,7 +73,7 @@ struct Table<SphereFill> {
 template <>
 struct Table<MeshFill> {
   static constexpr const char* kName = "mesh_fill";
-  static constexpr const char* kHelp = "The inside of a model that is closed: a jar of its own shape.";
+  static constexpr const char* kHelp = "The inside of a closed model, such as a jar.";
   static Fields<MeshFill> fields() {
     return {{"file", &MeshFill::file,
              "model file relative to the scene, or the name of a model that comes with offstage; FILE#NODE "

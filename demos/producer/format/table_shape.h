@@ -83,7 +83,7 @@ struct Table<MeshDecomposition> {
          "that is "
          "not dynamic"},
         {"max_error", &MeshDecomposition::max_error,
-         "approximate: accepted volume in which the parts and the model differ, as a share of the model's "
+         "approximate: accepted volume in which the parts and the model differ, as a fraction of the model's "
          "volume; a larger one takes fewer parts",
          "", between(0.001, 1)},
         {"max_parts", &MeshDecomposition::max_parts,
@@ -94,7 +94,8 @@ struct Table<MeshDecomposition> {
          "exact: smallest angle between a cut and the faces that it meets; relaxed if no cut satisfies it",
          "degrees", between(0, 90)},
         {"min_distance", &MeshDecomposition::min_distance,
-         "exact: smallest distance of a cut from vertices off it, as a share of the mean edge; relaxed if no "
+         "exact: smallest distance of a cut from vertices off it, as a fraction of the mean edge; relaxed if "
+         "no "
          "cut satisfies it",
          "", between(0, 1)}};
   }

@@ -84,8 +84,8 @@ struct Table<sim::CollisionMethods> {
          "rule by which these trees divide their items: the `surface_area` heuristic, or the `mean` of "
          "the midpoints"},
         {"mesh_pairs", &T::mesh_pairs,
-         "when two meshes meet is found by their convex `parts`, or by tests of their `triangles`; their "
-         "contact points are those of the parts, and a compound always meets others by its parts"},
+         "pieces of two meshes that determine the time of impact: their convex `parts` or their `triangles`; "
+         "contact points are always those of the parts, and a compound always uses its parts"},
         {"cell_factor", &T::cell_factor,
          "for `broad_phase: grid`: width of a cell in mean diameters of the bodies", "", between(0.1, 100)}};
   }
@@ -112,7 +112,7 @@ struct Table<WorldSettings> {
          "`fast` does a bounded amount of work; `auto` uses `exact` where it is not slower, and resolves "
          "each collision at its own time while at most six bodies are awake; `lcp` is as "
          "`exact`, with forces by Dantzig's and Baraff's pivoting for groups of at most 64 contacts, whose "
-         "friction has separate limits along two tangents, and hands other groups to `exact`"},
+         "friction has separate limits along two tangents, and leaves other groups to `exact`"},
         {"impact", &T::impact,
          "how collisions at the same time are resolved: `simultaneous` solves them together; `sequential` "
          "solves one after the other, so that an impact travels through a row of balls"},
@@ -153,14 +153,16 @@ struct Table<Material> {
   static Fields<Material> fields() {
     using T = Material;
     return {
-        {"name", &T::name, "name that bodies, springs and cloths refer to; empty: material_ and its index"},
+        {"name", &T::name,
+         "name that bodies, springs and cloths refer to; default: material_N, where N is the index in the "
+         "list"},
         {"color", &T::color, "base colour; with an alpha below 1 the surface and its shadow are translucent"},
-        {"metallic", &T::metallic, "0: dielectric, 1: metal", "", kShare},
-        {"roughness", &T::roughness, "0: mirror, 1: dull", "", kShare},
+        {"metallic", &T::metallic, "0: dielectric, 1: metal", "", kFraction},
+        {"roughness", &T::roughness, "0: mirror, 1: dull", "", kFraction},
         {"transmission", &T::transmission,
-         "share of the light that passes through the surface: 1 is glass, which tints the light with its "
-         "colour; for cloth, the share that passes between the threads without a tint",
-         "", kShare},
+         "fraction of the light that passes through the surface: 1 is glass, which tints the light with its "
+         "colour; for cloth, the fraction that passes between the threads without a tint",
+         "", kFraction},
         {"refraction", &T::refraction, "index of refraction of a transmitting material", "", between(1, 3)},
         {"emission", &T::emission, "colour of the emitted light"},
         {"emission_strength", &T::emission_strength,
@@ -186,7 +188,7 @@ struct Table<Material> {
         {"two_sided", &T::two_sided, "back faces are lit and drawn as well"},
         {"fabric", &T::fabric, "appearance of the threads on cloths; default: that of the cloth's fabric"},
         {"restitution", &T::restitution,
-         "coefficient of restitution; of two materials the larger value is used", "", kShare},
+         "coefficient of restitution; of two materials the larger value is used", "", kFraction},
         {"friction", &T::friction,
          "coefficient of dynamic friction; of two materials the geometric mean is used, as for the next two "
          "keys",
@@ -198,8 +200,9 @@ struct Table<Material> {
          "default: `friction`",
          "", kNotNegative},
         {"rolling_friction", &T::rolling_friction,
-         "greatest torque against rolling, per contact force, between bodies: how far the centre of pressure "
-         "is ahead of the middle of the contact. A ball of radius r decelerates by 5/7 g times this / r. "
+         "greatest torque against rolling, per contact force, between bodies: the distance by which the "
+         "centre of pressure is ahead of the middle of the contact. A ball of radius r decelerates by 5/7 g "
+         "times this / r. "
          "Steel on steel has about 1e-5 m, a ball on carpet 1e-3 m; of two materials the larger value is "
          "used",
          "m", kNotNegative},
@@ -221,7 +224,7 @@ struct Table<ContactRule> {
     return {
         {"materials", &T::materials, "names of two materials, in any order; may be the same", kRequired},
         {"restitution", &T::restitution, "coefficient of restitution; default: from the materials", "",
-         kShare},
+         kFraction},
         {"friction", &T::friction,
          "coefficient of dynamic friction, along the friction axis if there is one; across it, the ratio "
          "given by the materials applies; default: from the materials",
@@ -230,9 +233,9 @@ struct Table<ContactRule> {
          "coefficient of static friction; default: `friction` of this rule if given, or else from the "
          "materials",
          "", kNotNegative},
-        {"rolling_friction", &T::rolling_friction, "see materials; default: from the materials", "m",
+        {"rolling_friction", &T::rolling_friction, "as for materials; default: from the materials", "m",
          kNotNegative},
-        {"spinning_friction", &T::spinning_friction, "see materials; default: from the materials", "m",
+        {"spinning_friction", &T::spinning_friction, "as for materials; default: from the materials", "m",
          kNotNegative},
     };
   }
@@ -294,7 +297,7 @@ struct Table<Body> {
   static Fields<Body> fields() {
     using T = Body;
     return Fields<T>{
-        {"name", &T::name, "unique name; empty: body_ and its index"},
+        {"name", &T::name, "unique name; default: body_N, where N is the index in the list"},
         {"motion", &T::motion,
          "`static` bodies never move, `kinematic` bodies follow their keyframes and spin, `dynamic` bodies "
          "are moved by forces"},
@@ -369,7 +372,7 @@ struct Table<Spring> {
   static Fields<Spring> fields() {
     using T = Spring;
     return {
-        {"name", &T::name, "unique name; empty: spring_ and its index"},
+        {"name", &T::name, "unique name; default: spring_N, where N is the index in the list"},
         {"a", &T::a, "one end"},
         {"b", &T::b, "the other end"},
         {"stiffness", &T::stiffness, "force per extension", "N/m", kNotNegative},

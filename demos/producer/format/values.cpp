@@ -265,8 +265,8 @@ Description Codec<Quat>::describe(Catalogue& all, const Spec&) {
 
 namespace {
 
-/// The value of two hexadecimal digits as a share of 255; negative if they are invalid.
-float hex_share(std::string_view digits) {
+/// The value of two hexadecimal digits as a fraction of 255; negative if they are invalid.
+float hex_fraction(std::string_view digits) {
   int value = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value, 16);
   return error == std::errc() && end == digits.data() + digits.size() && value >= 0
@@ -281,9 +281,9 @@ std::optional<Eigen::Vector4f> parse_hex(std::string_view text) {
   Eigen::Vector4f rgba(0, 0, 0, 1);
   for (std::size_t i = 0; digits * i + 1 < text.size(); ++i) {
     const std::string_view value = text.substr(digits * i + 1, digits);
-    const float share = hex_share(brief ? std::string(2, value.front()) : std::string(value));
-    if (share < 0) return {};
-    rgba[static_cast<Eigen::Index>(i)] = i < 3 ? render::srgb_decode(share) : share;
+    const float fraction = hex_fraction(brief ? std::string(2, value.front()) : std::string(value));
+    if (fraction < 0) return {};
+    rgba[static_cast<Eigen::Index>(i)] = i < 3 ? render::srgb_decode(fraction) : fraction;
   }
   return rgba;
 }
@@ -306,7 +306,7 @@ void Codec<Color>::read(Reader& in, const Node& node, const Spec&, Color& out) {
   bool good = true;
   for (std::size_t i = 0; i < list->size(); ++i) {
     in.within(std::to_string(i), [&] {
-      const auto v = in.number((*list)[i], {"", "", "", i < 3 ? between(0, 1e6) : kShare});
+      const auto v = in.number((*list)[i], {"", "", "", i < 3 ? between(0, 1e6) : kFraction});
       good = good && v;
       rgba[static_cast<Eigen::Index>(i)] = static_cast<float>(v.value_or(0));
     });
@@ -323,7 +323,7 @@ Description Codec<Color>::describe(Catalogue& all, const Spec&) {
   const Object hex = {{"type", "string"}, {"pattern", "^#([0-9a-fA-F]{3,4}|[0-9a-fA-F]{6}|[0-9a-fA-F]{8})$"}};
   Object light = {{"type", "number"}}, alpha = {{"type", "number"}};
   between(0, 1e6).add_to(light);
-  kShare.add_to(alpha);
+  kFraction.add_to(alpha);
   const Object list = {
       {"type", "array"}, {"items", List{light, light, light, alpha}}, {"minItems", 3}, {"maxItems", 4}};
   return {all.share("colour", Object{{"oneOf", List{hex, list}}}), "[colour](#colours)"};

@@ -176,7 +176,7 @@ struct Codec<std::pair<Real, V>> {
   }
 
  private:
-  static inline const Spec kAge{"", "", "", kShare};
+  static inline const Spec kAge{"", "", "", kFraction};
 };
 
 }  // namespace offstage::producer

@@ -28,7 +28,7 @@ constexpr double kFreeParticle_s = 0.015e-6;       // a sub-step of a particle
 constexpr double kParticle_s = 0.1e-6;             // the same where it collides with bodies
 constexpr double kPackedParticle_s = 1e-6;         // the same where it collides with other particles
 constexpr double kTriangle_s = 0.1e-6;             // a sub-frame of a triangle with its shadow
-constexpr double kClothPicture_s = 0.09;           // a sub-frame of a cloth, whatever its mesh
+constexpr double kClothPicture_s = 0.09;           // time per sub-frame of a cloth, independent of its mesh
 constexpr double kPixel_s = 40e-3 / (1280 * 720);  // a sub-frame of a pixel of ground
 
 /// Time of a sub-frame for a particle of each style; puffs cover many pixels.

@@ -34,8 +34,8 @@ struct CostEstimate {
   double simulation_s_per_s = 0;    ///< measured, per second of film
   std::optional<double> frame_s;    ///< time of drawing, measured and scaled to the film's size and quality
   std::string not_drawn;            ///< reason if there is no frame_s
-  double film_s = 0;                ///< whole film, with the trial's number of particles
-  double most_film_s = 0;           ///< the same with the greatest possible number of particles
+  double film_s = 0;                ///< time of the whole film with the trial's number of particles [s]
+  double most_film_s = 0;           ///< the same with the greatest possible number of particles [s]
   std::vector<ObjectCost> objects;  ///< the most expensive first
 };
 

@@ -45,8 +45,8 @@ struct MethodResult {
   std::optional<double> deviation(const MethodResult& other) const;
 };
 
-/// Receives the share of a run that is done, 0 .. 1.
-using MethodProgress = std::function<void(double share)>;
+/// Receives the fraction of a run that is done, 0 .. 1.
+using MethodProgress = std::function<void(double fraction)>;
 
 /// Simulates all frames with the scene's methods, or as many as it can in `limit_s` seconds. Throws
 /// Interrupted after a signal.

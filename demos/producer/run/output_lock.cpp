@@ -101,7 +101,7 @@ bool OutputLock::take(int mode, const std::string& output) {
     if (!lock_) render::throw_file_error(file_, "cannot be created");
     if (::flock(lock_.fd(), mode | LOCK_NB) != 0) {
       if (errno == EWOULDBLOCK) return false;
-      log("warning: {}: this file system has no locks; see to it that no other render writes here\n", output);
+      log("warning: {}: this file system has no locks; make sure that no other render writes here\n", output);
       lock_.close();
       return true;
     }

@@ -51,7 +51,7 @@ class Pipeline {
     changed_.notify_all();
     return true;
   }
-  void no_more_jobs() {
+  void finish_jobs() {
     const std::lock_guard lock(mutex_);
     all_produced_ = true;
     changed_.notify_all();

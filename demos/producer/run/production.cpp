@@ -72,7 +72,7 @@ class ProgressMeter {
  private:
   /// Simulated and finished frames are weighted by their mean times.
   void report() {
-    constexpr double kKnown = 0.02;  // share of the work after which the rest can be estimated
+    constexpr double kKnown = 0.02;  // fraction of the work after which the rest can be estimated
     const auto mean = [](double sum, int count, double guess) { return count > 0 ? sum / count : guess; };
     const double simulating = mean(simulation_ms_, latest_.frames_simulated, 0),
                  drawing = mean(drawing_ms_, latest_.done, guess_ms_);
@@ -273,7 +273,7 @@ void produce_frames(Pipeline& pipeline, StateSource& source, const RenderJob& jo
     if (job.report) source.describe(frame_job);
     if (!pipeline.push(std::move(frame_job))) return;
   }
-  pipeline.no_more_jobs();
+  pipeline.finish_jobs();
 }
 
 }  // namespace

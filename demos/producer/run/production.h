@@ -75,7 +75,7 @@ struct Progress {
   double sim_ms = 0, render_ms = 0, encode_ms = 0;  ///< for the latest finished frame
   uint64_t particles = 0;                           ///< in that frame
   double eta_s = 0;                                 ///< remaining time [s]; 0: not known yet
-  double fraction = 0;                              ///< share of the work of simulation and drawing, 0 .. 1
+  double fraction = 0;  ///< fraction of the work of simulation and drawing, 0 .. 1
   /// Frames of the simulation, including those that the film skips; both 0 without a simulation.
   int frames_simulated = 0, frames_to_simulate = 0;
   bool frame_finished = true;  ///< false: reported for a simulated frame

@@ -118,7 +118,7 @@ void ProgressPrinter::operator()(const Progress& progress) {
 }
 
 void ProgressPrinter::finish() {
-  if (style_ == ProgressStyle::bar) keep_status();
+  if (style_ == ProgressStyle::bar) end_status_line();
 }
 
 StepNotice::StepNotice(ProgressStyle style, std::string what)

@@ -35,12 +35,12 @@ std::vector<std::string> notes_of(const SimulationTotals& t) {
         "warning: the motion of joints did not converge {} times; joints may come apart or slow down. "
         "Reduce world.step (now {:g} s).",
         t.joints.unsolved, t.step_s));
-  for (const auto& [cloth, share] : t.softened_cloths)
+  for (const auto& [cloth, fraction] : t.softened_cloths)
     notes.push_back(fmt::format(
         "warning: cloth '{}': the stiffness of springs was reduced to {:.2g} of its value, because they are "
         "too stiff for their step; the cloth stretches up to {:.2g} times as far as \"stretch\" says. Remove "
         "\"soften\", reduce \"substep\" or use \"integrator\": \"implicit\".",
-        cloth, share, 1 / share));
+        cloth, fraction, 1 / fraction));
   for (const auto& [cloth, tear] : t.first_tears)
     notes.push_back(
         fmt::format("note: cloth '{}' first tore at {:.3f} s at ({:.3g}, {:.3g}, {:.3g}): a thread was "

@@ -49,8 +49,8 @@ std::string label(double value) {
 /// Round numbers within a range, about `count` of them.
 std::vector<double> ticks(double low, double high, int count) {
   const double rough = (high - low) / count, power = std::pow(10, std::floor(std::log10(rough)));
-  const double share = rough / power;
-  const double step = power * (share <= 1 ? 1 : share <= 2 ? 2 : share <= 5 ? 5 : 10);
+  const double fraction = rough / power;
+  const double step = power * (fraction <= 1 ? 1 : fraction <= 2 ? 2 : fraction <= 5 ? 5 : 10);
   std::vector<double> result;
   // The margin includes the last one if rounding puts it slightly beyond the range.
   for (double k = std::ceil(low / step); k * step <= high + 1e-6 * step; ++k) result.push_back(k * step);

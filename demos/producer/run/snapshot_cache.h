@@ -15,7 +15,7 @@ class SnapshotCache {
  public:
   /// Version of the folder's layout and of the snapshots in it; another one is refused (docs/cache.md).
   static constexpr int kFormat = 4;
-  static constexpr const char* kFile = "cache.json";  ///< which generation is published, and of what
+  static constexpr const char* kFile = "cache.json";  ///< names the published generation and its simulation
   static constexpr std::string_view kGenerationPrefix =
       "generation-";  ///< prefix of the folders with snapshots
   /// "000012.snap"

@@ -61,12 +61,12 @@ std::optional<std::vector<std::string>> range(const std::string& text, const std
   }
   const auto [first, last, step] = numbers;
   if (step == 0 || (last - first) * step < 0) refuse_sweep(text, "the step does not reach the last value");
-  constexpr double kSlack = 1e-9;  // share of a step: 0:1:0.1 has 11 values
+  constexpr double kSlack = 1e-9;  // fraction of a step: 0:1:0.1 has 11 values
   const double steps = std::floor((last - first) / step + kSlack);
   if (!(steps < static_cast<double>(kMostCombinations)))
     refuse_sweep(text, fmt::format("has {:.0f} values; the limit is {} runs", steps + 1, kMostCombinations));
   std::vector<std::string> all;
-  constexpr double kZero = 1e-12;  // share of a step: rounding error of 0 in -1:1:0.1
+  constexpr double kZero = 1e-12;  // fraction of a step: rounding error of 0 in -1:1:0.1
   for (int i = 0; i <= static_cast<int>(steps); ++i) {
     const double value = first + i * step;
     all.push_back(fmt::format("{:.12g}", std::abs(value) < kZero * std::abs(step) ? 0.0 : value));

@@ -79,7 +79,7 @@ struct ClothCord {
   Where where;
   Vec3 from = Vec3::Zero();
   Vec3 to = Vec3(0, -1, 0);  ///< where its other end is at time 0
-  bool held = true;          ///< that end stays there, or at its place on the body
+  bool held = true;          ///< the other end is fixed in the world or on the body
   std::string body;
   Real until = 1e30;
   Real length = 0;
@@ -95,7 +95,7 @@ struct Cloth {
   std::string name;
   ClothShape shape = GridShape{};
   std::string fabric = "cotton";
-  FabricChanges changes;  ///< its keys are directly in the cloth
+  FabricChanges changes;  ///< the keys of the changes are keys of the cloth itself
   std::string material;   ///< name; empty: the look of the fabric
   Vec3 position = Vec3::Zero();
   Quat orientation = Quat::Identity();
@@ -118,7 +118,7 @@ struct Cloth {
   Real remove_at = 1e30;
   bool visible = true;
   bool casts_shadow = true;
-  Placement placement;  ///< its three keys are directly in the cloth
+  Placement placement;  ///< the three keys of the placement are keys of the cloth itself
 };
 
 }  // namespace offstage::producer

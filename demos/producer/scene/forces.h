@@ -40,7 +40,7 @@ struct WindField : FieldOf<sim::WindField> {
 struct VortexField : FieldOf<sim::Vortex> {};
 struct TurbulenceField : FieldOf<sim::Turbulence> {};
 
-/// A force between particles, with the particles.
+/// A force between particles, and the systems of these particles.
 template <class E>
 struct PairForceOf : NamedForce, E {
   using Effect = E;

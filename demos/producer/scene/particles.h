@@ -48,7 +48,7 @@ struct ParticleLook {
   std::string texture;  ///< picture of sprites; empty: a soft disc
   std::optional<render::SpriteSheet> sheet;
   std::optional<LookMesh> mesh;  ///< for the style `mesh`, which needs it
-  Varying angle_deg = 0.0;       ///< at creation
+  Varying angle_deg = 0.0;       ///< angle of a new particle
   Varying spin_deg_per_s = 0.0;
 
   /// Whether the angle of a particle is visible.
@@ -83,7 +83,8 @@ struct ParticleGroup {
   Real charge = 0;
   Real appear_at = 0;
   Real remove_at = 1e30;
-  sim::ParticleSystemDef behaviour;  ///< its keys are directly in the group; see system_def()
+  sim::ParticleSystemDef
+      behaviour;  ///< the keys of the behaviour are keys of the group itself; see system_def()
   ParticleLook look;
 };
 
@@ -102,7 +103,8 @@ struct AgeSource;
 struct ParticleSource : effects::NewParticles {
   Where where;
   std::string name;
-  sim::ParticleSystemDef behaviour;  ///< its keys are directly in the source; see system_def()
+  sim::ParticleSystemDef
+      behaviour;  ///< the keys of the behaviour are keys of the source itself; see system_def()
   ParticleLook look;
   std::optional<Split> split;
   std::vector<TrailSource> trails;
@@ -172,8 +174,8 @@ struct Emitter : ParticleSource, effects::EmitterRelease {
   Placement placement;
 };
 
-/// Kind of creation of a particle.
-struct Birth {
+/// The trail or the event of its parent by which a source emits particles. Neither: the source is an emitter.
+struct Emission {
   const TrailSource* trail = nullptr;
   const EventSource* event = nullptr;
   effects::Trigger trigger = effects::Trigger::collision;
@@ -192,30 +194,30 @@ void visit_list(const std::string& parent, const char* kind, const List& list, F
 
 template <class F>
 void visit_tree(const ParticleSource& source, const ParticleSource* parent, const std::string& name,
-                const Birth& birth, F& visit) {
+                const Emission& emission, F& visit) {
   using effects::Trigger;
-  visit(source, parent, name, birth);
+  visit(source, parent, name, emission);
   visit_list(name, "trails", source.trails, [&](const TrailSource& child, const std::string& full) {
-    visit_tree(child, &source, full, Birth{.trail = &child}, visit);
+    visit_tree(child, &source, full, Emission{.trail = &child}, visit);
   });
   visit_list(name, "on_age", source.on_age, [&](const AgeSource& child, const std::string& full) {
-    visit_tree(child, &source, full, Birth{.event = &child, .trigger = Trigger::age, .age = child.age},
+    visit_tree(child, &source, full, Emission{.event = &child, .trigger = Trigger::age, .age = child.age},
                visit);
   });
-  visit_list(name, "on_collision", source.on_collision,
-             [&](const EventSource& child, const std::string& full) {
-               visit_tree(child, &source, full, Birth{.event = &child, .trigger = Trigger::collision}, visit);
-             });
+  visit_list(
+      name, "on_collision", source.on_collision, [&](const EventSource& child, const std::string& full) {
+        visit_tree(child, &source, full, Emission{.event = &child, .trigger = Trigger::collision}, visit);
+      });
   visit_list(name, "on_death", source.on_death, [&](const EventSource& child, const std::string& full) {
-    visit_tree(child, &source, full, Birth{.event = &child, .trigger = Trigger::death}, visit);
+    visit_tree(child, &source, full, Emission{.event = &child, .trigger = Trigger::death}, visit);
   });
 }
 
 }  // namespace detail
 
-/// Calls visit(source, parent, name, birth) for an emitter and all of its child particles, parents first. The
-/// name of a child is that of its parent, a slash, and its own name. This is also the order of their point
-/// sets.
+/// Calls visit(source, parent, name, emission) for an emitter and all of its child particles, parents first.
+/// The name of a child is that of its parent, a slash, and its own name. This is also the order of their
+/// point sets.
 template <class F>
 void for_each_source(const Emitter& emitter, F&& visit) {
   detail::visit_tree(emitter, nullptr, emitter.name, {}, visit);

@@ -62,7 +62,7 @@ struct Material {
   Real roughness = 0.5;
   Color emission{{0, 0, 0, 1}};
   Real emission_strength = 1;
-  Real transmission = 0;  ///< share of the light that enters the surface and passes through, as in glass
+  Real transmission = 0;  ///< fraction of the light that enters the surface and passes through, as in glass
   Real refraction = 1.5;  ///< index of refraction
   render::Pattern pattern = render::Pattern::none;
   Color pattern_color{{0.4f, 0.4f, 0.4f, 1}};
@@ -140,7 +140,7 @@ struct Body {
   Vec3 spin = Vec3::Zero();
   Real appear_at = 0;
   Real remove_at = 1e30;
-  Placement placement;  ///< its three keys are directly in the body
+  Placement placement;  ///< the three keys of the placement are keys of the body itself
 
   /// Whether the parts of its shape move by an animation.
   bool has_animated_shape() const { return animation && !model && std::holds_alternative<MeshFile>(shape); }
@@ -166,9 +166,9 @@ struct Spring {
   std::string material;
 };
 
-/// How the lines of an overlay are drawn.
+/// The look of the lines of an overlay.
 struct LineLook {
-  Real width = 0.003;  ///< share of the picture's height
+  Real width = 0.003;  ///< fraction of the picture's height
   Real hidden = 0.3;   ///< opacity of parts behind other objects
 };
 
@@ -185,7 +185,7 @@ struct TreeOverlay : LineLook {
 struct PartsOverlay {
   Where where;
   std::string body;
-  Varying explode = 0.0;  ///< additional distance of the parts from the centre, as a share
+  Varying explode = 0.0;  ///< additional distance of the parts from the centre, as a fraction
 };
 /// The closest points of two bodies, or the penetration of one in the other.
 struct ClosestOverlay : LineLook {
@@ -246,7 +246,7 @@ struct TextOverlay {
   Where where;
   std::string text = "{time}";
   TextPlace place = TextPlace::bottom_left;
-  Real size = 0.035;  ///< height of a line, as a share of the picture's
+  Real size = 0.035;  ///< height of a line, as a fraction of the picture's
   Color color{{1, 1, 1, 1}};
   Real from = 0;  ///< start of its display
   std::optional<Real> until;
@@ -382,10 +382,10 @@ enum class Metering { fixed, automatic };
 struct RenderSettings {
   Eigen::Vector2i size = {1280, 720};
   Quality quality = Quality::preview;
-  Real shutter = 0.5;  ///< share of the frame time during which the shutter is open
+  Real shutter = 0.5;  ///< fraction of the frame time during which the shutter is open
   Varying exposure = 1.0;
   Metering metering = Metering::fixed;
-  Real bloom = 0.12;  ///< share of the light beyond white that is spread as glow
+  Real bloom = 0.12;  ///< fraction of the light beyond white that is spread as glow
   render::ToneCurve tone_curve = render::ToneCurve::filmic;
 };
 

@@ -76,7 +76,7 @@ void bind_film(py::module_& m) {
       .def_readonly("motion", &PythonFrame::motion,
                     "(height, width, 2) float32 [px] since the previous frame; or None.");
   py::class_<Film>(m, "Film",
-                   "An iterator over the frames of a film, which a thread of its own makes in advance.")
+                   "An iterator over the frames of a film, which a separate thread renders in advance.")
       .def("__iter__", [](py::object self) { return self; })
       .def("__next__", &next_frame)
       .def("__len__", &Film::total)

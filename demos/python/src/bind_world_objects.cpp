@@ -205,7 +205,7 @@ sim::Attachment attachment(LiveWorld& w, const py::object& end) {
       const auto id = pair[1].cast<uint64_t>();
       const std::vector<uint64_t>& ids = w.world.particles(system).id;
       if (!std::binary_search(ids.begin(), ids.end(), id))
-        throw std::invalid_argument("there is no particle of this id");
+        throw std::invalid_argument("there is no particle with this id");
       return sim::ParticlePoint{system, id};
     }
   }
@@ -512,7 +512,7 @@ void bind_building(py::class_<LiveWorld>& world) {
            "A pin is a\n"
            "vertex, or (vertex, body).")
       .def("add_mesh_cloth", &add_mesh_cloth, py::arg("vertices"), py::arg("triangles"),
-           "As add_grid_cloth, of a mesh.")
+           "Adds a cloth from a mesh; keywords as for add_grid_cloth.")
       .def("add_contact_rule", &add_contact_rule, py::arg("a"), py::arg("b"),
            py::arg("restitution") = py::none(), py::arg("friction") = py::none(),
            py::arg("static_friction") = py::none(), py::arg("rolling_friction") = py::none(),
@@ -520,7 +520,8 @@ void bind_building(py::class_<LiveWorld>& world) {
   const auto removal = [&]<class H>(H) {
     world.def(
         "remove", [](LiveWorld& w, H handle) { return w.remove(handle); }, py::arg("object"),
-        "Removes an object; False if it was removed before. A body takes its springs and joints along.");
+        "Removes an object; False if it was removed before. Removing a body also removes its springs and "
+        "joints.");
   };
   removal(sim::BodyHandle{});
   removal(sim::ParticleSystemHandle{});

@@ -24,7 +24,8 @@ class LiveWorld {
   template <class H>
   static H live(const std::set<H>& known, H handle, const char* kind) {
     if (!known.contains(handle))
-      throw std::invalid_argument(std::string("this ") + kind + " is not one of this world, or was removed");
+      throw std::invalid_argument(std::string("this ") + kind +
+                                  " does not belong to this world, or was removed");
     return handle;
   }
   sim::BodyHandle body(sim::BodyHandle h) const { return live(bodies, h, "body"); }

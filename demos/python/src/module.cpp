@@ -35,7 +35,7 @@ void translate(std::exception_ptr error) {
 }
 
 void bind_errors(py::module_& m) {
-  py::class_<Problem>(m, "Problem", "One problem of a scene: where it is, and what is wrong.")
+  py::class_<Problem>(m, "Problem", "One problem of a scene: its place and a message.")
       .def_property_readonly("file", [](const Problem& p) { return p.where.file; })
       .def_property_readonly(
           "line", [](const Problem& p) { return p.where.line; }, "From 1; 0: not from a file.")
@@ -46,7 +46,7 @@ void bind_errors(py::module_& m) {
       .def("__str__", &Problem::describe)
       .def("__repr__", &Problem::describe);
   scene_error = new_exception(m, "SceneError", PyExc_ValueError,
-                              "A scene that cannot be used. `problems` lists what is wrong, and where.");
+                              "A scene that cannot be used. `problems` lists the errors with their places.");
   diverged_error =
       new_exception(m, "DivergedError", PyExc_ArithmeticError,
                     "The simulation is no longer finite. `state` is the last state as JSON text.");

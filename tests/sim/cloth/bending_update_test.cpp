@@ -1,5 +1,5 @@
-/// What a tear or a clamp changes in the bending of a cloth is computed again around it alone: the result is
-/// that of a cloth assigned as a whole, to the last bit.
+/// After a tear or a clamp, the bending of a cloth is computed again only around it. The result is that of a
+/// cloth assigned as a whole, to the last bit.
 
 #include <algorithm>
 

@@ -18,7 +18,7 @@ Pairs found_by(const ClothTree& tree, std::span<const Vec4> points) {
   return pairs;
 }
 
-/// Triangles apart from each other, so that no surface tells that any cannot meet, on short ways.
+/// Separate triangles on short paths, so that no surface excludes pairs.
 struct Swarm {
   explicit Swarm(uint32_t count) {
     std::mt19937_64 random(7);
@@ -111,7 +111,7 @@ struct Strip {
   ClothTree tree;
 };
 
-TEST(ClothTree, PassesOverWhatIsNearlyFlat) {
+TEST(ClothTree, SkipsNearlyFlatPatches) {
   EXPECT_TRUE(Strip(0).found().empty());
   EXPECT_TRUE(Strip(0.02).found().empty());
 }

@@ -13,7 +13,7 @@ struct Layers {
         points.position.push_back(p);
     points.start = points.rest = points.position;
     points.velocity.assign(6, Vec4::Zero());
-    points.acceleration = points.pull = points.velocity;
+    points.acceleration = points.pin_impulse = points.velocity;
     points.mass.assign(6, 1);
     points.inverse_mass.assign(6, 1);
     points.holder.assign(6, nullptr);
@@ -22,10 +22,10 @@ struct Layers {
     points.cloth = {0, 0, 0, 1, 1, 1};
     contacts.assign({{0, 1, 2}, {3, 4, 5}}, points);
   }
-  /// Both layers move as far towards these ways [m] as they may.
+  /// Moves both layers by these displacements [m], as far as contacts allow.
   void move(const Vec4& lower, const Vec4& upper) {
     make(lower, upper);
-    shorten(Vec4::Zero(), MoveShares(6, 1));
+    shorten(Vec4::Zero(), MoveFractions(6, 1));
     contacts.end_substep(points, kStep);
   }
   void make(const Vec4& lower, const Vec4& upper) {
@@ -33,14 +33,14 @@ struct Layers {
     for (std::size_t i = 0; i < 6; ++i) points.position[i] += i < 3 ? lower : upper;
   }
   /// What of their moves goes beyond the drift that all make in any case.
-  void shorten(const Vec4& drift, MoveShares shares) {
+  void shorten(const Vec4& drift, MoveFractions fractions) {
     contacts.find_doubtful(points, kStep, std::vector<Vec4>(6, drift));
     std::vector<uint32_t> lowered;
     for (Vec4& start : points.start) start += drift;
-    for (int round = 0; round < 64 && contacts.shorten(points, shares, lowered); ++round) {
+    for (int round = 0; round < 64 && contacts.shorten(points, fractions, lowered); ++round) {
     }
     for (std::size_t i = 0; i < 6; ++i)
-      points.position[i] = points.start[i] + shares[i] * (points.position[i] - points.start[i]);
+      points.position[i] = points.start[i] + fractions[i] * (points.position[i] - points.start[i]);
     for (Vec4& start : points.start) start -= drift;
   }
   Real least_height() const {
@@ -84,12 +84,12 @@ TEST(SelfContacts, HoldLayersApartInTheFrameOfTheirDrift) {
   EXPECT_GT(layers.least_height(), 0);
 }
 
-// Pairs are sought for the ways that all make, and these two are too far apart for that.
-TEST(SelfContacts, FindWhatAMovingFrameBroughtNearWhenLookedAtOnceMore) {
+// The search covers the displacements of all points, and these two are too far apart for them.
+TEST(SelfContacts, FindPairsThatAMovingFrameBroughtNear) {
   Layers layers(0.03);
   layers.make(Vec4::Zero(), Vec4::Zero());
   layers.shorten(Vec4(0, 0.05, 0, 0), {0, 0, 0, 1, 1, 1});
-  layers.shorten(Vec4::Zero(), MoveShares(6, 1));
+  layers.shorten(Vec4::Zero(), MoveFractions(6, 1));
   EXPECT_GT(layers.least_height(), 0);
 }
 

@@ -200,7 +200,7 @@ std::vector<Vec3> turned_box(const Vec3& size, const Quat& q) {
   return points;
 }
 
-TEST(ObbFit, IsTheBoxOfABoxWhateverIsInside) {
+TEST(ObbFit, IsTheBoxOfABoxWithAnyPointsInside) {
   const Quat q(0.9, 0.2, -0.3, 0.25);
   const Vec3 size(3, 2, 1);
   std::vector<Vec3> points = turned_box(size, q.normalized());

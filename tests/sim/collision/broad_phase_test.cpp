@@ -72,15 +72,15 @@ Aabb scattered_box(const Scatter& random, uint64_t i) {
   return {centre - half, centre + half};
 }
 
-// Objects are added, removed, at rest or moving, and the share of moving ones changes. All paths of the grid
-// are taken: resting objects settle, become active again, and levels are rebuilt.
-TEST(BroadPhase, FindsExactlyTheMeetingBoxesWhateverHappens) {
+// Objects are added, removed, at rest or moving, and the fraction of moving ones changes. All paths of the
+// grid are taken: resting objects settle, become active again, and levels are rebuilt.
+TEST(BroadPhase, FindsExactlyTheOverlappingBoxesAfterAnyChanges) {
   for (const GridKind kind : kKinds) {
     const Scatter random{5};
     Both both(kind);
     std::size_t settlings = 0, found = 0;
     for (uint64_t step = 0; step < 120; ++step) {
-      const Real share = step < 40 ? 1 : step < 80 ? 0.02 : 0.3;
+      const Real fraction = step < 40 ? 1 : step < 80 ? 0.02 : 0.3;
       for (uint32_t i = 0; i < 400; ++i) {
         const uint64_t event = 1000 * step + i;
         const bool present = both.grid.contains(i);
@@ -88,7 +88,7 @@ TEST(BroadPhase, FindsExactlyTheMeetingBoxesWhateverHappens) {
           both.insert(i, scattered_box(random, event), random.uniform(event, 21) < 0.3);
         else if (present && random.uniform(event, 22) < 0.01)
           both.remove(i);
-        else if (present && !both.model.items[i].is_static && random.uniform(event, 23) < share)
+        else if (present && !both.model.items[i].is_static && random.uniform(event, 23) < fraction)
           both.move(i, both.model.items[i].box.translated(0.1 * Vec3(random.uniform(event, 24), 0, -0.5)));
         else if (present && random.uniform(event, 25) < 0.002)
           both.move(i, scattered_box(random, event));

@@ -57,7 +57,7 @@ TEST(CollisionShapes, EveryKindOfTreeGivesTheSameDistancesAndImpacts) {
                      second = time_of_impact({ring, rest, &counts}, {*same, path}, 1e-4);
           ASSERT_EQ(first.has_value(), second.has_value());
           if (first) {
-            EXPECT_NEAR(first->share, second->share, 1e-3);
+            EXPECT_NEAR(first->fraction, second->fraction, 1e-3);
           }
           EXPECT_GT(counts.volumes, 0u);
         }

@@ -228,7 +228,7 @@ TEST(NarrowPhase, ABodyInsideASolidIsInPenetration) {
     const auto impact =
         time_of_impact(MovingShape{*solid, resting}, MovingShape{ball.collision, inside}, 1e-6);
     ASSERT_TRUE(impact);
-    EXPECT_EQ(impact->share, 0);
+    EXPECT_EQ(impact->fraction, 0);
     EXPECT_LT(impact->separation.distance, 0);
   }
   PairCache cache;
@@ -338,9 +338,9 @@ TEST(NarrowPhase, ABodySinkingIntoASheetStaysOnItsSide) {
 
 /// The reference of the tests: samples many times, then bisects the first interval that ends in contact.
 std::optional<Real> first_contact(const MovingShape& a, const MovingShape& b, Real tolerance, int looks) {
-  const auto near = [&](Real share) {
+  const auto near = [&](Real fraction) {
     PairCache none;
-    const auto s = separation(a.shape, b.shape, between(a.path.at(share), b.path.at(share)), none);
+    const auto s = separation(a.shape, b.shape, between(a.path.at(fraction), b.path.at(fraction)), none);
     return s && s->distance <= tolerance;
   };
   if (near(0)) return 0;
@@ -370,19 +370,19 @@ TEST(TimeOfImpact, OfNonConvexSolidsAgreesWithBisection) {
                nearer = first_contact(moving_a, moving_b, kTolerance / 2, 100);
     if (nearer) {
       ASSERT_TRUE(impact) << i;
-      EXPECT_LE(impact->share, *nearer + 1e-9) << i;
+      EXPECT_LE(impact->fraction, *nearer + 1e-9) << i;
     }
     if (!impact) continue;
     if (near && nearer && *nearer - *near < 1e-3) {
-      EXPECT_GE(impact->share, *near - 1e-9) << i;
+      EXPECT_GE(impact->fraction, *near - 1e-9) << i;
     }
     ++impacts;
     EXPECT_TRUE(impact->converged);
     PairCache none;
-    const auto s =
-        separation(a.collision, b.collision, between(way_a.at(impact->share), way_b.at(impact->share)), none);
+    const auto s = separation(a.collision, b.collision,
+                              between(way_a.at(impact->fraction), way_b.at(impact->fraction)), none);
     EXPECT_LE(s->distance, kTolerance * (1 + 1e-6)) << i;
-    if (impact->share > 0) {
+    if (impact->fraction > 0) {
       EXPECT_GT(s->distance, kTolerance / 2 - 1e-9) << i;
     }
   }
@@ -406,7 +406,7 @@ TEST(TimeOfNextImpact, ARodThatTouchesMeetsTheGroundAgainWithItsOtherEnd) {
     const Pose start = pose({0, high, 0}, kTilt);
     const auto rocks = next(start, pose({0, high, 0}, -2 * kTilt));
     ASSERT_TRUE(rocks);
-    const Pose then = PosePath(start, pose({0, high, 0}, -2 * kTilt)).at(rocks->share);
+    const Pose then = PosePath(start, pose({0, high, 0}, -2 * kTilt)).at(rocks->fraction);
     EXPECT_NEAR(then.point_to_world({0.5, -0.01, 0}).y(), 0, 1e-3);
     EXPECT_NEAR(then.vector_to_world(Vec3::UnitX()).y(), -std::sin(kTilt), 1e-3) << "the other end";
     EXPECT_NEAR(rocks->separation.distance, 0, 2 * kTolerance);
@@ -419,7 +419,7 @@ TEST(TimeOfNextImpact, ARodThatTouchesMeetsTheGroundAgainWithItsOtherEnd) {
   }
 }
 
-TEST(PairCache, KeepsWhatIsUsed) {
+TEST(PairCache, KeepsUsedEntries) {
   PairCache cache;
   cache.of(3, 1).gjk.size = 7;
   cache.of(1, 2).gjk.size = 8;

@@ -15,8 +15,8 @@ Pose still_pose(const Vec3& position, Real angle = 0, const Vec3& axis = Vec3::U
   return {position, Quat(Eigen::AngleAxisd(angle, axis.normalized()))};
 }
 
-Real distance(const MovingConvex& a, const MovingConvex& b, Real share) {
-  const Pose p = a.path.at(share), q = b.path.at(share);
+Real distance(const MovingConvex& a, const MovingConvex& b, Real fraction) {
+  const Pose p = a.path.at(fraction), q = b.path.at(fraction);
   GjkCache fresh;
   return gjk(a.shape, b.shape, {p.point_to_body(q.position), p.orientation.conjugate() * q.orientation},
              fresh)
@@ -44,8 +44,8 @@ TEST(TimeOfImpact, FallingBoxOnABox) {
   const PosePath falling(still_pose({0, 3, 0}), still_pose({0, 0, 0})), resting(still_pose({0.2, 0, 0}));
   const auto impact = time_of_impact({box, falling}, {box, resting}, kTolerance);
   ASSERT_TRUE(impact);
-  EXPECT_NEAR(impact->share, 2.0 / 3, kTolerance);
-  EXPECT_LE(impact->share, 2.0 / 3);
+  EXPECT_NEAR(impact->fraction, 2.0 / 3, kTolerance);
+  EXPECT_LE(impact->fraction, 2.0 / 3);
   EXPECT_NEAR(impact->separation.normal.y(), 1, 1e-9);
   EXPECT_LE(impact->advances, 3);
 }
@@ -59,8 +59,8 @@ TEST(TimeOfImpact, SpheresThatGlanceAndThatMiss) {
     ASSERT_EQ(impact.has_value(), offset < 1) << offset;
     if (!impact) continue;
     const Real reach = 1 + kTolerance, expected = (4 - std::sqrt(reach * reach - offset * offset)) / 8;
-    EXPECT_NEAR(impact->share, expected, 1e-5);
-    EXPECT_GE(impact->share, expected - 1e-14);
+    EXPECT_NEAR(impact->fraction, expected, 1e-5);
+    EXPECT_GE(impact->fraction, expected - 1e-14);
   }
 }
 
@@ -71,7 +71,7 @@ TEST(TimeOfImpact, TurningRodMeetsThePlane) {
   const PosePath turning(start, end), ground{Pose{}};
   const auto impact = time_of_plane_impact({rod, turning}, ground, kTolerance);
   ASSERT_TRUE(impact);
-  const Quat q = turning.at(impact->share).orientation;
+  const Quat q = turning.at(impact->fraction).orientation;
   const Real angle = 2 * std::atan2(q.z(), q.w());
   EXPECT_NEAR(std::sin(angle) + 0.5e-3 * std::cos(angle), 0.5, 2 * kTolerance);
   EXPECT_LE(impact->separation.distance, kTolerance);
@@ -85,7 +85,7 @@ TEST(TimeOfImpact, TiltingPlaneMeetsABall) {
       swinging(still_pose(Vec3::Zero()), still_pose(Vec3::Zero(), 1.0));
   const auto impact = time_of_plane_impact({ball, resting}, swinging, kTolerance);
   ASSERT_TRUE(impact);
-  const Vec3 up = swinging.at(impact->share).vector_to_world(Vec3::UnitY());
+  const Vec3 up = swinging.at(impact->fraction).vector_to_world(Vec3::UnitY());
   EXPECT_NEAR(up.dot(Vec3(2, 0.5, 0)), 0.1, 2 * kTolerance);
   const PosePath sinking(still_pose(Vec3::Zero()), still_pose(Vec3(0, -1, 0), -1.0));
   EXPECT_FALSE(time_of_plane_impact({ball, resting}, sinking, kTolerance));
@@ -97,7 +97,7 @@ TEST(TimeOfImpact, TouchingAtTheStartIsAnImpactAtOnce) {
     const PosePath sliding(still_pose({0, height, 0}), still_pose({1, height, 0})), resting{Pose{}};
     const auto impact = time_of_impact({box, sliding}, {box, resting}, kTolerance);
     ASSERT_TRUE(impact);
-    EXPECT_EQ(impact->share, 0);
+    EXPECT_EQ(impact->fraction, 0);
     EXPECT_NEAR(impact->separation.distance, height - 1, 1e-9);
   }
 }
@@ -125,14 +125,14 @@ TEST(TimeOfImpact, AgreesWithFineBisection) {
     const auto nearer = bisection(moving_a, moving_b, kTolerance / 2, 300);
     if (nearer) {
       ASSERT_TRUE(impact) << i;
-      EXPECT_LE(impact->share, *nearer + 1e-11) << i;
+      EXPECT_LE(impact->fraction, *nearer + 1e-11) << i;
     }
     if (!impact) continue;
     ++impacts;
     EXPECT_TRUE(impact->converged) << i;
-    EXPECT_LE(distance(moving_a, moving_b, impact->share), kTolerance * (1 + 1e-6)) << i;
-    for (int k = 0; k < 100 && impact->share > 0; ++k)
-      EXPECT_GT(distance(moving_a, moving_b, impact->share * k / 100), kTolerance / 2 - 1e-9) << i;
+    EXPECT_LE(distance(moving_a, moving_b, impact->fraction), kTolerance * (1 + 1e-6)) << i;
+    for (int k = 0; k < 100 && impact->fraction > 0; ++k)
+      EXPECT_GT(distance(moving_a, moving_b, impact->fraction * k / 100), kTolerance / 2 - 1e-9) << i;
   }
   EXPECT_GT(impacts, 100);
 }

@@ -118,7 +118,7 @@ TEST(ContactLcp, JointsHoldAndTheirBoundedRowsKeepTheirBounds) {
   }
 }
 
-TEST(ContactLcp, RefusesWhatItCannotSolveAndChangesNothing) {
+TEST(ContactLcp, RefusesUnsolvableProblemsAndChangesNothing) {
   ContactSample s = stacked_boxes(20, {0, -0.04, 0}, 0.5);  // 80 contacts
   ASSERT_GT(s.contacts.size(), kMostLcpContacts);
   const ContactSample before = s;

@@ -84,7 +84,7 @@ TEST(Relaxation, WallOfHundredStandsAtCoarseSteps) {
 }
 
 // Without the averaging of forces over steps, the wall keeps swaying with 0.02 J.
-TEST(Relaxation, WallOfHundredComesToRest) {
+TEST(Relaxation, WallOfHundredReachesRest) {
   BoxScene s = brick_wall(100);
   s.run(2, kStep);
   EXPECT_LT(s.kinetic_energy(), 1e-5);
@@ -232,7 +232,7 @@ TEST(Relaxation, ConveyorCarriesTheBox) {
 }
 
 // A body turns about a point that it touches, as a manifold that has shrunk to this point remembers it: one
-// point has no torque, so what it would turn to is not hit.
+// point has no torque, so the part of the body that would turn into the other one does not collide.
 TEST(Relaxation, APointHasNoTorque) {
   std::vector<RelaxedBody> bodies(2);
   bodies[0].inverse_mass = 1;

@@ -10,7 +10,7 @@ namespace {
 
 using Map = SlotMap<std::string, struct NameTag>;
 
-TEST(SlotMap, FindsWhatItHoldsAndNothingElse) {
+TEST(SlotMap, FindsItsElementsAndNothingElse) {
   Map map;
   const auto a = map.insert("a"), b = map.insert("b");
   EXPECT_EQ(map[a], "a");

@@ -60,9 +60,9 @@ TEST(Air, MovesBodiesByItsOwnDragOrTheirs) {
   RigidMotion motion = at_rest({0, 1, 0.5});
   motion.velocity = {1, 2, 3};
   const Vec3 air = TurbulentFlow(turbulence, 0.2).velocity(motion.position);
-  const Real share = 1 - motion.position.norm() / 4;
+  const Real fraction = 1 - motion.position.norm() / 4;
   const Vec3 by_field = wrench({.effect = turbulence}, 0.2, motion, Vec3::Zero(), 0.3).force;
-  EXPECT_NEAR((by_field - share * 0.5 * (air - motion.velocity)).norm(), 0, 1e-15);
+  EXPECT_NEAR((by_field - fraction * 0.5 * (air - motion.velocity)).norm(), 0, 1e-15);
   const Vec3 by_own = wrench({.effect = vortex}, 0.2, motion, Vec3::Zero(), 0.3).force;
   EXPECT_NEAR((by_own - 0.3 * velocity(vortex, motion.position)).norm(), 0, 1e-15);
 }
@@ -128,7 +128,7 @@ TEST(Explosion, GoesOffOnce) {
   EXPECT_FALSE(bang.explodes(0.75, 1));
 }
 
-TEST(ForceDef, SaysWhatIsWrong) {
+TEST(ForceDef, NamesErrors) {
   EXPECT_EQ(problem(ForceDef{}), "");
   EXPECT_NE(problem({.start = 2, .end = 1}).find("end"), std::string::npos);
   EXPECT_NE(problem({.effect = WindField{.drag = -1}}).find("drag"), std::string::npos);

@@ -135,8 +135,8 @@ TEST(Turbulence, SeedsAndOctavesAreIndependent) {
   b = a;
   b.octaves = 2;
   const auto both = velocities(b, 0, x), first = velocities(a, 0, x);
-  const Real share = 1 / std::sqrt(1 + std::pow(2, -2.0 / 3));
-  EXPECT_NEAR(correlation(both, first), share, 0.02);
+  const Real fraction = 1 / std::sqrt(1 + std::pow(2, -2.0 / 3));
+  EXPECT_NEAR(correlation(both, first), fraction, 0.02);
 }
 
 TEST(Turbulence, AtAPointDoesNotDependOnOtherPointsAndIsFiniteFarAway) {

@@ -300,7 +300,8 @@ Real covered(const TriangleMesh& mesh, const ConvexDecomposition& d, uint64_t po
   return static_cast<Real>(held) / inside;
 }
 
-/// Greatest height of a point of the surface over the part that is nearest, as a share of the mesh's extent.
+/// Greatest height of a point of the surface over the part that is nearest, as a fraction of the mesh's
+/// extent.
 Real greatest_gap(const TriangleMesh& mesh, const ConvexDecomposition& d) {
   Real gap = 0;
   for (const Triangle& t : mesh.triangles) {
@@ -314,11 +315,11 @@ Real greatest_gap(const TriangleMesh& mesh, const ConvexDecomposition& d) {
   return gap / extent(mesh);
 }
 
-/// Trimmed hulls lose at most this share of the solid: rims around hollows, which lie about as far outside of
-/// the hull as the ground of the hollow lies inside. A limit of 0.01 leaves 7.7 % more volume than the model
-/// in the bowl that comes with offstage, and 8.0 % in the goblet; 0.03 leaves 3.3 and 4.3 %.
+/// Trimmed hulls lose at most this fraction of the solid: rims around hollows, which lie about as far outside
+/// of the hull as the ground of the hollow lies inside. A limit of 0.01 leaves 7.7 % more volume than the
+/// model in the bowl that comes with offstage, and 8.0 % in the goblet; 0.03 leaves 3.3 and 4.3 %.
 constexpr Real kMostUncovered = 0.03;
-/// No rim lies farther outside than this share of the extent.
+/// No rim lies farther outside than this fraction of the extent.
 constexpr Real kDeepestGap = 0.02;
 
 TEST(ApproximateDecomposition, HolesAreBridgedAndSidesStaySmooth) {
@@ -398,7 +399,7 @@ TEST(ApproximateDecomposition, IsTheSameOnAnyNumberOfThreads) {
     EXPECT_TRUE(std::ranges::equal(one.parts[k].vertices(), many.parts[k].vertices()));
 }
 
-/// Volume in which the parts and the solid differ, by random points, as a share of the solid's.
+/// Volume in which the parts and the solid differ, by random points, as a fraction of the solid's.
 Real sampled_difference(const TriangleMesh& mesh, const ConvexDecomposition& d, uint64_t points) {
   int inside = 0, different = 0;
   for (const Vec3& p : scattered_points(mesh, points)) {

@@ -117,7 +117,7 @@ TEST(SolidDistance, OfRoundSolidsIsExactInsideAndOutside) {
       if (d.distance > 0) {
         EXPECT_NEAR(d.normal.dot(on_surface), support(solid, d.normal), 1e-9);
       }
-      // No surface point is nearer: the distance changes by at most the way.
+      // No surface point is nearer: the distance changes by at most the displacement.
       const Vec3 q = p + in_box(0.05);
       EXPECT_LE(std::abs(signed_distance(solid, q).distance - d.distance), (q - p).norm() * (1 + 1e-9));
     }

@@ -67,7 +67,7 @@ TEST_P(RotatingParticles, RollDownAnInclineWithFiveSeventhsOfTheAcceleration) {
 }
 
 // An oblique hit keeps momentum and angular momentum. With enough friction it leaves the surfaces at rest
-// against each other: the effective mass across the normal is 2/7 of that along it, and this share of the
+// against each other: the effective mass across the normal is 2/7 of that along it, and this fraction of the
 // energy of sliding is lost.
 TEST_P(RotatingParticles, KeepMomentumAndAngularMomentumInAHit) {
   world_ = World({.gravity = Vec3::Zero(), .max_step = kRotationFrame / 8, .particle_contacts = GetParam()});

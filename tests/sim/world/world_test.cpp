@@ -46,7 +46,7 @@ TEST(World, UsesTheFewestEqualSubSteps) {
   EXPECT_EQ(world.step(1.0 / 1000).substeps, 1u);
 }
 
-TEST(World, ReportsOnlyWhatMoved) {
+TEST(World, ReportsOnlyMovedObjects) {
   World world;
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .pose = {Vec3(0, -50, 0)}});
   const auto still = world.add_body({.motion = MotionType::kinematic});

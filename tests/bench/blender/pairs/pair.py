@@ -91,7 +91,7 @@ def add_camera(camera):
     bpy.context.scene.camera = thing
 
 
-def make_translucent(name, share):
+def make_translucent(name, fraction):
     """Cloth: light that falls on one side leaves on both."""
     for material in bpy.data.materials:
         if not material.name.startswith(name) or not material.use_nodes:
@@ -102,7 +102,7 @@ def make_translucent(name, share):
         through = nodes.new("ShaderNodeBsdfTranslucent")
         through.inputs["Color"].default_value = principled.inputs["Base Color"].default_value
         mix = nodes.new("ShaderNodeMixShader")
-        mix.inputs[0].default_value = share
+        mix.inputs[0].default_value = fraction
         links.new(principled.outputs[0], mix.inputs[1])
         links.new(through.outputs[0], mix.inputs[2])
         links.new(mix.outputs[0], output.inputs["Surface"])

@@ -13,7 +13,7 @@
 
 namespace offstage::effects {
 
-/// What a random number is used for. The values affect the result of every scene: append, never renumber.
+/// The use of a random number. The values affect the result of every scene: append, never renumber.
 enum Property : uint32_t {
   kRate,
   kCount,
@@ -88,9 +88,9 @@ struct Cone {
 /// The integer nearest to a number, clamped to [0, 1e9].
 uint64_t rounded(Real x);
 
-/// Adds a particle that was created at `birth` during a sub-step from `start` to `end`, or before it; in the
-/// second case it has flown straight since. Returns false if its lifespan is over by then.
-bool add_newborn(sim::World& world, sim::ParticleSystemHandle system, sim::Particle particle, Real birth,
-                 Real start, Real end);
+/// Adds a particle that was created at `birth_time` during a sub-step from `start` to `end`, or before it; in
+/// the second case it has flown straight since. Returns false if its lifespan is over by then.
+bool add_new_particle(sim::World& world, sim::ParticleSystemHandle system, sim::Particle particle,
+                      Real birth_time, Real start, Real end);
 
 }  // namespace offstage::effects

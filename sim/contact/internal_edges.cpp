@@ -1,4 +1,4 @@
-#include "sim/contact/seams.h"
+#include "sim/contact/internal_edges.h"
 
 #include <algorithm>
 #include <cmath>
@@ -16,8 +16,8 @@ namespace offstage::sim {
 namespace {
 
 /// Cosine: normals with a smaller angle count as equal.
-constexpr Real kSameWay = 1 - 1e-10;
-/// Share of the body's extent by which clipping may put points outside of their surface.
+constexpr Real kSameDirection = 1 - 1e-10;
+/// Fraction of the body's extent by which clipping may put points outside of their surface.
 constexpr Real kClipped = 2e-3;
 /// Cosines: a surface continues a face if its own normal differs by less than kGoesOn; a contact pushes along
 /// the surface's own normal if it differs by less than kOwnNormal.
@@ -92,8 +92,8 @@ struct View {
       if (m->points[k].separation < m->points[best].separation) best = k;
     return best;
   }
-  /// A seam is a line, or a point on a line.
-  bool may_be_at_seam() const {
+  /// An internal edge is a line, or a point on a line.
+  bool may_be_at_internal_edge() const {
     if (continues() || y().collision_shape().is_plane() || !is_narrow(*m)) return false;
     return !is_face() || !std::holds_alternative<Sphere>(x().def.shape);
   }
@@ -120,7 +120,7 @@ class BodyContacts {
                           speculative ? &pair->at_end(i - found) : &all[i].manifold});
       }
     }
-    flush_ = std::min(kFlush, kFlushShare * x.extent);
+    flush_ = std::min(kFlush, kFlushFraction * x.extent);
   }
 
   std::vector<Verdict> judge() const {
@@ -143,7 +143,7 @@ class BodyContacts {
         if (!views_[i].speculative) verdicts.back().instead = upright(views_[i], *face);
         continue;
       }
-      if (!views_[i].may_be_at_seam()) continue;
+      if (!views_[i].may_be_at_internal_edge()) continue;
       for (std::size_t k = 0; k < views_.size(); ++k)
         if (k != i && !views_[k].speculative)
           if (const auto normal = normal_instead(views_[i], views_[k])) hidden.push_back({i, k, *normal});
@@ -181,7 +181,7 @@ class BodyContacts {
     return best;
   }
 
-  /// Whether the known points of X on flush surfaces predict all points of a speculative contact: X goes on
+  /// Whether the known points of X on flush surfaces predict all points of a speculative contact: X moves on
   /// from one tile to the next, and the force at its first tile holds it over the second one, too.
   bool is_predicted(const View& v) const {
     for (uint32_t k = 0; k < v.m->count; ++k)
@@ -211,8 +211,8 @@ class BodyContacts {
   /// surface's own normal, or that of the face if the surface only continues the face.
   std::optional<Vec3> normal_instead(const View& v, const View& face) const {
     const Vec3 n = v.normal(), up = face.normal();
-    if (v.x_piece() != face.x_piece() || n.dot(up) > kSameWay) return std::nullopt;
-    // Two convex pieces have no seam between them: all their contacts are valid.
+    if (v.x_piece() != face.x_piece() || n.dot(up) > kSameDirection) return std::nullopt;
+    // Two convex pieces have no internal edge between them: all their contacts are valid.
     if (v.pair == face.pair && v.y_piece() == face.y_piece()) return std::nullopt;
     const uint32_t deepest = face.deepest();
     const Vec3& on_face = face.on_y(deepest);
@@ -220,8 +220,8 @@ class BodyContacts {
     Real low = std::min(0.0, face.m->points[deepest].separation) - flush_ - clipped;
     const Real moved = v.speculative ? std::abs(up.dot(x_.pose.position - x_.start_pose.position)) : 0;
     low -= moved;
-    // What is level with a face is not nearer to X than the face. A contact that is nearer is beside the
-    // face.
+    // A surface that is flush with a face is not nearer to X than the face. A contact that is nearer is
+    // beside the face.
     if (v.m->points[v.deepest()].separation < face.m->points[deepest].separation - flush_ - clipped - moved)
       return std::nullopt;
     for (uint32_t k = 0; k < v.m->count; ++k)
@@ -242,7 +242,7 @@ class BodyContacts {
       return std::nullopt;
     const Vec3 over_top = top + std::max(0.0, up.dot(on_face - top)) * up + over;
     const Vec3 own = distance(v, top_piece, over_top).normal;
-    if (own.dot(n) > kSameWay) return std::nullopt;
+    if (own.dot(n) > kSameDirection) return std::nullopt;
     if (own.dot(up) > kGoesOn) return is_flat(v, over_top, up, across) ? std::optional(up) : std::nullopt;
     const bool is_slope = own.dot(up) > 0 && own.dot(n) > 0 && own.dot(n) < kOwnNormal;
     return is_slope && is_ramp(v, top, up, across) ? std::optional(own) : std::nullopt;
@@ -383,9 +383,9 @@ struct Group {
   std::vector<ContactPair*> pairs;
 };
 
-/// Returns groups for the movable bodies that have a contact that may be at a seam; and, one by one, the
-/// pairs of immovable bodies with bodies of several pieces.
-std::vector<Group> groups_with_seams(std::span<ContactPair* const> pairs) {
+/// Returns groups for the movable bodies that have a contact that may be at an internal edge; and, one by
+/// one, the pairs of immovable bodies with bodies of several pieces.
+std::vector<Group> groups_with_internal_edges(std::span<ContactPair* const> pairs) {
   std::vector<Group> groups;
   std::vector<std::pair<Body*, std::size_t>> numbers;  // by slot
   const auto group_of = [&](Body& x) -> std::size_t {
@@ -420,10 +420,11 @@ std::vector<Group> groups_with_seams(std::span<ContactPair* const> pairs) {
 
 }  // namespace
 
-std::vector<ContactPair*> remove_seam_contacts(std::span<ContactPair* const> pairs, Real time, Real h) {
+std::vector<ContactPair*> remove_internal_edge_contacts(std::span<ContactPair* const> pairs, Real time,
+                                                        Real h) {
   const bool none = std::none_of(pairs.begin(), pairs.end(), [](ContactPair* p) { return p->has_narrow(); });
   if (none) return {};
-  const std::vector<Group> groups = groups_with_seams(pairs);
+  const std::vector<Group> groups = groups_with_internal_edges(pairs);
   std::vector<std::vector<Verdict>> verdicts(groups.size());
   for_each_index(groups.size(), [&](std::size_t i) {
     verdicts[i] = BodyContacts(*groups[i].x, groups[i].pairs, time, h).judge();

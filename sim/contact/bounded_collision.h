@@ -10,7 +10,7 @@ inline constexpr std::size_t kFewContacts = 8;
 
 /// Resolves collisions as collide() does, with at most about ten thousand operations. Some contacts of a
 /// large cluster may still approach afterwards. Like collide(), it never adds kinetic energy.
-ContactWork collide_roughly(std::span<ContactBody> bodies, std::span<Contact> contacts,
+ContactWork collide_bounded(std::span<ContactBody> bodies, std::span<Contact> contacts,
                             std::span<const Real> restitution, ImpactLaw law, const JointProblem& joints);
 
 }  // namespace offstage::sim
