@@ -13,14 +13,14 @@
 namespace offstage::sim {
 namespace {
 
-/// Share of a penetration that a step removes, and the greatest speed of the removal [m/s].
+/// Fraction of a penetration that a step removes, and the greatest speed of the removal [m/s].
 constexpr Real kPushOut = 0.2, kFastestPush = 0.5;
 /// Points that approach faster than this have closed in the interval, not before [m/s].
 constexpr Real kClosing = 1e-3;
 /// Points of a body that touches only unmoved bodies, and approaches them at a distance faster than this,
 /// close later in the interval, however near they are [m/s].
 constexpr Real kApproaching = 1e-4;
-/// Uncertainty of the approach of a resting contact, as a share of the normal velocity due to rotation in
+/// Uncertainty of the approach of a resting contact, as a fraction of the normal velocity due to rotation in
 /// half an interval.
 constexpr Real kTurningShare = 0.5;
 /// A stopped body also stops its neighbours where they would overlap by more than kOverlap [m]; this is
@@ -28,9 +28,9 @@ constexpr Real kTurningShare = 0.5;
 constexpr int kBlockPasses = 20;
 constexpr Real kOverlap = 1e-6;
 /// The result of a fall-back is rejected if its residual is larger than kRough [m/s], or if it adds energy
-/// beyond the rounding share.
+/// beyond the rounding fraction.
 constexpr Real kRough = 1e-2, kEnergyRounding = 1e-9;
-/// Share of the kinetic energy that the velocity terms of a solution may add in a step.
+/// Fraction of the kinetic energy that the velocity terms of a solution may add in a step.
 constexpr Real kTermsShare = 0.02;
 
 /// `linear` is the bias at the end of a contact that does not turn.
@@ -106,7 +106,7 @@ bool ExactContacts::solve_lcp(ContactWork& work) {
 /// solution; their unbounded impulses nearly cancel, and the rest throws bodies away. The velocity terms of
 /// R9 are wrong if a thin body turns far in a step. Moving surfaces, motors and friction in joints may do
 /// work. All other forces may only dissipate energy, apart from the speed at which overlaps are removed and a
-/// small share for those terms. Energy that motors and friction take away is counted, since a limit or a
+/// small fraction for those terms. Energy that motors and friction take away is counted, since a limit or a
 /// contact against which a motor pushes returns a part of it.
 bool ExactContacts::is_safe(const ContactWork& work) const {
   if (work.fallbacks > 0 && work.residual > kRough) return false;
@@ -246,19 +246,19 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
     Body& body = *island.bodies[i];
     const Vec3 dv = bodies_[i].velocity - free_[i].velocity,
                dw = bodies_[i].angular_velocity - free_[i].angular_velocity;
-    Vec3 way = rest_[i] * dv, turn = rest_[i] * dw;
+    Vec3 mean = rest_[i] * dv, mean_spin = rest_[i] * dw;
     if (closing_[i]) {
-      way = (dv + bodies_[i].velocity - body.start_twist.velocity) / 2;
-      turn = (dw + bodies_[i].angular_velocity - body.start_twist.angular_velocity) / 2;
+      mean = (dv + bodies_[i].velocity - body.start_twist.velocity) / 2;
+      mean_spin = (dw + bodies_[i].angular_velocity - body.start_twist.angular_velocity) / 2;
     }
     if (displacement_) {
-      way = displacement_->shift / duration - (body.start_twist.velocity + free_[i].velocity) / 2;
-      turn = displacement_->turn / duration -
-             (body.start_twist.angular_velocity + free_[i].angular_velocity) / 2;
+      mean = displacement_->shift / duration - (body.start_twist.velocity + free_[i].velocity) / 2;
+      mean_spin = displacement_->turn / duration -
+                  (body.start_twist.angular_velocity + free_[i].angular_velocity) / 2;
     }
     add_effect(body, {body.rigid.mass * dv,
                       body.rigid.spin_momentum(body.impulse_orientation(duration, interval.substep), dw), dw,
-                      duration * way, duration * turn, duration / interval.substep});
+                      duration * mean, duration * mean_spin, duration / interval.substep});
   }
 }
 
@@ -266,7 +266,7 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
 /// half of the change of velocity in the interval. If this would cause an overlap, the other body counts as
 /// stopped, too.
 void ExactContacts::close_neighbors(const Island& island, Real duration) {
-  const auto way = [&](uint32_t i, const Vec3& arm) {
+  const auto displacement = [&](uint32_t i, const Vec3& arm) {
     const Vec3 end = bodies_[i].velocity_at(arm);
     if (i >= island.bodies.size() || closing_[i]) return Vec3(duration * end);
     return Vec3(duration / 2 * (end + island.bodies[i]->start_twist.at(arm)));
@@ -277,7 +277,8 @@ void ExactContacts::close_neighbors(const Island& island, Real duration) {
     for (const Contact& c : contacts_) {
       if (closing_[c.a] == closing_[c.b]) continue;
       const Real separation = std::max(0.0, -c.target * duration);
-      if (separation + c.frame.n.dot(way(c.a, c.arm_a) - way(c.b, c.arm_b)) > -kOverlap) continue;
+      if (separation + c.frame.n.dot(displacement(c.a, c.arm_a) - displacement(c.b, c.arm_b)) > -kOverlap)
+        continue;
       closing_[c.a] = closing_[c.b] = 1;
       changed = true;
     }

@@ -54,10 +54,10 @@ class ExactContacts {
   std::vector<PointForce*> forces_;        // force of each contact, in its pair
   // Speed of each contact at the start, as an absolute value, less the part due to rotation [m/s].
   std::vector<Real> approach_;
-  std::vector<uint8_t> closing_;      // by body: whether a contact of it closed in the interval
-  std::vector<Real> rest_;            // by body: share of the interval in which it has its change of velocity
-  bool is_alone_ = false;             // whether a single body touches unmoved ones only, without joints
-  std::vector<ClosingPoint> points_;  // of each contact
+  std::vector<uint8_t> closing_;  // by body: whether a contact of it closed in the interval
+  std::vector<Real> rest_;        // by body: fraction of the interval in which it has its change of velocity
+  bool is_alone_ = false;         // whether a single body touches unmoved ones only, without joints
+  std::vector<ClosingPoint> points_;          // of each contact
   std::optional<Displacement> displacement_;  // of the single body, if the interval was divided
   Real cost_ = 0;
   IslandJoints joints_;
