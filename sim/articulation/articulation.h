@@ -38,8 +38,9 @@ struct Joint {
   Vec6 reaction = Vec6::Zero();
   /// Impulses of its rows with bounds (joint_limits.h); initial guess of the next solution.
   std::array<Real, 12> efforts = {};
-  /// Torque of its stiffness and damping on body a in the free motion, world axes [N m]. It is that of the end
-  /// of the last interval, so that a rod at rest does not move freely: its links would turn far in a sub-step.
+  /// Torque of its stiffness and damping on body a in the free motion, world axes [N m]. It is that of the
+  /// end of the last interval, so that a rod at rest does not move freely: its links would turn far in a
+  /// sub-step.
   Vec3 held_torque = Vec3::Zero();
 
   /// Whether the joint has a limit, a motor, friction or damping.

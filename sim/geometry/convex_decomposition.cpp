@@ -226,7 +226,8 @@ Real volume_of(const std::vector<SolidPiece>& solids) {
 CutDecomposition cuts_within(const std::vector<SolidPiece>& solids, const DecompositionSettings& settings) {
   CutDecomposition best;
   for (Real count = settings.max_parts;;) {
-    CutDecomposition cuts = decompose_by_cuts(solids, {settings.max_error, static_cast<std::size_t>(count)});
+    CutDecomposition cuts =
+        decompose_by_cuts(solids, {settings.max_error, static_cast<std::size_t>(count), settings.max_parts});
     if (best.parts.empty() || cuts.error < best.error) best = std::move(cuts);
     if (best.parts.empty() || best.error <= settings.max_error || count >= settings.most_parts) return best;
     const Real expected = count * best.error / settings.max_error;
