@@ -108,7 +108,6 @@ Articulation::Articulation(std::vector<Joint*> joints)
   for (Joint* joint : joints_) {
     joint->articulation = this;
     has_bounded_rows_ |= joint->has_bounded_rows();
-    has_springs_ |= joint->def.stiffness > 0;
     for (const Body* body : {joint->a, joint->b}) has_kinematic_ |= body && body->is_kinematic();
     frames_a_.push_back(link_frame(joint->a, joint->on_a));
     frames_b_.push_back(link_frame(joint->b, joint->on_b));
@@ -154,18 +153,6 @@ void Articulation::begin_motion(Real t, Real h) {
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     driven_a_[j] = acceleration(joints_[j]->a);
     driven_b_[j] = acceleration(joints_[j]->b);
-  }
-  for (std::size_t j = 0; j < joints_.size(); ++j)
-    if (joints_[j]->def.stiffness > 0)
-      joints_[j]->held_torque =
-          link_motion(joints_[j]->b, t).axes * (frames_b_[j].axes * spring_torque(*joints_[j]));
-}
-
-void Articulation::add_held_torques(std::span<Vec3> torques) const {
-  for (std::size_t j = 0; j < joints_.size(); ++j) {
-    const auto& [a, b, count] = system_.joints()[j];
-    if (a != JointSystem::kDriven) torques[a] += joints_[j]->held_torque;
-    if (b != JointSystem::kDriven) torques[b] -= joints_[j]->held_torque;
   }
 }
 
@@ -221,10 +208,7 @@ void Articulation::add_forces(Real t, std::span<const LinkMotion> motion,
     if (a != JointSystem::kDriven) forces[a] += rows_[j].on_a * impulses_[j];
     if (b != JointSystem::kDriven) forces[b] += rows_[j].on_b * impulses_[j];
   }
-  for (std::size_t j = 0; j < joints_.size(); ++j) {
-    joints_[j]->load = wrench(j, impulses_[j], motion);
-    joints_[j]->load.torque += joints_[j]->held_torque;
-  }
+  for (std::size_t j = 0; j < joints_.size(); ++j) joints_[j]->load = wrench(j, impulses_[j], motion);
 }
 
 /// The force and torque, or impulses, that the constraints of a joint exert on its body a.

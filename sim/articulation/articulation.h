@@ -38,10 +38,6 @@ struct Joint {
   Vec6 reaction = Vec6::Zero();
   /// Impulses of its rows with bounds (joint_limits.h); initial guess of the next solution.
   std::array<Real, 12> efforts = {};
-  /// Torque of its stiffness and damping on body a in the free motion, world axes [N m]. It is that of the
-  /// end of the last interval, so that a rod at rest does not move freely: its links would turn far in a
-  /// sub-step.
-  Vec3 held_torque = Vec3::Zero();
 
   /// Whether the joint has a limit, a motor, friction or damping.
   bool has_bounded_rows() const;
@@ -68,8 +64,6 @@ class Articulation final : public JointedBodies {
   Real greatest_frequency() const;
   /// Begins a motion from t to t + h.
   void begin_motion(Real t, Real h);
-  /// Adds the torques of the joints' springs in the motion to the torques of the links.
-  void add_held_torques(std::span<Vec3> torques) const;
   /// Adds the joint forces at a time within the motion to `forces` [force, torque] of the links. `motion` is
   /// the state of the links, and `forces` holds all other forces on entry.
   void add_forces(Real t, std::span<const LinkMotion> motion, std::span<const LinkMobility> mobility,
@@ -102,7 +96,6 @@ class Articulation final : public JointedBodies {
     return place_of(j, start, start_motion_, still_a, still_b);
   }
   bool has_bounded_rows() const { return has_bounded_rows_; }
-  bool has_springs() const { return has_springs_; }  ///< whether a joint has a stiffness
   const JointSystem& system() const { return system_; }
   JointSystem& system() { return system_; }
   /// Adds the constraint impulses of an interval of this duration [s] to the loads of the joints, which
@@ -141,7 +134,7 @@ class Articulation final : public JointedBodies {
   std::vector<Body*> bodies_;
   std::vector<JointFrame> frames_a_, frames_b_;  // relative to the links' centres
   std::vector<Driven> driven_a_, driven_b_;      // driven links in this motion
-  bool has_bounded_rows_ = false, has_kinematic_ = false, has_springs_ = false;
+  bool has_bounded_rows_ = false, has_kinematic_ = false;
   std::vector<Momenta> settled_;  // momenta of the bodies after settle()
   JointSystem system_;
 

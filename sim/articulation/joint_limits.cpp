@@ -134,9 +134,9 @@ class RowMaker {
   Real at_start(const Direction& d) const { return d.end.error - h_ / 2 * (speed_at_start(d) + speed(d)); }
   Real speed_at_start(const Direction& d) const { return speed(d.start, start_); }
 
-  void add(const BoundedRow& row, std::size_t slot, bool closes, Real held = 0) {
+  void add(const BoundedRow& row, std::size_t slot, bool closes) {
     rows_->push_back(row);
-    origins_->push_back({&joint_, slot, acting_.arm_a, closes, held});
+    origins_->push_back({&joint_, slot, acting_.arm_a, closes});
   }
   void add_guessed(BoundedRow row, std::size_t slot, bool closes) {
     row.impulse = std::clamp(h_ * joint_.efforts[slot], row.lower, row.upper);
@@ -242,7 +242,7 @@ class RowMaker {
         r.lower = -r.upper;
         add_guessed(r, kFriction + i, false);
       }
-      if (def_.damping > 0 && !(def_.stiffness > 0)) {
+      if (def_.damping > 0) {
         r.upper = kInfinite;
         r.lower = -kInfinite;
         r.softness = 1 / (h_ * def_.damping);
@@ -251,21 +251,19 @@ class RowMaker {
     }
   }
 
-  /// The torque -k theta - c u of a spherical joint at the interval's end, for the rotation vector theta of a
-  /// relative to b and its rate u. The row adds what the torque in the free motion lacks.
+  /// The torque -k theta of a spherical joint at the interval's end, for the rotation vector theta of a
+  /// relative to b.
   void add_spring() {
     const Vec3 theta = rotation_vector(end_);
-    const Real resistance = def_.stiffness * h_ + def_.damping;
     for (int i = 0; i < 3; ++i) {
       Direction row = turning(i);
       row.end.error = theta[i];
       BoundedRow r = bounded(row);
-      const Real held = r.on_a.tail<3>().dot(joint_.held_torque);
       r.lower = -kInfinite;
       r.upper = kInfinite;
-      r.softness = 1 / (h_ * resistance);
-      r.target = -(def_.stiffness * at_start(row) + held) / resistance;
-      add(r, kSpring + static_cast<std::size_t>(i), false, held);
+      r.softness = 1 / (h_ * h_ * def_.stiffness);
+      r.target = -at_start(row) / h_;
+      add_guessed(r, kSpring + static_cast<std::size_t>(i), false);
     }
   }
 
@@ -290,10 +288,6 @@ class RowMaker {
 };
 
 }  // namespace
-
-Vec3 spring_torque(const Joint& joint) {
-  return Eigen::Map<const Vec3>(&joint.efforts[kSpring]);
-}
 
 std::optional<Real> first_stop(const Articulation& articulation, Real duration, Real time) {
   std::optional<Real> first;

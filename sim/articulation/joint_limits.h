@@ -17,12 +17,7 @@ struct BoundedOrigin {
   /// Whether the row changes the joint's speed so that it reaches its coordinate at the interval's end. The
   /// bodies then move with their new velocities during the whole interval.
   bool closes;
-  Real held = 0;  ///< effort in this direction that the free motion contains
 };
-
-/// Torque of a joint's stiffness and damping at the end of the last interval, in the axes of its frame on b
-/// [N m].
-Vec3 spring_torque(const Joint& joint);
 
 /// The share of an interval that ends at `time` after which the free motion of an articulation first reaches
 /// a limit, after its place_within(); none if it reaches no limit.

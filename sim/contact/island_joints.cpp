@@ -100,7 +100,7 @@ void IslandJoints::store_impact_impulses() {
 void IslandJoints::store_impulses(Real duration) {
   for (std::size_t i = 0; i < bounded_.size(); ++i) {
     const Real effort = bounded_[i].impulse / duration;
-    origins_[i].joint->efforts[origins_[i].slot] = effort + origins_[i].held;
+    origins_[i].joint->efforts[origins_[i].slot] = effort;
     origins_[i].joint->load += wrench(i, effort);
   }
   std::size_t first = 0;

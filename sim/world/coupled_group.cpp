@@ -179,13 +179,6 @@ void CoupledGroup::set_free_forces(Real t, std::span<const Real> x, std::span<co
     apply(s.a, -f.size * f.along, x, dp);
     apply(s.b, f.size * f.along, x, dp);
   }
-  std::vector<Vec3> torques;
-  for (const Jointed& j : articulations_) {
-    if (!j.articulation->has_springs()) continue;
-    torques.assign(j.links.size(), Vec3::Zero());
-    j.articulation->add_held_torques(torques);
-    for (std::size_t k = 0; k < torques.size(); ++k) vec3(dp, kBodyP * j.links[k] + 3) += torques[k];
-  }
 }
 
 /// Available for particles with forces between each other; the forces of springs and bodies depend on the
