@@ -220,12 +220,13 @@ Real volume_of(const std::vector<SolidPiece>& solids) {
 
 /// Parts with the accepted error, if a number up to `most_parts` has it. A patch of a shell of the thickness
 /// t whose sides are a and b along the principal curvatures k_a and k_b has a hull that is larger by the
-/// fraction (|k_a| a^2 + |k_b| b^2) / (12 t). So the error falls as 1 / n with the number n of parts, and
-/// needs at least sqrt(|k_a k_b|) area / (6 t error) parts.
+/// fraction (|k_a| a^2 + |k_b| b^2) / (12 t), so the error falls as 1 / n with the number n of parts.
+/// docs/models.md has the least number of trimmed parts.
 CutDecomposition cuts_within(const std::vector<SolidPiece>& solids, const DecompositionSettings& settings) {
   CutDecomposition best;
   for (Real count = settings.max_parts;;) {
-    CutDecomposition cuts = decompose_by_cuts(solids, {settings.max_error, static_cast<std::size_t>(count)});
+    CutDecomposition cuts =
+        decompose_by_cuts(solids, {settings.max_error, static_cast<std::size_t>(count), settings.max_parts});
     if (best.parts.empty() || cuts.error < best.error) best = std::move(cuts);
     if (best.parts.empty() || best.error <= settings.max_error || count >= settings.most_parts) return best;
     const Real expected = count * best.error / settings.max_error;

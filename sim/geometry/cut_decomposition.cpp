@@ -25,6 +25,8 @@ constexpr Real kMorePieces = 1.5, kMoreCells = 1.25;
 /// Trimming removes a part of it, which only the trial shows.
 constexpr Real kCutTo = 0.7;
 constexpr std::array<Real, 3> kMergeTo = {2, 1.4, 1};
+/// Trials between two of them where there are more than enough parts.
+constexpr int kTrials = 3;
 
 class SolidCutter {
  public:
@@ -103,16 +105,32 @@ class SolidCutter {
       excess += p.excess;
     }
     const HullMerger merger(hulls);
+    const auto merge = [&](Real merge_to) {
+      const Real budget = std::max(0.0, merge_to * goal_.max_error * whole_ - excess);
+      return merger.run(goal_.max_parts, budget);
+    };
     CutDecomposition result;
     std::size_t count = 0;
+    Real missed = 0, reached = 0;  // in accepted errors
     for (Real merge_to : kMergeTo) {
-      const Real budget = std::max(0.0, merge_to * goal_.max_error * whole_ - excess);
-      std::vector<MergedHull> parts = merger.run(goal_.max_parts, budget);
+      std::vector<MergedHull> parts = merge(merge_to);
       // A smaller budget ends the same mergers earlier.
       if (parts.size() == count) continue;
       count = parts.size();
       result = trimmed_parts(pieces, std::move(parts));
-      if (result.error <= goal_.max_error) break;
+      if (result.error <= goal_.max_error) {
+        reached = merge_to;
+        break;
+      }
+      missed = merge_to;
+    }
+    if (missed == 0 || reached == 0) return result;
+    for (int trial = 0; trial < kTrials && result.parts.size() > goal_.enough_parts; ++trial) {
+      const Real merge_to = (missed + reached) / 2;
+      CutDecomposition fewer = trimmed_parts(pieces, merge(merge_to));
+      const bool is_good = fewer.error <= goal_.max_error;
+      (is_good ? reached : missed) = merge_to;
+      if (is_good) result = std::move(fewer);
     }
     return result;
   }

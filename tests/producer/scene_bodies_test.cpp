@@ -93,13 +93,16 @@ TEST(SceneBodies, InvalidCouplingsAreRefused) {
                 bodies + R"("joints": [{"type": "gear", "a": "a"}, {"type": "screw", "a": "a", "ratio": 0},
       {"type": "pulley", "a": "a", "b": "b", "pulley_a": [0, 3, 0], "pulley_b": [0, 3, 0], "ratio": -1},
       {"type": "distance", "a": "a", "anchor": [0, 1, 0], "length_limits": [0, 0.5]},
-      {"type": "revolute", "a": "a", "stiffness": 3}, {"a": "a", "restitution": 0.5}])"),
+      {"type": "revolute", "a": "a", "stiffness": 3}, {"a": "a", "restitution": 0.5},
+      {"type": "revolute", "a": "a", "ratio": 2, "pulley_a": [0, 3, 0]}])"),
             "/joints/0/b: is needed: a gear or rack couples two bodies\n"
             "/joints/1/ratio: must not be 0\n"
             "/joints/2/ratio: must be greater than 0 for a pulley\n"
             "/joints/3/length_limits: must be a range that contains the length at time 0, 1.000000 m\n"
             "/joints/4/stiffness: is for spherical joints; use a motor with a \"stiffness\"\n"
-            "/joints/5/restitution: has no effect: it is for impacts at limits, and the joint has none\n");
+            "/joints/5/restitution: has no effect: it is for impacts at limits, and the joint has none\n"
+            "/joints/6/ratio: is for gears, racks, screws and pulleys\n"
+            "/joints/6/pulley_a: is for pulleys\n");
 }
 
 // The rope of 2 m lets its load fall by 1 m.

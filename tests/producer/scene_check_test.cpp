@@ -48,6 +48,11 @@ TEST(SceneCheck, EmittersThatPushABodyOrGetItsVelocityNeedOne) {
   EXPECT_EQ(errors_of(R"({"bodies": [{"name": "a", "motion": "static"}], )" + on_body),
             "/emitters/0/recoil: pushes dynamic bodies only, and \"a\" is not\n");
   EXPECT_EQ(errors_of(R"({"bodies": [{"name": "a"}], )" + on_body), "");
+  EXPECT_EQ(
+      errors_of(R"({"bodies": [{"name": "a"}],
+                          "emitters": [{"body": "a", "surface": {"type": "face", "size": [1, 2, 3]}}]})"),
+      "/emitters/0/surface: has the faces of its body; \"position\" and \"size\" are for an emitter without "
+      "one\n");
 }
 
 TEST(SceneCheck, NamesReferToExistingObjects) {
@@ -188,6 +193,8 @@ TEST(SceneCheck, ContactRulesNameTwoMaterialsOnce) {
             "/contacts/4/materials: is required: names of two materials, in any order; may be the same\n"
             "/contacts/5/materials/1: must not be empty\n"
             "/contacts/5/restitution: must be between 0 and 1, got 2\n");
+  EXPECT_EQ(warnings_of(R"({"bodies": [{"name": "a"}], "forces": [{"type": "applied", "bodies": ["a"]}]})"),
+            "/forces/0: has no effect: it has neither a force nor a torque nor keyframes\n");
   EXPECT_EQ(warnings_of(R"({"materials": [{"name": "ice"}], "bodies": [{"material": "ice"}],
                            "contacts": [{"materials": ["ice", "ice"]}]})"),
             "/contacts/0: has no effect: it has neither restitution nor friction\n");

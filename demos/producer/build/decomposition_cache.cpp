@@ -12,7 +12,7 @@ namespace offstage::producer {
 namespace {
 
 /// Increase the version whenever decompose() gives other results.
-constexpr FileKind kPartsKind = {"offparts", 4, "convex decomposition"};
+constexpr FileKind kPartsKind = {"offparts", 5, "convex decomposition"};
 
 using sim::ConvexDecomposition;
 using sim::ConvexPolyhedron;

@@ -440,6 +440,8 @@ class Checker : SceneChecker {
     check_times(force.keyframes, path + "/keyframes");
     if (!force.keyframes.empty() && (!force.force.isZero(0) || !force.torque.isZero(0)))
       fail(path, "has both \"keyframes\" and a \"force\" or \"torque\"; give one of them");
+    if (force.keyframes.empty() && force.force.isZero(0) && force.torque.isZero(0))
+      warn(path, "has no effect: it has neither a force nor a torque nor keyframes");
   }
   void check_force(const Explosion& explosion) {
     check_pushed(explosion, explosion.bodies);

@@ -71,6 +71,9 @@ class JointChecker : CheckBase {
     using enum sim::JointType;
     if ((how.type == gear || how.type == rack) && joint.b.empty())
       fail(path + "/b", "is needed: a gear or rack couples two bodies");
+    if (how.type != pulley)
+      for (const auto& [key, point] : {std::pair("/pulley_a", joint.pulley_a), {"/pulley_b", joint.pulley_b}})
+        if (!point.isZero(0)) fail(path + key, "is for pulleys");
     if (how.type == pulley) {
       if (!(how.ratio > 0)) fail(path + "/ratio", "must be greater than 0 for a pulley");
       for (const auto& [key, strand] : {std::pair("/pulley_a", Vec3(joint.anchor - joint.pulley_a)),
@@ -98,6 +101,8 @@ class JointChecker : CheckBase {
     if (joint.stiffness > 0 && joint.type != spherical)
       fail(path + "/stiffness", "is for spherical joints; use a motor with a \"stiffness\"");
     if (joint.ratio == 0) fail(path + "/ratio", "must not be 0");
+    if (joint.ratio != 1 && !is_coupling && joint.type != screw && joint.type != pulley)
+      fail(path + "/ratio", "is for gears, racks, screws and pulleys");
     if (joint.restitution > 0 && !joint.limits && !joint.length_limits && !joint.limits_deg &&
         joint.type != pulley)
       fail(path + "/restitution", "has no effect: it is for impacts at limits, and the joint has none");

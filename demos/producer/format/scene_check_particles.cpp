@@ -213,6 +213,10 @@ class ParticleChecker : CheckBase {
     if (emitter.inherit_velocity != 1 && emitter.body.empty())
       fail(path + "/inherit_velocity",
            "is a fraction of the velocity of a body; the emitter needs a \"body\"");
+    if (const auto* face = std::get_if<FaceSurface>(&emitter.surface);
+        face && !emitter.body.empty() && (!face->position.isZero(0) || face->size != Vec3::Ones()))
+      fail(path + "/surface",
+           "has the faces of its body; \"position\" and \"size\" are for an emitter without one");
     check_count(emitter);
   }
 

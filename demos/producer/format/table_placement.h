@@ -112,7 +112,7 @@ struct Table<Fill> {
         {"packing", &Fill::packing,
          "arrangement of the centres: `hexagonal` is the closest (balls that touch fill 74 %), `cubic` is a "
          "grid "
-         "(52 %), `random` places them one after the other at random (about 35 %)"},
+         "(52 %), `random` places them one after the other at random (about 28 %)"},
         {"seed", &Fill::seed, "another seed gives another random arrangement", "", kNotNegative}};
   }
 };

@@ -468,6 +468,18 @@ TEST(ApproximateDecomposition, ThinBowlsKeepTheirVolumeAndTheirGround) {
   EXPECT_LE(greatest_gap(mesh, d), kDeepestGap);
 }
 
+// Of a dome of the thickness t and the radius r, a part with the area A differs by at least A / (8 pi r t) of
+// its volume: its inner side is at best flat (docs/models.md).
+TEST(ApproximateDecomposition, DomesTakeAtMostTwiceTheLeastNumberOfParts) {
+  const Real thickness = 0.05, radius = 1 - thickness / 2, error = 0.05;
+  const ConvexDecomposition d = decomposed(bowl(1, 1 - thickness, 48, 24), {.max_error = error});
+  const Real least =
+      2 * std::numbers::pi * radius * radius / (8 * std::numbers::pi * radius * thickness * error);
+  EXPECT_LE(d.difference, error);
+  EXPECT_GT(static_cast<Real>(d.parts.size()), least);
+  EXPECT_LT(static_cast<Real>(d.parts.size()), 2 * least);
+}
+
 // The water of a fountain: a flat sheet beside the solid, and one through it.
 TEST(ApproximateDecomposition, SheetsBesideASolidDoNotCount) {
   TriangleMesh mesh = u_solid();
