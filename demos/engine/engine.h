@@ -37,7 +37,7 @@ struct FilmEvent {
   uint64_t run = 0;
   std::string film;
   Phase phase = Phase::loading;
-  double lead_in = 0;      ///< simulated share of the time before frame 1
+  double lead_in = 0;      ///< simulated fraction of the time before frame 1
   int simulated = 0;       ///< number of frames
   std::string message;     ///< reason of a failure, or the file being loaded
   std::string statistics;  ///< JSON, after the simulation is complete

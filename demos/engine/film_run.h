@@ -66,7 +66,7 @@ class FilmRun {
   bool draw_lead_in(const Stop& stop);
   /// Draws a frame whose state is available at full size.
   bool refine(int frame, Detail detail, const Stop& stop);
-  /// Name of the visible object at a position of a frame, or empty. The position is a share of width and
+  /// Name of the visible object at a position of a frame, or empty. The position is a fraction of width and
   /// height, from the top left corner. The state must be available.
   std::string pick(int frame, double x, double y);
   /// A small picture for a sheet; the state must be available.

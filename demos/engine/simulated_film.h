@@ -35,7 +35,7 @@ class SimulatedFilm : public producer::StateSource {
   producer::Snapshot current() const { return simulation_->snapshot(); }
   /// The latest simulated frame, or 0 before the first.
   int simulated_to() const { return simulation_ ? simulation_->frame() : 0; }
-  /// Finished share of the work before frame 1.
+  /// Finished fraction of the work before frame 1.
   double lead_in() const;
 
   int advances_to(int frame) override;

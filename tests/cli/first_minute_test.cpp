@@ -216,9 +216,9 @@ TEST(Estimate, NamesTheMostExpensiveObject) {
   EXPECT_GT(cost["drawing_s_per_frame"], 0);
   EXPECT_GT(cost["film_s"], 0);
   EXPECT_LE(cost["trial_film_s"], 5);
-  double shares = 0;
-  for (const json& object : cost["objects"]) shares += object["share"].get<double>();
-  EXPECT_NEAR(shares, 1, 1e-3);
+  double fractions = 0;
+  for (const json& object : cost["objects"]) fractions += object["fraction"].get<double>();
+  EXPECT_NEAR(fractions, 1, 1e-3);
   const Outcome quick = offstage("validate s.json --no-estimate --json", folder.path());
   EXPECT_FALSE(json::parse(quick.out).contains("cost"));
 }

@@ -1,4 +1,4 @@
-// The estimated share of each object in the work of a scene.
+// The estimated fraction of each object in the work of a scene.
 
 #include "producer/run/cost.h"
 

@@ -234,7 +234,8 @@ TEST(EmitterFaces, AreThoseOfTheBodyOrOfACube) {
 
 TEST(Lifetimes, GroupsAppearAndAreRemoved) {
   const LoadedScene loaded = body_scene(R"("output": {"fps": 10, "duration": 3},
-    "particles": [{"name": "p", "places": [{"position": [0, 0, 0]}], "appear_at": 0.55, "remove_at": 1.25}])");
+    "particles": [{"name": "p", "places": [{"position": [0, 0, 0]}], "appear_at": 0.55, "remove_at": 1.25},
+                  {"name": "q", "places": [{"position": [5, 0, 0]}], "appear_at": 0.5}])");
   const ModelLibrary models;
   Simulation simulation(loaded.scene, models);
   std::vector<std::size_t> counts;
@@ -246,10 +247,11 @@ TEST(Lifetimes, GroupsAppearAndAreRemoved) {
       EXPECT_NEAR(p.position[0].y(), -9.81 / 2 * 0.15 * 0.15, 1e-3);
     }
   }
-  EXPECT_EQ(counts[5], 0u);
-  EXPECT_EQ(counts[6], 1u);
-  EXPECT_EQ(counts[12], 1u);
-  EXPECT_EQ(counts[13], 0u);
+  EXPECT_EQ(counts[4], 0u);
+  EXPECT_EQ(counts[5], 1u);  // at 0.5 s
+  EXPECT_EQ(counts[6], 2u);
+  EXPECT_EQ(counts[12], 2u);
+  EXPECT_EQ(counts[13], 1u);
 }
 
 // The table has a row for each particle of each frame, and both forms hold the same numbers.

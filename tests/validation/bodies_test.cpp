@@ -256,6 +256,26 @@ TEST(Lifetimes, BodiesFallFromWhenTheyAppearAndSupportsVanish) {
   EXPECT_FALSE(once.hex().empty());
 }
 
+// The state at a time shows the bodies that exist at this time.
+TEST(Lifetimes, BeginAndEndWithTheStateOfTheirTime) {
+  World world(sleepless());
+  BodyDef def;
+  def.shape = Sphere{0.1};
+  def.pose.position = {0, 10, 0};
+  def.appear_at = 0.5;
+  def.remove_at = 1;
+  const BodyHandle body = world.add_body(def);
+  run(world, 0.5 - 1.0 / 60);
+  EXPECT_FALSE(world.is_present(body));
+  run(world, 1.0 / 60);
+  EXPECT_TRUE(world.is_present(body));
+  EXPECT_EQ(world.body(body).pose.position.y(), 10);
+  run(world, 0.5 - 1.0 / 60);
+  EXPECT_TRUE(world.is_present(body));
+  run(world, 1.0 / 60);
+  EXPECT_FALSE(world.is_present(body));
+}
+
 // A sleeping body wakes when its support is removed; particles fall through where a body was.
 TEST(Lifetimes, RemovalWakesWhatRestedOnTheBody) {
   World world(WorldDef{});

@@ -238,7 +238,7 @@ void Simulation::add_particles(const ParticleGroup& group, sim::ParticleSystemHa
 /// Adds the groups that appear in this sub-step.
 void Simulation::add_late_particles(Real start, Real end) {
   for (const Group& group : groups_)
-    if (const Real at = group.scene->appear_at; at > 0 && at >= start && at < end)
+    if (const Real at = group.scene->appear_at; at > start && at <= end)
       add_particles(*group.scene, group.handle, end - at);
 }
 

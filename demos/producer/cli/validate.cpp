@@ -89,7 +89,7 @@ Json cost_json(const CostEstimate& cost) {
                                {"name", object.name},
                                {"count", object.count},
                                {"size", object.size},
-                               {"share", rounded(object.share)},
+                               {"fraction", rounded(object.fraction)},
                                {"advice", object.advice}});
   return json;
 }
@@ -114,9 +114,9 @@ void print_cost(const Scene& scene, const CostEstimate& cost) {
   constexpr std::size_t kRows = 6;
   constexpr double kWorthARow = 0.005;
   for (std::size_t i = 0; i < std::min(kRows, cost.objects.size()); ++i)
-    if (cost.objects[i].share >= kWorthARow)
-      fmt::print("  {:>4.0f} %  {}\n", 100 * cost.objects[i].share, describe(cost.objects[i]));
-  if (!cost.objects.empty() && cost.objects.front().share > 0)
+    if (cost.objects[i].fraction >= kWorthARow)
+      fmt::print("  {:>4.0f} %  {}\n", 100 * cost.objects[i].fraction, describe(cost.objects[i]));
+  if (!cost.objects.empty() && cost.objects.front().fraction > 0)
     fmt::print("most expensive: {}; cheaper with {}\n", describe(cost.objects.front()),
                cost.objects.front().advice);
 }

@@ -261,9 +261,9 @@ CostEstimate estimate_cost(const LoadedScene& loaded, const ModelLibrary& models
   for (ObjectCost& object : cost.objects) {
     const double own = (all_simulation > 0 ? simulating * object.simulation_s / all_simulation : 0) +
                        (all_drawing > 0 ? drawing * object.drawing_s / all_drawing : 0);
-    object.share = cost.film_s > 0 ? own / cost.film_s : 0;
+    object.fraction = cost.film_s > 0 ? own / cost.film_s : 0;
   }
-  std::ranges::stable_sort(cost.objects, std::ranges::greater{}, &ObjectCost::share);
+  std::ranges::stable_sort(cost.objects, std::ranges::greater{}, &ObjectCost::fraction);
   return cost;
 }
 

@@ -23,7 +23,7 @@ struct ObjectCost {
   double simulation_s = 0;  ///< time per second of film
   double drawing_s = 0;     ///< time per frame
   uint64_t particles = 0;   ///< for an emitter: greatest number of particles alive at once
-  double share = 0;         ///< share of the time of the whole film, 0 .. 1; set only by estimate_cost()
+  double fraction = 0;      ///< fraction of the time of the whole film, 0 .. 1; set only by estimate_cost()
 };
 
 /// Returns every object of a (flat) scene that has a cost, in no particular order.
