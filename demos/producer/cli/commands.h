@@ -102,6 +102,8 @@ ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
 /// Reads the models of a scene, and appends its warnings instead of printing them.
 ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const TalkOptions& talk,
                          std::vector<Problem>& warnings);
+/// Key of all settings that decide the pixels of a scene's frames.
+std::string frame_settings(const LoadedScene& loaded, const ModelLibrary& models, render::GlPlatform gl);
 /// JSON as indented "key: value" lines.
 void print_readable(const nlohmann::ordered_json& json, int indent = 0);
 /// Error message for an invalid frame rate.
@@ -116,6 +118,8 @@ void check_distinct(const std::string& a, const std::string& b);
 /// Throws OutputError unless the name ends in .png.
 void check_png(const std::string& file);
 
+/// The frame of a number. Throws std::invalid_argument for one outside of the film.
+int checked_frame(const Scene& scene, double number);
 /// The frame nearest to a time. Throws std::invalid_argument for one outside of the film.
 int frame_at(const Scene& scene, double time);
 inline constexpr int kSmallSide_px = 320;  ///< side of the pictures of a sheet

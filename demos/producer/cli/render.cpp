@@ -1,4 +1,4 @@
-// render, frame and simulate.
+// render.
 
 #include <algorithm>
 #include <array>
@@ -36,52 +36,9 @@
 namespace offstage::producer {
 namespace {
 
-struct SimulateOptions {
-  SceneOptions scene;
-  TalkOptions talk;
-  std::string trace, contacts, cloths, cloth_points, joints, particles, trace_every = "frame", cache, stats;
-  int threads = 0;
-  bool force = false;
-};
-
-struct FrameOptions {
-  SceneOptions scene;
-  TalkOptions talk;
-  std::string out;
-  std::optional<int> frame;
-  std::optional<double> at;
-  int threads = 0;
-  bool force = false;
-  render::GlPlatform gl = render::GlPlatform::automatic;
-};
-
 namespace fs = std::filesystem;
 
 constexpr uint64_t kStatesBytes = 4ull << 30;  // limit for the states for further cameras, on the disk
-
-void report_run(const RunStats& stats, const TalkOptions& talk, const std::string& stats_file) {
-  if (!stats_file.empty()) write_text_file(stats_file, to_json(stats));
-  if (talk.quiet) return;
-  if (!stats.blank_frames.empty())
-    log("warning: frame {}{} is blank: all pixels are equal. Check the camera, the lights and the exposure\n",
-        stats.blank_frames.front(),
-        stats.blank_frames.size() > 1 ? fmt::format(" (and {} more)", stats.blank_frames.size() - 1) : "");
-  for (const std::string& note : notes_of(stats.totals)) log("{}\n", note);
-  if (!talk.verbose) return;
-  for (const auto& [name, times] : {std::pair("simulate", &stats.sim), std::pair("draw", &stats.render),
-                                    std::pair("encode", &stats.encode)}) {
-    const StageTimes::Summary s = times->summary();
-    log("{:9} {:8.2f} ms mean  {:8.2f} p50  {:8.2f} p95  {:8.2f} max\n", name, s.mean, s.p50, s.p95, s.max);
-  }
-  log("{} frames in {:.2f} s, first after {:.2f} s, {:.0f} MB\n", stats.frames, stats.wall_s, stats.startup_s,
-      peak_rss_mb());
-}
-
-/// The exit code of an interrupted run; prints how to continue.
-int interrupted(const RunStats& stats, int total, const std::string& advice) {
-  log("interrupted: {} of {} frames done{}\n", stats.frames + stats.frames_kept, total, advice);
-  return 128 + stats.interrupted_by;
-}
 
 struct Plan {
   LoadedScene loaded;
@@ -124,11 +81,6 @@ int print_plan(const Plan& plan) {
       {"settings", plan.settings}};
   fmt::print("{}\n", json.dump(2));
   return kOk;
-}
-
-std::string frame_settings(const LoadedScene& loaded, const ModelLibrary& models, render::GlPlatform gl) {
-  // Its pixels differ.
-  return settings_key(loaded, models) + (gl == render::GlPlatform::egl_gpu ? "-gpu" : "");
 }
 
 /// Warns of, or refuses, what the format of the frames cannot hold.
@@ -331,15 +283,12 @@ int render_cameras(const RenderOptions& options) {
   return kOk;
 }
 
-int checked_frame(const Scene& scene, double wanted) {
-  const int count = scene.frame_count();
-  if (wanted >= 1 && wanted <= count) return static_cast<int>(wanted);
-  throw std::invalid_argument(
-      fmt::format("frame {} is outside the film; it has frames 1-{}, times {:g} to {:g} s", wanted, count,
-                  scene.output.start, scene.output.time_of(count)));
-}
-
 }  // namespace
+
+std::string frame_settings(const LoadedScene& loaded, const ModelLibrary& models, render::GlPlatform gl) {
+  // Its pixels differ.
+  return settings_key(loaded, models) + (gl == render::GlPlatform::egl_gpu ? "-gpu" : "");
+}
 
 void check_file(const std::string& file, bool force) {
   if (file.empty()) return;
@@ -364,6 +313,14 @@ void check_distinct(const std::string& a, const std::string& b) {
 void check_png(const std::string& file) {
   if (fs::path(file).extension() != ".png")
     throw OutputError(file + ": a picture is a PNG file; give a name ending in .png");
+}
+
+int checked_frame(const Scene& scene, double number) {
+  const int count = scene.frame_count();
+  if (number >= 1 && number <= count) return static_cast<int>(number);
+  throw std::invalid_argument(
+      fmt::format("frame {} is outside the film; it has frames 1-{}, times {:g} to {:g} s", number, count,
+                  scene.output.start, scene.output.time_of(count)));
 }
 
 int frame_at(const Scene& scene, double time) {
@@ -419,88 +376,6 @@ int render_command(const RenderOptions& given) {
   return render_to_video(plan, models, options);
 }
 
-namespace {
-
-int frame_command(const FrameOptions& options) {
-  const LoadedScene loaded = load(options.scene, options.talk.quiet);
-  const Scene& scene = loaded.scene;
-  int frame = 0;
-  if (options.at) {
-    frame = frame_at(scene, *options.at);
-  } else {
-    const double wanted = options.frame.value_or(1);
-    frame = checked_frame(scene, wanted < 0 ? wanted + scene.frame_count() + 1 : wanted);
-  }
-  check_png(options.out);
-  check_file(options.out, options.force);
-  const render::ChannelChoice channels{scene.output.channels, scene.output.channel_format};
-  const fs::path stem = fs::path(options.out).replace_extension();
-  for (const fs::path& file : render::channel_files(stem, channels)) check_file(file.string(), options.force);
-
-  class PictureSink : public render::FrameSink {
-   public:
-    PictureSink(fs::path path, std::string settings)
-        : path_(std::move(path)), settings_(std::move(settings)) {}
-    void write(int, const render::Image& image) override { render::write_png(path_, image, settings_); }
-    void close() override {}
-
-   private:
-    fs::path path_;
-    std::string settings_;
-  };
-  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
-  const auto threads = simulation_threads(options.threads);
-  render::pin_environment(threads_or_all(options.threads), options.gl);
-  PictureSink sink(options.out, frame_settings(loaded, models, options.gl));
-  RunProgress progress(scene, models, options.talk);
-  const RunStats stats = render_frames(
-      loaded, models,
-      {.frames = {frame}, .threads = 1, .cache = {}, .channels = channels, .channels_stem = stem}, sink,
-      std::ref(progress));
-  progress.finish();
-  report_run(stats, options.talk, "");
-  if (stats.interrupted_by) return interrupted(stats, 1, "");
-  print_output_name(options.out);
-  return kOk;
-}
-
-int simulate_command(const SimulateOptions& options) {
-  const LoadedScene loaded = load(options.scene, options.talk.quiet);
-  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
-  const std::array files = {options.stats,        options.trace,  options.contacts, options.cloths,
-                            options.cloth_points, options.joints, options.particles};
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    check_file(files[i], options.force);
-    for (std::size_t k = 0; k < i; ++k) check_distinct(files[k], files[i]);
-  }
-  const auto threads = simulation_threads(options.threads);
-  SimulateJob job{.cache = {},
-                  .force = options.force,
-                  .trace = {},
-                  .contacts = {},
-                  .cloths = {},
-                  .joints = {},
-                  .particles = {},
-                  .cloth_points = {},
-                  .trace_every_step = options.trace_every == "step"};
-  if (!options.cache.empty()) job.cache = options.cache;
-  if (!options.trace.empty()) job.trace = options.trace;
-  if (!options.contacts.empty()) job.contacts = options.contacts;
-  if (!options.cloths.empty()) job.cloths = options.cloths;
-  if (!options.cloth_points.empty()) job.cloth_points = options.cloth_points;
-  if (!options.joints.empty()) job.joints = options.joints;
-  if (!options.particles.empty()) job.particles = options.particles;
-  RunProgress progress(loaded.scene, models, options.talk);
-  const RunStats stats = simulate_frames(loaded, models, job, std::ref(progress));
-  progress.finish();
-  report_run(stats, options.talk, options.stats);
-  if (stats.interrupted_by) return interrupted(stats, loaded.scene.frame_count(), "");
-  if (options.stats.empty()) fmt::print("{}", to_json(stats));
-  return kOk;
-}
-
-}  // namespace
-
 Command add_render(CLI::App& app, const WatchCommand& watch) {
   const auto options = std::make_shared<RenderOptions>();
   RenderOptions& render = *options;
@@ -549,55 +424,6 @@ Command add_render(CLI::App& app, const WatchCommand& watch) {
             if (options->out.empty()) options->out = default_film(options->scene.file);
             return options->watch ? watch(*options) : render_command(*options);
           }};
-}
-
-Command add_frame(CLI::App& app) {
-  const auto options = std::make_shared<FrameOptions>();
-  FrameOptions& frame = *options;
-  CLI::App* command = app.add_subcommand("frame", "Draw one frame to a PNG");
-  add_scene(*command, frame.scene);
-  command->add_option("-o,--output", frame.out, "PNG file")->required();
-  auto* number = command->add_option("-n,--frame", frame.frame,
-                                     "Number of the frame (negative numbers count from the end)");
-  command->add_option("--at", frame.at, "Time of the frame in seconds, instead of its number")
-      ->excludes(number);
-  add_camera(*command, frame.scene);
-  add_picture(*command, frame.scene);
-  add_timing(*command, frame.scene);
-  add_threads(*command, frame.threads);
-  add_gl(*command, frame.gl);
-  add_channels(*command, frame.scene);
-  command->add_flag("--force", frame.force, "Replace an existing file");
-  add_talk(*command, frame.talk);
-  return {command, [options] { return frame_command(*options); }};
-}
-
-Command add_simulate(CLI::App& app) {
-  const auto options = std::make_shared<SimulateOptions>();
-  SimulateOptions& simulate = *options;
-  CLI::App* command = app.add_subcommand("simulate", "Simulate without drawing; prints statistics as JSON");
-  add_scene(*command, simulate.scene);
-  add_timing(*command, simulate.scene);
-  command->add_option("--trace", simulate.trace,
-                      "CSV of position, orientation and velocities of moving objects");
-  command->add_option("--contacts", simulate.contacts,
-                      "CSV of the contact points of bodies, with their forces");
-  command->add_option("--cloths", simulate.cloths, "CSV of strain, contacts and volume of cloths");
-  command->add_option("--cloth-points", simulate.cloth_points,
-                      "CSV of position and velocity of the vertices of cloths");
-  command->add_option("--joints", simulate.joints, "CSV of the loads and positions of joints");
-  command->add_option(
-      "--particles", simulate.particles,
-      "Table of all particles, emitted ones included: CSV, or binary if its name ends in .bin");
-  command->add_option("--trace-every", simulate.trace_every, "Interval of the CSV rows: frame or step")
-      ->check(CLI::IsMember({"frame", "step"}));
-  command->add_option("--cache", simulate.cache, "Folder for one snapshot per frame, for `render --cache`");
-  command->add_option("--stats", simulate.stats,
-                      "Write the statistics to this JSON file instead of standard output");
-  add_threads(*command, simulate.threads);
-  command->add_flag("--force", simulate.force, "Replace existing output");
-  add_talk(*command, simulate.talk);
-  return {command, [options] { return simulate_command(*options); }};
 }
 
 }  // namespace offstage::producer

@@ -1,9 +1,14 @@
 #include "producer/cli/run_progress.h"
 
 #include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
 
 #include "producer/base/log.h"
 #include "producer/run/cost.h"
+#include "producer/run/run_notes.h"
+#include "producer/run/run_report.h"
 
 namespace offstage::producer {
 
@@ -38,6 +43,29 @@ void RunProgress::warn_of_long_run(const Progress& progress) {
                          describe(*costliest), costliest->advice);
   log("note: this takes about {}, most of it for the {}.{}\n", duration_text(all),
       simulating ? "simulation" : "drawing", advice);
+}
+
+void report_run(const RunStats& stats, const TalkOptions& talk, const std::string& stats_file) {
+  if (!stats_file.empty()) write_text_file(stats_file, to_json(stats));
+  if (talk.quiet) return;
+  if (!stats.blank_frames.empty())
+    log("warning: frame {}{} is blank: all pixels are equal. Check the camera, the lights and the exposure\n",
+        stats.blank_frames.front(),
+        stats.blank_frames.size() > 1 ? fmt::format(" (and {} more)", stats.blank_frames.size() - 1) : "");
+  for (const std::string& note : notes_of(stats.totals)) log("{}\n", note);
+  if (!talk.verbose) return;
+  for (const auto& [name, times] : {std::pair("simulate", &stats.sim), std::pair("draw", &stats.render),
+                                    std::pair("encode", &stats.encode)}) {
+    const StageTimes::Summary s = times->summary();
+    log("{:9} {:8.2f} ms mean  {:8.2f} p50  {:8.2f} p95  {:8.2f} max\n", name, s.mean, s.p50, s.p95, s.max);
+  }
+  log("{} frames in {:.2f} s, first after {:.2f} s, {:.0f} MB\n", stats.frames, stats.wall_s, stats.startup_s,
+      peak_rss_mb());
+}
+
+int interrupted(const RunStats& stats, int total, const std::string& advice) {
+  log("interrupted: {} of {} frames done{}\n", stats.frames + stats.frames_kept, total, advice);
+  return 128 + stats.interrupted_by;
 }
 
 }  // namespace offstage::producer

@@ -1,9 +1,11 @@
 #pragma once
-/// Messages of the command line during a run: its progress, and once that it takes long and why.
+/// Messages of the command line during a run, its progress and once that it takes long and why, and after it.
 
 #include <chrono>
+#include <string>
 
 #include "producer/cli/commands.h"
+#include "producer/run/production.h"
 #include "producer/run/progress.h"
 
 namespace offstage::producer {
@@ -26,5 +28,10 @@ class RunProgress {
   bool told_ = false;
   const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
+
+/// Writes the statistics of a run to `stats_file`, unless that is empty, and prints its warnings and notes.
+void report_run(const RunStats& stats, const TalkOptions& talk, const std::string& stats_file);
+/// Returns the exit code of an interrupted run; prints how far it came and `advice`, how to continue.
+int interrupted(const RunStats& stats, int total, const std::string& advice);
 
 }  // namespace offstage::producer
