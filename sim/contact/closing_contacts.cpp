@@ -6,7 +6,9 @@
 namespace offstage::sim {
 namespace {
 
+/// Greatest number of times at which contacts close, and cost of a solution [ns, see ProximalNewton::cost()].
 constexpr int kMostClosings = 8;
+constexpr Real kMostCost = 5e5;
 /// Contacts that close this soon after another one close with it, as a part of the interval.
 constexpr Real kSameClosing = 1e-9;
 /// Part of the kinetic energy that a solution may add by rounding.
@@ -82,7 +84,7 @@ class Pieces {
       rows_.push_back(i);
     }
     const std::vector<ContactBody> before = bodies_;
-    const std::optional<ContactWork> work = newton_.solve(bodies_, closed_);
+    const std::optional<ContactWork> work = newton_.solve(bodies_, closed_, {}, kMostCost);
     if (!work || work->fallbacks > 0) return false;
     result_.work.add(*work);
     return at_once ? added_energy(before, bodies_, closed_) <= kClosingRounding * kinetic_energy(before)

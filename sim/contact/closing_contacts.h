@@ -40,7 +40,7 @@ struct ClosingSolution {
 /// Solves an interval of length `duration` [s]. `start` has the velocities at its start and `free` those at
 /// its end without contacts; `contacts` have the targets of points that touch, and guesses of their impulses
 /// over the interval. Points with a gap push from the time on at which it closes, without rebound. There is
-/// no result if they close at more than kMostClosings times, or if a solution fails or adds energy.
+/// no result if they close at more than eight times, or if a solution fails, costs too much or adds energy.
 std::optional<ClosingSolution> solve_closing(std::span<const ContactBody> start,
                                              std::span<const ContactBody> free,
                                              std::span<const Contact> contacts,

@@ -206,6 +206,27 @@ class BodyContacts {
                                 known.x_is_a ? v.normal() : Vec3(-v.normal()), point, h_ - time_, between);
   }
 
+  /// The point of a piece that is farthest in a direction.
+  static Vec3 farthest(Body& body, uint32_t piece, const Pose& at, const Vec3& d) {
+    const Convex convex = body.collision_shape().piece(piece);
+    const Vec3 local = at.vector_to_body(d);
+    uint32_t vertex = 0;
+    return at.point_to_world(convex.support(local, vertex) + convex.radius * local);
+  }
+
+  /// Whether X turns into a contact beside a face on which it lies, as a box does that tips over an edge of
+  /// the face: the contact and the lowest point of X approach faster than the point on the face. The lowest
+  /// point of a body that slides, rolls or lands does not.
+  bool tips_into(const View& v, const View& face) const {
+    const Vec3 up = face.normal();
+    const auto speed = [&](const View& to, const Vec3& place) {
+      return (to.x_is_a ? 1 : -1) * up.dot(to.pair->relative_velocity(place));
+    };
+    const Real tips = speed(face, face.on_y(face.deepest())) - flush_ / (h_ - time_);
+    return speed(v, v.on_y(v.deepest())) < tips &&
+           speed(v, farthest(v.x(), v.x_piece(), pose(x_, false), -up)) < tips;
+  }
+
   /// Returns a new normal for a contact that is level with or below a face on which the same piece lies, if
   /// the surface at the contact, seen from above the face, does not have the contact's normal. It is the
   /// surface's own normal, or that of the face if the surface only continues the face.
@@ -214,6 +235,7 @@ class BodyContacts {
     if (v.x_piece() != face.x_piece() || n.dot(up) > kSameDirection) return std::nullopt;
     // Two convex pieces have no internal edge between them: all their contacts are valid.
     if (v.pair == face.pair && v.y_piece() == face.y_piece()) return std::nullopt;
+    if (tips_into(v, face)) return std::nullopt;
     const uint32_t deepest = face.deepest();
     const Vec3& on_face = face.on_y(deepest);
     const Real clipped = kClipped * x_.extent;
@@ -261,12 +283,6 @@ class BodyContacts {
     const Vec3 up = pose(face.y(), false).vector_to_body(face.normal()),
                on_face = pose(face.y(), false).point_to_body(face.on_y(deepest)),
                lying = pose(x_, false).point_to_body(face.on_x(deepest));
-    const auto farthest = [](Body& body, uint32_t piece, const Pose& at, const Vec3& d) {
-      const Convex convex = body.collision_shape().piece(piece);
-      const Vec3 local = at.vector_to_body(d);
-      uint32_t vertex = 0;
-      return at.point_to_world(convex.support(local, vertex) + convex.radius * local);
-    };
     return std::all_of(std::begin(kBothEnds), std::end(kBothEnds), [&](bool at_end) {
       const Pose below = pose(face.y(), at_end), x = pose(x_, at_end), y = pose(v.y(), at_end);
       const Vec3 n = below.vector_to_world(up);
