@@ -137,7 +137,8 @@ void GltfMaterials::read_transmission(const GltfValue& source, Material& look, G
   look.transmission = fraction(transmission.number("transmissionFactor", 0));
   if (look.transmission == 0) return;
   if (source.text("alphaMode") == "BLEND")
-    file_.warn(source.place() + ": transmission is ignored where alphaMode BLEND is translucent");
+    file_.warn(source.place() +
+               ": the transmission is ignored at the translucent places of the alphaMode BLEND");
   look.transmission_texture = map(transmission, "transmissionTexture", Alpha::drop, sets);
   const double thickness = volume.number("thicknessFactor", 0);
   look.thin = thickness <= 0;

@@ -213,7 +213,7 @@ std::vector<std::string> ignored_by_assimp(const aiScene& scene) {
   add(scene.mNumAnimations, " animations are ignored: only those of glTF 2.0 files are played");
   add(static_cast<std::size_t>(
           std::ranges::count_if(meshes, [](const aiMesh* m) { return m->mNumBones > 0; })),
-      " meshes have bones, which are ignored: they are drawn as stored");
+      " mesh(es) with bones: the bones are ignored, and the meshes have the pose that the file stores");
   add(static_cast<std::size_t>(
           std::ranges::count_if(meshes, [](const aiMesh* m) { return m->mNumAnimMeshes > 0; })),
       " meshes have morph targets, which are ignored");

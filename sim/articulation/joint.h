@@ -37,8 +37,9 @@ enum class JointType : uint8_t {
   /// Allows rotation of a about the axis together with displacement along it, relative to b: ratio metres per
   /// turn, positive for a right-handed thread.
   screw,
-  /// A rope from `anchor` on a over a fixed point to another one and to `anchor_b` on b:
-  /// |anchor - pulley_a| + ratio |anchor_b - pulley_b| stays at most at its length when the joint is created.
+  /// A rope that runs from `anchor` on body a over the fixed points `pulley_a` and `pulley_b` to `anchor_b`
+  /// on body b. |anchor - pulley_a| + ratio |anchor_b - pulley_b| never exceeds its value at the time at
+  /// which the joint is created.
   pulley,
 };
 

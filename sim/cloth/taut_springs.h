@@ -1,7 +1,7 @@
 #pragma once
 /// Solves one linear complementarity problem for springs at their greatest length and for contacts of cloth
-/// with dynamic bodies: impulses after which springs reach their target length and points leave bodies,
-/// linearised. So the whole taut cloth stops a heavy body, not only the points that it touches.
+/// with dynamic bodies. Its impulses bring the springs to their target length and keep the points out of the
+/// bodies, to first order. So the whole taut cloth stops a heavy body, not only the points that it touches.
 ///
 /// With the rows of J the directions of springs and contacts, and W the inverse masses of points and bodies,
 /// the impulses are the lambda >= 0 of the linear complementarity problem J W J^T lambda >= excess. Conjugate

@@ -19,8 +19,9 @@ namespace offstage::sim {
 struct ContactPlace {
   Vec3 normal;        ///< unit, from b to a, world
   Vec3 arm_a, arm_b;  ///< from the bodies' centres of mass (of kinematic bodies their origins) [m]
-  /// Rotation since the start of the points of the body whose feature defines the contact: that of the body,
-  /// or, for points on the sides and rims of round bodies, of the meridian that faces the other body.
+  /// Rotation, since the interval's start, of the contact points of the body whose feature defines the
+  /// contact. They turn with the body, or, on the sides and rims of round bodies, with the meridian that
+  /// faces the other body.
   Quat turn;
 };
 

@@ -123,8 +123,8 @@ struct Body : BodyModel {
     body.set_state(start);
     return body;
   }
-  /// The orientation whose inertia turns the contact and joint impulses of the interval into velocities. The
-  /// interval has this duration [s] and is part of a sub-step of this length [s].
+  /// The orientation whose inertia turns the contact and joint impulses of the interval into velocities.
+  /// `duration` is the length of the interval and `substep` that of the sub-step of which it is a part [s].
   ///
   /// For compact bodies it is that of the interval's end, so that velocities and momenta agree there. For
   /// thin bodies it belongs to the time at which the impulses act: the middle, as contact_motion() predicts

@@ -60,7 +60,7 @@ struct ParticleSystem {
   /// Whether its collisions are those of ParticleCollisions.
   bool hits_particles() const { return def.internal || def.external || def.rotates; }
   /// For particles that do not collide with particles: integrates, sweeps against bodies, ages and removes.
-  /// In a `coupled` system the particles of whole_step() are already integrated.
+  /// In a `coupled` system, the particles for which whole_step() is true are already integrated.
   ParticleTally step(const ParticleStage& stage, const ParticleForces& forces, bool coupled);
 
   /// For the other particles: only integrates, and stores the initial state.

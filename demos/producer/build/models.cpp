@@ -428,8 +428,11 @@ ChosenScale automatic_scale(Real largest_side, render::Model::UnitSource unit) {
   const std::string size = fmt::format("the longest side of {:.4g}", largest_side);
   if (largest_side <= largest_m) return {1, size + fmt::format(" is at most {:g} m", largest_m)};
   if (0.01 * largest_side <= largest_m)
-    return {0.01, size + fmt::format(" is likely in centimetres: more than {:g} m are unlikely", largest_m)};
-  return {0.001, size + fmt::format(" is likely in millimetres: more than {:g} m are unlikely", largest_m)};
+    return {0.01, size + fmt::format(" is likely in centimetres, because in metres it would exceed {:g} m",
+                                     largest_m)};
+  return {0.001,
+          size + fmt::format(" is likely in millimetres, because in larger units it would exceed {:g} m",
+                             largest_m)};
 }
 
 ChosenScale automatic_scale(const render::Model& model) {
