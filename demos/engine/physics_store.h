@@ -1,6 +1,7 @@
 #pragma once
 /// Simulated states and their figures, in memory of a bounded size. Those of the least recently used
-/// simulations are removed first. And the collision meshes of the latest simulation, for the next one.
+/// simulations are removed first. The store also keeps the collision meshes of the latest simulation for the
+/// next one.
 
 #include <list>
 #include <memory>

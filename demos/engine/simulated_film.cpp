@@ -66,7 +66,7 @@ void SimulatedFilm::add_figures(double sim_ms) {
                                .particles = world.particle_count(),
                                .contacts = world.contacts().size(),
                                .energy = world.energy(),
-                               .state_hash = world.state_hash().hex()});
+                               .state_hash = state(frame).state_hash.hex()});
   constexpr int kEvery = 15;  // number of frames
   if (frame % kEvery == 0 || frame == last_) physics_->notes = producer::notes_of(simulation_->totals());
 }

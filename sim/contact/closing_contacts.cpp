@@ -9,8 +9,8 @@ namespace {
 /// Greatest number of times at which contacts close, and cost of a solution [ns, see ProximalNewton::cost()].
 constexpr int kMostClosings = 8;
 constexpr Real kMostCost = 5e5;
-/// Contacts that close this soon after another one close with it, as a part of the interval.
-constexpr Real kSameClosing = 1e-9;
+/// Smaller gaps are closed [m].
+constexpr Real kClosed = 1e-11;
 /// Part of the kinetic energy that a solution may add by rounding.
 constexpr Real kClosingRounding = 1e-9;
 
@@ -26,16 +26,6 @@ Real closing_time(Real gap, Real first, Real last, Real rest) {
   return 2 * gap / sum;
 }
 
-Real kinetic_energy(std::span<const ContactBody> bodies) {
-  Real energy = 0;
-  for (const ContactBody& b : bodies)
-    if (b.is_moved())
-      energy += (b.velocity.squaredNorm() / b.inverse_mass +
-                 b.angular_velocity.dot(b.inverse_inertia.inverse() * b.angular_velocity)) /
-                2;
-  return energy;
-}
-
 /// State of the solution at a time of the interval.
 class Pieces {
  public:
@@ -49,7 +39,8 @@ class Pieces {
         duration_(duration),
         newton_(newton),
         now_(start.begin(), start.end()) {
-    result_.impulses.assign(contacts.size(), Vec3::Zero());
+    result_.contacts.assign(contacts.begin(), contacts.end());
+    for (Contact& c : result_.contacts) c.impulse = c.moment = Vec3::Zero();
     result_.displacements.resize(start.size());
     for (const ClosingPoint& p : points) gaps_.push_back(p.gap);
   }
@@ -90,6 +81,13 @@ class Pieces {
     return at_once ? added_energy(before, bodies_, closed_) <= kClosingRounding * kinetic_energy(before)
                    : true;
   }
+  /// Adds a part of the impulses of the last solution.
+  void add_impulses(Real part) {
+    for (std::size_t k = 0; k < rows_.size(); ++k) {
+      result_.contacts[rows_[k]].impulse += part * closed_[k].impulse;
+      result_.contacts[rows_[k]].moment += part * closed_[k].moment;
+    }
+  }
   /// Solves from now to the end of the interval with the contacts that are closed.
   bool solve_rest() {
     const Real part = 1 - time_ / duration_;
@@ -116,7 +114,7 @@ class Pieces {
   /// Moves by a time, with velocities that change at a constant rate to those of bodies_.
   void advance(Real duration) {
     const Real part = duration / (duration_ - time_);
-    for (std::size_t k = 0; k < rows_.size(); ++k) result_.impulses[rows_[k]] += part * closed_[k].impulse;
+    add_impulses(part);
     std::vector<ContactBody> next = now_;
     for (std::size_t i = 0; i < now_.size(); ++i) {
       next[i].velocity += part * (bodies_[i].velocity - now_[i].velocity);
@@ -128,7 +126,7 @@ class Pieces {
     for (uint32_t i = 0; i < contacts_.size(); ++i)
       if (gaps_[i] > 0) {
         gaps_[i] += duration / 2 * (speed(i, now_) + speed(i, next));
-        if (gaps_[i] <= kSameClosing * duration_) gaps_[i] = 0;
+        if (gaps_[i] <= kClosed) gaps_[i] = 0;
       }
     now_ = std::move(next);
     time_ += duration;
@@ -137,7 +135,7 @@ class Pieces {
   bool close() {
     bodies_ = now_;
     if (!solve_closed(time_ / duration_, true)) return false;
-    for (std::size_t k = 0; k < rows_.size(); ++k) result_.impulses[rows_[k]] += closed_[k].impulse;
+    add_impulses(1);
     now_ = bodies_;
     return true;
   }

@@ -32,7 +32,7 @@ struct Displacement {
 
 struct ClosingSolution {
   std::vector<ContactBody> bodies;          ///< velocities at the end
-  std::vector<Vec3> impulses;               ///< of the contacts
+  std::vector<Contact> contacts;            ///< with their impulses of the whole interval
   std::vector<Displacement> displacements;  ///< of the bodies
   ContactWork work;
 };

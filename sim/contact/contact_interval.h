@@ -12,6 +12,8 @@ struct ContactInterval {
   /// Length of the sub-step of which the interval is all or a part [s]; sets the rate at which penetration is
   /// removed.
   Real substep;
+  /// Contacts that approach faster are impacts, WorldDef::collision_speed [m/s].
+  Real impact_speed;
   /// Whether the interval is a whole sub-step without impacts. Only the forces of whole sub-steps are stored
   /// as the initial guess of the next one. The force that stops a body in a short part before or after an
   /// impact would be far too large for a whole sub-step, and forces would accumulate if a part were solved

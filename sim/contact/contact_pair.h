@@ -66,8 +66,6 @@ class alignas(64) ContactPair {
   Real deepest = 0;  ///< deepest overlap that find() has seen in this sub-step [m]
   /// Impacts of this pair are traced back to; otherwise its points limit the approach.
   bool needs_toi = false;
-  /// Points that approach more slowly than this [m/s] are not traced back to while other points touch.
-  Real toi_speed = 0;
 
   /// Only `b` may be a plane.
   ContactPair(Body& a, Body& b, const PairSurface& surface);
@@ -99,11 +97,12 @@ class alignas(64) ContactPair {
   bool predicts(const PlacedManifold& m, const Vec3& normal, const ContactPoint& at_end, Real duration,
                 bool between_points) const;
 
-  /// Whether the impact of a point is traced back to, so that the point does not limit the approach.
-  bool awaits_impact(const PlacedManifold& m, const ContactPoint& point) const {
+  /// Whether the impact of a point is traced back to, so that the point does not limit the approach. While
+  /// other points touch, it must approach faster than `impact_speed` [m/s].
+  bool awaits_impact(const PlacedManifold& m, const ContactPoint& point, Real impact_speed) const {
     if (!needs_toi || point.separation <= kTouching) return false;
     return separation_ > kTouching ||
-           relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n) < -toi_speed;
+           relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n) < -impact_speed;
   }
 
   /// Prefetches memory for find(): first that of the pair, and a little later that of the first manifold.

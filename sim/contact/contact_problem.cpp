@@ -133,6 +133,15 @@ std::optional<std::size_t> worst_contact(std::span<const ContactBody> bodies,
   return worst;
 }
 
+Real kinetic_energy(std::span<const ContactBody> bodies) {
+  Real energy = 0;
+  for (const ContactBody& b : bodies)
+    if (b.is_moved())
+      energy += b.velocity.squaredNorm() / b.inverse_mass / 2 +
+                b.angular_velocity.dot(b.inverse_inertia.inverse() * b.angular_velocity) / 2;
+  return energy;
+}
+
 Real added_energy(std::span<const ContactBody> before, std::span<const ContactBody> after,
                   std::span<const Contact> contacts) {
   Real energy = 0;

@@ -97,6 +97,9 @@ Real residual(std::span<const ContactBody> bodies, std::span<const Contact> cont
 std::optional<std::size_t> worst_contact(std::span<const ContactBody> bodies,
                                          std::span<const Contact> contacts);
 
+/// Kinetic energy of the bodies that contacts move [J].
+Real kinetic_energy(std::span<const ContactBody> bodies);
+
 /// Kinetic energy that the contacts' impulses add to bodies, whose velocities are `before` without and
 /// `after` with the impulses [J]. The work of conveyors is not included. A solution without targets and
 /// biases adds none: friction and plastic impacts dissipate.

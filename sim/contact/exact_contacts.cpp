@@ -125,15 +125,12 @@ bool ExactContacts::is_safe(const ContactWork& work) const {
       energy += gain;
   if (energy <= 0) return true;
 
-  Real push = 0, kinetic = 0, mass = 0;
+  Real push = 0, mass = 0;
   for (const Contact& c : contacts_)
     if (c.impulse.x() > 0) push = std::max(push, c.target);
-  for (const ContactBody& body : free_) {
-    if (!body.is_moved()) continue;
-    mass += 1 / body.inverse_mass;
-    kinetic += body.velocity.squaredNorm() / body.inverse_mass / 2 +
-               body.angular_velocity.dot(body.inverse_inertia.inverse() * body.angular_velocity) / 2;
-  }
+  for (const ContactBody& body : free_)
+    if (body.is_moved()) mass += 1 / body.inverse_mass;
+  const Real kinetic = kinetic_energy(free_);
   if (work.fallbacks > 0) return energy <= kEnergyRounding * kinetic;
   return energy <= kTermsShare * kinetic + mass * push * push / 2;
 }
@@ -153,22 +150,19 @@ void ExactContacts::divide_at_closings(const Body& body, const ContactInterval& 
   std::vector<ContactBody> start = free_;
   start[body.row].velocity = body.start_twist.velocity;
   start[body.row].angular_velocity = body.start_twist.angular_velocity;
-  std::vector<Contact> contacts = contacts_;
-  for (std::size_t i = 0; i < contacts.size(); ++i)
-    contacts[i].impulse = interval.duration * forces_[i]->last;
+  std::vector<Contact> guesses = contacts_;
+  for (std::size_t i = 0; i < guesses.size(); ++i) guesses[i].impulse = interval.duration * forces_[i]->last;
   std::optional<ClosingSolution> solution =
-      solve_closing(start, free_, contacts, points_, interval.duration, newton_);
+      solve_closing(start, free_, guesses, points_, interval.duration, newton_);
   if (!solution) return;
-  for (std::size_t i = 0; i < contacts.size(); ++i) contacts[i].impulse = solution->impulses[i];
-  std::swap(bodies_, solution->bodies);
-  std::swap(contacts_, contacts);
-  if (is_safe(solution->work)) {
-    work.add(solution->work);
-    displacement_ = solution->displacements[body.row];
-    return;
-  }
-  std::swap(bodies_, solution->bodies);
-  std::swap(contacts_, contacts);
+  const auto exchange = [&] {
+    std::swap(bodies_, solution->bodies);
+    std::swap(contacts_, solution->contacts);
+  };
+  exchange();
+  if (!is_safe(solution->work)) return exchange();
+  work.add(solution->work);
+  displacement_ = solution->displacements[body.row];
 }
 
 uint32_t ExactContacts::add_body(Body& body, const ContactInterval& interval) {
@@ -189,7 +183,7 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
   for (PlacedManifold& m : pair.manifolds())
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       const ContactPoint& point = m.manifold.points[k];
-      if (pair.awaits_impact(m, point)) continue;
+      if (pair.awaits_impact(m, point, interval.impact_speed)) continue;
       const Vec3 place = (point.on_a + point.on_b) / 2;
       const Vec3 u = in_frame(m.frame, pair.relative_velocity(place) + surface);
       const ContactMotion motion = contact_motion(pair.a(), pair.b(), m.manifold, m.frame, place,

@@ -100,7 +100,7 @@ void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifol
   // The next impact of the pair is traced back to, so its point does not push before.
   if (!pair.needs_toi || !waits_for_impacts(pair.a()) || !waits_for_impacts(pair.b())) return;
   for (uint32_t k = 0; k < patch.count; ++k) {
-    if (!pair.awaits_impact(m, m.manifold.points[k])) continue;
+    if (!pair.awaits_impact(m, m.manifold.points[k], interval.impact_speed)) continue;
     patch.points[k].separation = kOutOfReach;
     patch.points[k].force = patch.points[k].mean_force = 0;
   }

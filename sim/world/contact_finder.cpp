@@ -264,7 +264,6 @@ void ContactFinder::find_points(ContactPair& pair, Real time, Real h) const {
 /// points.
 void ContactFinder::choose_event(ContactPair& pair, bool far, Real left) const {
   pair.needs_toi = far && !pair.toi_exhausted;
-  pair.toi_speed = world_.def.collision_speed;
   const bool bounces = is_exact_ || pair.surface().restitution > 0;
   if (far || pair.toi_exhausted || !bounces || pair.restitution_suppressed) return;
   for (const PlacedManifold& m : pair.manifolds())

@@ -52,7 +52,13 @@ void ContactSolver::solve_all(std::span<Island> islands, Real start, Real h, Ste
   for (Island& island : islands)
     if (has_forces(island)) all.push_back(&island);
   if (world_.def.solver == SolverKind::automatic) patience_.begin(all, h);
-  solve(all, {.duration = h, .end = start + h, .substep = h, .is_whole = true}, report);
+  solve(all,
+        {.duration = h,
+         .end = start + h,
+         .substep = h,
+         .impact_speed = world_.def.collision_speed,
+         .is_whole = true},
+        report);
 }
 
 void ContactSolver::solve(Island& island, const ContactInterval& interval, StepReport& report) {

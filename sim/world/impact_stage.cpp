@@ -192,7 +192,11 @@ void ImpactStage::trace_back(Island& island, Real time) {
   island.motion->restore(island.bodies);
   motion_.move_group(island.bodies, start_, island.from, time - island.from);
   solver_.solve(island,
-                {.duration = time - island.from, .end = start_ + time, .substep = h_, .is_whole = false},
+                {.duration = time - island.from,
+                 .end = start_ + time,
+                 .substep = h_,
+                 .impact_speed = world_.def.collision_speed,
+                 .is_whole = false},
                 report_);
   for (Body* body : island.bodies) {
     body->pose = body->rigid.pose();
@@ -280,7 +284,12 @@ void ImpactStage::continue_from(uint32_t number, Real time) {
     joined = join_next(number, time);
     if (joined) continue;
     solver_.solve(islands_[number],
-                  {.duration = h_ - time, .end = start_ + h_, .substep = h_, .is_whole = false}, report_);
+                  {.duration = h_ - time,
+                   .end = start_ + h_,
+                   .substep = h_,
+                   .impact_speed = world_.def.collision_speed,
+                   .is_whole = false},
+                  report_);
     find_pairs_again(number);
     joined = join_overtaken(number, time);
   }
@@ -403,7 +412,12 @@ void ImpactStage::find_pairs_again(uint32_t number) {
     if (outside(pair->a()) || outside(pair->b()) || pair->manifolds().empty()) continue;
     if (pair->a().is_awake() || pair->b().is_awake()) islands_[added].pairs.push_back(pair);
   }
-  solver_.solve(islands_[added], {.duration = h_, .end = start_ + h_, .substep = h_, .is_whole = true},
+  solver_.solve(islands_[added],
+                {.duration = h_,
+                 .end = start_ + h_,
+                 .substep = h_,
+                 .impact_speed = world_.def.collision_speed,
+                 .is_whole = true},
                 report_);
 }
 
