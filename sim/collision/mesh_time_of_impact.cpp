@@ -103,8 +103,8 @@ class Instant {
                   pose_a_.orientation.conjugate() * pose_b_.orientation},
         placement_(a_from_b_, a.shape.hull().reach() + b.shape.hull().reach(), 0),
         closing_(pose_a_.vector_to_body(b.path.velocity() - a.path.velocity())),
-        spin_a_(pose_a_.vector_to_body(a.path.angular_velocity(fraction))),
-        spin_b_(pose_a_.vector_to_body(b.path.angular_velocity(fraction))) {}
+        turn_a_(turn_in_a(a)),
+        turn_b_(turn_in_a(b)) {}
 
   const Pose& a_from_b() const { return a_from_b_; }
   /// The closest two pieces, if any are in contact at this time.
@@ -120,6 +120,14 @@ class Instant {
   }
 
  private:
+  /// The rotation of all pieces of a shape, in A's frame. Several pieces are not round about one axis.
+  CoreRotation turn_in_a(const MovingShape& s) const {
+    CoreRotation turn = s.shape.piece_count() == 1
+                            ? core_rotation({s.shape.hull(), s.path}, fraction_)
+                            : CoreRotation{s.path.angular_velocity(fraction_), s.path.max_acceleration(1)};
+    turn.velocity = pose_a_.vector_to_body(turn.velocity);
+    return turn;
+  }
   template <class A, class B>
   void search(const BoundingTree<A>& tree_a, const BoundingTree<B>& tree_b, Real limit) {
     NodePairStack<A, B> stack;  // `gap` holds the time here
@@ -154,13 +162,13 @@ class Instant {
     const Vec3& normal = directed.normal;
     const Real reach_a = volume_reach(a.volume), reach_b = volume_reach(b.volume);
     Gap gap{directed.distance - placement_.slack, normal.dot(closing_), 0};
-    if (a_.path.turns()) {
-      gap.rate += spin_a_.cross(normal).norm() * reach_a;
-      gap.acceleration += a_.path.max_acceleration(reach_a);
+    if (turn_a_.acceleration > 0) {
+      gap.rate += turn_a_.velocity.cross(normal).norm() * reach_a;
+      gap.acceleration += turn_a_.acceleration * reach_a;
     }
-    if (b_.path.turns()) {
-      gap.rate += spin_b_.cross(normal).norm() * reach_b;
-      gap.acceleration += b_.path.max_acceleration(reach_b);
+    if (turn_b_.acceleration > 0) {
+      gap.rate += turn_b_.velocity.cross(normal).norm() * reach_b;
+      gap.acceleration += turn_b_.acceleration * reach_b;
     }
     return gap.time_to(tolerance_ / 2);
   }
@@ -181,7 +189,8 @@ class Instant {
   Real fraction_, tolerance_;
   Pose pose_a_, pose_b_, a_from_b_;
   Placement placement_;
-  Vec3 closing_, spin_a_, spin_b_;  // A's frame
+  Vec3 closing_;  // A's frame
+  CoreRotation turn_a_, turn_b_;
   Real time_ = kInfinity;
   std::optional<Separation> contact_;
 };

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "sim/collision/gjk.h"
 
@@ -15,11 +16,22 @@ Pose relative(const Pose& a, const Pose& b) {
   return {a.point_to_body(b.position), a.orientation.conjugate() * b.orientation};
 }
 
-/// The largest d.p over the points of a placed solid, relative to its frame's origin; d is in the world.
+/// The largest d.p over the points of a placed core, relative to its frame's origin; d is in the world.
 Real extent(const Convex& shape, const Quat& orientation, const Vec3& d) {
   const Vec3 local = orientation.conjugate() * d;
   uint32_t start = 0;
-  return local.dot(shape.support(local, start)) + shape.radius * local.norm();
+  return local.dot(shape.support(local, start));
+}
+
+/// Distance of the farthest point of the core from the frame's origin [m].
+Real core_reach(const Convex& shape) {
+  return shape.reach() - shape.radius;
+}
+
+/// Whether a core is symmetric about the y axis of its frame.
+bool is_round(const Convex& shape) {
+  return shape.core == Convex::Core::segment || shape.core == Convex::Core::cylinder ||
+         shape.core == Convex::Core::cone;
 }
 
 /// Advances until the solids are within the tolerance. `gap_at(fraction, separation)` measures the gap and
@@ -49,19 +61,34 @@ Real Gap::time_to(Real target) const {
   return acceleration > 0 ? (root - rate) / acceleration : kInfinity;
 }
 
+// The axis e of a round core turns with w' = w - (w.e) e, and w.e / |w| = c is constant, since the path turns
+// about a fixed axis. With s = |w'| / |w|, a point at distance 1 that turns with w' has at most the
+// centripetal acceleration s^2 w^2, the tangential one s |dw/dt| of the path and s |c| w^2 of the moving e.
+// Their sum is at most sqrt(2) s times the path's bound of |dw/dt| + w^2.
+CoreRotation core_rotation(const MovingConvex& solid, Real fraction) {
+  const PosePath& path = solid.path;
+  if (!path.turns() || solid.shape.core == Convex::Core::point) return {};
+  const CoreRotation all{path.angular_velocity(fraction), path.max_acceleration(1)};
+  if (!is_round(solid.shape)) return all;
+  const Vec3 axis = path.at(fraction).vector_to_world(Vec3::UnitY());
+  const Vec3 of_axis = all.velocity - all.velocity.dot(axis) * axis;
+  const Real factor = std::numbers::sqrt2 * of_axis.norm() / all.velocity.norm();
+  return factor < 1 ? CoreRotation{of_axis, factor * all.acceleration} : all;
+}
+
 Gap closing_gap(const MovingConvex& a, const MovingConvex& b, Real fraction, Real distance,
                 const Vec3& normal) {
   Gap gap{distance, normal.dot(b.path.velocity() - a.path.velocity()), 0};
-  // -n.(w x r) = r.(w x n) for the points of A, and n.(w x r) = r.(n x w) for those of B.
-  if (a.path.turns()) {
-    gap.rate +=
-        extent(a.shape, a.path.at(fraction).orientation, a.path.angular_velocity(fraction).cross(normal));
-    gap.acceleration += a.path.max_acceleration(a.shape.reach());
+  const CoreRotation turn_a = core_rotation(a, fraction), turn_b = core_rotation(b, fraction);
+  // -n.(w x r) = r.(w x n) for the points of A, and n.(w x r) = r.(n x w) for those of B. The radius around a
+  // core does not turn.
+  if (turn_a.acceleration > 0) {
+    gap.rate += extent(a.shape, a.path.at(fraction).orientation, turn_a.velocity.cross(normal));
+    gap.acceleration += core_reach(a.shape) * turn_a.acceleration;
   }
-  if (b.path.turns()) {
-    gap.rate +=
-        extent(b.shape, b.path.at(fraction).orientation, normal.cross(b.path.angular_velocity(fraction)));
-    gap.acceleration += b.path.max_acceleration(b.shape.reach());
+  if (turn_b.acceleration > 0) {
+    gap.rate += extent(b.shape, b.path.at(fraction).orientation, normal.cross(turn_b.velocity));
+    gap.acceleration += core_reach(b.shape) * turn_b.acceleration;
   }
   return gap;
 }
@@ -81,16 +108,16 @@ std::optional<Impact> time_of_impact(const MovingConvex& a, const MovingConvex& 
 // the opposite rotation. The relative acceleration seen from the plane has the Coriolis and centripetal terms
 // in addition.
 std::optional<Impact> time_of_plane_impact(const MovingConvex& a, const PosePath& plane, Real tolerance) {
-  const Real reach = a.shape.reach();
-  // The greatest distance of a point of the solid from the plane's origin occurs at one end of the motion.
+  const Real reach = core_reach(a.shape);
+  // The greatest distance of a point of the core from the plane's origin occurs at one end of the motion.
   const Real lever =
       reach + std::sqrt(std::max((a.path.start().position - plane.start().position).squaredNorm(),
                                  (a.path.end().position - plane.end().position).squaredNorm()));
   const Vec3 travel = a.path.velocity() - plane.velocity();
   const auto gap_at = [&](Real fraction, Separation& s) {
     const Pose pose = a.path.at(fraction), ground = plane.at(fraction);
-    const Vec3 up = ground.vector_to_world(Vec3::UnitY()), w = plane.angular_velocity(fraction),
-               spin = a.path.angular_velocity(fraction);
+    const Vec3 up = ground.vector_to_world(Vec3::UnitY()), w = plane.angular_velocity(fraction);
+    const CoreRotation turn = core_rotation(a, fraction);
     const Vec3 down = pose.vector_to_body(-up);
     uint32_t start = 0;
     const Vec3 deepest = a.shape.support(down, start) + a.shape.radius * down;
@@ -102,10 +129,10 @@ std::optional<Impact> time_of_plane_impact(const MovingConvex& a, const PosePath
     s.iterations = 1;
     const Vec3 turning = w.cross(up);
     Gap gap{s.distance, -up.dot(travel) - turning.dot(pose.position - ground.position), 0};
-    gap.rate += extent(a.shape, pose.orientation, spin.cross(up) - turning);
+    gap.rate += extent(a.shape, pose.orientation, turn.velocity.cross(up) - turning);
     const Real fastest = a.path.turns() ? std::sqrt(a.path.max_acceleration(1)) : 0,
                ground_fastest = plane.turns() ? std::sqrt(plane.max_acceleration(1)) : 0;
-    gap.acceleration = a.path.max_acceleration(reach) + plane.max_acceleration(lever) +
+    gap.acceleration = reach * turn.acceleration + plane.max_acceleration(lever) +
                        2 * ground_fastest * (travel.norm() + fastest * reach);
     return gap;
   };

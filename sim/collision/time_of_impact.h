@@ -39,6 +39,17 @@ std::optional<Impact> time_of_impact(const MovingConvex& a, const MovingConvex& 
 /// of the plane, in the solid's frame.
 std::optional<Impact> time_of_plane_impact(const MovingConvex& a, const PosePath& plane, Real tolerance);
 
+/// Rotation of a solid's core, as far as it moves the core as a whole.
+struct CoreRotation {
+  Vec3 velocity = Vec3::Zero();  ///< world [rad per step]
+  Real acceleration = 0;  ///< bound of the acceleration of a point at distance 1 from the origin [per step^2]
+};
+
+/// The rotation of a solid at a time of its motion. A round core is in the same place if it turns about its
+/// axis, so only the rotation of the axis counts: a wheel that rolls approaches the floor no faster than its
+/// axle. A point does not turn at all.
+CoreRotation core_rotation(const MovingConvex& solid, Real fraction);
+
 /// The distance of two solids at some time, and bounds of its decrease from there on.
 struct Gap {
   Real distance;      ///< [m]

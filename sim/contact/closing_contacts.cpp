@@ -6,11 +6,13 @@
 namespace offstage::sim {
 namespace {
 
-/// Greatest number of times at which contacts close, and cost of a solution [ns, see ProximalNewton::cost()].
-constexpr int kMostClosings = 8;
-constexpr Real kMostCost = 5e5;
-/// Smaller gaps are closed [m].
-constexpr Real kClosed = 1e-11;
+/// Greatest number of times at which contacts close.
+constexpr int kMostClosings = 16;
+/// Smaller gaps are closed [m]. Gaps that close this soon after another one close with it, as a fraction of
+/// the interval: the points of a wheel come to a seam together, apart from rounding.
+constexpr Real kClosed = 1e-11, kTogether = 1e-3;
+/// Contacts that approach more slowly need not be stopped [m/s].
+constexpr Real kStopped = 1e-9;
 /// Part of the kinetic energy that a solution may add by rounding.
 constexpr Real kClosingRounding = 1e-9;
 
@@ -29,26 +31,23 @@ Real closing_time(Real gap, Real first, Real last, Real rest) {
 /// State of the solution at a time of the interval.
 class Pieces {
  public:
-  Pieces(std::span<const ContactBody> start, std::span<const ContactBody> free,
-         std::span<const Contact> contacts, std::span<const ClosingPoint> points, Real duration,
-         ProximalNewton& newton)
-      : start_(start),
-        free_(free),
-        contacts_(contacts),
-        points_(points),
-        duration_(duration),
-        newton_(newton),
-        now_(start.begin(), start.end()) {
-    result_.contacts.assign(contacts.begin(), contacts.end());
+  Pieces(const ClosingProblem& problem, ProximalNewton& newton)
+      : problem_(problem), newton_(newton), now_(problem.start.begin(), problem.start.end()) {
+    result_.contacts.assign(problem.contacts.begin(), problem.contacts.end());
     for (Contact& c : result_.contacts) c.impulse = c.moment = Vec3::Zero();
-    result_.displacements.resize(start.size());
-    for (const ClosingPoint& p : points) gaps_.push_back(p.gap);
+    result_.bounded.assign(problem.joints.bounded.begin(), problem.joints.bounded.end());
+    for (BoundedRow& r : result_.bounded) r.impulse = 0;
+    result_.constraints.assign(problem.joints.impulses.size(), Vec6::Zero());
+    result_.displacements.resize(now_.size());
+    for (const ClosingPoint& p : problem.points) gaps_.push_back(p.gap);
+    for (const Contact& c : problem.contacts) guesses_.push_back(c.impulse);
+    closing_.resize(gaps_.size());
   }
 
   std::optional<ClosingSolution> solve() {
     for (int closings = 0; closings <= kMostClosings; ++closings) {
       if (!close() || !solve_rest()) return {};
-      const Real rest = duration_ - time_, closing = next_closing();
+      const Real rest = problem_.duration - time_, closing = next_closing();
       advance(std::min(closing, rest));
       if (closing >= rest) {
         result_.bodies = now_;
@@ -59,27 +58,55 @@ class Pieces {
   }
 
  private:
-  /// Solves the closed contacts in bodies_, whose velocities do not contain their impulses.
-  bool solve_closed(Real part, bool at_once) {
+  /// Solves the closed contacts and the joints in bodies_, whose velocities do not contain their impulses,
+  /// for the rest of the interval, or for the instant `now`.
+  bool solve_closed(bool now) {
+    const Real elapsed = time_ / problem_.duration;
     closed_.clear();
     rows_.clear();
-    for (uint32_t i = 0; i < contacts_.size(); ++i) {
+    for (uint32_t i = 0; i < problem_.contacts.size(); ++i) {
       if (gaps_[i] > 0) continue;
-      Contact c = contacts_[i];
-      c.bias = points_[i].bias_at(part);
-      c.offset = points_[i].surface + c.bias;
-      c.target = at_once || points_[i].gap > 0 ? 0 : c.target;
-      c.is_guessed = c.is_guessed && !at_once;
-      c.impulse = at_once ? Vec3(Vec3::Zero()) : Vec3((1 - time_ / duration_) * c.impulse);
+      Contact c = problem_.contacts[i];
+      c.bias = problem_.points[i].bias_at(now ? elapsed : 1);
+      c.offset = problem_.points[i].surface + c.bias;
+      c.target = now || problem_.points[i].gap > 0 ? 0 : c.target;
+      c.is_guessed = c.is_guessed && !now;
+      c.impulse = now ? Vec3(Vec3::Zero()) : Vec3((1 - elapsed) * guesses_[i]);
       closed_.push_back(c);
       rows_.push_back(i);
     }
+    bounded_.assign(problem_.joints.bounded.begin(), problem_.joints.bounded.end());
+    for (std::size_t k = 0; k < bounded_.size(); ++k) set_row(bounded_[k], result_.bounded[k].impulse, now);
+    reactions_.clear();
+    for (const Vec6& p : problem_.joints.impulses)
+      reactions_.push_back(now ? Vec6(Vec6::Zero()) : Vec6((1 - elapsed) * p));
     const std::vector<ContactBody> before = bodies_;
-    const std::optional<ContactWork> work = newton_.solve(bodies_, closed_, {}, kMostCost);
+    const std::optional<ContactWork> work = newton_.solve(
+        bodies_, closed_, {problem_.joints.constraints, bounded_, reactions_}, problem_.budget - cost_);
     if (!work || work->fallbacks > 0) return false;
+    cost_ += newton_.cost();
     result_.work.add(*work);
-    return at_once ? added_energy(before, bodies_, closed_) <= kClosingRounding * kinetic_energy(before)
-                   : true;
+    return now ? added_energy(before, bodies_, closed_) <= kClosingRounding * kinetic_energy(before) : true;
+  }
+  /// A row over the rest of the interval, after its impulse `before`, or at the instant `now`. At an instant,
+  /// motors and friction of limited strength and springs do nothing, and a motor of any strength keeps its
+  /// speed.
+  void set_row(BoundedRow& row, Real before, bool now) const {
+    const Real rest = 1 - time_ / problem_.duration;
+    row.impulse *= now ? 0 : rest;
+    row.lower *= rest;
+    row.upper *= rest;
+    row.target -= row.softness * before;
+    if (!now) return;
+    if (row.softness > 0 || std::isfinite(row.lower)) row.lower = row.upper = 0;
+    row.target = row.offset + row_speed(row, bodies_);
+  }
+  static Real row_speed(const BoundedRow& row, std::span<const ContactBody> bodies) {
+    Real u = 0;
+    for (const auto& [body, on] : {std::pair(row.a, &row.on_a), std::pair(row.b, &row.on_b)})
+      if (body != kUnmoved)
+        u += on->head<3>().dot(bodies[body].velocity) + on->tail<3>().dot(bodies[body].angular_velocity);
+    return u;
   }
   /// Adds a part of the impulses of the last solution.
   void add_impulses(Real part) {
@@ -87,33 +114,42 @@ class Pieces {
       result_.contacts[rows_[k]].impulse += part * closed_[k].impulse;
       result_.contacts[rows_[k]].moment += part * closed_[k].moment;
     }
+    for (std::size_t k = 0; k < bounded_.size(); ++k)
+      result_.bounded[k].impulse += part * bounded_[k].impulse;
+    for (std::size_t k = 0; k < reactions_.size(); ++k) result_.constraints[k] += part * reactions_[k];
   }
   /// Solves from now to the end of the interval with the contacts that are closed.
   bool solve_rest() {
-    const Real part = 1 - time_ / duration_;
+    const Real part = 1 - time_ / problem_.duration;
     bodies_ = now_;
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
-      bodies_[i].velocity += part * (free_[i].velocity - start_[i].velocity);
-      bodies_[i].angular_velocity += part * (free_[i].angular_velocity - start_[i].angular_velocity);
+      bodies_[i].velocity += part * (problem_.free[i].velocity - problem_.start[i].velocity);
+      bodies_[i].angular_velocity +=
+          part * (problem_.free[i].angular_velocity - problem_.start[i].angular_velocity);
     }
-    return solve_closed(1, false);
+    if (!solve_closed(false)) return false;
+    for (std::size_t k = 0; k < rows_.size(); ++k) guesses_[rows_[k]] = closed_[k].impulse / part;
+    return true;
   }
   Real speed(uint32_t i, std::span<const ContactBody> bodies) const {
-    const Contact& c = contacts_[i];
+    const Contact& c = problem_.contacts[i];
     return c.frame.n.dot(bodies[c.a].velocity_at(c.arm_a) - bodies[c.b].velocity_at(c.arm_b)) +
-           points_[i].surface.x();
+           problem_.points[i].surface.x();
   }
-  Real next_closing() const {
-    const Real rest = duration_ - time_;
+  /// Time until the next contact closes, which is beyond the end if none does.
+  Real next_closing() {
+    const Real rest = problem_.duration - time_;
     Real next = 2 * rest;
-    for (uint32_t i = 0; i < contacts_.size(); ++i)
-      if (gaps_[i] > 0)
-        next = std::min(next, closing_time(gaps_[i], speed(i, now_), speed(i, bodies_), rest));
+    for (uint32_t i = 0; i < gaps_.size(); ++i) {
+      if (gaps_[i] == 0) continue;
+      closing_[i] = closing_time(gaps_[i], speed(i, now_), speed(i, bodies_), rest);
+      next = std::min(next, closing_[i]);
+    }
     return next;
   }
   /// Moves by a time, with velocities that change at a constant rate to those of bodies_.
   void advance(Real duration) {
-    const Real part = duration / (duration_ - time_);
+    const Real part = duration / (problem_.duration - time_);
     add_impulses(part);
     std::vector<ContactBody> next = now_;
     for (std::size_t i = 0; i < now_.size(); ++i) {
@@ -123,44 +159,47 @@ class Pieces {
       d.shift += duration / 2 * (now_[i].velocity + next[i].velocity);
       d.turn += duration / 2 * (now_[i].angular_velocity + next[i].angular_velocity);
     }
-    for (uint32_t i = 0; i < contacts_.size(); ++i)
-      if (gaps_[i] > 0) {
-        gaps_[i] += duration / 2 * (speed(i, now_) + speed(i, next));
-        if (gaps_[i] <= kClosed) gaps_[i] = 0;
-      }
+    for (uint32_t i = 0; i < gaps_.size(); ++i) {
+      if (gaps_[i] == 0) continue;
+      gaps_[i] += duration / 2 * (speed(i, now_) + speed(i, next));
+      if (gaps_[i] <= kClosed || closing_[i] <= duration + kTogether * problem_.duration) gaps_[i] = 0;
+    }
     now_ = std::move(next);
     time_ += duration;
   }
   /// Stops the approach of the closed contacts.
   bool close() {
+    const Real elapsed = time_ / problem_.duration;
+    bool approaches = false;
+    for (uint32_t i = 0; i < gaps_.size(); ++i)
+      approaches = approaches ||
+                   (gaps_[i] == 0 && speed(i, now_) + problem_.points[i].bias_at(elapsed).x() < -kStopped);
+    if (!approaches) return true;
     bodies_ = now_;
-    if (!solve_closed(time_ / duration_, true)) return false;
+    if (!solve_closed(true)) return false;
     add_impulses(1);
     now_ = bodies_;
     return true;
   }
 
-  const std::span<const ContactBody> start_, free_;
-  const std::span<const Contact> contacts_;
-  const std::span<const ClosingPoint> points_;
-  const Real duration_;
+  const ClosingProblem& problem_;
   ProximalNewton& newton_;
   ClosingSolution result_;
-  Real time_ = 0;
-  std::vector<Real> gaps_;                 // now; 0: closed
+  Real time_ = 0, cost_ = 0;
+  std::vector<Real> gaps_, closing_;       // of each contact: now, 0 if closed; and the time until it closes
+  std::vector<Vec3> guesses_;              // impulse of each contact in the whole interval
   std::vector<ContactBody> now_, bodies_;  // velocities now, and at the end of the interval
+  // The last solution; rows_ has the index of each contact.
   std::vector<Contact> closed_;
-  std::vector<uint32_t> rows_;  // index of each of them
+  std::vector<uint32_t> rows_;
+  std::vector<BoundedRow> bounded_;
+  std::vector<Vec6> reactions_;
 };
 
 }  // namespace
 
-std::optional<ClosingSolution> solve_closing(std::span<const ContactBody> start,
-                                             std::span<const ContactBody> free,
-                                             std::span<const Contact> contacts,
-                                             std::span<const ClosingPoint> points, Real duration,
-                                             ProximalNewton& newton) {
-  return Pieces(start, free, contacts, points, duration, newton).solve();
+std::optional<ClosingSolution> solve_closing(const ClosingProblem& problem, ProximalNewton& newton) {
+  return Pieces(problem, newton).solve();
 }
 
 }  // namespace offstage::sim

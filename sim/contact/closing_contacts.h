@@ -31,20 +31,31 @@ struct Displacement {
 };
 
 struct ClosingSolution {
-  std::vector<ContactBody> bodies;          ///< velocities at the end
-  std::vector<Contact> contacts;            ///< with their impulses of the whole interval
+  std::vector<ContactBody> bodies;  ///< velocities at the end
+  // With their impulses of the whole interval:
+  std::vector<Contact> contacts;
+  std::vector<BoundedRow> bounded;
+  std::vector<Vec6> constraints;            ///< impulses of the joints' constraints
   std::vector<Displacement> displacements;  ///< of the bodies
   ContactWork work;
 };
 
-/// Solves an interval of length `duration` [s]. `start` has the velocities at its start and `free` those at
-/// its end without contacts; `contacts` have the targets of points that touch, and guesses of their impulses
-/// over the interval. Points with a gap push from the time on at which it closes, without rebound. There is
-/// no result if they close at more than eight times, or if a solution fails, costs too much or adds energy.
-std::optional<ClosingSolution> solve_closing(std::span<const ContactBody> start,
-                                             std::span<const ContactBody> free,
-                                             std::span<const Contact> contacts,
-                                             std::span<const ClosingPoint> points, Real duration,
-                                             ProximalNewton& newton);
+/// An interval of length `duration` [s].
+struct ClosingProblem {
+  std::span<const ContactBody> start;  ///< velocities at its start
+  std::span<const ContactBody> free;   ///< and at its end, without contacts and bounded rows
+  /// With the targets of points that touch, and guesses of their impulses over the interval.
+  std::span<const Contact> contacts;
+  std::span<const ClosingPoint> points;  ///< of the contacts
+  /// Impulses are guesses. Rows that act only in a part of the interval, as limits do, are not accepted.
+  JointProblem joints;
+  Real duration;
+  Real budget;  ///< greatest cost of the solution [ns, see ProximalNewton::cost()]
+};
+
+/// Solves an interval in pieces. Points with a gap push from the time on at which it closes, without rebound.
+/// There is no result if they close at more than eight times, or if a solution fails or adds energy, or if
+/// all together cost too much.
+std::optional<ClosingSolution> solve_closing(const ClosingProblem& problem, ProximalNewton& newton);
 
 }  // namespace offstage::sim

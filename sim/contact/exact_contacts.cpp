@@ -17,9 +17,14 @@ namespace {
 constexpr Real kPushOut = 0.2, kFastestPush = 0.5;
 /// Points that approach faster than this have closed in the interval, not before [m/s].
 constexpr Real kClosing = 1e-3;
-/// Points of a body that touches only unmoved bodies, and approaches them at a distance faster than this,
-/// close later in the interval, however near they are [m/s].
+/// Points that approach at a distance faster than this close later in the interval, however near they are, if
+/// it may be divided [m/s].
 constexpr Real kApproaching = 1e-4;
+/// The intervals of islands with more bodies are not divided: they are heaps, for which it would cost more
+/// than the solution.
+constexpr std::size_t kMostDivided = 6;
+/// Greatest cost of a solution and its division [ns, see ProximalNewton::cost()].
+constexpr Real kMostDivision = 2e6;
 /// Uncertainty of the approach of a resting contact, as a fraction of the normal velocity due to rotation in
 /// half an interval.
 constexpr Real kTurningShare = 0.5;
@@ -54,11 +59,11 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
     add_body(*body, interval);
   }
   points_.clear();
-  displacement_.reset();
-  is_alone_ = island.bodies.size() == 1 && island.articulations.empty();
-  for (ContactPair* pair : island.pairs) add_points(*pair, interval);
+  displacements_.clear();
   const Island* const one[] = {&island};
   joints_.collect(one, interval);
+  may_divide_ = island.bodies.size() <= kMostDivided && joints_.act_throughout();
+  for (ContactPair* pair : island.pairs) add_points(*pair, interval);
   if (contacts_.empty() && joints_.bounded().empty()) return {.is_applied = true, .work = {}};
 
   free_ = bodies_;
@@ -75,7 +80,7 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
     if (outcome.work.fallbacks > 0)
       if (const auto worst = worst_contact(bodies_, contacts_)) outcome.rough = pairs_[*worst];
     if (!outcome.is_applied) return outcome;
-    if (has_closing()) divide_at_closings(*island.bodies.front(), interval, outcome.work);
+    if (has_closing()) divide_at_closings(island, interval, std::min(2 * budget, kMostDivision) - cost_, outcome.work);
   }
   joints_.store_impulses(interval.duration);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
@@ -135,34 +140,44 @@ bool ExactContacts::is_safe(const ContactWork& work) const {
   return energy <= kTermsShare * kinetic + mass * push * push / 2;
 }
 
-/// Whether a contact that approached pushes, while a contact touches from the interval's start on.
+/// Whether an unmoved body is touched from the interval's start on, and a contact with one that approached
+/// pushes. Bodies that are carried by other moving bodies lose little by one solution.
 bool ExactContacts::has_closing() const {
   bool touches = false, closes = false;
   for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Contact& c = contacts_[i];
+    if (bodies_[c.a].is_moved() && bodies_[c.b].is_moved()) continue;
     touches = touches || points_[i].gap == 0;
-    closes = closes || (contacts_[i].impulse.x() > 0 && (points_[i].gap > 0 || approach_[i] > kApproaching));
+    closes = closes || (c.impulse.x() > 0 && (points_[i].gap > 0 || approach_[i] > kApproaching));
   }
   return touches && closes;
 }
 
 /// Replaces the solution by one that is divided at the times at which contacts close, if that is safe.
-void ExactContacts::divide_at_closings(const Body& body, const ContactInterval& interval, ContactWork& work) {
+void ExactContacts::divide_at_closings(const Island& island, const ContactInterval& interval, Real budget,
+                                       ContactWork& work) {
   std::vector<ContactBody> start = free_;
-  start[body.row].velocity = body.start_twist.velocity;
-  start[body.row].angular_velocity = body.start_twist.angular_velocity;
+  for (const Body* body : island.bodies) {
+    start[body->row].velocity = body->start_twist.velocity;
+    start[body->row].angular_velocity = body->start_twist.angular_velocity;
+  }
   std::vector<Contact> guesses = contacts_;
-  for (std::size_t i = 0; i < guesses.size(); ++i) guesses[i].impulse = interval.duration * forces_[i]->last;
+  for (std::size_t i = 0; i < guesses.size(); ++i)
+    if (guesses[i].is_guessed) guesses[i].impulse = interval.duration * forces_[i]->last;
+  const JointProblem joints = joints_.problem();
   std::optional<ClosingSolution> solution =
-      solve_closing(start, free_, guesses, points_, interval.duration, newton_);
+      solve_closing({start, free_, guesses, points_, joints, interval.duration, budget}, newton_);
   if (!solution) return;
   const auto exchange = [&] {
     std::swap(bodies_, solution->bodies);
     std::swap(contacts_, solution->contacts);
+    std::swap_ranges(joints.bounded.begin(), joints.bounded.end(), solution->bounded.begin());
+    std::swap_ranges(joints.impulses.begin(), joints.impulses.end(), solution->constraints.begin());
   };
   exchange();
   if (!is_safe(solution->work)) return exchange();
   work.add(solution->work);
-  displacement_ = solution->displacements[body.row];
+  displacements_ = std::move(solution->displacements);
 }
 
 uint32_t ExactContacts::add_body(Body& body, const ContactInterval& interval) {
@@ -190,7 +205,7 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
                                                   point.separation, h, interval.substep);
       // The approach of a rotating contact differs slightly from the prediction of its rotation.
       const Real approach = std::max(0.0, std::abs(u.x()) - kTurningShare * std::abs(motion.gain.x()));
-      const bool closes_later = is_alone_ && point.separation > 0 && u.x() < 0 && approach > kApproaching;
+      const bool closes_later = may_divide_ && point.separation > 0 && u.x() < 0 && approach > kApproaching;
       const bool touches = point.separation <= kTouching && !closes_later;
       Contact c{.a = a, .b = b, .frame = motion.frame};
       c.arm_a = motion.middle.arm_a;
@@ -211,7 +226,7 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       pairs_.push_back(&pair);
       forces_.push_back(&m.forces[k]);
       approach_.push_back(approach);
-      if (is_alone_)
+      if (may_divide_)
         points_.push_back(
             closing_point(touches ? 0 : point.separation, in_frame(c.frame, surface), motion,
                           motion.turns ? Vec3(Vec3::Zero()) : velocity_bias(pair, m, point, h)));
@@ -245,10 +260,10 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
       mean = (dv + bodies_[i].velocity - body.start_twist.velocity) / 2;
       mean_spin = (dw + bodies_[i].angular_velocity - body.start_twist.angular_velocity) / 2;
     }
-    if (displacement_) {
-      mean = displacement_->shift / duration - (body.start_twist.velocity + free_[i].velocity) / 2;
-      mean_spin = displacement_->turn / duration -
-                  (body.start_twist.angular_velocity + free_[i].angular_velocity) / 2;
+    if (!displacements_.empty()) {
+      const auto& [shift, turn] = displacements_[i];
+      mean = shift / duration - (body.start_twist.velocity + free_[i].velocity) / 2;
+      mean_spin = turn / duration - (body.start_twist.angular_velocity + free_[i].angular_velocity) / 2;
     }
     add_effect(body, {body.rigid.mass * dv,
                       body.rigid.spin_momentum(body.impulse_orientation(duration, interval.substep), dw), dw,

@@ -1,7 +1,6 @@
 #pragma once
 /// Solution of the contacts of one island by the exact solver (physics R8, R9, N11).
 
-#include <optional>
 #include <vector>
 
 #include "sim/contact/closing_contacts.h"
@@ -32,8 +31,7 @@ class ExactContacts {
   /// energy; otherwise the fast solver, whose work is bounded, must solve the island.
   Outcome solve(const Island& island, const ContactInterval& interval, Real budget,
                 Method method = Method::proximal);
-  /// Cost of the last solve() [ns], without that of a division at the times at which contacts close, which is
-  /// small.
+  /// Cost of the last solve() [ns], without that of a division at the times at which contacts close.
   Real cost() const { return cost_; }
 
  private:
@@ -41,7 +39,8 @@ class ExactContacts {
   void add_points(ContactPair& pair, const ContactInterval& interval);
   bool solve_lcp(ContactWork& work);
   bool has_closing() const;
-  void divide_at_closings(const Body& body, const ContactInterval& interval, ContactWork& work);
+  void divide_at_closings(const Island& island, const ContactInterval& interval, Real budget,
+                          ContactWork& work);
   bool is_safe(const ContactWork& work) const;
   void move_bodies(const Island& island, const ContactInterval& interval);
   void close_stops();
@@ -56,9 +55,9 @@ class ExactContacts {
   std::vector<Real> approach_;
   std::vector<uint8_t> closing_;  // by body: whether a contact of it closed in the interval
   std::vector<Real> rest_;        // by body: fraction of the interval in which it has its change of velocity
-  bool is_alone_ = false;         // whether a single body touches unmoved ones only, without joints
-  std::vector<ClosingPoint> points_;          // of each contact
-  std::optional<Displacement> displacement_;  // of the single body, if the interval was divided
+  bool may_divide_ = false;       // whether the interval of the island may be divided
+  std::vector<ClosingPoint> points_;         // of each contact
+  std::vector<Displacement> displacements_;  // of the bodies, if the interval was divided
   Real cost_ = 0;
   IslandJoints joints_;
   ProximalNewton newton_;

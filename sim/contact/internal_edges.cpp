@@ -65,33 +65,40 @@ bool lies_on_lines(const Shape& shape) {
          std::holds_alternative<Cone>(shape) || std::holds_alternative<Frustum>(shape);
 }
 
-/// A manifold seen from body X, which it shares with other manifolds; Y is the other body.
+/// A manifold seen from body X, which it shares with other manifolds; Y is the other body. What the
+/// comparisons of all views with each other use is stored.
 struct View {
+  View(ContactPair& of, uint32_t i, bool is_speculative, const Manifold& manifold, bool x_is_first)
+      : pair(&of),
+        m(&manifold),
+        index(i),
+        x_piece(x_is_first ? m->piece_a : m->piece_b),
+        y_piece(x_is_first ? m->piece_b : m->piece_a),
+        x_is_a(x_is_first),
+        speculative(is_speculative),
+        normal(x_is_first ? m->normal : Vec3(-m->normal)) {
+    for (uint32_t k = 1; k < m->count; ++k)
+      if (m->points[k].separation < m->points[deepest].separation) deepest = k;
+  }
+
   ContactPair* pair;
-  uint32_t index;
-  bool x_is_a, speculative;
   const Manifold* m;
+  uint32_t index, x_piece, y_piece, deepest = 0;
+  bool x_is_a, speculative;
+  Vec3 normal;  ///< towards X
 
   Body& x() const { return x_is_a ? pair->a() : pair->b(); }
   Body& y() const { return x_is_a ? pair->b() : pair->a(); }
-  uint32_t x_piece() const { return x_is_a ? m->piece_a : m->piece_b; }
-  uint32_t y_piece() const { return x_is_a ? m->piece_b : m->piece_a; }
-  Vec3 normal() const { return x_is_a ? m->normal : Vec3(-m->normal); }  ///< towards X
   const Vec3& on_y(uint32_t k) const { return x_is_a ? m->points[k].on_b : m->points[k].on_a; }
   const Vec3& on_x(uint32_t k) const { return x_is_a ? m->points[k].on_a : m->points[k].on_b; }
+  Real separation() const { return m->points[deepest].separation; }
   /// The piece of Y at a point.
   uint32_t piece_at(uint32_t k) const {
-    return y().collision_shape().is_plane() || !y().collision_shape().surface() ? y_piece()
+    return y().collision_shape().is_plane() || !y().collision_shape().surface() ? y_piece
                                                                                 : m->points[k].piece;
   }
   bool continues() const { return x_is_a ? m->continues_b : m->continues_a; }
   bool is_face() const { return m->source == (x_is_a ? NormalSource::face_of_b : NormalSource::face_of_a); }
-  uint32_t deepest() const {
-    uint32_t best = 0;
-    for (uint32_t k = 1; k < m->count; ++k)
-      if (m->points[k].separation < m->points[best].separation) best = k;
-    return best;
-  }
   /// An internal edge is a line, or a point on a line.
   bool may_be_at_internal_edge() const {
     if (continues() || y().collision_shape().is_plane() || !is_narrow(*m)) return false;
@@ -114,13 +121,13 @@ class BodyContacts {
     for (ContactPair* pair : pairs) {
       const std::vector<PlacedManifold>& all = pair->manifolds();
       const std::size_t found = all.size() - pair->speculative;
-      for (std::size_t i = 0; i < all.size(); ++i) {
-        const bool speculative = i >= found;
-        views_.push_back({pair, static_cast<uint32_t>(i), &pair->a() == &x, speculative,
-                          speculative ? &pair->at_end(i - found) : &all[i].manifold});
-      }
+      for (std::size_t i = 0; i < all.size(); ++i)
+        views_.emplace_back(*pair, static_cast<uint32_t>(i), i >= found,
+                            i >= found ? pair->at_end(i - found) : all[i].manifold, &pair->a() == &x);
     }
     flush_ = std::min(kFlush, kFlushFraction * x.extent);
+    for (const View& v : views_)
+      if (!v.speculative && v.is_face() && v.separation() <= flush_) faces_.push_back(&v);
   }
 
   std::vector<Verdict> judge() const {
@@ -136,11 +143,11 @@ class BodyContacts {
         verdicts.push_back({views_[i].pair, views_[i].index, {}});
         continue;
       }
-      const auto face = std::find_if(views_.begin(), views_.end(),
-                                     [&](const View& other) { return keeps_apart(other, views_[i]); });
-      if (face != views_.end()) {
+      const auto face = std::find_if(faces_.begin(), faces_.end(),
+                                     [&](const View* f) { return keeps_apart(*f, views_[i]); });
+      if (face != faces_.end()) {
         verdicts.push_back({views_[i].pair, views_[i].index, {}});
-        if (!views_[i].speculative) verdicts.back().instead = upright(views_[i], *face);
+        if (!views_[i].speculative) verdicts.back().instead = upright(views_[i], **face);
         continue;
       }
       if (!views_[i].may_be_at_internal_edge()) continue;
@@ -158,7 +165,7 @@ class BodyContacts {
       last = contact;
       const View& v = views_[contact];
       verdicts.push_back({v.pair, v.index, {}});
-      if (normal != views_[by].normal() && !v.speculative)
+      if (normal != views_[by].normal && !v.speculative)
         verdicts.back().instead = on_slope(v, views_[by], normal);
     }
     return verdicts;
@@ -192,18 +199,17 @@ class BodyContacts {
   }
 
   bool predicts(const View& known, const View& v, uint32_t k) const {
-    const Vec3 up = known.normal();
-    if (known.x_piece() != v.x_piece() || v.normal().dot(up) < kGoesOn) return false;
+    const Vec3 up = known.normal;
+    if (known.x_piece != v.x_piece || v.normal.dot(up) < kGoesOn) return false;
     const Body& y = known.y();
-    const Vec3 at_end =
-        pose(y, true).point_to_world(pose(y, false).point_to_body(known.on_y(known.deepest())));
+    const Vec3 at_end = pose(y, true).point_to_world(pose(y, false).point_to_body(known.on_y(known.deepest)));
     if (up.dot(v.on_y(k) - at_end) > flush_) return false;
     // The tiles divide the line on which X lies differently at the end.
     const bool between = known.pair != v.pair || lies_on_lines(x_.def.shape);
     ContactPoint point = v.m->points[k];
     if (known.x_is_a != v.x_is_a) std::swap(point.on_a, point.on_b);
     return known.pair->predicts(known.pair->manifolds()[known.index],
-                                known.x_is_a ? v.normal() : Vec3(-v.normal()), point, h_ - time_, between);
+                                known.x_is_a ? v.normal : Vec3(-v.normal), point, h_ - time_, between);
   }
 
   /// The point of a piece that is farthest in a direction.
@@ -218,37 +224,35 @@ class BodyContacts {
   /// the face: the contact and the lowest point of X approach faster than the point on the face. The lowest
   /// point of a body that slides, rolls or lands does not.
   bool tips_into(const View& v, const View& face) const {
-    const Vec3 up = face.normal();
+    const Vec3 up = face.normal;
     const auto speed = [&](const View& to, const Vec3& place) {
       return (to.x_is_a ? 1 : -1) * up.dot(to.pair->relative_velocity(place));
     };
-    const Real tips = speed(face, face.on_y(face.deepest())) - flush_ / (h_ - time_);
-    return speed(v, v.on_y(v.deepest())) < tips &&
-           speed(v, farthest(v.x(), v.x_piece(), pose(x_, false), -up)) < tips;
+    const Real tips = speed(face, face.on_y(face.deepest)) - flush_ / (h_ - time_);
+    return speed(v, v.on_y(v.deepest)) < tips &&
+           speed(v, farthest(v.x(), v.x_piece, pose(x_, false), -up)) < tips;
   }
 
   /// Returns a new normal for a contact that is level with or below a face on which the same piece lies, if
   /// the surface at the contact, seen from above the face, does not have the contact's normal. It is the
   /// surface's own normal, or that of the face if the surface only continues the face.
   std::optional<Vec3> normal_instead(const View& v, const View& face) const {
-    const Vec3 n = v.normal(), up = face.normal();
-    if (v.x_piece() != face.x_piece() || n.dot(up) > kSameDirection) return std::nullopt;
+    const Vec3 n = v.normal, up = face.normal;
+    if (v.x_piece != face.x_piece || n.dot(up) > kSameDirection) return std::nullopt;
     // Two convex pieces have no internal edge between them: all their contacts are valid.
-    if (v.pair == face.pair && v.y_piece() == face.y_piece()) return std::nullopt;
-    if (tips_into(v, face)) return std::nullopt;
-    const uint32_t deepest = face.deepest();
-    const Vec3& on_face = face.on_y(deepest);
+    if (v.pair == face.pair && v.y_piece == face.y_piece) return std::nullopt;
+    const Vec3& on_face = face.on_y(face.deepest);
     const Real clipped = kClipped * x_.extent;
-    Real low = std::min(0.0, face.m->points[deepest].separation) - flush_ - clipped;
+    Real low = std::min(0.0, face.separation()) - flush_ - clipped;
     const Real moved = v.speculative ? std::abs(up.dot(x_.pose.position - x_.start_pose.position)) : 0;
     low -= moved;
     // A surface that is flush with a face is not nearer to X than the face. A contact that is nearer is
     // beside the face.
-    if (v.m->points[v.deepest()].separation < face.m->points[deepest].separation - flush_ - clipped - moved)
-      return std::nullopt;
+    if (v.separation() < face.separation() - flush_ - clipped - moved) return std::nullopt;
     for (uint32_t k = 0; k < v.m->count; ++k)
       if (const Real height = up.dot(v.on_y(k) - on_face); height < low || height > flush_ + clipped)
         return std::nullopt;
+    if (tips_into(v, face)) return std::nullopt;
     Vec3 top = on_surface(v, 0);
     uint32_t top_piece = v.piece_at(0);
     for (uint32_t k = 0; k < v.m->count; ++k) {
@@ -274,20 +278,19 @@ class BodyContacts {
   /// the other piece is nowhere lower than the point that lies on the face, and Y's piece is nowhere above
   /// the plane of the face.
   bool keeps_apart(const View& face, const View& v) const {
-    if (face.speculative || !face.is_face() || face.x_piece() == v.x_piece() ||
-        v.normal().dot(face.normal()) > kGoesOn || v.y().collision_shape().is_plane())
+    if (face.x_piece == v.x_piece || v.normal.dot(face.normal) > kGoesOn ||
+        v.y().collision_shape().is_plane())
       return false;
-    const uint32_t deepest = face.deepest();
-    const auto height = [&](const Vec3& place) { return face.normal().dot(place - face.on_y(deepest)); };
-    if (face.m->points[deepest].separation > flush_ || height(v.on_x(0)) < -flush_) return false;
-    const Vec3 up = pose(face.y(), false).vector_to_body(face.normal()),
+    const uint32_t deepest = face.deepest;
+    if (face.normal.dot(v.on_x(0) - face.on_y(deepest)) < -flush_) return false;
+    const Vec3 up = pose(face.y(), false).vector_to_body(face.normal),
                on_face = pose(face.y(), false).point_to_body(face.on_y(deepest)),
                lying = pose(x_, false).point_to_body(face.on_x(deepest));
     return std::all_of(std::begin(kBothEnds), std::end(kBothEnds), [&](bool at_end) {
       const Pose below = pose(face.y(), at_end), x = pose(x_, at_end), y = pose(v.y(), at_end);
       const Vec3 n = below.vector_to_world(up);
-      return n.dot(farthest(v.y(), v.y_piece(), y, n) - below.point_to_world(on_face)) <= flush_ &&
-             n.dot(farthest(v.x(), v.x_piece(), x, -n) - x.point_to_world(lying)) >= -flush_;
+      return n.dot(farthest(v.y(), v.y_piece, y, n) - below.point_to_world(on_face)) <= flush_ &&
+             n.dot(farthest(v.x(), v.x_piece, x, -n) - x.point_to_world(lying)) >= -flush_;
     });
   }
 
@@ -305,10 +308,10 @@ class BodyContacts {
   /// The contact with the normal of a face that keeps_apart(). It still holds a leg that stands on the edge
   /// of something as high as the face; points below the face are out of reach.
   Manifold upright(const View& v, const View& face) const {
-    const Vec3 up = face.normal();
+    const Vec3 up = face.normal;
     Manifold m = without_points(v, up);
     for (uint32_t k = 0; k < v.m->count; ++k) {
-      const Real height = up.dot(v.on_y(k) - face.on_y(face.deepest()));
+      const Real height = up.dot(v.on_y(k) - face.on_y(face.deepest));
       if (height < -flush_) continue;
       ContactPoint point = v.m->points[k];
       point.separation = up.dot(v.on_x(k) - v.on_y(k)) + std::max(0.0, height);
@@ -334,7 +337,7 @@ class BodyContacts {
   }
 
   /// Distance of a place in the world from a piece of Y, the one of the contact by default.
-  SurfaceDistance distance(const View& v, const Vec3& place) const { return distance(v, v.y_piece(), place); }
+  SurfaceDistance distance(const View& v, const Vec3& place) const { return distance(v, v.y_piece, place); }
   SurfaceDistance distance(const View& v, uint32_t piece, const Vec3& place) const {
     const Pose y = pose(v.y(), v.speculative);
     SurfaceDistance d = piece_distance(v.y().collision_shape(), piece, y.point_to_body(place));
@@ -347,7 +350,7 @@ class BodyContacts {
   bool is_flat(const View& v, const Vec3& over, const Vec3& up, const Vec3& along) const {
     const CollisionShape& shape = v.y().collision_shape();
     const bool is_triangle =
-        !shape.is_plane() && shape.solid().mesh && shape.piece(v.y_piece()).core == Convex::Core::triangle;
+        !shape.is_plane() && shape.solid().mesh && shape.piece(v.y_piece).core == Convex::Core::triangle;
     if (is_triangle) return true;  // its neighbours continue it
     const Vec3 aside = kLookBeside * flush_ * along;
     return distance(v, over - aside).normal.dot(up) > kGoesOn ||
@@ -356,26 +359,24 @@ class BodyContacts {
 
   /// The contact of X's piece with the slope that begins at a contact.
   Manifold on_slope(const View& v, const View& face, const Vec3& normal) const {
-    const Pose plane{highest(v, face.normal()), rotation_between(Vec3::UnitY(), normal)};
+    const Pose plane{highest(v, face.normal), rotation_between(Vec3::UnitY(), normal)};
     const Pose x = pose(v.x(), false), y = pose(v.y(), false);
     const Pose plane_from_x{plane.point_to_body(x.position), plane.orientation.conjugate() * x.orientation};
-    const Real margin = std::max(0.0, v.m->points[v.deepest()].separation) + kSlopeMargin;
+    const Real margin = std::max(0.0, v.separation()) + kSlopeMargin;
     const Manifold on_plane =
-        placed(plane_manifold(v.x().collision_shape().piece(v.x_piece()), plane_from_x, margin), plane);
+        placed(plane_manifold(v.x().collision_shape().piece(v.x_piece), plane_from_x, margin), plane);
     Manifold m = without_points(v, normal);
     // The piece stands on the face, not in the slope. If it were deeper, the slope would be the corner of a
     // flush object.
-    const Real least =
-        std::min({0.0, v.m->points[v.deepest()].separation, face.m->points[face.deepest()].separation}) -
-        flush_;
+    const Real least = std::min({0.0, v.separation(), face.separation()}) - flush_;
     const auto add = [&](const ContactPoint& p) {
       const auto& [on_a, on_b] = v.x_is_a ? std::tie(p.on_a, p.on_b) : std::tie(p.on_b, p.on_a);
-      m.points[m.count++] = {on_a, on_b, p.separation, p.id, v.y_piece()};
+      m.points[m.count++] = {on_a, on_b, p.separation, p.id, v.y_piece};
     };
     for (uint32_t k = 0; k < on_plane.count; ++k) {
       const ContactPoint& p = on_plane.points[k];
       if (p.separation < least) return {};
-      if (piece_distance(v.y().collision_shape(), v.y_piece(), y.point_to_body(p.on_b)).distance <= margin)
+      if (piece_distance(v.y().collision_shape(), v.y_piece, y.point_to_body(p.on_b)).distance <= margin)
         add(p);
     }
     if (m.count > 0) return m;
@@ -391,6 +392,7 @@ class BodyContacts {
   const Body& x_;
   Real time_, h_, flush_;
   std::vector<View> views_;
+  std::vector<const View*> faces_;  // of Y, on which X lies
 };
 
 /// The pairs of one body.
@@ -399,37 +401,36 @@ struct Group {
   std::vector<ContactPair*> pairs;
 };
 
-/// Returns groups for the movable bodies that have a contact that may be at an internal edge; and, one by
-/// one, the pairs of immovable bodies with bodies of several pieces.
+/// Returns groups for the movable bodies that have a contact that may be at an internal edge, in the order of
+/// their slots; and before them, one by one, the pairs of immovable bodies with bodies of several pieces.
 std::vector<Group> groups_with_internal_edges(std::span<ContactPair* const> pairs) {
+  constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
   std::vector<Group> groups;
-  std::vector<std::pair<Body*, std::size_t>> numbers;  // by slot
-  const auto group_of = [&](Body& x) -> std::size_t {
-    const auto at =
-        std::lower_bound(numbers.begin(), numbers.end(), x.handle.index,
-                         [](const auto& e, uint32_t slot) { return e.first->handle.index < slot; });
-    return at != numbers.end() && at->first == &x ? at->second : groups.size();
-  };
+  std::vector<std::size_t> group_of;  // by slot
   std::vector<Body*> bodies;
+  for (ContactPair* pair : pairs)
+    for (const Body* x : {&pair->a(), &pair->b()})
+      if (x->handle.index >= group_of.size()) group_of.resize(x->handle.index + 1, kNone);
   for (ContactPair* pair : pairs) {
     if (!pair->has_narrow()) continue;
     for (const auto& [x, y] : {std::pair(&pair->a(), &pair->b()), std::pair(&pair->b(), &pair->a())}) {
-      if (x->is_awake() || x->is_kinematic())
-        bodies.push_back(x);
-      else if (y->collision_shape().piece_count() > 1)
+      if (x->is_awake() || x->is_kinematic()) {
+        if (group_of[x->handle.index] == kNone) bodies.push_back(x);
+        group_of[x->handle.index] = 0;  // numbered below
+      } else if (y->collision_shape().piece_count() > 1) {
         groups.push_back({x, {pair}});
+      }
     }
   }
   std::sort(bodies.begin(), bodies.end(), [](Body* a, Body* b) { return a->handle.index < b->handle.index; });
-  bodies.erase(std::unique(bodies.begin(), bodies.end()), bodies.end());
   for (Body* x : bodies) {
-    numbers.emplace_back(x, groups.size());
+    group_of[x->handle.index] = groups.size();
     groups.push_back({x, {}});
   }
   for (ContactPair* pair : pairs) {
     if (pair->manifolds().empty()) continue;
-    for (Body* x : {&pair->a(), &pair->b()})
-      if (const std::size_t g = group_of(*x); g < groups.size()) groups[g].pairs.push_back(pair);
+    for (const Body* x : {&pair->a(), &pair->b()})
+      if (const std::size_t g = group_of[x->handle.index]; g != kNone) groups[g].pairs.push_back(pair);
   }
   return groups;
 }

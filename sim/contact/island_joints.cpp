@@ -1,6 +1,7 @@
 #include "sim/contact/island_joints.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace offstage::sim {
 
@@ -33,6 +34,14 @@ void IslandJoints::place(Articulation& a, const ContactInterval& interval) {
   if (a.has_bounded_rows()) stop = first_stop(a, interval.duration, interval.end);
   if (stop) a.place_within(interval.end, interval.duration, *stop, interval.substep);
   stops_.push_back(stop);
+}
+
+bool IslandJoints::act_throughout() const {
+  // Limits have one finite bound.
+  return std::none_of(stops_.begin(), stops_.end(), [](const auto& stop) { return stop.has_value(); }) &&
+         std::all_of(bounded_.begin(), bounded_.end(), [](const BoundedRow& row) {
+           return std::isfinite(row.lower) == std::isfinite(row.upper);
+         });
 }
 
 void IslandJoints::project(std::span<ContactBody> bodies, Real end) const {

@@ -32,6 +32,8 @@ class IslandJoints {
   std::span<Articulation* const> articulations() const { return articulations_; }
   /// The fraction of the interval after which the impulses of an articulation act.
   Real acting_from(std::size_t articulation) const { return stops_[articulation].value_or(kMiddle); }
+  /// Whether all rows act throughout the interval: there are no limits near.
+  bool act_throughout() const;
   /// Removes the parts of the velocities at the interval's end that violate the constraints of the time when
   /// a limit is reached: the joint forces that would have turned the velocities afterwards end with the
   /// motion. Articulations that reach no limit are not changed.

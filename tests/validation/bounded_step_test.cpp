@@ -8,7 +8,9 @@
 namespace offstage::sim {
 namespace {
 
-// The counted work of the exact solver's attempts is limited, and so are the impacts of a sub-step.
+// The counted work of the exact solver's attempts is limited, and so are the impacts of a sub-step. In a
+// small world the sub-steps of a few small islands may be divided where contacts close, which takes up to 2
+// ms each.
 TEST(BoundedStep, OfHeapsTakesFewTraceBacksAndFactorizations) {
   for (const Heap heap : kHeaps) {
     World world = heap_scene(heap);
@@ -18,7 +20,7 @@ TEST(BoundedStep, OfHeapsTakesFewTraceBacksAndFactorizations) {
       ASSERT_LE(r.impacts.tracebacks, 60u) << name_of(heap) << ", step " << step;
       ASSERT_LE(r.solvers.impacts.iterations, 6000u) << name_of(heap) << ", step " << step;
       ASSERT_LE(r.solvers.exact.iterations, 2500u) << name_of(heap) << ", step " << step;
-      ASSERT_LE(r.solvers.exact.factorizations, 600u) << name_of(heap) << ", step " << step;
+      ASSERT_LE(r.solvers.exact.factorizations, 1000u) << name_of(heap) << ", step " << step;
     }
   }
 }

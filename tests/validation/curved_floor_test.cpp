@@ -84,8 +84,7 @@ class CurvedFloor : public testing::TestWithParam<std::tuple<SolverKind, int>> {
  protected:
   static bool is_fast() { return std::get<0>(GetParam()) == SolverKind::fast; }
   static bool is_coarse() { return std::get<1>(GetParam()) == 60; }
-  /// Energy per mass after kTroughSeconds, as sliding_energy(), and at the start.
-  static std::pair<Real, Real> energy(int strips, const Shape& shape, const Quat& pose, Real friction) {
+  static World world_with_trough(int strips, Real friction) {
     World w(WorldDef{
         .max_step = 1.0 / std::get<1>(GetParam()), .solver = std::get<0>(GetParam()), .sleep = false});
     const MeshHandle mesh = w.add_mesh(strip_trough(strips));
@@ -93,6 +92,11 @@ class CurvedFloor : public testing::TestWithParam<std::tuple<SolverKind, int>> {
                 .motion = MotionType::static_body,
                 .restitution = 0,
                 .friction = friction});
+    return w;
+  }
+  /// Energy per mass after kTroughSeconds, as sliding_energy(), and at the start.
+  static std::pair<Real, Real> energy(int strips, const Shape& shape, const Quat& pose, Real friction) {
+    World w = world_with_trough(strips, friction);
     w.add_body({.shape = shape,
                 .pose = {TroughPath(strips).middle_of_start(), pose},
                 .mass = 1,
@@ -129,6 +133,34 @@ TEST_P(CurvedFloor, LetsRoundBodiesRollAsARoundTrough) {
     const auto [left, start] = energy(720, shapes[i], lying, 1);
     EXPECT_GT(left, (!is_fast() ? 0.98 : is_coarse() ? 0.94 : 0.97) * start) << "shape " << i;
   }
+}
+
+// The wheels come to the seams one after the other, while the rest of the cart is carried. Each seam takes
+// the part beta^2 of the energy of motion, shared by four wheels: in eight swings over 115 seams 3.5 %.
+TEST_P(CurvedFloor, LetsACartRollAsARoundTrough) {
+  World w = world_with_trough(360, 1);
+  const Real turned = 0.5, half_length = 0.2, height = kTroughRadius * std::cos(pi / 720) - kTroughBall;
+  const Vec3 forward(std::cos(turned), std::sin(turned), 0), up(-forward.y(), forward.x(), 0);
+  const Real depth = std::sqrt(height * height - half_length * half_length);
+  const Vec3 middle = Vec3(0, kTroughRadius, 0) - depth * up;
+  const BodyHandle chassis = w.add_body({.shape = Box{Vec3(0.5, 0.04, 0.2)},
+                                         .pose = {middle, Quat(Eigen::AngleAxisd(turned, Vec3::UnitZ()))},
+                                         .mass = 20});
+  for (const Real x : {-half_length, half_length})
+    for (const Real z : {-0.2, 0.2}) {
+      const Vec3 place = middle + x * forward + z * Vec3::UnitZ();
+      const BodyHandle wheel = w.add_body({.shape = Sphere{kTroughBall},
+                                           .pose = {place, Quat::Identity()},
+                                           .mass = 2,
+                                           .restitution = 0,
+                                           .friction = 1});
+      w.add_joint({.type = JointType::revolute, .a = chassis, .b = wheel, .anchor = place});
+    }
+  const Real lowest = 28 * kTroughGravity * (kTroughRadius - depth), start = w.energy().total() - lowest;
+  for (int frame = 0; frame < 60 * kTroughSeconds; ++frame) w.step(1.0 / 60);
+  const Real left = (w.energy().total() - lowest) / start;
+  EXPECT_LT(left, 0.97);
+  EXPECT_GT(left, is_fast() ? 0.82 : is_coarse() ? 0.86 : 0.955);
 }
 
 // At a step of one frame these seams close at up to 0.5 m/s, so that impacts are looked for; contacts that

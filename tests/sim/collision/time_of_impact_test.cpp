@@ -1,5 +1,9 @@
 #include "sim/collision/time_of_impact.h"
 
+#include <array>
+#include <numbers>
+#include <utility>
+
 #include <gtest/gtest.h>
 
 #include "random.h"
@@ -99,6 +103,35 @@ TEST(TimeOfImpact, TouchingAtTheStartIsAnImpactAtOnce) {
     ASSERT_TRUE(impact);
     EXPECT_EQ(impact->fraction, 0);
     EXPECT_NEAR(impact->separation.distance, height - 1, 1e-9);
+  }
+}
+
+// A round body that turns about its own axis approaches nothing by its rotation. If the rotation counted, a
+// wheel just above the floor would need thousands of advances.
+TEST(TimeOfImpact, RollingAboveTheFloorNeedsFewAdvances) {
+  const Convex floor = convex(Box{Vec3(10, 1, 10)});
+  const PosePath resting(still_pose({0, -0.5, 0}));
+  const Real height = 0.2 + 1.5 * kTolerance, sunk = 0.2 - kTolerance;
+  const std::array<std::pair<Shape, Quat>, 4> wheels = {
+      {{Sphere{0.2}, Quat::Identity()},
+       {Capsule{0.2, 0.5}, Quat(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitX()))},
+       {Cylinder{0.2, 0.1}, Quat(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitX()))},
+       {Frustum{0.2, 0.2, 0.1}, Quat(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitX()))}}};
+  for (const auto& [shape, orientation] : wheels) {
+    const Convex wheel = convex(shape);
+    const auto path_to = [&](Real end_height) {
+      return PosePath(
+          Pose{Vec3(-0.3, height, 0), orientation},
+          Pose{Vec3(0.3, end_height, 0), Quat(Eigen::AngleAxisd(-3, Vec3::UnitZ())) * orientation});
+    };
+    EXPECT_FALSE(time_of_impact({wheel, path_to(height)}, {floor, resting}, kTolerance)) << shape.index();
+    EXPECT_FALSE(time_of_plane_impact({wheel, path_to(height)}, PosePath(Pose{}), kTolerance));
+    for (const auto& impact : {time_of_impact({wheel, path_to(sunk)}, {floor, resting}, kTolerance),
+                               time_of_plane_impact({wheel, path_to(sunk)}, PosePath(Pose{}), kTolerance)}) {
+      ASSERT_TRUE(impact) << shape.index();
+      EXPECT_LE(impact->advances, 10) << shape.index();
+      EXPECT_NEAR(impact->fraction, 0.3, 0.11) << shape.index();
+    }
   }
 }
 
