@@ -67,6 +67,7 @@ class Numbers(Case):
             }, 16);''', element)
 
     def test_the_film_follows_the_pointer_during_a_drag(self):
+        self.page.set_text(SCENE.replace('[320, 180]', '[640, 360]'))  # drawing takes longer than showing
         self.page.wait_for_frame(1)
         self.page.select('/emitters/0')
         for element in (self.track('rate'), self.page.find('#stage')):

@@ -1,5 +1,6 @@
 """The base class of the tests of the tuning page: a scene, a server and a browser."""
 
+import atexit
 import pathlib
 import shutil
 import sys
@@ -27,7 +28,7 @@ SCENE = '''// A small fountain, with comments that must stay.
      "look": {"color": "#4080ff"}}
   ],
   "camera": {"type": "static", "eye": [0, 1.5, 5], "target": [0, 0.8, 0]},
-  "render": {"size": [640, 360]},
+  "render": {"size": [320, 180]},
   "output": {"fps": 20, "duration": 1}
 }
 '''
@@ -35,19 +36,19 @@ SCENE = '''// A small fountain, with comments that must stay.
 
 class Case(unittest.TestCase):
     scene_text = SCENE
+    driver = None  # one browser for all classes
 
     @classmethod
     def setUpClass(cls):
-        cls.driver = browser()
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.driver.quit()
+        if not Case.driver:
+            Case.driver = browser()
+            atexit.register(Case.driver.quit)
 
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix='offstage-tune-'))
         self.scene = self.folder / 'fountain.json'
         self.scene.write_bytes(self.scene_text.encode())
+        self.driver.get_log('browser')  # forgets the errors that other tests caused
         self.server = Server(PROGRAM, self.scene)
         self.page = Page(self.driver, self.server.address)
         wait(lambda: self.page.js('return tuneStore.writer === tuneStore.tab'), what='the right to write')

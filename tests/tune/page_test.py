@@ -128,6 +128,7 @@ class Looking(Case):
         self.assertEqual(page.find('#final-state').get_attribute('data-hash'), json.loads(told.stdout)['state_hash'])
 
     def test_the_visible_frame_is_refined_while_nothing_changes(self):
+        self.page.set_text(SCENE.replace('[320, 180]', '[640, 360]'))  # so that the first picture is seen
         wait(lambda: self.page.js('return document.getElementById("film").dataset.detail') == 'preview', 60)
         wait(lambda: self.page.js('return document.getElementById("film").dataset.detail') == 'final', 60)
 
@@ -180,7 +181,7 @@ class Looking(Case):
         page.click('[data-mode="wipe"]')
         wait(lambda: page.pixels() != alone, 10, 'the wipe')
         page.click('[data-mode="side"]')
-        wait(lambda: page.js('return document.getElementById("film").width') == 1280)
+        wait(lambda: page.js('return document.getElementById("film").width') == 640)
         page.click('[data-mode="turns"]')
         seen = set()
         wait(lambda: seen.add(page.pixels()) or len(seen) > 1, 10, 'both in turns')
@@ -246,7 +247,7 @@ class Looking(Case):
         page.wait_for_frame(1)
         page.click('#versions-button')
         first = wait(lambda: len(page.all('.version')) == 2 and page.all('.version')[1])
-        wait(lambda: page.js('return arguments[0].querySelector("img")?.naturalWidth', first) == 640, 10, 'its picture')
+        wait(lambda: page.js('return arguments[0].querySelector("img")?.naturalWidth', first) == 320, 10, 'its picture')
         page.js('arguments[0].querySelector("button").click()', first)
         wait(lambda: page.text() == SCENE)
 

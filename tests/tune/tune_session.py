@@ -23,7 +23,7 @@ def wait(condition, seconds=30, what='a condition'):
             return value
         if time.monotonic() > end:
             raise AssertionError(f'{what} did not come true in {seconds} s')
-        time.sleep(0.03)
+        time.sleep(0.05)  # each question costs several milliseconds of the browser
 
 
 class Server:
