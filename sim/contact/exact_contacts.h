@@ -39,7 +39,7 @@ class ExactContacts {
   void add_points(ContactPair& pair, const ContactInterval& interval);
   bool solve_lcp(ContactWork& work);
   bool has_closing() const;
-  void divide_at_closings(const Island& island, const ContactInterval& interval, Real budget,
+  bool divide_at_closings(const Island& island, const ContactInterval& interval, Real budget,
                           ContactWork& work);
   bool is_safe(const ContactWork& work) const;
   void move_bodies(const Island& island, const ContactInterval& interval);

@@ -36,7 +36,8 @@ namespace offstage::sim {
 /// Keep one object per island between steps: the factored matrix of nearly the same contacts is reused.
 class ProximalNewton {
  public:
-  /// Solves to a residual of 1e-7 of the velocities (1e-11 m/s at least). Starts from the contacts' impulses,
+  /// Solves to a residual of 1e-7 of the velocities (1e-11 m/s at least), or of up to 1e-3 where it converges
+  /// slowly; `residual` of the result says so. Starts from the contacts' impulses,
   /// which the bodies' velocities must not contain yet. If the bounded iterations do not converge, projected
   /// Gauss-Seidel continues from their result. If the cost would exceed `budget` [ns, as cost()], there is no
   /// result and nothing is changed.
