@@ -25,6 +25,8 @@ constexpr int kVelocitySteps = 2;
 constexpr Real kLeaving = 1e-6;
 /// Velocities that violate the constraints by less than this count as unchanged since settle() [m/s].
 constexpr Real kDisturbed = 1e-7;
+/// Greatest phase of a vibration under the tension of the joints between two kicks [rad].
+constexpr Real kKickPhase = 1;
 
 bool is_moved(const Body* body) {
   return body && body->is_dynamic();
@@ -49,11 +51,13 @@ uint32_t index_in(std::span<Body* const> bodies, const Body* body) {
   return static_cast<uint32_t>(at - bodies.begin());
 }
 
-JointSystem make_system(std::span<Body* const> bodies, std::span<Joint* const> joints) {
+JointSystem make_system(std::span<Body* const> bodies, std::span<Joint* const> joints, bool with_springs) {
   std::vector<JointSystem::Topology> topology;
-  for (const Joint* joint : joints)
+  for (const Joint* joint : joints) {
+    const uint32_t soft = with_springs && joint->has_spring() ? 3 : 0;
     topology.push_back(
-        {index_in(bodies, joint->a), index_in(bodies, joint->b), constraint_count(joint->def)});
+        {index_in(bodies, joint->a), index_in(bodies, joint->b), constraint_count(joint->def) + soft});
+  }
   return {static_cast<uint32_t>(bodies.size()), std::move(topology)};
 }
 
@@ -98,13 +102,15 @@ JointFrame link_frame(const Body* body, const JointFrame& in_body) {
   return frame;
 }
 
-bool Joint::has_bounded_rows() const {
+bool Joint::has_rows_besides_spring() const {
   return def.lower > -JointDef::kFree || def.upper < JointDef::kFree || def.swing < JointDef::kFree ||
-         def.friction > 0 || def.damping > 0 || def.stiffness > 0 || def.motor.mode != Motor::Mode::none;
+         def.friction > 0 || (def.damping > 0 && !has_spring()) || def.motor.mode != Motor::Mode::none;
 }
 
 Articulation::Articulation(std::vector<Joint*> joints)
-    : joints_(std::move(joints)), bodies_(dynamic_bodies(joints_)), system_(make_system(bodies_, joints_)) {
+    : joints_(std::move(joints)),
+      bodies_(dynamic_bodies(joints_)),
+      system_(make_system(bodies_, joints_, false)) {
   for (Joint* joint : joints_) {
     joint->articulation = this;
     has_bounded_rows_ |= joint->has_bounded_rows();
@@ -120,6 +126,11 @@ Articulation::Articulation(std::vector<Joint*> joints)
   velocities_.resize(bodies_.size());
   change_.resize(joints_.size());
   impulses_.resize(joints_.size());
+  if (std::ranges::any_of(joints_, &Joint::has_spring)) {
+    sprung_.emplace(make_system(bodies_, joints_, true));
+    sprung_rows_.resize(joints_.size());
+    kick_loads_.resize(joints_.size());
+  }
 }
 
 /// A link that a force F pulls at a lever arm r swings with w^2 = F K / r, where K is its mobility at the
@@ -141,6 +152,22 @@ Real Articulation::greatest_frequency() const {
     consider(joints_[j]->b, frames_b_[j]);
   }
   return std::sqrt(greatest);
+}
+
+/// A link of the mass m in a rod under the force F has the frequency of greatest_frequency(), or with the
+/// inertia that the springs add to short waves (physics A8), at most sqrt(F / 2 h sqrt(m k)).
+Real Articulation::kicks_needed(Real duration) const {
+  Real most = duration * greatest_frequency();
+  Real sprung = 0;
+  for (const Joint* joint : joints_) {
+    for (const Body* body : {joint->a, joint->b}) {
+      if (!is_moved(body)) continue;
+      const Real inertia = std::sqrt(body->rigid.mass * joint->def.stiffness);
+      if (!(inertia > 0)) return std::max(1.0, std::ceil(most / kKickPhase));
+      sprung = std::max(sprung, duration * joint->load.force.norm() / (2 * inertia));
+    }
+  }
+  return std::max(1.0, std::ceil(std::min(most, sprung) / kKickPhase));
 }
 
 void Articulation::begin_motion(Real t, Real h) {
@@ -208,12 +235,75 @@ void Articulation::add_forces(Real t, std::span<const LinkMotion> motion,
     if (a != JointSystem::kDriven) forces[a] += rows_[j].on_a * impulses_[j];
     if (b != JointSystem::kDriven) forces[b] += rows_[j].on_b * impulses_[j];
   }
-  for (std::size_t j = 0; j < joints_.size(); ++j) joints_[j]->load = wrench(j, impulses_[j], motion);
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    joints_[j]->load = wrench(j, rows_[j], impulses_[j], motion);
+    if (has_springs()) joints_[j]->load += kick_loads_[j];
+  }
 }
 
-/// The force and torque, or impulses, that the constraints of a joint exert on its body a.
-Wrench Articulation::wrench(std::size_t j, const Vec6& impulse, std::span<const LinkMotion> motion) const {
-  const Vec6 on_a = rows_[j].on_a * impulse;
+/// Appends to the constraints of read_rows() the rows of springs and dampers. With the speed u after a kick,
+/// their torque is -k (theta + h u) - c u: as an impulse p, u + softness p = -h k theta softness. `error` is
+/// minus the right-hand side less the present speed.
+void Articulation::read_sprung_rows(Real t, Real h, std::span<const LinkMotion> motion) {
+  LinkMotion still_a, still_b;
+  softened_ = 1;
+  sprung_rows_ = rows_;
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    if (!joints_[j]->has_spring()) continue;
+    const JointDef& def = joints_[j]->def;
+    const JointPlace place = place_of(j, t, motion, still_a, still_b);
+    const Vec3 theta = rotation_vector(place), spin = place.a.angular_velocity - place.b.angular_velocity;
+    JointRows& rows = sprung_rows_[j];
+    const Real softness = 1 / (h * def.resistance(h));
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      const Vec3 axis = place.axes_b.col(i);
+      JointRow row = turning_row(axis);
+      row.error = axis.dot(spin) + h * def.stiffness * theta[i] * softness;
+      rows.softness[rows.count] = softness;
+      rows.add(row);
+    }
+  }
+}
+
+/// Factors the system of the constraints of read_rows(), with the inertia that springs add to the links:
+/// light links that projections turned against stiff springs would be thrown back by them. Returns the
+/// system, or null if the constraints are too degenerate.
+JointSystem* Articulation::factorize_inert(Real time) {
+  if (!has_springs() || kick_duration_ == 0) return system_.factorize(rows_, mobility_) ? &system_ : nullptr;
+  system_.update(rows_);
+  read_sprung_rows(time, kick_duration_, motion_);
+  return sprung_->factorize(sprung_rows_, mobility_) ? &*sprung_ : nullptr;
+}
+
+void Articulation::kick(Real t, Real h, std::span<const LinkMotion> motion,
+                        std::span<const LinkMobility> mobility, std::span<Vec6> forces) {
+  kick_duration_ = h;
+  read_rows(t, motion);
+  read_sprung_rows(t, h, motion);
+  if (!sprung_->factorize(sprung_rows_, mobility)) return;  // settle() detects and counts the same failure
+  for (std::size_t i = 0; i < bodies_.size(); ++i) velocities_[i] = h * mobility[i].velocity(forces[i]);
+  std::vector<Vec6> by_forces(joints_.size());
+  sprung_->relative(velocities_, by_forces);
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    // The velocities already satisfy the constraints, whose errors are those of the positions.
+    change_[j] = -by_forces[j];
+    for (uint32_t i = rows_[j].count; i < sprung_rows_[j].count; ++i)
+      change_[j][i] -= sprung_rows_[j].error[i];
+  }
+  sprung_->correct(change_, impulses_, velocities_);
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    const auto& [a, b, count] = sprung_->joints()[j];
+    const Vec6 force = impulses_[j] / h;
+    if (a != JointSystem::kDriven) forces[a] += sprung_rows_[j].on_a * force;
+    if (b != JointSystem::kDriven) forces[b] += sprung_rows_[j].on_b * force;
+    kick_loads_[j] = wrench(j, sprung_rows_[j], force, motion);
+  }
+}
+
+/// The force and torque, or impulses, that the rows of a joint exert on its body a.
+Wrench Articulation::wrench(std::size_t j, const JointRows& rows, const Vec6& impulse,
+                            std::span<const LinkMotion> motion) const {
+  const Vec6 on_a = rows.on_a * impulse;
   const uint32_t a = system_.joints()[j].a;
   const Mat3 axes = a != JointSystem::kDriven ? motion[a].axes : link_motion(joints_[j]->a, 0).axes;
   // The torque of the angular constraints, without the moment of the force.
@@ -221,13 +311,14 @@ Wrench Articulation::wrench(std::size_t j, const Vec6& impulse, std::span<const 
 }
 
 void Articulation::add_loads(std::span<const Vec6> impulses, Real duration) {
+  const std::span<const JointRows> rows = has_springs() ? sprung_rows_ : rows_;
   for (std::size_t j = 0; j < joints_.size(); ++j)
-    joints_[j]->load += wrench(j, impulses[j] / duration, motion_);
+    joints_[j]->load += wrench(j, rows[j], impulses[j] / duration, motion_);
 }
 
 void Articulation::add_impact_impulses(std::span<const Vec6> impulses) {
   for (std::size_t j = 0; j < joints_.size(); ++j)
-    joints_[j]->impact_impulse += wrench(j, impulses[j], motion_);
+    joints_[j]->impact_impulse += wrench(j, rows_[j], impulses[j], motion_);
 }
 
 void Articulation::begin_impulses(Real time) {
@@ -391,6 +482,17 @@ void Articulation::place_within(Real time, Real duration, Real fraction, Real su
   }
   read_rows(time, motion_, before_);
   system_.factorize(rows_, mobility_);
+  if (!has_springs()) return;
+  read_sprung_rows(time, duration, motion_);
+  sprung_->factorize(sprung_rows_, mobility_);
+}
+
+bool Articulation::soften(Real factor) {
+  if (!has_springs() || factor == softened_) return false;
+  for (JointRows& rows : sprung_rows_) rows.softness *= factor / softened_;
+  softened_ = factor;
+  sprung_->factorize(sprung_rows_, mobility_);
+  return true;
 }
 
 void Articulation::project(Real time, std::span<Vec6> velocities) {
@@ -432,6 +534,7 @@ void Articulation::transmit_impulses(Real time, JointFigures& tally) {
 
 void Articulation::settle(Real time, JointFigures& tally) {
   Real apart = 0;
+  JointSystem* system = nullptr;
   std::vector<Pose> before(bodies_.size());  // poses of the centres of mass
   for (int step = 0; step < kMostSteps; ++step) {
     read_bodies();
@@ -441,7 +544,11 @@ void Articulation::settle(Real time, JointFigures& tally) {
     // One factorization serves for all small corrections.
     if (step > 0 && now <= kSmall) {
       system_.update(rows_);
-    } else if (!system_.factorize(rows_, mobility_)) {
+      if (system != &system_) {
+        read_sprung_rows(time, kick_duration_, motion_);
+        system->update(sprung_rows_);
+      }
+    } else if (system = factorize_inert(time); !system) {
       ++tally.unsolved;
       return;
     }
@@ -463,7 +570,7 @@ void Articulation::settle(Real time, JointFigures& tally) {
     for (std::size_t j = 0; j < joints_.size(); ++j)
       change_[j] = -rows_[j].error * std::min(1.0, kFarApart / std::max(now, kTogether));
     std::vector<Vec6> shift(bodies_.size(), Vec6::Zero());
-    system_.correct(change_, impulses_, shift);
+    system->correct(change_, impulses_, shift);
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
       RigidBody& r = bodies_[i]->rigid;
       const Vec3 w = r.angular_velocity();
@@ -483,7 +590,7 @@ void Articulation::settle(Real time, JointFigures& tally) {
       c = -c;
     }
     if (fastest <= kTogether) break;
-    system_.correct(change_, impulses_, velocities_);
+    system->correct(change_, impulses_, velocities_);
     add_impact_impulses(impulses_);
   }
   for (std::size_t i = 0; i < bodies_.size(); ++i)

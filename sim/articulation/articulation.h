@@ -39,8 +39,10 @@ struct Joint {
   /// Impulses of its rows with bounds (joint_limits.h); initial guess of the next solution.
   std::array<Real, 12> efforts = {};
 
-  /// Whether the joint has a limit, a motor, friction or damping.
-  bool has_bounded_rows() const;
+  bool has_spring() const { return def.stiffness > 0; }
+  /// Whether the joint has a limit, a motor, friction, or a damper without a spring.
+  bool has_rows_besides_spring() const;
+  bool has_bounded_rows() const { return has_spring() || has_rows_besides_spring(); }
 };
 
 /// Whether the joint's coordinate is an unbounded angle; Joint::coordinate then counts whole turns.
@@ -59,9 +61,22 @@ class Articulation final : public JointedBodies {
   std::span<Body* const> bodies() const { return bodies_; }  ///< the dynamic bodies, in slot order
   std::span<Joint* const> joints() const { return joints_; }
 
+  bool has_springs() const { return !sprung_rows_.empty(); }
   /// Estimates the highest angular frequency at which links swing under the last forces of their joints
   /// [rad/s].
   Real greatest_frequency() const;
+  /// With springs: the number of parts of an interval of this duration [s] for which kick() is stable.
+  Real kicks_needed(Real duration) const;
+  /// With springs, before a motion: the number of times that kick() will be called in it.
+  void set_kicks(Real count) { kicks_ = count; }
+  /// The fraction of a motion from which impulses have to act to move the links as the forces of its kicks
+  /// do.
+  Real kicks_act_from() const { return (1 - 1 / kicks_) / 2; }
+  /// With springs: the mean forces on the links [force, torque] that change their velocities at t by all
+  /// forces of the part from t to t + h, the springs and dampers of the joints included, by implicit Euler
+  /// (physics A8). `forces` holds all other forces on entry.
+  void kick(Real t, Real h, std::span<const LinkMotion> motion, std::span<const LinkMobility> mobility,
+            std::span<Vec6> forces);
   /// Begins a motion from t to t + h.
   void begin_motion(Real t, Real h);
   /// Adds the joint forces at a time within the motion to `forces` [force, torque] of the links. `motion` is
@@ -98,6 +113,11 @@ class Articulation final : public JointedBodies {
   bool has_bounded_rows() const { return has_bounded_rows_; }
   const JointSystem& system() const { return system_; }
   JointSystem& system() { return system_; }
+  /// After place_within(), the system of the constraints, and of the springs and dampers as soft rows, which
+  /// resist changes of the free motion.
+  JointSystem& inert_system() { return has_springs() ? *sprung_ : system_; }
+  /// Multiplies the softness of the springs after place_within() by a factor. Returns whether it has changed.
+  bool soften(Real factor);
   /// Adds the constraint impulses of an interval of this duration [s] to the loads of the joints, which
   /// already contain the forces of the motion.
   void add_loads(std::span<const Vec6> impulses, Real duration);
@@ -128,7 +148,10 @@ class Articulation final : public JointedBodies {
   void read_rows(Real time, std::span<const LinkMotion> motion, Real before = 0);
   void read_bodies(bool at_start = false);
   void residual(Real time, std::span<const Vec6> velocities, std::span<Vec6> result) const;
-  Wrench wrench(std::size_t j, const Vec6& impulse, std::span<const LinkMotion> motion) const;
+  Wrench wrench(std::size_t j, const JointRows& rows, const Vec6& impulse,
+                std::span<const LinkMotion> motion) const;
+  void read_sprung_rows(Real t, Real h, std::span<const LinkMotion> motion);
+  JointSystem* factorize_inert(Real time);
 
   std::vector<Joint*> joints_;
   std::vector<Body*> bodies_;
@@ -137,6 +160,12 @@ class Articulation final : public JointedBodies {
   bool has_bounded_rows_ = false, has_kinematic_ = false;
   std::vector<Momenta> settled_;  // momenta of the bodies after settle()
   JointSystem system_;
+
+  // With springs: the constraints and the springs as soft rows, and the loads by the kicks.
+  std::optional<JointSystem> sprung_;
+  std::vector<JointRows> sprung_rows_;
+  std::vector<Wrench> kick_loads_;
+  Real kicks_ = 1, kick_duration_ = 0, softened_ = 1;
 
   std::vector<JointRows> rows_;
   std::vector<LinkMotion> motion_, start_motion_, end_motion_;

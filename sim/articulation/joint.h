@@ -104,6 +104,9 @@ struct JointDef {
   /// time; its anchors and axes have moved with the bodies.
   Real appear_at = 0, remove_at = kFree;
 
+  /// The torque k theta + c u of its spring and damper changes by this for each unit of the speed u at the
+  /// end of an interval of the length h, with the angle theta there.
+  Real resistance(Real h) const { return damping + h * stiffness; }
   /// Whether it only couples motions that other joints allow.
   bool is_coupling() const { return type == JointType::gear || type == JointType::rack; }
   bool has_limits() const { return lower > -kFree || upper < kFree; }

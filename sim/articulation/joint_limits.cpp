@@ -32,6 +32,7 @@ class RowMaker {
  public:
   RowMaker(const Articulation& articulation, std::size_t j, Real duration, Real time)
       : joint_(*articulation.joints()[j]),
+        is_kicked_(articulation.has_springs()),
         def_(joint_.def),
         h_(duration),
         time_(time),
@@ -50,7 +51,6 @@ class RowMaker {
       add_range(swing(), kSwing, least_swing(), def_.swing);
     }
     if (def_.friction > 0 || def_.damping > 0) add_resistance();
-    if (def_.stiffness > 0) add_spring();
   }
 
   void add_stops(std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins) {
@@ -58,6 +58,12 @@ class RowMaker {
     origins_ = &origins;
     if (def_.has_free_coordinate()) add_stop(free(), kLimit, def_.lower, def_.upper);
     if (def_.swing < kInfinite) add_stop(swing(), kSwing, least_swing(), def_.swing);
+  }
+
+  void add_spring(std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins) {
+    rows_ = &rows;
+    origins_ = &origins;
+    for (std::size_t i = 0; i < 3; ++i) add_guessed(spring_row(i), kSpring + i, false);
   }
 
   /// See first_stop().
@@ -131,7 +137,10 @@ class RowMaker {
 
   /// The coordinate at the interval's start for which the mean of the speeds at both ends leads to its end,
   /// without the effect of the rows. From there, the row's target leads exactly to the wanted coordinate.
-  Real at_start(const Direction& d) const { return d.end.error - h_ / 2 * (speed_at_start(d) + speed(d)); }
+  /// Links with springs move with the speed of the end.
+  Real at_start(const Direction& d) const {
+    return d.end.error - h_ / 2 * ((is_kicked_ ? speed(d) : speed_at_start(d)) + speed(d));
+  }
   Real speed_at_start(const Direction& d) const { return speed(d.start, start_); }
 
   void add(const BoundedRow& row, std::size_t slot, bool closes) {
@@ -176,7 +185,8 @@ class RowMaker {
 
   /// Adds a row for the nearer of both limits. If they are equal, the coordinate is held.
   void add_range(const Direction& row, std::size_t slot, Real lower, Real upper) {
-    if (lower < upper && (add_stop_within(row, slot, lower, 1) || add_stop_within(row, slot, upper, -1)))
+    if (!is_kicked_ && lower < upper &&
+        (add_stop_within(row, slot, lower, 1) || add_stop_within(row, slot, upper, -1)))
       return;
     const Real reach = kNear + 2 * h_ * std::abs(speed(row));
     const Real below = row.end.error - lower, above = upper - row.end.error;
@@ -187,13 +197,17 @@ class RowMaker {
     const bool is_low = below <= above;
     const Real side = is_low ? 1 : -1, limit = is_low ? lower : upper;
     // A joint that rests at its limit, or leaves it, is held by a constant force in the whole interval.
-    const bool closes =
-        side * speed_at_start(row) < -std::max(kClosing, std::abs(speed(row) - speed_at_start(row)));
+    const bool closes = is_kicked_ || side * speed_at_start(row) <
+                                          -std::max(kClosing, std::abs(speed(row) - speed_at_start(row)));
     const Real gap = side * ((closes ? at_start(row) : row.start.error) - limit);
     BoundedRow r = turning_with(row);
     r.lower = lower == upper || !is_low ? -kInfinite : 0;
     r.upper = lower == upper || is_low ? kInfinite : 0;
     r.target = -side * (gap > 0 ? gap / h_ : std::max(gap * kPushOut / h_, -kFastestPush));
+    // Links with springs move by the speed of the end, so they rebound before they reach the limit.
+    const Real approach = -side * speed_at_start(row);
+    if (is_kicked_ && approach > JointDef::kBounceSpeed && side * (row.end.error - limit) < 0)
+      r.target = side * std::max(side * r.target, def_.restitution * approach);
     add_guessed(r, slot, closes);
   }
 
@@ -242,7 +256,7 @@ class RowMaker {
         r.lower = -r.upper;
         add_guessed(r, kFriction + i, false);
       }
-      if (def_.damping > 0) {
+      if (def_.damping > 0 && !joint_.has_spring()) {
         r.upper = kInfinite;
         r.lower = -kInfinite;
         r.softness = 1 / (h_ * def_.damping);
@@ -251,20 +265,17 @@ class RowMaker {
     }
   }
 
-  /// The torque -k theta of a spherical joint at the interval's end, for the rotation vector theta of a
-  /// relative to b.
-  void add_spring() {
-    const Vec3 theta = rotation_vector(end_);
-    for (int i = 0; i < 3; ++i) {
-      Direction row = turning(i);
-      row.end.error = theta[i];
-      BoundedRow r = bounded(row);
-      r.lower = -kInfinite;
-      r.upper = kInfinite;
-      r.softness = 1 / (h_ * h_ * def_.stiffness);
-      r.target = -at_start(row) / h_;
-      add_guessed(r, kSpring + static_cast<std::size_t>(i), false);
-    }
+  /// The torque of a spring and its damper in the free motion changes by h (h k + c) times the change of the
+  /// speed.
+  BoundedRow spring_row(std::size_t axis) const {
+    const Direction row = turning(static_cast<Eigen::Index>(axis));
+    BoundedRow r = bounded(row);
+    r.lower = -kInfinite;
+    r.upper = kInfinite;
+    r.softness = 1 / (h_ * def_.resistance(h_));
+    r.target = speed(row.acting, acting_);
+    r.resists_change = true;
+    return r;
   }
 
   void add_stop(const Direction& row, std::size_t slot, Real lower, Real upper) {
@@ -279,6 +290,7 @@ class RowMaker {
   }
 
   Joint& joint_;
+  bool is_kicked_;
   const JointDef& def_;
   Real h_, time_;
   LinkMotion start_a_, start_b_, still_a_, still_b_, end_a_, end_b_;
@@ -304,6 +316,14 @@ void collect_bounded_rows(const Articulation& articulation, Real duration, Real 
   for (std::size_t j = 0; j < articulation.joints().size(); ++j)
     if (articulation.joints()[j]->has_bounded_rows())
       RowMaker(articulation, j, duration, time).add_all(rows, origins);
+}
+
+void collect_springs(const Articulation& articulation, Real duration, Real time,
+                     std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins) {
+  if (!articulation.has_springs()) return;
+  for (std::size_t j = 0; j < articulation.joints().size(); ++j)
+    if (articulation.joints()[j]->has_spring())
+      RowMaker(articulation, j, duration, time).add_spring(rows, origins);
 }
 
 void collect_stops(const Articulation& articulation, Real time, std::vector<BoundedRow>& rows,

@@ -1,5 +1,5 @@
 #pragma once
-/// Limits, motors, friction and damping of joints as rows with bounds (physics A6).
+/// Limits, motors, friction, damping and springs of joints as rows with bounds (physics A6, A8).
 
 #include <optional>
 #include <vector>
@@ -27,6 +27,12 @@ std::optional<Real> first_stop(const Articulation& articulation, Real duration, 
 /// `time`. Its bodies have the indices Body::row.
 void collect_bounded_rows(const Articulation& articulation, Real duration, Real time,
                           std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins);
+
+/// Appends rows by which the springs and dampers resist changes of the free motion (physics A8), for an
+/// interval of this duration, or for a collision in a sub-step of this duration: links that springs make
+/// stiff in a sub-step are so in a collision, too.
+void collect_springs(const Articulation& articulation, Real duration, Real time,
+                     std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins);
 
 /// Appends the rows of reached limits, for a collision at `time`.
 void collect_stops(const Articulation& articulation, Real time, std::vector<BoundedRow>& rows,

@@ -31,6 +31,7 @@ struct BoundedRow {
   // For the fast solver: the fraction of the interval after which the row acts, and how much greater `offset`
   // is at the interval's start, decreasing linearly [m/s] or [rad/s].
   Real from = 0, turning = 0;
+  bool resists_change = false;  ///< whether `target` is u before the solution, whose change the row resists
 };
 
 struct JointProblem {

@@ -57,6 +57,7 @@ struct JointRows {
   uint32_t count = 0;
   Mat6 on_a = Mat6::Zero(), on_b = Mat6::Zero();  ///< J^T: a column for each constraint
   Vec6 error = Vec6::Zero(), bias = Vec6::Zero();
+  Vec6 softness = Vec6::Zero();  ///< change of the row's speed that its own impulse takes back
 
   void add(const JointRow& row);
 };

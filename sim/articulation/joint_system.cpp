@@ -103,6 +103,7 @@ bool JointSystem::factorize(Matrix<N>& m) {
     };
     add(joints_[j].a, rows_[j].on_a, response_a_[j]);
     add(joints_[j].b, rows_[j].on_b, response_b_[j]);
+    m.diagonal[j].diagonal() += rows_[j].softness.template head<N>();
     for (auto i = static_cast<Eigen::Index>(rows_[j].count); i < N; ++i) m.diagonal[j](i, i) = 1;
   }
   for (const Coupling& c : couplings_) {
@@ -196,6 +197,7 @@ void JointSystem::refine(std::span<const Vec6> change, std::span<Vec6> impulses)
     given_.assign(links_.size(), Vec6::Zero());
     apply(p, given_);
     relative(given_, result);
+    for (std::size_t j = 0; j < p.size(); ++j) result[j] += rows_[j].softness.cwiseProduct(p[j]);
   };
   std::vector<Vec6>&r = residual_, &z = part_, &p = direction_, &q = product_;
   multiply(impulses, r);

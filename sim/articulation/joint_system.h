@@ -1,9 +1,9 @@
 #pragma once
-/// The linear system of an articulation's joints (physics A1). With M the masses of its links and J its
-/// constraints, A = J M^-1 J^T has a block row for each joint and couples joints that share a link. A link
-/// with many joints would couple all of them; it gets a row of its own instead, so that any tree costs O(n).
-/// If joints form loops, rows may be linearly dependent. A small fraction of the diagonal is then added, and
-/// conjugate gradients remove the error that this causes.
+/// The linear system of an articulation's joints (physics A1). With M the masses of its links, J its
+/// constraints and S their softness, A = J M^-1 J^T + S has a block row for each joint and couples joints
+/// that share a link. A link with many joints would couple all of them; it gets a row of its own instead, so
+/// that any tree costs O(n). If joints form loops, rows may be linearly dependent. A small fraction of the
+/// diagonal is then added, and conjugate gradients remove the error that this causes.
 
 #include <array>
 #include <cstdint>
@@ -36,8 +36,8 @@ class JointSystem {
 
   /// Computes J v for all joints. Driven links count as motionless.
   void relative(std::span<const Vec6> velocities, std::span<Vec6> result) const;
-  /// Computes the impulses p that change J v by `change` and applies them: velocities += M^-1 J^T p. Does
-  /// nothing if factorize() failed.
+  /// Computes the impulses p that change J v by `change` - S p and applies them: velocities += M^-1 J^T p.
+  /// Does nothing if factorize() failed.
   void correct(std::span<const Vec6> change, std::span<Vec6> impulses, std::span<Vec6> velocities);
 
   std::span<const Topology> joints() const { return joints_; }

@@ -168,6 +168,14 @@ Real approach(const Contact& c, std::span<const ContactBody> bodies) {
   return std::max(0.0, -c.relative_velocity(bodies).x());
 }
 
+Real speed(const BoundedRow& r, std::span<const ContactBody> bodies) {
+  Real u = r.offset;
+  for (const auto& [body, on] : {std::pair(r.a, &r.on_a), std::pair(r.b, &r.on_b)})
+    if (body != kUnmoved)
+      u += on->head<3>().dot(bodies[body].velocity) + on->tail<3>().dot(bodies[body].angular_velocity);
+  return u;
+}
+
 /// Limit of a solution's work: unlimited, or a bounded number of operations.
 enum class Effort : uint8_t { full, bounded };
 
@@ -213,6 +221,8 @@ class Cluster {
         effort_(effort),
         before_(bodies.begin(), bodies.end()) {
     for (const Contact& c : contacts) velocities_.push_back(c.relative_velocity(bodies));
+    for (BoundedRow& r : joints.bounded)
+      if (r.resists_change) r.target = speed(r, bodies);
   }
 
   ContactWork solve() {
@@ -322,7 +332,10 @@ class Cluster {
     Real size = 0;
     for (std::size_t i = 0; i < contacts_.size(); ++i)
       size += contacts_[i].impulse.norm() * velocities_[i].norm();
-    return sim::added_energy(before_, bodies_, contacts_) - kRounding * static_cast<Real>(kDense) * size;
+    Real energy = sim::added_energy(before_, bodies_, contacts_);
+    for (const BoundedRow& r : joints_.bounded)
+      if (r.resists_change) energy += r.impulse * (r.target + speed(r, bodies_)) / 2;
+    return energy - kRounding * static_cast<Real>(kDense) * size;
   }
 
   /// For an inexact result: scales the impulses down. The energy added by s p is s (p.u + s p.(u+ - u) / 2),
@@ -333,6 +346,11 @@ class Cluster {
       first += contacts_[i].impulse.dot(velocities_[i]);
       second += contacts_[i].impulse.dot(contacts_[i].relative_velocity(bodies_) - velocities_[i]) / 2;
     }
+    for (const BoundedRow& r : joints_.bounded)
+      if (r.resists_change) {
+        first += r.impulse * r.target;
+        second += r.impulse * (speed(r, bodies_) - r.target) / 2;
+      }
     const Real factor = first < 0 ? std::min(1.0, -first / second) : 0;
     for (Contact& c : contacts_) c.impulse *= factor;
     for (Vec6& p : joints_.impulses) p *= factor;

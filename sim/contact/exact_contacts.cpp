@@ -61,7 +61,7 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
   points_.clear();
   displacements_.clear();
   const Island* const one[] = {&island};
-  joints_.collect(one, interval);
+  joints_.collect(one, interval, IslandJoints::Springs::rows);
   may_divide_ = island.bodies.size() <= kMostDivided && joints_.act_throughout();
   for (ContactPair* pair : island.pairs) add_points(*pair, interval);
   if (contacts_.empty() && joints_.bounded().empty()) return {.is_applied = true, .work = {}};
@@ -253,6 +253,11 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
   for (std::size_t i = 0; i < contacts_.size(); ++i)
     if (approach_[i] > kClosing && contacts_[i].impulse.x() > 0)
       closing_[contacts_[i].a] = closing_[contacts_[i].b] = 1;
+  // Links with springs move by the velocities of the end in any case.
+  std::vector<uint8_t> is_kicked(bodies_.size(), 0);
+  for (const Articulation* a : joints_.articulations())
+    if (a->has_springs())
+      for (const Body* link : a->bodies()) is_kicked[link->row] = closing_[link->row] = 1;
   close_stops();
   close_links();
   close_neighbors(island, duration);
@@ -265,7 +270,7 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
     const Vec3 dv = bodies_[i].velocity - free_[i].velocity,
                dw = bodies_[i].angular_velocity - free_[i].angular_velocity;
     Vec3 mean = rest_[i] * dv, mean_spin = rest_[i] * dw;
-    if (closing_[i]) {
+    if (closing_[i] && !is_kicked[i]) {
       mean = (dv + bodies_[i].velocity - body.start_twist.velocity) / 2;
       mean_spin = (dw + bodies_[i].angular_velocity - body.start_twist.angular_velocity) / 2;
     }

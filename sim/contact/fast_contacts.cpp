@@ -175,7 +175,7 @@ void FastContacts::collect_link_contacts() {
 ContactWork FastContacts::solve(std::span<const Island* const> islands, const ContactInterval& interval) {
   const Real h = interval.duration;
   collect(islands);
-  joints_.collect(islands, interval);
+  joints_.collect(islands, interval, IslandJoints::Springs::constraints);
   if (origins_.empty() && joints_.bounded().empty()) return {};
   bodies_.resize(members_.size());
   patches_.resize(origins_.size());

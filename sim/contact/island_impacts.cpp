@@ -127,7 +127,7 @@ CollisionOutcome resolve_collisions(const Island& island, const CollisionSetting
   CollisionOutcome outcome;
   if (cluster.contacts.empty()) return outcome;
   IslandJoints joints;
-  joints.collect_for_collision(island, settings.time);
+  joints.collect_for_collision(island, settings.time, settings.substep);
   const JointProblem problem = joints.problem();
   if (settings.whole)
     outcome.work = collide(cluster.bodies, cluster.contacts, cluster.restitution, settings.law, problem);

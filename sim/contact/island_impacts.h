@@ -8,6 +8,7 @@ namespace offstage::sim {
 
 struct CollisionSettings {
   Real time;             ///< as the world's time [s]
+  Real substep;          ///< [s]
   Real reach;            ///< contacts with a smaller separation belong to the cluster [m]
   Real collision_speed;  ///< contacts that approach faster bounce [m/s]
   ImpactLaw law;

@@ -6,20 +6,24 @@
 namespace offstage::sim {
 
 bool has_forces(const Island& island) {
-  return !island.pairs.empty() || std::any_of(island.articulations.begin(), island.articulations.end(),
-                                              [](const Articulation* a) { return a->has_bounded_rows(); });
+  // Springs are in the free motion; their rows act on what changes it.
+  const auto has_other_rows = [](const Joint* joint) { return joint->has_rows_besides_spring(); };
+  return !island.pairs.empty() ||
+         std::any_of(island.articulations.begin(), island.articulations.end(), [&](const Articulation* a) {
+           return a->has_bounded_rows() && std::ranges::any_of(a->joints(), has_other_rows);
+         });
 }
 
 /// `place` evaluates the constraints of an articulation.
 template <class Place>
-void IslandJoints::collect_constraints(const Island& island, Place&& place) {
+void IslandJoints::collect_constraints(const Island& island, Springs springs, Place&& place) {
   const auto row = [](const Articulation& a, uint32_t link) {
     return link == JointSystem::kDriven ? kUnmoved : a.bodies()[link]->row;
   };
   for (Articulation* a : island.articulations) {
     place(*a);
     articulations_.push_back(a);
-    const JointSystem& system = a->system();
+    const JointSystem& system = springs == Springs::rows ? a->system() : a->inert_system();
     for (std::size_t j = 0; j < system.joints().size(); ++j)
       constraints_.push_back(
           {row(*a, system.joints()[j].a), row(*a, system.joints()[j].b), &system.rows()[j]});
@@ -29,9 +33,10 @@ void IslandJoints::collect_constraints(const Island& island, Place&& place) {
 /// The impulses act in the middle of the interval. Those of a limit that is reached act from then on: they
 /// would otherwise change the angular momentum, by the motion of the joint between both times.
 void IslandJoints::place(Articulation& a, const ContactInterval& interval) {
-  a.place_within(interval.end, interval.duration, kMiddle, interval.substep);
+  const Real from = a.has_springs() ? a.kicks_act_from() : kMiddle;
+  a.place_within(interval.end, interval.duration, from, interval.substep);
   std::optional<Real> stop;
-  if (a.has_bounded_rows()) stop = first_stop(a, interval.duration, interval.end);
+  if (a.has_bounded_rows() && !a.has_springs()) stop = first_stop(a, interval.duration, interval.end);
   if (stop) a.place_within(interval.end, interval.duration, *stop, interval.substep);
   stops_.push_back(stop);
 }
@@ -39,6 +44,8 @@ void IslandJoints::place(Articulation& a, const ContactInterval& interval) {
 bool IslandJoints::act_throughout() const {
   // Limits have one finite bound.
   return std::none_of(stops_.begin(), stops_.end(), [](const auto& stop) { return stop.has_value(); }) &&
+         std::none_of(articulations_.begin(), articulations_.end(),
+                      [](const Articulation* a) { return a->has_springs(); }) &&
          std::all_of(bounded_.begin(), bounded_.end(), [](const BoundedRow& row) {
            return std::isfinite(row.lower) == std::isfinite(row.upper);
          });
@@ -60,7 +67,8 @@ void IslandJoints::project(std::span<ContactBody> bodies, Real end) const {
   }
 }
 
-void IslandJoints::collect(std::span<const Island* const> islands, const ContactInterval& interval) {
+void IslandJoints::collect(std::span<const Island* const> islands, const ContactInterval& interval,
+                           Springs springs) {
   articulations_.clear();
   constraints_.clear();
   bounded_.clear();
@@ -70,23 +78,31 @@ void IslandJoints::collect(std::span<const Island* const> islands, const Contact
   impulses_.clear();
   for (const Island* island : islands) {
     const std::size_t first = articulations_.size();
-    collect_constraints(*island, [&](Articulation& a) { place(a, interval); });
+    collect_constraints(*island, springs, [&](Articulation& a) { place(a, interval); });
     for (std::size_t i = first; i < articulations_.size(); ++i) {
-      collect_bounded_rows(*articulations_[i], interval.duration, interval.end, bounded_, origins_);
+      const Articulation& a = *articulations_[i];
+      collect_bounded_rows(a, interval.duration, interval.end, bounded_, origins_);
+      if (springs == Springs::rows) collect_springs(a, interval.duration, interval.end, bounded_, origins_);
       bounded_ends_.push_back(static_cast<uint32_t>(bounded_.size()));
-      for (const Joint* joint : articulations_[i]->joints())
+      for (const Joint* joint : a.joints()) {
         impulses_.push_back(interval.duration * joint->reaction);
+        if (springs == Springs::rows && joint->has_spring()) impulses_.back().tail<3>().setZero();
+      }
     }
   }
 }
 
-void IslandJoints::collect_for_collision(const Island& island, Real time) {
+void IslandJoints::collect_for_collision(const Island& island, Real time, Real substep) {
   articulations_.clear();
   constraints_.clear();
   bounded_.clear();
   origins_.clear();
-  collect_constraints(island, [&](Articulation& a) { a.place(time, true); });
-  for (const Articulation* a : articulations_) collect_stops(*a, time, bounded_, origins_);
+  collect_constraints(island, Springs::rows, [&](Articulation& a) { a.place(time, true); });
+  for (const Articulation* a : articulations_) {
+    collect_stops(*a, time, bounded_, origins_);
+    collect_springs(*a, substep, time, bounded_, origins_);
+  }
+  for (BoundedRow& row : bounded_) row.impulse = 0;
   impulses_.assign(constraints_.size(), Vec6::Zero());
 }
 

@@ -19,10 +19,12 @@ bool has_forces(const Island& island);
 /// The joints of islands as part of a contact problem. Their bodies have the indices Body::row.
 class IslandJoints {
  public:
+  /// Whether springs are rows without bounds, or soft constraints.
+  enum class Springs { rows, constraints };
   /// Collects the joints' constraints and rows for an interval.
-  void collect(std::span<const Island* const> islands, const ContactInterval& interval);
+  void collect(std::span<const Island* const> islands, const ContactInterval& interval, Springs springs);
   /// Collects the constraints and rows for a collision at the bodies' `start` states.
-  void collect_for_collision(const Island& island, Real time);
+  void collect_for_collision(const Island& island, Real time, Real substep);
   /// Adds the impulses of a collision to the loads of the joints.
   void store_impact_impulses();
   JointProblem problem() { return {constraints_, bounded_, impulses_}; }
@@ -31,8 +33,11 @@ class IslandJoints {
 
   std::span<Articulation* const> articulations() const { return articulations_; }
   /// The fraction of the interval after which the impulses of an articulation act.
-  Real acting_from(std::size_t articulation) const { return stops_[articulation].value_or(kMiddle); }
-  /// Whether all rows act throughout the interval: there are no limits near.
+  Real acting_from(std::size_t articulation) const {
+    const Articulation& a = *articulations_[articulation];
+    return stops_[articulation].value_or(a.has_springs() ? a.kicks_act_from() : kMiddle);
+  }
+  /// Whether all impulses act evenly throughout the interval: there are no limits near, and no springs.
   bool act_throughout() const;
   /// Removes the parts of the velocities at the interval's end that violate the constraints of the time when
   /// a limit is reached: the joint forces that would have turned the velocities afterwards end with the
@@ -47,7 +52,7 @@ class IslandJoints {
   static constexpr Real kMiddle = 0.5;
 
   template <class Place>
-  void collect_constraints(const Island& island, Place&& place);
+  void collect_constraints(const Island& island, Springs springs, Place&& place);
   void place(Articulation& a, const ContactInterval& interval);
   Wrench wrench(std::size_t bounded, Real impulse) const;
 

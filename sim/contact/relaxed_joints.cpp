@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/Cholesky>
-
 #include "sim/contact/relaxation.h"
 
 namespace offstage::sim {
@@ -13,10 +11,6 @@ namespace {
 
 /// Rows times links above which the responses of all links are not stored.
 constexpr std::size_t kMostResponses = 20000;
-/// Rows without bounds above which sweeps solve them: the cost of a factor is the cube of their number.
-constexpr std::size_t kMostCoupled = 400;
-/// Sweeps over rows converge fast if the effect of the other rows on each is below this fraction of its own.
-constexpr Real kWeakCoupling = 0.5;
 /// A row that acts from the interval's end on acts in its last sub-step; fraction of the interval.
 constexpr Real kInstant = 1e-9;
 /// The contacts of an articulation depend on each other. Passes over them end when none changes a velocity by
@@ -107,66 +101,21 @@ void RelaxedJoints::begin(std::span<const RelaxedBody> bodies, Real duration, ui
 
 void RelaxedJoints::prepare(Part& part, std::span<const RelaxedBody> bodies) {
   const std::size_t rows = part.last_row - part.first_row;
-  const bool has_springs = std::ranges::count_if(part.articulation->joints(), [](const Joint* joint) {
-                             return joint->def.stiffness > 0;
-                           }) > 1;
-  const bool whole = part.bodies.size() * rows <= kMostResponses || (has_springs && rows <= kMostCoupled);
+  const bool whole = part.bodies.size() * rows <= kMostResponses;
   for (uint32_t i = part.first_row; i < part.last_row; ++i)
     prepare_row(part, problem_.bounded[i], rows_[i], bodies, whole);
-  if (whole && has_springs) prepare_coupled(part);
 }
 
-/// Sweeps do not converge for the springs of a stiff rod: a rod of 20 links would sag 14 times too far. Their
-/// equations are linear, so they are solved together.
-void RelaxedJoints::prepare_coupled(Part& part) {
-  for (uint32_t i = part.first_row; i < part.last_row; ++i) {
-    const BoundedRow& r = problem_.bounded[i];
-    if (std::isinf(r.lower) && std::isinf(r.upper) && r.from == 0 && rows_[i].softness > 0)
-      part.coupled.push_back(i);
-  }
-  const auto n = static_cast<Eigen::Index>(part.coupled.size());
-  if (n < 2 || part.coupled.size() > kMostCoupled) return part.coupled.clear();
-  std::vector<std::size_t> place(bodies_.size(), part.bodies.size());
-  for (std::size_t k = 0; k < part.bodies.size(); ++k) place[part.bodies[k]] = k;
-  const auto effect = [&](const Row& row, const BoundedRow& on) {
-    Real u = 0;
-    for (const auto& [body, direction] : {std::pair(on.a, &on.on_a), std::pair(on.b, &on.on_b)})
-      if (body != kUnmoved && place[body] < part.bodies.size())
-        u += direction->dot(row.response[place[body]]);
-    return u;
-  };
-  Eigen::MatrixXd A(n, n);
-  bool is_weak = true;
-  for (Eigen::Index j = 0; j < n; ++j) {
-    const Row& row = rows_[part.coupled[static_cast<std::size_t>(j)]];
-    for (Eigen::Index i = 0; i < n; ++i)
-      A(i, j) = effect(row, problem_.bounded[part.coupled[static_cast<std::size_t>(i)]]);
-    A(j, j) += row.softness;
-    is_weak &= A.col(j).cwiseAbs().sum() - A(j, j) < kWeakCoupling * A(j, j);
-  }
-  if (is_weak || Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>(A).info() != Eigen::Success)
-    return part.coupled.clear();
-  part.coupled_factor = std::move(A);
-  for (const uint32_t i : part.coupled) rows_[i].is_coupled = true;
-}
-
-void RelaxedJoints::solve_coupled(Part& part, std::span<BodyMotion> motions, Real elapsed, bool is_last) {
-  Eigen::VectorXd error(static_cast<Eigen::Index>(part.coupled.size()));
-  for (std::size_t k = 0; k < part.coupled.size(); ++k) {
-    const BoundedRow& r = problem_.bounded[part.coupled[k]];
-    const Row& row = rows_[part.coupled[k]];
-    error[static_cast<Eigen::Index>(k)] =
-        speed(r, motions) + (1 - elapsed / duration_) * r.turning - r.target + row.softness * row.impulse;
-  }
-  part.coupled_factor.triangularView<Eigen::Lower>().solveInPlace(error);
-  part.coupled_factor.triangularView<Eigen::Lower>().transpose().solveInPlace(error);
-  for (std::size_t k = 0; k < part.coupled.size(); ++k) {
-    Row& row = rows_[part.coupled[k]];
-    const Real change = -error[static_cast<Eigen::Index>(k)], next = row.impulse + change;
-    push(part, problem_.bounded[part.coupled[k]], row, change, motions);
-    row.sum += is_last ? change : next;
-    row.impulse = next;
-  }
+/// The rows of springs oppose the change of their speeds since the step's start. With steady forces it grows
+/// in proportion to the time, and the impulses of the sub-steps are equal: the softness times the sum of them
+/// is the change in each sub-step.
+void RelaxedJoints::soften(Part& part, Real elapsed) {
+  const Real substeps = std::max(1.0, std::round(elapsed / substep_));
+  if (!part.articulation->soften(substeps)) return;
+  for (uint32_t i = part.first_row; i < part.last_row; ++i)
+    prepare_row(part, problem_.bounded[i], rows_[i], bodies_, true);
+  part.prepared = 0;
+  for (uint32_t i = part.first_contact; i < part.last_contact; ++i) contact_rows_[i].is_ready = false;
 }
 
 /// `whole`: whether the response of the whole articulation is found, not only that of the row's bodies.
@@ -187,7 +136,7 @@ void RelaxedJoints::prepare_row(Part& part, const BoundedRow& r, Row& row,
       if (part.bodies[k] == r.a) row.response[k] = row.response_a, has_a = true;
       if (part.bodies[k] == r.b) row.response[k] = row.response_b, has_b = true;
     }
-    JointSystem& system = part.articulation->system();
+    JointSystem& system = part.articulation->inert_system();
     system.relative(row.response, part.change);
     for (Vec6& c : part.change) c = -c;
     system.correct(part.change, part.impulses, row.response);
@@ -230,11 +179,13 @@ void RelaxedJoints::start(uint32_t p, std::span<BodyMotion> motions) {
 
 void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapsed, bool is_last) {
   Part& part = parts_[p];
-  JointSystem& system = part.articulation->system();
+  soften(part, elapsed);
+  JointSystem& system = part.articulation->inert_system();
   for (std::size_t k = 0; k < part.bodies.size(); ++k)
     part.velocities[k] = change_of(motions[part.bodies[k]]) - free_change(bodies_[part.bodies[k]], elapsed);
   system.relative(part.velocities, part.change);
-  for (Vec6& c : part.change) c = -c;
+  for (std::size_t j = 0; j < part.change.size(); ++j)
+    part.change[j] = -part.change[j] - system.rows()[j].softness.cwiseProduct(part.now[j]);
   std::vector<Vec6>& correction = part.velocities;
   std::fill(correction.begin(), correction.end(), Vec6::Zero());
   system.correct(part.change, part.impulses, correction);
@@ -244,11 +195,9 @@ void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapse
   if (is_last) std::fill(part.now.begin(), part.now.end(), Vec6::Zero());
   for (std::size_t j = 0; j < part.now.size(); ++j) part.now[j] += part.impulses[j];
 
-  if (!part.coupled.empty()) solve_coupled(part, motions, elapsed, is_last);
   for (uint32_t i = part.first_row; i < part.last_row; ++i) {
     const BoundedRow& r = problem_.bounded[i];
     Row& row = rows_[i];
-    if (row.is_coupled) continue;
     row.acts |= elapsed > (r.from - kInstant) * duration_;
     if (!row.acts) continue;
     const Real u = speed(r, motions) + (1 - elapsed / duration_) * r.turning;
@@ -303,12 +252,13 @@ void RelaxedJoints::solve_contacts(Part& part, std::span<BodyMotion> motions, Re
 void RelaxedJoints::begin_push(uint32_t p, std::span<const BodyMotion> motions) {
   Part& part = parts_[p];
   part.before_push.clear();
+  part.pushed.assign(part.bodies.size(), Vec6::Zero());
   for (const uint32_t body : part.bodies) part.before_push.push_back(motions[body].shift);
 }
 
 Real RelaxedJoints::push_out(uint32_t p, std::span<BodyMotion> motions) {
   Part& part = parts_[p];
-  JointSystem& system = part.articulation->system();
+  JointSystem& system = part.articulation->inert_system();
   for (std::size_t k = 0; k < part.bodies.size(); ++k)
     part.velocities[k] = twist(motions[part.bodies[k]].shift - part.before_push[k]);
   system.relative(part.velocities, part.change);
@@ -320,6 +270,7 @@ Real RelaxedJoints::push_out(uint32_t p, std::span<BodyMotion> motions) {
   for (std::size_t k = 0; k < part.bodies.size(); ++k) {
     motions[part.bodies[k]].shift += lanes(correction[k]);
     farthest = std::max(farthest, correction[k].head<3>().norm());
+    part.pushed[k] = twist(motions[part.bodies[k]].shift - part.before_push[k]);
   }
   for (std::size_t j = 0; j < part.shift.size(); ++j) part.shift[j] += part.impulses[j];
   return farthest;
@@ -352,6 +303,14 @@ void RelaxedJoints::add_motion(std::span<RelaxedBody> bodies, std::span<const Re
       const BoundedRow& r = contacts_[i].row;
       to(r.a, contact_rows_[i].sum * r.on_a, contact_rows_[i].shift * r.on_a);
       to(r.b, contact_rows_[i].sum * r.on_b, contact_rows_[i].shift * r.on_b);
+    }
+    // Links with springs move by the change of the velocity at the end: any other motion would strain them.
+    if (!part.articulation->has_springs()) continue;
+    const Real time = (1 - part.articulation->kicks_act_from()) * duration_;
+    for (std::size_t k = 0; k < part.bodies.size(); ++k) {
+      RelaxedBody& b = bodies[part.bodies[k]];
+      b.displacement = time * b.inverse_mass * b.impulse + part.pushed[k].head<3>();
+      b.rotation_vector = time * (b.inverse_inertia * b.angular_impulse) + part.pushed[k].tail<3>();
     }
   }
 }

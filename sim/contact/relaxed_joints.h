@@ -1,13 +1,11 @@
 #pragma once
 /// Joints in the sub-steps of the fast solver. After the contacts' sweep, the sparse system of each
 /// articulation satisfies all its constraints at once, so neither long chains nor large mass ratios stretch
-/// it. Its rows without bounds, those of springs and dampers, are then solved together if they are stiff, and
-/// all others one after the other, each using the response of the whole articulation to its impulse.
+/// it. Springs take part in it as soft constraints. Rows with bounds are then solved one after the other,
+/// each using the response of the whole articulation to its impulse.
 
 #include <span>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "sim/articulation/articulation.h"
 #include "sim/articulation/joint_problem.h"
@@ -64,7 +62,6 @@ class RelaxedJoints {
     Real shift = 0;              // integral of the sum over the step
     bool acts = false;           // whether the time from which it acts has come
     bool is_ready = false;       // whether its responses are known
-    bool is_coupled = false;     // whether it is solved together with others
     // Of the links to a unit impulse; empty: only of its own two links, in `response_a` and `response_b`.
     std::vector<Vec6> response;
     std::vector<Vec6> reaction;  // of the joints to a unit impulse
@@ -78,10 +75,7 @@ class RelaxedJoints {
     std::vector<uint32_t> bodies;  // indices of the links' bodies
     std::vector<Vec6> velocities, change, impulses;
     std::vector<FloatLanes> before_push;  // by link: its displacement
-    // Rows that are solved together, by index in `rows_`; empty: none. The Cholesky factor of the matrix of
-    // their speeds per impulse.
-    std::vector<uint32_t> coupled;
-    Eigen::MatrixXd coupled_factor;
+    std::vector<Vec6> pushed;             // by link: its displacement since then
     // Impulses of the joints in this sub-step, in the whole step, and the integral of these over the step.
     std::vector<Vec6> now, sum, shift;
   };
@@ -89,8 +83,7 @@ class RelaxedJoints {
   void prepare(Part& part, std::span<const RelaxedBody> bodies);
   void prepare_row(Part& part, const BoundedRow& r, Row& row, std::span<const RelaxedBody> bodies,
                    bool whole);
-  void prepare_coupled(Part& part);
-  void solve_coupled(Part& part, std::span<BodyMotion> motions, Real elapsed, bool is_last);
+  void soften(Part& part, Real elapsed);
   void push(Part& part, const BoundedRow& r, const Row& row, Real impulse,
             std::span<BodyMotion> motions) const;
   void solve_contacts(Part& part, std::span<BodyMotion> motions, Real elapsed, bool is_last);

@@ -164,9 +164,18 @@ void CoupledGroup::force(Real t, std::span<const Real> x, std::span<const Real> 
   for (const Jointed& j : articulations_) add_joint_forces(j, t, x, p, dp);
 }
 
-/// Computes in `dp` all forces except those of joints.
+/// Computes in `dp` the forces of the motion between kicks, except those of joints.
 void CoupledGroup::set_free_forces(Real t, std::span<const Real> x, std::span<const Real> p,
                                    std::span<Real> dp) const {
+  set_all_forces(t, x, p, dp);
+  for (const Jointed& j : articulations_)
+    if (j.articulation->has_springs())
+      for (const std::size_t link : j.links) std::ranges::fill(dp.subspan(kBodyP * link, kBodyP), 0);
+}
+
+/// Computes in `dp` all forces except those of joints.
+void CoupledGroup::set_all_forces(Real t, std::span<const Real> x, std::span<const Real> p,
+                                  std::span<Real> dp) const {
   for (std::size_t i = 0; i < bodies_.size(); ++i)
     stage(i, x, p).force(forces_, t, dp.subspan(kBodyP * i, kBodyP));
   const auto particles_x = x.subspan(particle_x(0)), particles_v = p.subspan(particle_p(0));
@@ -192,26 +201,63 @@ bool CoupledGroup::force_and_damping(Real t, std::span<const Real> x, std::span<
   return true;
 }
 
-void CoupledGroup::add_joint_forces(const Jointed& jointed, Real t, std::span<const Real> x,
-                                    std::span<const Real> p, std::span<Real> dp) const {
+/// The links of an articulation, with the forces on them.
+struct CoupledGroup::Links {
+  std::vector<LinkMotion> motion;
+  std::vector<LinkMobility> mobility;
+  std::vector<Vec6> forces;
+};
+
+CoupledGroup::Links CoupledGroup::links(const Jointed& jointed, std::span<const Real> x,
+                                        std::span<const Real> p, std::span<const Real> dp) const {
   const std::size_t count = jointed.links.size();
-  std::vector<LinkMotion> motion(count);
-  std::vector<LinkMobility> mobility(count);
-  std::vector<Vec6> forces(count);
+  Links links{std::vector<LinkMotion>(count), std::vector<LinkMobility>(count), std::vector<Vec6>(count)};
   for (std::size_t k = 0; k < count; ++k) {
     const std::size_t i = jointed.links[k];
     const RigidStage s = stage(i, x, p);
     const Mat3 axes = s.motion.orientation.toRotationMatrix();
-    motion[k] = {s.motion.position, axes, s.motion.velocity, s.motion.angular_velocity};
-    mobility[k] = {1 / s.body.mass, axes * s.body.inverse_inertia * axes.transpose()};
-    forces[k] << vec3(dp, kBodyP * i), vec3(dp, kBodyP * i + 3);
+    links.motion[k] = {s.motion.position, axes, s.motion.velocity, s.motion.angular_velocity};
+    links.mobility[k] = {1 / s.body.mass, axes * s.body.inverse_inertia * axes.transpose()};
+    links.forces[k] << vec3(dp, kBodyP * i), vec3(dp, kBodyP * i + 3);
   }
-  jointed.articulation->add_forces(t, motion, mobility, forces);
-  for (std::size_t k = 0; k < count; ++k) {
+  return links;
+}
+
+void CoupledGroup::add_joint_forces(const Jointed& jointed, Real t, std::span<const Real> x,
+                                    std::span<const Real> p, std::span<Real> dp) const {
+  Links of = links(jointed, x, p, dp);
+  jointed.articulation->add_forces(t, of.motion, of.mobility, of.forces);
+  for (std::size_t k = 0; k < of.forces.size(); ++k) {
     const std::size_t at = kBodyP * jointed.links[k];
-    vec3(dp, at) = forces[k].head<3>();
-    vec3(dp, at + 3) = forces[k].tail<3>();
+    vec3(dp, at) = of.forces[k].head<3>();
+    vec3(dp, at + 3) = of.forces[k].tail<3>();
   }
+}
+
+/// Changes the velocities of links with springs by all forces from t to t + h. They then move without forces
+/// (physics A8).
+void CoupledGroup::kick(Real t, Real h, IntegratorWorkspace& work) {
+  work.dp.resize(p_.size());
+  set_all_forces(t, x_, p_, work.dp);
+  for (const Jointed& j : articulations_) {
+    if (!j.articulation->has_springs()) continue;
+    Links of = links(j, x_, p_, work.dp);
+    j.articulation->kick(t, h, of.motion, of.mobility, of.forces);
+    for (std::size_t k = 0; k < of.forces.size(); ++k) {
+      const std::span<Real> p(p_);
+      const std::size_t at = kBodyP * j.links[k];
+      vec3(p, at) += h * of.forces[k].head<3>();
+      vec3(p, at + 3) += h * of.forces[k].tail<3>();
+    }
+  }
+}
+
+/// The number of kicks in a step.
+Real CoupledGroup::kicks(Real h) const {
+  Real count = 1;
+  for (const Jointed& j : articulations_)
+    if (j.articulation->has_springs()) count = std::max(count, j.articulation->kicks_needed(h));
+  return std::min(count, kMostPieces);
 }
 
 /// No fixed-step integrator is accurate if bodies turn, or swing, by much more than this in a step. Links
@@ -222,7 +268,7 @@ Real CoupledGroup::pieces(Real h) const {
   for (const Jointed& j : articulations_) {
     for (const Body* body : j.articulation->bodies())
       fastest = std::max(fastest, body->rigid.angular_velocity().norm());
-    tightest = std::max(tightest, j.articulation->greatest_frequency());
+    if (!j.articulation->has_springs()) tightest = std::max(tightest, j.articulation->greatest_frequency());
   }
   return std::clamp(std::ceil(std::max({fastest / kTurn, tightest / kSwing, spin / kSpin}) * h), 1.0,
                     kMostPieces);
@@ -260,10 +306,15 @@ void CoupledGroup::step(const Integrator& integrator, Real t, Real h, Integrator
   const bool particles_only = bodies_.empty() && springs_.empty();
   const Integrator& chosen =
       particles_only ? sim::integrator(groups_.front().system->def.integrator) : integrator;
-  const Real count = pieces(h), duration = h / count;
+  const bool is_kicked =
+      std::ranges::any_of(articulations_, [](const Jointed& j) { return j.articulation->has_springs(); });
+  const Real kick_count = is_kicked ? kicks(h) : 1;
+  for (const Jointed& j : articulations_) j.articulation->set_kicks(kick_count);
+  const Real each = std::ceil(pieces(h) / kick_count), count = kick_count * each, duration = h / count;
   int halvings = kMostHalvings;
   for (Real i = 0; i < count; ++i) {
     const Real begin = t + i * duration;
+    if (is_kicked && std::fmod(i, each) == 0) kick(begin, h / kick_count, work);
     if (articulations_.empty())
       chosen.step(*this, begin, duration, x_, p_, work);
     else

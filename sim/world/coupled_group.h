@@ -104,9 +104,14 @@ class CoupledGroup final : public DynamicSystem {
     return {bodies_[body]->rigid, x.subspan(kBodyX * body, kBodyX), p.subspan(kBodyP * body, kBodyP)};
   }
   void add_articulation(Articulation& articulation, const BodyIndex& index);
+  struct Links;
+  Links links(const Jointed& jointed, std::span<const Real> x, std::span<const Real> p,
+              std::span<const Real> dp) const;
   void add_joint_forces(const Jointed& jointed, Real t, std::span<const Real> x, std::span<const Real> p,
                         std::span<Real> dp) const;
   Real pieces(Real h) const;
+  Real kicks(Real h) const;
+  void kick(Real t, Real h, IntegratorWorkspace& work);
   /// Kinetic energy [J], power of all forces except those of joints [W], and the kinetic energy that these
   /// forces would give to free bodies from rest in a time t, divided by t^2 [J/s^2].
   struct EnergyRate {
@@ -117,6 +122,7 @@ class CoupledGroup final : public DynamicSystem {
   void advance(const Integrator& integrator, Real t, Real h, int depth, int& halvings,
                IntegratorWorkspace& work);
   void limit_energy(Real most);
+  void set_all_forces(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const;
   void set_free_forces(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const;
   void add_group(const WorldState& world, ParticleSystem& system);
   void add_pair_forces(const WorldState& world);

@@ -57,6 +57,14 @@ TEST(SceneJoints, InvalidValuesAreRefusedWithTheAllowedOnes) {
             "/joints/1/limits_deg: must be a range that contains 0, the position of the joint at time 0\n");
   EXPECT_EQ(joint_errors(bodies + R"("joints": [{"a": "door", "motor": {}}])"),
             "/joints/0/motor: drives revolute, prismatic, screw and distance joints only\n");
+  EXPECT_EQ(joint_errors(bodies + R"("joints": [
+                {"type": "revolute", "a": "door", "second_axis": [0, 1, 0], "anchor_b": [0, 1, 0]},
+                {"type": "revolute", "a": "door", "motor": {"stiffness": 2, "target": 10,
+                 "keys": [{"time": 0, "target": 5}]}}])"),
+            "/joints/0/second_axis: is for universal joints, gears and racks\n"
+            "/joints/0/anchor_b: is for distance joints, racks and pulleys\n"
+            "/joints/1/motor/stiffness: is for the mode \"position\"\n"
+            "/joints/1/motor/target: is replaced by \"keys\"; remove one of them\n");
   EXPECT_EQ(joint_errors(bodies + R"("articulations": [{"type": "chain", "end": "world"}])"),
             "/articulations/0/sag: must be above 1.0005 if both ends are fixed: a taut chain cannot carry a "
             "sideways load\n");
@@ -92,9 +100,8 @@ std::vector<Real> sags_of_rod(int links, const char* solver, Real step, const st
   return sags;
 }
 /// Weight of the rod per length [N/m]. Its links are capsules.
-Real weight_of_rod(int links) {
-  constexpr Real kRadius = 0.01;
-  return 2000 * 9.81 * std::numbers::pi * kRadius * kRadius * (1 - 2 * kRadius / 3 * links);
+Real weight_of_rod(int links, Real radius = 0.01, Real density = 2000) {
+  return density * 9.81 * std::numbers::pi * radius * radius * (1 - 2 * radius / 3 * links);
 }
 
 // A clamped beam under its weight w sags by w L^4 / 8 B, a row of n links by 1 + 1 / n^2 times as much. Here
@@ -109,6 +116,52 @@ TEST(Articulations, AChainWithBendStiffnessSagsAsACantilever) {
                         .back(),
                     expected, 0.01 * expected)
             << solver << " " << step << " " << links;
+      }
+}
+
+// The place of rest does not depend on the damping, also of a rod of light links that turn far within a
+// sub-step without their springs.
+TEST(Articulations, DampingDoesNotHoldAnElasticChainUp) {
+  const Real expected = weight_of_rod(32, 0.005, 658) / (8 * 2) * (1 + 1.0 / (32 * 32));
+  for (const char* solver : {"exact", "fast"})
+    for (const Real step : {1.0 / 240, 1.0 / 60})
+      for (const char* damping : {"1", "4"})
+        EXPECT_NEAR(sags_of_rod(32, solver, step,
+                                R"("radius": 0.005, "density": 658, "bend_stiffness": 2, "damping": )" +
+                                    std::string(damping))
+                        .back(),
+                    expected, 3e-3 * expected)
+            << solver << " " << step << " " << damping;
+}
+
+// Heavy balls fall on a light rod: they bend it by more than a right angle, or, where it is stiff, bounce
+// off. No solver and no step adds energy beyond the error of links that turn far in a sub-step.
+TEST(Articulations, BallsThatHitAnElasticChainAddNoEnergy) {
+  for (const char* solver : {"auto", "exact", "fast", "lcp"})
+    for (const Real step : {1.0 / 240, 1.0 / 60})
+      for (const char* stiffness : {"2", "200"}) {
+        const std::string world = R"("output": {"fps": 60, "duration": 1.6}, "world": {"solver": ")" +
+                                  std::string(solver) + R"(", "step": )" + std::to_string(step) + "}, ";
+        const std::string rod =
+            R"("articulations": [{"type": "chain", "from": [0, 1, 0], "to": [1, 1, 0], "links": 32,
+                "radius": 0.005, "density": 658, "damping": 0.02, "bend_stiffness": )" +
+            std::string(stiffness) + "}]";
+        const LoadedScene loaded = parse(world + R"("bodies": [
+              {"name": "floor", "motion": "static", "shape": {"type": "plane"}},
+              {"name": "ball", "shape": {"type": "sphere", "radius": 0.05}, "position": [0.3, 1.6, 0],
+               "repeat": {"count": 4, "offset": [0.2, 0.5, 0.003]}}], )" +
+                                         rod);
+        const ModelLibrary models;
+        Simulation simulation(loaded.scene, models);
+        const Real start = simulation.world().energy().total();
+        Real least = start;
+        for (int frame = 1; frame < loaded.scene.frame_count(); ++frame) {
+          simulation.advance();
+          const Real now = simulation.world().energy().total();
+          ASSERT_LT(now, least + 0.03 * start) << solver << " " << step << " " << stiffness << " " << frame;
+          least = std::min(least, now);
+        }
+        EXPECT_LT(least, 0.8 * start) << "no ball has hit it";
       }
 }
 

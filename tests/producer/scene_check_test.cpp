@@ -266,6 +266,8 @@ TEST(SceneCheck, EventsAtUnreachableAgesAreErrors) {
       errors_of(scene(R"("split": {"age": 1.1}, "trails": [{"start_age": 1}], "on_age": [{"age": 1.1}])")),
       "");
   EXPECT_EQ(errors_of(scene(R"("split": {"age": 1.5, "enabled": false})")), "");
+  EXPECT_EQ(errors_of(scene(R"("split": {"age": 0.5, "delay": 0.2, "delay_steps": 10})")),
+            "/emitters/0/split/delay: is replaced by \"delay_steps\"; remove one of them\n");
 }
 
 // --- Springs ---

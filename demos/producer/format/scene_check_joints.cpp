@@ -74,6 +74,8 @@ class JointChecker : CheckBase {
     if (how.type != pulley)
       for (const auto& [key, point] : {std::pair("/pulley_a", joint.pulley_a), {"/pulley_b", joint.pulley_b}})
         if (!point.isZero(0)) fail(path + key, "is for pulleys");
+    if (how.type != rack && !has_rope(how.type) && !joint.anchor_b.isZero(0))
+      fail(path + "/anchor_b", "is for distance joints, racks and pulleys");
     if (how.type == pulley) {
       if (!(how.ratio > 0)) fail(path + "/ratio", "must be greater than 0 for a pulley");
       for (const auto& [key, strand] : {std::pair("/pulley_a", Vec3(joint.anchor - joint.pulley_a)),
@@ -100,6 +102,8 @@ class JointChecker : CheckBase {
       fail(path + "/length_limits", "replaces \"limits\"; give one of them");
     if (joint.stiffness > 0 && joint.type != spherical)
       fail(path + "/stiffness", "is for spherical joints; use a motor with a \"stiffness\"");
+    if (joint.second_axis && joint.type != universal && !is_coupling)
+      fail(path + "/second_axis", "is for universal joints, gears and racks");
     if (joint.ratio == 0) fail(path + "/ratio", "must not be 0");
     if (joint.ratio != 1 && !is_coupling && joint.type != screw && joint.type != pulley)
       fail(path + "/ratio", "is for gears, racks, screws and pulleys");
@@ -125,6 +129,12 @@ class JointChecker : CheckBase {
     if (!joint.motor) return;
     if (joint.type != revolute && joint.type != prismatic && joint.type != distance && joint.type != screw)
       fail(path + "/motor", "drives revolute, prismatic, screw and distance joints only");
+    if (joint.motor->mode == sim::Motor::Mode::speed)
+      for (const auto& [key, value] :
+           {std::pair("/stiffness", joint.motor->stiffness), {"/damping", joint.motor->damping}})
+        if (value > 0) fail(path + "/motor" + key, "is for the mode \"position\"");
+    if (!joint.motor->keys.empty() && joint.motor->target != 0)
+      fail(path + "/motor/target", "is replaced by \"keys\"; remove one of them");
     check_keys(path + "/motor/keys", joint.motor->keys);
   }
 

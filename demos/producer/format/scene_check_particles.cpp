@@ -168,6 +168,11 @@ class ParticleChecker : CheckBase {
                                        "{}; it must be less than the lifespan",
                                        age, longest, what));
     };
+    const auto is_usual = [](const effects::Varying& delay) {
+      return delay.index() == 0 && std::get<0>(delay) == std::get<0>(effects::SplitDef().delay);
+    };
+    if (source.split && source.split->delay_steps > 0 && !is_usual(source.split->delay))
+      fail(path + "/split/delay", "is replaced by \"delay_steps\"; remove one of them");
     if (source.split && source.split->enabled && effects::upper_bound(source.split->count) >= 0.5)
       check_age(effects::lower_bound(source.split->age), "/split/age", "split");
     for (std::size_t i = 0; i < source.trails.size(); ++i)
