@@ -123,7 +123,7 @@ void StreaksPass::prepare(const PaintOrder& order, const View& view, const PuffL
   bands_.sort(splats_, width_px_, height_px_);
 }
 
-Eigen::AlignedBox2i StreaksPass::lay_behind(const Eigen::AlignedBox2i& area_px, const FrameUniforms& frame,
+Eigen::AlignedBox2i StreaksPass::draw_behind(const Eigen::AlignedBox2i& area_px, const FrameUniforms& frame,
                                             GLuint color) {
   Eigen::AlignedBox2i changed;
   if (first_behind_ >= splats_.size() || area_px.isEmpty()) return changed;

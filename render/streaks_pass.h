@@ -26,7 +26,7 @@ class StreaksPass {
   void pass(uint32_t first) { first_behind_ = first; }
   /// Draws the streaks behind the next object over an area of the picture; returns the pixels that may have
   /// changed.
-  Eigen::AlignedBox2i lay_behind(const Eigen::AlignedBox2i& area_px, const FrameUniforms& frame,
+  Eigen::AlignedBox2i draw_behind(const Eigen::AlignedBox2i& area_px, const FrameUniforms& frame,
                                  GLuint color);
   /// Draws the remaining streaks over a band of the picture (see StreakBands). For both functions, the
   /// picture's framebuffer must be bound for reading.

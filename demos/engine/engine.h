@@ -132,16 +132,16 @@ class Engine {
 
   FilmDef definition(Loaded scene, const std::optional<ViewCamera>& camera) const;
   void work();
-  void work_with(const Workshop& workshop);
-  bool step(const Workshop& workshop);
-  bool take_requests(const Workshop& workshop);
-  void start_film(const Workshop& workshop);
+  void work_with(const FilmResources& resources);
+  bool step(const FilmResources& resources);
+  bool take_requests(const FilmResources& resources);
+  void start_film(const FilmResources& resources);
   bool answer_picks();
   bool advance_film();
   bool refine_frame();
   bool is_film_drawn();
-  bool advance_pinned(const Workshop& workshop);
-  bool advance_sweep(const Workshop& workshop);
+  bool advance_pinned(const FilmResources& resources);
+  bool advance_sweep(const FilmResources& resources);
   std::shared_ptr<const producer::ModelLibrary> models_for(const FilmDef& def);
   void report_frame(int frame, Detail detail);
   void report_film(FilmEvent::Phase phase, const std::string& message = "");

@@ -32,7 +32,7 @@ struct FilmDef {
 };
 
 /// Data shared by the films of a session.
-struct Workshop {
+struct FilmResources {
   PhysicsStore& physics;
   FrameStore& frames;
   render::Context& context;
@@ -45,7 +45,7 @@ class FilmRun {
   using Stop = std::function<bool()>;
 
   /// Throws the exceptions of building a simulation.
-  FilmRun(FilmDef def, std::shared_ptr<const producer::ModelLibrary> models, const Workshop& workshop);
+  FilmRun(FilmDef def, std::shared_ptr<const producer::ModelLibrary> models, const FilmResources& resources);
 
   const FilmDef& def() const { return def_; }
   int frames() const { return scene_.frame_count(); }
@@ -53,7 +53,7 @@ class FilmRun {
   void look_from(const std::optional<ViewCamera>& camera, const std::string& film);
 
   bool has_state(int frame) const { return simulated_.has_state(frame); }
-  bool has_draft(int frame) const { return workshop_.frames.has(def_.film, frame, Detail::draft); }
+  bool has_draft(int frame) const { return resources_.frames.has(def_.film, frame, Detail::draft); }
   /// The first frame without a draft; frames() + 1 if there is none.
   int first_missing();
 
@@ -90,7 +90,7 @@ class FilmRun {
 
   FilmDef def_;
   std::shared_ptr<const producer::ModelLibrary> models_;
-  Workshop workshop_;
+  FilmResources resources_;
   producer::Scene scene_;  // as used for drafts
   SimulatedFilm simulated_;
   std::optional<producer::Picture> picture_;

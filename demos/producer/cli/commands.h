@@ -52,7 +52,7 @@ Command add_completion(CLI::App& app);
 
 struct RenderOptions {
   SceneOptions scene;
-  TalkOptions talk;
+  LogOptions log;
   std::string out;
   std::string frames, chunk;
   std::string format = "rgba";  ///< format of standard output
@@ -98,9 +98,9 @@ LoadedScene load(const SceneOptions& options, bool quiet,
 void print_warnings(const std::vector<Problem>& warnings);
 /// Reads the models of a scene, and shows steps that take long. Prints warnings unless quiet. Throws
 /// Interrupted between two models, and the exceptions of ModelLibrary.
-ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const TalkOptions& talk);
+ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const LogOptions& log_options);
 /// Reads the models of a scene, and appends its warnings instead of printing them.
-ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const TalkOptions& talk,
+ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const LogOptions& log_options,
                          std::vector<Problem>& warnings);
 /// Key of all settings that decide the pixels of a scene's frames.
 std::string frame_settings(const LoadedScene& loaded, const ModelLibrary& models, render::GlPlatform gl);

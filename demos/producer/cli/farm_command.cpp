@@ -33,7 +33,7 @@ namespace {
 
 struct FarmOptions {
   SceneOptions scene;
-  TalkOptions talk;
+  LogOptions log;
   std::string out, work, program, status;
   bool slurm = false;
   int local = 0;  ///< number of drawing processes on this machine; 0: none
@@ -89,8 +89,8 @@ FarmPlan plan_of(const FarmOptions& options) {
 
 /// Checks the scene on this machine before any job is submitted, and sets the key of the plan.
 void check_scene(const FarmOptions& options, FarmPlan& plan) {
-  const LoadedScene loaded = load(options.scene, options.talk.quiet);
-  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
+  const LoadedScene loaded = load(options.scene, options.log.quiet);
+  const ModelLibrary models = load_models(loaded, options.scene, options.log);
   plan.key = settings_key(loaded, models);
   plan.chunks = std::min(plan.chunks, loaded.scene.frame_count());
   if (plan.encodes)
@@ -146,7 +146,7 @@ std::optional<std::string> run_script(const FarmPlan& plan, const std::vector<st
 
 int run_locally(const FarmOptions& options, const FarmPlan& plan) {
   const auto say = [&](const std::string& line) {
-    if (!options.talk.quiet) log("{}\n", line);
+    if (!options.log.quiet) log("{}\n", line);
   };
   say("simulating once");
   if (const auto failed = run_script(plan, {"simulate.sh"}, "simulate.log")) {
@@ -192,7 +192,7 @@ int submit_to_slurm(const FarmOptions& options, const FarmPlan& plan) {
   if (const auto failed = run_script(plan, {script.name}, "submit.log"))
     throw render::UnavailableError("sbatch did not accept the jobs: " + *failed);
   fmt::print("jobs {}", render::read_text_file(plan.work / "jobs", 1 << 16));
-  if (!options.talk.quiet)
+  if (!options.log.quiet)
     log("show their progress: offstage farm --status {}\n", shell_word(plan.work.string()));
   return kOk;
 }
@@ -282,7 +282,7 @@ Command add_farm(CLI::App& app) {
   add_timing(*command, farm.scene);
   add_threads(*command, farm.threads);
   add_gl(*command, farm.gl);
-  add_talk(*command, farm.talk);
+  add_log_options(*command, farm.log);
   return {command, [options] { return farm_command(*options); }};
 }
 

@@ -38,7 +38,7 @@ struct SceneOptions {
   bool from_standard_input() const { return file == kStandardInput; }
 };
 
-struct TalkOptions {
+struct LogOptions {
   ProgressStyle progress = ProgressStyle::automatic;
   bool quiet = false, verbose = false;
 };
@@ -53,7 +53,7 @@ void add_quality(CLI::App& command, SceneOptions& scene);
 /// Quality and size of a picture, and of the small pictures of a sheet.
 void add_picture(CLI::App& command, SceneOptions& scene);
 void add_small_picture(CLI::App& command, SceneOptions& scene);
-void add_talk(CLI::App& command, TalkOptions& talk);
+void add_log_options(CLI::App& command, LogOptions& log_options);
 void add_channels(CLI::App& app, SceneOptions& scene);
 void add_gl(CLI::App& command, render::GlPlatform& gl);
 void add_threads(CLI::App& command, int& threads);

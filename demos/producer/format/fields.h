@@ -2,9 +2,8 @@
 /// One description of each key of the scene format, from which reading, writing, the schema and the reference
 /// follow.
 ///
-/// Table<T> lists the keys of a struct T as Fields<T>; Codec<V> defines the JSON form of a value of type V. A
-/// new key is one line in a table_*.h; a new kind of value is one Codec. Those of plain values are in
-/// values.h.
+/// Table<T> lists the keys of a struct T as Fields<T>; Codec<V> defines the JSON form of a value of type V.
+/// scene_table.h says where a new key goes.
 
 #include <cstddef>
 #include <cstdint>

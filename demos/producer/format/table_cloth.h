@@ -3,7 +3,9 @@
 
 #include <array>
 
-#include "producer/format/table_world.h"
+#include "producer/format/table_placement.h"
+#include "producer/format/table_shape.h"
+#include "producer/format/values.h"
 
 namespace offstage::producer {
 

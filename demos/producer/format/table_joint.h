@@ -3,7 +3,8 @@
 
 #include <array>
 
-#include "producer/format/table_world.h"
+#include "producer/format/table_shape.h"
+#include "producer/format/values.h"
 
 namespace offstage::producer {
 
@@ -265,7 +266,7 @@ struct Table<Crane> {
   static constexpr const char* kName = "crane";
   static constexpr const char* kHelp =
       "A tower crane whose jib points along +X, with a load on its rope: bodies NAME/mast, jib, "
-      "counterweight, trolley, load, joints NAME/slew, way, rope.";
+      "counterweight, trolley, load, joints NAME/slew, travel, rope.";
   static Fields<Crane> fields() {
     using T = Crane;
     return Fields<T>{
