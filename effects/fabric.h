@@ -27,8 +27,8 @@ struct Fabric {
   BendModel bend_model = BendModel::plate;
   /// Fraction of the critical damping of each spring between its two points, >= 0.
   Real damping = 0.05;
-  /// The same of springs of one kind, >= 0; empty: `damping`. Those that bend are springs only with
-  /// BendModel::springs.
+  /// Fraction of the critical damping of one kind of springs, >= 0; empty: `damping`. Springs for bending
+  /// exist only with BendModel::springs.
   std::optional<Real> stretch_damping, shear_damping, bend_spring_damping;
   Real friction = 0.5;       ///< friction on bodies, >= 0
   Real self_friction = 0.3;  ///< friction on itself, >= 0

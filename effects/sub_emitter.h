@@ -42,7 +42,8 @@ struct SubEmitterDef {
   Trigger trigger = Trigger::collision;
   Real age = 1;  ///< age for the trigger `age` [s], >= 0
   EventRelease release = {};
-  /// Their speed is added in the directions around the axis.
+  /// Parameters of the new particles. Their speed is along directions around the axis, in addition to their
+  /// fraction of the parent's velocity.
   NewParticles particles = {.spread_deg = 30.0, .radius = 0.005, .lifespan = 1.0};
 };
 

@@ -265,7 +265,7 @@ void GltfFile::warn(const std::string& line) {
   constexpr std::size_t kMostCharacters = 300;
   const std::string text = one_line(line.substr(0, kMostCharacters));
   if (warned_.size() <= kMaxGltfWarnings && warned_.insert(text).second)
-    warnings_.push_back(warned_.size() > kMaxGltfWarnings ? "further warnings are left out" : text);
+    warnings_.push_back(warned_.size() > kMaxGltfWarnings ? "further warnings are omitted" : text);
 }
 
 std::vector<uint8_t> GltfFile::resource(const std::string& uri, const std::string& what) const {
@@ -277,7 +277,7 @@ std::vector<uint8_t> GltfFile::resource(const std::string& uri, const std::strin
     return base64_decoded(std::string_view(uri).substr(comma + 1), what);
   }
   const std::filesystem::path file = find_beside(path_.parent_path(), uri);
-  if (file.empty()) throw FileError(what + ": '" + one_line(uri.substr(0, 200)) + "' is not there");
+  if (file.empty()) throw FileError(what + ": '" + one_line(uri.substr(0, 200)) + "' does not exist");
   if (!folders_.contain(file))
     throw FileError(what + ": '" + one_line(uri.substr(0, 200)) +
                     "' is outside of the folders that may be read");

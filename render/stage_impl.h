@@ -118,7 +118,7 @@ struct Stage::Impl {
         surface_probe(def.width_px, def.height_px),
         strip(static_cast<std::size_t>(def.width_px) * StreakBands::kRows * 4) {
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
-    gl::check_error("making the stage");
+    gl::check_error("creating the stage");
   }
 
   void upload(const FrameUniforms& frame) {

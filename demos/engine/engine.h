@@ -90,7 +90,7 @@ class Engine {
 
   /// Shows this version from now on. Returns a number that increases with every call.
   Run show(Loaded scene, const std::optional<ViewCamera>& camera);
-  /// Key of a version's pictures with the scene's own camera.
+  /// Key under which the store has the pictures of a version that are drawn with the scene's own camera.
   std::string film_of(const producer::LoadedScene& scene) const;
   /// Sets a second version whose frames are kept and, in idle time, completed; null: none.
   void pin(Loaded scene);
@@ -98,8 +98,8 @@ class Engine {
   void look_at(int frame, bool playing);
   /// Reads model files again after they have changed.
   void forget_models();
-  /// Name of the object at a position of a frame; see FilmRun::pick. Also empty if the frame is not
-  /// available.
+  /// Name of the object that is visible at a position of a frame, as FilmRun::pick() returns it; empty also
+  /// if the frame is not available.
   std::future<std::string> pick(int frame, double x, double y);
   /// Draws a small frame of each of these versions; ends an earlier sweep. Returns its number.
   uint64_t sweep(std::vector<Loaded> versions, int frame);

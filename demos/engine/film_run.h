@@ -23,28 +23,28 @@ struct ViewCamera {
   bool operator==(const ViewCamera& other) const { return eye == other.eye && target == other.target; }
 };
 
-/// A version of a scene, with the keys of its pictures and its physics.
+/// A version of a scene, with the keys under which the stores have its pictures and its states.
 struct FilmDef {
   std::shared_ptr<const producer::LoadedScene> loaded;
   std::optional<ViewCamera> camera;
-  std::string film;     ///< key of its pictures
-  std::string physics;  ///< key of its states
+  std::string film;     ///< key of its pictures in the FrameStore
+  std::string physics;  ///< key of its states in the PhysicsStore
 };
 
-/// Data shared by the films of a session.
+/// Stores, GL context and JPEG encoder, which the films of a session share.
 struct FilmResources {
   PhysicsStore& physics;
   FrameStore& frames;
   render::Context& context;
   JpegWriter& jpeg;
-  Eigen::Vector2i draft_px;  ///< drafts fit into this
+  Eigen::Vector2i draft_px;  ///< greatest size of a draft [px]
 };
 
 class FilmRun {
  public:
   using Stop = std::function<bool()>;
 
-  /// Throws the exceptions of building a simulation.
+  /// Throws what the constructor of producer::Simulation throws.
   FilmRun(FilmDef def, std::shared_ptr<const producer::ModelLibrary> models, const FilmResources& resources);
 
   const FilmDef& def() const { return def_; }

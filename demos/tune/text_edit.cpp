@@ -108,7 +108,7 @@ std::vector<std::string> steps_of(std::string_view path) {
     if (path[i] == '/') {
       steps.emplace_back();
     } else if (steps.empty()) {
-      throw std::invalid_argument("a path begins with a slash: " + std::string(path));
+      throw std::invalid_argument("a path must begin with a slash: " + std::string(path));
     } else if (path[i] == '~' && i + 1 < path.size()) {
       steps.back() += path[++i] == '0' ? '~' : '/';
     } else {

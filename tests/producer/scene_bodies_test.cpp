@@ -195,7 +195,7 @@ TEST(Fills, MakeParticlesAndCopiesOfBodies) {
     EXPECT_LT(std::hypot(body.position.x(), body.position.z()), 0.15);
   EXPECT_EQ(body_scene_errors(R"("bodies": [{"name": "m", "fill": {}}])"),
             "/bodies/0/fill: needs a \"spacing\", the distance between neighbouring copies\n");
-  const char* no_room = ": has no room for a single place; use a smaller \"spacing\" or a larger volume\n";
+  const char* no_room = ": has no room for a single object; use a smaller \"spacing\" or a larger volume\n";
   EXPECT_EQ(body_scene_errors(R"("bodies": [{"name": "m", "fill": {"spacing": 2}}])"),
             std::string("/bodies/0/fill") + no_room);
   EXPECT_EQ(body_scene_errors(R"("particles": [{"fill": {"spacing": 2}}])"),
@@ -204,7 +204,7 @@ TEST(Fills, MakeParticlesAndCopiesOfBodies) {
   EXPECT_EQ(
       body_scene_errors(
           R"("particles": [{"fill": {"shape": {"type": "cylinder", "radius": 0.06, "height": 1e9}, "spacing": 0.1}}])"),
-      "/particles/0/fill: has more than 5000000 places; use a larger \"spacing\" or a smaller volume\n");
+      "/particles/0/fill: has room for more than 5000000 objects, the limit; use a larger \"spacing\" or a smaller volume\n");
 }
 
 TEST(EmitterFaces, AreThoseOfTheBodyOrOfACube) {

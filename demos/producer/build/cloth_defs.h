@@ -23,12 +23,13 @@ struct FlatCloth {
   sim::ClothDef def;         ///< without pins, which need the bodies
   std::vector<Vec3> places;  ///< positions of its vertices in its own frame, without those of cords [m]
   std::vector<Eigen::Vector2f> uvs;  ///< coordinates along the cloth, of all vertices [m]
-  std::vector<uint32_t> cord_ends;   ///< last vertices of its cords
+  std::vector<uint32_t> cord_ends;   ///< for each cord, the index of its last vertex
 
   std::vector<uint32_t> triangles() const;  ///< three vertices each
 };
 
-/// `model`: that of a mesh, otherwise null. Throws std::invalid_argument for an impossible shape or fabric.
+/// Creates the flat cloth. `model` is the model file of a cloth that has one, otherwise null. Throws
+/// std::invalid_argument for an impossible shape or fabric.
 FlatCloth flat_cloth(const Cloth& cloth, const render::Model* model);
 
 /// Number of vertices of a cloth, without those of cords. `model` as above.
@@ -49,7 +50,8 @@ std::string selects_nothing(const FlatCloth& flat);
 /// length, or are not those of a grid.
 std::vector<sim::ClothSeam> sewn_vertices(const ClothSeam& seam, const Cloth& cloth, const FlatCloth& flat);
 
-/// Returns the look of a cloth without a material; materials without a fabric use its fabric.
+/// Returns the look of a fabric, for cloths without a material. A material without `fabric` takes the fabric
+/// part of this look.
 render::Material fabric_look(const std::string& fabric);
 
 /// Returns why an explicit integrator is unstable for a cloth of this scene, with the spring and the longest

@@ -41,7 +41,7 @@ class ModelLibrary {
                std::vector<Problem>& warnings, const StepCallback& on_step = {});
 
   const render::Model& model(const std::string& file) const { return models_.at(file); }
-  /// The file and the settings of a model's decomposition.
+  /// Key of the convex parts of a model: its file and the settings of the decomposition.
   static std::string parts_key(const MeshFile& mesh);
   /// The unscaled convex parts of a model, or null if they are not needed.
   const sim::ConvexDecomposition* parts(const MeshFile& mesh) const {

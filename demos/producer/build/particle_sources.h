@@ -19,7 +19,7 @@
 
 namespace offstage::producer {
 
-/// Colour, size and rotation of a look, prepared for many particles.
+/// Computes colour, size and rotation of particles from their look.
 class LookRamps {
  public:
   LookRamps(const ParticleLook& look, uint64_t seed, const std::string& name);
@@ -49,7 +49,7 @@ class ParticleSources {
   /// Time before 0 at which the first particles are created [s].
   Real prewarm() const;
 
-  /// Must be called before each sub-step.
+  /// Adds the particles that are created in (start, end] to the world. Must be called before each sub-step.
   void emit(sim::World& world, Real start, Real end);
 
   struct Counts {

@@ -58,8 +58,8 @@ struct RenderOptions {
   std::string format = "rgba";  ///< format of standard output
   std::string cache, stats, report;
   std::vector<std::string> cameras;  ///< cameras to draw, or kAllCameras; empty: the scene's `camera`
-  /// Folder of the states for several cameras: they are read if it holds those of this simulation, otherwise
-  /// they are written to it. Empty: none.
+  /// Folder for the states of a film with several cameras: the first camera writes them, the others read
+  /// them. Empty: none.
   std::string states;
   int threads = 0;  ///< 0: all available
   int jobs = 0;     ///< 0: chosen by `threads`
@@ -99,14 +99,14 @@ void print_warnings(const std::vector<Problem>& warnings);
 /// Reads the models of a scene, and shows steps that take long. Prints warnings unless quiet. Throws
 /// Interrupted between two models, and the exceptions of ModelLibrary.
 ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const LogOptions& log_options);
-/// Reads the models of a scene, and appends its warnings instead of printing them.
+/// Reads the models of a scene, and appends warnings to `warnings` instead of printing them.
 ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const LogOptions& log_options,
                          std::vector<Problem>& warnings);
 /// Key of all settings that decide the pixels of a scene's frames.
 std::string frame_settings(const LoadedScene& loaded, const ModelLibrary& models, render::GlPlatform gl);
-/// JSON as indented "key: value" lines.
+/// Prints JSON as indented lines "key: value".
 void print_readable(const nlohmann::ordered_json& json, int indent = 0);
-/// Error message for an invalid frame rate.
+/// Returns the error message for an invalid frame rate.
 std::string wrong_frame_rate(const std::string& text);
 void write_text_file(const std::string& path, const std::string& text);
 /// Writes to the first name of STEM.EXT, STEM-2.EXT, ... that does not exist, and returns it.
@@ -118,9 +118,9 @@ void check_distinct(const std::string& a, const std::string& b);
 /// Throws OutputError unless the name ends in .png.
 void check_png(const std::string& file);
 
-/// The frame of a number. Throws std::invalid_argument for one outside of the film.
+/// Converts a number to a frame. Throws std::invalid_argument if the film has no such frame.
 int checked_frame(const Scene& scene, double number);
-/// The frame nearest to a time. Throws std::invalid_argument for one outside of the film.
+/// Returns the frame nearest to a time [s]. Throws std::invalid_argument for a time outside of the film.
 int frame_at(const Scene& scene, double time);
 inline constexpr int kSmallSide_px = 320;  ///< side of the pictures of a sheet
 /// A size such as "320x180" for small pictures of a scene: its aspect ratio, with the given longer side.

@@ -248,16 +248,16 @@ Command add_farm(CLI::App& app) {
   const auto options = std::make_shared<FarmOptions>();
   FarmOptions& farm = *options;
   CLI::App* command = app.add_subcommand(
-      "farm", "Simulate once and draw on many machines by Slurm, or by several processes of this one");
+      "farm", "Simulate once, then draw in many processes: on the nodes of a Slurm cluster, or on this machine");
   command->add_option("scene", farm.scene.file, "Scene file");
   command->add_option("-o,--output", farm.out, "Video, or frames/####.png");
   command->add_flag("--slurm", farm.slurm,
-                    "Submit the steps to Slurm; the folder must be visible to all nodes");
+                    "Submit the steps to Slurm; all nodes must be able to read and write the folder");
   command
       ->add_option("--local", farm.local,
                    "Run the same steps on this machine, with this number of drawing processes")
       ->check(CLI::Range(1, 256));
-  command->add_option("--chunks", farm.chunks, "Parts of the frames")
+  command->add_option("--chunks", farm.chunks, "Number of parts into which the frames are divided, each a job of its own")
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
   command->add_option("--retries", farm.retries, "Number of retries of a failed step")
@@ -265,15 +265,15 @@ Command add_farm(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--work", farm.work,
                       "Folder of scripts, cache, frames and logs (default: OUTPUT.farm)");
-  command->add_option("--partition", farm.partition, "Partition of Slurm");
-  command->add_option("--account", farm.account, "Account of Slurm");
-  command->add_option("--time", farm.time, "Time limit of each job of Slurm, such as 2:00:00");
+  command->add_option("--partition", farm.partition, "Slurm partition");
+  command->add_option("--account", farm.account, "Slurm account");
+  command->add_option("--time", farm.time, "Time limit of each Slurm job, such as 2:00:00");
   command
       ->add_option("--sbatch", farm.sbatch,
                    "A further option of sbatch, such as --sbatch=--mem=8G (repeatable)")
       ->allow_extra_args(false);
   command->add_option("--program", farm.program, "Path of offstage on the nodes (default: this one)");
-  auto* resume = command->add_flag("--resume", farm.resume, "Keep the steps and frames that are done");
+  auto* resume = command->add_flag("--resume", farm.resume, "Continue an earlier farm: keep the steps and frames that are done");
   command->add_flag("--force", farm.force, "Start again, and replace existing output")->excludes(resume);
   command->add_flag("--dry-run", farm.dry_run, "Print the scripts and write nothing");
   command->add_option("--status", farm.status, "Report the progress of the farm in this folder");

@@ -275,7 +275,7 @@ std::string write_numbered_file(const std::string& stem, const std::string& endi
     write_text_file(name, text);
     return name;
   }
-  throw render::FileError(stem + ending + ": this name and those with numbers from 2 on are in use");
+  throw render::FileError(stem + ending + ": this name, and the same name with every number from 2 on, is in use");
 }
 
 void write_text_file(const std::string& path, const std::string& text) {

@@ -45,12 +45,13 @@ struct LogOptions {
 
 // Each adds options to a command, which are parsed into the last argument.
 void add_allow(CLI::App& command, std::vector<std::string>& allow);
-/// Values, seed and folders; `add_scene` adds the file, too.
+/// Adds the options that override values of the scene, its seed and its folders. add_scene() adds the scene
+/// file, too.
 void add_overrides(CLI::App& command, SceneOptions& scene);
 void add_scene(CLI::App& command, SceneOptions& scene);
 void add_timing(CLI::App& command, SceneOptions& scene);
 void add_quality(CLI::App& command, SceneOptions& scene);
-/// Quality and size of a picture, and of the small pictures of a sheet.
+/// Adds the options for quality and size: of a whole picture, or of each small picture of a contact sheet.
 void add_picture(CLI::App& command, SceneOptions& scene);
 void add_small_picture(CLI::App& command, SceneOptions& scene);
 void add_log_options(CLI::App& command, LogOptions& log_options);

@@ -1,5 +1,6 @@
 #pragma once
-/// Messages of the command line during a run, its progress and once that it takes long and why, and after it.
+/// Messages of a command about its run: the progress, a note if the run will take long, and warnings and
+/// notes at the end.
 
 #include <chrono>
 #include <string>
@@ -10,7 +11,8 @@
 
 namespace offstage::producer {
 
-/// The function for ProgressCallback. The scene and the models must outlive it.
+/// Prints the progress of a run; it is called as a ProgressCallback. The scene and the models must outlive
+/// this object.
 class RunProgress {
  public:
   RunProgress(const Scene& scene, const ModelLibrary& models, const LogOptions& log_options);

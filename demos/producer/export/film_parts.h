@@ -64,7 +64,8 @@ struct FilmPoints {
   bool glows = false;   ///< the particles emit light of their colour
 };
 
-/// Invisible objects are omitted. Names are unique among objects of the same kind.
+/// The meshes, materials and objects of a film. Invisible objects are omitted. Names are unique among objects
+/// of the same kind.
 class FilmParts {
  public:
   FilmParts(const Scene& scene, const ModelLibrary& models);

@@ -85,7 +85,7 @@ class ParticleChecker : CheckBase {
     if (look.sheet && (look.texture.empty() || look.style != LookStyle::sprite))
       warn(path + "/sheet", "has no effect: it divides the texture of sprites, and there is none");
     if (look.sheet && look.sheet->columns * look.sheet->rows > render::kMostSheetPictures)
-      fail(path + "/sheet", fmt::format("has {} pictures, of at most {}",
+      fail(path + "/sheet", fmt::format("has {} pictures; a sheet has at most {}",
                                         look.sheet->columns * look.sheet->rows, render::kMostSheetPictures));
     const auto moves = [](const Varying& v) {
       return effects::lower_bound(v) != 0 || effects::upper_bound(v) != 0;
@@ -216,7 +216,7 @@ class ParticleChecker : CheckBase {
     if (const auto* face = std::get_if<FaceSurface>(&emitter.surface);
         face && !emitter.body.empty() && (!face->position.isZero(0) || face->size != Vec3::Ones()))
       fail(path + "/surface",
-           "has the faces of its body; \"position\" and \"size\" are for an emitter without one");
+           "has the faces of the emitter's body; \"position\" and \"size\" are for an emitter without a body");
     check_count(emitter);
   }
 

@@ -17,7 +17,7 @@ struct LoadedScene {
   Scene scene;
   SceneFolder folder;  ///< folder of relative files
   std::vector<Problem> warnings;
-  /// The effective scene with every default, as compact JSON; it determines the result of a run.
+  /// The scene with all overrides and defaults, as compact JSON; it determines the result of a run.
   std::string canonical;
 };
 
@@ -33,7 +33,7 @@ LoadedScene parse_scene(std::string_view text, const std::string& name, const Sc
 
 /// Names of the cameras of a scene: kMainCamera, then those of `cameras`.
 std::vector<std::string> camera_names(const Scene& scene);
-/// Makes a camera of the scene that which is drawn. Throws std::invalid_argument for an unknown name.
+/// Selects the camera that is drawn. Throws std::invalid_argument for an unknown name.
 void choose_camera(LoadedScene& loaded, const std::string& name);
 
 /// JSON Schema, draft 07.

@@ -98,7 +98,7 @@ struct Table<Body> {
          "contact have an axis, the one of the body that is listed first in the scene is used"},
         {"surface_velocity", &T::surface_velocity,
          "velocity of the surface relative to the body, as on a conveyor belt; in the body's frame", "m/s"},
-        {"collides", &T::collides, "takes part in collisions"},
+        {"collides", &T::collides, "whether the body collides with bodies, particles and cloths"},
         {"visible", &T::visible, "is drawn"},
         {"casts_shadow", &T::casts_shadow, "casts a shadow"},
         {"keyframes", &T::keyframes, "poses over time; kinematic bodies only"},

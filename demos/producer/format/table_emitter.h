@@ -24,12 +24,12 @@ struct Table<Split> {
   static Fields<Split> fields() {
     using T = Split;
     return {
-        {"enabled", &T::enabled, "whether particles split"},
+        {"enabled", &T::enabled, "whether particles split at all"},
         {"count", &T::count, "number of children of one split, rounded", "", between(0, 1000)},
         {"age", &T::age, "age of a particle at its first split", "s", kPositive},
-        {"delay", &T::delay, "time to its next split", "s", kPositive},
+        {"delay", &T::delay, "time from one split of a particle to its next", "s", kPositive},
         {"delay_steps", &T::delay_steps,
-         "instead of `delay`: time to its next split as a number of sub-steps of `world.step`; 0: `delay` "
+         "instead of `delay`: time from one split of a particle to its next, as a number of sub-steps of `world.step`; 0: `delay` "
          "applies",
          "", between(0, 1e6)},
         {"depth", &T::depth,
@@ -70,7 +70,7 @@ struct Table<ParticleSource> {
         .with(&T::behaviour);
   }
 };
-/// Child particles of any source.
+/// Appends the keys of child particles, which all sources have.
 template <class T>
 Fields<T> with_offspring(Fields<T> fields) {
   return std::move(fields).then({
@@ -105,11 +105,11 @@ template <>
 struct Names<effects::Axis> {
   static constexpr std::array kNames = {"normal", "velocity"};
 };
-/// Keys of all events.
+/// Keys that all sub-emitters have: those of collisions, of deaths and of ages.
 template <class T>
 Fields<T> event_fields() {
   return with_offspring(Fields<T>{
-      {"probability", &T::probability, "probability that an event creates particles", "", kFraction},
+      {"probability", &T::probability, "probability that an event (a collision, a death or an age) creates particles", "", kFraction},
       {"min_speed", &T::min_speed,
        "least speed of the parent after the event; slower parents create no particles", "m/s", kNotNegative},
       {"count", &T::count, "number of particles for each event, rounded", "", kCounts},
@@ -287,7 +287,7 @@ struct Table<Emitter> {
          "s", kNotNegative},
         {"windows", &T::windows, "periods in which `rate` and `count` release; empty: always"},
         {"prewarm", &T::prewarm,
-         "how long before `start` the emitter has been running. Until time 0, particles move and collide "
+         "time for which the emitter has already been running at `start`. Until time 0, particles move and collide "
          "while dynamic bodies, cloths and particle groups stand still, kinematic bodies follow their keys, "
          "and forces have their values of time 0",
          "s", kNotNegative},

@@ -15,17 +15,17 @@ struct Table<sim::ParticleSystemDef> {
     using T = sim::ParticleSystemDef;
     return {
         {"linear_drag", &T::linear_drag, "drag force per speed relative to the air", "kg/s", kNotNegative},
-        {"gravity", &T::gravity, "the world's gravity acts on the particles"},
+        {"gravity", &T::gravity, "whether the world's gravity acts on the particles"},
         {"force", &T::force, "constant force on each particle", "N"},
-        {"collides", &T::collides, "particles collide with bodies"},
-        {"internal", &T::internal, "particles of this system collide with each other"},
-        {"external", &T::external, "particles collide with those of other systems that also have `external`"},
+        {"collides", &T::collides, "whether particles collide with bodies"},
+        {"internal", &T::internal, "whether particles of this system collide with each other"},
+        {"external", &T::external, "whether particles collide with those of other systems that also have `external`"},
         {"rotates", &T::rotates,
          "contacts turn the particles as solid balls, so that they roll and friction acts at their surface; "
          "otherwise they slide without turning. Objects of the style `mesh` show the rotation. Sand and "
          "other "
          "granular materials need it to flow and heap"},
-        {"dies_on_hit", &T::dies_on_hit, "a particle is removed at its first collision"},
+        {"dies_on_hit", &T::dies_on_hit, "whether a particle is removed at its first collision"},
         {"integrator", &T::integrator,
          "integration method of particles without springs; `leapfrog` is of second order at the cost of one "
          "force evaluation, and is stable for any drag"},

@@ -7,7 +7,7 @@
 
 namespace offstage::producer {
 
-/// Help of the keys that bring a model file to its size, wherever a file is named.
+/// Help of the keys `scale` and `fit`, which every object with a model file has.
 inline constexpr const char* kModelScaleHelp =
     "scale factor of the model; `auto`: from the file's likely unit to metres (docs/models.md; `offstage "
     "info "

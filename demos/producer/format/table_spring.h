@@ -25,12 +25,12 @@ struct Table<Spring> {
     return {
         {"name", &T::name, "unique name; default: spring_N, where N is the index in the list"},
         {"a", &T::a, "one end"},
-        {"b", &T::b, "the other end"},
+        {"b", &T::b, "the second end of the spring"},
         {"stiffness", &T::stiffness, "force per extension", "N/m", kNotNegative},
         {"damping", &T::damping, "force per speed of extension", "N s/m", kNotNegative},
         {"rest_length", &T::rest_length, "length without force; negative: the distance of the ends at time 0",
          "m"},
-        {"visible", &T::visible, "is drawn as a rod"},
+        {"visible", &T::visible, "whether the spring is drawn as a rod"},
         {"radius", &T::radius, "radius of the rod", "m", kPositive},
         {"material", &T::material, "name of the rod's material; empty: grey"},
     };

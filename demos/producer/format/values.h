@@ -81,7 +81,7 @@ struct Codec<Color> {
   static Node write(const Color& value);
   static Description describe(Catalogue& all, const Spec& spec);
 };
-/// A cube around the origin: half of its edge.
+/// A cube around the origin, written as half the length of its edge.
 template <>
 struct Codec<sim::Aabb> {
   static void read(Reader& in, const Node& node, const Spec& spec, sim::Aabb& out);

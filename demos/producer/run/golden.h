@@ -30,7 +30,8 @@ struct Golden {
   std::vector<GoldenFrame> frames;
 };
 
-/// Folders of the states of a simulation between two drawings of a golden; empty: none.
+/// Folders with the simulated states of a golden's frames, so that they can be drawn again without
+/// simulation; empty: none.
 struct GoldenStates {
   std::string keep;  ///< folder to which the states of the golden frames are written
   std::string from;  ///< folder from which they are read, instead of simulating

@@ -33,9 +33,9 @@ struct MethodResult {
   std::string fault;
 
   double steps_per_second() const;
-  /// Iterations of the exact and the fast solver and of that of impacts: Newton steps, sweeps and pivots.
+  /// Iterations of the contact solvers and of the impact solver: Newton steps, sweeps and pivots.
   uint64_t iterations() const;
-  /// Pivots of contact forces by linear complementarity.
+  /// Pivots of the solver `lcp`, which computes contact forces as a linear complementarity problem.
   uint64_t pivots() const;
   /// Cases that the intended algorithm did not solve: those of the contact solvers, exceeded budgets and
   /// limits of impacts, suppressed restitution, and failed projections of joints.
@@ -53,7 +53,7 @@ using MethodProgress = std::function<void(double fraction)>;
 MethodResult run_method(const std::string& name, const LoadedScene& loaded, const ModelLibrary& models,
                         double limit_s, const MethodProgress& progress = {});
 
-/// Keeps the shorter time of two runs of the same method; one that ended early does not count.
+/// Merges two runs of the same method: keeps the shorter time, but not that of a run that ended early.
 void merge(MethodResult& result, const MethodResult& again);
 
 /// A table in aligned columns, or as CSV. The deviation is that from the first result.

@@ -73,7 +73,7 @@ std::string to_json(const RunStats& stats);
 struct Progress {
   int done = 0, total = 0;                          ///< finished frames
   double sim_ms = 0, render_ms = 0, encode_ms = 0;  ///< for the latest finished frame
-  uint64_t particles = 0;                           ///< in that frame
+  uint64_t particles = 0;                           ///< number of particles in that frame
   double eta_s = 0;                                 ///< remaining time [s]; 0: not known yet
   double fraction = 0;  ///< fraction of the work of simulation and drawing, 0 .. 1
   /// Frames of the simulation, including those that the film skips; both 0 without a simulation.

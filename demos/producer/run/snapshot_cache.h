@@ -38,8 +38,8 @@ class SnapshotCache {
   /// Removes the generations that are not published and that no process holds.
   void remove_unused_generations() const { remove_old_generations(); }
 
-  /// For the generation begun or opened. Both throw FileError; read() also for a snapshot of another run.
-  /// write() returns the bytes that the snapshot takes.
+  /// Write or read the snapshot of a frame, in the generation that was begun or opened. Both throw FileError;
+  /// read() also for a snapshot of another run. write() returns the size of the snapshot [bytes].
   uint64_t write(const Snapshot& snapshot) const;
   Snapshot read(int frame) const;
 

@@ -78,7 +78,7 @@ using ClothSeam = std::variant<SideSeam, PointSeam>;
 struct ClothCord {
   Where where;
   Vec3 from = Vec3::Zero();
-  Vec3 to = Vec3(0, -1, 0);  ///< where its other end is at time 0
+  Vec3 to = Vec3(0, -1, 0);  ///< position of the other end at time 0
   bool held = true;          ///< the other end is fixed in the world or on the body
   std::string body;
   Real until = 1e30;
@@ -95,7 +95,7 @@ struct Cloth {
   std::string name;
   ClothShape shape = GridShape{};
   std::string fabric = "cotton";
-  FabricChanges changes;  ///< the keys of the changes are keys of the cloth itself
+  FabricChanges changes;  ///< in the file, the keys of the changes are keys of the cloth
   std::string material;   ///< name; empty: the look of the fabric
   Vec3 position = Vec3::Zero();
   Quat orientation = Quat::Identity();
@@ -118,7 +118,7 @@ struct Cloth {
   Real remove_at = 1e30;
   bool visible = true;
   bool casts_shadow = true;
-  Placement placement;  ///< the three keys of the placement are keys of the cloth itself
+  Placement placement;  ///< in the file, the keys of the placement are keys of the cloth
 };
 
 }  // namespace offstage::producer

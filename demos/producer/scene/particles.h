@@ -37,7 +37,8 @@ struct ParticleLook {
   LookStyle style = LookStyle::sprite;
   Color color;
   std::vector<std::pair<Real, Color>> color_over_age;       ///< [age 0..1, colour]; multiplies `color`
-  std::vector<std::pair<Real, Real>> temperature_over_age;  ///< [age 0..1, K]; multiplies both
+  // [age 0..1, K]; multiplies `color` and `color_over_age`.
+  std::vector<std::pair<Real, Real>> temperature_over_age;  /
   std::vector<std::pair<Real, Real>> size_over_age;         ///< [age 0..1, factor]
   effects::RampKind ramp = effects::RampKind::linear;
   Real color_deviation = 0;  ///< deviation of brightness, per particle
@@ -51,7 +52,7 @@ struct ParticleLook {
   Varying angle_deg = 0.0;       ///< angle of a new particle
   Varying spin_deg_per_s = 0.0;
 
-  /// Whether the angle of a particle is visible.
+  /// Whether the rotation of a particle can be seen in its look.
   bool turns() const;
 };
 
@@ -84,7 +85,7 @@ struct ParticleGroup {
   Real appear_at = 0;
   Real remove_at = 1e30;
   sim::ParticleSystemDef
-      behaviour;  ///< the keys of the behaviour are keys of the group itself; see system_def()
+      behaviour;  ///< in the file, the keys of the behaviour are keys of the group; see system_def()
   ParticleLook look;
 };
 
@@ -104,7 +105,7 @@ struct ParticleSource : effects::NewParticles {
   Where where;
   std::string name;
   sim::ParticleSystemDef
-      behaviour;  ///< the keys of the behaviour are keys of the source itself; see system_def()
+      behaviour;  ///< in the file, the keys of the behaviour are keys of the source; see system_def()
   ParticleLook look;
   std::optional<Split> split;
   std::vector<TrailSource> trails;
@@ -163,7 +164,7 @@ using EmitterSurface = std::variant<PlaneSurface, SphereSurface, DiscSurface, Me
 /// such face.
 std::optional<EmitterSurface> face_of(const FaceSurface& surface, const struct Body* body);
 
-/// Position of a surface.
+/// The position of a surface, whatever its kind.
 Vec3& position_of(EmitterSurface& surface);
 const Vec3& position_of(const EmitterSurface& surface);
 
@@ -174,7 +175,8 @@ struct Emitter : ParticleSource, effects::EmitterRelease {
   Placement placement;
 };
 
-/// The trail or the event of its parent by which a source emits particles. Neither: the source is an emitter.
+/// What makes a source emit particles: a trail or an event of its parent. If neither is set, the source is an
+/// emitter.
 struct Emission {
   const TrailSource* trail = nullptr;
   const EventSource* event = nullptr;

@@ -140,7 +140,7 @@ struct Body {
   Vec3 spin = Vec3::Zero();
   Real appear_at = 0;
   Real remove_at = 1e30;
-  Placement placement;  ///< the three keys of the placement are keys of the body itself
+  Placement placement;  ///< in the file, the keys of the placement are keys of the body
 
   /// Whether the parts of its shape move by an animation.
   bool has_animated_shape() const { return animation && !model && std::holds_alternative<MeshFile>(shape); }
@@ -222,7 +222,7 @@ struct IslandsOverlay : LineLook {
 struct JointsOverlay : LineLook {
   Where where;
   std::string joint;     ///< empty: all
-  Real size = 0.08;      ///< radius of the ring around an axis, which is four times as long
+  Real size = 0.08;      ///< radius of the ring around an axis; the axis is drawn four times as long
   Real force_scale = 0;  ///< length of an arrow per newton on a; 0: none
   Color color{{1, 0.45f, 0.1f, 1}};
   Color force_color{{0.2f, 0.8f, 1, 1}};
@@ -255,7 +255,7 @@ struct TextOverlay {
 using Overlay = std::variant<TreeOverlay, PartsOverlay, ClosestOverlay, ContactsOverlay, VelocitiesOverlay,
                              IslandsOverlay, JointsOverlay, ClothOverlay, TrailsOverlay, TextOverlay>;
 
-/// Keys of all cameras.
+/// The keys that all cameras have.
 struct Lens {
   Real fov_deg = 40;
   std::optional<Real> focal_mm;  ///< replaces fov_deg
@@ -310,13 +310,13 @@ inline constexpr const char* kMainCamera = "main";  ///< name of Scene::camera
 inline constexpr const char* kAllCameras = "all";   ///< all of them
 
 struct SunLight {
-  Vec3 direction = {0.45, 0.75, 0.5};  ///< towards the sun
+  Vec3 direction = {0.45, 0.75, 0.5};  ///< direction towards the sun
   Color color{{1, 0.95f, 0.87f, 1}};
   Real intensity = 3;
   Real size_deg = 1.5;
   bool shadows = true;
 };
-/// Keys of all lights near the scene.
+/// The keys that all lights near the scene have: all but the sun.
 struct LampBase {
   Where where;
   std::string body;  ///< body that carries it; empty: none
@@ -345,7 +345,7 @@ struct ModelLights {
   std::string name;     ///< empty: all of them
   Real intensity = 1;   ///< factor of their intensities
   Real radius = 0.01;   ///< radius of point and spot lights
-  Real size_deg = 0.5;  ///< apparent size of directional lights
+  Real size_deg = 0.5;  ///< angular diameter of directional lights
   bool shadows = true;
 };
 using Light = std::variant<SunLight, PointLight, SpotLight, AreaLight, ModelLights>;
@@ -376,7 +376,7 @@ struct EnvironmentSettings {
 enum class Quality { draft, preview, final };
 int subframes(Quality quality);
 
-/// `automatic`: each frame is exposed for the mean brightness of the same grey.
+/// `automatic`: the exposure is chosen for each frame, such that all frames have the same mean brightness.
 enum class Metering { fixed, automatic };
 
 struct RenderSettings {
@@ -415,7 +415,7 @@ struct Scene {
   std::vector<Effect> effects;  ///< after loading, its emitters and forces are among the others
   std::vector<Spring> springs;
   std::vector<Joint> joints;
-  /// Converted to bodies and joints together with the copies.
+  /// When copies are expanded, these are replaced by their bodies and joints.
   std::vector<ArticulationTemplate> articulations;
   std::vector<Cloth> cloths;
   std::vector<Force> forces;

@@ -22,7 +22,7 @@ using sim::Quat;
 using sim::Real;
 using sim::Vec3;
 
-/// A time that never comes: the default of `remove_at` is later [s].
+/// Times from here on mean "never" [s]; the default of `remove_at` is later than this.
 inline constexpr Real kForever = 1e29;
 
 /// Whether an object with these times exists at a time; a rounding error before does not matter.
