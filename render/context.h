@@ -20,7 +20,8 @@ enum class GlPlatform {
 
 /// Returns "auto", "osmesa", "egl" or "egl:gpu".
 std::string_view name_of(GlPlatform platform);
-/// Returns the platform of such a name. Throws std::invalid_argument, which lists the names.
+/// Returns the platform with a name as name_of() returns it. Throws std::invalid_argument, which lists the
+/// names.
 GlPlatform gl_platform(std::string_view name);
 /// Returns the platform in the environment variable OFFSTAGE_GL, or automatic if it is not set. Throws
 /// std::invalid_argument for an unknown name.

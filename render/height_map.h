@@ -1,5 +1,5 @@
 #pragma once
-/// Private: converts pictures of classic materials to those of physically based ones.
+/// Private: converts textures of classic materials (bump maps, masks) to those of physically based ones.
 
 #include "render/image.h"
 

@@ -23,7 +23,7 @@ struct Image {
 struct HdrImage {
   int width_px = 0, height_px = 0;
   std::vector<float> rgba;   ///< width * height * 4
-  bool transparent = false;  ///< same as Image::transparent
+  bool transparent = false;  ///< alpha is used; see Image::transparent
 
   std::size_t pixel_count() const {
     return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);

@@ -33,15 +33,16 @@ struct GpuMesh {
   bool boxy = false;                    ///< fills its box, except for a bevel
   std::unique_ptr<const RayMesh> rays;  ///< the same for light rays
 
-  bool stored = false;         ///< was there at Stage::store_previous_transforms()
+  bool stored = false;         ///< the mesh existed at the last Stage::store_previous_transforms()
   gl::Buffer vertices_before;  ///< previous vertices, if they have been replaced; otherwise 0
 
-  /// Makes the present vertices those from which motion starts.
+  /// Stores the present vertices as the start of motion in Channels.
   void store();
-  /// The vertices that replace those of `before`, with as many of them, remember the stored ones.
+  /// Takes over the stored vertices of `before`, the mesh that this one replaces, if both have as many
+  /// vertices.
   void store_previous_vertices(GpuMesh& before);
 };
-/// The binding of the vertices from which motion in Channels starts.
+/// Vertex buffer binding of the positions from which motion in Channels starts.
 inline constexpr GLuint kBeforeBinding = 3;
 
 /// The uniform block of shaders/material.glsl.
@@ -58,7 +59,7 @@ struct GpuMaterial {
   Pattern pattern = Pattern::none;
   Weave weave = Weave::plain;
   bool textured = false;
-  bool detailed = false;  ///< see Material::is_detailed(); textured then, too
+  bool detailed = false;  ///< see Material::is_detailed(); a detailed material is also textured
   bool cut_out = false;   ///< has holes by its alpha, and is opaque elsewhere
   bool triplanar = false;
   bool thin = false;
@@ -92,7 +93,7 @@ struct Instance {
   /// Ball around the instance.
   Vector3f center() const { return world_from_mesh * mesh->center; }
   float radius() const { return mesh->radius * scale(); }
-  /// Whether it fills that ball.
+  /// Whether the instance fills the ball of center() and radius().
   bool is_ball() const;
 };
 
@@ -103,8 +104,9 @@ class MeshPass {
   /// Sorts the visible instances for this view. The instances must stay in memory until the view is drawn.
   void prepare(std::span<const Instance* const> instances, const View& view, const Features& features);
   enum class Shading {
-    surface,  ///< writes surfaces for the tracer of light
-    traced,   ///< in the light that was traced; in quick pictures, only those that are not plain
+    surface,  ///< writes the surfaces from which light is traced
+    /// Shaded by the traced light; quick pictures draw only materials that are not plain in this way.
+    traced,
     traced_with_particles,  ///< as `traced`; glass also shows particles behind it
   };
   /// Draws the opaque instances, and the opaque parts of blended ones.
@@ -130,7 +132,7 @@ class MeshPass {
     float thickness;  ///< thickness of its first instance, in the world
   };
   void draw(const Batch& batch);
-  /// Whether the surface pass writes all that its colour depends on.
+  /// Whether the surface pass writes everything on which the colour of a batch depends.
   bool is_plain(const Batch& batch) const { return quick_ && batch.material->plain && !batch.mesh->endless; }
   gl::LazyProgram& surface_program(const Batch& batch, Shading shading);
   static void set_facing(const Batch& batch);
@@ -145,7 +147,7 @@ class MeshPass {
   gl::Texture white_;
   gl::StreamBuffer rows_;
   std::vector<Batch> opaque_, translucent_;
-  std::vector<const Instance*> see_through_;  ///< instances of translucent_
+  std::vector<const Instance*> see_through_;  ///< instances whose material lets light through, in their order
 };
 
 }  // namespace offstage::render

@@ -61,7 +61,7 @@ struct TextureMap {
   /// Transform of the texture coordinates by rows: (u, v, 1) to the place in the image, v downwards.
   std::array<Vector3f, 2> rows = {Vector3f(1, 0, 0), Vector3f(0, 1, 0)};
 
-  bool is_plain() const;  ///< whether it uses the first set without a transform
+  bool is_plain() const;  ///< whether the map uses the first set of coordinates without a transform
 };
 
 /// Metallic/roughness material, with the parameters of glTF 2.0 and some of its extensions.
@@ -104,7 +104,7 @@ struct Material {
   float clearcoat_roughness = 0;
   Vector3f sheen_color = Vector3f::Zero();  ///< light scattered at grazing angles, as of velvet
 
-  /// Whether it needs more than the first three textures in their plain form.
+  /// Whether the material needs more than its first three textures, or a transform of texture coordinates.
   bool is_detailed() const;
 };
 
@@ -149,8 +149,9 @@ struct Model {
   /// The place of a camera or light in the file.
   struct Place {
     std::string name;  ///< name of the node, unique among cameras or lights
-    int node = -1;     ///< index in `rig`, if it was read; -1: none
-    Eigen::Matrix4f model_from_place = Eigen::Matrix4f::Identity();  ///< in the rest pose; looks along -z
+    int node = -1;     ///< index of the node in `rig`, if the rig was read; -1: none
+    /// Transform in the rest pose; cameras and lights look along -z.
+    Eigen::Matrix4f model_from_place = Eigen::Matrix4f::Identity();
   };
   struct Camera : Place {
     bool perspective = true;  ///< false: orthographic

@@ -12,7 +12,8 @@
 
 namespace offstage::render {
 
-/// `folders` must outlive it. All other files are treated as missing.
+/// Returns the file access for assimp: it can open regular files in `folders`, and all other files are
+/// treated as missing. `folders` must outlive the result.
 std::unique_ptr<Assimp::IOSystem> make_model_files(const InputFolders& folders);
 
 /// Whether a file name ends in `ending`, in any letter case.

@@ -1,6 +1,6 @@
 #pragma once
-/// Private: what assimp does not read of MTL files (Wavefront's material library format, 1995): options of
-/// textures, masks, bump maps, and the physically based values Pr and Pm.
+/// Private: the statements of MTL files that assimp does not read (Wavefront's material library format,
+/// 1995): options of textures, masks, bump maps, and the physically based values Pr and Pm.
 
 #include <filesystem>
 #include <map>

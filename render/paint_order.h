@@ -27,9 +27,9 @@ class Region {
   bool is_in_front_of(const Region& other) const;
   bool contains(const Vector3f& place) const;
 
-  /// Sets the visible surface of a body that fills its box badly, such as a wavy cloth: the depth along the
-  /// view axis of its nearest surface for each pixel of `area_px`, by rows, infinite where there is none. The
-  /// surface then decides for points within the box.
+  /// Sets the visible surface of a body that fills only a small part of its box, such as a wavy cloth: the
+  /// depth along the view axis of its nearest surface for each pixel of `area_px`, by rows, infinite where
+  /// there is none. The surface then decides for points within the box.
   void set_surface(const Eigen::AlignedBox2i& area_px, std::vector<float> depths, const Vector2f& size_px);
 
   const std::array<Vector3f, 8>& corners() const { return corners_; }
@@ -87,7 +87,7 @@ class PaintOrder {
   /// Keys of the visible particles of a kind, nearest first; equal depths are ordered by set and id.
   std::span<const uint64_t> keys(Kind kind) const { return keys_[index(kind)]; }
   std::span<const Source> sources(Kind kind) const { return sources_[index(kind)]; }
-  /// Number of points of a kind, visible or not.
+  /// Number of all points of a kind, whether visible or not.
   uint32_t count(Kind kind) const { return counts_[index(kind)]; }
   uint32_t number(Kind kind, uint64_t key) const;
   Place place(Kind kind, uint64_t key) const;

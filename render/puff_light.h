@@ -25,10 +25,10 @@ struct PuffLight {
   SkyModel sky;
   Vector3f to_sun;
 
-  /// `sky_model`: with the direction of the sun in this sub-frame.
+  /// `sky_model` must have the direction of the sun in this sub-frame.
   PuffLight(const OpacityGrid& opacity, const FrameUniforms& frame_uniforms, const SkyModel& sky_model,
             const Vector3f& sun_direction, const AirLight& air_light);
-  /// `number`: see AirLight::sun.
+  /// Returns the radiance of a puff at a place. `number`: see AirLight::sun.
   PuffRadiance radiance(const Vector3f& place, float radius, const Vector3f& albedo, float number,
                         const Vector3f& to_eye) const;
   /// Sky light on a white surface with this normal, and the sky reflected from a direction by a surface of

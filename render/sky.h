@@ -13,9 +13,9 @@ struct SkyModel {
   Vector3f sun_direction;
   Vector3f zenith, horizon, ground;
   Vector3f glow;          ///< radiance around the sun
-  TurnedSky turned = {};  ///< the picture in place of the colours
+  TurnedSky turned = {};  ///< the picture that replaces the colours
   bool has_bright_part() const { return turned.picture && turned.picture->has_bright_part(); }
-  bool seen_as_colors = false;  ///< the picture only lights; background and fog have the colours
+  bool seen_as_colors = false;  ///< the picture only gives light; the background and the fog show the colours
 };
 
 SkyModel make_sky(const Sun& sun, const Environment& environment);

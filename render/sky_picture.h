@@ -54,9 +54,9 @@ class SkyPicture {
   /// `blur_deg`: standard deviation of a Gaussian that blurs the background, but not the light; 0: none.
   explicit SkyPicture(const HdrImage& image, float blur_deg = 0);
 
-  /// Radiance from a unit direction, both parts.
+  /// Radiance from a unit direction, the sum of both parts.
   Vector3f seen(const Vector3f& direction) const { return unpacked_at(direction); }
-  /// The dim part.
+  /// Radiance of the dim part from a unit direction.
   Vector3f dim(const Vector3f& direction) const;
   /// The dim part as a surface of this roughness mirrors it, for the mirrored direction.
   Vector3f mirrored(const Vector3f& direction, float roughness) const;
@@ -103,7 +103,8 @@ class SkyPicture {
   SkyGrid light_;                ///< both parts
   std::vector<float> fraction_;  ///< fraction of the bright part in the same cells
   std::vector<float> row_sum_;   ///< sum of luminance * solid angle of the bright part, up to each row
-  std::vector<float> sums_;      ///< the same within each row
+  /// Sums of luminance * solid angle of the bright part within each row, up to each cell.
+  std::vector<float> sums_;
   float bright_total_ = 0;
   SkyBeam beam_;
   Irradiance irradiance_;

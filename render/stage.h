@@ -34,7 +34,7 @@ struct Camera {
 };
 
 struct Sun {
-  Vector3f direction = Vector3f(0.45f, 0.75f, 0.5f).normalized();  ///< towards the sun, unit
+  Vector3f direction = Vector3f(0.45f, 0.75f, 0.5f).normalized();  ///< unit direction towards the sun
   Vector3f color = {1, 0.95f, 0.87f};
   float intensity = 3;    ///< radiance of a white surface that faces the sun, before exposure
   float size_deg = 1.5f;  ///< diameter of the disc, which sets the softness of shadows
@@ -51,7 +51,9 @@ struct Lamp {
   float cone_deg = 0;                 ///< full angle of a cone; otherwise zero
   float softness = 0.3f;              ///< fraction of the cone over which its edge fades
   bool squared_edge =
-      false;  ///< fades with the square (KHR_lights_punctual), not in proportion to the cosine
+      /// The edge of the cone fades with the square of a linear ramp (KHR_lights_punctual), instead of in
+      /// proportion to the cosine.
+      false;
   bool shadows = true;
 };
 
@@ -59,7 +61,7 @@ struct Lamp {
 struct Environment {
   Vector3f zenith = {0.20f, 0.42f, 0.88f};
   Vector3f horizon = {0.95f, 1.05f, 1.15f};
-  Vector3f ground = {0.36f, 0.33f, 0.28f};  ///< visible below the horizon, and light from below
+  Vector3f ground = {0.36f, 0.33f, 0.28f};  ///< colour below the horizon, and of the light from below
   float intensity = 1;                      ///< scales sky and ambient together
   /// Albedo of the ground, which reflects the light of sun and sky; replaces `ground`.
   std::optional<Vector3f> ground_albedo = {};
@@ -112,7 +114,8 @@ struct PointsDef {
   bool lit = true;           ///< lit by sun and sky; false: its colour is its radiance
   bool casts_shadow = true;  ///< casts a shadow on the scene; smoke also on other smoke
   float softness = 0.5f;     ///< width of the fade at the rim, as a fraction of the radius, in [0, 1]
-  /// Length of streaks is velocity * stretch_s; other styles except balls are longer by this [s].
+  /// Streaks are velocity * stretch_s long. Other styles, except balls, are lengthened by the same distance
+  /// [s].
   float stretch_s = 1.0f / 60;
   /// Fraction by which a streak fades towards its tail, in [0, 1]: 0 for a drop, 1 for a spark.
   float taper = 0;
@@ -148,7 +151,8 @@ struct SampleOffsets {
   Eigen::Vector2f lens = Eigen::Vector2f::Zero();
   Eigen::Vector2f light = Eigen::Vector2f::Zero();
   int index = 0;  ///< number of the sub-frame
-  int count = 1;  ///< number of sub-frames in the frame; among many, one needs no filtering of its own
+  /// Number of sub-frames in the frame; where there are several, a sub-frame is not filtered by itself.
+  int count = 1;
 };
 /// Offsets of sub-frame i of n: a fixed low-discrepancy set; all zero for n = 1.
 SampleOffsets sample_offsets(int i, int n);
@@ -156,7 +160,8 @@ SampleOffsets sample_offsets(int i, int n);
 /// Sums over the values that rays found for light from the sky and other surfaces, and for mirror images.
 struct LightSums {
   double arriving = 0;  ///< luminance of the light of these rays
-  double removed = 0;   ///< light that was removed from the brightest rays, which would stay visible as dots
+  /// Luminance that was removed from the brightest rays, which would otherwise be visible as dots.
+  double removed = 0;
 
   LightSums& operator+=(const LightSums& other) {
     arriving += other.arriving;

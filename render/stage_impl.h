@@ -38,7 +38,7 @@ struct Stage::Impl {
     gl::Texture color, depth;
     gl::Framebuffer framebuffer;
     PictureCopy depth_copy;  ///< depth of the picture, for particles
-    PictureCopy behind;      ///< picture with the particles that are visible through glass
+    PictureCopy behind;      ///< copy of the picture with the particles that are visible through glass
     gl::Texture bodies;      ///< the picture without particles; created when they may be behind glass
     gl::Framebuffer bodies_framebuffer;
 
@@ -66,7 +66,7 @@ struct Stage::Impl {
     std::size_t instance = 0;      ///< index in MeshPass::translucent
     bool glass = false;
     bool fills_region = false;
-    Eigen::AlignedBox2i area_px;    ///< area that it covers
+    Eigen::AlignedBox2i area_px;    ///< area of the picture that the body covers
     Eigen::AlignedBox2i looked_px;  ///< area of the picture that it shows by refraction
   };
 
@@ -82,7 +82,7 @@ struct Stage::Impl {
   std::vector<Lamp> shining;  ///< lamps and fires of this sub-frame
   float time = 0;
   Features features;                    ///< of this sub-frame
-  bool particles_behind_glass = false;  ///< may be in this sub-frame
+  bool particles_behind_glass = false;  ///< whether this sub-frame may show particles through glass
   LightSources light_sources;           ///< of this sub-frame
 
   Slots<std::unique_ptr<GpuMesh>, MeshTag> meshes{"mesh"};

@@ -22,8 +22,8 @@ struct VideoFormat {
 
 std::span<const VideoFormat> video_formats();
 
-/// Returns the format of a definition. Throws std::invalid_argument with advice if the format cannot
-/// represent it.
+/// Returns the format that the ending of a video's name selects. Throws std::invalid_argument with advice if
+/// the format cannot represent it.
 const VideoFormat& video_format(const VideoDef& def);
 
 /// Returns the whole command; ffmpeg reads the frames from its standard input.

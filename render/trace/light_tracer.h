@@ -34,7 +34,7 @@ struct LightBuffer {
   std::vector<Vector4f>
       arriving;  ///< light from the sky and other surfaces; w: fraction of the sun that is visible
   std::vector<Vector4f> mirrored;    ///< light from the mirrored direction; w: 1 where it was computed
-  bool has_mirrors = false;          ///< if not, `mirrored` is not up to date
+  bool has_mirrors = false;          ///< whether any surface mirrors; if not, `mirrored` is not updated
   std::vector<Vector4f> lamps;       ///< diffuse light of lamps; empty: there are none
   std::vector<Vector4f> highlights;  ///< lobes of lamps, without reflectance; w: their Fresnel factor
   LightSums sums;
@@ -69,7 +69,7 @@ struct LightView {
 /// Light of the visible surfaces, for rays that meet them again: it has no noise and costs no further rays.
 class VisibleLight {
  public:
-  /// `picture`: of the opaque objects, rows from the bottom up; empty: not known.
+  /// `picture`: colours of the opaque objects, rows from the bottom up; empty: not known.
   VisibleLight(const LightBuffer& light, const LightView& view, std::span<const Vector4f> picture = {})
       : light_(light), view_(view), picture_(picture) {}
   /// Index of the pixel that shows a point; negative if it is not visible.
@@ -91,23 +91,25 @@ class LightTracer {
   LightTracer(const RayScene& scene, const LightSources& sources, StopTest stop = {});
 
   void trace(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
-  /// The same for the surfaces of a translucent body in a part of the picture. `visible`: the opaque objects.
+  /// Computes the light at the surfaces of a translucent body in a part of the picture. `visible`: light of
+  /// the opaque objects.
   void trace_body(const SurfaceBuffer& surfaces, const LightView& view, const VisibleLight& visible,
                   LightBuffer& light) const;
 
-  /// `surfaces`: a part of the picture, with glass only; (x, y) is its first pixel. `behind`: the opaque
-  /// objects, with their picture.
+  /// Computes the light at the surfaces of glass in a part of the picture, whose first pixel is (x, y).
+  /// `behind`: light of the opaque objects, with their picture.
   void trace_glass(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
                    const VisibleLight& behind, GlassBuffer& glass) const;
 
  private:
   struct Point;   ///< a visible surface
-  struct Points;  ///< eight of them
-  struct Path;    ///< from the eye
+  struct Points;  ///< eight visible surfaces
+  struct Path;    ///< a path of light rays, traced from the eye
   /// Light that a path found.
   struct FoundLight {
-    Vector3f noisy = Vector3f::Zero();    ///< by random directions
-    Vector3f certain = Vector3f::Zero();  ///< found without random directions, or weighted against a lamp
+    Vector3f noisy = Vector3f::Zero();    ///< light found by random directions, which is noisy
+    /// Light found without random directions, or weighted because a lamp was sampled, too.
+    Vector3f certain = Vector3f::Zero();
     Vector3f limited(LightSums& sums) const;
   };
   FoundLight radiance(Path path, PixelSampler& sampler, const VisibleLight* visible = nullptr,

@@ -39,8 +39,8 @@ struct SimulationTotals : sim::StepFigures {
   uint64_t most_contacts = 0;         ///< greatest number of contact points of bodies at the end of a frame
   std::vector<std::string> broken_joints;  ///< in the order of breaking
   std::vector<std::string> lost_bodies;    ///< bodies that left the world's bounds and were frozen there
-  // By cloth: the smallest factor by which the stiffness of a spring was reduced.
-  std::map<std::string, sim::Real> softened_cloths;  /
+  /// By cloth: the smallest factor by which the stiffness of a spring was reduced.
+  std::map<std::string, sim::Real> softened_cloths;
   std::map<std::string, sim::ClothTear> first_tears;
   /// Bodies with approximate contact forces, and how often a solver fell back for them.
   std::map<std::string, uint64_t> rough_bodies;

@@ -41,8 +41,8 @@ struct PointSet {
 struct ClothSample {
   std::vector<Eigen::Vector3f> points;      ///< [m]
   std::vector<Eigen::Vector3f> velocities;  ///< [m/s]
-  // Version of `triangles` and `sources`; 0: the cloth is intact, and both are empty.
-  uint32_t version = 0;             /
+  /// Version of `triangles` and `sources`; 0: the cloth is intact, and both are empty.
+  uint32_t version = 0;
   std::vector<uint32_t> triangles;  ///< three points each
   std::vector<uint32_t> sources;    ///< for each point, the vertex of the scene's cloth from which it comes
 };
