@@ -106,7 +106,8 @@ int wait_status(pid_t child, const ConfinedWork& work) {
   }
   int status = 0;
   while (::waitpid(child, &status, 0) < 0)
-    if (errno != EINTR) throw UnavailableError("the process that reads files cannot be waited for: " + system_reason(errno));
+    if (errno != EINTR)
+      throw UnavailableError("the process that reads files cannot be waited for: " + system_reason(errno));
   if (stopped) throw StoppedError(work.what + ": reading was interrupted");
   if (still)
     throw FileError(work.what + ": the process that reads it made no progress for " +
@@ -117,10 +118,11 @@ int wait_status(pid_t child, const ConfinedWork& work) {
 [[noreturn]] void throw_for_end(const ConfinedWork& work, const ProcessLimits& limits, int status) {
   if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) throw_too_slow(work, limits);
   if (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL)
-    throw FileError(work.what +
-                    ": the process that reads it was killed by another process; perhaps the machine ran out of memory");
-  throw FileError(work.what + ": crashed the process that reads it (" + describe_failure(status).value_or("ended") +
-                  "); it is broken or nested too deeply");
+    throw FileError(
+        work.what +
+        ": the process that reads it was killed by another process; perhaps the machine ran out of memory");
+  throw FileError(work.what + ": crashed the process that reads it (" +
+                  describe_failure(status).value_or("ended") + "); it is broken or nested too deeply");
 }
 
 }  // namespace
@@ -138,10 +140,12 @@ ChildAnswer::~ChildAnswer() {
 
 ChildAnswer run_confined(const ConfinedWork& work, const std::function<void(int)>& job) {
   const Descriptor memory(::memfd_create("offstage-answer", MFD_CLOEXEC));
-  if (!memory) throw UnavailableError("no memory file can be created for reading files: " + system_reason(errno));
+  if (!memory)
+    throw UnavailableError("no memory file can be created for reading files: " + system_reason(errno));
   const ProcessLimits limits = limits_of(work);
   const pid_t child = ::fork();
-  if (child < 0) throw UnavailableError("the process that reads files cannot be started: " + system_reason(errno));
+  if (child < 0)
+    throw UnavailableError("the process that reads files cannot be started: " + system_reason(errno));
   if (child == 0) become_child(work, limits, memory.fd(), job);
 
   const int status = wait_status(child, work);

@@ -258,7 +258,8 @@ class GltfImporter {
     if (!rig_)
       warn(file_.count("animations"),
            "animations are not played: the model is in its rest pose; `animation` of a body plays one");
-    if (model_.cameras.empty()) warn(file_.count("cameras"), "cameras are ignored: no node of the drawn scene has a usable one");
+    if (model_.cameras.empty())
+      warn(file_.count("cameras"), "cameras are ignored: no node of the drawn scene has a usable one");
     if (model_.lights.empty())
       warn(file_.root().extension("KHR_lights_punctual").count("lights"),
            "lights are ignored: no node of the drawn scene has a usable one");

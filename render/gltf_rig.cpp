@@ -236,8 +236,9 @@ RigClip GltfRig::clip(std::size_t index) {
       clip.duration = std::max(clip.duration, read->times.back());
       RigNode& node = rig_.nodes[static_cast<std::size_t>(read->node)];
       if (node.has_matrix && read->path != RigChannel::Path::weights)
-        file_.warn(animation.place() + ": the node '" + node.name +
-                   "' has a matrix in place of translation, rotation and scale, so its animation has no effect");
+        file_.warn(
+            animation.place() + ": the node '" + node.name +
+            "' has a matrix in place of translation, rotation and scale, so its animation has no effect");
       clip.channels.push_back(std::move(*read));
     }
   return clip;

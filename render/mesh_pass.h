@@ -31,7 +31,7 @@ struct GpuMesh {
   bool endless = false;                 ///< see Mesh::endless
   bool round = false;                   ///< fills the ball inscribed in its box
   bool boxy = false;                    ///< fills its box, except for a bevel
-  std::unique_ptr<const RayMesh> rays;  ///< the same for light rays
+  std::unique_ptr<const RayMesh> rays;  ///< the mesh as light rays see it
 
   bool stored = false;         ///< the mesh existed at the last Stage::store_previous_transforms()
   gl::Buffer vertices_before;  ///< previous vertices, if they have been replaced; otherwise 0
@@ -68,7 +68,7 @@ struct GpuMaterial {
   bool glass = false;   ///< light goes through and is refracted
   bool smooth = false;  ///< mirrors the scene
   bool plain = false;   ///< fully described by one colour, roughness and fraction of metal
-  std::unique_ptr<const RayMaterial> rays;  ///< the same for light rays
+  std::unique_ptr<const RayMaterial> rays;  ///< the material as light rays see it
 
   /// Whether objects behind the surface are visible through it.
   bool lets_through() const { return blended || glass; }

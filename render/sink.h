@@ -31,10 +31,9 @@ class FrameSink {
 std::filesystem::path frame_path(const std::filesystem::path& pattern, int frame);
 
 struct VideoDef {
-  std::filesystem::path
-      /// Name of the video. Its ending selects the encoder: .mp4 .webm .mov .mkv .gif .webp .apng; .png is an
-      /// animated PNG here.
-      path;
+  /// Name of the video. Its ending selects the encoder: .mp4 .webm .mov .mkv .gif .webp .apng; .png is an
+  /// animated PNG here.
+  std::filesystem::path path;
   int width_px = 0, height_px = 0;
   FrameRate fps;
   bool alpha = false;  ///< .webm, .mov, .webp, .apng, .png support it; other formats are refused

@@ -50,10 +50,9 @@ struct Lamp {
   Vector3f direction = {0, -1, 0};    ///< unit direction of cones and rectangles
   float cone_deg = 0;                 ///< full angle of a cone; otherwise zero
   float softness = 0.3f;              ///< fraction of the cone over which its edge fades
-  bool squared_edge =
-      /// The edge of the cone fades with the square of a linear ramp (KHR_lights_punctual), instead of in
-      /// proportion to the cosine.
-      false;
+  /// The edge of the cone fades with the square of a linear ramp (KHR_lights_punctual), instead of in
+  /// proportion to the cosine.
+  bool squared_edge = false;
   bool shadows = true;
 };
 

@@ -75,15 +75,15 @@ struct Stage::Impl {
   std::optional<Camera> camera_before;
   Sun sun;
   Environment environment;
-  SkyModel sky;                                    ///< of this sub-frame
+  SkyModel sky;                                    ///< sky in this sub-frame
   std::shared_ptr<const SkyPicture> uploaded_sky;  ///< sky picture that the textures contain
   gl::Texture sky_levels, sky_background;
   std::vector<Lamp> lamps;
   std::vector<Lamp> shining;  ///< lamps and fires of this sub-frame
   float time = 0;
-  Features features;                    ///< of this sub-frame
+  Features features;                    ///< light-dependent definitions for the shaders in this sub-frame
   bool particles_behind_glass = false;  ///< whether this sub-frame may show particles through glass
-  LightSources light_sources;           ///< of this sub-frame
+  LightSources light_sources;           ///< sources of light in this sub-frame
 
   Slots<std::unique_ptr<GpuMesh>, MeshTag> meshes{"mesh"};
   Slots<std::unique_ptr<GpuMaterial>, MaterialTag> materials{"material"};

@@ -28,7 +28,7 @@ class StreaksPass {
   /// Draws the streaks behind the next object over an area of the picture; returns the pixels that may have
   /// changed.
   Eigen::AlignedBox2i draw_behind(const Eigen::AlignedBox2i& area_px, const FrameUniforms& frame,
-                                 GLuint color);
+                                  GLuint color);
   /// Draws the remaining streaks over a band of the picture (see StreakBands). For both functions, the
   /// picture's framebuffer must be bound for reading.
   void blend_over(int bottom, int rows, const FrameUniforms& frame, std::span<float> rgba);

@@ -16,7 +16,7 @@ struct VideoFormat {
   bool keeps_alpha;
   bool needs_even_size;  ///< colour is stored at half size in both directions
   double max_fps;
-  std::vector<std::string> opaque;       ///< encoder options
+  std::vector<std::string> opaque;       ///< encoder options without alpha
   std::vector<std::string> transparent;  ///< encoder options with alpha
 };
 

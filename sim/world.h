@@ -106,7 +106,7 @@ struct CollisionMethods {
   BroadPhase broad_phase = BroadPhase::multi_grid;
   ImpactTime impact_time = ImpactTime::advancement;
   Trees trees = Trees::aabb;
-  TreeSplit tree_split = TreeSplit::surface_area;  ///< how these trees are split
+  TreeSplit tree_split = TreeSplit::surface_area;  ///< rule by which the trees are split
   MeshPairs mesh_pairs = MeshPairs::parts;
   /// Width of a cell of the uniform grid in mean diameters of the bodies (the book's k), > 0.
   Real cell_factor = CellSizes::kMeansInCell;
@@ -160,7 +160,7 @@ struct MovedBody {
 
 /// State of a body at the end of the last step.
 struct BodyState {
-  Pose pose;              ///< pose of the body's own frame, as given at creation
+  Pose pose;              ///< pose of the body's frame, in which its shape was given
   Vec3 centre;            ///< centre of mass, world [m]
   Vec3 velocity;          ///< velocity of the centre of mass [m/s]
   Vec3 angular_velocity;  ///< world [rad/s]
@@ -271,7 +271,7 @@ class World {
   std::span<const ParticleEvent> particle_events() const;
   ClothView cloth(ClothHandle cloth) const;
   const ClothDef& cloth_def(ClothHandle cloth) const;
-  const ClothReport& cloth_report(ClothHandle cloth) const;  ///< report of the last step
+  const ClothReport& cloth_report(ClothHandle cloth) const;  ///< statistics of the cloth in the last step
   /// The gas inside of a cloth with `pressure` now; zero for other cloths.
   ClothGasState cloth_gas(ClothHandle cloth) const;
   void for_each_cloth(const std::function<void(ClothHandle)>& f) const;

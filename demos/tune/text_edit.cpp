@@ -267,7 +267,8 @@ std::string set_value(std::string_view text, std::string_view path, std::string_
   std::string value = normalized(json);
   if (followed.steps == steps.size()) {
     std::string result(text);
-    return result.replace(followed.end->value.begin, followed.end->value.end - followed.end->value.begin, value);
+    return result.replace(followed.end->value.begin, followed.end->value.end - followed.end->value.begin,
+                          value);
   }
   // Content of the missing objects and lists, from the inside. A list in an object whose keys are on separate
   // lines has its first item on a separate line, too.
@@ -284,7 +285,8 @@ std::string set_value(std::string_view text, std::string_view path, std::string_
       value = "[" + value + "]";
   }
   const std::string& step = steps[followed.steps];
-  if (followed.end->list && index_of_step(step) == followed.end->parts.size()) return append_to(text, *followed.end, value);
+  if (followed.end->list && index_of_step(step) == followed.end->parts.size())
+    return append_to(text, *followed.end, value);
   if (!followed.end->object) refuse_path(path);
   return append_to(text, *followed.end, quoted(step) + colon_of(text, *followed.end) + value);
 }
@@ -309,8 +311,8 @@ std::string rename_key(std::string_view text, std::string_view path, const std::
   if (followed.end->key != key && child_of(*followed.parent, key))
     throw std::invalid_argument("there is already a key \"" + key + '"');
   std::string result(text);
-  return result.replace(followed.end->key_range.begin, followed.end->key_range.end - followed.end->key_range.begin,
-                        quoted(key));
+  return result.replace(followed.end->key_range.begin,
+                        followed.end->key_range.end - followed.end->key_range.begin, quoted(key));
 }
 
 std::string blank_out(std::string_view text, const std::vector<std::string>& paths) {

@@ -107,7 +107,7 @@ class LightTracer {
   struct Path;    ///< a path of light rays, traced from the eye
   /// Light that a path found.
   struct FoundLight {
-    Vector3f noisy = Vector3f::Zero();    ///< light found by random directions, which is noisy
+    Vector3f noisy = Vector3f::Zero();  ///< light found by random directions, which is noisy
     /// Light found without random directions, or weighted because a lamp was sampled, too.
     Vector3f certain = Vector3f::Zero();
     Vector3f limited(LightSums& sums) const;

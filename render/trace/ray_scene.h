@@ -67,7 +67,7 @@ struct Hit {
   Vector3f face = Vector3f::Zero();    ///< unit normal of the triangle, on the side of the ray's origin
   bool front = true;
   const RayMaterial* material = nullptr;
-  float translucency = 0;                       ///< translucency of a cloth, else 0
+  float translucency = 0;  ///< translucency of a cloth, else 0
   /// Number of the object in the scene, and of the triangle in its mesh.
   unsigned object = 0, triangle = 0;
   Vector3f object_position = Vector3f::Zero();  ///< position in the object's frame, for patterns

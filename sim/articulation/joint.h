@@ -51,7 +51,7 @@ struct Motor {
   struct Key {
     Real time = 0;                                          ///< [s]
     Real target = 0;                                        ///< [rad/s] or [m/s], or [rad] or [m]
-    Interpolation interpolation = Interpolation::monotone;  ///< to the next key
+    Interpolation interpolation = Interpolation::monotone;  ///< interpolation to the next key
   };
   Mode mode = Mode::none;
   std::vector<Key> targets = {};  ///< strictly increasing times; empty: the target is 0
@@ -89,7 +89,7 @@ struct JointDef {
                        ///< second axis [rad]
   /// Coefficient of restitution at the limits `lower` and `upper`, in [0, 1], for speeds above kBounceSpeed.
   Real restitution = 0;
-  static constexpr Real kBounceSpeed = 0.05;  ///< [m/s], [rad/s]
+  static constexpr Real kBounceSpeed = 0.05;  ///< least speed at a limit that is reflected [m/s], [rad/s]
   /// Spherical joints: torque per angle of rotation from the pose at creation, about any axis [N m/rad].
   Real stiffness = 0;
   /// Dry friction: greatest torque or force against motion in each free direction [N m] or [N].
@@ -104,7 +104,7 @@ struct JointDef {
   /// time; its anchors and axes have moved with the bodies.
   Real appear_at = 0, remove_at = kFree;
 
-  /// Whether it only couples motions that other joints allow.
+  /// Whether a joint of this type only couples motions that other joints allow.
   bool is_coupling() const { return type == JointType::gear || type == JointType::rack; }
   bool has_limits() const { return lower > -kFree || upper < kFree; }
   /// Whether the joint has a coordinate that limits, motor and friction can act on.
@@ -134,7 +134,7 @@ struct JointState {
   /// Load on a at its anchor: the mean over the last sub-step, impacts included [N], [N m].
   Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
   Real coordinate = 0;  ///< the free coordinate; 0 for joints without one
-  Real speed = 0;       ///< rate of the free coordinate
+  Real speed = 0;       ///< rate of the free coordinate [rad/s] or [m/s]
   Real error = 0;       ///< distance by which the anchors violate the joint [m]
   bool broken = false;
 };

@@ -22,9 +22,9 @@ Real joint_gap(const Articulation& articulation, Real time);
 /// Elastic energy of a joint's stiffness and of a position motor with a stiffness, which is a spring whose
 /// effort is limited, at a time [J].
 Real spring_energy(const Joint& joint, Real time);
-/// Whether a joint connects it to the world or to a static or kinematic body.
+/// Whether a joint connects the articulation to the world or to a static or kinematic body.
 bool is_held(const Articulation& articulation);
-/// Whether a joint connects it to a kinematic body, which may do work.
+/// Whether a joint connects the articulation to a kinematic body, which may do work.
 bool has_kinematic_end(const Articulation& articulation);
 
 /// Kinetic energy of the links relative to their common motion; if the articulation is held, all kinetic

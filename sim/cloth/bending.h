@@ -33,7 +33,7 @@ class ClothBending {
   /// curvature can be measured even if there is no rigidity.
   void assign(std::span<const Vec3> rest, std::span<const Triangle> triangles, std::span<const Real> masses,
               Real rigidity, Real damping, Real rest_fraction, bool measures = false);
-  /// Without rigidity; nothing resists bending.
+  /// Whether nothing resists bending, because the rigidity is 0.
   bool empty() const { return rigidity_ == 0 || patches_.empty(); }
   Real damping() const { return damping_; }
 
@@ -104,7 +104,7 @@ class ClothBending {
   std::vector<Real> value_;               // off the diagonal; rows add up to zero with it
   std::vector<Real> diagonal_, row_sum_;  // the latter of absolute values, with the diagonal
   std::vector<Vec4> residual_, direction_, image_;
-  /// Of M + stiff K, without the rows of points that do not move.
+  /// Factor of M + stiff K without the rows of points that do not move.
   using Factor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<Real>>;
   std::shared_ptr<Factor> factor_;
   float factor_stiff_ = 0;

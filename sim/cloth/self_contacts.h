@@ -21,7 +21,7 @@ namespace offstage::sim {
 
 class SelfContacts {
  public:
-  /// Triangles of the cloths that collide with cloth.
+  /// Sets the triangles, those of cloths that collide with cloth.
   void assign(std::vector<Triangle> triangles, const ClothPoints& points);
   bool empty() const { return triangles_.empty(); }
 
@@ -33,7 +33,8 @@ class SelfContacts {
   /// towards the drift of its point. Points of one piece have a common drift.
   void find_doubtful(const ClothPoints& points, Real dt, std::span<const Vec4> drift);
   void find_none() { contacts_.clear(); }
-  /// Calls visit(points) for the pairs found: four, of which the first and the last are of one each.
+  /// Calls visit(points) for each pair found, with its four points. The first belongs to one partner of the
+  /// pair, and the last to the other.
   template <class Visit>
   void for_doubtful(Visit&& visit) const {
     for (const Contact& c : contacts_) visit(pairs_[c.pair].points);
@@ -43,7 +44,8 @@ class SelfContacts {
   /// Lowers the fractions of the moves of pairs that crossed, and adds their points to `lowered`. Returns
   /// whether there were any.
   bool shorten(const ClothPoints& points, MoveFractions& fractions, std::vector<uint32_t>& lowered);
-  /// Records the moves of points at the end of the sub-step.
+  /// Records the moves of points, for the next search. To be called at the end of a sub-step of length dt
+  /// [s].
   void end_substep(const ClothPoints& points, Real dt);
 
   std::span<const uint64_t> active() const {

@@ -24,7 +24,8 @@ inline constexpr Real kStretchAim = 0.97;
 struct SpringLimit {
   uint32_t a, b;       ///< points
   Real rest, longest;  ///< [m]
-  bool tears = false;  ///< it tears first, between steps of the world, and does not stop a body
+  /// Whether the spring tears before it stops a body; tearing happens between sub-steps of the world.
+  bool tears = false;
 };
 
 /// Contact of a point of cloth, or of a point within a triangle, with a dynamic body.
@@ -75,7 +76,7 @@ class TautSprings {
     std::array<uint32_t, 3> corners;  // places
     std::array<Real, 3> weights;
   };
-  /// Acts on one place along the direction, and on the other against it.
+  /// A row acts on one place along its direction, and on the other against it.
   struct Row {
     uint32_t first, second;  // places
     Vec4 direction;

@@ -40,7 +40,7 @@ struct CellRange {
   uint32_t object;  ///< caller's index, below CellTable::kMaxObjects
   int32_t level;
   std::array<int32_t, 3> low, high;  ///< cell coordinates, both inclusive
-  CellBox box;                       ///< its cell lanes are not set
+  CellBox box;                       ///< box of the object; the lanes of its cell are not set
 
   /// The same object at a coarser level. The width of cells doubles from level to level, so cells of all
   /// levels nest.
@@ -81,7 +81,7 @@ class CellTable {
   void find_pairs_with(const CellTable& other, uint32_t first, uint32_t end, CandidatePairs& out) const;
 
  private:
-  /// An object to be inserted.
+  /// A copy of an object that is to be inserted, with the hash of its cell.
   struct Listed {
     uint32_t hash;
     uint32_t range;  // index of the range

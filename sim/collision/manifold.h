@@ -32,7 +32,7 @@ enum class NormalSource : uint8_t {
 };
 
 struct Manifold {
-  Vec3 normal = Vec3::UnitY();  ///< unit, from B to A
+  Vec3 normal = Vec3::UnitY();  ///< unit vector from B to A
   NormalSource source = NormalSource::points;
   Vec3 edge_a = Vec3::Zero(), edge_b = Vec3::Zero();  ///< unit directions of the lines of `source`
   /// Depth of those lines and points behind the surfaces [m]: the radius for a sphere's centre or the axis of

@@ -42,11 +42,13 @@ struct Obstacle {
 
   Solid solid;
   Pose start, end;
-  Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();  ///< mean over the sub-step, world
-  Real turn = 0;                                                  ///< angle turned [rad]
-  Real extent;                                                    ///< reach() of the solid
+  /// Mean velocity and angular velocity over the sub-step, world axes [m/s], [rad/s].
+  Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
+  Real turn = 0;  ///< angle turned [rad]
+  /// Distance of the farthest point of the solid from its origin [m].
+  Real extent;
   Real restitution, friction;
-  Real cross_friction = 1;  ///< across the friction axis over that along it
+  Real cross_friction = 1;  ///< friction across the friction axis over friction along it
   Vec3 friction_axis =
       Vec3::Zero();       ///< direction of the surface's friction axis, in the solid's frame; zero: none
   uint32_t body = 0;      ///< the world's index of the body
@@ -63,7 +65,7 @@ struct Obstacle {
 struct Reaction {
   uint32_t body;         ///< Obstacle::body
   Vec3 impulse;          ///< [N s]
-  Vec3 angular_impulse;  ///< about the centre of mass [N m s]
+  Vec3 angular_impulse;  ///< angular impulse about the centre of mass [N m s]
 };
 
 /// A set of obstacles: planes in a list, the others in a tree of swept boxes.

@@ -27,7 +27,7 @@ struct ContactPlace {
 
 struct ContactMotion {
   ContactPlace middle;
-  ContactFrame frame;  ///< frame at the middle of the interval
+  ContactFrame frame;  ///< frame of the contact at the middle of the interval
   /// Change of the relative velocity at the contact due to the rotation of arms and normal alone, in `frame`
   /// (n, t, k): gain s + bow s^2, where s increases from -1 at the start through 0 in the middle to 1 at the
   /// end [m/s].

@@ -58,13 +58,15 @@ class alignas(64) ContactPair {
   bool has_narrow_ = false;
 
  public:
-  uint32_t impacts = 0;        ///< number in this sub-step
-  uint8_t speculative = 0;     ///< number of manifolds that add_speculative_contacts() added
-  bool toi_exhausted = false;  ///< limit of impacts reached: not traced back again in this sub-step
-  /// Its contacts have no restitution in this sub-step; they only limit the approach.
+  uint32_t impacts = 0;     ///< number of impacts of this pair in this sub-step
+  uint8_t speculative = 0;  ///< number of manifolds that add_speculative_contacts() added
+  /// Whether the pair reached its limit of impacts: it is not traced back again in this sub-step.
+  bool toi_exhausted = false;
+  /// Whether the contacts of the pair have no restitution in this sub-step: they only limit the approach.
   bool restitution_suppressed = false;
   Real deepest = 0;  ///< deepest overlap that find() has seen in this sub-step [m]
-  /// Impacts of this pair are traced back to; otherwise its points limit the approach.
+  /// Whether the island of this pair is moved back to the time of its impacts; otherwise the contact points
+  /// limit the approach.
   bool needs_toi = false;
 
   /// Only `b` may be a plane.
@@ -123,7 +125,7 @@ class alignas(64) ContactPair {
 
   /// Whether the only contact is that of a sphere with a simple shape, found in closed form.
   bool has_sphere() const { return has_sphere_; }
-  /// Whether find() was never called.
+  /// Whether find() was never called for this pair.
   bool is_new() const { return found_margin_ < 0; }
 
   std::vector<PlacedManifold>& manifolds() { return placed_; }

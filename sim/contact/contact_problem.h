@@ -46,9 +46,10 @@ struct ContactBody {
 /// One point where body a touches body b. Vectors of three numbers are in the order normal, t, k of its
 /// frame.
 struct Contact {
-  uint32_t a = 0, b = 0;                            ///< indices of bodies; not both unmoved
-  ContactFrame frame;                               ///< n from b to a
-  Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();  ///< from the centres of mass to the point, world [m]
+  uint32_t a = 0, b = 0;  ///< indices of bodies; not both unmoved
+  ContactFrame frame;     ///< n from b to a
+  /// Vectors from the centres of mass to the point, world axes [m].
+  Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();
   /// Added to the relative velocity, for moving surfaces and turning frames [m/s].
   Vec3 offset = Vec3::Zero();
   /// The part of `offset` that is not a surface velocity: velocity terms of R9 [m/s].

@@ -17,7 +17,7 @@ class ExactContacts {
   /// How the problem is solved.
   enum class Method : uint8_t {
     proximal,  ///< by the proximal Newton method on the true friction cone
-    lcp        ///< by linear complementarity (contact_lcp.h), or else as above
+    lcp        ///< by linear complementarity (contact_lcp.h); where this fails, as `proximal`
   };
   struct Outcome {
     /// False: nothing was changed, because the cost exceeded the budget, or because the result of a fall-back

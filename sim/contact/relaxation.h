@@ -87,10 +87,12 @@ struct ContactPatch {
   /// Friction of all points together: tangential [N] and about the normal [N m]; in and out like
   /// Point::force.
   Real force_t = 0, force_k = 0, torque_n = 0;
-  Vec3 mean_friction = Vec3::Zero();     ///< the mean of these, like Point::mean_force
-  Vec3 friction_impulse = Vec3::Zero();  ///< in the order of mean_friction, like Point::impulse
-  Vec3 friction_shift = Vec3::Zero();    ///< in the order of mean_friction, like Point::shift
-  Real rolling = 0, spinning = 0;        ///< see Contact
+  Vec3 mean_friction = Vec3::Zero();  ///< the mean of these, like Point::mean_force
+  /// Impulses of friction over the whole step, in the order of mean_friction; see Point::impulse.
+  Vec3 friction_impulse = Vec3::Zero();
+  /// Effect of friction on positions, in the order of mean_friction; see Point::shift.
+  Vec3 friction_shift = Vec3::Zero();
+  Real rolling = 0, spinning = 0;  ///< rolling and spinning friction [m]; see Contact
   /// Rolling friction: angular impulse about t and k, like Point::impulse [N m s], and its Point::shift.
   Tangential rolling_impulse = Tangential::Zero(), rolling_shift = Tangential::Zero();
 };

@@ -37,10 +37,11 @@ struct BodyDef {
   /// moment at most the sum of the other two. Default: that of the shape about its own centre, scaled to the
   /// mass.
   std::optional<Mat3> inertia = {};
-  Real linear_drag = 0;       ///< k_v of F = -k_v v [kg/s]
-  Real angular_drag = 0;      ///< k_w of tau = -k_w w [kg m^2/s]
-  std::string material;       ///< name of the surface for ContactRule; may be empty
-  Real restitution = 0.5;     ///< in [0, 1]; a pair uses the larger value of both bodies
+  Real linear_drag = 0;   ///< k_v of F = -k_v v [kg/s]
+  Real angular_drag = 0;  ///< k_w of tau = -k_w w [kg m^2/s]
+  std::string material;   ///< name of the surface for ContactRule; may be empty
+  /// Coefficient of restitution in [0, 1]; a pair uses the larger value of its bodies.
+  Real restitution = 0.5;
   Real friction = 0.5;        ///< dynamic coefficient of Coulomb friction; a pair uses the geometric mean
   Real static_friction = -1;  ///< static coefficient; negative: the same as `friction`
   /// Dynamic coefficient across friction_axis; negative: the same as along it. In every pair, friction across
@@ -59,7 +60,7 @@ struct BodyDef {
   /// Velocity of the surface relative to the body, as of a conveyor, in its frame [m/s].
   Vec3 surface_velocity = Vec3::Zero();
   bool collides = true;  ///< takes part in collisions with bodies and particles
-  KeyframeTrack track;   ///< for kinematic bodies
+  KeyframeTrack track;   ///< motion of a kinematic body
   /// Times between which it exists [s]. It appears at its initial pose and velocity, and is removed, at the
   /// start of the first sub-step from then on. While it does not exist, nothing touches it, and its springs
   /// and joints have no effect; its joints take the poses of the time when it appears. Its removal releases

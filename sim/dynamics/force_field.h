@@ -98,8 +98,8 @@ struct AppliedForce {
 /// explosion, so it also turns bodies that are hit off-centre.
 struct Explosion {
   Vec3 point = Vec3::Zero();
-  Real impulse = 1;  ///< on a body or a particle right at the point [N s]
-  Real radius = 1;   ///< no effect from here on [m], > 0
+  Real impulse = 1;  ///< impulse on a body or a particle at the point of the explosion [N s]
+  Real radius = 1;   ///< distance from which on there is no effect [m], > 0
   uint32_t drop_rate = 1;
 };
 
@@ -109,7 +109,7 @@ struct ForceDef {
                               MutualGravitation, Coulomb, LennardJones, AppliedForce>;
 
   std::string name;
-  /// The objects on which it acts. If none is named: all dynamic bodies and all cloths, no particles.
+  /// The objects on which the force acts. If none is named: all dynamic bodies and all cloths, no particles.
   std::vector<BodyHandle> bodies;
   std::vector<ParticleSystemHandle> systems;
   /// Moving air acts on the triangles of cloths. Every other force, and the drag of moving air with k > 0, is
@@ -125,11 +125,11 @@ struct ForceDef {
   bool is_unrestricted() const { return bodies.empty() && systems.empty() && cloths.empty(); }
   bool is_on(Real time) const { return time >= start && time < end; }
   bool is_explosion() const { return std::holds_alternative<Explosion>(effect); }
-  /// Whether it is a force between particles.
+  /// Whether this is a force between particles.
   bool is_pairwise() const;
-  /// Whether its effect on a body at rest can change with time.
+  /// Whether the effect of this force on a body at rest can change with time.
   bool changes() const;
-  /// Whether it is an explosion at a time in [from, to).
+  /// Whether this force is an explosion whose time is in [from, to).
   bool explodes(Real from, Real to) const { return is_explosion() && from <= start && start < to; }
 };
 
@@ -165,7 +165,7 @@ struct ActiveForce {
   std::vector<const RigidBody*> only;  ///< sorted by address; used if the definition names any body
 
   bool acts_on(const RigidBody& body) const;
-  /// Whether it acts on the body at any time from `from` to `to`.
+  /// Whether the force acts on the body at any time from `from` to `to`.
   bool acts_on(const RigidBody& body, Real from, Real to) const {
     return !def->is_explosion() && def->start <= to && def->end > from && acts_on(body);
   }

@@ -26,10 +26,10 @@ struct HullToMerge {
   uint32_t solid = 0;  ///< parts of one solid do not overlap much; those of different solids may
 };
 
-/// Merges parts, for several bounds.
+/// Merges convex parts; run() can be called several times, with different bounds.
 class HullMerger {
  public:
-  /// `parts` must remain.
+  /// `parts` must outlive this object.
   explicit HullMerger(std::span<const HullToMerge> parts);
   ~HullMerger();
 

@@ -22,7 +22,7 @@ struct Polyhedron {
     uint32_t origin = 0, face = 0, next = 0, previous = 0, twin = 0, sibling = 0;
   };
   struct Face {
-    uint32_t first = 0;  ///< any of its half-edges
+    uint32_t first = 0;  ///< one of the face's half-edges
     Plane plane;
   };
 

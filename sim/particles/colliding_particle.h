@@ -19,7 +19,7 @@ struct CollidingParticle {
   Vec3 path_velocity;  ///< mean velocity along its path
   Vec3 velocity;       ///< at the end of the sub-step
   Vec3 acceleration;   ///< mean acceleration by forces
-  Real from;           ///< start of its path, since the sub-step's start [s]
+  Real from;           ///< time at which the path starts, since the sub-step's start [s]
   Real mass, radius, restitution, friction;
   /// For a ball that turns: m r^2 / I (kBallTurning) and r times its angular velocity [m/s]; otherwise zero.
   Real turning;
@@ -114,7 +114,7 @@ inline Real greater_acceleration(const CollidingParticle& a, const CollidingPart
 /// A collision of a particle, for the caller.
 struct ParticleStrike {
   uint32_t particle;
-  Real time;  ///< since the sub-step's start [s]
+  Real time;  ///< time of the collision, since the sub-step's start [s]
   Vec3 position, velocity, normal;
 };
 

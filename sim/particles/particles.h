@@ -68,7 +68,7 @@ struct ParticleFigures {
   uint64_t retired = 0;     ///< left the world's bounds
   uint64_t ejected = 0;     ///< found inside a body and projected out (P4)
   uint64_t removed = 0;     ///< found inside a body and could not be projected out (P4)
-  uint64_t collisions = 0;  ///< with bodies and particles
+  uint64_t collisions = 0;  ///< collisions with bodies and particles
   uint64_t truncated = 0;   ///< particles that reached the limit of collisions in one sub-step
 
   static constexpr auto figures() {

@@ -25,12 +25,12 @@ class ContactFinder {
   /// Forgets the contacts of a body, and of all bodies.
   void forget(const Body& body);
   void forget_all();
-  /// To be called after the groups of joints have changed.
+  /// Passes the groups of joints to the broad phase. To be called after they have changed.
   void update_joint_groups();
 
   /// Finds the pairs of a sub-step of length h and their contact points, after the bodies have moved freely.
   void find(Real h);
-  /// No body moves in this sub-step.
+  /// Clears the list of pairs, for a sub-step in which no body moves.
   void clear();
   /// The pairs with a body that can move, by the ranks of their bodies.
   std::span<ContactPair* const> pairs() const { return pairs_; }
@@ -57,7 +57,7 @@ class ContactFinder {
   /// the automatic choice while few bodies move.
   bool is_exact() const { return is_exact_; }
 
-  /// Adds the statistics of the sub-step.
+  /// Adds the statistics of the sub-step to the report.
   void count(StepReport& report) const;
 
  private:

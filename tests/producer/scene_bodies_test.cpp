@@ -204,7 +204,8 @@ TEST(Fills, MakeParticlesAndCopiesOfBodies) {
   EXPECT_EQ(
       body_scene_errors(
           R"("particles": [{"fill": {"shape": {"type": "cylinder", "radius": 0.06, "height": 1e9}, "spacing": 0.1}}])"),
-      "/particles/0/fill: has room for more than 5000000 objects, the limit; use a larger \"spacing\" or a smaller volume\n");
+      "/particles/0/fill: has room for more than 5000000 objects, the limit; use a larger \"spacing\" or a "
+      "smaller volume\n");
 }
 
 TEST(EmitterFaces, AreThoseOfTheBodyOrOfACube) {

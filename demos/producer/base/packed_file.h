@@ -77,7 +77,8 @@ class ByteReader {
   /// too short for them, before memory is allocated.
   std::size_t take_count(std::size_t record_size) {
     const auto n = take<uint64_t>();
-    if (n > bytes_.size() / record_size) throw render::FileError(source_ + ": damaged (a list is longer than the file)");
+    if (n > bytes_.size() / record_size)
+      throw render::FileError(source_ + ": damaged (a list is longer than the file)");
     return n;
   }
   /// Throws if data remain.

@@ -300,7 +300,9 @@ void resolve_fill(ParticleGroup& group, std::vector<Problem>& errors) {
   where.path += "/fill";
   if (places.empty()) errors.push_back({where, kNoRoom});
   if (places.size() > kMostPlaces) {
-    errors.push_back({where, "has room for more than 5000000 objects, the limit; use a larger \"spacing\" or a smaller volume"});
+    errors.push_back(
+        {where,
+         "has room for more than 5000000 objects, the limit; use a larger \"spacing\" or a smaller volume"});
     places.clear();
   }
   for (const Vec3& p : places)

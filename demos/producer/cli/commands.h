@@ -98,10 +98,11 @@ LoadedScene load(const SceneOptions& options, bool quiet,
 void print_warnings(const std::vector<Problem>& warnings);
 /// Reads the models of a scene, and shows steps that take long. Prints warnings unless quiet. Throws
 /// Interrupted between two models, and the exceptions of ModelLibrary.
-ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const LogOptions& log_options);
+ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
+                         const LogOptions& log_options);
 /// Reads the models of a scene, and appends warnings to `warnings` instead of printing them.
-ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const LogOptions& log_options,
-                         std::vector<Problem>& warnings);
+ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
+                         const LogOptions& log_options, std::vector<Problem>& warnings);
 /// Key of all settings that decide the pixels of a scene's frames.
 std::string frame_settings(const LoadedScene& loaded, const ModelLibrary& models, render::GlPlatform gl);
 /// Prints JSON as indented lines "key: value".

@@ -248,7 +248,8 @@ Command add_farm(CLI::App& app) {
   const auto options = std::make_shared<FarmOptions>();
   FarmOptions& farm = *options;
   CLI::App* command = app.add_subcommand(
-      "farm", "Simulate once, then draw in many processes: on the nodes of a Slurm cluster, or on this machine");
+      "farm",
+      "Simulate once, then draw in many processes: on the nodes of a Slurm cluster, or on this machine");
   command->add_option("scene", farm.scene.file, "Scene file");
   command->add_option("-o,--output", farm.out, "Video, or frames/####.png");
   command->add_flag("--slurm", farm.slurm,
@@ -257,7 +258,9 @@ Command add_farm(CLI::App& app) {
       ->add_option("--local", farm.local,
                    "Run the same steps on this machine, with this number of drawing processes")
       ->check(CLI::Range(1, 256));
-  command->add_option("--chunks", farm.chunks, "Number of parts into which the frames are divided, each a job of its own")
+  command
+      ->add_option("--chunks", farm.chunks,
+                   "Number of parts into which the frames are divided, each a job of its own")
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
   command->add_option("--retries", farm.retries, "Number of retries of a failed step")
@@ -273,7 +276,8 @@ Command add_farm(CLI::App& app) {
                    "A further option of sbatch, such as --sbatch=--mem=8G (repeatable)")
       ->allow_extra_args(false);
   command->add_option("--program", farm.program, "Path of offstage on the nodes (default: this one)");
-  auto* resume = command->add_flag("--resume", farm.resume, "Continue an earlier farm: keep the steps and frames that are done");
+  auto* resume = command->add_flag("--resume", farm.resume,
+                                   "Continue an earlier farm: keep the steps and frames that are done");
   command->add_flag("--force", farm.force, "Start again, and replace existing output")->excludes(resume);
   command->add_flag("--dry-run", farm.dry_run, "Print the scripts and write nothing");
   command->add_option("--status", farm.status, "Report the progress of the farm in this folder");

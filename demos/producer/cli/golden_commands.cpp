@@ -131,7 +131,8 @@ void compare_scene(const CompareOptions& options, const std::string& file, Compa
                     "--reason \"...\"",
                     options.golden, file, file, options.golden));
   if (!place.moved_from.empty())
-    log("note: the golden was recorded for {}, which no longer exists; {} is taken to be the same scene, moved\n",
+    log("note: the golden was recorded for {}, which no longer exists; {} is taken to be the same scene, "
+        "moved\n",
         (fs::path(options.golden) / place.moved_from).lexically_normal().string(), file);
   const bool several = options.inputs.size() > 1;
   const auto states_in = [&](const std::string& folder) {
@@ -281,9 +282,10 @@ Command add_compare(CLI::App& app) {
   command->add_option("inputs", compare.inputs, "Scenes, or two pictures, or two folders of frames")
       ->required();
   command->add_option("--golden", compare.golden, "Folder of the goldens")->capture_default_str();
-  command->add_option("--report", compare.report,
-                      "Folder for the expected and actual pictures, their difference and an HTML page; with\n"
-                      "several scenes, a subfolder for each scene that differs, and a page that lists them all");
+  command->add_option(
+      "--report", compare.report,
+      "Folder for the expected and actual pictures, their difference and an HTML page; with\n"
+      "several scenes, a subfolder for each scene that differs, and a page that lists them all");
   command->add_option("--junit", compare.junit,
                       "Write the results of the scenes to this JUnit XML file, which CI systems read");
   CLI::Option* keep = command->add_option("--keep-states", compare.states.keep,

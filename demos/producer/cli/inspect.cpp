@@ -237,8 +237,8 @@ LoadedScene load(const SceneOptions& options, bool quiet, const std::vector<std:
   return loaded;
 }
 
-ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const LogOptions& log_options,
-                         std::vector<Problem>& warnings) {
+ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
+                         const LogOptions& log_options, std::vector<Problem>& warnings) {
   const ProgressStyle style = log_options.quiet ? ProgressStyle::none : log_options.progress;
   std::optional<StepNotice> notice;
   ModelLibrary models(loaded.scene, loaded.folder, options.decompositions(), warnings,
@@ -257,7 +257,8 @@ ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
   return models;
 }
 
-ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const LogOptions& log_options) {
+ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
+                         const LogOptions& log_options) {
   std::vector<Problem> warnings;
   ModelLibrary models = load_models(loaded, options, log_options, warnings);
   if (!log_options.quiet) print_warnings(warnings);
@@ -275,7 +276,8 @@ std::string write_numbered_file(const std::string& stem, const std::string& endi
     write_text_file(name, text);
     return name;
   }
-  throw render::FileError(stem + ending + ": this name, and the same name with every number from 2 on, is in use");
+  throw render::FileError(stem + ending +
+                          ": this name, and the same name with every number from 2 on, is in use");
 }
 
 void write_text_file(const std::string& path, const std::string& text) {

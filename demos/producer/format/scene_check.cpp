@@ -197,7 +197,8 @@ class Checker : SceneChecker {
            "has no effect: no body of this material has a friction_axis");
     if (any && material.cross_friction.value_or(0) > 0 && material.friction == 0)
       fail(material.where.path + "/cross_friction",
-           "needs a \"friction\" above 0, such as 0.001: friction across the axis is a multiple of friction along it");
+           "needs a \"friction\" above 0, such as 0.001: friction across the axis is a multiple of friction "
+           "along it");
   }
   static bool has_grain(const Body& body) { return !body.friction_axis.isZero(0); }
 

@@ -215,8 +215,9 @@ class ParticleChecker : CheckBase {
            "is a fraction of the velocity of a body; the emitter needs a \"body\"");
     if (const auto* face = std::get_if<FaceSurface>(&emitter.surface);
         face && !emitter.body.empty() && (!face->position.isZero(0) || face->size != Vec3::Ones()))
-      fail(path + "/surface",
-           "has the faces of the emitter's body; \"position\" and \"size\" are for an emitter without a body");
+      fail(
+          path + "/surface",
+          "has the faces of the emitter's body; \"position\" and \"size\" are for an emitter without a body");
     check_count(emitter);
   }
 

@@ -1,6 +1,6 @@
 #pragma once
-/// The keys of an entry of `emitters`: the surface, the times of its releases, and the new particles, which can
-/// split, leave trails, and release other particles at an age, a death or a collision.
+/// The keys of an entry of `emitters`: the surface, the times of its releases, and the new particles, which
+/// can split, leave trails, and release other particles at an age, a death or a collision.
 
 #include <array>
 
@@ -29,7 +29,8 @@ struct Table<Split> {
         {"age", &T::age, "age of a particle at its first split", "s", kPositive},
         {"delay", &T::delay, "time from one split of a particle to its next", "s", kPositive},
         {"delay_steps", &T::delay_steps,
-         "instead of `delay`: time from one split of a particle to its next, as a number of sub-steps of `world.step`; 0: `delay` "
+         "instead of `delay`: time from one split of a particle to its next, as a number of sub-steps of "
+         "`world.step`; 0: `delay` "
          "applies",
          "", between(0, 1e6)},
         {"depth", &T::depth,
@@ -109,7 +110,8 @@ struct Names<effects::Axis> {
 template <class T>
 Fields<T> event_fields() {
   return with_offspring(Fields<T>{
-      {"probability", &T::probability, "probability that an event (a collision, a death or an age) creates particles", "", kFraction},
+      {"probability", &T::probability,
+       "probability that an event (a collision, a death or an age) creates particles", "", kFraction},
       {"min_speed", &T::min_speed,
        "least speed of the parent after the event; slower parents create no particles", "m/s", kNotNegative},
       {"count", &T::count, "number of particles for each event, rounded", "", kCounts},
@@ -287,7 +289,8 @@ struct Table<Emitter> {
          "s", kNotNegative},
         {"windows", &T::windows, "periods in which `rate` and `count` release; empty: always"},
         {"prewarm", &T::prewarm,
-         "time for which the emitter has already been running at `start`. Until time 0, particles move and collide "
+         "time for which the emitter has already been running at `start`. Until time 0, particles move and "
+         "collide "
          "while dynamic bodies, cloths and particle groups stand still, kinematic bodies follow their keys, "
          "and forces have their values of time 0",
          "s", kNotNegative},

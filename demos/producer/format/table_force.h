@@ -54,7 +54,8 @@ inline constexpr const char* kClothsHelp =
     "the whole "
     "cloth, distributed by mass";
 inline constexpr const char* kBodiesHelp =
-    "names of the bodies on which the force acts: of one copy, or of all copies; if this and the next two keys are empty, the force acts on all dynamic bodies and all cloths";
+    "names of the bodies on which the force acts: of one copy, or of all copies; if this and the next two "
+    "keys are empty, the force acts on all dynamic bodies and all cloths";
 inline constexpr const char* kForceNameHelp =
     "unique name; default: force_N, where N is the index in the list";
 inline constexpr const char* kAirDragHelp =
@@ -189,8 +190,8 @@ struct Table<AppliedForce> {
     using T = AppliedForce;
     return {
         {"name", &T::name, kForceNameHelp},
-        {"bodies", &T::bodies, "names of the dynamic bodies on which the force acts: of one copy, or of all copies",
-         kRequired},
+        {"bodies", &T::bodies,
+         "names of the dynamic bodies on which the force acts: of one copy, or of all copies", kRequired},
         {"point", &T::point, "point of application in the body's frame; default: the centre of mass", "m"},
         {"axes", &T::axes,
          "axes of `force` and `torque`: those of the `world`, or those that turn with the `body`"},

@@ -28,7 +28,8 @@ struct Table<Material> {
     using T = Material;
     return {
         {"name", &T::name,
-         "name by which bodies, springs and cloths refer to the material; default: material_N, where N is the index in the "
+         "name by which bodies, springs and cloths refer to the material; default: material_N, where N is "
+         "the index in the "
          "list"},
         {"color", &T::color, "base colour; with an alpha below 1 the surface and its shadow are translucent"},
         {"metallic", &T::metallic, "0: dielectric, 1: metal", "", kFraction},
@@ -107,10 +108,10 @@ struct Table<ContactRule> {
          "coefficient of static friction; default: `friction` of this rule if given, or else from the "
          "materials",
          "", kNotNegative},
-        {"rolling_friction", &T::rolling_friction, "coefficient of rolling friction; default: from the materials", "m",
-         kNotNegative},
-        {"spinning_friction", &T::spinning_friction, "coefficient of spinning friction; default: from the materials", "m",
-         kNotNegative},
+        {"rolling_friction", &T::rolling_friction,
+         "coefficient of rolling friction; default: from the materials", "m", kNotNegative},
+        {"spinning_friction", &T::spinning_friction,
+         "coefficient of spinning friction; default: from the materials", "m", kNotNegative},
     };
   }
 };

@@ -1,6 +1,6 @@
 #pragma once
-/// The keys of an entry of `particles`, a group of particles that are placed one by one; and the keys by which
-/// all particles move and collide, which emitters have, too.
+/// The keys of an entry of `particles`, a group of particles that are placed one by one; and the keys by
+/// which all particles move and collide, which emitters have, too.
 
 #include "producer/format/table_particle_look.h"
 #include "producer/format/table_placement.h"
@@ -19,7 +19,8 @@ struct Table<sim::ParticleSystemDef> {
         {"force", &T::force, "constant force on each particle", "N"},
         {"collides", &T::collides, "whether particles collide with bodies"},
         {"internal", &T::internal, "whether particles of this system collide with each other"},
-        {"external", &T::external, "whether particles collide with those of other systems that also have `external`"},
+        {"external", &T::external,
+         "whether particles collide with those of other systems that also have `external`"},
         {"rotates", &T::rotates,
          "contacts turn the particles as solid balls, so that they roll and friction acts at their surface; "
          "otherwise they slide without turning. Objects of the style `mesh` show the rotation. Sand and "

@@ -37,7 +37,9 @@ struct Table<RenderSettings> {
          "`fixed` uses `exposure` unchanged; `automatic` also brings each frame to the same average "
          "brightness"},
         {"bloom", &T::bloom, "fraction of very bright light that spreads as glow; 0: none", "", kNotNegative},
-        {"tone_curve", &T::tone_curve, "mapping from light to picture values: `filmic` compresses dark and bright parts smoothly, `linear` clips"}};
+        {"tone_curve", &T::tone_curve,
+         "mapping from light to picture values: `filmic` compresses dark and bright parts smoothly, `linear` "
+         "clips"}};
   }
 };
 

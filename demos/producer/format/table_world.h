@@ -60,17 +60,25 @@ struct Table<sim::CollisionMethods> {
     using T = sim::CollisionMethods;
     return {
         {"narrow_phase", &T::narrow_phase,
-         "algorithm for the distance of convex polyhedra: `gjk`, or `vclip`, which steps from feature to feature (vertices, edges, faces); round shapes use GJK in either case"},
+         "algorithm for the distance of convex polyhedra: `gjk`, or `vclip`, which steps from feature to "
+         "feature (vertices, edges, faces); round shapes use GJK in either case"},
         {"broad_phase", &T::broad_phase,
-         "search for pairs of bodies that may touch: `multi_grid` is a grid with cells of several sizes, `grid` has cells of one size"},
+         "search for pairs of bodies that may touch: `multi_grid` is a grid with cells of several sizes, "
+         "`grid` has cells of one size"},
         {"impact_time", &T::impact_time,
-         "search for the time of an impact: `advancement` approaches the impact in safe steps and never misses it; `bisection` halves the sub-step of bodies that overlap at its end, and misses bodies that passed through each other"},
+         "search for the time of an impact: `advancement` approaches the impact in safe steps and never "
+         "misses it; `bisection` halves the sub-step of bodies that overlap at its end, and misses bodies "
+         "that passed through each other"},
         {"trees", &T::trees,
-         "volumes of the bounding trees over the convex parts and triangles of meshes: axis-aligned boxes (`aabb`), oriented boxes (`obb`) or spheres; `mixed` has spheres for dynamic bodies and axis-aligned boxes for the others"},
+         "volumes of the bounding trees over the convex parts and triangles of meshes: axis-aligned boxes "
+         "(`aabb`), oriented boxes (`obb`) or spheres; `mixed` has spheres for dynamic bodies and "
+         "axis-aligned boxes for the others"},
         {"tree_split", &T::tree_split,
-         "rule by which bounding trees divide their items: the `surface_area` heuristic, or the `mean` of the midpoints"},
+         "rule by which bounding trees divide their items: the `surface_area` heuristic, or the `mean` of "
+         "the midpoints"},
         {"mesh_pairs", &T::mesh_pairs,
-         "pieces of two meshes between which the time of impact is searched: their convex `parts` or their `triangles`; contact points are always those of the parts, and a compound always uses its parts"},
+         "pieces of two meshes between which the time of impact is searched: their convex `parts` or their "
+         "`triangles`; contact points are always those of the parts, and a compound always uses its parts"},
         {"cell_factor", &T::cell_factor,
          "for `broad_phase: grid`: width of a cell in mean diameters of the bodies", "", between(0.1, 100)}};
   }

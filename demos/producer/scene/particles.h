@@ -36,10 +36,10 @@ struct LookMesh {
 struct ParticleLook {
   LookStyle style = LookStyle::sprite;
   Color color;
-  std::vector<std::pair<Real, Color>> color_over_age;       ///< [age 0..1, colour]; multiplies `color`
+  std::vector<std::pair<Real, Color>> color_over_age;  ///< [age 0..1, colour]; multiplies `color`
   /// [age 0..1, K]; multiplies `color` and `color_over_age`.
   std::vector<std::pair<Real, Real>> temperature_over_age;
-  std::vector<std::pair<Real, Real>> size_over_age;         ///< [age 0..1, factor]
+  std::vector<std::pair<Real, Real>> size_over_age;  ///< [age 0..1, factor]
   effects::RampKind ramp = effects::RampKind::linear;
   Real color_deviation = 0;  ///< deviation of brightness, per particle
   /// Deviation of red, green, blue, alpha, per particle.
