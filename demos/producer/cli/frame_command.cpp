@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "producer/base/log.h"
 #include "producer/cli/command_line.h"
 #include "producer/cli/commands.h"
 #include "producer/cli/run_progress.h"

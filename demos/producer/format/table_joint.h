@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "producer/format/table_placement.h"
 #include "producer/format/table_shape.h"
 #include "producer/format/values.h"
 

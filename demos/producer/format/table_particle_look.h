@@ -109,5 +109,6 @@ struct Table<ParticleLook> {
         {"spin_deg_per_s", &T::spin_deg_per_s, "speed of this rotation", "degrees/s"},
     };
   }
+};
 
 }  // namespace offstage::producer
