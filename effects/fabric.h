@@ -20,8 +20,9 @@ enum class BendModel {
 
 struct Fabric {
   Real areal_density = 0.15;  ///< [kg/m^2], > 0
-  Real stretch = 1000;        ///< along the threads: force per metre of width at a strain of 1 [N/m], > 0
-  Real shear = 100;           ///< resistance across the cells [N/m], >= 0
+  /// Stiffness along the threads: force per metre of width at a strain of 1 [N/m], > 0.
+  Real stretch = 1000;
+  Real shear = 100;  ///< resistance across the cells [N/m], >= 0
   Real bend = 1e-4;  ///< flexural rigidity: moment per metre of width at a curvature of 1/m [N m], >= 0
   Real bend_damping = 2e-3;  ///< the moment is bend * (curvature + bend_damping * its rate) [s], >= 0
   BendModel bend_model = BendModel::plate;
@@ -34,8 +35,9 @@ struct Fabric {
   Real self_friction = 0.3;  ///< friction on itself, >= 0
   /// Distance from other layers and from bodies [m], > 0; larger than that of real cloth.
   Real thickness = 0.005;
-  Real drag = 1;             ///< coefficient of the pressure of air perpendicular to the cloth, >= 0
-  Real lift = 0.98;          ///< at most `drag`; drag - lift is the coefficient for air along the cloth
+  Real drag = 1;  ///< coefficient of the pressure of air perpendicular to the cloth, >= 0
+  /// Coefficient of lift, at most `drag`; drag - lift is the coefficient for air along the cloth.
+  Real lift = 0.98;
   Real max_stretch = 1.1;    ///< greatest length over rest length along the threads, > 1; 0: no limit
   Real max_shear = 0;        ///< greatest length of shear springs over their rest length; 0: no limit
   Real min_bend_radius = 0;  ///< smallest radius to which it bends [m], >= 0; 0: no limit

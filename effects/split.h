@@ -17,7 +17,7 @@ class Draws;
 
 /// Percentages are of the parent's value at the time of the split; 100 gives the same value.
 struct SplitDef {
-  std::string name;  ///< also names its random stream
+  std::string name;  ///< name of the split, which also selects its random numbers
   uint64_t seed = 1;
   bool enabled = true;
   Varying count = 2.0;  ///< children per split, rounded

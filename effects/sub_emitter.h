@@ -37,7 +37,7 @@ struct EventRelease {
 };
 
 struct SubEmitterDef {
-  std::string name = {};  ///< also names its random stream
+  std::string name = {};  ///< name of the sub-emitter, which also selects its random numbers
   uint64_t seed = 1;
   Trigger trigger = Trigger::collision;
   Real age = 1;  ///< age for the trigger `age` [s], >= 0

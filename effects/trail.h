@@ -22,7 +22,7 @@ struct TrailRelease {
 };
 
 struct TrailDef {
-  std::string name = {};  ///< also names its random stream
+  std::string name = {};  ///< name of the trail, which also selects its random numbers
   uint64_t seed = 1;
   TrailRelease release = {};
   /// Parameters of the new particles. Their speed is opposite to the parent's velocity, in addition to their

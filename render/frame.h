@@ -63,7 +63,7 @@ class ScreenArea {
  private:
   const View& view_;
   float margin_;
-  Eigen::AlignedBox2f area_;  ///< in [-1, 1]
+  Eigen::AlignedBox2f area_;  ///< rectangle in normalized coordinates, from -1 to 1
 };
 
 /// Creates the view of a sub-frame. Depth runs from 1 at the near plane to 0 at the far one, which keeps

@@ -107,7 +107,7 @@ class MeshPass {
     surface,  ///< writes the surfaces from which light is traced
     /// Shaded by the traced light; quick pictures draw only materials that are not plain in this way.
     traced,
-    traced_with_particles,  ///< as `traced`; glass also shows particles behind it
+    traced_with_particles,  ///< does what `traced` does, and glass also shows the particles behind it
   };
   /// Draws the opaque instances, and the opaque parts of blended ones.
   void draw_opaque(Shading shading);

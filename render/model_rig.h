@@ -32,7 +32,7 @@ struct RigChannel {
   int node = 0;
   Path path = Path::translation;
   Interpolation interpolation = Interpolation::linear;
-  std::vector<float> times;   ///< not decreasing
+  std::vector<float> times;   ///< times of the keys, not decreasing [s]
   std::vector<float> values;  ///< values of each key; with `cubic`: tangent in, value, tangent out
 };
 

@@ -24,7 +24,8 @@ struct MtlMap {
 };
 
 struct MtlMaterial {
-  std::map<std::string, MtlMap> maps;  ///< by statement, in lower case: map_kd, map_d, bump, norm, map_ke ...
+  /// Textures by the names of their statements in lower case: map_kd, map_d, bump, norm, map_ke ...
+  std::map<std::string, MtlMap> maps;
   std::optional<float> roughness, metallic;  ///< Pr, Pm
   std::set<std::string> ignored;             ///< statements that are not drawn, in lower case
 };

@@ -44,8 +44,8 @@ class Region {
 
   Eigen::Affine3f box_from_world_;
   Eigen::AlignedBox3f box_, world_box_;
-  std::array<Vector3f, 8> corners_;  ///< in the world
-  Vector3f eye_;                     ///< in the box's frame
+  std::array<Vector3f, 8> corners_;  ///< corners of the box in the world
+  Vector3f eye_;                     ///< position of the eye in the box's frame
   Vector3f center_, world_eye_;
   float radius_ = 0;                  ///< radius of a ball; 0 for a box
   float nearest_ = 0, farthest_ = 0;  ///< range of depth along the view axis
@@ -112,7 +112,9 @@ class PaintOrder {
       1;  ///< number of bodies per group; particles are not inserted between the bodies of a group
   std::vector<Run> runs_;  ///< back to front
   std::vector<uint32_t>
-      run_begins_;  ///< first run of each body, then of the particles in front of all, then the end
+      /// Index of the first run before each body, then that of the particles in front of all bodies, then the
+      /// end.
+      run_begins_;
 };
 
 }  // namespace offstage::render

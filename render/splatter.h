@@ -21,7 +21,7 @@ struct Splat {
   float half_x, half_y;  ///< half-size of the rectangle around it
   float ux, uy, vx,
       vy;  ///< Position in the atlas's cell, in [-1, 1]: u = ux * dx + uy * dy, v = vx * dx + vy * dy.
-  float depth, inverse_reach;  ///< along the view axis [m]; 1 / (2 * radius)
+  float depth, inverse_reach;  ///< distance along the view axis [m]; 1 / (2 * radius) [1/m]
   float opacity;               ///< opacity where the cell's cover is 1
   float cover;  ///< fraction of its opacity that hides the background: 1 for smoke, 0 only adds light
   /// Radiance of red, green and blue where the normal is n: r[0] + r[1] n.x + r[2] n.y + r[3] n.z.
@@ -41,10 +41,11 @@ struct StreakSplat {
   float half_x, half_y;
   float along_x, along_y;             ///< unit vector to its head
   float half_length, inverse_radius;  ///< half-length of the straight part; 1 / radius
-  float depth, depth_slope;           ///< at the centre [m], and its change per pixel towards the head
-  float inverse_reach;                ///< 1 / (2 * radius) [1/m]
-  float opacity, cover;               ///< see Splat::opacity and Splat::cover
-  float softness, taper;              ///< see PointsDef::softness and PointsDef::taper
+  /// Distance of the centre along the view axis [m], and its change per pixel towards the head.
+  float depth, depth_slope;
+  float inverse_reach;    ///< 1 / (2 * radius) [1/m]
+  float opacity, cover;   ///< see Splat::opacity and Splat::cover
+  float softness, taper;  ///< see PointsDef::softness and PointsDef::taper
   const StreakLight* light;
 };
 

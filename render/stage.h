@@ -118,7 +118,7 @@ struct PointsDef {
   float stretch_s = 1.0f / 60;
   /// Fraction by which a streak fades towards its tail, in [0, 1]: 0 for a drop, 1 for a spark.
   float taper = 0;
-  float metallic = 0, roughness = 0.3f;  ///< for spheres
+  float metallic = 0, roughness = 0.3f;  ///< material of spheres: fraction of metal, and roughness
   SpriteSheet sheet = {};                ///< division of the picture of sprites
 };
 

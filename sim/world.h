@@ -71,20 +71,28 @@ struct ContactRule {
 
 /// Solver for resting contact (physics N11, N12).
 enum class SolverKind {
-  exact,      ///< each collision at its own time, contact forces to rounding: slow for piles of hundreds of
-              ///< bodies
-  fast,       ///< time stepping on velocities: a bounded amount of work, errors far below a millimetre
-  automatic,  ///< exact for small islands and where it costs less than fast, judged by the work of previous
-              ///< steps
-  lcp,  ///< as exact, with forces by Dantzig's and Baraff's pivoting and separate limits of friction along
-        ///< both tangents (N9, N10); islands that it does not solve go to the exact solver and are counted
+  /// Resolves each collision at its own time, and computes contact forces to rounding. Slow for piles of
+  /// hundreds of bodies.
+  exact,
+  /// Time stepping on velocities: a bounded amount of work, with errors far below a millimetre.
+  fast,
+  /// Uses `exact` for small islands and where it costs less than `fast`, judged by the work of previous
+  /// steps.
+  automatic,
+  /// Computes contact forces by Dantzig's and Baraff's pivoting, with separate limits of friction along both
+  /// tangents (N9, N10); otherwise as `exact`. Islands that pivoting does not solve go to the exact solver
+  /// and
+  /// are counted.
+  lcp,
 };
 
 /// Solver for the contact forces of particles (physics P7).
 enum class ParticleContactMethod : uint8_t {
-  relaxation,  ///< Gauss-Seidel with bounded work
-  lcp  ///< clusters of at most WorldDef::particle_cluster contacts by Dantzig's and Baraff's pivoting; other
-       ///< clusters, and those that pivoting does not solve, by relaxation, and counted
+  /// Solves the contacts of all particles by Gauss-Seidel sweeps, with bounded work.
+  relaxation,
+  /// Solves clusters of at most WorldDef::particle_cluster contacts by Dantzig's and Baraff's pivoting. Other
+  /// clusters, and those that pivoting does not solve, are left to relaxation and counted.
+  lcp
 };
 
 /// Algorithms of collision detection. All give the same results within their tolerances, except that
@@ -113,10 +121,11 @@ struct CollisionMethods {
 };
 
 struct WorldDef {
-  Vec3 gravity = {0, -9.81, 0};                     ///< [m/s^2]
-  Vec3 wind = Vec3::Zero();                         ///< velocity of the air, for drag [m/s]
-  Real max_step = 1.0 / 240;                        ///< longest sub-step [s]
-  IntegratorKind integrator = IntegratorKind::rk4;  ///< for bodies and all objects connected by springs
+  Vec3 gravity = {0, -9.81, 0};  ///< [m/s^2]
+  Vec3 wind = Vec3::Zero();      ///< velocity of the air, for drag [m/s]
+  Real max_step = 1.0 / 240;     ///< longest sub-step [s]
+  /// Integrator of bodies and of all objects connected by springs.
+  IntegratorKind integrator = IntegratorKind::rk4;
   Real integration_error = 1e-6;  ///< largest error of a coordinate per step of the adaptive integrators [m]
   SolverKind solver = SolverKind::automatic;
   ImpactLaw impact = ImpactLaw::simultaneous;
@@ -140,7 +149,7 @@ struct Energy {
 struct ContactState {
   BodyHandle a, b;
   Vec3 point = Vec3::Zero();   ///< between both surfaces, world [m]
-  Vec3 normal = Vec3::Zero();  ///< from b to a
+  Vec3 normal = Vec3::Zero();  ///< unit normal from b to a
   /// Force on a, friction included: the mean over the last sub-step, or over the part of it after the last
   /// impact [N].
   Vec3 force = Vec3::Zero();
@@ -164,7 +173,7 @@ struct BodyState {
   Vec3 centre;            ///< centre of mass, world [m]
   Vec3 velocity;          ///< velocity of the centre of mass [m/s]
   Vec3 angular_velocity;  ///< world [rad/s]
-  Vec3 angular_momentum;  ///< about the centre of mass, world [kg m^2/s]
+  Vec3 angular_momentum;  ///< angular momentum about the centre of mass, world axes [kg m^2/s]
   Real mass = 0;          ///< [kg]; 0 unless dynamic
 };
 
@@ -197,7 +206,7 @@ class World {
   MeshHandle add_shared_mesh(std::shared_ptr<const CollisionMesh> mesh);
   std::shared_ptr<const CollisionMesh> shared_mesh(MeshHandle mesh) const;
   const MeshTopology& topology(MeshHandle mesh) const;
-  const TriangleMesh& mesh(MeshHandle mesh) const;  ///< as registered (welded)
+  const TriangleMesh& mesh(MeshHandle mesh) const;  ///< the mesh as it was registered, that is welded
   const CollisionMesh& collision_mesh(MeshHandle mesh) const;
 
   /// Adds a body. Throws std::invalid_argument, naming the field and its allowed values, for a size, mass or

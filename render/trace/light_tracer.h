@@ -53,7 +53,7 @@ struct GlassBuffer {
   std::vector<Vector4f>
       through;  ///< light that comes through the glass; w: fraction of the sun that is visible
   std::vector<Vector4f> mirrored;           ///< light from the mirrored direction; w: 1
-  std::vector<Vector4f> lamps, highlights;  ///< as in LightBuffer
+  std::vector<Vector4f> lamps, highlights;  ///< light of lamps; see LightBuffer
   LightSums sums;
 };
 

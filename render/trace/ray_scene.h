@@ -61,7 +61,7 @@ class RayMesh {
 
 /// The first hit of a ray.
 struct Hit {
-  float distance = 0;  ///< along the ray [m]
+  float distance = 0;  ///< distance along the ray [m]
   Vector3f position = Vector3f::Zero();
   Vector3f normal = Vector3f::Zero();  ///< smooth, on the side of the ray's origin
   Vector3f face = Vector3f::Zero();    ///< unit normal of the triangle, on the side of the ray's origin
@@ -106,7 +106,8 @@ class RayScene {
   /// Fraction of the light that arrives along a segment: 0 behind an opaque object, and the product of the
   /// transmittances of translucent ones. `direction` is a unit vector.
   Vector3f transmittance(const Vector3f& from, const Vector3f& direction, float length) const;
-  /// The same for the segments whose `active` is -1; the others get 0.
+  /// Fractions of the light that arrives along eight segments. Only those whose `active` is -1 are computed;
+  /// the others get 0.
   LaneVectors transmittance(const LaneVectors& from, const LaneVectors& direction, Lanes length,
                             IntLanes active) const;
   /// Returns false if the ray meets nothing within `length` [m].

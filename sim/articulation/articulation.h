@@ -85,11 +85,12 @@ class Articulation final : public JointedBodies {
   void place_within(Real time, Real duration, Real fraction, Real substep);
   /// Projects velocities of the links at `time` onto the constraints of the last place_within().
   void project(Real time, std::span<Vec6> velocities);
-  /// Place of a joint for which the last of both evaluated the constraints.
+  /// Place of a joint at the state for which place() or place_within(), whichever was called last, evaluated
+  /// the constraints.
   JointPlace joint_place(std::size_t j, Real time, LinkMotion& still_a, LinkMotion& still_b) const {
     return place_of(j, time, motion_, still_a, still_b, before_);
   }
-  /// The same at the end and at the start of the interval.
+  /// Place of a joint at the end of the interval; start_place() has that at its start.
   JointPlace end_place(std::size_t j, Real time, LinkMotion& still_a, LinkMotion& still_b) const {
     return place_of(j, time, end_motion_, still_a, still_b);
   }

@@ -95,7 +95,7 @@ struct JointDef {
   /// Dry friction: greatest torque or force against motion in each free direction [N m] or [N].
   Real friction = 0;
   Real damping = 0;        ///< viscous damping, in each free direction [N m s] or [N s/m]
-  Motor motor = {};        ///< for revolute, prismatic, screw and distance joints
+  Motor motor = {};        ///< motor of a revolute, prismatic, screw or distance joint
   Real max_force = kFree;  ///< the joint breaks at a larger force [N]
   /// The joint breaks at a larger torque of constraints, limits, motor and friction together [N m].
   Real max_torque = kFree;
@@ -107,7 +107,7 @@ struct JointDef {
   /// Whether a joint of this type only couples motions that other joints allow.
   bool is_coupling() const { return type == JointType::gear || type == JointType::rack; }
   bool has_limits() const { return lower > -kFree || upper < kFree; }
-  /// Whether the joint has a coordinate that limits, motor and friction can act on.
+  /// Whether the joint has a coordinate on which limits, motor and friction can act.
   bool has_free_coordinate() const {
     return type != JointType::fixed && !is_coupling() &&
            (type != JointType::distance || has_limits() || motor.mode != Motor::Mode::none);

@@ -10,8 +10,8 @@ namespace offstage::sim {
 /// Motion of bodies as if they were one rigid body with the same momentum and angular momentum.
 struct CommonMotion {
   Vec3 centre = Vec3::Zero(), velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
-  Vec3 angular_momentum = Vec3::Zero();  ///< about the centre [kg m^2/s]
-  Mat3 inverse_inertia = Mat3::Zero();   ///< about the centre, world axes [1/(kg m^2)]
+  Vec3 angular_momentum = Vec3::Zero();  ///< angular momentum about the centre [kg m^2/s]
+  Mat3 inverse_inertia = Mat3::Zero();   ///< inverse inertia about the centre, world axes [1/(kg m^2)]
 
   Vec3 velocity_at(const Vec3& place) const { return velocity + angular_velocity.cross(place - centre); }
 };

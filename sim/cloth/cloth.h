@@ -56,8 +56,9 @@ struct ClothSpring {
 /// Holds a vertex at a point of the world or of a body. The cloth exerts a force on the body.
 struct ClothPin {
   uint32_t vertex = 0;
-  BodyHandle body;                                     ///< null: the world
-  Vec3 position = Vec3::Zero();                        ///< in the body's frame, or of the world [m]
+  BodyHandle body;  ///< null: the world
+  /// Position in the body's frame or, without a body, in the world [m].
+  Vec3 position = Vec3::Zero();
   Real until = std::numeric_limits<Real>::infinity();  ///< the pin is released at this time [s]
 };
 

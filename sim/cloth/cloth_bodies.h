@@ -84,8 +84,9 @@ class ClothBody {
 
   bool touched = false;     ///< whether cloth touched it in this sub-step of the world
   Real touching_speed = 0;  ///< greatest relative speed of such a contact [m/s]
-  bool pinches = false;     ///< whether it pinches cloth against another body in this sub-step of the world
-  bool collides = true;     ///< whether cloth collides with the body; false: the body only holds pins
+  /// Whether the body pinches cloth against another body in this sub-step of the world.
+  bool pinches = false;
+  bool collides = true;  ///< whether cloth collides with the body; false: the body only holds pins
 
  private:
   void accelerate(const Vec3& dv, const Vec3& dw);

@@ -42,8 +42,8 @@ struct CellRange {
   std::array<int32_t, 3> low, high;  ///< cell coordinates, both inclusive
   CellBox box;                       ///< box of the object; the lanes of its cell are not set
 
-  /// The same object at a coarser level. The width of cells doubles from level to level, so cells of all
-  /// levels nest.
+  /// Returns the cells of the same object at a coarser level. The width of cells doubles from level to level,
+  /// so cells of all levels nest.
   CellRange at(int32_t coarser) const;
 };
 

@@ -86,7 +86,7 @@ void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose
 struct MovingShape {
   const CollisionShape& shape;
   const PosePath& path;
-  TestCounts* counts = nullptr;  ///< if given for the first shape, tests are added to it
+  TestCounts* counts = nullptr;  ///< tests are added to these counts, if they are given for the first shape
 };
 
 /// Returns the time, as a fraction of the step, at which the shapes are within `tolerance` [m], > 0, of each

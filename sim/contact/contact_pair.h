@@ -28,8 +28,8 @@ struct PairSurface {
 /// Force at a point of a manifold on body a, in the manifold's frame.
 struct PointForce {
   Vec3 now = Vec3::Zero();   ///< mean over the interval [N]
-  Vec3 last = Vec3::Zero();  ///< at the end of the interval; initial guess of the next one [N]
-  Vec3 mean = Vec3::Zero();  ///< over previous intervals; used by the fast solver [N]
+  Vec3 last = Vec3::Zero();  ///< force at the end of the interval, the initial guess for the next one [N]
+  Vec3 mean = Vec3::Zero();  ///< mean over previous intervals, for the fast solver [N]
   bool known = false;        ///< whether the point existed in the previous interval
 };
 
@@ -37,7 +37,7 @@ struct PointForce {
 struct PlacedManifold {
   ContactFrame frame;  ///< contact_frame() of the normal, or t along the friction axis
   Real torque = 0,
-       mean_torque = 0;  ///< about the normal, of all points together; used by the fast solver [N m]
+       mean_torque = 0;  ///< mean torque of all points about the normal, for the fast solver [N m]
   Manifold manifold;     ///< world
   std::array<PointForce, 4> forces;
 };
@@ -151,7 +151,7 @@ class alignas(64) ContactPair {
     Vec3 on_a, last, mean, normal;
     Real torque, mean_torque;
     uint32_t id;
-    bool taken = false;  ///< whether it was matched with a current point
+    bool taken = false;  ///< whether the stored point was matched with a current one
   };
   static PointForce stored_force(const StoredPoint& p, const ContactFrame& frame, const Mat3& a_axes);
   void find_points(const Pose& a, const Pose& b, Real margin, Real reuse, bool turning);

@@ -30,7 +30,7 @@ namespace offstage::sim {
 
 struct ContactBody {
   Real inverse_mass = 0;                ///< [1/kg]; 0: contacts do not move it
-  Mat3 inverse_inertia = Mat3::Zero();  ///< about the centre of mass, world axes [1/(kg m^2)]
+  Mat3 inverse_inertia = Mat3::Zero();  ///< inverse inertia about the centre of mass, world axes [1/(kg m^2)]
   /// Velocity of the centre of mass [m/s]; solvers add the effect of the impulses.
   Vec3 velocity = Vec3::Zero();
   Vec3 angular_velocity = Vec3::Zero();  ///< world [rad/s]

@@ -16,8 +16,8 @@ class ExactContacts {
  public:
   /// How the problem is solved.
   enum class Method : uint8_t {
-    proximal,  ///< by the proximal Newton method on the true friction cone
-    lcp        ///< by linear complementarity (contact_lcp.h); where this fails, as `proximal`
+    proximal,  ///< proximal Newton method on the true friction cone
+    lcp        ///< linear complementarity (contact_lcp.h); where this fails, the method `proximal`
   };
   struct Outcome {
     /// False: nothing was changed, because the cost exceeded the budget, or because the result of a fall-back

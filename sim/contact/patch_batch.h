@@ -31,8 +31,8 @@ struct BodyMotion {
 
 /// Twists and wrenches of the patches, by group.
 struct PatchGroups {
-  LaneVector<FloatLanes> normal;    ///< along n, about t, about k
-  LaneVector<FloatLanes> friction;  ///< along t, along k, about n
+  LaneVector<FloatLanes> normal;    ///< components along n, about t and about k
+  LaneVector<FloatLanes> friction;  ///< components along t, along k and about n
 };
 
 struct PatchBatch {

@@ -36,7 +36,7 @@ namespace offstage::sim {
 /// A body during a step of the fast solver.
 struct RelaxedBody {
   Real inverse_mass = 0;                ///< [1/kg]; 0: contacts do not move it, but it may be moving
-  Mat3 inverse_inertia = Mat3::Zero();  ///< about the centre of mass, world axes [1/(kg m^2)]
+  Mat3 inverse_inertia = Mat3::Zero();  ///< inverse inertia about the centre of mass, world axes [1/(kg m^2)]
   Vec3 velocity = Vec3::Zero();  ///< velocity of the centre of mass [m/s]; in: at the start, out: at the end
   Vec3 angular_velocity = Vec3::Zero();           ///< world [rad/s]; in: at the start, out: at the end
   Vec3 free_acceleration = Vec3::Zero();          ///< mean over the step, without contacts [m/s^2]
@@ -63,15 +63,16 @@ struct RelaxedBody {
 struct ContactPatch {
   struct Point {
     Real t = 0, k = 0;    ///< coordinates along the tangents, from the patch's centre [m]
-    Real separation = 0;  ///< at the start of the step, negative in penetration [m]
+    Real separation = 0;  ///< separation at the start of the step, negative in penetration [m]
     Real force = 0;  ///< normal force [N]; in: the guess from the last step; out: at the end of this step
     Real mean_force = 0;  ///< mean over the time before [N]; in: from the last step, out: updated
     Real impulse = 0;     ///< out: impulse over the whole step [N s]
     Real shift = 0;       ///< out: mass times the displacement by this point in the step [kg m]
   };
-  uint32_t a = 0, b = 0;                            ///< indices of bodies; at least one is movable
-  ContactFrame frame;                               ///< n from b to a
-  Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();  ///< from the centres of mass to the patch's centre [m]
+  uint32_t a = 0, b = 0;  ///< indices of bodies; at least one is movable
+  ContactFrame frame;     ///< n from b to a
+  /// Vectors from the centres of mass to the patch's centre [m].
+  Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();
   Vec3 offset = Vec3::Zero();  ///< (n, t, k), added to the relative velocity, for moving surfaces [m/s]
   /// Change of the relative velocity at the centre due to turning arms and frames, in (n, t, k): gain s + bow
   /// s^2, where s increases linearly from -1 at the step's start to 1 at its end [m/s]. The normal velocity

@@ -24,7 +24,7 @@ struct LinkContact {
   uint32_t part;          ///< index of the articulation
   uint32_t patch, point;  ///< indices of the contact
   BoundedRow row;         ///< the normal velocity; out: its impulse in the whole step
-  Real separation;        ///< at the step's start [m]
+  Real separation;        ///< separation at the start of the step [m]
 };
 
 class RelaxedJoints {

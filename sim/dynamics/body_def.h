@@ -26,7 +26,7 @@ struct BodyDef {
   std::string name;
   Shape shape = Sphere{};
   MotionType motion = MotionType::dynamic;
-  Pose pose;                     ///< at time 0; the pose of kinematic bodies with keys is that of the keys
+  Pose pose;                     ///< pose at time 0; a kinematic body with keys has the pose of its keys
   Vec3 velocity = Vec3::Zero();  ///< velocity of the centre of mass [m/s]
   Vec3 angular_velocity = Vec3::Zero();  ///< world axes [rad/s]
   Real density = 1000;                   ///< [kg/m^3], > 0; ignored if mass > 0

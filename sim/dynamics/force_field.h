@@ -63,7 +63,7 @@ struct Vortex {
   Vec3 axis = Vec3::UnitY();  ///< direction of the axis, of any length but 0; the rotation is right-handed
   Real circulation = 1;  ///< Gamma, at a large distance [m^2/s]; at the radius the speed is Gamma / (4 pi R)
   Real radius = 0.1;     ///< R, the distance of the greatest speed [m], > 0
-  Real drag = 0;         ///< as WindField::drag [kg/s]
+  Real drag = 0;         ///< drag coefficient k; see WindField::drag [kg/s]
   Region region;
   uint32_t drop_rate = 0;
 };
@@ -87,11 +87,13 @@ struct AppliedForce {
     Real time = 0;                                        ///< [s]
     Vec3 force = Vec3::Zero();                            ///< [N]
     Vec3 torque = Vec3::Zero();                           ///< [N m]
-    Interpolation interpolation = Interpolation::linear;  ///< to the next key
+    Interpolation interpolation = Interpolation::linear;  ///< interpolation to the next key
   };
-  std::vector<Key> keys;           ///< at least one, with strictly increasing times; constant outside of them
-  std::optional<Vec3> point = {};  ///< in the body's frame [m]; default: the centre of mass
-  bool body_axes = false;          ///< force and torque are in the body's axes, not in the world's
+  /// Keys, at least one, with strictly increasing times; force and torque are constant outside of them.
+  std::vector<Key> keys;
+  /// Point of application in the body's frame [m]; default: the centre of mass.
+  std::optional<Vec3> point = {};
+  bool body_axes = false;  ///< force and torque are in the body's axes, not in the world's
 };
 
 /// An impulse away from a point, at the force's start. It acts on each body at its point nearest to the

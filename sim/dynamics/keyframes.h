@@ -13,7 +13,8 @@ namespace offstage::sim {
 struct Keyframe {
   Real time = 0;  ///< [s]
   Pose pose;
-  std::optional<Interpolation> interpolation = {};  ///< to the next key; default: that of the track
+  /// Interpolation to the next key; default: that of the track.
+  std::optional<Interpolation> interpolation = {};
 };
 
 /// A pose with its velocities.

@@ -18,7 +18,7 @@ struct RigidState {
 struct RigidBody : RigidState {
   Real mass = 1;
   Vec3 centre = Vec3::Zero();       ///< centre of mass in the shape's frame
-  Mat3 inertia = Mat3::Identity();  ///< about the centre of mass, axes of the shape's frame
+  Mat3 inertia = Mat3::Identity();  ///< inertia about the centre of mass, axes of the shape's frame [kg m^2]
   Mat3 inverse_inertia = Mat3::Identity();
   Real linear_drag = 0, angular_drag = 0;
 

@@ -56,7 +56,7 @@ SolidMesh placed(SolidMesh solid, const Pose& pose);
 struct BodyMass {
   Real mass = 0;                ///< [kg]
   Vec3 centre = Vec3::Zero();   ///< [m]
-  Mat3 inertia = Mat3::Zero();  ///< about the centre [kg m^2]
+  Mat3 inertia = Mat3::Zero();  ///< inertia about the centre of mass [kg m^2]
 };
 
 /// A uniform solid at a pose in a compound.

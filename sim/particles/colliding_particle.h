@@ -17,7 +17,7 @@ namespace offstage::sim {
 struct CollidingParticle {
   Vec3 position;       ///< position at the start of its path
   Vec3 path_velocity;  ///< mean velocity along its path
-  Vec3 velocity;       ///< at the end of the sub-step
+  Vec3 velocity;       ///< velocity at the end of the sub-step
   Vec3 acceleration;   ///< mean acceleration by forces
   Real from;           ///< time at which the path starts, since the sub-step's start [s]
   Real mass, radius, restitution, friction;
@@ -25,7 +25,7 @@ struct CollidingParticle {
   Real turning;
   Vec3 surface_spin;
   uint32_t system;          ///< number of its system
-  bool internal, external;  ///< see ParticleSystemDef
+  bool internal, external;  ///< collision flags of its system; see ParticleSystemDef
   bool hits_bodies;
 
   Vec3 at(Real t) const { return position + (t - from) * path_velocity; }

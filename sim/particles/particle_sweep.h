@@ -113,7 +113,8 @@ class ParticleSweep {
     const Obstacle* obstacle;
     Real friction;
     Real fraction;  // start of the contact
-    /// Its obstacle was hit and will move away in the next sub-step; until then it only blocks the particle.
+    /// Whether the obstacle was hit and will move away in the next sub-step; until then it only blocks the
+    /// particle.
     bool gives_way;
   };
 

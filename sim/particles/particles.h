@@ -54,7 +54,7 @@ struct ParticleEvent {
   Kind kind = Kind::collision;
   ParticleSystemHandle system;
   uint64_t id = 0;
-  Real time = 0;                 ///< as the world's time [s]
+  Real time = 0;                 ///< time of the event, on the world's clock [s]
   Vec3 position = Vec3::Zero();  ///< centre of the particle [m]
   Vec3 velocity = Vec3::Zero();  ///< velocity after the event [m/s]
   Vec3 normal = Vec3::Zero();    ///< normal of the surface hit, towards the particle; zero for a death
@@ -86,8 +86,8 @@ struct ParticleArrays {
   std::vector<Vec3> position, velocity;
   std::vector<Real> mass, radius, age, lifespan, restitution, friction, charge;
   std::vector<uint64_t> id;  ///< unique in its system, ascending, never reused
-  /// In the world [rad/s], and the rotation since the particle's creation; both are empty unless the system
-  /// `rotates`.
+  /// Angular velocity in the world [rad/s], and the rotation since the particle's creation. Both are empty
+  /// unless the system `rotates`.
   std::vector<Vec3> angular_velocity;
   std::vector<Quat> orientation;
 

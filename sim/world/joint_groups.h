@@ -46,8 +46,8 @@ class JointGroups {
 
 /// Joins the bodies in their present poses, at the anchors of the definition.
 void fit(Joint& joint);
-/// Joins the bodies of a joint that appears later at their poses of that time. Anchors and axes have moved
-/// with them: those of a with a, or with b if there is no a.
+/// Joins the bodies of a joint that appears after time 0, in their present poses. Its anchors and axes have
+/// moved with the bodies: with a, or with b if there is no a.
 void place_at_bodies(Joint& joint);
 /// Whether a joint prevents an island from falling asleep.
 bool is_driven(const Island& island, Real time);

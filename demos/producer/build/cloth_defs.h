@@ -20,7 +20,7 @@ inline constexpr std::size_t kMaxClothVertices = 250'000;
 
 /// A cloth in its own frame, and placed in the world.
 struct FlatCloth {
-  sim::ClothDef def;         ///< without pins, which need the bodies
+  sim::ClothDef def;         ///< definition of the cloth, without pins, which need the bodies
   std::vector<Vec3> places;  ///< positions of its vertices in its own frame, without those of cords [m]
   std::vector<Eigen::Vector2f> uvs;  ///< coordinates along the cloth, of all vertices [m]
   std::vector<uint32_t> cord_ends;   ///< for each cord, the index of its last vertex

@@ -79,8 +79,9 @@ class ModelLibrary {
   std::map<std::string, render::Model> models_;
   std::map<std::string, render::Image> textures_;
   std::shared_ptr<const render::SkyPicture> sky_;
-  std::map<std::string, sim::ConvexDecomposition> parts_;     ///< by parts_key()
-  std::map<std::string, std::vector<AnimatedPiece>> pieces_;  ///< by animation_key()
+  std::map<std::string, sim::ConvexDecomposition> parts_;  ///< convex parts of models, by parts_key()
+  /// Colliding pieces of bodies, by animation_key().
+  std::map<std::string, std::vector<AnimatedPiece>> pieces_;
   std::vector<Decomposed> decomposed_;
   std::string digest_;
 };
@@ -97,7 +98,7 @@ struct ChosenScale {
 /// (millimetres). `largest_side`: longest edge of the box around the file's content, in the unit that was
 /// read or assumed [m].
 ChosenScale automatic_scale(Real largest_side, render::Model::UnitSource unit);
-/// The same for a model as it was read, whose Model::file_size must be known.
+/// Returns the factor for a model that was read; Model::file_size must be known.
 ChosenScale automatic_scale(const render::Model& model);
 
 /// Scale factor that brings a model to the size of its use: `scale` times the factor that fits its bounding

@@ -54,7 +54,7 @@ class ParticleSources {
 
   struct Counts {
     uint64_t waiting = 0;  ///< particles that were postponed for lack of room
-    uint64_t skipped = 0;  ///< not released because of a limit
+    uint64_t skipped = 0;  ///< particles that were not released because of a limit
   };
   Counts counts() const;
 

@@ -37,7 +37,7 @@ class DivergedError : public std::runtime_error {
 struct SimulationTotals : sim::StepFigures {
   uint64_t waiting = 0, skipped = 0;  ///< counts of the emitters
   uint64_t most_contacts = 0;         ///< greatest number of contact points of bodies at the end of a frame
-  std::vector<std::string> broken_joints;  ///< in the order of breaking
+  std::vector<std::string> broken_joints;  ///< names of broken joints, in the order in which they broke
   std::vector<std::string> lost_bodies;    ///< bodies that left the world's bounds and were frozen there
   /// By cloth: the smallest factor by which the stiffness of a spring was reduced.
   std::map<std::string, sim::Real> softened_cloths;

@@ -61,7 +61,7 @@ struct Snapshot {
   std::vector<RodSample> rods;
   std::vector<PointSet> point_sets;
   std::vector<ClothSample> cloths;
-  std::vector<LineSet> overlays;  ///< for each overlay of the scene; empty for those that draw no lines
+  std::vector<LineSet> overlays;  ///< lines of each overlay of the scene; empty for overlays without lines
   sim::StateHash state_hash;
 
   uint64_t point_count() const;

@@ -21,7 +21,8 @@ namespace offstage::producer {
 struct Command {
   CLI::App* arguments;  ///< belongs to the program's command line
   std::function<int()>
-      run;  ///< with the options that were parsed; returns an exit code, errors are exceptions
+      /// Runs the command with the options that were parsed. Returns an exit code; errors are exceptions.
+      run;
 };
 
 struct RenderOptions;
@@ -67,7 +68,7 @@ struct RenderOptions {
   render::GlPlatform gl = render::GlPlatform::automatic;
 
   // These are set by render --watch.
-  std::function<bool()> stop;  ///< as RenderJob::stop
+  std::function<bool()> stop;  ///< see RenderJob::stop
   /// Makes RenderJob::states for a film that ends with the frame `last`; empty: none.
   std::function<std::unique_ptr<StateSource>(const LoadedScene&, const ModelLibrary&, int last)> states_of;
   bool prints_name = true;  ///< whether the name of the complete output is printed

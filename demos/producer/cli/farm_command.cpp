@@ -55,7 +55,8 @@ fs::path default_work(const OutputTarget& target) {
 
 FarmPlan plan_of(const FarmOptions& options) {
   const OutputTarget target = parse_output(options.out);
-  if (target.kind == OutputKind::pipe) throw OutputError("-: a farm writes files; name a video or frames");
+  if (target.kind == OutputKind::pipe)
+    throw OutputError("-: a farm cannot write to standard output; name a video or frames");
   if (options.scene.from_standard_input())
     throw std::invalid_argument("farm: needs a scene file that all machines can read");
   FarmPlan plan;

@@ -32,7 +32,7 @@ struct FilmPart {
 
 struct FilmBody {
   std::string name;
-  std::optional<std::size_t> slot;  ///< in Snapshot::bodies; none: it never moves
+  std::optional<std::size_t> slot;  ///< index in Snapshot::bodies; none: the body never moves
   BodySample place;                 ///< pose at time 0
   std::vector<FilmPart> parts;
   Real appear_at = 0, remove_at = 1e30;  ///< times between which it exists [s]
@@ -44,23 +44,23 @@ struct FilmBody {
 /// A spring, rod or rope: a cylinder of length 1 along Y, which is placed between two points.
 struct FilmRod {
   std::string name;
-  std::size_t rod = 0;  ///< in Snapshot::rods
+  std::size_t rod = 0;  ///< index in Snapshot::rods
   std::size_t mesh = 0, material = 0;
 };
 
 struct FilmCloth {
   std::string name;
   Real appear_at = 0, remove_at = 1e30;  ///< [s]
-  std::size_t cloth = 0;                 ///< in Snapshot::cloths
+  std::size_t cloth = 0;                 ///< index in Snapshot::cloths
   std::size_t material = 0;
-  std::vector<uint32_t> triangles;   ///< for a cloth without tears
+  std::vector<uint32_t> triangles;   ///< triangles of the cloth before it tears
   std::vector<Eigen::Vector2f> uvs;  ///< texture coordinates of the intact cloth's vertices, over its bounds,
                                      ///< v upwards
 };
 
 struct FilmPoints {
   std::string name;
-  std::size_t set = 0;  ///< in Snapshot::point_sets
+  std::size_t set = 0;  ///< index in Snapshot::point_sets
   bool glows = false;   ///< the particles emit light of their colour
 };
 

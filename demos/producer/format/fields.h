@@ -35,13 +35,13 @@ inline constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 struct Limits {
   Real low = -kInfinity, high = kInfinity;
   bool open_low = false, open_high = false;  ///< the bound itself is excluded
-  bool nonzero = false;                      ///< for a vector: it needs a direction
+  bool nonzero = false;                      ///< a vector must not be zero
 
   bool bounded() const { return low > -kInfinity || high < kInfinity; }
   bool allows(Real v) const { return (open_low ? v > low : v >= low) && (open_high ? v < high : v <= high); }
-  std::string range() const;                      ///< for a table: "> 0", "0 .. 1"
-  std::string rule(std::string_view unit) const;  ///< for a sentence: "greater than 0 m"
-  void add_to(Object& schema) const;              ///< as minimum, exclusiveMaximum ...
+  std::string range() const;                      ///< text for a table: "> 0", "0 .. 1"
+  std::string rule(std::string_view unit) const;  ///< text for a sentence: "greater than 0 m"
+  void add_to(Object& schema) const;              ///< adds minimum, exclusiveMaximum ...
 };
 inline constexpr Limits kPositive{.low = 0, .open_low = true};
 inline constexpr Limits kNotNegative{.low = 0};

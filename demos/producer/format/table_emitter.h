@@ -282,7 +282,7 @@ struct Table<Emitter> {
          "1/m", between(0, 1e9)},
         {"count", &T::count, "number of particles released together in every `interval`, rounded", "",
          kCounts},
-        {"interval", &T::interval, "time between releases of `count`", "s", kPositive},
+        {"interval", &T::interval, "time from one release of `count` particles to the next", "s", kPositive},
         {"bursts", &T::bursts, "many particles at given times"},
         {"start", &T::start, "time at which `rate` and `count` start", "s", kNotNegative},
         {"end", &T::end, "time at which all releases end; existing particles stay until their lifespan ends",

@@ -42,7 +42,7 @@ struct GoldenStates {
 struct GoldenPlace {
   std::string name;     ///< name of the golden's files
   std::string source;   ///< path of the scene, relative to the folder, with links resolved
-  bool exists = false;  ///< it exists and belongs to this scene
+  bool exists = false;  ///< whether the golden exists and belongs to this scene
   /// Source of the golden, if that file does not exist any more: the scene is assumed to have been moved.
   std::string moved_from;
 };

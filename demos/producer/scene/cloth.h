@@ -50,7 +50,7 @@ struct CornerPin : PinScope {
 };
 struct SidePin : PinScope {
   Side side = Side::top;
-  int every = 1;  ///< only every n-th of its vertices, from the first
+  int every = 1;  ///< holds every n-th vertex of the side, from the first
 };
 struct NearestPin : PinScope {
   Vec3 point = Vec3::Zero();

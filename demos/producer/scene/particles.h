@@ -48,7 +48,7 @@ struct ParticleLook {
   std::optional<Real> softness, stretch, taper, metallic, roughness;
   std::string texture;  ///< picture of sprites; empty: a soft disc
   std::optional<render::SpriteSheet> sheet;
-  std::optional<LookMesh> mesh;  ///< for the style `mesh`, which needs it
+  std::optional<LookMesh> mesh;  ///< object that the style `mesh` draws, which needs one
   Varying angle_deg = 0.0;       ///< angle of a new particle
   Varying spin_deg_per_s = 0.0;
 
@@ -69,9 +69,10 @@ struct ParticlePlace {
 struct ParticleGroup {
   Where where;
   std::string name;
-  std::vector<ParticlePlace> places;  ///< after loading, those of the file and of `fill` follow
-  std::optional<Fill> fill;           ///< adds places
-  std::string file;                   ///< PLY or OBJ file; empty: none
+  /// Particles one by one; after loading, those of the file and of `fill` follow.
+  std::vector<ParticlePlace> places;
+  std::optional<Fill> fill;  ///< adds places
+  std::string file;          ///< PLY or OBJ file; empty: none
   ModelScale scale;
   std::optional<Vec3> fit;       ///< see MeshFile::fit
   Vec3 position = Vec3::Zero();  ///< position of the file's origin
@@ -92,7 +93,7 @@ struct ParticleGroup {
 /// Splitting of particles into others of the same kind, from a given age on. Percentages are those of the
 /// parent's values.
 struct Split : effects::SplitDef {
-  int delay_steps = 0;  ///< in place of `delay`, in sub-steps of world.step
+  int delay_steps = 0;  ///< replaces `delay`: number of sub-steps of world.step
 };
 
 struct TrailSource;

@@ -72,12 +72,13 @@ struct Material {
   Real texture_scale = 1;
   Real texture_angle_deg = 0;
   bool two_sided = false;
-  std::optional<FabricLook> fabric;  ///< for cloths; default: that of the cloth's fabric
+  std::optional<FabricLook> fabric;  ///< look of the threads on cloths; default: that of the cloth's fabric
   Real restitution = 0.5;
   Real friction = 0.5;                  ///< dynamic coefficient
   std::optional<Real> static_friction;  ///< static coefficient; default: `friction`
   std::optional<Real> cross_friction;   ///< coefficient across a body's friction_axis; default: `friction`
-  Real rolling_friction = 0, spinning_friction = 0;  ///< see sim::BodyDef [m]
+  /// Coefficients of rolling and spinning friction [m]; see sim::BodyDef.
+  Real rolling_friction = 0, spinning_friction = 0;
 };
 
 /// Contact properties of two materials, which replace those combined from both.
@@ -91,7 +92,7 @@ struct ModelLook {
   std::string file;
   ModelScale scale = {};
   std::optional<Vec3> fit = {};  ///< see MeshFile::fit
-  Vec3 position = Vec3::Zero();  ///< in the body's frame
+  Vec3 position = Vec3::Zero();  ///< position of the model's origin, in the body's frame
   Quat orientation = Quat::Identity();
 };
 
@@ -105,9 +106,10 @@ struct ModelAnimation {
 
 struct BodyKey {
   Real time = 0;
-  std::optional<Vec3> position;                     ///< default: the body's
-  std::optional<Quat> orientation;                  ///< default: the body's
-  std::optional<sim::Interpolation> interpolation;  ///< to the next key; default: the body's
+  std::optional<Vec3> position;     ///< default: the body's
+  std::optional<Quat> orientation;  ///< default: the body's
+  /// Interpolation to the next key; default: that of the body.
+  std::optional<sim::Interpolation> interpolation;
 };
 
 struct Body {
@@ -198,7 +200,7 @@ struct ClosestOverlay : LineLook {
 /// by geometry for bodies that are not dynamic, for which the simulation has none.
 struct ContactsOverlay : LineLook {
   Where where;
-  std::string a, b;      ///< both empty: all pairs
+  std::string a, b;      ///< names of two bodies; both empty: all pairs of bodies
   Real margin = 0.01;    ///< distance that counts as touching, for contacts by geometry
   Real size = 0.06;      ///< radius of the ring around a point; its arrow is four times as long
   Real force_scale = 0;  ///< length of an arrow per newton of the contact's force
@@ -273,8 +275,9 @@ struct CameraKey {
   Real time = 0;
   Vec3 eye = {4, 2.5, 6};
   Vec3 target = Vec3::Zero();
-  std::optional<Real> fov_deg, focus;               ///< default: the camera's
-  std::optional<sim::Interpolation> interpolation;  ///< to the next key; default: the camera's
+  std::optional<Real> fov_deg, focus;  ///< default: the camera's
+  /// Interpolation to the next key; default: that of the camera.
+  std::optional<sim::Interpolation> interpolation;
 };
 struct KeyframedCamera : Lens {
   std::vector<CameraKey> keyframes;
@@ -284,7 +287,7 @@ struct OrbitCamera : Lens {
   Vec3 target = Vec3::Zero();
   Real radius = 8;
   Real height = 3;     ///< height of the eye above the target
-  Real start_deg = 0;  ///< from +Z towards +X
+  Real start_deg = 0;  ///< angle at time 0, from +Z towards +X
   Real turn_deg_per_s = 20;
 };
 struct FollowCamera : Lens {
@@ -405,14 +408,15 @@ struct Scene {
   int version = 1;
   std::string name;  ///< default: the name of the file
   std::string description;
-  std::string fill_digest;  ///< after loading: of the models that fills read; empty if there are none
+  std::string fill_digest;  ///< after loading: digest of the models that fills read; empty if there are none
   WorldSettings world;
   std::vector<Material> materials;
   std::vector<ContactRule> contacts;
   std::vector<Body> bodies;
   std::vector<ParticleGroup> particles;
   std::vector<Emitter> emitters;
-  std::vector<Effect> effects;  ///< after loading, its emitters and forces are among the others
+  /// Presets at places; after loading, their emitters and forces are among the others.
+  std::vector<Effect> effects;
   std::vector<Spring> springs;
   std::vector<Joint> joints;
   /// When copies are expanded, these are replaced by their bodies and joints.
