@@ -32,8 +32,8 @@ struct EmitterRelease {
   Vec3 direction = Vec3::Zero();
   Real inherit_velocity = 1;  ///< fraction of the velocity of the body's point that particles get, >= 0
   bool recoil = false;        ///< whether particles push a dynamic body back by their momentum relative to it
-  /// Particles are placed anywhere on the surface and are never postponed; for particles that do not collide
-  /// with each other.
+  /// Whether particles are placed anywhere on the surface and are never postponed. For particles that do not
+  /// collide with each other.
   bool overlap = false;
   Varying rate = 100.0;  ///< particles per second, released one by one; 0: only `count` and bursts
   /// Particles per metre of the path of the body's point at the surface's origin [1/m], >= 0; spread evenly

@@ -14,7 +14,7 @@ namespace offstage::effects {
 /// an open limit is refused unless its own `min` or `max` excludes the limit.
 struct Limits {
   Real low = -std::numeric_limits<Real>::max(), high = std::numeric_limits<Real>::max();
-  bool low_open = false;  ///< `low` itself is not allowed
+  bool low_open = false;  ///< whether `low` itself is not allowed
 };
 
 inline constexpr Limits kAnyNumber{}, kNotNegative{.low = 0}, kPositive{.low = 0, .low_open = true},

@@ -22,7 +22,8 @@ struct SplitDef {
   bool enabled = true;
   Varying count = 2.0;  ///< children per split, rounded
   Varying age = 1.0;    ///< age of the parent at its first split [s], > 0
-  Varying delay = 0.5;  ///< time to its next split [s], > 0; for n simulation steps use n WorldDef::max_step
+  /// Time from one split of a parent to its next [s], > 0; for n simulation steps use n WorldDef::max_step.
+  Varying delay = 0.5;
   /// Greatest number of splits in a line of descent, those of ancestors included. If children can split, too,
   /// one particle becomes at most (1 + count)^depth.
   int depth = 1;

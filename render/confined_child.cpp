@@ -111,7 +111,7 @@ int wait_status(pid_t child, const ConfinedWork& work) {
   if (stopped) throw StoppedError(work.what + ": reading was interrupted");
   if (still)
     throw FileError(work.what + ": the process that reads it made no progress for " +
-                    std::to_string(work.standstill.count()) + " s; it is broken");
+                    std::to_string(work.standstill.count()) + " s; the file is broken");
   return status;
 }
 

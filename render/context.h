@@ -62,7 +62,7 @@ class Context {
 
 /// A device listed by EGL.
 struct EglDevice {
-  bool software = false;   ///< llvmpipe rather than a GPU
+  bool software = false;   ///< whether the device is llvmpipe, not a GPU
   std::string name;        ///< name from the vendor's driver, such as "NVIDIA H100 80GB HBM3"; may be empty
   std::string file;        ///< device file, such as /dev/dri/card0; empty if there is none
   std::string extensions;  ///< EGL_EXTENSIONS of the device

@@ -30,7 +30,7 @@ std::vector<uint8_t> unpack_meshopt(const MeshoptView& view, std::span<const uin
 struct DracoMesh {
   struct Attribute {
     int width = 0;            ///< numbers per vertex
-    bool normalized = false;  ///< integers were scaled to [0, 1] or [-1, 1]
+    bool normalized = false;  ///< whether integers were scaled to [0, 1] or [-1, 1]
     std::vector<float> values;
   };
   std::vector<uint32_t> indices;

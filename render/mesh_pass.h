@@ -27,13 +27,13 @@ struct GpuMesh {
   Vector3f center;  ///< centre of the bounding ball
   float radius = 0;
   float thickness = 0;                  ///< smallest side of the bounding box
-  bool flat = false;                    ///< lies in an axis-aligned plane
+  bool flat = false;                    ///< whether the mesh lies in an axis-aligned plane
   bool endless = false;                 ///< see Mesh::endless
-  bool round = false;                   ///< fills the ball inscribed in its box
-  bool boxy = false;                    ///< fills its box, except for a bevel
+  bool round = false;                   ///< whether the mesh fills the ball inscribed in its box
+  bool boxy = false;                    ///< whether the mesh fills its box, except for a bevel
   std::unique_ptr<const RayMesh> rays;  ///< the mesh as light rays see it
 
-  bool stored = false;         ///< the mesh existed at the last Stage::store_previous_transforms()
+  bool stored = false;         ///< whether the mesh existed at the last Stage::store_previous_transforms()
   gl::Buffer vertices_before;  ///< previous vertices, if they have been replaced; otherwise 0
 
   /// Stores the present vertices as the start of motion in Channels.
@@ -60,14 +60,15 @@ struct GpuMaterial {
   Weave weave = Weave::plain;
   bool textured = false;
   bool detailed = false;  ///< see Material::is_detailed(); a detailed material is also textured
-  bool cut_out = false;   ///< has holes by its alpha, and is opaque elsewhere
+  bool cut_out = false;   ///< whether alpha cuts holes, and the material is opaque elsewhere
   bool triplanar = false;
   bool thin = false;
   bool two_sided = false;
   bool blended = false;
-  bool glass = false;   ///< light goes through and is refracted
-  bool smooth = false;  ///< mirrors the scene
-  bool plain = false;   ///< fully described by one colour, roughness and fraction of metal
+  bool glass = false;   ///< whether light passes through and is refracted
+  bool smooth = false;  ///< whether the material mirrors the scene
+  /// Whether the material is fully described by one colour, roughness and fraction of metal.
+  bool plain = false;
   std::unique_ptr<const RayMaterial> rays;  ///< the material as light rays see it
 
   /// Whether objects behind the surface are visible through it.

@@ -57,7 +57,7 @@ struct RigSurface {
   int skin = -1;                 ///< -1: none; then the triangles are in the node's frame
   int material = 0;              ///< index into Model::materials
   Mesh mesh;                     ///< the mesh without morph targets and skin
-  bool flat = false;             ///< the file has no normals: each face has its own
+  bool flat = false;             ///< whether the file has no normals, so that each face has its own
   std::size_t influences = 0;    ///< joints per vertex
   std::vector<uint32_t> joints;  ///< indices into RigSkin::joints; others are ignored
   std::vector<float> weights;    ///< weight of each entry of `joints`

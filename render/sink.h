@@ -36,7 +36,9 @@ struct VideoDef {
   std::filesystem::path path;
   int width_px = 0, height_px = 0;
   FrameRate fps;
-  bool alpha = false;  ///< .webm, .mov, .webp, .apng, .png support it; other formats are refused
+  /// Whether the video has transparency: .webm, .mov, .webp, .apng and .png support it; other formats are
+  /// refused.
+  bool alpha = false;
   StopTest stop = {};  ///< ends the wait for an encoder that does not read a frame or does not end
 };
 

@@ -58,7 +58,8 @@ class SkyPicture {
   Vector3f seen(const Vector3f& direction) const { return unpacked_at(direction); }
   /// Radiance of the dim part from a unit direction.
   Vector3f dim(const Vector3f& direction) const;
-  /// The dim part as a surface of this roughness mirrors it, for the mirrored direction.
+  /// Radiance of the dim part that a surface of this roughness mirrors; `direction` is the mirrored
+  /// direction.
   Vector3f mirrored(const Vector3f& direction, float roughness) const;
   /// Light of the dim part on a white surface with normal n: constant + slope * n + n * curvature * n.
   struct Irradiance {

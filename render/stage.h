@@ -50,7 +50,7 @@ struct Lamp {
   Vector3f direction = {0, -1, 0};    ///< unit direction of cones and rectangles
   float cone_deg = 0;                 ///< full angle of a cone; otherwise zero
   float softness = 0.3f;              ///< fraction of the cone over which its edge fades
-  /// The edge of the cone fades with the square of a linear ramp (KHR_lights_punctual), instead of in
+  /// Whether the edge of the cone fades with the square of a linear ramp (KHR_lights_punctual), instead of in
   /// proportion to the cosine.
   bool squared_edge = false;
   bool shadows = true;
@@ -101,17 +101,18 @@ enum class PointStyle {
 struct SpriteSheet {
   int columns = 1, rows = 1;
   float fps = 12;             ///< pictures per second of a particle's age, >= 0
-  bool blend = true;          ///< fades from each picture to the next; false: they change at once
-  bool loop = true;           ///< the first picture follows the last; false: the last one stays
-  bool random_start = false;  ///< particles start with different pictures
+  bool blend = true;          ///< whether each picture fades to the next; false: pictures change at once
+  bool loop = true;           ///< whether the first picture follows the last; false: the last one stays
+  bool random_start = false;  ///< whether particles start with different pictures
 };
 inline constexpr int kMostSheetPictures = 1024;
 
 struct PointsDef {
   PointStyle style = PointStyle::sprite;
-  bool additive = false;     ///< adds light instead of covering: fire, sparks
-  bool lit = true;           ///< lit by sun and sky; false: its colour is its radiance
-  bool casts_shadow = true;  ///< casts a shadow on the scene; smoke also on other smoke
+  bool additive = false;  ///< whether particles add light instead of covering: fire, sparks
+  /// Whether particles are lit by sun and sky; false: their colour is their radiance.
+  bool lit = true;
+  bool casts_shadow = true;  ///< whether particles cast shadows on the scene, and smoke also on other smoke
   float softness = 0.5f;     ///< width of the fade at the rim, as a fraction of the radius, in [0, 1]
   /// Streaks are velocity * stretch_s long. Other styles, except balls, are lengthened by the same distance
   /// [s].
@@ -171,8 +172,8 @@ struct LightSums {
 
 struct StageDef {
   int width_px = 1280, height_px = 720;
-  /// Less exact pictures in less time, for looking at a scene while it is edited: the light of the sun and
-  /// from around is traced for a part of the pixels, and interpolated for those in between.
+  /// Whether pictures are less exact and take less time, for looking at a scene while it is edited: the light
+  /// of the sun and from around is traced for a part of the pixels, and interpolated for those in between.
   bool quick = false;
 };
 

@@ -14,7 +14,7 @@ struct VideoFormat {
   const char* encoder;
   const char* container;
   bool keeps_alpha;
-  bool needs_even_size;  ///< colour is stored at half size in both directions
+  bool needs_even_size;  ///< whether colour is stored at half size in both directions
   double max_fps;
   std::vector<std::string> opaque;       ///< encoder options without alpha
   std::vector<std::string> transparent;  ///< encoder options with alpha

@@ -135,12 +135,14 @@ struct RoughContact {
 
 /// Statistics of a step. Numerical trouble is reported here, never as an exception.
 struct StepReport : StepFigures {
-  std::vector<BodyHandle> bodies_retired;  ///< left the world's bounds: frozen from here on
-  std::vector<JointHandle> joints_broken;  ///< exceeded their breaking force or torque in this step
+  /// Bodies that left the world's bounds; they are frozen from here on.
+  std::vector<BodyHandle> bodies_retired;
+  /// Joints that exceeded their breaking force or torque in this step.
+  std::vector<JointHandle> joints_broken;
   /// One for each fall-back of a contact solver, in the order of occurrence.
   std::vector<RoughContact> rough_contacts;
-  bool finite = true;    ///< false: a quantity became NaN or infinite
-  NonFinite non_finite;  ///< the first such object, if not finite
+  bool finite = true;    ///< whether all quantities are finite, not NaN or infinite
+  NonFinite non_finite;  ///< the first object with a quantity that is not finite, if any
 };
 
 }  // namespace offstage::sim

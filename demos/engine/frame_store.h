@@ -21,7 +21,7 @@ struct StoredFrame {
   Detail detail = Detail::draft;
   double draw_ms = 0;
   std::shared_ptr<const std::string> jpeg;
-  render::Camera camera;  ///< camera with which it was drawn
+  render::Camera camera;  ///< camera with which the frame was drawn
 };
 
 /// Pictures by film and frame. A refined picture is returned in place of the draft on request; the draft is

@@ -63,7 +63,7 @@ struct LightView {
   Eigen::Matrix4f clip_from_world;
   float pixel_m;  ///< width of a pixel at distance 1
   SampleOffsets offsets;
-  bool sparse = false;  ///< the light of most pixels is interpolated; see Gaps
+  bool sparse = false;  ///< whether the light of most pixels is interpolated; see Gaps
 };
 
 /// Light of the visible surfaces, for rays that meet them again: it has no noise and costs no further rays.

@@ -55,7 +55,8 @@ struct Motor {
   };
   Mode mode = Mode::none;
   std::vector<Key> targets = {};  ///< strictly increasing times; empty: the target is 0
-  bool smooth = false;            ///< interpolates by a cubic whose rate is zero at every key
+  /// Whether targets are interpolated by a cubic whose rate is zero at every key.
+  bool smooth = false;
   Real max_effort = std::numeric_limits<Real>::infinity();  ///< [N m] or [N]
   /// For a position target: effort = stiffness (target - position) - damping speed. With stiffness 0 the
   /// target is held rigidly within max_effort.

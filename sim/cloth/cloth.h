@@ -148,8 +148,8 @@ struct ClothDef {
 
   ClothIntegrator integrator = ClothIntegrator::relaxed;
   Real substep = 1.0 / 960;  ///< longest sub-step of the cloth [s], > 0; never longer than that of the world
-  /// For the integrator `relaxed`: springs take one step in each sub-step. The stiffness of springs that are
-  /// too stiff for it is clamped (ClothReport::clamped).
+  /// Whether springs take a single step in each sub-step, with the integrator `relaxed`. The stiffness of
+  /// springs that are too stiff for it is clamped (ClothReport::clamped).
   bool soften = false;
 };
 
@@ -177,7 +177,7 @@ struct ClothTear {
   Vec3 place = Vec3::Zero();  ///< [m]
   Real stretch = 0;           ///< length of the thread over its rest length
   bool by_pressure = false;   ///< whether the cloth is closed and under pressure
-  bool touches_body = false;  ///< the cloth touched a body in that sub-step
+  bool touches_body = false;  ///< whether the cloth touched a body in that sub-step
 };
 
 /// The gas inside of a closed cloth.

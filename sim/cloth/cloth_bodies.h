@@ -82,7 +82,7 @@ class ClothBody {
     touching_speed = std::max(touching_speed, speed);
   }
 
-  bool touched = false;     ///< whether cloth touched it in this sub-step of the world
+  bool touched = false;     ///< whether cloth touched the body in this sub-step of the world
   Real touching_speed = 0;  ///< greatest relative speed of such a contact [m/s]
   /// Whether the body pinches cloth against another body in this sub-step of the world.
   bool pinches = false;

@@ -40,7 +40,7 @@ struct Cloth {
 /// Volume inside of a closed surface by the divergence theorem [m^3].
 Real enclosed_volume(std::span<const Vec3> points, std::span<const Triangle> triangles);
 
-/// Elastic energy of its springs [J].
+/// Elastic energy of a cloth's springs [J].
 Real elastic_energy(const Cloth& cloth);
 
 }  // namespace offstage::sim

@@ -70,7 +70,7 @@ class TautSprings {
     uint32_t point, body;
     Vec3 arm;  // from the body's centre
   };
-  /// A place within a triangle: the mean of those of its corners.
+  /// A place within a triangle: the weighted mean of the places of its corners.
   struct MeanPlace {
     uint32_t place;
     std::array<uint32_t, 3> corners;  // places

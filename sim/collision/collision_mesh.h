@@ -36,7 +36,8 @@ class CollisionMesh {
   MassProperties mass;
   AabbTree tree;          ///< tree of the triangles
   ConvexPolyhedron hull;  ///< convex hull of the vertices
-  /// The mesh is closed and not inverted, so it has an inside; otherwise it is a two-sided surface.
+  /// Whether the mesh is closed and not inverted, so that it has an inside; otherwise it is a two-sided
+  /// surface.
   bool solid;
   /// The solids of a compound, if there are several. They may overlap, so faces of one can be inside another.
   std::vector<std::unique_ptr<const CollisionMesh>> solids;

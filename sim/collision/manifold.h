@@ -18,7 +18,8 @@ struct ContactPoint {
   /// Identifies the two features that meet here: a vertex and the other solid, or two edges. It is constant
   /// from step to step while they meet.
   uint32_t id = 0;
-  /// Contact with a mesh by its triangles: the triangle at this point. A manifold may join several.
+  /// For a mesh that is represented by its triangles: the triangle at this point. The points of one manifold
+  /// may lie on several triangles.
   uint32_t piece = 0;
 };
 

@@ -22,7 +22,7 @@ struct Obstacle {
   Vec3 velocity_at(const Vec3& p, Real fraction) const {
     return velocity + angular_velocity.cross(p - start.position - fraction * (end.position - start.position));
   }
-  /// Position of its centre of mass at a fraction of the sub-step.
+  /// Position of the solid's centre of mass at a fraction of the sub-step.
   Vec3 centre_at(Real fraction) const { return at(fraction).point_to_world(centre); }
   /// Unit direction of the friction axis where the surface has the normal n (world) at a fraction of the
   /// sub-step; zero where friction is the same in all directions.
@@ -35,7 +35,7 @@ struct Obstacle {
   /// straight path is curved; the pieces deviate from it by at most kChordError of the particle's radius. The
   /// number is bounded.
   int pieces(Real particle_radius) const;
-  /// Box in the world around all its positions during the sub-step.
+  /// Box in the world around all positions of the solid during the sub-step.
   Aabb swept_bounds() const;
 
   static constexpr Real kChordError = 0.02;

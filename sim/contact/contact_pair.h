@@ -22,7 +22,7 @@ struct PairSurface {
   const Body* axis_body = nullptr;  ///< body that defines the friction axis; null: isotropic
   bool conveys = false;             ///< whether a surface is a conveyor
   DistanceMethod method = DistanceMethod::gjk;
-  bool by_triangles = false;  ///< impacts are found by the triangles of two meshes
+  bool by_triangles = false;  ///< whether impacts are found by the triangles of two meshes
 };
 
 /// Force at a point of a manifold on body a, in the manifold's frame.

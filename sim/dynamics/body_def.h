@@ -59,7 +59,7 @@ struct BodyDef {
   Real spinning_friction = 0;
   /// Velocity of the surface relative to the body, as of a conveyor, in its frame [m/s].
   Vec3 surface_velocity = Vec3::Zero();
-  bool collides = true;  ///< takes part in collisions with bodies and particles
+  bool collides = true;  ///< whether the body collides with bodies and particles
   KeyframeTrack track;   ///< motion of a kinematic body
   /// Times between which it exists [s]. It appears at its initial pose and velocity, and is removed, at the
   /// start of the first sub-step from then on. While it does not exist, nothing touches it, and its springs

@@ -61,9 +61,10 @@ struct WindField {
 struct Vortex {
   Vec3 point = Vec3::Zero();  ///< a point of the axis
   Vec3 axis = Vec3::UnitY();  ///< direction of the axis, of any length but 0; the rotation is right-handed
-  Real circulation = 1;  ///< Gamma, at a large distance [m^2/s]; at the radius the speed is Gamma / (4 pi R)
-  Real radius = 0.1;     ///< R, the distance of the greatest speed [m], > 0
-  Real drag = 0;         ///< drag coefficient k; see WindField::drag [kg/s]
+  /// Circulation Gamma at a large distance [m^2/s]; the speed at the radius is Gamma / (4 pi R).
+  Real circulation = 1;
+  Real radius = 0.1;  ///< R, the distance of the greatest speed [m], > 0
+  Real drag = 0;      ///< drag coefficient k; see WindField::drag [kg/s]
   Region region;
   uint32_t drop_rate = 0;
 };
@@ -93,7 +94,7 @@ struct AppliedForce {
   std::vector<Key> keys;
   /// Point of application in the body's frame [m]; default: the centre of mass.
   std::optional<Vec3> point = {};
-  bool body_axes = false;  ///< force and torque are in the body's axes, not in the world's
+  bool body_axes = false;  ///< whether force and torque are in the body's axes, not in the world's
 };
 
 /// An impulse away from a point, at the force's start. It acts on each body at its point nearest to the

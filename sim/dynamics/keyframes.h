@@ -30,7 +30,8 @@ struct KeyframeTrack {
   /// Orientations turn along the shortest arc between two keys if the keys beside them turn about the same
   /// axis.
   Interpolation interpolation = Interpolation::monotone;
-  /// Repeat with the period keys.back().time - keys.front().time; otherwise the end poses are held.
+  /// Whether the keys repeat with the period keys.back().time - keys.front().time; otherwise the end poses
+  /// are held.
   bool loop = false;
   Vec3 spin = Vec3::Zero();  ///< additional rotation about the body's origin, body axes [rad/s]
 

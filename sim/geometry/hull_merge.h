@@ -17,7 +17,7 @@ Real hull_volume(const ConvexPolyhedron& p);
 struct MergedHull {
   ConvexPolyhedron hull;
   std::vector<uint32_t> members;  ///< indices of the parts
-  Real shared = 0;  ///< volume that is in several of them, if they are of different solids [m^3]
+  Real shared = 0;  ///< volume that lies in several of the parts, if these belong to different solids [m^3]
 };
 
 /// A part before the merger.

@@ -33,7 +33,7 @@ struct MeshDefects {
   uint32_t non_manifold_edges = 0;  ///< edges with three or more faces
   uint32_t flipped_edges = 0;       ///< edges whose two faces run along them in the same direction
   uint32_t degenerate_faces = 0;    ///< faces of zero area or with a repeated vertex
-  bool inverted = false;            ///< the enclosed volume is negative
+  bool inverted = false;            ///< whether the enclosed volume is negative
 
   bool closed() const { return border_edges == 0 && non_manifold_edges == 0 && flipped_edges == 0; }
   /// Returns one line that names every defect; empty if there is none.

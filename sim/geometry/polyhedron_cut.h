@@ -16,7 +16,8 @@ struct Cut {
     Vec3 point;
     uint32_t half_edge;  ///< leaves the corner; if `on_edge`, the corner is in its middle
     bool on_edge;
-    bool across_face;  ///< the side crosses the face of `half_edge`; otherwise it is the edge `half_edge`
+    /// Whether the side crosses the face of `half_edge`; otherwise the side is the edge `half_edge`.
+    bool across_face;
   };
   Polyhedron::Plane plane;
   std::vector<Corner> corners;                ///< counter-clockwise about the plane's normal

@@ -57,7 +57,7 @@ struct ParticleSystem {
   void admit_new_particles(const ParticleForces& forces);
   /// Stores the state at the start of the sub-step, for a CoupledGroup that integrates the system.
   void begin_coupled();
-  /// Whether its collisions are those of ParticleCollisions.
+  /// Whether ParticleCollisions resolves the collisions of this system.
   bool hits_particles() const { return def.internal || def.external || def.rotates; }
   /// For particles that do not collide with particles: integrates, sweeps against bodies, ages and removes.
   /// In a `coupled` system, the particles for which whole_step() is true are already integrated.

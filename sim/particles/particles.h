@@ -64,10 +64,10 @@ struct ParticleEvent {
 /// Figures of the particles in a step.
 struct ParticleFigures {
   uint64_t born = 0;
-  uint64_t expired = 0;     ///< reached their lifespan or died in a collision
-  uint64_t retired = 0;     ///< left the world's bounds
-  uint64_t ejected = 0;     ///< found inside a body and projected out (P4)
-  uint64_t removed = 0;     ///< found inside a body and could not be projected out (P4)
+  uint64_t expired = 0;     ///< particles that reached their lifespan or were removed by a collision
+  uint64_t retired = 0;     ///< particles that left the world's bounds
+  uint64_t ejected = 0;     ///< particles found inside a body and projected out (P4)
+  uint64_t removed = 0;     ///< particles found inside a body that could not be projected out (P4)
   uint64_t collisions = 0;  ///< collisions with bodies and particles
   uint64_t truncated = 0;   ///< particles that reached the limit of collisions in one sub-step
 
@@ -85,7 +85,7 @@ struct ParticleFigures {
 struct ParticleArrays {
   std::vector<Vec3> position, velocity;
   std::vector<Real> mass, radius, age, lifespan, restitution, friction, charge;
-  std::vector<uint64_t> id;  ///< unique in its system, ascending, never reused
+  std::vector<uint64_t> id;  ///< ids of the particles: unique in the system, ascending, never reused
   /// Angular velocity in the world [rad/s], and the rotation since the particle's creation. Both are empty
   /// unless the system `rotates`.
   std::vector<Vec3> angular_velocity;

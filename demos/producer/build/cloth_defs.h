@@ -32,7 +32,7 @@ struct FlatCloth {
 /// std::invalid_argument for an impossible shape or fabric.
 FlatCloth flat_cloth(const Cloth& cloth, const render::Model* model);
 
-/// Number of vertices of a cloth, without those of cords. `model` as above.
+/// Number of vertices of a cloth, without those of cords. `model`: see flat_cloth().
 std::size_t vertex_count(const Cloth& cloth, const render::Model* model);
 
 /// Returns the fabric of a cloth with its changes. Throws std::invalid_argument for an unknown name.

@@ -28,7 +28,7 @@ struct SceneOptions {
   std::optional<std::string> channel_format;
   std::string camera;              ///< name of the camera to draw; empty: the scene's `camera`
   std::vector<std::string> allow;  ///< additional folders for the scene's files
-  bool no_cache = false;           ///< convex parts of models are neither read from the disk nor stored
+  bool no_cache = false;           ///< whether the cache of convex parts is neither read nor written
 
   DecompositionCache decompositions() const {
     return no_cache ? DecompositionCache() : DecompositionCache::of_user();

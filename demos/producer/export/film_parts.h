@@ -35,7 +35,7 @@ struct FilmBody {
   std::optional<std::size_t> slot;  ///< index in Snapshot::bodies; none: the body never moves
   BodySample place;                 ///< pose at time 0
   std::vector<FilmPart> parts;
-  Real appear_at = 0, remove_at = 1e30;  ///< times between which it exists [s]
+  Real appear_at = 0, remove_at = 1e30;  ///< times between which the object exists [s]
 
   bool has_lifetime() const { return appear_at > 0 || remove_at < kForever; }
   bool exists_at(double time) const { return exists(appear_at, remove_at, time); }
@@ -61,7 +61,7 @@ struct FilmCloth {
 struct FilmPoints {
   std::string name;
   std::size_t set = 0;  ///< index in Snapshot::point_sets
-  bool glows = false;   ///< the particles emit light of their colour
+  bool glows = false;   ///< whether the particles emit light of their colour
 };
 
 /// The meshes, materials and objects of a film. Invisible objects are omitted. Names are unique among objects

@@ -35,7 +35,7 @@ inline constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 struct Limits {
   Real low = -kInfinity, high = kInfinity;
   bool open_low = false, open_high = false;  ///< the bound itself is excluded
-  bool nonzero = false;                      ///< a vector must not be zero
+  bool nonzero = false;                      ///< whether a vector must not be zero
 
   bool bounded() const { return low > -kInfinity || high < kInfinity; }
   bool allows(Real v) const { return (open_low ? v > low : v >= low) && (open_high ? v < high : v <= high); }

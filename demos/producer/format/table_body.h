@@ -51,10 +51,11 @@ struct Table<ModelAnimation> {
       "the skin around it.";
   static Fields<ModelAnimation> fields() {
     using T = ModelAnimation;
-    return {{"clip", &T::clip, "name of the animation, or its number from 0; empty: the first one"},
-            {"speed", &T::speed, "seconds of the animation per second", "", kNotNegative},
-            {"start", &T::start, "time at which it starts; until then its first pose is held", "s"},
-            {"loop", &T::loop, "starts again at its end; false: its last pose is held"}};
+    return {
+        {"clip", &T::clip, "name of the animation, or its number from 0; empty: the first one"},
+        {"speed", &T::speed, "seconds of the animation per second", "", kNotNegative},
+        {"start", &T::start, "time at which the animation starts; until then its first pose is held", "s"},
+        {"loop", &T::loop, "whether the animation starts again at its end; false: its last pose is held"}};
   }
 };
 template <>

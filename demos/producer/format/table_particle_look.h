@@ -99,7 +99,8 @@ struct Table<ParticleLook> {
         {"texture", &T::texture,
          "image file that is drawn for each sprite, times its colour; empty: a soft disc. The longer side is "
          "the particle's diameter"},
-        {"sheet", &T::sheet, "the pictures of a flip-book in the texture; default: it is one picture"},
+        {"sheet", &T::sheet,
+         "division of the texture into the pictures of a flip-book; default: the texture is one picture"},
         {"mesh", &T::mesh, "the object that the style `mesh` draws, with its own material"},
         {"angle_deg", &T::angle_deg,
          "rotation of a new particle, counter-clockwise as seen by the camera, or about the axis of the "

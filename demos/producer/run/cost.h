@@ -19,7 +19,7 @@ struct ObjectCost {
   std::string kind, name;   ///< "cloth", "sheet"
   std::size_t count = 1;    ///< number of copies
   std::string size;         ///< "1681 vertices"
-  std::string advice;       ///< how to make it cheaper
+  std::string advice;       ///< advice how to make the object cheaper
   double simulation_s = 0;  ///< time per second of film
   double drawing_s = 0;     ///< time per frame
   uint64_t particles = 0;   ///< for an emitter: greatest number of particles alive at once

@@ -24,7 +24,7 @@ struct GoldenFrame {
 };
 
 struct Golden {
-  std::string scene;   ///< name, with which its files begin
+  std::string scene;   ///< name of the golden, with which the names of its files begin
   std::string source;  ///< the scene's file, relative to the folder of goldens; empty: not recorded
   std::string reason, fingerprint;
   std::vector<GoldenFrame> frames;
@@ -34,7 +34,7 @@ struct Golden {
 /// simulation; empty: none.
 struct GoldenStates {
   std::string keep;  ///< folder to which the states of the golden frames are written
-  std::string from;  ///< folder from which they are read, instead of simulating
+  std::string from;  ///< folder from which the states are read, instead of simulating
 };
 
 /// The golden of a scene file in a folder. A golden records its scene file, so two scenes of the same name in

@@ -65,7 +65,7 @@ using ClothPin = std::variant<CornerPin, SidePin, NearestPin, BoxPin>;
 struct SideSeam {
   Where where;
   Side a = Side::left, b = Side::right;
-  bool reversed = false;  ///< the first vertex of one side is sewn to the last of the other
+  bool reversed = false;  ///< whether the first vertex of one side is sewn to the last of the other
 };
 /// The vertices nearest to two points.
 struct PointSeam {
@@ -79,7 +79,7 @@ struct ClothCord {
   Where where;
   Vec3 from = Vec3::Zero();
   Vec3 to = Vec3(0, -1, 0);  ///< position of the other end at time 0
-  bool held = true;          ///< the other end is fixed in the world or on the body
+  bool held = true;          ///< whether the other end is fixed in the world or on the body
   std::string body;
   Real until = 1e30;
   Real length = 0;

@@ -25,7 +25,7 @@ struct JointMotor {
   Real target = 0;             ///< target, if there are no keys
   std::vector<MotorKey> keys;  ///< targets in order of time
   sim::Interpolation interpolation = sim::Interpolation::monotone;
-  bool smooth = false;  ///< stops at every key
+  bool smooth = false;  ///< whether the motion stops at every key
   std::optional<Real> max_effort;
   Real stiffness = 0, damping = 0;
 };
@@ -167,7 +167,7 @@ struct ModelTree {
   ModelScale scale;
   Real density = 1000;
   std::string base = "world";  ///< holder of the uppermost nodes: a body, "world", or nothing
-  std::string material;        ///< empty: those of the file
+  std::string material;        ///< name of the material; empty: the materials of the file
   bool collides = true;
   /// Friction and damping of the joints that are not in `joints`, which are spherical.
   Real friction = 0, damping = 0;

@@ -29,7 +29,7 @@ struct LookMesh {
   Shape shape = sim::Box{};
   std::string material;       ///< name; empty: the default material, or that of the model file
   std::optional<Vec3> axis;   ///< axis of `angle_deg` and `spin_deg_per_s`; default: random, per particle
-  bool along_motion = false;  ///< the mesh's +Y axis points along the velocity
+  bool along_motion = false;  ///< whether the mesh's +Y axis points along the velocity
 };
 
 /// Look of particles. Omitted values are those of the style; see points_def().
@@ -171,7 +171,7 @@ const Vec3& position_of(const EmitterSurface& surface);
 
 struct Emitter : ParticleSource, effects::EmitterRelease {
   std::string preset;  ///< already merged into the emitter when a scene is read
-  std::string body;    ///< name of the body it moves with; empty: fixed in the world
+  std::string body;    ///< name of the body with which the emitter moves; empty: fixed in the world
   EmitterSurface surface = PlaneSurface{};
   Placement placement;
 };

@@ -100,7 +100,7 @@ struct ModelLook {
 struct ModelAnimation {
   std::string clip;  ///< name, or number from 0; empty: the first one
   Real speed = 1;
-  Real start = 0;  ///< time at which it starts; until then its first pose is held
+  Real start = 0;  ///< time at which the animation starts; until then its first pose is held
   bool loop = true;
 };
 

@@ -109,7 +109,7 @@ struct Scatter {
   int count = 10;
   Eigen::Vector2d size = {10, 10};  ///< size of the rectangle along x and z
   Real min_distance = 0;  ///< smallest distance of copies; those without room are omitted with a warning
-  bool turn = true;       ///< random rotation about the vertical
+  bool turn = true;       ///< whether each copy is rotated about the vertical at random
   Varying scale = 1.0;    ///< factor of a body's shape and model
   uint64_t seed = 1;
 };
