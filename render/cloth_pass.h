@@ -20,7 +20,7 @@ struct Cloth {
   Vector2f texture_from_uv = {1, 1};
   bool casts_shadow = true;
   ClothSurface surface;
-  uint32_t object = 0;           ///< id in Channels
+  uint32_t object = 0;           ///< id of the object in Channels
   std::vector<Vector3f> before;  ///< vertex positions at the last Stage::store_previous_transforms()
 
   gl::StreamBuffer vertices, indices;

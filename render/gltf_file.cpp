@@ -194,8 +194,9 @@ void GltfFile::check() {
   const GltfValue asset = root_.child("asset");
   const std::string version = asset.text("version"), least = asset.text("minVersion", "2.0");
   if (!version.starts_with("2."))
-    throw FileError("asset.version is '" + one_line(version.substr(0, 20)) + "'; 2.0 can be read");
-  if (least != "2.0") throw FileError("it needs glTF " + one_line(least.substr(0, 20)) + "; 2.0 can be read");
+    throw FileError("asset.version is '" + one_line(version.substr(0, 20)) + "'; only 2.0 can be read");
+  if (least != "2.0")
+    throw FileError("it needs glTF " + one_line(least.substr(0, 20)) + "; only 2.0 can be read");
   check_extensions();
 }
 

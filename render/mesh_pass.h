@@ -87,7 +87,7 @@ struct Instance {
   Eigen::Affine3f world_from_mesh = Eigen::Affine3f::Identity();
   bool casts_shadow = true;
   bool visible = true;
-  uint32_t object = 0;                    ///< id in Channels
+  uint32_t object = 0;                    ///< id of the object in Channels
   std::optional<Eigen::Affine3f> before;  ///< pose at Stage::store_previous_transforms
 
   float scale() const;

@@ -171,7 +171,7 @@ struct Model {
   std::string unit;  ///< unit of length in the file and how it was found, in words
   enum class UnitSource { stated, none, millimetres };
   UnitSource unit_source = UnitSource::none;  ///< `millimetres`: none, but customary (STL); taken as metres
-  /// Longest side of the box around all of the file [m]; empty if only a node was read (see
+  /// Longest side of the box around the content of the whole file [m]; empty if only a node was read (see
   /// read_file_size()).
   std::optional<float> file_size;
   std::vector<std::string> warnings;  ///< repaired or ignored elements, one line each

@@ -43,7 +43,7 @@ struct PointSet {
   Eigen::AlignedBox3f box;                         ///< bounds of the drawn particles, streaks at full length
   gl::StreamBuffer buffer;                         ///< visible balls by depth
   std::size_t seen = 0;                            ///< number of visible balls in the buffer
-  uint32_t object = 0;                             ///< id in Channels
+  uint32_t object = 0;                             ///< id of the object in Channels
   std::unique_ptr<const RayMaterial> rays;         ///< material of spheres, for light rays
 
   void assign(std::span<const Point> values);

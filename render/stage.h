@@ -44,7 +44,7 @@ struct Sun {
 /// A light source near the scene: a glowing ball, a cone, or a rectangle.
 struct Lamp {
   Vector3f position = {0, 3, 0};
-  Vector3f intensity = {10, 10, 10};  ///< radiance of a white surface 1 m away that faces it
+  Vector3f intensity = {10, 10, 10};  ///< radiance of a white surface that faces the lamp from 1 m away
   float radius = 0.1f;                ///< radius of a ball [m], > 0
   Vector2f size = {0, 0};             ///< size of a rectangle [m]; otherwise zero
   Vector3f direction = {0, -1, 0};    ///< unit direction of cones and rectangles

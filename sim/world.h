@@ -148,7 +148,7 @@ struct Energy {
 /// A contact point of two bodies.
 struct ContactState {
   BodyHandle a, b;
-  Vec3 point = Vec3::Zero();   ///< between both surfaces, world [m]
+  Vec3 point = Vec3::Zero();   ///< contact point in the middle between both surfaces, world [m]
   Vec3 normal = Vec3::Zero();  ///< unit normal from b to a
   /// Force on a, friction included: the mean over the last sub-step, or over the part of it after the last
   /// impact [N].

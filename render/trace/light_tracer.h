@@ -45,7 +45,8 @@ struct LightBuffer {
   LightValues glow;             ///< per pixel: light of glowing meshes; empty: there are none
   LightValues around, mirrors;  ///< per cell: diffuse light from around, and mirrored light
   LightPlane inverse_distance, brightness, reach2, noisy_reach2;  ///< see LightGuide::find_reach
-  LightPlane with_mirror, with_rough_mirror;                      ///< cells: 1 or 0
+  /// For each cell, 1 if a surface in it mirrors, or mirrors roughly, else 0.
+  LightPlane with_mirror, with_rough_mirror;
 };
 
 /// Light at the glass surfaces in a part of the picture, rows from the bottom up.

@@ -112,8 +112,8 @@ struct ClothDef {
   Real seam_time = 1;  ///< time in which seams close [s], > 0
 
   Vec3 velocity = Vec3::Zero();  ///< velocity at the start, or when the cloth appears [m/s]
-  /// Times between which it exists [s]. It appears at its initial shape, and is removed, at the start of the
-  /// first sub-step from then on.
+  /// Times between which the cloth exists [s]. It appears in its initial shape at the start of the first
+  /// sub-step at or after appear_at, and is removed at the start of the first sub-step at or after remove_at.
   Real appear_at = 0, remove_at = kInfinity;
 
   bool collides = true;  ///< whether the cloth collides with bodies and particles

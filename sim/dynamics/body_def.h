@@ -61,10 +61,10 @@ struct BodyDef {
   Vec3 surface_velocity = Vec3::Zero();
   bool collides = true;  ///< whether the body collides with bodies and particles
   KeyframeTrack track;   ///< motion of a kinematic body
-  /// Times between which it exists [s]. It appears at its initial pose and velocity, and is removed, at the
-  /// start of the first sub-step from then on. While it does not exist, nothing touches it, and its springs
-  /// and joints have no effect; its joints take the poses of the time when it appears. Its removal releases
-  /// its springs, joints and pins.
+  /// Times between which the body exists [s]. It appears at its initial pose and velocity at the start of the
+  /// first sub-step at or after appear_at, and is removed at the start of the first sub-step at or after
+  /// remove_at. While it does not exist, nothing touches it, and its springs and joints have no effect; its
+  /// joints take the poses of the time when it appears. Its removal releases its springs, joints and pins.
   Real appear_at = 0, remove_at = kInfinity;
 };
 

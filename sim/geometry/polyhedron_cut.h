@@ -20,7 +20,8 @@ struct Cut {
     bool across_face;
   };
   Polyhedron::Plane plane;
-  std::vector<Corner> corners;                ///< counter-clockwise about the plane's normal
+  /// Corners of the cut face, counter-clockwise about the plane's normal.
+  std::vector<Corner> corners;
   std::vector<std::vector<uint32_t>> pieces;  ///< convex parts of the cut face, as indices of corners
 };
 

@@ -49,7 +49,7 @@ SolidMesh solid_mesh(const Tube& tube);
 SolidMesh solid_mesh(const OpenBox& box);
 /// One convex part. A sphere has 32 x 16 faces, round sides have 48. Plane and MeshShape are not accepted.
 SolidMesh solid_mesh(const Shape& primitive);
-/// The solid at a pose.
+/// Returns the solid moved to a pose.
 SolidMesh placed(SolidMesh solid, const Pose& pose);
 
 /// Mass, centre of mass and inertia of a body.

@@ -33,7 +33,7 @@ struct Particle {
 struct ParticleSystemDef {
   std::string name;
   Real linear_drag = 0;       ///< k_d of F = -k_d (v - wind) [kg/s]
-  bool gravity = true;        ///< whether the world's gravity acts
+  bool gravity = true;        ///< whether the world's gravity acts on the particles
   Vec3 force = Vec3::Zero();  ///< constant extra force per particle [N]
   bool collides = true;       ///< whether its particles collide with bodies (the book's "complex" flag)
   bool internal = false;      ///< whether its particles collide with each other

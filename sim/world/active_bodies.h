@@ -31,7 +31,7 @@ class ActiveBodies {
   void note_new_set() { is_ranked_ = false, note_change(); }
   /// Marks the lists as outdated. To be called after a body has become able or unable to move.
   void note_change() { is_current_ = false, ++version_; }
-  /// Number of changes so far.
+  /// Number of changes of the set of moving bodies so far.
   uint64_t version() const { return version_; }
   /// Updates the lists after changes.
   void update();

@@ -32,7 +32,7 @@ class ContactFinder {
   void find(Real h);
   /// Clears the list of pairs, for a sub-step in which no body moves.
   void clear();
-  /// The pairs with a body that can move, by the ranks of their bodies.
+  /// The pairs with a body that can move, ordered by the ranks of their bodies.
   std::span<ContactPair* const> pairs() const { return pairs_; }
   /// Calls f(pair) for all pairs, in the order of the bodies' slots.
   template <class F>

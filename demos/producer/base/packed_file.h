@@ -31,7 +31,7 @@ std::vector<uint8_t> pack(const FileKind& kind, std::span<const uint8_t> payload
 /// `source`.
 std::vector<uint8_t> unpack(const FileKind& kind, std::span<const uint8_t> bytes, const std::string& source);
 
-/// Throws render::FileError.
+/// Returns the bytes of a whole file. Throws render::FileError.
 std::vector<uint8_t> read_file(const std::filesystem::path& path);
 
 /// Appends numbers and vectors in the machine's byte order.
@@ -81,7 +81,7 @@ class ByteReader {
       throw render::FileError(source_ + ": damaged (a list is longer than the file)");
     return n;
   }
-  /// Throws if data remain.
+  /// Throws render::FileError unless all data were read.
   void expect_end() const {
     if (!bytes_.empty()) throw render::FileError(source_ + ": damaged (bytes follow its end)");
   }

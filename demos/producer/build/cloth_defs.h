@@ -25,7 +25,7 @@ struct FlatCloth {
   std::vector<Eigen::Vector2f> uvs;  ///< coordinates along the cloth, of all vertices [m]
   std::vector<uint32_t> cord_ends;   ///< for each cord, the index of its last vertex
 
-  std::vector<uint32_t> triangles() const;  ///< three vertices each
+  std::vector<uint32_t> triangles() const;  ///< Returns the triangles as three vertices each.
 };
 
 /// Creates the flat cloth. `model` is the model file of a cloth that has one, otherwise null. Throws

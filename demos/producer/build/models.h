@@ -116,7 +116,7 @@ Real scale_of(const Use& use, const ModelLibrary& models) {
 
 /// All triangles of a model as one mesh for the simulation, scaled.
 sim::TriangleMesh collision_mesh(const render::Model& model, double scale);
-/// "exact", "approximate" ...
+/// Returns the name of a method of decomposition: "exact", "approximate" ...
 std::string method_name(sim::ConvexDecomposition::Method method);
 
 /// A model's convex parts as those of its scaled mesh.

@@ -62,8 +62,8 @@ struct RenderOptions {
   /// Folder for the states of a film with several cameras: the first camera writes them, the others read
   /// them. Empty: none.
   std::string states;
-  int threads = 0;  ///< 0: all available
-  int jobs = 0;     ///< 0: chosen by `threads`
+  int threads = 0;  ///< number of threads of the simulation; 0: all available
+  int jobs = 0;     ///< number of frames drawn at the same time; 0: chosen by `threads`
   bool resume = false, force = false, dry_run = false, watch = false;
   render::GlPlatform gl = render::GlPlatform::automatic;
 
@@ -79,7 +79,7 @@ std::string default_film(const std::string& scene_file);
 
 struct TuneOptions {
   SceneOptions scene;
-  int port = 0;                  ///< 0: any free port
+  int port = 0;                  ///< port of the page; 0: any free one
   std::string size = "640x360";  ///< size of drafts
   bool open = true;              ///< whether to open the page in a browser
   int threads = 0;

@@ -9,7 +9,7 @@ namespace offstage::producer {
 
 struct Failure {
   int code = 0;         ///< an ExitCode
-  std::string kind;     ///< "scene invalid", "usage", ...
+  std::string kind;     ///< kind of the error: "scene invalid", "usage", ...
   std::string message;  ///< the message that the program prints, without a line break at its end
 };
 

@@ -19,7 +19,7 @@
 namespace offstage::producer {
 
 struct FilmMaterial {
-  std::string name;  ///< unique, not empty
+  std::string name;  ///< name of the material: unique, not empty
   render::Material look;
   std::optional<render::Image> texture;  ///< texture of the base colour
 };
@@ -77,7 +77,7 @@ class FilmParts {
   std::vector<FilmRod> rods;
   std::vector<FilmCloth> cloths;
   std::vector<FilmPoints> points;
-  std::vector<std::string> lamps;  ///< names, in the order of lamps_at()
+  std::vector<std::string> lamps;  ///< names of the lights, in the order of lamps_at()
   render::Sun sun;
 
   render::Camera camera_at(const Snapshot& snapshot) const;

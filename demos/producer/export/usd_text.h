@@ -22,7 +22,7 @@ class PrimNames {
   std::set<std::string> taken_;
 };
 
-/// A quoted string.
+/// Text of a quoted string.
 std::string quoted(std::string_view text);
 
 std::string text(float value);
@@ -35,7 +35,7 @@ std::string text(const Eigen::Matrix4f& transform);
 /// Text of a token.
 std::string text(const std::string& token);
 
-/// "[a, b, ...]"
+/// Text of a list: "[a, b, ...]".
 template <class T>
 std::string list(std::span<const T> values) {
   std::string out = "[";

@@ -34,7 +34,7 @@ inline constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 /// number.
 struct Limits {
   Real low = -kInfinity, high = kInfinity;
-  bool open_low = false, open_high = false;  ///< the bound itself is excluded
+  bool open_low = false, open_high = false;  ///< whether the bound itself is excluded
   bool nonzero = false;                      ///< whether a vector must not be zero
 
   bool bounded() const { return low > -kInfinity || high < kInfinity; }

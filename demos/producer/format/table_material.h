@@ -98,20 +98,22 @@ struct Table<ContactRule> {
     using T = ContactRule;
     return {
         {"materials", &T::materials, "names of two materials, in any order; may be the same", kRequired},
-        {"restitution", &T::restitution, "coefficient of restitution; default: from the materials", "",
-         kFraction},
+        {"restitution", &T::restitution,
+         "coefficient of restitution; default: the value that follows from the two materials", "", kFraction},
         {"friction", &T::friction,
          "coefficient of dynamic friction, along the friction axis if there is one; across it, the ratio "
-         "given by the materials applies; default: from the materials",
+         "given by the materials applies; default: the value that follows from the two materials",
          "", kNotNegative},
         {"static_friction", &T::static_friction,
          "coefficient of static friction; default: `friction` of this rule if given, or else from the "
          "materials",
          "", kNotNegative},
         {"rolling_friction", &T::rolling_friction,
-         "coefficient of rolling friction; default: from the materials", "m", kNotNegative},
+         "coefficient of rolling friction; default: the value that follows from the two materials", "m",
+         kNotNegative},
         {"spinning_friction", &T::spinning_friction,
-         "coefficient of spinning friction; default: from the materials", "m", kNotNegative},
+         "coefficient of spinning friction; default: the value that follows from the two materials", "m",
+         kNotNegative},
     };
   }
 };

@@ -36,7 +36,8 @@ struct JointBehaviour {
   Vec3 axis = Vec3::UnitZ();
   std::optional<Vec3> second_axis;  ///< default: +X, or `axis` for a gear
   Real ratio = 1;                   ///< ratio of a gear [1], rack [m], screw [m per turn] or pulley [1]
-  std::optional<std::array<Real, 2>> limits;         ///< limits of sliding and of changes of lengths [m]
+  /// Limits of the displacement of a sliding joint, or of the change of a length [m].
+  std::optional<std::array<Real, 2>> limits;
   std::optional<std::array<Real, 2>> length_limits;  ///< least and greatest length of a rope [m]
   std::optional<std::array<Real, 2>> limits_deg;     ///< limits of rotation
   std::optional<Real> swing_deg;

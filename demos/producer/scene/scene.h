@@ -345,7 +345,7 @@ struct AreaLight : LampBase {
 struct ModelLights {
   Where where;
   std::string body;
-  std::string name;     ///< empty: all of them
+  std::string name;     ///< name of the light's node; empty: all lights of the file
   Real intensity = 1;   ///< factor of their intensities
   Real radius = 0.01;   ///< radius of point and spot lights
   Real size_deg = 0.5;  ///< angular diameter of directional lights
