@@ -35,9 +35,9 @@ struct SplitDef {
   uint64_t max_alive = 1'000'000;    ///< children beyond this are not released, but counted
 };
 
-/// Splits the particles of one system into children of the same system, which then split themselves, or of
-/// another one. The parent continues to exist. Random numbers depend only on the line of descent, so they do
-/// not depend on the order of events.
+/// Splits the particles of one system into children of the same system, which then split themselves, or into
+/// children of another system. The parent continues to exist. Random numbers depend only on the line of
+/// descent, so they do not depend on the order of events.
 class Splitter {
  public:
   /// Throws std::invalid_argument if a parameter is out of range.

@@ -31,7 +31,7 @@ struct LightImage {
   std::vector<std::string> warnings;
 };
 /// Reads Radiance HDR, OpenEXR (RGB or Y), or a picture in sRGB that read_image() reads, with all of its
-/// bits. Values that are negative or not numbers become 0, infinite ones the largest half float; both with a
+/// bits. Negative values and NaN become 0, and infinite values become the largest half float; both with a
 /// warning. Throws FileError.
 LightImage decode_light_image(std::span<const uint8_t> bytes, const std::string& name,
                               uint64_t max_pixels = kMaxLightPixels);

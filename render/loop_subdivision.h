@@ -1,7 +1,7 @@
 #pragma once
 /// Loop's subdivision of triangle meshes (C. Loop, 1987; weights of J. Warren, 1995): every triangle becomes
 /// four, and the surface becomes smoother. The weights depend only on the triangles and are computed once.
-/// Positions that change every frame are then weighted sums of the coarse ones.
+/// The positions of each frame are then weighted sums of the coarse positions.
 
 #include <array>
 #include <cstdint>

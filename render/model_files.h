@@ -1,6 +1,6 @@
 #pragma once
-/// The files that belong to a model. Those that assimp may open are regular ones in its folders. Private to
-/// render.
+/// The files that belong to a model. assimp may open only regular files in the folders of the model. Private
+/// to render.
 
 #include <filesystem>
 #include <memory>

@@ -22,8 +22,8 @@ class Region {
   /// hide the body. A place within the body is behind its surface. On one line of sight, every place behind a
   /// hidden one is hidden, too.
   bool hides(const Vector3f& place, float depth) const;
-  /// Whether this body can hide the other one. Decided by a face of either box that separates the two, else
-  /// by the distance of their centres.
+  /// Whether this body can hide `other`. This is decided by a face of either box that separates the two, else
+  /// by the distances of their centres.
   bool is_in_front_of(const Region& other) const;
   bool contains(const Vector3f& place) const;
 

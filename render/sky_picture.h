@@ -46,7 +46,7 @@ struct SkyBeam {
 class SkyPicture {
  public:
   static constexpr int kMostColumns =
-      4096;  ///< greatest width of the visible picture; larger ones are reduced
+      4096;  ///< greatest width of the visible picture; larger pictures are reduced
   static constexpr int kMostLightColumns = 1024;  ///< greatest width of the picture that gives light
   static constexpr int kLevels = 5;               ///< prefiltered for the roughness 0, 1/4 ... 1
 

@@ -30,7 +30,7 @@ struct Camera {
   float fov_deg = 40;  ///< vertical, in (0, 180)
   float near_m = 0.05f, far_m = 1e6f;
   float aperture = 0;  ///< lens diameter [m]; 0: everything is sharp
-  float focus = 0;     ///< distance in focus [m]; 0: that of the target
+  float focus = 0;     ///< distance in focus [m]; 0: the distance of the target
 };
 
 struct Sun {

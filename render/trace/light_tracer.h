@@ -41,9 +41,9 @@ struct LightBuffer {
 
   // In between. Light from around is computed for cells of 2x2 pixels.
   LightGuide pixels, cells;
-  LightValues direct;           ///< per pixel: visible fraction of the sun, then diffuse light of lamps
-  LightValues glow;             ///< per pixel: light of glowing meshes; empty: there are none
-  LightValues around, mirrors;  ///< per cell: diffuse light from around, and mirrored light
+  LightValues direct;           ///< for each pixel: visible fraction of the sun, and diffuse light of lamps
+  LightValues glow;             ///< for each pixel: light of glowing meshes; empty: there are none
+  LightValues around, mirrors;  ///< for each cell: diffuse light from around, and mirrored light
   LightPlane inverse_distance, brightness, reach2, noisy_reach2;  ///< see LightGuide::find_reach
   /// For each cell, 1 if a surface in it mirrors, or mirrors roughly, else 0.
   LightPlane with_mirror, with_rough_mirror;

@@ -30,8 +30,8 @@ class JointSystem {
   /// constraints are too degenerate; correct() then has no effect.
   bool factorize(std::span<const JointRows> rows, std::span<const LinkMobility> links);
 
-  /// Replaces the constraints by ones near those of the last factorize(), whose factor is kept. correct()
-  /// must then be iterated.
+  /// Replaces the constraints by rows that differ little from those of the last factorize(). The factor is
+  /// kept, so correct() must be iterated.
   void update(std::span<const JointRows> rows) { rows_ = rows; }
 
   /// Computes J v for all joints. Driven links count as motionless.

@@ -27,7 +27,7 @@ class SelfContacts {
 
   /// After points moved freely in a sub-step of length dt: separates pairs that are closer than their
   /// thickness, and keeps pairs from crossing as far as impulses between two points can. The search for pairs
-  /// is repeated only if the known ones no longer suffice.
+  /// is repeated only if the known pairs no longer suffice.
   void push_apart(ClothPoints& points, Real dt);
   /// Finds the pairs that may have crossed with the current moves, or may cross if any move is shortened
   /// towards the drift of its point. Points of one piece have a common drift.

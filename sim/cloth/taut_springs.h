@@ -30,8 +30,8 @@ struct SpringLimit {
 
 /// Contact of a point of cloth, or of a point within a triangle, with a dynamic body.
 struct BodyContact {
-  std::array<uint32_t, 3> points;  ///< a single point: three times the same
-  std::array<Real, 3> weights;     ///< barycentric weights of the points; a single point: 1, 0, 0
+  std::array<uint32_t, 3> points;  ///< indices of the points; for a single point, three times the same index
+  std::array<Real, 3> weights;     ///< barycentric weights of the points; for a single point: 1, 0, 0
   ClothBody* body;
   Vec3 normal;   ///< unit normal of the body's surface, world axes
   Vec3 on_body;  ///< contact point on the body's surface, world [m]

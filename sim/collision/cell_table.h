@@ -47,8 +47,9 @@ struct CellRange {
   CellRange at(int32_t coarser) const;
 };
 
-/// Objects are entered as the level's own, or as finer ones that belong to a level of smaller cells. A pair
-/// is found here if at least one of the two is the level's own: this is the coarser of their levels.
+/// A table contains the objects of its own level, and finer objects, which belong to levels of smaller cells.
+/// It finds the pairs of which at least one object belongs to its own level. Each pair is thus found at the
+/// coarser of the two levels.
 ///
 /// Every pair is found once. The cells that two objects share are a box of cells. Its low corner is, along
 /// each axis, the low cell of the one or of the other object, and it is the only shared cell of which that is

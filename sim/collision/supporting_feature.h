@@ -35,8 +35,8 @@ struct SupportingFeature {
   void place(const Mat3& rotation, const Vec3& translation);
 };
 
-/// Returns the feature with the largest part within `slack` of the plane with the unit normal `d` that
-/// touches the solid. For a polyhedron it is the face at the support vertex with the largest such part
+/// Returns the feature with the largest part within `slack` of the plane that touches the solid and has the
+/// unit normal `d`. For a polyhedron it is the face at the support vertex with the largest such part
 /// (projected on the plane), for a cylinder or cone the flat side or a line of the round side. Discs are
 /// given as regular polygons on the rim, and faces with many corners by their most distant corners.
 SupportingFeature supporting_feature(const Convex& c, const Vec3& d, Real slack);

@@ -107,7 +107,8 @@ class alignas(64) ContactPair {
            relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n) < -impact_speed;
   }
 
-  /// Prefetches memory for find(): first that of the pair, and a little later that of the first manifold.
+  /// Prefetches memory for find(): first the pair itself, and a little later, with prefetch_manifold(), its
+  /// first manifold.
   void prefetch() const { sim::prefetch(this, this + 1); }
   void prefetch_manifold() const {
     if (!placed_.empty()) sim::prefetch(placed_.data(), placed_.data() + 1);
@@ -118,8 +119,8 @@ class alignas(64) ContactPair {
   /// The i-th manifold added by add_speculative_contacts(), with its points at their positions at the
   /// interval's end.
   const Manifold& at_end(std::size_t i) const { return at_end_[i]; }
-  /// Replaces the i-th manifold by another one in world coordinates. A manifold without points is removed at
-  /// the next drop_empty(). The separation remains that of the bodies.
+  /// Replaces the i-th manifold by `m`, which is in world coordinates. A manifold without points is removed
+  /// at the next drop_empty(). separation() remains the separation of the bodies.
   void replace(uint32_t i, const Manifold& m);
   void drop_empty();
 

@@ -55,8 +55,8 @@ struct Contact {
   /// The part of `offset` that is not a surface velocity: velocity terms of R9 [m/s].
   Vec3 bias = Vec3::Zero();
   Real target = 0;  ///< smallest normal velocity after the solution [m/s]
-  /// Coulomb's coefficients along t and k. Equal ones give the round cone, |p_tk| <= mu p_n; with different
-  /// ones each axis has its own limit (R6).
+  /// Coulomb's coefficients along t and k. If they are equal, friction has the round cone |p_tk| <= mu p_n;
+  /// otherwise each axis has its own limit (R6).
   Real friction_t = 0, friction_k = 0;
   /// Rolling and spinning friction: the greatest angular impulse about the tangents and about the normal, per
   /// normal impulse [m].

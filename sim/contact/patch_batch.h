@@ -78,7 +78,7 @@ struct PatchBatch {
   Vector friction_impulse, friction_mean, friction_before, friction_shift;
   /// Sum of the normal impulses with which the friction was computed, if the patch slides; else 0 [N s].
   Lanes pressure;
-  Lanes holds;     ///< all ones where friction was well within its limit in the last sweep, else 0
+  Lanes holds;     ///< all bits set where friction was well within its limit in the last sweep, else 0
   Lanes renewal;   ///< fraction of the difference by which means follow their impulses
   Lanes residual;  ///< change of the velocity of the centre in the last sweep [m/s]
   bool turns;      ///< whether `gain` is used

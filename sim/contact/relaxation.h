@@ -80,8 +80,8 @@ struct ContactPatch {
   Vec3 gain = Vec3::Zero(), bow = Vec3::Zero();
   Real gain_along_t = 0, gain_along_k = 0;
   bool turns = false;  ///< whether any gain differs from 0
-  /// Coulomb's coefficients. Equal coefficients give the round cone; with different ones each axis has its
-  /// own limit.
+  /// Coulomb's coefficients. If they are equal, friction has the round cone; otherwise each axis has its own
+  /// limit.
   Real friction_t = 0, friction_k = 0;
   uint32_t count = 0;
   std::array<Point, 4> points;

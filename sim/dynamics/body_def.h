@@ -31,7 +31,7 @@ struct BodyDef {
   Vec3 angular_velocity = Vec3::Zero();  ///< world axes [rad/s]
   Real density = 1000;                   ///< [kg/m^3], > 0; ignored if mass > 0
   Real mass = 0;                         ///< [kg]; 0: from density and volume
-  /// Centre of mass in the body's frame [m]; default: that of the shape.
+  /// Centre of mass in the body's frame [m]; default: the shape's centre of mass.
   std::optional<Vec3> centre = {};
   /// Inertia about the centre of mass, axes of the body's frame [kg m^2]: symmetric, and each principal
   /// moment at most the sum of the other two. Default: that of the shape about its own centre, scaled to the

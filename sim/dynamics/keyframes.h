@@ -13,7 +13,7 @@ namespace offstage::sim {
 struct Keyframe {
   Real time = 0;  ///< [s]
   Pose pose;
-  /// Interpolation to the next key; default: that of the track.
+  /// Interpolation to the next key; default: the interpolation of the track.
   std::optional<Interpolation> interpolation = {};
 };
 

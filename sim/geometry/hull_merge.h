@@ -23,7 +23,7 @@ struct MergedHull {
 /// A part before the merger.
 struct HullToMerge {
   ConvexPolyhedron hull;
-  uint32_t solid = 0;  ///< parts of one solid do not overlap much; those of different solids may
+  uint32_t solid = 0;  ///< parts of one solid do not overlap much; parts of different solids may
 };
 
 /// Merges convex parts; run() can be called several times, with different bounds.

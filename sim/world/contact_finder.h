@@ -40,7 +40,8 @@ class ContactFinder {
     graph_.for_each(f);
   }
 
-  /// Wakes the sleeping bodies near moving ones, moves them through the sub-step, and returns them.
+  /// Wakes the sleeping bodies near moving bodies, moves the woken bodies through the sub-step, and returns
+  /// them.
   std::vector<Body*> wake_touched(FreeMotion& motion, Real start, Real h);
   /// Extends the pairs to the changed paths of bodies in the sub-step; existing pairs are kept, because
   /// impacts and islands refer to them. Returns whether there may be new ones; see ContactPair::is_new().

@@ -46,7 +46,7 @@ TEST(SceneCheck, EmittersThatPushABodyOrGetItsVelocityNeedOne) {
             "/emitters/0/recoil: pushes a body back; the emitter needs a \"body\"\n");
   const std::string on_body = R"("emitters": [{"body": "a", "recoil": true, "inherit_velocity": 0.5}]})";
   EXPECT_EQ(errors_of(R"({"bodies": [{"name": "a", "motion": "static"}], )" + on_body),
-            "/emitters/0/recoil: pushes dynamic bodies only, and \"a\" is not\n");
+            "/emitters/0/recoil: pushes dynamic bodies only, and \"a\" is not dynamic\n");
   EXPECT_EQ(errors_of(R"({"bodies": [{"name": "a"}], )" + on_body), "");
   EXPECT_EQ(
       errors_of(R"({"bodies": [{"name": "a"}],

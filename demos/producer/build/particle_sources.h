@@ -24,7 +24,7 @@ class LookRamps {
  public:
   LookRamps(const ParticleLook& look, uint64_t seed, const std::string& name);
 
-  /// Look of the particles at `time`. `places`: those of a group, which may have individual colours.
+  /// Look of the particles at `time`. `places`: the particles of a group, which may have individual colours.
   PointSet points(const sim::ParticleArrays& particles, Real time,
                   const std::vector<ParticlePlace>* places) const;
 

@@ -26,7 +26,8 @@ struct Command {
 };
 
 struct RenderOptions;
-/// render --watch is in a library above this one: see engine/watch_command.h.
+/// The function behind `render --watch`, which is in a library that depends on this one: see
+/// engine/watch_command.h.
 using WatchCommand = std::function<int(const RenderOptions&)>;
 
 // Each adds a command with its options to the program's command line.
@@ -85,7 +86,7 @@ struct TuneOptions {
   int threads = 0;
   render::GlPlatform gl = render::GlPlatform::automatic;
 };
-/// The tuning page is in a library above this one: see tune/tune_command.h.
+/// The function behind `tune`, which is in a library that depends on this one: see tune/tune_command.h.
 using TuneCommand = std::function<int(const TuneOptions&)>;
 
 /// Number of threads, or that of all available processors if it is 0.

@@ -31,7 +31,7 @@ struct EncodeOptions {
   std::vector<std::string> frames;  ///< one pattern
   LogOptions log;
   std::string out;
-  std::optional<std::string> fps;  ///< default: that of the manifest beside the frames, or 30
+  std::optional<std::string> fps;  ///< default: the rate of the manifest beside the frames, or 30
   bool allow_gaps = false, force = false;
 };
 

@@ -150,7 +150,7 @@ struct ObjectEntry {
 
   Node definition() const;  ///< JSON Schema
 };
-/// Every object of the format, each after the first one that refers to it.
+/// All objects of the format. Each comes after the first object that refers to it.
 class Catalogue {
  public:
   /// Returns a reference to the named object; `describe` fills in its entry the first time.

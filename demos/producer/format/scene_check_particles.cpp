@@ -209,7 +209,7 @@ class ParticleChecker : CheckBase {
       fail(path + "/recoil", "pushes a body back; the emitter needs a \"body\"");
     const auto pushed = std::ranges::find(flat_.bodies, emitter.body, &Body::name);
     if (emitter.recoil && pushed != flat_.bodies.end() && pushed->motion != sim::MotionType::dynamic)
-      fail(path + "/recoil", "pushes dynamic bodies only, and \"" + emitter.body + "\" is not");
+      fail(path + "/recoil", "pushes dynamic bodies only, and \"" + emitter.body + "\" is not dynamic");
     if (emitter.inherit_velocity != 1 && emitter.body.empty())
       fail(path + "/inherit_velocity",
            "is a fraction of the velocity of a body; the emitter needs a \"body\"");

@@ -22,8 +22,8 @@ struct LoadedScene {
 };
 
 /// Reads a scene file and its includes, applies `overrides` ("path=value", path as a JSON pointer or dotted),
-/// and checks the result. The file "-" is standard input. Files that it names must be in its folder or in the
-/// `allowed` ones. Throws SceneError with the problems.
+/// and checks the result. The file "-" is standard input. Files that the scene names must be in its folder or
+/// in one of the `allowed` folders. Throws SceneError with the problems.
 LoadedScene load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides = {},
                        const std::vector<std::string>& allowed = {});
 

@@ -37,7 +37,7 @@ struct Table<BodyKey> {
             {"orientation", &BodyKey::orientation,
              "orientation of the body at this key; default: the body's `orientation`"},
             {"interpolation", &BodyKey::interpolation,
-             "interpolation from this key to the next; default: that of the body"}};
+             "interpolation from this key to the next; default: the interpolation of the body"}};
   }
 };
 template <>
@@ -83,7 +83,8 @@ struct Table<Body> {
          "angular velocity at time 0, in world axes; dynamic bodies only", "rad/s"},
         {"density", &T::density, "density; determines the mass unless `mass` is given", "kg/m^3", kPositive},
         {"mass", &T::mass, "mass of a dynamic body; 0: computed from density and volume", "kg", kNotNegative},
-        {"centre", &T::centre, "centre of mass in the body's frame; default: that of the shape", "m"},
+        {"centre", &T::centre, "centre of mass in the body's frame; default: the shape's centre of mass",
+         "m"},
         {"inertia", &T::inertia,
          "moments of inertia Ixx, Iyy and Izz about the centre of mass, in the body's axes; default: those "
          "of the "

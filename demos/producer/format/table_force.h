@@ -137,7 +137,7 @@ struct Table<HandKey> {
     return {{"time", &HandKey::time, "time of the key; times must increase", "s"},
             {"position", &HandKey::position, "position of the hand", "m"},
             {"interpolation", &HandKey::interpolation,
-             "interpolation from this key to the next; default: that of the grab"}};
+             "interpolation from this key to the next; default: the interpolation of the grab"}};
   }
 };
 template <>
@@ -177,7 +177,7 @@ struct Table<AppliedKey> {
             {"force", &T::force, "force at this time", "N"},
             {"torque", &T::torque, "torque at this time", "N m"},
             {"interpolation", &T::interpolation,
-             "interpolation from this key to the next; default: that of the force"}};
+             "interpolation from this key to the next; default: the interpolation of the force"}};
   }
 };
 template <>

@@ -27,7 +27,7 @@ struct Table<MotorKey> {
     return {{"time", &MotorKey::time, "time of the key; times must increase", "s"},
             {"target", &MotorKey::target, "target, in the unit of the motor's `target`"},
             {"interpolation", &MotorKey::interpolation,
-             "interpolation from this key to the next; default: that of the motor"}};
+             "interpolation from this key to the next; default: the interpolation of the motor"}};
   }
 };
 template <>

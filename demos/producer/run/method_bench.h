@@ -40,8 +40,8 @@ struct MethodResult {
   /// Cases that the intended algorithm did not solve: those of the contact solvers, exceeded budgets and
   /// limits of impacts, suppressed restitution, and failed projections of joints.
   uint64_t fallbacks() const;
-  /// Greatest distance between a body's positions at the end of this run and of another one [m]; nothing if
-  /// either run ended early.
+  /// Greatest distance between the positions of a body at the end of this run and at the end of `other` [m];
+  /// nothing if either run ended early.
   std::optional<double> deviation(const MethodResult& other) const;
 };
 

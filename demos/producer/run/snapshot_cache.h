@@ -13,7 +13,8 @@ namespace offstage::producer {
 
 class SnapshotCache {
  public:
-  /// Version of the folder's layout and of the snapshots in it; another one is refused (docs/cache.md).
+  /// Version of the folder's layout and of the snapshots in it. Folders of other versions are refused
+  /// (docs/cache.md).
   static constexpr int kFormat = 4;
   static constexpr const char* kFile = "cache.json";  ///< names the published generation and its simulation
   static constexpr std::string_view kGenerationPrefix =

@@ -55,7 +55,7 @@ struct LennardJonesForce : PairForceOf<sim::LennardJones> {};
 struct HandKey {
   Real time = 0;
   Vec3 position = Vec3::Zero();
-  /// Interpolation to the next key; default: that of the grab.
+  /// Interpolation to the next key; default: the interpolation of the grab.
   std::optional<sim::Interpolation> interpolation;
 };
 /// A damped spring of length 0 from a body or from particles to a moving point, as of a hand.
@@ -78,7 +78,7 @@ enum class ForceAxes { world, body };
 struct AppliedKey {
   Real time = 0;
   Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
-  /// Interpolation to the next key; default: that of the force.
+  /// Interpolation to the next key; default: the interpolation of the force.
   std::optional<sim::Interpolation> interpolation;
 };
 /// A force at a point of bodies, and a torque.

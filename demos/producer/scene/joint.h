@@ -16,7 +16,7 @@ namespace offstage::producer {
 struct MotorKey {
   Real time = 0;
   Real target = 0;
-  /// Interpolation to the next key; default: that of the motor.
+  /// Interpolation to the next key; default: the interpolation of the motor.
   std::optional<sim::Interpolation> interpolation;
 };
 

@@ -47,7 +47,7 @@ struct FabricLook {
   Real sheen = 0.2;
   Color sheen_color;
   Real translucency = 0.15;
-  std::optional<Color> back_color;  ///< default: that of the front
+  std::optional<Color> back_color;  ///< default: the colour of the front
 };
 
 /// Look and contact properties.
@@ -72,7 +72,8 @@ struct Material {
   Real texture_scale = 1;
   Real texture_angle_deg = 0;
   bool two_sided = false;
-  std::optional<FabricLook> fabric;  ///< look of the threads on cloths; default: that of the cloth's fabric
+  std::optional<FabricLook>
+      fabric;  ///< look of the threads on cloths; default: the look of the cloth's fabric
   Real restitution = 0.5;
   Real friction = 0.5;                  ///< dynamic coefficient
   std::optional<Real> static_friction;  ///< static coefficient; default: `friction`
@@ -108,7 +109,7 @@ struct BodyKey {
   Real time = 0;
   std::optional<Vec3> position;     ///< default: the body's
   std::optional<Quat> orientation;  ///< default: the body's
-  /// Interpolation to the next key; default: that of the body.
+  /// Interpolation to the next key; default: the interpolation of the body.
   std::optional<sim::Interpolation> interpolation;
 };
 
@@ -126,7 +127,7 @@ struct Body {
   Vec3 angular_velocity = Vec3::Zero();
   Real density = 1000;
   Real mass = 0;
-  std::optional<Vec3> centre;   ///< centre of mass, in the body's frame; default: that of the shape
+  std::optional<Vec3> centre;   ///< centre of mass, in the body's frame; default: the shape's centre of mass
   std::optional<Vec3> inertia;  ///< moments Ixx, Iyy, Izz about the centre of mass; default: the shape's
   Vec3 inertia_products = Vec3::Zero();  ///< Ixy, Iyz, Izx of the inertia matrix, with `inertia`
   Real linear_drag = 0;
@@ -276,7 +277,7 @@ struct CameraKey {
   Vec3 eye = {4, 2.5, 6};
   Vec3 target = Vec3::Zero();
   std::optional<Real> fov_deg, focus;  ///< default: the camera's
-  /// Interpolation to the next key; default: that of the camera.
+  /// Interpolation to the next key; default: the interpolation of the camera.
   std::optional<sim::Interpolation> interpolation;
 };
 struct KeyframedCamera : Lens {
