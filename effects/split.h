@@ -24,13 +24,14 @@ struct SplitDef {
   Varying age = 1.0;    ///< age of the parent at its first split [s], > 0
   /// Time from one split of a parent to its next [s], > 0; for n simulation steps use n WorldDef::max_step.
   Varying delay = 0.5;
-  /// Greatest number of splits in a line of descent, those of ancestors included. If children can split, too,
-  /// one particle becomes at most (1 + count)^depth.
+  /// Greatest number of splits in a line of descent, including the splits of ancestors. If children can
+  /// split, too, one particle becomes at most (1 + count)^depth.
   int depth = 1;
   Varying velocity_percent = 100.0;
-  Varying spread_deg = 0.0;          ///< angle from the parent's direction [degrees]
-  Varying radius_percent = 50.0;     ///< > 0
-  Varying mass_percent = 0.0;        ///< mass of each child; 0: that by the parent's density
+  Varying spread_deg = 0.0;       ///< angle from the parent's direction [degrees]
+  Varying radius_percent = 50.0;  ///< > 0
+  /// Mass of each child; 0: the mass that follows from the parent's density.
+  Varying mass_percent = 0.0;
   Varying lifespan_percent = 100.0;  ///< > 0
   uint64_t max_alive = 1'000'000;    ///< children beyond this are not released, but counted
 };

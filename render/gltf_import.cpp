@@ -259,10 +259,10 @@ class GltfImporter {
       warn(file_.count("animations"),
            "animations are not played: the model is in its rest pose; `animation` of a body plays one");
     if (model_.cameras.empty())
-      warn(file_.count("cameras"), "cameras are ignored: no node of the drawn scene has a usable one");
+      warn(file_.count("cameras"), "cameras are ignored: no node of the file's scene has a usable camera");
     if (model_.lights.empty())
       warn(file_.root().extension("KHR_lights_punctual").count("lights"),
-           "lights are ignored: no node of the drawn scene has a usable one");
+           "lights are ignored: no node of the file's scene has a usable light");
   }
 
   /// The default material is the last one; it is kept if a part uses it, or if there is no other.

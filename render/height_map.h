@@ -1,5 +1,6 @@
 #pragma once
-/// Private: converts textures of classic materials (bump maps, masks) to those of physically based ones.
+/// Private: converts textures of classic materials (bump maps, masks) to textures of physically based
+/// materials.
 
 #include "render/image.h"
 

@@ -35,8 +35,8 @@ class LightPass {
   /// Traces the light of glass. The picture must show the opaque objects.
   void trace_glass(const LightSources& sources, const View& view, const SampleOffsets& offsets,
                    GLuint picture_framebuffer);
-  /// Traces the light of a translucent body. It replaces that of the opaque objects, which must have been
-  /// drawn.
+  /// Traces the light of a translucent body. It replaces the light of the opaque objects, which must have
+  /// been drawn.
   void trace_body(const LightSources& sources, const View& view, const SampleOffsets& offsets);
 
  private:

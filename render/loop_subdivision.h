@@ -30,7 +30,7 @@ class LoopSubdivision {
   const std::vector<uint32_t>& triangles() const { return triangles_; }
   std::size_t vertex_count() const { return first_term_.size() - 1; }
 
-  /// Computes values at the vertices of the finer mesh from those at the coarse vertices.
+  /// Computes values at the vertices of the finer mesh from the values at the coarse vertices.
   template <class V>
   void refine(std::span<const V> coarse, std::vector<V>& fine) const {
     fine.resize(vertex_count());

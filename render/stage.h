@@ -187,8 +187,8 @@ class Stage {
   MeshHandle add_mesh(const Mesh& mesh);
   /// Replaces a mesh, for instance by its next pose; all instances of it change.
   void set_mesh(MeshHandle handle, const Mesh& mesh);
-  /// `textures` are those to which the material's indices refer; each is uploaded once per call, with mip
-  /// maps.
+  /// `textures` are the textures to which the material's indices refer; each is uploaded once per call, with
+  /// mip maps.
   MaterialHandle add_material(const Material& material, std::span<const Image> textures = {});
   InstanceHandle add_instance(MeshHandle mesh, MaterialHandle material, bool casts_shadow = true);
   /// `picture`: drawn for each sprite instead of a soft disc; it covers the square around the particle, or a

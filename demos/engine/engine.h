@@ -148,8 +148,8 @@ class Engine {
   void fail(const std::string& what);
   /// Whether there is a request of any kind.
   bool is_stale() const { return ending_ || holds_ > 0 || requested_ != taken_; }
-  /// Whether there is, or soon will be, another version or camera. Other requests, such as those of a film
-  /// that plays, leave a draft its time.
+  /// Whether there is, or soon will be, another version or camera. Other requests, such as the frames of a
+  /// film that plays, let a draft finish first.
   bool is_outdated() const { return ending_ || holds_ > 0 || runs_ != run_; }
 
   const EngineSettings settings_;

@@ -46,7 +46,7 @@ struct Joint {
 
 /// Whether the joint's coordinate is an unbounded angle; Joint::coordinate then counts whole turns.
 bool counts_turns(const Joint& joint);
-/// Motion of a body at a time: that of its centre of mass, or of its origin if it is not dynamic.
+/// Motion of a body at a time: the motion of its centre of mass, or of its origin if it is not dynamic.
 LinkMotion link_motion(const Body* body, Real time);
 /// Frame of a joint on a body, relative to the point whose motion link_motion() returns.
 JointFrame link_frame(const Body* body, const JointFrame& in_body);

@@ -26,7 +26,7 @@ enum class JointType : uint8_t {
   prismatic,  ///< allows displacement along the axis, without rotation
   universal,  ///< allows rotation about the axis, fixed in a, and about the second axis, fixed in b
   /// Keeps the distance of the anchors, as a massless rod does; with limits or a motor the length may change,
-  /// as that of a rope or a winch.
+  /// as the length of a rope or a winch does.
   distance,
   /// Couples the rotation of a about `axis` with that of b about `second_axis`: angle of a + ratio * angle of
   /// b = 0. The axes are fixed in the bodies; other joints, whose carrier does not turn, hold the wheels.

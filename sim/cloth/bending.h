@@ -45,7 +45,7 @@ class ClothBending {
   Real fastest() const { return fastest_; }
   /// Energy [J].
   Real energy(std::span<const Vec4> x) const;
-  /// Adds scale times the bending forces at x to f. Points are those of the cloth, from 0.
+  /// Adds scale times the bending forces at x to f. The points are numbered within the cloth, from 0.
   void add_forces(std::span<const Vec4> x, Real scale, std::span<Vec4> f) const;
   /// Adds the bending forces at x, and those of damping at the velocities v, to f.
   void add_damped_forces(std::span<const Vec4> x, std::span<const Vec4> v, std::span<Vec4> f);

@@ -21,7 +21,7 @@ namespace offstage::sim {
 
 class SelfContacts {
  public:
-  /// Sets the triangles, those of cloths that collide with cloth.
+  /// Sets the triangles of the cloths that collide with cloth.
   void assign(std::vector<Triangle> triangles, const ClothPoints& points);
   bool empty() const { return triangles_.empty(); }
 

@@ -16,8 +16,9 @@ namespace offstage::sim {
 class CollisionShape {
  public:
   struct Options {
-    /// Whether contacts need a penetration depth, as those of dynamic bodies do. A mesh is then represented
-    /// by its convex parts, even if these are approximate. Otherwise its exact surface is preferred.
+    /// Whether contacts need a penetration depth, as the contacts of dynamic bodies do. A mesh is then
+    /// represented by its convex parts, even if these are approximate. Otherwise its exact surface is
+    /// preferred.
     bool needs_volume = false;
     /// Whether a mesh is represented by its triangles in any case. Two shapes with this option are tested
     /// triangle against triangle.

@@ -28,7 +28,8 @@ std::pair<Real, Real> friction(const PairSurface& surface, const Vec3& u);
 /// interval's end.
 Vec3 origin(const Body& body);
 
-/// A body that contacts do not move, for the exact solver and that of impacts: asleep, static or kinematic.
+/// A body that contacts do not move, in the exact solver and in the solver of impacts: asleep, static or
+/// kinematic.
 ContactBody unmoved_body(const Body& body);
 
 /// The inverse inertia in world axes at an orientation.

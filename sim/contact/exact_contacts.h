@@ -32,8 +32,8 @@ class ExactContacts {
   /// energy; otherwise the fast solver, whose work is bounded, must solve the island.
   Outcome solve(const Island& island, const ContactInterval& interval, Real budget,
                 Method method = Method::proximal);
-  /// Cost of the last solve() [ns], without that of a division at the times at which contacts close, which is
-  /// small.
+  /// Cost of the last solve() [ns]. The small cost of dividing the interval at the times at which contacts
+  /// close is not included.
   Real cost() const { return cost_; }
 
  private:

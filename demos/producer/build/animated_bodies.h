@@ -22,7 +22,7 @@ std::vector<AnimatedPiece> collision_pieces(const render::ModelRig& rig, int cli
 
 /// Motion of a piece over a film of the length `end` [s]. `own`: the motion of the body; `rest`: its initial
 /// pose; `scale`: scale factor of the model. The animation is sampled 120 times per second. Where it starts
-/// again in another pose than that of its end, the piece jumps.
+/// again in a pose other than its last one, the piece jumps.
 sim::KeyframeTrack piece_track(const render::ModelRig& rig, const AnimatedPiece& piece,
                                const ModelAnimation& animation, const sim::KeyframeTrack& own,
                                const sim::Pose& rest, double scale, double end);

@@ -1,5 +1,5 @@
 #pragma once
-/// Conversion of ready-made articulations to bodies and joints, and of joints to those of the simulation.
+/// Conversion of ready-made articulations to bodies and joints, and of a scene's joints to sim::JointDef.
 
 #include <vector>
 

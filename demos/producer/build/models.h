@@ -119,7 +119,7 @@ sim::TriangleMesh collision_mesh(const render::Model& model, double scale);
 /// Returns the name of a method of decomposition: "exact", "approximate" ...
 std::string method_name(sim::ConvexDecomposition::Method method);
 
-/// A model's convex parts as those of its scaled mesh.
+/// The convex parts of a model, scaled like its mesh.
 sim::ConvexDecomposition scaled(sim::ConvexDecomposition decomposition, double scale);
 
 /// XXH3-128 in hexadecimal of a mesh.

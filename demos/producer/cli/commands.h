@@ -89,7 +89,7 @@ struct TuneOptions {
 /// The function behind `tune`, which is in a library that depends on this one: see tune/tune_command.h.
 using TuneCommand = std::function<int(const TuneOptions&)>;
 
-/// Number of threads, or that of all available processors if it is 0.
+/// Number of threads, or the number of available processors if it is 0.
 int threads_or_all(int threads);
 /// Limits the simulation to this number of threads during its lifetime.
 tbb::global_control simulation_threads(int threads);

@@ -136,7 +136,7 @@ class JointChecker : CheckBase {
   void check_keys(const std::string& path, const std::vector<MotorKey>& keys) {
     for (std::size_t i = 1; i < keys.size(); ++i)
       if (!(keys[i].time > keys[i - 1].time))
-        fail(path + "/" + std::to_string(i) + "/time", "must be later than that of the previous key");
+        fail(path + "/" + std::to_string(i) + "/time", "must be later than the time of the previous key");
   }
 
   void check(const Chain& chain) {

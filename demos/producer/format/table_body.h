@@ -86,9 +86,8 @@ struct Table<Body> {
         {"centre", &T::centre, "centre of mass in the body's frame; default: the shape's centre of mass",
          "m"},
         {"inertia", &T::inertia,
-         "moments of inertia Ixx, Iyy and Izz about the centre of mass, in the body's axes; default: those "
-         "of the "
-         "shape about its own centre, for the body's mass",
+         "moments of inertia Ixx, Iyy and Izz about the centre of mass, in the body's axes; default: the "
+         "moments of the shape about its own centre, for the body's mass",
          "kg m^2", kPositive},
         {"inertia_products", &T::inertia_products,
          "off-diagonal elements Ixy, Iyz and Izx of the inertia matrix; need `inertia`", "kg m^2"},

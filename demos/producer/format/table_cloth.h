@@ -254,7 +254,9 @@ struct Table<Cloth> {
             {"tear", &T::tear, "length relative to the rest length at which threads tear, above 1; 0: never",
              "", kNotNegative},
             {"pressure", &T::pressure,
-             "pressure inside a closed cloth above that of the air, at the initial volume", "Pa"},
+             "excess of the pressure inside a closed cloth over the pressure of the air, at the initial "
+             "volume",
+             "Pa"},
             {"inflate_time", &T::inflate_time,
              "time in which the gas of `pressure` is let in, at a constant rate; 0: it is present from "
              "the start",

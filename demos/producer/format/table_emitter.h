@@ -34,7 +34,7 @@ struct Table<Split> {
          "applies",
          "", between(0, 1e6)},
         {"depth", &T::depth,
-         "largest number of splits in the history of a particle, including those of its ancestors", "",
+         "largest number of splits in the history of a particle, including the splits of its ancestors", "",
          between(1, 16)},
         {"velocity_percent", &T::velocity_percent,
          "fraction of the parent's velocity that a child starts with", "%"},

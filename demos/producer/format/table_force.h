@@ -196,7 +196,7 @@ struct Table<AppliedForce> {
         {"axes", &T::axes,
          "axes of `force` and `torque`: those of the `world`, or those that turn with the `body`"},
         {"force", &T::force, "force, without keyframes", "N"},
-        {"torque", &T::torque, "torque in addition to that of the force, without keyframes", "N m"},
+        {"torque", &T::torque, "torque in addition to the torque of `force`, without keyframes", "N m"},
         {"keyframes", &T::keyframes,
          "force and torque over time, instead of `force` and `torque`; constant before the first and after "
          "the last"},

@@ -43,14 +43,14 @@ struct Table<LookMesh> {
       "ball; its own size has no effect.";
   static Fields<LookMesh> fields() {
     using T = LookMesh;
-    return {
-        {"shape", &T::shape, "what is drawn; not a plane"},
-        {"material", &T::material, "name of its material; empty: that of the model file, or a default one"},
-        {"axis", &T::axis,
-         "axis of `angle_deg` and `spin_deg_per_s`, in the mesh's axes; default: a random axis for each "
-         "particle",
-         "", kDirection},
-        {"along_motion", &T::along_motion, "the mesh's +Y axis points along the velocity"}};
+    return {{"shape", &T::shape, "what is drawn; not a plane"},
+            {"material", &T::material,
+             "name of its material; empty: the material of the model file, or a default material"},
+            {"axis", &T::axis,
+             "axis of `angle_deg` and `spin_deg_per_s`, in the mesh's axes; default: a random axis for each "
+             "particle",
+             "", kDirection},
+            {"along_motion", &T::along_motion, "the mesh's +Y axis points along the velocity"}};
   }
 };
 template <>

@@ -20,7 +20,7 @@ struct Table<sim::ParticleSystemDef> {
         {"collides", &T::collides, "whether particles collide with bodies"},
         {"internal", &T::internal, "whether particles of this system collide with each other"},
         {"external", &T::external,
-         "whether particles collide with those of other systems that also have `external`"},
+         "whether particles collide with particles of other systems that also have `external`"},
         {"rotates", &T::rotates,
          "contacts turn the particles as solid balls, so that they roll and friction acts at their surface; "
          "otherwise they slide without turning. Objects of the style `mesh` show the rotation. Sand and "
@@ -41,7 +41,7 @@ struct Table<ParticlePlace> {
   static Fields<ParticlePlace> fields() {
     return {{"position", &ParticlePlace::position, "position at time 0", "m"},
             {"velocity", &ParticlePlace::velocity, "velocity at time 0", "m/s"},
-            {"color", &ParticlePlace::color, "colour, instead of that of the look"}};
+            {"color", &ParticlePlace::color, "colour, instead of the colour of the look"}};
   }
 };
 template <>

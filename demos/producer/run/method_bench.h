@@ -53,10 +53,10 @@ using MethodProgress = std::function<void(double fraction)>;
 MethodResult run_method(const std::string& name, const LoadedScene& loaded, const ModelLibrary& models,
                         double limit_s, const MethodProgress& progress = {});
 
-/// Merges two runs of the same method: keeps the shorter time, but not that of a run that ended early.
+/// Merges two runs of the same method: keeps the shorter time, unless it belongs to a run that ended early.
 void merge(MethodResult& result, const MethodResult& again);
 
-/// A table in aligned columns, or as CSV. The deviation is that from the first result.
+/// A table in aligned columns, or as CSV. The deviation is the deviation from the first result.
 std::string to_text(const std::vector<MethodResult>& results);
 std::string to_csv(const std::vector<MethodResult>& results);
 

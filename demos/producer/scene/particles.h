@@ -69,7 +69,7 @@ struct ParticlePlace {
 struct ParticleGroup {
   Where where;
   std::string name;
-  /// Particles one by one; after loading, those of the file and of `fill` follow.
+  /// Particles one by one; after loading, the particles of the file and of `fill` follow.
   std::vector<ParticlePlace> places;
   std::optional<Fill> fill;  ///< adds places
   std::string file;          ///< PLY or OBJ file; empty: none

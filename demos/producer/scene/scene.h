@@ -304,7 +304,7 @@ struct ModelCamera : Lens {
 };
 using Camera = std::variant<StaticCamera, KeyframedCamera, OrbitCamera, FollowCamera, ModelCamera>;
 
-/// A further camera, which is drawn on request.
+/// A further camera, which the option `--camera` selects.
 struct NamedCamera {
   Where where;
   std::string name;
