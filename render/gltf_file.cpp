@@ -411,7 +411,7 @@ std::vector<T> GltfFile::read(const GltfValue& accessor, const Layout& form,
   if (!sparse.exists()) return result;
   const GltfValue places = sparse.child("indices"), values = sparse.child("values");
   const std::size_t n = sparse.size("count", 0);
-  if (n > form.count) throw sparse.wrong("count", "is larger than that of the accessor");
+  if (n > form.count) throw sparse.wrong("count", "is larger than the accessor's count");
   const std::optional<std::size_t> place_view = places.index("bufferView", count("bufferViews"));
   const std::optional<std::size_t> value_view = values.index("bufferView", count("bufferViews"));
   if (!place_view || !value_view) throw FileError(sparse.place() + ": has no buffer view");

@@ -78,7 +78,7 @@ class alignas(64) ContactPair {
   /// The shapes by which the time of an impact of the two bodies is found.
   const CollisionShape& impact_shape_a() const { return impact_shape(*a_); }
   const CollisionShape& impact_shape_b() const { return impact_shape(*b_); }
-  /// Tests of volumes and pieces since the last call.
+  /// Returns how many tests of bounding volumes and of pairs of pieces were made since the last call.
   TestCounts take_tests() { return std::exchange(cache_.tests, {}); }
 
   /// Finds the contact points where the bodies at these poses are within `margin` [m] of each other. If their
@@ -86,10 +86,11 @@ class alignas(64) ContactPair {
   /// updated. `turning`: see find_manifolds().
   void find(const Pose& a, const Pose& b, Real margin, Real reuse, bool turning);
 
-  /// Adds speculative contacts to those of find() at the interval's start. They are where the freely moving
-  /// bodies would overlap at the interval's end by more than the existing points predict, because fast
-  /// turning or sliding brings other features together. Their separations are chosen such that the velocities
-  /// at the arms of the start, over `duration` [s], give the separations at the end.
+  /// Adds speculative contacts to the contacts that find() found at the interval's start. Speculative
+  /// contacts are where the freely moving bodies would overlap at the interval's end by more than the
+  /// existing points predict, because fast turning or sliding brings other features together. Their
+  /// separations are chosen such that the velocities at these points over `duration` [s], with the lever arms
+  /// of the start, give the separations at the end.
   void add_speculative_contacts(Real duration);
 
   /// Whether the motion of the points of a manifold of this pair over `duration` [s] predicts an overlap that
