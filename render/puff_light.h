@@ -31,9 +31,9 @@ struct PuffLight {
   /// Returns the radiance of a puff at a place. `number`: see AirLight::sun.
   PuffRadiance radiance(const Vector3f& place, float radius, const Vector3f& albedo, float number,
                         const Vector3f& to_eye) const;
-  /// Sky light on a white surface with this normal, and the sky reflected from a direction by a surface of
-  /// this roughness, as in shaders/sky.glsl.
+  /// Sky light on a white surface with this normal, as in shaders/sky.glsl.
   Vector3f ambient(const Vector3f& normal) const;
+  /// Light of the sky that a surface of this roughness reflects, when a mirror would show this direction.
   Vector3f sky_reflection(const Vector3f& direction, float roughness) const;
   /// Light that fog adds on the way to the eye, and in w the fraction that arrives, as fog_to in
   /// shaders/sky.glsl.

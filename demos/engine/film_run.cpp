@@ -56,7 +56,8 @@ void look_with(Scene& scene, const Scene& original, const producer::ModelLibrary
 
 }  // namespace
 
-FilmRun::FilmRun(FilmDef def, std::shared_ptr<const producer::ModelLibrary> models, const FilmResources& resources)
+FilmRun::FilmRun(FilmDef def, std::shared_ptr<const producer::ModelLibrary> models,
+                 const FilmResources& resources)
     : def_(std::move(def)),
       models_(std::move(models)),
       resources_(resources),

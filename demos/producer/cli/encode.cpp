@@ -92,7 +92,8 @@ void check_not_a_frame(const EncodeOptions& options, const FrameSequence& sequen
 }
 
 /// Encodes all frames; returns the number of encoded frames, which is smaller if a signal ended it.
-std::size_t encode(const FrameSequence& sequence, const render::VideoDef& def, const LogOptions& log_options) {
+std::size_t encode(const FrameSequence& sequence, const render::VideoDef& def,
+                   const LogOptions& log_options) {
   const auto sink = render::make_video_sink(def);
   ProgressPrinter printer(log_options.quiet ? ProgressStyle::none : log_options.progress);
   const auto start = std::chrono::steady_clock::now();

@@ -241,7 +241,7 @@ std::string preset_description(const std::string& name) {
 }
 
 std::vector<EffectParts> apply_presets(SceneSource& source, const SceneFolder& folder,
-                                     std::vector<Problem>& problems) {
+                                       std::vector<Problem>& problems) {
   if (!source.root.as<Object>()) return {};
   Layer layer(source, folder, problems);
   layer.lay_under_emitters();

@@ -1,6 +1,6 @@
 #pragma once
-/// The table of all keys of the scene format, with their units, ranges and help texts. The loader, the writer,
-/// the schema and the reference follow from it, so each key is defined only here.
+/// The table of all keys of the scene format, with their units, ranges and help texts. The loader, the
+/// writer, the schema and the reference follow from it, so each key is defined only here.
 ///
 /// To add a key, add one line to the file that is named after the object which gets the key:
 ///
