@@ -27,7 +27,7 @@ struct MtlMaterial {
   /// Textures by the names of their statements in lower case: map_kd, map_d, bump, norm, map_ke ...
   std::map<std::string, MtlMap> maps;
   std::optional<float> roughness, metallic;  ///< Pr, Pm
-  std::set<std::string> ignored;             ///< statements that are not drawn, in lower case
+  std::set<std::string> ignored;             ///< names of the statements without effect, in lower case
 };
 
 /// Parses the text of one library.

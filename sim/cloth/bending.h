@@ -47,11 +47,11 @@ class ClothBending {
   Real energy(std::span<const Vec4> x) const;
   /// Adds scale times the bending forces at x to f. The points are numbered within the cloth, from 0.
   void add_forces(std::span<const Vec4> x, Real scale, std::span<Vec4> f) const;
-  /// Adds the bending forces at x, and those of damping at the velocities v, to f.
+  /// Adds the bending forces at x, and the damping forces at the velocities v, to f.
   void add_damped_forces(std::span<const Vec4> x, std::span<const Vec4> v, std::span<Vec4> f);
   /// Adds scale K p to y: K is the Hessian of the energy without the curvature at rest.
   void multiply(std::span<const Vec4> p, Real scale, std::span<Vec4> y) const;
-  /// The factor of the unit matrix on the diagonal of K for a point [N/m].
+  /// The 3 x 3 block of K for a point is this number [N/m] times the unit matrix.
   Real diagonal(uint32_t point) const { return diagonal_[point]; }
 
   /// The curvature is measured by patches, two to a triangle: one measures the surroundings as a smooth

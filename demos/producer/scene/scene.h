@@ -296,7 +296,7 @@ struct FollowCamera : Lens {
   Vec3 offset = {0, 2, 6};  ///< position of the eye relative to the body, world axes
   Vec3 look_offset = Vec3::Zero();
 };
-/// A camera of the model file that a body shows. Its field of view is that of the file.
+/// A camera of the model file that a body shows. Its field of view comes from the file.
 struct ModelCamera : Lens {
   Where where;
   std::string body;
