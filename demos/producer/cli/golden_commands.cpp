@@ -277,8 +277,9 @@ Command add_compare(CLI::App& app) {
   const auto options = std::make_shared<CompareOptions>();
   CompareOptions& compare = *options;
   compare.golden = "tests/golden";
-  CLI::App* command = app.add_subcommand(
-      "compare", "Compare scenes with their goldens, or two pictures or folders of frames");
+  CLI::App* command = app.add_subcommand("compare",
+                                         "Compare scenes with their goldens (recorded states and pictures), "
+                                         "or two pictures or folders of frames");
   command->add_option("inputs", compare.inputs, "Scenes, or two pictures, or two folders of frames")
       ->required();
   command->add_option("--golden", compare.golden, "Folder of the goldens")->capture_default_str();
@@ -305,7 +306,8 @@ Command add_bless(CLI::App& app) {
   const auto options = std::make_shared<BlessOptions>();
   BlessOptions& bless = *options;
   bless.golden = "tests/golden";
-  CLI::App* command = app.add_subcommand("bless", "Record the goldens of scenes again");
+  CLI::App* command =
+      app.add_subcommand("bless", "Record the goldens of scenes again: their states and pictures");
   command->add_option("scenes", bless.scenes, "Scene files")->required();
   command->add_option("--golden", bless.golden, "Folder of the goldens")->capture_default_str();
   command->add_option("--reason", bless.reason, "Reason for the change, which the golden records")
