@@ -73,7 +73,7 @@ TEST(Textures, OptionsWithoutEffectAreNamed) {
   EXPECT_EQ(
       findings_of(R"({"materials": [{"name": "m", "texture_scale": 2}], "bodies": [{"material": "m"}]})",
                   folder),
-      "/materials/0/texture_scale: has no effect: there is no \"texture\"\n");
+      "/materials/0/texture_scale: has no effect: the material has no \"texture\"\n");
   EXPECT_EQ(
       findings_of(R"({"materials": [{"name": "m", "texture": "a.png", "texture_projection": "triplanar"}],
                             "cloths": [{"name": "c", "material": "m"}]})",

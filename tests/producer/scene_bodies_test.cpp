@@ -74,8 +74,8 @@ TEST(SceneBodies, WrongShapesAndTimesAreRefused) {
             "/bodies/0/shape/tube_radius: must be less than the \"radius\" of the torus\n"
             "/bodies/1/shape/thickness: must be less than the \"radius\" of the tube; use a cylinder for a "
             "solid one\n"
-            "/bodies/2/shape/thickness: must be less than half of the \"size\" along x and z, and less than "
-            "that along y\n"
+            "/bodies/2/shape/thickness: must be less than half of \"size\" along x and z, and less than "
+            "\"size\" along y\n"
             "/bodies/3/shape/parts: is empty; a compound needs at least one part\n"
             "/bodies/4/inertia_products: need \"inertia\"\n"
             "/bodies/5/remove_at: must be later than \"appear_at\" (2 s), got 1 s\n");
