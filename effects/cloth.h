@@ -39,10 +39,10 @@ sim::ClothDef mesh_cloth(const sim::TriangleMesh& mesh, const sim::Pose& pose, c
 sim::ClothDef sphere_cloth(Real radius, uint32_t divisions, const sim::Pose& pose, const Fabric& fabric);
 
 /// A cord between a vertex of a cloth and a point: masses and springs in a row. With one segment it is a
-/// spring, which pushes, too; with more it buckles when pushed.
+/// spring, which also resists compression; with more segments it buckles under compression.
 struct Cord {
   uint32_t vertex = 0;           ///< index of a vertex of the cloth
-  Vec3 end = Vec3::Zero();       ///< where the other end is at the start (world) [m]
+  Vec3 end = Vec3::Zero();       ///< position of the other end at the start, world [m]
   Real length = 0;               ///< length at rest [m]; 0: the distance of the ends
   uint32_t segments = 10;        ///< 1 to 1000
   Real stiffness = 50;           ///< force at a strain of 1 [N], > 0

@@ -17,7 +17,7 @@ class Draws;
 /// Counts of an emitter since its start.
 struct EmitterReport {
   uint64_t released = 0;
-  uint64_t skipped = 0;  ///< not released because max_alive was reached
+  uint64_t skipped = 0;  ///< particles that were not released because max_alive was reached
   uint64_t waiting = 0;  ///< particles that were due, but had no room on the surface; they are released later
   uint64_t waited = 0;   ///< total number of particles that were postponed
 };

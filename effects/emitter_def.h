@@ -28,11 +28,12 @@ struct TimeWindow {
 /// The directions and times at which an emitter releases particles. Times are on the emitter's clock, which
 /// shows 0 at the `origin` given to the Emitter.
 struct EmitterRelease {
-  Vec3 direction = Vec3::Zero();  ///< in the frame of the body or the world; zero: the normal of the surface
-  Real inherit_velocity = 1;      ///< fraction of the velocity of the body's point that particles get, >= 0
-  bool recoil = false;  ///< whether particles push a dynamic body back by their momentum relative to it
-  /// Particles are placed anywhere on the surface and are never postponed; for particles that do not collide
-  /// with each other.
+  /// Direction of release, in the frame of the body or the world; zero: the normal of the surface.
+  Vec3 direction = Vec3::Zero();
+  Real inherit_velocity = 1;  ///< fraction of the velocity of the body's point that particles get, >= 0
+  bool recoil = false;        ///< whether particles push a dynamic body back by their momentum relative to it
+  /// Whether particles are placed anywhere on the surface and are never postponed. For particles that do not
+  /// collide with each other.
   bool overlap = false;
   Varying rate = 100.0;  ///< particles per second, released one by one; 0: only `count` and bursts
   /// Particles per metre of the path of the body's point at the surface's origin [1/m], >= 0; spread evenly
@@ -48,7 +49,7 @@ struct EmitterRelease {
 };
 
 struct EmitterDef {
-  std::string name = {};  ///< also names its random stream
+  std::string name = {};  ///< name of the emitter, which also selects its random numbers
   uint64_t seed = 1;
   EmitterSurface surface = {};
   /// Null: fixed in the world; otherwise it moves with the body, and releases nothing while the body does not

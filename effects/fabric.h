@@ -20,22 +20,24 @@ enum class BendModel {
 
 struct Fabric {
   Real areal_density = 0.15;  ///< [kg/m^2], > 0
-  Real stretch = 1000;        ///< along the threads: force per metre of width at a strain of 1 [N/m], > 0
-  Real shear = 100;           ///< resistance across the cells [N/m], >= 0
+  /// Stiffness along the threads: force per metre of width at a strain of 1 [N/m], > 0.
+  Real stretch = 1000;
+  Real shear = 100;  ///< resistance across the cells [N/m], >= 0
   Real bend = 1e-4;  ///< flexural rigidity: moment per metre of width at a curvature of 1/m [N m], >= 0
   Real bend_damping = 2e-3;  ///< the moment is bend * (curvature + bend_damping * its rate) [s], >= 0
   BendModel bend_model = BendModel::plate;
   /// Fraction of the critical damping of each spring between its two points, >= 0.
   Real damping = 0.05;
-  /// The same of springs of one kind, >= 0; empty: `damping`. Those that bend are springs only with
-  /// BendModel::springs.
+  /// Fraction of the critical damping of one kind of springs, >= 0; empty: `damping`. Springs for bending
+  /// exist only with BendModel::springs.
   std::optional<Real> stretch_damping, shear_damping, bend_spring_damping;
   Real friction = 0.5;       ///< friction on bodies, >= 0
   Real self_friction = 0.3;  ///< friction on itself, >= 0
   /// Distance from other layers and from bodies [m], > 0; larger than that of real cloth.
   Real thickness = 0.005;
-  Real drag = 1;             ///< coefficient of the pressure of air perpendicular to the cloth, >= 0
-  Real lift = 0.98;          ///< at most `drag`; drag - lift is the coefficient for air along the cloth
+  Real drag = 1;  ///< coefficient of the pressure of air perpendicular to the cloth, >= 0
+  /// Coefficient of lift, at most `drag`; drag - lift is the coefficient for air along the cloth.
+  Real lift = 0.98;
   Real max_stretch = 1.1;    ///< greatest length over rest length along the threads, > 1; 0: no limit
   Real max_shear = 0;        ///< greatest length of shear springs over their rest length; 0: no limit
   Real min_bend_radius = 0;  ///< smallest radius to which it bends [m], >= 0; 0: no limit

@@ -10,11 +10,11 @@
 
 namespace offstage::effects {
 
-/// Allowed range of a parameter. Closed limits truncate a distribution (F2); an open limit must be set
-/// explicitly.
+/// Allowed range of a parameter. A closed limit truncates a distribution (F2). A distribution that can reach
+/// an open limit is refused unless its own `min` or `max` excludes the limit.
 struct Limits {
   Real low = -std::numeric_limits<Real>::max(), high = std::numeric_limits<Real>::max();
-  bool low_open = false;  ///< `low` itself is not allowed
+  bool low_open = false;  ///< whether `low` itself is not allowed
 };
 
 inline constexpr Limits kAnyNumber{}, kNotNegative{.low = 0}, kPositive{.low = 0, .low_open = true},
@@ -23,7 +23,8 @@ inline constexpr Real kMaxRate = 1e9, kMaxCount = 1e9, kMinInterval = 1e-6;
 inline constexpr Limits kRates{.low = 0, .high = kMaxRate}, kCounts{.low = 0, .high = kMaxCount};
 inline constexpr Limits kIntervals{.low = kMinInterval, .low_open = true};
 
-/// Throws std::invalid_argument in the name of `owner`, such as `emitter "rain"`.
+/// Throws std::invalid_argument if a value is not allowed. `owner` begins the message, such as `emitter
+/// "rain"`.
 void check(const std::string& owner, const char* field, const Varying& v, const Limits& limits);
 
 /// Checks the parameters that all new particles have.

@@ -13,7 +13,8 @@
 
 namespace offstage::effects {
 
-/// The use of a random number. The values affect the result of every scene: append, never renumber.
+/// The purpose of a random number. The values affect the result of every scene: append new ones, never
+/// renumber.
 enum Property : uint32_t {
   kRate,
   kCount,

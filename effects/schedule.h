@@ -13,7 +13,7 @@ namespace offstage::effects {
 struct Release {
   Real time;
   uint64_t count;
-  bool waited = false;  ///< whether it was postponed for lack of room on the surface
+  bool waited = false;  ///< whether the release was postponed for lack of room on the surface
 };
 
 class Schedule {

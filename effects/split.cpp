@@ -84,7 +84,7 @@ void Splitter::split(sim::World& world, const Due& due, Real start, Real end) {
     enter(own_children_.back(), line, due.time, due.left - 1);
   }
   report_.skipped += count - allowed;
-  ++report_.answered;
+  ++report_.triggered;
   if (due.left > 1)
     due_.push({due.time + draw(def_.delay, kDelay), due.id, due.line, due.left - 1, due.done + 1});
 }

@@ -17,26 +17,28 @@ class Draws;
 
 /// Percentages are of the parent's value at the time of the split; 100 gives the same value.
 struct SplitDef {
-  std::string name;  ///< also names its random stream
+  std::string name;  ///< name of the split, which also selects its random numbers
   uint64_t seed = 1;
   bool enabled = true;
   Varying count = 2.0;  ///< children per split, rounded
   Varying age = 1.0;    ///< age of the parent at its first split [s], > 0
-  Varying delay = 0.5;  ///< time to its next split [s], > 0; for n simulation steps use n WorldDef::max_step
-  /// Greatest number of splits in a line of descent, those of ancestors included. If children can split, too,
-  /// one particle becomes at most (1 + count)^depth.
+  /// Time from one split of a parent to its next [s], > 0; for n simulation steps use n WorldDef::max_step.
+  Varying delay = 0.5;
+  /// Greatest number of splits in a line of descent, including the splits of ancestors. If children can
+  /// split, too, one particle becomes at most (1 + count)^depth.
   int depth = 1;
   Varying velocity_percent = 100.0;
-  Varying spread_deg = 0.0;          ///< angle from the parent's direction [degrees]
-  Varying radius_percent = 50.0;     ///< > 0
-  Varying mass_percent = 0.0;        ///< mass of each child; 0: that by the parent's density
+  Varying spread_deg = 0.0;       ///< angle from the parent's direction [degrees]
+  Varying radius_percent = 50.0;  ///< > 0
+  /// Mass of each child; 0: the mass that follows from the parent's density.
+  Varying mass_percent = 0.0;
   Varying lifespan_percent = 100.0;  ///< > 0
   uint64_t max_alive = 1'000'000;    ///< children beyond this are not released, but counted
 };
 
-/// Splits the particles of one system into children of the same system, which then split themselves, or of
-/// another one. The parent continues to exist. Random numbers depend only on the line of descent, so they do
-/// not depend on the order of events.
+/// Splits the particles of one system into children of the same system, which then split themselves, or into
+/// children of another system. The parent continues to exist. Random numbers depend only on the line of
+/// descent, so they do not depend on the order of events.
 class Splitter {
  public:
   /// Throws std::invalid_argument if a parameter is out of range.

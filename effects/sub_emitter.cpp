@@ -92,7 +92,7 @@ void SubEmitter::answer(sim::World& world, const sim::ParticleEvent& event, Real
   }
   born_ += allowed;
   report_.skipped += count - allowed;
-  ++report_.answered;
+  ++report_.triggered;
 }
 
 sim::Particle SubEmitter::answer_to(const sim::ParticleEvent& event, const Draws& draw) const {

@@ -29,25 +29,27 @@ enum class Axis {
 /// The particles that an event releases.
 struct EventRelease {
   Real probability = 1;  ///< probability that an event triggers particles, in [0, 1]
-  Real min_speed = 0;    ///< smallest speed of the parent after the event [m/s]; slower ones trigger nothing
-  Varying count = 5.0;   ///< particles per event, rounded
+  /// Smallest speed of the parent after the event [m/s]; slower parents trigger nothing.
+  Real min_speed = 0;
+  Varying count = 5.0;  ///< particles per event, rounded
   Axis axis = Axis::normal;
   Varying velocity_percent = 0.0;  ///< fraction of the parent's velocity after the event
   uint64_t max_per_step = 10'000;  ///< new particles in one sub-step; more are not released, but counted
 };
 
 struct SubEmitterDef {
-  std::string name = {};  ///< also names its random stream
+  std::string name = {};  ///< name of the sub-emitter, which also selects its random numbers
   uint64_t seed = 1;
   Trigger trigger = Trigger::collision;
   Real age = 1;  ///< age for the trigger `age` [s], >= 0
   EventRelease release = {};
-  /// Their speed is added in the directions around the axis.
+  /// Parameters of the new particles. Their speed is along directions around the axis, in addition to their
+  /// fraction of the parent's velocity.
   NewParticles particles = {.spread_deg = 30.0, .radius = 0.005, .lifespan = 1.0};
 };
 
-/// Releases particles of one system at the events of another one, or of the same. Random numbers depend on
-/// the parent's id and the time of the event.
+/// Releases particles of one system at the events of particles of another system, or of the same one. Random
+/// numbers depend on the parent's id and the time of the event.
 class SubEmitter {
  public:
   /// Throws std::invalid_argument if a parameter is out of range.

@@ -22,10 +22,11 @@ struct TrailRelease {
 };
 
 struct TrailDef {
-  std::string name = {};  ///< also names its random stream
+  std::string name = {};  ///< name of the trail, which also selects its random numbers
   uint64_t seed = 1;
   TrailRelease release = {};
-  /// Their speed is added in the directions around the one opposite to the parent's velocity.
+  /// Parameters of the new particles. Their speed is opposite to the parent's velocity, in addition to their
+  /// fraction of that velocity.
   NewParticles particles = {.speed = 0.0, .radius = 0.005, .lifespan = 1.0};
 };
 

@@ -11,7 +11,7 @@ struct Bloom {
   float threshold = 4;      ///< applies to the brightest channel after exposure; a sunlit white is about 4
   float strength = 0.12f;   ///< fraction of the light above the threshold that is spread
   float radius = 0.04f;     ///< radius of the widest blur, as a fraction of the picture's height
-  float exposure = 1;       ///< same meaning as in ToneMap
+  float exposure = 1;       ///< see ToneMap::exposure
   float sample_weight = 1;  ///< 1 / number of sub-frames summed in the image
 };
 

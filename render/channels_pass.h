@@ -17,8 +17,8 @@ class ChannelsPass {
   void begin(const Matrix4f& clip_from_world, const Matrix4f& clip_before_from_world);
   void draw(const Instance& instance);
   void draw(const Cloth& cloth);
-  /// Draws balls that PointsPass has prepared. Their previous positions follow from their velocity over
-  /// `time` [s].
+  /// Draws the balls of a set, after PointsPass has prepared it. Their previous positions follow from their
+  /// velocity over `time` [s].
   void draw_balls(PointsPass& pass, const PointSet& set, float time);
   void end(Channels& result);
 

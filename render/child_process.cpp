@@ -43,7 +43,7 @@ BoundedCapture::BoundedCapture(std::size_t max_bytes)
     : max_bytes_(max_bytes), memory_(::memfd_create("offstage-capture", MFD_CLOEXEC | MFD_ALLOW_SEALING)) {
   if (!memory_ || ::ftruncate(memory_.fd(), static_cast<off_t>(max_bytes)) != 0 ||
       ::fcntl(memory_.fd(), F_ADD_SEALS, F_SEAL_GROW) != 0) {
-    throw_file_error("memory file", "cannot be made");
+    throw_file_error("memory file", "cannot be created");
   }
 }
 
@@ -106,7 +106,7 @@ std::optional<std::string> ChildProcess::wait(const StopTest& stop) {
     ended = ::waitpid(pid_, &status, 0);
   } while (ended < 0 && errno == EINTR);
   pid_ = -1;
-  return ended < 0 ? "an unknown end: " + system_reason(errno) : describe_failure(status);
+  return ended < 0 ? "an unknown exit status: " + system_reason(errno) : describe_failure(status);
 }
 
 std::optional<std::string> ChildProcess::wait_for(std::chrono::milliseconds limit) {

@@ -13,15 +13,15 @@
 
 namespace offstage::render {
 
-/// A cloth as stored in the stage.
+/// A cloth of the stage, with the data for drawing it.
 struct Cloth {
   const GpuMaterial* material = nullptr;
   float thickness = 0;
   Vector2f texture_from_uv = {1, 1};
   bool casts_shadow = true;
   ClothSurface surface;
-  uint32_t object = 0;           ///< id in Channels
-  std::vector<Vector3f> before;  ///< vertex positions at Stage::store_previous_transforms
+  uint32_t object = 0;           ///< id of the object in Channels
+  std::vector<Vector3f> before;  ///< vertex positions at the last Stage::store_previous_transforms()
 
   gl::StreamBuffer vertices, indices;
   uint32_t uploaded = 0;  ///< version of the uploaded indices
@@ -40,7 +40,7 @@ class ClothPass {
   /// Draws the depth of an opaque cloth into the picture. It is exactly the surface that `draw` shades.
   void draw_depth(const Cloth& cloth);
   void draw(const Cloth& cloth, const Features& features);
-  /// Writes the surface of a cloth for the tracer of light.
+  /// Draws the surface of a cloth into the targets from which its light is traced.
   void draw_surface(const Cloth& cloth);
 
  private:
@@ -49,7 +49,7 @@ class ClothPass {
   gl::LazyProgram& program(const GpuMaterial& material, const Features& features);
 
   std::map<std::tuple<Weave, Pattern, bool, bool, Features>, gl::LazyProgram>
-      programs_;  ///< keyed also by textured, translucent
+      programs_;  ///< key: textured, translucent, features
   gl::LazyProgram depth_, surface_, sheer_surface_, textured_sheer_surface_;
 };
 

@@ -13,7 +13,7 @@
 namespace offstage::render {
 
 struct ClothVertex {
-  Vector3f position;  ///< on the middle layer; rim vertices lie on the surface
+  Vector3f position;  ///< position on the middle layer of the cloth; rim vertices lie on the surface
   Vector3f normal;    ///< normal of the front; rim normals point outwards
   float lift;         ///< half the thickness [m]; 0 for rim vertices
   Vector2f uv;        ///< position along the cloth [m]

@@ -49,8 +49,8 @@ ProcessLimits limits_of(const ConfinedWork& work) {
   } catch (const FileError& error) {
     message = error.what();
   } catch (const std::bad_alloc&) {
-    message = work.what + ": needs more than " + std::to_string(limits.memory_bytes / kMiB) +
-              " MiB of memory to read; it is broken or too large";
+    message = work.what + ": reading it needs more than " + std::to_string(limits.memory_bytes / kMiB) +
+              " MiB of memory; the file is broken or too large";
   } catch (const std::exception& error) {
     message = work.what + ": cannot be read: " + one_line(error.what());
   }
@@ -61,8 +61,8 @@ ProcessLimits limits_of(const ConfinedWork& work) {
 }
 
 [[noreturn]] void throw_too_slow(const ConfinedWork& work, const ProcessLimits& limits) {
-  throw FileError(work.what + ": takes more than " + std::to_string(limits.cpu_s) +
-                  " s of processor time to read; it is broken or too large");
+  throw FileError(work.what + ": reading it takes more than " + std::to_string(limits.cpu_s) +
+                  " s of processor time; the file is broken or too large");
 }
 
 /// Detects a child that does not work any more: in the last minute it used less than a hundredth of the time.
@@ -106,21 +106,23 @@ int wait_status(pid_t child, const ConfinedWork& work) {
   }
   int status = 0;
   while (::waitpid(child, &status, 0) < 0)
-    if (errno != EINTR) throw UnavailableError("the reader of files was lost: " + system_reason(errno));
+    if (errno != EINTR)
+      throw UnavailableError("the process that reads files cannot be waited for: " + system_reason(errno));
   if (stopped) throw StoppedError(work.what + ": reading was interrupted");
   if (still)
-    throw FileError(work.what + ": its reader made no progress for " +
-                    std::to_string(work.standstill.count()) + " s; it is broken");
+    throw FileError(work.what + ": the process that reads it made no progress for " +
+                    std::to_string(work.standstill.count()) + " s; the file is broken");
   return status;
 }
 
 [[noreturn]] void throw_for_end(const ConfinedWork& work, const ProcessLimits& limits, int status) {
   if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) throw_too_slow(work, limits);
   if (WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL)
-    throw FileError(work.what +
-                    ": its reader was killed from outside; perhaps the machine ran out of memory");
-  throw FileError(work.what + ": crashed its reader (" + describe_failure(status).value_or("ended") +
-                  "); it is broken or nested too deeply");
+    throw FileError(
+        work.what +
+        ": the process that reads it was killed by another process; perhaps the machine ran out of memory");
+  throw FileError(work.what + ": crashed the process that reads it (" +
+                  describe_failure(status).value_or("ended") + "); it is broken or nested too deeply");
 }
 
 }  // namespace
@@ -138,10 +140,12 @@ ChildAnswer::~ChildAnswer() {
 
 ChildAnswer run_confined(const ConfinedWork& work, const std::function<void(int)>& job) {
   const Descriptor memory(::memfd_create("offstage-answer", MFD_CLOEXEC));
-  if (!memory) throw UnavailableError("no memory file for the reader of files: " + system_reason(errno));
+  if (!memory)
+    throw UnavailableError("no memory file can be created for reading files: " + system_reason(errno));
   const ProcessLimits limits = limits_of(work);
   const pid_t child = ::fork();
-  if (child < 0) throw UnavailableError("the reader of files cannot be started: " + system_reason(errno));
+  if (child < 0)
+    throw UnavailableError("the process that reads files cannot be started: " + system_reason(errno));
   if (child == 0) become_child(work, limits, memory.fd(), job);
 
   const int status = wait_status(child, work);

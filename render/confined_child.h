@@ -14,11 +14,12 @@
 namespace offstage::render {
 
 struct ConfinedWork {
-  std::string what;  ///< name of the file, for messages
+  std::string what;  ///< name of the file that is read, for messages
   /// Size of the file, which determines the limits: 10 s of processor time and 1 s more for each 5 MiB, at
   /// most 60 s; 1.5 GiB of memory and 16 times the size, at most 4 GiB.
   uint64_t file_bytes = 0;
-  /// Number of pictures that the file may refer to: 128 MiB of memory more for each, within the same 4 GiB.
+  /// Number of pictures that the file may refer to. Each adds 128 MiB to the limit of memory, up to the same
+  /// 4 GiB.
   uint64_t pictures = 0;
   const InputFolders* folders = nullptr;  ///< folders that may be read
   StopTest stop = {};
@@ -41,9 +42,9 @@ class ChildAnswer {
   void* data_ = nullptr;
 };
 
-/// Runs `job` in the child, with a memory file for its answer. Throws FileError with the message of `job`, or
-/// with how the child ended: too slow, too much memory, killed, crashed. Throws StoppedError after a request
-/// to stop, and UnavailableError if no process can be started.
+/// Runs `job` in a child process; its argument is the descriptor of a memory file for the answer. Throws
+/// FileError with the message of `job`, or with how the child ended: too slow, too much memory, killed,
+/// crashed. Throws StoppedError after a request to stop, and UnavailableError if no process can be started.
 ChildAnswer run_confined(const ConfinedWork& work, const std::function<void(int)>& job);
 
 }  // namespace offstage::render

@@ -93,7 +93,8 @@ GlPlatform gl_platform(std::string_view name) {
     if (known == name) return value;
     names += (names.empty() ? "" : ", ") + std::string(known);
   }
-  throw std::invalid_argument("'" + std::string(name) + "' is not an OpenGL backend; there are " + names);
+  throw std::invalid_argument("'" + std::string(name) + "' is not an OpenGL backend; the backends are " +
+                              names);
 }
 
 GlPlatform gl_platform_of_environment() {

@@ -20,7 +20,8 @@ enum class GlPlatform {
 
 /// Returns "auto", "osmesa", "egl" or "egl:gpu".
 std::string_view name_of(GlPlatform platform);
-/// Returns the platform of such a name. Throws std::invalid_argument, which lists the names.
+/// Returns the platform with a name as name_of() returns it. Throws std::invalid_argument, which lists the
+/// names.
 GlPlatform gl_platform(std::string_view name);
 /// Returns the platform in the environment variable OFFSTAGE_GL, or automatic if it is not set. Throws
 /// std::invalid_argument for an unknown name.
@@ -61,7 +62,7 @@ class Context {
 
 /// A device listed by EGL.
 struct EglDevice {
-  bool software = false;   ///< llvmpipe rather than a GPU
+  bool software = false;   ///< whether the device is llvmpipe, not a GPU
   std::string name;        ///< name from the vendor's driver, such as "NVIDIA H100 80GB HBM3"; may be empty
   std::string file;        ///< device file, such as /dev/dri/card0; empty if there is none
   std::string extensions;  ///< EGL_EXTENSIONS of the device

@@ -50,7 +50,8 @@ class Bytes : public Imf::IStream {
   explicit Bytes(std::span<const uint8_t> bytes) : Imf::IStream("memory"), bytes_(bytes) {}
   bool read(char c[], int n) override {
     const auto size = static_cast<std::size_t>(n);
-    if (at_ > bytes_.size() || size > bytes_.size() - at_) throw std::runtime_error("it ends too early");
+    if (at_ > bytes_.size() || size > bytes_.size() - at_)
+      throw std::runtime_error("the file ends too early");
     std::memcpy(c, bytes_.data() + at_, size);
     at_ += size;
     return at_ < bytes_.size();
@@ -73,8 +74,8 @@ HdrImage decode_rgb(std::span<const uint8_t> bytes, uint64_t max_pixels) {
   if (width < 1 || height < 1 || width > kMostSide || height > kMostSide ||
       static_cast<uint64_t>(width * height) > max_pixels)
     throw std::runtime_error("it has " + std::to_string(width) + "x" + std::to_string(height) +
-                             " pixels, of at most " + std::to_string(max_pixels >> 20) + " Mi and " +
-                             std::to_string(kMostSide) + " a side");
+                             " pixels; at most " + std::to_string(max_pixels >> 20) + " Mi pixels and " +
+                             std::to_string(kMostSide) + " per side are possible");
   const Imf::ChannelList& channels = file.header().channels();
   const bool grey = channels.findChannel("R") == nullptr;
   const char* names[] = {grey ? "Y" : "R", grey ? "Y" : "G", grey ? "Y" : "B"};

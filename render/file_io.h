@@ -44,7 +44,7 @@ std::string system_reason(int error);
 [[noreturn]] void throw_file_error(const std::filesystem::path& path, const std::string& what,
                                    int error = errno);
 
-/// Polled during waits; true asks to end them. Empty: never.
+/// Polled during waits: returns true to ask for their end. Empty: waits are never ended.
 using StopTest = std::function<bool()>;
 
 /// Limits the wait for another program: after a request to stop, the program has three seconds to make
@@ -71,7 +71,7 @@ int write_all(int fd, std::span<const uint8_t> bytes, const StopTest& stop = {})
 /// Returns the bytes of a regular file. Named pipes, devices and folders are refused at once. Throws
 /// FileError, also for a file larger than `max_bytes`.
 std::vector<uint8_t> read_file(const std::filesystem::path& path, uint64_t max_bytes);
-/// Reads a whole file as text.
+/// Returns the text of a regular file, like read_file().
 std::string read_text_file(const std::filesystem::path& path, uint64_t max_bytes);
 
 /// Creates the parent folders of `file`. Throws FileError.

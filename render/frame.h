@@ -34,15 +34,15 @@ struct FrameUniforms {
 
 static_assert(offsetof(FrameUniforms, air) == 22 * sizeof(Vector4f));
 
-/// Defines of the shaders that depend on the lighting, such as "LAMPS 1".
+/// Preprocessor definitions for shaders, which depend on the lighting, such as "LAMPS 1".
 using Features = std::vector<std::string>;
 
 /// The eye of one sub-frame: displaced within the lens, looking along `forward`.
 struct View {
   Matrix4f clip_from_world;
   Vector3f eye, right, up, forward;
-  Vector2f tan_half;  ///< half the width and height of the image plane at distance 1
-  Vector2f shear;     ///< shift of the image in half-sizes, by lens and pixel offsets
+  Vector2f tan_half;  ///< half the width and half the height of the image plane at distance 1
+  Vector2f shear;     ///< shift of the image due to lens and pixel offsets, as a fraction of tan_half
   float near_m = 0, far_m = 0;
 
   /// Whether a ball may be in view; false only if it is outside of one plane of the frustum.
@@ -63,7 +63,7 @@ class ScreenArea {
  private:
   const View& view_;
   float margin_;
-  Eigen::AlignedBox2f area_;  ///< in [-1, 1]
+  Eigen::AlignedBox2f area_;  ///< rectangle in normalized coordinates, from -1 to 1
 };
 
 /// Creates the view of a sub-frame. Depth runs from 1 at the near plane to 0 at the far one, which keeps

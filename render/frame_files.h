@@ -19,7 +19,7 @@ enum class FrameFormat {
 
 /// The format of a file by its ending: .png, .jpg, .jpeg or .exr; nothing for others.
 std::optional<FrameFormat> frame_format(const std::filesystem::path& path);
-/// Returns these endings, with their dots.
+/// Returns the endings of files of frames, with their dots.
 const std::vector<std::string>& frame_endings();
 
 /// Size and settings that are stored in the file of a frame.
@@ -35,7 +35,7 @@ std::optional<FrameFile> inspect_frame(const std::filesystem::path& path);
 
 /// Writes half floats of linear light: R, G, B, and A if the image is transparent. Throws FileError.
 void write_exr(const std::filesystem::path& path, const HdrImage& image, const std::string& settings = {});
-/// The part of inspect_frame() for EXR files.
+/// Does what inspect_frame() does, for EXR files.
 std::optional<FrameFile> inspect_exr(const std::filesystem::path& path);
 
 /// Creates a sink that writes one file per frame, in the format of the pattern's ending, with the settings.

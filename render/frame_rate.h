@@ -9,7 +9,7 @@
 namespace offstage::render {
 
 struct FrameRate {
-  int numerator = 30, denominator = 1;  ///< in lowest terms; positive in a valid rate
+  int numerator = 30, denominator = 1;  ///< the fraction in lowest terms; a valid rate is positive
 
   constexpr FrameRate(int n = 30, int d = 1) : numerator(n), denominator(d) {}
   bool operator==(const FrameRate&) const = default;

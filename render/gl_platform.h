@@ -19,7 +19,8 @@ class PlatformContext {
 
 /// Creates an OpenGL 4.5 core context, current on this thread. Throws UnavailableError.
 std::unique_ptr<PlatformContext> make_osmesa_context();
-/// Does the same by EGL without a surface, on llvmpipe or on the first GPU with OpenGL 4.5.
+/// Creates an OpenGL 4.5 core context by EGL without a surface, current on this thread, on llvmpipe or on the
+/// first GPU with OpenGL 4.5. Throws UnavailableError.
 std::unique_ptr<PlatformContext> make_egl_context(bool gpu);
 
 /// A shared library that stays loaded until the process ends.

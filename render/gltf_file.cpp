@@ -194,8 +194,9 @@ void GltfFile::check() {
   const GltfValue asset = root_.child("asset");
   const std::string version = asset.text("version"), least = asset.text("minVersion", "2.0");
   if (!version.starts_with("2."))
-    throw FileError("asset.version is '" + one_line(version.substr(0, 20)) + "'; 2.0 can be read");
-  if (least != "2.0") throw FileError("it needs glTF " + one_line(least.substr(0, 20)) + "; 2.0 can be read");
+    throw FileError("asset.version is '" + one_line(version.substr(0, 20)) + "'; only 2.0 can be read");
+  if (least != "2.0")
+    throw FileError("it needs glTF " + one_line(least.substr(0, 20)) + "; only 2.0 can be read");
   check_extensions();
 }
 
@@ -265,7 +266,7 @@ void GltfFile::warn(const std::string& line) {
   constexpr std::size_t kMostCharacters = 300;
   const std::string text = one_line(line.substr(0, kMostCharacters));
   if (warned_.size() <= kMaxGltfWarnings && warned_.insert(text).second)
-    warnings_.push_back(warned_.size() > kMaxGltfWarnings ? "further warnings are left out" : text);
+    warnings_.push_back(warned_.size() > kMaxGltfWarnings ? "further warnings are omitted" : text);
 }
 
 std::vector<uint8_t> GltfFile::resource(const std::string& uri, const std::string& what) const {
@@ -277,7 +278,7 @@ std::vector<uint8_t> GltfFile::resource(const std::string& uri, const std::strin
     return base64_decoded(std::string_view(uri).substr(comma + 1), what);
   }
   const std::filesystem::path file = find_beside(path_.parent_path(), uri);
-  if (file.empty()) throw FileError(what + ": '" + one_line(uri.substr(0, 200)) + "' is not there");
+  if (file.empty()) throw FileError(what + ": '" + one_line(uri.substr(0, 200)) + "' does not exist");
   if (!folders_.contain(file))
     throw FileError(what + ": '" + one_line(uri.substr(0, 200)) +
                     "' is outside of the folders that may be read");
@@ -410,7 +411,7 @@ std::vector<T> GltfFile::read(const GltfValue& accessor, const Layout& form,
   if (!sparse.exists()) return result;
   const GltfValue places = sparse.child("indices"), values = sparse.child("values");
   const std::size_t n = sparse.size("count", 0);
-  if (n > form.count) throw sparse.wrong("count", "is larger than that of the accessor");
+  if (n > form.count) throw sparse.wrong("count", "is larger than the accessor's count");
   const std::optional<std::size_t> place_view = places.index("bufferView", count("bufferViews"));
   const std::optional<std::size_t> value_view = values.index("bufferView", count("bufferViews"));
   if (!place_view || !value_view) throw FileError(sparse.place() + ": has no buffer view");

@@ -17,8 +17,8 @@ struct GltfPrimitive {
   FileSurface surface;
   std::size_t points = 0,
               lines = 0;  ///< number of points and lines of a primitive without triangles; they are not drawn
-  std::vector<uint32_t> joints;  ///< `influences` per vertex, of the skin's list
-  std::vector<float> weights;    ///< as long as `joints`
+  std::vector<uint32_t> joints;  ///< indices into the joints of the skin, `influences` for each vertex
+  std::vector<float> weights;    ///< weight of each entry of `joints`
   std::size_t influences = 0;    ///< joints per vertex
 };
 
@@ -30,9 +30,10 @@ class GltfGeometry {
   std::size_t primitive_count(std::size_t mesh) const {
     return file_.item("meshes", mesh).count("primitives");
   }
-  /// The primitive before morph targets; read once.
+  /// Returns a primitive without its morph targets. Each is read only once.
   const GltfPrimitive& primitive(std::size_t mesh, std::size_t index);
-  /// Adds the morph targets, if any has a weight. `weights` of a node replace those of the mesh.
+  /// Returns a primitive with its morph targets, or nothing if none has a weight. The `weights` of a node
+  /// replace the weights of the mesh.
   std::optional<FileSurface> morphed(std::size_t mesh, std::size_t index, const GltfValue& node);
   /// Poses a surface by the joints' transforms (section 3.7.3.3): positions are then in the scene's frame.
   FileSurface posed(const FileSurface& surface, const GltfPrimitive& source,

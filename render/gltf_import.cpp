@@ -258,10 +258,11 @@ class GltfImporter {
     if (!rig_)
       warn(file_.count("animations"),
            "animations are not played: the model is in its rest pose; `animation` of a body plays one");
-    if (model_.cameras.empty()) warn(file_.count("cameras"), "cameras have no usable place in the scene");
+    if (model_.cameras.empty())
+      warn(file_.count("cameras"), "cameras are ignored: no node of the file's scene has a usable camera");
     if (model_.lights.empty())
       warn(file_.root().extension("KHR_lights_punctual").count("lights"),
-           "lights have no usable place in the scene");
+           "lights are ignored: no node of the file's scene has a usable light");
   }
 
   /// The default material is the last one; it is kept if a part uses it, or if there is no other.

@@ -11,9 +11,9 @@
 
 namespace offstage::render {
 
-/// Imports the default scene of a file in its rest pose: nodes, skins and morph targets applied. As
-/// import_model(), but with the reasons of errors only. Empty for a file of version 1, which assimp reads.
-/// Throws FileError.
+/// Imports the default scene of a file in its rest pose: nodes, skins and morph targets applied. Does what
+/// import_model() does, but its errors contain only the reason. Returns nothing for a file of version 1,
+/// which assimp reads. Throws FileError.
 std::optional<Model> import_gltf(const std::filesystem::path& path, const std::string& node,
                                  const InputFolders& folders, bool with_rig);
 

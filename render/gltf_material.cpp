@@ -184,7 +184,7 @@ void GltfMaterials::read_iridescence(const GltfValue& source, Material& look) {
   look.color.head<3>() += of_metal * (metal - look.color.head<3>());
   look.specular += strength * (film_reflectance(n, thickness_nm, look.specular) - look.specular);
   file_.warn(
-      "KHR_materials_iridescence is approximated: the colours that it has from the front are drawn at all "
+      "KHR_materials_iridescence is approximated: its colours of a perpendicular view are drawn at all "
       "angles");
   warn_of_textures(film, {"iridescenceTexture", "iridescenceThicknessTexture"});
 }

@@ -134,8 +134,8 @@ Image decode_webp(std::span<const uint8_t> bytes, const std::string& name, uint6
   const auto width = static_cast<uint64_t>(features.width), height = static_cast<uint64_t>(features.height);
   if (width * height > max_pixels)
     throw FileError(name + ": cannot be read as an image: it has " + std::to_string(width) + "x" +
-                    std::to_string(height) + " pixels, of at most " + std::to_string(max_pixels >> 20) +
-                    " Mi");
+                    std::to_string(height) + " pixels; at most " + std::to_string(max_pixels >> 20) +
+                    " Mi pixels are possible");
   Image image{features.width, features.height, std::vector<uint8_t>(width * height * 4)};
   image.transparent = features.has_alpha != 0;
   if (WebPDecodeRGBAInto(bytes.data(), bytes.size(), image.rgba.data(), image.rgba.size(),

@@ -21,7 +21,7 @@ struct MeshoptView {
   std::string mode;    ///< ATTRIBUTES, TRIANGLES or INDICES
   std::string filter;  ///< NONE, OCTAHEDRAL, QUATERNION or EXPONENTIAL
   std::size_t count = 0, stride = 0;
-  std::string place;  ///< for messages
+  std::string place;  ///< place in the document, for messages
 };
 /// Returns `count * stride` bytes. Throws FileError.
 std::vector<uint8_t> unpack_meshopt(const MeshoptView& view, std::span<const uint8_t> packed);
@@ -30,7 +30,7 @@ std::vector<uint8_t> unpack_meshopt(const MeshoptView& view, std::span<const uin
 struct DracoMesh {
   struct Attribute {
     int width = 0;            ///< numbers per vertex
-    bool normalized = false;  ///< integers were scaled to [0, 1] or [-1, 1]
+    bool normalized = false;  ///< whether integers were scaled to [0, 1] or [-1, 1]
     std::vector<float> values;
   };
   std::vector<uint32_t> indices;

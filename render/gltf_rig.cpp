@@ -103,7 +103,7 @@ void GltfRig::add_mesh(std::size_t index, std::size_t mesh, std::span<const Eige
       continue;
     }
     if (instances.size() > 1)
-      file_.warn(node.place() + ": only one of its instances is drawn, because it deforms");
+      file_.warn(node.place() + ": only one of its instances is drawn, because the mesh deforms");
     surface.flat = surface.mesh.normals.size() != surface.mesh.positions.size();
     if (surface.flat) separate_corners(surface);
     rig_.surfaces.push_back(std::move(surface));
@@ -236,8 +236,9 @@ RigClip GltfRig::clip(std::size_t index) {
       clip.duration = std::max(clip.duration, read->times.back());
       RigNode& node = rig_.nodes[static_cast<std::size_t>(read->node)];
       if (node.has_matrix && read->path != RigChannel::Path::weights)
-        file_.warn(animation.place() + ": the node '" + node.name +
-                   "' has a matrix, which hides its animation");
+        file_.warn(
+            animation.place() + ": the node '" + node.name +
+            "' has a matrix in place of translation, rotation and scale, so its animation has no effect");
       clip.channels.push_back(std::move(*read));
     }
   return clip;

@@ -14,7 +14,7 @@ namespace offstage::render {
 
 class GltfRig {
  public:
-  /// `parents`: of each node of the file, -1: none; `order`: all nodes, parents first.
+  /// `parents`: parent of each node of the file, or -1; `order`: all nodes, parents first.
   GltfRig(GltfFile& file, GltfGeometry& geometry, std::span<const int> parents,
           std::span<const std::size_t> order);
 
@@ -23,7 +23,7 @@ class GltfRig {
   void add_mesh(std::size_t node, std::size_t mesh, std::span<const Eigen::Affine3d> instances);
   /// Index of a node of the file in the rig.
   int index_of(std::size_t node) const { return rig_index_[node]; }
-  /// Reads the animations; call it after all meshes.
+  /// Reads the animations and returns the rig. Must be called after all meshes were added.
   ModelRig finish();
 
  private:

@@ -1,5 +1,6 @@
 #pragma once
-/// Private: converts pictures of classic materials to those of physically based ones.
+/// Private: converts textures of classic materials (bump maps, masks) to textures of physically based
+/// materials.
 
 #include "render/image.h"
 
@@ -7,8 +8,8 @@ namespace offstage::render {
 
 /// Whether a picture looks like a normal map: bluish, and neutral in red and green on average.
 bool is_normal_map(const Image& image);
-/// The normal map (X towards +u, Y towards the top) of a height map that repeats: white is one hundredth of
-/// the picture's width above black, times `bump`.
+/// Returns the normal map (X towards +u, Y towards the top) of a height map that repeats. The height of white
+/// above black is `bump` times one hundredth of the picture's width.
 Image normals_of_heights(const Image& heights, float bump);
 /// `base` with the alpha of a mask: the mask's own alpha if it has any, else its luminance. An empty base is
 /// white and as large as the mask.

@@ -12,7 +12,7 @@ namespace offstage::render {
 struct Image {
   int width_px = 0, height_px = 0;
   std::vector<uint8_t> rgba;  ///< width * height * 4
-  bool transparent = false;   ///< alpha is used; otherwise files are written without alpha
+  bool transparent = false;   ///< whether alpha is used; otherwise files are written without alpha
 
   std::size_t pixel_count() const {
     return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);
@@ -23,7 +23,7 @@ struct Image {
 struct HdrImage {
   int width_px = 0, height_px = 0;
   std::vector<float> rgba;   ///< width * height * 4
-  bool transparent = false;  ///< same as Image::transparent
+  bool transparent = false;  ///< whether alpha is used; see Image::transparent
 
   std::size_t pixel_count() const {
     return static_cast<std::size_t>(width_px) * static_cast<std::size_t>(height_px);

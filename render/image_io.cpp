@@ -49,11 +49,11 @@ FileError unreadable_image(const std::string& name, const std::string& why) {
 /// The size that the file declares, checked before anything is decoded.
 void check_image_size(int width, int height, const std::string& name, uint64_t max_pixels) {
   const std::string size =
-      "it has " + std::to_string(width) + "x" + std::to_string(height) + " pixels, of at most ";
+      "it has " + std::to_string(width) + "x" + std::to_string(height) + " pixels; at most ";
   if (width > kMaxSide || height > kMaxSide)
-    throw unreadable_image(name, size + std::to_string(kMaxSide) + " a side");
+    throw unreadable_image(name, size + std::to_string(kMaxSide) + " per side are possible");
   if (static_cast<uint64_t>(width) * static_cast<uint64_t>(height) > max_pixels)
-    throw unreadable_image(name, size + std::to_string(max_pixels >> 20) + " Mi");
+    throw unreadable_image(name, size + std::to_string(max_pixels >> 20) + " Mi pixels are possible");
 }
 
 void check_declared_size(std::span<const uint8_t> bytes, const std::string& name, uint64_t max_pixels) {

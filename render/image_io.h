@@ -19,7 +19,7 @@ inline constexpr uint64_t kMaxTexturePixels = uint64_t{1}
 /// pixels a side; 16-bit samples are converted to 8 bits. The declared size is checked before decoding.
 /// Throws FileError.
 Image read_image(const std::filesystem::path& path, uint64_t max_pixels = kMaxImagePixels);
-/// Reads an image from memory (for textures embedded in model files); `name` is used in messages.
+/// Decodes an image in memory, such as a texture embedded in a model file. `name` is used in messages.
 Image decode_image(std::span<const uint8_t> bytes, const std::string& name,
                    uint64_t max_pixels = kMaxImagePixels);
 
@@ -31,7 +31,7 @@ struct LightImage {
   std::vector<std::string> warnings;
 };
 /// Reads Radiance HDR, OpenEXR (RGB or Y), or a picture in sRGB that read_image() reads, with all of its
-/// bits. Values that are negative or not numbers become 0, infinite ones the largest half float; both with a
+/// bits. Negative values and NaN become 0, and infinite values become the largest half float; both with a
 /// warning. Throws FileError.
 LightImage decode_light_image(std::span<const uint8_t> bytes, const std::string& name,
                               uint64_t max_pixels = kMaxLightPixels);
@@ -43,7 +43,8 @@ std::vector<uint8_t> encode_png(const Image& image, const std::string& settings 
 
 /// Start of the comment in which a JPEG stores its settings.
 inline constexpr std::string_view kJpegSettings = "offstage settings ";
-/// Encodes JPEG of quality 95 with colour at full resolution. `settings` as for PNG. Alpha is left out.
+/// Encodes JPEG of quality 95 with colour at full resolution. `settings` are stored as by encode_png(). Alpha
+/// is omitted.
 std::vector<uint8_t> encode_jpeg(const Image& image, const std::string& settings = {});
 
 /// Returns the settings stored in a PNG of offstage; empty for other files, and for a file that cannot be

@@ -8,7 +8,7 @@ namespace offstage::render {
 
 class InputFolders {
  public:
-  /// No files may be read.
+  /// No folders: no file may be read.
   InputFolders() = default;
   /// The folders and their subfolders; symbolic links are resolved in the constructor. Folders that do not
   /// exist are ignored.

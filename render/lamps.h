@@ -1,5 +1,5 @@
 #pragma once
-/// Private: fires as lamps.
+/// Private: lamps that stand for the light of fires.
 
 #include "render/points_pass.h"
 

@@ -14,8 +14,7 @@ struct View;
 
 class LightPass {
  public:
-  /// `depth`: the picture's depth, in which the visible surfaces were drawn.
-  /// `quick`: see StageDef.
+  /// `depth`: depth buffer of the picture, into which the visible surfaces are drawn. `quick`: see StageDef.
   LightPass(int width_px, int height_px, const gl::Texture& depth, bool quick);
   /// The scene that rays meet, to be filled and built before trace().
   RayScene& scene() { return scene_; }
@@ -36,8 +35,8 @@ class LightPass {
   /// Traces the light of glass. The picture must show the opaque objects.
   void trace_glass(const LightSources& sources, const View& view, const SampleOffsets& offsets,
                    GLuint picture_framebuffer);
-  /// Traces the light of a translucent body. It replaces that of the opaque objects, which must have been
-  /// drawn.
+  /// Traces the light of a translucent body. It replaces the light of the opaque objects, which must have
+  /// been drawn.
   void trace_body(const LightSources& sources, const View& view, const SampleOffsets& offsets);
 
  private:
@@ -54,10 +53,10 @@ class LightPass {
   LightBuffer light_;
   bool quick_;
   gl::Texture places_, normals_;
-  gl::Texture colors_;  ///< of quick pictures
+  gl::Texture colors_;  ///< colours of surfaces; only for quick pictures
   gl::Framebuffer framebuffer_;
   gl::Texture arriving_, mirrored_;
-  bool mirrored_is_filled_ = true;  ///< whether any value is not zero
+  bool mirrored_is_filled_ = true;  ///< whether any value of the texture of mirrored light is not zero
   gl::Texture lamps_, highlights_;  ///< created when there are lamps
 
   // Created when there is something translucent.

@@ -1,6 +1,6 @@
 #pragma once
 /// Private: draws lines. Every line is one quad that faces the eye. Lines are drawn instanced and blended
-/// back to front over the finished picture: first the hidden parts, faintly, then the visible ones.
+/// back to front over the finished picture: first the hidden parts, faintly, then the visible parts.
 
 #include <span>
 #include <vector>

@@ -1,7 +1,7 @@
 #pragma once
 /// Loop's subdivision of triangle meshes (C. Loop, 1987; weights of J. Warren, 1995): every triangle becomes
 /// four, and the surface becomes smoother. The weights depend only on the triangles and are computed once.
-/// Positions that change every frame are then weighted sums of the coarse ones.
+/// The positions of each frame are then weighted sums of the coarse positions.
 
 #include <array>
 #include <cstdint>
@@ -30,7 +30,7 @@ class LoopSubdivision {
   const std::vector<uint32_t>& triangles() const { return triangles_; }
   std::size_t vertex_count() const { return first_term_.size() - 1; }
 
-  /// Computes values at the vertices of the finer mesh from those at the coarse vertices.
+  /// Computes values at the vertices of the finer mesh from the values at the coarse vertices.
   template <class V>
   void refine(std::span<const V> coarse, std::vector<V>& fine) const {
     fine.resize(vertex_count());

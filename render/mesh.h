@@ -19,8 +19,9 @@ struct Mesh {
   std::vector<Vector3f> positions;
   std::vector<Vector3f> normals;
   std::vector<Vector2f> uvs;
-  std::vector<Vector2f> second_uvs = {};  ///< for textures with TextureMap::uv_set 1
-  std::vector<Vector4f> colors = {};      ///< linear, straight alpha; used if Material::vertex_colors
+  std::vector<Vector2f> second_uvs = {};  ///< texture coordinates for textures with TextureMap::uv_set 1
+  /// Colours of the vertices, linear with straight alpha; used if Material::vertex_colors.
+  std::vector<Vector4f> colors = {};
   /// Direction of increasing u for normal maps; w is 1 or -1, the side of the direction of increasing v.
   /// Empty: derived from the texture coordinates while drawing.
   std::vector<Vector4f> tangents = {};

@@ -210,15 +210,15 @@ std::vector<std::string> ignored_by_assimp(const aiScene& scene) {
     if (count > 0) lines.push_back(std::to_string(count) + what);
   };
   const std::span<aiMesh* const> meshes(scene.mMeshes, scene.mNumMeshes);
-  add(scene.mNumAnimations, " animations are ignored: only those of glTF 2.0 files are played");
+  add(scene.mNumAnimations, " animations are ignored: only animations of glTF 2.0 files are played");
   add(static_cast<std::size_t>(
           std::ranges::count_if(meshes, [](const aiMesh* m) { return m->mNumBones > 0; })),
       " mesh(es) with bones: the bones are ignored, and the meshes have the pose that the file stores");
   add(static_cast<std::size_t>(
           std::ranges::count_if(meshes, [](const aiMesh* m) { return m->mNumAnimMeshes > 0; })),
       " meshes have morph targets, which are ignored");
-  add(scene.mNumCameras, " cameras are ignored: only those of glTF 2.0 files can be used");
-  add(scene.mNumLights, " lights are ignored: only those of glTF 2.0 files can be used");
+  add(scene.mNumCameras, " cameras are ignored: only cameras of glTF 2.0 files can be used");
+  add(scene.mNumLights, " lights are ignored: only lights of glTF 2.0 files can be used");
   return lines;
 }
 

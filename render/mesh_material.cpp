@@ -240,7 +240,7 @@ class MaterialImporter {
       return decode_embedded(*embedded, "embedded texture " + name);
     }
     const std::filesystem::path path = find_beside(folder_, name);
-    if (path.empty()) throw FileError("texture '" + name + "' is not there");
+    if (path.empty()) throw FileError("texture '" + name + "' does not exist");
     if (!folders_.contain(path))
       throw FileError("texture '" + name +
                       "' is outside of the folders that may be read; allow its folder with --allow DIR");

@@ -27,21 +27,22 @@ struct GpuMesh {
   Vector3f center;  ///< centre of the bounding ball
   float radius = 0;
   float thickness = 0;                  ///< smallest side of the bounding box
-  bool flat = false;                    ///< lies in an axis-aligned plane
+  bool flat = false;                    ///< whether the mesh lies in an axis-aligned plane
   bool endless = false;                 ///< see Mesh::endless
-  bool round = false;                   ///< fills the ball inscribed in its box
-  bool boxy = false;                    ///< fills its box, except for a bevel
-  std::unique_ptr<const RayMesh> rays;  ///< the same for light rays
+  bool round = false;                   ///< whether the mesh fills the ball inscribed in its box
+  bool boxy = false;                    ///< whether the mesh fills its box, except for a bevel
+  std::unique_ptr<const RayMesh> rays;  ///< the mesh as light rays see it
 
-  bool stored = false;         ///< was there at Stage::store_previous_transforms()
+  bool stored = false;         ///< whether the mesh existed at the last Stage::store_previous_transforms()
   gl::Buffer vertices_before;  ///< previous vertices, if they have been replaced; otherwise 0
 
-  /// Makes the present vertices those from which motion starts.
+  /// Stores the present vertices as the start of motion in Channels.
   void store();
-  /// The vertices that replace those of `before`, with as many of them, remember the stored ones.
+  /// Takes over the stored vertices of `before`, the mesh that this one replaces, if both have as many
+  /// vertices.
   void store_previous_vertices(GpuMesh& before);
 };
-/// The binding of the vertices from which motion in Channels starts.
+/// Vertex buffer binding of the positions from which motion in Channels starts.
 inline constexpr GLuint kBeforeBinding = 3;
 
 /// The uniform block of shaders/material.glsl.
@@ -58,16 +59,17 @@ struct GpuMaterial {
   Pattern pattern = Pattern::none;
   Weave weave = Weave::plain;
   bool textured = false;
-  bool detailed = false;  ///< see Material::is_detailed(); textured then, too
-  bool cut_out = false;   ///< has holes by its alpha, and is opaque elsewhere
+  bool detailed = false;  ///< see Material::is_detailed(); a detailed material is also textured
+  bool cut_out = false;   ///< whether alpha cuts holes, and the material is opaque elsewhere
   bool triplanar = false;
   bool thin = false;
   bool two_sided = false;
   bool blended = false;
-  bool glass = false;   ///< light goes through and is refracted
-  bool smooth = false;  ///< mirrors the scene
-  bool plain = false;   ///< fully described by one colour, roughness and fraction of metal
-  std::unique_ptr<const RayMaterial> rays;  ///< the same for light rays
+  bool glass = false;   ///< whether light passes through and is refracted
+  bool smooth = false;  ///< whether the material mirrors the scene
+  /// Whether the material is fully described by one colour, roughness and fraction of metal.
+  bool plain = false;
+  std::unique_ptr<const RayMaterial> rays;  ///< the material as light rays see it
 
   /// Whether objects behind the surface are visible through it.
   bool lets_through() const { return blended || glass; }
@@ -85,14 +87,14 @@ struct Instance {
   Eigen::Affine3f world_from_mesh = Eigen::Affine3f::Identity();
   bool casts_shadow = true;
   bool visible = true;
-  uint32_t object = 0;                    ///< id in Channels
+  uint32_t object = 0;                    ///< id of the object in Channels
   std::optional<Eigen::Affine3f> before;  ///< pose at Stage::store_previous_transforms
 
   float scale() const;
   /// Ball around the instance.
   Vector3f center() const { return world_from_mesh * mesh->center; }
   float radius() const { return mesh->radius * scale(); }
-  /// Whether it fills that ball.
+  /// Whether the instance fills the ball of center() and radius().
   bool is_ball() const;
 };
 
@@ -103,9 +105,10 @@ class MeshPass {
   /// Sorts the visible instances for this view. The instances must stay in memory until the view is drawn.
   void prepare(std::span<const Instance* const> instances, const View& view, const Features& features);
   enum class Shading {
-    surface,  ///< writes surfaces for the tracer of light
-    traced,   ///< in the light that was traced; in quick pictures, only those that are not plain
-    traced_with_particles,  ///< as `traced`; glass also shows particles behind it
+    surface,  ///< writes the surfaces from which light is traced
+    /// Shaded by the traced light; quick pictures draw only materials that are not plain in this way.
+    traced,
+    traced_with_particles,  ///< does what `traced` does, and glass also shows the particles behind it
   };
   /// Draws the opaque instances, and the opaque parts of blended ones.
   void draw_opaque(Shading shading);
@@ -130,7 +133,7 @@ class MeshPass {
     float thickness;  ///< thickness of its first instance, in the world
   };
   void draw(const Batch& batch);
-  /// Whether the surface pass writes all that its colour depends on.
+  /// Whether the surface pass writes everything on which the colour of a batch depends.
   bool is_plain(const Batch& batch) const { return quick_ && batch.material->plain && !batch.mesh->endless; }
   gl::LazyProgram& surface_program(const Batch& batch, Shading shading);
   static void set_facing(const Batch& batch);
@@ -145,7 +148,7 @@ class MeshPass {
   gl::Texture white_;
   gl::StreamBuffer rows_;
   std::vector<Batch> opaque_, translucent_;
-  std::vector<const Instance*> see_through_;  ///< instances of translucent_
+  std::vector<const Instance*> see_through_;  ///< instances whose material lets light through, in their order
 };
 
 }  // namespace offstage::render

@@ -56,12 +56,12 @@ struct TextureMap {
   int image = -1;  ///< index into Model::textures, -1: none
   int uv_set = 0;  ///< 0: Mesh::uvs, 1: Mesh::second_uvs
   Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
-  bool nearest = false;  ///< enlarged texels are squares instead of being interpolated
-  bool mip_maps = true;  ///< reduced texels are averaged
+  bool nearest = false;  ///< whether enlarged texels are squares instead of being interpolated
+  bool mip_maps = true;  ///< whether reduced texels are averaged
   /// Transform of the texture coordinates by rows: (u, v, 1) to the place in the image, v downwards.
   std::array<Vector3f, 2> rows = {Vector3f(1, 0, 0), Vector3f(0, 1, 0)};
 
-  bool is_plain() const;  ///< whether it uses the first set without a transform
+  bool is_plain() const;  ///< whether the map uses the first set of coordinates without a transform
 };
 
 /// Metallic/roughness material, with the parameters of glTF 2.0 and some of its extensions.
@@ -79,8 +79,9 @@ struct Material {
   bool two_sided = false;
   Fabric fabric = {};                  ///< used for cloths only
   TextureMap base_color_texture = {};  ///< sRGB colour and alpha, times `color`
-  /// Projects `base_color_texture` along the three axes of the mesh, blended where the surface turns from one
-  /// to the next, in place of its texture coordinates. One unit of the coordinates is then a metre.
+  /// Whether `base_color_texture` is projected along the three axes of the mesh instead of being placed by
+  /// texture coordinates. The projections are blended where the surface turns from one axis to the next, and
+  /// one unit of the coordinates is a metre.
   bool triplanar = false;
   TextureMap metallic_roughness_texture = {};  ///< G: roughness, B: metallic, times the factors
   TextureMap emission_texture = {};            ///< sRGB, times `emission`
@@ -92,10 +93,10 @@ struct Material {
   float occlusion_strength = 1;                ///< in [0, 1]
   /// Points with less alpha are holes and all others are opaque (an alpha mask). 0: alpha blends.
   float alpha_cutoff = 0;
-  bool unlit = false;          ///< shows its base colour as it is, without light
+  bool unlit = false;          ///< whether the base colour is shown as it is, without light
   bool thin = false;           ///< whether the surface is a sheet that transmits and does not refract
-  bool vertex_colors = false;  ///< Mesh::colors multiply the base colour
-  bool vertex_alpha = false;   ///< some vertex colours are translucent
+  bool vertex_colors = false;  ///< whether Mesh::colors multiply the base colour
+  bool vertex_alpha = false;   ///< whether some vertex colours are translucent
   /// Reflectance of a dielectric that faces the eye; ((n - 1) / (n + 1))^2 of its index of refraction n.
   Vector3f specular = {0.04f, 0.04f, 0.04f};
   /// Alpha of `specular_texture` is the glossiness: roughness = 1 - glossiness * alpha. Negative: not used.
@@ -104,7 +105,7 @@ struct Material {
   float clearcoat_roughness = 0;
   Vector3f sheen_color = Vector3f::Zero();  ///< light scattered at grazing angles, as of velvet
 
-  /// Whether it needs more than the first three textures in their plain form.
+  /// Whether the material needs more than its first three textures, or a transform of texture coordinates.
   bool is_detailed() const;
 };
 
@@ -149,8 +150,9 @@ struct Model {
   /// The place of a camera or light in the file.
   struct Place {
     std::string name;  ///< name of the node, unique among cameras or lights
-    int node = -1;     ///< index in `rig`, if it was read; -1: none
-    Eigen::Matrix4f model_from_place = Eigen::Matrix4f::Identity();  ///< in the rest pose; looks along -z
+    int node = -1;     ///< index of the node in `rig`, if the rig was read; -1: none
+    /// Transform in the rest pose; cameras and lights look along -z.
+    Eigen::Matrix4f model_from_place = Eigen::Matrix4f::Identity();
   };
   struct Camera : Place {
     bool perspective = true;  ///< false: orthographic
@@ -169,7 +171,7 @@ struct Model {
   std::string unit;  ///< unit of length in the file and how it was found, in words
   enum class UnitSource { stated, none, millimetres };
   UnitSource unit_source = UnitSource::none;  ///< `millimetres`: none, but customary (STL); taken as metres
-  /// Longest side of the box around all of the file [m]; empty if only a node was read (see
+  /// Longest side of the box around the content of the whole file [m]; empty if only a node was read (see
   /// read_file_size()).
   std::optional<float> file_size;
   std::vector<std::string> warnings;  ///< repaired or ignored elements, one line each

@@ -1,6 +1,6 @@
 #pragma once
-/// The files that belong to a model. Those that assimp may open are regular ones in its folders. Private to
-/// render.
+/// The files that belong to a model. assimp may open only regular files in the folders of the model. Private
+/// to render.
 
 #include <filesystem>
 #include <memory>
@@ -12,14 +12,16 @@
 
 namespace offstage::render {
 
-/// `folders` must outlive it. All other files are treated as missing.
+/// Returns the file access for assimp: it can open regular files in `folders`, and all other files are
+/// treated as missing. `folders` must outlive the result.
 std::unique_ptr<Assimp::IOSystem> make_model_files(const InputFolders& folders);
 
 /// Whether a file name ends in `ending`, in any letter case.
 bool has_ending(const std::filesystem::path& path, const std::string& ending);
 
-/// Finds a file that a model names: by the name given, then by its file name in the model's folder, then
-/// there in any letter case, for paths from other machines. Empty if there is none.
+/// Finds a file that a model names: by the name given, then by its file name in the model's folder, then by
+/// its file name in other letter case (models often contain paths of another machine). Empty if there is
+/// none.
 std::filesystem::path find_beside(const std::filesystem::path& folder, std::string name);
 
 }  // namespace offstage::render

@@ -32,7 +32,7 @@ struct RigChannel {
   int node = 0;
   Path path = Path::translation;
   Interpolation interpolation = Interpolation::linear;
-  std::vector<float> times;   ///< not decreasing
+  std::vector<float> times;   ///< times of the keys, not decreasing [s]
   std::vector<float> values;  ///< values of each key; with `cubic`: tangent in, value, tangent out
 };
 
@@ -44,11 +44,11 @@ struct RigClip {
 
 struct RigSkin {
   std::vector<int> joints;              ///< nodes
-  std::vector<Eigen::Matrix4f> unbind;  ///< inverse bind matrices; as many as joints
+  std::vector<Eigen::Matrix4f> unbind;  ///< inverse bind matrix of each joint
 };
 
 struct RigTarget {
-  std::vector<Vector3f> positions, normals;  ///< offsets; empty or as long as the mesh's
+  std::vector<Vector3f> positions, normals;  ///< offset of each vertex of the mesh; empty: none
 };
 
 /// Triangles that move together.
@@ -56,11 +56,11 @@ struct RigSurface {
   int node = 0;
   int skin = -1;                 ///< -1: none; then the triangles are in the node's frame
   int material = 0;              ///< index into Model::materials
-  Mesh mesh;                     ///< before morph targets and skin
-  bool flat = false;             ///< the file has no normals: each face has its own
+  Mesh mesh;                     ///< the mesh without morph targets and skin
+  bool flat = false;             ///< whether the file has no normals, so that each face has its own
   std::size_t influences = 0;    ///< joints per vertex
   std::vector<uint32_t> joints;  ///< indices into RigSkin::joints; others are ignored
-  std::vector<float> weights;    ///< as many as `joints`
+  std::vector<float> weights;    ///< weight of each entry of `joints`
   std::vector<RigTarget> targets;
 
   bool deforms() const { return skin >= 0 || !targets.empty(); }
@@ -82,7 +82,8 @@ struct RigPose {
   std::vector<Eigen::Affine3f> world;       ///< transform of each node, in the model's frame
   std::vector<std::vector<float>> weights;  ///< weights of the morph targets of each node
 };
-/// `clip` -1: the rest pose. Before its first and after its last key, each channel keeps its value.
+/// Returns the pose at a time of a clip [s], or the rest pose for `clip` -1. Before its first and after its
+/// last key, each channel keeps its value.
 RigPose pose_at(const ModelRig& rig, int clip, float time);
 
 /// The mesh of a surface with its morph targets and skin (section 3.7.3.3); with a skin in the model's frame,

@@ -1,6 +1,6 @@
 #pragma once
-/// Private: what assimp does not read of MTL files (Wavefront's material library format, 1995): options of
-/// textures, masks, bump maps, and the physically based values Pr and Pm.
+/// Private: the statements of MTL files that assimp does not read (Wavefront's material library format,
+/// 1995): options of textures, masks, bump maps, and the physically based values Pr and Pm.
 
 #include <filesystem>
 #include <map>
@@ -24,9 +24,10 @@ struct MtlMap {
 };
 
 struct MtlMaterial {
-  std::map<std::string, MtlMap> maps;  ///< by statement, in lower case: map_kd, map_d, bump, norm, map_ke ...
+  /// Textures by the names of their statements in lower case: map_kd, map_d, bump, norm, map_ke ...
+  std::map<std::string, MtlMap> maps;
   std::optional<float> roughness, metallic;  ///< Pr, Pm
-  std::set<std::string> ignored;             ///< statements that are not drawn, in lower case
+  std::set<std::string> ignored;             ///< names of the statements without effect, in lower case
 };
 
 /// Parses the text of one library.

@@ -18,7 +18,7 @@ class OpacityGrid {
   struct Absorber {
     Vector3f position;
     float radius;   ///< radius over which the absorber is spread [m]
-    float section;  ///< optical depth times area [m^2]
+    float section;  ///< optical depth times area of an absorber [m^2]
   };
   /// Builds the grid. `away` is the unit direction in which the light travels. Clears the grid if there are
   /// no absorbers.

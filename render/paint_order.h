@@ -22,14 +22,14 @@ class Region {
   /// hide the body. A place within the body is behind its surface. On one line of sight, every place behind a
   /// hidden one is hidden, too.
   bool hides(const Vector3f& place, float depth) const;
-  /// Whether this body can hide the other one. Decided by a face of either box that separates the two, else
-  /// by the distance of their centres.
+  /// Whether this body can hide `other`. This is decided by a face of either box that separates the two, else
+  /// by the distances of their centres.
   bool is_in_front_of(const Region& other) const;
   bool contains(const Vector3f& place) const;
 
-  /// Sets the visible surface of a body that fills its box badly, such as a wavy cloth: the depth along the
-  /// view axis of its nearest surface for each pixel of `area_px`, by rows, infinite where there is none. The
-  /// surface then decides for points within the box.
+  /// Sets the visible surface of a body that fills only a small part of its box, such as a wavy cloth: the
+  /// depth along the view axis of its nearest surface for each pixel of `area_px`, by rows, infinite where
+  /// there is none. The surface then decides for points within the box.
   void set_surface(const Eigen::AlignedBox2i& area_px, std::vector<float> depths, const Vector2f& size_px);
 
   const std::array<Vector3f, 8>& corners() const { return corners_; }
@@ -44,8 +44,8 @@ class Region {
 
   Eigen::Affine3f box_from_world_;
   Eigen::AlignedBox3f box_, world_box_;
-  std::array<Vector3f, 8> corners_;  ///< in the world
-  Vector3f eye_;                     ///< in the box's frame
+  std::array<Vector3f, 8> corners_;  ///< corners of the box in the world
+  Vector3f eye_;                     ///< position of the eye in the box's frame
   Vector3f center_, world_eye_;
   float radius_ = 0;                  ///< radius of a ball; 0 for a box
   float nearest_ = 0, farthest_ = 0;  ///< range of depth along the view axis
@@ -87,7 +87,7 @@ class PaintOrder {
   /// Keys of the visible particles of a kind, nearest first; equal depths are ordered by set and id.
   std::span<const uint64_t> keys(Kind kind) const { return keys_[index(kind)]; }
   std::span<const Source> sources(Kind kind) const { return sources_[index(kind)]; }
-  /// Number of points of a kind, visible or not.
+  /// Number of all points of a kind, whether visible or not.
   uint32_t count(Kind kind) const { return counts_[index(kind)]; }
   uint32_t number(Kind kind, uint64_t key) const;
   Place place(Kind kind, uint64_t key) const;
@@ -112,7 +112,9 @@ class PaintOrder {
       1;  ///< number of bodies per group; particles are not inserted between the bodies of a group
   std::vector<Run> runs_;  ///< back to front
   std::vector<uint32_t>
-      run_begins_;  ///< first run of each body, then of the particles in front of all, then the end
+      /// Index of the first run before each body, then that of the particles in front of all bodies, then the
+      /// end.
+      run_begins_;
 };
 
 }  // namespace offstage::render

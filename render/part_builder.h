@@ -28,7 +28,7 @@ class PartBuilder {
     points_ += points;
     lines_ += lines;
   }
-  /// One line for each kind of element that was left out.
+  /// Returns one line for each kind of element that was left out.
   std::vector<std::string> left_out() const;
 
  private:

@@ -16,7 +16,8 @@ class PictureCopy {
   /// Marks an area of the picture as changed.
   void change(const Eigen::AlignedBox2i& area_px);
   void change_all() { change(all_px_); }
-  /// Copies the changed areas that are connected with `area_px`, at most once per change, and binds the copy.
+  /// Updates the copy at least in `area_px` and binds it. Areas that have changed since they were last copied
+  /// are copied, once per change.
   void update(GLuint picture, const Eigen::AlignedBox2i& area_px);
 
  private:

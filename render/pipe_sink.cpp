@@ -85,7 +85,7 @@ class PipeSink final : public FrameSink {
 
   void write(int, const Image& image) override {
     if (image.width_px != width_px_ || image.height_px != height_px_) {
-      throw std::invalid_argument("pipe sink: the size of the frame differs from that of the stream");
+      throw std::invalid_argument("pipe sink: the size of the frame differs from the size of the stream");
     }
     if (!y4m_) return out_.write(image.rgba);
     const std::string mark = std::exchange(header_, "") + "FRAME\n";

@@ -16,7 +16,7 @@ struct PngPixels {
   int bits = 8;      ///< bits of a sample: 8 or 16
   std::span<const uint8_t> samples;
   std::string comment = {};   ///< comment, in UTF-8
-  std::string settings = {};  ///< settings of the picture, in ASCII; see png_settings
+  std::string settings = {};  ///< settings of the picture, in ASCII; see png_settings()
 };
 
 /// Throws std::invalid_argument if the sizes are inconsistent.

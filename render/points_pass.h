@@ -38,12 +38,12 @@ struct PointSet {
       points;  ///< w of position: radius; w of velocity: a pseudo-random number per particle in [0, 1)
   std::vector<uint64_t> ids;
   std::vector<float> ages;
-  std::vector<GpuPicture> turns;                   ///< for each point; sprites and flakes only
+  std::vector<GpuPicture> turns;                   ///< for each point of sprites and flakes
   std::shared_ptr<const SpritePictures> pictures;  ///< null: soft discs
   Eigen::AlignedBox3f box;                         ///< bounds of the drawn particles, streaks at full length
   gl::StreamBuffer buffer;                         ///< visible balls by depth
-  std::size_t seen = 0;                            ///< number of them
-  uint32_t object = 0;                             ///< id in Channels
+  std::size_t seen = 0;                            ///< number of visible balls in the buffer
+  uint32_t object = 0;                             ///< id of the object in Channels
   std::unique_ptr<const RayMaterial> rays;         ///< material of spheres, for light rays
 
   void assign(std::span<const Point> values);
@@ -72,7 +72,7 @@ class PointsPass {
     return textures_.add(std::move(pictures));
   }
   void draw_spheres(const PointSet& set, const Features& features);
-  /// Writes the surfaces of balls for the tracer of light.
+  /// Draws the surfaces of balls into the targets from which their light is traced.
   void draw_surfaces(const PointSet& set);
   /// Draws sprites or flakes; `first` and `last` are their keys in the PaintOrder.
   void draw_blended(PointStyle style, uint32_t first, uint32_t last);
@@ -86,7 +86,8 @@ class PointsPass {
   gl::LazyProgram& blended_program(PointStyle style, bool pictures);
 
   std::map<Features, gl::LazyProgram> ball_programs_;
-  std::map<std::pair<PointStyle, bool>, gl::LazyProgram> blended_programs_;  ///< keyed also by pictures
+  /// Key: style, and whether the points have pictures.
+  std::map<std::pair<PointStyle, bool>, gl::LazyProgram> blended_programs_;
   gl::LazyProgram surface_{{"frame.glsl", "sky.glsl", "points.vert"},
                            {"frame.glsl", "sky.glsl", "light.glsl", "surface.glsl", "sphere.frag"},
                            {"STYLE 2", "SURFACE 1"}};
@@ -96,7 +97,7 @@ class PointsPass {
   gl::VertexArray vertex_array_, blended_array_;
   std::vector<GpuPoint> ordered_;
   gl::StreamBuffer blended_buffer_;
-  std::vector<BlendedPoint> blended_;  ///< sprites, then flakes, each back to front
+  std::vector<BlendedPoint> blended_;  ///< all sprites, then all flakes, each back to front
   /// The first of a run of blended points with pictures in the same texture.
   struct PictureRun {
     std::size_t first;
@@ -104,7 +105,7 @@ class PointsPass {
   };
   std::vector<PictureRun> picture_runs_;  ///< runs of one picture among all blended points, in their order
   SpriteTextures textures_;
-  uint32_t sprites_ = 0, flakes_ = 0;  ///< number of each
+  uint32_t sprites_ = 0, flakes_ = 0;  ///< number of sprites and of flakes
   std::vector<std::pair<float, uint32_t>> keys_;
 };
 

@@ -1,7 +1,7 @@
 #pragma once
-/// Cuts the polygons of model files into triangles. assimp's ear cutting makes triangles without area between
-/// three corners in a line, which later steps drop: solids then have holes, and cannot be divided into convex
-/// parts exactly.
+/// Cuts the polygons of model files into triangles. The ear clipping of assimp makes triangles without area
+/// from three corners in a line. Later steps drop these triangles, so solids have holes and cannot be divided
+/// into convex parts exactly.
 
 #include <cstdint>
 #include <span>

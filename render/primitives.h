@@ -20,9 +20,9 @@ Mesh make_frustum(float radius, float top_radius, float height, int segments = 6
 Mesh make_ellipsoid(const Vector3f& radii, int segments = 48);
 /// `radius`: distance of the tube's centre line from the axis.
 Mesh make_torus(float radius, float tube_radius, int segments = 72);
-/// A hollow cylinder, open at both ends; `radius` is that of the outside.
+/// A hollow cylinder, open at both ends; `radius` is the outer radius.
 Mesh make_tube(float radius, float height, float thickness, int segments = 64);
-/// A cuboid without its top at +Y; `size` is that of the outside.
+/// A cuboid without its top at +Y; `size` is the outer size.
 Mesh make_open_box(const Vector3f& size, float thickness);
 /// Creates a square in the plane y = 0, facing +Y. Its cells get finer towards the centre, so that distant
 /// ground is cheap. It represents an infinite plane (see Mesh::endless).

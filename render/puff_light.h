@@ -25,15 +25,15 @@ struct PuffLight {
   SkyModel sky;
   Vector3f to_sun;
 
-  /// `sky_model`: with the direction of the sun in this sub-frame.
+  /// `sky_model` must have the direction of the sun in this sub-frame.
   PuffLight(const OpacityGrid& opacity, const FrameUniforms& frame_uniforms, const SkyModel& sky_model,
             const Vector3f& sun_direction, const AirLight& air_light);
-  /// `number`: see AirLight::sun.
+  /// Returns the radiance of a puff at a place. `number`: see AirLight::sun.
   PuffRadiance radiance(const Vector3f& place, float radius, const Vector3f& albedo, float number,
                         const Vector3f& to_eye) const;
-  /// Sky light on a white surface with this normal, and the sky reflected from a direction by a surface of
-  /// this roughness, as in shaders/sky.glsl.
+  /// Sky light on a white surface with this normal, as in shaders/sky.glsl.
   Vector3f ambient(const Vector3f& normal) const;
+  /// Light of the sky that a surface of this roughness reflects, when a mirror would show this direction.
   Vector3f sky_reflection(const Vector3f& direction, float roughness) const;
   /// Light that fog adds on the way to the eye, and in w the fraction that arrives, as fog_to in
   /// shaders/sky.glsl.

@@ -27,7 +27,8 @@ void close_descriptors(int kept);
 /// Features that the kernel lacks are skipped.
 void enter_sandbox(std::span<const std::filesystem::path> folders);
 
-/// Returns which of the two the kernel supports, for `doctor`: "Landlock and seccomp", "seccomp", ...
+/// Returns which of Landlock and seccomp the kernel supports, for `doctor`: "Landlock and seccomp",
+/// "seccomp", ...
 std::string sandbox_support();
 
 }  // namespace offstage::render

@@ -17,12 +17,12 @@ class FrameSink {
   virtual ~FrameSink() = default;
   /// Throws FileError, also when the encoder ended early; the message then contains its last output.
   virtual void write(int frame, const Image& image) = 0;
-  /// Whether the sink stores linear light: then write_linear() is called after each write().
+  /// Whether the sink stores linear light. If so, write_linear() must be called after each write().
   virtual bool needs_linear() const { return false; }
   /// Writes the linear light of a frame, exposed; premultiplied alpha.
   virtual void write_linear(int, const HdrImage&) {}
-  /// Completes the output: a video gets its name only now. Without this call the destructor discards partial
-  /// output.
+  /// Completes the output; a video has a temporary name until then. Without this call the destructor discards
+  /// partial output.
   virtual void close() = 0;
 };
 
@@ -31,12 +31,14 @@ class FrameSink {
 std::filesystem::path frame_path(const std::filesystem::path& pattern, int frame);
 
 struct VideoDef {
-  std::filesystem::path
-      /// Its ending selects the encoder: .mp4 .webm .mov .mkv .gif .webp .apng; .png is an animated PNG here.
-      path;
+  /// Name of the video. Its ending selects the encoder: .mp4 .webm .mov .mkv .gif .webp .apng; .png is an
+  /// animated PNG here.
+  std::filesystem::path path;
   int width_px = 0, height_px = 0;
   FrameRate fps;
-  bool alpha = false;  ///< .webm, .mov, .webp, .apng, .png support it; other formats are refused
+  /// Whether the video has transparency: .webm, .mov, .webp, .apng and .png support it; other formats are
+  /// refused.
+  bool alpha = false;
   StopTest stop = {};  ///< ends the wait for an encoder that does not read a frame or does not end
 };
 

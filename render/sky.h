@@ -13,9 +13,10 @@ struct SkyModel {
   Vector3f sun_direction;
   Vector3f zenith, horizon, ground;
   Vector3f glow;          ///< radiance around the sun
-  TurnedSky turned = {};  ///< the picture in place of the colours
+  TurnedSky turned = {};  ///< the picture that replaces the colours
   bool has_bright_part() const { return turned.picture && turned.picture->has_bright_part(); }
-  bool seen_as_colors = false;  ///< the picture only lights; background and fog have the colours
+  /// Whether the picture only gives light, while the background and the fog show the colours.
+  bool seen_as_colors = false;
 };
 
 SkyModel make_sky(const Sun& sun, const Environment& environment);
@@ -26,8 +27,8 @@ Vector3f sky_radiance(const SkyModel& sky, const Vector3f& direction);
 /// Radiance of the colours, even if there is a picture.
 Vector3f gradient_radiance(const SkyModel& sky, const Vector3f& direction);
 
-/// The sky as a surface of this roughness mirrors it, as sky_reflection() in shaders/sky.glsl. `ambient`:
-/// light on a white surface whose normal is the direction.
+/// Radiance of the sky that a surface of this roughness mirrors; equal to sky_reflection() in
+/// shaders/sky.glsl. `ambient`: light on a white surface whose normal is the direction.
 Vector3f sky_mirrored(const SkyModel& sky, const Vector3f& direction, float roughness,
                       const Vector3f& ambient);
 

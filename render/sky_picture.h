@@ -46,7 +46,7 @@ struct SkyBeam {
 class SkyPicture {
  public:
   static constexpr int kMostColumns =
-      4096;  ///< greatest width of the visible picture; larger ones are reduced
+      4096;  ///< greatest width of the visible picture; larger pictures are reduced
   static constexpr int kMostLightColumns = 1024;  ///< greatest width of the picture that gives light
   static constexpr int kLevels = 5;               ///< prefiltered for the roughness 0, 1/4 ... 1
 
@@ -54,11 +54,12 @@ class SkyPicture {
   /// `blur_deg`: standard deviation of a Gaussian that blurs the background, but not the light; 0: none.
   explicit SkyPicture(const HdrImage& image, float blur_deg = 0);
 
-  /// Radiance from a unit direction, both parts.
+  /// Radiance from a unit direction, the sum of both parts.
   Vector3f seen(const Vector3f& direction) const { return unpacked_at(direction); }
-  /// The dim part.
+  /// Radiance of the dim part from a unit direction.
   Vector3f dim(const Vector3f& direction) const;
-  /// The dim part as a surface of this roughness mirrors it, for the mirrored direction.
+  /// Radiance of the dim part that a surface of this roughness mirrors; `direction` is the mirrored
+  /// direction.
   Vector3f mirrored(const Vector3f& direction, float roughness) const;
   /// Light of the dim part on a white surface with normal n: constant + slope * n + n * curvature * n.
   struct Irradiance {
@@ -100,10 +101,11 @@ class SkyPicture {
 
   Packed sharp_;
   std::vector<Packed> background_;
-  SkyGrid light_;                ///< both parts
+  SkyGrid light_;                ///< radiance of both parts together
   std::vector<float> fraction_;  ///< fraction of the bright part in the same cells
   std::vector<float> row_sum_;   ///< sum of luminance * solid angle of the bright part, up to each row
-  std::vector<float> sums_;      ///< the same within each row
+  /// Sums of luminance * solid angle of the bright part within each row, up to each cell.
+  std::vector<float> sums_;
   float bright_total_ = 0;
   SkyBeam beam_;
   Irradiance irradiance_;

@@ -21,7 +21,7 @@ struct Splat {
   float half_x, half_y;  ///< half-size of the rectangle around it
   float ux, uy, vx,
       vy;  ///< Position in the atlas's cell, in [-1, 1]: u = ux * dx + uy * dy, v = vx * dx + vy * dy.
-  float depth, inverse_reach;  ///< along the view axis [m]; 1 / (2 * radius)
+  float depth, inverse_reach;  ///< distance along the view axis [m]; 1 / (2 * radius) [1/m]
   float opacity;               ///< opacity where the cell's cover is 1
   float cover;  ///< fraction of its opacity that hides the background: 1 for smoke, 0 only adds light
   /// Radiance of red, green and blue where the normal is n: r[0] + r[1] n.x + r[2] n.y + r[3] n.z.
@@ -41,10 +41,11 @@ struct StreakSplat {
   float half_x, half_y;
   float along_x, along_y;             ///< unit vector to its head
   float half_length, inverse_radius;  ///< half-length of the straight part; 1 / radius
-  float depth, depth_slope;           ///< at the centre [m], and its change per pixel towards the head
-  float inverse_reach;                ///< 1 / (2 * radius) [1/m]
-  float opacity, cover;               ///< as in Splat
-  float softness, taper;              ///< as in PointsDef
+  /// Distance of the centre along the view axis [m], and its change per pixel towards the head.
+  float depth, depth_slope;
+  float inverse_reach;    ///< 1 / (2 * radius) [1/m]
+  float opacity, cover;   ///< see Splat::opacity and Splat::cover
+  float softness, taper;  ///< see PointsDef::softness and PointsDef::taper
   const StreakLight* light;
 };
 
@@ -52,7 +53,7 @@ struct StreakSplat {
 struct SplatPicture {
   int width_px = 0, height_px = 0;
   std::vector<float> depth;  ///< depth of the scene along the view axis [m], one value per pixel
-  std::vector<float> rgbt;   ///< 4 values per pixel; written where a splat may be
+  std::vector<float> rgbt;   ///< 4 values per pixel; valid only in the tiles that splats touch
 
   /// Rectangle of pixels that may have changed, in whole tiles; the rest of rgbt is not written.
   int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
@@ -89,7 +90,8 @@ class StreakBands {
   void sort(std::span<const StreakSplat> front_to_back, int width_px, int height_px);
   /// Returns the range of tile columns between `left` and `right` that contain streaks.
   std::pair<int, int> columns_px(int left, int right) const;
-  /// Whether these tiles of a band contain streaks, from number `first` on, that were not drawn.
+  /// Whether the tiles of a band from `left` to `right` contain streaks, from number `first` on, that were
+  /// not drawn yet.
   bool any(int bottom, int left, int right, uint32_t first) const;
   /// Draws the streaks from `first` on that were not drawn yet over a strip. The distance along the view axis
   /// is x / (depth + y) of `distance`.

@@ -30,11 +30,11 @@ struct Camera {
   float fov_deg = 40;  ///< vertical, in (0, 180)
   float near_m = 0.05f, far_m = 1e6f;
   float aperture = 0;  ///< lens diameter [m]; 0: everything is sharp
-  float focus = 0;     ///< distance in focus [m]; 0: that of the target
+  float focus = 0;     ///< distance in focus [m]; 0: the distance of the target
 };
 
 struct Sun {
-  Vector3f direction = Vector3f(0.45f, 0.75f, 0.5f).normalized();  ///< towards the sun, unit
+  Vector3f direction = Vector3f(0.45f, 0.75f, 0.5f).normalized();  ///< unit direction towards the sun
   Vector3f color = {1, 0.95f, 0.87f};
   float intensity = 3;    ///< radiance of a white surface that faces the sun, before exposure
   float size_deg = 1.5f;  ///< diameter of the disc, which sets the softness of shadows
@@ -44,14 +44,15 @@ struct Sun {
 /// A light source near the scene: a glowing ball, a cone, or a rectangle.
 struct Lamp {
   Vector3f position = {0, 3, 0};
-  Vector3f intensity = {10, 10, 10};  ///< radiance of a white surface 1 m away that faces it
+  Vector3f intensity = {10, 10, 10};  ///< radiance of a white surface that faces the lamp from 1 m away
   float radius = 0.1f;                ///< radius of a ball [m], > 0
   Vector2f size = {0, 0};             ///< size of a rectangle [m]; otherwise zero
   Vector3f direction = {0, -1, 0};    ///< unit direction of cones and rectangles
   float cone_deg = 0;                 ///< full angle of a cone; otherwise zero
   float softness = 0.3f;              ///< fraction of the cone over which its edge fades
-  bool squared_edge =
-      false;  ///< fades with the square (KHR_lights_punctual), not in proportion to the cosine
+  /// Whether the edge of the cone fades with the square of a linear ramp (KHR_lights_punctual), instead of in
+  /// proportion to the cosine.
+  bool squared_edge = false;
   bool shadows = true;
 };
 
@@ -59,7 +60,7 @@ struct Lamp {
 struct Environment {
   Vector3f zenith = {0.20f, 0.42f, 0.88f};
   Vector3f horizon = {0.95f, 1.05f, 1.15f};
-  Vector3f ground = {0.36f, 0.33f, 0.28f};  ///< visible below the horizon, and light from below
+  Vector3f ground = {0.36f, 0.33f, 0.28f};  ///< colour below the horizon, and of the light from below
   float intensity = 1;                      ///< scales sky and ambient together
   /// Albedo of the ground, which reflects the light of sun and sky; replaces `ground`.
   std::optional<Vector3f> ground_albedo = {};
@@ -100,23 +101,25 @@ enum class PointStyle {
 struct SpriteSheet {
   int columns = 1, rows = 1;
   float fps = 12;             ///< pictures per second of a particle's age, >= 0
-  bool blend = true;          ///< fades from each picture to the next; false: they change at once
-  bool loop = true;           ///< the first picture follows the last; false: the last one stays
-  bool random_start = false;  ///< particles start with different pictures
+  bool blend = true;          ///< whether each picture fades to the next; false: pictures change at once
+  bool loop = true;           ///< whether the first picture follows the last; false: the last one stays
+  bool random_start = false;  ///< whether particles start with different pictures
 };
 inline constexpr int kMostSheetPictures = 1024;
 
 struct PointsDef {
   PointStyle style = PointStyle::sprite;
-  bool additive = false;     ///< adds light instead of covering: fire, sparks
-  bool lit = true;           ///< lit by sun and sky; false: its colour is its radiance
-  bool casts_shadow = true;  ///< casts a shadow on the scene; smoke also on other smoke
+  bool additive = false;  ///< whether particles add light instead of covering: fire, sparks
+  /// Whether particles are lit by sun and sky; false: their colour is their radiance.
+  bool lit = true;
+  bool casts_shadow = true;  ///< whether particles cast shadows on the scene, and smoke also on other smoke
   float softness = 0.5f;     ///< width of the fade at the rim, as a fraction of the radius, in [0, 1]
-  /// Length of streaks is velocity * stretch_s; other styles except balls are longer by this [s].
+  /// Streaks are velocity * stretch_s long. Other styles, except balls, are lengthened by the same distance
+  /// [s].
   float stretch_s = 1.0f / 60;
   /// Fraction by which a streak fades towards its tail, in [0, 1]: 0 for a drop, 1 for a spark.
   float taper = 0;
-  float metallic = 0, roughness = 0.3f;  ///< for spheres
+  float metallic = 0, roughness = 0.3f;  ///< material of spheres: fraction of metal, and roughness
   SpriteSheet sheet = {};                ///< division of the picture of sprites
 };
 
@@ -148,7 +151,8 @@ struct SampleOffsets {
   Eigen::Vector2f lens = Eigen::Vector2f::Zero();
   Eigen::Vector2f light = Eigen::Vector2f::Zero();
   int index = 0;  ///< number of the sub-frame
-  int count = 1;  ///< number of sub-frames in the frame; among many, one needs no filtering of its own
+  /// Number of sub-frames in the frame; where there are several, a sub-frame is not filtered by itself.
+  int count = 1;
 };
 /// Offsets of sub-frame i of n: a fixed low-discrepancy set; all zero for n = 1.
 SampleOffsets sample_offsets(int i, int n);
@@ -156,7 +160,8 @@ SampleOffsets sample_offsets(int i, int n);
 /// Sums over the values that rays found for light from the sky and other surfaces, and for mirror images.
 struct LightSums {
   double arriving = 0;  ///< luminance of the light of these rays
-  double removed = 0;   ///< light that was removed from the brightest rays, which would stay visible as dots
+  /// Luminance that was removed from the brightest rays, which would otherwise be visible as dots.
+  double removed = 0;
 
   LightSums& operator+=(const LightSums& other) {
     arriving += other.arriving;
@@ -167,8 +172,8 @@ struct LightSums {
 
 struct StageDef {
   int width_px = 1280, height_px = 720;
-  /// Less exact pictures in less time, for looking at a scene while it is edited: the light of the sun and
-  /// from around is traced for a part of the pixels, and interpolated for those in between.
+  /// Whether pictures are less exact and take less time, for looking at a scene while it is edited: the light
+  /// of the sun and from around is traced for a part of the pixels, and interpolated for those in between.
   bool quick = false;
 };
 
@@ -182,8 +187,8 @@ class Stage {
   MeshHandle add_mesh(const Mesh& mesh);
   /// Replaces a mesh, for instance by its next pose; all instances of it change.
   void set_mesh(MeshHandle handle, const Mesh& mesh);
-  /// `textures` are those to which the material's indices refer; each is uploaded once per call, with mip
-  /// maps.
+  /// `textures` are the textures to which the material's indices refer; each is uploaded once per call, with
+  /// mip maps.
   MaterialHandle add_material(const Material& material, std::span<const Image> textures = {});
   InstanceHandle add_instance(MeshHandle mesh, MaterialHandle material, bool casts_shadow = true);
   /// `picture`: drawn for each sprite instead of a soft disc; it covers the square around the particle, or a

@@ -252,7 +252,7 @@ void Stage::Impl::probe_surfaces(std::span<const TranslucentBody> bodies, std::s
 }
 
 void Stage::Impl::lay_streaks_behind(const Eigen::AlignedBox2i& area_px, const FrameUniforms& frame) {
-  picture.behind.change(streaks_pass.lay_behind(area_px, frame, picture.color));
+  picture.behind.change(streaks_pass.draw_behind(area_px, frame, picture.color));
 }
 
 void Stage::Impl::draw_run(const PaintOrder::Run& run, const View& view, const FrameUniforms& frame) {

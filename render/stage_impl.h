@@ -38,7 +38,7 @@ struct Stage::Impl {
     gl::Texture color, depth;
     gl::Framebuffer framebuffer;
     PictureCopy depth_copy;  ///< depth of the picture, for particles
-    PictureCopy behind;      ///< picture with the particles that are visible through glass
+    PictureCopy behind;      ///< copy of the picture with the particles that are visible through glass
     gl::Texture bodies;      ///< the picture without particles; created when they may be behind glass
     gl::Framebuffer bodies_framebuffer;
 
@@ -66,7 +66,7 @@ struct Stage::Impl {
     std::size_t instance = 0;      ///< index in MeshPass::translucent
     bool glass = false;
     bool fills_region = false;
-    Eigen::AlignedBox2i area_px;    ///< area that it covers
+    Eigen::AlignedBox2i area_px;    ///< area of the picture that the body covers
     Eigen::AlignedBox2i looked_px;  ///< area of the picture that it shows by refraction
   };
 
@@ -75,15 +75,15 @@ struct Stage::Impl {
   std::optional<Camera> camera_before;
   Sun sun;
   Environment environment;
-  SkyModel sky;                                    ///< of this sub-frame
+  SkyModel sky;                                    ///< sky in this sub-frame
   std::shared_ptr<const SkyPicture> uploaded_sky;  ///< sky picture that the textures contain
   gl::Texture sky_levels, sky_background;
   std::vector<Lamp> lamps;
   std::vector<Lamp> shining;  ///< lamps and fires of this sub-frame
   float time = 0;
-  Features features;                    ///< of this sub-frame
-  bool particles_behind_glass = false;  ///< may be in this sub-frame
-  LightSources light_sources;           ///< of this sub-frame
+  Features features;                    ///< light-dependent definitions for the shaders in this sub-frame
+  bool particles_behind_glass = false;  ///< whether this sub-frame may show particles through glass
+  LightSources light_sources;           ///< sources of light in this sub-frame
 
   Slots<std::unique_ptr<GpuMesh>, MeshTag> meshes{"mesh"};
   Slots<std::unique_ptr<GpuMaterial>, MaterialTag> materials{"material"};
@@ -118,7 +118,7 @@ struct Stage::Impl {
         surface_probe(def.width_px, def.height_px),
         strip(static_cast<std::size_t>(def.width_px) * StreakBands::kRows * 4) {
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
-    gl::check_error("making the stage");
+    gl::check_error("creating the stage");
   }
 
   void upload(const FrameUniforms& frame) {

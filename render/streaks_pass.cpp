@@ -123,8 +123,8 @@ void StreaksPass::prepare(const PaintOrder& order, const View& view, const PuffL
   bands_.sort(splats_, width_px_, height_px_);
 }
 
-Eigen::AlignedBox2i StreaksPass::lay_behind(const Eigen::AlignedBox2i& area_px, const FrameUniforms& frame,
-                                            GLuint color) {
+Eigen::AlignedBox2i StreaksPass::draw_behind(const Eigen::AlignedBox2i& area_px, const FrameUniforms& frame,
+                                             GLuint color) {
   Eigen::AlignedBox2i changed;
   if (first_behind_ >= splats_.size() || area_px.isEmpty()) return changed;
   const auto [left, right] = bands_.columns_px(area_px.min().x(), area_px.max().x());

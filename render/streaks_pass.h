@@ -22,12 +22,13 @@ class StreaksPass {
   /// Prepares the streaks of a sub-frame. `light` includes the smoke between sun and streaks. Streaks do not
   /// move during a frame, so only its first sub-frame (`new_frame`) computes their light.
   void prepare(const PaintOrder& order, const View& view, const PuffLight& light, bool new_frame);
-  /// The streaks from `first` of their keys in the PaintOrder on are behind the next object.
+  /// Declares that the streaks from `first` on (index of their keys in the PaintOrder) are behind the next
+  /// object.
   void pass(uint32_t first) { first_behind_ = first; }
   /// Draws the streaks behind the next object over an area of the picture; returns the pixels that may have
   /// changed.
-  Eigen::AlignedBox2i lay_behind(const Eigen::AlignedBox2i& area_px, const FrameUniforms& frame,
-                                 GLuint color);
+  Eigen::AlignedBox2i draw_behind(const Eigen::AlignedBox2i& area_px, const FrameUniforms& frame,
+                                  GLuint color);
   /// Draws the remaining streaks over a band of the picture (see StreakBands). For both functions, the
   /// picture's framebuffer must be bound for reading.
   void blend_over(int bottom, int rows, const FrameUniforms& frame, std::span<float> rgba);
@@ -38,11 +39,11 @@ class StreaksPass {
     uint64_t id = ~uint64_t{0};
     StreakLight light;
   };
-  std::vector<KnownLight> lights_;  ///< by number, for those visible in this frame
+  std::vector<KnownLight> lights_;  ///< light of the streaks that are visible in this frame, by their numbers
   int width_px_, height_px_;
   uint32_t first_behind_ = 0;
   StreakBands bands_;
-  std::vector<float> depth_, rgba_;  ///< values of a band
+  std::vector<float> depth_, rgba_;  ///< depth and colour of a band of the picture
 };
 
 }  // namespace offstage::render

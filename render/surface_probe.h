@@ -1,5 +1,5 @@
 #pragma once
-/// Private: finds the distance of the nearest surface of a single body, pixel by pixel.
+/// Private: measures the distance to the surface of a single body in each pixel.
 
 #include <functional>
 #include <vector>

@@ -10,7 +10,8 @@
 
 namespace offstage::render {
 
-inline constexpr int kTextHeight_px = 10;  ///< from the top of a capital to the bottom of a "g", at scale 1
+/// Height of a line from the top of a capital to the bottom of a "g", at scale 1.
+inline constexpr int kTextHeight_px = 10;
 
 /// Width of one line at scale 1 [px].
 int text_width_px(std::string_view text);

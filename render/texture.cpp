@@ -94,8 +94,8 @@ gl::Texture make_texture(const Image& image, TextureContent content, const Textu
                          float alpha_cutoff) {
   if (image.width_px < 1 || image.height_px < 1 || std::max(image.width_px, image.height_px) > kMaxSize_px) {
     throw UnavailableError("a texture of " + std::to_string(image.width_px) + "x" +
-                           std::to_string(image.height_px) + " pixels cannot be drawn; up to " +
-                           std::to_string(kMaxSize_px) + " each way are possible");
+                           std::to_string(image.height_px) + " pixels cannot be drawn; at most " +
+                           std::to_string(kMaxSize_px) + " pixels per side are possible");
   }
   GLuint name = 0;
   glCreateTextures(GL_TEXTURE_2D, 1, &name);

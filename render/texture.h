@@ -11,12 +11,12 @@ namespace offstage::render {
 
 enum class TextureContent { color /**< sRGB */, data /**< linear */ };
 
-/// `map`: how the texture is repeated and filtered. `alpha_cutoff` above 0: the fraction of pixels with at
-/// least this alpha stays the same in reduced levels, so that leaves do not get thin at a distance (I.
-/// Castano, "Computing alpha mipmaps", 2010).
+/// Creates a texture. `map`: how the texture is repeated and filtered. `alpha_cutoff` above 0: the fraction
+/// of pixels with at least this alpha stays the same in reduced levels, so that leaves do not get thin at a
+/// distance (I. Castano, "Computing alpha mipmaps", 2010).
 gl::Texture make_texture(const Image& image, TextureContent content, const TextureMap& map = {},
                          float alpha_cutoff = 0);
-/// Pictures of a sky, in levels of decreasing size.
+/// Creates a texture of a sky from pictures of decreasing size, which become its mip levels.
 gl::Texture make_texture(std::span<const SkyPicture::Packed> levels);
 gl::Texture make_white_texture();
 /// True if any pixel is not opaque.

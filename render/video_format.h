@@ -14,16 +14,16 @@ struct VideoFormat {
   const char* encoder;
   const char* container;
   bool keeps_alpha;
-  bool needs_even_size;  ///< colour is stored at half size in both directions
+  bool needs_even_size;  ///< whether colour is stored at half size in both directions
   double max_fps;
-  std::vector<std::string> opaque;       ///< encoder options
+  std::vector<std::string> opaque;       ///< encoder options without alpha
   std::vector<std::string> transparent;  ///< encoder options with alpha
 };
 
 std::span<const VideoFormat> video_formats();
 
-/// Returns the format of a definition. Throws std::invalid_argument with advice if the format cannot
-/// represent it.
+/// Returns the format that the ending of a video's name selects. Throws std::invalid_argument with advice if
+/// the format cannot represent it.
 const VideoFormat& video_format(const VideoDef& def);
 
 /// Returns the whole command; ffmpeg reads the frames from its standard input.

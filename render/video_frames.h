@@ -1,5 +1,5 @@
 #pragma once
-/// Finds the frames in a finished video file, by the index or the packets of its container. Private to
+/// Checks a finished video file: counts its frames by the index or the packets of the container. Private to
 /// render.
 
 #include <filesystem>

@@ -129,7 +129,7 @@ class VideoSink final : public FrameSink {
 
   void write(int, const Image& image) override {
     if (image.width_px != def_.width_px || image.height_px != def_.height_px) {
-      throw std::invalid_argument("video sink: the frame's size is not the film's");
+      throw std::invalid_argument("video sink: the frame has another size than the film");
     }
     if (!channel_.ours) throw std::logic_error("video sink: it is closed");
     const int error = send_all(channel_.ours.fd(), image.rgba, def_.stop);

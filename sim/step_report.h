@@ -19,7 +19,7 @@ namespace offstage::sim {
 
 /// Bodies and their sleep.
 struct BodyFigures {
-  uint32_t awake = 0, asleep = 0;  ///< in the last sub-step
+  uint32_t awake = 0, asleep = 0;  ///< number of bodies in the last sub-step
   uint32_t islands = 0;            ///< groups of bodies connected by contacts or joints in that sub-step
   uint64_t woken = 0, put_to_sleep = 0;  ///< times that a body woke or fell asleep
 
@@ -72,9 +72,10 @@ struct ImpactFigures {
 
 /// All cloths together; for a single one see ClothReport, which describes the figures.
 struct ClothFigures {
-  Real strain = 0;                                                ///< greatest strain of a thread
-  Real penetration = 0;                                           ///< greatest [m]
-  uint64_t contacts = 0, self_contacts = 0, springs_clamped = 0;  ///< at the end of the step
+  Real strain = 0;  ///< greatest strain of a thread
+  /// Greatest depth of a vertex inside a body [m].
+  Real penetration = 0;
+  uint64_t contacts = 0, self_contacts = 0, springs_clamped = 0;  ///< numbers at the end of the step
   uint64_t moves_limited = 0, moves_held_back = 0, crossings = 0, springs_torn = 0, unconverged = 0;
 
   static constexpr auto figures() {
@@ -134,12 +135,14 @@ struct RoughContact {
 
 /// Statistics of a step. Numerical trouble is reported here, never as an exception.
 struct StepReport : StepFigures {
-  std::vector<BodyHandle> bodies_retired;  ///< left the world's bounds: frozen from here on
-  std::vector<JointHandle> joints_broken;  ///< exceeded their breaking force or torque in this step
+  /// Bodies that left the world's bounds; they are frozen from here on.
+  std::vector<BodyHandle> bodies_retired;
+  /// Joints that exceeded their breaking force or torque in this step.
+  std::vector<JointHandle> joints_broken;
   /// One for each fall-back of a contact solver, in the order of occurrence.
   std::vector<RoughContact> rough_contacts;
-  bool finite = true;    ///< false: a quantity became NaN or infinite
-  NonFinite non_finite;  ///< the first such object, if not finite
+  bool finite = true;    ///< whether all quantities are finite, not NaN or infinite
+  NonFinite non_finite;  ///< the first object with a quantity that is not finite, if any
 };
 
 }  // namespace offstage::sim

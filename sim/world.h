@@ -71,20 +71,28 @@ struct ContactRule {
 
 /// Solver for resting contact (physics N11, N12).
 enum class SolverKind {
-  exact,      ///< each collision at its own time, contact forces to rounding: slow for piles of hundreds of
-              ///< bodies
-  fast,       ///< time stepping on velocities: a bounded amount of work, errors far below a millimetre
-  automatic,  ///< exact for small islands and where it costs less than fast, judged by the work of previous
-              ///< steps
-  lcp,  ///< as exact, with forces by Dantzig's and Baraff's pivoting and separate limits of friction along
-        ///< both tangents (N9, N10); islands that it does not solve go to the exact solver and are counted
+  /// Resolves each collision at its own time, and computes contact forces to rounding. Slow for piles of
+  /// hundreds of bodies.
+  exact,
+  /// Time stepping on velocities: a bounded amount of work, with errors far below a millimetre.
+  fast,
+  /// Uses `exact` for small islands and where it costs less than `fast`, judged by the work of previous
+  /// steps.
+  automatic,
+  /// Computes contact forces by Dantzig's and Baraff's pivoting, with separate limits of friction along both
+  /// tangents (N9, N10); otherwise as `exact`. Islands that pivoting does not solve go to the exact solver
+  /// and
+  /// are counted.
+  lcp,
 };
 
 /// Solver for the contact forces of particles (physics P7).
 enum class ParticleContactMethod : uint8_t {
-  relaxation,  ///< Gauss-Seidel with bounded work
-  lcp  ///< clusters of at most WorldDef::particle_cluster contacts by Dantzig's and Baraff's pivoting; other
-       ///< clusters, and those that pivoting does not solve, by relaxation, and counted
+  /// Solves the contacts of all particles by Gauss-Seidel sweeps, with bounded work.
+  relaxation,
+  /// Solves clusters of at most WorldDef::particle_cluster contacts by Dantzig's and Baraff's pivoting. Other
+  /// clusters, and those that pivoting does not solve, are left to relaxation and counted.
+  lcp
 };
 
 /// Algorithms of collision detection. All give the same results within their tolerances, except that
@@ -106,17 +114,18 @@ struct CollisionMethods {
   BroadPhase broad_phase = BroadPhase::multi_grid;
   ImpactTime impact_time = ImpactTime::advancement;
   Trees trees = Trees::aabb;
-  TreeSplit tree_split = TreeSplit::surface_area;  ///< how these trees are split
+  TreeSplit tree_split = TreeSplit::surface_area;  ///< rule by which the trees are split
   MeshPairs mesh_pairs = MeshPairs::parts;
   /// Width of a cell of the uniform grid in mean diameters of the bodies (the book's k), > 0.
   Real cell_factor = CellSizes::kMeansInCell;
 };
 
 struct WorldDef {
-  Vec3 gravity = {0, -9.81, 0};                     ///< [m/s^2]
-  Vec3 wind = Vec3::Zero();                         ///< velocity of the air, for drag [m/s]
-  Real max_step = 1.0 / 240;                        ///< longest sub-step [s]
-  IntegratorKind integrator = IntegratorKind::rk4;  ///< for bodies and all objects connected by springs
+  Vec3 gravity = {0, -9.81, 0};  ///< [m/s^2]
+  Vec3 wind = Vec3::Zero();      ///< velocity of the air, for drag [m/s]
+  Real max_step = 1.0 / 240;     ///< longest sub-step [s]
+  /// Integrator of bodies and of all objects connected by springs.
+  IntegratorKind integrator = IntegratorKind::rk4;
   Real integration_error = 1e-6;  ///< largest error of a coordinate per step of the adaptive integrators [m]
   SolverKind solver = SolverKind::automatic;
   ImpactLaw impact = ImpactLaw::simultaneous;
@@ -139,8 +148,8 @@ struct Energy {
 /// A contact point of two bodies.
 struct ContactState {
   BodyHandle a, b;
-  Vec3 point = Vec3::Zero();   ///< between both surfaces, world [m]
-  Vec3 normal = Vec3::Zero();  ///< from b to a
+  Vec3 point = Vec3::Zero();   ///< contact point in the middle between both surfaces, world [m]
+  Vec3 normal = Vec3::Zero();  ///< unit normal from b to a
   /// Force on a, friction included: the mean over the last sub-step, or over the part of it after the last
   /// impact [N].
   Vec3 force = Vec3::Zero();
@@ -160,11 +169,11 @@ struct MovedBody {
 
 /// State of a body at the end of the last step.
 struct BodyState {
-  Pose pose;              ///< pose of the body's own frame, as given at creation
+  Pose pose;              ///< pose of the body's frame, in which its shape was given
   Vec3 centre;            ///< centre of mass, world [m]
   Vec3 velocity;          ///< velocity of the centre of mass [m/s]
   Vec3 angular_velocity;  ///< world [rad/s]
-  Vec3 angular_momentum;  ///< about the centre of mass, world [kg m^2/s]
+  Vec3 angular_momentum;  ///< angular momentum about the centre of mass, world axes [kg m^2/s]
   Real mass = 0;          ///< [kg]; 0 unless dynamic
 };
 
@@ -197,7 +206,7 @@ class World {
   MeshHandle add_shared_mesh(std::shared_ptr<const CollisionMesh> mesh);
   std::shared_ptr<const CollisionMesh> shared_mesh(MeshHandle mesh) const;
   const MeshTopology& topology(MeshHandle mesh) const;
-  const TriangleMesh& mesh(MeshHandle mesh) const;  ///< as registered (welded)
+  const TriangleMesh& mesh(MeshHandle mesh) const;  ///< the mesh as it was registered, that is welded
   const CollisionMesh& collision_mesh(MeshHandle mesh) const;
 
   /// Adds a body. Throws std::invalid_argument, naming the field and its allowed values, for a size, mass or
@@ -271,7 +280,7 @@ class World {
   std::span<const ParticleEvent> particle_events() const;
   ClothView cloth(ClothHandle cloth) const;
   const ClothDef& cloth_def(ClothHandle cloth) const;
-  const ClothReport& cloth_report(ClothHandle cloth) const;  ///< report of the last step
+  const ClothReport& cloth_report(ClothHandle cloth) const;  ///< statistics of the cloth in the last step
   /// The gas inside of a cloth with `pressure` now; zero for other cloths.
   ClothGasState cloth_gas(ClothHandle cloth) const;
   void for_each_cloth(const std::function<void(ClothHandle)>& f) const;

@@ -157,11 +157,11 @@ void Engine::work() {
   }
 }
 
-void Engine::work_with(const Workshop& workshop) {
+void Engine::work_with(const FilmResources& resources) {
   while (!ending_) {
     bool busy = false;
     try {
-      busy = holds_ == 0 && step(workshop);
+      busy = holds_ == 0 && step(resources);
     } catch (const std::exception& error) {  // exceptions of the scene, the models, the physics, GL
       fail(error.what());
       busy = true;
@@ -174,14 +174,14 @@ void Engine::work_with(const Workshop& workshop) {
   }
 }
 
-bool Engine::step(const Workshop& workshop) {
-  if (take_requests(workshop)) return true;
-  return answer_picks() || advance_sweep(workshop) || refine_frame() || advance_film() ||
-         advance_pinned(workshop);
+bool Engine::step(const FilmResources& resources) {
+  if (take_requests(resources)) return true;
+  return answer_picks() || advance_sweep(resources) || refine_frame() || advance_film() ||
+         advance_pinned(resources);
 }
 
 /// Returns whether there were any requests.
-bool Engine::take_requests(const Workshop& workshop) {
+bool Engine::take_requests(const FilmResources& resources) {
   std::optional<FilmDef> wanted;
   {
     const std::lock_guard lock(mutex_);
@@ -203,14 +203,14 @@ bool Engine::take_requests(const Workshop& workshop) {
     def_ = std::move(wanted);
   } else {
     def_ = std::move(wanted);
-    start_film(workshop);
+    start_film(resources);
   }
   return true;
 }
 
-void Engine::start_film(const Workshop& workshop) {
+void Engine::start_film(const FilmResources& resources) {
   film_.reset();
-  film_ = std::make_unique<FilmRun>(*def_, models_for(*def_), workshop);
+  film_ = std::make_unique<FilmRun>(*def_, models_for(*def_), resources);
   {
     const std::lock_guard lock(mutex_);
     figures_ = film_->physics().figures;
@@ -313,14 +313,14 @@ bool Engine::refine_frame() {
   return false;
 }
 
-bool Engine::advance_pinned(const Workshop& workshop) {
+bool Engine::advance_pinned(const FilmResources& resources) {
   std::optional<FilmDef> wanted;
   {
     const std::lock_guard lock(mutex_);
     wanted = wanted_pinned_;
   }
   if (!wanted) return false;
-  if (!pinned_) pinned_ = std::make_unique<FilmRun>(*wanted, models_for(*wanted), workshop);
+  if (!pinned_) pinned_ = std::make_unique<FilmRun>(*wanted, models_for(*wanted), resources);
   const int frame = pinned_->first_missing();
   if (frame > pinned_->frames()) return false;
   if (pinned_->has_state(frame)) {
@@ -334,7 +334,7 @@ bool Engine::advance_pinned(const Workshop& workshop) {
 }
 
 /// Processes one version at a time; after an order in between, the version is started again.
-bool Engine::advance_sweep(const Workshop& workshop) {
+bool Engine::advance_sweep(const FilmResources& resources) {
   Loaded version;
   CellEvent event;
   int frame = 1;
@@ -353,7 +353,7 @@ bool Engine::advance_sweep(const Workshop& workshop) {
       const std::lock_guard lock(mutex_);
       def = definition(version, {});
     }
-    Workshop small = workshop;
+    FilmResources small = resources;
     small.draft_px = {320, 180};
     FilmRun run(def, models_for(def), small);
     frame = std::clamp(frame, 1, run.frames());
@@ -361,7 +361,7 @@ bool Engine::advance_sweep(const Workshop& workshop) {
       if (is_stale()) return true;
       run.simulated().simulate();
     }
-    picture = std::make_shared<const std::string>(workshop.jpeg.write(run.small_picture(frame), 85));
+    picture = std::make_shared<const std::string>(resources.jpeg.write(run.small_picture(frame), 85));
     event.particles = run.physics().figures.at(static_cast<std::size_t>(frame - 1)).particles;
   } catch (const std::exception& error) {
     event.fault = error.what();

@@ -90,7 +90,7 @@ class Engine {
 
   /// Shows this version from now on. Returns a number that increases with every call.
   Run show(Loaded scene, const std::optional<ViewCamera>& camera);
-  /// Key of a version's pictures with the scene's own camera.
+  /// Key under which the store has the pictures of a version that are drawn with the scene's own camera.
   std::string film_of(const producer::LoadedScene& scene) const;
   /// Sets a second version whose frames are kept and, in idle time, completed; null: none.
   void pin(Loaded scene);
@@ -98,8 +98,8 @@ class Engine {
   void look_at(int frame, bool playing);
   /// Reads model files again after they have changed.
   void forget_models();
-  /// Name of the object at a position of a frame; see FilmRun::pick. Also empty if the frame is not
-  /// available.
+  /// Name of the object that is visible at a position of a frame, as FilmRun::pick() returns it; empty also
+  /// if the frame is not available.
   std::future<std::string> pick(int frame, double x, double y);
   /// Draws a small frame of each of these versions; ends an earlier sweep. Returns its number.
   uint64_t sweep(std::vector<Loaded> versions, int frame);
@@ -132,24 +132,24 @@ class Engine {
 
   FilmDef definition(Loaded scene, const std::optional<ViewCamera>& camera) const;
   void work();
-  void work_with(const Workshop& workshop);
-  bool step(const Workshop& workshop);
-  bool take_requests(const Workshop& workshop);
-  void start_film(const Workshop& workshop);
+  void work_with(const FilmResources& resources);
+  bool step(const FilmResources& resources);
+  bool take_requests(const FilmResources& resources);
+  void start_film(const FilmResources& resources);
   bool answer_picks();
   bool advance_film();
   bool refine_frame();
   bool is_film_drawn();
-  bool advance_pinned(const Workshop& workshop);
-  bool advance_sweep(const Workshop& workshop);
+  bool advance_pinned(const FilmResources& resources);
+  bool advance_sweep(const FilmResources& resources);
   std::shared_ptr<const producer::ModelLibrary> models_for(const FilmDef& def);
   void report_frame(int frame, Detail detail);
   void report_film(FilmEvent::Phase phase, const std::string& message = "");
   void fail(const std::string& what);
   /// Whether there is a request of any kind.
   bool is_stale() const { return ending_ || holds_ > 0 || requested_ != taken_; }
-  /// Whether there is, or soon will be, another version or camera. Other requests, such as those of a film
-  /// that plays, leave a draft its time.
+  /// Whether there is, or soon will be, another version or camera. Other requests, such as the frames of a
+  /// film that plays, let a draft finish first.
   bool is_outdated() const { return ending_ || holds_ > 0 || runs_ != run_; }
 
   const EngineSettings settings_;

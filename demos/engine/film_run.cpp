@@ -56,13 +56,14 @@ void look_with(Scene& scene, const Scene& original, const producer::ModelLibrary
 
 }  // namespace
 
-FilmRun::FilmRun(FilmDef def, std::shared_ptr<const producer::ModelLibrary> models, const Workshop& workshop)
+FilmRun::FilmRun(FilmDef def, std::shared_ptr<const producer::ModelLibrary> models,
+                 const FilmResources& resources)
     : def_(std::move(def)),
       models_(std::move(models)),
-      workshop_(workshop),
+      resources_(resources),
       scene_(def_.loaded->scene),
-      simulated_(def_.loaded->scene, *models_, workshop_.physics, def_.physics, frames()) {
-  scene_.render.size = fitted(scene_.render.size, workshop_.draft_px);
+      simulated_(def_.loaded->scene, *models_, resources_.physics, def_.physics, frames()) {
+  scene_.render.size = fitted(scene_.render.size, resources_.draft_px);
   scene_.render.quality = producer::Quality::draft;
   look_with(scene_, def_.loaded->scene, *models_, def_.camera);
 }
@@ -81,7 +82,7 @@ int FilmRun::first_missing() {
 }
 
 producer::Picture& FilmRun::draft_picture() {
-  if (!picture_) picture_.emplace(scene_, *models_, workshop_.context, true);
+  if (!picture_) picture_.emplace(scene_, *models_, resources_.context, true);
   return *picture_;
 }
 
@@ -100,8 +101,8 @@ bool FilmRun::draw_draft(int frame, const producer::Snapshot& before, const prod
   const render::Image image = draft_picture().draw(before, now, stop);
   if (image.rgba.empty()) return false;
   camera_ = picture_->camera();
-  auto jpeg = std::make_shared<const std::string>(workshop_.jpeg.write(image, kDraftQuality));
-  workshop_.frames.put(def_.film, frame, {Detail::draft, ms_since(start), std::move(jpeg), camera_});
+  auto jpeg = std::make_shared<const std::string>(resources_.jpeg.write(image, kDraftQuality));
+  resources_.frames.put(def_.film, frame, {Detail::draft, ms_since(start), std::move(jpeg), camera_});
   return true;
 }
 
@@ -110,7 +111,7 @@ bool FilmRun::refine(int frame, Detail detail, const Stop& stop) {
     refined_ = std::make_unique<Refined>();
     refined_->scene = def_.loaded->scene;
     look_with(refined_->scene, def_.loaded->scene, *models_, def_.camera);
-    refined_->picture.emplace(refined_->scene, *models_, workshop_.context);
+    refined_->picture.emplace(refined_->scene, *models_, resources_.context);
     if (stop()) return false;
   }
   refined_->scene.render.quality =
@@ -119,8 +120,8 @@ bool FilmRun::refine(int frame, Detail detail, const Stop& stop) {
   const render::Image image = refined_->picture->draw(previous(frame), state(frame), stop);
   if (image.rgba.empty()) return false;
   camera_ = refined_->picture->camera();
-  auto jpeg = std::make_shared<const std::string>(workshop_.jpeg.write(image, kFineQuality));
-  workshop_.frames.put(def_.film, frame, {detail, ms_since(start), std::move(jpeg), camera_});
+  auto jpeg = std::make_shared<const std::string>(resources_.jpeg.write(image, kFineQuality));
+  resources_.frames.put(def_.film, frame, {detail, ms_since(start), std::move(jpeg), camera_});
   return true;
 }
 

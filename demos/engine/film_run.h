@@ -23,29 +23,29 @@ struct ViewCamera {
   bool operator==(const ViewCamera& other) const { return eye == other.eye && target == other.target; }
 };
 
-/// A version of a scene, with the keys of its pictures and its physics.
+/// A version of a scene, with the keys under which the stores have its pictures and its states.
 struct FilmDef {
   std::shared_ptr<const producer::LoadedScene> loaded;
   std::optional<ViewCamera> camera;
-  std::string film;     ///< key of its pictures
-  std::string physics;  ///< key of its states
+  std::string film;     ///< key of its pictures in the FrameStore
+  std::string physics;  ///< key of its states in the PhysicsStore
 };
 
-/// Data shared by the films of a session.
-struct Workshop {
+/// Stores, GL context and JPEG encoder, which the films of a session share.
+struct FilmResources {
   PhysicsStore& physics;
   FrameStore& frames;
   render::Context& context;
   JpegWriter& jpeg;
-  Eigen::Vector2i draft_px;  ///< drafts fit into this
+  Eigen::Vector2i draft_px;  ///< greatest size of a draft [px]
 };
 
 class FilmRun {
  public:
   using Stop = std::function<bool()>;
 
-  /// Throws the exceptions of building a simulation.
-  FilmRun(FilmDef def, std::shared_ptr<const producer::ModelLibrary> models, const Workshop& workshop);
+  /// Throws what the constructor of producer::Simulation throws.
+  FilmRun(FilmDef def, std::shared_ptr<const producer::ModelLibrary> models, const FilmResources& resources);
 
   const FilmDef& def() const { return def_; }
   int frames() const { return scene_.frame_count(); }
@@ -53,7 +53,7 @@ class FilmRun {
   void look_from(const std::optional<ViewCamera>& camera, const std::string& film);
 
   bool has_state(int frame) const { return simulated_.has_state(frame); }
-  bool has_draft(int frame) const { return workshop_.frames.has(def_.film, frame, Detail::draft); }
+  bool has_draft(int frame) const { return resources_.frames.has(def_.film, frame, Detail::draft); }
   /// The first frame without a draft; frames() + 1 if there is none.
   int first_missing();
 
@@ -90,7 +90,7 @@ class FilmRun {
 
   FilmDef def_;
   std::shared_ptr<const producer::ModelLibrary> models_;
-  Workshop workshop_;
+  FilmResources resources_;
   producer::Scene scene_;  // as used for drafts
   SimulatedFilm simulated_;
   std::optional<producer::Picture> picture_;

@@ -21,7 +21,7 @@ struct StoredFrame {
   Detail detail = Detail::draft;
   double draw_ms = 0;
   std::shared_ptr<const std::string> jpeg;
-  render::Camera camera;  ///< camera with which it was drawn
+  render::Camera camera;  ///< camera with which the frame was drawn
 };
 
 /// Pictures by film and frame. A refined picture is returned in place of the draft on request; the draft is
@@ -36,7 +36,7 @@ class FrameStore {
   bool has(const std::string& film, int frame, Detail detail) const;
   /// Frames with a draft, as first and last of each range.
   std::vector<std::pair<int, int>> ranges(const std::string& film) const;
-  /// Sets the films that are removed last.
+  /// Sets the films whose frames are removed last.
   void protect(std::vector<std::string> films);
   std::size_t bytes() const;
   std::size_t most_bytes() const { return most_bytes_; }

@@ -8,7 +8,7 @@
 
 namespace offstage::engine {
 
-/// One per thread; its buffers are reused.
+/// Writes pictures as JPEG files in memory. Each thread needs its own object, because the buffers are reused.
 class JpegWriter {
  public:
   JpegWriter();

@@ -17,10 +17,11 @@ namespace offstage::engine {
 
 /// The states of one simulation so far.
 struct Physics {
-  std::vector<std::shared_ptr<const producer::Snapshot>> states;  ///< from frame 1; null: not stored
-  std::vector<producer::FrameFigures> figures;                    ///< from frame 1
-  std::optional<producer::RunStats> totals;  ///< figures of the whole simulation, after its last frame
-  std::vector<std::string> notes;            ///< problems during the simulation, as sentences
+  /// State of each frame, from frame 1; null: not stored.
+  std::vector<std::shared_ptr<const producer::Snapshot>> states;
+  std::vector<producer::FrameFigures> figures;  ///< figures of each frame, from frame 1
+  std::optional<producer::RunStats> totals;     ///< figures of the whole simulation, after its last frame
+  std::vector<std::string> notes;               ///< problems during the simulation, as sentences
 };
 
 inline constexpr std::size_t kPhysicsBytes = 384u << 20;  ///< usual limit for states

@@ -11,11 +11,11 @@
 
 namespace offstage::engine {
 
-/// A simulation begins when a state is needed that is not in the store, and always at the start of the film.
+/// Where a state is not in the store, the film is simulated from its start up to that state.
 class SimulatedFilm : public producer::StateSource {
  public:
-  /// `key` names the simulation in the store, and `last` is the last frame of the film that is needed; every
-  /// film with the same key has the same one. The scene, the models and the store must outlive this object.
+  /// `key` names the simulation in the store. `last` is the last frame that is needed, which is the same for
+  /// all films with this key. The scene, the models and the store must outlive this object.
   SimulatedFilm(const producer::Scene& scene, const producer::ModelLibrary& models, PhysicsStore& store,
                 std::string key, int last);
 

@@ -75,7 +75,7 @@ class Watcher {
       if (hash != rendered_) render_once(watch, hash);
       while (!watch.changed() && !producer::interrupt_signal()) watch.wait(milliseconds(1000));
     }
-    if (!options_.talk.quiet) producer::log("the watch has ended\n");
+    if (!options_.log.quiet) producer::log("the watch has ended\n");
     return 128 + producer::interrupt_signal();
   }
 
@@ -88,7 +88,7 @@ class Watcher {
     if (!code) return;
     rendered_ = hash;
     if (*code == producer::kOk) publish(unfinished.path());
-    if (options_.talk.quiet) return;
+    if (options_.log.quiet) return;
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
     if (*code == producer::kOk)
       producer::log("rendered in {:.1f} s; waiting for changes of the scene (Ctrl-C quits)\n",

@@ -11,7 +11,7 @@
 
 namespace offstage::tune {
 
-/// A state of the text that was shown.
+/// A version of the scene's text that the page has shown.
 struct Version {
   uint64_t id = 0;
   std::string label;               ///< description of the change: "rate", "pasted text"
@@ -48,8 +48,8 @@ class Document {
   std::string undo_label() const { return can_undo() ? history_[now_].label : ""; }
   std::string redo_label() const { return can_redo() ? history_[now_ + 1].label : ""; }
 
-  /// Versions of this session, oldest first, including those that an undo has left; the oldest are removed
-  /// when they take too much memory.
+  /// Versions of this session, oldest first, including those that were undone. The oldest are removed when
+  /// the versions take too much memory.
   const std::deque<Version>& versions() const { return versions_; }
   /// Returns the version with this number, or null.
   const Version* find(uint64_t id) const;

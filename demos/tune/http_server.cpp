@@ -193,7 +193,7 @@ struct HttpServer::Impl {
                                                                  httplib::Response& response) {
       const auto picture = session.engine().frame(request.matches[1], std::stoi(request.matches[2]),
                                                   detail_of(request.get_param_value("d")));
-      if (!picture) return refuse(response, 404, "This frame is not kept.");
+      if (!picture) return refuse(response, 404, "This frame is not in memory.");
       const render::Camera& c = picture->camera;
       response.set_header("X-Camera", fmt::format("{} {} {} {} {} {} {}", c.eye.x(), c.eye.y(), c.eye.z(),
                                                   c.target.x(), c.target.y(), c.target.z(), c.fov_deg));
@@ -206,7 +206,7 @@ struct HttpServer::Impl {
                const auto picture =
                    ranges.empty() ? std::nullopt
                                   : session.engine().frame(film, ranges.back().second, engine::Detail::draft);
-               if (!picture) return refuse(response, 404, "No frame of this version is kept.");
+               if (!picture) return refuse(response, 404, "No frame of this version is in memory.");
                send_picture(*picture->jpeg, response);
              });
     main.Get("/[0-9a-f]+/cell/([0-9]{1,18})/([0-9]{1,4})",

@@ -1,10 +1,11 @@
 #pragma once
 /// Serves the page and its session over HTTP, on this machine only.
 ///
-/// One server has the page, the pictures and the changes. Two more have the streams of the tabs, four each,
-/// because browsers allow at most six connections to a server. Every address begins with a random token. The
-/// Host of every request, and the Origin of those that have one, must be ours, so that no other page in the
-/// same browser can read or change anything, even by a host name that resolves to this machine.
+/// One server answers requests for the page and the pictures, and takes the changes. Two more serve the
+/// streams of the tabs, four each, because browsers allow at most six connections to a server. Every address
+/// begins with a random token. The Host of every request, and the Origin of those that have one, must be
+/// ours, so that no other page in the same browser can read or change anything, even by a host name that
+/// resolves to this machine.
 
 #include <memory>
 #include <string>

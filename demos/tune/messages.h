@@ -37,7 +37,8 @@ std::string kind_of(const engine::FrameEvent& event);
 std::string kind_of(const engine::FilmEvent& event);
 std::string kind_of(const engine::CellEvent& event);
 
-/// Converts a path in the text without the items at `muted` to the path in the whole text.
+/// Converts a path that is valid in the text without the muted items (at `muted`) to the path of the same
+/// value in the whole text.
 std::string with_muted(const std::string& path, const std::vector<std::string>& muted);
 
 }  // namespace offstage::tune

@@ -265,7 +265,7 @@ Reply Session::redo(const nlohmann::json&) {
 Reply Session::restore(const nlohmann::json& request) {
   const std::lock_guard lock(mutex_);
   const Version* version = document_.find(request.at("id").get<uint64_t>());
-  if (!version) return refused(404, "this version is no longer kept");
+  if (!version) return refused(404, "this version of the scene is no longer in memory");
   document_.change(version->text, fmt::format("go back to version {}", version->id), {}, "");
   return shown();
 }
@@ -306,7 +306,7 @@ Reply Session::pin(const nlohmann::json& request) {
   engine::Engine::Loaded loaded;
   if (request.contains("id") && !request["id"].is_null()) {
     const Version* version = document_.find(request["id"].get<uint64_t>());
-    if (!version) return refused(404, "this version is no longer kept");
+    if (!version) return refused(404, "this version of the scene is no longer in memory");
     loaded = parse(version->text, true).loaded;
     if (!loaded) return refused(422, "this version is not a valid scene");
     pinned_ = version_json(*version, films_);

@@ -26,7 +26,7 @@ class Tabs {
   /// Opens the stream of a tab and returns its ticket; an earlier stream of the same tab ends. Returns
   /// nothing if there are already kMostTabs others. The first tab is the writer.
   std::optional<uint64_t> open(const std::string& tab);
-  /// Ends a stream, if it is still that of the tab. The tab that has been open longest becomes the writer.
+  /// Ends a stream, unless the tab has a newer one. The tab that has been open longest becomes the writer.
   void close(const std::string& tab, uint64_t ticket);
   void close_all();
 

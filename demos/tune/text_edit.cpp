@@ -108,7 +108,7 @@ std::vector<std::string> steps_of(std::string_view path) {
     if (path[i] == '/') {
       steps.emplace_back();
     } else if (steps.empty()) {
-      throw std::invalid_argument("a path begins with a slash: " + std::string(path));
+      throw std::invalid_argument("a path must begin with a slash: " + std::string(path));
     } else if (path[i] == '~' && i + 1 < path.size()) {
       steps.back() += path[++i] == '0' ? '~' : '/';
     } else {
@@ -136,21 +136,21 @@ std::optional<std::size_t> child_of(const Part& parent, const std::string& step)
 }
 
 /// Result of following a path: the deepest existing value, its parent, and the number of steps.
-struct Way {
+struct FollowedPath {
   const Part* parent = nullptr;
   std::size_t index = 0;  ///< in the parent
   const Part* end;
-  std::size_t taken = 0;
+  std::size_t steps = 0;
 };
 
-Way follow(const Part& root, const std::vector<std::string>& steps) {
-  Way way{.end = &root};
+FollowedPath follow(const Part& root, const std::vector<std::string>& steps) {
+  FollowedPath followed{.end = &root};
   for (const std::string& step : steps) {
-    const auto child = child_of(*way.end, step);
+    const auto child = child_of(*followed.end, step);
     if (!child) break;
-    way = {way.end, *child, &way.end->parts[*child], way.taken + 1};
+    followed = {followed.end, *child, &followed.end->parts[*child], followed.steps + 1};
   }
-  return way;
+  return followed;
 }
 
 [[noreturn]] void refuse_path(std::string_view path) {
@@ -263,39 +263,41 @@ std::string quoted(const std::string& key) {
 std::string set_value(std::string_view text, std::string_view path, std::string_view json) {
   const Part root = parts_of(text);
   const std::vector<std::string> steps = steps_of(path);
-  const Way way = follow(root, steps);
+  const FollowedPath followed = follow(root, steps);
   std::string value = normalized(json);
-  if (way.taken == steps.size()) {
+  if (followed.steps == steps.size()) {
     std::string result(text);
-    return result.replace(way.end->value.begin, way.end->value.end - way.end->value.begin, value);
+    return result.replace(followed.end->value.begin, followed.end->value.end - followed.end->value.begin,
+                          value);
   }
   // Content of the missing objects and lists, from the inside. A list in an object whose keys are on separate
   // lines has its first item on a separate line, too.
-  const auto indent = way.end->object && !way.end->parts.empty()
-                          ? own_line_indent(text, way.end->parts.back().begin())
+  const auto indent = followed.end->object && !followed.end->parts.empty()
+                          ? own_line_indent(text, followed.end->parts.back().begin())
                           : std::nullopt;
   const std::string line(line_end(text));
-  for (std::size_t i = steps.size(); i > way.taken + 1; --i) {
+  for (std::size_t i = steps.size(); i > followed.steps + 1; --i) {
     if (steps[i - 1] != "0")
       value = "{" + quoted(steps[i - 1]) + ": " + value + "}";
-    else if (indent && i == way.taken + 2)
+    else if (indent && i == followed.steps + 2)
       value = "[" + line + *indent + "  " + value + line + *indent + "]";
     else
       value = "[" + value + "]";
   }
-  const std::string& step = steps[way.taken];
-  if (way.end->list && index_of_step(step) == way.end->parts.size()) return append_to(text, *way.end, value);
-  if (!way.end->object) refuse_path(path);
-  return append_to(text, *way.end, quoted(step) + colon_of(text, *way.end) + value);
+  const std::string& step = steps[followed.steps];
+  if (followed.end->list && index_of_step(step) == followed.end->parts.size())
+    return append_to(text, *followed.end, value);
+  if (!followed.end->object) refuse_path(path);
+  return append_to(text, *followed.end, quoted(step) + colon_of(text, *followed.end) + value);
 }
 
 std::string remove_value(std::string_view text, std::string_view path) {
   const Part root = parts_of(text);
   const std::vector<std::string> steps = steps_of(path);
-  const Way way = follow(root, steps);
+  const FollowedPath followed = follow(root, steps);
   std::string result(text);
-  if (way.taken < steps.size() || !way.parent) return result;
-  std::vector<ByteRange> gone = bytes_to_remove(text, *way.parent, way.index);
+  if (followed.steps < steps.size() || !followed.parent) return result;
+  std::vector<ByteRange> gone = bytes_to_remove(text, *followed.parent, followed.index);
   std::ranges::sort(gone, std::ranges::greater(), &ByteRange::begin);
   for (const ByteRange& range : gone) result.erase(range.begin, range.end - range.begin);
   return result;
@@ -304,13 +306,13 @@ std::string remove_value(std::string_view text, std::string_view path) {
 std::string rename_key(std::string_view text, std::string_view path, const std::string& key) {
   const Part root = parts_of(text);
   const std::vector<std::string> steps = steps_of(path);
-  const Way way = follow(root, steps);
-  if (way.taken < steps.size() || !way.parent || !way.parent->object) refuse_path(path);
-  if (way.end->key != key && child_of(*way.parent, key))
+  const FollowedPath followed = follow(root, steps);
+  if (followed.steps < steps.size() || !followed.parent || !followed.parent->object) refuse_path(path);
+  if (followed.end->key != key && child_of(*followed.parent, key))
     throw std::invalid_argument("there is already a key \"" + key + '"');
   std::string result(text);
-  return result.replace(way.end->key_range.begin, way.end->key_range.end - way.end->key_range.begin,
-                        quoted(key));
+  return result.replace(followed.end->key_range.begin,
+                        followed.end->key_range.end - followed.end->key_range.begin, quoted(key));
 }
 
 std::string blank_out(std::string_view text, const std::vector<std::string>& paths) {
@@ -323,9 +325,9 @@ std::string blank_out(std::string_view text, const std::vector<std::string>& pat
   std::vector<std::pair<const Part*, std::size_t>> items;
   for (const std::string& path : paths) {
     const std::vector<std::string> steps = steps_of(path);
-    const Way way = follow(root, steps);
-    if (way.taken == steps.size() && way.parent && way.parent->list)
-      items.emplace_back(way.parent, way.index);
+    const FollowedPath followed = follow(root, steps);
+    if (followed.steps == steps.size() && followed.parent && followed.parent->list)
+      items.emplace_back(followed.parent, followed.index);
   }
   for (const auto& [list, index] : items) blank(list->parts[index].value);
   // Of the commas of a list, those between two remaining items stay.
@@ -352,9 +354,9 @@ std::string blank_out(std::string_view text, const std::vector<std::string>& pat
 ByteRange range_of(std::string_view text, std::string_view path) {
   const Part root = parts_of(text);
   const std::vector<std::string> steps = steps_of(path);
-  const Way way = follow(root, steps);
-  if (way.taken < steps.size()) refuse_path(path);
-  return way.end->value;
+  const FollowedPath followed = follow(root, steps);
+  if (followed.steps < steps.size()) refuse_path(path);
+  return followed.end->value;
 }
 
 }  // namespace offstage::tune

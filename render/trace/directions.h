@@ -26,8 +26,8 @@ SquarePoint<T> on_disc(const SquarePoint<T>& uv) {
   return {wide ? cosine : sine, wide ? sine : cosine};
 }
 
-/// Any two directions across the unit vector n (T. Duff et al., "Building an Orthonormal Basis, Revisited",
-/// 2017).
+/// Computes two unit directions that are perpendicular to the unit vector n and to each other (T. Duff et
+/// al., "Building an Orthonormal Basis, Revisited", 2017).
 template <class T>
 void make_basis(const Three<T>& n, Three<T>& a, Three<T>& b) {
   const T sign = n.z < 0.0f ? T{} - 1.0f : T{} + 1.0f;

@@ -20,7 +20,7 @@ inline void intersect(RTCScene scene, RTCRayHit& ray) {
 inline void occluded(RTCScene scene, RTCRay& ray) {
   rtcOccluded1(scene, &ray);
 }
-/// For rays that are close to each other.
+/// Tests eight rays that are close to each other for any hit.
 inline void occluded(RTCScene scene, const Valid& valid, RTCRay8& rays) {
   RTCOccludedArguments arguments;
   rtcInitOccludedArguments(&arguments);

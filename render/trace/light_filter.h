@@ -58,7 +58,7 @@ struct LightGuide {
   LightPlane inverse_size2;  ///< 1 / (width of a pixel on the surface)^2 [1/m^2]
 };
 
-/// Values of light at the pixels of a guide.
+/// Values of light at the pixels of a picture, whose surfaces a LightGuide describes.
 class LightValues {
  public:
   LightValues() = default;
@@ -75,7 +75,8 @@ class LightValues {
  private:
   class Averaging;
   std::vector<LightPlane> values_, next_;
-  std::vector<float> even_;  ///< by run of pixels and channel: the value if all are equal, else not a number
+  /// For each run of pixels and each channel: the value if all pixels of the run have the same one, else NaN.
+  std::vector<float> even_;
 };
 
 /// The pixels whose light a sparse picture leaves out.
@@ -83,7 +84,7 @@ enum class Gaps {
   half,            ///< every other one, as on a chessboard
   three_quarters,  ///< all in odd rows and columns
 };
-/// Whether a pixel is one of them. Those without a visible neighbour to take their light from are not.
+/// Whether a pixel is a gap. A pixel without a visible neighbour to take its light from is none.
 bool is_gap(Gaps gaps, const LightGuide& guide, int x, int y);
 /// Sets the values of gaps to means of four neighbours, above all of those with a similar place and normal.
 void fill_gaps(Gaps gaps, const LightGuide& guide, std::span<LightPlane* const> planes);

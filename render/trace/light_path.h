@@ -28,8 +28,8 @@ bool is_rough_glass(const RayMaterial& material);
 Vector3f enter(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Vector3f& from,
                Vector3f& direction);
 
-/// The light of a sample of a glowing mesh on a white surface, if nothing is between them, weighted against
-/// that of rays that meet the mesh by chance.
+/// The light of a sample of a glowing mesh on a white surface, if nothing is between the two. It is weighted,
+/// because rays that meet the mesh by chance find the same light.
 Vector3f light_of_glow(const GlowSample& sample, const Vector3f& normal, const Vector3f& face);
 
 /// Surfaces with less roughness^2 mirror and refract a single direction.
@@ -74,7 +74,7 @@ struct LightTracer::Path {
     by_chance = true;
     density = -1;
   }
-  /// The fraction of the glow at a hit that sampling does not find.
+  /// Weight of the glow that a ray meets by chance at a hit, because Glow::sample() finds the same light.
   float fraction_of_glow(const Hit& hit, const Glow& glow) const {
     if (glow.empty() || diffuse_normal.isZero()) return 1;
     const Vector3f outgoing = (hit.position - diffuse_place).normalized();

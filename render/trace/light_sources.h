@@ -29,7 +29,7 @@ class SunDisc {
   LaneVectors direction(const SquarePoint<Lanes>& uv) const;
 
  private:
-  Vector3f middle_, across_, along_;  ///< radii of the disc at distance 1
+  Vector3f middle_, across_, along_;  ///< centre and two perpendicular radii of the disc, at distance 1
 };
 
 }  // namespace offstage::render

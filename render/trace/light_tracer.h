@@ -34,18 +34,19 @@ struct LightBuffer {
   std::vector<Vector4f>
       arriving;  ///< light from the sky and other surfaces; w: fraction of the sun that is visible
   std::vector<Vector4f> mirrored;    ///< light from the mirrored direction; w: 1 where it was computed
-  bool has_mirrors = false;          ///< if not, `mirrored` is not up to date
+  bool has_mirrors = false;          ///< whether any surface mirrors; if not, `mirrored` is not updated
   std::vector<Vector4f> lamps;       ///< diffuse light of lamps; empty: there are none
   std::vector<Vector4f> highlights;  ///< lobes of lamps, without reflectance; w: their Fresnel factor
   LightSums sums;
 
   // In between. Light from around is computed for cells of 2x2 pixels.
   LightGuide pixels, cells;
-  LightValues direct;           ///< per pixel: visible fraction of the sun, then diffuse light of lamps
-  LightValues glow;             ///< per pixel: light of glowing meshes; empty: there are none
-  LightValues around, mirrors;  ///< per cell: diffuse light from around, and mirrored light
+  LightValues direct;           ///< for each pixel: visible fraction of the sun, and diffuse light of lamps
+  LightValues glow;             ///< for each pixel: light of glowing meshes; empty: there are none
+  LightValues around, mirrors;  ///< for each cell: diffuse light from around, and mirrored light
   LightPlane inverse_distance, brightness, reach2, noisy_reach2;  ///< see LightGuide::find_reach
-  LightPlane with_mirror, with_rough_mirror;                      ///< cells: 1 or 0
+  /// For each cell, 1 if a surface in it mirrors, or mirrors roughly, else 0.
+  LightPlane with_mirror, with_rough_mirror;
 };
 
 /// Light at the glass surfaces in a part of the picture, rows from the bottom up.
@@ -53,7 +54,7 @@ struct GlassBuffer {
   std::vector<Vector4f>
       through;  ///< light that comes through the glass; w: fraction of the sun that is visible
   std::vector<Vector4f> mirrored;           ///< light from the mirrored direction; w: 1
-  std::vector<Vector4f> lamps, highlights;  ///< as in LightBuffer
+  std::vector<Vector4f> lamps, highlights;  ///< light of lamps; see LightBuffer
   LightSums sums;
 };
 
@@ -63,13 +64,13 @@ struct LightView {
   Eigen::Matrix4f clip_from_world;
   float pixel_m;  ///< width of a pixel at distance 1
   SampleOffsets offsets;
-  bool sparse = false;  ///< the light of most pixels is interpolated; see Gaps
+  bool sparse = false;  ///< whether the light of most pixels is interpolated; see Gaps
 };
 
 /// Light of the visible surfaces, for rays that meet them again: it has no noise and costs no further rays.
 class VisibleLight {
  public:
-  /// `picture`: of the opaque objects, rows from the bottom up; empty: not known.
+  /// `picture`: colours of the opaque objects, rows from the bottom up; empty: not known.
   VisibleLight(const LightBuffer& light, const LightView& view, std::span<const Vector4f> picture = {})
       : light_(light), view_(view), picture_(picture) {}
   /// Index of the pixel that shows a point; negative if it is not visible.
@@ -91,23 +92,25 @@ class LightTracer {
   LightTracer(const RayScene& scene, const LightSources& sources, StopTest stop = {});
 
   void trace(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
-  /// The same for the surfaces of a translucent body in a part of the picture. `visible`: the opaque objects.
+  /// Computes the light at the surfaces of a translucent body in a part of the picture. `visible`: light of
+  /// the opaque objects.
   void trace_body(const SurfaceBuffer& surfaces, const LightView& view, const VisibleLight& visible,
                   LightBuffer& light) const;
 
-  /// `surfaces`: a part of the picture, with glass only; (x, y) is its first pixel. `behind`: the opaque
-  /// objects, with their picture.
+  /// Computes the light at the surfaces of glass in a part of the picture, whose first pixel is (x, y).
+  /// `behind`: light of the opaque objects, with their picture.
   void trace_glass(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
                    const VisibleLight& behind, GlassBuffer& glass) const;
 
  private:
   struct Point;   ///< a visible surface
-  struct Points;  ///< eight of them
-  struct Path;    ///< from the eye
+  struct Points;  ///< eight visible surfaces
+  struct Path;    ///< a path of light rays, traced from the eye
   /// Light that a path found.
   struct FoundLight {
-    Vector3f noisy = Vector3f::Zero();    ///< by random directions
-    Vector3f certain = Vector3f::Zero();  ///< found without random directions, or weighted against a lamp
+    Vector3f noisy = Vector3f::Zero();  ///< light found by random directions, which is noisy
+    /// Light found without random directions, or weighted because a lamp was sampled, too.
+    Vector3f certain = Vector3f::Zero();
     Vector3f limited(LightSums& sums) const;
   };
   FoundLight radiance(Path path, PixelSampler& sampler, const VisibleLight* visible = nullptr,

@@ -13,7 +13,7 @@ struct LampPoint {
   Three<T> towards;  ///< unit direction from the place to the point
   T distance;        ///< [m]
   T fraction;  ///< fraction of the lamp's intensity that arrives at a surface there that faces the point
-  Three<T> arriving;  ///< the fraction times the intensity: radiance of a white surface
+  Three<T> arriving;  ///< radiance of a white surface: `fraction` times the intensity of the lamp
   T density;  ///< probability density of the direction, if rays meet the lamp, too; otherwise 0 [1/sr]
 };
 
@@ -33,7 +33,8 @@ class RayLamp {
   LampPoint<float> point_of_sky(const SquarePoint<float>& uv) const;
 
   Lamp def_;
-  TurnedSky sky_;  ///< without a picture: a lamp near the scene
+  /// The sky whose picture is the lamp; without a picture, this object is a lamp near the scene.
+  TurnedSky sky_;
   Vector3f right_, up_;
   float cone_factor_ = 0, cone_offset_ = 1;
 };

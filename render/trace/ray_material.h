@@ -24,7 +24,8 @@ class RayMaterial {
 
   /// Colour and opacity at a point. `footprint`: width of the averaged area [m].
   Vector4f color(const Hit& hit, float footprint) const;
-  /// Radiance that the surface itself emits, and its mean.
+  /// Radiance that the surface emits at these texture coordinates, and the mean of this radiance over the
+  /// surface.
   Vector3f emission_at(const Vector2f& uv) const;
   const Vector3f& mean_emission() const { return mean_emission_; }
   /// Whether no light passes anywhere.

@@ -42,7 +42,8 @@ class RayMesh {
   Vector2f uv_at(unsigned triangle, const Vector2f& barycentric) const;
   /// Area of all triangles, in the mesh's own units.
   float area() const;
-  /// The triangle that belongs to a number in [0, 1), each in proportion to its area, and its chance.
+  /// Chooses a triangle by a number in [0, 1), with a probability in proportion to its area; chance_of()
+  /// returns this probability.
   unsigned triangle_at(float choice) const;
   float chance_of(unsigned triangle) const;
 
@@ -60,15 +61,16 @@ class RayMesh {
 
 /// The first hit of a ray.
 struct Hit {
-  float distance = 0;  ///< along the ray [m]
+  float distance = 0;  ///< distance along the ray [m]
   Vector3f position = Vector3f::Zero();
   Vector3f normal = Vector3f::Zero();  ///< smooth, on the side of the ray's origin
   Vector3f face = Vector3f::Zero();    ///< unit normal of the triangle, on the side of the ray's origin
   bool front = true;
   const RayMaterial* material = nullptr;
-  float translucency = 0;                       ///< translucency of a cloth, else 0
-  unsigned object = 0, triangle = 0;            ///< numbers in the scene and in the mesh
-  Vector3f object_position = Vector3f::Zero();  ///< for patterns
+  float translucency = 0;  ///< translucency of a cloth, else 0
+  /// Number of the object in the scene, and of the triangle in its mesh.
+  unsigned object = 0, triangle = 0;
+  Vector3f object_position = Vector3f::Zero();  ///< position in the object's frame, for patterns
   Vector3f object_normal = Vector3f::Zero();
   Vector2f uv = {0, 0};
   Vector4f color = {1, 1, 1, 1};  ///< interpolated colour of the vertices
@@ -86,7 +88,7 @@ class RayScene {
   /// Returns the object's number. The mesh and the material must stay in memory until clear().
   unsigned add(const RayMesh& mesh, const RayMaterial& material, const Eigen::Affine3f& world_from_mesh,
                bool casts_shadow);
-  static constexpr unsigned kNone = ~0u;  ///< in place of a number: it has no triangles
+  static constexpr unsigned kNone = ~0u;  ///< returned in place of a number if the mesh has no triangles
   /// The lists must stay in memory until clear(). Positions must be finite.
   void add_cloth(std::span<const ClothVertex> vertices, std::span<const uint32_t> indices,
                  const RayMaterial& material, const Vector2f& texture_from_uv, bool casts_shadow);
@@ -104,7 +106,8 @@ class RayScene {
   /// Fraction of the light that arrives along a segment: 0 behind an opaque object, and the product of the
   /// transmittances of translucent ones. `direction` is a unit vector.
   Vector3f transmittance(const Vector3f& from, const Vector3f& direction, float length) const;
-  /// The same for the segments whose `active` is -1; the others get 0.
+  /// Fractions of the light that arrives along eight segments. Only those whose `active` is -1 are computed;
+  /// the others get 0.
   LaneVectors transmittance(const LaneVectors& from, const LaneVectors& direction, Lanes length,
                             IntLanes active) const;
   /// Returns false if the ray meets nothing within `length` [m].
@@ -119,7 +122,7 @@ class RayScene {
   Vector3f through_translucent(const Vector3f& from, const Vector3f& direction, float length) const;
   unsigned attach(RTCGeometryTy* geometry, Object object, bool casts_shadow);
 
-  std::vector<Object> objects_;  ///< by Embree's geometry id
+  std::vector<Object> objects_;  ///< objects by Embree's geometry id
   std::vector<RayTree> cloth_trees_;
   RayTree tree_;
   bool has_translucent_ = false;

@@ -38,7 +38,7 @@ class Sampler {
     return {fraction(reversed(permuted(k, salt * 0x9E3779B1u))),
             fraction(reversed(permuted(pascal(k), salt * 0x85EBCA77u)))};
   }
-  /// Leaves out coordinates.
+  /// Skips pairs of coordinates.
   void skip(uint32_t pairs) { pairs_ += pairs; }
 
  private:

@@ -23,20 +23,21 @@ struct Joint {
   JointDef def;
   JointHandle handle;
   Body *a = nullptr, *b = nullptr;  ///< b may be null: the world
-  JointFrame on_a, on_b;            ///< frames in the bodies' frames
+  JointFrame on_a, on_b;            ///< frame of the joint on a and on b, each in the body's frame
   Real length = 0;                  ///< length of a rod or rope; offset of a coupling by whole turns
   Articulation* articulation = nullptr;
 
   bool is_broken = false;
-  bool is_absent = false;  ///< before it appears, and after its removal
+  bool is_absent = false;  ///< whether the joint has not appeared yet, or was removed
   Real coordinate = 0;     ///< accumulated coordinate, for joints that count turns
   // Loads of the joint on body a, about the anchor.
   Wrench load;            ///< mean during the last motion, including the effect of contacts [N], [N m]
-  Wrench impact_impulse;  ///< impulses of collisions in this sub-step [N s], [N m s]
+  Wrench impact_impulse;  ///< sum of the joint's impulses in the collisions of this sub-step [N s], [N m s]
   Wrench borne;           ///< mean load of the last sub-step including impacts [N], [N m]
-  /// Impulse of its constraints in the last contact solution; initial guess of the next one.
+  /// Impulse of the joint's constraints in the last contact solution; initial guess of the next one.
   Vec6 reaction = Vec6::Zero();
-  /// Impulses of its rows with bounds (joint_limits.h); initial guess of the next solution.
+  /// Impulses of the joint's rows with bounds (joint_limits.h) in the last solution; initial guess of the
+  /// next one.
   std::array<Real, 12> efforts = {};
 
   bool has_spring() const { return def.stiffness > 0; }
@@ -47,7 +48,7 @@ struct Joint {
 
 /// Whether the joint's coordinate is an unbounded angle; Joint::coordinate then counts whole turns.
 bool counts_turns(const Joint& joint);
-/// Motion of a body at a time: that of its centre of mass, or of its origin if it is not dynamic.
+/// Motion of a body at a time: the motion of its centre of mass, or of its origin if it is not dynamic.
 LinkMotion link_motion(const Body* body, Real time);
 /// Frame of a joint on a body, relative to the point whose motion link_motion() returns.
 JointFrame link_frame(const Body* body, const JointFrame& in_body);
@@ -99,11 +100,12 @@ class Articulation final : public JointedBodies {
   void place_within(Real time, Real duration, Real fraction, Real substep);
   /// Projects velocities of the links at `time` onto the constraints of the last place_within().
   void project(Real time, std::span<Vec6> velocities);
-  /// Place of a joint for which the last of both evaluated the constraints.
+  /// Place of a joint at the state for which place() or place_within(), whichever was called last, evaluated
+  /// the constraints.
   JointPlace joint_place(std::size_t j, Real time, LinkMotion& still_a, LinkMotion& still_b) const {
     return place_of(j, time, motion_, still_a, still_b, before_);
   }
-  /// The same at the end and at the start of the interval.
+  /// Place of a joint at the end of the interval; start_place() has that at its start.
   JointPlace end_place(std::size_t j, Real time, LinkMotion& still_a, LinkMotion& still_b) const {
     return place_of(j, time, end_motion_, still_a, still_b);
   }
@@ -124,8 +126,8 @@ class Articulation final : public JointedBodies {
   /// Adds constraint impulses of a collision to the loads of the joints.
   void add_impact_impulses(std::span<const Vec6> impulses);
 
-  /// Prepares for impulses on links at the end of a sub-step, at this time and the bodies' current poses. The
-  /// system is factored when a link is first used.
+  /// Prepares link_mobility() and respond() for impulses on links at the end of a sub-step, at this time and
+  /// the bodies' current poses. The system is factored at the first of these calls.
   void begin_impulses(Real time);
   Mat6 link_mobility(uint32_t link, const Vec6& push) override;
   void respond(uint32_t link, const Vec6& impulse, std::span<Vec6> velocities) override;

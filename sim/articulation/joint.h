@@ -26,7 +26,7 @@ enum class JointType : uint8_t {
   prismatic,  ///< allows displacement along the axis, without rotation
   universal,  ///< allows rotation about the axis, fixed in a, and about the second axis, fixed in b
   /// Keeps the distance of the anchors, as a massless rod does; with limits or a motor the length may change,
-  /// as that of a rope or a winch.
+  /// as the length of a rope or a winch does.
   distance,
   /// Couples the rotation of a about `axis` with that of b about `second_axis`: angle of a + ratio * angle of
   /// b = 0. The axes are fixed in the bodies; other joints, whose carrier does not turn, hold the wheels.
@@ -51,11 +51,12 @@ struct Motor {
   struct Key {
     Real time = 0;                                          ///< [s]
     Real target = 0;                                        ///< [rad/s] or [m/s], or [rad] or [m]
-    Interpolation interpolation = Interpolation::monotone;  ///< to the next key
+    Interpolation interpolation = Interpolation::monotone;  ///< interpolation to the next key
   };
   Mode mode = Mode::none;
   std::vector<Key> targets = {};  ///< strictly increasing times; empty: the target is 0
-  bool smooth = false;            ///< interpolates by a cubic whose rate is zero at every key
+  /// Whether targets are interpolated by a cubic whose rate is zero at every key.
+  bool smooth = false;
   Real max_effort = std::numeric_limits<Real>::infinity();  ///< [N m] or [N]
   /// For a position target: effort = stiffness (target - position) - damping speed. With stiffness 0 the
   /// target is held rigidly within max_effort.
@@ -89,13 +90,13 @@ struct JointDef {
                        ///< second axis [rad]
   /// Coefficient of restitution at the limits `lower` and `upper`, in [0, 1], for speeds above kBounceSpeed.
   Real restitution = 0;
-  static constexpr Real kBounceSpeed = 0.05;  ///< [m/s], [rad/s]
+  static constexpr Real kBounceSpeed = 0.05;  ///< least speed at a limit that is reflected [m/s], [rad/s]
   /// Spherical joints: torque per angle of rotation from the pose at creation, about any axis [N m/rad].
   Real stiffness = 0;
   /// Dry friction: greatest torque or force against motion in each free direction [N m] or [N].
   Real friction = 0;
   Real damping = 0;        ///< viscous damping, in each free direction [N m s] or [N s/m]
-  Motor motor = {};        ///< for revolute, prismatic, screw and distance joints
+  Motor motor = {};        ///< motor of a revolute, prismatic, screw or distance joint
   Real max_force = kFree;  ///< the joint breaks at a larger force [N]
   /// The joint breaks at a larger torque of constraints, limits, motor and friction together [N m].
   Real max_torque = kFree;
@@ -104,13 +105,13 @@ struct JointDef {
   /// time; its anchors and axes have moved with the bodies.
   Real appear_at = 0, remove_at = kFree;
 
-  /// The torque k theta + c u of its spring and damper changes by this for each unit of the speed u at the
-  /// end of an interval of the length h, with the angle theta there.
+  /// Returns how much the torque k theta + c u of the joint's spring and damper changes for each unit of the
+  /// speed u at the end of an interval of the length h [s], where theta is the angle at this end.
   Real resistance(Real h) const { return damping + h * stiffness; }
-  /// Whether it only couples motions that other joints allow.
+  /// Whether a joint of this type only couples motions that other joints allow.
   bool is_coupling() const { return type == JointType::gear || type == JointType::rack; }
   bool has_limits() const { return lower > -kFree || upper < kFree; }
-  /// Whether the joint has a coordinate that limits, motor and friction can act on.
+  /// Whether the joint has a coordinate on which limits, motor and friction can act.
   bool has_free_coordinate() const {
     return type != JointType::fixed && !is_coupling() &&
            (type != JointType::distance || has_limits() || motor.mode != Motor::Mode::none);
@@ -137,7 +138,7 @@ struct JointState {
   /// Load on a at its anchor: the mean over the last sub-step, impacts included [N], [N m].
   Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
   Real coordinate = 0;  ///< the free coordinate; 0 for joints without one
-  Real speed = 0;       ///< rate of the free coordinate
+  Real speed = 0;       ///< rate of the free coordinate [rad/s] or [m/s]
   Real error = 0;       ///< distance by which the anchors violate the joint [m]
   bool broken = false;
 };

@@ -10,8 +10,8 @@ namespace offstage::sim {
 /// Motion of bodies as if they were one rigid body with the same momentum and angular momentum.
 struct CommonMotion {
   Vec3 centre = Vec3::Zero(), velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
-  Vec3 angular_momentum = Vec3::Zero();  ///< about the centre [kg m^2/s]
-  Mat3 inverse_inertia = Mat3::Zero();   ///< about the centre, world axes [1/(kg m^2)]
+  Vec3 angular_momentum = Vec3::Zero();  ///< angular momentum about the centre [kg m^2/s]
+  Mat3 inverse_inertia = Mat3::Zero();   ///< inverse inertia about the centre, world axes [1/(kg m^2)]
 
   Vec3 velocity_at(const Vec3& place) const { return velocity + angular_velocity.cross(place - centre); }
 };
@@ -22,9 +22,9 @@ Real joint_gap(const Articulation& articulation, Real time);
 /// Elastic energy of a joint's stiffness and of a position motor with a stiffness, which is a spring whose
 /// effort is limited, at a time [J].
 Real spring_energy(const Joint& joint, Real time);
-/// Whether a joint connects it to the world or to a static or kinematic body.
+/// Whether a joint connects the articulation to the world or to a static or kinematic body.
 bool is_held(const Articulation& articulation);
-/// Whether a joint connects it to a kinematic body, which may do work.
+/// Whether a joint connects the articulation to a kinematic body, which may do work.
 bool has_kinematic_end(const Articulation& articulation);
 
 /// Kinetic energy of the links relative to their common motion; if the articulation is held, all kinetic

@@ -12,8 +12,8 @@ namespace offstage::sim {
 /// Origin of a row with bounds.
 struct BoundedOrigin {
   Joint* joint;
-  std::size_t slot;  ///< index in Joint::efforts
-  Vec3 arm;          ///< from the centre of the joint's body a to the anchor, world [m]
+  std::size_t slot;  ///< index of the row in Joint::efforts
+  Vec3 arm;          ///< vector from the centre of the joint's body a to the anchor, world axes [m]
   /// Whether the row changes the joint's speed so that it reaches its coordinate at the interval's end. The
   /// bodies then move with their new velocities during the whole interval.
   bool closes;

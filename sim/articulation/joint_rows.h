@@ -41,9 +41,9 @@ struct JointPlace {
   JointPlace(const LinkMotion& a, const JointFrame& on_a, const LinkMotion& b, const JointFrame& on_b);
 
   const LinkMotion &a, &b;
-  Vec3 arm_a, arm_b;    ///< from the links' centres to the anchors, world
-  Vec3 apart;           ///< vector from the anchor on b to that on a
-  Mat3 axes_a, axes_b;  ///< world
+  Vec3 arm_a, arm_b;    ///< vectors from the links' centres to the anchors, world axes [m]
+  Vec3 apart;           ///< vector from the anchor on b to the anchor on a, world axes [m]
+  Mat3 axes_a, axes_b;  ///< axes of the joint on a and on b, as columns, in the world
 };
 
 /// One constraint or one free direction: J = [on_a, on_b].

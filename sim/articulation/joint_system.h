@@ -19,19 +19,19 @@ class JointSystem {
  public:
   static constexpr uint32_t kDriven = UINT32_MAX;  ///< index used for a link that forces do not move
   struct Topology {
-    uint32_t a, b;  ///< links, or kDriven
+    uint32_t a, b;  ///< indices of the two links; kDriven: a link that forces do not move
     uint32_t rows;  ///< number of constraints
   };
 
   /// The joints must connect all links.
   JointSystem(uint32_t links, std::vector<Topology> joints);
 
-  /// Factors the system of the rows, which the caller must keep. Returns false if the constraints are too
-  /// degenerate; correct() then has no effect.
+  /// Factors the system of these rows, to which the object keeps a reference. Returns false if the
+  /// constraints are too degenerate; correct() then has no effect.
   bool factorize(std::span<const JointRows> rows, std::span<const LinkMobility> links);
 
-  /// Replaces the constraints by ones near those of the last factorize(), whose factor is kept. correct()
-  /// must then be iterated.
+  /// Replaces the constraints by rows that differ little from those of the last factorize(). The factor is
+  /// kept, so correct() must be iterated.
   void update(std::span<const JointRows> rows) { rows_ = rows; }
 
   /// Computes J v for all joints. Driven links count as motionless.

@@ -14,19 +14,21 @@ namespace offstage::sim {
 
 class AirDrag {
  public:
-  /// The cloth's points begin at index `first`. Its address must stay valid until the next call.
+  /// Sets the cloth on which the air acts. Its points begin at index `first`, and its address must stay valid
+  /// until the next call.
   void assign(const Cloth& cloth, std::size_t first);
 
-  /// The next renew() linearises again, because other forces, masses or velocities changed.
+  /// Makes the next renew() linearise again. To be called after other forces, masses or velocities have
+  /// changed.
   void expire() { left_ = 0; }
-  /// To be called before each sub-step of length dt. Where the last linearisation no longer holds, sets the
-  /// accelerations of the points to those by outer forces and by air at their present velocities. `substeps`
-  /// of the world's sub-step are left, each with `steps` steps of the integrator.
+  /// To be called before each sub-step of length dt. If the last linearisation no longer holds, sets the
+  /// accelerations of the points to those due to outer forces and to the air at their present velocities.
+  /// `substeps` of the world's sub-step are left, each with `steps` steps of the integrator.
   void renew(ClothPoints& points, Real dt, uint32_t substeps, uint32_t steps);
-  /// Returns whether the velocities have no influence.
+  /// Returns whether the force of the air does not depend on the velocities of the points.
   bool empty() const { return !is_active_; }
 
-  /// To be called before steps of length h.
+  /// Prepares respond() for steps of length h [s].
   void begin(Real h);
   /// Returns the change of the acceleration of the cloth's point i if its velocity is v.
   Vec4 change(std::size_t i, const Vec4& v) const { return -times(resistance_[i], v - from_[i]); }

@@ -23,8 +23,8 @@ namespace offstage::sim {
 
 class BendLimit {
  public:
-  /// For the cloth with this number, which has `count` points from `first` on. `bending` must stay valid and
-  /// measure the curvature. `radius` > 0 [m].
+  /// Limits the bending of the cloth with this number, which has `count` points from `first` on. `bending`
+  /// must stay valid and measure the curvature. `radius` > 0 [m].
   BendLimit(uint32_t cloth, std::size_t first, std::size_t count, const ClothBending& bending, Real radius)
       : cloth_(cloth), first_(first), count_(count), bending_(&bending), radius_(radius) {}
   uint32_t cloth() const { return cloth_; }
@@ -35,7 +35,7 @@ class BendLimit {
   /// `cuts`.
   bool project(ClothPoints& points, Real dt, std::span<const Vec4> kick, std::vector<VelocityCut>& cuts);
 
-  /// Greatest curvature times the radius.
+  /// Greatest curvature of the cloth, times the radius.
   Real greatest(const ClothPoints& points) const;
 
  private:

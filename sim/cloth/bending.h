@@ -33,7 +33,7 @@ class ClothBending {
   /// curvature can be measured even if there is no rigidity.
   void assign(std::span<const Vec3> rest, std::span<const Triangle> triangles, std::span<const Real> masses,
               Real rigidity, Real damping, Real rest_fraction, bool measures = false);
-  /// Without rigidity; nothing resists bending.
+  /// Whether nothing resists bending, because the rigidity is 0.
   bool empty() const { return rigidity_ == 0 || patches_.empty(); }
   Real damping() const { return damping_; }
 
@@ -45,13 +45,13 @@ class ClothBending {
   Real fastest() const { return fastest_; }
   /// Energy [J].
   Real energy(std::span<const Vec4> x) const;
-  /// Adds scale times the bending forces at x to f. Points are those of the cloth, from 0.
+  /// Adds scale times the bending forces at x to f. The points are numbered within the cloth, from 0.
   void add_forces(std::span<const Vec4> x, Real scale, std::span<Vec4> f) const;
-  /// Adds the bending forces at x, and those of damping at the velocities v, to f.
+  /// Adds the bending forces at x, and the damping forces at the velocities v, to f.
   void add_damped_forces(std::span<const Vec4> x, std::span<const Vec4> v, std::span<Vec4> f);
   /// Adds scale K p to y: K is the Hessian of the energy without the curvature at rest.
   void multiply(std::span<const Vec4> p, Real scale, std::span<Vec4> y) const;
-  /// The factor of the unit matrix on the diagonal of K for a point [N/m].
+  /// The 3 x 3 block of K for a point is this number [N/m] times the unit matrix.
   Real diagonal(uint32_t point) const { return diagonal_[point]; }
 
   /// The curvature is measured by patches, two to a triangle: one measures the surroundings as a smooth
@@ -104,7 +104,7 @@ class ClothBending {
   std::vector<Real> value_;               // off the diagonal; rows add up to zero with it
   std::vector<Real> diagonal_, row_sum_;  // the latter of absolute values, with the diagonal
   std::vector<Vec4> residual_, direction_, image_;
-  /// Of M + stiff K, without the rows of points that do not move.
+  /// Factor of M + stiff K without the rows of points that do not move.
   using Factor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<Real>>;
   std::shared_ptr<Factor> factor_;
   float factor_stiff_ = 0;

@@ -23,10 +23,10 @@ struct ClothTag {};
 using ClothHandle = Handle<ClothTag>;
 
 enum class SpringKind : uint8_t {
-  stretch,  ///< to direct neighbours; these tear
-  shear,    ///< across the diagonals of cells
-  bend,     ///< to second neighbours, or across an edge
-  cord,     ///< part of a cord at a vertex; it neither tears nor has a limit
+  stretch,  ///< between direct neighbours; these springs tear
+  shear,    ///< along the diagonals of cells
+  bend,     ///< between second neighbours, or between the vertices opposite an edge
+  cord,     ///< segment of a cord; it neither tears nor has a stretch limit
 };
 
 /// F = -(k e + c (d'.d)/|d|) d/|d| on vertex a, d from b to a, with the elongation e = |d| - L.
@@ -43,7 +43,8 @@ struct ClothSpring {
   std::array<uint32_t, 2> counterpart = {};  ///< vertices of the other diagonal (its counterpart)
   Real counterpart_rest = 0;                 ///< rest length of the counterpart [m]; 0: there is none
 
-  /// e, of a spring of this length, with the positions of vertices in `at`.
+  /// Returns the elongation e of the spring, whose present length is `length`; `at` has the positions of the
+  /// points.
   template <class Points>
   Real elongation(Real length, const Points& at, std::size_t first = 0) const {
     if (counterpart_rest == 0) return length - rest_length;
@@ -55,8 +56,9 @@ struct ClothSpring {
 /// Holds a vertex at a point of the world or of a body. The cloth exerts a force on the body.
 struct ClothPin {
   uint32_t vertex = 0;
-  BodyHandle body;                                     ///< null: the world
-  Vec3 position = Vec3::Zero();                        ///< in the body's frame, or of the world [m]
+  BodyHandle body;  ///< null: the world
+  /// Position in the body's frame or, without a body, in the world [m].
+  Vec3 position = Vec3::Zero();
   Real until = std::numeric_limits<Real>::infinity();  ///< the pin is released at this time [s]
 };
 
@@ -109,16 +111,18 @@ struct ClothDef {
   std::vector<ClothSeam> seams;
   Real seam_time = 1;  ///< time in which seams close [s], > 0
 
-  Vec3 velocity = Vec3::Zero();  ///< at the start, or when it appears [m/s]
-  /// Times between which it exists [s]. It appears at its initial shape, and is removed, at the start of the
-  /// first sub-step from then on.
+  Vec3 velocity = Vec3::Zero();  ///< velocity at the start, or when the cloth appears [m/s]
+  /// Times between which the cloth exists [s]. It appears in its initial shape at the start of the first
+  /// sub-step at or after appear_at, and is removed at the start of the first sub-step at or after remove_at.
   Real appear_at = 0, remove_at = kInfinity;
 
-  bool collides = true;        ///< with bodies and particles
-  bool self_collision = true;  ///< with itself and with other cloths that have this flag
-  Real thickness = 0.005;      ///< distance kept from bodies, and between two layers [m], > 0
-  Real friction =
-      0.5;  ///< on bodies: combined with the body's friction by the geometric mean, as between bodies
+  bool collides = true;  ///< whether the cloth collides with bodies and particles
+  /// Whether the cloth collides with itself, and with other cloths that have this flag.
+  bool self_collision = true;
+  Real thickness = 0.005;  ///< distance kept from bodies, and between two layers [m], > 0
+  /// Coefficient of friction on bodies: the geometric mean with the body's coefficient is used, as between
+  /// bodies.
+  Real friction = 0.5;
   Real self_friction = 0.3;  ///< coefficient of friction of cloth on cloth
 
   Real max_stretch = 0;  ///< greatest length of stretch springs over their rest length, > 1; 0: no limit (F7)
@@ -144,8 +148,8 @@ struct ClothDef {
 
   ClothIntegrator integrator = ClothIntegrator::relaxed;
   Real substep = 1.0 / 960;  ///< longest sub-step of the cloth [s], > 0; never longer than that of the world
-  /// Of `relaxed`: one step of the springs in each sub-step. The stiffness of springs that are too stiff for
-  /// it is clamped (ClothReport::clamped).
+  /// Whether springs take a single step in each sub-step, with the integrator `relaxed`. The stiffness of
+  /// springs that are too stiff for it is clamped (ClothReport::clamped).
   bool soften = false;
 };
 
@@ -162,7 +166,7 @@ std::string problem(const ClothDef& def);
 struct StableStep {
   Real step = std::numeric_limits<Real>::infinity();  ///< [s]
   uint32_t spring = 0;                                ///< index of the spring in the definition
-  bool bending = false;                               ///< bending limits it, not a spring
+  bool bending = false;                               ///< whether bending limits the step, and not a spring
 };
 /// Largest stable step of a definition. It is infinite unless the integrator is `symplectic` or `rk4`.
 StableStep largest_stable_step(const ClothDef& def);
@@ -173,13 +177,14 @@ struct ClothTear {
   Vec3 place = Vec3::Zero();  ///< [m]
   Real stretch = 0;           ///< length of the thread over its rest length
   bool by_pressure = false;   ///< whether the cloth is closed and under pressure
-  bool touches_body = false;  ///< the cloth touched a body in that sub-step
+  bool touches_body = false;  ///< whether the cloth touched a body in that sub-step
 };
 
 /// The gas inside of a closed cloth.
 struct ClothGasState {
-  Real volume = 0;    ///< with each hole of a tear closed by a fan of triangles [m^3]
-  Real pressure = 0;  ///< over that outside [Pa], at the height of the first vertex if the gas has a weight
+  Real volume = 0;  ///< volume inside, with each hole of a tear closed by a fan of triangles [m^3]
+  /// Pressure above that outside [Pa], at the height of the first vertex if the gas has a weight.
+  Real pressure = 0;
 };
 
 /// Statistics of a cloth. Counts are sums over the sub-steps of the last step; other values are those at its
@@ -201,7 +206,7 @@ struct ClothReport {
   uint32_t spring_steps = 1;  ///< number of steps of the springs in each sub-step of a `relaxed` cloth
   uint64_t torn = 0;          ///< number of torn springs
   uint64_t unconverged = 0;   ///< solves of springs or bending that reached the limit of iterations
-  std::optional<ClothTear> first_tear;  ///< the first since the start
+  std::optional<ClothTear> first_tear;  ///< the first tear since the start; empty: the cloth never tore
   bool finite = true;  ///< false: the cloth became non-finite and stays at its last finite state
 };
 
@@ -215,7 +220,7 @@ struct ClothView {
   /// The springs that are not broken. Springs of the kind `cord` are as many as in the definition, in its
   /// order.
   std::span<const ClothSpring> springs;
-  uint32_t version = 0;  ///< grows when triangles or the number of points change
+  uint32_t version = 0;  ///< increases whenever the triangles or the number of points change
 };
 
 }  // namespace offstage::sim

@@ -28,8 +28,8 @@ class ClothBody {
   /// Begins a sub-step of cloth, which covers the fractions `from` to `to` of the world's sub-step and lasts
   /// dt [s].
   void begin(Real from, Real to, Real dt);
-  Real duration() const { return dt_; }         ///< duration of that sub-step [s]
-  const Pose& start() const { return start_; }  ///< of that sub-step
+  Real duration() const { return dt_; }         ///< duration of the cloth's sub-step [s]
+  const Pose& start() const { return start_; }  ///< pose at the start of the cloth's sub-step
   const Pose& end() const { return end_; }
   const Solid& solid() const { return obstacle_.solid; }
   const Obstacle& obstacle() const { return obstacle_; }
@@ -82,10 +82,11 @@ class ClothBody {
     touching_speed = std::max(touching_speed, speed);
   }
 
-  bool touched = false;     ///< whether cloth touched it in this sub-step of the world
+  bool touched = false;     ///< whether cloth touched the body in this sub-step of the world
   Real touching_speed = 0;  ///< greatest relative speed of such a contact [m/s]
-  bool pinches = false;     ///< whether it pinches cloth against another body in this sub-step of the world
-  bool collides = true;     ///< false: it only holds pins
+  /// Whether the body pinches cloth against another body in this sub-step of the world.
+  bool pinches = false;
+  bool collides = true;  ///< whether cloth collides with the body; false: the body only holds pins
 
  private:
   void accelerate(const Vec3& dv, const Vec3& dw);
@@ -98,7 +99,7 @@ class ClothBody {
   Vec3 gained_ = Vec3::Zero(), gained_spin_ = Vec3::Zero();  // of velocity
   Vec3 shift_ = Vec3::Zero(), turn_ = Vec3::Zero();          // by that, of the centre
   Vec3 centre_ = Vec3::Zero();                               // of mass, at the end of cloth's sub-step
-  Pose start_, end_;                                         // of that sub-step
+  Pose start_, end_;         // at the start and the end of the cloth's sub-step
   Vec3 bow_ = Vec3::Zero();  // deviation of the path from a line: half the acceleration times the square of
                              // the world's sub-step
   Real dt_ = 0, to_ = 0;     // of cloth's sub-step

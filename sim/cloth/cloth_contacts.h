@@ -51,7 +51,8 @@ class ClothContacts {
   bool is_near_several(std::size_t point) const {
     return point < near_several_.size() && near_several_[point];
   }
-  std::span<const uint64_t> active() const { return active_; }  ///< contacts of the last solve(), by cloth
+  /// Number of contacts of each cloth in the last solve().
+  std::span<const uint64_t> active() const { return active_; }
   /// Returns whether any point of a cloth touched a body since the last find().
   bool touched(std::size_t cloth) const { return cloth < touched_.size() && touched_[cloth]; }
   /// Raises the greatest penetration of each cloth's points to that at the end of a sub-step [m].

@@ -57,7 +57,7 @@ Vec3 direction(const Vec3& v) {
 }
 
 template <class Field, class Flow>
-void blow(const Field& f, Run& run, Flow&& flow) {
+void add_flow(const Field& f, Run& run, Flow&& flow) {
   for (std::size_t i = 0; i < run.size(); ++i) {
     const Real fraction = strength(f.region, f.drop_rate, run.at(i));
     if (!(fraction > 0)) continue;
@@ -68,10 +68,10 @@ void blow(const Field& f, Run& run, Flow&& flow) {
 }
 
 void add(const WindField& f, Run& run) {
-  blow(f, run, [&](std::size_t) { return f.wind; });
+  add_flow(f, run, [&](std::size_t) { return f.wind; });
 }
 void add(const Vortex& f, Run& run) {
-  blow(f, run, [&](std::size_t i) { return velocity(f, run.at(i)); });
+  add_flow(f, run, [&](std::size_t i) { return velocity(f, run.at(i)); });
 }
 void add(const Turbulence& f, Run& run) {
   std::vector<Real> places, air(3 * run.size());
@@ -80,7 +80,7 @@ void add(const Turbulence& f, Run& run) {
     places.insert(places.end(), p.begin(), p.end());
   }
   TurbulentFlow(f, run.time).velocity(places, air);
-  blow(f, run, [&](std::size_t i) { return Vec3(air[3 * i], air[3 * i + 1], air[3 * i + 2]); });
+  add_flow(f, run, [&](std::size_t i) { return Vec3(air[3 * i], air[3 * i + 1], air[3 * i + 2]); });
 }
 void add(const ConstantField& f, Run& run) {
   for (std::size_t i = 0; i < run.size(); ++i)

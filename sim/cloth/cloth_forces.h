@@ -10,7 +10,7 @@
 
 namespace offstage::sim {
 
-/// Fields and air of a sub-step of the world.
+/// Gravity, fields and air that act on cloths in a sub-step of the world.
 struct ClothWeather {
   Real time, h;
   Vec3 gravity, wind;

@@ -21,7 +21,8 @@ class ClothGas {
   /// Sum of the areas of the holes, each the length of its area vector [m^2].
   Real hole_area(std::span<const Vec3> points) const;
 
-  /// Fraction of its overpressure at a given volume that the gas still has, 0 to 1.
+  /// Fraction of the gas that has not leaked out, 0 to 1: the overpressure at a given volume is this fraction
+  /// of the initial one.
   Real remaining_fraction() const { return remaining_fraction_; }
   /// Lets gas flow out for a time h [s]. `pressure` is the overpressure at the volume as it would be without
   /// a loss [Pa], `density` that of the gas [kg/m^3], > 0. By Bernoulli's equation the gas leaves at the
@@ -36,7 +37,7 @@ class ClothGas {
   struct Edge {
     uint32_t from, to;  // in the direction of its triangle
   };
-  /// Edges of one border.
+  /// A hole: a range of the edges, which form one border.
   struct Hole {
     std::size_t first, end;
   };

@@ -17,11 +17,12 @@ namespace offstage::sim {
 /// The points and springs of one cloth.
 struct ClothRange {
   std::size_t begin, end;
-  std::span<const ClothSpring> springs;  ///< between points of all cloths
+  /// Springs of this cloth; their ends are indices into the points of all cloths.
+  std::span<const ClothSpring> springs;
   ClothBending& bending;
   AirDrag& air;
 
-  /// The values of this cloth's points, of those of all points.
+  /// Returns the part of an array over all points that belongs to this cloth.
   template <class T>
   std::span<T> part(std::vector<T>& of_all) const {
     return std::span<T>(of_all).subspan(begin, end - begin);
@@ -32,19 +33,20 @@ struct ClothRange {
   }
 };
 
-/// Gauss-Seidel sweeps (cloth_springs.h) in `steps` equal steps. Returns false if stiff bending was not
-/// solved to its tolerance.
+/// Integrates by Gauss-Seidel sweeps (cloth_springs.h) in `steps` equal steps. Returns false if stiff bending
+/// was not solved to its tolerance.
 bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& springs, uint32_t steps, Real h,
                   std::span<Vec4> kick);
 
 void step_symplectic(ClothPoints& points, const ClothRange& cloth, Real h);
 
-/// Classical Runge-Kutta.
+/// Integrates by the classical Runge-Kutta method of fourth order.
 void step_rk4(ClothPoints& points, const ClothRange& cloth, Real h, std::span<Vec4> kick);
 
-/// Backward Euler, linearised once. A spring that is compressed does not push sideways in it, which keeps the
-/// system positive definite (Choi and Ko, "Stable but Responsive Cloth", 2002). Conjugate gradients with a
-/// block-diagonal preconditioner. Returns false if they reached the limit of iterations.
+/// Integrates by backward Euler, linearised once. In the linearisation a compressed spring has no force
+/// across its direction, which keeps the system positive definite (Choi and Ko, "Stable but Responsive
+/// Cloth", 2002). The system is solved by conjugate gradients with a block-diagonal preconditioner. Returns
+/// false if these reached the limit of iterations.
 bool step_implicit(ClothPoints& points, const ClothRange& cloth, Real h);
 
 }  // namespace offstage::sim

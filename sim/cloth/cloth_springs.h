@@ -21,7 +21,7 @@ namespace offstage::sim {
 
 class ClothSprings {
  public:
-  /// Springs of one cloth, between points of all cloths.
+  /// Sets the springs of one cloth. Their ends are indices into the points of all cloths.
   void assign(std::span<const ClothSpring> springs, const ClothPoints& points);
 
   /// Adapts the stable step to the points' present positions: a spring under tension also acts across its
@@ -30,7 +30,7 @@ class ClothSprings {
   void adapt_to_stretch(const ClothPoints& points);
   /// The longest step at which no spring's stiffness is clamped [s].
   Real longest_step() const { return longest_step_; }
-  /// To be called before steps of length h.
+  /// Prepares for steps of length h [s].
   void begin(const ClothPoints& points, Real h);
   /// Applies the forces of the springs at the points' start to `moves`, the displacements of points in a
   /// step. The moves of pinned points are kept, and the impulses on them are added to their `pin_impulse`.
@@ -64,7 +64,7 @@ class ClothSprings {
     uint32_t count;  // of lanes that have this point
     uint32_t held;   // bit mask of those whose point is held
   };
-  /// Values of a row that only the explicit step needs.
+  /// Values of a row that are needed only for the explicit step.
   struct Elastic {
     Lanes rest, stiffness;  // the latter times h^2, clamped if necessary
     std::array<uint32_t, kLanes> spring;

@@ -47,8 +47,8 @@ class ClothSystem {
   };
   /// Frame in which a point's move was shortened.
   enum Shortened : uint8_t { kWhole, kInPiece, kInWorld };
-  /// Frame of a piece of cloth, everything it may cross and the dynamic bodies that hold it, in which its
-  /// moves are shortened.
+  /// The frame in which the moves of a piece of cloth are shortened. The frame moves with the piece, all
+  /// cloth that it may cross and the dynamic bodies that hold it.
   struct Frame {
     bool rests = false;                 // in the world
     bool anchored = false;              // a fixed object holds it

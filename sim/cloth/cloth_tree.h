@@ -24,7 +24,7 @@ class ClothTree {
   /// Fits boxes around the triangles at `from`, enlarged by each point's `margin`, and bounds of their paths
   /// to `to`.
   void fit(std::span<const Vec4> from, std::span<const Vec4> to, std::span<const Real> margin);
-  /// As above, for some of the triangles.
+  /// Does what fit() does, for some of the triangles.
   void refit(std::span<const uint32_t> triangles, std::span<const Vec4> from, std::span<const Vec4> to,
              std::span<const Real> margin);
 

@@ -15,7 +15,7 @@ namespace offstage::sim {
 
 class CornerContacts {
  public:
-  /// Triangles of the cloths that collide with bodies.
+  /// Sets the triangles, those of cloths that collide with bodies.
   void assign(std::vector<Triangle> triangles, const ClothPoints& points);
   /// Finds the features and triangles that can meet in a sub-step of the world of length h.
   void find(const ClothPoints& points, std::span<ClothBody> bodies, Real h);

@@ -19,7 +19,7 @@ struct FourVectors {
   FourVectors operator*(Lanes s) const { return {s * x, s * y, s * z}; }
   Lanes dot(const FourVectors& b) const { return x * b.x + y * b.y + z * b.z; }
 
-  /// Of the points with these numbers.
+  /// Returns the vectors of the four points with these indices.
   static FourVectors of(const Vec4* points, const std::array<uint32_t, 4>& at) {
     const auto load = [&](std::size_t k) -> Lanes { return _mm256_load_pd(points[at[k]].data()); };
     const Lanes a = load(0), b = load(1), c = load(2), d = load(3);
@@ -30,7 +30,7 @@ struct FourVectors {
     return {__builtin_shufflevector(ab, cd, 0, 1, 4, 5), __builtin_shufflevector(aby, cdy, 0, 1, 4, 5),
             __builtin_shufflevector(ab, cd, 2, 3, 6, 7)};
   }
-  /// x y z 0 of each.
+  /// Returns the four vectors, each as x y z 0.
   std::array<Lanes, 4> apart() const {
     const Lanes none = {};
     const Lanes xy0 = __builtin_shufflevector(x, y, 0, 4, 2, 6),

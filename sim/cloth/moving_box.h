@@ -13,9 +13,9 @@ namespace offstage::sim {
 
 struct MovingBox {
   using Corner = Eigen::Array4f;    // x y z 0
-  std::array<Corner, 2> low, high;  ///< at the start and at the end
+  std::array<Corner, 2> low, high;  ///< corners at the start and at the end of the motion
 
-  /// Box around bounds at the start and at the end.
+  /// Returns the box that has these bounds at the start and at the end of the motion.
   static MovingBox around(const Vec4& low_start, const Vec4& high_start, const Vec4& low_end,
                           const Vec4& high_end) {
     return {{below(low_start), below(low_end)}, {above(high_start), above(high_end)}};
@@ -45,7 +45,7 @@ struct MovingBox {
   }
 };
 
-/// Eight of them, one in each lane.
+/// Eight moving boxes, one in each lane of a register.
 class EightBoxes {
  public:
   static constexpr uint32_t kCount = 8;

@@ -15,12 +15,12 @@ namespace offstage::sim {
 
 class RoundContacts {
  public:
-  /// Whether triangles with edges of up to `edge` at the distance `thickness` of their points from the shape
-  /// may come too near to the shape between these points, or let it pass.
+  /// Whether a triangle whose corners keep the distance `thickness` from the shape can nevertheless come too
+  /// near to the shape between its corners, or let the shape pass. `edge`: greatest length of its edges [m].
   static bool concerns(const Solid& solid, Real edge, Real thickness);
 
   void clear() { near_.clear(); }
-  /// A triangle and a body that can meet in the sub-step of the world.
+  /// Adds a triangle and a body that can meet in this sub-step of the world.
   void add(uint32_t triangle, uint32_t body) { near_.push_back({triangle, body}); }
   /// Moves triangles out of the bodies in a sub-step of cloth of length dt. Appends to `cuts`.
   void solve(std::span<const Triangle> triangles, ClothPoints& points, std::span<ClothBody> bodies, Real dt,

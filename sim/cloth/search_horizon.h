@@ -33,7 +33,7 @@ class SearchHorizon {
   static constexpr std::array<uint32_t, 7> kLengths = {1, 2, 3, 4, 6, 8, 12};
   /// Number of periods between two trials, and after a successful trial.
   static constexpr uint32_t kWait = 8, kWaitAfterGain = 2;
-  /// Fraction of the work that another length must at most take to be chosen.
+  /// Another length is chosen if it takes at most this fraction of the present work.
   static constexpr Real kWorthIt = 0.95;
 
   uint32_t neighbour() const {

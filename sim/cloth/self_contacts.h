@@ -21,19 +21,20 @@ namespace offstage::sim {
 
 class SelfContacts {
  public:
-  /// Triangles of the cloths that collide with cloth.
+  /// Sets the triangles of the cloths that collide with cloth.
   void assign(std::vector<Triangle> triangles, const ClothPoints& points);
   bool empty() const { return triangles_.empty(); }
 
   /// After points moved freely in a sub-step of length dt: separates pairs that are closer than their
   /// thickness, and keeps pairs from crossing as far as impulses between two points can. The search for pairs
-  /// is repeated only if the known ones no longer suffice.
+  /// is repeated only if the known pairs no longer suffice.
   void push_apart(ClothPoints& points, Real dt);
   /// Finds the pairs that may have crossed with the current moves, or may cross if any move is shortened
   /// towards the drift of its point. Points of one piece have a common drift.
   void find_doubtful(const ClothPoints& points, Real dt, std::span<const Vec4> drift);
   void find_none() { contacts_.clear(); }
-  /// Calls visit(points) for the pairs found: four, of which the first and the last are of one each.
+  /// Calls visit(points) for each pair found, with its four points. The first belongs to one partner of the
+  /// pair, and the last to the other.
   template <class Visit>
   void for_doubtful(Visit&& visit) const {
     for (const Contact& c : contacts_) visit(pairs_[c.pair].points);
@@ -43,7 +44,8 @@ class SelfContacts {
   /// Lowers the fractions of the moves of pairs that crossed, and adds their points to `lowered`. Returns
   /// whether there were any.
   bool shorten(const ClothPoints& points, MoveFractions& fractions, std::vector<uint32_t>& lowered);
-  /// Records the moves of points at the end of the sub-step.
+  /// Records the moves of points, for the next search. To be called at the end of a sub-step of length dt
+  /// [s].
   void end_substep(const ClothPoints& points, Real dt);
 
   std::span<const uint64_t> active() const {

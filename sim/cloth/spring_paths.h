@@ -19,13 +19,13 @@ struct SpringPath {
   std::vector<uint32_t> springs;  ///< indices of springs in the span given to spring_paths()
 };
 
-/// Every spring lies in one path. Neighbours in a path are of one kind and meet at an angle of less than 45
-/// degrees in the unstrained cloth. A closed path is cut open.
+/// Divides the springs into paths, such that each spring is in exactly one. Neighbours in a path are of one
+/// kind and meet at an angle of less than 45 degrees in the unstrained cloth. A closed path is cut open.
 std::vector<SpringPath> spring_paths(std::span<const ClothSpring> springs, const ClothPoints& points);
 
-/// The number of colours, of which the last is that of paths for which none was left.
+/// The number of colours. The last one is for paths that cannot have any of the others.
 inline constexpr uint32_t kPathColors = 65;
-/// A colour of each path: paths of one colour, other than the last, share no point.
+/// Returns a colour for each path. Paths of one colour share no point, unless it is the last colour.
 std::vector<uint32_t> path_colors(std::span<const SpringPath> paths, std::size_t point_count);
 
 }  // namespace offstage::sim

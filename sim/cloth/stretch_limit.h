@@ -39,7 +39,7 @@ class StretchLimit {
                std::vector<VelocityCut>& cuts);
   /// Whether any spring is too long, not counting those that tear first.
   bool any_too_long(const ClothPoints& points) const;
-  /// As above, for all springs.
+  /// Whether any spring is too long, including those that tear.
   bool any_beyond(const ClothPoints& points) const;
   /// Solves for all springs at their limits and these contacts together.
   void project_with(std::span<const BodyContact> contacts, ClothPoints& points,

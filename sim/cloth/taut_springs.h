@@ -24,13 +24,14 @@ inline constexpr Real kStretchAim = 0.97;
 struct SpringLimit {
   uint32_t a, b;       ///< points
   Real rest, longest;  ///< [m]
-  bool tears = false;  ///< it tears first, between steps of the world, and does not stop a body
+  /// Whether the spring tears before it stops a body; tearing happens between sub-steps of the world.
+  bool tears = false;
 };
 
 /// Contact of a point of cloth, or of a point within a triangle, with a dynamic body.
 struct BodyContact {
-  std::array<uint32_t, 3> points;  ///< a single point: three times the same
-  std::array<Real, 3> weights;     ///< barycentric weights of the points; a single point: 1, 0, 0
+  std::array<uint32_t, 3> points;  ///< indices of the points; for a single point, three times the same index
+  std::array<Real, 3> weights;     ///< barycentric weights of the points; for a single point: 1, 0, 0
   ClothBody* body;
   Vec3 normal;   ///< unit normal of the body's surface, world axes
   Vec3 on_body;  ///< contact point on the body's surface, world [m]
@@ -69,13 +70,13 @@ class TautSprings {
     uint32_t point, body;
     Vec3 arm;  // from the body's centre
   };
-  /// A place within a triangle: the mean of those of its corners.
+  /// A place within a triangle: the weighted mean of the places of its corners.
   struct MeanPlace {
     uint32_t place;
     std::array<uint32_t, 3> corners;  // places
     std::array<Real, 3> weights;
   };
-  /// Acts on one place along the direction, and on the other against it.
+  /// A row acts on one place along its direction, and on the other against it.
   struct Row {
     uint32_t first, second;  // places
     Vec4 direction;

@@ -1,5 +1,6 @@
 #pragma once
-/// Tearing (physics F8): stretch springs over the limit break, and the adjacent triangles separate.
+/// Tearing of cloth (physics F8): stretch springs longer than the limit break, and the adjacent triangles
+/// separate.
 
 #include "sim/cloth/cloth_state.h"
 

@@ -16,9 +16,10 @@ inline constexpr Real kTriangleDistance = 0.5;
 
 struct TriangleContact {
   std::array<Real, 3> weights;  ///< weights of the triangle's corners
-  Vec3 on_body;                 ///< in the world, at the end of the sub-step
-  Vec3 normal;                  ///< from the body to the triangle
-  Real gap;                     ///< to the distance that it keeps [m]; < 0
+  Vec3 on_body;                 ///< contact point on the body at the end of the sub-step, world [m]
+  Vec3 normal;                  ///< unit normal from the body to the triangle
+  /// Distance of the place from the body, minus the distance that it must keep [m]; negative.
+  Real gap;
 };
 
 /// Moves the triangle's points and the body apart in a sub-step of cloth of length dt, with Coulomb friction.

@@ -25,7 +25,7 @@ class BoundingTree {
   /// child's subtree.
   struct Node {
     Volume volume;
-    uint32_t size;          ///< nodes in the subtree, itself included
+    uint32_t size;          ///< number of nodes in the subtree, including this one
     uint32_t first, count;  ///< range of items() in the subtree
 
     bool is_leaf() const { return size == 1; }

@@ -40,7 +40,7 @@ class BroadPhase {
   /// Work of the last call of pairs(), as counts.
   struct Work {
     std::size_t entered = 0;   ///< objects inserted because they may have moved
-    std::size_t copies = 0;    ///< copies of these in cells
+    std::size_t copies = 0;    ///< copies of the inserted objects in cells
     std::size_t compared = 0;  ///< pairs of boxes compared
     std::size_t settled = 0;   ///< objects in the rebuilt grid of objects at rest; 0 if it was not rebuilt
   };

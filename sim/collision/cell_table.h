@@ -40,15 +40,16 @@ struct CellRange {
   uint32_t object;  ///< caller's index, below CellTable::kMaxObjects
   int32_t level;
   std::array<int32_t, 3> low, high;  ///< cell coordinates, both inclusive
-  CellBox box;                       ///< its cell lanes are not set
+  CellBox box;                       ///< box of the object; the lanes of its cell are not set
 
-  /// The same object at a coarser level. The width of cells doubles from level to level, so cells of all
-  /// levels nest.
+  /// Returns the cells of the same object at a coarser level. The width of cells doubles from level to level,
+  /// so cells of all levels nest.
   CellRange at(int32_t coarser) const;
 };
 
-/// Objects are entered as the level's own, or as finer ones that belong to a level of smaller cells. A pair
-/// is found here if at least one of the two is the level's own: this is the coarser of their levels.
+/// A table contains the objects of its own level, and finer objects, which belong to levels of smaller cells.
+/// It finds the pairs of which at least one object belongs to its own level. Each pair is thus found at the
+/// coarser of the two levels.
 ///
 /// Every pair is found once. The cells that two objects share are a box of cells. Its low corner is, along
 /// each axis, the low cell of the one or of the other object, and it is the only shared cell of which that is
@@ -81,7 +82,7 @@ class CellTable {
   void find_pairs_with(const CellTable& other, uint32_t first, uint32_t end, CandidatePairs& out) const;
 
  private:
-  /// An object to be inserted.
+  /// A copy of an object that is to be inserted, with the hash of its cell.
   struct Listed {
     uint32_t hash;
     uint32_t range;  // index of the range

@@ -26,7 +26,8 @@ class CollisionMesh {
   /// needed.
   explicit CollisionMesh(TriangleMesh welded, std::optional<ConvexDecomposition> known = {});
 
-  /// A compound: at least one welded solid. The mesh is that of all solids, without joining them.
+  /// Creates a compound of at least one welded solid. Its mesh contains the meshes of all solids, which are
+  /// not joined.
   explicit CollisionMesh(std::vector<SolidMesh> solids);
 
   TriangleMesh mesh;
@@ -35,12 +36,14 @@ class CollisionMesh {
   MassProperties mass;
   AabbTree tree;          ///< tree of the triangles
   ConvexPolyhedron hull;  ///< convex hull of the vertices
-  /// The mesh is closed and not inverted, so it has an inside; otherwise it is a two-sided surface.
+  /// Whether the mesh is closed and not inverted, so that it has an inside; otherwise it is a two-sided
+  /// surface.
   bool solid;
   /// The solids of a compound, if there are several. They may overlap, so faces of one can be inside another.
   std::vector<std::unique_ptr<const CollisionMesh>> solids;
 
-  /// Computed at the first call, which may take seconds; safe from several threads.
+  /// The convex decomposition. It is computed at the first call, which may take seconds. Several threads may
+  /// call this.
   const ConvexDecomposition& decomposition() const;
   /// Tree over the boxes of the decomposition's parts, whose items are their indices.
   const AabbTree& part_tree() const;

@@ -16,10 +16,12 @@ namespace offstage::sim {
 class CollisionShape {
  public:
   struct Options {
-    /// For dynamic bodies: contacts with them need a penetration depth, so a mesh is represented by its parts
-    /// even if these are approximate. For other bodies the exact surface is preferred.
+    /// Whether contacts need a penetration depth, as the contacts of dynamic bodies do. A mesh is then
+    /// represented by its convex parts, even if these are approximate. Otherwise its exact surface is
+    /// preferred.
     bool needs_volume = false;
-    /// A mesh is represented by its triangles in any case, and two such shapes by tests of two triangles.
+    /// Whether a mesh is represented by its triangles in any case. Two shapes with this option are tested
+    /// triangle against triangle.
     bool by_triangles = false;
     TreeChoice tree = {};
   };

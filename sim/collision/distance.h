@@ -20,7 +20,7 @@ struct SurfaceDistance {
 
 struct Solid {
   const Shape* shape = nullptr;
-  const CollisionMesh* mesh = nullptr;  ///< for a MeshShape
+  const CollisionMesh* mesh = nullptr;  ///< the registered mesh of a MeshShape, otherwise null
 };
 
 SurfaceDistance signed_distance(const Sphere& s, const Vec3& p);

@@ -28,8 +28,8 @@ struct GjkCache {
 /// deepest_point(), which returns the normal of a face of A - B, so the normal is robust near touching.
 Separation gjk(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache& cache);
 
-/// The same without a cache, for solids that are known to overlap: depth and direction of the smallest
-/// translation that separates them.
+/// Returns depth and direction of the smallest translation that separates two solids, which are known to
+/// overlap.
 Separation penetration(const Convex& a, const Convex& b, const Pose& a_from_b);
 
 /// Whether A and B have a point in common; ends at the first separating direction.

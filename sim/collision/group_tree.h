@@ -13,7 +13,7 @@ namespace offstage::sim {
 
 class GroupTree {
  public:
-  /// Requires at least one member.
+  /// Builds the tree of the objects with these indices, of which there must be at least one.
   explicit GroupTree(std::span<const uint32_t> members);
 
   std::span<const uint32_t> members() const { return members_; }

@@ -18,7 +18,7 @@ class GroupedBroadPhase {
                              Real means_in_cell = CellSizes::kMeansInCell)
       : grid_(kind, means_in_cell) {}
 
-  /// These functions are as those of BroadPhase, for objects of both levels.
+  /// Does what BroadPhase::insert() does; move() and remove(), too, do what those of BroadPhase do.
   void insert(uint32_t object, const Aabb& box, bool is_static = false);
   void move(uint32_t object, const Aabb& box);
   void remove(uint32_t object);
@@ -28,7 +28,7 @@ class GroupedBroadPhase {
   /// at most.
   void set_groups(std::span<const std::vector<uint32_t>> groups);
 
-  /// The pairs that BroadPhase::pairs() would give.
+  /// Returns the same pairs as BroadPhase::pairs() does.
   std::span<const IndexPair> pairs();
 
  private:

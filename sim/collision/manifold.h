@@ -12,12 +12,14 @@ namespace offstage::sim {
 
 /// One point of a manifold.
 struct ContactPoint {
-  Vec3 on_a = Vec3::Zero(), on_b = Vec3::Zero();  ///< on the surfaces; on_a - on_b = separation * normal
-  Real separation = 0;                            ///< [m], negative in penetration
+  /// Points on the surfaces of A and B; on_a - on_b = separation * normal.
+  Vec3 on_a = Vec3::Zero(), on_b = Vec3::Zero();
+  Real separation = 0;  ///< [m], negative in penetration
   /// Identifies the two features that meet here: a vertex and the other solid, or two edges. It is constant
   /// from step to step while they meet.
   uint32_t id = 0;
-  /// Contact with a mesh by its triangles: the triangle at this point. A manifold may join several.
+  /// For a mesh that is represented by its triangles: the triangle at this point. The points of one manifold
+  /// may lie on several triangles.
   uint32_t piece = 0;
 };
 
@@ -26,13 +28,13 @@ enum class NormalSource : uint8_t {
   face_of_a,  ///< the normal is fixed in A
   face_of_b,  ///< the normal is fixed in B
   edges,      ///< the normal is perpendicular to a line fixed in A and to a line fixed in B
-  edge_of_a,  ///< from a point fixed in B, perpendicular to a line fixed in A
-  edge_of_b,  ///< to a point fixed in A, perpendicular to a line fixed in B
-  points,     ///< from a point fixed in B to one fixed in A
+  edge_of_a,  ///< the normal leads from a point fixed in B perpendicularly to a line fixed in A
+  edge_of_b,  ///< the normal leads from a line fixed in B, perpendicularly to it, to a point fixed in A
+  points,     ///< the normal leads from a point fixed in B to a point fixed in A
 };
 
 struct Manifold {
-  Vec3 normal = Vec3::UnitY();  ///< unit, from B to A
+  Vec3 normal = Vec3::UnitY();  ///< unit vector from B to A
   NormalSource source = NormalSource::points;
   Vec3 edge_a = Vec3::Zero(), edge_b = Vec3::Zero();  ///< unit directions of the lines of `source`
   /// Depth of those lines and points behind the surfaces [m]: the radius for a sphere's centre or the axis of

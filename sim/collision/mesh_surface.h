@@ -19,7 +19,7 @@ class MeshSurface {
 
   /// The triangles across the edges (0,1), (1,2), (2,0) of a face, skipping slivers; kNoFace at a border.
   const std::array<uint32_t, 3>& across(uint32_t face) const { return faces_[face].across; }
-  /// Whether one of its vertices is at a border, beyond which the surface is unknown.
+  /// Whether a vertex of the face is at a border of the mesh, beyond which the surface is unknown.
   bool is_at_border(uint32_t face) const { return faces_[face].at_border; }
   /// Whether the triangle is too thin to have a reliable normal.
   bool is_sliver(uint32_t face) const { return faces_[face].sliver; }

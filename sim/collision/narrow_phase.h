@@ -41,7 +41,7 @@ class PairCache {
   /// Removes the entries that were not used since the last call.
   void forget_unused();
 
-  /// Tests of the queries with this cache.
+  /// Number of tests in all queries with this cache.
   TestCounts tests;
   /// Whether the shapes are at their actual, not predicted, poses. Sides are stored only then.
   bool keeps_sides = true;
@@ -86,7 +86,7 @@ void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose
 struct MovingShape {
   const CollisionShape& shape;
   const PosePath& path;
-  TestCounts* counts = nullptr;  ///< if given for the first shape, tests are added to it
+  TestCounts* counts = nullptr;  ///< tests are added to these counts, if they are given for the first shape
 };
 
 /// Returns the time, as a fraction of the step, at which the shapes are within `tolerance` [m], > 0, of each
@@ -96,8 +96,8 @@ struct MovingShape {
 /// "C2A: controlled conservative advancement for continuous collision detection of polygonal models" (2009).
 std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance);
 
-/// The same by bisection of the step, as in the book: shapes that overlap at the end have met before. Impacts
-/// of shapes that are apart again at the end are missed.
+/// Returns the same time, found by bisection of the step as in the book: shapes that overlap at the end have
+/// met before. Impacts of shapes that are apart again at the end are missed.
 std::optional<Impact> bisected_time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance);
 
 /// Returns the time of the next impact of shapes that are within the tolerance at the start and may stay so

@@ -22,7 +22,7 @@ struct Obstacle {
   Vec3 velocity_at(const Vec3& p, Real fraction) const {
     return velocity + angular_velocity.cross(p - start.position - fraction * (end.position - start.position));
   }
-  /// Position of its centre of mass at a fraction of the sub-step.
+  /// Position of the solid's centre of mass at a fraction of the sub-step.
   Vec3 centre_at(Real fraction) const { return at(fraction).point_to_world(centre); }
   /// Unit direction of the friction axis where the surface has the normal n (world) at a fraction of the
   /// sub-step; zero where friction is the same in all directions.
@@ -35,18 +35,20 @@ struct Obstacle {
   /// straight path is curved; the pieces deviate from it by at most kChordError of the particle's radius. The
   /// number is bounded.
   int pieces(Real particle_radius) const;
-  /// Box in the world around all its positions during the sub-step.
+  /// Box in the world around all positions of the solid during the sub-step.
   Aabb swept_bounds() const;
 
   static constexpr Real kChordError = 0.02;
 
   Solid solid;
   Pose start, end;
-  Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();  ///< mean over the sub-step, world
-  Real turn = 0;                                                  ///< angle turned [rad]
-  Real extent;                                                    ///< reach() of the solid
+  /// Mean velocity and angular velocity over the sub-step, world axes [m/s], [rad/s].
+  Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
+  Real turn = 0;  ///< angle turned [rad]
+  /// Distance of the farthest point of the solid from its origin [m].
+  Real extent;
   Real restitution, friction;
-  Real cross_friction = 1;  ///< across the friction axis over that along it
+  Real cross_friction = 1;  ///< friction across the friction axis over friction along it
   Vec3 friction_axis =
       Vec3::Zero();       ///< direction of the surface's friction axis, in the solid's frame; zero: none
   uint32_t body = 0;      ///< the world's index of the body
@@ -63,7 +65,7 @@ struct Obstacle {
 struct Reaction {
   uint32_t body;         ///< Obstacle::body
   Vec3 impulse;          ///< [N s]
-  Vec3 angular_impulse;  ///< about the centre of mass [N m s]
+  Vec3 angular_impulse;  ///< angular impulse about the centre of mass [N m s]
 };
 
 /// A set of obstacles: planes in a list, the others in a tree of swept boxes.

@@ -11,7 +11,7 @@ namespace offstage::sim {
 /// overlapping ones with the smallest translation (up to the tolerance of the algorithm).
 struct Separation {
   Real distance = 0;            ///< [m]; negative: penetration depth
-  Vec3 normal = Vec3::UnitY();  ///< unit, from B to A: an approaching pair has (v_A - v_B).n < 0
+  Vec3 normal = Vec3::UnitY();  ///< unit vector from B to A: an approaching pair has (v_A - v_B).n < 0
   Vec3 on_a = Vec3::Zero();     ///< closest point on the surface of A
   Vec3 on_b = Vec3::Zero();     ///< closest point on the surface of B; on_a - on_b = distance * normal
   int iterations = 0;           ///< iterations of the algorithm, for benchmarks and statistics

@@ -20,7 +20,8 @@ struct Simplex {
 struct SimplexPoint {
   Vec3 v = Vec3::Zero();
   Real squared = std::numeric_limits<Real>::infinity();  ///< |v|^2
-  std::size_t size = 0;                                  ///< number of corners; 4: the origin is inside
+  /// Number of corners of the face; 4: the origin is inside the simplex.
+  std::size_t size = 0;
   std::array<uint8_t, 4> corner{};
   std::array<Real, 4> weight{};
 

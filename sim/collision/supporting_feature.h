@@ -35,15 +35,15 @@ struct SupportingFeature {
   void place(const Mat3& rotation, const Vec3& translation);
 };
 
-/// Returns the feature with the largest part within `slack` of the plane with the unit normal `d` that
-/// touches the solid. For a polyhedron it is the face at the support vertex with the largest such part
+/// Returns the feature with the largest part within `slack` of the plane that touches the solid and has the
+/// unit normal `d`. For a polyhedron it is the face at the support vertex with the largest such part
 /// (projected on the plane), for a cylinder or cone the flat side or a line of the round side. Discs are
 /// given as regular polygons on the rim, and faces with many corners by their most distant corners.
 SupportingFeature supporting_feature(const Convex& c, const Vec3& d, Real slack);
 
-/// The same without faces. For a polyhedron it is the edge at the support vertex that is perpendicular to
-/// `d`, or else the one with the longest part within `slack`; for a rim it is a point. `on_surface` is the
-/// touching point of the core.
+/// Returns the edge or point that faces `d`, but never a face. For a polyhedron it is the edge at the support
+/// vertex that is perpendicular to `d`, or else the one with the longest part within `slack`; for a rim it is
+/// a point. `on_surface` is the touching point of the core.
 SupportingFeature supporting_edge(const Convex& c, const Vec3& d, Real slack, const Vec3& on_surface);
 
 }  // namespace offstage::sim

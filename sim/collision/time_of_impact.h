@@ -35,8 +35,8 @@ struct MovingConvex {
 /// the end. For solids that are within it at the start, the time is 0.
 std::optional<Impact> time_of_impact(const MovingConvex& a, const MovingConvex& b, Real tolerance);
 
-/// The same for the half-space below a plane, which is the xz plane of its path's frame. The normal is that
-/// of the plane, in the solid's frame.
+/// Returns the time of impact, as time_of_impact() does, of a solid and the half-space below a plane, which
+/// is the xz plane of its path's frame. The normal is that of the plane, in the solid's frame.
 std::optional<Impact> time_of_plane_impact(const MovingConvex& a, const PosePath& plane, Real tolerance);
 
 /// Rotation of a solid's core, as far as it moves the core as a whole.

@@ -14,8 +14,8 @@ enum class TreeSplit : uint8_t {
   /// Splits at the mean of the midpoints along the longest axis; at their median if the mean is unbalanced;
   /// along another axis if all midpoints coincide. This is the book's rule.
   mean,
-  /// Splits at the least cost of queries by the surface area heuristic, among 16 bins along each axis: Wald,
-  /// "On fast construction of SAH-based bounding volume hierarchies" (2007).
+  /// Splits where queries cost least according to the surface area heuristic, among 16 bins along each axis:
+  /// Wald, "On fast construction of SAH-based bounding volume hierarchies" (2007).
   surface_area,
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-/// Contact with triangles that are parts of a mesh: as by manifold(), but restricted to the normals that the
-/// surrounding surface allows (mesh_surface.h), on the side on which the other solid is.
+/// Contact with triangles that are parts of a mesh: manifolds like those of manifold(), but restricted to the
+/// normals that the surrounding surface allows (mesh_surface.h), on the side on which the other solid is.
 
 #include <optional>
 #include <vector>
@@ -11,8 +11,9 @@
 namespace offstage::sim {
 
 /// Computes the manifold of a sphere and a triangle in closed form, in their common frame; `triangle` has the
-/// side on which the sphere is, however deep. There are no points if they are more than `margin` [m] apart or
-/// the surface around the triangle is nearer. `of_b`: the triangle is B.
+/// side of the triangle from which the sphere came, even if the sphere is deep behind it. There are no points
+/// if they are more than `margin` [m] apart or the surface around the triangle is nearer. `of_b`: the
+/// triangle is B.
 void sphere_triangle_manifold(const Vec3& centre, Real radius, const SurfaceTriangle& triangle,
                               const Pose& mesh_pose, bool of_b, Real margin, Manifold& m);
 

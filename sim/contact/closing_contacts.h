@@ -25,18 +25,19 @@ struct ClosingPoint {
   Vec3 bias_at(Real part) const { return bias[0] + part * (bias[1] + part * bias[2]); }
 };
 
-/// Displacement of a body in an interval: of its centre of mass [m], and a small rotation vector [rad].
+/// Displacement of a body in an interval: `shift` of its centre of mass [m], and `turn`, a small rotation
+/// vector [rad].
 struct Displacement {
   Vec3 shift = Vec3::Zero(), turn = Vec3::Zero();
 };
 
 struct ClosingSolution {
-  std::vector<ContactBody> bodies;  ///< velocities at the end
-  // With their impulses of the whole interval:
+  std::vector<ContactBody> bodies;  ///< bodies with their velocities at the interval's end
+  // With their impulses over the whole interval:
   std::vector<Contact> contacts;
   std::vector<BoundedRow> bounded;
   std::vector<Vec6> constraints;            ///< impulses of the joints' constraints
-  std::vector<Displacement> displacements;  ///< of the bodies
+  std::vector<Displacement> displacements;  ///< displacement of each body in the interval
   ContactWork work;
 };
 

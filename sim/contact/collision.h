@@ -14,8 +14,8 @@ namespace offstage::sim {
 /// Order of the impulses in a cluster.
 enum class ImpactLaw : uint8_t {
   simultaneous,  ///< all impulses at once, P_n >= 0 complementary to u_n >= -e u_n(before)
-  /// One contact after the other, the fastest approach first, and equally fast ones together. Impulses
-  /// propagate as through Newton's cradle.
+  /// Impulses at one contact after the other, the fastest approach first; contacts that approach equally fast
+  /// are solved together. Impulses propagate as through Newton's cradle.
   sequential
 };
 

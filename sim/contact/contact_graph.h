@@ -20,9 +20,9 @@ struct Island {
   std::vector<Body*> bodies;
   std::vector<ContactPair*> pairs;
   std::vector<Articulation*> articulations;
-  /// System that moved it from the interval's start and can restore its state.
+  /// System that has moved the island from the interval's start, and can restore its state.
   CoupledSystem* motion = nullptr;
-  Real from = 0;  ///< start of its interval, since the sub-step's start [s]
+  Real from = 0;  ///< start of the island's interval, since the sub-step's start [s]
 };
 
 class ContactGraph {

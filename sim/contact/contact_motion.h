@@ -17,8 +17,9 @@ namespace offstage::sim {
 
 /// Position of a contact at one time of the interval.
 struct ContactPlace {
-  Vec3 normal;        ///< unit, from b to a, world
-  Vec3 arm_a, arm_b;  ///< from the bodies' centres of mass (of kinematic bodies their origins) [m]
+  Vec3 normal;  ///< unit, from b to a, world
+  /// Vectors from the bodies' centres of mass (of kinematic bodies: their origins) to the contact [m].
+  Vec3 arm_a, arm_b;
   /// Rotation, since the interval's start, of the contact points of the body whose feature defines the
   /// contact. They turn with the body, or, on the sides and rims of round bodies, with the meridian that
   /// faces the other body.
@@ -27,7 +28,7 @@ struct ContactPlace {
 
 struct ContactMotion {
   ContactPlace middle;
-  ContactFrame frame;  ///< frame at the middle of the interval
+  ContactFrame frame;  ///< frame of the contact at the middle of the interval
   /// Change of the relative velocity at the contact due to the rotation of arms and normal alone, in `frame`
   /// (n, t, k): gain s + bow s^2, where s increases from -1 at the start through 0 in the middle to 1 at the
   /// end [m/s].

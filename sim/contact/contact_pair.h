@@ -22,14 +22,14 @@ struct PairSurface {
   const Body* axis_body = nullptr;  ///< body that defines the friction axis; null: isotropic
   bool conveys = false;             ///< whether a surface is a conveyor
   DistanceMethod method = DistanceMethod::gjk;
-  bool by_triangles = false;  ///< impacts are found by the triangles of two meshes
+  bool by_triangles = false;  ///< whether impacts are found by the triangles of two meshes
 };
 
 /// Force at a point of a manifold on body a, in the manifold's frame.
 struct PointForce {
   Vec3 now = Vec3::Zero();   ///< mean over the interval [N]
-  Vec3 last = Vec3::Zero();  ///< at the end of the interval; initial guess of the next one [N]
-  Vec3 mean = Vec3::Zero();  ///< over previous intervals; used by the fast solver [N]
+  Vec3 last = Vec3::Zero();  ///< force at the end of the interval, the initial guess for the next one [N]
+  Vec3 mean = Vec3::Zero();  ///< mean over previous intervals, for the fast solver [N]
   bool known = false;        ///< whether the point existed in the previous interval
 };
 
@@ -37,7 +37,7 @@ struct PointForce {
 struct PlacedManifold {
   ContactFrame frame;  ///< contact_frame() of the normal, or t along the friction axis
   Real torque = 0,
-       mean_torque = 0;  ///< about the normal, of all points together; used by the fast solver [N m]
+       mean_torque = 0;  ///< mean torque of all points about the normal, for the fast solver [N m]
   Manifold manifold;     ///< world
   std::array<PointForce, 4> forces;
 };
@@ -58,13 +58,15 @@ class alignas(64) ContactPair {
   bool has_narrow_ = false;
 
  public:
-  uint32_t impacts = 0;        ///< number in this sub-step
-  uint8_t speculative = 0;     ///< number of manifolds that add_speculative_contacts() added
-  bool toi_exhausted = false;  ///< limit of impacts reached: not traced back again in this sub-step
-  /// Its contacts have no restitution in this sub-step; they only limit the approach.
+  uint32_t impacts = 0;     ///< number of impacts of this pair in this sub-step
+  uint8_t speculative = 0;  ///< number of manifolds that add_speculative_contacts() added
+  /// Whether the pair reached its limit of impacts: it is not traced back again in this sub-step.
+  bool toi_exhausted = false;
+  /// Whether the contacts of the pair have no restitution in this sub-step: they only limit the approach.
   bool restitution_suppressed = false;
   Real deepest = 0;  ///< deepest overlap that find() has seen in this sub-step [m]
-  /// Impacts of this pair are traced back to; otherwise its points limit the approach.
+  /// Whether the island of this pair is moved back to the time of its impacts; otherwise the contact points
+  /// limit the approach.
   bool needs_toi = false;
 
   /// Only `b` may be a plane.
@@ -76,7 +78,7 @@ class alignas(64) ContactPair {
   /// The shapes by which the time of an impact of the two bodies is found.
   const CollisionShape& impact_shape_a() const { return impact_shape(*a_); }
   const CollisionShape& impact_shape_b() const { return impact_shape(*b_); }
-  /// Tests of volumes and pieces since the last call.
+  /// Returns how many tests of bounding volumes and of pairs of pieces were made since the last call.
   TestCounts take_tests() { return std::exchange(cache_.tests, {}); }
 
   /// Finds the contact points where the bodies at these poses are within `margin` [m] of each other. If their
@@ -84,10 +86,11 @@ class alignas(64) ContactPair {
   /// updated. `turning`: see find_manifolds().
   void find(const Pose& a, const Pose& b, Real margin, Real reuse, bool turning);
 
-  /// Adds speculative contacts to those of find() at the interval's start. They are where the freely moving
-  /// bodies would overlap at the interval's end by more than the existing points predict, because fast
-  /// turning or sliding brings other features together. Their separations are chosen such that the velocities
-  /// at the arms of the start, over `duration` [s], give the separations at the end.
+  /// Adds speculative contacts to the contacts that find() found at the interval's start. Speculative
+  /// contacts are where the freely moving bodies would overlap at the interval's end by more than the
+  /// existing points predict, because fast turning or sliding brings other features together. Their
+  /// separations are chosen such that the velocities at these points over `duration` [s], with the lever arms
+  /// of the start, give the separations at the end.
   void add_speculative_contacts(Real duration);
 
   /// Whether the motion of the points of a manifold of this pair over `duration` [s] predicts an overlap that
@@ -105,7 +108,8 @@ class alignas(64) ContactPair {
            relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n) < -impact_speed;
   }
 
-  /// Prefetches memory for find(): first that of the pair, and a little later that of the first manifold.
+  /// Prefetches memory for find(): first the pair itself, and a little later, with prefetch_manifold(), its
+  /// first manifold.
   void prefetch() const { sim::prefetch(this, this + 1); }
   void prefetch_manifold() const {
     if (!placed_.empty()) sim::prefetch(placed_.data(), placed_.data() + 1);
@@ -116,14 +120,14 @@ class alignas(64) ContactPair {
   /// The i-th manifold added by add_speculative_contacts(), with its points at their positions at the
   /// interval's end.
   const Manifold& at_end(std::size_t i) const { return at_end_[i]; }
-  /// Replaces the i-th manifold by another one in world coordinates. A manifold without points is removed at
-  /// the next drop_empty(). The separation remains that of the bodies.
+  /// Replaces the i-th manifold by `m`, which is in world coordinates. A manifold without points is removed
+  /// at the next drop_empty(). separation() remains the separation of the bodies.
   void replace(uint32_t i, const Manifold& m);
   void drop_empty();
 
   /// Whether the only contact is that of a sphere with a simple shape, found in closed form.
   bool has_sphere() const { return has_sphere_; }
-  /// Whether find() was never called.
+  /// Whether find() was never called for this pair.
   bool is_new() const { return found_margin_ < 0; }
 
   std::vector<PlacedManifold>& manifolds() { return placed_; }
@@ -149,7 +153,7 @@ class alignas(64) ContactPair {
     Vec3 on_a, last, mean, normal;
     Real torque, mean_torque;
     uint32_t id;
-    bool taken = false;  ///< whether it was matched with a current point
+    bool taken = false;  ///< whether the stored point was matched with a current one
   };
   static PointForce stored_force(const StoredPoint& p, const ContactFrame& frame, const Mat3& a_axes);
   void find_points(const Pose& a, const Pose& b, Real margin, Real reuse, bool turning);

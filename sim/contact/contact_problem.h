@@ -30,7 +30,7 @@ namespace offstage::sim {
 
 struct ContactBody {
   Real inverse_mass = 0;                ///< [1/kg]; 0: contacts do not move it
-  Mat3 inverse_inertia = Mat3::Zero();  ///< about the centre of mass, world axes [1/(kg m^2)]
+  Mat3 inverse_inertia = Mat3::Zero();  ///< inverse inertia about the centre of mass, world axes [1/(kg m^2)]
   /// Velocity of the centre of mass [m/s]; solvers add the effect of the impulses.
   Vec3 velocity = Vec3::Zero();
   Vec3 angular_velocity = Vec3::Zero();  ///< world [rad/s]
@@ -46,16 +46,17 @@ struct ContactBody {
 /// One point where body a touches body b. Vectors of three numbers are in the order normal, t, k of its
 /// frame.
 struct Contact {
-  uint32_t a = 0, b = 0;                            ///< indices of bodies; not both unmoved
-  ContactFrame frame;                               ///< n from b to a
-  Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();  ///< from the centres of mass to the point, world [m]
+  uint32_t a = 0, b = 0;  ///< indices of bodies; not both unmoved
+  ContactFrame frame;     ///< n from b to a
+  /// Vectors from the centres of mass to the point, world axes [m].
+  Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();
   /// Added to the relative velocity, for moving surfaces and turning frames [m/s].
   Vec3 offset = Vec3::Zero();
   /// The part of `offset` that is not a surface velocity: velocity terms of R9 [m/s].
   Vec3 bias = Vec3::Zero();
   Real target = 0;  ///< smallest normal velocity after the solution [m/s]
-  /// Coulomb's coefficients along t and k. Equal ones give the round cone, |p_tk| <= mu p_n; with different
-  /// ones each axis has its own limit (R6).
+  /// Coulomb's coefficients along t and k. If they are equal, friction has the round cone |p_tk| <= mu p_n;
+  /// otherwise each axis has its own limit (R6).
   Real friction_t = 0, friction_k = 0;
   /// Rolling and spinning friction: the greatest angular impulse about the tangents and about the normal, per
   /// normal impulse [m].

@@ -17,17 +17,19 @@ Vec3 velocity_bias(const ContactPair& pair, const PlacedManifold& placed, const 
 /// Velocity that conveyors add to the velocity of a relative to b [m/s], world axes.
 Vec3 surface_velocity(const ContactPair& pair);
 
-/// Components along n, t and k.
+/// Components of a world vector along n, t and k.
 Vec3 in_frame(const ContactFrame& f, const Vec3& v);
 
 /// Coefficients of friction along t and k at a relative velocity u (contact's frame): the static coefficients
 /// if the contact does not slide.
 std::pair<Real, Real> friction(const PairSurface& surface, const Vec3& u);
 
-/// Reference point of a body's velocities. For kinematic bodies it is that of the interval's end.
+/// Point to which a body's velocity refers [m]: the centre of mass, or the origin of a kinematic body at the
+/// interval's end.
 Vec3 origin(const Body& body);
 
-/// A body that contacts do not move, for the exact solver and that of impacts: asleep, static or kinematic.
+/// A body that contacts do not move, in the exact solver and in the solver of impacts: asleep, static or
+/// kinematic.
 ContactBody unmoved_body(const Body& body);
 
 /// The inverse inertia in world axes at an orientation.
@@ -41,7 +43,7 @@ struct IntervalEffect {
   Vec3 impulse, angular_impulse;  ///< [N s], [N m s]
   Vec3 spin;                      ///< expected change of the angular velocity [rad/s]
   Vec3 shift, turn;               ///< displacement [m] and small rotation vector [rad]
-  Real fraction;                  ///< fraction of the sub-step that the interval is
+  Real fraction;                  ///< length of the interval over that of the sub-step
 };
 
 /// Adds the effect of an interval to a body in its state at the end of the free motion.

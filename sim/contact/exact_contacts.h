@@ -15,8 +15,8 @@ class ExactContacts {
  public:
   /// How the problem is solved.
   enum class Method : uint8_t {
-    proximal,  ///< by the proximal Newton method on the true friction cone
-    lcp        ///< by linear complementarity (contact_lcp.h), or else as above
+    proximal,  ///< proximal Newton method on the true friction cone
+    lcp        ///< linear complementarity (contact_lcp.h); where this fails, the method `proximal`
   };
   struct Outcome {
     /// False: nothing was changed, because the cost exceeded the budget, or because the result of a fall-back
@@ -31,7 +31,8 @@ class ExactContacts {
   /// energy; otherwise the fast solver, whose work is bounded, must solve the island.
   Outcome solve(const Island& island, const ContactInterval& interval, Real budget,
                 Method method = Method::proximal);
-  /// Cost of the last solve() [ns], without that of a division at the times at which contacts close.
+  /// Cost of the last solve() [ns]. The cost of dividing the interval at the times at which contacts close is
+  /// not included.
   Real cost() const { return cost_; }
 
  private:

@@ -70,8 +70,8 @@ Vector shortened(const Vector& v, Real limit) {
   return length > limit ? Vector(limit / length * v) : v;
 }
 
-/// Sliding and spinning friction have one common limit up to this arm; a longer one belongs to surfaces that
-/// are nearly without friction, and then each has its own limit [m].
+/// Greatest arm s for which sliding and spinning friction share one limit [m]. A longer arm belongs to
+/// surfaces that are nearly without friction; sliding and spinning then have separate limits.
 inline constexpr Real kLongestSpinArm = 0.1;
 
 /// The arm s at which spinning counts as sliding [m]; 0 if sliding and spinning are limited separately: no

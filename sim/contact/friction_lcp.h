@@ -1,6 +1,6 @@
 #pragma once
-/// Contacts with Coulomb friction by pivoting on the dense matrix of a small cluster (physics N10). It solves
-/// collisions of up to about twenty contacts.
+/// Solves contacts with Coulomb friction by pivoting on the dense matrix of a small cluster (physics N10). It
+/// is used for collisions of up to about twenty contacts.
 
 #include <span>
 

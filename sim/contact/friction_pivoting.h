@@ -17,7 +17,7 @@ namespace offstage::sim {
 struct DenseContacts {
   Eigen::MatrixXd A;                      ///< J M^-1 J^T, symmetric, positive semidefinite [1/kg]
   Eigen::VectorXd b;                      ///< [m/s]
-  std::vector<Eigen::Vector2d> friction;  ///< for each contact, along t and k
+  std::vector<Eigen::Vector2d> friction;  ///< coefficients of friction of each contact, along t and along k
   /// Dynamic friction: p_t = -mu p_n and p_k = 0 for any tangential velocities.
   std::vector<uint8_t> slides;
   /// Optional: excluded rows. Their normal impulse is fixed at 1, so that the limits of their tangents are

@@ -7,8 +7,8 @@
 namespace offstage::sim {
 
 struct CollisionSettings {
-  Real time;             ///< as the world's time [s]
-  Real substep;          ///< [s]
+  Real time;             ///< time of the world at which the island collides [s]
+  Real substep;          ///< length of the sub-step [s]
   Real reach;            ///< contacts with a smaller separation belong to the cluster [m]
   Real collision_speed;  ///< contacts that approach faster bounce [m/s]
   ImpactLaw law;

@@ -43,7 +43,7 @@ class IslandJoints {
   /// a limit is reached: the joint forces that would have turned the velocities afterwards end with the
   /// motion. Articulations that reach no limit are not changed.
   void project(std::span<ContactBody> bodies, Real end) const;
-  /// End of the bounded rows of each articulation.
+  /// For each articulation, the end of its rows among bounded().
   std::span<const uint32_t> bounded_ends() const { return bounded_ends_; }
   std::span<const BoundedRow> bounded() const { return bounded_; }
   std::span<const BoundedOrigin> origins() const { return origins_; }

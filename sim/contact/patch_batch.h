@@ -31,15 +31,15 @@ struct BodyMotion {
 
 /// Twists and wrenches of the patches, by group.
 struct PatchGroups {
-  LaneVector<FloatLanes> normal;    ///< along n, about t, about k
-  LaneVector<FloatLanes> friction;  ///< along t, along k, about n
+  LaneVector<FloatLanes> normal;    ///< components along n, about t and about k
+  LaneVector<FloatLanes> friction;  ///< components along t, along k and about n
 };
 
 struct PatchBatch {
   using Lanes = FloatLanes;
   using Vector = LaneVector<Lanes>;
   using Symmetric = LaneSymmetric<Lanes>;
-  using Index = ContactColoring::Batch;  ///< by lane
+  using Index = ContactColoring::Batch;  ///< an index for each lane
 
   struct Point {
     Lanes x, y, radius;   ///< coordinates along t and k, and distance from the centre [m]
@@ -55,7 +55,7 @@ struct PatchBatch {
   std::array<bool, ContactColoring::kLanes> moves_a, moves_b;
   uint32_t count;   ///< greatest number of points in a lane
   float tolerance;  ///< tolerance of the next sweep's rounds [m/s]
-  bool alone;       ///< see prepare()
+  bool alone;       ///< whether sweeps of other patches do not correct errors of this batch; see prepare()
   Vector n, t, k, arm_a, arm_b;
   Lanes inverse_mass_a, inverse_mass_b;
   Symmetric inverse_inertia_a, inverse_inertia_b;
@@ -73,12 +73,12 @@ struct PatchBatch {
   Lanes rolling;                         ///< radius of the disc of rolling friction per normal impulse [m]
   Lanes spin_arm;                        ///< spinning friction over the coefficient of friction [m]
   Vector rolling_impulse;                ///< about t and k in y and z, like the normal group; x is 0 [N m s]
-  Vector rolling_before, rolling_shift;  ///< see Point
-  /// Along t, k, about n; see Point.
+  Vector rolling_before, rolling_shift;  ///< rolling friction, as Point::before and Point::shift
+  /// Friction along t and k, and about n; for the meanings see Point.
   Vector friction_impulse, friction_mean, friction_before, friction_shift;
   /// Sum of the normal impulses with which the friction was computed, if the patch slides; else 0 [N s].
   Lanes pressure;
-  Lanes holds;     ///< all ones where friction was well within its limit in the last sweep, else 0
+  Lanes holds;     ///< all bits set where friction was well within its limit in the last sweep, else 0
   Lanes renewal;   ///< fraction of the difference by which means follow their impulses
   Lanes residual;  ///< change of the velocity of the centre in the last sweep [m/s]
   bool turns;      ///< whether `gain` is used
@@ -87,7 +87,7 @@ struct PatchBatch {
   Vector bow;        ///< bow of the centre along n, t, k, see ContactPatch
 };
 
-/// Time of a sub-step.
+/// The times of a sub-step within a step.
 struct SubstepTime {
   Real substep;   ///< length of the sub-step [s]
   Real elapsed;   ///< time from the step's start to the beginning of the sub-step [s]

@@ -36,7 +36,7 @@ namespace offstage::sim {
 /// A body during a step of the fast solver.
 struct RelaxedBody {
   Real inverse_mass = 0;                ///< [1/kg]; 0: contacts do not move it, but it may be moving
-  Mat3 inverse_inertia = Mat3::Zero();  ///< about the centre of mass, world axes [1/(kg m^2)]
+  Mat3 inverse_inertia = Mat3::Zero();  ///< inverse inertia about the centre of mass, world axes [1/(kg m^2)]
   Vec3 velocity = Vec3::Zero();  ///< velocity of the centre of mass [m/s]; in: at the start, out: at the end
   Vec3 angular_velocity = Vec3::Zero();           ///< world [rad/s]; in: at the start, out: at the end
   Vec3 free_acceleration = Vec3::Zero();          ///< mean over the step, without contacts [m/s^2]
@@ -63,15 +63,16 @@ struct RelaxedBody {
 struct ContactPatch {
   struct Point {
     Real t = 0, k = 0;    ///< coordinates along the tangents, from the patch's centre [m]
-    Real separation = 0;  ///< at the start of the step, negative in penetration [m]
+    Real separation = 0;  ///< separation at the start of the step, negative in penetration [m]
     Real force = 0;  ///< normal force [N]; in: the guess from the last step; out: at the end of this step
     Real mean_force = 0;  ///< mean over the time before [N]; in: from the last step, out: updated
     Real impulse = 0;     ///< out: impulse over the whole step [N s]
     Real shift = 0;       ///< out: mass times the displacement by this point in the step [kg m]
   };
-  uint32_t a = 0, b = 0;                            ///< indices of bodies; at least one is movable
-  ContactFrame frame;                               ///< n from b to a
-  Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();  ///< from the centres of mass to the patch's centre [m]
+  uint32_t a = 0, b = 0;  ///< indices of bodies; at least one is movable
+  ContactFrame frame;     ///< n from b to a
+  /// Vectors from the centres of mass to the patch's centre [m].
+  Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();
   Vec3 offset = Vec3::Zero();  ///< (n, t, k), added to the relative velocity, for moving surfaces [m/s]
   /// Change of the relative velocity at the centre due to turning arms and frames, in (n, t, k): gain s + bow
   /// s^2, where s increases linearly from -1 at the step's start to 1 at its end [m/s]. The normal velocity
@@ -79,18 +80,20 @@ struct ContactPatch {
   Vec3 gain = Vec3::Zero(), bow = Vec3::Zero();
   Real gain_along_t = 0, gain_along_k = 0;
   bool turns = false;  ///< whether any gain differs from 0
-  /// Coulomb's coefficients. Equal coefficients give the round cone; with different ones each axis has its
-  /// own limit.
+  /// Coulomb's coefficients. If they are equal, friction has the round cone; otherwise each axis has its own
+  /// limit.
   Real friction_t = 0, friction_k = 0;
   uint32_t count = 0;
   std::array<Point, 4> points;
   /// Friction of all points together: tangential [N] and about the normal [N m]; in and out like
   /// Point::force.
   Real force_t = 0, force_k = 0, torque_n = 0;
-  Vec3 mean_friction = Vec3::Zero();     ///< the mean of these, like Point::mean_force
-  Vec3 friction_impulse = Vec3::Zero();  ///< in the order of mean_friction, like Point::impulse
-  Vec3 friction_shift = Vec3::Zero();    ///< in the order of mean_friction, like Point::shift
-  Real rolling = 0, spinning = 0;        ///< see Contact
+  Vec3 mean_friction = Vec3::Zero();  ///< the mean of these, like Point::mean_force
+  /// Impulses of friction over the whole step, in the order of mean_friction; see Point::impulse.
+  Vec3 friction_impulse = Vec3::Zero();
+  /// Effect of friction on positions, in the order of mean_friction; see Point::shift.
+  Vec3 friction_shift = Vec3::Zero();
+  Real rolling = 0, spinning = 0;  ///< rolling and spinning friction [m]; see Contact
   /// Rolling friction: angular impulse about t and k, like Point::impulse [N m s], and its Point::shift.
   Tangential rolling_impulse = Tangential::Zero(), rolling_shift = Tangential::Zero();
 };

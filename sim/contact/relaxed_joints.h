@@ -22,7 +22,7 @@ struct LinkContact {
   uint32_t part;          ///< index of the articulation
   uint32_t patch, point;  ///< indices of the contact
   BoundedRow row;         ///< the normal velocity; out: its impulse in the whole step
-  Real separation;        ///< at the step's start [m]
+  Real separation;        ///< separation at the start of the step [m]
 };
 
 class RelaxedJoints {
@@ -40,7 +40,7 @@ class RelaxedJoints {
   void start(uint32_t part, std::span<BodyMotion> motions);
   /// Solves a part at the end of a sub-step, `elapsed` after the start.
   void solve(uint32_t part, std::span<BodyMotion> motions, Real elapsed, bool is_last);
-  /// Before overlaps are removed by moving bodies.
+  /// Stores the displacements of the links. To be called before overlaps are removed by moving bodies.
   void begin_push(uint32_t part, std::span<const BodyMotion> motions);
   /// Moves the links of a part so that the displacements since begin_push() agree with the joints. Returns
   /// the greatest one [m]. Without this, joints would pull bodies back into the overlap at the end of each
@@ -51,7 +51,7 @@ class RelaxedJoints {
   /// Adds the effect of the joints in the step to the bodies, in double precision. `late` is, by body, the
   /// time by which the displacement by the sub-steps is too large per change of velocity [s].
   void add_motion(std::span<RelaxedBody> bodies, std::span<const Real> late) const;
-  /// Writes the impulses of the whole step.
+  /// Writes the impulses of the whole step to the problem and the contacts.
   void finish();
 
  private:

@@ -22,7 +22,7 @@
 
 namespace offstage::sim {
 
-/// The rule by which a figure of several steps follows from those of the steps.
+/// The rule by which a figure of several steps follows from the figures of the single steps.
 enum class OverSteps : uint8_t { sum, greatest, last };
 
 template <class Part, class Value>

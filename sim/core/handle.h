@@ -57,7 +57,7 @@ class SlotMap {
   }
   const T* find(HandleType h) const { return const_cast<SlotMap*>(this)->find(h); }
 
-  /// The object; the handle must be live.
+  /// Returns the object; it must exist.
   T& operator[](HandleType h) {
     T* value = find(h);
     assert(value && "stale or null handle");

@@ -22,9 +22,10 @@ inline uint32_t available_threads() {
                   static_cast<uint32_t>(std::max(1, tbb::this_task_arena::max_concurrency())));
 }
 
-/// The blocks of a stage that one thread takes first; other threads take the rest when their own blocks are
-/// used up. One counter serves all stages, because they come in order, and the whole shared state is in one
-/// cache line: besides the work of the blocks, passing that line between cores is the only cost of a stage.
+/// The part of a stage's blocks with which one thread begins. Other threads take blocks from this part when
+/// their own parts are used up. One counter serves all stages, because they come in order, and the whole
+/// shared state is in one cache line: besides the work of the blocks, passing that line between cores is the
+/// only cost of a stage.
 class alignas(64) BlockShare {
  public:
   /// Takes one block. Returns how many of the `count` blocks of a stage were taken before, or `count` if none

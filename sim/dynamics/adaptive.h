@@ -20,7 +20,7 @@ class AdaptiveIntegrator : public Integrator {
   /// `error_order`: the error of a step of length h falls as h^error_order.
   explicit AdaptiveIntegrator(int error_order) : error_order_(error_order) {}
 
-  /// Called before the first attempt.
+  /// Prepares for the attempts; called before the first one.
   virtual void begin(const DynamicSystem&, Real, std::span<const Real>, std::span<const Real>,
                      IntegratorWorkspace&) const {}
   /// Takes a step from (x, p) to work.next_x, work.next_p, and estimates its error in work.error_x,

@@ -26,21 +26,22 @@ struct BodyDef {
   std::string name;
   Shape shape = Sphere{};
   MotionType motion = MotionType::dynamic;
-  Pose pose;                     ///< at time 0; the pose of kinematic bodies with keys is that of the keys
+  Pose pose;                     ///< pose at time 0; a kinematic body with keys has the pose of its keys
   Vec3 velocity = Vec3::Zero();  ///< velocity of the centre of mass [m/s]
   Vec3 angular_velocity = Vec3::Zero();  ///< world axes [rad/s]
   Real density = 1000;                   ///< [kg/m^3], > 0; ignored if mass > 0
   Real mass = 0;                         ///< [kg]; 0: from density and volume
-  /// Centre of mass in the body's frame [m]; default: that of the shape.
+  /// Centre of mass in the body's frame [m]; default: the shape's centre of mass.
   std::optional<Vec3> centre = {};
   /// Inertia about the centre of mass, axes of the body's frame [kg m^2]: symmetric, and each principal
   /// moment at most the sum of the other two. Default: that of the shape about its own centre, scaled to the
   /// mass.
   std::optional<Mat3> inertia = {};
-  Real linear_drag = 0;       ///< k_v of F = -k_v v [kg/s]
-  Real angular_drag = 0;      ///< k_w of tau = -k_w w [kg m^2/s]
-  std::string material;       ///< name of the surface for ContactRule; may be empty
-  Real restitution = 0.5;     ///< in [0, 1]; a pair uses the larger value of both bodies
+  Real linear_drag = 0;   ///< k_v of F = -k_v v [kg/s]
+  Real angular_drag = 0;  ///< k_w of tau = -k_w w [kg m^2/s]
+  std::string material;   ///< name of the surface for ContactRule; may be empty
+  /// Coefficient of restitution in [0, 1]; a pair uses the larger value of its bodies.
+  Real restitution = 0.5;
   Real friction = 0.5;        ///< dynamic coefficient of Coulomb friction; a pair uses the geometric mean
   Real static_friction = -1;  ///< static coefficient; negative: the same as `friction`
   /// Dynamic coefficient across friction_axis; negative: the same as along it. In every pair, friction across
@@ -58,12 +59,12 @@ struct BodyDef {
   Real spinning_friction = 0;
   /// Velocity of the surface relative to the body, as of a conveyor, in its frame [m/s].
   Vec3 surface_velocity = Vec3::Zero();
-  bool collides = true;  ///< takes part in collisions with bodies and particles
-  KeyframeTrack track;   ///< for kinematic bodies
-  /// Times between which it exists [s]. It appears at its initial pose and velocity, and is removed, at the
-  /// start of the first sub-step from then on. While it does not exist, nothing touches it, and its springs
-  /// and joints have no effect; its joints take the poses of the time when it appears. Its removal releases
-  /// its springs, joints and pins.
+  bool collides = true;  ///< whether the body collides with bodies and particles
+  KeyframeTrack track;   ///< motion of a kinematic body
+  /// Times between which the body exists [s]. It appears at its initial pose and velocity at the start of the
+  /// first sub-step at or after appear_at, and is removed at the start of the first sub-step at or after
+  /// remove_at. While it does not exist, nothing touches it, and its springs and joints have no effect; its
+  /// joints take the poses of the time when it appears. Its removal releases its springs, joints and pins.
   Real appear_at = 0, remove_at = kInfinity;
 };
 

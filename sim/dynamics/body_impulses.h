@@ -1,8 +1,8 @@
 #pragma once
 /// Impulses of particles on dynamic bodies in a sub-step (physics P8, A3). The bodies move by them from the
-/// next sub-step on, but each collision of a particle already uses the velocity after the previous ones. The
-/// sum of many impulses therefore never transfers more momentum and energy than there is. An impulse on a
-/// body with joints acts on its whole articulation.
+/// next sub-step on, but each collision of a particle already uses the velocity after the previous
+/// collisions. The sum of many impulses therefore never transfers more momentum and energy than there is. An
+/// impulse on a body with joints acts on its whole articulation.
 
 #include <map>
 #include <span>

@@ -61,9 +61,10 @@ struct WindField {
 struct Vortex {
   Vec3 point = Vec3::Zero();  ///< a point of the axis
   Vec3 axis = Vec3::UnitY();  ///< direction of the axis, of any length but 0; the rotation is right-handed
-  Real circulation = 1;  ///< Gamma, at a large distance [m^2/s]; at the radius the speed is Gamma / (4 pi R)
-  Real radius = 0.1;     ///< R, the distance of the greatest speed [m], > 0
-  Real drag = 0;         ///< as WindField::drag [kg/s]
+  /// Circulation Gamma at a large distance [m^2/s]; the speed at the radius is Gamma / (4 pi R).
+  Real circulation = 1;
+  Real radius = 0.1;  ///< R, the distance of the greatest speed [m], > 0
+  Real drag = 0;      ///< drag coefficient k; see WindField::drag [kg/s]
   Region region;
   uint32_t drop_rate = 0;
 };
@@ -87,19 +88,21 @@ struct AppliedForce {
     Real time = 0;                                        ///< [s]
     Vec3 force = Vec3::Zero();                            ///< [N]
     Vec3 torque = Vec3::Zero();                           ///< [N m]
-    Interpolation interpolation = Interpolation::linear;  ///< to the next key
+    Interpolation interpolation = Interpolation::linear;  ///< interpolation to the next key
   };
-  std::vector<Key> keys;           ///< at least one, with strictly increasing times; constant outside of them
-  std::optional<Vec3> point = {};  ///< in the body's frame [m]; default: the centre of mass
-  bool body_axes = false;          ///< force and torque are in the body's axes, not in the world's
+  /// Keys, at least one, with strictly increasing times; force and torque are constant outside of them.
+  std::vector<Key> keys;
+  /// Point of application in the body's frame [m]; default: the centre of mass.
+  std::optional<Vec3> point = {};
+  bool body_axes = false;  ///< whether force and torque are in the body's axes, not in the world's
 };
 
 /// An impulse away from a point, at the force's start. It acts on each body at its point nearest to the
 /// explosion, so it also turns bodies that are hit off-centre.
 struct Explosion {
   Vec3 point = Vec3::Zero();
-  Real impulse = 1;  ///< on a body or a particle right at the point [N s]
-  Real radius = 1;   ///< no effect from here on [m], > 0
+  Real impulse = 1;  ///< impulse on a body or a particle at the point of the explosion [N s]
+  Real radius = 1;   ///< distance from which on there is no effect [m], > 0
   uint32_t drop_rate = 1;
 };
 
@@ -109,7 +112,7 @@ struct ForceDef {
                               MutualGravitation, Coulomb, LennardJones, AppliedForce>;
 
   std::string name;
-  /// The objects on which it acts. If none is named: all dynamic bodies and all cloths, no particles.
+  /// The objects on which the force acts. If none is named: all dynamic bodies and all cloths, no particles.
   std::vector<BodyHandle> bodies;
   std::vector<ParticleSystemHandle> systems;
   /// Moving air acts on the triangles of cloths. Every other force, and the drag of moving air with k > 0, is
@@ -125,11 +128,11 @@ struct ForceDef {
   bool is_unrestricted() const { return bodies.empty() && systems.empty() && cloths.empty(); }
   bool is_on(Real time) const { return time >= start && time < end; }
   bool is_explosion() const { return std::holds_alternative<Explosion>(effect); }
-  /// Whether it is a force between particles.
+  /// Whether this is a force between particles.
   bool is_pairwise() const;
-  /// Whether its effect on a body at rest can change with time.
+  /// Whether the effect of this force on a body at rest can change with time.
   bool changes() const;
-  /// Whether it is an explosion at a time in [from, to).
+  /// Whether this force is an explosion whose time is in [from, to).
   bool explodes(Real from, Real to) const { return is_explosion() && from <= start && start < to; }
 };
 
@@ -165,7 +168,7 @@ struct ActiveForce {
   std::vector<const RigidBody*> only;  ///< sorted by address; used if the definition names any body
 
   bool acts_on(const RigidBody& body) const;
-  /// Whether it acts on the body at any time from `from` to `to`.
+  /// Whether the force acts on the body at any time from `from` to `to`.
   bool acts_on(const RigidBody& body, Real from, Real to) const {
     return !def->is_explosion() && def->start <= to && def->end > from && acts_on(body);
   }

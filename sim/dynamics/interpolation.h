@@ -20,7 +20,7 @@ enum class Interpolation : uint8_t {
   step,    ///< holds the first key's value and jumps at the second key
 };
 
-/// N numbers at a time, with the interpolation to the next key.
+/// A key of a curve: N numbers at a time, with the interpolation to the next key.
 template <int N>
 struct CurveKey {
   Real time;  ///< [s]

@@ -13,7 +13,8 @@ namespace offstage::sim {
 struct Keyframe {
   Real time = 0;  ///< [s]
   Pose pose;
-  std::optional<Interpolation> interpolation = {};  ///< to the next key; default: that of the track
+  /// Interpolation to the next key; default: the interpolation of the track.
+  std::optional<Interpolation> interpolation = {};
 };
 
 /// A pose with its velocities.
@@ -29,7 +30,8 @@ struct KeyframeTrack {
   /// Orientations turn along the shortest arc between two keys if the keys beside them turn about the same
   /// axis.
   Interpolation interpolation = Interpolation::monotone;
-  /// Repeat with the period keys.back().time - keys.front().time; otherwise the end poses are held.
+  /// Whether the keys repeat with the period keys.back().time - keys.front().time; otherwise the end poses
+  /// are held.
   bool loop = false;
   Vec3 spin = Vec3::Zero();  ///< additional rotation about the body's origin, body axes [rad/s]
 

@@ -33,8 +33,9 @@ class NeighborGrid {
         visit_cells(row(run[0].first + i, run[1].first + j), run[2], p, radius, f);
   }
 
-  /// The same for the point at a place of the sorted order, but each pair of points is reported only once,
-  /// for one of the two. The radius must not be greater than the width of a cell.
+  /// Calls f(index) for the neighbours of the point at a place of the sorted order, such that each pair of
+  /// points is reported only once, for one of the two. The radius must not be greater than the width of a
+  /// cell.
   template <class F>
   void for_each_pair(std::size_t place, Real radius, F&& f) const {
     const Vec3 p = point(place);
@@ -98,7 +99,7 @@ class NeighborGrid {
         if (distance2[k] <= radius2) f(index_[e + k]);
     }
   }
-  /// The same for consecutive cells of a row.
+  /// Calls f(index) for the points within the radius in consecutive cells of a row.
   template <class F>
   void visit_cells(uint32_t row, Run run, const Vec3& p, Real radius, F&& f) const {
     const uint32_t first = run.first & mask_[2], whole = mask_[2] + 1;

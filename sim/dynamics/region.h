@@ -9,15 +9,14 @@
 
 namespace offstage::sim {
 
-/// The strength in a region decreases from 1 in the middle to 0 at the edge, to the power of the field's drop
-/// rate; with drop rate 0 it is 1 throughout.
+/// The strength in a region is f^p, where f decreases linearly from 1 in the middle to 0 at the edge, and p
+/// is the field's drop rate; with drop rate 0 it is 1 throughout.
 struct Everywhere {};
 struct SphereRegion {
   Vec3 centre = Vec3::Zero();
   Real radius = 1;  ///< [m], > 0
 };
-/// Aligned with the world's axes. The strength is that of the axis along which the point is nearest to the
-/// edge.
+/// Aligned with the world's axes; f belongs to the axis along which the point is nearest to the edge.
 struct BoxRegion {
   Vec3 centre = Vec3::Zero();
   Vec3 size = Vec3::Ones();  ///< full edges [m], > 0

@@ -18,7 +18,7 @@ struct RigidState {
 struct RigidBody : RigidState {
   Real mass = 1;
   Vec3 centre = Vec3::Zero();       ///< centre of mass in the shape's frame
-  Mat3 inertia = Mat3::Identity();  ///< about the centre of mass, axes of the shape's frame
+  Mat3 inertia = Mat3::Identity();  ///< inertia about the centre of mass, axes of the shape's frame [kg m^2]
   Mat3 inverse_inertia = Mat3::Identity();
   Real linear_drag = 0, angular_drag = 0;
 
@@ -33,8 +33,8 @@ struct RigidBody : RigidState {
   }
   /// H for the angular velocity w.
   Vec3 spin_momentum(const Quat& q, const Vec3& w) const { return q * (inertia * (q.conjugate() * w)); }
-  /// Whether its greatest moment of inertia is more than about ten times the least one. tr I tr I^-1 is 9 for
-  /// a ball and 10 for a coin.
+  /// Whether the body's greatest moment of inertia is more than about ten times the least one. tr I tr I^-1
+  /// is 9 for a ball and 10 for a coin.
   bool is_thin() const { return inertia.trace() * inverse_inertia.trace() > 26; }
   Pose pose() const { return {position - orientation * centre, orientation}; }
 

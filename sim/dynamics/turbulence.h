@@ -38,8 +38,8 @@ struct EddyLattice {
   float bias;                     ///< makes the mean of the hashes 0
 };
 
-/// The velocity of turbulent air at a time. It is periodic in space with 1024 eddies, and not periodic in
-/// time.
+/// Computes the velocity of turbulent air at one time. The velocity is periodic in space with a period of
+/// 1024 eddies, and not periodic in time.
 ///
 /// Each corner c of a lattice has a random velocity a. Let d be the vector from c, in cells, and w(d) the
 /// corner's smooth weight. The potential psi = sum w (a x d)/2 has the curl

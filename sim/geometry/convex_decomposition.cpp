@@ -237,9 +237,9 @@ CutDecomposition cuts_within(const std::vector<SolidPiece>& solids, const Decomp
 ConvexDecomposition decompose_approximately(const std::vector<SolidPiece>& solids,
                                             const DecompositionSettings& settings, const std::string& why) {
   const Real volume = volume_of(solids);
-  if (!(volume > 0)) return no_parts("the surface encloses nothing: " + why);
+  if (!(volume > 0)) return no_parts("the surface encloses no volume: " + why);
   const CutDecomposition cuts = cuts_within(solids, settings);
-  if (cuts.parts.empty()) return no_parts("the surface encloses nothing: " + why);
+  if (cuts.parts.empty()) return no_parts("the surface encloses no volume: " + why);
   const Real error = relative_error(cuts.parts, volume);
   ConvexDecomposition result{Method::approximate, cuts.parts, error, cuts.error, why};
   if (solids.size() > 1 && may_overlap(solids)) estimate_errors(solids, result);
@@ -272,7 +272,7 @@ ConvexDecomposition decompose(const TriangleMesh& mesh, const MeshTopology& topo
     return decompose(outward, MeshTopology(outward), settings);
   }
   const Real volume = mass_properties(mesh).volume;
-  if (!(volume > 0)) return no_parts("the surface encloses nothing");
+  if (!(volume > 0)) return no_parts("the surface encloses no volume");
   if (settings.method == Wanted::hull) return hull_alone(mesh, volume);
   std::string why = "asked for";
   if (settings.method != Wanted::approximate) {

@@ -31,9 +31,11 @@ struct DecompositionSettings {
   /// Smallest distance of an exact cut from vertices off it, as a fraction of the mean edge. Relaxed if no
   /// cut satisfies it.
   Real min_distance = 0.1;
-  uint32_t max_reflex_edges = 2000;  ///< with more reflex edges the solid is approximated at once
-  Real max_error = 0.05;             ///< accepted error of an approximate decomposition, > 0
-  uint32_t max_parts = 64;           ///< wanted greatest number, >= 1
+  /// Greatest number of reflex edges for the exact method; a solid with more is approximated at once.
+  uint32_t max_reflex_edges = 2000;
+  Real max_error = 0.05;  ///< accepted error of an approximate decomposition, > 0
+  /// Greatest number of approximate parts, unless these miss `max_error`; >= 1.
+  uint32_t max_parts = 64;
   /// Greatest number of approximate parts, >= max_parts: where max_parts miss the error, as for thin bent
   /// shells, more are made, up to this number, which has priority over the error.
   uint32_t most_parts = 1024;

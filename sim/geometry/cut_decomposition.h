@@ -17,7 +17,7 @@ namespace offstage::sim {
 
 struct CutGoal {
   Real max_error = 0.05;       ///< accepted CutDecomposition::error, > 0
-  std::size_t max_parts = 64;  ///< has priority over the error, >= 1
+  std::size_t max_parts = 64;  ///< greatest number of parts, >= 1; has priority over `max_error`
   /// Number of parts above which fewer are searched for that also have the accepted error.
   std::size_t enough_parts = 64;
 };

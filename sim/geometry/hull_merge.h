@@ -17,19 +17,19 @@ Real hull_volume(const ConvexPolyhedron& p);
 struct MergedHull {
   ConvexPolyhedron hull;
   std::vector<uint32_t> members;  ///< indices of the parts
-  Real shared = 0;  ///< volume that is in several of them, if they are of different solids [m^3]
+  Real shared = 0;  ///< volume that lies in several of the parts, if these belong to different solids [m^3]
 };
 
 /// A part before the merger.
 struct HullToMerge {
   ConvexPolyhedron hull;
-  uint32_t solid = 0;  ///< parts of one solid do not overlap much; those of different solids may
+  uint32_t solid = 0;  ///< parts of one solid do not overlap much; parts of different solids may
 };
 
-/// Merges parts, for several bounds.
+/// Merges convex parts; run() can be called several times, with different bounds.
 class HullMerger {
  public:
-  /// `parts` must remain.
+  /// `parts` must outlive this object.
   explicit HullMerger(std::span<const HullToMerge> parts);
   ~HullMerger();
 

@@ -129,7 +129,7 @@ class Decomposer {
       const std::optional<RatedCut> best = best_cut(p, reflex);
       if (work_ > limits_.max_work) return {{}, "too many cuts"};
       if (result.parts.size() + rest.size() >= limits_.max_parts) return {{}, too_many_parts(limits_)};
-      if (!best) return {{}, "no plane resolves an edge"};
+      if (!best) return {{}, "no cut plane was found for a reflex edge"};
       for (Polyhedron& part : separate(std::move(p), best->cut)) rest.push_back(std::move(part));
     }
     return result;

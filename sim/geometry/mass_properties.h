@@ -13,7 +13,7 @@ namespace offstage::sim {
 struct MassProperties {
   Real volume = 0;              ///< [m^3]; negative for an inverted mesh
   Vec3 centre = Vec3::Zero();   ///< centre of mass in the shape's frame [m]
-  Mat3 inertia = Mat3::Zero();  ///< about the centre of mass, axes of the shape's frame [m^5]
+  Mat3 inertia = Mat3::Zero();  ///< inertia about the centre of mass, axes of the shape's frame [m^5]
 };
 
 /// Inertia in its principal axes: inertia = R diag(moments) R^T, moments ascending.

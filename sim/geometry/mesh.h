@@ -33,7 +33,7 @@ struct MeshDefects {
   uint32_t non_manifold_edges = 0;  ///< edges with three or more faces
   uint32_t flipped_edges = 0;       ///< edges whose two faces run along them in the same direction
   uint32_t degenerate_faces = 0;    ///< faces of zero area or with a repeated vertex
-  bool inverted = false;            ///< the enclosed volume is negative
+  bool inverted = false;            ///< whether the enclosed volume is negative
 
   bool closed() const { return border_edges == 0 && non_manifold_edges == 0 && flipped_edges == 0; }
   /// Returns one line that names every defect; empty if there is none.
@@ -60,11 +60,13 @@ class MeshTopology {
   /// Vertices that share an edge with a vertex, in ascending order.
   std::span<const uint32_t> vertex_neighbours(uint32_t vertex) const;
 
-  const Vec3& face_normal(uint32_t face) const { return face_normals_[face]; }  ///< unit; zero if degenerate
-  const Vec3& edge_normal(uint32_t edge) const { return edge_normals_[edge]; }  ///< mean of its faces', unit
+  /// Unit normal; zero for a degenerate face.
+  const Vec3& face_normal(uint32_t face) const { return face_normals_[face]; }
+  /// Unit mean of the normals of the edge's faces.
+  const Vec3& edge_normal(uint32_t edge) const { return edge_normals_[edge]; }
   const Vec3& vertex_normal(uint32_t vertex) const {
     return vertex_normals_[vertex];
-  }  ///< angle-weighted, unit
+  }  ///< unit mean of the normals around the vertex, weighted by angle
 
   const MeshDefects& defects() const { return defects_; }
 

@@ -22,7 +22,7 @@ struct Polyhedron {
     uint32_t origin = 0, face = 0, next = 0, previous = 0, twin = 0, sibling = 0;
   };
   struct Face {
-    uint32_t first = 0;  ///< any of its half-edges
+    uint32_t first = 0;  ///< one of the face's half-edges
     Plane plane;
   };
 
@@ -72,7 +72,7 @@ struct Wedge {
   Vec3 plane_normal(Real theta) const;
 };
 
-/// The wedge at a half-edge, between its face and its twin's.
+/// Returns the wedge at a half-edge, between its face and the face of its twin.
 Wedge wedge(const Polyhedron& p, uint32_t half_edge);
 
 /// Builds one polyhedron for each connected piece of the surface. Neighbouring triangles that lie in one

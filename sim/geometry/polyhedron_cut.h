@@ -16,10 +16,12 @@ struct Cut {
     Vec3 point;
     uint32_t half_edge;  ///< leaves the corner; if `on_edge`, the corner is in its middle
     bool on_edge;
-    bool across_face;  ///< the side crosses the face of `half_edge`; otherwise it is the edge `half_edge`
+    /// Whether the side crosses the face of `half_edge`; otherwise the side is the edge `half_edge`.
+    bool across_face;
   };
   Polyhedron::Plane plane;
-  std::vector<Corner> corners;                ///< counter-clockwise about the plane's normal
+  /// Corners of the cut face, counter-clockwise about the plane's normal.
+  std::vector<Corner> corners;
   std::vector<std::vector<uint32_t>> pieces;  ///< convex parts of the cut face, as indices of corners
 };
 

@@ -20,7 +20,7 @@ Real orient2d(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::V
 class OrientedPlane {
  public:
   OrientedPlane(const Vec3& a, const Vec3& b, const Vec3& c);
-  /// orient3d(a, b, c, d).
+  /// Returns orient3d(a, b, c, d).
   Real side(const Vec3& d) const;
 
  private:

@@ -49,14 +49,14 @@ SolidMesh solid_mesh(const Tube& tube);
 SolidMesh solid_mesh(const OpenBox& box);
 /// One convex part. A sphere has 32 x 16 faces, round sides have 48. Plane and MeshShape are not accepted.
 SolidMesh solid_mesh(const Shape& primitive);
-/// The solid at a pose.
+/// Returns the solid moved to a pose.
 SolidMesh placed(SolidMesh solid, const Pose& pose);
 
 /// Mass, centre of mass and inertia of a body.
 struct BodyMass {
   Real mass = 0;                ///< [kg]
   Vec3 centre = Vec3::Zero();   ///< [m]
-  Mat3 inertia = Mat3::Zero();  ///< about the centre [kg m^2]
+  Mat3 inertia = Mat3::Zero();  ///< inertia about the centre of mass [kg m^2]
 };
 
 /// A uniform solid at a pose in a compound.

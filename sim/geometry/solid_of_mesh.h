@@ -1,6 +1,6 @@
 #pragma once
-/// The solids that a mesh bounds, also a mesh with holes or edges of many faces, for the approximate convex
-/// decomposition.
+/// Finds the solids that a mesh bounds, for the approximate convex decomposition. The mesh may have holes,
+/// and edges with more than two faces.
 
 #include <cstdint>
 #include <vector>

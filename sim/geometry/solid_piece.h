@@ -24,9 +24,10 @@ struct SolidPiece {
     std::vector<Side> sides;
   };
 
-  std::vector<Vec3> points;           ///< [m]
-  std::vector<uint32_t> corners;      ///< corners of the polygons of the surface, as indices of points
-  std::vector<uint32_t> first = {0};  ///< first corner of each polygon, and the number of corners at the end
+  std::vector<Vec3> points;       ///< [m]
+  std::vector<uint32_t> corners;  ///< corners of the polygons of the surface, as indices of points
+  /// Index of each polygon's first corner; the last entry is the number of corners.
+  std::vector<uint32_t> first = {0};
   std::vector<Cap> caps;
 
   std::size_t polygon_count() const { return first.size() - 1; }

@@ -23,7 +23,8 @@ using Vec6 = Eigen::Matrix<Real, 6, 1>;
 /// Properties of a row of blocks that are known before the factorization.
 struct BlockRowKind {
   bool is_negative = false;  ///< whether its sign in S is negative
-  bool is_empty = false;     ///< its diagonal block is zero: its neighbours are eliminated first
+  /// Whether the diagonal block of the row is zero: its neighbours are then eliminated first.
+  bool is_empty = false;
   friend bool operator==(const BlockRowKind&, const BlockRowKind&) = default;
 };
 

@@ -21,11 +21,11 @@ inline Lanes lane_abs(Lanes x) {
 inline Lanes lane_max(Lanes x, Lanes y) {
   return x > y ? x : y;
 }
-/// (y, z, x).
+/// Returns (y, z, x).
 inline Lanes lane_next(Lanes v) {
   return __builtin_shufflevector(v, v, 1, 2, 0, 3);
 }
-/// (z, x, y).
+/// Returns (z, x, y).
 inline Lanes lane_last(Lanes v) {
   return __builtin_shufflevector(v, v, 2, 0, 1, 3);
 }

@@ -15,8 +15,8 @@ namespace offstage::sim {
 
 struct LcpSolution {
   Eigen::VectorXd f;                ///< >= 0
-  uint32_t pivots = 0;              ///< number of steps, each ended by a blocking index
-  bool fell_back = false;           ///< the result is from projected Gauss-Seidel
+  uint32_t pivots = 0;              ///< number of steps of Dantzig's method
+  bool fell_back = false;           ///< whether the result is from projected Gauss-Seidel, the fall-back
   std::vector<uint32_t> unbounded;  ///< indices that no force, however large, brings to a >= 0
   /// Greatest |min(A_ii f_i, a_i)| over the indices that are not unbounded, in units of b.
   Real residual = 0;

@@ -17,15 +17,15 @@ namespace offstage::sim {
 struct CollidingParticle {
   Vec3 position;       ///< position at the start of its path
   Vec3 path_velocity;  ///< mean velocity along its path
-  Vec3 velocity;       ///< at the end of the sub-step
+  Vec3 velocity;       ///< velocity at the end of the sub-step
   Vec3 acceleration;   ///< mean acceleration by forces
-  Real from;           ///< start of its path, since the sub-step's start [s]
+  Real from;           ///< time at which the path starts, since the sub-step's start [s]
   Real mass, radius, restitution, friction;
   /// For a ball that turns: m r^2 / I (kBallTurning) and r times its angular velocity [m/s]; otherwise zero.
   Real turning;
   Vec3 surface_spin;
   uint32_t system;          ///< number of its system
-  bool internal, external;  ///< see ParticleSystemDef
+  bool internal, external;  ///< collision flags of its system; see ParticleSystemDef
   bool hits_bodies;
 
   Vec3 at(Real t) const { return position + (t - from) * path_velocity; }
@@ -114,7 +114,7 @@ inline Real greater_acceleration(const CollidingParticle& a, const CollidingPart
 /// A collision of a particle, for the caller.
 struct ParticleStrike {
   uint32_t particle;
-  Real time;  ///< since the sub-step's start [s]
+  Real time;  ///< time of the collision, since the sub-step's start [s]
   Vec3 position, velocity, normal;
 };
 

@@ -17,8 +17,9 @@ class ParticleCollisions {
  public:
   /// Results for the particles of a system.
   struct Outcome {
-    std::vector<uint8_t> touched, trapped;  ///< by particle
-    ParticleTally tally;                    ///< counts of collisions only
+    /// For each particle: whether it touched anything, and whether it is trapped in a body.
+    std::vector<uint8_t> touched, trapped;
+    ParticleTally tally;  ///< counts of the system; only those of collisions are set
   };
 
   /// Moves the particles of systems after their flight (ParticleSystem::fly_all) to the end of the sub-step.

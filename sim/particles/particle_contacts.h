@@ -56,9 +56,9 @@ class ParticleContacts {
  private:
   static constexpr Real kNever = std::numeric_limits<Real>::infinity();
 
-  /// The effect of a contact. It is in single precision, because a sweep takes as long as reading the
-  /// contacts. The impulses on two particles are opposite all the same, and velocities are in double
-  /// precision.
+  /// A contact, with the data that sweeps read. It is in single precision, because a sweep takes as long as
+  /// reading the contacts. The impulses on two particles are opposite all the same, and velocities are in
+  /// double precision.
   struct Contact {
     Eigen::Vector3f normal_single;
     Eigen::Vector3f impulse_single;

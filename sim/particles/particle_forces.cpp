@@ -61,12 +61,12 @@ void add(const PointField& f, const Run& run) {
   });
 }
 
-/// `blow(block, air)` writes the velocity of the air at each particle of a block.
-template <class Field, class Blow>
-void add_air(const Field& f, const Run& run, Blow&& blow) {
+/// `flow(block, air)` writes the velocity of the air at each particle of a block.
+template <class Field, class Flow>
+void add_air(const Field& f, const Run& run, Flow&& flow) {
   for_each_block(f, run, [&](const Run& b, std::span<const Real> fraction) {
     std::array<Real, 3 * kBlock> air;
-    blow(b, std::span(air).first(3 * b.size()));
+    flow(b, std::span(air).first(3 * b.size()));
     for (std::size_t i = 0; i < b.size(); ++i) {
       b.push(i, fraction[i] *
                     air_drag(f.drag, b.own_drag, vec3(std::span<const Real>(air), 3 * i), b.velocity(i)));

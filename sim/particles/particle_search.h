@@ -21,8 +21,8 @@ class ParticleSearch {
   void build(std::span<const CollidingParticle> particles, std::span<const uint32_t> members, Real h,
              Real margin);
 
-  /// Calls f(index) for the particles whose paths may come near that of `particle`, including itself. Its
-  /// state may differ from that when it was sorted.
+  /// Calls f(index) for the particles whose paths may come near that of `particle`, including itself. The
+  /// state of `particle` may have changed since build().
   template <class F>
   void for_each_near(const CollidingParticle& particle, F&& f) const {
     const Ball b = ball(particle);
@@ -35,8 +35,8 @@ class ParticleSearch {
   /// Lists for each particle those with which it may collide and whose paths may come near its own. Each pair
   /// is listed once, for one of the two. All particles must have been sorted.
   void list_partners(std::span<const CollidingParticle> particles);
-  /// The same for pairs with at least one `chosen` particle (a flag for each particle), for which the pair is
-  /// listed.
+  /// Lists only pairs with at least one `chosen` particle (a flag for each particle); such a pair is listed
+  /// for that particle.
   void list_partners(std::span<const CollidingParticle> particles, std::span<const uint8_t> chosen);
   std::span<const uint32_t> partners(uint32_t i) const {
     const List& list = lists_[i];

@@ -23,13 +23,14 @@ struct ParticlePath {
 };
 
 struct SweepOutcome {
-  uint32_t collisions = 0;    ///< number of impacts; resting contacts do not count
-  bool hit = false;           ///< it touched anything
-  bool ejected = false;       ///< it was inside a body and was projected out (P4)
-  bool trapped = false;       ///< it was inside a body and could not be projected out (P4)
-  bool truncated = false;     ///< it reached the limit of hits
-  bool strikes_body = false;  ///< it strikes a dynamic body and was left unchanged ...
-  Real time = 0;              ///< ... at this fraction of the sub-step
+  uint32_t collisions = 0;  ///< number of impacts; resting contacts do not count
+  bool hit = false;         ///< whether the particle touched anything
+  bool ejected = false;     ///< whether the particle was inside a body and was projected out (P4)
+  bool trapped = false;     ///< whether the particle was inside a body and could not be projected out (P4)
+  bool truncated = false;   ///< whether the particle reached the limit of collisions
+  /// Whether the particle strikes a dynamic body, at the fraction `time`, and was left unchanged.
+  bool strikes_body = false;
+  Real time = 0;  ///< time of that strike, as a fraction of the sub-step
 };
 
 /// A collision of a particle, with the state after it.
@@ -69,7 +70,7 @@ class NearObstacles {
  public:
   NearObstacles(const Obstacles& fixed, const Obstacles& moving) : fixed_(fixed), moving_(moving) {}
 
-  /// Finds those that a sphere may touch on its path from a to b.
+  /// Finds the obstacles that a sphere may touch on its path from a to b.
   void find(const Vec3& a, const Vec3& b, Real radius);
   std::span<const Obstacle* const> all() const { return near_; }
 
@@ -112,7 +113,8 @@ class ParticleSweep {
     const Obstacle* obstacle;
     Real friction;
     Real fraction;  // start of the contact
-    /// Its obstacle was hit and will move away in the next sub-step; until then it only blocks the particle.
+    /// Whether the obstacle was hit and will move away in the next sub-step; until then it only blocks the
+    /// particle.
     bool gives_way;
   };
 

@@ -19,7 +19,7 @@ namespace offstage::sim {
 struct ParticleTally : ParticleFigures {
   /// The first particle whose state became infinite or NaN; the world sets `object`.
   std::optional<NonFinite> lost;
-  std::vector<ParticleEvent> events;  ///< if the system reports them
+  std::vector<ParticleEvent> events;  ///< events of particles; empty unless the system reports them
 
   ParticleTally& operator+=(const ParticleTally& t);
 };
@@ -57,13 +57,13 @@ struct ParticleSystem {
   void admit_new_particles(const ParticleForces& forces);
   /// Stores the state at the start of the sub-step, for a CoupledGroup that integrates the system.
   void begin_coupled();
-  /// Whether its collisions are those of ParticleCollisions.
+  /// Whether ParticleCollisions resolves the collisions of this system.
   bool hits_particles() const { return def.internal || def.external || def.rotates; }
   /// For particles that do not collide with particles: integrates, sweeps against bodies, ages and removes.
   /// In a `coupled` system, the particles for which whole_step() is true are already integrated.
   ParticleTally step(const ParticleStage& stage, const ParticleForces& forces, bool coupled);
 
-  /// For the other particles: only integrates, and stores the initial state.
+  /// For particles that collide with particles: integrates without collisions, and stores the initial state.
   void fly_all(const ParticleStage& stage, const ParticleForces& forces, bool coupled);
   /// A particle's flight: initial state and duration.
   struct Flight {

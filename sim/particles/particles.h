@@ -33,7 +33,7 @@ struct Particle {
 struct ParticleSystemDef {
   std::string name;
   Real linear_drag = 0;       ///< k_d of F = -k_d (v - wind) [kg/s]
-  bool gravity = true;        ///< whether the world's gravity acts
+  bool gravity = true;        ///< whether the world's gravity acts on the particles
   Vec3 force = Vec3::Zero();  ///< constant extra force per particle [N]
   bool collides = true;       ///< whether its particles collide with bodies (the book's "complex" flag)
   bool internal = false;      ///< whether its particles collide with each other
@@ -54,7 +54,7 @@ struct ParticleEvent {
   Kind kind = Kind::collision;
   ParticleSystemHandle system;
   uint64_t id = 0;
-  Real time = 0;                 ///< as the world's time [s]
+  Real time = 0;                 ///< time of the event, on the world's clock [s]
   Vec3 position = Vec3::Zero();  ///< centre of the particle [m]
   Vec3 velocity = Vec3::Zero();  ///< velocity after the event [m/s]
   Vec3 normal = Vec3::Zero();    ///< normal of the surface hit, towards the particle; zero for a death
@@ -64,11 +64,11 @@ struct ParticleEvent {
 /// Figures of the particles in a step.
 struct ParticleFigures {
   uint64_t born = 0;
-  uint64_t expired = 0;     ///< reached their lifespan or died in a collision
-  uint64_t retired = 0;     ///< left the world's bounds
-  uint64_t ejected = 0;     ///< found inside a body and projected out (P4)
-  uint64_t removed = 0;     ///< found inside a body and could not be projected out (P4)
-  uint64_t collisions = 0;  ///< with bodies and particles
+  uint64_t expired = 0;     ///< particles that reached their lifespan or were removed by a collision
+  uint64_t retired = 0;     ///< particles that left the world's bounds
+  uint64_t ejected = 0;     ///< particles found inside a body and projected out (P4)
+  uint64_t removed = 0;     ///< particles found inside a body that could not be projected out (P4)
+  uint64_t collisions = 0;  ///< collisions with bodies and particles
   uint64_t truncated = 0;   ///< particles that reached the limit of collisions in one sub-step
 
   static constexpr auto figures() {
@@ -85,9 +85,9 @@ struct ParticleFigures {
 struct ParticleArrays {
   std::vector<Vec3> position, velocity;
   std::vector<Real> mass, radius, age, lifespan, restitution, friction, charge;
-  std::vector<uint64_t> id;  ///< unique in its system, ascending, never reused
-  /// In the world [rad/s], and the rotation since the particle's creation; both are empty unless the system
-  /// `rotates`.
+  std::vector<uint64_t> id;  ///< ids of the particles: unique in the system, ascending, never reused
+  /// Angular velocity in the world [rad/s], and the rotation since the particle's creation. Both are empty
+  /// unless the system `rotates`.
   std::vector<Vec3> angular_velocity;
   std::vector<Quat> orientation;
 

@@ -26,11 +26,12 @@ class ActiveBodies {
       for (Body* body : group) f(*body);
   }
 
-  /// To be called after a body has been added, removed or taken out, or has appeared.
+  /// Marks the lists as outdated. To be called after a body has been added or removed, or has appeared or
+  /// disappeared.
   void note_new_set() { is_ranked_ = false, note_change(); }
-  /// To be called after a body has begun or ended to be able to move.
+  /// Marks the lists as outdated. To be called after a body has become able or unable to move.
   void note_change() { is_current_ = false, ++version_; }
-  /// Number of changes so far.
+  /// Number of changes of the set of moving bodies so far.
   uint64_t version() const { return version_; }
   /// Updates the lists after changes.
   void update();
@@ -48,7 +49,7 @@ class ActiveBodies {
   void wake_pushed(Real time);
   /// Lets islands fall asleep at the end of a sub-step of length h from `start` on.
   void put_to_sleep(std::span<const Island> islands, Real start, Real h);
-  /// Adds the counts since the last call.
+  /// Adds the numbers of bodies that woke or fell asleep since the last call to the report.
   void count(StepReport& report);
 
  private:

@@ -14,7 +14,8 @@ class ClothMotion {
  public:
   ClothMotion(const WorldState& world, ActiveBodies& active) : world_(world), active_(active) {}
 
-  /// To be called after a cloth has been added or removed, or has appeared.
+  /// Updates the list of cloths to step. To be called after a cloth has been added or removed, or has
+  /// appeared.
   void arrange();
   /// Releases the cloth that is pinned to a body.
   void detach(BodyHandle body);
@@ -22,7 +23,7 @@ class ClothMotion {
   void begin_step();
   /// Moves all cloths through a sub-step, and the bodies that they displace. Returns the impulses on bodies.
   std::vector<Reaction> step(Real start, Real h);
-  /// Adds the statistics of the step.
+  /// Adds the statistics of the step to the report.
   void report(StepReport& report);
 
  private:

@@ -25,14 +25,14 @@ class ContactFinder {
   /// Forgets the contacts of a body, and of all bodies.
   void forget(const Body& body);
   void forget_all();
-  /// To be called after the groups of joints have changed.
+  /// Passes the groups of joints to the broad phase. To be called after they have changed.
   void update_joint_groups();
 
   /// Finds the pairs of a sub-step of length h and their contact points, after the bodies have moved freely.
   void find(Real h);
-  /// No body moves in this sub-step.
+  /// Clears the list of pairs, for a sub-step in which no body moves.
   void clear();
-  /// The pairs with a body that can move, by the ranks of their bodies.
+  /// The pairs with a body that can move, ordered by the ranks of their bodies.
   std::span<ContactPair* const> pairs() const { return pairs_; }
   /// Calls f(pair) for all pairs, in the order of the bodies' slots.
   template <class F>
@@ -40,7 +40,8 @@ class ContactFinder {
     graph_.for_each(f);
   }
 
-  /// Wakes the sleeping bodies near moving ones, moves them through the sub-step, and returns them.
+  /// Wakes the sleeping bodies near moving bodies, moves the woken bodies through the sub-step, and returns
+  /// them.
   std::vector<Body*> wake_touched(FreeMotion& motion, Real start, Real h);
   /// Extends the pairs to the changed paths of bodies in the sub-step; existing pairs are kept, because
   /// impacts and islands refer to them. Returns whether there may be new ones; see ContactPair::is_new().
@@ -57,7 +58,7 @@ class ContactFinder {
   /// the automatic choice while few bodies move.
   bool is_exact() const { return is_exact_; }
 
-  /// Adds the statistics of the sub-step.
+  /// Adds the statistics of the sub-step to the report.
   void count(StepReport& report) const;
 
  private:

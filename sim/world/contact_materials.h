@@ -15,7 +15,7 @@ namespace offstage::sim {
 
 class ContactMaterials {
  public:
-  /// The number of a material, which is new if its name is.
+  /// Returns the number of a material; a new name gets a new number.
   uint32_t number(const std::string& material);
   void add(const ContactRule& rule) { rules_[std::minmax(number(rule.a), number(rule.b))] = rule; }
   /// The surface of two bodies that meet: by the rule for their materials, or by their own values. Their

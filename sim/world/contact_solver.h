@@ -19,7 +19,7 @@ class ContactSolver {
   void solve_all(std::span<Island> islands, Real start, Real h, StepReport& report);
   /// Solves some islands over an interval within a sub-step.
   void solve(std::span<Island* const> group, const ContactInterval& interval, StepReport& report);
-  /// The same for one island, if any forces can act in it.
+  /// Solves one island over an interval, if any forces can act in it.
   void solve(Island& island, const ContactInterval& interval, StepReport& report);
 
  private:

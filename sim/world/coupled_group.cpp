@@ -93,7 +93,7 @@ CoupledGroup::End CoupledGroup::resolve(const WorldState& world, const Attachmen
   if (const auto* b = std::get_if<BodyPoint>(&a)) {
     const Body* body = world.bodies[b->body].get();
     if (body->is_awake()) {
-      assert(index.contains(body) && "both ends of a spring must be in the same network");
+      assert(index.contains(body) && "both ends of a spring must be in the same group");
       return {End::Kind::dynamic, b->position - body->rigid.centre, body, index.at(body)};
     }
     if (body->can_move()) return {End::Kind::kinematic, b->position, body};

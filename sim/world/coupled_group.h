@@ -59,7 +59,7 @@ class CoupledGroup final : public DynamicSystem {
     std::vector<Real> mass;            // masses of these particles
     std::size_t offset;                // index of the first of them in units of 3, after the bodies
 
-    /// The part of all particles' coordinates or velocities that belongs to these particles.
+    /// Returns the part of an array over the particles of the group that belongs to one system.
     template <class T>
     std::span<T> part(std::span<T> particles) const {
       return particles.subspan(3 * offset, 3 * members.size());

@@ -14,8 +14,8 @@ class CoupledSystem {
   /// Uses all dynamic bodies, and all particle systems with springs or with forces between particles. No
   /// object may be added to the world or removed from it during its lifetime.
   explicit CoupledSystem(WorldState& world, std::span<const ForceDef* const> forces = {});
-  /// Uses these bodies, and what connects them, for the rest of a sub-step that a CoupledSystem of all
-  /// objects has begun. They must contain all bodies that are connected() to them.
+  /// Uses these bodies, with their springs, joints and forces, for the rest of a sub-step that a
+  /// CoupledSystem of all objects has begun. They must contain all bodies that are connected() to them.
   CoupledSystem(WorldState& world, std::span<Body* const> bodies,
                 std::span<const ForceDef* const> forces = {});
 

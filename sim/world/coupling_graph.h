@@ -17,7 +17,7 @@ class CouplingGraph {
 
   explicit CouplingGraph(const WorldState& world);
 
-  /// Greater than the numbers of all components.
+  /// A number greater than the numbers of all components.
   std::size_t size() const { return objects_.size(); }
   /// Number that connected objects share; kNone for an object without connections.
   std::size_t component(const Body& body) const { return find(&body); }

@@ -23,9 +23,9 @@ class FreeMotion {
   CoupledSystem& move_group(std::span<Body* const> group, Real start, Real from, Real duration);
   /// The system of all bodies in this sub-step.
   CoupledSystem& whole() const { return *systems_.front(); }
-  /// The system that was used last.
+  /// The system that has moved bodies last.
   CoupledSystem& last() const { return *systems_.back(); }
-  /// Adds the statistics of this sub-step.
+  /// Adds the statistics of this sub-step to the report.
   void count(StepReport& report) const;
 
  private:

@@ -17,7 +17,7 @@ std::optional<Real> impact_time(const ContactPair& pair, const WorldDef& def, Re
 
 /// Whether a body of the pair turns so fast in the time h that its rotation is divided into pieces.
 bool turns_fast(const ContactPair& pair, Real h);
-/// Number of pieces of the rotation.
+/// Number of pieces into which the rotation is divided for the search.
 uint32_t search_pieces(const ContactPair& pair, Real h);
 
 }  // namespace offstage::sim

@@ -14,7 +14,8 @@ class JointGroups {
  public:
   explicit JointGroups(WorldState& world) : world_(world) {}
 
-  /// To be called after a joint or one of its bodies has been added, removed or broken, or has appeared.
+  /// Marks the groups as outdated. To be called after a joint or one of its bodies has been added, removed or
+  /// broken, or has appeared.
   void note_change() { is_current_ = false; }
   /// Updates the articulations after changes. Returns whether there were any.
   bool update();
@@ -24,9 +25,9 @@ class JointGroups {
   const std::vector<std::vector<uint32_t>>& colliding() const { return colliding_; }
   /// Whether two bodies do not collide with each other because of a joint.
   bool is_collision_disabled(const Body& a, const Body& b) const;
-  /// Null for a body without joints.
+  /// Returns the articulation of the body in a slot; null for a body without joints.
   Articulation* articulation_of(uint32_t slot) const;
-  /// By slot.
+  /// The places of bodies in their articulations, by the slots of the bodies.
   std::span<const BodyImpulses::Link> links() const { return links_; }
 
   /// Breaks the joints whose load in a sub-step of length h exceeded their limits.
@@ -43,10 +44,10 @@ class JointGroups {
   std::vector<Articulation*> articulation_of_;        // by slot
 };
 
-/// Joins the bodies at their poses, where the definition says.
+/// Joins the bodies in their present poses, at the anchors of the definition.
 void fit(Joint& joint);
-/// Joins the bodies of a joint that appears later at their poses of that time. Anchors and axes have moved
-/// with them: those of a with a, or with b if there is no a.
+/// Joins the bodies of a joint that appears after time 0, in their present poses. Its anchors and axes have
+/// moved with the bodies: with a, or with b if there is no a.
 void place_at_bodies(Joint& joint);
 /// Whether a joint prevents an island from falling asleep.
 bool is_driven(const Island& island, Real time);

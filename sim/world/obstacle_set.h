@@ -9,7 +9,7 @@ namespace offstage::sim {
 /// A body that moves through a sub-step of length h. Impulses can move a dynamic one, unless it `is_fixed`.
 Obstacle swept_obstacle(const Body& body, Real h, bool is_fixed = false);
 
-/// Those that cannot move are prepared again only after a change (physics E9).
+/// The obstacles of a sub-step. Bodies that cannot move are prepared again only after a change (physics E9).
 class ObstacleSet {
  public:
   /// Prepares a sub-step of length h. `fixes_dynamic`: dynamic bodies do not move in it, which holds while

@@ -202,7 +202,7 @@ TEST(Split, CanBeOffAndLimited) {
   Splitter off({.enabled = false}, system, system);
   Splitter limited({.count = 10.0, .age = 0.1, .delay = 0.1, .depth = 3, .max_alive = 8}, system, system);
   run(world, 1, 60, off, limited);
-  EXPECT_EQ(off.report().answered, 0u);
+  EXPECT_EQ(off.report().triggered, 0u);
   EXPECT_EQ(world.particle_count(), 8u);
   EXPECT_GT(limited.report().skipped, 0u);
   EXPECT_THROW(Splitter({.age = 0.0}, system, system), std::invalid_argument);

@@ -25,7 +25,7 @@ TEST(SubEmitter, AnAgeTriggersOnceAtItsTime) {
        .particles = {.speed = 2.0, .spread_deg = Uniform{0, 180}, .radius = 0.005, .lifespan = 1e9}},
       shells, stars);
   run(world, 2, 24, emitter, burst);
-  EXPECT_EQ(burst.report().answered, 120u);
+  EXPECT_EQ(burst.report().triggered, 120u);
   const auto births = births_of(world, stars), parents = births_of(world, shells);
   ASSERT_EQ(births.size(), 480u);
   for (std::size_t i = 0; i < births.size(); ++i) {
@@ -48,7 +48,7 @@ TEST(SubEmitter, ADeathTriggersWhereItHappens) {
                     .particles = {.speed = 3.0, .spread_deg = 30.0, .radius = 0.005, .lifespan = 1e9}},
                    shells, stars);
   run(world, 1, 60, burst);
-  EXPECT_EQ(burst.report().answered, 10u);
+  EXPECT_EQ(burst.report().triggered, 10u);
   ASSERT_EQ(burst.report().released, 200u);
   const auto births = births_of(world, stars);
   // The parent's position is known only at the end of the sub-step in which it died.
@@ -110,8 +110,8 @@ TEST(SubEmitter, TriggersByProbabilityUpToItsLimit) {
   const Rain free = rain(2, kSplash);
   const auto hits = static_cast<Real>(free.hits);
   // The collisions of the last sub-step have not been processed yet.
-  EXPECT_NEAR(static_cast<Real>(free.report.answered), hits / 2, 3 * std::sqrt(hits / 4) + 25);
-  EXPECT_NEAR(static_cast<Real>(free.report.released) / static_cast<Real>(free.report.answered), 4, 0.1);
+  EXPECT_NEAR(static_cast<Real>(free.report.triggered), hits / 2, 3 * std::sqrt(hits / 4) + 25);
+  EXPECT_NEAR(static_cast<Real>(free.report.released) / static_cast<Real>(free.report.triggered), 4, 0.1);
   EXPECT_EQ(free.report.skipped, 0u);
 
   SubEmitterDef few = kSplash;
@@ -143,7 +143,7 @@ TEST(SubEmitter, EmitsAboutTheNormalFromTheContactPoint) {
 TEST(SubEmitter, SlowHitsAndImpossibleNumbersAreRefused) {
   SubEmitterDef def = kSplash;
   def.release.min_speed = 1000;
-  EXPECT_EQ(rain(2, def).report.answered, 0u);
+  EXPECT_EQ(rain(2, def).report.triggered, 0u);
   EXPECT_THROW(SubEmitter({.release = {.probability = 1.5}}, {}, {}), std::invalid_argument);
   EXPECT_THROW(SubEmitter({.particles = {.spread_deg = 30.0, .radius = 0.005, .lifespan = 0.0}}, {}, {}),
                std::invalid_argument);

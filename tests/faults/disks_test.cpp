@@ -8,7 +8,7 @@
 #include <sys/mount.h>
 
 #include "cli/program.h"
-#include "faults/tries.h"
+#include "faults/injection_count.h"
 
 namespace offstage::test {
 namespace {

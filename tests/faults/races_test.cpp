@@ -9,7 +9,7 @@
 
 #include "cli/program.h"
 #include "faults/background.h"
-#include "faults/tries.h"
+#include "faults/injection_count.h"
 
 namespace offstage::test {
 namespace {

@@ -73,7 +73,7 @@ TEST(Textures, OptionsWithoutEffectAreNamed) {
   EXPECT_EQ(
       findings_of(R"({"materials": [{"name": "m", "texture_scale": 2}], "bodies": [{"material": "m"}]})",
                   folder),
-      "/materials/0/texture_scale: has no effect: there is no \"texture\"\n");
+      "/materials/0/texture_scale: has no effect: the material has no \"texture\"\n");
   EXPECT_EQ(
       findings_of(R"({"materials": [{"name": "m", "texture": "a.png", "texture_projection": "triplanar"}],
                             "cloths": [{"name": "c", "material": "m"}]})",
@@ -109,9 +109,9 @@ TEST(SkyPictures, OfAWrongKindAreRefusedWithTheirPlace) {
   EXPECT_EQ(with(R"("picture": {"file": "a.png"})"), "");
   EXPECT_EQ(with(R"("picture": {"file": "square.png"})"),
             "/environment/picture: square.png: a picture of the sky is twice as wide as high, not 4x4\n");
-  EXPECT_EQ(
-      with(R"("picture": {"file": "a.png"}, "clouds": 0.5)"),
-      "/environment/clouds: a sky from a picture has the clouds of the picture; leave out one of both\n");
+  EXPECT_EQ(with(R"("picture": {"file": "a.png"}, "clouds": 0.5)"),
+            "/environment/clouds: a sky from a picture has the clouds of the picture; remove \"clouds\" or "
+            "\"picture\"\n");
   EXPECT_NE(with(R"("picture": {"file": "none.hdr"})").find("/environment/picture/file: "),
             std::string::npos);
 }

@@ -74,8 +74,8 @@ TEST(SceneBodies, WrongShapesAndTimesAreRefused) {
             "/bodies/0/shape/tube_radius: must be less than the \"radius\" of the torus\n"
             "/bodies/1/shape/thickness: must be less than the \"radius\" of the tube; use a cylinder for a "
             "solid one\n"
-            "/bodies/2/shape/thickness: must be less than half of the \"size\" along x and z, and less than "
-            "that along y\n"
+            "/bodies/2/shape/thickness: must be less than half of \"size\" along x and z, and less than "
+            "\"size\" along y\n"
             "/bodies/3/shape/parts: is empty; a compound needs at least one part\n"
             "/bodies/4/inertia_products: need \"inertia\"\n"
             "/bodies/5/remove_at: must be later than \"appear_at\" (2 s), got 1 s\n");
@@ -195,7 +195,7 @@ TEST(Fills, MakeParticlesAndCopiesOfBodies) {
     EXPECT_LT(std::hypot(body.position.x(), body.position.z()), 0.15);
   EXPECT_EQ(body_scene_errors(R"("bodies": [{"name": "m", "fill": {}}])"),
             "/bodies/0/fill: needs a \"spacing\", the distance between neighbouring copies\n");
-  const char* no_room = ": has no room for a single place; use a smaller \"spacing\" or a larger volume\n";
+  const char* no_room = ": has no room for a single object; use a smaller \"spacing\" or a larger volume\n";
   EXPECT_EQ(body_scene_errors(R"("bodies": [{"name": "m", "fill": {"spacing": 2}}])"),
             std::string("/bodies/0/fill") + no_room);
   EXPECT_EQ(body_scene_errors(R"("particles": [{"fill": {"spacing": 2}}])"),
@@ -204,7 +204,8 @@ TEST(Fills, MakeParticlesAndCopiesOfBodies) {
   EXPECT_EQ(
       body_scene_errors(
           R"("particles": [{"fill": {"shape": {"type": "cylinder", "radius": 0.06, "height": 1e9}, "spacing": 0.1}}])"),
-      "/particles/0/fill: has more than 5000000 places; use a larger \"spacing\" or a smaller volume\n");
+      "/particles/0/fill: has room for more than 5000000 objects, the limit; use a larger \"spacing\" or a "
+      "smaller volume\n");
 }
 
 TEST(EmitterFaces, AreThoseOfTheBodyOrOfACube) {

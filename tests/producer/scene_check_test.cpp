@@ -46,13 +46,13 @@ TEST(SceneCheck, EmittersThatPushABodyOrGetItsVelocityNeedOne) {
             "/emitters/0/recoil: pushes a body back; the emitter needs a \"body\"\n");
   const std::string on_body = R"("emitters": [{"body": "a", "recoil": true, "inherit_velocity": 0.5}]})";
   EXPECT_EQ(errors_of(R"({"bodies": [{"name": "a", "motion": "static"}], )" + on_body),
-            "/emitters/0/recoil: pushes dynamic bodies only, and \"a\" is not\n");
+            "/emitters/0/recoil: pushes dynamic bodies only, and \"a\" is not dynamic\n");
   EXPECT_EQ(errors_of(R"({"bodies": [{"name": "a"}], )" + on_body), "");
-  EXPECT_EQ(
-      errors_of(R"({"bodies": [{"name": "a"}],
+  EXPECT_EQ(errors_of(R"({"bodies": [{"name": "a"}],
                           "emitters": [{"body": "a", "surface": {"type": "face", "size": [1, 2, 3]}}]})"),
-      "/emitters/0/surface: has the faces of its body; \"position\" and \"size\" are for an emitter without "
-      "one\n");
+            "/emitters/0/surface: has the faces of the emitter's body; \"position\" and \"size\" are for an "
+            "emitter without "
+            "a body\n");
 }
 
 TEST(SceneCheck, NamesReferToExistingObjects) {
@@ -81,7 +81,8 @@ TEST(SceneCheck, AlgorithmsWithoutEffectAreRefused) {
       "by the size of each body\n"
       "/world/collision/trees: has no effect: no body has the shape of a mesh or a compound\n"
       "/world/collision/tree_split: has no effect: no body has the shape of a mesh or a compound\n"
-      "/world/collision/mesh_pairs: has no effect: two bodies with shapes of meshes are needed, there are 0\n"
+      "/world/collision/mesh_pairs: has no effect: it needs two bodies with the shape of a mesh; there are "
+      "0\n"
       "/world/particle_cluster: is for \"particle_contacts\": \"lcp\"\n");
   const std::string rings = R"("bodies": [{"name": "ring", "shape": {"type": "torus"}, "position": [0, 5, 0],
     "repeat": {"count": 2, "offset": [0, 4, 0]}}])";
@@ -208,10 +209,10 @@ TEST(SceneCheck, CrossFrictionNeedsMaterialAndAxis) {
   EXPECT_EQ(warnings_of(R"({"materials": [{"name": "planks", "cross_friction": 1}],
     "bodies": [{"material": "planks", "friction_axis": [1, 0, 0]}]})"),
             "");
-  EXPECT_EQ(
-      errors_of(R"({"materials": [{"name": "skate", "friction": 0, "cross_friction": 1}],
+  EXPECT_EQ(errors_of(R"({"materials": [{"name": "skate", "friction": 0, "cross_friction": 1}],
     "bodies": [{"material": "skate", "friction_axis": [1, 0, 0]}]})"),
-      "/materials/0/cross_friction: needs a \"friction\" above 0, which it is relative to, such as 0.001\n");
+            "/materials/0/cross_friction: needs a \"friction\" above 0, such as 0.001: friction across the "
+            "axis is a multiple of friction along it\n");
 }
 
 TEST(SceneCheck, ForcesNameExistingObjects) {

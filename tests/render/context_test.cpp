@@ -156,7 +156,7 @@ TEST(ContextPlatform, UnknownNamesAreRefusedWithTheList) {
     gl_platform("glx");
     FAIL() << "taken";
   } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "'glx' is not an OpenGL backend; there are auto, osmesa, egl, egl:gpu");
+    EXPECT_STREQ(error.what(), "'glx' is not an OpenGL backend; the backends are auto, osmesa, egl, egl:gpu");
   }
 }
 

@@ -266,7 +266,7 @@ TEST(ReadModel, WarnsOnceOfATextureThatIsNotThere) {
   folder.put("a.mtl", "newmtl m\nmap_Kd none.png\nnewmtl n\nmap_Kd none.png\n");
   const Model model =
       read_model(folder.put("a.obj", "mtllib a.mtl\n" + std::string(kTriangle) + "usemtl m\nf 1 2 3\n"));
-  EXPECT_EQ(model.warnings, std::vector<std::string>{"texture 'none.png' is not there"});
+  EXPECT_EQ(model.warnings, std::vector<std::string>{"texture 'none.png' does not exist"});
   EXPECT_EQ(model.materials.at(static_cast<std::size_t>(model.parts.at(0).material)).base_color_texture.image,
             -1);
 }

@@ -35,7 +35,7 @@ def main():
             for path in sorted(os.path.join(place, name) for name in names if name.endswith((".h", ".cpp"))):
                 with open(path, encoding="utf-8") as file:
                     lines = file.read().splitlines()
-                problems += [f"{path}:{line}: a function of {length} lines, of at most {LONGEST_FUNCTION}"
+                problems += [f"{path}:{line}: a function of {length} lines; at most {LONGEST_FUNCTION} are allowed"
                              for line, length in functions(lines) if length > LONGEST_FUNCTION]
                 if len(lines) > LONG_FILE:
                     long_files.append(f"{path}: {len(lines)} lines")

@@ -10,7 +10,8 @@ namespace offstage {
 /// A place in a scene file. `path` is a JSON pointer such as /emitters/0/rate.
 struct Where {
   std::string file;
-  int line = 0, column = 0;  ///< from 1; 0: not from a file (an override, a default)
+  /// Position in the file, from 1; 0: not from a file, but from an override or a default.
+  int line = 0, column = 0;
   std::string path;
 };
 

@@ -15,18 +15,18 @@ namespace offstage::producer {
 /// A position in one of the texts of a scene.
 struct Position {
   int file = -1;             ///< index into SceneSource::files; -1: not from a text
-  int line = 0, column = 0;  ///< from 1, in characters; 0: not from a file
+  int line = 0, column = 0;  ///< position in characters, from 1; 0: not from a file
 };
 
 struct Node;
 struct Member;
 using List = std::vector<Node>;
-using Object = std::vector<Member>;  ///< in the order of the file, keys unique
+using Object = std::vector<Member>;  ///< members in the order of the file; their keys are unique
 
 /// A JSON value and its position.
 struct Node {
   using Value = std::variant<std::nullptr_t, bool, int64_t, double, std::string, List, Object>;
-  Value value;  ///< null at first
+  Value value;  ///< the value; null in a new node
   Position at;
 
   Node();

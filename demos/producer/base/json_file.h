@@ -25,7 +25,7 @@ class JsonObject {
   bool has(const std::string& key) const { return json_.contains(key); }
   std::string text(const std::string& key, const std::string& otherwise = {}) const;
   bool flag(const std::string& key, bool otherwise) const;
-  /// An integer from 0 to `most`.
+  /// Returns an integer from 0 to `most`; `otherwise` if the key is missing.
   int count(const std::string& key, int otherwise, int most) const;
   /// The objects of a list; none if the key is missing.
   std::vector<JsonObject> objects(const std::string& key) const;

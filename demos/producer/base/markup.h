@@ -1,5 +1,5 @@
 #pragma once
-/// Text inside of HTML and XML.
+/// Escapes text for HTML and XML.
 
 #include <string>
 #include <string_view>

@@ -18,7 +18,8 @@
 
 namespace offstage::producer {
 
-/// Kind of a file: at most eight characters, the version that is read and written, and its name in messages.
+/// Kind of a file: its magic word of at most eight characters, the format version that is read and written,
+/// and the name of the kind in messages.
 struct FileKind {
   std::string_view magic;
   uint32_t version;
@@ -26,10 +27,11 @@ struct FileKind {
 };
 
 std::vector<uint8_t> pack(const FileKind& kind, std::span<const uint8_t> payload);
-/// Returns the payload. Throws render::FileError with `source`.
+/// Returns the decompressed payload of a file's bytes. Throws render::FileError, which names the file
+/// `source`.
 std::vector<uint8_t> unpack(const FileKind& kind, std::span<const uint8_t> bytes, const std::string& source);
 
-/// Throws render::FileError.
+/// Returns the bytes of a whole file. Throws render::FileError.
 std::vector<uint8_t> read_file(const std::filesystem::path& path);
 
 /// Appends numbers and vectors in the machine's byte order.
@@ -51,7 +53,8 @@ class ByteWriter {
   std::vector<uint8_t> bytes_;
 };
 
-/// Reads the same data. Throws render::FileError with `source` at the end of the data.
+/// Reads numbers and vectors that a ByteWriter has appended. Throws render::FileError, which names the file
+/// `source`, if the data end too early.
 class ByteReader {
  public:
   ByteReader(std::span<const uint8_t> bytes, const std::string& source) : bytes_(bytes), source_(source) {}
@@ -70,16 +73,17 @@ class ByteReader {
     for (int i = 0; i < V::SizeAtCompileTime; ++i) v[i] = take<typename V::Scalar>();
     return v;
   }
-  /// Reads a count of records of at least `record_size` bytes. A wrong count throws before memory is
-  /// allocated.
+  /// Reads the number of records that follow, of at least `record_size` bytes each. Throws if the data are
+  /// too short for them, before memory is allocated.
   std::size_t take_count(std::size_t record_size) {
     const auto n = take<uint64_t>();
-    if (n > bytes_.size() / record_size) throw render::FileError(source_ + ": damaged (bad count)");
+    if (n > bytes_.size() / record_size)
+      throw render::FileError(source_ + ": damaged (a list is longer than the file)");
     return n;
   }
-  /// Throws if data are left.
+  /// Throws render::FileError unless all data were read.
   void expect_end() const {
-    if (!bytes_.empty()) throw render::FileError(source_ + ": damaged (trailing bytes)");
+    if (!bytes_.empty()) throw render::FileError(source_ + ": damaged (bytes follow its end)");
   }
 
  private:

@@ -24,7 +24,8 @@ class SceneFolder {
   /// Returns an error message for a file outside of all the folders, with symbolic links resolved; empty if
   /// it is inside.
   std::string wrong_place(const std::filesystem::path& file) const;
-  /// As above, and also an error message if there is no regular file. The path may end in #NODE.
+  /// Returns an error message for a file that wrong_place() refuses or that is not a regular file; empty if
+  /// it can be read. The path may end in #NODE.
   std::string wrong_file(const std::filesystem::path& file) const;
 
  private:

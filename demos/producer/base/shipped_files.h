@@ -9,8 +9,9 @@
 
 namespace offstage::producer {
 
-/// Returns the folder `installed` of the folder named by OFFSTAGE_DATA, else of ../share/offstage beside the
-/// program, else `source` in the source tree from which it was compiled; empty if none exists.
+/// Returns the first of these folders that exists, or an empty path: `installed` in the folder that
+/// OFFSTAGE_DATA names; `installed` in ../share/offstage, seen from the program; `source` in the source tree
+/// from which the program was compiled.
 std::filesystem::path shipped_folder(std::string_view installed, std::string_view source);
 
 /// Returns the file of a model named by a scene, FILE or FILE#NODE: relative to the scene's folder or, if

@@ -1,5 +1,5 @@
 #pragma once
-/// Parts of ready-made articulations.
+/// Builds the bodies and joints of ready-made articulations.
 
 #include <string>
 #include <vector>

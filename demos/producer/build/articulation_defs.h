@@ -1,5 +1,5 @@
 #pragma once
-/// Conversion of ready-made articulations to bodies and joints, and of joints to those of the simulation.
+/// Conversion of ready-made articulations to bodies and joints, and of a scene's joints to sim::JointDef.
 
 #include <vector>
 
@@ -12,9 +12,9 @@ namespace offstage::producer {
 void expand_joints(const Scene& scene, Scene& flat, std::vector<Problem>& errors,
                    std::vector<Problem>& warnings);
 
-/// Whether joints of this type have a length that `length_limits` limit.
+/// Whether joints of this type have a length, which `length_limits` can limit.
 bool has_rope(sim::JointType type);
-/// The length of such a joint at time 0 [m].
+/// The length of a joint for which has_rope() is true, at time 0 [m].
 Real rope_length(const Joint& joint);
 
 /// Converts a joint without its bodies.

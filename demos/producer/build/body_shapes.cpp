@@ -65,7 +65,7 @@ std::optional<ShapeProblem> problem_of(const sim::Tube& t) {
 std::optional<ShapeProblem> problem_of(const sim::OpenBox& b) {
   if (2 * b.thickness < std::min(b.size.x(), b.size.z()) && b.thickness < b.size.y()) return {};
   return ShapeProblem{"/thickness",
-                      "must be less than half of the \"size\" along x and z, and less than that along y"};
+                      "must be less than half of \"size\" along x and z, and less than \"size\" along y"};
 }
 template <class S>
 std::optional<ShapeProblem> problem_of(const S&) {

@@ -10,7 +10,8 @@
 
 namespace offstage::producer {
 
-/// Numbers that distinguish the mesh of a shape from others. Not for MeshFile and Compound.
+/// Numbers that identify the mesh of a shape: shapes with equal numbers share a mesh. Not for MeshFile and
+/// Compound.
 std::vector<float> shape_key(const sim::Sphere& s);
 std::vector<float> shape_key(const sim::Box& s);
 std::vector<float> shape_key(const sim::Capsule& s);
@@ -43,7 +44,7 @@ std::vector<sim::SolidMesh> solids_of(const Shape& shape);
 /// Whether a body collides by the parts or triangles of a mesh: mesh files and the shapes of solids_of().
 bool is_mesh(const Body& body);
 
-/// Key of the solids of a shape: equal keys, equal solids.
+/// Numbers that identify the solids of a shape: shapes with equal numbers have equal solids.
 std::vector<float> solids_key(const Shape& shape);
 
 /// The inertia matrix of a body that has `inertia`.

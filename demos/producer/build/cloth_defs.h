@@ -20,18 +20,19 @@ inline constexpr std::size_t kMaxClothVertices = 250'000;
 
 /// A cloth in its own frame, and placed in the world.
 struct FlatCloth {
-  sim::ClothDef def;         ///< without pins, which need the bodies
+  sim::ClothDef def;         ///< definition of the cloth, without pins, which need the bodies
   std::vector<Vec3> places;  ///< positions of its vertices in its own frame, without those of cords [m]
   std::vector<Eigen::Vector2f> uvs;  ///< coordinates along the cloth, of all vertices [m]
-  std::vector<uint32_t> cord_ends;   ///< last vertices of its cords
+  std::vector<uint32_t> cord_ends;   ///< for each cord, the index of its last vertex
 
-  std::vector<uint32_t> triangles() const;  ///< three vertices each
+  std::vector<uint32_t> triangles() const;  ///< Returns the triangles as three vertices each.
 };
 
-/// `model`: that of a mesh, otherwise null. Throws std::invalid_argument for an impossible shape or fabric.
+/// Creates the flat cloth. `model` is the model file of a cloth that has one, otherwise null. Throws
+/// std::invalid_argument for an impossible shape or fabric.
 FlatCloth flat_cloth(const Cloth& cloth, const render::Model* model);
 
-/// Number of vertices of a cloth, without those of cords. `model` as above.
+/// Number of vertices of a cloth, without those of cords. `model`: see flat_cloth().
 std::size_t vertex_count(const Cloth& cloth, const render::Model* model);
 
 /// Returns the fabric of a cloth with its changes. Throws std::invalid_argument for an unknown name.
@@ -49,7 +50,8 @@ std::string selects_nothing(const FlatCloth& flat);
 /// length, or are not those of a grid.
 std::vector<sim::ClothSeam> sewn_vertices(const ClothSeam& seam, const Cloth& cloth, const FlatCloth& flat);
 
-/// Returns the look of a cloth without a material; materials without a fabric use its fabric.
+/// Returns the look of a fabric, for cloths without a material. A material without `fabric` takes the fabric
+/// part of this look.
 render::Material fabric_look(const std::string& fabric);
 
 /// Returns why an explicit integrator is unstable for a cloth of this scene, with the spring and the longest

@@ -13,7 +13,7 @@ class DecompositionCache {
  public:
   /// Uses a folder, which is created when the first result is stored.
   explicit DecompositionCache(std::filesystem::path folder) : folder_(std::move(folder)) {}
-  /// Stores nothing.
+  /// Creates a cache that stores nothing.
   DecompositionCache() = default;
   /// Uses $XDG_CACHE_HOME/offstage, else $HOME/.cache/offstage; stores nothing if neither is set.
   static DecompositionCache of_user();

@@ -29,7 +29,7 @@ effects::SubEmitterDef event_def(const Emission& emission, const std::string& na
 
 /// Greatest number of particles of a source.
 struct SourceBound {
-  effects::WorstCase possible;  ///< without regard to max_alive
+  effects::WorstCase possible;  ///< bounds without the limit `max_alive`
   uint64_t alive = 0;           ///< number of particles at once, limited by max_alive
 };
 /// Calls visit(source, name, bound) for an emitter and all of its child particles in a film that ends at

@@ -8,9 +8,9 @@
 
 namespace offstage::producer {
 
-/// Returns the centres relative to that of the volume, from below, without fill.position. `spacing` [m], > 0.
-/// At most `most` places are returned, and one more to show that there would be more. The order and the
-/// places depend only on the arguments.
+/// Returns the centres of the places, ordered from below, relative to the centre of the volume; fill.position
+/// is not added. `spacing` [m], > 0. At most `most` places are returned, and one more to show that there
+/// would be more. The order and the places depend only on the arguments.
 std::vector<Vec3> fill_places(const Fill& fill, Real spacing, std::size_t most);
 
 }  // namespace offstage::producer

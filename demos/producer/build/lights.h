@@ -15,10 +15,10 @@ namespace offstage::producer {
 render::Sun sun_of(const Scene& scene, const ModelLibrary& models);
 /// Returns the environment without the picture of the sky, which the caller sets.
 render::Environment environment_of(const Scene& scene);
-/// The other lights at a time, in scene order.
+/// The lights of a scene other than the sun at a time [s], in scene order.
 std::vector<render::Lamp> lamps_of(const Scene& scene, const ModelLibrary& models, double time,
                                    const BodyPlaces& places, const std::vector<BodySample>& moving);
-/// The names of the same lights; empty for those without one.
+/// The names of the lights that lamps_of() returns; empty for a light without a name.
 std::vector<std::string> lamp_names(const Scene& scene, const ModelLibrary& models);
 
 }  // namespace offstage::producer

@@ -141,8 +141,8 @@ Parts build(const Crane& crane) {
 
   const Vec3 start(0.6 * R, H - 0.3 * beam, 0);
   make.box("trolley", crane.frame, {1.6 * beam, 0.6 * beam, 1.3 * beam}, 0.1 * crane.load_mass, start);
-  Joint& way = make.join(prismatic, "way", "trolley", "jib", start, Vec3::UnitX());
-  way.behaviour.motor = follow(sim::Motor::Mode::position, crane.trolley);
+  Joint& travel = make.join(prismatic, "travel", "trolley", "jib", start, Vec3::UnitX());
+  travel.behaviour.motor = follow(sim::Motor::Mode::position, crane.trolley);
 
   const Real side = crane.load_size, hook = 0.45 * H;  // top of the load
   make.box("load", crane.load, Vec3::Constant(side), crane.load_mass, {start.x(), hook - side / 2, 0});

@@ -1,6 +1,6 @@
 #pragma once
-/// Data of files that decides which objects a scene has: articulations from the node trees of models,
-/// particles from point clouds, and models that are filled.
+/// Objects of a scene that follow from the data of files: articulations from the node trees of models,
+/// particles from point clouds, and particles that fill models.
 
 #include <vector>
 

@@ -151,7 +151,8 @@ bool is_inaccurate(const sim::ConvexDecomposition& parts, const sim::Decompositi
 std::string inaccuracy(const sim::ConvexDecomposition& parts) {
   if (parts.parts.empty()) return "there are no convex parts, so its triangles collide: " + parts.note;
   return fmt::format(
-      "its {} convex parts differ from it in {:.1f} % of its volume ({}). More parts reduce the difference: "
+      "its {} convex parts differ from the model in {:.1f} % of its volume ({}). More parts reduce the "
+      "difference: "
       "`decomposition.max_parts`, at most 1024",
       parts.parts.size(), 100 * parts.difference, parts.note);
 }

@@ -41,7 +41,7 @@ class ModelLibrary {
                std::vector<Problem>& warnings, const StepCallback& on_step = {});
 
   const render::Model& model(const std::string& file) const { return models_.at(file); }
-  /// The file and the settings of a model's decomposition.
+  /// Key of the convex parts of a model: its file and the settings of the decomposition.
   static std::string parts_key(const MeshFile& mesh);
   /// The unscaled convex parts of a model, or null if they are not needed.
   const sim::ConvexDecomposition* parts(const MeshFile& mesh) const {
@@ -79,8 +79,9 @@ class ModelLibrary {
   std::map<std::string, render::Model> models_;
   std::map<std::string, render::Image> textures_;
   std::shared_ptr<const render::SkyPicture> sky_;
-  std::map<std::string, sim::ConvexDecomposition> parts_;     ///< by parts_key()
-  std::map<std::string, std::vector<AnimatedPiece>> pieces_;  ///< by animation_key()
+  std::map<std::string, sim::ConvexDecomposition> parts_;  ///< convex parts of models, by parts_key()
+  /// Colliding pieces of bodies, by animation_key().
+  std::map<std::string, std::vector<AnimatedPiece>> pieces_;
   std::vector<Decomposed> decomposed_;
   std::string digest_;
 };
@@ -97,7 +98,7 @@ struct ChosenScale {
 /// (millimetres). `largest_side`: longest edge of the box around the file's content, in the unit that was
 /// read or assumed [m].
 ChosenScale automatic_scale(Real largest_side, render::Model::UnitSource unit);
-/// The same for a model as it was read, whose Model::file_size must be known.
+/// Returns the factor for a model that was read; Model::file_size must be known.
 ChosenScale automatic_scale(const render::Model& model);
 
 /// Scale factor that brings a model to the size of its use: `scale` times the factor that fits its bounding
@@ -115,10 +116,10 @@ Real scale_of(const Use& use, const ModelLibrary& models) {
 
 /// All triangles of a model as one mesh for the simulation, scaled.
 sim::TriangleMesh collision_mesh(const render::Model& model, double scale);
-/// "exact", "approximate" ...
+/// Returns the name of a method of decomposition: "exact", "approximate" ...
 std::string method_name(sim::ConvexDecomposition::Method method);
 
-/// A model's convex parts as those of its scaled mesh.
+/// The convex parts of a model, scaled like its mesh.
 sim::ConvexDecomposition scaled(sim::ConvexDecomposition decomposition, double scale);
 
 /// XXH3-128 in hexadecimal of a mesh.

@@ -19,7 +19,7 @@ struct ObjectTable {
 
   struct BodyEntry {
     const Body* body;
-    std::optional<std::size_t> slot;  ///< in Snapshot::bodies; none: it never moves
+    std::optional<std::size_t> slot;  ///< index in Snapshot::bodies; none: the body never moves
     uint32_t id;
   };
   /// A cylinder between two points: a spring, a part of a joint's rod or rope, or a segment of a cord.

@@ -50,7 +50,7 @@ class Overlays {
     sim::Shape shape;
     std::optional<sim::CollisionShape> collision;
   };
-  /// At most one is a plane; it is the second.
+  /// Two bodies. At most one is a plane, which is then `b`.
   struct ColliderPair {
     const Collider *a, *b;
   };

@@ -19,12 +19,12 @@
 
 namespace offstage::producer {
 
-/// Colour, size and rotation of a look, prepared for many particles.
+/// Computes colour, size and rotation of particles from their look.
 class LookRamps {
  public:
   LookRamps(const ParticleLook& look, uint64_t seed, const std::string& name);
 
-  /// Look of the particles at `time`. `places`: those of a group, which may have individual colours.
+  /// Look of the particles at `time`. `places`: the particles of a group, which may have individual colours.
   PointSet points(const sim::ParticleArrays& particles, Real time,
                   const std::vector<ParticlePlace>* places) const;
 
@@ -49,12 +49,12 @@ class ParticleSources {
   /// Time before 0 at which the first particles are created [s].
   Real prewarm() const;
 
-  /// Must be called before each sub-step.
+  /// Adds the particles that are created in (start, end] to the world. Must be called before each sub-step.
   void emit(sim::World& world, Real start, Real end);
 
   struct Counts {
     uint64_t waiting = 0;  ///< particles that were postponed for lack of room
-    uint64_t skipped = 0;  ///< not released because of a limit
+    uint64_t skipped = 0;  ///< particles that were not released because of a limit
   };
   Counts counts() const;
 

@@ -135,7 +135,7 @@ class Picture {
   /// interval; empty if they have none.
   static std::vector<Eigen::Quaternionf> orientations_at(const PointSet& before, const PointSet& now, float w,
                                                          std::span<const render::Point> points);
-  /// `orientations`: of each point, or empty.
+  /// `orientations`: rotation of each point, or empty.
   void place_meshes(DrawnMeshes& drawn, std::span<const render::Point> points,
                     std::span<const Eigen::Quaternionf> orientations);
   /// Time between two sub-frames; 0 if there is only one [s].

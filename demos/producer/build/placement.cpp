@@ -227,7 +227,7 @@ const Vec3& position_of(const Emitter& emitter) {
 }
 
 constexpr const char* kNoRoom =
-    "has no room for a single place; use a smaller \"spacing\" or a larger volume";
+    "has no room for a single object; use a smaller \"spacing\" or a larger volume";
 
 template <class T>
 std::vector<T> expand_all(const std::vector<T>& originals, uint64_t seed, std::vector<Problem>& errors,
@@ -300,7 +300,9 @@ void resolve_fill(ParticleGroup& group, std::vector<Problem>& errors) {
   where.path += "/fill";
   if (places.empty()) errors.push_back({where, kNoRoom});
   if (places.size() > kMostPlaces) {
-    errors.push_back({where, "has more than 5000000 places; use a larger \"spacing\" or a smaller volume"});
+    errors.push_back(
+        {where,
+         "has room for more than 5000000 objects, the limit; use a larger \"spacing\" or a smaller volume"});
     places.clear();
   }
   for (const Vec3& p : places)

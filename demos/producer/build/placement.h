@@ -20,7 +20,7 @@ inline constexpr int kMaxCopies = 100'000;  ///< limit for one object
 
 /// A rigid motion of the world from an original, with all its keyframes, to one of its copies.
 struct PlacedCopy {
-  sim::Pose motion;    ///< copy from original, both in world coordinates
+  sim::Pose motion;    ///< transform of the copy from the original, both in world coordinates
   Real scale = 1;      ///< factor of the object's size
   std::string suffix;  ///< suffix of its name: "_0", "_1" ...
 };

@@ -22,7 +22,8 @@ Affine3f scaled_pose(const Vec3& position, const Quat& orientation, Real scale) 
 template <class Place>
 std::string unknown_place(const std::string& file, const char* kind, const std::string& name,
                           const std::vector<Place>& known) {
-  if (known.empty()) return fmt::format("{}: has no {}s; `offstage info` lists those of a file", file, kind);
+  if (known.empty())
+    return fmt::format("{}: has no {}s; `offstage info FILE` lists what a file has", file, kind);
   std::vector<std::string> names;
   for (const Place& place : known) names.push_back(place.name);
   return fmt::format("{}: has no {} '{}'{}", file, kind, name, suggestion(name, names));

@@ -21,9 +21,9 @@ struct ShownModel {
 /// The model file that is drawn for a body; empty if it is drawn as its shape.
 std::optional<ShownModel> shown_model(const Body& body, const ModelLibrary& models);
 
-/// The body of a name. It must exist.
+/// Returns the body with a name, which must exist.
 const Body& body_of(const Scene& scene, const std::string& name);
-/// The camera of a scene's entry, or null.
+/// Returns the camera of the model file that an entry of the scene selects; null if there is none.
 const render::Model::Camera* find_camera(const ModelCamera& camera, const Scene& scene,
                                          const ModelLibrary& models);
 /// Whether an entry of the scene's lights contains a light of its file.

@@ -20,8 +20,8 @@
 
 namespace offstage::producer {
 
-/// The physics cannot continue, because a quantity became infinite or NaN. Contains the state as JSON text,
-/// to be saved.
+/// The physics cannot continue, because a quantity became infinite or NaN. The exception contains the state
+/// as JSON text, which can be saved.
 class DivergedError : public std::runtime_error {
  public:
   DivergedError(const std::string& what, std::string state)
@@ -37,9 +37,10 @@ class DivergedError : public std::runtime_error {
 struct SimulationTotals : sim::StepFigures {
   uint64_t waiting = 0, skipped = 0;  ///< counts of the emitters
   uint64_t most_contacts = 0;         ///< greatest number of contact points of bodies at the end of a frame
-  std::vector<std::string> broken_joints;  ///< in the order of breaking
+  std::vector<std::string> broken_joints;  ///< names of broken joints, in the order in which they broke
   std::vector<std::string> lost_bodies;    ///< bodies that left the world's bounds and were frozen there
-  std::map<std::string, sim::Real> softened_cloths;  ///< least fraction of its stiffness that a spring had
+  /// By cloth: the smallest factor by which the stiffness of a spring was reduced.
+  std::map<std::string, sim::Real> softened_cloths;
   std::map<std::string, sim::ClothTear> first_tears;
   /// Bodies with approximate contact forces, and how often a solver fell back for them.
   std::map<std::string, uint64_t> rough_bodies;

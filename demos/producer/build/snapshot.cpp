@@ -141,14 +141,14 @@ Snapshot deserialize(std::span<const uint8_t> bytes, const std::string& source, 
     }
     set.spins.resize(in.take_count(kSpinBytes));
     if (!set.spins.empty() && set.spins.size() != set.points.size())
-      throw render::FileError(source + ": is damaged: not all particles of a set turn");
+      throw render::FileError(source + ": is damaged: only some particles of a set have a rate of rotation");
     for (std::size_t i = 0; i < set.spins.size(); ++i) {
       set.points[i].angle = in.take<float>();
       set.spins[i] = in.take<float>();
     }
     take_bytes(in, set.orientations);
     if (!set.orientations.empty() && set.orientations.size() != set.points.size())
-      throw render::FileError(source + ": is damaged: not all particles of a set have orientations");
+      throw render::FileError(source + ": is damaged: only some particles of a set have an orientation");
   }
   snapshot.cloths.resize(in.take_count(kClothBytes));
   for (ClothSample& cloth : snapshot.cloths) {

@@ -32,7 +32,7 @@ struct RodSample {
 struct PointSet {
   std::vector<render::Point> points;
   std::vector<float> ages;   ///< [s]
-  std::vector<float> spins;  ///< rates of Point::angle [rad/s]; empty: none turns
+  std::vector<float> spins;  ///< rate of Point::angle for each point [rad/s]; empty: no point rotates
   /// Rotations by contacts since the birth time; empty unless the particles `rotate` and show it.
   std::vector<Eigen::Quaternionf> orientations;
 };
@@ -41,7 +41,8 @@ struct PointSet {
 struct ClothSample {
   std::vector<Eigen::Vector3f> points;      ///< [m]
   std::vector<Eigen::Vector3f> velocities;  ///< [m/s]
-  uint32_t version = 0;             ///< version of the next two; 0: the cloth is intact, and they are empty
+  /// Version of `triangles` and `sources`; 0: the cloth is intact, and both are empty.
+  uint32_t version = 0;
   std::vector<uint32_t> triangles;  ///< three points each
   std::vector<uint32_t> sources;    ///< for each point, the vertex of the scene's cloth from which it comes
 };
@@ -60,7 +61,7 @@ struct Snapshot {
   std::vector<RodSample> rods;
   std::vector<PointSet> point_sets;
   std::vector<ClothSample> cloths;
-  std::vector<LineSet> overlays;  ///< for each overlay of the scene; empty for those that draw no lines
+  std::vector<LineSet> overlays;  ///< lines of each overlay of the scene; empty for overlays without lines
   sim::StateHash state_hash;
 
   uint64_t point_count() const;

@@ -23,14 +23,14 @@ struct BenchOptions {
   double limit_s = 60;  ///< longest run
   int threads = 0;
   bool force = false;
-  TalkOptions talk;
+  LogOptions log;
 };
 
 /// Says which method runs: a status line on a terminal, a line for each run in a log file.
 class BenchProgress {
  public:
-  BenchProgress(const TalkOptions& talk, std::size_t runs)
-      : style_(talk.quiet ? ProgressStyle::none : resolved(talk.progress)), runs_(runs) {}
+  BenchProgress(const LogOptions& log_options, std::size_t runs)
+      : style_(log_options.quiet ? ProgressStyle::none : resolved(log_options.progress)), runs_(runs) {}
 
   void begin(const std::string& method) {
     ++run_;
@@ -67,14 +67,14 @@ class BenchProgress {
 
 /// Simulates a scene by each of the algorithms that it can choose from, and prints a table.
 int bench_command(const BenchOptions& options) {
-  const LoadedScene loaded = load(options.scene, options.talk.quiet);
+  const LoadedScene loaded = load(options.scene, options.log.quiet);
   check_file(options.csv, options.force);
-  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
+  const ModelLibrary models = load_models(loaded, options.scene, options.log);
   const auto threads = simulation_threads(options.threads);
   const std::vector<Method> methods = methods_of(loaded.scene);
   std::vector<LoadedScene> scenes;
   for (const Method& method : methods) scenes.push_back(load(options.scene, true, method.overrides));
-  BenchProgress progress(options.talk, methods.size() * static_cast<std::size_t>(options.repeat));
+  BenchProgress progress(options.log, methods.size() * static_cast<std::size_t>(options.repeat));
   // The methods take turns, so that a busy machine slows all of them alike.
   std::vector<MethodResult> results;
   for (int round = 0; round < options.repeat; ++round)
@@ -116,7 +116,7 @@ Command add_bench(CLI::App& app) {
       ->check(CLI::PositiveNumber);
   add_threads(*command, bench.threads);
   command->add_flag("--force", bench.force, "Replace an existing file");
-  add_talk(*command, bench.talk);
+  add_log_options(*command, bench.log);
   return {command, [options] { return bench_command(*options); }};
 }
 

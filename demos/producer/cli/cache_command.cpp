@@ -111,7 +111,8 @@ Command add_cache(CLI::App& app) {
       ->required()
       ->transform(CLI::CheckedTransformer(actions).description("{list,verify,clear}"));
   command
-      ->add_option("folders", given.folders, "Caches; for `list` and `verify` also folders that hold caches")
+      ->add_option("folders", given.folders,
+                   "Folders with a cache; `list` and `verify` also accept folders that contain several")
       ->required();
   command->add_flag("--json", given.json, "Print the list as JSON");
   return {command, [options] { return cache_command(*options); }};

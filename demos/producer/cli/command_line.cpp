@@ -126,7 +126,8 @@ Command add_tune(CLI::App& app, const TuneCommand& run) {
   command->add_option("scene", tune.scene.file, "Scene file")->required();
   command->add_option("--port", tune.port, "Port on this machine (default: any that is free)")
       ->check(CLI::Range(1, 65535));
-  command->add_option("--size", tune.size, "Size WxH that drafts fit into")->capture_default_str();
+  command->add_option("--size", tune.size, "Largest size WxH of the small pictures shown first")
+      ->capture_default_str();
   command->add_flag_callback(
       "--no-open", [&tune] { tune.open = false; }, "Only print the address and open no browser");
   add_allow(*command, tune.scene.allow);

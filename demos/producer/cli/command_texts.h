@@ -1,5 +1,5 @@
 #pragma once
-/// The manual page and the completions of shells, made from the description of the command line itself.
+/// The manual page and the completions of shells, generated from the description of the command line.
 
 #include <string>
 #include <string_view>

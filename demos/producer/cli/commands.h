@@ -21,11 +21,13 @@ namespace offstage::producer {
 struct Command {
   CLI::App* arguments;  ///< belongs to the program's command line
   std::function<int()>
-      run;  ///< with the options that were parsed; returns an exit code, errors are exceptions
+      /// Runs the command with the options that were parsed. Returns an exit code; errors are exceptions.
+      run;
 };
 
 struct RenderOptions;
-/// render --watch is in a library above this one: see engine/watch_command.h.
+/// The function behind `render --watch`, which is in a library that depends on this one: see
+/// engine/watch_command.h.
 using WatchCommand = std::function<int(const RenderOptions&)>;
 
 // Each adds a command with its options to the program's command line.
@@ -52,22 +54,22 @@ Command add_completion(CLI::App& app);
 
 struct RenderOptions {
   SceneOptions scene;
-  TalkOptions talk;
+  LogOptions log;
   std::string out;
   std::string frames, chunk;
   std::string format = "rgba";  ///< format of standard output
   std::string cache, stats, report;
   std::vector<std::string> cameras;  ///< cameras to draw, or kAllCameras; empty: the scene's `camera`
-  /// Folder of the states for several cameras: they are read if it holds those of this simulation, otherwise
-  /// they are written to it. Empty: none.
+  /// Folder for the states of a film with several cameras: the first camera writes them, the others read
+  /// them. Empty: none.
   std::string states;
-  int threads = 0;  ///< 0: all available
-  int jobs = 0;     ///< 0: chosen by `threads`
+  int threads = 0;  ///< number of threads of the simulation; 0: all available
+  int jobs = 0;     ///< number of frames drawn at the same time; 0: chosen by `threads`
   bool resume = false, force = false, dry_run = false, watch = false;
   render::GlPlatform gl = render::GlPlatform::automatic;
 
   // These are set by render --watch.
-  std::function<bool()> stop;  ///< as RenderJob::stop
+  std::function<bool()> stop;  ///< see RenderJob::stop
   /// Makes RenderJob::states for a film that ends with the frame `last`; empty: none.
   std::function<std::unique_ptr<StateSource>(const LoadedScene&, const ModelLibrary&, int last)> states_of;
   bool prints_name = true;  ///< whether the name of the complete output is printed
@@ -78,16 +80,16 @@ std::string default_film(const std::string& scene_file);
 
 struct TuneOptions {
   SceneOptions scene;
-  int port = 0;                  ///< 0: any free port
+  int port = 0;                  ///< port of the page; 0: any free one
   std::string size = "640x360";  ///< size of drafts
   bool open = true;              ///< whether to open the page in a browser
   int threads = 0;
   render::GlPlatform gl = render::GlPlatform::automatic;
 };
-/// The tuning page is in a library above this one: see tune/tune_command.h.
+/// The function behind `tune`, which is in a library that depends on this one: see tune/tune_command.h.
 using TuneCommand = std::function<int(const TuneOptions&)>;
 
-/// Number of threads, or that of all available processors if it is 0.
+/// Number of threads, or the number of available processors if it is 0.
 int threads_or_all(int threads);
 /// Limits the simulation to this number of threads during its lifetime.
 tbb::global_control simulation_threads(int threads);
@@ -98,15 +100,16 @@ LoadedScene load(const SceneOptions& options, bool quiet,
 void print_warnings(const std::vector<Problem>& warnings);
 /// Reads the models of a scene, and shows steps that take long. Prints warnings unless quiet. Throws
 /// Interrupted between two models, and the exceptions of ModelLibrary.
-ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const TalkOptions& talk);
-/// Reads the models of a scene, and appends its warnings instead of printing them.
-ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const TalkOptions& talk,
-                         std::vector<Problem>& warnings);
+ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
+                         const LogOptions& log_options);
+/// Reads the models of a scene, and appends warnings to `warnings` instead of printing them.
+ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
+                         const LogOptions& log_options, std::vector<Problem>& warnings);
 /// Key of all settings that decide the pixels of a scene's frames.
 std::string frame_settings(const LoadedScene& loaded, const ModelLibrary& models, render::GlPlatform gl);
-/// JSON as indented "key: value" lines.
+/// Prints JSON as indented lines "key: value".
 void print_readable(const nlohmann::ordered_json& json, int indent = 0);
-/// Error message for an invalid frame rate.
+/// Returns the error message for an invalid frame rate.
 std::string wrong_frame_rate(const std::string& text);
 void write_text_file(const std::string& path, const std::string& text);
 /// Writes to the first name of STEM.EXT, STEM-2.EXT, ... that does not exist, and returns it.
@@ -118,9 +121,9 @@ void check_distinct(const std::string& a, const std::string& b);
 /// Throws OutputError unless the name ends in .png.
 void check_png(const std::string& file);
 
-/// The frame of a number. Throws std::invalid_argument for one outside of the film.
+/// Converts a number to a frame. Throws std::invalid_argument if the film has no such frame.
 int checked_frame(const Scene& scene, double number);
-/// The frame nearest to a time. Throws std::invalid_argument for one outside of the film.
+/// Returns the frame nearest to a time [s]. Throws std::invalid_argument for a time outside of the film.
 int frame_at(const Scene& scene, double time);
 inline constexpr int kSmallSide_px = 320;  ///< side of the pictures of a sheet
 /// A size such as "320x180" for small pictures of a scene: its aspect ratio, with the given longer side.

@@ -29,9 +29,9 @@ namespace {
 
 struct EncodeOptions {
   std::vector<std::string> frames;  ///< one pattern
-  TalkOptions talk;
+  LogOptions log;
   std::string out;
-  std::optional<std::string> fps;  ///< default: that of the manifest beside the frames, or 30
+  std::optional<std::string> fps;  ///< default: the rate of the manifest beside the frames, or 30
   bool allow_gaps = false, force = false;
 };
 
@@ -67,7 +67,7 @@ bool any_transparent(const FrameSequence& sequence) {
 }
 
 /// Composites a picture with straight alpha over black, in linear light.
-void lay_over_black(render::Image& image) {
+void composite_over_black(render::Image& image) {
   static const std::array<float, 256> linear = [] {
     std::array<float, 256> table{};
     for (std::size_t i = 0; i < table.size(); ++i)
@@ -92,22 +92,23 @@ void check_not_a_frame(const EncodeOptions& options, const FrameSequence& sequen
 }
 
 /// Encodes all frames; returns the number of encoded frames, which is smaller if a signal ended it.
-std::size_t encode(const FrameSequence& sequence, const render::VideoDef& def, const TalkOptions& talk) {
+std::size_t encode(const FrameSequence& sequence, const render::VideoDef& def,
+                   const LogOptions& log_options) {
   const auto sink = render::make_video_sink(def);
-  ProgressPrinter printer(talk.quiet ? ProgressStyle::none : talk.progress);
+  ProgressPrinter printer(log_options.quiet ? ProgressStyle::none : log_options.progress);
   const auto start = std::chrono::steady_clock::now();
   const auto total = static_cast<int>(sequence.frames.size());
-  bool told = false;
+  bool is_noted = false;
   int done = 0;
   for (const SequenceFrame& frame : sequence.frames) {
     if (interrupt_signal()) return static_cast<std::size_t>(done);
     render::Image image = render::read_image(frame.path);
     if (!def.alpha && is_transparent(image)) {
-      if (!std::exchange(told, true) && !talk.quiet)
+      if (!std::exchange(is_noted, true) && !log_options.quiet)
         log("note: {} has no transparency; transparent frames are composited over black. Use .webm, .mov, "
             ".webp or .apng to keep it\n",
             def.path.extension().string());
-      lay_over_black(image);
+      composite_over_black(image);
     }
     const auto encode_start = std::chrono::steady_clock::now();
     sink->write(frame.number, image);
@@ -154,15 +155,15 @@ int encode_command(const EncodeOptions& options) {
   check_file(target.path.string(), options.force);
   const OutputLock lock(OutputLock::beside(target.path), target.path.string());
   def.alpha = render::keeps_alpha(target.path.extension().string()) && any_transparent(sequence);
-  if (sequence.left_out > 0 && !options.talk.quiet)
+  if (sequence.left_out > 0 && !options.log.quiet)
     log("note: {} frames are missing between {} and {}; the video skips them\n", sequence.left_out,
         sequence.frames.front().number, sequence.frames.back().number);
-  const std::size_t done = encode(sequence, def, options.talk);
+  const std::size_t done = encode(sequence, def, options.log);
   if (done < sequence.frames.size()) {
     log("interrupted: {} of {} frames encoded; nothing was written\n", done, sequence.frames.size());
     return 128 + interrupt_signal();
   }
-  if (!options.talk.quiet)
+  if (!options.log.quiet)
     log("{} frames, {} per second, {:.3f} s\n", sequence.frames.size(), def.fps.text(),
         def.fps.seconds(static_cast<int64_t>(sequence.frames.size())));
   print_output_name(target.path.string());
@@ -182,7 +183,7 @@ Command add_encode(CLI::App& app) {
                       "Frames per second: 24, 29.97, 30000/1001 (default: as rendered, or 30)");
   command->add_flag("--allow-gaps", encode.allow_gaps, "Skip missing frame numbers");
   command->add_flag("--force", encode.force, "Replace an existing file");
-  add_talk(*command, encode.talk);
+  add_log_options(*command, encode.log);
   return {command, [options] { return encode_command(*options); }};
 }
 

@@ -23,7 +23,7 @@ namespace {
 
 struct ExportOptions {
   SceneOptions scene;
-  TalkOptions talk;
+  LogOptions log;
   std::string out, frames, cache;
   int threads = 0;
   bool force = false;
@@ -38,15 +38,15 @@ void check_target(const ExportTarget& target, const std::vector<int>& frames, bo
 
 int export_command(const ExportOptions& options) {
   const ExportTarget target = parse_export(options.out);
-  const LoadedScene loaded = load(options.scene, options.talk.quiet);
-  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
+  const LoadedScene loaded = load(options.scene, options.log.quiet);
+  const ModelLibrary models = load_models(loaded, options.scene, options.log);
   const std::vector<int> frames = parse_frames(options.frames, loaded.scene.frame_count());
   check_target(target, frames, options.force);
   const auto threads = simulation_threads(options.threads);
 
   const FilmParts parts(loaded.scene, models);
   const std::unique_ptr<FilmExport> film = make_export(target, parts);
-  RunProgress progress(loaded.scene, models, options.talk);
+  RunProgress progress(loaded.scene, models, options.log);
   SnapshotJob job{.frames = frames, .cache = {}};
   if (!options.cache.empty()) job.cache = options.cache;
   const RunStats stats = visit_frames(
@@ -57,7 +57,7 @@ int export_command(const ExportOptions& options) {
     return 128 + stats.interrupted_by;
   }
   film->close();
-  if (!options.talk.quiet)
+  if (!options.log.quiet)
     for (const std::string& note : film->notes()) log("note: {}\n", note);
   print_output_name(options.out);
   return kOk;
@@ -82,7 +82,7 @@ Command add_export(CLI::App& app) {
                       "Take the snapshots of `simulate --cache` instead of simulating");
   add_threads(*command, given.threads);
   command->add_flag("--force", given.force, "Replace existing output");
-  add_talk(*command, given.talk);
+  add_log_options(*command, given.log);
   return {command, [options] { return export_command(*options); }};
 }
 

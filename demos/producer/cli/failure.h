@@ -9,8 +9,8 @@ namespace offstage::producer {
 
 struct Failure {
   int code = 0;         ///< an ExitCode
-  std::string kind;     ///< "scene invalid", "usage", ...
-  std::string message;  ///< as the program prints it, without a line break at its end
+  std::string kind;     ///< kind of the error: "scene invalid", "usage", ...
+  std::string message;  ///< the message that the program prints, without a line break at its end
 };
 
 /// Describes any exception except those of an interrupt (Interrupted, render::StoppedError), which are

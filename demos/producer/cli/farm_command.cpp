@@ -33,7 +33,7 @@ namespace {
 
 struct FarmOptions {
   SceneOptions scene;
-  TalkOptions talk;
+  LogOptions log;
   std::string out, work, program, status;
   bool slurm = false;
   int local = 0;  ///< number of drawing processes on this machine; 0: none
@@ -55,7 +55,8 @@ fs::path default_work(const OutputTarget& target) {
 
 FarmPlan plan_of(const FarmOptions& options) {
   const OutputTarget target = parse_output(options.out);
-  if (target.kind == OutputKind::pipe) throw OutputError("-: a farm writes files; name a video or frames");
+  if (target.kind == OutputKind::pipe)
+    throw OutputError("-: a farm cannot write to standard output; name a video or frames");
   if (options.scene.from_standard_input())
     throw std::invalid_argument("farm: needs a scene file that all machines can read");
   FarmPlan plan;
@@ -89,8 +90,8 @@ FarmPlan plan_of(const FarmOptions& options) {
 
 /// Checks the scene on this machine before any job is submitted, and sets the key of the plan.
 void check_scene(const FarmOptions& options, FarmPlan& plan) {
-  const LoadedScene loaded = load(options.scene, options.talk.quiet);
-  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
+  const LoadedScene loaded = load(options.scene, options.log.quiet);
+  const ModelLibrary models = load_models(loaded, options.scene, options.log);
   plan.key = settings_key(loaded, models);
   plan.chunks = std::min(plan.chunks, loaded.scene.frame_count());
   if (plan.encodes)
@@ -146,7 +147,7 @@ std::optional<std::string> run_script(const FarmPlan& plan, const std::vector<st
 
 int run_locally(const FarmOptions& options, const FarmPlan& plan) {
   const auto say = [&](const std::string& line) {
-    if (!options.talk.quiet) log("{}\n", line);
+    if (!options.log.quiet) log("{}\n", line);
   };
   say("simulating once");
   if (const auto failed = run_script(plan, {"simulate.sh"}, "simulate.log")) {
@@ -192,7 +193,7 @@ int submit_to_slurm(const FarmOptions& options, const FarmPlan& plan) {
   if (const auto failed = run_script(plan, {script.name}, "submit.log"))
     throw render::UnavailableError("sbatch did not accept the jobs: " + *failed);
   fmt::print("jobs {}", render::read_text_file(plan.work / "jobs", 1 << 16));
-  if (!options.talk.quiet)
+  if (!options.log.quiet)
     log("show their progress: offstage farm --status {}\n", shell_word(plan.work.string()));
   return kOk;
 }
@@ -248,16 +249,19 @@ Command add_farm(CLI::App& app) {
   const auto options = std::make_shared<FarmOptions>();
   FarmOptions& farm = *options;
   CLI::App* command = app.add_subcommand(
-      "farm", "Simulate once and draw on many machines by Slurm, or by several processes of this one");
+      "farm",
+      "Simulate once, then draw in many processes: on the nodes of a Slurm cluster, or on this machine");
   command->add_option("scene", farm.scene.file, "Scene file");
   command->add_option("-o,--output", farm.out, "Video, or frames/####.png");
   command->add_flag("--slurm", farm.slurm,
-                    "Submit the steps to Slurm; the folder must be visible to all nodes");
+                    "Submit the steps to Slurm; all nodes must be able to read and write the folder");
   command
       ->add_option("--local", farm.local,
                    "Run the same steps on this machine, with this number of drawing processes")
       ->check(CLI::Range(1, 256));
-  command->add_option("--chunks", farm.chunks, "Parts of the frames")
+  command
+      ->add_option("--chunks", farm.chunks,
+                   "Number of parts into which the frames are divided, each a job of its own")
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
   command->add_option("--retries", farm.retries, "Number of retries of a failed step")
@@ -265,15 +269,16 @@ Command add_farm(CLI::App& app) {
       ->capture_default_str();
   command->add_option("--work", farm.work,
                       "Folder of scripts, cache, frames and logs (default: OUTPUT.farm)");
-  command->add_option("--partition", farm.partition, "Partition of Slurm");
-  command->add_option("--account", farm.account, "Account of Slurm");
-  command->add_option("--time", farm.time, "Time limit of each job of Slurm, such as 2:00:00");
+  command->add_option("--partition", farm.partition, "Slurm partition");
+  command->add_option("--account", farm.account, "Slurm account");
+  command->add_option("--time", farm.time, "Time limit of each Slurm job, such as 2:00:00");
   command
       ->add_option("--sbatch", farm.sbatch,
                    "A further option of sbatch, such as --sbatch=--mem=8G (repeatable)")
       ->allow_extra_args(false);
   command->add_option("--program", farm.program, "Path of offstage on the nodes (default: this one)");
-  auto* resume = command->add_flag("--resume", farm.resume, "Keep the steps and frames that are done");
+  auto* resume = command->add_flag("--resume", farm.resume,
+                                   "Continue an earlier farm: keep the steps and frames that are done");
   command->add_flag("--force", farm.force, "Start again, and replace existing output")->excludes(resume);
   command->add_flag("--dry-run", farm.dry_run, "Print the scripts and write nothing");
   command->add_option("--status", farm.status, "Report the progress of the farm in this folder");
@@ -282,7 +287,7 @@ Command add_farm(CLI::App& app) {
   add_timing(*command, farm.scene);
   add_threads(*command, farm.threads);
   add_gl(*command, farm.gl);
-  add_talk(*command, farm.talk);
+  add_log_options(*command, farm.log);
   return {command, [options] { return farm_command(*options); }};
 }
 

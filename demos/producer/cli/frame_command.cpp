@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "producer/base/log.h"
 #include "producer/cli/command_line.h"
 #include "producer/cli/commands.h"
 #include "producer/cli/run_progress.h"
@@ -23,7 +24,7 @@ namespace fs = std::filesystem;
 
 struct FrameOptions {
   SceneOptions scene;
-  TalkOptions talk;
+  LogOptions log;
   std::string out;
   std::optional<int> frame;
   std::optional<double> at;
@@ -33,7 +34,7 @@ struct FrameOptions {
 };
 
 int frame_command(const FrameOptions& options) {
-  const LoadedScene loaded = load(options.scene, options.talk.quiet);
+  const LoadedScene loaded = load(options.scene, options.log.quiet);
   const Scene& scene = loaded.scene;
   int frame = 0;
   if (options.at) {
@@ -59,17 +60,17 @@ int frame_command(const FrameOptions& options) {
     fs::path path_;
     std::string settings_;
   };
-  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
+  const ModelLibrary models = load_models(loaded, options.scene, options.log);
   const auto threads = simulation_threads(options.threads);
   render::pin_environment(threads_or_all(options.threads), options.gl);
   PictureSink sink(options.out, frame_settings(loaded, models, options.gl));
-  RunProgress progress(scene, models, options.talk);
+  RunProgress progress(scene, models, options.log);
   const RunStats stats = render_frames(
       loaded, models,
       {.frames = {frame}, .threads = 1, .cache = {}, .channels = channels, .channels_stem = stem}, sink,
       std::ref(progress));
   progress.finish();
-  report_run(stats, options.talk, "");
+  report_run(stats, options.log, "");
   if (stats.interrupted_by) return interrupted(stats, 1, "");
   print_output_name(options.out);
   return kOk;
@@ -94,7 +95,7 @@ Command add_frame(CLI::App& app) {
   add_gl(*command, frame.gl);
   add_channels(*command, frame.scene);
   command->add_flag("--force", frame.force, "Replace an existing file");
-  add_talk(*command, frame.talk);
+  add_log_options(*command, frame.log);
   return {command, [options] { return frame_command(*options); }};
 }
 

@@ -131,7 +131,8 @@ void compare_scene(const CompareOptions& options, const std::string& file, Compa
                     "--reason \"...\"",
                     options.golden, file, file, options.golden));
   if (!place.moved_from.empty())
-    log("note: the golden was recorded for {}, which no longer exists; it is used for {} as its moved file\n",
+    log("note: the golden was recorded for {}, which no longer exists; {} is taken to be the same scene, "
+        "moved\n",
         (fs::path(options.golden) / place.moved_from).lexically_normal().string(), file);
   const bool several = options.inputs.size() > 1;
   const auto states_in = [&](const std::string& folder) {
@@ -276,14 +277,16 @@ Command add_compare(CLI::App& app) {
   const auto options = std::make_shared<CompareOptions>();
   CompareOptions& compare = *options;
   compare.golden = "tests/golden";
-  CLI::App* command = app.add_subcommand(
-      "compare", "Compare scenes with their goldens, or two pictures or folders of frames");
+  CLI::App* command = app.add_subcommand("compare",
+                                         "Compare scenes with their goldens (recorded states and pictures), "
+                                         "or two pictures or folders of frames");
   command->add_option("inputs", compare.inputs, "Scenes, or two pictures, or two folders of frames")
       ->required();
   command->add_option("--golden", compare.golden, "Folder of the goldens")->capture_default_str();
-  command->add_option("--report", compare.report,
-                      "Folder for the expected and actual pictures, their difference and an HTML page; with\n"
-                      "several scenes, a folder for each that differs, and a page about all");
+  command->add_option(
+      "--report", compare.report,
+      "Folder for the expected and actual pictures, their difference and an HTML page; with\n"
+      "several scenes, a subfolder for each scene that differs, and a page that lists them all");
   command->add_option("--junit", compare.junit,
                       "Write the results of the scenes to this JUnit XML file, which CI systems read");
   CLI::Option* keep = command->add_option("--keep-states", compare.states.keep,
@@ -303,7 +306,8 @@ Command add_bless(CLI::App& app) {
   const auto options = std::make_shared<BlessOptions>();
   BlessOptions& bless = *options;
   bless.golden = "tests/golden";
-  CLI::App* command = app.add_subcommand("bless", "Record the goldens of scenes again");
+  CLI::App* command =
+      app.add_subcommand("bless", "Record the goldens of scenes again: their states and pictures");
   command->add_option("scenes", bless.scenes, "Scene files")->required();
   command->add_option("--golden", bless.golden, "Folder of the goldens")->capture_default_str();
   command->add_option("--reason", bless.reason, "Reason for the change, which the golden records")

@@ -6,8 +6,8 @@
 
 namespace offstage::producer {
 
-/// A hidden folder beside an output, so that a file is moved from one to the other by a rename. It is removed
-/// with the object.
+/// A hidden folder in the folder of an output: on the same file system, so that finished files are moved by a
+/// rename. The destructor removes the folder.
 class HiddenFolder {
  public:
   /// Creates the folder ".OUTPUT.PURPOSE-NUMBER". Throws std::filesystem::filesystem_error.

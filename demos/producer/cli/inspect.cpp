@@ -237,9 +237,9 @@ LoadedScene load(const SceneOptions& options, bool quiet, const std::vector<std:
   return loaded;
 }
 
-ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const TalkOptions& talk,
-                         std::vector<Problem>& warnings) {
-  const ProgressStyle style = talk.quiet ? ProgressStyle::none : talk.progress;
+ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
+                         const LogOptions& log_options, std::vector<Problem>& warnings) {
+  const ProgressStyle style = log_options.quiet ? ProgressStyle::none : log_options.progress;
   std::optional<StepNotice> notice;
   ModelLibrary models(loaded.scene, loaded.folder, options.decompositions(), warnings,
                       [&](const std::string& step) {
@@ -249,7 +249,7 @@ ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
                       });
   constexpr double kLong_s = 10;
   for (const ModelLibrary::Decomposed& part : models.decomposed())
-    if (part.seconds > kLong_s && !talk.quiet)
+    if (part.seconds > kLong_s && !log_options.quiet)
       log("note: it took {} to decompose '{}' ({} triangles) into {} convex parts{}; a simpler model, or a "
           "primitive as its shape, makes every run faster\n",
           duration_text(part.seconds), part.file, part.triangles, part.parts->parts.size(),
@@ -257,10 +257,11 @@ ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
   return models;
 }
 
-ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options, const TalkOptions& talk) {
+ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
+                         const LogOptions& log_options) {
   std::vector<Problem> warnings;
-  ModelLibrary models = load_models(loaded, options, talk, warnings);
-  if (!talk.quiet) print_warnings(warnings);
+  ModelLibrary models = load_models(loaded, options, log_options, warnings);
+  if (!log_options.quiet) print_warnings(warnings);
   return models;
 }
 
@@ -275,7 +276,8 @@ std::string write_numbered_file(const std::string& stem, const std::string& endi
     write_text_file(name, text);
     return name;
   }
-  throw render::FileError(stem + ending + ": this name and those with numbers from 2 on are in use");
+  throw render::FileError(stem + ending +
+                          ": this name, and the same name with every number from 2 on, is in use");
 }
 
 void write_text_file(const std::string& path, const std::string& text) {

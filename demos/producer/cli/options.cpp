@@ -63,13 +63,13 @@ void add_small_picture(CLI::App& command, SceneOptions& scene) {
                      "Size of each picture WxH (default: 320 pixels on the longer side)");
 }
 
-void add_talk(CLI::App& command, TalkOptions& talk) {
+void add_log_options(CLI::App& command, LogOptions& log_options) {
   command
-      .add_option("--progress", talk.progress,
+      .add_option("--progress", log_options.progress,
                   "auto: a bar on a terminal, lines in a log file, nothing on a pipe; bar, plain, json, none")
       ->transform(CLI::CheckedTransformer(kProgressStyles).description(""));
-  command.add_flag("-q,--quiet", talk.quiet, "Print errors only");
-  command.add_flag("-v,--verbose", talk.verbose, "Print more: stage times, memory");
+  command.add_flag("-q,--quiet", log_options.quiet, "Print errors only");
+  command.add_flag("-v,--verbose", log_options.verbose, "Print more: stage times, memory");
 }
 
 void add_channels(CLI::App& app, SceneOptions& scene) {

@@ -28,7 +28,7 @@ struct SceneOptions {
   std::optional<std::string> channel_format;
   std::string camera;              ///< name of the camera to draw; empty: the scene's `camera`
   std::vector<std::string> allow;  ///< additional folders for the scene's files
-  bool no_cache = false;           ///< convex parts of models are neither read from the disk nor stored
+  bool no_cache = false;           ///< whether the cache of convex parts is neither read nor written
 
   DecompositionCache decompositions() const {
     return no_cache ? DecompositionCache() : DecompositionCache::of_user();
@@ -38,22 +38,23 @@ struct SceneOptions {
   bool from_standard_input() const { return file == kStandardInput; }
 };
 
-struct TalkOptions {
+struct LogOptions {
   ProgressStyle progress = ProgressStyle::automatic;
   bool quiet = false, verbose = false;
 };
 
 // Each adds options to a command, which are parsed into the last argument.
 void add_allow(CLI::App& command, std::vector<std::string>& allow);
-/// Values, seed and folders; `add_scene` adds the file, too.
+/// Adds the options that override values of the scene, its seed and its folders. add_scene() adds the scene
+/// file, too.
 void add_overrides(CLI::App& command, SceneOptions& scene);
 void add_scene(CLI::App& command, SceneOptions& scene);
 void add_timing(CLI::App& command, SceneOptions& scene);
 void add_quality(CLI::App& command, SceneOptions& scene);
-/// Quality and size of a picture, and of the small pictures of a sheet.
+/// Adds the options for quality and size: of a whole picture, or of each small picture of a contact sheet.
 void add_picture(CLI::App& command, SceneOptions& scene);
 void add_small_picture(CLI::App& command, SceneOptions& scene);
-void add_talk(CLI::App& command, TalkOptions& talk);
+void add_log_options(CLI::App& command, LogOptions& log_options);
 void add_channels(CLI::App& app, SceneOptions& scene);
 void add_gl(CLI::App& command, render::GlPlatform& gl);
 void add_threads(CLI::App& command, int& threads);

@@ -141,7 +141,7 @@ OutputLock lock_film(const Plan& plan) {
 
 RunStats draw(const Plan& plan, const ModelLibrary& models, const RenderOptions& options,
               std::vector<int> frames, render::FrameSink& sink) {
-  RunProgress progress(plan.loaded.scene, models, options.talk);
+  RunProgress progress(plan.loaded.scene, models, options.log);
   RenderJob job{
       .frames = std::move(frames), .threads = plan.jobs, .cache = {}, .report = !options.report.empty()};
   if (!options.cache.empty()) job.cache = options.cache;
@@ -193,7 +193,7 @@ int render_to_frames(const Plan& plan, const ModelLibrary& models, const RenderO
     folder.lock = {};  // its file would prevent the folder from being removed
     remove_frames(plan.frames_pattern.parent_path());
   }
-  report_run(stats, options.talk, options.stats);
+  report_run(stats, options.log, options.stats);
   if (stats.interrupted_by)
     return interrupted(stats, static_cast<int>(plan.frames.size()),
                        options.force ? "; continue with the same command and --resume instead of --force"
@@ -216,7 +216,7 @@ int render_to_video(const Plan& plan, const ModelLibrary& models, const RenderOp
     if (!plan.channels.choice.any())
       remove_channels(channels_folder(plan.target.path));  // those of an earlier film
   }
-  report_run(stats, options.talk, options.stats);
+  report_run(stats, options.log, options.stats);
   if (!stats.interrupted_by) {
     if (options.prints_name) print_output_name(plan.target.path.string());
     return kOk;
@@ -231,7 +231,7 @@ int render_to_pipe(const Plan& plan, const ModelLibrary& models, const RenderOpt
   auto sink = render::make_pipe_sink(options.format == "y4m", scene.render.size.x(), scene.render.size.y(),
                                      scene.output.fps, [] { return interrupt_signal() != 0; });
   const RunStats stats = draw(plan, models, options, plan.frames, *sink);
-  report_run(stats, options.talk, options.stats);
+  report_run(stats, options.log, options.stats);
   return stats.interrupted_by ? interrupted(stats, static_cast<int>(plan.frames.size()), "") : kOk;
 }
 
@@ -338,8 +338,8 @@ int render_command(const RenderOptions& given) {
     return render_cameras(given);
   RenderOptions options = given;
   if (options.cameras.size() == 1) options.scene.camera = options.cameras.front();
-  LoadedScene loaded = load(options.scene, options.talk.quiet);
-  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
+  LoadedScene loaded = load(options.scene, options.log.quiet);
+  const ModelLibrary models = load_models(loaded, options.scene, options.log);
   const Plan plan = make_plan(options, models, std::move(loaded));
   if (plan.target.kind == OutputKind::video) {
     render::check_video(video_def(plan));
@@ -419,7 +419,7 @@ Command add_render(CLI::App& app, const WatchCommand& watch) {
   command->add_option("--stats", render.stats, "Write statistics of the run to this JSON file");
   command->add_option("--report", render.report,
                       "Write pictures, plots, settings and hashes of the run to this HTML file");
-  add_talk(*command, render.talk);
+  add_log_options(*command, render.log);
   return {command, [options, watch] {
             if (options->out.empty()) options->out = default_film(options->scene.file);
             return options->watch ? watch(*options) : render_command(*options);

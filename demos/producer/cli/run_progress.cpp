@@ -12,11 +12,11 @@
 
 namespace offstage::producer {
 
-RunProgress::RunProgress(const Scene& scene, const ModelLibrary& models, const TalkOptions& talk)
+RunProgress::RunProgress(const Scene& scene, const ModelLibrary& models, const LogOptions& log_options)
     : scene_(scene),
       models_(models),
-      quiet_(talk.quiet),
-      printer_(talk.quiet ? ProgressStyle::none : talk.progress) {}
+      quiet_(log_options.quiet),
+      printer_(log_options.quiet ? ProgressStyle::none : log_options.progress) {}
 
 void RunProgress::operator()(const Progress& progress) {
   if (!quiet_ && !told_) warn_of_long_run(progress);
@@ -45,15 +45,15 @@ void RunProgress::warn_of_long_run(const Progress& progress) {
       simulating ? "simulation" : "drawing", advice);
 }
 
-void report_run(const RunStats& stats, const TalkOptions& talk, const std::string& stats_file) {
+void report_run(const RunStats& stats, const LogOptions& log_options, const std::string& stats_file) {
   if (!stats_file.empty()) write_text_file(stats_file, to_json(stats));
-  if (talk.quiet) return;
+  if (log_options.quiet) return;
   if (!stats.blank_frames.empty())
     log("warning: frame {}{} is blank: all pixels are equal. Check the camera, the lights and the exposure\n",
         stats.blank_frames.front(),
         stats.blank_frames.size() > 1 ? fmt::format(" (and {} more)", stats.blank_frames.size() - 1) : "");
   for (const std::string& note : notes_of(stats.totals)) log("{}\n", note);
-  if (!talk.verbose) return;
+  if (!log_options.verbose) return;
   for (const auto& [name, times] : {std::pair("simulate", &stats.sim), std::pair("draw", &stats.render),
                                     std::pair("encode", &stats.encode)}) {
     const StageTimes::Summary s = times->summary();

@@ -1,5 +1,6 @@
 #pragma once
-/// Messages of the command line during a run, its progress and once that it takes long and why, and after it.
+/// Messages of a command about its run: the progress, a note if the run will take long, and warnings and
+/// notes at the end.
 
 #include <chrono>
 #include <string>
@@ -10,10 +11,11 @@
 
 namespace offstage::producer {
 
-/// The function for ProgressCallback. The scene and the models must outlive it.
+/// Prints the progress of a run; it is called as a ProgressCallback. The scene and the models must outlive
+/// this object.
 class RunProgress {
  public:
-  RunProgress(const Scene& scene, const ModelLibrary& models, const TalkOptions& talk);
+  RunProgress(const Scene& scene, const ModelLibrary& models, const LogOptions& log_options);
   void operator()(const Progress& progress);
   /// Ends the terminal's line.
   void finish() { printer_.finish(); }
@@ -30,7 +32,7 @@ class RunProgress {
 };
 
 /// Writes the statistics of a run to `stats_file`, unless that is empty, and prints its warnings and notes.
-void report_run(const RunStats& stats, const TalkOptions& talk, const std::string& stats_file);
+void report_run(const RunStats& stats, const LogOptions& log_options, const std::string& stats_file);
 /// Returns the exit code of an interrupted run; prints how far it came and `advice`, how to continue.
 int interrupted(const RunStats& stats, int total, const std::string& advice);
 

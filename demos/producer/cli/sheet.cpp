@@ -24,7 +24,7 @@ namespace {
 
 struct SheetOptions {
   SceneOptions scene;
-  TalkOptions talk;
+  LogOptions log;
   std::string out;
   int count = 12, columns = 0;  ///< columns 0: chosen by the count
   int threads = 0;
@@ -73,18 +73,18 @@ int sheet_command(const SheetOptions& options) {
   check_file(options.out, options.force);
   SceneOptions scene_options = options.scene;
   if (!scene_options.size) scene_options.size = small_size(load(options.scene, true).scene, kSmallSide_px);
-  const LoadedScene loaded = load(scene_options, options.talk.quiet);
+  const LoadedScene loaded = load(scene_options, options.log.quiet);
   const Scene& scene = loaded.scene;
   const std::vector<int> frames = spread_frames(options.count, scene.frame_count());
   const int columns = options.columns > 0 ? options.columns : columns_for(frames.size());
   check_sheet_size(frames.size(), columns, scene.render.size.x(), scene.render.size.y());
 
-  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
+  const ModelLibrary models = load_models(loaded, options.scene, options.log);
   const auto threads = simulation_threads(options.threads);
   const int jobs = threads_or_all(options.threads);
   render::pin_environment(jobs, options.gl);
   CellSink sink(scene);
-  RunProgress progress(scene, models, options.talk);
+  RunProgress progress(scene, models, options.log);
   const RunStats stats = render_frames(loaded, models, {.frames = frames, .threads = jobs, .cache = {}}, sink,
                                        std::ref(progress));
   progress.finish();
@@ -119,7 +119,7 @@ Command add_sheet(CLI::App& app) {
   add_threads(*command, sheet.threads);
   add_gl(*command, sheet.gl);
   command->add_flag("--force", sheet.force, "Replace an existing file");
-  add_talk(*command, sheet.talk);
+  add_log_options(*command, sheet.log);
   return {command, [options] { return sheet_command(*options); }};
 }
 

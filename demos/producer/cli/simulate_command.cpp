@@ -17,15 +17,15 @@ namespace {
 
 struct SimulateOptions {
   SceneOptions scene;
-  TalkOptions talk;
+  LogOptions log;
   std::string trace, contacts, cloths, cloth_points, joints, particles, trace_every = "frame", cache, stats;
   int threads = 0;
   bool force = false;
 };
 
 int simulate_command(const SimulateOptions& options) {
-  const LoadedScene loaded = load(options.scene, options.talk.quiet);
-  const ModelLibrary models = load_models(loaded, options.scene, options.talk);
+  const LoadedScene loaded = load(options.scene, options.log.quiet);
+  const ModelLibrary models = load_models(loaded, options.scene, options.log);
   const std::array files = {options.stats,        options.trace,  options.contacts, options.cloths,
                             options.cloth_points, options.joints, options.particles};
   for (std::size_t i = 0; i < files.size(); ++i) {
@@ -49,10 +49,10 @@ int simulate_command(const SimulateOptions& options) {
   if (!options.cloth_points.empty()) job.cloth_points = options.cloth_points;
   if (!options.joints.empty()) job.joints = options.joints;
   if (!options.particles.empty()) job.particles = options.particles;
-  RunProgress progress(loaded.scene, models, options.talk);
+  RunProgress progress(loaded.scene, models, options.log);
   const RunStats stats = simulate_frames(loaded, models, job, std::ref(progress));
   progress.finish();
-  report_run(stats, options.talk, options.stats);
+  report_run(stats, options.log, options.stats);
   if (stats.interrupted_by) return interrupted(stats, loaded.scene.frame_count(), "");
   if (options.stats.empty()) fmt::print("{}", to_json(stats));
   return kOk;
@@ -84,7 +84,7 @@ Command add_simulate(CLI::App& app) {
                       "Write the statistics to this JSON file instead of standard output");
   add_threads(*command, simulate.threads);
   command->add_flag("--force", simulate.force, "Replace existing output");
-  add_talk(*command, simulate.talk);
+  add_log_options(*command, simulate.log);
   return {command, [options] { return simulate_command(*options); }};
 }
 

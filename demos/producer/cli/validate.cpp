@@ -158,8 +158,8 @@ int validate_command(const ValidateOptions& options) {
   Json result = {{"file", file}, {"valid", true}, {"errors", Json::array()}, {"warnings", Json::array()}};
   try {
     LoadedScene loaded = load_scene(file, options.scene.overrides(), options.scene.allow);
-    const TalkOptions talk{.progress = ProgressStyle::automatic, .quiet = options.json};
-    const ModelLibrary models = load_models(loaded, options.scene, talk, loaded.warnings);
+    const LogOptions log_options{.progress = ProgressStyle::automatic, .quiet = options.json};
+    const ModelLibrary models = load_models(loaded, options.scene, log_options, loaded.warnings);
     Simulation simulation(loaded.scene, models);  // finds the errors that only building shows
     add_overlaps(loaded.scene, simulation, loaded.warnings);
     std::optional<CostEstimate> cost;

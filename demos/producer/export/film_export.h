@@ -15,9 +15,9 @@ namespace offstage::producer {
 class FilmExport {
  public:
   virtual ~FilmExport() = default;
-  /// Takes the frames in ascending order. Throws render::FileError.
+  /// Writes a frame; frames must come in ascending order. Throws render::FileError.
   virtual void write(const Snapshot& snapshot) = 0;
-  /// Completes the output. A single file gets its name only now.
+  /// Completes the output. A single file has a temporary name until then.
   virtual void close() = 0;
   /// Describes the objects and properties that the format cannot hold, one per line; empty if there are none.
   virtual std::vector<std::string> notes() const { return {}; }
@@ -32,7 +32,8 @@ struct ExportTarget {
 };
 
 /// Parses the output OUT. Throws std::invalid_argument for an ending other than .usda, .glb, .ply, .obj and
-/// .csv, and for a single file where the format needs one per frame (or the other way round).
+/// .csv, and for a single file where the format needs a file per frame, or a pattern where it needs a single
+/// file.
 ExportTarget parse_export(const std::string& out);
 
 /// `parts` must outlive the exporter. Throws render::FileError.

@@ -19,7 +19,7 @@
 namespace offstage::producer {
 
 struct FilmMaterial {
-  std::string name;  ///< unique, not empty
+  std::string name;  ///< name of the material: unique, not empty
   render::Material look;
   std::optional<render::Image> texture;  ///< texture of the base colour
 };
@@ -32,10 +32,10 @@ struct FilmPart {
 
 struct FilmBody {
   std::string name;
-  std::optional<std::size_t> slot;  ///< in Snapshot::bodies; none: it never moves
+  std::optional<std::size_t> slot;  ///< index in Snapshot::bodies; none: the body never moves
   BodySample place;                 ///< pose at time 0
   std::vector<FilmPart> parts;
-  Real appear_at = 0, remove_at = 1e30;  ///< times between which it exists [s]
+  Real appear_at = 0, remove_at = 1e30;  ///< times between which the object exists [s]
 
   bool has_lifetime() const { return appear_at > 0 || remove_at < kForever; }
   bool exists_at(double time) const { return exists(appear_at, remove_at, time); }
@@ -44,27 +44,28 @@ struct FilmBody {
 /// A spring, rod or rope: a cylinder of length 1 along Y, which is placed between two points.
 struct FilmRod {
   std::string name;
-  std::size_t rod = 0;  ///< in Snapshot::rods
+  std::size_t rod = 0;  ///< index in Snapshot::rods
   std::size_t mesh = 0, material = 0;
 };
 
 struct FilmCloth {
   std::string name;
   Real appear_at = 0, remove_at = 1e30;  ///< [s]
-  std::size_t cloth = 0;                 ///< in Snapshot::cloths
+  std::size_t cloth = 0;                 ///< index in Snapshot::cloths
   std::size_t material = 0;
-  std::vector<uint32_t> triangles;   ///< for a cloth without tears
+  std::vector<uint32_t> triangles;   ///< triangles of the cloth before it tears
   std::vector<Eigen::Vector2f> uvs;  ///< texture coordinates of the intact cloth's vertices, over its bounds,
                                      ///< v upwards
 };
 
 struct FilmPoints {
   std::string name;
-  std::size_t set = 0;  ///< in Snapshot::point_sets
-  bool glows = false;   ///< the particles emit light of their colour
+  std::size_t set = 0;  ///< index in Snapshot::point_sets
+  bool glows = false;   ///< whether the particles emit light of their colour
 };
 
-/// Invisible objects are omitted. Names are unique among objects of the same kind.
+/// The meshes, materials and objects of a film. Invisible objects are omitted. Names are unique among objects
+/// of the same kind.
 class FilmParts {
  public:
   FilmParts(const Scene& scene, const ModelLibrary& models);
@@ -76,7 +77,7 @@ class FilmParts {
   std::vector<FilmRod> rods;
   std::vector<FilmCloth> cloths;
   std::vector<FilmPoints> points;
-  std::vector<std::string> lamps;  ///< names, in the order of lamps_at()
+  std::vector<std::string> lamps;  ///< names of the lights, in the order of lamps_at()
   render::Sun sun;
 
   render::Camera camera_at(const Snapshot& snapshot) const;

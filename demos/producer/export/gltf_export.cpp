@@ -209,8 +209,10 @@ class GltfExport : public FilmExport {
       notes.push_back(fmt::format("glTF has no area lights: {} {} exported as spot lights", areas,
                                   areas == 1 ? "is" : "are"));
     if (zooms_)
-      notes.push_back("glTF has no animated field of view: the camera keeps that of its first frame");
-    if (flickers_) notes.push_back("glTF has no animated intensity: lights keep that of the first frame");
+      notes.push_back(
+          "glTF has no animated field of view: the camera keeps the field of view of its first frame");
+    if (flickers_)
+      notes.push_back("glTF has no animated intensity: lights keep the intensity of the first frame");
     return notes;
   }
 

@@ -6,8 +6,8 @@
 
 namespace offstage::producer {
 
-/// Other programs interpolate between two samples. A constant value is therefore sampled once more just
-/// before it changes.
+/// The samples of one value. Other programs interpolate between two samples, so a value that was constant is
+/// sampled once more just before it changes.
 template <class T>
 class SampleTrack {
  public:

@@ -22,20 +22,20 @@ class PrimNames {
   std::set<std::string> taken_;
 };
 
-/// A quoted string.
+/// Text of a quoted string.
 std::string quoted(std::string_view text);
 
 std::string text(float value);
 std::string text(const Eigen::Vector2f& v);
 std::string text(const Eigen::Vector3f& v);
-/// Real part first, as in quatf.
+/// Text of a quatf, with the real part first.
 std::string text(const Eigen::Quaternionf& q);
-/// As matrix4d, which uses row vectors: the transpose of Eigen's matrix.
+/// Text of a matrix4d. It is for row vectors, so it is the transpose of Eigen's matrix.
 std::string text(const Eigen::Matrix4f& transform);
-/// A token.
+/// Text of a token.
 std::string text(const std::string& token);
 
-/// "[a, b, ...]"
+/// Text of a list: "[a, b, ...]".
 template <class T>
 std::string list(std::span<const T> values) {
   std::string out = "[";

@@ -27,8 +27,8 @@ struct GeometryParticles {
 
 struct WorldGeometry {
   std::vector<Eigen::Vector3f> positions, normals;
-  std::vector<Eigen::Vector2f> uvs;  ///< v downwards; zero where a mesh has none
-  std::vector<uint32_t> indices;     ///< three per triangle
+  std::vector<Eigen::Vector2f> uvs;  ///< texture coordinates, v downwards; zero where a mesh has none
+  std::vector<uint32_t> indices;     ///< indices of vertices, three per triangle
   std::vector<GeometryGroup> groups;
   std::vector<GeometryParticles> particles;
 };

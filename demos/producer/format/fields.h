@@ -2,9 +2,8 @@
 /// One description of each key of the scene format, from which reading, writing, the schema and the reference
 /// follow.
 ///
-/// Table<T> lists the keys of a struct T as Fields<T>; Codec<V> defines the JSON form of a value of type V. A
-/// new key is one line in a table_*.h; a new kind of value is one Codec. Those of plain values are in
-/// values.h.
+/// Table<T> lists the keys of a struct T as Fields<T>; Codec<V> defines the JSON form of a value of type V.
+/// scene_table.h says where a new key goes.
 
 #include <cstddef>
 #include <cstdint>
@@ -35,14 +34,14 @@ inline constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 /// number.
 struct Limits {
   Real low = -kInfinity, high = kInfinity;
-  bool open_low = false, open_high = false;  ///< the bound itself is excluded
-  bool nonzero = false;                      ///< for a vector: it needs a direction
+  bool open_low = false, open_high = false;  ///< whether the bound itself is excluded
+  bool nonzero = false;                      ///< whether a vector must not be zero
 
   bool bounded() const { return low > -kInfinity || high < kInfinity; }
   bool allows(Real v) const { return (open_low ? v > low : v >= low) && (open_high ? v < high : v <= high); }
-  std::string range() const;                      ///< for a table: "> 0", "0 .. 1"
-  std::string rule(std::string_view unit) const;  ///< for a sentence: "greater than 0 m"
-  void add_to(Object& schema) const;              ///< as minimum, exclusiveMaximum ...
+  std::string range() const;                      ///< text for a table: "> 0", "0 .. 1"
+  std::string rule(std::string_view unit) const;  ///< text for a sentence: "greater than 0 m"
+  void add_to(Object& schema) const;              ///< adds minimum, exclusiveMaximum ...
 };
 inline constexpr Limits kPositive{.low = 0, .open_low = true};
 inline constexpr Limits kNotNegative{.low = 0};
@@ -70,20 +69,20 @@ Limits within_unit(Limits limits, std::string_view unit);
 struct Required {};
 inline constexpr Required kRequired;
 
-/// Name, help, unit and limits of one key.
+/// Name, help, unit and limits of one key; whether it is required.
 struct Spec {
   std::string key, help, unit;
   Limits limits;
   bool required = false;
 };
 
-/// Continues after every problem and collects them all.
+/// Reads values from a JSON tree. After a problem it continues, so that all problems are collected.
 class Reader {
  public:
-  /// `files` are the names for positions.
+  /// `files`: names of the files to which Position::file refers.
   explicit Reader(std::span<const std::string> files) : files_(files) {}
 
-  /// Runs f with one step appended to the path in messages.
+  /// Runs f while one step is appended to the path in messages.
   template <class F>
   void within(std::string_view step, F&& f) {
     const std::size_t length = path_.size();
@@ -101,7 +100,7 @@ class Reader {
   }
   bool is_full() const { return problems_.size() >= kMostProblems; }
   std::size_t more() const { return more_; }
-  /// "must be a number, got true"
+  /// Reports the problem "must be ALLOWED, got VALUE", such as "must be a number, got true".
   void refuse(const Node& node, std::string_view allowed);
 
   /// Returns the number in `node` if it is one, within the limits.
@@ -113,8 +112,8 @@ class Reader {
                    std::size_t most = SIZE_MAX);
   /// Returns the index in `names` of the string in `node`.
   std::optional<std::size_t> choice(const Node& node, std::span<const std::string> names);
-  /// Returns the index in `names` of the key "type" of an object; without that key the first one, unless it
-  /// is required.
+  /// Returns the index in `names` of the key "type" of an object; without that key 0, unless the key is
+  /// required.
   std::optional<std::size_t> type(const Node& node, std::span<const std::string> names, bool required);
   /// Calls read(i, value) for each key of an object that is specs[i], with that key's path. Reports unknown
   /// keys (except "type" if the object is `tagged`) and missing required keys. `name` is the name of the
@@ -151,7 +150,7 @@ struct ObjectEntry {
 
   Node definition() const;  ///< JSON Schema
 };
-/// Every object of the format, each after the first one that refers to it.
+/// All objects of the format. Each comes after the first object that refers to it.
 class Catalogue {
  public:
   /// Returns a reference to the named object; `describe` fills in its entry the first time.
@@ -183,8 +182,9 @@ concept Tabled = requires {
   Table<T>::kName;
 };
 
-/// The codec of one type, for a value at some address. The code below does not depend on the types of values
-/// and objects; otherwise two hundred keys would be as many classes of functions to compile.
+/// The codec of one type, with the type erased: values are given by their address. The code below does not
+/// depend on the types of values and objects; otherwise two hundred keys would be as many classes of
+/// functions to compile.
 struct ValueKind {
   void (*read)(Reader&, const Node&, const Spec&, void* out);
   std::optional<Node> (*write)(const void* value);
@@ -256,9 +256,9 @@ class Fields {
 
   std::span<const Key> keys() const { return keys_; }
 
-  /// Adds further keys of T.
+  /// Appends further keys of T.
   Fields then(const Fields& more) && { return std::move(*this).add(more, 0); }
-  /// Adds the keys of a member, or of a base, which are directly in T.
+  /// Appends the keys of a member of T (with), or of a base class of T (with_base), as keys of T itself.
   template <class Part>
   Fields with(Part T::*part) && {
     return std::move(*this).add(Table<Part>::fields(), offset_in<T>(initial_object<T>().*part));
@@ -285,7 +285,7 @@ Node write_object(std::span<const Key> keys, const std::string& tag, const void*
 void describe_object(Catalogue& all, std::span<const Key> keys, const std::string& tag, bool tag_required,
                      const void* initial, ObjectEntry& entry);
 
-/// Objects.
+/// The codec of an object that has a Table.
 template <Tabled T>
 struct Codec<T> {
   static void read(Reader& in, const Node& node, const Spec&, T& out, bool tagged = false) {
@@ -326,8 +326,9 @@ struct Codec<E> {
   static Description describe(Catalogue&, const Spec&) { return describe_names(Names<E>::kNames); }
 };
 
-/// Objects distinguished by "type": `kName`, `kHelp`, `kTags` for each alternative; `kRequired`, or else the
-/// first one if absent.
+/// Names of the alternatives of a variant, which the key "type" distinguishes: `kName`, `kHelp`, `kTags` with
+/// one name for each alternative, and `kRequired`; if it is false, an object without "type" is the first
+/// alternative.
 template <class V>
 struct Tags;
 

@@ -240,8 +240,8 @@ std::string preset_description(const std::string& name) {
   return text_of(parse_json(read_text(file), file.string()).find("description"));
 }
 
-std::vector<EffectParts> lay_presets(SceneSource& source, const SceneFolder& folder,
-                                     std::vector<Problem>& problems) {
+std::vector<EffectParts> apply_presets(SceneSource& source, const SceneFolder& folder,
+                                       std::vector<Problem>& problems) {
   if (!source.root.as<Object>()) return {};
   Layer layer(source, folder, problems);
   layer.lay_under_emitters();

@@ -34,8 +34,8 @@ struct EffectParts {
 
 /// Merges presets into the emitters that name one, and adds those of effects to the emitters and forces of
 /// the tree. Values of a wrong type are left unchanged, for the reader to report.
-std::vector<EffectParts> lay_presets(SceneSource& source, const SceneFolder& folder,
-                                     std::vector<Problem>& problems);
+std::vector<EffectParts> apply_presets(SceneSource& source, const SceneFolder& folder,
+                                       std::vector<Problem>& problems);
 
 /// Sets name, place, body and time of the objects that come from effects, and removes the effects from the
 /// scene.

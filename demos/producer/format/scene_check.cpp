@@ -88,7 +88,7 @@ class Checker : SceneChecker {
     for (const Body& body : flat_.bodies) meshes += is_mesh(body);
     if (c.mesh_pairs != usual.mesh_pairs && meshes < 2)
       fail("/world/collision/mesh_pairs",
-           fmt::format("has no effect: two bodies with shapes of meshes are needed, there {} {}",
+           fmt::format("has no effect: it needs two bodies with the shape of a mesh; there {} {}",
                        meshes == 1 ? "is" : "are", meshes));
     if (c.trees != usual.trees && meshes == 0)
       fail("/world/collision/trees", "has no effect: no body has the shape of a mesh or a compound");
@@ -143,7 +143,7 @@ class Checker : SceneChecker {
                       : material.texture_angle_deg != 0 ? "/texture_angle_deg"
                                                         : nullptr;
     if (key && material.texture.empty())
-      warn(material.where.path + key, "has no effect: there is no \"texture\"");
+      warn(material.where.path + key, "has no effect: the material has no \"texture\"");
   }
   void check_materials() {
     for (const Material& material : scene_.materials) check_texture(material);
@@ -197,7 +197,8 @@ class Checker : SceneChecker {
            "has no effect: no body of this material has a friction_axis");
     if (any && material.cross_friction.value_or(0) > 0 && material.friction == 0)
       fail(material.where.path + "/cross_friction",
-           "needs a \"friction\" above 0, which it is relative to, such as 0.001");
+           "needs a \"friction\" above 0, such as 0.001: friction across the axis is a multiple of friction "
+           "along it");
   }
   static bool has_grain(const Body& body) { return !body.friction_axis.isZero(0); }
 

@@ -17,8 +17,8 @@ struct Findings {
   std::vector<Problem> errors, warnings;
 };
 
-/// Checks a scene as described; `flat` is the same with placements expanded. Files are searched in `folder`.
-/// Problems only have a path; the caller adds the lines.
+/// Checks a scene; `flat` is the same scene with placements expanded to copies. Files are searched in
+/// `folder`. Problems have only the path of a value; the caller adds file and line.
 Findings check_scene(const Scene& scene, const Scene& flat, const SceneFolder& folder);
 
 /// Returns the longest step at which the integrator is stable for a damped spring of stiffness k and damping

@@ -8,8 +8,8 @@
 
 namespace offstage::producer {
 
-/// Adds the problems of the cloths of a scene as described; `flat`: with its placements expanded. Checks that
-/// need the triangles of a file are made when the simulation is built.
+/// Adds the problems of the cloths of a scene to `findings`; `flat` is the same scene with placements
+/// expanded to copies. Checks that need the triangles of a file are made when the simulation is built.
 void check_cloths(const Scene& scene, const Scene& flat, const SceneFolder& folder, Findings& findings);
 
 }  // namespace offstage::producer

@@ -181,7 +181,7 @@ class FilmChecker : SceneChecker {
     if (environment.picture) check_file("/environment/picture/file", environment.picture->file);
     if (environment.picture && environment.clouds > 0)
       fail("/environment/clouds",
-           "a sky from a picture has the clouds of the picture; leave out one of both");
+           "a sky from a picture has the clouds of the picture; remove \"clouds\" or \"picture\"");
   }
 
   void check_output() {

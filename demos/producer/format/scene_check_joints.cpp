@@ -81,7 +81,7 @@ class JointChecker : CheckBase {
       for (const auto& [key, strand] : {std::pair("/pulley_a", Vec3(joint.anchor - joint.pulley_a)),
                                         {"/pulley_b", Vec3(joint.anchor_b - joint.pulley_b)}})
         if (!(strand.norm() > 1e-9))
-          fail(path + key, "is at the anchor; both strands of the rope need a length");
+          fail(path + key, "is at the anchor; each strand of the rope must be longer than 0");
     }
     if (!how.length_limits || !has_rope(how.type)) return;
     const Real length = rope_length(joint);
@@ -146,7 +146,7 @@ class JointChecker : CheckBase {
   void check_keys(const std::string& path, const std::vector<MotorKey>& keys) {
     for (std::size_t i = 1; i < keys.size(); ++i)
       if (!(keys[i].time > keys[i - 1].time))
-        fail(path + "/" + std::to_string(i) + "/time", "must be later than that of the previous key");
+        fail(path + "/" + std::to_string(i) + "/time", "must be later than the time of the previous key");
   }
 
   void check(const Chain& chain) {

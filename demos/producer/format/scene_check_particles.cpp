@@ -85,7 +85,7 @@ class ParticleChecker : CheckBase {
     if (look.sheet && (look.texture.empty() || look.style != LookStyle::sprite))
       warn(path + "/sheet", "has no effect: it divides the texture of sprites, and there is none");
     if (look.sheet && look.sheet->columns * look.sheet->rows > render::kMostSheetPictures)
-      fail(path + "/sheet", fmt::format("has {} pictures, of at most {}",
+      fail(path + "/sheet", fmt::format("has {} pictures; a sheet has at most {}",
                                         look.sheet->columns * look.sheet->rows, render::kMostSheetPictures));
     const auto moves = [](const Varying& v) {
       return effects::lower_bound(v) != 0 || effects::upper_bound(v) != 0;
@@ -214,14 +214,15 @@ class ParticleChecker : CheckBase {
       fail(path + "/recoil", "pushes a body back; the emitter needs a \"body\"");
     const auto pushed = std::ranges::find(flat_.bodies, emitter.body, &Body::name);
     if (emitter.recoil && pushed != flat_.bodies.end() && pushed->motion != sim::MotionType::dynamic)
-      fail(path + "/recoil", "pushes dynamic bodies only, and \"" + emitter.body + "\" is not");
+      fail(path + "/recoil", "pushes dynamic bodies only, and \"" + emitter.body + "\" is not dynamic");
     if (emitter.inherit_velocity != 1 && emitter.body.empty())
       fail(path + "/inherit_velocity",
            "is a fraction of the velocity of a body; the emitter needs a \"body\"");
     if (const auto* face = std::get_if<FaceSurface>(&emitter.surface);
         face && !emitter.body.empty() && (!face->position.isZero(0) || face->size != Vec3::Ones()))
-      fail(path + "/surface",
-           "has the faces of its body; \"position\" and \"size\" are for an emitter without one");
+      fail(
+          path + "/surface",
+          "has the faces of the emitter's body; \"position\" and \"size\" are for an emitter without a body");
     check_count(emitter);
   }
 

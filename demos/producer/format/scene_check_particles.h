@@ -9,13 +9,14 @@
 
 namespace offstage::producer {
 
-/// Adds the problems of the particles of a scene as described; `flat`: with its placements expanded.
+/// Adds the problems of the particles of a scene to `findings`; `flat` is the same scene with placements
+/// expanded to copies.
 void check_particles(const Scene& scene, const Scene& flat, Findings& findings);
 
 /// The names of all particle systems: of groups, of emitters, and of their child particles.
 std::vector<std::string> particle_names(const Scene& scene);
 
-/// Greatest number of particles of one name at one time.
+/// Greatest number of particles that the system of this name has at one time.
 struct ParticleBound {
   std::string name;
   uint64_t alive = 0;

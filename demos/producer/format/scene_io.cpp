@@ -102,7 +102,7 @@ LoadedScene parse_scene(std::string_view text, const std::string& name, const Sc
   std::vector<Problem> errors;
   const Node defaults = write_scene({});
   for (const std::string& override : overrides) apply_override(source, override, defaults, errors);
-  const std::vector<EffectParts> from_effects = lay_presets(source, folder, errors);
+  const std::vector<EffectParts> from_effects = apply_presets(source, folder, errors);
 
   const std::vector<Problem> retired = drop_retired_keys(source);
   Scene described;

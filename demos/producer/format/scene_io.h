@@ -17,13 +17,13 @@ struct LoadedScene {
   Scene scene;
   SceneFolder folder;  ///< folder of relative files
   std::vector<Problem> warnings;
-  /// The effective scene with every default, as compact JSON; it determines the result of a run.
+  /// The scene with all overrides and defaults, as compact JSON; it determines the result of a run.
   std::string canonical;
 };
 
 /// Reads a scene file and its includes, applies `overrides` ("path=value", path as a JSON pointer or dotted),
-/// and checks the result. The file "-" is standard input. Files that it names must be in its folder or in the
-/// `allowed` ones. Throws SceneError with the problems.
+/// and checks the result. The file "-" is standard input. Files that the scene names must be in its folder or
+/// in one of the `allowed` folders. Throws SceneError with the problems.
 LoadedScene load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides = {},
                        const std::vector<std::string>& allowed = {});
 
@@ -33,7 +33,7 @@ LoadedScene parse_scene(std::string_view text, const std::string& name, const Sc
 
 /// Names of the cameras of a scene: kMainCamera, then those of `cameras`.
 std::vector<std::string> camera_names(const Scene& scene);
-/// Makes a camera of the scene that which is drawn. Throws std::invalid_argument for an unknown name.
+/// Selects the camera that is drawn. Throws std::invalid_argument for an unknown name.
 void choose_camera(LoadedScene& loaded, const std::string& name);
 
 /// JSON Schema, draft 07.

@@ -14,7 +14,7 @@
 namespace offstage::producer {
 
 struct SceneSource {
-  std::vector<std::string> files;  ///< file names for positions
+  std::vector<std::string> files;  ///< names of the files to which positions refer
   Node root;
 
   /// Position of the value at a JSON pointer; if it was not given, position of the object that would contain

@@ -1,11 +1,20 @@
 #include "producer/format/scene_table.h"
 
+#include "producer/format/table_body.h"
+#include "producer/format/table_camera.h"
 #include "producer/format/table_cloth.h"
-#include "producer/format/table_film.h"
+#include "producer/format/table_effect.h"
+#include "producer/format/table_emitter.h"
+#include "producer/format/table_environment.h"
 #include "producer/format/table_force.h"
 #include "producer/format/table_joint.h"
+#include "producer/format/table_light.h"
+#include "producer/format/table_material.h"
+#include "producer/format/table_output.h"
 #include "producer/format/table_overlay.h"
 #include "producer/format/table_particles.h"
+#include "producer/format/table_render.h"
+#include "producer/format/table_spring.h"
 #include "producer/format/table_world.h"
 
 namespace offstage::producer {
@@ -21,8 +30,9 @@ struct Table<Scene> {
         {"name", &T::name, "name of the scene; empty: the file's name"},
         {"description", &T::description, "short description of the scene"},
         {"world", &T::world, "settings of the whole simulation"},
-        {"materials", &T::materials, "appearances and contact behaviours, used by name"},
-        {"contacts", &T::contacts, "contact behaviours of pairs of materials"},
+        {"materials", &T::materials,
+         "surfaces: how they look, and their friction and restitution; other objects refer to them by name"},
+        {"contacts", &T::contacts, "friction and restitution of pairs of materials"},
         {"bodies", &T::bodies, "rigid bodies"},
         {"particles", &T::particles, "groups of particles placed one by one"},
         {"emitters", &T::emitters, "sources of particles"},
@@ -34,7 +44,8 @@ struct Table<Scene> {
         {"forces", &T::forces, "force fields, moving air, hands, explosions, forces between particles"},
         {"overlays", &T::overlays, "lines and text that show how the simulation sees the scene"},
         {"camera", &T::camera, "the camera"},
-        {"cameras", &T::cameras, "further cameras, which are drawn on request"},
+        {"cameras", &T::cameras,
+         "further cameras; the option `--camera NAME` draws one of them instead of `camera`"},
         {"lights", &T::lights, "the sun and other lights"},
         {"environment", &T::environment, "sky, ambient light, fog"},
         {"render", &T::render, "the picture"},
@@ -42,8 +53,6 @@ struct Table<Scene> {
     };
   }
 };
-
-// --- The whole ---
 
 void read_scene(Reader& in, const Node& node, Scene& out) {
   Codec<Scene>::read(in, node, {}, out);

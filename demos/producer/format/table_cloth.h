@@ -3,7 +3,9 @@
 
 #include <array>
 
-#include "producer/format/table_world.h"
+#include "producer/format/table_placement.h"
+#include "producer/format/table_shape.h"
+#include "producer/format/values.h"
 
 namespace offstage::producer {
 
@@ -27,8 +29,9 @@ struct Table<SphereCloth> {
   static Fields<SphereCloth> fields() {
     return {{"radius", &SphereCloth::radius, "radius", "m", kPositive},
             {"divisions", &SphereCloth::divisions,
-             "how often the 20 triangles of an icosahedron are divided into four: 3 gives 642 vertices", "",
-             between(0, 6)}};
+             "number of subdivisions of an icosahedron, each of which divides every triangle into four: 3 "
+             "gives 642 vertices",
+             "", between(0, 6)}};
   }
 };
 template <>
@@ -63,12 +66,15 @@ struct Table<FabricChanges> {
          "between second neighbours, which resist sharp folds but hardly a slight curvature"},
         {"damping", &T::damping, "fraction of the critical damping of a spring", "", between(0, 10)},
         {"stretch_damping", &T::stretch_damping,
-         "the same for springs along the threads; default of this and the next two keys: `damping`", "",
-         between(0, 10)},
-        {"shear_damping", &T::shear_damping, "the same for springs across the cells", "", between(0, 10)},
+         "fraction of the critical damping of springs along the threads; default of this and the next two "
+         "keys: `damping`",
+         "", between(0, 10)},
+        {"shear_damping", &T::shear_damping,
+         "fraction of the critical damping of springs diagonally across the cells", "", between(0, 10)},
         {"bend_spring_damping", &T::bend_spring_damping,
-         "the same for springs between second neighbours, with the `bend_model` `springs`", "",
-         between(0, 10)},
+         "fraction of the critical damping of springs between second neighbours, with the `bend_model` "
+         "`springs`",
+         "", between(0, 10)},
         {"friction", &T::friction,
          "coefficient of friction against bodies; of cloth and body the geometric mean is used", "",
          kNotNegative},
@@ -104,10 +110,10 @@ struct Names<Corner> {
 template <>
 struct Table<PinScope> {
   static Fields<PinScope> fields() {
-    return {
-        {"body", &PinScope::body,
-         "name of the body that the vertices are attached to, at their places at time 0; empty: the world"},
-        {"until", &PinScope::until, "time at which the pin is released", "s", kNotNegative}};
+    return {{"body", &PinScope::body,
+             "name of the body to which the vertices are attached, at their positions of time 0; empty: the "
+             "vertices stay in the world"},
+            {"until", &PinScope::until, "time at which the pin is released", "s", kNotNegative}};
   }
 };
 template <>
@@ -195,17 +201,18 @@ struct Table<ClothCord> {
   static Fields<ClothCord> fields() {
     using T = ClothCord;
     return {
-        {"from", &T::from, "it begins at the vertex nearest to this point, in the cloth's frame", "m"},
-        {"to", &T::to, "position of its other end at time 0, in the cloth's frame", "m"},
-        {"held", &T::held, "the other end is held at its place in the world or on `body`; false: it is free"},
+        {"from", &T::from, "start of the cord: the vertex nearest to this point, in the cloth's frame", "m"},
+        {"to", &T::to, "other end of the cord: its position at time 0, in the cloth's frame", "m"},
+        {"held", &T::held,
+         "whether the other end is held, at its place in the world or on `body`; false: it hangs free"},
         {"body", &T::body, "name of the body that holds the other end; empty: the world"},
         {"until", &T::until, "time at which the other end is released", "s", kNotNegative},
         {"length", &T::length,
-         "length at rest; 0: the distance of its ends at time 0. A cord that is longer hangs down between "
-         "its ends",
+         "length of the cord at rest; 0: the distance of its ends at time 0. A longer cord hangs down "
+         "between its ends",
          "m", kNotNegative},
-        {"segments", &T::segments, "number of its segments", "", between(1, 1000)},
-        {"stiffness", &T::stiffness, "force at a strain of 1", "N", kPositive},
+        {"segments", &T::segments, "number of segments of the cord", "", between(1, 1000)},
+        {"stiffness", &T::stiffness, "tensile force of the cord at a strain of 1", "N", kPositive},
         {"mass_per_length", &T::mass_per_length, "mass per length", "kg/m", kPositive},
         {"damping", &T::damping, "fraction of the critical damping of a segment", "", between(0, 10)},
         {"visible", &T::visible, "is drawn"},
@@ -240,14 +247,16 @@ struct Table<Cloth> {
             {"pins", &T::pins, "vertices that are held"},
             {"seams", &T::seams, "vertices that are sewn together"},
             {"cords", &T::cords, "strings and springs that hang on vertices"},
-            {"seam_time", &T::seam_time, "time in which seams close", "s", kPositive},
-            {"collides", &T::collides, "takes part in collisions with bodies and particles"},
+            {"seam_time", &T::seam_time, "time in which seams are pulled together", "s", kPositive},
+            {"collides", &T::collides, "whether the cloth collides with bodies and particles"},
             {"self_collision", &T::self_collision,
              "collides with itself, and with other cloths that have `self_collision`"},
             {"tear", &T::tear, "length relative to the rest length at which threads tear, above 1; 0: never",
              "", kNotNegative},
             {"pressure", &T::pressure,
-             "pressure inside a closed cloth above that of the air, at the initial volume", "Pa"},
+             "excess of the pressure inside a closed cloth over the pressure of the air, at the initial "
+             "volume",
+             "Pa"},
             {"inflate_time", &T::inflate_time,
              "time in which the gas of `pressure` is let in, at a constant rate; 0: it is present from "
              "the start",
@@ -263,16 +272,16 @@ struct Table<Cloth> {
             {"air_density", &T::air_density, "density of the surrounding air; 0: no air", "kg/m^3",
              kNotNegative},
             {"integrator", &T::integrator,
-             "integration method of the springs; `symplectic` and `rk4` are explicit, for soft cloth and "
-             "short sub-steps"},
+             "integration method of the springs; `symplectic` and `rk4` are explicit: stable only for soft "
+             "cloth and short sub-steps"},
             {"substep", &T::substep,
-             "longest step of the cloth, at most one sub-step of the world. With the integrator `relaxed` "
-             "the "
-             "springs take as many shorter steps in it as their stiffness needs",
+             "longest step of the cloth, at most one sub-step of the world. With the integrator `relaxed`, "
+             "springs divide it into as many shorter steps as their stiffness needs",
              "s", over(0, 1)},
             {"soften", &T::soften,
-             "with the integrator `relaxed`: one step of the springs in each `substep`, which is faster. The "
-             "stiffness of springs that are too stiff for it is reduced, and a warning gives the factor"},
+             "with the integrator `relaxed`: springs take a single step in each `substep`, which is faster. "
+             "The stiffness of springs that are too stiff for this step is reduced, and a warning gives the "
+             "factor"},
             {"appear_at", &T::appear_at, "time at which the cloth appears, with its shape of time 0", "s",
              kNotNegative},
             {"remove_at", &T::remove_at, "time at which the cloth is removed; must be later than `appear_at`",

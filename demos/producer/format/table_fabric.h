@@ -24,7 +24,7 @@ struct Table<FabricLook> {
         {"sheen", &T::sheen, "light scattered by fibres, visible at grazing angles", "", kFraction},
         {"sheen_color", &T::sheen_color, "colour of the sheen"},
         {"translucency", &T::translucency, "fraction of the light that shines through", "", kFraction},
-        {"back_color", &T::back_color, "colour of the back; default: that of the front"},
+        {"back_color", &T::back_color, "colour of the back; default: the colour of the front"},
     };
   }
 };

@@ -54,13 +54,12 @@ inline constexpr const char* kClothsHelp =
     "the whole "
     "cloth, distributed by mass";
 inline constexpr const char* kBodiesHelp =
-    "names of the bodies that it acts on: of one copy, or of all copies; if this and the next two keys are "
-    "empty, it "
-    "acts on all dynamic bodies and all cloths";
+    "names of the bodies on which the force acts: of one copy, or of all copies; if this and the next two "
+    "keys are empty, the force acts on all dynamic bodies and all cloths";
 inline constexpr const char* kForceNameHelp =
     "unique name; default: force_N, where N is the index in the list";
 inline constexpr const char* kAirDragHelp =
-    "drag force per speed relative to this air; 0: it acts only through the drag that each object has";
+    "drag force per speed relative to this air; 0: the air acts only through the drag of each object";
 
 template <>
 struct Table<ForceScope> {
@@ -73,7 +72,7 @@ struct Table<ForceScope> {
             {"end", &T::end, "time at which the force ends", "s", kNotNegative}};
   }
 };
-/// Adds the keys that fields have besides their own.
+/// Appends the keys that all fields have.
 template <class T>
 Fields<T> field_keys(Fields<T> own) {
   return std::move(own)
@@ -81,14 +80,14 @@ Fields<T> field_keys(Fields<T> own) {
              {"drop_rate", &T::drop_rate, kDropRateHelp, "", kDropRate}})
       .template with_base<ForceScope>();
 }
-/// Adds the keys that forces between particles have besides their own.
+/// Appends the keys that all forces between particles have.
 template <class T>
 Fields<T> pair_keys(Fields<T> own) {
   return std::move(own).then(
       {{"particles", &T::particles, "names of groups and emitters whose particles act on each other",
         kRequired},
        {"cut_off", &T::cut_off,
-        "particles farther apart than this do not act on each other, which saves much time; 0: no limit", "m",
+        "distance from which on particles do not act on each other, which saves much time; 0: no limit", "m",
         kNotNegative},
        {"region", &T::region, "region in which the force acts"},
        {"drop_rate", &T::drop_rate, kDropRateHelp, "", kDropRate},
@@ -138,7 +137,7 @@ struct Table<HandKey> {
     return {{"time", &HandKey::time, "time of the key; times must increase", "s"},
             {"position", &HandKey::position, "position of the hand", "m"},
             {"interpolation", &HandKey::interpolation,
-             "interpolation from this key to the next; default: that of the grab"}};
+             "interpolation from this key to the next; default: the interpolation of the grab"}};
   }
 };
 template <>
@@ -178,7 +177,7 @@ struct Table<AppliedKey> {
             {"force", &T::force, "force at this time", "N"},
             {"torque", &T::torque, "torque at this time", "N m"},
             {"interpolation", &T::interpolation,
-             "interpolation from this key to the next; default: that of the force"}};
+             "interpolation from this key to the next; default: the interpolation of the force"}};
   }
 };
 template <>
@@ -191,19 +190,19 @@ struct Table<AppliedForce> {
     using T = AppliedForce;
     return {
         {"name", &T::name, kForceNameHelp},
-        {"bodies", &T::bodies, "names of the dynamic bodies that it acts on: of one copy, or of all copies",
-         kRequired},
+        {"bodies", &T::bodies,
+         "names of the dynamic bodies on which the force acts: of one copy, or of all copies", kRequired},
         {"point", &T::point, "point of application in the body's frame; default: the centre of mass", "m"},
         {"axes", &T::axes,
          "axes of `force` and `torque`: those of the `world`, or those that turn with the `body`"},
         {"force", &T::force, "force, without keyframes", "N"},
-        {"torque", &T::torque, "torque in addition to that of the force, without keyframes", "N m"},
+        {"torque", &T::torque, "torque in addition to the torque of `force`, without keyframes", "N m"},
         {"keyframes", &T::keyframes,
          "force and torque over time, instead of `force` and `torque`; constant before the first and after "
          "the last"},
         {"interpolation", &T::interpolation, kInterpolationHelp},
-        {"start", &T::start, "time at which it starts to act", "s", kNotNegative},
-        {"end", &T::end, "time at which it stops acting", "s", kNotNegative}};
+        {"start", &T::start, "time at which the force starts", "s", kNotNegative},
+        {"end", &T::end, "time at which the force ends", "s", kNotNegative}};
   }
 };
 template <>
@@ -258,7 +257,7 @@ struct Table<TurbulenceField> {
          "s", kNotNegative},
         {"drift", &T::drift, "velocity at which the eddies move; the mean wind is not part of this force",
          "m/s"},
-        {"seed", &T::seed, "another seed gives other eddies", "", between(0, 1e9)},
+        {"seed", &T::seed, "seed of the random numbers that place the eddies", "", between(0, 1e9)},
         {"drag", &T::drag, kAirDragHelp, "kg/s", kNotNegative}});
   }
 };

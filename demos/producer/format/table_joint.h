@@ -3,7 +3,9 @@
 
 #include <array>
 
-#include "producer/format/table_world.h"
+#include "producer/format/table_placement.h"
+#include "producer/format/table_shape.h"
+#include "producer/format/values.h"
 
 namespace offstage::producer {
 
@@ -25,7 +27,7 @@ struct Table<MotorKey> {
     return {{"time", &MotorKey::time, "time of the key; times must increase", "s"},
             {"target", &MotorKey::target, "target, in the unit of the motor's `target`"},
             {"interpolation", &MotorKey::interpolation,
-             "interpolation from this key to the next; default: that of the motor"}};
+             "interpolation from this key to the next; default: the interpolation of the motor"}};
   }
 };
 template <>
@@ -265,7 +267,7 @@ struct Table<Crane> {
   static constexpr const char* kName = "crane";
   static constexpr const char* kHelp =
       "A tower crane whose jib points along +X, with a load on its rope: bodies NAME/mast, jib, "
-      "counterweight, trolley, load, joints NAME/slew, way, rope.";
+      "counterweight, trolley, load, joints NAME/slew, travel, rope.";
   static Fields<Crane> fields() {
     using T = Crane;
     return Fields<T>{

@@ -73,8 +73,8 @@ struct Table<ContactsOverlay> {
   static constexpr const char* kName = "contacts_overlay";
   static constexpr const char* kHelp =
       "Contact points of bodies as rings, with arrows in the direction of the force on the first body (for a "
-      "plane: on the other body). They are those of the simulation, or computed from the geometry if neither "
-      "body is dynamic.";
+      "plane: on the other body). The points come from the simulation, or from the geometry if neither body "
+      "is dynamic.";
   static Fields<ContactsOverlay> fields() {
     using T = ContactsOverlay;
     return Fields<T>{

@@ -42,9 +42,9 @@ struct Table<Scatter> {
             {"size", &Scatter::size, "size of the rectangle along x and z", "m", kNotNegative},
             {"min_distance", &Scatter::min_distance,
              "least distance between copies; a copy that finds no place is omitted", "m", kNotNegative},
-            {"turn", &Scatter::turn, "each copy is turned about its vertical axis by a random angle"},
+            {"turn", &Scatter::turn, "whether each copy is turned about its vertical axis by a random angle"},
             {"scale", &Scatter::scale, "scale factor of a body's shape and model", "", kScale},
-            {"seed", &Scatter::seed, "another seed gives another arrangement", "", kNotNegative}};
+            {"seed", &Scatter::seed, "seed of the random numbers that place the copies", "", kNotNegative}};
   }
 };
 template <>
@@ -113,7 +113,7 @@ struct Table<Fill> {
          "arrangement of the centres: `hexagonal` is the closest (balls that touch fill 74 %), `cubic` is a "
          "grid "
          "(52 %), `random` places them one after the other at random (about 28 %)"},
-        {"seed", &Fill::seed, "another seed gives another random arrangement", "", kNotNegative}};
+        {"seed", &Fill::seed, "seed of the random numbers of the `random` arrangement", "", kNotNegative}};
   }
 };
 template <>

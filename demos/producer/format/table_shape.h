@@ -7,7 +7,7 @@
 
 namespace offstage::producer {
 
-/// Help of the keys that bring a model file to its size, wherever a file is named.
+/// Help of the keys `scale` and `fit`, which every object with a model file has.
 inline constexpr const char* kModelScaleHelp =
     "scale factor of the model; `auto`: from the file's likely unit to metres (docs/models.md; `offstage "
     "info "
@@ -83,20 +83,20 @@ struct Table<MeshDecomposition> {
          "that is "
          "not dynamic"},
         {"max_error", &MeshDecomposition::max_error,
-         "approximate: accepted volume in which the parts and the model differ, as a fraction of the model's "
-         "volume; a larger one takes fewer parts",
+         "for `approximate`: accepted volume in which the parts and the model differ, as a fraction of the "
+         "model's volume; a larger fraction takes fewer parts",
          "", between(0.001, 1)},
         {"max_parts", &MeshDecomposition::max_parts,
          "greatest number of parts; has priority over `max_error`. Default: 64, and up to 1024 if the error "
          "needs them, as for thin bent shells",
          "", between(1, 1024)},
         {"min_angle_deg", &MeshDecomposition::min_angle_deg,
-         "exact: smallest angle between a cut and the faces that it meets; relaxed if no cut satisfies it",
+         "for `exact`: smallest angle between a cut and the faces that it meets; the limit is relaxed if no "
+         "cut satisfies it",
          "degrees", between(0, 90)},
         {"min_distance", &MeshDecomposition::min_distance,
-         "exact: smallest distance of a cut from vertices off it, as a fraction of the mean edge; relaxed if "
-         "no "
-         "cut satisfies it",
+         "for `exact`: smallest distance between a cut and the vertices that are not on it, as a fraction of "
+         "the mean edge length; the limit is relaxed if no cut satisfies it",
          "", between(0, 1)}};
   }
 };

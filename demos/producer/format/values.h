@@ -32,6 +32,17 @@ struct Codec<Real> {
   static Node write(const Real& value);
   static Description describe(Catalogue& all, const Spec& spec);
 };
+/// A number of single precision, as in structs of the renderer. It is read and written as any other number.
+template <>
+struct Codec<float> {
+  static void read(Reader& in, const Node& node, const Spec& spec, float& out) {
+    Real value = static_cast<Real>(out);
+    Codec<Real>::read(in, node, spec, value);
+    out = static_cast<float>(value);
+  }
+  static Node write(const float& value) { return Codec<Real>::write(static_cast<Real>(value)); }
+  static Description describe(Catalogue& all, const Spec& spec) { return Codec<Real>::describe(all, spec); }
+};
 template <>
 struct Codec<int> {
   static void read(Reader& in, const Node& node, const Spec& spec, int& out);
@@ -70,7 +81,7 @@ struct Codec<Color> {
   static Node write(const Color& value);
   static Description describe(Catalogue& all, const Spec& spec);
 };
-/// A cube around the origin: half of its edge.
+/// A cube around the origin, written as half the length of its edge.
 template <>
 struct Codec<sim::Aabb> {
   static void read(Reader& in, const Node& node, const Spec& spec, sim::Aabb& out);

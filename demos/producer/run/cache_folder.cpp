@@ -62,7 +62,7 @@ CacheInfo read_cache_info(const fs::path& folder) {
       info.generation.find('/') != std::string::npos)
     published->refuse("generation", "the name of a generation's folder");
   std::error_code error;
-  if (!fs::is_directory(folder / info.generation, error)) info.problem = "its snapshots are gone";
+  if (!fs::is_directory(folder / info.generation, error)) info.problem = "its snapshots were deleted";
   return info;
 }
 

@@ -154,9 +154,10 @@ void check_sheet_size(std::size_t cells, int columns, int width_px, int height_p
   if (side(static_cast<std::size_t>(columns), width_px) <= kMostSide_px &&
       side(rows, height_px) <= kMostSide_px)
     return;
-  throw std::invalid_argument(fmt::format(
-      "a sheet of {} x {} pictures of {} x {} pixels is too large (at most {} a side); use a smaller --size",
-      columns, rows, width_px, height_px, kMostSide_px));
+  throw std::invalid_argument(
+      fmt::format("a sheet of {} x {} pictures of {} x {} pixels is too large (at most {} pixels per side); "
+                  "use a smaller --size",
+                  columns, rows, width_px, height_px, kMostSide_px));
 }
 
 int columns_for(std::size_t cells) {

@@ -9,7 +9,7 @@
 namespace offstage::producer {
 
 struct SheetCell {
-  std::vector<std::string> label;  ///< lines
+  std::vector<std::string> label;  ///< lines of text below the picture
   render::Image picture;           ///< empty: `fault` is shown instead
   std::string fault = {};
 };

@@ -19,7 +19,7 @@ struct ObjectCost {
   std::string kind, name;   ///< "cloth", "sheet"
   std::size_t count = 1;    ///< number of copies
   std::string size;         ///< "1681 vertices"
-  std::string advice;       ///< how to make it cheaper
+  std::string advice;       ///< advice how to make the object cheaper
   double simulation_s = 0;  ///< time per second of film
   double drawing_s = 0;     ///< time per frame
   uint64_t particles = 0;   ///< for an emitter: greatest number of particles alive at once
@@ -30,12 +30,13 @@ struct ObjectCost {
 std::vector<ObjectCost> object_costs(const Scene& scene, const ModelLibrary& models);
 
 struct CostEstimate {
-  double trial_film_s = 0;          ///< film time that the trial simulated [s]
-  double simulation_s_per_s = 0;    ///< measured, per second of film
-  std::optional<double> frame_s;    ///< time of drawing, measured and scaled to the film's size and quality
-  std::string not_drawn;            ///< reason if there is no frame_s
-  double film_s = 0;                ///< time of the whole film with the trial's number of particles [s]
-  double most_film_s = 0;           ///< the same with the greatest possible number of particles [s]
+  double trial_film_s = 0;        ///< film time that the trial simulated [s]
+  double simulation_s_per_s = 0;  ///< measured time of simulation per second of film [s]
+  std::optional<double> frame_s;  ///< time of drawing, measured and scaled to the film's size and quality
+  std::string not_drawn;          ///< reason if there is no frame_s
+  double film_s = 0;              ///< time of the whole film with the trial's number of particles [s]
+  /// Time of the whole film with the greatest possible number of particles [s].
+  double most_film_s = 0;
   std::vector<ObjectCost> objects;  ///< the most expensive first
 };
 

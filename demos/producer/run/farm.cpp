@@ -63,7 +63,7 @@ std::vector<FarmScript> step_scripts(const FarmPlan& plan) {
     render.push_back(word);
 
   std::vector<FarmScript> scripts;
-  scripts.push_back({"simulate.sh", head(plan, "simulates once, for all chunks") +
+  scripts.push_back({"simulate.sh", head(plan, "simulates the film once, for all chunks") +
                                         "[ ! -e done/simulate ] || exit 0\ntry " +
                                         command_text(plan, simulate) + "\ntouch done/simulate\n"});
   // With --resume a finished chunk keeps its frames; partial files of a crashed machine are drawn again.

@@ -11,8 +11,7 @@ namespace offstage::producer {
 struct FarmPlan {
   std::filesystem::path program, scene, out, work;  ///< absolute
   std::vector<std::string> simulate_options;        ///< options of `simulate`, which affect the motion
-  std::vector<std::string> render_options;   ///< options of `render`: those, and the ones that affect the
-                                             ///< picture
+  std::vector<std::string> render_options;   ///< of `render`: simulate_options, and options of the picture
   std::string key;                           ///< hash of the settings of the simulation and of the pictures
   int chunks = 8, retries = 2, threads = 0;  ///< threads 0: all available
   bool encodes = true;                       ///< false: the frames are the output

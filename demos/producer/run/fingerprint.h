@@ -1,7 +1,7 @@
 #pragma once
 /// Properties that determine the bits of a picture besides the scene: GL, C library, processor class,
-/// compiler. Golden images are compared exactly under the same fingerprint, and within a tolerance under
-/// another one.
+/// compiler. Golden images are compared exactly if the fingerprints are equal, and within a tolerance
+/// otherwise.
 
 #include <string>
 

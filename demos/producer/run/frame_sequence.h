@@ -13,8 +13,9 @@ struct SequenceFrame {
 };
 
 struct FrameSequence {
-  std::filesystem::path pattern;      ///< with #, as in render::frame_path
-  std::vector<SequenceFrame> frames;  ///< by number; at least one
+  /// Pattern of the file names, in which # stands for the number; see render::frame_path.
+  std::filesystem::path pattern;
+  std::vector<SequenceFrame> frames;  ///< frames in the order of their numbers; at least one
   int width_px = 0, height_px = 0;    ///< size of every frame
   bool may_be_transparent = false;    ///< whether a frame has an alpha channel
   int left_out = 0;                   ///< number of missing frames between the first and the last

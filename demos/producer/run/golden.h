@@ -24,16 +24,17 @@ struct GoldenFrame {
 };
 
 struct Golden {
-  std::string scene;   ///< name, with which its files begin
+  std::string scene;   ///< name of the golden, with which the names of its files begin
   std::string source;  ///< the scene's file, relative to the folder of goldens; empty: not recorded
   std::string reason, fingerprint;
   std::vector<GoldenFrame> frames;
 };
 
-/// Folders of the states of a simulation between two drawings of a golden; empty: none.
+/// Folders with the simulated states of a golden's frames, so that they can be drawn again without
+/// simulation; empty: none.
 struct GoldenStates {
   std::string keep;  ///< folder to which the states of the golden frames are written
-  std::string from;  ///< folder from which they are read, instead of simulating
+  std::string from;  ///< folder from which the states are read, instead of simulating
 };
 
 /// The golden of a scene file in a folder. A golden records its scene file, so two scenes of the same name in
@@ -41,7 +42,7 @@ struct GoldenStates {
 struct GoldenPlace {
   std::string name;     ///< name of the golden's files
   std::string source;   ///< path of the scene, relative to the folder, with links resolved
-  bool exists = false;  ///< it exists and belongs to this scene
+  bool exists = false;  ///< whether the golden exists and belongs to this scene
   /// Source of the golden, if that file does not exist any more: the scene is assumed to have been moved.
   std::string moved_from;
 };

@@ -33,15 +33,15 @@ struct MethodResult {
   std::string fault;
 
   double steps_per_second() const;
-  /// Iterations of the exact and the fast solver and of that of impacts: Newton steps, sweeps and pivots.
+  /// Iterations of the contact solvers and of the impact solver: Newton steps, sweeps and pivots.
   uint64_t iterations() const;
-  /// Pivots of contact forces by linear complementarity.
+  /// Pivots of the solver `lcp`, which computes contact forces as a linear complementarity problem.
   uint64_t pivots() const;
   /// Cases that the intended algorithm did not solve: those of the contact solvers, exceeded budgets and
   /// limits of impacts, suppressed restitution, and failed projections of joints.
   uint64_t fallbacks() const;
-  /// Greatest distance between a body's positions at the end of this run and of another one [m]; nothing if
-  /// either run ended early.
+  /// Greatest distance between the positions of a body at the end of this run and at the end of `other` [m];
+  /// nothing if either run ended early.
   std::optional<double> deviation(const MethodResult& other) const;
 };
 
@@ -53,10 +53,10 @@ using MethodProgress = std::function<void(double fraction)>;
 MethodResult run_method(const std::string& name, const LoadedScene& loaded, const ModelLibrary& models,
                         double limit_s, const MethodProgress& progress = {});
 
-/// Keeps the shorter time of two runs of the same method; one that ended early does not count.
+/// Merges two runs of the same method: keeps the shorter time, unless it belongs to a run that ended early.
 void merge(MethodResult& result, const MethodResult& again);
 
-/// A table in aligned columns, or as CSV. The deviation is that from the first result.
+/// A table in aligned columns, or as CSV. The deviation is the deviation from the first result.
 std::string to_text(const std::vector<MethodResult>& results);
 std::string to_csv(const std::vector<MethodResult>& results);
 

@@ -43,7 +43,8 @@ std::string hash_pattern(const std::string& pattern);
 
 /// Identifies the frames in a folder.
 struct Manifest {
-  std::string scene, settings;  ///< name; settings_key()
+  std::string scene;     ///< name of the scene
+  std::string settings;  ///< its settings_key()
   int width_px = 0, height_px = 0, frames = 0;
   render::FrameRate fps;
 };

@@ -25,7 +25,7 @@ class ParticleTable {
   ParticleTable(const ParticleTable&) = delete;
   ParticleTable& operator=(const ParticleTable&) = delete;
 
-  /// One row per particle.
+  /// Appends one row for each particle.
   void record(int frame, double time);
   /// Completes the file; one that is not completed keeps the ending .partial.
   void close();

@@ -94,7 +94,7 @@ class Pipeline {
     const std::lock_guard lock(mutex_);
     return failure_ != nullptr;
   }
-  /// Must be called after the threads have ended.
+  /// Throws the first exception that ended a stage, if any. Must be called after the threads have ended.
   void rethrow_failure() const {
     if (failure_) std::rethrow_exception(failure_);
   }
@@ -110,7 +110,7 @@ class Pipeline {
   std::exception_ptr failure_;
 };
 
-/// Runs `work`; an exception in it becomes that of the pipeline.
+/// Runs `work`, and passes an exception of it to the pipeline, which ends the run.
 template <class F>
 void guarded(Pipeline& pipeline, F&& work) {
   try {

@@ -41,7 +41,7 @@ struct FrameFigures {
   double sim_ms = 0, render_ms = 0, encode_ms = 0;
   uint64_t particles = 0;
   std::size_t contacts = 0;           ///< contacts of bodies; 0 with a cache
-  std::optional<sim::Energy> energy;  ///< empty with a cache
+  std::optional<sim::Energy> energy;  ///< energy of the state; empty with a cache
   std::string state_hash, pixel_hash;
 };
 
@@ -50,17 +50,19 @@ struct RunStats {
   int frames = 0;       ///< written by this run
   int frames_kept = 0;  ///< existing frames that were kept (resume)
   double wall_s = 0;
-  double startup_s = 0;  ///< from the start of the process to the first written frame
+  double startup_s = 0;  ///< time from the start of the process to the first written frame
   StageTimes sim, render, encode;
   std::size_t bodies = 0;
   uint64_t particles = 0;  ///< number at the end
   uint64_t most_particles = 0;
   SimulationTotals totals;
   render::LightSums light;
-  std::optional<sim::Energy> energy_start, energy_end;  ///< empty with a cache
-  std::string state_hash;                               ///< after the last frame
-  std::map<int, std::string> frame_states;              ///< state hash of every drawn frame
-  std::vector<FrameFigures> figures;                    ///< only if the job requests them
+  /// Energy at the start and at the end; empty with a cache.
+  std::optional<sim::Energy> energy_start, energy_end;
+  std::string state_hash;                   ///< hash of the state after the last frame
+  std::map<int, std::string> frame_states;  ///< state hash of every drawn frame
+  /// Figures of each frame, only if the job requests them.
+  std::vector<FrameFigures> figures;
   std::vector<std::pair<int, render::Image>> pictures;  ///< thumbnails of about a dozen frames
   std::vector<int> blank_frames;                        ///< all pixels equal: something is probably wrong
   int interrupted_by = 0;                               ///< number of the signal, or 0
@@ -71,11 +73,12 @@ std::string to_json(const RunStats& stats);
 
 /// Progress of a run. Reported after every simulated and every finished frame, by one thread at a time.
 struct Progress {
-  int done = 0, total = 0;                          ///< finished frames
-  double sim_ms = 0, render_ms = 0, encode_ms = 0;  ///< for the latest finished frame
-  uint64_t particles = 0;                           ///< in that frame
-  double eta_s = 0;                                 ///< remaining time [s]; 0: not known yet
-  double fraction = 0;  ///< fraction of the work of simulation and drawing, 0 .. 1
+  int done = 0, total = 0;  ///< finished frames
+  /// Times of simulating, drawing and encoding the latest finished frame.
+  double sim_ms = 0, render_ms = 0, encode_ms = 0;
+  uint64_t particles = 0;  ///< number of particles in that frame
+  double eta_s = 0;        ///< remaining time [s]; 0: not known yet
+  double fraction = 0;     ///< fraction of the work of simulation and drawing, 0 .. 1
   /// Frames of the simulation, including those that the film skips; both 0 without a simulation.
   int frames_simulated = 0, frames_to_simulate = 0;
   bool frame_finished = true;  ///< false: reported for a simulated frame
@@ -118,7 +121,7 @@ struct SimulateJob {
   std::optional<std::filesystem::path> joints;             ///< CSV of the loads and states of joints
   std::optional<std::filesystem::path> particles;          ///< table of all particles; see particle_table.h
   std::optional<std::filesystem::path> cloth_points = {};  ///< CSV of the vertices of cloths
-  bool trace_every_step = false;  ///< rows for all sub-steps; otherwise once per frame
+  bool trace_every_step = false;  ///< whether rows are written for every sub-step; otherwise for every frame
 };
 
 /// Runs only the physics, over all frames.

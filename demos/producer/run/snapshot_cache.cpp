@@ -102,7 +102,7 @@ void SnapshotCache::open(const std::string& key, int frames) {
     frames_ = frames;
     if (hold_ && ::flock(hold_.fd(), LOCK_SH | LOCK_NB) == 0 && fs::exists(generation_)) return;
   }
-  refuse("its snapshots are gone; simulate again with --force");
+  refuse("its snapshots were deleted; simulate again with --force");
 }
 
 bool SnapshotCache::holds(const std::string& key, int frames) const {

@@ -13,7 +13,8 @@ namespace offstage::producer {
 
 class SnapshotCache {
  public:
-  /// Version of the folder's layout and of the snapshots in it; another one is refused (docs/cache.md).
+  /// Version of the folder's layout and of the snapshots in it. Folders of other versions are refused
+  /// (docs/cache.md).
   static constexpr int kFormat = 4;
   static constexpr const char* kFile = "cache.json";  ///< names the published generation and its simulation
   static constexpr std::string_view kGenerationPrefix =
@@ -38,8 +39,8 @@ class SnapshotCache {
   /// Removes the generations that are not published and that no process holds.
   void remove_unused_generations() const { remove_old_generations(); }
 
-  /// For the generation begun or opened. Both throw FileError; read() also for a snapshot of another run.
-  /// write() returns the bytes that the snapshot takes.
+  /// Write or read the snapshot of a frame, in the generation that was begun or opened. Both throw FileError;
+  /// read() also for a snapshot of another run. write() returns the size of the snapshot [bytes].
   uint64_t write(const Snapshot& snapshot) const;
   Snapshot read(int frame) const;
 

@@ -18,7 +18,7 @@ class StateSource {
   using OnAdvance = std::function<bool()>;
 
   virtual ~StateSource() = default;
-  /// Number of calls of Simulation::advance() that at() needs for all frames up to this one.
+  /// Number of calls of Simulation::advance() that at() needs for all frames up to `frame`.
   virtual int advances_to(int frame) = 0;
   /// The state of a frame; null if `on_advance` returned false before. Frames are requested in ascending
   /// order. Throws DivergedError, and FileError for a cache.

@@ -60,7 +60,8 @@ std::optional<std::vector<std::string>> range(const std::string& text, const std
     numbers[i] = *number;
   }
   const auto [first, last, step] = numbers;
-  if (step == 0 || (last - first) * step < 0) refuse_sweep(text, "the step does not reach the last value");
+  if (step == 0 || (last - first) * step < 0)
+    refuse_sweep(text, "the step is 0 or has the wrong sign, so it never reaches the last value");
   constexpr double kSlack = 1e-9;  // fraction of a step: 0:1:0.1 has 11 values
   const double steps = std::floor((last - first) / step + kSlack);
   if (!(steps < static_cast<double>(kMostCombinations)))

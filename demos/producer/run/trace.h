@@ -15,9 +15,8 @@ class Trace {
  public:
   Trace(const std::filesystem::path& path, const Simulation& simulation);
 
-  /// One row per moving body that exists at the time, per cloth (its centre of mass and mean velocity) and
-  /// per placed particle
-  /// ("group/id").
+  /// Appends one row for each moving body that exists at the time, each cloth (its centre of mass and mean
+  /// velocity) and each placed particle ("group/id").
   void record(double time);
   void close() { file_.close(); }
 
@@ -31,7 +30,7 @@ class ClothTrace {
  public:
   ClothTrace(const std::filesystem::path& path, const Simulation& simulation);
 
-  /// One row per cloth.
+  /// Appends one row for each cloth.
   void record(double time);
   void close() { file_.close(); }
 
@@ -45,7 +44,7 @@ class ClothPointTrace {
  public:
   ClothPointTrace(const std::filesystem::path& path, const Simulation& simulation);
 
-  /// One row per vertex of each cloth.
+  /// Appends one row for each vertex of each cloth.
   void record(double time);
   void close() { file_.close(); }
 
@@ -60,7 +59,7 @@ class JointTrace {
  public:
   JointTrace(const std::filesystem::path& path, const Simulation& simulation);
 
-  /// One row per joint.
+  /// Appends one row for each joint.
   void record(double time);
   void close() { file_.close(); }
 
@@ -74,7 +73,7 @@ class ContactTrace {
  public:
   ContactTrace(const std::filesystem::path& path, const Simulation& simulation);
 
-  /// One row per contact point.
+  /// Appends one row for each contact point.
   void record(double time);
   void close() { file_.close(); }
 

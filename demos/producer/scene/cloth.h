@@ -50,7 +50,7 @@ struct CornerPin : PinScope {
 };
 struct SidePin : PinScope {
   Side side = Side::top;
-  int every = 1;  ///< only every n-th of its vertices, from the first
+  int every = 1;  ///< holds every n-th vertex of the side, from the first
 };
 struct NearestPin : PinScope {
   Vec3 point = Vec3::Zero();
@@ -65,7 +65,7 @@ using ClothPin = std::variant<CornerPin, SidePin, NearestPin, BoxPin>;
 struct SideSeam {
   Where where;
   Side a = Side::left, b = Side::right;
-  bool reversed = false;  ///< the first vertex of one side is sewn to the last of the other
+  bool reversed = false;  ///< whether the first vertex of one side is sewn to the last of the other
 };
 /// The vertices nearest to two points.
 struct PointSeam {
@@ -78,8 +78,8 @@ using ClothSeam = std::variant<SideSeam, PointSeam>;
 struct ClothCord {
   Where where;
   Vec3 from = Vec3::Zero();
-  Vec3 to = Vec3(0, -1, 0);  ///< where its other end is at time 0
-  bool held = true;          ///< the other end is fixed in the world or on the body
+  Vec3 to = Vec3(0, -1, 0);  ///< position of the other end at time 0
+  bool held = true;          ///< whether the other end is fixed in the world or on the body
   std::string body;
   Real until = 1e30;
   Real length = 0;
@@ -95,7 +95,7 @@ struct Cloth {
   std::string name;
   ClothShape shape = GridShape{};
   std::string fabric = "cotton";
-  FabricChanges changes;  ///< the keys of the changes are keys of the cloth itself
+  FabricChanges changes;  ///< in the file, the keys of the changes are keys of the cloth
   std::string material;   ///< name; empty: the look of the fabric
   Vec3 position = Vec3::Zero();
   Quat orientation = Quat::Identity();
@@ -118,7 +118,7 @@ struct Cloth {
   Real remove_at = 1e30;
   bool visible = true;
   bool casts_shadow = true;
-  Placement placement;  ///< the three keys of the placement are keys of the cloth itself
+  Placement placement;  ///< in the file, the keys of the placement are keys of the cloth
 };
 
 }  // namespace offstage::producer

@@ -9,7 +9,7 @@
 
 namespace offstage::producer {
 
-/// Names of a preset's emitters and forces, with the keys that replace theirs.
+/// For emitters and forces of a preset, by their names: the keys to replace.
 struct Overrides {
   Node node = Object{};
 };

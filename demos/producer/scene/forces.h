@@ -55,7 +55,8 @@ struct LennardJonesForce : PairForceOf<sim::LennardJones> {};
 struct HandKey {
   Real time = 0;
   Vec3 position = Vec3::Zero();
-  std::optional<sim::Interpolation> interpolation;  ///< to the next key; default: the grab's
+  /// Interpolation to the next key; default: the interpolation of the grab.
+  std::optional<sim::Interpolation> interpolation;
 };
 /// A damped spring of length 0 from a body or from particles to a moving point, as of a hand.
 struct Grab : NamedForce {
@@ -77,14 +78,15 @@ enum class ForceAxes { world, body };
 struct AppliedKey {
   Real time = 0;
   Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
-  std::optional<sim::Interpolation> interpolation;  ///< to the next key; default: the force's
+  /// Interpolation to the next key; default: the interpolation of the force.
+  std::optional<sim::Interpolation> interpolation;
 };
 /// A force at a point of bodies, and a torque.
 struct AppliedForce : NamedForce {
   std::vector<std::string> bodies;
-  std::optional<Vec3> point;  ///< in the body's frame; default: the centre of mass
+  std::optional<Vec3> point;  ///< point of application in the body's frame; default: the centre of mass
   ForceAxes axes = ForceAxes::world;
-  Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  ///< without keyframes
+  Vec3 force = Vec3::Zero(), torque = Vec3::Zero();  ///< force and torque, if there are no keyframes
   std::vector<AppliedKey> keyframes;
   sim::Interpolation interpolation = sim::Interpolation::linear;
   Real start = 0;

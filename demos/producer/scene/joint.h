@@ -16,15 +16,16 @@ namespace offstage::producer {
 struct MotorKey {
   Real time = 0;
   Real target = 0;
-  std::optional<sim::Interpolation> interpolation;  ///< to the next key; default: the motor's
+  /// Interpolation to the next key; default: the interpolation of the motor.
+  std::optional<sim::Interpolation> interpolation;
 };
 
 struct JointMotor {
   sim::Motor::Mode mode = sim::Motor::Mode::speed;
-  Real target = 0;             ///< without keys
-  std::vector<MotorKey> keys;  ///< in order of time
+  Real target = 0;             ///< target, if there are no keys
+  std::vector<MotorKey> keys;  ///< targets in order of time
   sim::Interpolation interpolation = sim::Interpolation::monotone;
-  bool smooth = false;  ///< stops at every key
+  bool smooth = false;  ///< whether the motion stops at every key
   std::optional<Real> max_effort;
   Real stiffness = 0, damping = 0;
 };
@@ -35,11 +36,12 @@ struct JointBehaviour {
   Vec3 axis = Vec3::UnitZ();
   std::optional<Vec3> second_axis;  ///< default: +X, or `axis` for a gear
   Real ratio = 1;                   ///< ratio of a gear [1], rack [m], screw [m per turn] or pulley [1]
-  std::optional<std::array<Real, 2>> limits;         ///< limits of sliding and of changes of lengths [m]
+  /// Limits of the displacement of a sliding joint, or of the change of a length [m].
+  std::optional<std::array<Real, 2>> limits;
   std::optional<std::array<Real, 2>> length_limits;  ///< least and greatest length of a rope [m]
   std::optional<std::array<Real, 2>> limits_deg;     ///< limits of rotation
   std::optional<Real> swing_deg;
-  Real restitution = 0;  ///< at the limits
+  Real restitution = 0;  ///< coefficient of restitution at the limits
   Real stiffness = 0;    ///< stiffness of a spherical joint [N m/rad]
   Real friction = 0, damping = 0;
   std::optional<JointMotor> motor;
@@ -121,7 +123,7 @@ struct Bridge {
 struct Vehicle {
   Where where;
   std::string name;
-  Vec3 position = Vec3::Zero();  ///< on the ground, at the centre of its wheels
+  Vec3 position = Vec3::Zero();  ///< point on the ground at the centre of the wheels
   Quat orientation = Quat::Identity();
   Vec3 velocity = Vec3::Zero();
   Real length = 4, width = 1.8, wheel_radius = 0.36;
@@ -129,7 +131,7 @@ struct Vehicle {
   Real suspension_hz = 1.6;       ///< natural frequency of the suspension
   std::vector<MotorKey> speed;    ///< [m/s]
   std::vector<MotorKey> steer;    ///< steering angle at the centre of the front axle [degrees], left positive
-  Real max_torque = 900;          ///< for each rear wheel
+  Real max_torque = 900;          ///< greatest torque of each rear wheel
   std::string paint, trim, tyre;  ///< names of materials
   Placement placement;
 };
@@ -166,9 +168,10 @@ struct ModelTree {
   ModelScale scale;
   Real density = 1000;
   std::string base = "world";  ///< holder of the uppermost nodes: a body, "world", or nothing
-  std::string material;        ///< empty: those of the file
+  std::string material;        ///< name of the material; empty: the materials of the file
   bool collides = true;
-  Real friction = 0, damping = 0;  ///< for joints that are not in `joints`, which are spherical
+  /// Friction and damping of the joints that are not in `joints`, which are spherical.
+  Real friction = 0, damping = 0;
   std::vector<NodeJoint> joints;
   Placement placement;
 
@@ -178,7 +181,7 @@ struct ModelTree {
     int parent;
     sim::Pose pose;
   };
-  std::vector<Link> links;  ///< empty if the file could not be read
+  std::vector<Link> links;  ///< nodes of the file; empty if the file could not be read
 };
 
 using ArticulationTemplate = std::variant<Chain, Ragdoll, Bridge, Vehicle, Crane, ModelTree>;

@@ -29,16 +29,17 @@ struct LookMesh {
   Shape shape = sim::Box{};
   std::string material;       ///< name; empty: the default material, or that of the model file
   std::optional<Vec3> axis;   ///< axis of `angle_deg` and `spin_deg_per_s`; default: random, per particle
-  bool along_motion = false;  ///< the mesh's +Y axis points along the velocity
+  bool along_motion = false;  ///< whether the mesh's +Y axis points along the velocity
 };
 
 /// Look of particles. Omitted values are those of the style; see points_def().
 struct ParticleLook {
   LookStyle style = LookStyle::sprite;
   Color color;
-  std::vector<std::pair<Real, Color>> color_over_age;       ///< [age 0..1, colour]; multiplies `color`
-  std::vector<std::pair<Real, Real>> temperature_over_age;  ///< [age 0..1, K]; multiplies both
-  std::vector<std::pair<Real, Real>> size_over_age;         ///< [age 0..1, factor]
+  std::vector<std::pair<Real, Color>> color_over_age;  ///< [age 0..1, colour]; multiplies `color`
+  /// [age 0..1, K]; multiplies `color` and `color_over_age`.
+  std::vector<std::pair<Real, Real>> temperature_over_age;
+  std::vector<std::pair<Real, Real>> size_over_age;  ///< [age 0..1, factor]
   effects::RampKind ramp = effects::RampKind::linear;
   Real color_deviation = 0;  ///< deviation of brightness, per particle
   /// Deviation of red, green, blue, alpha, per particle.
@@ -47,11 +48,11 @@ struct ParticleLook {
   std::optional<Real> softness, stretch, taper, metallic, roughness;
   std::string texture;  ///< picture of sprites; empty: a soft disc
   std::optional<render::SpriteSheet> sheet;
-  std::optional<LookMesh> mesh;  ///< for the style `mesh`, which needs it
+  std::optional<LookMesh> mesh;  ///< object that the style `mesh` draws, which needs one
   Varying angle_deg = 0.0;       ///< angle of a new particle
   Varying spin_deg_per_s = 0.0;
 
-  /// Whether the angle of a particle is visible.
+  /// Whether the rotation of a particle can be seen in its look.
   bool turns() const;
 };
 
@@ -61,16 +62,17 @@ render::PointsDef points_def(const ParticleLook& look);
 struct ParticlePlace {
   Vec3 position = Vec3::Zero();
   Vec3 velocity = Vec3::Zero();
-  std::optional<Color> color;  ///< default: that of the look
+  std::optional<Color> color;  ///< default: the colour of the look
 };
 
 /// Particles placed one by one, or as the points of a file.
 struct ParticleGroup {
   Where where;
   std::string name;
-  std::vector<ParticlePlace> places;  ///< after loading, those of the file and of `fill` follow
-  std::optional<Fill> fill;           ///< adds places
-  std::string file;                   ///< PLY or OBJ file; empty: none
+  /// Particles one by one; after loading, the particles of the file and of `fill` follow.
+  std::vector<ParticlePlace> places;
+  std::optional<Fill> fill;  ///< adds places
+  std::string file;          ///< PLY or OBJ file; empty: none
   ModelScale scale;
   std::optional<Vec3> fit;       ///< see MeshFile::fit
   Vec3 position = Vec3::Zero();  ///< position of the file's origin
@@ -84,14 +86,14 @@ struct ParticleGroup {
   Real appear_at = 0;
   Real remove_at = 1e30;
   sim::ParticleSystemDef
-      behaviour;  ///< the keys of the behaviour are keys of the group itself; see system_def()
+      behaviour;  ///< in the file, the keys of the behaviour are keys of the group; see system_def()
   ParticleLook look;
 };
 
 /// Splitting of particles into others of the same kind, from a given age on. Percentages are those of the
 /// parent's values.
 struct Split : effects::SplitDef {
-  int delay_steps = 0;  ///< in place of `delay`, in sub-steps of world.step
+  int delay_steps = 0;  ///< replaces `delay`: number of sub-steps of world.step
 };
 
 struct TrailSource;
@@ -104,7 +106,7 @@ struct ParticleSource : effects::NewParticles {
   Where where;
   std::string name;
   sim::ParticleSystemDef
-      behaviour;  ///< the keys of the behaviour are keys of the source itself; see system_def()
+      behaviour;  ///< in the file, the keys of the behaviour are keys of the source; see system_def()
   ParticleLook look;
   std::optional<Split> split;
   std::vector<TrailSource> trails;
@@ -163,18 +165,19 @@ using EmitterSurface = std::variant<PlaneSurface, SphereSurface, DiscSurface, Me
 /// such face.
 std::optional<EmitterSurface> face_of(const FaceSurface& surface, const struct Body* body);
 
-/// Position of a surface.
+/// The position of a surface, whatever its kind.
 Vec3& position_of(EmitterSurface& surface);
 const Vec3& position_of(const EmitterSurface& surface);
 
 struct Emitter : ParticleSource, effects::EmitterRelease {
   std::string preset;  ///< already merged into the emitter when a scene is read
-  std::string body;    ///< name of the body it moves with; empty: fixed in the world
+  std::string body;    ///< name of the body with which the emitter moves; empty: fixed in the world
   EmitterSurface surface = PlaneSurface{};
   Placement placement;
 };
 
-/// The trail or the event of its parent by which a source emits particles. Neither: the source is an emitter.
+/// What makes a source emit particles: a trail or an event of its parent. If neither is set, the source is an
+/// emitter.
 struct Emission {
   const TrailSource* trail = nullptr;
   const EventSource* event = nullptr;

@@ -47,7 +47,7 @@ struct FabricLook {
   Real sheen = 0.2;
   Color sheen_color;
   Real translucency = 0.15;
-  std::optional<Color> back_color;  ///< default: that of the front
+  std::optional<Color> back_color;  ///< default: the colour of the front
 };
 
 /// Look and contact properties.
@@ -72,12 +72,14 @@ struct Material {
   Real texture_scale = 1;
   Real texture_angle_deg = 0;
   bool two_sided = false;
-  std::optional<FabricLook> fabric;  ///< for cloths; default: that of the cloth's fabric
+  std::optional<FabricLook>
+      fabric;  ///< look of the threads on cloths; default: the look of the cloth's fabric
   Real restitution = 0.5;
   Real friction = 0.5;                  ///< dynamic coefficient
   std::optional<Real> static_friction;  ///< static coefficient; default: `friction`
   std::optional<Real> cross_friction;   ///< coefficient across a body's friction_axis; default: `friction`
-  Real rolling_friction = 0, spinning_friction = 0;  ///< see sim::BodyDef [m]
+  /// Coefficients of rolling and spinning friction [m]; see sim::BodyDef.
+  Real rolling_friction = 0, spinning_friction = 0;
 };
 
 /// Contact properties of two materials, which replace those combined from both.
@@ -91,7 +93,7 @@ struct ModelLook {
   std::string file;
   ModelScale scale = {};
   std::optional<Vec3> fit = {};  ///< see MeshFile::fit
-  Vec3 position = Vec3::Zero();  ///< in the body's frame
+  Vec3 position = Vec3::Zero();  ///< position of the model's origin, in the body's frame
   Quat orientation = Quat::Identity();
 };
 
@@ -99,15 +101,16 @@ struct ModelLook {
 struct ModelAnimation {
   std::string clip;  ///< name, or number from 0; empty: the first one
   Real speed = 1;
-  Real start = 0;  ///< time at which it starts; until then its first pose is held
+  Real start = 0;  ///< time at which the animation starts; until then its first pose is held
   bool loop = true;
 };
 
 struct BodyKey {
   Real time = 0;
-  std::optional<Vec3> position;                     ///< default: the body's
-  std::optional<Quat> orientation;                  ///< default: the body's
-  std::optional<sim::Interpolation> interpolation;  ///< to the next key; default: the body's
+  std::optional<Vec3> position;     ///< default: the body's
+  std::optional<Quat> orientation;  ///< default: the body's
+  /// Interpolation to the next key; default: the interpolation of the body.
+  std::optional<sim::Interpolation> interpolation;
 };
 
 struct Body {
@@ -124,7 +127,7 @@ struct Body {
   Vec3 angular_velocity = Vec3::Zero();
   Real density = 1000;
   Real mass = 0;
-  std::optional<Vec3> centre;   ///< centre of mass, in the body's frame; default: that of the shape
+  std::optional<Vec3> centre;   ///< centre of mass, in the body's frame; default: the shape's centre of mass
   std::optional<Vec3> inertia;  ///< moments Ixx, Iyy, Izz about the centre of mass; default: the shape's
   Vec3 inertia_products = Vec3::Zero();  ///< Ixy, Iyz, Izx of the inertia matrix, with `inertia`
   Real linear_drag = 0;
@@ -140,7 +143,7 @@ struct Body {
   Vec3 spin = Vec3::Zero();
   Real appear_at = 0;
   Real remove_at = 1e30;
-  Placement placement;  ///< the three keys of the placement are keys of the body itself
+  Placement placement;  ///< in the file, the keys of the placement are keys of the body
 
   /// Whether the parts of its shape move by an animation.
   bool has_animated_shape() const { return animation && !model && std::holds_alternative<MeshFile>(shape); }
@@ -198,7 +201,7 @@ struct ClosestOverlay : LineLook {
 /// by geometry for bodies that are not dynamic, for which the simulation has none.
 struct ContactsOverlay : LineLook {
   Where where;
-  std::string a, b;      ///< both empty: all pairs
+  std::string a, b;      ///< names of two bodies; both empty: all pairs of bodies
   Real margin = 0.01;    ///< distance that counts as touching, for contacts by geometry
   Real size = 0.06;      ///< radius of the ring around a point; its arrow is four times as long
   Real force_scale = 0;  ///< length of an arrow per newton of the contact's force
@@ -222,7 +225,7 @@ struct IslandsOverlay : LineLook {
 struct JointsOverlay : LineLook {
   Where where;
   std::string joint;     ///< empty: all
-  Real size = 0.08;      ///< radius of the ring around an axis, which is four times as long
+  Real size = 0.08;      ///< radius of the ring around an axis; the axis is drawn four times as long
   Real force_scale = 0;  ///< length of an arrow per newton on a; 0: none
   Color color{{1, 0.45f, 0.1f, 1}};
   Color force_color{{0.2f, 0.8f, 1, 1}};
@@ -255,7 +258,7 @@ struct TextOverlay {
 using Overlay = std::variant<TreeOverlay, PartsOverlay, ClosestOverlay, ContactsOverlay, VelocitiesOverlay,
                              IslandsOverlay, JointsOverlay, ClothOverlay, TrailsOverlay, TextOverlay>;
 
-/// Keys of all cameras.
+/// The keys that all cameras have.
 struct Lens {
   Real fov_deg = 40;
   std::optional<Real> focal_mm;  ///< replaces fov_deg
@@ -273,8 +276,9 @@ struct CameraKey {
   Real time = 0;
   Vec3 eye = {4, 2.5, 6};
   Vec3 target = Vec3::Zero();
-  std::optional<Real> fov_deg, focus;               ///< default: the camera's
-  std::optional<sim::Interpolation> interpolation;  ///< to the next key; default: the camera's
+  std::optional<Real> fov_deg, focus;  ///< default: the camera's
+  /// Interpolation to the next key; default: the interpolation of the camera.
+  std::optional<sim::Interpolation> interpolation;
 };
 struct KeyframedCamera : Lens {
   std::vector<CameraKey> keyframes;
@@ -284,7 +288,7 @@ struct OrbitCamera : Lens {
   Vec3 target = Vec3::Zero();
   Real radius = 8;
   Real height = 3;     ///< height of the eye above the target
-  Real start_deg = 0;  ///< from +Z towards +X
+  Real start_deg = 0;  ///< angle at time 0, from +Z towards +X
   Real turn_deg_per_s = 20;
 };
 struct FollowCamera : Lens {
@@ -292,7 +296,7 @@ struct FollowCamera : Lens {
   Vec3 offset = {0, 2, 6};  ///< position of the eye relative to the body, world axes
   Vec3 look_offset = Vec3::Zero();
 };
-/// A camera of the model file that a body shows. Its field of view is that of the file.
+/// A camera of the model file that a body shows. Its field of view comes from the file.
 struct ModelCamera : Lens {
   Where where;
   std::string body;
@@ -300,7 +304,7 @@ struct ModelCamera : Lens {
 };
 using Camera = std::variant<StaticCamera, KeyframedCamera, OrbitCamera, FollowCamera, ModelCamera>;
 
-/// A further camera, which is drawn on request.
+/// A further camera, which the option `--camera` selects.
 struct NamedCamera {
   Where where;
   std::string name;
@@ -310,13 +314,13 @@ inline constexpr const char* kMainCamera = "main";  ///< name of Scene::camera
 inline constexpr const char* kAllCameras = "all";   ///< all of them
 
 struct SunLight {
-  Vec3 direction = {0.45, 0.75, 0.5};  ///< towards the sun
+  Vec3 direction = {0.45, 0.75, 0.5};  ///< direction towards the sun
   Color color{{1, 0.95f, 0.87f, 1}};
   Real intensity = 3;
   Real size_deg = 1.5;
   bool shadows = true;
 };
-/// Keys of all lights near the scene.
+/// The keys that all lights near the scene have: all but the sun.
 struct LampBase {
   Where where;
   std::string body;  ///< body that carries it; empty: none
@@ -342,10 +346,10 @@ struct AreaLight : LampBase {
 struct ModelLights {
   Where where;
   std::string body;
-  std::string name;     ///< empty: all of them
+  std::string name;     ///< name of the light's node; empty: all lights of the file
   Real intensity = 1;   ///< factor of their intensities
   Real radius = 0.01;   ///< radius of point and spot lights
-  Real size_deg = 0.5;  ///< apparent size of directional lights
+  Real size_deg = 0.5;  ///< angular diameter of directional lights
   bool shadows = true;
 };
 using Light = std::variant<SunLight, PointLight, SpotLight, AreaLight, ModelLights>;
@@ -376,7 +380,7 @@ struct EnvironmentSettings {
 enum class Quality { draft, preview, final };
 int subframes(Quality quality);
 
-/// `automatic`: each frame is exposed for the mean brightness of the same grey.
+/// `automatic`: the exposure is chosen for each frame, such that all frames have the same mean brightness.
 enum class Metering { fixed, automatic };
 
 struct RenderSettings {
@@ -405,17 +409,18 @@ struct Scene {
   int version = 1;
   std::string name;  ///< default: the name of the file
   std::string description;
-  std::string fill_digest;  ///< after loading: of the models that fills read; empty if there are none
+  std::string fill_digest;  ///< after loading: digest of the models that fills read; empty if there are none
   WorldSettings world;
   std::vector<Material> materials;
   std::vector<ContactRule> contacts;
   std::vector<Body> bodies;
   std::vector<ParticleGroup> particles;
   std::vector<Emitter> emitters;
-  std::vector<Effect> effects;  ///< after loading, its emitters and forces are among the others
+  /// Presets at places; after loading, their emitters and forces are among the others.
+  std::vector<Effect> effects;
   std::vector<Spring> springs;
   std::vector<Joint> joints;
-  /// Converted to bodies and joints together with the copies.
+  /// When copies are expanded, these are replaced by their bodies and joints.
   std::vector<ArticulationTemplate> articulations;
   std::vector<Cloth> cloths;
   std::vector<Force> forces;

@@ -22,7 +22,7 @@ using sim::Quat;
 using sim::Real;
 using sim::Vec3;
 
-/// A time that never comes: the default of `remove_at` is later [s].
+/// Times from here on mean "never" [s]; the default of `remove_at` is later than this.
 inline constexpr Real kForever = 1e29;
 
 /// Whether an object with these times exists at a time; a rounding error before does not matter.
@@ -68,7 +68,7 @@ struct MeshFile {
   std::string file;
   ModelScale scale = {};
   std::optional<Vec3> fit = {};  ///< edges of the box that the model just fits into before `scale` [m]
-  std::optional<MeshDecomposition> decomposition = {};  ///< only for bodies
+  std::optional<MeshDecomposition> decomposition = {};  ///< criteria of the convex parts; only for bodies
 };
 
 /// A solid in a compound.
@@ -77,7 +77,7 @@ using PartShape = std::variant<sim::Sphere, sim::Box, sim::Capsule, sim::Cylinde
 struct CompoundPart {
   Where where;
   PartShape shape = sim::Box{};
-  Vec3 position = Vec3::Zero();  ///< in the body's frame
+  Vec3 position = Vec3::Zero();  ///< position of the part, in the body's frame
   Quat orientation = Quat::Identity();
   std::optional<Real> density;  ///< default: the body's
   std::string material;         ///< name of its material; empty: the body's
@@ -107,9 +107,9 @@ struct Grid {
 /// Copies at random places in a rectangle centred on the original.
 struct Scatter {
   int count = 10;
-  Eigen::Vector2d size = {10, 10};  ///< along x and z
+  Eigen::Vector2d size = {10, 10};  ///< size of the rectangle along x and z
   Real min_distance = 0;  ///< smallest distance of copies; those without room are omitted with a warning
-  bool turn = true;       ///< random rotation about the vertical
+  bool turn = true;       ///< whether each copy is rotated about the vertical at random
   Varying scale = 1.0;    ///< factor of a body's shape and model
   uint64_t seed = 1;
 };
@@ -117,7 +117,7 @@ struct BoxFill {
   Vec3 size = Vec3::Ones();
 };
 struct CylinderFill {
-  Real radius = 0.5, height = 1;  ///< about the vertical
+  Real radius = 0.5, height = 1;  ///< size of a cylinder whose axis is vertical
 };
 struct SphereFill {
   Real radius = 0.5;
@@ -127,14 +127,14 @@ struct MeshFill {
   std::string file;
   ModelScale scale = {};
   std::optional<Vec3> fit = {};  ///< see MeshFile::fit
-  sim::TriangleMesh solid = {};  ///< after loading: outward, scaled
+  sim::TriangleMesh solid = {};  ///< after loading: the scaled model, with normals that point out
 };
 enum class Packing { hexagonal, cubic, random };
 /// Places that fill a volume, each at half the spacing or more from its surface.
 struct Fill {
   std::variant<BoxFill, CylinderFill, SphereFill, MeshFill> shape = BoxFill{};
   Vec3 position = Vec3::Zero();  ///< centre: relative to the original, or of particles in the world
-  Real spacing = 0;              ///< distance of neighbours; 0: the diameter of the particles
+  Real spacing = 0;              ///< distance between neighbouring places; 0: the diameter of the particles
   Packing packing = Packing::hexagonal;
   uint64_t seed = 1;  ///< seed of random places
 };

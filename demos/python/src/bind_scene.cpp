@@ -140,7 +140,7 @@ void bind_snapshot(py::module_& m) {
             }
             return out;
           },
-          "(n, 4): the same as [w, x, y, z], copied.")
+          "(n, 4): unit quaternions [w, x, y, z] of the moving bodies, body to world; a copy.")
       .def_property_readonly(
           "point_sets",
           [](const py::object& self) {

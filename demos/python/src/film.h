@@ -31,7 +31,7 @@ struct SharedScene {
 struct FilmJob {
   std::vector<int> frames;                     ///< ascending
   bool images = true;                          ///< false: only states and channels
-  bool channels = false;                       ///< depth, normals, ids and motion
+  bool channels = false;                       ///< whether frames have depth, normals, ids and motion
   std::optional<std::filesystem::path> cache;  ///< folder from which states are read instead of simulating
 };
 

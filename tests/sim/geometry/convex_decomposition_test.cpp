@@ -380,7 +380,7 @@ TEST(ApproximateDecomposition, SurfacesWithoutInsideHaveNoParts) {
   const ConvexDecomposition d = decomposed(terrain);
   EXPECT_EQ(d.method, Method::none);
   EXPECT_TRUE(d.parts.empty());
-  EXPECT_EQ(d.note, "the surface encloses nothing: 32 border edges");
+  EXPECT_EQ(d.note, "the surface encloses no volume: 32 border edges");
   EXPECT_EQ(decomposed({}).method, Method::none);
   EXPECT_EQ(decomposed({{Vec3::Ones(), Vec3::Ones(), Vec3::Ones()}, {{0, 1, 2}}}).method, Method::none);
   // A two-sided sheet is closed but has no volume.
