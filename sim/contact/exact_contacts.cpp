@@ -23,6 +23,9 @@ constexpr Real kApproaching = 1e-4;
 /// The intervals of islands with more bodies are not divided: they are heaps, for which it would cost more
 /// than the solution.
 constexpr std::size_t kMostDivided = 6;
+/// Corners of bodies that turn farther than this in an interval do not move on straight lines [rad]. An
+/// island of several bodies with such a body is not divided, since bodies that have met would overlap.
+constexpr Real kMostTurned = 0.1;
 /// Greatest cost of a solution and its division [ns, see ProximalNewton::cost()].
 constexpr Real kMostDivision = 2e6;
 /// Uncertainty of the approach of a resting contact, as a fraction of the normal velocity due to rotation in
@@ -37,6 +40,18 @@ constexpr Real kOverlap = 1e-6;
 constexpr Real kRough = 1e-2, kEnergyRounding = 1e-9;
 /// Fraction of the kinetic energy that the velocity terms of a solution may add in a step.
 constexpr Real kTermsShare = 0.02;
+
+/// Angular speed of a body's corners [rad/s]. The rotation of round bodies about their axis does not count.
+Real turning_of_corners(const Body& body) {
+  const Vec3& spin = body.start_twist.angular_velocity;
+  const Shape& shape = body.def.shape;
+  if (std::holds_alternative<Sphere>(shape)) return 0;
+  if (!std::holds_alternative<Capsule>(shape) && !std::holds_alternative<Cylinder>(shape) &&
+      !std::holds_alternative<Cone>(shape) && !std::holds_alternative<Frustum>(shape))
+    return spin.norm();
+  const Vec3 axis = body.start_pose.vector_to_world(Vec3::UnitY());
+  return (spin - spin.dot(axis) * axis).norm();
+}
 
 /// `linear` is the bias at the end of a contact that does not turn.
 ClosingPoint closing_point(Real gap, const Vec3& surface, const ContactMotion& motion, const Vec3& linear) {
@@ -62,7 +77,12 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
   displacements_.clear();
   const Island* const one[] = {&island};
   joints_.collect(one, interval, IslandJoints::Springs::rows);
-  may_divide_ = island.bodies.size() <= kMostDivided && joints_.act_throughout();
+  may_divide_ = island.bodies.size() == 1 ||
+                (island.bodies.size() <= kMostDivided &&
+                 std::all_of(island.bodies.begin(), island.bodies.end(), [&](const Body* body) {
+                   return turning_of_corners(*body) * interval.duration <= kMostTurned;
+                 }));
+  may_divide_ = may_divide_ && joints_.act_throughout();
   for (ContactPair* pair : island.pairs) add_points(*pair, interval);
   if (contacts_.empty() && joints_.bounded().empty()) return {.is_applied = true, .work = {}};
 

@@ -42,10 +42,13 @@ void IslandJoints::place(Articulation& a, const ContactInterval& interval) {
 }
 
 bool IslandJoints::act_throughout() const {
-  // Limits have one finite bound.
+  // The direction of a distance joint turns with its ends. Limits have one finite bound.
+  const auto is_distance = [](const Joint* joint) { return joint->def.type == JointType::distance; };
   return std::none_of(stops_.begin(), stops_.end(), [](const auto& stop) { return stop.has_value(); }) &&
          std::none_of(articulations_.begin(), articulations_.end(),
-                      [](const Articulation* a) { return a->has_springs(); }) &&
+                      [&](const Articulation* a) {
+                        return a->has_springs() || std::ranges::any_of(a->joints(), is_distance);
+                      }) &&
          std::all_of(bounded_.begin(), bounded_.end(), [](const BoundedRow& row) {
            return std::isfinite(row.lower) == std::isfinite(row.upper);
          });

@@ -37,7 +37,8 @@ class IslandJoints {
     const Articulation& a = *articulations_[articulation];
     return stops_[articulation].value_or(a.has_springs() ? a.kicks_act_from() : kMiddle);
   }
-  /// Whether all impulses act evenly throughout the interval: there are no limits near, and no springs.
+  /// Whether all impulses act evenly throughout the interval and in the same directions: there are no limits
+  /// near, no springs, and no distance joints.
   bool act_throughout() const;
   /// Removes the parts of the velocities at the interval's end that violate the constraints of the time when
   /// a limit is reached: the joint forces that would have turned the velocities afterwards end with the

@@ -22,7 +22,7 @@ std::vector<Vec3> places(const Copies& copies, const Vec3& position = Vec3::Zero
   return all;
 }
 
-Scene scene_of(const std::string& text) {
+Scene parsed_scene(const std::string& text) {
   return parse_scene(text, "scene", ".").scene;
 }
 
@@ -141,7 +141,7 @@ TEST(Placement, TooManyCopiesAreAnErrorForAnyProduct) {
   const std::string scene =
       R"({"bodies": [{"repeat": {"count": 100000}, "grid": {"count": [100000, 100000, 2]}}]})";
   try {
-    scene_of(scene);
+    parsed_scene(scene);
     FAIL();
   } catch (const SceneError& error) {
     EXPECT_STREQ(
@@ -152,7 +152,7 @@ TEST(Placement, TooManyCopiesAreAnErrorForAnyProduct) {
 }
 
 TEST(Placement, MotionIsRotatedWithItsCopy) {
-  const Scene scene = scene_of(R"({"bodies": [
+  const Scene scene = parsed_scene(R"({"bodies": [
     {"name": "arm", "motion": "kinematic", "position": [1, 0, 0], "orientation": {"axis": [1, 2, 0], "angle_deg": 30},
      "keyframes": [{"time": 0}, {"time": 1, "position": [2, 1, 0], "orientation": {"axis": [0, 0, 1], "angle_deg": 90}}],
      "spin": [1, 0, 0], "repeat": {"count": 3, "turn_deg": 120, "offset": [0, 5, 0], "pivot": [3, 0, 0]}},
@@ -194,7 +194,7 @@ TEST(Placement, ScaleActsOnShapeAndModel) {
 }
 
 TEST(Placement, EmittersAreCopiedToo) {
-  const Scene scene = scene_of(R"({"emitters": [
+  const Scene scene = parsed_scene(R"({"emitters": [
     {"name": "jet", "surface": {"position": [2, 1, 0], "direction": [1, 0, 0]}, "repeat": {"count": 2, "turn_deg": 90}}]})");
   ASSERT_EQ(scene.emitters.size(), 2u);
   EXPECT_EQ(scene.emitters[1].name, "jet_1");
@@ -204,7 +204,7 @@ TEST(Placement, EmittersAreCopiedToo) {
 }
 
 TEST(Placement, ACopiedEmitterTurnsAsAWhole) {
-  const Scene scene = scene_of(R"({"emitters": [
+  const Scene scene = parsed_scene(R"({"emitters": [
     {"surface": {"direction": [0, 1, 0], "size": [2, 0.02]}, "repeat": {"count": 2, "turn_deg": 90}},
     {"surface": {"direction": [1, 2, 3], "turn_deg": 20, "size": [2, 0.02]}, "repeat": {"count": 2, "turn_deg": -35}}]})");
   for (const std::size_t first : {0u, 2u}) {
