@@ -76,7 +76,7 @@ class Pieces {
       rows_.push_back(i);
     }
     bounded_.assign(problem_.joints.bounded.begin(), problem_.joints.bounded.end());
-    for (std::size_t k = 0; k < bounded_.size(); ++k) set_row(bounded_[k], result_.bounded[k].impulse, now);
+    for (BoundedRow& row : bounded_) set_row(row, now);
     reactions_.clear();
     for (const Vec6& p : problem_.joints.impulses)
       reactions_.push_back(now ? Vec6(Vec6::Zero()) : Vec6((1 - elapsed) * p));
@@ -88,15 +88,15 @@ class Pieces {
     result_.work.add(*work);
     return now ? added_energy(before, bodies_, closed_) <= kClosingRounding * kinetic_energy(before) : true;
   }
-  /// A row over the rest of the interval, after its impulse `before`, or at the instant `now`. At an instant,
-  /// motors and friction of limited strength and springs do nothing, and a motor of any strength keeps its
-  /// speed.
-  void set_row(BoundedRow& row, Real before, bool now) const {
+  /// Changes a row of the whole interval to one of its rest, or of the instant `now`. Efforts are constant
+  /// over the interval. At an instant, motors and friction of limited strength, soft motors and dampers do
+  /// nothing, and a motor of any strength keeps its speed.
+  void set_row(BoundedRow& row, bool now) const {
     const Real rest = 1 - time_ / problem_.duration;
     row.impulse *= now ? 0 : rest;
     row.lower *= rest;
     row.upper *= rest;
-    row.target -= row.softness * before;
+    row.softness /= rest;
     if (!now) return;
     if (row.softness > 0 || std::isfinite(row.lower)) row.lower = row.upper = 0;
     row.target = row.offset + row_speed(row, bodies_);
