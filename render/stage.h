@@ -151,7 +151,8 @@ struct SampleOffsets {
   Eigen::Vector2f lens = Eigen::Vector2f::Zero();
   Eigen::Vector2f light = Eigen::Vector2f::Zero();
   int index = 0;  ///< number of the sub-frame
-  /// Number of sub-frames in the frame; where there are several, a sub-frame is not filtered by itself.
+  /// Number of sub-frames in the frame. If there are several, the noise filter is applied to their mean, not
+  /// to each of them.
   int count = 1;
 };
 /// Offsets of sub-frame i of n: a fixed low-discrepancy set; all zero for n = 1.

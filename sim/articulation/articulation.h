@@ -120,8 +120,8 @@ class Articulation final : public JointedBodies {
   JointSystem& inert_system() { return has_springs() ? *sprung_ : system_; }
   /// Multiplies the softness of the springs after place_within() by a factor. Returns whether it has changed.
   bool soften(Real factor);
-  /// Adds the constraint impulses of an interval of this duration [s] to the loads of the joints, which
-  /// already contain the forces of the motion.
+  /// Adds constraint forces to the loads of the joints: the impulses of an interval divided by its duration
+  /// [s]. The loads already contain the constraint forces of the free motion.
   void add_loads(std::span<const Vec6> impulses, Real duration);
   /// Adds constraint impulses of a collision to the loads of the joints.
   void add_impact_impulses(std::span<const Vec6> impulses);

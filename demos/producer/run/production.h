@@ -45,7 +45,7 @@ struct FrameFigures {
   std::string state_hash, pixel_hash;
 };
 
-/// Results of a run: the stats object of the command line.
+/// Results of a run. The command line prints them as a JSON object.
 struct RunStats {
   int frames = 0;       ///< written by this run
   int frames_kept = 0;  ///< existing frames that were kept (resume)
