@@ -173,8 +173,9 @@ struct LightSums {
 
 struct StageDef {
   int width_px = 1280, height_px = 720;
-  /// Whether pictures are less exact and take less time, for looking at a scene while it is edited: the light
-  /// of the sun and from around is traced for a part of the pixels, and interpolated for those in between.
+  /// Whether pictures are less exact and take less time, for looking at a scene while it is edited. The light
+  /// of the sun and of the surroundings is then traced for some of the pixels, and interpolated for the
+  /// others.
   bool quick = false;
 };
 
