@@ -30,7 +30,7 @@ struct SplitDef {
   Varying velocity_percent = 100.0;
   Varying spread_deg = 0.0;       ///< angle from the parent's direction [degrees]
   Varying radius_percent = 50.0;  ///< > 0
-  /// Mass of each child; 0: the mass that follows from the parent's density.
+  /// Mass of each child; 0: the mass at which the child has the parent's density.
   Varying mass_percent = 0.0;
   Varying lifespan_percent = 100.0;  ///< > 0
   uint64_t max_alive = 1'000'000;    ///< children beyond this are not released, but counted

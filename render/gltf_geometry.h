@@ -32,8 +32,8 @@ class GltfGeometry {
   }
   /// Returns a primitive without its morph targets. Each is read only once.
   const GltfPrimitive& primitive(std::size_t mesh, std::size_t index);
-  /// Returns a primitive with its morph targets, or nothing if none has a weight. The `weights` of a node
-  /// replace the weights of the mesh.
+  /// Returns a primitive with its morph targets applied, or nothing if the weights of all targets are 0. The
+  /// `weights` of a node replace the weights of the mesh.
   std::optional<FileSurface> morphed(std::size_t mesh, std::size_t index, const GltfValue& node);
   /// Poses a surface by the joints' transforms (section 3.7.3.3): positions are then in the scene's frame.
   FileSurface posed(const FileSurface& surface, const GltfPrimitive& source,

@@ -22,13 +22,13 @@ struct ModelPath {
 /// Splits FILE#NODE, unless a file with the whole name exists.
 ModelPath split_node(const std::filesystem::path& path);
 
-/// Reads a model and its textures, embedded or beside it. Applies the transforms of its nodes, and removes
-/// elements that cannot be drawn (points, lines, faces with bad indices or no area, non-finite vertices) with
-/// a warning. Cameras and lights are ignored; of glTF files, with a warning. `with_rig`: also reads the
-/// animations of a glTF file and the surfaces that they move, into Model::rig. There is one part per material
-/// and kind of vertex, with normals (by compute_normals() if the file has none; flat for glTF). Texture
-/// coordinates start at the image's top left, with v downwards. Up axis and unit are converted to Y and
-/// metres if the format defines them (FBX, Collada). Colours of classic materials (diffuse, specular,
+/// Reads a model and its textures, embedded in it or beside it. Applies the transforms of its nodes, and
+/// removes elements that cannot be drawn (points, lines, faces with bad indices or no area, non-finite
+/// vertices) with a warning. Cameras and lights are ignored; in glTF files, with a warning. `with_rig`: also
+/// reads the animations of a glTF file and the surfaces that they move, into Model::rig. There is one part
+/// per material and kind of vertex, with normals (by compute_normals() if the file has none; flat for glTF).
+/// Texture coordinates start at the image's top left, with v downwards. Up axis and unit are converted to Y
+/// and metres if the format defines them (FBX, Collada). Colours of classic materials (diffuse, specular,
 /// shininess) are treated as sRGB, those of physically based materials as linear. For a path that ends in
 /// #NODE, only the triangles of that node, in its frame (Model::Node). The model and all files that it names
 /// must be in `folders`; if there are none, in the model's own folder. Throws FileError with one line for a

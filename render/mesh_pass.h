@@ -115,10 +115,10 @@ class MeshPass {
   GLuint white() const { return white_; }
   /// Translucent instances, in the order of the instances.
   std::span<const Instance* const> translucent() const { return see_through_; }
-  /// Draws one of `translucent`. With Shading::traced_with_particles, pictures with and without the particles
-  /// behind it are bound.
+  /// Draws element k of translucent(). With Shading::traced_with_particles, the pictures with and without the
+  /// particles behind it must be bound.
   void draw_translucent(std::size_t k, Shading shading);
-  /// Draws only the depth of one of `translucent`.
+  /// Draws only the depth of element k of translucent().
   void draw_translucent_depth(std::size_t k);
 
  private:

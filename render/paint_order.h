@@ -92,8 +92,8 @@ class PaintOrder {
   uint32_t number(Kind kind, uint64_t key) const;
   Place place(Kind kind, uint64_t key) const;
 
-  /// Runs, back to front, of the particles that are drawn before body `k`; for k = number of bodies, those in
-  /// front of all bodies.
+  /// The runs that are drawn after body `body` - 1 and before body `body`, from back to front. For the number
+  /// of bodies: those drawn last, which are nearer to the camera than all bodies.
   std::span<const Run> runs_before(std::size_t body) const;
   std::size_t run_count() const { return runs_.size(); }
   /// The pixels that the sprites or flakes of a run can change.

@@ -12,9 +12,9 @@
 namespace offstage::render {
 
 /// Returns the triangles of a simple polygon, three indices of corners each, in the polygon's sense of
-/// rotation. Each has an area; of all ears the one nearest to an equilateral triangle is cut first. Corners
-/// may lie in a line, and the polygon may be slightly bent. Empty if it has no area, crosses itself or has
-/// more than 1024 corners.
+/// rotation. No triangle has zero area; of all ears the one nearest to an equilateral triangle is cut first.
+/// Several corners may lie on one line, and the corners may lie slightly outside of a common plane. Empty if
+/// the polygon has no area, crosses itself or has more than 1024 corners.
 std::vector<uint32_t> cut_polygon(std::span<const Eigen::Vector3d> corners);
 
 }  // namespace offstage::render

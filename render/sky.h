@@ -21,10 +21,11 @@ struct SkyModel {
 
 SkyModel make_sky(const Sun& sun, const Environment& environment);
 
-/// Radiance of the sky from a unit direction, without the sun's disc. Of a picture, both of its parts.
+/// Radiance of the sky from a unit direction, without the sun's disc; for a picture, the sum of its dim and
+/// its bright part.
 Vector3f sky_radiance(const SkyModel& sky, const Vector3f& direction);
 
-/// Radiance of the colours, even if there is a picture.
+/// Radiance of the sky's colours, even if a picture replaces them.
 Vector3f gradient_radiance(const SkyModel& sky, const Vector3f& direction);
 
 /// Radiance of the sky that a surface of this roughness mirrors; equal to sky_reflection() in

@@ -33,7 +33,8 @@ struct SkyGrid {
   float solid_angle(int row) const;
 };
 
-/// Mean values of the cells of another grid, weighted by solid angle.
+/// Returns a grid of this size. Each cell has the mean of the part of `grid` that it covers, weighted by
+/// solid angle.
 SkyGrid resampled(const SkyGrid& grid, int columns, int rows);
 
 /// A light with a direction that stands for many.
@@ -79,12 +80,13 @@ class SkyPicture {
     Vector3f direction;
     Vector3f light;  ///< radiance of the bright part divided by the density
   };
-  /// The direction of the bright part that belongs to a point of the unit square.
+  /// Maps a point of the unit square to a direction in the bright part. Points with a uniform distribution
+  /// give directions with the distribution density().
   Sample sample(const Vector2f& uv) const;
   const SkyBeam& beam() const { return beam_; }  ///< the bright part as a whole
 
-  /// The background as GL_RGB9_E5, which has what seen() returns unless it is blurred, and its reduced
-  /// levels.
+  /// A picture in the format GL_RGB9_E5. background() contains what seen() returns and its reduced levels or,
+  /// if there is a blur, only the blurred picture.
   struct Packed {
     int columns = 0, rows = 0;
     std::vector<uint32_t> values;

@@ -151,7 +151,8 @@ struct SampleOffsets {
   Eigen::Vector2f lens = Eigen::Vector2f::Zero();
   Eigen::Vector2f light = Eigen::Vector2f::Zero();
   int index = 0;  ///< number of the sub-frame
-  /// Number of sub-frames in the frame; where there are several, a sub-frame is not filtered by itself.
+  /// Number of sub-frames in the frame. If there are several, the noise filter is applied to their mean, not
+  /// to each of them.
   int count = 1;
 };
 /// Offsets of sub-frame i of n: a fixed low-discrepancy set; all zero for n = 1.
@@ -172,8 +173,9 @@ struct LightSums {
 
 struct StageDef {
   int width_px = 1280, height_px = 720;
-  /// Whether pictures are less exact and take less time, for looking at a scene while it is edited: the light
-  /// of the sun and from around is traced for a part of the pixels, and interpolated for those in between.
+  /// Whether pictures are less exact and take less time, for looking at a scene while it is edited. The light
+  /// of the sun and of the surroundings is then traced for some of the pixels, and interpolated for the
+  /// others.
   bool quick = false;
 };
 

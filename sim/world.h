@@ -98,8 +98,9 @@ enum class ParticleContactMethod : uint8_t {
 /// Algorithms of collision detection. All give the same results within their tolerances, except that
 /// bisection misses bodies that pass through each other within a sub-step; they differ in their cost.
 struct CollisionMethods {
-  /// Volumes of the trees over the parts and triangles of meshes (H1-H3). `mixed`: spheres for dynamic bodies
-  /// and axis-aligned boxes for the others, so that trees of two kinds meet.
+  /// Kind of the bounding volumes in the trees over the parts and triangles of meshes (physics H1-H3).
+  /// `mixed`: spheres for dynamic bodies and axis-aligned boxes for the others, which uses the tests between
+  /// volumes of different kinds.
   enum class Trees : uint8_t { aabb, obb, sphere, mixed };
   /// The pieces by which the time of an impact of two meshes is found: their convex parts, or their triangles
   /// as in section 2.4 (R3). Contact points are those of the parts in either case.
@@ -257,7 +258,8 @@ class World {
   /// Advances by `sampling_time` in the fewest equal sub-steps not longer than WorldDef::max_step.
   StepReport step(Real sampling_time, const BeforeSubStep& before = {});
 
-  /// Time since the start [s]; negative between calls of prewarm().
+  /// Time since the start of the simulation [s]. Negative while prewarm() has not yet reached the time 0,
+  /// which it may do in several calls.
   Real time() const;
   const WorldDef& def() const;
 

@@ -75,8 +75,8 @@ class Engine {
     uint64_t number = 0;
     std::string film;
   };
-  /// During its lifetime the engine begins no new work and ends drafts, so that the processors are free for
-  /// the next request: work done between the arrival of a change and show() would be useless.
+  /// While a Hold exists, the engine begins no new work and aborts drafts in progress. The processors are
+  /// then free for the next request: work done between the arrival of a change and show() would be useless.
   class Hold {
    public:
     explicit Hold(Engine& engine) : engine_(engine) { ++engine_.holds_; }

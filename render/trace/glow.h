@@ -26,7 +26,8 @@ class Glow {
   /// fills that ball. Mesh and material must stay in memory.
   void add(unsigned object, const RayMesh& mesh, const RayMaterial& material,
            const Eigen::Affine3f& world_from_mesh, const Vector3f& center, float radius, bool is_ball);
-  /// Keeps the kMost sources with the greatest power. The others are left to rays that meet them by chance.
+  /// Keeps the kMost sources with the greatest power. The others give light only where rays meet them by
+  /// chance.
   void limit();
   bool empty() const { return sources_.empty(); }
   /// Chooses a source in proportion to an estimate of its light on a surface at `place`, and a point of it in

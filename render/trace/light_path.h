@@ -28,8 +28,9 @@ bool is_rough_glass(const RayMaterial& material);
 Vector3f enter(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Vector3f& from,
                Vector3f& direction);
 
-/// The light of a sample of a glowing mesh on a white surface, if nothing is between the two. It is weighted,
-/// because rays that meet the mesh by chance find the same light.
+/// Radiance that a sample of a glowing mesh gives to a white surface, if nothing is between the two. It is
+/// reduced by a weight, because rays that meet the mesh by chance contribute the rest of this light.
+/// `normal`: shading normal of the surface; `face`: normal of its triangle.
 Vector3f light_of_glow(const GlowSample& sample, const Vector3f& normal, const Vector3f& face);
 
 /// Surfaces with less roughness^2 mirror and refract a single direction.

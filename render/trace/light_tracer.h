@@ -77,7 +77,8 @@ class VisibleLight {
   int find(const Hit& hit) const;
   bool has_picture() const { return !picture_.empty(); }
   Vector3f color(int pixel) const { return picture_[static_cast<std::size_t>(pixel)].head<3>(); }
-  /// Light from the sky, other surfaces and lamps; w: fraction of the sun that is visible.
+  /// Light that the surface in a pixel receives from the sky, other surfaces and lamps; w: fraction of the
+  /// sun that is visible from it.
   Vector4f arriving(int pixel) const;
 
  private:

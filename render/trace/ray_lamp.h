@@ -33,7 +33,7 @@ class RayLamp {
   LampPoint<float> point_of_sky(const SquarePoint<float>& uv) const;
 
   Lamp def_;
-  /// The sky whose picture is the lamp; without a picture, this object is a lamp near the scene.
+  /// The sky, if the bright part of its picture is the lamp. Without a picture, the lamp is `def_`.
   TurnedSky sky_;
   Vector3f right_, up_;
   float cone_factor_ = 0, cone_offset_ = 1;

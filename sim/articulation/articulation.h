@@ -93,10 +93,10 @@ class Articulation final : public JointedBodies {
   /// Evaluates the constraints at the bodies' current `rigid` states or, if `at_start`, at those of their
   /// interval's start.
   void place(Real time, bool at_start = false);
-  /// Evaluates the constraints for the contact solver, after a fraction of an interval of this duration [s]
-  /// that ends at `time` with the bodies' `rigid` states: where the impulses of the interval act, on average.
-  /// Applied at the poses of its end, they would change the angular momentum by the turn of the arms until
-  /// then.
+  /// Evaluates the constraints for the contact solver at the poses after `fraction` of an interval of
+  /// `duration` [s] that ends at `time` with the bodies' `rigid` states. There the impulses of the interval
+  /// act, on average. At the poses of the interval's end they would change the angular momentum, because
+  /// their arms turn until then.
   void place_within(Real time, Real duration, Real fraction, Real substep);
   /// Projects velocities of the links at `time` onto the constraints of the last place_within().
   void project(Real time, std::span<Vec6> velocities);
@@ -120,8 +120,8 @@ class Articulation final : public JointedBodies {
   JointSystem& inert_system() { return has_springs() ? *sprung_ : system_; }
   /// Multiplies the softness of the springs after place_within() by a factor. Returns whether it has changed.
   bool soften(Real factor);
-  /// Adds the constraint impulses of an interval of this duration [s] to the loads of the joints, which
-  /// already contain the forces of the motion.
+  /// Adds constraint forces to the loads of the joints: the impulses of an interval divided by its duration
+  /// [s]. The loads already contain the constraint forces of the free motion.
   void add_loads(std::span<const Vec6> impulses, Real duration);
   /// Adds constraint impulses of a collision to the loads of the joints.
   void add_impact_impulses(std::span<const Vec6> impulses);

@@ -29,7 +29,7 @@ enum class JointType : uint8_t {
   /// as the length of a rope or a winch does.
   distance,
   /// Couples the rotation of a about `axis` with that of b about `second_axis`: angle of a + ratio * angle of
-  /// b = 0. The axes are fixed in the bodies; other joints, whose carrier does not turn, hold the wheels.
+  /// b = 0. The axes are fixed in the bodies. Other joints hold the wheels on a carrier, which must not turn.
   gear,
   /// Couples the rotation of a about `axis` with the displacement of b along `second_axis`, a direction of
   /// the world: displacement = ratio * angle, where the ratio is the radius of the pinion [m].

@@ -18,8 +18,8 @@ struct JointConstraint {
   const JointRows* rows;
 };
 
-/// u = on_a . v_a + on_b . v_b + offset becomes `target` - softness p if p is within its bounds; otherwise p
-/// is at the bound in that direction.
+/// A condition on u = on_a . v_a + on_b . v_b + offset with a bounded impulse p: u becomes `target` -
+/// softness p. If this requires an impulse beyond a bound, p is at that bound.
 struct BoundedRow {
   uint32_t a = kUnmoved, b = kUnmoved;
   Vec6 on_a = Vec6::Zero(), on_b = Vec6::Zero();

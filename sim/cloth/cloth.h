@@ -132,10 +132,11 @@ struct ClothDef {
   Real tear = 0;
 
   ClothAir air;
-  /// Overpressure inside a closed cloth at its rest volume V0 [Pa]. At the volume V it is pressure V0 / V, as
-  /// in an isothermal gas. 0: none.
+  /// Overpressure inside a closed cloth at its rest volume V0 [Pa]; 0: none. At another volume V the
+  /// overpressure is `pressure` times V0 / V: Boyle's law, applied to the overpressure alone.
   Real pressure = 0;
-  /// Time in which the gas of `pressure` is let in, at a constant rate from 0 [s], >= 0.
+  /// Time over which the gas of `pressure` is let in at a constant rate [s], >= 0; 0: it is inside from the
+  /// start.
   Real inflate_time = 0;
   /// Density of the gas inside [kg/m^3], >= 0; empty: that of the air. It requires `pressure` > 0. The
   /// weight of the gas, less that of the displaced air, acts on the cloth: the overpressure changes with the

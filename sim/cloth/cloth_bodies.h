@@ -41,8 +41,8 @@ class ClothBody {
   /// Displacement of the centre of mass during the sub-step of cloth.
   Vec3 move() const { return centre_ - start_.point_to_world(obstacle_.centre); }
 
-  /// Displacement of the surface during the sub-step of cloth, at the point that is at `p` (world) at its
-  /// end.
+  /// Displacement of the body's surface during the cloth's sub-step [m], at the surface point that is at `p`
+  /// (world) at the end of that sub-step.
   Vec3 surface_motion(const Vec3& p) const;
   /// Velocity of the body's material point at `p` at the end of the world's sub-step, including the changes
   /// due to cloth.

@@ -32,12 +32,13 @@ class ClothContacts {
   /// Returns the contacts with dynamic bodies at the points' current positions, including points that are
   /// closer than twice the distance that they keep.
   void collect(const ClothPoints& points, std::vector<BodyContact>& found);
-  /// Stops bodies that press into cloth whose moves were shortened, that is, moves of points with a non-zero
-  /// `shortened`, and removes the part of the bodies' moves towards the cloth. `triangles` are their contacts
-  /// with triangles. The result does not depend on the order of the contacts. `recoil` is the inverse mass of
-  /// each cloth with the bodies that hold it: 0 if it is pinned to the world. `whole_velocity` is their
-  /// common velocity, or that of the single object that the cloth is pinned to; `kick` is the velocity of
-  /// points besides that of their moves. Returns for each cloth the impulse that it absorbs [N s].
+  /// Stops bodies that press into cloth at points whose moves were shortened (those with a non-zero
+  /// `shortened`), and removes the part of the bodies' moves that is towards the cloth. The result does not
+  /// depend on the order of the contacts. `triangles`: contacts of the bodies with triangles. `kick`:
+  /// velocity of each point in addition to that of its move. `recoil`: inverse mass of each cloth together
+  /// with the bodies that hold it; 0 if it is pinned to the world. `whole_velocity`: common velocity of the
+  /// cloth and these bodies, or that of the single object to which the cloth is pinned. Returns for each
+  /// cloth the impulse that it absorbs [N s].
   std::vector<Vec3> stop_bodies(const ClothPoints& points, std::span<const uint8_t> shortened,
                                 std::span<const Vec4> kick, std::span<const Real> recoil,
                                 std::span<const std::optional<Vec3>> whole_velocity,

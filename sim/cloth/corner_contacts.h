@@ -1,7 +1,7 @@
 #pragma once
-/// Contact of bodies with triangles of cloth: of corners and edges of boxes, rims of cylinders and cones,
-/// vertices of meshes' hulls, and of rounded bodies (round_contacts.h). cloth_contacts.h keeps the points of
-/// cloth out of bodies; these contacts keep the triangles between the points out.
+/// Contacts of triangles of cloth with bodies: with the corners and edges of boxes, the rims of cylinders and
+/// cones, the vertices of meshes' hulls, and with rounded bodies (round_contacts.h). cloth_contacts.h keeps
+/// the points of cloth out of bodies; these contacts keep out the triangles between the points.
 
 #include <span>
 #include <vector>

@@ -14,10 +14,10 @@ namespace offstage::sim {
 
 class SearchHorizon {
  public:
-  /// Counts operations of the search for pairs, or of checking them.
+  /// Adds operations of the search for pairs, or of checking the pairs, to those of the current period.
   void add_work(Real work) { work_ += work; }
-  /// Ends a period of this duration [s], and begins the next one with a new search. Returns for how many
-  /// sub-steps this is to suffice.
+  /// Ends a period that lasted for `lasted` [s], and begins the next one with a new search. Returns the
+  /// number of sub-steps for which the new search is to suffice.
   uint32_t next(Real lasted) {
     if (!(lasted > 0)) return kLengths[tried_];  // searched twice in one sub-step: the period goes on
     const Real rate = work_ / lasted;

@@ -10,8 +10,8 @@
 
 namespace offstage::sim {
 
-/// Distance that points within triangles keep from bodies, as a fraction of the cloth's thickness, which its
-/// vertices keep. Flat parts of bodies therefore touch only vertices.
+/// Distance that points within triangles keep from bodies, as a fraction of the cloth's thickness. Vertices
+/// keep the whole thickness, so flat parts of bodies touch only vertices.
 inline constexpr Real kTriangleDistance = 0.5;
 
 struct TriangleContact {

@@ -82,7 +82,8 @@ class CellTable {
   void find_pairs_with(const CellTable& other, uint32_t first, uint32_t end, CandidatePairs& out) const;
 
  private:
-  /// A copy of an object that is to be inserted, with the hash of its cell.
+  /// A copy of an object for one cell that its box touches, before it is inserted. `hash` is that of the
+  /// cell.
   struct Listed {
     uint32_t hash;
     uint32_t range;  // index of the range

@@ -52,7 +52,7 @@ inline uint32_t edge_id(uint32_t tag, uint32_t other_tag) {
 inline uint32_t crossing_id(uint32_t body_x, uint32_t edge_x, uint32_t edge_y) {
   return body_x == 0 ? mixed(edge_x, edge_y) : mixed(edge_y, edge_x);
 }
-/// Id of the closest point of a body that is not one of its corners.
+/// Id of a contact at the closest point of a body, where that point is not one of the body's corners.
 inline uint32_t closest_id(uint32_t body) {
   return mixed(2, body);
 }

@@ -48,9 +48,9 @@ Convex convex(const ConvexPolyhedron& polyhedron, Real radius = 0);
 /// segment or a point.
 Convex convex_triangle(const Vec3& a, const Vec3& b, const Vec3& c);
 
-/// Returns a vertex of a polyhedron that is farthest along `d`. Climbs from `start` along the edges. On small
-/// polyhedra, and if neighbours are level within rounding (the top may then be elsewhere), all vertices are
-/// checked.
+/// Returns a vertex of a polyhedron that is farthest along `d`. Climbs from `start` along the edges to the
+/// top. Checks all vertices if the polyhedron is small, or if a neighbour of the top is level with it within
+/// rounding, because another vertex may then be higher.
 uint32_t support_vertex(const ConvexPolyhedron& p, const Vec3& d, uint32_t start);
 
 }  // namespace offstage::sim

@@ -28,8 +28,8 @@ class MinkowskiDifference {
   MinkowskiDifference(const Convex& a, const Convex& b, const Pose& a_from_b)
       : a_(a), b_(b), R_(a_from_b.orientation.toRotationMatrix()), t_(a_from_b.position) {}
 
-  /// Returns the point of A - B that is lowest along `d`, which need not be unit. Vertices are climbed from
-  /// `hint`.
+  /// Returns the point of A - B that is lowest along `d`, which need not be a unit vector. The search over
+  /// vertices starts at `hint`.
   SupportPoint lowest(const Vec3& d, VertexPair hint) const {
     SupportPoint p;
     p.from = hint;

@@ -163,8 +163,9 @@ class alignas(64) ContactPair {
   void inherit(std::vector<StoredPoint>& points, const Pose& a);
   void reuse(const Pose& a, const Pose& b, const std::vector<StoredPoint>& points);
   void set_frame(PlacedManifold& m) const;
-  /// Displacement of a relative to b along the normal by the free motion, at a contact of the start in the
-  /// middle between surfaces that are `gap` apart [m].
+  /// Displacement of a relative to b along the normal that free motion causes during `duration` [m], at a
+  /// contact of the manifold `m` at the interval's start. `place`: position of the contact, in the middle
+  /// between surfaces that are `gap` apart [m].
   Real free_displacement(const PlacedManifold& m, const Vec3& place, Real gap, Real duration) const;
   PlacedManifold moved_back(const Manifold& at_end, Real duration) const;
 

@@ -50,9 +50,10 @@ struct Contact {
   ContactFrame frame;     ///< n from b to a
   /// Vectors from the centres of mass to the point, world axes [m].
   Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();
-  /// Added to the relative velocity, for moving surfaces and turning frames [m/s].
+  /// Velocity that is added to the relative velocity of the bodies, due to moving surfaces and the turning of
+  /// the contact's frame [m/s].
   Vec3 offset = Vec3::Zero();
-  /// The part of `offset` that is not a surface velocity: velocity terms of R9 [m/s].
+  /// The part of `offset` that is not due to moving surfaces: the velocity terms (physics R9) [m/s].
   Vec3 bias = Vec3::Zero();
   Real target = 0;  ///< smallest normal velocity after the solution [m/s]
   /// Coulomb's coefficients along t and k. If they are equal, friction has the round cone |p_tk| <= mu p_n;

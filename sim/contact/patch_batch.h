@@ -23,8 +23,9 @@ namespace offstage::sim {
 struct ContactPatch;
 struct RelaxedBody;
 
-/// Deviation of a body within a step from uniform motion: its change of velocity since the start, and the
-/// resulting displacement and rotation. Elements 0 to 2 are linear, elements 4 to 6 angular.
+/// Deviation of a body from uniform motion within a step: `velocity` is the change of its velocity since the
+/// step's start, `shift` the resulting displacement and rotation. Elements 0 to 2 are linear [m/s, m],
+/// elements 4 to 6 angular [rad/s, rad].
 struct BodyMotion {
   FloatLanes velocity{}, shift{};
 };

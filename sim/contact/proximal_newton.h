@@ -73,7 +73,7 @@ class ProximalNewton {
     uint32_t a, b, pair;
     bool is_free;
   };
-  /// The constraints of a joint. They are a row of the matrix after the rows of the bodies.
+  /// The constraints of a joint: one block row of the matrix. These rows follow the block rows of the bodies.
   struct Constraint {
     uint32_t a, b, pair_a, pair_b;
     Mat6 diagonal;

@@ -14,14 +14,15 @@
 
 namespace offstage::sim {
 
-/// Bodies of an articulation, for impulses at the end of a sub-step. Velocities are those of the centre of
-/// mass, impulses act about it, in world axes.
+/// Bodies of an articulation, and their response to impulses at the end of a sub-step. Velocities are those
+/// of the centre of mass, and impulses act at it; both are in world axes.
 class JointedBodies {
  public:
   virtual ~JointedBodies() = default;
-  /// Returns the 6 x 6 matrix of the velocities of a link due to unit impulses and angular impulses on it,
-  /// joints included. It is for impulses in about the direction of `push`: an active limit resists
-  /// only impulses that push against it. May be called from several threads at the same time.
+  /// Returns the 6 x 6 matrix of the velocities that unit impulses and angular impulses on a link give to
+  /// this link, joints included. It is valid for impulses in about the direction of `push`, because an active
+  /// limit of a joint resists only impulses that push against it. May be called from several threads at the
+  /// same time.
   virtual Mat6 link_mobility(uint32_t link, const Vec6& push) = 0;
   /// Adds the velocities of all links due to an impulse on one link, limits included.
   virtual void respond(uint32_t link, const Vec6& impulse, std::span<Vec6> velocities) = 0;

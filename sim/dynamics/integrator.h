@@ -110,7 +110,8 @@ class Integrator {
   virtual ~Integrator() = default;
   virtual void step(const DynamicSystem& system, Real t, Real h, std::span<Real> x, std::span<Real> p,
                     IntegratorWorkspace& work) const = 0;
-  /// The error of a motion falls as the step to this power.
+  /// Order of convergence: the error after a given time is proportional to the length of the step to this
+  /// power.
   virtual int order() const = 0;
 };
 

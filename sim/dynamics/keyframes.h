@@ -1,6 +1,6 @@
 #pragma once
-/// Keyframed motion of kinematic bodies (physics E8, N6): positions and orientations by one of the
-/// interpolations, with the matching velocities.
+/// Keyframed motion of kinematic bodies (physics E8, N6): positions and orientations interpolated between
+/// keys (interpolation.h), with the matching velocities.
 
 #include <optional>
 #include <vector>

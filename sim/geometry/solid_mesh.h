@@ -47,7 +47,8 @@ struct SolidMesh {
 SolidMesh solid_mesh(const Torus& torus);
 SolidMesh solid_mesh(const Tube& tube);
 SolidMesh solid_mesh(const OpenBox& box);
-/// One convex part. A sphere has 32 x 16 faces, round sides have 48. Plane and MeshShape are not accepted.
+/// Returns the surface of a primitive as one convex part. A sphere has 32 x 16 faces, and a round side has 48
+/// faces around its axis. Plane and MeshShape are not accepted.
 SolidMesh solid_mesh(const Shape& primitive);
 /// Returns the solid moved to a pose.
 SolidMesh placed(SolidMesh solid, const Pose& pose);

@@ -18,13 +18,13 @@ struct LcpSolution {
   uint32_t pivots = 0;              ///< number of steps of Dantzig's method
   bool fell_back = false;           ///< whether the result is from projected Gauss-Seidel, the fall-back
   std::vector<uint32_t> unbounded;  ///< indices that no force, however large, brings to a >= 0
-  /// Greatest |min(A_ii f_i, a_i)| over the indices that are not unbounded, in units of b.
+  /// Greatest |min(A_ii f_i, a_i)| over the indices that are not unbounded, in the unit of b.
   Real residual = 0;
 };
 
 /// Finds f such that a = A f + b >= 0, f >= 0, f.a = 0. A may be singular, as it is with redundant contacts;
 /// some of the dependent rows then keep f = 0. If no such f exists (b is outside of the range of A),
-/// `unbounded` lists the indices.
+/// `unbounded` lists the indices at which a < 0 remains.
 LcpSolution solve_lcp(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
 
 }  // namespace offstage::sim

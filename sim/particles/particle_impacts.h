@@ -1,9 +1,10 @@
 #pragma once
 /// Collisions of particles with particles and bodies, one after the other in the order of time, at their
 /// exact times (physics E6, P3, P5, P6). Particles that touch when one of them is hit form a cluster and are
-/// solved together. The work is bounded: a particle with too many collisions in a sub-step, or all particles
-/// if there are too many, are left to resting contact (particle_contacts.h), which also prevents tunnelling.
-/// So are slow collisions in a crowd, of which there are very many, each depending on all others.
+/// solved together. The work is bounded: a particle with too many collisions in a sub-step is left to resting
+/// contact (particle_contacts.h), which also prevents tunnelling; all particles are if there are too many
+/// collisions in total. Slow collisions in a crowd are left to it, too, because there are very many of them,
+/// and each depends on all others.
 
 #include <functional>
 #include <queue>

@@ -18,8 +18,8 @@ class ContactMaterials {
   /// Returns the number of a material; a new name gets a new number.
   uint32_t number(const std::string& material);
   void add(const ContactRule& rule) { rules_[std::minmax(number(rule.a), number(rule.b))] = rule; }
-  /// The surface of two bodies that meet: by the rule for their materials, or by their own values. Their
-  /// contacts are found by these methods.
+  /// Returns the surface properties of two bodies that meet. Properties that the rule for their materials
+  /// does not give follow from the bodies' own values. `methods`: how the contacts of the bodies are found.
   PairSurface surface(const Body& a, const Body& b, const CollisionMethods& methods) const;
 
  private:

@@ -59,7 +59,8 @@ class CoupledGroup final : public DynamicSystem {
     std::vector<Real> mass;            // masses of these particles
     std::size_t offset;                // index of the first of them in units of 3, after the bodies
 
-    /// Returns the part of an array over the particles of the group that belongs to one system.
+    /// Returns the elements of this system's particles in an array over all particles of the coupled group,
+    /// three numbers for each.
     template <class T>
     std::span<T> part(std::span<T> particles) const {
       return particles.subspan(3 * offset, 3 * members.size());

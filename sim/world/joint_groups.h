@@ -17,7 +17,7 @@ class JointGroups {
   /// Marks the groups as outdated. To be called after a joint or one of its bodies has been added, removed or
   /// broken, or has appeared.
   void note_change() { is_current_ = false; }
-  /// Updates the articulations after changes. Returns whether there were any.
+  /// Rebuilds the articulations if there were changes since the last call. Returns whether there were any.
   bool update();
 
   /// For each articulation the slots of its bodies that can collide and move, ordered so that joined bodies

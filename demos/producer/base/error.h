@@ -26,8 +26,8 @@ struct Problem {
   std::string describe() const;
 };
 
-/// An invalid scene, with the problems found: at most kMostProblems, and one more with the number of the
-/// rest.
+/// An invalid scene, with the problems found. If there are more than kMostProblems, one further entry gives
+/// the number of the others, which are left out.
 class SceneError : public std::runtime_error {
  public:
   explicit SceneError(std::vector<Problem> problems);

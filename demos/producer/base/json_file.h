@@ -12,11 +12,11 @@
 
 namespace offstage::producer {
 
-/// Greatest number of frames in such a file.
+/// Greatest number of frames in a JSON file of offstage.
 inline constexpr int kMostFrames = 1'000'000'000;
 
-/// An object in such a file. A missing key has its default; a key of another type throws render::FileError
-/// "FILE: /key: must be a text, got 3".
+/// An object in a JSON file of offstage. A missing key has its default; a value of the wrong type throws
+/// render::FileError "FILE: /key: must be a text, got 3".
 class JsonObject {
  public:
   JsonObject(std::filesystem::path file, std::string path, nlohmann::json json)

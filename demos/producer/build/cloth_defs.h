@@ -35,7 +35,8 @@ FlatCloth flat_cloth(const Cloth& cloth, const render::Model* model);
 /// Number of vertices of a cloth, without those of cords. `model`: see flat_cloth().
 std::size_t vertex_count(const Cloth& cloth, const render::Model* model);
 
-/// Returns the fabric of a cloth with its changes. Throws std::invalid_argument for an unknown name.
+/// Returns the fabric that a cloth names, with the changes that the cloth makes to it. Throws
+/// std::invalid_argument for an unknown name.
 effects::Fabric fabric_of(const Cloth& cloth);
 /// Names of all fabrics.
 std::vector<std::string> fabric_names();

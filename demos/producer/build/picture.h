@@ -131,8 +131,8 @@ class Picture {
   void points_at(std::size_t set, const Snapshot& previous, const Snapshot& current, float w,
                  double frame_time, bool all, std::vector<render::Point>& points) const;
   void place_points(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
-  /// Returns the rotations of some of the set's current points by contacts, at the fraction w of the frame
-  /// interval; empty if they have none.
+  /// Returns the rotations that contacts have given to `points`, which are some of the points of `now`, at
+  /// the fraction w of the frame interval; empty if the set stores no rotations.
   static std::vector<Eigen::Quaternionf> orientations_at(const PointSet& before, const PointSet& now, float w,
                                                          std::span<const render::Point> points);
   /// `orientations`: rotation of each point, or empty.

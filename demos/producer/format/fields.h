@@ -61,9 +61,9 @@ constexpr Limits over(Real low, Real high) {
 /// Factors of size: with lengths of up to 1e9 m, no derived quantity overflows.
 inline constexpr Limits kScale{.low = 1e-9, .high = 1e9};
 
-/// Narrows the limits of a size, mass or coefficient to the range of its unit: lengths to 1e-9 to 1e9 m,
-/// masses up to 1e30 kg, densities to 1e-12 to 1e12 kg/m^3, coefficients up to 1e30. Limits that do not begin
-/// at 0 stay.
+/// Narrows the limits of a size, mass or coefficient to the range of its unit: lengths to [1e-9, 1e9] m,
+/// masses to at most 1e30 kg, densities to [1e-12, 1e12] kg/m^3, coefficients to at most 1e30. Where 0 itself
+/// is allowed, it stays the lower limit. Limits whose lower end is not 0 are returned unchanged.
 Limits within_unit(Limits limits, std::string_view unit);
 
 struct Required {};

@@ -1,9 +1,10 @@
 #pragma once
-/// Presets: files of emitters and forces that form an effect; scenes name and override them.
+/// Presets: files of emitters and forces that form an effect. A scene uses a preset by its name and can
+/// override its values.
 ///
 /// A preset is a JSON file with a `description`, `emitters` and `forces` in the form of a scene, around the
-/// origin. It is searched by its name in $OFFSTAGE_PRESETS, in share/offstage/presets of the installation, or
-/// in effects/presets of the source; a name that ends with .json is a file relative to the scene.
+/// origin. It is looked up by its name in $OFFSTAGE_PRESETS, in share/offstage/presets of the installation,
+/// or in effects/presets of the source; a name that ends with .json is a file relative to the scene.
 
 #include <cstddef>
 #include <filesystem>

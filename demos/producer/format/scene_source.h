@@ -42,9 +42,9 @@ SceneSource read_source(std::string_view text, const std::string& name, const Sc
 /// Merges `top` into `base`, object by object; an object with a "type" replaces one of another type.
 void merge(Node& base, Node top);
 
-/// Sets "path=value" in the tree. The value is JSON or else a string; the path is as /emitters/0/rate or
-/// emitters.rain.rate. Missing parts of the tree are created, lists with their content in `defaults`. Adds to
-/// `problems` if the path does not exist.
+/// Sets a value of the tree as "path=value" says. A path has the form /emitters/0/rate or emitters.rain.rate;
+/// a value that is not JSON is taken as a string. Missing parts of the tree are created; a missing list gets
+/// the items that it has in `defaults`. Adds to `problems` if the path does not exist.
 void apply_override(SceneSource& source, const std::string& override, const Node& defaults,
                     std::vector<Problem>& problems);
 

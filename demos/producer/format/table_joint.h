@@ -41,7 +41,7 @@ struct Table<JointMotor> {
             {"target", &T::target, "target in degrees or metres, or per second; `keys` override it"},
             {"keys", &T::keys, "targets over time"},
             {"interpolation", &T::interpolation, kInterpolationHelp},
-            {"smooth", &T::smooth, "a `monotone` curve has zero speed at every key"},
+            {"smooth", &T::smooth, "whether a `monotone` curve has zero speed at every key"},
             {"max_effort", &T::max_effort, "greatest torque or force; default: unlimited", "N m or N",
              kNotNegative},
             {"stiffness", &T::stiffness, "stiffness of position control, per radian or metre; 0: rigid",

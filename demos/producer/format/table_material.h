@@ -47,11 +47,11 @@ struct Table<Material> {
         {"pattern_scale", &T::pattern_scale, "size of one cell of the pattern", "m", kPositive},
         {"texture", &T::texture, "image file that multiplies the base colour; empty: none"},
         {"texture_projection", &T::texture_projection,
-         "`surface` lays the texture by the coordinates of the shape or model, once over a primitive's side "
-         "and "
-         "over a cloth; `triplanar` projects it along the three axes of the body, without distortion and "
-         "seams. "
-         "Triplanar is not for cloths"},
+         "`surface` maps the texture by the texture coordinates of the shape or model: one copy covers each "
+         "side "
+         "of a primitive, or a whole cloth. `triplanar` projects it along the three axes of the body, "
+         "without "
+         "distortion or seams. Triplanar is not for cloths"},
         {"texture_scale", &T::texture_scale,
          "size of one copy of the texture: with `surface` a factor of its size, with `triplanar` its width "
          "in "

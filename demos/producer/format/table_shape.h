@@ -78,10 +78,11 @@ struct Table<MeshDecomposition> {
   static Fields<MeshDecomposition> fields() {
     return {
         {"method", &MeshDecomposition::method,
-         "`auto`: exact if that takes at most `max_parts` (64), else approximate; `exact`: with up to 1024 "
-         "parts, else approximate; `approximate`; `hull`: the convex hull as the only part, also of a body "
-         "that is "
-         "not dynamic"},
+         "`exact`: exact convex parts if at most 1024 suffice, else as `approximate`; `approximate`: parts "
+         "within "
+         "`max_error`; `auto`: exact if at most `max_parts` (64) suffice, else approximate; `hull`: only the "
+         "convex "
+         "hull, also for a static or kinematic body, which otherwise collides by its triangles"},
         {"max_error", &MeshDecomposition::max_error,
          "for `approximate`: accepted volume in which the parts and the model differ, as a fraction of the "
          "model's volume; a larger fraction takes fewer parts",
@@ -191,9 +192,9 @@ struct Table<CompoundPart> {
             {"orientation", &T::orientation, "orientation of the part in the body's frame"},
             {"density", &T::density, "density of the part; default: the body's", "kg/m^3", kPositive},
             {"material", &T::material,
-             "name of the material that the part is drawn with; empty: the body's, whose friction and "
-             "restitution "
-             "apply to all parts"}};
+             "name of the material with which the part is drawn; empty: that of the body. Friction and "
+             "restitution are "
+             "always those of the body's material"}};
   }
 };
 template <>

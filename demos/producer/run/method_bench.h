@@ -56,7 +56,7 @@ MethodResult run_method(const std::string& name, const LoadedScene& loaded, cons
 /// Merges two runs of the same method: keeps the shorter time, unless it belongs to a run that ended early.
 void merge(MethodResult& result, const MethodResult& again);
 
-/// A table in aligned columns, or as CSV. The deviation is the deviation from the first result.
+/// The results as a table in aligned columns, or as CSV. Deviations are those from the first result.
 std::string to_text(const std::vector<MethodResult>& results);
 std::string to_csv(const std::vector<MethodResult>& results);
 

@@ -45,7 +45,7 @@ struct FrameFigures {
   std::string state_hash, pixel_hash;
 };
 
-/// Results of a run: the stats object of the command line.
+/// Results of a run. The command line prints them as a JSON object.
 struct RunStats {
   int frames = 0;       ///< written by this run
   int frames_kept = 0;  ///< existing frames that were kept (resume)
@@ -101,8 +101,8 @@ struct RenderJob {
   render::ChannelChoice channels;  ///< channels to write
   /// Stem of the channel files; '#' stands for the frame number, as in render::frame_path.
   std::filesystem::path channels_stem;
-  /// After it returned true the run ends within one frame by render::StoppedError, without output. Several
-  /// threads call it. Empty: never.
+  /// Whether to stop. After it has returned true, the run ends within one frame with render::StoppedError and
+  /// without output. Several threads call it. Empty: the run is never stopped.
   std::function<bool()> stop = {};
 };
 

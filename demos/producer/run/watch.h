@@ -32,10 +32,11 @@ class FileWatch {
 
   /// Whether a file has changed since the construction, or was created or removed.
   bool changed() const;
-  /// Waits at most this time, or until something happens in a folder of the files, or a signal arrives.
+  /// Waits for `limit` at most; less if something happens in a folder that contains one of the files, or if a
+  /// signal arrives.
   void wait(std::chrono::milliseconds limit);
-  /// Waits until the files have not changed for this time, because an editor may write a file in several
-  /// steps.
+  /// Waits until the files have not changed for the duration `still`, because an editor may write a file in
+  /// several steps.
   void settle(std::chrono::milliseconds still);
 
   Method method() const { return fd_ < 0 ? Method::polling : Method::notified; }

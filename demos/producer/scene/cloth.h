@@ -67,7 +67,7 @@ struct SideSeam {
   Side a = Side::left, b = Side::right;
   bool reversed = false;  ///< whether the first vertex of one side is sewn to the last of the other
 };
-/// The vertices nearest to two points.
+/// A seam between the two vertices nearest to the points `a` and `b`.
 struct PointSeam {
   Where where;
   Vec3 a = Vec3::Zero(), b = Vec3::Zero();

@@ -34,7 +34,7 @@
 
 namespace offstage::producer {
 
-/// `bounds` is a cube around the origin.
+/// The scene key `world`. In a scene, `bounds` is always a cube around the origin.
 struct WorldSettings : sim::WorldDef {
   uint64_t seed = 1;
 };
