@@ -79,10 +79,11 @@ struct Table<MeshDecomposition> {
     return {
         {"method", &MeshDecomposition::method,
          "`exact`: exact convex parts if at most 1024 suffice, else as `approximate`; `approximate`: parts "
-         "within "
-         "`max_error`; `auto`: exact if at most `max_parts` (64) suffice, else approximate; `hull`: only the "
-         "convex "
-         "hull, also for a static or kinematic body, which otherwise collides by its triangles"},
+         "within `max_error`; `auto`: exact if at most `max_parts` (64) suffice, else approximate; `hull`: "
+         "only "
+         "the convex hull. A static or kinematic body without exact parts collides by its triangles, unless "
+         "the "
+         "method is `hull`"},
         {"max_error", &MeshDecomposition::max_error,
          "for `approximate`: accepted volume in which the parts and the model differ, as a fraction of the "
          "model's volume; a larger fraction takes fewer parts",
