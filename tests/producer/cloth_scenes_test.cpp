@@ -26,7 +26,8 @@ std::vector<std::string> gallery() {
   return names;
 }
 
-/// Points behind the surface of a body; of meshes the simulation's own figure says it.
+/// Points behind the surface of a body by more than rounding: cords end on surfaces. Of meshes the
+/// simulation's own figure says it.
 std::size_t points_inside(const sim::World& world, const sim::ClothView& cloth) {
   std::size_t count = 0;
   world.for_each_body([&](sim::BodyHandle handle) {
@@ -34,7 +35,7 @@ std::size_t points_inside(const sim::World& world, const sim::ClothView& cloth) 
     if (!def.collides || std::holds_alternative<sim::MeshShape>(def.shape)) return;
     const sim::Pose pose = world.body(handle).pose;
     for (const sim::Vec3& p : cloth.points)
-      count += sim::signed_distance(sim::Solid{&def.shape, nullptr}, pose.point_to_body(p)).distance < 0;
+      count += sim::signed_distance(sim::Solid{&def.shape, nullptr}, pose.point_to_body(p)).distance < -1e-12;
   });
   return count;
 }
@@ -72,7 +73,7 @@ TEST_P(LongClothScene, KeepsClothOutOfBodiesAndOfItself) {
     ASSERT_EQ(inside, 0u) << "frame " << i;
     ASSERT_EQ(crossed_pairs(simulation), 0u) << "frame " << i;
   }
-  EXPECT_EQ(simulation.totals().cloth.penetration, 0);
+  EXPECT_LT(simulation.totals().cloth.penetration, 1e-12);
 }
 
 INSTANTIATE_TEST_SUITE_P(Long, LongClothScene, ::testing::ValuesIn(gallery()),
