@@ -99,14 +99,7 @@ class Pieces {
     row.softness /= rest;
     if (!now) return;
     if (row.softness > 0 || std::isfinite(row.lower)) row.lower = row.upper = 0;
-    row.target = row.offset + row_speed(row, bodies_);
-  }
-  static Real row_speed(const BoundedRow& row, std::span<const ContactBody> bodies) {
-    Real u = 0;
-    for (const auto& [body, on] : {std::pair(row.a, &row.on_a), std::pair(row.b, &row.on_b)})
-      if (body != kUnmoved)
-        u += on->head<3>().dot(bodies[body].velocity) + on->tail<3>().dot(bodies[body].angular_velocity);
-    return u;
+    row.target = row_speed(row, bodies_);
   }
   /// Adds a part of the impulses of the last solution.
   void add_impulses(Real part) {

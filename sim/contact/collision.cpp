@@ -168,14 +168,6 @@ Real approach(const Contact& c, std::span<const ContactBody> bodies) {
   return std::max(0.0, -c.relative_velocity(bodies).x());
 }
 
-Real speed(const BoundedRow& r, std::span<const ContactBody> bodies) {
-  Real u = r.offset;
-  for (const auto& [body, on] : {std::pair(r.a, &r.on_a), std::pair(r.b, &r.on_b)})
-    if (body != kUnmoved)
-      u += on->head<3>().dot(bodies[body].velocity) + on->tail<3>().dot(bodies[body].angular_velocity);
-  return u;
-}
-
 /// Limit of a solution's work: unlimited, or a bounded number of operations.
 enum class Effort : uint8_t { full, bounded };
 
@@ -222,7 +214,7 @@ class Cluster {
         before_(bodies.begin(), bodies.end()) {
     for (const Contact& c : contacts) velocities_.push_back(c.relative_velocity(bodies));
     for (BoundedRow& r : joints.bounded)
-      if (r.resists_change) r.target = speed(r, bodies);
+      if (r.resists_change) r.target = row_speed(r, bodies);
   }
 
   ContactWork solve() {
@@ -334,7 +326,7 @@ class Cluster {
       size += contacts_[i].impulse.norm() * velocities_[i].norm();
     Real energy = sim::added_energy(before_, bodies_, contacts_);
     for (const BoundedRow& r : joints_.bounded)
-      if (r.resists_change) energy += r.impulse * (r.target + speed(r, bodies_)) / 2;
+      if (r.resists_change) energy += r.impulse * (r.target + row_speed(r, bodies_)) / 2;
     return energy - kRounding * static_cast<Real>(kDense) * size;
   }
 
@@ -349,7 +341,7 @@ class Cluster {
     for (const BoundedRow& r : joints_.bounded)
       if (r.resists_change) {
         first += r.impulse * r.target;
-        second += r.impulse * (speed(r, bodies_) - r.target) / 2;
+        second += r.impulse * (row_speed(r, bodies_) - r.target) / 2;
       }
     const Real factor = first < 0 ? std::min(1.0, -first / second) : 0;
     for (Contact& c : contacts_) c.impulse *= factor;

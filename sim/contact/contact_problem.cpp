@@ -115,6 +115,14 @@ void apply_moment(const Contact& c, const Vec3& moment, std::span<ContactBody> b
   bodies[c.b].angular_velocity -= bodies[c.b].inverse_inertia * m;
 }
 
+Real row_speed(const BoundedRow& row, std::span<const ContactBody> bodies) {
+  Real u = row.offset;
+  for (const auto& [body, on] : {std::pair(row.a, &row.on_a), std::pair(row.b, &row.on_b)})
+    if (body != kUnmoved)
+      u += on->head<3>().dot(bodies[body].velocity) + on->tail<3>().dot(bodies[body].angular_velocity);
+  return u;
+}
+
 Real residual(std::span<const ContactBody> bodies, std::span<const Contact> contacts) {
   Real worst = 0;
   for (const Contact& c : contacts) worst = std::max(worst, violation(c, bodies));

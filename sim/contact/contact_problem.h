@@ -22,6 +22,7 @@
 #include <tuple>
 #include <vector>
 
+#include "sim/articulation/joint_problem.h"
 #include "sim/collision/contact_frame.h"
 #include "sim/core/figures.h"
 #include "sim/core/types.h"
@@ -90,6 +91,9 @@ void apply(const Contact& contact, const Vec3& impulse, std::span<ContactBody> b
 
 /// Adds an angular impulse in the contact's frame to its bodies.
 void apply_moment(const Contact& contact, const Vec3& moment, std::span<ContactBody> bodies);
+
+/// u of a row of a joint: its relative velocity, offset included [m/s] or [rad/s].
+Real row_speed(const BoundedRow& row, std::span<const ContactBody> bodies);
 
 /// Residual of an approximate solution: the greatest violation of the conditions above [m/s]. Impulses are
 /// converted to velocities by |K| p.

@@ -21,9 +21,7 @@ constexpr Real kAligned = 0.995;
 Vec3 core_point(const Body& body, const Vec3& place) {
   const Shape& shape = body.def.shape;
   if (std::holds_alternative<Sphere>(shape)) return body.start_pose.position;
-  if (!std::holds_alternative<Capsule>(shape) && !std::holds_alternative<Cylinder>(shape) &&
-      !std::holds_alternative<Cone>(shape) && !std::holds_alternative<Frustum>(shape))
-    return place;
+  if (!is_round_about_axis(shape)) return place;
   const Vec3 local = body.start_pose.point_to_body(place);
   return body.start_pose.point_to_world(Vec3(0, local.y(), 0));
 }

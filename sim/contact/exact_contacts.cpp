@@ -46,9 +46,7 @@ Real turning_of_corners(const Body& body) {
   const Vec3& spin = body.start_twist.angular_velocity;
   const Shape& shape = body.def.shape;
   if (std::holds_alternative<Sphere>(shape)) return 0;
-  if (!std::holds_alternative<Capsule>(shape) && !std::holds_alternative<Cylinder>(shape) &&
-      !std::holds_alternative<Cone>(shape) && !std::holds_alternative<Frustum>(shape))
-    return spin.norm();
+  if (!is_round_about_axis(shape)) return spin.norm();
   const Vec3 axis = body.start_pose.vector_to_world(Vec3::UnitY());
   return (spin - spin.dot(axis) * axis).norm();
 }
@@ -141,16 +139,9 @@ bool ExactContacts::solve_lcp(ContactWork& work) {
 bool ExactContacts::is_safe(const ContactWork& work) const {
   if (work.fallbacks > 0 && work.residual > kRough) return false;
   Real energy = added_energy(free_, bodies_, contacts_);
-  const auto power = [](const BoundedRow& r, std::span<const ContactBody> bodies) {
-    Real u = r.offset;
-    for (const auto& [body, on] : {std::pair(r.a, &r.on_a), std::pair(r.b, &r.on_b)})
-      if (body != kUnmoved)
-        u += on->head<3>().dot(bodies[body].velocity) + on->tail<3>().dot(bodies[body].angular_velocity);
-    return r.impulse * u;
-  };
   // Limits have one finite bound; motors and friction have two, and motors of any strength none.
   for (const BoundedRow& r : joints_.bounded())
-    if (const Real gain = (power(r, free_) + power(r, bodies_)) / 2;
+    if (const Real gain = (r.impulse * row_speed(r, free_) + r.impulse * row_speed(r, bodies_)) / 2;
         std::isfinite(r.lower) != std::isfinite(r.upper) || gain < 0)
       energy += gain;
   if (energy <= 0) return true;

@@ -59,12 +59,6 @@ SurfaceDistance piece_distance(const CollisionShape& shape, uint32_t piece, cons
 /// The start and the end of an interval.
 constexpr bool kBothEnds[] = {false, true};
 
-/// Whether bodies of a shape lie on a line of their surface.
-bool lies_on_lines(const Shape& shape) {
-  return std::holds_alternative<Capsule>(shape) || std::holds_alternative<Cylinder>(shape) ||
-         std::holds_alternative<Cone>(shape) || std::holds_alternative<Frustum>(shape);
-}
-
 /// A manifold seen from body X, which it shares with other manifolds; Y is the other body. What the
 /// comparisons of all views with each other use is stored.
 struct View {
@@ -205,7 +199,7 @@ class BodyContacts {
     const Vec3 at_end = pose(y, true).point_to_world(pose(y, false).point_to_body(known.on_y(known.deepest)));
     if (up.dot(v.on_y(k) - at_end) > flush_) return false;
     // The tiles divide the line on which X lies differently at the end.
-    const bool between = known.pair != v.pair || lies_on_lines(x_.def.shape);
+    const bool between = known.pair != v.pair || is_round_about_axis(x_.def.shape);
     ContactPoint point = v.m->points[k];
     if (known.x_is_a != v.x_is_a) std::swap(point.on_a, point.on_b);
     return known.pair->predicts(known.pair->manifolds()[known.index],
