@@ -40,7 +40,7 @@ GpuPicture picture_of(const Point& point, const PointsDef& def, float random_num
 }
 
 Vector4f style_of(const PointsDef& def) {
-  return {std::clamp(def.softness, 0.01f, 1.0f), def.stretch_s, def.lit ? 1.0f : 0.0f,
+  return {std::clamp(def.softness, 0.01f, 1.0f), def.stretch_s, def.lit ? 1.0f : -1.0f,
           def.additive ? 1.0f : 0.0f};
 }
 
@@ -116,8 +116,9 @@ PointsPass::PointsPass() : vertex_array_(gl::make_vertex_array()), blended_array
   }
   gl::set_attribute(blended_array_, 3, 0, 4, offsetof(BlendedPoint, style));
   gl::set_attribute(blended_array_, 4, 0, 4, offsetof(BlendedPoint, picture));
-  gl::set_attribute(blended_array_, 5, 0, 4, offsetof(BlendedPoint, light));
-  gl::set_attribute(blended_array_, 6, 0, 2, offsetof(BlendedPoint, size_px));
+  for (GLuint c = 0; c < 3; ++c)
+    gl::set_attribute(blended_array_, 5 + c, 0, 4, offsetof(BlendedPoint, light) + c * sizeof(Vector4f));
+  gl::set_attribute(blended_array_, 8, 0, 2, offsetof(BlendedPoint, size_px));
 }
 
 void PointsPass::prepare(PointSet& set, const View& view) {
@@ -161,7 +162,8 @@ void PointsPass::prepare_blended(const PaintOrder& order, const PuffLight& light
         picture_runs_.push_back({blended_.size(), pictures.texture});
       const auto layer = static_cast<float>(pictures.first_layer);
       blended_.push_back({at.set->points[at.index], style_of(at.set->def),
-                          at.set->turns[at.index] + Vector4f(0, layer, layer, 0), Vector4f::Zero(), size_px});
+                          at.set->turns[at.index] + Vector4f(0, layer, layer, 0),
+                          Eigen::Matrix<float, 4, 3>::Zero(), size_px});
     }
     return static_cast<uint32_t>(keys.size());
   };
@@ -171,11 +173,13 @@ void PointsPass::prepare_blended(const PaintOrder& order, const PuffLight& light
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blended_.size(), 256), [&](const auto& range) {
     for (std::size_t k = range.begin(); k < range.end(); ++k) {
       BlendedPoint& p = blended_[k];
-      if (p.style.z() == 0) continue;  // not lit
+      if (p.style.z() < 0) continue;  // not lit
       const Vector3f place = p.point.position.head<3>();
       const float radius = p.point.position.w(), number = p.point.velocity.w();
-      p.light << light.air.lamps_around(place, radius, number),
-          light.air.sun(place, radius, number) * std::exp(-light.grid.depth(place));
+      p.style.z() = light.air.sun(place, radius, number) * std::exp(-light.grid.depth(place));
+      const AirRadiance around = light.around.at(place).light;
+      const Vector3f constant = around.constant + light.air.lamps_around(place, radius, number);
+      p.light << constant.transpose(), around.slope.transpose();
     }
   });
   blended_buffer_.write(std::span<const BlendedPoint>(blended_));

@@ -26,9 +26,11 @@ using GpuPicture = Vector4f;
 /// A sprite or flake of any set.
 struct BlendedPoint {
   GpuPoint point;
-  Vector4f style;
+  Vector4f style;  ///< softness, stretch [s]; fraction of the sun that is visible, or -1: not lit; additive
   GpuPicture picture;
-  Vector4f light;                       ///< light of lamps; w: fraction of the sun's light that reaches it
+  /// Light of lamps and from around, a column for each of red, green and blue: the constant and the slope of
+  /// an AirRadiance.
+  Eigen::Matrix<float, 4, 3> light;
   Vector2f size_px = Vector2f::Ones();  ///< size of its picture
 };
 

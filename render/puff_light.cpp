@@ -16,11 +16,17 @@ float sun_fraction(float depth, float albedo) {
 }  // namespace
 
 PuffLight::PuffLight(const OpacityGrid& opacity, const FrameUniforms& frame_uniforms,
-                     const SkyModel& sky_model, const Vector3f& sun_direction, const AirLight& air_light)
-    : grid(opacity), frame(frame_uniforms), air(air_light), sky(sky_model), to_sun(sun_direction) {}
+                     const SkyModel& sky_model, const Vector3f& sun_direction, const AirLight& air_light,
+                     const AirField& light_around)
+    : grid(opacity),
+      frame(frame_uniforms),
+      air(air_light),
+      around(light_around),
+      sky(sky_model),
+      to_sun(sun_direction) {}
 
-PuffRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vector3f& albedo, float number,
-                                 const Vector3f& to_eye) const {
+AirRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vector3f& albedo, float number,
+                                const Vector3f& to_eye) const {
   // Optical depth and its gradient, from the corners of a tetrahedron in the puff.
   static const std::array<Vector3f, 4> kCorners = {Vector3f(1, 1, 1), Vector3f(1, -1, -1),
                                                    Vector3f(-1, 1, -1), Vector3f(-1, -1, 1)};
@@ -32,7 +38,7 @@ PuffRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vect
     depth += 0.25f * d;
     slope += d / (4 * reach) * corner;
   }
-  // Smoke above reduces the light of the sky. Steps grow, because distant smoke needs no detail.
+  // Smoke above reduces the light from around. Steps grow, because distant smoke needs no detail.
   float above = 0, step = grid.cell_m();
   Vector3f p = place;
   for (int k = 0; k < 4 && !grid.empty(); ++k, step *= 2) {
@@ -50,9 +56,10 @@ PuffRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vect
   const Vector3f sun = air.sun(place, radius, number) * frame.sun_radiance.head<3>();
   const float sky_fraction = 0.25f + 0.75f * std::exp(-0.6f * above);
 
-  PuffRadiance result;
+  const AirRadiance lit_around = around.at(place).light;
+  AirRadiance result;
   result.constant = sun * (0.68f * middle + 0.9f * direct * forward2 * forward2 * forward2) +
-                    sky_fraction * frame.irradiance_at(0);
+                    sky_fraction * lit_around.constant;
   Vector3f towards_light = 0.36f * direct * to_sun;
   if (steepness > 1e-6f) towards_light -= 0.65f * (light - dark) / steepness * slope;
   result.slope = sun * towards_light.transpose();
@@ -60,9 +67,7 @@ PuffRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vect
     result.constant += 0.3f * lamp;
     result.slope += 0.3f * lamp * towards.transpose();
   });
-  result.slope.col(0) += sky_fraction * frame.irradiance_at(3);
-  result.slope.col(1) += sky_fraction * frame.irradiance_at(1);
-  result.slope.col(2) += sky_fraction * frame.irradiance_at(2);
+  result.slope += sky_fraction * lit_around.slope;
   return result;
 }
 

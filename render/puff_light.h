@@ -7,30 +7,27 @@
 #include "render/frame.h"
 #include "render/opacity_grid.h"
 #include "render/sky.h"
+#include "render/trace/air_field.h"
 #include "render/trace/air_light.h"
 
 namespace offstage::render {
-
-/// Radiance of a white puff at a point with normal n (world direction): constant + slope * n, per channel.
-struct PuffRadiance {
-  Vector3f constant = Vector3f::Zero();
-  Eigen::Matrix3f slope = Eigen::Matrix3f::Zero();  ///< rows: red, green, blue
-};
 
 /// The lighting that all puffs of a sub-frame share.
 struct PuffLight {
   const OpacityGrid& grid;
   const FrameUniforms& frame;
   const AirLight& air;
+  const AirField& around;
   SkyModel sky;
   Vector3f to_sun;
 
   /// `sky_model` must have the direction of the sun in this sub-frame.
   PuffLight(const OpacityGrid& opacity, const FrameUniforms& frame_uniforms, const SkyModel& sky_model,
-            const Vector3f& sun_direction, const AirLight& air_light);
-  /// Returns the radiance of a puff at a place. `number`: see AirLight::sun.
-  PuffRadiance radiance(const Vector3f& place, float radius, const Vector3f& albedo, float number,
-                        const Vector3f& to_eye) const;
+            const Vector3f& sun_direction, const AirLight& air_light, const AirField& light_around);
+  /// Returns the radiance of a white puff at a place, as a function of the normal of its surface. `number`:
+  /// see AirLight::sun.
+  AirRadiance radiance(const Vector3f& place, float radius, const Vector3f& albedo, float number,
+                       const Vector3f& to_eye) const;
   /// Sky light on a white surface with this normal, as in shaders/sky.glsl.
   Vector3f ambient(const Vector3f& normal) const;
   /// Light of the sky that a surface of this roughness reflects, when a mirror would show this direction.

@@ -161,7 +161,7 @@ void light_puff(const PointSet& set, std::size_t i, const Vector3f& eye,
   const Vector4f fog = light.fog_to(center);
   const Vector3f haze = s.cover * fog.head<3>();
   const Vector3f albedo = point.color.head<3>();
-  PuffRadiance radiance;
+  AirRadiance radiance;
   Eigen::Matrix3f by_cell_normal = Eigen::Matrix3f::Zero();
   if (set.def.style == PointStyle::fire) {
     const float turn = Shape(point.velocity.w()).turn;

@@ -11,6 +11,21 @@ namespace {
 // Texture units of shaders/sky.glsl and sky.frag.
 constexpr GLuint kSkyLevelsUnit = 23, kSkyBackgroundUnit = 24;
 
+/// The particles that the light around them changes.
+std::vector<AirField::Ball> lit_particles(const PaintOrder& order) {
+  std::vector<AirField::Ball> result;
+  using enum PaintOrder::Kind;
+  for (const PaintOrder::Kind kind : {puffs, sprites, flakes, streaks}) {
+    for (const uint64_t key : order.keys(kind)) {
+      const PaintOrder::Place at = order.place(kind, key);
+      const GpuPoint& point = at.set->points[at.index];
+      if (at.set->def.lit && at.set->def.style != PointStyle::fire)
+        result.push_back({point.position.head<3>(), point.velocity.w()});
+    }
+  }
+  return result;
+}
+
 }  // namespace
 
 // The sky and its picture as textures.
@@ -325,9 +340,13 @@ void Stage::Impl::draw_translucent(std::span<const Cloth* const> sheets, std::sp
   probe_surfaces(bodies, sets, frame, regions);
   paint_order.build(sets, regions, view);
   const AirLight air(light_pass.scene(), light_sources, offsets);
+  AirRadiance open{.constant = frame.irradiance_at(0)};
+  open.slope << frame.irradiance_at(3), frame.irradiance_at(1), frame.irradiance_at(2);
+  const AirField around(LightTracer(light_pass.scene(), light_sources), offsets, lit_particles(paint_order),
+                        open);
   SkyModel sky_of_frame = sky;
   sky_of_frame.sun_direction = frame.sun_direction.head<3>();
-  const PuffLight light(puffs_pass.grid(), frame, sky_of_frame, sun.direction.normalized(), air);
+  const PuffLight light(puffs_pass.grid(), frame, sky_of_frame, sun.direction.normalized(), air, around);
   points_pass.prepare_blended(paint_order, light);
   puffs_pass.prepare_splats(paint_order, view, light);
   streaks_pass.prepare(paint_order, view, light, offsets.index == 0);

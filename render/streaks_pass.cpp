@@ -12,10 +12,12 @@ constexpr float kNearestStreak = 0.016f;
 constexpr float kThinnest_px = 0.6f;  // radius; thinner streaks are drawn with this radius and fainter
 
 // A drop stretched by its motion: it refracts the sky behind it, and is bright when the sun is behind it.
-Vector3f drop_light(const PuffLight& light, const GpuPoint& point, const Vector3f& to_eye) {
+Vector3f drop_light(const PuffLight& light, const GpuPoint& point, const Vector3f& to_eye,
+                    const AirLightAround& around) {
   const Vector3f place = point.position.head<3>();
   const float radius = point.position.w(), number = point.velocity.w();
-  const Vector3f through = 0.5f * (light.sky_reflection(-to_eye, 0.25f) + light.ambient(Vector3f::UnitY()));
+  const Vector3f through =
+      0.5f * (around.sky * light.sky_reflection(-to_eye, 0.25f) + around.light.at(Vector3f::UnitY()));
   const float forward = 0.5f - 0.5f * light.to_sun.dot(to_eye);
   const float forward2 = forward * forward, forward8 = forward2 * forward2 * forward2 * forward2;
   const float visibility = light.air.sun(place, radius, number) * std::exp(-light.grid.depth(place));
@@ -38,10 +40,11 @@ StreakLight light_of(const GpuPoint& point, const PointsDef& def, const View& vi
   const Vector3f own = point.color.head<3>(), haze = cover * fog.head<3>();
   Vector3f middle = own, left = own, right = own;
   if (def.lit) {
-    middle = own.cwiseProduct(drop_light(light, point, to_eye));
+    const AirLightAround around = light.around.at(center);
+    middle = own.cwiseProduct(drop_light(light, point, to_eye, around));
     const Vector3f across = along.y() * view.right - along.x() * view.up;
-    left = light.sky_reflection((-across - 0.6f * to_eye).normalized(), 0.1f);
-    right = light.sky_reflection((across - 0.6f * to_eye).normalized(), 0.1f);
+    left = around.sky * light.sky_reflection((-across - 0.6f * to_eye).normalized(), 0.1f);
+    right = around.sky * light.sky_reflection((across - 0.6f * to_eye).normalized(), 0.1f);
   }
   StreakLight s;
   for (int c = 0; c < 3; ++c) {

@@ -3,11 +3,11 @@ layout(location = 0) in vec4 in_position;  // w: radius
 layout(location = 1) in vec4 in_velocity;  // w: random number in [0, 1)
 layout(location = 2) in vec4 in_color;
 #if STYLE != 2
-layout(location = 3) in vec4 style;       // softness, stretch [s], lit, additive
+layout(location = 3) in vec4 style;       // softness, stretch [s]; fraction of the sun, or -1: not lit; additive
 layout(location = 4) in vec4 in_picture;  // angle, two layers of the sheet, fraction of the second one
-layout(location = 5) in vec4 in_light;    // of lamps; w: fraction of the sun that reaches the particle
+layout(location = 5) in vec4 in_light[3]; // of lamps and from around: constant and slope of red, green, blue
 #ifdef PICTURES
-layout(location = 6) in vec2 in_size;     // of the picture, which is in the corner of its layer [px]
+layout(location = 8) in vec2 in_size;     // of the picture, which is in the corner of its layer [px]
 #endif
 #endif
 
@@ -42,6 +42,14 @@ vec4 viewer_of(vec3 p) {
   return vec4(to_eye / distance, frame.eye.w * distance);
 }
 
+#if STYLE != 2
+// The light of lamps and from around on a white surface with this normal.
+vec3 light_around(vec3 n) {
+  vec4 at = vec4(1.0, n);
+  return max(vec3(dot(in_light[0], at), dot(in_light[1], at), dot(in_light[2], at)), 0.0);
+}
+#endif
+
 #if STYLE == 0
 // A puff is a soft ball: bright towards the light, and brighter still against it.
 vec3 puff_light(vec3 n, vec3 to_viewer) {
@@ -49,13 +57,13 @@ vec3 puff_light(vec3 n, vec3 to_viewer) {
   float forward = saturate(-dot(l, to_viewer)), forward2 = forward * forward;
   float phase = max(0.45 + 0.35 * dot(n, l) + 0.8 * forward2 * forward2, 0.0);
   // Some light reaches the shadow of a cloud from all sides.
-  return ambient(n) + frame.sun_radiance.rgb * (phase * mix(0.2, 1.0, in_light.w));
+  return light_around(n) + frame.sun_radiance.rgb * (phase * mix(0.2, 1.0, style.z));
 }
 #elif STYLE == 5
 // Ice and dust transmit light in all directions, most of it forwards.
 vec3 flake_light(vec3 to_viewer) {
   float forward = saturate(-dot(frame.sun_direction.xyz, to_viewer)), forward2 = forward * forward;
-  return ambient(vec3(0.0, 0.5, 0.0)) + frame.sun_radiance.rgb * (in_light.w * (0.4 + 0.8 * forward2 * forward2));
+  return light_around(vec3(0.0, 0.5, 0.0)) + frame.sun_radiance.rgb * (style.z * (0.4 + 0.8 * forward2 * forward2));
 }
 #endif
 
@@ -125,13 +133,13 @@ void main() {
   light = vec4(in_color.rgb, alpha * saturate(0.5 * (gl_Position.w - uniforms.depth.z) / drawn));
   reach = drawn;
   rim = vec2(style.x, style.w);
-  if (style.z != 0.0) {
+  if (style.z >= 0.0) {
 #if STYLE == 0
     vec3 shine = puff_light(normalize(u * corner.x + w * corner.y + 0.7 * viewer.xyz), viewer.xyz);
 #elif STYLE == 5
     vec3 shine = flake_light(viewer.xyz);
 #endif
-    light.rgb *= shine + in_light.rgb;
+    light.rgb *= shine;
   }
 #ifdef PICTURES
   light.rgb *= fog.w;

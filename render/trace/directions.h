@@ -56,6 +56,13 @@ Three<T> cosine_direction(const Three<T>& n, const SquarePoint<T>& uv) {
   return normalized(a * d.x + b * d.y + n * up);
 }
 
+/// A direction, all of which are equally likely.
+inline Eigen::Vector3f even_direction(const SquarePoint<float>& uv) {
+  const float y = 1 - 2 * uv.x, across = std::sqrt(std::max(1 - y * y, 0.0f));
+  const float turn = 2 * std::numbers::pi_v<float> * uv.y;
+  return {across * std::cos(turn), y, across * std::sin(turn)};
+}
+
 /// A normal of the microfacets that are visible from `view`, for GGX with a = roughness^2 (J. Dupuy and
 /// A. Benyoub, "Sampling Visible GGX Normals with Spherical Caps", 2023).
 Eigen::Vector3f visible_facet(const Eigen::Vector3f& n, const Eigen::Vector3f& view, float a,

@@ -8,6 +8,7 @@ namespace {
 
 constexpr int kMostBounces = 16;       // between diffuse surfaces
 constexpr int kMostSteps = 32;         // along a path, mirrors and glass included
+constexpr int kAirRays = 8;            // from each point in the air
 constexpr float kSmoothMetal = 0.35f;  // with less roughness, a path goes on in the mirrored direction
 
 float fresnel_of_glass(float cosine, float ratio) {
@@ -302,6 +303,55 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
     path.cone = 0.5f;
   }
   return light;
+}
+
+// The fraction of the sky's light that arrives is the sum over the rays that meet nothing, divided by the sum
+// over all rays. Where nothing is in the way, the light is therefore that of the open sky without noise.
+AirLightAround LightTracer::trace_air(const Vector3f& place, float number, const SampleOffsets& offsets,
+                                      const AirRadiance& open) const {
+  const auto bits = static_cast<uint32_t>(number * 0x1p24f);
+  AirRadiance all, arrived, from_objects;
+  const auto add = [](AirRadiance& sum, const Vector3f& radiance, const Vector3f& direction) {
+    sum.constant += radiance / kAirRays;
+    sum.slope += 2.0f / kAirRays * radiance * direction.transpose();
+  };
+  float above = 0, above_arrived = 0;
+  LightSums removed;
+  for (int k = 0; k < kAirRays; ++k) {
+    PixelSampler sampler(bits >> 12, bits & 4095, kAirRays * offsets.index + k, kAirRays * offsets.count);
+    Path path{.from = place, .direction = even_direction(sampler.next()), .cone = 0.5f};
+    path.scatter(Vector3f::Zero(), path.direction);
+    const Vector3f direction = path.direction, there = sky_met(direction, false, -1);
+    float met = kFar;
+    const FoundLight found = radiance(path, sampler, nullptr, &met);
+    const bool free = met == kFar;
+    if (!free) add(from_objects, found.limited(removed), direction);
+    if (free) add(arrived, there, direction);
+    add(all, there, direction);
+    if (direction.y() > 0) above += there.sum();
+    if (direction.y() > 0 && free) above_arrived += there.sum();
+    if (k > 0 || sources_.glow.empty()) continue;
+    const float choice = sampler.next().x;
+    const GlowSample sample = sources_.glow.sample(place, Vector3f::Zero(), choice, sampler.next());
+    if (!(sample.density > 0)) continue;
+    const Vector3f seen = scene_.transmittance(place, sample.towards, kBeforeGlow * sample.distance);
+    add(from_objects,
+        kAirRays * kEvenDensity / (sample.density + kEvenDensity) * seen.cwiseProduct(sample.radiance),
+        sample.towards);
+  }
+  AirLightAround result{.light = {}, .sky = above > 0 ? above_arrived / above : 1};
+  for (int c = 0; c < 3; ++c) {
+    const float fraction = all.constant[c] > 0 ? arrived.constant[c] / all.constant[c] : 1;
+    float& constant = result.light.constant[c];
+    constant = fraction * open.constant[c] + from_objects.constant[c];
+    auto slope = result.light.slope.row(c);
+    slope = fraction * open.slope.row(c) + arrived.slope.row(c) - fraction * all.slope.row(c) +
+            from_objects.slope.row(c);
+    // With few rays, the slope can be so steep that one side would be darker than dark.
+    const float steepness = slope.norm();
+    if (steepness > constant) slope *= constant / steepness;
+  }
+  return result;
 }
 
 }  // namespace offstage::render

@@ -33,6 +33,9 @@ Vector3f enter(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Ve
 /// `normal`: shading normal of the surface; `face`: normal of its triangle.
 Vector3f light_of_glow(const GlowSample& sample, const Vector3f& normal, const Vector3f& face);
 
+/// Probability density of a direction, if all are equally likely [1/sr].
+inline constexpr float kEvenDensity = 0.25f / std::numbers::pi_v<float>;
+
 /// Surfaces with less roughness^2 mirror and refract a single direction.
 inline constexpr float kSharp = 0.002f;
 
@@ -63,30 +66,34 @@ struct LightTracer::Path {
   /// Probability density of the direction [1/sr] if the bright part of the sky was sampled, too; else
   /// negative.
   float density = -1;
-  /// The last point at which it left a diffuse surface, whose light from glowing meshes is also sampled. A
-  /// normal of zero: there was no such surface.
-  Vector3f diffuse_place = Vector3f::Zero(), diffuse_normal = Vector3f::Zero();
+  /// The last point whose light from glowing meshes is also sampled: on a diffuse surface with this normal,
+  /// or in the air, where the normal is zero.
+  Vector3f sampled_place = Vector3f::Zero(), sampled_normal = Vector3f::Zero();
+  bool glow_is_sampled = false;  ///< whether there was such a point
 
-  /// Leaves a diffuse surface.
+  /// Leaves a diffuse surface, or a point in the air if the normal is zero.
   void scatter(const Vector3f& normal, const Vector3f& outgoing) {
-    diffuse_place = from;
-    diffuse_normal = normal;
+    sampled_place = from;
+    sampled_normal = normal;
+    glow_is_sampled = true;
     direction = outgoing;
     by_chance = true;
     density = -1;
   }
   /// Weight of the glow that a ray meets by chance at a hit, because Glow::sample() finds the same light.
   float fraction_of_glow(const Hit& hit, const Glow& glow) const {
-    if (glow.empty() || diffuse_normal.isZero()) return 1;
-    const Vector3f outgoing = (hit.position - diffuse_place).normalized();
-    const float own = std::max(outgoing.dot(diffuse_normal), 1e-3f) / std::numbers::pi_v<float>;
-    return own / (own + glow.density(diffuse_place, diffuse_normal, hit));
+    if (glow.empty() || !glow_is_sampled) return 1;
+    const Vector3f outgoing = (hit.position - sampled_place).normalized();
+    const float own = sampled_normal.isZero()
+                          ? kEvenDensity
+                          : std::max(outgoing.dot(sampled_normal), 1e-3f) / std::numbers::pi_v<float>;
+    return own / (own + glow.density(sampled_place, sampled_normal, hit));
   }
   /// Leaves a surface in a mirrored direction.
   void turn(const Vector3f& outgoing, const Hit& hit) {
     mirrored = true;
     density = -1;
-    diffuse_normal.setZero();
+    glow_is_sampled = false;
     direction = outgoing.dot(hit.face) > 0 ? outgoing : reflected(outgoing, hit.face);
     from = off_surface(hit.position, hit.face);
   }

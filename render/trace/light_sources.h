@@ -20,6 +20,20 @@ struct LightSources {
   const OpacityGrid* smoke = nullptr;  ///< null: none
 };
 
+/// Light at a point in the air, as the radiance of a white surface there with unit normal n: constant +
+/// slope * n, per channel.
+struct AirRadiance {
+  Vector3f constant = Vector3f::Zero();
+  Eigen::Matrix3f slope = Eigen::Matrix3f::Zero();  ///< rows: red, green, blue
+  Vector3f at(const Vector3f& normal) const { return (constant + slope * normal).cwiseMax(0.0f); }
+};
+
+/// Light at a point in the air from everything but the sun's disc and lamps.
+struct AirLightAround {
+  AirRadiance light;
+  float sky = 1;  ///< fraction of the sky's light from above the horizon that arrives
+};
+
 /// The disc of the sun.
 class SunDisc {
  public:

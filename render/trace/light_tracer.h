@@ -103,6 +103,11 @@ class LightTracer {
   void trace_glass(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
                    const VisibleLight& behind, GlassBuffer& glass) const;
 
+  /// Traces the light that a point in the air receives from everything but the sun's disc and lamps.
+  /// `number`, in [0, 1), selects the rays. `open`: the light of the sky where nothing hides it.
+  AirLightAround trace_air(const Vector3f& place, float number, const SampleOffsets& offsets,
+                           const AirRadiance& open) const;
+
  private:
   struct Point;   ///< a visible surface
   struct Points;  ///< eight visible surfaces

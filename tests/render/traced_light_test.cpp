@@ -168,6 +168,32 @@ TEST_F(TracedLight, ReachesParticlesAndPanesOnlyWhereNothingIsInTheWay) {
   expect_half_lit("pane");
 }
 
+// The furnace for particles: inside a closed ball, they have the light of its wall, whatever the sky outside.
+TEST_F(TracedLight, ParticlesIndoorsHaveTheLightOfTheWalls) {
+  Environment sky = even_sky(2);
+  sky.visible = false;  // not through the particle, either
+  s.stage.set_environment(sky);
+  look({.eye = {0, 0, 1.5f}, .target = {0, 0, 0}, .fov_deg = 40});
+  const auto brightness = [&](PointStyle style, float wall) {
+    const InstanceHandle room =
+        s.add(make_sphere(2), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = Vector3f::Constant(wall)});
+    const PointsHandle points = s.stage.add_points({.style = style, .softness = 0.1f});
+    s.stage.set_points(
+        points,
+        std::array{Point{
+            .position = {0, 0, 0}, .velocity = {0, 0, 0}, .radius = 0.3f, .color = {1, 1, 1, 1}, .id = 1}});
+    const float result = mean_around(mean_of(s, 4), {80, 60}, 2);
+    s.stage.remove(points);
+    s.stage.remove(room);
+    return result;
+  };
+  for (const PointStyle style : {PointStyle::sprite, PointStyle::flake, PointStyle::smoke}) {
+    EXPECT_NEAR(brightness(style, 0.5f), 0.5f, 0.05f) << static_cast<int>(style);
+    EXPECT_NEAR(brightness(style, 0), 0, 0.01f) << static_cast<int>(style);
+  }
+  EXPECT_NEAR(brightness(PointStyle::streak, 0), 0, 0.01f);  // of which drops mirror the sky
+}
+
 // A wide screen with a straight edge at height h, and the sun overhead, whose disc has the radius w = h
 // tan(s) on the floor: at distance x from the edge's shadow, a segment of the disc is visible, with the
 // fraction 1/2 + (u sqrt(1 - u^2) + asin u) / pi, u = x / w.
