@@ -38,61 +38,39 @@ LightGuide::LightGuide(int width, int height)
       filled(width, height),
       inverse_size2(width, height) {}
 
-namespace {
-
-constexpr int kBlock = 8;  // pixels
-
-/// Sums over blocks of pixels, of a brightness and of its square.
-class BlockSums {
- public:
-  BlockSums(const LightGuide& guide, const LightPlane& brightness)
-      : columns_((guide.width_px + kBlock - 1) / kBlock),
-        rows_((guide.height_px + kBlock - 1) / kBlock),
-        sums_(static_cast<std::size_t>(columns_ * rows_)) {
-    tbb::parallel_for(0, rows_, [&](int row) {
-      for (int y = row * kBlock; y < std::min((row + 1) * kBlock, guide.height_px); ++y) {
-        const float *value = brightness.at(0, y), *filled = guide.filled.at(0, y);
-        for (int x = 0; x < guide.width_px; ++x) {
-          Sums& sums = at(x / kBlock, row);
-          sums.count += filled[x];
-          sums.value += filled[x] * value[x];
-          sums.square += filled[x] * value[x] * value[x];
-        }
+LightNoise::LightNoise(const LightGuide& guide, const LightPlane& brightness)
+    : columns_((guide.width_px + kBlock - 1) / kBlock),
+      rows_((guide.height_px + kBlock - 1) / kBlock),
+      sums_(static_cast<std::size_t>(columns_ * rows_)) {
+  tbb::parallel_for(0, rows_, [&](int row) {
+    for (int y = row * kBlock; y < std::min((row + 1) * kBlock, guide.height_px); ++y) {
+      const float *value = brightness.at(0, y), *filled = guide.filled.at(0, y);
+      for (int x = 0; x < guide.width_px; ++x) {
+        Sums& sums = at(x / kBlock, row);
+        sums.count += filled[x];
+        sums.value += filled[x] * value[x];
+        sums.square += filled[x] * value[x] * value[x];
       }
-    });
-  }
-  /// Variance over the square of the mean, in a block and its neighbours.
-  float relative_variance(int column, int row) const {
-    Sums total;
-    for (int y = std::max(row - 1, 0); y <= std::min(row + 1, rows_ - 1); ++y)
-      for (int x = std::max(column - 1, 0); x <= std::min(column + 1, columns_ - 1); ++x) {
-        const Sums& part = at(x, y);
-        total.count += part.count;
-        total.value += part.value;
-        total.square += part.square;
-      }
-    if (!(total.value > 0)) return 0;
-    return std::max(total.count * total.square / (total.value * total.value) - 1, 0.0f);
-  }
+    }
+  });
+}
 
- private:
-  struct Sums {
-    float count = 0, value = 0, square = 0;
-  };
-  Sums& at(int column, int row) { return sums_[static_cast<std::size_t>(row * columns_ + column)]; }
-  const Sums& at(int column, int row) const {
-    return sums_[static_cast<std::size_t>(row * columns_ + column)];
-  }
+float LightNoise::relative_variance(int x, int y) const {
+  const int column = x / kBlock, row = y / kBlock;
+  Sums total;
+  for (int r = std::max(row - 1, 0); r <= std::min(row + 1, rows_ - 1); ++r)
+    for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns_ - 1); ++c) {
+      const Sums& part = at(c, r);
+      total.count += part.count;
+      total.value += part.value;
+      total.square += part.square;
+    }
+  if (!(total.value > 0)) return 0;
+  return std::max(total.count * total.square / (total.value * total.value) - 1, 0.0f);
+}
 
-  int columns_, rows_;
-  std::vector<Sums> sums_;
-};
-
-}  // namespace
-
-void LightGuide::find_reach(const LightPlane& inverse_distance, const LightPlane& brightness,
-                            LightPlane& reach2, LightPlane& noisy_reach2) const {
-  const BlockSums blocks(*this, brightness);
+void LightGuide::find_reach(const LightPlane& inverse_distance, const LightNoise& noise, LightPlane& reach2,
+                            LightPlane& noisy_reach2) const {
   const float least_px = std::min(kLeastNoisyFraction * static_cast<float>(height_px), kLeastNoisy_px);
   for_filter_rows(height_px, [&](int y) {
     for (int x = 0; x < width_px; x += kLanes) {
@@ -103,8 +81,7 @@ void LightGuide::find_reach(const LightPlane& inverse_distance, const LightPlane
           sum += present * inverse_distance.lanes(x + dx, row);
           count += present;
         }
-      const float noise = blocks.relative_variance(x / kBlock, y / kBlock);
-      const float noisy = std::max(1 - 1 / std::max(noise, 1e-6f), 0.0f);
+      const float noisy = std::max(1 - 1 / std::max(noise.relative_variance(x, y), 1e-6f), 0.0f);
       const Lanes mean = sum / larger(count, Lanes{} + 1);
       const Lanes most = square_root(inverse_size2.lanes(x, y)) * (1 / least_px);
       const Lanes inverse = mean + noisy * (smaller(mean, most) - mean);
@@ -114,6 +91,20 @@ void LightGuide::find_reach(const LightPlane& inverse_distance, const LightPlane
           x, y, noisy > 0 ? inverse * inverse * (1 / (noisy_fraction * noisy_fraction)) : Lanes{} + kNoReach);
     }
   });
+}
+
+Lanes LightGuide::similar_around(int x, int y) const {
+  const LaneVectors p = lanes_of(place, x, y), n = lanes_of(normal, x, y);
+  const Lanes size2 = inverse_size2.lanes(x, y);
+  Lanes sum{};
+  for (int row = std::max(y - 2, 0); row <= std::min(y + 2, height_px - 1); ++row)
+    for (int there = x - 2; there <= x + 2; ++there) {
+      const Lanes off = dot(lanes_of(place, there, row) - p, n);
+      const Lanes facing = larger(dot(n, lanes_of(normal, there, row)), Lanes{});
+      const Lanes f2 = facing * facing, f4 = f2 * f2, f8 = f4 * f4, apart = 1 + off * off * size2;
+      sum += filled.lanes(there, row) * f8 * f8 / (apart * apart);
+    }
+  return sum * (1.0f / 25);
 }
 
 LightValues::LightValues(int width_px, int height_px, std::size_t channels)

@@ -42,15 +42,43 @@ class LightPlane {
   std::vector<float> values_;
 };
 
+struct LightGuide;
+
+/// How noisy light is in each part of a picture.
+class LightNoise {
+ public:
+  static constexpr int kBlock = 8;  ///< pixels; side of a part
+  /// `brightness`: of the light that one ray found, for each pixel with a surface.
+  LightNoise(const LightGuide& guide, const LightPlane& brightness);
+  /// Variance over the square of the mean, in the block of a pixel and its neighbours.
+  float relative_variance(int x, int y) const;
+
+ private:
+  struct Sums {
+    float count = 0, value = 0, square = 0;
+  };
+  Sums& at(int column, int row) { return sums_[static_cast<std::size_t>(row * columns_ + column)]; }
+  const Sums& at(int column, int row) const {
+    return sums_[static_cast<std::size_t>(row * columns_ + column)];
+  }
+
+  int columns_, rows_;
+  std::vector<Sums> sums_;
+};
+
 /// The surfaces in a picture, which say how far light may be averaged.
 struct LightGuide {
   LightGuide(int width_px, int height_px);
-  /// From 1 / (distance that a ray went) and the brightness that it found, for each pixel, computes 1 /
-  /// distance^2 over which light may be averaged: a fraction of the mean distance around. `noisy_reach2` is
-  /// that of further steps, which only noisy light needs: light whose variance exceeds the square of its
-  /// mean. All are means of the neighbourhood, since a single ray says little.
-  void find_reach(const LightPlane& inverse_distance, const LightPlane& brightness, LightPlane& reach2,
+  /// From 1 / (distance that a ray went), for each pixel, computes 1 / distance^2 over which light may be
+  /// averaged: a fraction of the mean distance around. `noisy_reach2` is that of further steps, which only
+  /// noisy light needs: light whose variance exceeds the square of its mean. Both are means of the
+  /// neighbourhood, since a single ray says little.
+  void find_reach(const LightPlane& inverse_distance, const LightNoise& noise, LightPlane& reach2,
                   LightPlane& noisy_reach2) const;
+
+  /// For eight pixels from x on, the fraction of the 25 pixels around each that have a similar place and
+  /// normal.
+  Lanes similar_around(int x, int y) const;
 
   int width_px, height_px;
   std::array<LightPlane, 3> place, normal;

@@ -17,6 +17,11 @@ namespace offstage::render {
 namespace {
 
 constexpr int kRowsPerTask = 8;
+constexpr uint32_t kRowsPerRound = 4096;                // rows of samples between those of two rounds
+constexpr int kRoundsPerSubFrame = 2, kMostRounds = 8;  // further rounds of light from around
+// Variance of this light over the square of its mean, from which on further rounds are traced, and the most
+// cells over which the filter averages it.
+constexpr float kTargetVariance = 0.0064f, kMostAveraged = 400;
 constexpr float kBrightest =
     50;  // of light that arrives after bounces; brighter samples would stay visible as dots
 constexpr int kWidestStep = 16;  // of the filter of light from around, in cells
@@ -360,28 +365,29 @@ IntLanes LightTracer::pixels_of_cells(const SurfaceBuffer& surfaces, int x, int 
   return at;
 }
 
-// The light from around at eight cells of a row.
-void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
-                              LightBuffer& light, LightSums& sums) const {
+// The light from around at eight cells of a row, by one path for each. Rounds after the first one are
+// averaged with those before.
+void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, int round, IntLanes active,
+                              const LightView& view, LightBuffer& light, LightSums& sums) const {
   const int k = view.offsets.index;
-  IntLanes gaps{};
+  IntLanes gaps = ~active;
   for (int i = 0; view.sparse && i < kLanes; ++i)
     gaps[i] = x + i >= light.cells.width_px || is_gap(Gaps::three_quarters, light.cells, x + i, y) ? -1 : 0;
   if (!any(~gaps)) return;
   const Points points(surfaces, pixels_of_cells(surfaces, x, y, view));
-  if (!view.sparse) set_guide(points, x, y, view, 2, light.cells);
+  if (!view.sparse && round == 0) set_guide(points, x, y, view, 2, light.cells);
   const Lanes none{};
   const int shift = view.sparse ? 1 : 0;  // numbers of samples without those of gaps
+  const uint32_t row = (static_cast<uint32_t>(y) >> shift) + static_cast<uint32_t>(round) * kRowsPerRound;
   Sampler<UintLanes> samplers((UintLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<uint32_t>(x)) >> shift,
-                              UintLanes{} + (static_cast<uint32_t>(y) >> shift), k, view.offsets.count);
+                              UintLanes{} + row, k, view.offsets.count);
   const LaneVectors directions = cosine_direction(points.normal, samplers.next());
   LaneVectors around{none, none, none};
   Lanes inverse_distance{};
   for (int i = 0; i < kLanes; ++i) {
     if (!points.visible[i] || gaps[i]) continue;
     const Point point = points.one(i, view.eye);
-    PixelSampler sampler(static_cast<uint32_t>(x + i) >> shift, static_cast<uint32_t>(y) >> shift, k,
-                         view.offsets.count);
+    PixelSampler sampler(static_cast<uint32_t>(x + i) >> shift, row, k, view.offsets.count);
     sampler.skip(1);
     Vector3f outgoing(directions.x[i], directions.y[i], directions.z[i]);
     if (outgoing.dot(point.face) <= 0) outgoing = reflected(outgoing, point.face);
@@ -391,9 +397,43 @@ void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, const
     set_lane(around, i, radiance(path, sampler, nullptr, &met).limited(sums));
     inverse_distance[i] = 1 / std::max(met, 8 * view.pixel_m * (point.place - view.eye).norm());
   }
-  store(light.around.channels(), x, y, around);
+  const std::span<LightPlane> mean = light.around.channels();
+  if (round > 0) {
+    const auto mean_with = [&](const LightPlane& plane, Lanes value) {
+      const Lanes before = plane.lanes(x, y),
+                  change = (value - before) * (1.0f / static_cast<float>(round + 1));
+      return before + (active ? change : none);
+    };
+    return store(mean, x, y,
+                 {mean_with(mean[0], around.x), mean_with(mean[1], around.y), mean_with(mean[2], around.z)});
+  }
+  store(mean, x, y, around);
   light.inverse_distance.set_lanes(x, y, inverse_distance);
   light.brightness.set_lanes(x, y, around.x + around.y + around.z);
+}
+
+// Further rounds for the cells where the mean over the filter and all sub-frames would still be noisy: where
+// light comes from small bright areas, near corners, and on narrow surfaces.
+void LightTracer::refine_cells(const SurfaceBuffer& surfaces, const LightNoise& noise, const LightView& view,
+                               LightBuffer& light) const {
+  const LightGuide& cells = light.cells;
+  const int most = std::min(kRoundsPerSubFrame * view.offsets.count, kMostRounds);
+  light.sums += sum_over_rows(cells.height_px, [&](int y, LightSums& sums) {
+    for (int x = 0; x < cells.width_px; x += kLanes) {
+      const float excess = noise.relative_variance(x, y) - 1;
+      if (excess <= 0) continue;
+      const Lanes one = Lanes{} + 1;
+      const Lanes reach2 = cells.inverse_size2.lanes(x, y) / larger(light.reach2.lanes(x, y), one * 1e-20f);
+      const Lanes averaged =
+          larger(cells.similar_around(x, y) * smaller(3 * reach2, one * kMostAveraged), one);
+      const Lanes rounds = excess / (kTargetVariance * static_cast<float>(view.offsets.count) * averaged);
+      for (int round = 1; round <= most; ++round) {
+        const IntLanes active = (cells.filled.lanes(x, y) > 0.0f) & (rounds > static_cast<float>(round));
+        if (!any(active)) break;
+        trace_cells(surfaces, x, y, round, active, view, light, sums);
+      }
+    }
+  });
 }
 
 // Interpolates the light in the gaps of a sparse picture.
@@ -460,12 +500,15 @@ void LightTracer::trace_arriving(const SurfaceBuffer& surfaces, const LightView&
     for_rows(height, [&](int y) { trace_sparse_sun(surfaces, y, view, light); });
   }
   light.sums = sum_over_rows(light.cells.height_px, [&](int y, LightSums& sums) {
-    for (int x = 0; x < light.cells.width_px; x += kLanes) trace_cells(surfaces, x, y, view, light, sums);
+    for (int x = 0; x < light.cells.width_px; x += kLanes)
+      trace_cells(surfaces, x, y, 0, IntLanes{} - 1, view, light, sums);
   });
   if (view.sparse) fill_sparse(light);
+  const LightNoise noise(light.cells, light.brightness);
+  light.cells.find_reach(light.inverse_distance, noise, light.reach2, light.noisy_reach2);
+  if (!view.sparse) refine_cells(surfaces, noise, view, light);
   light.direct.average(light.pixels, light.pixels.filled, nullptr, 1);
   if (glows) light.glow.average(light.pixels, light.pixels.filled, nullptr, 1);
-  light.cells.find_reach(light.inverse_distance, light.brightness, light.reach2, light.noisy_reach2);
   const int widest = view.offsets.count >= 16 ? 4 : 8;
   for (int step = 1; step <= kWidestStep; step *= 2)
     light.around.average(light.cells, light.cells.filled,

@@ -154,8 +154,10 @@ class LightTracer {
                      LightBuffer& light) const;
   static void set_guide(const Points& points, int x, int y, const LightView& view, float size_px,
                         LightGuide& guide);
-  void trace_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view, LightBuffer& light,
-                   LightSums& sums) const;
+  void trace_cells(const SurfaceBuffer& surfaces, int x, int y, int round, IntLanes active,
+                   const LightView& view, LightBuffer& light, LightSums& sums) const;
+  void refine_cells(const SurfaceBuffer& surfaces, const LightNoise& noise, const LightView& view,
+                    LightBuffer& light) const;
   Vector3f sky_seen(const Vector3f& direction) const;
   Vector3f sky_met(const Vector3f& direction, bool sharp, float density) const;
 
