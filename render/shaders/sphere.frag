@@ -2,7 +2,7 @@
 layout(location = 1) flat in vec4 color;
 layout(location = 2) flat in vec4 ball;  // centre, radius
 layout(location = 3) in vec3 position;
-layout(location = 1) uniform vec4 style;
+layout(location = 1) uniform vec4 style;  // z: negative if not lit
 layout(location = 2) uniform vec2 surface;  // metallic, roughness
 #ifndef SURFACE
 layout(location = 0) out vec4 result;
@@ -24,7 +24,7 @@ void main() {
   write_surface(hit, n, n, -ray, surface.y + mirror);
 #else
   vec3 radiance = color.rgb;
-  if (style.z != 0.0) {
+  if (style.z >= 0.0) {
     Surface s = Surface(color.rgb, surface.y, surface.x, vec3(0.0));
     radiance = shade(s, n, -ray, traced_light(n, n)) + highlights_of_lamps(mix(vec3(0.04), s.albedo, s.metallic));
   }
