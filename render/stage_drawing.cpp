@@ -130,8 +130,12 @@ void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<
   for (const Instance* instance : shown) {
     if (!instance->visible) continue;
     const RayMaterial& material = *instance->material->rays;
-    const unsigned object =
-        scene.add(*instance->mesh->rays, material, instance->world_from_mesh, instance->casts_shadow);
+    const bool focuses = sun.intensity > 0 && sun.shadows && instance->casts_shadow &&
+                         material.transmission > 0 && !material.thin;
+    const unsigned object = scene.add(*instance->mesh->rays, material, instance->world_from_mesh,
+                                      instance->casts_shadow, focuses);
+    if (object != RayScene::kNone && focuses)
+      light_sources.glass.push_back({object, instance->center(), instance->radius()});
     if (object != RayScene::kNone && !material.mean_emission().isZero())
       light_sources.glow.add(object, *instance->mesh->rays, material, instance->world_from_mesh,
                              instance->center(), instance->radius(), instance->is_ball());

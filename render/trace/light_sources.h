@@ -11,12 +11,20 @@
 
 namespace offstage::render {
 
+/// A solid piece of glass, which focuses the light of the sun; and a ball around it.
+struct GlassPiece {
+  unsigned object;  ///< in the RayScene
+  Vector3f center;
+  float radius;
+};
+
 struct LightSources {
   Sun sun;
   SkyModel sky;
   float fog = 0;
   std::vector<RayLamp> lamps;
   Glow glow;
+  std::vector<GlassPiece> glass;
   const OpacityGrid* smoke = nullptr;  ///< null: none
 };
 

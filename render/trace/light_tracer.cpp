@@ -153,7 +153,8 @@ Lanes LightTracer::sun_visibility(const LaneVectors& place, IntLanes active,
       if (active[i]) fraction[i] = std::exp(-sources_.smoke->depth({place.x[i], place.y[i], place.z[i]}));
   }
   if (!sources_.sun.shadows) return fraction;
-  const LaneVectors light = scene_.transmittance(place, sun_disc_.direction(uv), Lanes{} + kFar, active);
+  const LaneVectors light =
+      scene_.transmittance(place, sun_disc_.direction(uv), Lanes{} + kFar, active, RayScene::Focus::blocks);
   return fraction * ((light.x + light.y + light.z) * (1.0f / 3));
 }
 
@@ -467,6 +468,7 @@ LightSums LightTracer::sum_over_rows(int height, const auto& each) const {
 
 void LightTracer::trace(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const {
   trace_arriving(surfaces, view, light);
+  if (!sources_.glass.empty()) add_caustics(view, light);
   if (light.has_mirrors) trace_mirrors(surfaces, view, VisibleLight(light, view), light);
 }
 

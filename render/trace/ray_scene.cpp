@@ -14,7 +14,16 @@ namespace offstage::render {
 namespace {
 
 // Groups of objects that a ray may leave out.
-constexpr unsigned kOpaqueCaster = 1, kTranslucentCaster = 2, kNoCaster = 4, kAll = 7, kSprite = 8;
+constexpr unsigned kOpaqueCaster = 1, kTranslucentCaster = 2, kFocusingCaster = 4, kNoCaster = 8, kAll = 15,
+                   kSprite = 16;
+// Those that reduce the light along a shadow ray.
+constexpr unsigned kDimming = kTranslucentCaster | kFocusingCaster | kSprite;
+
+/// Those that block a shadow ray.
+constexpr unsigned blocking(RayScene::Focus focus) {
+  return focus == RayScene::Focus::blocks ? kOpaqueCaster | kFocusingCaster : kOpaqueCaster;
+}
+
 // Largest number of translucent surfaces and sprites that a shadow ray is tested against; light passes the
 // others freely.
 constexpr int kMostPassed = 64;
@@ -196,9 +205,12 @@ void RayScene::clear() {
   has_translucent_ = false;
 }
 
-unsigned RayScene::attach(RTCGeometryTy* geometry, Object object, bool casts_shadow) {
+unsigned RayScene::attach(RTCGeometryTy* geometry, Object object, bool casts_shadow, bool focuses) {
   const bool solid = object.material->is_opaque();
-  rtcSetGeometryMask(geometry, !casts_shadow ? kNoCaster : solid ? kOpaqueCaster : kTranslucentCaster);
+  rtcSetGeometryMask(geometry, !casts_shadow ? kNoCaster
+                               : solid       ? kOpaqueCaster
+                               : focuses     ? kFocusingCaster
+                                             : kTranslucentCaster);
   has_translucent_ = has_translucent_ || (casts_shadow && !solid);
   const unsigned id = attach_to(tree_.get(), geometry);
   if (objects_.size() <= id) objects_.resize(id + 1);
@@ -207,7 +219,7 @@ unsigned RayScene::attach(RTCGeometryTy* geometry, Object object, bool casts_sha
 }
 
 unsigned RayScene::add(const RayMesh& mesh, const RayMaterial& material,
-                       const Eigen::Affine3f& world_from_mesh, bool casts_shadow) {
+                       const Eigen::Affine3f& world_from_mesh, bool casts_shadow, bool focuses) {
   if (mesh.indices.empty() || !world_from_mesh.matrix().allFinite()) return kNone;
   const float determinant = world_from_mesh.linear().determinant();
   if (determinant == 0) return kNone;
@@ -217,7 +229,7 @@ unsigned RayScene::add(const RayMesh& mesh, const RayMaterial& material,
   Object object{.material = &material, .mesh = &mesh, .world_from_mesh = world_from_mesh};
   object.normal_from_mesh = world_from_mesh.linear().inverse().transpose();
   object.mirrored = determinant < 0;
-  return attach(geometry, std::move(object), casts_shadow);
+  return attach(geometry, std::move(object), casts_shadow, focuses);
 }
 
 void RayScene::add_cloth(std::span<const ClothVertex> vertices, std::span<const uint32_t> indices,
@@ -394,9 +406,10 @@ Vector3f RayScene::smooth_place(const Vector3f& eye, const Vector3f& place) cons
   return object->smoothed(ray.hit.primID, eye, offset / length);
 }
 
-Vector3f RayScene::transmittance(const Vector3f& from, const Vector3f& direction, float length) const {
+Vector3f RayScene::transmittance(const Vector3f& from, const Vector3f& direction, float length,
+                                 Focus focus) const {
   RTCRay ray;
-  set_ray(ray, from, direction, length, kOpaqueCaster);
+  set_ray(ray, from, direction, length, blocking(focus));
   embree::occluded(tree_.get(), ray);
   if (ray.tfar < 0) return Vector3f::Zero();
   return through_translucent(from, direction, length);
@@ -433,13 +446,13 @@ IntLanes blocked(RTCScene tree, const LaneVectors& from, const LaneVectors& dire
 }  // namespace
 
 LaneVectors RayScene::transmittance(const LaneVectors& from, const LaneVectors& direction, Lanes length,
-                                    IntLanes active) const {
+                                    IntLanes active, Focus focus) const {
   const Lanes none{};
-  const IntLanes free = active & ~blocked(tree_.get(), from, direction, length, active, kOpaqueCaster);
+  const IntLanes free = active & ~blocked(tree_.get(), from, direction, length, active, blocking(focus));
   const Lanes open = free ? none + 1 : none;
   LaneVectors fraction{open, open, open};
   if (!has_translucent_) return fraction;
-  const IntLanes dimmed = blocked(tree_.get(), from, direction, length, free, kTranslucentCaster | kSprite);
+  const IntLanes dimmed = blocked(tree_.get(), from, direction, length, free, kDimming);
   for (int i = 0; i < kLanes; ++i) {
     if (!dimmed[i]) continue;
     const Vector3f one = through_translucent({from.x[i], from.y[i], from.z[i]},
@@ -455,7 +468,7 @@ Vector3f RayScene::through_translucent(const Vector3f& from, const Vector3f& dir
   Vector3f fraction = Vector3f::Ones(), place = from;
   for (int layer = 0; has_translucent_ && layer < kMostPassed && length > 0; ++layer) {
     RTCRayHit hit_ray;
-    set_ray(hit_ray.ray, place, direction, length, kTranslucentCaster | kSprite);
+    set_ray(hit_ray.ray, place, direction, length, kDimming);
     const Object* object = first_object(hit_ray);
     if (object == nullptr) break;
     float advance = 0;

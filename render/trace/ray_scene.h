@@ -86,8 +86,9 @@ class RayScene {
   /// Removes all objects.
   void clear();
   /// Returns the object's number. The mesh and the material must stay in memory until clear().
+  /// `focuses`: the light of the sun that it refracts is traced, see Focus.
   unsigned add(const RayMesh& mesh, const RayMaterial& material, const Eigen::Affine3f& world_from_mesh,
-               bool casts_shadow);
+               bool casts_shadow, bool focuses = false);
   static constexpr unsigned kNone = ~0u;  ///< returned in place of a number if the mesh has no triangles
   /// The lists must stay in memory until clear(). Positions must be finite.
   void add_cloth(std::span<const ClothVertex> vertices, std::span<const uint32_t> indices,
@@ -103,13 +104,17 @@ class RayScene {
   void build();
 
   bool empty() const { return objects_.empty(); }
+  /// Whether the objects that focus light let it pass straight through, as an approximation, or block it,
+  /// because their refracted light is added.
+  enum class Focus { passes, blocks };
   /// Fraction of the light that arrives along a segment: 0 behind an opaque object, and the product of the
   /// transmittances of translucent ones. `direction` is a unit vector.
-  Vector3f transmittance(const Vector3f& from, const Vector3f& direction, float length) const;
+  Vector3f transmittance(const Vector3f& from, const Vector3f& direction, float length,
+                         Focus focus = Focus::passes) const;
   /// Fractions of the light that arrives along eight segments. Only those whose `active` is -1 are computed;
   /// the others get 0.
   LaneVectors transmittance(const LaneVectors& from, const LaneVectors& direction, Lanes length,
-                            IntLanes active) const;
+                            IntLanes active, Focus focus = Focus::passes) const;
   /// Returns false if the ray meets nothing within `length` [m].
   bool first_hit(const Vector3f& from, const Vector3f& direction, float length, Hit& hit) const;
   /// The point `place` of a mesh that is visible from `eye`, moved onto the surface that its smooth normals
@@ -120,7 +125,7 @@ class RayScene {
   struct Object;
   const Object* first_object(RTCRayHit& ray) const;
   Vector3f through_translucent(const Vector3f& from, const Vector3f& direction, float length) const;
-  unsigned attach(RTCGeometryTy* geometry, Object object, bool casts_shadow);
+  unsigned attach(RTCGeometryTy* geometry, Object object, bool casts_shadow, bool focuses = false);
 
   std::vector<Object> objects_;  ///< objects by Embree's geometry id
   std::vector<RayTree> cloth_trees_;

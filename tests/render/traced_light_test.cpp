@@ -168,6 +168,36 @@ TEST_F(TracedLight, ReachesParticlesAndPanesOnlyWhereNothingIsInTheWay) {
   expect_half_lit("pane");
 }
 
+// A ball with refractive index 3/2 focuses parallel light at 3/2 of its radius behind its centre.
+TEST_F(TracedLight, OfTheSunIsFocusedByABallOfGlass) {
+  const Material clear{.color = {1, 1, 1, 1}, .roughness = 0, .transmission = 1};
+  s.stage.set_sun({.direction = {0, 1, 0}, .color = {1, 1, 1}, .intensity = 1, .size_deg = 0.5f});
+  s.add(make_ground(20), {.color = {0.5f, 0.5f, 0.5f, 1}, .roughness = 1});
+  look({.eye = {2, 1.2f, 0}, .target = {0, 0, 0}, .fov_deg = 30});
+  const auto light_at = [&](float x) { return mean_around(mean_of(s, 4), place_of({x, 0, 0}), 1); };
+  const float open = light_at(0);
+  const InstanceHandle ball = s.add(make_sphere(0.3f), clear, {0, 0.45f, 0});
+  EXPECT_GT(light_at(0), 5 * open);
+  EXPECT_LT(light_at(0.2f), 0.3f * open);  // in its shadow
+
+  // From far above, a ball spreads the light over a wide area and keeps it, but for what its surfaces mirror.
+  s.stage.remove(ball);
+  look({.eye = {0, 2.1f, 0.001f}, .target = {0, 0, 0}, .fov_deg = 140});  // each pixel shows the same area
+  const auto sum = [&] {
+    const HdrImage picture = mean_of(s, 4);
+    float result = 0;
+    for (int y = 0; y < 120; ++y)
+      for (int x = 0; x < 160; ++x) result += pixel(picture, x, y).y();
+    return result;
+  };
+  const float without = sum(), pixel_m = 2 * 2.1f * std::tan(70 * std::numbers::pi_v<float> / 180) / 120;
+  const float met = without / (160 * 120) * std::numbers::pi_v<float> * 0.09f / (pixel_m * pixel_m);
+  s.add(make_sphere(0.3f), clear, {0, 2.5f, 0});
+  const float lost = (without - sum()) / met;
+  EXPECT_GT(lost, 0.05f);
+  EXPECT_LT(lost, 0.25f);
+}
+
 // The furnace for particles: inside a closed ball, they have the light of its wall, whatever the sky outside.
 TEST_F(TracedLight, ParticlesIndoorsHaveTheLightOfTheWalls) {
   Environment sky = even_sky(2);
