@@ -130,12 +130,14 @@ void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<
   for (const Instance* instance : shown) {
     if (!instance->visible) continue;
     const RayMaterial& material = *instance->material->rays;
-    const bool focuses = sun.intensity > 0 && sun.shadows && instance->casts_shadow &&
-                         material.transmission > 0 && !material.thin;
+    const bool focuses =
+        instance->casts_shadow && !instance->mesh->endless && material.transmission > 0 && !material.thin;
     const unsigned object = scene.add(*instance->mesh->rays, material, instance->world_from_mesh,
                                       instance->casts_shadow, focuses);
     if (object != RayScene::kNone && focuses)
-      light_sources.glass.push_back({object, instance->center(), instance->radius()});
+      light_sources.glass.push_back(
+          {object, instance->world_from_mesh * instance->mesh->box.min(),
+           instance->world_from_mesh.linear() * instance->mesh->box.sizes().asDiagonal()});
     if (object != RayScene::kNone && !material.mean_emission().isZero())
       light_sources.glow.add(object, *instance->mesh->rays, material, instance->world_from_mesh,
                              instance->center(), instance->radius(), instance->is_ball());
@@ -154,7 +156,12 @@ void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<
                         set->def.softness);
   }
   scene.build();
-  for (const Lamp& lamp : shining) light_sources.lamps.emplace_back(lamp);
+  for (const Lamp& lamp : shining) {
+    const bool within_glass = std::ranges::any_of(light_sources.glass, [&](const GlassPiece& piece) {
+      return piece.contains(lamp.position, lamp.radius);
+    });
+    light_sources.lamps.emplace_back(lamp, within_glass);
+  }
   if (sky.has_bright_part()) light_sources.lamps.emplace_back(sky.turned);
   if (!puffs_pass.grid().empty()) light_sources.smoke = &puffs_pass.grid();
   light_pass.trace(light_sources, view, offsets, stop);

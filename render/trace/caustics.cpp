@@ -1,10 +1,10 @@
-/// Sunlight that pieces of glass focus (H. W. Jensen, "Global Illumination using Photon Maps", 1996). Rays
-/// from the sun are refracted by the glass, and their light is added to the pixels that show the places where
-/// they end.
+/// Light of the sun and of lamps that pieces of glass focus (H. W. Jensen, "Global Illumination using Photon
+/// Maps", 1996). Rays from the sources are refracted by the glass, and their light is added to the pixels
+/// that show the places where they end.
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <numeric>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -14,17 +14,19 @@
 namespace offstage::render {
 namespace {
 
-// Rays per pixel that a piece covers: of a frame, and at most of a sub-frame.
-constexpr float kRaysPerPixel = 4, kMostRaysPerPixel = 2;
+constexpr float kRaysPerPixel = 1;    // that a piece covers, in a sub-frame
 constexpr float kMostRays = 4e5f;     // of a sub-frame
-constexpr float kRaysPerMean = 36;    // over which a pixel of a frame is averaged
+constexpr float kRaysPerMean = 64;    // over which a pixel of a frame is averaged
 constexpr int kWidestMean_px = 4;     // half-width of the square of pixels
 constexpr int kMostSurfaces = 16;     // of glass that a ray meets
 constexpr float kSameSurface = 0.9f;  // cosine between normals
 
+/// Pixels that a piece covers, if it is seen from all sides equally: a quarter of its box's surface.
 float pixels_of(const GlassPiece& piece, const LightView& view) {
-  const float pixel = view.pixel_m * (piece.center - view.eye).norm();
-  return std::numbers::pi_v<float> * piece.radius * piece.radius / std::max(pixel * pixel, 1e-20f);
+  const float pixel = view.pixel_m * (piece.center() - view.eye).norm();
+  float area = 0;
+  for (int k = 0; k < 3; ++k) area += 0.5f * piece.side(k).norm();
+  return area / std::max(pixel * pixel, 1e-20f);
 }
 
 /// Area that a pixel shows of a surface [m^2]. Its solid angle is in proportion to the cube of the cosine
@@ -38,26 +40,55 @@ float area_of_pixel(const Vector3f& place, const Vector3f& normal, const LightVi
 
 }  // namespace
 
-/// Where a ray from the sun ends.
+/// The sun, or a lamp: each point of it that belongs to `uv`, as seen from a place.
+struct LightTracer::Source {
+  const Sun* sun;  ///< null: a lamp
+  const SunDisc& disc;
+  const RayLamp* lamp;
+
+  LampPoint<float> point(const Vector3f& place, const SquarePoint<float>& uv) const {
+    if (sun == nullptr) return lamp->point(from_eigen(place), uv);
+    return {from_eigen(disc.direction(uv)), kFar, 1, from_eigen(sun->intensity * sun->color), 0};
+  }
+  /// Light that arrives at a face of the box of a piece, whose area is the length of `outward`,
+  /// approximately.
+  Vector3f light(const Vector3f& middle, const Vector3f& outward) const {
+    const LampPoint<float> at = point(middle, {0.5f, 0.5f});
+    return to_eigen(at.arriving) * std::max(outward.dot(to_eigen(at.towards)), 0.0f);
+  }
+};
+
+/// Where a ray from a source ends.
 struct LightTracer::Photon {
   int pixel = -1;  ///< that shows the place; negative: none
   Vector3f light = Vector3f::Zero();
 };
 
-// Follows a ray that enters the disc around a piece of glass. Of those that meet other glass before it, the
-// rays towards that glass have the light.
-LightTracer::Photon LightTracer::trace_photon(const GlassPiece& piece, uint32_t number, const LightView& view,
+// Follows a ray that enters the box around a piece of glass, one of `count`. Of those that meet other glass
+// before it, the rays towards that glass have the light.
+LightTracer::Photon LightTracer::trace_photon(const GlassPiece& piece, const Source& source, uint32_t number,
+                                              float count, const LightView& view,
                                               const VisibleLight& visible) const {
   PixelSampler sampler(number & 1023, number >> 10, view.offsets.index, view.offsets.count);
-  const SquarePoint<float> on_piece = on_disc(sampler.next());
-  const Vector3f to_sun = sun_disc_.direction(sampler.next());
-  Three<float> a, b;
-  make_basis(from_eigen(to_sun), a, b);
-  const float r = 1.01f * piece.radius;
-  const Vector3f start = piece.center + r * (to_sun + on_piece.x * to_eigen(a) + on_piece.y * to_eigen(b));
-  Vector3f from = start, direction = -to_sun;
   Photon photon;
-  Vector3f fraction = Vector3f::Ones();
+  WeightedChoice choice(sampler.next().x);
+  int chosen = -1;
+  for (int face = 0; face < 6; ++face)
+    if (const float weight = source.light(piece.middle_of(face), piece.outward(face)).sum();
+        weight > 0 && choice.take(weight))
+      chosen = face;
+  if (chosen < 0) return photon;
+  const SquarePoint<float> on_face = sampler.next();
+  // A little outside, because a box of glass fills its box.
+  const Vector3f entry = piece.center() + 1.001f * (piece.middle_of(chosen) - piece.center()) +
+                         (on_face.x - 0.5f) * piece.edges.col((chosen + 1) % 3) +
+                         (on_face.y - 0.5f) * piece.edges.col((chosen + 2) % 3);
+  const LampPoint<float> origin = source.point(entry, sampler.next());
+  const Vector3f towards = to_eigen(origin.towards);
+  const float area = piece.outward(chosen).dot(towards) * choice.sum() / choice.weight();
+  if (area <= 0) return photon;
+
+  Vector3f from = entry, direction = -towards, fraction = Vector3f::Ones();
   for (int k = 0; k < kMostSurfaces; ++k) {
     Hit hit;
     if (!scene_.first_hit(from, direction, kFar, hit) || (k == 0 && hit.object != piece.object))
@@ -77,9 +108,11 @@ LightTracer::Photon LightTracer::trace_photon(const GlassPiece& piece, uint32_t 
     }
   }
   if (photon.pixel < 0) return photon;
-  const float smoke = sources_.smoke != nullptr ? std::exp(-sources_.smoke->depth(start)) : 1.0f;
+  fraction *= area / count;
+  if (source.sun != nullptr && sources_.smoke != nullptr) fraction *= std::exp(-sources_.smoke->depth(entry));
   photon.light =
-      smoke * fraction.cwiseProduct(scene_.transmittance(start, to_sun, kFar, RayScene::Focus::blocks));
+      fraction.cwiseProduct(to_eigen(origin.arriving))
+          .cwiseProduct(scene_.transmittance(entry, towards, origin.distance, RayScene::Focus::blocks));
   return photon;
 }
 
@@ -110,29 +143,41 @@ void LightTracer::add_photon(const Photon& photon, int half_px, const LightView&
 }
 
 void LightTracer::add_caustics(const LightView& view, LightBuffer& light) const {
-  const VisibleLight visible(light, view);
+  std::vector<Source> sources;
+  if (sources_.sun.intensity > 0 && sources_.sun.shadows)
+    sources.push_back({.sun = &sources_.sun, .disc = sun_disc_, .lamp = nullptr});
+  for (const RayLamp& lamp : sources_.lamps)
+    if (lamp.focus() == RayScene::Focus::blocks)
+      sources.push_back({.sun = nullptr, .disc = sun_disc_, .lamp = &lamp});
+
   const auto sub_frames = static_cast<float>(view.offsets.count);
-  const float wanted = std::min(kRaysPerPixel / sub_frames, kMostRaysPerPixel);
   float pixels = 0;
   for (const GlassPiece& piece : sources_.glass) pixels += pixels_of(piece, view);
-  const float per_pixel = std::min(wanted, kMostRays / std::max(pixels, 1.0f));
+  const float per_pixel = std::min(kRaysPerPixel, kMostRays / std::max(pixels, 1.0f));
   const float side = std::sqrt(kRaysPerMean / (per_pixel * sub_frames));
   const int half_px = std::clamp(static_cast<int>(std::ceil(0.5f * (side - 1))), 1, kWidestMean_px);
+  const VisibleLight visible(light, view);
   std::vector<Photon> photons;
   for (const GlassPiece& piece : sources_.glass) {
-    const float count = std::max(std::ceil(per_pixel * pixels_of(piece, view)), 1.0f);
-    const float area = std::numbers::pi_v<float> * std::pow(1.01f * piece.radius, 2.0f);
-    const Vector3f power = sources_.sun.intensity * area / count * sources_.sun.color;
-    photons.resize(static_cast<std::size_t>(count));
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, photons.size(), 256), [&](const auto& range) {
-      for (std::size_t k = range.begin(); k < range.end(); ++k) {
-        photons[k] = trace_photon(piece, static_cast<uint32_t>(k), view, visible);
-        photons[k].light = photons[k].light.cwiseProduct(power);
-      }
-    });
-    // One after the other, so that the sums do not depend on the threads.
-    for (const Photon& photon : photons)
-      if (photon.pixel >= 0) add_photon(photon, half_px, view, light);
+    std::vector<float> powers;  // each ray of a piece has about the same power
+    for (const Source& source : sources) {
+      float& power = powers.emplace_back(0.0f);
+      for (int face = 0; face < 6; ++face)
+        power += source.light(piece.middle_of(face), piece.outward(face)).sum();
+    }
+    const float all = std::accumulate(powers.begin(), powers.end(), 0.0f);
+    for (std::size_t k = 0; k < sources.size(); ++k) {
+      if (!(powers[k] > 0)) continue;
+      const float count = std::ceil(per_pixel * pixels_of(piece, view) * powers[k] / all);
+      photons.resize(static_cast<std::size_t>(count));
+      tbb::parallel_for(tbb::blocked_range<std::size_t>(0, photons.size(), 256), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i)
+          photons[i] = trace_photon(piece, sources[k], static_cast<uint32_t>(i), count, view, visible);
+      });
+      // One after the other, so that the sums do not depend on the threads.
+      for (const Photon& photon : photons)
+        if (photon.pixel >= 0) add_photon(photon, half_px, view, light);
+    }
   }
 }
 

@@ -3,7 +3,18 @@
 #include <cmath>
 #include <numbers>
 
+#include <Eigen/LU>
+
 namespace offstage::render {
+
+bool GlassPiece::contains(const Vector3f& place, float margin_m) const {
+  const Vector3f at = edges.inverse() * (place - corner);
+  for (int k = 0; k < 3; ++k) {
+    const float margin = margin_m / edges.col(k).norm();
+    if (!(at[k] >= -margin && at[k] <= 1 + margin)) return false;
+  }
+  return true;
+}
 
 SunDisc::SunDisc(const Sun& sun, const Vector3f& direction) : middle_(direction) {
   const float radius = std::tan(0.5f * sun.size_deg * std::numbers::pi_v<float> / 180);

@@ -11,11 +11,23 @@
 
 namespace offstage::render {
 
-/// A solid piece of glass, which focuses the light of the sun; and a ball around it.
+/// A solid piece of glass, which focuses light, and the box around it.
 struct GlassPiece {
   unsigned object;  ///< in the RayScene
-  Vector3f center;
-  float radius;
+  Vector3f corner;
+  Eigen::Matrix3f edges;  ///< columns: the edges of the box at its corner
+
+  Vector3f center() const { return corner + 0.5f * edges.rowwise().sum(); }
+  /// A vector along edge k, at right angles to the other two, whose length is the area of the side they span.
+  Vector3f side(int k) const {
+    const Vector3f normal = edges.col((k + 1) % 3).cross(edges.col((k + 2) % 3));
+    return normal.dot(edges.col(k)) < 0 ? -normal : normal;
+  }
+  /// Outward normal of one of the six faces, whose length is the area of the face; and the middle of the
+  /// face.
+  Vector3f outward(int face) const { return face < 3 ? -side(face) : side(face - 3); }
+  Vector3f middle_of(int face) const { return center() + (face < 3 ? -0.5f : 0.5f) * edges.col(face % 3); }
+  bool contains(const Vector3f& place, float margin_m) const;
 };
 
 struct LightSources {

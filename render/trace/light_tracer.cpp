@@ -222,7 +222,7 @@ LightTracer::LampLight LightTracer::trace_lamps(const Points& points, const Ligh
     if (lamp.def().shadows) {
       LaneVectors place = points.place;
       lift(points, lit & (dot(points.face, point.towards) < kGrazing), view, place);
-      const LaneVectors seen = scene_.transmittance(place, point.towards, point.distance, lit);
+      const LaneVectors seen = scene_.transmittance(place, point.towards, point.distance, lit, lamp.focus());
       arriving = {arriving.x * seen.x, arriving.y * seen.y, arriving.z * seen.z};
     }
     diffuse = diffuse + arriving;

@@ -156,9 +156,10 @@ class LightTracer {
                         LightGuide& guide);
   void trace_cells(const SurfaceBuffer& surfaces, int x, int y, int round, IntLanes active,
                    const LightView& view, LightBuffer& light, LightSums& sums) const;
+  struct Source;
   struct Photon;
-  Photon trace_photon(const GlassPiece& piece, uint32_t number, const LightView& view,
-                      const VisibleLight& visible) const;
+  Photon trace_photon(const GlassPiece& piece, const Source& source, uint32_t number, float count,
+                      const LightView& view, const VisibleLight& visible) const;
   static void add_photon(const Photon& photon, int half_px, const LightView& view, LightBuffer& light);
   void add_caustics(const LightView& view, LightBuffer& light) const;
   void refine_cells(const SurfaceBuffer& surfaces, const LightNoise& noise, const LightView& view,

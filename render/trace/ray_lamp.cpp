@@ -2,7 +2,8 @@
 
 namespace offstage::render {
 
-RayLamp::RayLamp(const Lamp& lamp) : def_(lamp) {
+RayLamp::RayLamp(const Lamp& lamp, bool within_glass) : def_(lamp) {
+  if (within_glass || !lamp.shadows) focus_ = RayScene::Focus::passes;
   def_.direction.normalize();
   const Vector3f side = std::abs(def_.direction.y()) < 0.99f ? Vector3f::UnitY() : Vector3f::UnitX();
   right_ = def_.direction.cross(side).normalized();

@@ -4,6 +4,7 @@
 #include "render/sky_picture.h"
 #include "render/stage.h"
 #include "render/trace/directions.h"
+#include "render/trace/ray_scene.h"
 
 namespace offstage::render {
 
@@ -19,13 +20,16 @@ struct LampPoint {
 
 class RayLamp {
  public:
-  explicit RayLamp(const Lamp& lamp);
+  /// `within_glass`: whether a solid piece of glass contains it.
+  explicit RayLamp(const Lamp& lamp, bool within_glass = false);
   /// The bright part of the picture of a sky, which must have one.
   explicit RayLamp(const TurnedSky& sky);
   /// The point of the lamp that belongs to `uv`. `place` is where the light arrives.
   LampPoint<float> point(const Three<float>& place, const SquarePoint<float>& uv) const;
   LampPoint<Lanes> point(const LaneVectors& place, const SquarePoint<Lanes>& uv) const;
   const Lamp& def() const { return def_; }
+  /// How its shadow rays to the surfaces of the picture meet glass that focuses light.
+  RayScene::Focus focus() const { return focus_; }
 
  private:
   template <class T>
@@ -33,6 +37,7 @@ class RayLamp {
   LampPoint<float> point_of_sky(const SquarePoint<float>& uv) const;
 
   Lamp def_;
+  RayScene::Focus focus_ = RayScene::Focus::blocks;
   /// The sky, if the bright part of its picture is the lamp. Without a picture, the lamp is `def_`.
   TurnedSky sky_;
   Vector3f right_, up_;
