@@ -19,9 +19,9 @@ namespace {
 constexpr int kRowsPerTask = 8;
 constexpr uint32_t kRowsPerRound = 4096;                // rows of samples between those of two rounds
 constexpr int kRoundsPerSubFrame = 2, kMostRounds = 8;  // further rounds of light from around
-// Variance of this light over the square of its mean, from which on further rounds are traced, and the most
-// cells over which the filter averages it.
-constexpr float kTargetVariance = 0.0064f, kMostAveraged = 400;
+// Variance of the mean of this light in a sub-frame over its square, from which on further rounds are traced,
+// and the most cells over which the filter averages it.
+constexpr float kTargetVariance = 0.0256f, kMostAveraged = 400;
 constexpr float kBrightest =
     50;  // of light that arrives after bounces; brighter samples would stay visible as dots
 constexpr int kWidestStep = 16;  // of the filter of light from around, in cells
@@ -427,7 +427,7 @@ void LightTracer::refine_cells(const SurfaceBuffer& surfaces, const LightNoise& 
       const Lanes reach2 = cells.inverse_size2.lanes(x, y) / larger(light.reach2.lanes(x, y), one * 1e-20f);
       const Lanes averaged =
           larger(cells.similar_around(x, y) * smaller(3 * reach2, one * kMostAveraged), one);
-      const Lanes rounds = excess / (kTargetVariance * static_cast<float>(view.offsets.count) * averaged);
+      const Lanes rounds = excess / (kTargetVariance * averaged);
       for (int round = 1; round <= most; ++round) {
         const IntLanes active = (cells.filled.lanes(x, y) > 0.0f) & (rounds > static_cast<float>(round));
         if (!any(active)) break;
