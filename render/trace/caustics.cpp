@@ -69,7 +69,7 @@ struct LightTracer::Photon {
 LightTracer::Photon LightTracer::trace_photon(const GlassPiece& piece, const Source& source, uint32_t number,
                                               float count, const LightView& view,
                                               const VisibleLight& visible) const {
-  PixelSampler sampler(number & 1023, number >> 10, view.offsets.index, view.offsets.count);
+  PixelSampler sampler(number, view.offsets.index, view.offsets.count);
   Photon photon;
   WeightedChoice choice(sampler.next().x);
   int chosen = -1;

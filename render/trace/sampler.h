@@ -26,8 +26,10 @@ class Sampler {
   using F = std::conditional_t<std::is_same_v<U, uint32_t>, float, Lanes>;
 
   /// Sample `index` of `count` of the pixel (x, y), both below 65536.
-  Sampler(U x, U y, int index, int count)
-      : reversed_index_(reversed((spread(x) | spread(y) << 1) * std::bit_ceil(static_cast<uint32_t>(count)) +
+  Sampler(U x, U y, int index, int count) : Sampler(spread(x) | spread(y) << 1, index, count) {}
+  /// Sample `index` of `count` of a ray with this number, where rays are numbered without gaps.
+  Sampler(U number, int index, int count)
+      : reversed_index_(reversed(number * std::bit_ceil(static_cast<uint32_t>(count)) +
                                  static_cast<uint32_t>(index))) {}
 
   /// The next two coordinates, each in [0, 1).
