@@ -17,7 +17,7 @@ namespace {
 constexpr float kRaysPerPixel = 1;    // that a piece covers, in a sub-frame
 constexpr float kMostRays = 4e5f;     // of a sub-frame
 constexpr float kRaysPerMean = 64;    // over which a pixel of a frame is averaged
-constexpr int kWidestMean_px = 4;     // half-width of the square of pixels
+constexpr int kWidestMean_px = 8;     // half-width of the square of pixels
 constexpr int kMostSurfaces = 16;     // of glass that a ray meets
 constexpr float kSameSurface = 0.9f;  // cosine between normals
 
@@ -54,7 +54,9 @@ struct LightTracer::Source {
   /// approximately.
   Vector3f light(const Vector3f& middle, const Vector3f& outward) const {
     const LampPoint<float> at = point(middle, {0.5f, 0.5f});
-    return to_eigen(at.arriving) * std::max(outward.dot(to_eigen(at.towards)), 0.0f);
+    // Other points of a lamp may be on the other side of the face, and those of the sky are all around.
+    const float least = lamp != nullptr && lamp->is_sky() ? 1.0f : 0.02f;
+    return to_eigen(at.arriving) * std::max(outward.dot(to_eigen(at.towards)), least * outward.norm());
   }
 };
 
@@ -116,6 +118,39 @@ LightTracer::Photon LightTracer::trace_photon(const GlassPiece& piece, const Sou
   return photon;
 }
 
+/// Photons per pixel around each place of the picture.
+class LightTracer::PhotonDensity {
+ public:
+  PhotonDensity(std::span<const Photon> photons, int width_px, int height_px)
+      : width_px_(width_px),
+        columns_((width_px + kBlock_px - 1) / kBlock_px),
+        rows_((height_px + kBlock_px - 1) / kBlock_px),
+        counts_(static_cast<std::size_t>(columns_ * rows_)) {
+    for (const Photon& photon : photons) ++counts_[block(column_of(photon.pixel), row_of(photon.pixel))];
+  }
+  /// The mean over the block of a pixel and its neighbours.
+  float at(int pixel) const {
+    float sum = 0;
+    int blocks = 0;
+    for (int y = std::max(row_of(pixel) - 1, 0); y <= std::min(row_of(pixel) + 1, rows_ - 1); ++y)
+      for (int x = std::max(column_of(pixel) - 1, 0); x <= std::min(column_of(pixel) + 1, columns_ - 1);
+           ++x) {
+        sum += counts_[block(x, y)];
+        ++blocks;
+      }
+    return sum / static_cast<float>(blocks * kBlock_px * kBlock_px);
+  }
+
+ private:
+  static constexpr int kBlock_px = 8;
+  int column_of(int pixel) const { return pixel % width_px_ / kBlock_px; }
+  int row_of(int pixel) const { return pixel / width_px_ / kBlock_px; }
+  std::size_t block(int column, int row) const { return static_cast<std::size_t>(row * columns_ + column); }
+
+  int width_px_, columns_, rows_;
+  std::vector<float> counts_;
+};
+
 // Spreads the light over the pixels of the same surface around.
 void LightTracer::add_photon(const Photon& photon, int half_px, const LightView& view, LightBuffer& light) {
   const LightGuide& guide = light.pixels;
@@ -150,12 +185,9 @@ void LightTracer::add_caustics(const LightView& view, LightBuffer& light) const 
     if (lamp.focus() == RayScene::Focus::blocks)
       sources.push_back({.sun = nullptr, .disc = sun_disc_, .lamp = &lamp});
 
-  const auto sub_frames = static_cast<float>(view.offsets.count);
   float pixels = 0;
   for (const GlassPiece& piece : sources_.glass) pixels += pixels_of(piece, view);
   const float per_pixel = std::min(kRaysPerPixel, kMostRays / std::max(pixels, 1.0f));
-  const float side = std::sqrt(kRaysPerMean / (per_pixel * sub_frames));
-  const int half_px = std::clamp(static_cast<int>(std::ceil(0.5f * (side - 1))), 1, kWidestMean_px);
   const VisibleLight visible(light, view);
   std::vector<Photon> photons;
   for (const GlassPiece& piece : sources_.glass) {
@@ -169,15 +201,22 @@ void LightTracer::add_caustics(const LightView& view, LightBuffer& light) const 
     for (std::size_t k = 0; k < sources.size(); ++k) {
       if (!(powers[k] > 0)) continue;
       const float count = std::ceil(per_pixel * pixels_of(piece, view) * powers[k] / all);
-      photons.resize(static_cast<std::size_t>(count));
-      tbb::parallel_for(tbb::blocked_range<std::size_t>(0, photons.size(), 256), [&](const auto& range) {
+      const std::size_t first = photons.size();
+      photons.resize(first + static_cast<std::size_t>(count));
+      tbb::parallel_for(tbb::blocked_range<std::size_t>(first, photons.size(), 256), [&](const auto& range) {
         for (std::size_t i = range.begin(); i < range.end(); ++i)
-          photons[i] = trace_photon(piece, sources[k], static_cast<uint32_t>(i), count, view, visible);
+          photons[i] =
+              trace_photon(piece, sources[k], static_cast<uint32_t>(i - first), count, view, visible);
       });
-      // One after the other, so that the sums do not depend on the threads.
-      for (const Photon& photon : photons)
-        if (photon.pixel >= 0) add_photon(photon, half_px, view, light);
     }
+  }
+  std::erase_if(photons, [](const Photon& photon) { return photon.pixel < 0; });
+  const PhotonDensity density(photons, light.pixels.width_px, light.pixels.height_px);
+  // One after the other, so that the sums do not depend on the threads.
+  for (const Photon& photon : photons) {
+    const float wanted = kRaysPerMean / (density.at(photon.pixel) * static_cast<float>(view.offsets.count));
+    const int half_px = static_cast<int>(std::ceil(0.5f * (std::sqrt(wanted) - 1)));
+    add_photon(photon, std::clamp(half_px, 1, kWidestMean_px), view, light);
   }
 }
 

@@ -158,6 +158,7 @@ class LightTracer {
                    const LightView& view, LightBuffer& light, LightSums& sums) const;
   struct Source;
   struct Photon;
+  class PhotonDensity;
   Photon trace_photon(const GlassPiece& piece, const Source& source, uint32_t number, float count,
                       const LightView& view, const VisibleLight& visible) const;
   static void add_photon(const Photon& photon, int half_px, const LightView& view, LightBuffer& light);

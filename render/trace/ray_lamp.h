@@ -28,6 +28,8 @@ class RayLamp {
   LampPoint<float> point(const Three<float>& place, const SquarePoint<float>& uv) const;
   LampPoint<Lanes> point(const LaneVectors& place, const SquarePoint<Lanes>& uv) const;
   const Lamp& def() const { return def_; }
+  /// Whether it is the bright part of the sky's picture.
+  bool is_sky() const { return sky_.picture != nullptr; }
   /// How its shadow rays to the surfaces of the picture meet glass that focuses light.
   RayScene::Focus focus() const { return focus_; }
 
