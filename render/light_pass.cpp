@@ -144,28 +144,33 @@ void LightPass::trace_glass(const LightSources& sources, const View& view, const
   if (through_glass_ == 0)
     for (gl::Texture* texture : {&through_glass_, &mirrored_by_glass_})
       *texture = gl::make_target(GL_RGBA32F, all_px_.sizes().x(), all_px_.sizes().y(), GL_NEAREST);
-  read_surfaces(part_px_, part_);
+  read_surfaces(part_px_, surfaces_);
   picture_.resize(light_.arriving.size());
   glBindFramebuffer(GL_READ_FRAMEBUFFER, picture_framebuffer);
   glReadPixels(0, 0, all_px_.sizes().x(), all_px_.sizes().y(), GL_RGBA, GL_FLOAT, picture_.data());
   const LightView seen = light_view(view, offsets);
+  // The textures have these values of the opaque objects already, so their memory can be used.
+  glass_light_.mirrored.swap(light_.mirrored);
+  glass_light_.highlights.swap(light_.highlights);
   LightTracer(scene_, sources)
-      .trace_glass(part_, part_px_.min().x(), part_px_.min().y(), seen, VisibleLight(light_, seen, picture_),
-                   glass_light_);
+      .trace_glass(surfaces_, part_px_.min().x(), part_px_.min().y(), seen,
+                   VisibleLight(light_, seen, picture_), glass_light_);
   sums_ += glass_light_.sums;
   write_texture(through_glass_, kThroughGlassUnit, part_px_, glass_light_.through);
   write_texture(mirrored_by_glass_, kMirroredByGlassUnit, part_px_, glass_light_.mirrored);
   write_lamps(part_px_, glass_light_.lamps, glass_light_.highlights);
+  glass_light_.mirrored.swap(light_.mirrored);
+  glass_light_.highlights.swap(light_.highlights);
 }
 
 void LightPass::trace_body(const LightSources& sources, const View& view, const SampleOffsets& offsets) {
   glDisable(GL_SCISSOR_TEST);
-  read_surfaces(part_px_, part_);
-  if (!body_light_ || body_light_->pixels.width_px != part_.width_px ||
-      body_light_->pixels.height_px != part_.height_px)
-    body_light_.emplace(part_.width_px, part_.height_px);
+  read_surfaces(part_px_, surfaces_);
+  if (!body_light_ || body_light_->pixels.width_px != surfaces_.width_px ||
+      body_light_->pixels.height_px != surfaces_.height_px)
+    body_light_.emplace(surfaces_.width_px, surfaces_.height_px);
   const LightView seen = light_view(view, offsets);
-  LightTracer(scene_, sources).trace_body(part_, seen, VisibleLight(light_, seen), *body_light_);
+  LightTracer(scene_, sources).trace_body(surfaces_, seen, VisibleLight(light_, seen), *body_light_);
   sums_ += body_light_->sums;
   write_light(part_px_, *body_light_);
 }

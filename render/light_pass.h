@@ -49,7 +49,7 @@ class LightPass {
   RayScene scene_;
   Eigen::AlignedBox2i all_px_;
   LightSums sums_;
-  SurfaceBuffer surfaces_;
+  SurfaceBuffer surfaces_;  ///< the surfaces whose light is traced last: opaque ones, or a part
   LightBuffer light_;
   bool quick_;
   gl::Texture places_, normals_;
@@ -63,7 +63,6 @@ class LightPass {
   gl::Texture part_depth_;
   gl::Framebuffer part_framebuffer_;
   Eigen::AlignedBox2i part_px_;
-  SurfaceBuffer part_;
   std::optional<LightBuffer> body_light_;
   gl::Texture through_glass_, mirrored_by_glass_;
   GlassBuffer glass_light_;
