@@ -96,11 +96,16 @@ LightTracer::Photon LightTracer::trace_photon(const GlassPiece& piece, const Sou
     if (!scene_.first_hit(from, direction, kFar, hit) || (k == 0 && hit.object != piece.object))
       return photon;
     const RayMaterial& material = *hit.material;
+    const Vector4f color = material.color(hit, 0);
+    if (color.w() < 1 && sampler.next().x >= color.w()) {  // through a hole, or a translucent surface
+      from = off_surface(hit.position, -hit.face);
+      continue;
+    }
     if (material.transmission <= 0) {
       photon.pixel = visible.find(hit);
       break;
     }
-    const Vector3f albedo = material.transmission * material.color(hit, 0).head<3>();
+    const Vector3f albedo = material.transmission * color.head<3>();
     if (sampler.next().x < mirrored_fraction(hit, direction)) {
       direction = reflected(direction, hit.normal);
       if (direction.dot(hit.face) <= 0) direction = reflected(direction, hit.face);
@@ -199,7 +204,7 @@ void LightTracer::add_caustics(const LightView& view, LightBuffer& light) const 
     }
     const float all = std::accumulate(powers.begin(), powers.end(), 0.0f);
     for (std::size_t k = 0; k < sources.size(); ++k) {
-      if (!(powers[k] > 0)) continue;
+      if (!(powers[k] > 0) || !std::isfinite(all)) continue;
       const float count = std::ceil(per_pixel * pixels_of(piece, view) * powers[k] / all);
       const std::size_t first = photons.size();
       photons.resize(first + static_cast<std::size_t>(count));
