@@ -7,7 +7,7 @@ cd "$(dirname "$0")/.."
 
 # Chapters, and of each scene the moment that shows it best.
 chapters=(
-  "Rigid bodies|wall:1.6 dominoes:2 arch:4.7 marbles:1.5 pile:0.9 explosion:1.5 coins:2 cradle:0.4 cradle_simultaneous:0.4 t_handle:3 collision:4 forces:2.25 machine:4.35 pushers:4.1 boules:2.2 book:1.1 toybox:2 workbench:1.4 glass:2.2 studio:2.5 evening:2.5"
+  "Rigid bodies|wall:1.6 dominoes:2 arch:4.7 marbles:1.5 pile:0.9 explosion:1.5 coins:2 cradle:0.4 cradle_simultaneous:0.4 t_handle:3 collision:4 forces:2.25 machine:4.35 pushers:4.1 boules:2.2 book:1.1 toybox:2 workbench:1.4 glass:2.2 studio:0.7 evening:2.5"
   "Articulated bodies|wrecking_chain:1.45 ragdolls:1.4 bridge:1.6 double_pendulums:12 linkage:5 gyroscope:2.6 robot_arm:5 crane:4.7 vehicle:7 multi_pendulum:1.2 tentacle:3 gears:1.4 playground:1.5"
   "Cloth|drape:3.5 flag:3 curtain:1.9 sheets:3 rotating_sphere:3 tablecloth:1.68 hammock:5 torn_banner:4 parachute:1.2 balloons:2.07 swatches:2.6 laundry:2.4"
   "Water and weather|fountain:5 jet_fountain:3 sprinkler:3.3 lawn_sprinkler:3 water_jet:3 rain:4 rain_square:3 hail:3 snow:5 thunderstorm:3"
