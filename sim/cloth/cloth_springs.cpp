@@ -161,15 +161,40 @@ void ClothSprings::set_longest_step() {
   longest_step_ = std::sqrt(square);
 }
 
+/// Elongations of the springs of a row, whose lengths are known.
+inline Lanes ClothSprings::elongations(const Batch& batch, std::size_t r, Lanes length, const Vec4* x) const {
+  const Lanes own = length - elastic_[r].rest;
+  if (batch.counterparts == kNone) return own;
+  const Counterparts& c = counterparts_[batch.counterparts + r - batch.first];
+  const FourVectors d = FourVectors::of(x, c.a) - FourVectors::of(x, c.b);
+  const Lanes none = {};
+  return c.rest > none ? (own - lane_root(d.dot(d)) + c.rest) / 2 : own;
+}
+
+/// Calls look(batch, row, d) for the springs of each row, with the vectors d from their second points to the first.
+template <class Look>
+inline void ClothSprings::for_rows(const Vec4* x, Look&& look) const {
+  for (const Batch& batch : batch_) {
+    FourVectors at = FourVectors::of(x, row_[batch.first].point);
+    for (std::size_t r = batch.first, end = r + batch.length; r < end; ++r) {
+      const FourVectors next = FourVectors::of(x, row_[r + 1].point);
+      look(batch, r, at - next);
+      at = next;
+    }
+  }
+}
+
 void ClothSprings::adapt_to_stretch(const ClothPoints& points) {
   const Vec4* const x = points.position.data();
-  std::vector<Real> across;  // sum of k e / (l m) of the springs at each point
-  // Adds the springs of a row to the sum if `adds`; else returns whether any is too long to be neglected.
-  const auto look = [&](const Batch& batch, std::size_t r, Lanes length2, bool adds) {
-    if (!adds)
-      return _mm256_movemask_pd(length2 >
-                                kShortEnough * kShortEnough * elastic_[r].rest * elastic_[r].rest) != 0;
-    const Lanes length = lane_root(length2), elongation = elongations(batch, r, length, x);
+  auto too_long = Lanes{} > Lanes{};
+  for_rows(x, [&](const Batch&, std::size_t r, const FourVectors& d) {
+    too_long |= d.dot(d) > kShortEnough * kShortEnough * elastic_[r].rest * elastic_[r].rest;
+  });
+  const bool is_stretched = (too_long[0] | too_long[1] | too_long[2] | too_long[3]) != 0;
+  if (!is_stretched && !is_stretched_) return;
+  std::vector<Real> across(points.size(), 0);  // sum of k e / (l m) of the springs at each point
+  for_rows(x, [&](const Batch& batch, std::size_t r, const FourVectors& d) {
+    const Lanes length = lane_root(d.dot(d)), elongation = elongations(batch, r, length, x);
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       const uint32_t spring = elastic_[r].spring[lane];
       if (spring == kNoSpring || !(elongation[lane] > 0)) continue;
@@ -177,24 +202,7 @@ void ClothSprings::adapt_to_stretch(const ClothPoints& points) {
       for (uint32_t end : {row_[r].point[lane], row_[r + 1].point[lane]})
         across[end] += stiffness / points.mass[end];
     }
-    return true;
-  };
-  const auto any = [&](bool adds) {
-    bool found = false;
-    for (const Batch& batch : batch_) {
-      FourVectors at = FourVectors::of(x, row_[batch.first].point);
-      for (std::size_t r = batch.first, end = r + batch.length; r < end; ++r) {
-        const FourVectors next = FourVectors::of(x, row_[r + 1].point), d = at - next;
-        found |= look(batch, r, d.dot(d), adds);
-        at = next;
-      }
-    }
-    return found;
-  };
-  const bool is_stretched = any(false);
-  if (!is_stretched && !is_stretched_) return;
-  across.assign(points.size(), 0);
-  any(true);
+  });
   for (Material& m : material_) {
     const Real sum = across[m.a] + across[m.b];
     m.most = sum > 0 ? std::min(m.most_at_rest, kMaxAcross * m.fastest / sum) : m.most_at_rest;
@@ -263,16 +271,6 @@ void ClothSprings::begin(const ClothPoints& points, Real step) {
       row.forget[lane] = static_cast<float>(forget);
     }
   }
-}
-
-/// Elongations of the springs of a row, whose lengths are known.
-Lanes ClothSprings::elongations(const Batch& batch, std::size_t r, Lanes length, const Vec4* x) const {
-  const Lanes own = length - elastic_[r].rest;
-  if (batch.counterparts == kNone) return own;
-  const Counterparts& c = counterparts_[batch.counterparts + r - batch.first];
-  const FourVectors d = FourVectors::of(x, c.a) - FourVectors::of(x, c.b);
-  const Lanes none = {};
-  return c.rest > none ? (own - lane_root(d.dot(d)) + c.rest) / 2 : own;
 }
 
 /// Calls act(lane) for the lanes of a row that have its point. Most rows have it in all, and their registers
