@@ -91,8 +91,14 @@ void AirDrag::begin(Real h) {
     const Real scale = 1 / (xx * a + xy * b + zx * c);
     const auto loss = [&](Real cofactor) { return static_cast<float>(1 - scale * cofactor); };
     const auto across = [&](Real cofactor) { return static_cast<float>(-scale * cofactor); };
-    loss_[i].at = {loss(a),   loss(xx * zz - zx * zx),   loss(xx * yy - xy * xy), 0,
-                   across(b), across(xy * zx - xx * yz), across(c),               0};
+    loss_[i].at = {loss(a),
+                   loss(xx * zz - zx * zx),
+                   loss(xx * yy - xy * xy),
+                   0,
+                   across(b),
+                   across(xy * zx - xx * yz),
+                   across(c),
+                   0};
   }
 }
 
@@ -157,10 +163,10 @@ void AirDrag::drag_triangles(const ClothPoints& points, std::size_t first, std::
     return by_normal * n1 * n2 + by_along * along1 * along2;
   };
   const auto force = (along * third).apart();
-  const auto diagonal = FourVectors{slope(n.x, n.x, along.x, along.x) + by_all,
-                                    slope(n.y, n.y, along.y, along.y) + by_all,
-                                    slope(n.z, n.z, along.z, along.z) + by_all}
-                            .apart();
+  const auto diagonal =
+      FourVectors{slope(n.x, n.x, along.x, along.x) + by_all, slope(n.y, n.y, along.y, along.y) + by_all,
+                  slope(n.z, n.z, along.z, along.z) + by_all}
+          .apart();
   const auto beside = FourVectors{slope(n.x, n.y, along.x, along.y), slope(n.y, n.z, along.y, along.z),
                                   slope(n.z, n.x, along.z, along.x)}
                           .apart();

@@ -91,7 +91,7 @@ class AirDrag {
   std::vector<Symmetric> loss_;  // 1 - (1 + h R)^-1
   std::vector<Vec4> from_, wind_, force_;
   std::vector<Real> mobility_;  // of each triangle: kValence over the mass of its points [1/kg]
-  Real prepared_for_ = -1;  // step [s]; < 0: none
+  Real prepared_for_ = -1;      // step [s]; < 0: none
 };
 
 }  // namespace offstage::sim

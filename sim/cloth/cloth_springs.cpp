@@ -146,8 +146,7 @@ void ClothSprings::add_stages(std::span<const std::size_t> color_ends) {
     for (std::size_t i = begin; i < end; ++i) longest = std::max(longest, batch_[i].length);
     // Paths of the last colour may share points.
     const bool alone = color + 1 == kPathColors;
-    const std::size_t block =
-        alone ? end - begin : (kBlock / (kLanes * kChains * longest) + 1) * kChains;
+    const std::size_t block = alone ? end - begin : (kBlock / (kLanes * kChains * longest) + 1) * kChains;
     (kind == Stage::apply ? apply_ : relax_).push_back({kind, begin, end, block, alone});
   };
   for (std::size_t c = 0; c < color_ends.size(); ++c) add(c, Stage::apply);
@@ -171,7 +170,8 @@ inline Lanes ClothSprings::elongations(const Batch& batch, std::size_t r, Lanes 
   return c.rest > none ? (own - lane_root(d.dot(d)) + c.rest) / 2 : own;
 }
 
-/// Calls look(batch, row, d) for the springs of each row, with the vectors d from their second points to the first.
+/// Calls look(batch, row, d) for the springs of each row, with the vectors d from their second points to the
+/// first.
 template <class Look>
 inline void ClothSprings::for_rows(const Vec4* x, Look&& look) const {
   for (const Batch& batch : batch_) {
@@ -331,7 +331,7 @@ void ClothSprings::apply(ClothPoints& points, std::span<Vec4> moves, const Batch
 /// latter. Gauss-Seidel on the impulses, which are zero at first: the equation of a spring is
 /// r + impulse / c = 0.
 inline void ClothSprings::relax(ClothPoints& points, Row& row, const Row& after, FourVectors& at,
-                         FourVectors& next) {
+                                FourVectors& next) {
   const FourVectors axis = widened(row.axis);
   const Lanes step = widened(row.along) * axis.dot(at - next) - widened(row.forget) * widened(row.impulse);
   row.impulse += narrowed(step);
@@ -342,7 +342,8 @@ inline void ClothSprings::relax(ClothPoints& points, Row& row, const Row& after,
   if (after.held != 0) pass_on(points, after, impulse);
 }
 
-inline void ClothSprings::relax_forward(ClothPoints& points, std::span<Vec4> moves, std::size_t r, FourVectors& at) {
+inline void ClothSprings::relax_forward(ClothPoints& points, std::span<Vec4> moves, std::size_t r,
+                                        FourVectors& at) {
   const Row& after = row_[r + 1];
   FourVectors next = FourVectors::of(moves.data(), after.point);
   relax(points, row_[r], after, at, next);
@@ -351,7 +352,7 @@ inline void ClothSprings::relax_forward(ClothPoints& points, std::span<Vec4> mov
 }
 
 inline void ClothSprings::relax_backward(ClothPoints& points, std::span<Vec4> moves, std::size_t r,
-                                  FourVectors& next) {
+                                         FourVectors& next) {
   const Row& after = row_[r + 1];
   FourVectors at = FourVectors::of(moves.data(), row_[r].point);
   relax(points, row_[r], after, at, next);
@@ -365,7 +366,8 @@ void ClothSprings::sweep_forward(ClothPoints& points, std::span<Vec4> moves, std
   std::array<FourVectors, kChains> at;
   for (std::size_t n = 0; n < batches.size(); ++n)
     at[n] = FourVectors::of(moves.data(), row_[batches[n].first].point);
-  const std::size_t common = batches.size() == kChains ? std::ranges::min(batches, {}, &Batch::length).length : 0;
+  const std::size_t common =
+      batches.size() == kChains ? std::ranges::min(batches, {}, &Batch::length).length : 0;
   for (std::size_t k = 0; k < common; ++k)
     in_turns([&](std::size_t n) { relax_forward(points, moves, batches[n].first + k, at[n]); });
   for (std::size_t n = 0; n < batches.size(); ++n) {
@@ -378,7 +380,8 @@ void ClothSprings::sweep_forward(ClothPoints& points, std::span<Vec4> moves, std
 void ClothSprings::sweep_backward(ClothPoints& points, std::span<Vec4> moves,
                                   std::span<const Batch> batches) {
   std::array<FourVectors, kChains> next;
-  const std::size_t common = batches.size() == kChains ? std::ranges::min(batches, {}, &Batch::length).length : 0;
+  const std::size_t common =
+      batches.size() == kChains ? std::ranges::min(batches, {}, &Batch::length).length : 0;
   for (std::size_t n = 0; n < batches.size(); ++n) {
     const std::size_t first = batches[n].first, end = first + batches[n].length;
     next[n] = FourVectors::of(moves.data(), row_[end].point);

@@ -97,7 +97,8 @@ class ClothSprings {
   void run(std::span<const Stage> stages, ClothPoints& points, std::span<Vec4> moves);
   template <class Look>
   [[gnu::always_inline]] void for_rows(const Vec4* x, Look&& look) const;
-  [[gnu::always_inline]] Lanes elongations(const Batch& batch, std::size_t row, Lanes length, const Vec4* x) const;
+  [[gnu::always_inline]] Lanes elongations(const Batch& batch, std::size_t row, Lanes length,
+                                           const Vec4* x) const;
   void apply(ClothPoints& points, std::span<Vec4> moves, const Batch& batch);
   static void pass_on(ClothPoints& points, const Row& row, const FourVectors& impulse);
   template <class Act>

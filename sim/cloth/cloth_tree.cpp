@@ -218,7 +218,8 @@ void ClothTree::fit_rings() {
   }
 }
 
-/// Whether the outline of a patch, seen along a direction towards which it leans, crosses itself: sweeps over its segments.
+/// Whether the outline of a patch, seen along a direction towards which it leans, crosses itself: sweeps over
+/// its segments.
 bool ClothTree::outline_crosses(std::span<const Vec4> points, const Node& node) const {
   if (node.count <= EightBoxes::kCount) return true;  // testing its triangles one by one costs no more
   const Vec3 normal = kDirections.mean(node.views);

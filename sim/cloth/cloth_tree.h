@@ -43,8 +43,8 @@ class ClothTree {
   using Views = uint64_t;
   struct Node {
     MovingBox box;
-    Views views;            // towards which its normals lean
-    uint32_t first, count;  // triangles, in order_
+    Views views;             // towards which its normals lean
+    uint32_t first, count;   // triangles, in order_
     uint32_t second;         // node; the first child is the next one. 0: a leaf
     uint32_t leaf = 0;       // of a leaf: its index in leaves_
     uint32_t fresh = 0;      // lanes of a leaf that were fitted last; else whether any below
@@ -101,11 +101,11 @@ class ClothTree {
   std::vector<std::array<uint32_t, 3>> beside_;  // triangle across each edge from a corner to the next
   std::vector<MovingBox> boxes_;                 // in the order of order_, as the next
   std::vector<Normals> normals_;
-  std::vector<uint8_t> ring_leans_;              // whether two rings around each triangle cannot cross themselves
-  std::vector<RingPart> ring_;                   // of one triangle after another
-  std::vector<uint32_t> first_in_ring_;          // of each triangle, and the end
-  std::vector<Views> views_around_;              // of two rings around each point
-  std::vector<Star> stars_;                      // of each point
+  std::vector<uint8_t> ring_leans_;      // whether two rings around each triangle cannot cross themselves
+  std::vector<RingPart> ring_;           // of one triangle after another
+  std::vector<uint32_t> first_in_ring_;  // of each triangle, and the end
+  std::vector<Views> views_around_;      // of two rings around each point
+  std::vector<Star> stars_;              // of each point
   std::vector<uint32_t> around_;
   std::vector<Node> nodes_;
   std::vector<uint32_t> leaf_;  // node of each place in order_
