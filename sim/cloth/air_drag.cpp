@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "sim/cloth/four_vectors.h"
+
 namespace offstage::sim {
 namespace {
 
@@ -28,6 +30,9 @@ void AirDrag::assign(const Cloth& cloth, std::size_t first) {
     const Real third = (cloth.points[t[1]] - a).cross(cloth.points[t[2]] - a).norm() / 6;
     for (uint32_t corner : t) area[corner] += third;
   }
+  mobility_.clear();
+  for (const Triangle& t : cloth.triangles)
+    mobility_.push_back(kValence / (cloth.masses[t[0]] + cloth.masses[t[1]] + cloth.masses[t[2]]));
   lightness_ = 0;
   for (std::size_t i = 0; i < area.size(); ++i) lightness_ = std::max(lightness_, area[i] / cloth.masses[i]);
 }
@@ -64,23 +69,36 @@ void AirDrag::renew(ClothPoints& points, Real dt, uint32_t substeps, uint32_t st
                                     points.field_drag.begin() + static_cast<std::ptrdiff_t>(first_ + n),
                                     [](Real rate) { return rate > 0; });
   if (!is_active_) return;
-  resistance_.assign(n, Columns::Zero());
+  resistance_.assign(n, {});
   from_.assign(points.velocity.begin() + static_cast<std::ptrdiff_t>(first_),
                points.velocity.begin() + static_cast<std::ptrdiff_t>(first_ + n));
   prepared_for_ = -1;
+  if (blows && def.air.drag > 0) drag_triangles(points);
   drag_points(points);
-  if (!blows) return;
-  if (def.air.drag > 0) drag_triangles(points);
-  if (def.ram_pressure > 0) catch_air(points);
+  if (blows && def.ram_pressure > 0) catch_air(points);
 }
 
 void AirDrag::begin(Real h) {
   if (h == prepared_for_) return;
   prepared_for_ = h;
-  response_.resize(resistance_.size());
+  loss_.resize(resistance_.size());
   for (std::size_t i = 0; i < resistance_.size(); ++i) {
-    response_[i].row(3).setZero();
-    response_[i].topRows<3>() = (Mat3::Identity() + h * resistance(i)).inverse();
+    const auto& r = resistance_[i].at;
+    const Real xx = 1 + h * r[0], yy = 1 + h * r[1], zz = 1 + h * r[2], xy = h * r[4], yz = h * r[5],
+               zx = h * r[6];
+    // The inverse by cofactors.
+    const Real a = yy * zz - yz * yz, b = zx * yz - xy * zz, c = xy * yz - yy * zx;
+    const Real scale = 1 / (xx * a + xy * b + zx * c);
+    const auto loss = [&](Real cofactor) { return static_cast<float>(1 - scale * cofactor); };
+    const auto across = [&](Real cofactor) { return static_cast<float>(-scale * cofactor); };
+    loss_[i].at = {loss(a),
+                   loss(xx * zz - zx * zx),
+                   loss(xx * yy - xy * xy),
+                   0,
+                   across(b),
+                   across(xy * zx - xx * yz),
+                   across(c),
+                   0};
   }
 }
 
@@ -88,8 +106,9 @@ void AirDrag::begin(Real h) {
 void AirDrag::drag_points(ClothPoints& points) {
   for (std::size_t i = 0; i < from_.size(); ++i) {
     const Real rate = points.field_drag[first_ + i];
+    if (!(rate > 0)) continue;
     points.acceleration[first_ + i] -= rate * from_[i];
-    resistance_[i].topRows<3>().diagonal().setConstant(fraction_ * rate);
+    resistance_[i].add(fraction_ * rate * Mat3::Identity());
   }
 }
 
@@ -97,35 +116,67 @@ void AirDrag::drag_points(ClothPoints& points) {
 /// u^T / |u|); with D u u^T D / u.D u in place of D u u^T it is symmetric, and exact for air along the normal
 /// and along the cloth. The implicit fraction of the first term is raised where air stops the triangle within
 /// the time of the linearisation, so that nothing is thrown back. Together they are the exact c |u| D of u /
-/// (1 + k u t) along u then as well.
+/// (1 + k u t) along u then as well. Four triangles at a time, one in each lane of a register.
 void AirDrag::drag_triangles(ClothPoints& points) {
+  const std::size_t n = from_.size();
+  wind_.resize(n);
+  force_.assign(n, Vec4::Zero());
+  for (std::size_t i = 0; i < n; ++i) wind_[i] = points.flow[first_ + i] - points.velocity[first_ + i];
+  const auto& triangles = cloth_->triangles;
+  for (std::size_t t = 0; t < triangles.size(); t += 4)
+    drag_triangles(points, t, std::min<std::size_t>(4, triangles.size() - t));
+  for (std::size_t i = 0; i < n; ++i) {
+    const Real inverse = 1 / points.mass[first_ + i];
+    points.acceleration[first_ + i] += inverse * force_[i];
+    for (float& entry : resistance_[i].at) entry *= static_cast<float>(inverse);
+  }
+}
+
+/// Adds the forces on `count` triangles from a first one on, and their slopes, to those of their corners.
+void AirDrag::drag_triangles(const ClothPoints& points, std::size_t first, std::size_t count) {
   const ClothAir& air = cloth_->def.air;
-  const Vec4* const x = points.position.data();
-  for (const Triangle& t : cloth_->triangles) {
-    const std::size_t i = first_ + t[0], j = first_ + t[1], k = first_ + t[2];
-    const Vec4 doubled = (x[j] - x[i]).cross3(x[k] - x[i]);
-    const Real size = doubled.norm();
-    const Vec4 wind = points.flow[i] + points.flow[j] + points.flow[k] - points.velocity[i] -
-                      points.velocity[j] - points.velocity[k];
-    const Vec4 u = wind / 3;
-    const Real speed = u.norm();
-    if (!(size > 0) || !(speed > 0)) continue;
-    const Vec4 n = doubled / size;
-    const Real scale = air.density * size / 4 * speed;  // c |u|
-    const Vec4 along = (air.drag - air.lift) * u + air.lift * u.dot(n) * n;
-    const Real braked =
-        kValence * span_ * scale * air.drag / (points.mass[i] + points.mass[j] + points.mass[k]);
-    const Real even = braked > 1 ? std::max(fraction_, 1 - 1 / braked) : fraction_;
-    const Real power = u.dot(along), rank = power > 0 ? (2 * fraction_ - even) / power : 0;
-    const Vec4 by_normal = even * air.lift * n, by_along = rank * along;
-    std::array<Vec4, 3> slope;  // columns
-    for (int c = 0; c < 3; ++c) slope[static_cast<std::size_t>(c)] = n[c] * by_normal + along[c] * by_along;
-    for (int c = 0; c < 3; ++c) slope[static_cast<std::size_t>(c)][c] += even * (air.drag - air.lift);
-    for (const std::size_t corner : {i, j, k}) {
-      const Real third = scale / 3 / points.mass[corner];
-      points.acceleration[corner] += third * along;
-      for (int c = 0; c < 3; ++c)
-        resistance_[corner - first_].col(c) += third * slope[static_cast<std::size_t>(c)];
+  const auto& triangles = cloth_->triangles;
+  std::array<std::array<uint32_t, 4>, 3> corner;
+  Lanes mobility = {};
+  for (std::size_t lane = 0; lane < 4; ++lane) {
+    const std::size_t t = first + std::min(lane, count - 1);
+    for (std::size_t k = 0; k < 3; ++k) corner[k][lane] = triangles[t][k];
+    mobility[static_cast<int>(lane)] = mobility_[t];
+  }
+  const auto place = [&](std::size_t k) {
+    return FourVectors::of(points.position.data() + first_, corner[k]);
+  };
+  const auto wind = [&](std::size_t k) { return FourVectors::of(wind_.data(), corner[k]); };
+  const Lanes none = {}, one = none + 1.0;
+  const FourVectors doubled = (place(1) - place(0)).cross(place(2) - place(0));
+  const FourVectors u = (wind(0) + wind(1) + wind(2)) * (one / 3);
+  const Lanes size = lane_root(doubled.dot(doubled)), speed = lane_root(u.dot(u));
+  const FourVectors n = doubled * (size > none ? one / size : none);
+  const Lanes scale = air.density / 4 * size * speed;  // c |u|
+  const FourVectors along = u * (none + (air.drag - air.lift)) + n * (air.lift * u.dot(n));
+  const Lanes braked = span_ * air.drag * scale * mobility;
+  const Lanes even = lane_max(one - one / braked, none + fraction_);
+  const Lanes power = u.dot(along), rank = power > none ? (2 * fraction_ - even) / power : none;
+  const Lanes third = scale / 3, by_normal = third * even * air.lift, by_along = third * rank,
+              by_all = third * even * (air.drag - air.lift);
+  const auto slope = [&](Lanes n1, Lanes n2, Lanes along1, Lanes along2) {
+    return by_normal * n1 * n2 + by_along * along1 * along2;
+  };
+  const auto force = (along * third).apart();
+  const auto diagonal =
+      FourVectors{slope(n.x, n.x, along.x, along.x) + by_all, slope(n.y, n.y, along.y, along.y) + by_all,
+                  slope(n.z, n.z, along.z, along.z) + by_all}
+          .apart();
+  const auto beside = FourVectors{slope(n.x, n.y, along.x, along.y), slope(n.y, n.z, along.y, along.z),
+                                  slope(n.z, n.x, along.z, along.x)}
+                          .apart();
+  for (std::size_t lane = 0; lane < count; ++lane) {
+    const __m256 slopes = _mm256_set_m128(_mm256_cvtpd_ps(beside[lane]), _mm256_cvtpd_ps(diagonal[lane]));
+    for (std::size_t k = 0; k < 3; ++k) {
+      Real* const sum = force_[corner[k][lane]].data();
+      _mm256_store_pd(sum, _mm256_load_pd(sum) + force[lane]);
+      float* const at = resistance_[corner[k][lane]].at.data();
+      _mm256_store_ps(at, _mm256_add_ps(_mm256_load_ps(at), slopes));
     }
   }
 }
@@ -164,7 +215,7 @@ void AirDrag::catch_air(ClothPoints& points) {
     for (const uint32_t corner : t) {
       const Real third = 1 / (3 * points.mass[first_ + corner]);
       points.acceleration[first_ + corner] += padded(pressure * third * area);
-      resistance_[corner].topRows<3>() += area.norm() * third * along;
+      resistance_[corner].add(area.norm() * third * along);
     }
   }
 }

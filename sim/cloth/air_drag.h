@@ -4,11 +4,15 @@
 /// part implicit. Steady motion and loads at rest are exact for any step. Free decay is of second order; with
 /// one step of the springs per linearisation, the decay u0 / (1 + k u0 t) of a flat cloth is exact.
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
+#include <immintrin.h>
+
 #include "sim/cloth/cloth_points.h"
 #include "sim/cloth/cloth_state.h"
+#include "sim/linear/lanes.h"
 
 namespace offstage::sim {
 
@@ -31,23 +35,49 @@ class AirDrag {
   /// Prepares respond() for steps of length h [s].
   void begin(Real h);
   /// Returns the change of the acceleration of the cloth's point i if its velocity is v.
-  Vec4 change(std::size_t i, const Vec4& v) const { return -times(resistance_[i], v - from_[i]); }
+  Vec4 change(std::size_t i, const Vec4& v) const { return -resistance_[i].times(v - from_[i]); }
+  /// Returns R v of the cloth's point i: R is the decrease of the acceleration per velocity [1/s].
+  Vec4 resist(std::size_t i, const Vec4& v) const { return resistance_[i].times(v); }
   /// Returns the part of a change of velocity dv that remains after the drag of a step, (1 + h R)^-1 dv.
-  Vec4 respond(std::size_t i, const Vec4& dv) const { return times(response_[i], dv); }
-  /// Returns R, the decrease of the acceleration per velocity [1/s].
-  Mat3 resistance(std::size_t i) const { return resistance_[i].topRows<3>(); }
+  Vec4 respond(std::size_t i, const Vec4& dv) const { return dv - loss_[i].times(dv); }
+  /// Returns R as a matrix.
+  Mat3 resistance(std::size_t i) const { return resistance_[i].matrix(); }
   /// Returns the velocity for which the accelerations of the points were computed.
   const Vec4& from(std::size_t i) const { return from_[i]; }
 
  private:
-  using Columns = Eigen::Matrix<Real, 4, 3>;  // the fourth row is 0
+  /// A symmetric matrix in single precision. Every step of the springs reads two of each point, and it only
+  /// slows motion, so the rounding is never seen.
+  struct alignas(32) Symmetric {
+    std::array<float, 8> at = {};  // xx yy zz 0 xy yz zx 0
 
-  static Vec4 times(const Columns& m, const Vec4& v) {
-    return v[0] * m.col(0) + v[1] * m.col(1) + v[2] * m.col(2);
-  }
+    Vec4 times(const Vec4& v) const {
+      const Lanes diagonal = _mm256_cvtps_pd(_mm_load_ps(at.data())),
+                  beside = _mm256_cvtps_pd(_mm_load_ps(at.data() + 4)), x = _mm256_load_pd(v.data());
+      const Lanes sum = diagonal * x + beside * lane_next(x) + lane_last(beside) * lane_last(x);
+      Vec4 result;
+      _mm256_store_pd(result.data(), sum);
+      return result;
+    }
+    void add(const Mat3& m) {
+      at[0] += static_cast<float>(m(0, 0));
+      at[1] += static_cast<float>(m(1, 1));
+      at[2] += static_cast<float>(m(2, 2));
+      at[4] += static_cast<float>(m(0, 1));
+      at[5] += static_cast<float>(m(1, 2));
+      at[6] += static_cast<float>(m(2, 0));
+    }
+    Mat3 matrix() const {
+      Mat3 m;
+      m << at[0], at[4], at[6], at[4], at[1], at[5], at[6], at[5], at[2];
+      return m;
+    }
+  };
+
   uint32_t substeps_until_change(const ClothPoints& points, Real dt) const;
   void drag_points(ClothPoints& points);
   void drag_triangles(ClothPoints& points);
+  void drag_triangles(const ClothPoints& points, std::size_t first, std::size_t count);
   void catch_air(ClothPoints& points);
 
   const Cloth* cloth_ = nullptr;
@@ -57,9 +87,11 @@ class AirDrag {
   Real span_ = 0;        // total time for which it is kept [s]
   Real fraction_ = 0.5;  // fraction of the linear part that is implicit
   bool is_active_ = false;
-  std::vector<Columns> resistance_, response_;
-  std::vector<Vec4> from_;
-  Real prepared_for_ = -1;  // step [s]; < 0: none
+  std::vector<Symmetric> resistance_;
+  std::vector<Symmetric> loss_;  // 1 - (1 + h R)^-1
+  std::vector<Vec4> from_, wind_, force_;
+  std::vector<Real> mobility_;  // of each triangle: kValence over the mass of its points [1/kg]
+  Real prepared_for_ = -1;      // step [s]; < 0: none
 };
 
 }  // namespace offstage::sim

@@ -459,25 +459,40 @@ void ClothBending::build_matrix(std::span<const uint8_t> rows) {
     }
     row_.push_back(column_.size());
   }
+  upper_column_.clear();
+  upper_value_.clear();
+  upper_row_ = {0};
+  for (uint32_t i = 0; i < n; ++i) {
+    for (std::size_t k = row_[i]; k < row_[i + 1]; ++k) {
+      if (column_[k] < i) continue;
+      upper_column_.push_back(column_[k]);
+      upper_value_.push_back(value_[k]);
+    }
+    upper_row_.push_back(upper_column_.size());
+  }
   fastest_ = 0;
   for (std::size_t i = 0; i < n; ++i) fastest_ = std::max(fastest_, row_sum_[i] / masses_[i]);
 }
 
 void ClothBending::multiply(std::span<const Vec4> p, Real scale, std::span<Vec4> y) const {
-  for (std::size_t i = 0; i + 1 < row_.size(); ++i) {
-    // Differences make the result independent of the cloth's place. There are four sums, because otherwise
+  for (std::size_t i = 0; i + 1 < upper_row_.size(); ++i) {
+    // Differences make the result independent of the cloth's place. There are two sums, because otherwise
     // each addition would wait for the previous one.
     const Vec4 own = p[i];
-    Vec4 a = Vec4::Zero(), b = a, c = a, d = a;
-    std::size_t k = row_[i];
-    for (const std::size_t end = row_[i + 1]; k + 4 <= end; k += 4) {
-      a += value_[k] * (p[column_[k]] - own);
-      b += value_[k + 1] * (p[column_[k + 1]] - own);
-      c += value_[k + 2] * (p[column_[k + 2]] - own);
-      d += value_[k + 3] * (p[column_[k + 3]] - own);
+    Vec4 a = Vec4::Zero(), b = a;
+    const auto couple = [&](std::size_t k, Vec4& sum) {
+      const uint32_t other = upper_column_[k];
+      const Vec4 force = scale * upper_value_[k] * (p[other] - own);
+      sum += force;
+      y[other] -= force;
+    };
+    std::size_t k = upper_row_[i];
+    for (const std::size_t end = upper_row_[i + 1]; k + 2 <= end; k += 2) {
+      couple(k, a);
+      couple(k + 1, b);
     }
-    for (; k < row_[i + 1]; ++k) a += value_[k] * (p[column_[k]] - own);
-    y[i] += scale * ((a + b) + (c + d));
+    if (k < upper_row_[i + 1]) couple(k, a);
+    y[i] += a + b;
   }
 }
 

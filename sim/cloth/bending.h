@@ -103,6 +103,11 @@ class ClothBending {
   std::vector<uint32_t> column_;
   std::vector<Real> value_;               // off the diagonal; rows add up to zero with it
   std::vector<Real> diagonal_, row_sum_;  // the latter of absolute values, with the diagonal
+  /// The entries above the diagonal. A pair of points gets opposite forces, so these suffice, and multiply()
+  /// takes as long as the memory needs to deliver them.
+  std::vector<std::size_t> upper_row_;  // and the end
+  std::vector<uint32_t> upper_column_;
+  std::vector<Real> upper_value_;
   std::vector<Vec4> residual_, direction_, image_;
   /// Factor of M + stiff K without the rows of points that do not move.
   using Factor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<Real>>;

@@ -73,7 +73,9 @@ void ClothSystem::assemble() {
   }
   first_spring_.push_back(all_springs_.size());
   kick_.assign(points_.size(), Vec4::Zero());
-  points_.moves.assign(points_.size(), Vec4::Zero());
+  for (std::vector<Vec4>* run :
+       {&points_.moves, &points_.step_start, &points_.step_velocity, &points_.step_gain})
+    run->assign(points_.size(), Vec4::Zero());
   points_.start = points_.position;
   points_.outer.assign(points_.size(), Vec4::Zero());
   points_.acceleration = points_.flow = points_.outer;

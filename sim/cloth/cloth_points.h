@@ -27,6 +27,7 @@ struct ClothPoints {
   std::vector<Vec4> flow;          ///< velocity of the air
   std::vector<Vec4> rest;          ///< position in the unstrained cloth
   std::vector<Vec4> moves;         ///< displacements in a step of the springs [m]
+  std::vector<Vec4> step_start, step_velocity, step_gain;  ///< of an integrator, during its sub-step
   std::vector<Vec4> pin_impulse;   ///< impulse of the springs on pinned points, times the sub-step [kg m]
   std::vector<Real> field_drag;    ///< rate of linear drag by fields and hands [1/s]
   std::vector<Real> mass;          ///< [kg]

@@ -36,11 +36,20 @@ constexpr Real kRounding = 1e-5;
 
 typedef float SpringFloats __attribute__((vector_size(16)));
 
+/// Calls act(n) for the numbers of four chains, written out so that the state of each stays in registers.
+template <class Act>
+[[gnu::always_inline]] inline void in_turns(Act&& act) {
+  act(0);
+  act(1);
+  act(2);
+  act(3);
+}
+
 inline Lanes widened(SpringFloats v) {
-  return __builtin_convertvector(v, Lanes);
+  return _mm256_cvtps_pd(v);
 }
 inline SpringFloats narrowed(Lanes v) {
-  return __builtin_convertvector(v, SpringFloats);
+  return _mm256_cvtpd_ps(v);
 }
 inline FourVectors widened(const std::array<SpringFloats, 3>& v) {
   return {widened(v[0]), widened(v[1]), widened(v[2])};
@@ -135,8 +144,10 @@ void ClothSprings::add_stages(std::span<const std::size_t> color_ends) {
     if (begin == end) return;
     std::size_t longest = 1;
     for (std::size_t i = begin; i < end; ++i) longest = std::max(longest, batch_[i].length);
-    const std::size_t block = color + 1 == kPathColors ? end - begin : kBlock / (kLanes * longest) + 1;
-    (kind == Stage::apply ? apply_ : relax_).push_back({kind, begin, end, block});
+    // Paths of the last colour may share points.
+    const bool alone = color + 1 == kPathColors;
+    const std::size_t block = alone ? end - begin : (kBlock / (kLanes * kChains * longest) + 1) * kChains;
+    (kind == Stage::apply ? apply_ : relax_).push_back({kind, begin, end, block, alone});
   };
   for (std::size_t c = 0; c < color_ends.size(); ++c) add(c, Stage::apply);
   for (std::size_t c = 0; c < color_ends.size(); ++c) add(c, Stage::forward);
@@ -149,15 +160,41 @@ void ClothSprings::set_longest_step() {
   longest_step_ = std::sqrt(square);
 }
 
+/// Elongations of the springs of a row, whose lengths are known.
+inline Lanes ClothSprings::elongations(const Batch& batch, std::size_t r, Lanes length, const Vec4* x) const {
+  const Lanes own = length - elastic_[r].rest;
+  if (batch.counterparts == kNone) return own;
+  const Counterparts& c = counterparts_[batch.counterparts + r - batch.first];
+  const FourVectors d = FourVectors::of(x, c.a) - FourVectors::of(x, c.b);
+  const Lanes none = {};
+  return c.rest > none ? (own - lane_root(d.dot(d)) + c.rest) / 2 : own;
+}
+
+/// Calls look(batch, row, d) for the springs of each row, with the vectors d from their second points to the
+/// first.
+template <class Look>
+inline void ClothSprings::for_rows(const Vec4* x, Look&& look) const {
+  for (const Batch& batch : batch_) {
+    FourVectors at = FourVectors::of(x, row_[batch.first].point);
+    for (std::size_t r = batch.first, end = r + batch.length; r < end; ++r) {
+      const FourVectors next = FourVectors::of(x, row_[r + 1].point);
+      look(batch, r, at - next);
+      at = next;
+    }
+  }
+}
+
 void ClothSprings::adapt_to_stretch(const ClothPoints& points) {
   const Vec4* const x = points.position.data();
-  std::vector<Real> across;  // sum of k e / (l m) of the springs at each point
-  // Adds the springs of a row to the sum if `adds`; else returns whether any is too long to be neglected.
-  const auto look = [&](const Batch& batch, std::size_t r, Lanes length2, bool adds) {
-    if (!adds)
-      return _mm256_movemask_pd(length2 >
-                                kShortEnough * kShortEnough * elastic_[r].rest * elastic_[r].rest) != 0;
-    const Lanes length = lane_root(length2), elongation = elongations(batch, r, length, x);
+  auto too_long = Lanes{} > Lanes{};
+  for_rows(x, [&](const Batch&, std::size_t r, const FourVectors& d) {
+    too_long |= d.dot(d) > kShortEnough * kShortEnough * elastic_[r].rest * elastic_[r].rest;
+  });
+  const bool is_stretched = (too_long[0] | too_long[1] | too_long[2] | too_long[3]) != 0;
+  if (!is_stretched && !is_stretched_) return;
+  std::vector<Real> across(points.size(), 0);  // sum of k e / (l m) of the springs at each point
+  for_rows(x, [&](const Batch& batch, std::size_t r, const FourVectors& d) {
+    const Lanes length = lane_root(d.dot(d)), elongation = elongations(batch, r, length, x);
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       const uint32_t spring = elastic_[r].spring[lane];
       if (spring == kNoSpring || !(elongation[lane] > 0)) continue;
@@ -165,24 +202,7 @@ void ClothSprings::adapt_to_stretch(const ClothPoints& points) {
       for (uint32_t end : {row_[r].point[lane], row_[r + 1].point[lane]})
         across[end] += stiffness / points.mass[end];
     }
-    return true;
-  };
-  const auto any = [&](bool adds) {
-    bool found = false;
-    for (const Batch& batch : batch_) {
-      FourVectors at = FourVectors::of(x, row_[batch.first].point);
-      for (std::size_t r = batch.first, end = r + batch.length; r < end; ++r) {
-        const FourVectors next = FourVectors::of(x, row_[r + 1].point), d = at - next;
-        found |= look(batch, r, d.dot(d), adds);
-        at = next;
-      }
-    }
-    return found;
-  };
-  const bool is_stretched = any(false);
-  if (!is_stretched && !is_stretched_) return;
-  across.assign(points.size(), 0);
-  any(true);
+  });
   for (Material& m : material_) {
     const Real sum = across[m.a] + across[m.b];
     m.most = sum > 0 ? std::min(m.most_at_rest, kMaxAcross * m.fastest / sum) : m.most_at_rest;
@@ -204,11 +224,17 @@ void ClothSprings::run(std::span<const Stage> stages, ClothPoints& points, std::
   const uint32_t threads = material_.size() < kWorthThreads ? 1 : available_threads();
   const auto all = [](const Stage&) { return true; };
   run_stages(stages, threads, all, [&](const Stage& stage, uint32_t block) {
-    const std::size_t begin = stage.begin + block * stage.block;
-    for (std::size_t i = begin, end = std::min(begin + stage.block, stage.end); i < end; ++i)
-      stage.kind == Stage::apply     ? apply(points, moves, batch_[i])
-      : stage.kind == Stage::forward ? sweep_forward(points, moves, batch_[i])
-                                     : sweep_backward(points, moves, batch_[i]);
+    const std::size_t begin = stage.begin + block * stage.block,
+                      end = std::min(begin + stage.block, stage.end);
+    const std::size_t together = stage.alone ? 1 : kChains;
+    for (std::size_t i = begin; i < end; i += together) {
+      const std::span<const Batch> batches(&batch_[i], std::min(together, end - i));
+      if (stage.kind == Stage::apply)
+        for (const Batch& batch : batches) apply(points, moves, batch);
+      else
+        stage.kind == Stage::forward ? sweep_forward(points, moves, batches)
+                                     : sweep_backward(points, moves, batches);
+    }
   });
 }
 
@@ -247,14 +273,18 @@ void ClothSprings::begin(const ClothPoints& points, Real step) {
   }
 }
 
-/// Elongations of the springs of a row, whose lengths are known.
-Lanes ClothSprings::elongations(const Batch& batch, std::size_t r, Lanes length, const Vec4* x) const {
-  const Lanes own = length - elastic_[r].rest;
-  if (batch.counterparts == kNone) return own;
-  const Counterparts& c = counterparts_[batch.counterparts + r - batch.first];
-  const FourVectors d = FourVectors::of(x, c.a) - FourVectors::of(x, c.b);
-  const Lanes none = {};
-  return c.rest > none ? (own - lane_root(d.dot(d)) + c.rest) / 2 : own;
+/// Calls act(lane) for the lanes of a row that have its point. Most rows have it in all, and their registers
+/// are then used without a detour by memory.
+template <class Act>
+inline void ClothSprings::for_lanes(const Row& row, Act&& act) {
+  if (row.count == kLanes) {
+    act(0);
+    act(1);
+    act(2);
+    act(3);
+    return;
+  }
+  for (std::size_t lane = 0; lane < row.count; ++lane) act(lane);
 }
 
 /// Adds impulses to pinned points.
@@ -264,10 +294,10 @@ void ClothSprings::pass_on(ClothPoints& points, const Row& row, const FourVector
       points.pin_impulse[row.point[lane]] += Vec4(impulse.x[lane], impulse.y[lane], impulse.z[lane], 0);
 }
 
-void ClothSprings::store(std::span<Vec4> moves, const Row& row, const FourVectors& move) {
+inline void ClothSprings::store(std::span<Vec4> moves, const Row& row, const FourVectors& move) {
   const std::array<Lanes, kLanes> each = move.apart();
-  for (uint32_t lane = 0; lane < row.count; ++lane)
-    _mm256_store_pd(moves[row.point[lane]].data(), each[lane]);
+  const auto put = [&](std::size_t lane) { _mm256_store_pd(moves[row.point[lane]].data(), each[lane]); };
+  for_lanes(row, put);
 }
 
 /// The explicit step, and the directions for the sweep.
@@ -276,10 +306,10 @@ void ClothSprings::apply(ClothPoints& points, std::span<Vec4> moves, const Batch
   FourVectors at = FourVectors::of(x, row_[batch.first].point), before = {};
   const auto give = [&](const Row& row, const FourVectors& impulse) {
     const std::array<Lanes, kLanes> each = (impulse * row.weight).apart();
-    for (uint32_t lane = 0; lane < row.count; ++lane) {
+    for_lanes(row, [&](std::size_t lane) {
       Real* const move = moves[row.point[lane]].data();
       _mm256_store_pd(move, _mm256_load_pd(move) + each[lane]);
-    }
+    });
     if (row.held != 0) pass_on(points, row, impulse);
   };
   for (std::size_t r = batch.first, end = r + batch.length; r < end; ++r) {
@@ -300,8 +330,8 @@ void ClothSprings::apply(ClothPoints& points, std::span<Vec4> moves, const Batch
 /// Relaxes the springs of a row, whose points have the moves `at` and `next`; `after` is the row of the
 /// latter. Gauss-Seidel on the impulses, which are zero at first: the equation of a spring is
 /// r + impulse / c = 0.
-void ClothSprings::relax(ClothPoints& points, Row& row, const Row& after, FourVectors& at,
-                         FourVectors& next) {
+inline void ClothSprings::relax(ClothPoints& points, Row& row, const Row& after, FourVectors& at,
+                                FourVectors& next) {
   const FourVectors axis = widened(row.axis);
   const Lanes step = widened(row.along) * axis.dot(at - next) - widened(row.forget) * widened(row.impulse);
   row.impulse += narrowed(step);
@@ -312,30 +342,54 @@ void ClothSprings::relax(ClothPoints& points, Row& row, const Row& after, FourVe
   if (after.held != 0) pass_on(points, after, impulse);
 }
 
-void ClothSprings::sweep_forward(ClothPoints& points, std::span<Vec4> moves, const Batch& batch) {
-  FourVectors at = FourVectors::of(moves.data(), row_[batch.first].point);
-  for (std::size_t r = batch.first, end = r + batch.length; r < end; ++r) {
-    Row& row = row_[r];
-    const Row& after = row_[r + 1];
-    FourVectors next = FourVectors::of(moves.data(), after.point);
-    relax(points, row, after, at, next);
-    store(moves, row, at);
-    at = next;
-  }
-  store(moves, row_[batch.first + batch.length], at);
+inline void ClothSprings::relax_forward(ClothPoints& points, std::span<Vec4> moves, std::size_t r,
+                                        FourVectors& at) {
+  const Row& after = row_[r + 1];
+  FourVectors next = FourVectors::of(moves.data(), after.point);
+  relax(points, row_[r], after, at, next);
+  store(moves, row_[r], at);
+  at = next;
 }
 
-void ClothSprings::sweep_backward(ClothPoints& points, std::span<Vec4> moves, const Batch& batch) {
-  FourVectors next = FourVectors::of(moves.data(), row_[batch.first + batch.length].point);
-  for (std::size_t r = batch.first + batch.length; r-- > batch.first;) {
-    Row& row = row_[r];
-    const Row& after = row_[r + 1];
-    FourVectors at = FourVectors::of(moves.data(), row.point);
-    relax(points, row, after, at, next);
-    store(moves, after, next);
-    next = at;
+inline void ClothSprings::relax_backward(ClothPoints& points, std::span<Vec4> moves, std::size_t r,
+                                         FourVectors& next) {
+  const Row& after = row_[r + 1];
+  FourVectors at = FourVectors::of(moves.data(), row_[r].point);
+  relax(points, row_[r], after, at, next);
+  store(moves, after, next);
+  next = at;
+}
+
+/// Up to kChains batches of one colour in turns: each row of a batch waits for the result of the previous
+/// one, and meanwhile the processor can work on the others.
+void ClothSprings::sweep_forward(ClothPoints& points, std::span<Vec4> moves, std::span<const Batch> batches) {
+  std::array<FourVectors, kChains> at;
+  for (std::size_t n = 0; n < batches.size(); ++n)
+    at[n] = FourVectors::of(moves.data(), row_[batches[n].first].point);
+  const std::size_t common =
+      batches.size() == kChains ? std::ranges::min(batches, {}, &Batch::length).length : 0;
+  for (std::size_t k = 0; k < common; ++k)
+    in_turns([&](std::size_t n) { relax_forward(points, moves, batches[n].first + k, at[n]); });
+  for (std::size_t n = 0; n < batches.size(); ++n) {
+    const std::size_t first = batches[n].first, end = first + batches[n].length;
+    for (std::size_t r = first + common; r < end; ++r) relax_forward(points, moves, r, at[n]);
+    store(moves, row_[end], at[n]);
   }
-  store(moves, row_[batch.first], next);
+}
+
+void ClothSprings::sweep_backward(ClothPoints& points, std::span<Vec4> moves,
+                                  std::span<const Batch> batches) {
+  std::array<FourVectors, kChains> next;
+  const std::size_t common =
+      batches.size() == kChains ? std::ranges::min(batches, {}, &Batch::length).length : 0;
+  for (std::size_t n = 0; n < batches.size(); ++n) {
+    const std::size_t first = batches[n].first, end = first + batches[n].length;
+    next[n] = FourVectors::of(moves.data(), row_[end].point);
+    for (std::size_t r = end; r-- > first + common;) relax_backward(points, moves, r, next[n]);
+  }
+  for (std::size_t k = common; k-- > 0;)
+    in_turns([&](std::size_t n) { relax_backward(points, moves, batches[n].first + k, next[n]); });
+  for (std::size_t n = 0; n < batches.size(); ++n) store(moves, row_[batches[n].first], next[n]);
 }
 
 }  // namespace offstage::sim

@@ -45,6 +45,7 @@ class ClothSprings {
 
  private:
   static constexpr std::size_t kLanes = 4;
+  static constexpr std::size_t kChains = 4;  // batches swept in turns
   typedef float Floats __attribute__((vector_size(kLanes * sizeof(float))));
 
   struct Material {
@@ -85,6 +86,7 @@ class ClothSprings {
     enum { apply, forward, backward } kind;
     std::size_t begin, end;  // batches
     std::size_t block;       // batches of a block
+    bool alone;              // one batch at a time
 
     uint32_t block_count() const { return static_cast<uint32_t>((end - begin + block - 1) / block); }
   };
@@ -93,13 +95,23 @@ class ClothSprings {
   void add_stages(std::span<const std::size_t> color_ends);
   void set_longest_step();
   void run(std::span<const Stage> stages, ClothPoints& points, std::span<Vec4> moves);
-  Lanes elongations(const Batch& batch, std::size_t row, Lanes length, const Vec4* x) const;
+  template <class Look>
+  [[gnu::always_inline]] void for_rows(const Vec4* x, Look&& look) const;
+  [[gnu::always_inline]] Lanes elongations(const Batch& batch, std::size_t row, Lanes length,
+                                           const Vec4* x) const;
   void apply(ClothPoints& points, std::span<Vec4> moves, const Batch& batch);
   static void pass_on(ClothPoints& points, const Row& row, const FourVectors& impulse);
-  static void store(std::span<Vec4> moves, const Row& row, const FourVectors& move);
-  static void relax(ClothPoints& points, Row& row, const Row& after, FourVectors& at, FourVectors& next);
-  void sweep_forward(ClothPoints& points, std::span<Vec4> moves, const Batch& batch);
-  void sweep_backward(ClothPoints& points, std::span<Vec4> moves, const Batch& batch);
+  template <class Act>
+  [[gnu::always_inline]] static void for_lanes(const Row& row, Act&& act);
+  [[gnu::always_inline]] static void store(std::span<Vec4> moves, const Row& row, const FourVectors& move);
+  [[gnu::always_inline]] static void relax(ClothPoints& points, Row& row, const Row& after, FourVectors& at,
+                                           FourVectors& next);
+  [[gnu::always_inline]] void relax_forward(ClothPoints& points, std::span<Vec4> moves, std::size_t row,
+                                            FourVectors& at);
+  [[gnu::always_inline]] void relax_backward(ClothPoints& points, std::span<Vec4> moves, std::size_t row,
+                                             FourVectors& next);
+  void sweep_forward(ClothPoints& points, std::span<Vec4> moves, std::span<const Batch> batches);
+  void sweep_backward(ClothPoints& points, std::span<Vec4> moves, std::span<const Batch> batches);
 
   std::vector<Material> material_;  // of each spring
   std::vector<Row> row_;

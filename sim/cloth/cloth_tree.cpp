@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <utility>
 
 #include "sim/core/disjoint_sets.h"
 
@@ -12,11 +14,11 @@ namespace offstage::sim {
 namespace {
 
 /// A patch is flat enough if all its normals have at least this cosine with a common direction.
-constexpr Real kLeaning = 0.3;
+constexpr float kLeaning = 0.3F;
 
 /// The same for the triangles around a point: an angle a then appears as at most 2 atan(tan(a / 2) / cosine)
 /// < a / cosine.
-constexpr Real kStarLeaning = 0.7;
+constexpr float kStarLeaning = 0.7F;
 /// Factor by which strain may increase a triangle's angles.
 constexpr Real kStrainedAngle = 1.15;
 
@@ -61,23 +63,42 @@ std::vector<uint32_t> pieces(std::span<const Triangle> triangles, std::size_t po
   return piece;
 }
 
-/// Least and greatest of a triangle's unit normals at both ends of its path.
-std::array<Vec4, 2> normal_bounds(const Triangle& t, std::span<const Vec4> from, std::span<const Vec4> to) {
-  const auto unit_normal = [&](std::span<const Vec4> x) {
-    const Vec3 n = (x[t[1]] - x[t[0]]).head<3>().cross((x[t[2]] - x[t[0]]).head<3>());
-    const Real size = n.norm();
-    return size > 0 ? padded(n / size) : Vec4(Vec4::Zero());
-  };
-  const Vec4 first = unit_normal(from), last = unit_normal(to);
-  return {first.cwiseMin(last), first.cwiseMax(last)};
+/// Unit normal of a triangle; zero without an area.
+Vec4 unit_normal(const Triangle& t, std::span<const Vec4> x) {
+  const Vec4 n = (x[t[1]] - x[t[0]]).cross3(x[t[2]] - x[t[0]]);
+  const Real size = n.norm();
+  return size > 0 ? Vec4(n / size) : Vec4(Vec4::Zero());
 }
 
-/// Whether all normals within bounds have at least this cosine with the middle one.
-bool lean(const Vec4& low, const Vec4& high, Real cosine) {
-  const Vec4 middle = low + high;
-  const Vec4 least = middle.cwiseProduct(low).cwiseMin(middle.cwiseProduct(high));
-  return least.sum() > cosine * middle.norm();
-}
+/// Directions evenly over the sphere, at most 20 degrees from any other: those with the components 0 0 1, 1 1
+/// 1, 0 1 2 and 1 2 2 in any order and with any signs. The last two of 64 are zero.
+struct Directions {
+  alignas(32) std::array<std::array<float, 64>, 3> axis = {};
+
+  Directions() {
+    std::size_t count = 0;
+    for (int x = -2; x <= 2; ++x)
+      for (int y = -2; y <= 2; ++y)
+        for (int z = -2; z <= 2; ++z) {
+          const int length2 = x * x + y * y + z * z;
+          if (length2 != 1 && length2 != 3 && length2 != 5 && length2 != 9) continue;
+          const float length = std::sqrt(static_cast<float>(length2));
+          for (std::size_t k = 0; k < 3; ++k)
+            axis[k][count] = static_cast<float>(std::array{x, y, z}[k]) / length;
+          ++count;
+        }
+  }
+  /// The mean of some of them.
+  Vec3 mean(uint64_t some) const {
+    Vec3 sum = Vec3::Zero();
+    for (; some != 0; some &= some - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(some));
+      sum += Vec3(axis[0][i], axis[1][i], axis[2][i]);
+    }
+    return sum.normalized();
+  }
+};
+const Directions kDirections;
 
 }  // namespace
 
@@ -91,6 +112,7 @@ void ClothTree::build(std::span<const Triangle> triangles, std::span<const Vec4>
                    [&](uint32_t a, uint32_t b) { return piece_[a] < piece_[b]; });
   boxes_.resize(triangles.size());
   normals_.resize(triangles.size());
+  ring_leans_.assign(triangles.size(), 0);
   nodes_.clear();
   std::vector<Vec4> centres;
   for (const Triangle& t : triangles) centres.push_back((points[t[0]] + points[t[1]] + points[t[2]]) / 3);
@@ -107,6 +129,7 @@ void ClothTree::build(std::span<const Triangle> triangles, std::span<const Vec4>
     leaves_.emplace_back().clear();
   }
   build_stars(points);
+  build_rings();
 }
 
 void ClothTree::build_stars(std::span<const Vec4> rest) {
@@ -138,21 +161,68 @@ void ClothTree::build_stars(std::span<const Vec4> rest) {
     for (uint32_t i : triangles_[order_[place]]) around_[stars_[i].first + taken[i]++] = place;
 }
 
-void ClothTree::fit_star(Star& star) const {
-  star.leans = false;
-  if (!star.simple) return;
-  Vec4 low = Vec4::Ones(), high = -low;
-  for (uint32_t i = star.first; i < star.first + star.count; ++i) {
-    low = low.cwiseMin(normals_[around_[i]][0]);
-    high = high.cwiseMax(normals_[around_[i]][1]);
+/// The triangles that share a point with any that shares a point with a triangle.
+void ClothTree::build_rings() {
+  ring_.clear();
+  first_in_ring_ = {0};
+  std::vector<uint32_t> seen_by(order_.size(), kNone);  // at each place: the last triangle that met it
+  for (uint32_t at = 0; at < order_.size(); ++at) {
+    const std::size_t first = ring_.size();
+    const auto add = [&](uint32_t place) {
+      if (std::exchange(seen_by[place], at) == at) return;
+      const Node& node = nodes_[leaf_[place]];
+      const auto own = std::ranges::find(ring_.begin() + static_cast<std::ptrdiff_t>(first), ring_.end(),
+                                         node.leaf, &RingPart::leaf);
+      const uint32_t lane = 1u << (place - node.first);
+      own == ring_.end() ? ring_.push_back({node.leaf, lane}) : void(own->lanes |= lane);
+    };
+    const auto around = [&](uint32_t point) {
+      return std::span(around_).subspan(stars_[point].first, stars_[point].count);
+    };
+    for (uint32_t corner : triangles_[order_[at]])
+      for (uint32_t place : around(corner))
+        for (uint32_t point : triangles_[order_[place]]) std::ranges::for_each(around(point), add);
+    first_in_ring_.push_back(static_cast<uint32_t>(ring_.size()));
   }
-  star.leans = lean(low, high, kStarLeaning);
 }
 
-/// Whether the outline of a patch, seen along its mean normal, crosses itself: sweeps over its segments.
+void ClothTree::fit_star(Star& star) const {
+  star.leans = false;
+  star.views = 0;
+  if (!star.simple) return;
+  const auto around = std::span(around_).subspan(star.first, star.count);
+  star.views = ~Views{0};
+  Vec4 sum = Vec4::Zero();
+  for (uint32_t place : around) {
+    star.views &= normals_[place].steep_views;
+    sum += normals_[place].at[0] + normals_[place].at[1];
+  }
+  const Real least = kStarLeaning * sum.norm();
+  star.leans = star.views != 0 || std::ranges::all_of(around, [&](uint32_t place) {
+                 const auto& [first, last] = normals_[place].at;
+                 return std::min(sum.dot(first), sum.dot(last)) > least;
+               });
+}
+
+/// Two rings of triangles are seen as one sheet from a direction towards which all of them lean steeply: at
+/// none of their points is there a notch or a slit, as `simple` stars tell.
+void ClothTree::fit_rings() {
+  views_around_.assign(stars_.size(), ~Views{0});
+  for (const Triangle& t : triangles_) {
+    const Views views = stars_[t[0]].views & stars_[t[1]].views & stars_[t[2]].views;
+    for (uint32_t corner : t) views_around_[corner] &= views;
+  }
+  for (std::size_t at = 0; at < order_.size(); ++at) {
+    const Triangle& t = triangles_[order_[at]];
+    ring_leans_[at] = (views_around_[t[0]] & views_around_[t[1]] & views_around_[t[2]]) != 0;
+  }
+}
+
+/// Whether the outline of a patch, seen along a direction towards which it leans, crosses itself: sweeps over
+/// its segments.
 bool ClothTree::outline_crosses(std::span<const Vec4> points, const Node& node) const {
   if (node.count <= EightBoxes::kCount) return true;  // testing its triangles one by one costs no more
-  const Vec3 normal = (node.normal_low + node.normal_high).head<3>().normalized();
+  const Vec3 normal = kDirections.mean(node.views);
   const Vec3 u = normal.unitOrthogonal(), v = normal.cross(u);
   struct Segment {
     uint32_t a, b;
@@ -224,6 +294,27 @@ void ClothTree::halve(const std::vector<Vec4>& centres, uint32_t first, uint32_t
   });
 }
 
+ClothTree::Normals ClothTree::normals_of(const std::array<Vec4, 2>& at) {
+  Normals normals{at, 0, 0};
+  for (std::size_t i = 0; i < 64; i += 8) {
+    const auto along = [&](const Vec4& n) {
+      __m256 sum = _mm256_setzero_ps();
+      for (std::size_t k = 0; k < 3; ++k)
+        sum = _mm256_add_ps(sum, _mm256_mul_ps(_mm256_set1_ps(static_cast<float>(n[static_cast<int>(k)])),
+                                               _mm256_load_ps(&kDirections.axis[k][i])));
+      return sum;
+    };
+    const __m256 least = _mm256_min_ps(along(at[0]), along(at[1]));
+    const auto above = [&](float cosine) {
+      const int bits = _mm256_movemask_ps(_mm256_cmp_ps(least, _mm256_set1_ps(cosine), _CMP_GT_OQ));
+      return static_cast<Views>(static_cast<unsigned>(bits)) << i;
+    };
+    normals.views |= above(kLeaning);
+    normals.steep_views |= above(kStarLeaning);
+  }
+  return normals;
+}
+
 void ClothTree::fit_triangle(uint32_t place, std::span<const Vec4> from, std::span<const Vec4> to,
                              std::span<const Real> margin) {
   const Triangle& t = triangles_[order_[place]];
@@ -235,7 +326,7 @@ void ClothTree::fit_triangle(uint32_t place, std::span<const Vec4> from, std::sp
     return x[t[0]].cwiseMax(x[t[1]]).cwiseMax(x[t[2]]) + around;
   };
   boxes_[place] = MovingBox::around(least(from), greatest(from), least(to), greatest(to));
-  normals_[place] = normal_bounds(t, from, to);
+  normals_[place] = normals_of({unit_normal(t, from), unit_normal(t, to)});
   Node& node = nodes_[leaf_[place]];
   leaves_[node.leaf].set(place - node.first, boxes_[place]);
   node.fresh |= 1u << (place - node.first);
@@ -247,19 +338,15 @@ void ClothTree::fit_node(uint32_t at) {
     const Node &a = nodes_[at + 1], &b = nodes_[node.second];
     node.box = a.box;
     node.box.extend(b.box);
-    node.normal_low = a.normal_low.cwiseMin(b.normal_low);
-    node.normal_high = a.normal_high.cwiseMax(b.normal_high);
+    node.views = a.views & b.views;
   } else {
     node.box = boxes_[node.first];
-    node.normal_low = normals_[node.first][0];
-    node.normal_high = normals_[node.first][1];
+    node.views = normals_[node.first].views;
     for (uint32_t i = node.first + 1; i < node.first + node.count; ++i) {
       node.box.extend(boxes_[i]);
-      node.normal_low = node.normal_low.cwiseMin(normals_[i][0]);
-      node.normal_high = node.normal_high.cwiseMax(normals_[i][1]);
+      node.views &= normals_[i].views;
     }
   }
-  node.leans = node.connected && lean(node.normal_low, node.normal_high, kLeaning);
 }
 
 /// The nodes above newly fitted triangles, children before their parents.
@@ -274,6 +361,7 @@ void ClothTree::fit_above() {
 void ClothTree::fit(std::span<const Vec4> from, std::span<const Vec4> to, std::span<const Real> margin) {
   for (uint32_t i = 0; i < order_.size(); ++i) fit_triangle(i, from, to, margin);
   for (Star& star : stars_) fit_star(star);
+  fit_rings();
   fit_above();
 }
 
@@ -283,6 +371,7 @@ void ClothTree::refit(std::span<const uint32_t> triangles, std::span<const Vec4>
   for (uint32_t t : triangles) fit_triangle(place_[t], from, to, margin);
   for (uint32_t t : triangles)
     for (uint32_t i : triangles_[t]) fit_star(stars_[i]);
+  fit_rings();
   fit_above();
 }
 

@@ -4,7 +4,8 @@
 /// outline, seen from there, does not cross itself; such a patch is skipped as a whole (Volino and
 /// Magnenat-Thalmann, "Efficient self-collision detection on smoothly discretized surface animations using
 /// geometrical shape regularity", 1994). The triangles around one point are skipped in the same case, unless
-/// their angles at the point could add up to more than a full turn as seen from that side.
+/// their angles at the point could add up to more than a full turn as seen from that side; and so are two
+/// rings of triangles around one triangle.
 
 #include <array>
 #include <bit>
@@ -38,15 +39,18 @@ class ClothTree {
   void overlapping(const Aabb& bounds, Visit&& visit) const;
 
  private:
+  /// Bit mask of the directions (cloth_tree.cpp) towards which all of some normals lean.
+  using Views = uint64_t;
   struct Node {
     MovingBox box;
-    Vec4 normal_low, normal_high;  // of the unit normals
-    uint32_t first, count;         // triangles, in order_
-    uint32_t second;               // node; the first child is the next one. 0: a leaf
-    uint32_t leaf = 0;             // of a leaf: its index in leaves_
-    uint32_t fresh = 0;            // lanes of a leaf that were fitted last; else whether any below
-    bool connected = false;        // all of it one piece
-    bool leans = false;            // connected, and all normals lie in one half-space
+    Views views;             // towards which its normals lean
+    uint32_t first, count;   // triangles, in order_
+    uint32_t second;         // node; the first child is the next one. 0: a leaf
+    uint32_t leaf = 0;       // of a leaf: its index in leaves_
+    uint32_t fresh = 0;      // lanes of a leaf that were fitted last; else whether any below
+    bool connected = false;  // all of it one piece
+
+    bool leans() const { return connected && views != 0; }  // all normals lie in one half-space
   };
 
   /// All triangles around a point.
@@ -54,10 +58,23 @@ class ClothTree {
     uint32_t first, count;  // places in order_, in around_
     bool simple;            // one fan, that does not overlap itself as long as its normals lean enough
     bool leans = false;     // simple, and its normals lie in one half-space
+    Views views = 0;        // simple, and its normals lean steeply towards these
+  };
+  /// The unit normals of a triangle at both ends of its path.
+  struct Normals {
+    std::array<Vec4, 2> at;
+    Views views, steep_views;
+  };
+  /// Triangles of a leaf that are within two rings of triangles around another one.
+  struct RingPart {
+    uint32_t leaf, lanes;
   };
 
   void build_stars(std::span<const Vec4> rest);
+  void build_rings();
+  static Normals normals_of(const std::array<Vec4, 2>& at);
   void fit_star(Star& star) const;
+  void fit_rings();
   bool in_leaning_star(const Triangle& a, const Triangle& b) const {
     for (uint32_t i : a)
       if ((i == b[0] || i == b[1] || i == b[2]) && stars_[i].leans) return true;
@@ -83,8 +100,12 @@ class ClothTree {
   std::vector<uint32_t> piece_;                  // connected piece of each triangle
   std::vector<std::array<uint32_t, 3>> beside_;  // triangle across each edge from a corner to the next
   std::vector<MovingBox> boxes_;                 // in the order of order_, as the next
-  std::vector<std::array<Vec4, 2>> normals_;     // bounds of the unit normals at both ends of the path
-  std::vector<Star> stars_;                      // of each point
+  std::vector<Normals> normals_;
+  std::vector<uint8_t> ring_leans_;      // whether two rings around each triangle cannot cross themselves
+  std::vector<RingPart> ring_;           // of one triangle after another
+  std::vector<uint32_t> first_in_ring_;  // of each triangle, and the end
+  std::vector<Views> views_around_;      // of two rings around each point
+  std::vector<Star> stars_;              // of each point
   std::vector<uint32_t> around_;
   std::vector<Node> nodes_;
   std::vector<uint32_t> leaf_;  // node of each place in order_
@@ -99,7 +120,7 @@ void ClothTree::pairs(std::span<const Vec4> points, Visit&& visit) const {
 template <class Visit>
 void ClothTree::within(std::span<const Vec4> points, uint32_t at, Visit& visit) const {
   const Node& node = nodes_[at];
-  if (node.fresh == 0 || (node.leans && !outline_crosses(points, node))) return;
+  if (node.fresh == 0 || (node.leans() && !outline_crosses(points, node))) return;
   if (node.second != 0) {
     within(points, at + 1, visit);
     within(points, node.second, visit);
@@ -113,9 +134,13 @@ void ClothTree::within(std::span<const Vec4> points, uint32_t at, Visit& visit) 
 template <class Visit>
 void ClothTree::look(const Node& own, uint32_t lane, const Node& other, uint32_t lanes, Visit& visit) const {
   if ((own.fresh >> lane & 1) == 0) lanes &= other.fresh;
+  const uint32_t at = own.first + lane;
+  if (ring_leans_[at])
+    for (uint32_t k = first_in_ring_[at]; k < first_in_ring_[at + 1]; ++k)
+      if (ring_[k].leaf == other.leaf) lanes &= ~ring_[k].lanes;
   if (lanes == 0) return;
-  const uint32_t a = order_[own.first + lane];
-  for (lanes &= leaves_[other.leaf].overlapping(boxes_[own.first + lane]); lanes != 0; lanes &= lanes - 1) {
+  const uint32_t a = order_[at];
+  for (lanes &= leaves_[other.leaf].overlapping(boxes_[at]); lanes != 0; lanes &= lanes - 1) {
     const uint32_t b = order_[other.first + static_cast<uint32_t>(std::countr_zero(lanes))];
     if (!in_leaning_star(triangles_[a], triangles_[b])) visit(a, b);
   }

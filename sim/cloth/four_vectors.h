@@ -19,6 +19,10 @@ struct FourVectors {
   FourVectors operator*(Lanes s) const { return {s * x, s * y, s * z}; }
   Lanes dot(const FourVectors& b) const { return x * b.x + y * b.y + z * b.z; }
 
+  FourVectors cross(const FourVectors& b) const {
+    return {y * b.z - z * b.y, z * b.x - x * b.z, x * b.y - y * b.x};
+  }
+
   /// Returns the vectors of the four points with these indices.
   static FourVectors of(const Vec4* points, const std::array<uint32_t, 4>& at) {
     const auto load = [&](std::size_t k) -> Lanes { return _mm256_load_pd(points[at[k]].data()); };

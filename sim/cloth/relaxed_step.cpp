@@ -25,13 +25,24 @@ class RelaxedBending {
   }
   bool is_stiff() const { return is_stiff_; }
 
-  /// Adds the effect of a step to the moves, and to the `pin_impulse` of pinned points.
+  /// The gain of a point by bending that is not stiff, which is the same in each step; 0 for pinned points.
+  Vec4 steady_gain(const ClothPoints& points, std::size_t i) const {
+    return h_ * h_ * points.inverse_mass[cloth_.begin + i] * force_[i];
+  }
+  /// Adds the effect of a step on pinned points to their `pin_impulse` and, of stiff bending, that on the
+  /// others to the moves.
   void apply(ClothPoints& points, std::span<Vec4> moves) {
     if (is_stiff_) {
       std::fill(force_.begin(), force_.end(), Vec4::Zero());
       cloth_.bending.add_forces(cloth_.part(points.start), 1, force_);
     }
-    give(points, moves);
+    for (std::size_t i = 0; i < force_.size(); ++i) {
+      const std::size_t k = cloth_.begin + i;
+      if (is_held(points, k))
+        points.pin_impulse[k] += h_ * h_ * force_[i];
+      else if (is_stiff_)
+        moves[k] += h_ * h_ * points.inverse_mass[k] * force_[i];
+    }
   }
 
   /// Removes the motion that stiff bending does not allow; returns whether the tolerance was reached.
@@ -48,14 +59,6 @@ class RelaxedBending {
   }
 
  private:
-  void give(ClothPoints& points, std::span<Vec4> moves) const {
-    for (std::size_t i = 0; i < force_.size(); ++i) {
-      const std::size_t k = cloth_.begin + i;
-      const Vec4 impulse = h_ * h_ * force_[i];
-      is_held(points, k) ? points.pin_impulse[k] += impulse : moves[k] += points.inverse_mass[k] * impulse;
-    }
-  }
-
   const ClothRange& cloth_;
   Real damping_, h_;
   bool is_stiff_;
@@ -68,48 +71,52 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
                   Real dt, std::span<Vec4> kick) {
   const Real h = dt / steps;
   const std::size_t n = cloth.end - cloth.begin;
-  SpringRun from(n), velocity(n);  // velocity times the step
-  for (std::size_t i = 0; i < n; ++i) {
-    const std::size_t k = cloth.begin + i;
-    from[i] = points.start[k];
-    velocity[i] = is_held(points, k) ? Vec4((points.position[k] - points.start[k]) / steps)
-                                     : Vec4(h * points.velocity[k]);
-  }
-  const bool bends = !cloth.bending.empty();
+  const std::span<Vec4> x = cloth.part(points.start), moves = cloth.part(points.moves),
+                        from = cloth.part(points.step_start), velocity = cloth.part(points.step_velocity),
+                        gain = cloth.part(points.step_gain);  // velocity and its gain times the step
+  const auto held = [&](std::size_t i) { return is_held(points, cloth.begin + i); };
+  const bool bends = !cloth.bending.empty(), drags = !cloth.air.empty();
   std::optional<RelaxedBending> bending;
   if (bends) bending.emplace(points, cloth, dt, h);
-  std::vector<Vec4>& moves = points.moves;
-  const bool drags = !cloth.air.empty();
   if (drags) cloth.air.begin(h);
   springs.begin(points, h);
+  // The move without springs, whose drag is that of the velocity before the step.
+  const auto coast = [&](std::size_t i, const Vec4& v) {
+    velocity[i] = v;
+    moves[i] = v + gain[i];
+    if (drags && !held(i)) moves[i] -= h * cloth.air.resist(i, v);
+  };
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t k = cloth.begin + i;
+    from[i] = x[i];
+    gain[i] = held(i) ? Vec4(Vec4::Zero()) : Vec4(h * h * points.acceleration[k]);
+    if (drags && !held(i)) gain[i] += h * h * cloth.air.resist(i, cloth.air.from(i));
+    if (bends && !bending->is_stiff()) gain[i] += bending->steady_gain(points, i);
+    coast(i, held(i) ? Vec4((points.position[k] - x[i]) / steps) : Vec4(h * points.velocity[k]));
+  }
   bool solved = true;
   for (uint32_t step = 0; step < steps; ++step) {
-    for (std::size_t i = 0; i < n; ++i) {
-      const std::size_t k = cloth.begin + i;
-      moves[k] = is_held(points, k) ? velocity[i] : Vec4(velocity[i] + h * h * points.acceleration[k]);
-      if (drags && !is_held(points, k)) moves[k] += h * h * cloth.air.change(i, velocity[i] / h);
-    }
-    if (bends) bending->apply(points, moves);
-    springs.apply(points, moves);
+    if (bends) bending->apply(points, points.moves);
+    springs.apply(points, points.moves);
     for (std::size_t i = 0; drags && i < n; ++i)
-      if (Vec4& move = moves[cloth.begin + i]; !is_held(points, cloth.begin + i))
-        move = velocity[i] + cloth.air.respond(i, move - velocity[i]);
-    if (bends && bending->is_stiff()) solved &= bending->filter(points, moves);
-    springs.relax(points, moves);
+      if (!held(i)) moves[i] = velocity[i] + cloth.air.respond(i, moves[i] - velocity[i]);
+    if (bends && bending->is_stiff()) solved &= bending->filter(points, points.moves);
+    springs.relax(points, points.moves);
     for (std::size_t i = 0; i < n; ++i) {
-      velocity[i] = moves[cloth.begin + i];
-      points.start[cloth.begin + i] += velocity[i];
+      const Vec4 move = moves[i];
+      x[i] += move;
+      coast(i, move);
     }
   }
   for (std::size_t i = 0; i < n; ++i) {
     const std::size_t k = cloth.begin + i;
-    if (is_held(points, k)) {
+    if (held(i)) {
       points.pin_impulse[k] *= steps;  // impulses times the whole sub-step
     } else {
-      points.position[k] = points.start[k];
-      if (steps > 1) kick[k] = velocity[i] / h - (points.position[k] - from[i]) / dt;
+      points.position[k] = x[i];
+      if (steps > 1) kick[k] = velocity[i] / h - (x[i] - from[i]) / dt;
     }
-    points.start[k] = from[i];
+    x[i] = from[i];
   }
   return solved;
 }
