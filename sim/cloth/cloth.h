@@ -130,8 +130,8 @@ struct ClothDef {
   Real max_stretch =
       0;  ///< greatest length of a stretch spring divided by its rest length, > 1; 0: no limit (F7)
   Real max_shear = 0;  ///< greatest length of a shear spring divided by its rest length; 0: no limit
-  /// Length divided by rest length at which a stretch spring tears, > 1; 0: never. If `tear` is less than
-  /// max_stretch, the stretch is limited to 1.2 * tear instead.
+  /// Length divided by rest length at which a stretch spring tears, > 1; 0: never. If there is a max_stretch,
+  /// it counts as at least 1.2 * tear, so that springs can tear.
   Real tear = 0;
 
   ClothAir air;

@@ -124,8 +124,8 @@ struct PushOut {
   Real limit;        ///< greatest displacement by push-out in a step [m]
 };
 /// Separates overlapping bodies by moving them without changing their velocities. If an earlier call opened a
-/// gap, its displacement is undone as far as necessary. Returns, for each lane, the greatest displacement of
-/// this call [m].
+/// gap, its displacement is undone as far as necessary. Returns, for each lane, the greatest displacement
+/// that a point required, before limits [m].
 FloatLanes push_out(PatchBatch& batch, std::span<BodyMotion> motions, const PushOut& push);
 
 /// Writes the forces to the patches.

@@ -67,8 +67,8 @@ class ProximalNewton {
     Real spin_limit = 0, roll_limit = 0;
     Real spin_scale() const { return arm > 0 ? arm : 1; }
   };
-  /// A row with bounds. `multiplier` is q, `impulse` is p(v), and `is_free` says whether p(v) is strictly
-  /// within the bounds.
+  /// A row with bounds. `multiplier` is q, `impulse` is p(v), and `is_free`: whether no bound was applied to
+  /// p(v).
   struct Bounded {
     Real multiplier, impulse, rho;
     uint32_t a, b, pair;
