@@ -1,5 +1,5 @@
 #pragma once
-/// Splits the items of a bounding tree, independently of its kind of volume.
+/// Builds the structure of a bounding tree by splitting its items, independently of the kind of volumes.
 
 #include <cstdint>
 #include <span>
