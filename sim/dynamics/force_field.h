@@ -47,8 +47,8 @@ struct PointField {
   uint32_t drop_rate = 0;
 };
 
-/// Moving air: viscous drag F = k (wind - v). With k = 0, the wind acts only through the object's own drag
-/// coefficient k_own, by the force k_own wind.
+/// Moving air: viscous drag F = k (wind - v), in addition to the object's own drag -k_own v. With k = 0 the
+/// force is k_own wind instead, so that the own drag acts relative to the air.
 struct WindField {
   Vec3 wind = Vec3::Zero();  ///< [m/s]
   Real drag = 0;             ///< k [kg/s], >= 0
