@@ -26,7 +26,8 @@ struct Fabric {
   Real shear =
       100;  ///< shear stiffness: force per metre of width at a strain of 1 of the diagonals [N/m], >= 0
   Real bend = 1e-4;  ///< flexural rigidity: moment per metre of width at a curvature of 1/m [N m], >= 0
-  Real bend_damping = 2e-3;  ///< the moment is bend * (curvature + bend_damping * its rate) [s], >= 0
+  Real bend_damping = 2e-3;  ///< damping time of bending [s], >= 0; the moment is bend * (curvature +
+                             ///< bend_damping * its rate)
   BendModel bend_model = BendModel::plate;
   /// Fraction of the critical damping of each spring between its two points, >= 0.
   Real damping = 0.05;

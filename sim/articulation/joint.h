@@ -35,7 +35,7 @@ enum class JointType : uint8_t {
   /// Couples the rotation of a about `axis` with the displacement of b along `second_axis`, a direction of
   /// the world: displacement = ratio * angle, where the ratio is the radius of the pinion [m].
   rack,
-  /// Allows rotation of a about the axis together with displacement along it, relative to b: ratio metres per
+  /// Couples rotation of a about the axis with displacement of a along it, relative to b: `ratio` metres per
   /// turn, positive for a right-handed thread.
   screw,
   /// A rope that runs from `anchor` on body a over the fixed points `pulley_a` and `pulley_b` to `anchor_b`

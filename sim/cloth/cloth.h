@@ -99,7 +99,7 @@ struct ClothDef {
   /// Flexural rigidity B of the cloth [N m], >= 0: moment per unit of width at a curvature of 1/m
   /// (bending.h).
   Real bend = 0;
-  /// Time tau in which bending is damped [s], >= 0: the moment is B (kappa + tau d kappa/dt).
+  /// Damping time tau of bending [s], >= 0: the moment per unit of width is B (kappa + tau d kappa/dt).
   Real bend_damping = 0;
   /// Fraction of the curvature of the unstrained cloth that is free of stress, 0 to 1.
   Real rest_curvature = 1;

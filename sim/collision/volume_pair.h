@@ -57,7 +57,7 @@ struct Placement {
   /// orthonormal to a few units.
   static constexpr Real kRounding = 64 * std::numeric_limits<Real>::epsilon();
 
-  Mat3 rotation;  ///< A's axes from B's
+  Mat3 rotation;  ///< rotation matrix from B's axes to A's axes
   Vec3 translation;
   Real slack;  ///< bound of the rounding errors [m]
   Real pad;    ///< margin and slack [m]
@@ -85,7 +85,8 @@ struct BoxPair {
   }
 
  private:
-  /// Gaps for one edge direction of b; `extent_b` is the extent of b along the products.
+  /// Gaps along the cross products of one edge direction of b, with the columns r and |r| = s in a's axes,
+  /// and all edges of a. `extent_b`: half extent of b along these products.
   Lanes product_gaps(Lanes r, Lanes s, Lanes extent_b) const {
     const Lanes a = lanes(half_a);
     return lane_abs(lane_last(offset) * lane_next(r) - lane_next(offset) * lane_last(r)) -

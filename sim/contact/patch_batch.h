@@ -128,7 +128,8 @@ struct PushOut {
 /// that a point required, before limits [m].
 FloatLanes push_out(PatchBatch& batch, std::span<BodyMotion> motions, const PushOut& push);
 
-/// Writes the forces to the patches.
+/// Writes the forces and impulses of the step to the patches (the members of ContactPatch marked as out).
+/// `substep`: length of a sub-step [s].
 void report(const PatchBatch& batch, std::span<ContactPatch> patches, Real substep);
 
 }  // namespace offstage::sim

@@ -60,7 +60,7 @@ struct WindField {
 /// outside, and nearly a rigid rotation near the axis. It has no divergence.
 struct Vortex {
   Vec3 point = Vec3::Zero();  ///< a point of the axis
-  Vec3 axis = Vec3::UnitY();  ///< direction of the axis, of any length but 0; the rotation is right-handed
+  Vec3 axis = Vec3::UnitY();  ///< direction of the axis (any length except 0); the rotation is right-handed
   /// Circulation Gamma at a large distance [m^2/s]; the speed at the radius is Gamma / (4 pi R).
   Real circulation = 1;
   Real radius = 0.1;  ///< R, the distance of the greatest speed [m], > 0

@@ -14,7 +14,8 @@ namespace offstage::sim {
 
 class ConvexPolyhedron {
  public:
-  /// `left` is the face that the edge bounds counter-clockwise, seen from outside; kNoFace on a segment.
+  /// An edge from vertex `tail` to vertex `head`, with the faces on its left and right, seen from outside.
+  /// Both faces are kNoFace for a segment.
   struct Edge {
     uint32_t tail, head;
     uint32_t left, right;
