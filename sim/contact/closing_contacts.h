@@ -59,7 +59,7 @@ struct ClosingProblem {
 };
 
 /// Solves an interval in pieces. A point with a gap pushes from the time at which the gap closes, and does
-/// not rebound. Returns no result if there are more than eight closing times, if a solution fails or adds
+/// not rebound. Returns no result if there are more than 16 closing times, if a solution fails or adds
 /// energy, or if the total cost exceeds the budget.
 std::optional<ClosingSolution> solve_closing(const ClosingProblem& problem, ProximalNewton& newton);
 
