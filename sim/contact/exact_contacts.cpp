@@ -156,9 +156,9 @@ bool ExactContacts::is_safe(const ContactWork& work) const {
   return energy <= kTermsShare * kinetic + mass * push * push / 2;
 }
 
-/// Whether some contact touches an immovable body from the interval's start, and another contact with an
-/// immovable body, which had a gap at the start, pushes. Bodies that rest on other moving bodies lose little
-/// energy if the interval is not divided.
+/// Whether some contact with an immovable body touches from the interval's start on, and another one pushes
+/// that had a gap at the start or approached faster than kApproaching. Bodies that rest on other moving
+/// bodies lose little energy if the interval is not divided.
 bool ExactContacts::has_closing() const {
   bool touches = false, closes = false;
   for (std::size_t i = 0; i < points_.size(); ++i) {
