@@ -31,9 +31,10 @@ class SearchHorizon {
 
  private:
   static constexpr std::array<uint32_t, 7> kLengths = {1, 2, 3, 4, 6, 8, 12};
-  /// Number of periods between two trials, and after a successful trial.
+  /// Number of periods until the next trial of another horizon: kWaitAfterGain after a successful trial,
+  /// otherwise kWait.
   static constexpr uint32_t kWait = 8, kWaitAfterGain = 2;
-  /// Another length is chosen if it takes at most this fraction of the present work.
+  /// Another horizon is chosen if its work is less than this fraction of the current work.
   static constexpr Real kWorthIt = 0.95;
 
   uint32_t neighbour() const {

@@ -47,8 +47,8 @@ bool moves_with_b(NormalSource source);
 /// of its origin.
 Vec3 start_centre(const Body& body);
 
-/// Whether contacts may move along a body's surface while it turns: it has rims or round sides and turns
-/// noticeably within `duration` [s].
+/// Whether contacts may move along a body's surface while the body turns. This requires rims or round sides,
+/// and a noticeable rotation within `duration` [s].
 bool runs_along(const Body& body, Real duration);
 
 /// Angular speed at the interval's start at which the axis of a cylinder, cone or frustum turns about the

@@ -68,7 +68,7 @@ struct ContactPatch {
     Real mean_force =
         0;             ///< moving average over previous sub-steps [N]; in: from the last step, out: updated
     Real impulse = 0;  ///< out: impulse over the whole step [N s]
-    Real shift = 0;    ///< out: mass times the displacement by this point in the step [kg m]
+    Real shift = 0;  ///< out: effective mass times the displacement that this point causes in the step [kg m]
   };
   uint32_t a = 0, b = 0;  ///< indices of bodies; at least one is movable
   ContactFrame frame;     ///< n from b to a

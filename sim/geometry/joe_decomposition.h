@@ -32,7 +32,7 @@ struct JoeResult {
   std::string failure;            ///< reason of the failure; otherwise empty
 };
 
-/// Returns the text of JoeResult::failure for more parts than allowed.
+/// Returns the text for JoeResult::failure if there are more parts than `limits` allow.
 std::string too_many_parts(const CutLimits& limits);
 
 /// Cuts polyhedra into parts without reflex edges. Points within `tolerance` of a cut count as on it.
