@@ -1,6 +1,6 @@
 #pragma once
 /// Creates cloths of fabrics: rectangles of woven cells, and arbitrary triangle meshes (physics F6, F8). The
-/// results are plain definitions, to which pins, seams, tearing and pressure are added.
+/// results are plain definitions; the caller may add pins, seams, tearing and pressure.
 
 #include <cstdint>
 #include <utility>
@@ -17,8 +17,8 @@ struct GridSize {
   uint32_t columns = 20, rows = 20;  ///< number of cells, 1 to 1000 each
 };
 
-/// Index of a vertex of a grid. Columns are along x from -width/2 and rows along z from -height/2 of the
-/// pose's frame, in the plane y = 0 with the normal +y.
+/// Returns the index of a vertex of a grid. In the pose's frame, the grid is in the plane y = 0 with the
+/// normal +y. Columns increase along x from -width/2, rows increase along z from -height/2.
 inline uint32_t grid_vertex(const GridSize& size, uint32_t column, uint32_t row) {
   return row * (size.columns + 1) + column;
 }
@@ -29,8 +29,8 @@ inline uint32_t grid_vertex(const GridSize& size, uint32_t column, uint32_t row)
 sim::ClothDef grid_cloth(const GridSize& size, const sim::Pose& pose, const Fabric& fabric);
 
 /// Creates a cloth from any triangle mesh: stretch springs along its edges, bend springs between the vertices
-/// opposite an edge. Vertices at the same position are merged (weld) unless `keep_vertices`; then the indices
-/// of vertices do not change.
+/// opposite an edge. Vertices at the same position are merged by weld(), unless `keep_vertices` is true,
+/// which keeps the vertex indices.
 sim::ClothDef mesh_cloth(const sim::TriangleMesh& mesh, const sim::Pose& pose, const Fabric& fabric,
                          bool keep_vertices = false);
 
@@ -50,8 +50,8 @@ struct Cord {
   Real damping = 0.1;            ///< fraction of the critical damping of each spring, >= 0
 };
 /// Adds a cord to a cloth and returns the index of its last vertex, for a pin. A cord that is longer than the
-/// distance of its ends hangs in two straight parts of equal length, in the direction of -Y as far as its
-/// ends allow. Throws std::invalid_argument for a value out of range.
+/// distance of its ends initially has the shape of a V: two straight parts of equal length that sag towards
+/// -Y as far as the ends allow. Throws std::invalid_argument for a value out of range.
 uint32_t add_cord(sim::ClothDef& def, const Cord& cord);
 
 }  // namespace offstage::effects

@@ -1,5 +1,5 @@
 #pragma once
-/// Colour and size over age (F4), and colours that vary from particle to particle (F2).
+/// Colour and size of particles over their age (physics F4), and random initial colours (F2).
 
 #include <algorithm>
 #include <array>
@@ -16,7 +16,8 @@ namespace offstage::effects {
 
 using Rgba = Eigen::Vector4f;  ///< linear, straight alpha; values above 1 glow
 
-/// Value over normalized age in [0, 1], piecewise linear, constant beyond the ends.
+/// A piecewise linear function of the normalized age (age divided by lifespan, 0 to 1). It is constant before
+/// the first and after the last key.
 template <class T>
 struct AgeRamp {
   struct Key {
@@ -45,9 +46,10 @@ enum class RampKind {
   smooth,  ///< continuous slope, without overshoot
 };
 
-/// Slope at the middle one of three keys with which no channel overshoots: 0 at an extremum, otherwise the
-/// weighted harmonic mean of the two slopes beside it (Fritsch and Butland, "A method for constructing local
-/// monotone piecewise cubic interpolants", 1984). h and s are the two spans and their slopes.
+/// Returns a slope at the middle of three keys for which a cubic does not overshoot: 0 at an extremum,
+/// otherwise the weighted harmonic mean of the slopes of the two segments (Fritsch and Butland, "A method for
+/// constructing local monotone piecewise cubic interpolants", 1984). h0, h1: lengths of the segments; s0, s1:
+/// their slopes.
 inline float monotone_slope(float h0, float h1, float s0, float s1) {
   if (!(s0 * s1 > 0)) return 0;
   const float w0 = 2 * h1 + h0, w1 = h1 + 2 * h0;
@@ -59,8 +61,8 @@ inline Rgba monotone_slope(float h0, float h1, const Rgba& s0, const Rgba& s1) {
   return slope;
 }
 
-/// A ramp prepared for many evaluations: the keys beside an age are found by a table, and a cubic is
-/// evaluated there. Exact, also at steps (two keys of one age).
+/// A ramp prepared for fast evaluation: a table finds the segment of an age, where a cubic is evaluated. The
+/// result is exact, also at steps (two keys of the same age).
 template <class T>
 class Ramp {
  public:
@@ -132,10 +134,11 @@ class Ramp {
 struct StartColor {
   Rgba mean = Rgba::Ones();
   Rgba deviation = Rgba::Zero();  ///< >= 0
-  /// Deviation of a common factor of red, green and blue with the mean 1.
+  /// Standard deviation of a random factor with the mean 1, by which red, green and blue are multiplied.
   float brightness_deviation = 0;
 
-  /// Colour of the particle with this id. It depends only on the id, so it need not be stored.
+  /// Returns the colour of the particle with this id. It depends only on the id and the stream, so it need
+  /// not be stored.
   Rgba of(const RandomStream& random, uint64_t id) const;
 };
 

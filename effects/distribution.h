@@ -1,5 +1,6 @@
 #pragma once
-/// Varying values: constant, normal (mean and deviation, F2), uniform, or a curve over time.
+/// Parameters that vary: a constant, a normal distribution (mean and deviation, physics F2), a uniform
+/// distribution, or a curve over time.
 
 #include <utility>
 #include <variant>
@@ -19,20 +20,21 @@ struct Normal {
 struct Uniform {
   Real low = 0, high = 1;
 };
-/// Piecewise linear over time [s], constant beyond the ends; times are strictly increasing.
+/// A piecewise linear function of time, as pairs of time [s] and value with strictly increasing times. It is
+/// constant before the first and after the last key.
 struct Curve {
   std::vector<std::pair<Real, Real>> keys;
 };
 
 using Varying = std::variant<Real, Normal, Uniform, Curve>;
 
-/// The value at quantile u in (0, 1) and time t.
+/// Returns the value for the quantile u in (0, 1), at the time t [s].
 Real sample(const Varying& v, Real u, Real t);
 /// Smallest and largest value that sample() can return; infinite for a normal distribution without clipping
 /// and bounds.
 Real lower_bound(const Varying& v);
 Real upper_bound(const Varying& v);
-/// Mean at time t, before truncation.
+/// Mean at the time t [s], before truncation.
 Real mean(const Varying& v, Real t);
 
 }  // namespace offstage::effects

@@ -2,9 +2,10 @@
 /// Emitters (physics F1, F2): release particles from a surface, with every parameter a distribution. Each
 /// particle is created at its own time within the step, from the position of the surface at that time.
 ///
-/// Particles of one release never overlap: each takes a cell of the plane, the sphere or the disc, in
-/// shuffled order, or keeps its distance on a mesh. Particles without room are postponed. The schedule
-/// depends only on the emitter's own clock, so counts and spread are the same at any frame rate.
+/// Particles of one release never overlap. On a plane, a sphere or a disc each particle gets a cell, in
+/// shuffled order; on a mesh its distance to the others is checked. Particles for which there is no room are
+/// released later. The schedule depends only on the emitter's own clock, so that numbers and distribution are
+/// the same at any frame rate.
 
 #include "effects/emitter_def.h"
 #include "effects/schedule.h"
@@ -25,9 +26,9 @@ struct EmitterReport {
 class Emitter {
  public:
   /// Throws std::invalid_argument if a parameter is out of range (radius <= 0, empty surface ...). `origin`
-  /// is the world's time at which the emitter's clock shows 0. Call World::prewarm() for the time by which
-  /// the emitter prewarms, so that particles released before time 0 move and collide until then. Otherwise
-  /// the first emit() lets them fly freely, through bodies.
+  /// is the world's time at which the emitter's clock shows 0. If the emitter prewarms, call World::prewarm()
+  /// for that time, so that particles released before time 0 move and collide until time 0. Otherwise the
+  /// first emit() moves them by free flight, through bodies.
   Emitter(const EmitterDef& def, sim::ParticleSystemHandle target, Real origin = 0);
 
   /// Adds the particles created in (start, end] to the world, each with its remaining time in this sub-step.

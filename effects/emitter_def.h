@@ -31,13 +31,14 @@ struct EmitterRelease {
   /// Direction of release, in the frame of the body or the world; zero: the normal of the surface.
   Vec3 direction = Vec3::Zero();
   Real inherit_velocity = 1;  ///< fraction of the velocity of the body's point that particles get, >= 0
-  bool recoil = false;        ///< whether particles push a dynamic body back by their momentum relative to it
-  /// Whether particles are placed anywhere on the surface and are never postponed. For particles that do not
-  /// collide with each other.
+  bool recoil =
+      false;  ///< whether a dynamic body gets the opposite of the particles' momentum relative to it
+  /// Whether particles may overlap when they are released. They are placed anywhere on the surface and never
+  /// postponed. For particles that do not collide with each other.
   bool overlap = false;
   Varying rate = 100.0;  ///< particles per second, released one by one; 0: only `count` and bursts
-  /// Particles per metre of the path of the body's point at the surface's origin [1/m], >= 0; spread evenly
-  /// along it.
+  /// Particles per metre of the path of the emitter's origin [1/m], >= 0. They are distributed evenly along
+  /// the path.
   Varying rate_per_metre = 0.0;
   Varying count = 0.0;     ///< particles per release, rounded; 0: no periodic release
   Varying interval = 0.1;  ///< time between releases [s], > 0
@@ -45,7 +46,7 @@ struct EmitterRelease {
   Real start = 0;                        ///< start of `rate` and `count` [s]
   Real end = 1e30;                       ///< end of all releases [s]; existing particles live on
   std::vector<TimeWindow> windows = {};  ///< times in which `rate` and `count` release; empty: always
-  Real prewarm = 0;                      ///< how long before `start` they begin [s], >= 0
+  Real prewarm = 0;                      ///< time by which `rate` and `count` begin before `start` [s], >= 0
 };
 
 struct EmitterDef {

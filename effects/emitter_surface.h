@@ -1,7 +1,7 @@
 #pragma once
-/// The surfaces from which particles are released (physics F1), and the places of a release. Cells keep new
-/// particles apart on the plane, the sphere and the disc; places on a mesh are distributed uniformly over its
-/// area.
+/// The surfaces from which particles are released (physics F1), and the positions of new particles. Cells
+/// keep new particles apart on the plane, the sphere and the disc; places on a mesh are distributed uniformly
+/// over its area.
 
 #include <array>
 #include <cstdint>
@@ -50,12 +50,13 @@ class ReleaseSurface {
 
   /// Whether the surface has cells. On a mesh, the distances of particles must be checked instead.
   bool has_cells() const { return kind_ != SurfaceKind::mesh; }
-  /// The greatest number of cells that keeps particles of this diameter apart, at least one.
+  /// Returns the division with the greatest number of cells in which particles of this diameter [m] do not
+  /// overlap; at least one cell.
   Cells cells(Real diameter) const;
-  /// Centre of a cell. Cells of the sphere and the disc are on a spiral that is rotated by three uniform
-  /// random numbers, so that no direction is preferred even with few cells.
+  /// Returns the centre of cell i. Cells of the sphere and the disc are on a spiral, which is rotated by
+  /// `turn`, three uniform random numbers, so that no direction is preferred even with few cells.
   Place cell(const Cells& cells, uint64_t i, const std::array<Real, 3>& turn) const;
-  /// A uniformly distributed place, from three uniform random numbers.
+  /// Returns a uniformly distributed place for three uniform random numbers in (0, 1).
   Place anywhere(const std::array<Real, 3>& u) const;
 
   Real area() const { return area_; }  ///< [m^2]
@@ -77,8 +78,8 @@ class ReleaseSurface {
   std::vector<Face> faces_;
 };
 
-/// A unit vector perpendicular to a unit vector, continuous except at one direction (Duff et al., "Building
-/// an orthonormal basis, revisited", JCGT 2017).
+/// Returns a unit vector perpendicular to a unit vector. It is a continuous function of n except at one
+/// direction (Duff et al., "Building an orthonormal basis, revisited", JCGT 2017).
 Vec3 perpendicular(const Vec3& n);
 
 }  // namespace offstage::effects

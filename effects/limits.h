@@ -11,7 +11,7 @@
 namespace offstage::effects {
 
 /// Allowed range of a parameter. A closed limit truncates a distribution (F2). A distribution that can reach
-/// an open limit is refused unless its own `min` or `max` excludes the limit.
+/// an open limit is an error, unless its own `min` or `max` excludes the limit.
 struct Limits {
   Real low = -std::numeric_limits<Real>::max(), high = std::numeric_limits<Real>::max();
   bool low_open = false;  ///< whether `low` itself is not allowed
@@ -23,8 +23,8 @@ inline constexpr Real kMaxRate = 1e9, kMaxCount = 1e9, kMinInterval = 1e-6;
 inline constexpr Limits kRates{.low = 0, .high = kMaxRate}, kCounts{.low = 0, .high = kMaxCount};
 inline constexpr Limits kIntervals{.low = kMinInterval, .low_open = true};
 
-/// Throws std::invalid_argument if a value is not allowed. `owner` begins the message, such as `emitter
-/// "rain"`.
+/// Throws std::invalid_argument if a value is not allowed. `owner` is the beginning of the message, for
+/// example `emitter "rain"`.
 void check(const std::string& owner, const char* field, const Varying& v, const Limits& limits);
 
 /// Checks the parameters that all new particles have.

@@ -18,7 +18,8 @@ struct NewParticles {
   Varying restitution = 0.3;  ///< in [0, 1]
   Varying friction = 0.5;     ///< >= 0
   Varying charge = 0.0;       ///< [C]
-  uint64_t max_alive = 1'000'000;  ///< particles beyond this are not released, but counted
+  uint64_t max_alive = 1'000'000;  ///< greatest number of living particles; further ones are not released,
+                                   ///< but counted as skipped
 };
 
 }  // namespace offstage::effects

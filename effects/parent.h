@@ -15,13 +15,13 @@ struct Parent {
   Real mass, radius, age, lifespan, restitution, friction, charge;
 };
 
-/// State of particle i at a time near the world's current time. It is extrapolated by gravity, the system's
-/// own force and its drag, to second order. The effect of other forces within a sub-step is negligible for
-/// the place of a child.
+/// Returns the state of particle i at a time near the world's current time [s]. It is extrapolated to second
+/// order with gravity and the system's own force and drag. Other forces are ignored; within a sub-step, their
+/// effect on the position of a child is negligible.
 Parent parent_at(const sim::World& world, sim::ParticleSystemHandle system, std::size_t i, Real time);
 
-/// Finds the particles of a system that have been stepped for the first time. Before this, the time of
-/// creation of a new particle is unknown.
+/// Finds the particles of a system that have been advanced for the first time. Before that, the creation time
+/// of a new particle is unknown.
 class NewParents {
  public:
   /// Returns the indices of the particles whose age has become greater than 0 since the last call, ascending.

@@ -74,11 +74,11 @@ inline sim::Particle drawn_particle(const NewParticles& def, const Draws& draw) 
   return p;
 }
 
-/// Directions about an axis, by a right-handed frame of unit vectors.
+/// Random directions about an axis. `axis` and `tangent` are perpendicular unit vectors.
 struct Cone {
   Vec3 axis, tangent;
 
-  /// A direction at a random angle from the axis, with a uniform azimuth.
+  /// Returns a direction at the angle `spread_deg` [degrees] from the axis, with a uniformly random azimuth.
   Vec3 drawn(const Varying& spread_deg, const Draws& draw) const {
     const SinCos spread = sincos(draw(spread_deg, kSpread) * (std::numbers::pi / 180));
     const SinCos azimuth = sincos(2 * std::numbers::pi * draw.uniform(kAzimuth));
@@ -86,11 +86,12 @@ struct Cone {
   }
 };
 
-/// The integer nearest to a number, clamped to [0, 1e9].
+/// Returns the nearest integer, clamped to [0, 1e9].
 uint64_t rounded(Real x);
 
-/// Adds a particle that was created at `birth_time` during a sub-step from `start` to `end`, or before it; in
-/// the second case it has flown straight since. Returns false if its lifespan is over by then.
+/// Adds a particle that was created at `birth_time`, during the sub-step from `start` to `end` or before it
+/// [s]. In the second case it has moved on a straight line until `start`. Returns false if its lifespan has
+/// already ended.
 bool add_new_particle(sim::World& world, sim::ParticleSystemHandle system, sim::Particle particle,
                       Real birth_time, Real start, Real end);
 

@@ -18,11 +18,11 @@ using sim::Vec3;
 /// The Philox4x32-10 bijection.
 std::array<uint32_t, 4> philox(std::array<uint32_t, 4> counter, std::array<uint32_t, 2> key);
 
-/// Stable 64-bit name of a stream, from an object's name (FNV-1a).
+/// Returns a 64-bit identifier of a stream for an object's name: its FNV-1a hash.
 uint64_t stream_id(std::string_view name);
 
-/// Combines two numbers to a well-mixed one: the index of objects that are identified by two numbers, such as
-/// the child of a particle.
+/// Returns a hash of two numbers: the index of an object that is identified by two numbers, for example the
+/// child of a particle.
 uint64_t combined(uint64_t a, uint64_t b);
 
 /// The random numbers of one object's stream: pure functions of (index, property).
@@ -53,11 +53,12 @@ class Permutation {
 };
 
 /// Inverse of the standard normal distribution function for p in (0, 1): Wichura's AS 241, relative error
-/// 1e-16. Uses only + - * / and sqrt, so its bits are the same everywhere.
+/// 1e-16. Uses only + - * / and sqrt, so the result is bitwise identical on all machines.
 Real normal_quantile(Real p);
 
-/// sin and cos of a finite x by range reduction and polynomials, error under 1e-15 for |x| < 1e6; same bits
-/// everywhere. Larger x are reduced by the double nearest to 2 pi.
+/// Sine and cosine of a finite x [rad], by range reduction and polynomials. The result is bitwise identical
+/// on all machines, with an error below 1e-15 for |x| < 1e6. Larger x are reduced with the double nearest to
+/// 2 pi and are less accurate.
 struct SinCos {
   Real sin, cos;
 };

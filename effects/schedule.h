@@ -1,6 +1,6 @@
 #pragma once
-/// Birth times of the particles of an emitter: the times of its releases, and their numbers of particles. The
-/// times depend only on its own clock, so they are the same at any frame rate.
+/// The schedule of an emitter: times of its releases, and numbers of particles. It depends only on the
+/// emitter's own clock, so it is the same at any frame rate.
 
 #include <algorithm>
 #include <vector>
@@ -21,7 +21,8 @@ class Schedule {
   /// `origin`: the time at which the emitter's clock shows 0.
   Schedule(const EmitterDef& def, Real origin);
 
-  /// Appends the releases due up to `end`, each kind in order of time.
+  /// Appends the releases that are due until `end` and were not returned before. Each kind of release is in
+  /// the order of time.
   void collect(Real end, std::vector<Release>& due);
   /// Nothing is released after this time.
   void stop(Real time) { end_ = std::min(end_, time); }

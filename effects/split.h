@@ -1,6 +1,6 @@
 #pragma once
-/// Splitting particles (physics F3): from a given age on, each releases children that get a fraction of its
-/// velocity, size and lifespan.
+/// Splitting particles (physics F3): from a given age on, a particle releases children, whose velocity, size
+/// and lifespan are percentages of its own.
 
 #include <functional>
 #include <queue>
@@ -30,10 +30,11 @@ struct SplitDef {
   Varying velocity_percent = 100.0;
   Varying spread_deg = 0.0;       ///< angle from the parent's direction [degrees]
   Varying radius_percent = 50.0;  ///< > 0
-  /// Mass of each child; 0: the mass at which the child has the parent's density.
+  /// Mass of a child; 0: the mass for which the child has the parent's density.
   Varying mass_percent = 0.0;
   Varying lifespan_percent = 100.0;  ///< > 0
-  uint64_t max_alive = 1'000'000;    ///< children beyond this are not released, but counted
+  uint64_t max_alive = 1'000'000;  ///< greatest number of living particles in the children's system; further
+                                   ///< children are not released, but counted
 };
 
 /// Splits the particles of one system into children of the same system, which then split themselves, or into

@@ -1,6 +1,6 @@
 #pragma once
-/// Sub-emitters release particles at events of other particles: an age, a death or a collision. They make
-/// splashes, bursting shells and sparks.
+/// Sub-emitters release particles at events of other particles: at a given age, at death or at a collision.
+/// They are used for splashes, bursting shells and sparks.
 
 #include <string>
 #include <vector>
@@ -33,8 +33,10 @@ struct EventRelease {
   Real min_speed = 0;
   Varying count = 5.0;  ///< particles per event, rounded
   Axis axis = Axis::normal;
-  Varying velocity_percent = 0.0;  ///< fraction of the parent's velocity after the event
-  uint64_t max_per_step = 10'000;  ///< new particles in one sub-step; more are not released, but counted
+  Varying velocity_percent =
+      0.0;  ///< percentage of the parent's velocity after the event that new particles get
+  uint64_t max_per_step = 10'000;  ///< greatest number of new particles in one sub-step; further ones are not
+                                   ///< released, but counted
 };
 
 struct SubEmitterDef {
@@ -43,8 +45,8 @@ struct SubEmitterDef {
   Trigger trigger = Trigger::collision;
   Real age = 1;  ///< age for the trigger `age` [s], >= 0
   EventRelease release = {};
-  /// Parameters of the new particles. Their speed is along directions around the axis, in addition to their
-  /// fraction of the parent's velocity.
+  /// Parameters of the new particles. Their own velocity is along a random direction around the axis; the
+  /// percentage of the parent's velocity is added to it.
   NewParticles particles = {.spread_deg = 30.0, .radius = 0.005, .lifespan = 1.0};
 };
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Trails: particles left behind by moving particles, as by the stars of a firework.
+/// Trails: particles that moving particles leave behind, like the stars of a firework.
 
 #include <string>
 #include <vector>
@@ -16,23 +16,23 @@ class Draws;
 /// The times at which parents leave particles of a trail.
 struct TrailRelease {
   Varying rate = 60.0;  ///< particles per second of each parent, drawn once for its life; must not be a curve
-  Real start_age = 0;   ///< age of the parent [s], >= 0
+  Real start_age = 0;   ///< age of the parent at which its trail begins [s], >= 0
   Real end_age = 1e30;  ///< age of the parent [s]
-  Varying velocity_percent = 0.0;  ///< fraction of the parent's velocity
+  Varying velocity_percent = 0.0;  ///< percentage of the parent's velocity that new particles get
 };
 
 struct TrailDef {
   std::string name = {};  ///< name of the trail, which also selects its random numbers
   uint64_t seed = 1;
   TrailRelease release = {};
-  /// Parameters of the new particles. Their speed is opposite to the parent's velocity, in addition to their
-  /// fraction of that velocity.
+  /// Parameters of the new particles. Their own velocity is opposite to the parent's velocity; the percentage
+  /// of the parent's velocity is added to it.
   NewParticles particles = {.speed = 0.0, .radius = 0.005, .lifespan = 1.0};
 };
 
-/// Leaves the trails of all parents. Each parent releases particles at regular times, from its position at
-/// each time, so a trail has no clumps however fast the parent moves. Random numbers depend on the parent's
-/// id and the number of the particle in its trail.
+/// Creates the trails of all particles of a system (the parents). Each parent releases particles at regular
+/// times from its position at that time, so that trails are even at any speed. Random numbers depend on the
+/// parent's id and the number of the particle in its trail.
 class Trail {
  public:
   /// Throws std::invalid_argument if a parameter is out of range, or if both systems are the same.

@@ -1,7 +1,7 @@
 #pragma once
 /// Greatest number of particles that a definition can create, so that `validate` can refuse it before a run
-/// (physics F3). The bounds hold for every seed and scenes with constant parameters reach them. Sums that
-/// would overflow are clamped to the largest number.
+/// (physics F3). The bounds hold for every seed. Scenes with constant parameters reach them. Sums that would
+/// overflow are clamped to the largest number.
 
 #include <cstdint>
 
@@ -12,8 +12,8 @@
 
 namespace offstage::effects {
 
-/// Bounds for the particles created within a run. In any time t at most at_once + rate t particles are
-/// created.
+/// Bounds for the particles created in a run. In any interval of length t, at most at_once + rate * t
+/// particles are created.
 struct WorstCase {
   uint64_t born = 0;   ///< total number
   uint64_t alive = 0;  ///< number at the end of any step

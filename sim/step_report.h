@@ -1,7 +1,7 @@
 #pragma once
-/// The report of World::step(). The figures are in parts; each part lists its figures once
-/// (sim/core/figures.h), and sums over steps, the statistics of a run and the dict of Python follow from the
-/// lists. The names are those of docs/output-files.md.
+/// The report of World::step(). Its statistics ("figures") are grouped in structs. Each struct lists its
+/// figures once (sim/core/figures.h); sums over steps, the statistics of a run and the Python dict are
+/// generated from these lists. The names are documented in docs/output-files.md.
 
 #include <cstdint>
 #include <tuple>
@@ -17,7 +17,7 @@
 
 namespace offstage::sim {
 
-/// Bodies and their sleep.
+/// Counts of awake and sleeping bodies.
 struct BodyFigures {
   uint32_t awake = 0, asleep = 0;  ///< number of bodies in the last sub-step
   uint32_t islands = 0;            ///< groups of bodies connected by contacts or joints in that sub-step
@@ -32,12 +32,12 @@ struct BodyFigures {
   }
 };
 
-/// Contacts of bodies, and the search for them.
+/// Contacts of bodies, and the work of collision detection.
 struct ContactFigures {
   uint64_t points = 0;        ///< contact points in the last sub-step
-  Real penetration = 0;       ///< greatest penetration at the starts of sub-steps and at impacts [m]
+  Real penetration = 0;       ///< greatest penetration at the start of a sub-step or at an impact [m]
   uint64_t pairs_tested = 0;  ///< pairs of bodies with overlapping boxes
-  uint64_t volume_tests = 0;  ///< tests of two volumes of the trees of two bodies
+  uint64_t volume_tests = 0;  ///< tests of two bounding volumes in the trees of two bodies
   uint64_t piece_tests = 0;   ///< tests of two convex parts or triangles of two bodies
   uint64_t speculative = 0;   ///< speculative contacts of the fast solver
 
@@ -70,7 +70,7 @@ struct ImpactFigures {
   }
 };
 
-/// All cloths together; for a single one see ClothReport, which describes the figures.
+/// Statistics of all cloths together. ClothReport has those of a single cloth and describes each figure.
 struct ClothFigures {
   Real strain = 0;  ///< greatest strain of a thread
   /// Greatest depth of a vertex inside a body [m].
@@ -133,13 +133,13 @@ struct RoughContact {
   BodyHandle a, b;
 };
 
-/// Statistics of a step. Numerical trouble is reported here, never as an exception.
+/// Statistics of a step. Numerical problems are reported here; they never throw an exception.
 struct StepReport : StepFigures {
-  /// Bodies that left the world's bounds; they are frozen from here on.
+  /// Bodies that left the world's bounds; they do not move any more.
   std::vector<BodyHandle> bodies_retired;
   /// Joints that exceeded their breaking force or torque in this step.
   std::vector<JointHandle> joints_broken;
-  /// One for each fall-back of a contact solver, in the order of occurrence.
+  /// One entry for each fall-back of a contact solver, in the order of occurrence.
   std::vector<RoughContact> rough_contacts;
   bool finite = true;    ///< whether all quantities are finite, not NaN or infinite
   NonFinite non_finite;  ///< the first object with a quantity that is not finite, if any

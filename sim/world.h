@@ -80,9 +80,8 @@ enum class SolverKind {
   /// steps.
   automatic,
   /// Computes contact forces by Dantzig's and Baraff's pivoting, with separate limits of friction along both
-  /// tangents (N9, N10); otherwise as `exact`. Islands that pivoting does not solve go to the exact solver
-  /// and
-  /// are counted.
+  /// tangents (N9, N10); otherwise as `exact`. Islands that pivoting does not solve are given to the exact
+  /// solver and counted as fall-backs.
   lcp,
 };
 
@@ -99,17 +98,19 @@ enum class ParticleContactMethod : uint8_t {
 /// bisection misses bodies that pass through each other within a sub-step; they differ in their cost.
 struct CollisionMethods {
   /// Kind of the bounding volumes in the trees over the parts and triangles of meshes (physics H1-H3).
-  /// `mixed`: spheres for dynamic bodies and axis-aligned boxes for the others, which uses the tests between
-  /// volumes of different kinds.
+  /// `mixed` uses spheres for dynamic bodies and axis-aligned boxes for the others; a sphere is then tested
+  /// against a box.
   enum class Trees : uint8_t { aabb, obb, sphere, mixed };
-  /// The pieces by which the time of an impact of two meshes is found: their convex parts, or their triangles
-  /// as in section 2.4 (R3). Contact points are those of the parts in either case.
+  /// Pieces of two meshes between which the time of impact is searched: convex parts, or triangles (book,
+  /// section 2.4; physics R3). Contact points are always computed between the convex parts.
   enum class MeshPairs : uint8_t { parts, triangles };
-  /// Distance of convex polyhedra: GJK, or V-Clip (physics R4). Round shapes use GJK in either case.
+  /// Algorithm for the distance of convex polyhedra: GJK or V-Clip (physics R4). Round shapes always use GJK.
   enum class NarrowPhase : uint8_t { gjk, vclip };
-  /// Grid that finds pairs of boxes: several levels of cells, or one size of cells for all objects (H5, H6).
+  /// Grid that finds overlapping bounding boxes: cells of several sizes, or one size for all objects (physics
+  /// H5, H6).
   enum class BroadPhase : uint8_t { multi_grid, grid };
-  /// Time of an impact: conservative advancement, or bisection of the sub-step as in section 1.4.3 (R12).
+  /// Search for the time of impact: conservative advancement, or bisection of the sub-step (book, section
+  /// 1.4.3; physics R12).
   enum class ImpactTime : uint8_t { advancement, bisection };
   NarrowPhase narrow_phase = NarrowPhase::gjk;
   BroadPhase broad_phase = BroadPhase::multi_grid;
@@ -146,7 +147,7 @@ struct Energy {
   Real total() const { return kinetic + potential + elastic; }
 };
 
-/// A contact point of two bodies.
+/// A contact point of two bodies at the end of the last step.
 struct ContactState {
   BodyHandle a, b;
   Vec3 point = Vec3::Zero();   ///< contact point in the middle between both surfaces, world [m]
@@ -168,7 +169,7 @@ struct MovedBody {
   Pose pose;
 };
 
-/// State of a body at the end of the last step.
+/// Current state of a body.
 struct BodyState {
   Pose pose;              ///< pose of the body's frame, in which its shape was given
   Vec3 centre;            ///< centre of mass, world [m]
@@ -197,17 +198,17 @@ class World {
   /// when a body first needs it, which is slow. Throws std::invalid_argument for an index out of range, a
   /// non-finite vertex or a mesh without faces.
   MeshHandle add_mesh(const TriangleMesh& mesh, std::optional<ConvexDecomposition> decomposition = {});
-  /// Registers a compound of solids, which are in its frame and may overlap. Its bodies collide by the convex
-  /// parts of all solids. The mass of a MeshShape of it counts overlaps twice and assumes one density;
-  /// sum_of() gives the mass of parts of several densities, for BodyDef. Throws std::invalid_argument as
-  /// add_mesh() does, and without solids.
+  /// Registers a compound of solids. Their vertices are in the frame of the compound, and solids may overlap.
+  /// Bodies of this shape collide with the convex parts of all solids. The mass of a MeshShape that uses the
+  /// compound assumes one density and counts overlaps twice; for several densities, pass the result of
+  /// sum_of() to BodyDef. Throws std::invalid_argument for an empty list and for the errors of add_mesh().
   MeshHandle add_compound(const std::vector<SolidMesh>& solids);
-  /// Registers a mesh of another world. Both share it and all that was computed for it, so this takes no
-  /// time. Throws std::invalid_argument for null.
+  /// Registers a mesh of another world. Both worlds share the mesh and its derived data; nothing is computed
+  /// again. Throws std::invalid_argument for null.
   MeshHandle add_shared_mesh(std::shared_ptr<const CollisionMesh> mesh);
   std::shared_ptr<const CollisionMesh> shared_mesh(MeshHandle mesh) const;
   const MeshTopology& topology(MeshHandle mesh) const;
-  const TriangleMesh& mesh(MeshHandle mesh) const;  ///< the mesh as it was registered, that is welded
+  const TriangleMesh& mesh(MeshHandle mesh) const;  ///< the registered mesh, after welding
   const CollisionMesh& collision_mesh(MeshHandle mesh) const;
 
   /// Adds a body. Throws std::invalid_argument, naming the field and its allowed values, for a size, mass or
@@ -234,8 +235,8 @@ class World {
   /// Sets the velocity of a dynamic body's centre of mass [m/s] and its angular velocity [rad/s].
   void set_velocity(BodyHandle body, const Vec3& velocity, const Vec3& angular_velocity);
 
-  /// Adds an impulse [N s] at a point of the world to a dynamic body, and wakes it. Bodies that joints
-  /// connect to it share it in the next sub-step.
+  /// Applies an impulse [N s] to a dynamic body at a point in world coordinates, and wakes the body. In the
+  /// next sub-step, joints transmit the impulse to connected bodies.
   void add_impulse(BodyHandle body, const Vec3& impulse, const Vec3& point);
 
   /// Adds a particle and returns its id. `elapsed` is the time from its birth time to the end of the coming
@@ -247,19 +248,19 @@ class World {
   /// Called before each sub-step with its start and end time; emitters add their particles here.
   using BeforeSubStep = std::function<void(Real start, Real end)>;
 
-  /// Advances only particles from one time to another before the first step(), in the same sub-steps as
-  /// step(): from <= to <= 0 [s]. A further call continues where the last one ended. Afterwards time() is
-  /// `to`. Particles collide with each other and with bodies. Dynamic bodies, cloths, springs and the
-  /// particles that existed before do not move. Kinematic bodies follow their tracks. Forces are those of
-  /// time 0, and forces between particles do not act. With from = to = 0, `before` is called once, and
-  /// particles created at that time exist from then on. Throws std::invalid_argument for other times.
+  /// Advances only the particles, from time `from` to time `to` [s], before the first step(). The times must
+  /// satisfy from <= to <= 0. A further call must start where the last one ended. The sub-steps are as long
+  /// as in step(). Afterwards time() is `to`. Particles collide with each other and with bodies. Dynamic
+  /// bodies, cloths, springs and previously existing particles do not move. Kinematic bodies follow their
+  /// tracks. Forces are those of time 0, and forces between particles do not act. With from = to = 0,
+  /// `before` is called once, and particles created at that time exist from then on. Throws
+  /// std::invalid_argument for other times.
   StepReport prewarm(Real from, Real to, const BeforeSubStep& before = {});
 
   /// Advances by `sampling_time` in the fewest equal sub-steps not longer than WorldDef::max_step.
   StepReport step(Real sampling_time, const BeforeSubStep& before = {});
 
-  /// Time since the start of the simulation [s]. Negative while prewarm() has not yet reached the time 0,
-  /// which it may do in several calls.
+  /// Time since the start of the simulation [s]. Negative until prewarm() has reached time 0.
   Real time() const;
   const WorldDef& def() const;
 
@@ -289,13 +290,14 @@ class World {
   std::size_t cloth_count() const;
   void for_each_body(const std::function<void(BodyHandle)>& f) const;
   void for_each_particle_system(const std::function<void(ParticleSystemHandle)>& f) const;
-  /// The contact points at the end of the last step, in the order of their bodies.
+  /// Contact points at the end of the last step, in the order of their bodies.
   std::vector<ContactState> contacts() const;
-  /// Pairs of bodies whose current overlap is deeper than `least` [m], > 0, in the order of slots. `a` is
-  /// dynamic. The contact solvers push such bodies apart during the next steps.
+  /// Pairs of bodies that currently overlap by more than `least` [m], which must be > 0. Pairs are in the
+  /// order of the bodies' slots. Body `a` of a pair is dynamic. The contact solvers push such bodies apart
+  /// during the next steps.
   std::vector<BodyOverlap> overlaps(Real least) const;
-  /// Number of the island that a body belongs to; islands are numbered in the order of their first bodies.
-  /// Empty for static and kinematic bodies.
+  /// Index of the island that contains a body. Islands are numbered in the order of their first bodies. Empty
+  /// for static and kinematic bodies.
   std::optional<uint32_t> island(BodyHandle body) const;
   bool is_asleep(BodyHandle body) const;
   std::size_t body_count() const;

@@ -1,6 +1,7 @@
 #pragma once
-/// Bodies connected by joints (physics A1, A4, A5). An articulation computes the joint forces, which keep the
-/// joints connected to the integrator's accuracy, and then projects away the remaining error.
+/// Bodies connected by joints (physics A1, A4, A5). An articulation computes the joint forces during a
+/// motion; with these, joints stay connected to the accuracy of the integrator. Afterwards it removes the
+/// remaining error by projection.
 
 #include <array>
 #include <memory>
@@ -23,8 +24,8 @@ struct Joint {
   JointDef def;
   JointHandle handle;
   Body *a = nullptr, *b = nullptr;  ///< b may be null: the world
-  JointFrame on_a, on_b;            ///< frame of the joint on a and on b, each in the body's frame
-  Real length = 0;                  ///< length of a rod or rope; offset of a coupling by whole turns
+  JointFrame on_a, on_b;            ///< frame of the joint on a and on b, in the frame of that body
+  Real length = 0;  ///< length of a rod or rope [m]; for gears, racks and screws the offset by whole turns
   Articulation* articulation = nullptr;
 
   bool is_broken = false;
@@ -32,8 +33,8 @@ struct Joint {
   Real coordinate = 0;     ///< accumulated coordinate, for joints that count turns
   // Loads of the joint on body a, about the anchor.
   Wrench load;            ///< mean during the last motion, including the effect of contacts [N], [N m]
-  Wrench impact_impulse;  ///< sum of the joint's impulses in the collisions of this sub-step [N s], [N m s]
-  Wrench borne;           ///< mean load of the last sub-step including impacts [N], [N m]
+  Wrench impact_impulse;  ///< sum of its impulses in all collisions of this sub-step [N s], [N m s]
+  Wrench borne;           ///< mean load over the last sub-step, including impacts [N], [N m]
   /// Impulse of the joint's constraints in the last contact solution; initial guess of the next one.
   Vec6 reaction = Vec6::Zero();
   /// Impulses of the joint's rows with bounds (joint_limits.h) in the last solution; initial guess of the
@@ -48,7 +49,8 @@ struct Joint {
 
 /// Whether the joint's coordinate is an unbounded angle; Joint::coordinate then counts whole turns.
 bool counts_turns(const Joint& joint);
-/// Motion of a body at a time: the motion of its centre of mass, or of its origin if it is not dynamic.
+/// Returns the motion of a body's centre of mass at a time [s]; for a body that is not dynamic, the motion of
+/// its origin.
 LinkMotion link_motion(const Body* body, Real time);
 /// Frame of a joint on a body, relative to the point whose motion link_motion() returns.
 JointFrame link_frame(const Body* body, const JointFrame& in_body);
@@ -70,18 +72,18 @@ class Articulation final : public JointedBodies {
   Real kicks_needed(Real duration) const;
   /// With springs, before a motion: the number of times that kick() will be called in it.
   void set_kicks(Real count) { kicks_ = count; }
-  /// The fraction of a motion from which impulses have to act to move the links as the forces of its kicks
-  /// do.
+  /// Fraction of a motion, from 0 to 1. Impulses applied at this time move the links as far as the same
+  /// impulses distributed over the kicks.
   Real kicks_act_from() const { return (1 - 1 / kicks_) / 2; }
-  /// With springs: the mean forces on the links [force, torque] that change their velocities at t by all
-  /// forces of the part from t to t + h, the springs and dampers of the joints included, by implicit Euler
-  /// (physics A8). `forces` holds all other forces on entry.
+  /// With springs: computes, by implicit Euler (physics A8), the mean force and torque on each link over the
+  /// part of the motion from t to t + h [s], springs and dampers of the joints included. `forces` holds all
+  /// other forces on entry, and the result [force, torque] on return.
   void kick(Real t, Real h, std::span<const LinkMotion> motion, std::span<const LinkMobility> mobility,
             std::span<Vec6> forces);
   /// Begins a motion from t to t + h.
   void begin_motion(Real t, Real h);
-  /// Adds the joint forces at a time within the motion to `forces` [force, torque] of the links. `motion` is
-  /// the state of the links, and `forces` holds all other forces on entry.
+  /// Adds the joint forces at time t within the motion to `forces`, which holds all other forces [force,
+  /// torque] on the links on entry. `motion`: state of the links at that time.
   void add_forces(Real t, std::span<const LinkMotion> motion, std::span<const LinkMobility> mobility,
                   std::span<Vec6> forces);
   /// Propagates impulses that acted on single bodies since the last settle() through the joints.
@@ -90,22 +92,22 @@ class Articulation final : public JointedBodies {
   /// smallest mass-weighted displacement, then the velocities.
   void settle(Real time, JointFigures& tally);
 
-  /// Evaluates the constraints at the bodies' current `rigid` states or, if `at_start`, at those of their
-  /// interval's start.
+  /// Evaluates the constraints at the current states Body::rigid or, if `at_start`, at the states at the
+  /// start of the interval.
   void place(Real time, bool at_start = false);
-  /// Evaluates the constraints for the contact solver at the poses after `fraction` of an interval of
-  /// `duration` [s] that ends at `time` with the bodies' `rigid` states. There the impulses of the interval
-  /// act, on average. At the poses of the interval's end they would change the angular momentum, because
-  /// their arms turn until then.
+  /// Evaluates the constraints for the contact solver, at the poses after a `fraction` of the interval. The
+  /// interval lasts `duration` [s] and ends at `time` with the states Body::rigid. The fraction is the
+  /// average time at which the impulses act. With the poses at the end of the interval, the arms would have
+  /// turned, and the impulses would change the angular momentum.
   void place_within(Real time, Real duration, Real fraction, Real substep);
   /// Projects velocities of the links at `time` onto the constraints of the last place_within().
   void project(Real time, std::span<Vec6> velocities);
-  /// Place of a joint at the state for which place() or place_within(), whichever was called last, evaluated
-  /// the constraints.
+  /// Returns the JointPlace of joint j at the state of the last place() or place_within(). `still_a` and
+  /// `still_b` are storage for ends that are not links.
   JointPlace joint_place(std::size_t j, Real time, LinkMotion& still_a, LinkMotion& still_b) const {
     return place_of(j, time, motion_, still_a, still_b, before_);
   }
-  /// Place of a joint at the end of the interval; start_place() has that at its start.
+  /// Returns the JointPlace of joint j at the end of the interval; start_place(), at its start.
   JointPlace end_place(std::size_t j, Real time, LinkMotion& still_a, LinkMotion& still_b) const {
     return place_of(j, time, end_motion_, still_a, still_b);
   }
@@ -115,8 +117,8 @@ class Articulation final : public JointedBodies {
   bool has_bounded_rows() const { return has_bounded_rows_; }
   const JointSystem& system() const { return system_; }
   JointSystem& system() { return system_; }
-  /// After place_within(), the system of the constraints, and of the springs and dampers as soft rows, which
-  /// resist changes of the free motion.
+  /// Returns the linear system after place_within(). It contains the constraints, and the springs and dampers
+  /// as soft rows, which resist changes of the free motion.
   JointSystem& inert_system() { return has_springs() ? *sprung_ : system_; }
   /// Multiplies the softness of the springs after place_within() by a factor. Returns whether it has changed.
   bool soften(Real factor);
@@ -126,8 +128,9 @@ class Articulation final : public JointedBodies {
   /// Adds constraint impulses of a collision to the loads of the joints.
   void add_impact_impulses(std::span<const Vec6> impulses);
 
-  /// Prepares link_mobility() and respond() for impulses on links at the end of a sub-step, at this time and
-  /// the bodies' current poses. The system is factored at the first of these calls.
+  /// Prepares link_mobility() and respond() for impulses on links at the end of a sub-step. `time`: that end
+  /// [s]. The bodies must be in their poses at this time. The linear system is factored at the first call of
+  /// link_mobility() or respond().
   void begin_impulses(Real time);
   Mat6 link_mobility(uint32_t link, const Vec6& push) override;
   void respond(uint32_t link, const Vec6& impulse, std::span<Vec6> velocities) override;

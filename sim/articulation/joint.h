@@ -25,32 +25,33 @@ enum class JointType : uint8_t {
   revolute,   ///< allows rotation about the axis
   prismatic,  ///< allows displacement along the axis, without rotation
   universal,  ///< allows rotation about the axis, fixed in a, and about the second axis, fixed in b
-  /// Keeps the distance of the anchors, as a massless rod does; with limits or a motor the length may change,
-  /// as the length of a rope or a winch does.
+  /// Keeps the distance between the anchors constant, like a massless rod. With limits or a motor the length
+  /// may change, like that of a rope or a winch.
   distance,
-  /// Couples the rotation of a about `axis` with that of b about `second_axis`: angle of a + ratio * angle of
-  /// b = 0. The axes are fixed in the bodies. Other joints hold the wheels on a carrier, which must not turn.
+  /// Couples the rotation of a about `axis` with the rotation of b about `second_axis`: angle of a + ratio *
+  /// angle of b = 0. The axes are fixed in the bodies. Other joints must hold the wheels on a carrier, and
+  /// the carrier must not turn.
   gear,
   /// Couples the rotation of a about `axis` with the displacement of b along `second_axis`, a direction of
   /// the world: displacement = ratio * angle, where the ratio is the radius of the pinion [m].
   rack,
-  /// Allows rotation of a about the axis together with displacement along it, relative to b: ratio metres per
+  /// Couples rotation of a about the axis with displacement of a along it, relative to b: `ratio` metres per
   /// turn, positive for a right-handed thread.
   screw,
   /// A rope that runs from `anchor` on body a over the fixed points `pulley_a` and `pulley_b` to `anchor_b`
-  /// on body b. |anchor - pulley_a| + ratio |anchor_b - pulley_b| never exceeds its value at the time at
-  /// which the joint is created.
+  /// on body b. The length |anchor - pulley_a| + ratio |anchor_b - pulley_b| never exceeds its initial value,
+  /// when the joint is created.
   pulley,
 };
 
 /// Motor that drives the free coordinate of a joint: the angle of a revolute joint [rad], the displacement of
-/// a prismatic joint [m], or the length change of a rod [m]. Each is 0 when the joint is created.
+/// a prismatic joint [m], or the length change of a rod [m]. The coordinate is 0 when the joint is created.
 struct Motor {
   enum class Mode : uint8_t { none, speed, position };
-  /// A target at a time. The target is constant before the first key and after the last one.
+  /// Target value at a time. Before the first key and after the last key the target is constant.
   struct Key {
-    Real time = 0;                                          ///< [s]
-    Real target = 0;                                        ///< [rad/s] or [m/s], or [rad] or [m]
+    Real time = 0;    ///< [s]
+    Real target = 0;  ///< target speed [rad/s] or [m/s], or target position [rad] or [m]
     Interpolation interpolation = Interpolation::monotone;  ///< interpolation to the next key
   };
   Mode mode = Mode::none;
@@ -65,8 +66,8 @@ struct Motor {
   Real target(Real time) const;
 };
 
-/// Definition of a joint, in world coordinates at the bodies' poses when the joint is created. Its
-/// coordinates are 0 in these poses.
+/// Definition of a joint. Points and axes are in world coordinates, for the poses of the bodies when the
+/// joint is created. In these poses the joint's coordinates are 0.
 struct JointDef {
   static constexpr Real kFree = std::numeric_limits<Real>::infinity();
 
@@ -76,7 +77,8 @@ struct JointDef {
   Vec3 anchor = Vec3::Zero();    ///< common point of both bodies [m]
   Vec3 anchor_b = Vec3::Zero();  ///< other end of a rod, on b [m]
   Vec3 axis = Vec3::UnitZ();  ///< axis of rotation or sliding; for a spherical joint, the axis of its twist
-  /// Second axis of a universal joint, not parallel to `axis`; axis of b of a gear, direction of a rack.
+  /// Second axis of a universal joint (not parallel to `axis`); axis of the gear wheel b; direction of a
+  /// rack.
   Vec3 second_axis = Vec3::UnitX();
   Real ratio = 1;  ///< ratio of a gear [1], rack [m], screw [m per turn] or pulley [1, > 0]; not 0
   Vec3 pulley_a = Vec3::Zero(),
@@ -86,11 +88,11 @@ struct JointDef {
   /// the twist of a spherical joint, or the angle of a screw or of a universal joint about `axis`. A pulley
   /// without limits has the upper limit 0.
   Real lower = -kFree, upper = kFree;
-  Real swing = kFree;  ///< greatest tilt of a spherical joint's axis, or angle of a universal joint about its
-                       ///< second axis [rad]
+  Real swing = kFree;  ///< greatest tilt of a spherical joint's axis, or greatest angle of a universal joint
+                       ///< about its second axis [rad]
   /// Coefficient of restitution at the limits `lower` and `upper`, in [0, 1], for speeds above kBounceSpeed.
   Real restitution = 0;
-  static constexpr Real kBounceSpeed = 0.05;  ///< least speed at a limit that is reflected [m/s], [rad/s]
+  static constexpr Real kBounceSpeed = 0.05;  ///< speeds below this do not rebound at a limit [m/s], [rad/s]
   /// Spherical joints: torque per angle of rotation from the pose at creation, about any axis [N m/rad].
   Real stiffness = 0;
   /// Dry friction: greatest torque or force against motion in each free direction [N m] or [N].
@@ -101,12 +103,12 @@ struct JointDef {
   /// The joint breaks at a larger torque of constraints, limits, motor and friction together [N m].
   Real max_torque = kFree;
   bool collide = false;  ///< whether the two bodies also collide with each other
-  /// Times between which it acts [s]. A joint that appears later joins its bodies in their poses of that
-  /// time; its anchors and axes have moved with the bodies.
+  /// The joint exists from `appear_at` to `remove_at` [s]. If it appears later than 0, it connects the bodies
+  /// in their poses at that time, and its anchors and axes have moved with the bodies.
   Real appear_at = 0, remove_at = kFree;
 
-  /// Returns how much the torque k theta + c u of the joint's spring and damper changes for each unit of the
-  /// speed u at the end of an interval of the length h [s], where theta is the angle at this end.
+  /// Returns c + h k, the derivative of the torque k theta + c u of spring and damper with respect to the
+  /// speed u, for implicit Euler over an interval of length h [s].
   Real resistance(Real h) const { return damping + h * stiffness; }
   /// Whether a joint of this type only couples motions that other joints allow.
   bool is_coupling() const { return type == JointType::gear || type == JointType::rack; }
@@ -118,10 +120,10 @@ struct JointDef {
   }
 };
 
-/// Figures of the joints in a step.
+/// Statistics of all joints in a step.
 struct JointFigures {
-  Real error = 0;         ///< greatest residual of a constraint at the end of a motion [m], [rad]
-  uint64_t unsolved = 0;  ///< failed factorizations and projections, and joint motions of limited energy
+  Real error = 0;         ///< greatest error of a constraint at the end of a motion [m], [rad]
+  uint64_t unsolved = 0;  ///< failed factorizations and projections, and motions whose energy was limited
 
   static constexpr auto figures() {
     using T = JointFigures;
@@ -134,7 +136,7 @@ struct JointFigures {
 /// State of a joint.
 struct JointState {
   Vec3 anchor_a = Vec3::Zero(), anchor_b = Vec3::Zero();  ///< world [m]
-  Vec3 axis = Vec3::UnitZ();                              ///< world, fixed in b
+  Vec3 axis = Vec3::UnitZ();                              ///< axis of the joint, world; fixed in b
   /// Load on a at its anchor: the mean over the last sub-step, impacts included [N], [N m].
   Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
   Real coordinate = 0;  ///< the free coordinate; 0 for joints without one

@@ -1,5 +1,5 @@
 #pragma once
-/// Energy and momentum of bodies connected by joints, for checks of their motion (physics A1, A5).
+/// Energy and momentum of bodies connected by joints, to check and correct their motion (physics A1, A5).
 
 #include <span>
 
@@ -7,7 +7,8 @@
 
 namespace offstage::sim {
 
-/// Motion of bodies as if they were one rigid body with the same momentum and angular momentum.
+/// Motion of a single rigid body with the same mass distribution, momentum and angular momentum as several
+/// bodies.
 struct CommonMotion {
   Vec3 centre = Vec3::Zero(), velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
   Vec3 angular_momentum = Vec3::Zero();  ///< angular momentum about the centre [kg m^2/s]
@@ -19,19 +20,19 @@ CommonMotion common_motion(std::span<Body* const> bodies);
 
 /// Returns the greatest constraint error of an articulation's joints at a time [m], [rad].
 Real joint_gap(const Articulation& articulation, Real time);
-/// Elastic energy of a joint's stiffness and of a position motor with a stiffness, which is a spring whose
-/// effort is limited, at a time [J].
+/// Elastic energy of a joint at a time [J]: of its stiffness, and of a position motor with a stiffness, which
+/// acts as a spring with limited effort.
 Real spring_energy(const Joint& joint, Real time);
 /// Whether a joint connects the articulation to the world or to a static or kinematic body.
 bool is_held(const Articulation& articulation);
 /// Whether a joint connects the articulation to a kinematic body, which may do work.
 bool has_kinematic_end(const Articulation& articulation);
 
-/// Kinetic energy of the links relative to their common motion; if the articulation is held, all kinetic
-/// energy [J].
+/// Kinetic energy of the links relative to their common motion [J]. If the articulation is_held(), the whole
+/// kinetic energy.
 Real internal_energy(const Articulation& articulation);
-/// Multiplies the velocities relative to the common motion by a fraction, 0 to 1. The result still satisfies
-/// the constraints, and an articulation that is not held keeps its momentum and angular momentum.
+/// Multiplies the velocities relative to the common motion by `fraction`, from 0 to 1. The velocities still
+/// satisfy the constraints. If the articulation is not held, momentum and angular momentum are conserved.
 void slow_down(const Articulation& articulation, Real fraction);
 /// Rotates the velocities of all bodies together to restore the angular momentum of `before`, after
 /// corrections have displaced the bodies.

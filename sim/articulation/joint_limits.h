@@ -9,28 +9,29 @@
 
 namespace offstage::sim {
 
-/// Origin of a row with bounds.
+/// The joint from which a bounded row was made.
 struct BoundedOrigin {
   Joint* joint;
   std::size_t slot;  ///< index of the row in Joint::efforts
   Vec3 arm;          ///< vector from the centre of the joint's body a to the anchor, world axes [m]
-  /// Whether the row changes the joint's speed so that it reaches its coordinate at the interval's end. The
-  /// bodies then move with their new velocities during the whole interval.
+  /// Whether the row makes the joint reach a given coordinate exactly at the interval's end. The bodies then
+  /// move with their new velocities during the whole interval.
   bool closes;
 };
 
-/// The fraction of an interval that ends at `time` after which the free motion of an articulation first
-/// reaches a limit, after its place_within(); none if it reaches no limit.
+/// Returns the fraction of an interval after which the free motion of an articulation first reaches a limit,
+/// from 0 to 1; empty if it reaches no limit. The interval lasts `duration` [s] and ends at `time`. Call
+/// Articulation::place_within() first.
 std::optional<Real> first_stop(const Articulation& articulation, Real duration, Real time);
 
-/// Appends the bounded rows of an articulation, after its place_within(), for an interval that ends at
-/// `time`. Its bodies have the indices Body::row.
+/// Appends the bounded rows of an articulation for an interval that lasts `duration` [s] and ends at `time`.
+/// Call Articulation::place_within() first. The indices of bodies are Body::row.
 void collect_bounded_rows(const Articulation& articulation, Real duration, Real time,
                           std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins);
 
-/// Appends rows by which the springs and dampers resist changes of the free motion (physics A8), for an
-/// interval of this duration, or for a collision in a sub-step of this duration: links that springs make
-/// stiff in a sub-step are so in a collision, too.
+/// Appends rows for springs and dampers, which resist changes of the free motion (physics A8). `duration` is
+/// the length of the interval or, for a collision, of the sub-step [s]: springs that are stiff over a
+/// sub-step resist a collision equally.
 void collect_springs(const Articulation& articulation, Real duration, Real time,
                      std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins);
 

@@ -18,12 +18,13 @@ struct JointConstraint {
   const JointRows* rows;
 };
 
-/// A condition on u = on_a . v_a + on_b . v_b + offset with a bounded impulse p: u becomes `target` -
-/// softness p. If this requires an impulse beyond a bound, p is at that bound.
+/// A condition on the speed u = on_a . v_a + on_b . v_b + offset, with a bounded impulse p. The solution has
+/// u = target - softness p; if this requires an impulse beyond a bound, p equals that bound.
 struct BoundedRow {
   uint32_t a = kUnmoved, b = kUnmoved;
   Vec6 on_a = Vec6::Zero(), on_b = Vec6::Zero();
-  Real offset = 0;            ///< contribution of driven links and of the turning direction [m/s] or [rad/s]
+  Real offset =
+      0;  ///< contribution of kinematic links and of the rotation of the row's direction [m/s] or [rad/s]
   Real target = 0;            ///< [m/s] or [rad/s]
   Real softness = 0;          ///< [1/kg] or [1/(kg m^2)], >= 0
   Real lower = 0, upper = 0;  ///< bounds of the impulse [N s] or [N m s]
@@ -31,13 +32,15 @@ struct BoundedRow {
   // For the fast solver: the fraction of the interval after which the row acts, and how much greater `offset`
   // is at the interval's start, decreasing linearly [m/s] or [rad/s].
   Real from = 0, turning = 0;
-  bool resists_change = false;  ///< whether `target` is u before the solution, whose change the row resists
+  bool resists_change =
+      false;  ///< whether `target` is the speed u before the solution: the row resists its change
 };
 
 struct JointProblem {
   std::span<const JointConstraint> constraints;
   std::span<BoundedRow> bounded;
-  std::span<Vec6> impulses;  ///< impulses of the constraints, by their rows; in: a guess; out: the solution
+  std::span<Vec6>
+      impulses;  ///< impulses of each constraint, one element per row; in: a guess; out: the solution
 
   bool empty() const { return constraints.empty() && bounded.empty(); }
 };

@@ -10,7 +10,8 @@
 
 namespace offstage::sim {
 
-/// Motion of a link at a time: of its centre of mass, or of its origin if it is kinematic.
+/// Motion of a link's centre of mass at one time, in world axes [m], [m/s], [rad/s]; for a kinematic link,
+/// motion of its origin.
 struct LinkMotion {
   Vec3 position = Vec3::Zero();
   Mat3 axes = Mat3::Identity();  ///< world from body
@@ -29,8 +30,8 @@ struct LinkMobility {
   }
 };
 
-/// Frame of a joint on a link, relative to the link's centre and in its axes. The columns of `axes` are the
-/// second axis, their cross product for a right-handed frame, and the axis.
+/// Frame of a joint on a link, relative to the link's centre and in the link's axes. The columns of `axes`
+/// are: the second axis, the cross product of axis and second axis, and the axis.
 struct JointFrame {
   Vec3 point = Vec3::Zero();
   Mat3 axes = Mat3::Identity();
@@ -57,26 +58,26 @@ struct JointRows {
   uint32_t count = 0;
   Mat6 on_a = Mat6::Zero(), on_b = Mat6::Zero();  ///< J^T: a column for each constraint
   Vec6 error = Vec6::Zero(), bias = Vec6::Zero();
-  Vec6 softness = Vec6::Zero();  ///< change of the row's speed that its own impulse takes back
+  Vec6 softness =
+      Vec6::Zero();  ///< compliance: the row's speed is reduced by softness times its impulse [1/kg]
 
   void add(const JointRow& row);
 };
 
-/// Number of constraints. A distance joint has one only if it is a rod.
+/// Number of scalar constraints of a joint, 0 to 6. A distance joint has a constraint only if it is a rod.
 uint32_t constraint_count(const JointDef& def);
-/// Axes of a joint's frame on body a or on body b, in the world when the joint is created: the columns of
-/// JointFrame::axes.
+/// Returns the axes of a joint's frame on body a (or b, if `of_b`) when the joint is created, in the world.
+/// For the columns see JointFrame::axes.
 Mat3 frame_axes(const JointDef& def, bool of_b);
-/// Whole turns of coupled rotations change the constraint of a gear, rack or screw; this is the change of
-/// Joint::length after a motion in which each rotation was at most half a turn.
+/// Returns the change of Joint::length of a gear, rack or screw due to whole turns of its rotations. To be
+/// called after each motion; a rotation must turn by at most half a turn in between.
 Real turns_offset(const JointDef& def, const JointPlace& place, Real length);
-/// Computes the rows of a joint; `length` is that of a rod, or the offset by whole turns of a gear, rack or
-/// screw.
+/// Computes the constraint rows of a joint. `length`: Joint::length.
 void set_joint_rows(const JointDef& def, const JointPlace& place, Real length, JointRows& rows);
 
-/// Row of the free coordinate of a revolute, prismatic, distance, screw or pulley joint, the first angle of a
-/// universal joint, or the twist of a spherical joint. `error` is the coordinate; angles are within half a
-/// turn.
+/// Returns the row of the free coordinate: of a revolute, prismatic, distance, screw or pulley joint, the
+/// first angle of a universal joint, or the twist of a spherical joint. JointRow::error is the coordinate [m]
+/// or [rad]; angles are in [-pi, pi].
 JointRow free_row(const JointDef& def, const JointPlace& place, Real length);
 /// Row of the tilt of a spherical joint's axis, or of the second angle of a universal joint.
 JointRow swing_row(JointType type, const JointPlace& place);
@@ -86,7 +87,8 @@ JointRow turning_row(const Vec3& axis);
 /// Rotation vector of a relative to b, in b's axes [rad].
 Vec3 rotation_vector(const JointPlace& place);
 
-/// The angle of (x, y) from the x axis, in [-pi, pi], with the same bits everywhere.
+/// Returns the angle of (x, y) from the x axis [rad], in [-pi, pi]. The result is bitwise identical on all
+/// machines.
 Real angle_of(Real y, Real x);
 
 }  // namespace offstage::sim

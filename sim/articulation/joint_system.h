@@ -1,9 +1,10 @@
 #pragma once
-/// The linear system of an articulation's joints (physics A1). With M the masses of its links, J its
-/// constraints and S their softness, A = J M^-1 J^T + S has a block row for each joint and couples joints
-/// that share a link. A link with many joints would couple all of them; it gets a row of its own instead, so
-/// that any tree costs O(n). If joints form loops, rows may be linearly dependent. A small fraction of the
-/// diagonal is then added, and conjugate gradients remove the error that this causes.
+/// The linear system of an articulation's joints (physics A1). The matrix is A = J M^-1 J^T + S, with the
+/// mass matrix M of the links, the Jacobian J of the constraints and their softness S. It has a block row for
+/// each joint and couples joints that share a link. A link with many joints would couple all of them. It gets
+/// its own block row instead, so that the cost for a tree of n joints is O(n). If joints form loops, rows may
+/// be linearly dependent. A small fraction of the diagonal is then added, and conjugate gradients remove the
+/// error that this causes.
 
 #include <array>
 #include <cstdint>

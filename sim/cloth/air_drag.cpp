@@ -114,9 +114,10 @@ void AirDrag::drag_points(ClothPoints& points) {
 
 /// F = c |u| D u with D = (C_D - C_L) 1 + C_L n n^T, a third to each corner. Its derivative is c (|u| D + D u
 /// u^T / |u|); with D u u^T D / u.D u in place of D u u^T it is symmetric, and exact for air along the normal
-/// and along the cloth. The implicit fraction of the first term is raised where air stops the triangle within
-/// the time of the linearisation, so that nothing is thrown back. Together they are the exact c |u| D of u /
-/// (1 + k u t) along u then as well. Four triangles at a time, one in each lane of a register.
+/// and along the cloth. Where air stops the triangle within the time of the linearisation, the implicit
+/// fraction of the first term is increased, so that the triangle does not rebound. Together they are the
+/// exact c |u| D of u / (1 + k u t) along u then as well. Four triangles are computed at a time, one in each
+/// lane of a register.
 void AirDrag::drag_triangles(ClothPoints& points) {
   const std::size_t n = from_.size();
   wind_.resize(n);

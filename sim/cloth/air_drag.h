@@ -22,25 +22,27 @@ class AirDrag {
   /// until the next call.
   void assign(const Cloth& cloth, std::size_t first);
 
-  /// Makes the next renew() linearise again. To be called after other forces, masses or velocities have
-  /// changed.
+  /// Forces the next renew() to linearise again. To be called after changes of other forces, masses or
+  /// velocities.
   void expire() { left_ = 0; }
-  /// To be called before each sub-step of length dt. If the last linearisation no longer holds, sets the
-  /// accelerations of the points to those due to outer forces and to the air at their present velocities.
-  /// `substeps` of the world's sub-step are left, each with `steps` steps of the integrator.
+  /// Updates the linearisation if it has expired: sets ClothPoints::acceleration to the effect of outer
+  /// forces and of the air at the current velocities. To be called before each sub-step of the cloth, of
+  /// length dt [s]. `substeps`: number of sub-steps of the cloth that are left in the world's sub-step;
+  /// `steps`: steps of the integrator in each of them.
   void renew(ClothPoints& points, Real dt, uint32_t substeps, uint32_t steps);
   /// Returns whether the force of the air does not depend on the velocities of the points.
   bool empty() const { return !is_active_; }
 
   /// Prepares respond() for steps of length h [s].
   void begin(Real h);
-  /// Returns the change of the acceleration of the cloth's point i if its velocity is v.
+  /// Returns the change of the acceleration of the cloth's point i [m/s^2] if its velocity is v instead of
+  /// from(i).
   Vec4 change(std::size_t i, const Vec4& v) const { return -resistance_[i].times(v - from_[i]); }
-  /// Returns R v of the cloth's point i: R is the decrease of the acceleration per velocity [1/s].
+  /// Returns R v of the cloth's point i: R is the decrease of its acceleration per unit of velocity [1/s].
   Vec4 resist(std::size_t i, const Vec4& v) const { return resistance_[i].times(v); }
   /// Returns the part of a change of velocity dv that remains after the drag of a step, (1 + h R)^-1 dv.
   Vec4 respond(std::size_t i, const Vec4& dv) const { return dv - loss_[i].times(dv); }
-  /// Returns R as a matrix.
+  /// Returns the matrix R of point i [1/s].
   Mat3 resistance(std::size_t i) const { return resistance_[i].matrix(); }
   /// Returns the velocity for which the accelerations of the points were computed.
   const Vec4& from(std::size_t i) const { return from_[i]; }

@@ -6,14 +6,16 @@
 namespace offstage::sim {
 namespace {
 
-/// The impulses of other places may bend a place too far if it is above this fraction of the limit.
+/// Patches above this fraction of the limit are part of the system, because impulses on other patches may
+/// bend them too far.
 constexpr Real kNearBendLimit = 0.8;
 /// Sweeps end when none changes a curvature by more than this fraction of the limit, or after this number of
 /// sweeps.
 constexpr Real kBendTolerance = 1e-4;
 constexpr int kMaxBendSweeps = 60;
-/// Fraction of its excess that a place keeps if it began the sub-step with it: springs, which the limit does
-/// not consider, would undo a sudden correction in the next sub-step, and the cloth would vibrate.
+/// Fraction of its excess that a patch keeps if it exceeded the limit already at the start of the sub-step.
+/// The limit does not consider springs: they would undo a sudden correction in the next sub-step, and the
+/// cloth would vibrate.
 constexpr Real kKeepsOfExcess = 0.5;
 
 }  // namespace
@@ -38,7 +40,7 @@ Real BendLimit::greatest(const ClothPoints& points) const {
   return radius_ * curvature;
 }
 
-/// Collects the places near their limit; returns whether any is beyond it.
+/// Collects the patches near the limit; returns whether any patch exceeds it.
 bool BendLimit::find_rows(const ClothPoints& points) {
   rows_.clear();
   gradient_.clear();

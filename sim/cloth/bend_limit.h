@@ -1,15 +1,15 @@
 #pragma once
-/// The smallest radius to which a cloth bends. In each sub-step, the impulses of all places of the cloth that
-/// are bent further are solved for together by projected Gauss-Seidel sweeps: impulses only bend back. A
-/// place is a triangle with its surroundings, whose curvature ClothBending measures: it is that of the
-/// surface on any mesh, and neither stretching nor the direction of a fold changes it.
+/// The smallest radius to which a cloth bends. In each sub-step, projected Gauss-Seidel sweeps compute
+/// impulses that bend the cloth back wherever its curvature exceeds the limit. The curvature is measured by
+/// ClothBending for each triangle and its surroundings (a patch). It does not depend on the mesh, on
+/// stretching or on the direction of a fold.
 ///
-/// The impulses are along gradients of curvatures, whose sums and moments are zero: momentum and angular
-/// momentum are kept. They begin with those of the last sub-step, which hardly differ while a load rests.
-/// They add no kinetic energy: the limit stops bending as an inelastic impact does. The moves stretch
-/// springs, which store that energy for a moment. Contacts with bodies and cloth, and the limit of stretch,
-/// are solved later in the sub-step and have precedence: under their pressure the curvature can exceed the
-/// limit for that sub-step.
+/// The impulses are along the gradients of the curvatures. The sum and the moment of a gradient are zero, so
+/// that momentum and angular momentum are conserved. The impulses of the last sub-step are the initial guess;
+/// under a constant load they hardly change. Impulses add no kinetic energy: the limit stops bending like an
+/// inelastic impact. The displacements stretch springs, which store this energy for a short time. Contacts
+/// with bodies and cloth, and the limit of stretch, are solved later in the sub-step and have precedence:
+/// under their pressure the curvature can exceed the limit for that sub-step.
 
 #include <cstdint>
 #include <span>
@@ -23,19 +23,20 @@ namespace offstage::sim {
 
 class BendLimit {
  public:
-  /// Limits the bending of the cloth with this number, which has `count` points from `first` on. `bending`
-  /// must stay valid and measure the curvature. `radius` > 0 [m].
+  /// Limits the bending of the cloth with the index `cloth`, whose points have the indices `first` to `first`
+  /// + `count` - 1. `bending` must outlive this object and measure the curvature. `radius`: smallest radius
+  /// [m], > 0.
   BendLimit(uint32_t cloth, std::size_t first, std::size_t count, const ClothBending& bending, Real radius)
       : cloth_(cloth), first_(first), count_(count), bending_(&bending), radius_(radius) {}
   uint32_t cloth() const { return cloth_; }
 
-  /// Bends back all places that are bent too far at the end of a sub-step of length dt. Returns whether there
-  /// were any. The impulses on held points are added to their `pin_impulse`. `kick` is the velocity of points
-  /// besides that of their moves; the part of the moves that must not count as velocity is appended to
-  /// `cuts`.
+  /// Bends back all patches that exceed the limit at the end of a sub-step of length dt [s]. Returns whether
+  /// there were any. The impulses on pinned points are added to ClothPoints::pin_impulse. `kick`: velocity of
+  /// each point in addition to displacement / dt. The part of the displacements that must not count as
+  /// velocity is appended to `cuts`.
   bool project(ClothPoints& points, Real dt, std::span<const Vec4> kick, std::vector<VelocityCut>& cuts);
 
-  /// Greatest curvature of the cloth, times the radius.
+  /// Greatest curvature of the cloth multiplied by the radius; 1 at the limit.
   Real greatest(const ClothPoints& points) const;
 
  private:

@@ -152,8 +152,8 @@ struct Recovered {
   GradientWeights weights;
 };
 
-/// The weights of points in the gradient at the first of the quadratic polynomial nearest to all; empty if
-/// they do not determine one.
+/// Fits a quadratic polynomial to all points. Returns the weights of the points in its gradient at the first
+/// point; empty if the points do not determine a polynomial.
 std::optional<GradientWeights> polynomial_gradient(std::span<const FlatPoint> points) {
   if (points.size() < 6) return {};
   Real size = 0;
@@ -173,7 +173,8 @@ std::optional<GradientWeights> polynomial_gradient(std::span<const FlatPoint> po
   return weights;
 }
 
-/// `clamped` of each triangle. At a clamped triangle the gradient is its own: of the others none counts.
+/// Recovers the gradient at a point. `clamped`: flag of each triangle. At a clamped triangle the gradient of
+/// this triangle is used, and the others are ignored.
 Recovered recover(const Unfolding& unfolding, std::span<const Triangle> triangles,
                   std::span<const uint8_t> clamped, uint32_t point) {
   Recovered result{unfolding.fan(point, false), {}};
@@ -580,7 +581,8 @@ void ClothBending::add_gradient(std::size_t index, std::span<const Vec4> x,
   }
 }
 
-/// Steps of one rate differ in their last bits: in single precision they are one.
+/// Factorizes M + stiff K, unless the last factor is for the same values. Lengths of equal steps may differ
+/// by rounding; they are compared in single precision.
 void ClothBending::factorize(std::span<const Real> masses, std::span<const Real> inverse_masses, Real stiff) {
   const auto rounded = static_cast<float>(stiff);
   if (factor_ && factor_stiff_ == rounded && std::ranges::equal(factor_masses_, inverse_masses)) return;

@@ -1,12 +1,12 @@
 #pragma once
 /// Bending of a cloth as a thin plate: energy B/2 times the integral of |H x - n b0|^2 over the unstrained
 /// cloth, where H x are the second derivatives of the points along the cloth, n is the normal and b0 the
-/// curvature at rest. Of a sheet that bends without stretching, |H x| is its curvature, so that B is the
+/// curvature at rest. For a sheet that bends without stretching, |H x| is its curvature. B is then the
 /// flexural rigidity [N m].
 ///
-/// The gradient at a point is that of the quadratic polynomial nearest to the point and its neighbours,
-/// unfolded into a plane. Second derivatives on a triangle are those of the linear function between the
-/// gradients at its corners. Both are exact for quadratic shapes on every triangulation. (Angles at edges
+/// The gradient at a point is computed from a quadratic polynomial fitted to the point and its neighbours,
+/// unfolded into a plane. Second derivatives on a triangle are the derivatives of the linear interpolation of
+/// the gradients at its corners. Both are exact for quadratic shapes on every triangulation. (Angles at edges
 /// alone, as in discrete shells, depend on the mesh: Grinspun et al., "Computing Discrete Shape Operators on
 /// General Meshes", 2006.) The energy is quadratic in the points, as in Bergou et al., "A Quadratic Bending
 /// Model for Inextensible Surfaces", 2006; its matrix is the same for x, y and z, and constant.
@@ -27,18 +27,18 @@ namespace offstage::sim {
 class ClothBending {
  public:
   /// `rigidity` B [N m]; 0: no bending. `damping`: time tau [s]; the moment is B (kappa + tau d kappa/dt).
-  /// `rest_fraction` of the curvature of `rest` is unstressed; the remainder is as if the cloth had been
-  /// flat. Of a cloth that tore, which has other corners of triangles and more points, only the surroundings
-  /// of the tears are computed again. Triangles that were clamped stay so until set_clamps(). `measures`: the
-  /// curvature can be measured even if there is no rigidity.
+  /// `rest_fraction`: fraction of the curvature of `rest` that is free of stress, 0 to 1; with 0 the cloth
+  /// tends to be flat. After a cloth has torn, only the surroundings of the tears are computed again.
+  /// Triangles stay clamped until set_clamps(). `measures`: whether curvature() is needed even if the
+  /// rigidity is 0.
   void assign(std::span<const Vec3> rest, std::span<const Triangle> triangles, std::span<const Real> masses,
               Real rigidity, Real damping, Real rest_fraction, bool measures = false);
   /// Whether nothing resists bending, because the rigidity is 0.
   bool empty() const { return rigidity_ == 0 || patches_.empty(); }
   Real damping() const { return damping_; }
 
-  /// Triangles with all corners held by the same body do not bend: they are clamped. `clamp` is a number of
-  /// each point; equal numbers other than 0 are one body.
+  /// Sets the clamped triangles, which do not bend: those whose corners are all held by the same body.
+  /// `clamp`: for each point the number of the body that holds it; 0: none.
   void set_clamps(std::span<const uint32_t> clamp);
 
   /// Upper bound of the eigenvalues of M^-1 K [1/s^2].
@@ -51,23 +51,25 @@ class ClothBending {
   void add_damped_forces(std::span<const Vec4> x, std::span<const Vec4> v, std::span<Vec4> f);
   /// Adds scale K p to y: K is the Hessian of the energy without the curvature at rest.
   void multiply(std::span<const Vec4> p, Real scale, std::span<Vec4> y) const;
-  /// The 3 x 3 block of K for a point is this number [N/m] times the unit matrix.
+  /// Returns the factor d [N/m] of the diagonal block of K for a point, which is d times the 3 x 3 unit
+  /// matrix.
   Real diagonal(uint32_t point) const { return diagonal_[point]; }
 
-  /// The curvature is measured by patches, two to a triangle: one measures the surroundings as a smooth
-  /// surface; the other measures shapes that alternate from point to point, which the first misses, and
-  /// counts half.
+  /// Number of patches, on which curvature is measured. Each triangle has two. One measures its surroundings
+  /// as a smooth surface. The other has half the weight and measures shapes that alternate from point to
+  /// point, which the first cannot see.
   std::size_t patch_count() const { return patches_.size(); }
   /// Curvature of a patch beyond that at rest, |H x - n b0| [1/m].
   Real curvature(std::size_t patch, std::span<const Vec4> x) const;
-  /// Appends the gradient of curvature() by the points. Its sum, and its moment about any point, are zero.
+  /// Appends the derivatives of curvature() with respect to the points, as pairs of point and derivative
+  /// [1/m^2]. Their sum, and their moment about any point, are zero.
   void add_gradient(std::size_t patch, std::span<const Vec4> x,
                     std::vector<std::pair<uint32_t, Vec4>>& gradient) const;
 
-  /// Solves (M + stiff K) moves = M moves, which turns explicit moves into those of backward Euler. Those of
-  /// points without an inverse mass stay. By conjugate gradients, or by a factorisation, which is kept for
-  /// the next step, if they would take many iterations. Returns false if they reached the limit of
-  /// iterations.
+  /// Replaces explicit displacements `moves` by the solution y of (M + stiff K) y = M moves, the
+  /// displacements of backward Euler. Points with the inverse mass 0 keep theirs. The system is solved by
+  /// conjugate gradients; if these would take many iterations, by a factorisation that is kept for the next
+  /// step. Returns false if the limit of iterations was reached.
   bool filter(std::span<const Real> masses, std::span<const Real> inverse_masses, Real stiff,
               std::span<Vec4> moves);
 

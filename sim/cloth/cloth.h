@@ -62,7 +62,7 @@ struct ClothPin {
   Real until = std::numeric_limits<Real>::infinity();  ///< the pin is released at this time [s]
 };
 
-/// Draws two vertices together, and then holds them.
+/// Pulls two vertices together within ClothDef::seam_time, and then holds them together.
 struct ClothSeam {
   uint32_t a = 0, b = 0;
 };
@@ -96,15 +96,17 @@ struct ClothDef {
   std::vector<Vec3> rest_vertices;  ///< positions in the unstrained cloth [m]; empty: as `vertices`
   std::vector<Triangle> triangles;
   std::vector<ClothSpring> springs;
-  /// Flexural rigidity B of the triangles [N m], >= 0: moment per width at a curvature of 1/m (bending.h).
+  /// Flexural rigidity B of the cloth [N m], >= 0: moment per unit of width at a curvature of 1/m
+  /// (bending.h).
   Real bend = 0;
-  /// Time tau in which bending is damped [s], >= 0: the moment is B (kappa + tau d kappa/dt).
+  /// Damping time tau of bending [s], >= 0: the moment per unit of width is B (kappa + tau d kappa/dt).
   Real bend_damping = 0;
   /// Fraction of the curvature of the unstrained cloth that is free of stress, 0 to 1.
   Real rest_curvature = 1;
-  /// Smallest radius to which the cloth bends [m], >= 0; 0: no limit. The curvature beyond that at rest stays
-  /// at most 1 / min_bend_radius (bend_limit.h), for any model of bending and without rigidity, too. On cells
-  /// larger than this radius it has no effect: the mesh itself cannot bend further.
+  /// Smallest radius to which the cloth bends [m], >= 0; 0: no limit. The curvature in excess of the
+  /// curvature at rest stays at most 1 / min_bend_radius (bend_limit.h). This holds for any model of bending,
+  /// even without rigidity. If the cells of the mesh are larger than this radius, the limit has no effect,
+  /// because the mesh itself cannot bend further.
   Real min_bend_radius = 0;
   std::vector<Real> masses;  ///< mass of each vertex [kg], > 0
   std::vector<ClothPin> pins;
@@ -119,36 +121,36 @@ struct ClothDef {
   bool collides = true;  ///< whether the cloth collides with bodies and particles
   /// Whether the cloth collides with itself, and with other cloths that have this flag.
   bool self_collision = true;
-  Real thickness = 0.005;  ///< distance kept from bodies, and between two layers [m], > 0
+  Real thickness = 0.005;  ///< distance between cloth and bodies, and between two layers of cloth [m], > 0
   /// Coefficient of friction on bodies: the geometric mean with the body's coefficient is used, as between
   /// bodies.
   Real friction = 0.5;
   Real self_friction = 0.3;  ///< coefficient of friction of cloth on cloth
 
-  Real max_stretch = 0;  ///< greatest length of stretch springs over their rest length, > 1; 0: no limit (F7)
-  Real max_shear = 0;    ///< greatest length of shear springs over their rest length; 0: no limit
-  /// Length over rest length at which a stretch spring tears, > 1; 0: never. If it is less than max_stretch,
-  /// max_stretch counts as 1.2 of it.
+  Real max_stretch =
+      0;  ///< greatest length of a stretch spring divided by its rest length, > 1; 0: no limit (F7)
+  Real max_shear = 0;  ///< greatest length of a shear spring divided by its rest length; 0: no limit
+  /// Length divided by rest length at which a stretch spring tears, > 1; 0: never. If there is a max_stretch,
+  /// it counts as at least 1.2 * tear, so that springs can tear.
   Real tear = 0;
 
   ClothAir air;
   /// Overpressure inside a closed cloth at its rest volume V0 [Pa]; 0: none. At another volume V the
   /// overpressure is `pressure` times V0 / V: Boyle's law, applied to the overpressure alone.
   Real pressure = 0;
-  /// Time over which the gas of `pressure` is let in at a constant rate [s], >= 0; 0: it is inside from the
-  /// start.
+  /// Duration of the inflation at a constant rate [s], >= 0; 0: the gas is inside from the start.
   Real inflate_time = 0;
-  /// Density of the gas inside [kg/m^3], >= 0; empty: that of the air. It requires `pressure` > 0. The
-  /// weight of the gas, less that of the displaced air, acts on the cloth: the overpressure changes with the
-  /// height at the rate (air.density - gas_density) g. The inertia of the gas, and that of the air that moves
-  /// with the cloth, are neglected.
+  /// Density of the gas inside [kg/m^3], >= 0; empty: air.density. Requires `pressure` > 0. The weight of the
+  /// gas, less that of the displaced air, acts on the cloth: the overpressure changes with the height at the
+  /// rate (air.density - gas_density) g. The inertia of the gas and of the surrounding air is neglected.
   std::optional<Real> gas_density;
-  /// For an open cloth such as a parachute: fraction of the stagnation pressure rho (u.m)^2 / 2 of the air
-  /// entering at its mouth that builds up inside, on the side that its normals point away from. 0: none.
+  /// For an open cloth such as a parachute: pressure inside, as a fraction of the stagnation pressure rho
+  /// (u.m)^2 / 2 of the air that enters at the mouth. It acts on the side opposite to the normals. 0: none.
   Real ram_pressure = 0;
 
   ClothIntegrator integrator = ClothIntegrator::relaxed;
-  Real substep = 1.0 / 960;  ///< longest sub-step of the cloth [s], > 0; never longer than that of the world
+  Real substep =
+      1.0 / 960;  ///< longest sub-step of the cloth [s], > 0; it is also limited by the world's sub-step
   /// Whether springs take a single step in each sub-step, with the integrator `relaxed`. The stiffness of
   /// springs that are too stiff for it is clamped (ClothReport::clamped).
   bool soften = false;
@@ -158,12 +160,12 @@ struct ClothDef {
 /// it is clamped.
 inline constexpr Real kShortestSpringStep = 1e-5;
 
-/// Describes the first error of a definition: the field, the place and the allowed values. Empty if there is
-/// none.
+/// Returns a description of the first error of a definition: field, place and allowed values. Empty if the
+/// definition is valid.
 std::string problem(const ClothDef& def);
 
-/// The longest step at which an explicit integrator is stable, considering the springs alone, and the spring
-/// that limits it: the one with the greatest ratio of stiffness to mass.
+/// Stability limit of an explicit integrator, considering only springs and bending, and the spring that
+/// determines the limit: the one with the greatest ratio of stiffness to mass.
 struct StableStep {
   Real step = std::numeric_limits<Real>::infinity();  ///< [s]
   uint32_t spring = 0;                                ///< index of the spring in the definition
@@ -172,24 +174,24 @@ struct StableStep {
 /// Largest stable step of a definition. It is infinite unless the integrator is `symplectic` or `rk4`.
 StableStep largest_stable_step(const ClothDef& def);
 
-/// The first thread of a cloth that tore.
+/// The first stretch spring of a cloth that tore.
 struct ClothTear {
   Real time = 0;              ///< end of the sub-step in which it tore [s]
   Vec3 place = Vec3::Zero();  ///< [m]
-  Real stretch = 0;           ///< length of the thread over its rest length
+  Real stretch = 0;           ///< length of the spring divided by its rest length
   bool by_pressure = false;   ///< whether the cloth is closed and under pressure
   bool touches_body = false;  ///< whether the cloth touched a body in that sub-step
 };
 
 /// The gas inside of a closed cloth.
 struct ClothGasState {
-  Real volume = 0;  ///< volume inside, with each hole of a tear closed by a fan of triangles [m^3]
-  /// Pressure above that outside [Pa], at the height of the first vertex if the gas has a weight.
+  Real volume = 0;  ///< volume inside [m^3]; holes of tears are closed by a fan of triangles
+  /// Overpressure [Pa]. If the gas has a weight, the overpressure at the height of the first vertex.
   Real pressure = 0;
 };
 
-/// Statistics of a cloth. Counts are sums over the sub-steps of the last step; other values are those at its
-/// end.
+/// Statistics of a cloth. Counts are sums over the sub-steps of the last step, unless stated otherwise; other
+/// values are from its end.
 struct ClothReport {
   uint64_t contacts = 0;       ///< contacts with bodies at the end: of vertices, and of bodies' corners
   uint64_t self_contacts = 0;  ///< contacts of cloth with cloth at the end
@@ -201,9 +203,10 @@ struct ClothReport {
   uint64_t bend_limited = 0;   ///< cloth sub-steps in which the limit min_bend_radius acted
   Real max_bend = 0;           ///< greatest curvature times min_bend_radius at the end; 0 without a limit
   uint64_t held_back = 0;      ///< moves shortened because cloth would have passed through cloth
-  uint64_t crossings = 0;  ///< pairs that could not be kept from crossing; cloth may pass through cloth there
-  uint64_t clamped = 0;    ///< springs whose stiffness the `relaxed` integrator clamped, at the end
-  Real least_stiffness = 1;   ///< least fraction of its stiffness that a clamped spring has left
+  uint64_t crossings =
+      0;                 ///< pairs whose crossing could not be prevented; cloth may have passed through cloth
+  uint64_t clamped = 0;  ///< springs whose stiffness the `relaxed` integrator clamped, at the end
+  Real least_stiffness = 1;   ///< smallest ratio of clamped to defined stiffness of all springs
   uint32_t spring_steps = 1;  ///< number of steps of the springs in each sub-step of a `relaxed` cloth
   uint64_t torn = 0;          ///< number of torn springs
   uint64_t unconverged = 0;   ///< solves of springs or bending that reached the limit of iterations
@@ -218,8 +221,8 @@ struct ClothView {
   std::span<const Triangle> triangles;
   /// For each point, the vertex of the definition that it comes from. Points are added where cloth tears.
   std::span<const uint32_t> sources;
-  /// The springs that are not broken. Springs of the kind `cord` are as many as in the definition, in its
-  /// order.
+  /// The springs that are not broken. Springs of the kind `cord` never break; their number and order are
+  /// those of the definition.
   std::span<const ClothSpring> springs;
   uint32_t version = 0;  ///< increases whenever the triangles or the number of points change
 };

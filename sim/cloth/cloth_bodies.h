@@ -16,14 +16,14 @@ namespace offstage::sim {
 
 class ClothBody {
  public:
-  /// `velocity` and `angular_velocity` are the body's at the end of the sub-step of length h [s];
-  /// `surface_velocity` is against the body, in its frame.
+  /// `velocity` and `angular_velocity` of the body are those at the end of the world's sub-step of length h
+  /// [s]. `surface_velocity`: velocity of the surface (conveyor) relative to the body, body frame [m/s].
   ClothBody(const Obstacle& obstacle, Real h, const Vec3& velocity, const Vec3& angular_velocity,
             const Vec3& surface_velocity);
 
-  /// Makes a body that carries cloth fall along a parabola within the sub-step of the world, as it does where
-  /// nothing hits it. Along the straight path on which cloth meets bodies, a body that hangs at rest
-  /// would sag in each sub-step. `gravity` [m/s^2].
+  /// Makes the path of a body that carries cloth a parabola within the world's sub-step, as for a body that
+  /// collides with nothing. Other paths are straight lines; on these, a body that hangs at rest would sag in
+  /// each sub-step. `gravity` [m/s^2].
   void fall_along_parabola(const Vec3& gravity);
   /// Begins a sub-step of cloth, which covers the fractions `from` to `to` of the world's sub-step and lasts
   /// dt [s].
@@ -38,7 +38,7 @@ class ClothBody {
   Real mass() const { return 1 / obstacle_.inverse_mass; }
   const Vec3& centre() const { return centre_; }  ///< centre of mass at the end of the cloth's sub-step
 
-  /// Displacement of the centre of mass during the sub-step of cloth.
+  /// Displacement of the centre of mass during the cloth's sub-step [m].
   Vec3 move() const { return centre_ - start_.point_to_world(obstacle_.centre); }
 
   /// Displacement of the body's surface during the cloth's sub-step [m], at the surface point that is at `p`
@@ -50,29 +50,30 @@ class ClothBody {
   const Vec3& angular_velocity() const {
     return angular_velocity_;
   }  ///< angular velocity at the same time [rad/s]
-  /// Velocity that a unit impulse along n (unit) at p gives to the point there, along n [1/kg].
+  /// Change of velocity along n (unit) of the point p, per unit of impulse along n at p [1/kg].
   Real mobility(const Vec3& p, const Vec3& n) const;
-  /// Applies an impulse at a point [N s].
+  /// Applies an impulse [N s] at a point, world.
   void apply_impulse(const Vec3& impulse, const Vec3& p);
-  /// Applies the impulse of a contact. It moves the body already in this sub-step of cloth, by `fraction` of
-  /// the displacement that its change of velocity causes in one sub-step. A delayed response of the body
-  /// would gain energy.
+  /// Applies the impulse of a contact [N s] at a point, and displaces the body already in this sub-step of
+  /// the cloth: by `fraction` times the change of velocity times the length of the sub-step. A delayed
+  /// response of the body would add energy.
   void apply_contact_impulse(const Vec3& impulse, const Vec3& p, Real fraction);
-  /// Applies impulses and angular impulses about centre(), in this order, to a body together with the mass of
-  /// the points pinned to it. The body moves already in this sub-step of cloth by `moving`, the part of the
-  /// impulses that acts from its start on. `carried` is the 6x6 mass matrix of these points about centre()
-  /// [kg, kg m, kg m^2]. Returns the change of velocity.
+  /// Applies an impulse and an angular impulse about centre(), in this order, to a body together with the
+  /// mass of the points pinned to it. `moving` is the part of the impulse that acts from the start of the
+  /// cloth's sub-step and displaces the body within it. `carried` is the 6x6 mass matrix of these points
+  /// about centre() [kg, kg m, kg m^2]. Returns the change of velocity.
   Vec6 apply_pin_impulses(const Vec6& impulse, const Vec6& moving, const Mat6& carried);
-  /// Change of velocity by a unit impulse and angular impulse, together with the mass that it carries.
+  /// Change of [velocity, angular velocity] per unit of [impulse, angular impulse] about centre(), with the
+  /// mass of the pinned points; see apply_pin_impulses().
   Mat6 mobility(const Mat6& carried) const;
-  /// Reduces the body's displacement relative to `drift` in this sub-step of cloth to a fraction, and changes
-  /// its velocity accordingly. Returns its change of velocity [m/s].
+  /// Multiplies the body's displacement relative to `drift` [m] in this sub-step of the cloth by `fraction`,
+  /// and changes its velocity accordingly. Returns the change of velocity [m/s].
   Vec3 shorten(Real fraction, const Vec3& drift);
 
-  /// Records the impulse of a pin on a sleeping body, which it does not move.
+  /// Records the impulse [N s] of a pin at p on a sleeping body, which does not move.
   void record_pin_impulse(const Vec3& impulse, const Vec3& p);
-  /// Sum of the impulses and angular impulses of pins in this sub-step of the world; empty if no pin holds
-  /// the body.
+  /// Sum of the impulses and angular impulses of pins in this sub-step of the world; empty if the body has no
+  /// pins.
   const std::optional<Reaction>& pin_load() const { return pin_load_; }
 
   const Reaction& reaction() const { return reaction_; }
@@ -84,7 +85,7 @@ class ClothBody {
 
   bool touched = false;     ///< whether cloth touched the body in this sub-step of the world
   Real touching_speed = 0;  ///< greatest relative speed of such a contact [m/s]
-  /// Whether the body pinches cloth against another body in this sub-step of the world.
+  /// Whether cloth is pinched between this body and another one in this sub-step of the world.
   bool pinches = false;
   bool collides = true;  ///< whether cloth collides with the body; false: the body only holds pins
 
@@ -107,7 +108,7 @@ class ClothBody {
   std::optional<Reaction> pin_load_;
 };
 
-/// The points that pins hold on one dynamic body.
+/// A dynamic body and the cloth points that are pinned to it.
 struct Carrier {
   ClothBody* body;
   std::vector<uint32_t> points;
@@ -120,8 +121,9 @@ struct Carrier {
   /// Applies an impulse to the body and its points, and moves the points. `moving`: the part of the impulse
   /// that also displaces the body within the sub-step, as in ClothBody::apply_pin_impulses().
   void apply_impulses(const Vec6& impulse, const Vec6& moving, ClothPoints& points) const;
-  /// Adds a change of the body's velocity to the points, whose momentum it already includes. Other
-  /// accelerations of the body reach the points only in ClothSystem::apply_pin_impulses_to_bodies().
+  /// Applies a change of the body's velocity and angular velocity to the points. It must have been computed
+  /// with the mass of the points included. Other changes of the body's velocity are applied to the points in
+  /// ClothSystem::apply_pin_impulses_to_bodies().
   void accelerate(const Vec3& dv, ClothPoints& points) const;
 };
 

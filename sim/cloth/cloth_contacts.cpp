@@ -21,7 +21,8 @@ constexpr int kStopSweeps = 30;
 
 }  // namespace
 
-/// A body is near a point that can reach it within twice the distance that both move at their present speeds.
+/// Finds the bodies near a point: those that it can reach within twice the distance that both move at their
+/// current speeds.
 void ClothContacts::look(const ClothPoints& points, uint32_t i, std::vector<Near>& found) const {
   const Vec3 p = points.at(i);
   const Vec3 v = points.velocity[i].head<3>();
@@ -182,8 +183,8 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
   }
 }
 
-/// Two bodies with a point between them push each other by velocities: they must not approach. The point also
-/// transmits friction between them, which is more than its own mass could.
+/// Resolves the contact of two bodies that pinch a point, on velocities: the bodies must not approach. The
+/// point also transmits friction between them, which is more than its own mass could.
 void ClothContacts::pinch(Touch& a, Touch& b, Real friction) {
   const Vec3 n = (a.normal - b.normal).normalized();
   const Real mobility = a.body->mobility(a.on_body, n) + b.body->mobility(b.on_body, n);
@@ -307,7 +308,8 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
   return taken;
 }
 
-/// Puts a point out of one body; `supported`: another body holds it from behind, and pinch() moved this one.
+/// Moves a point out of one body. `supported`: whether another body holds the point from behind; pinch() has
+/// then changed the velocities of the bodies.
 void ClothContacts::press(ClothPoints& points, Touch& t, Real dt, Real parts, bool supported,
                           std::vector<VelocityCut>& cuts) {
   const uint32_t i = t.near->point;

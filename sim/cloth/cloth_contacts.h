@@ -18,34 +18,34 @@ namespace offstage::sim {
 
 class ClothContacts {
  public:
-  /// Finds the bodies that points can touch in a sub-step of the world of length h. `collides`: for each
-  /// point, whether it collides.
+  /// Finds the bodies that points can touch in a sub-step of the world of length h [s]. `collides`: for each
+  /// point, whether it collides with bodies.
   void find(const ClothPoints& points, std::span<const uint8_t> collides, std::span<ClothBody> bodies, Real h,
             Real at = 0);
-  /// Greatest speed of points against dynamic bodies that they can touch [m/s].
+  /// Greatest speed of a point relative to a dynamic body that it can touch [m/s].
   Real fastest_approach(const ClothPoints& points) const;
   /// Repeats the search for points that moved farther than predicted.
   void find_runaways(const ClothPoints& points);
-  /// Moves points out of the bodies in a sub-step of cloth of length dt, which is one of `parts` equal parts
-  /// of the world's sub-step. Appends to `cuts`.
+  /// Moves points out of the bodies in a sub-step of the cloth of length dt [s]. `parts`: number of such
+  /// sub-steps in the world's sub-step. Displacements that must not count as velocity are appended to `cuts`.
   void solve(ClothPoints& points, Real dt, Real parts, std::vector<VelocityCut>& cuts);
   /// Returns the contacts with dynamic bodies at the points' current positions, including points that are
   /// closer than twice the distance that they keep.
   void collect(const ClothPoints& points, std::vector<BodyContact>& found);
-  /// Stops bodies that press into cloth at points whose moves were shortened (those with a non-zero
-  /// `shortened`), and removes the part of the bodies' moves that is towards the cloth. The result does not
-  /// depend on the order of the contacts. `triangles`: contacts of the bodies with triangles. `kick`:
-  /// velocity of each point in addition to that of its move. `recoil`: inverse mass of each cloth together
-  /// with the bodies that hold it; 0 if it is pinned to the world. `whole_velocity`: common velocity of the
-  /// cloth and these bodies, or that of the single object to which the cloth is pinned. Returns for each
-  /// cloth the impulse that it absorbs [N s].
+  /// Stops bodies that move towards cloth at points whose moves were shortened (non-zero `shortened`), and
+  /// removes the component of the bodies' displacements towards the cloth. The result does not depend on the
+  /// order of the contacts. `triangles`: contacts of the bodies with triangles. `kick`: velocity of each
+  /// point in addition to that of its move. `recoil`: for each cloth, the inverse of its mass including the
+  /// bodies that hold it [1/kg]; 0 if it is pinned to the world. `whole_velocity`: for each cloth, its mean
+  /// velocity including these bodies, or the velocity of the single object to which it is pinned. Returns for
+  /// each cloth the impulse that it absorbs [N s].
   std::vector<Vec3> stop_bodies(const ClothPoints& points, std::span<const uint8_t> shortened,
                                 std::span<const Vec4> kick, std::span<const Real> recoil,
                                 std::span<const std::optional<Vec3>> whole_velocity,
                                 std::span<const BodyContact> triangles);
 
-  /// A body to which a point was so close in the last solve() that it may soon touch it, or null; and whether
-  /// there were several.
+  /// near_to(): a body that was so close to the point in the last solve() that they may soon touch; null if
+  /// there is none. is_near_several(): whether there was more than one such body.
   const ClothBody* near_to(std::size_t point) const {
     return point < near_to_.size() ? near_to_[point] : nullptr;
   }
@@ -56,7 +56,8 @@ class ClothContacts {
   std::span<const uint64_t> active() const { return active_; }
   /// Returns whether any point of a cloth touched a body since the last find().
   bool touched(std::size_t cloth) const { return cloth < touched_.size() && touched_[cloth]; }
-  /// Raises the greatest penetration of each cloth's points to that at the end of a sub-step [m].
+  /// Updates the maximum of `penetration` of each cloth [m] with the penetration of its points at the end of
+  /// a sub-step.
   void measure(const ClothPoints& points, std::span<Real> penetration) const;
 
  private:

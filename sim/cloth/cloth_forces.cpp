@@ -16,7 +16,7 @@ Real gas_volume(const Cloth& cloth) {
   return std::max(cloth.gas.volume(cloth.points, cloth.triangles), 0.1 * cloth.rest_volume);
 }
 
-/// Pressure that the gas let in so far would have without a loss, at the present volume [Pa].
+/// Overpressure that the gas filled in so far would have at the current volume if none had leaked [Pa].
 Real overpressure(const Cloth& cloth) {
   const Real let_in = cloth.age < cloth.def.inflate_time ? cloth.age / cloth.def.inflate_time : 1;
   return let_in * cloth.def.pressure * cloth.rest_volume / gas_volume(cloth);

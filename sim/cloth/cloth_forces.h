@@ -20,15 +20,15 @@ struct ClothWeather {
 /// The gas inside of a cloth with `pressure`; zero for other cloths.
 ClothGasState gas_state(const Cloth& cloth);
 
-/// Sets the masses of a cloth's points, which begin at index `first`, their accelerations by outer forces,
-/// the velocity of the air there, and the rate of linear drag by fields and hands. The mass of the points of
-/// a torn cloth under pressure includes the gas that they move.
+/// Sets for each point of a cloth: mass, acceleration by outer forces, velocity of the air, and rate of
+/// linear drag. `first`: index of the cloth's first point. In a torn cloth under pressure, the mass includes
+/// the gas that moves with the point.
 void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather& weather,
                       ClothPoints& points);
 
-/// Lets the gas of a torn cloth flow out for a time weather.h, and calls add_outer_forces() for the next
-/// sub-step: its skin moves too fast for forces that stay through a sub-step of the world. Returns false if
-/// no gas flows.
+/// Lets the gas of a torn cloth flow out for the time weather.h [s], and calls add_outer_forces() for the
+/// next sub-step of the cloth. A bursting cloth moves too fast for forces that are constant over a sub-step
+/// of the world. Returns false if no gas flows.
 bool step_leak(Cloth& cloth, std::size_t first, const ClothWeather& weather, ClothPoints& points);
 
 }  // namespace offstage::sim

@@ -1,5 +1,5 @@
 #pragma once
-/// Gas inside of a closed cloth under pressure, which leaks through the holes that tears make (physics F8).
+/// Gas inside a closed cloth under pressure. It leaks through the holes of tears (physics F8).
 
 #include <cstdint>
 #include <span>
@@ -12,8 +12,8 @@ namespace offstage::sim {
 
 class ClothGas {
  public:
-  /// Finds the holes of a cloth with these triangles, whose normals point out: its borders. To be called
-  /// after the cloth tore.
+  /// Finds the holes of a cloth: the borders of its triangles, whose normals must point outwards. To be
+  /// called after the cloth has torn.
   void assign(std::span<const Triangle> triangles);
 
   /// Volume inside, with each hole closed by a fan around the centre of its border [m^3].
@@ -21,12 +21,12 @@ class ClothGas {
   /// Sum of the areas of the holes, each the length of its area vector [m^2].
   Real hole_area(std::span<const Vec3> points) const;
 
-  /// Fraction of the gas that has not leaked out, 0 to 1: the overpressure at a given volume is this fraction
-  /// of the initial one.
+  /// Fraction of the gas that has not leaked out, 0 to 1. The overpressure at a given volume is proportional
+  /// to this fraction.
   Real remaining_fraction() const { return remaining_fraction_; }
-  /// Lets gas flow out for a time h [s]. `pressure` is the overpressure at the volume as it would be without
-  /// a loss [Pa], `density` that of the gas [kg/m^3], > 0. By Bernoulli's equation the gas leaves at the
-  /// speed sqrt(2 p / density) through a fraction of the holes (kDischarge).
+  /// Lets gas flow out for a time h [s]. `pressure`: overpressure at this volume if no gas had leaked yet
+  /// [Pa]. `density`: density of the gas [kg/m^3], > 0. By Bernoulli's equation the gas leaves at the speed
+  /// sqrt(2 p / density) through the fraction kDischarge of the area of the holes.
   void leak(std::span<const Vec3> points, Real volume, Real pressure, Real density, Real h);
 
   /// Coefficient of discharge of a hole with a sharp edge (Batchelor, An Introduction to Fluid

@@ -1,5 +1,5 @@
-/// The part of ClothSystem for points that pins hold: on the world, or on bodies, which feel the force of the
-/// cloth.
+/// The part of ClothSystem for pinned points. They are pinned to the world, or to bodies, on which the cloth
+/// exerts forces.
 
 #include <algorithm>
 
@@ -66,10 +66,10 @@ void ClothSystem::move_held() {
   }
 }
 
-/// Applies the impulses at pins to the bodies. A body moves by them as the points of the cloth did: by forces
-/// at the start of the sub-step at once, by those at its end from the next sub-step on, and by those between
-/// by half. Bodies carry the mass of their pinned points, so they also provide the impulse that accelerates
-/// these points.
+/// Applies the impulses at pins to the bodies. A body moves in the same way as the points of the cloth:
+/// impulses at the start of the sub-step act at once, impulses at its end act from the next sub-step on, and
+/// half of those in between acts at once. Bodies carry the mass of their pinned points, so they also provide
+/// the impulse that accelerates these points.
 void ClothSystem::apply_pin_impulses_to_bodies(Real dt) {
   const auto impulse_on = [&](uint32_t i) {
     const Vec4 load = points_.pin_impulse[i] / dt + dt * points_.mass[i] * points_.acceleration[i];

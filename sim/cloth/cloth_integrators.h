@@ -1,8 +1,8 @@
 #pragma once
-/// Moves the points of a cloth by its springs, its bending and outer accelerations through a sub-step of
-/// length h, without contacts. Drag is implicit in all of them (air_drag.h). Pinned points have already been
-/// moved. Where the velocity at the end differs from the mean velocity of the move, `kick` gets the
-/// difference.
+/// Integrators of cloth: they move the points of a cloth through a sub-step of length h [s] under springs,
+/// bending and outer accelerations, without contacts. Drag is implicit in all of them (air_drag.h). Pinned
+/// points must already have been moved. If the velocity at the end differs from displacement / h, the
+/// difference is stored in `kick`.
 
 #include <span>
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Connected pieces of cloth: points connected permanently by springs, and temporarily by other connections.
+/// Connected pieces of cloth. Springs connect points permanently; other connections are temporary.
 
 #include <cstdint>
 #include <numeric>
@@ -29,7 +29,7 @@ class ClothPieces {
   }
   void forget() { sets_.separate(); }
 
-  /// The number of a point's piece, less than count().
+  /// Returns the index of the piece that contains a point, less than count().
   uint32_t of(uint32_t point) { return sets_.find(number_[point]); }
   std::size_t count() const { return sets_.size(); }
 

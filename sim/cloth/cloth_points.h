@@ -22,7 +22,7 @@ struct ClothPoints {
   std::vector<Vec4> position;
   std::vector<Vec4> start;         ///< position at the start of the cloth's sub-step
   std::vector<Vec4> velocity;      ///< mean velocity over the last sub-step of the cloth
-  std::vector<Vec4> outer;         ///< acceleration by everything but springs, contacts and drag
+  std::vector<Vec4> outer;         ///< acceleration by all forces except springs, contacts and drag
   std::vector<Vec4> acceleration;  ///< acceleration including the drag of the air at a velocity (air_drag.h)
   std::vector<Vec4> flow;          ///< velocity of the air
   std::vector<Vec4> rest;          ///< position in the unstrained cloth
@@ -32,8 +32,9 @@ struct ClothPoints {
   std::vector<Real> field_drag;    ///< rate of linear drag by fields and hands [1/s]
   std::vector<Real> mass;          ///< [kg]
   std::vector<Real> inverse_mass;  ///< 0 for pinned points
-  std::vector<ClothBody*> holder;  ///< the body whose pin holds it; null: none, or the world
-  std::vector<uint8_t> carried;    ///< whether that body is dynamic, so that the point moves with it
+  std::vector<ClothBody*>
+      holder;                    ///< the body to which it is pinned; null: not pinned, or pinned to the world
+  std::vector<uint8_t> carried;  ///< whether that body is dynamic, so that the point moves with it
   std::vector<Real> thickness, friction, self_friction;
   std::vector<uint32_t> cloth;  ///< index of the cloth of each point
 

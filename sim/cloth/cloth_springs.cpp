@@ -28,7 +28,7 @@ constexpr Real kShortEnough = 1.14;
 constexpr Real kSoftRatio = 0.5;
 /// Points as near as this have no direction between them [m^2].
 constexpr Real kNoLength2 = 1e-24;
-/// Between two points that are held [1/kg].
+/// Mobility of a spring between two pinned points, which avoids a division by zero [1/kg].
 constexpr Real kNoMobility = 1e-100;
 
 /// Rounding of a stiffness that equals the limit of the step.
@@ -238,8 +238,8 @@ void ClothSprings::run(std::span<const Stage> stages, ClothPoints& points, std::
   });
 }
 
-/// Prepares the values that depend only on the step and on which points are pinned. Steps of one rate differ
-/// in their last bits, as differences of times do: in single precision they are one.
+/// Prepares the values that depend only on the length of the step and on which points are pinned. Lengths of
+/// equal steps may differ by rounding errors of times; they are compared in single precision.
 void ClothSprings::begin(const ClothPoints& points, Real step) {
   const Real h = static_cast<float>(step);
   if (h == prepared_for_ && points.inverse_mass == inverse_mass_) return;

@@ -1,8 +1,8 @@
 #pragma once
 /// The springs of cloths by backward Euler, linearised once (Baraff and Witkin, "Large Steps in Cloth
-/// Simulation", 1998), and solved approximately. One symmetric Gauss-Seidel sweep corrects the explicit step,
-/// which contains every force exactly. In equilibrium the residual is zero, so cloth under a static load has
-/// its true length.
+/// Simulation", 1998), and solved approximately. One symmetric Gauss-Seidel sweep corrects the explicit step.
+/// The explicit step has the exact forces and is zero in equilibrium; therefore cloth under a static load has
+/// exactly the right length.
 ///
 /// The sweep follows paths of springs (spring_paths.h), four at a time, one in each lane of a register. Paths
 /// of one colour share no point, so a sweep gives identical bits on any number of threads.
@@ -24,22 +24,22 @@ class ClothSprings {
   /// Sets the springs of one cloth. Their ends are indices into the points of all cloths.
   void assign(std::span<const ClothSpring> springs, const ClothPoints& points);
 
-  /// Adapts the stable step to the points' present positions: a spring under tension also acts across its
-  /// direction, by its force over its length, and the sweep does not make that part implicit. To be called
-  /// where the stretch may have changed much; the result depends on the positions alone.
+  /// Adapts longest_step() to the current positions. A spring under tension also has a transverse stiffness,
+  /// its force divided by its length, which the sweep does not make implicit. To be called when the stretch
+  /// may have changed much; the result depends only on the positions.
   void adapt_to_stretch(const ClothPoints& points);
   /// The longest step at which no spring's stiffness is clamped [s].
   Real longest_step() const { return longest_step_; }
   /// Prepares for steps of length h [s].
   void begin(const ClothPoints& points, Real h);
-  /// Applies the forces of the springs at the points' start to `moves`, the displacements of points in a
-  /// step. The moves of pinned points are kept, and the impulses on them are added to their `pin_impulse`.
+  /// Adds the effect of the spring forces at ClothPoints::start to `moves`, the displacements of the points
+  /// in a step [m]. Pinned points keep their displacements; the impulses on them are added to
+  /// ClothPoints::pin_impulse.
   void apply(ClothPoints& points, std::span<Vec4> moves);
-  /// Makes the moves of apply() implicit, by one symmetric sweep.
+  /// Turns the explicit displacements of apply() into implicit ones, by one symmetric sweep.
   void relax(ClothPoints& points, std::span<Vec4> moves);
 
-  /// Number of springs whose stiffness was clamped, and the least fraction of its stiffness that any has
-  /// left.
+  /// Number of springs whose stiffness was clamped, and the smallest ratio of clamped to defined stiffness.
   uint64_t clamped() const { return clamped_; }
   Real least_stiffness() const { return least_stiffness_; }
 

@@ -191,8 +191,8 @@ void ClothSystem::limit_bending(Real dt) {
     if (limit.project(points_, dt, kick_, cuts_)) ++cloths_[limit.cloth()]->report.bend_limited;
 }
 
-/// Seams draw together evenly in their time and then hold. A delayed seam does not close faster, because the
-/// stretch limit would remove any motion that the cloth beside it cannot follow.
+/// Shortens seams at a constant rate within their time, and then keeps them closed. A delayed seam does not
+/// close faster, because the stretch limit would remove any motion that the cloth beside it cannot follow.
 void ClothSystem::close_seams(Real dt) {
   for (std::size_t k = 0; k < seams_.size(); ++k) {
     const Cloth& cloth = *cloths_[seams_[k].cloth];

@@ -35,7 +35,7 @@ class ClothSystem {
   /// Writes strains and counts of contacts into the cloths' reports.
   void measure();
 
-  /// Box around all points and the positions that they may reach within h.
+  /// Returns the bounding box of all points and of the positions that they may reach within the time h [s].
   Aabb reach(Real h) const;
 
  private:

@@ -51,7 +51,7 @@ Real turn(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vecto
   return (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x());
 }
 
-/// The number of the connected piece of each triangle: its least point.
+/// Returns, for each triangle, the number of its connected piece: the smallest point index in the piece.
 std::vector<uint32_t> pieces(std::span<const Triangle> triangles, std::size_t point_count) {
   DisjointSets sets(point_count);
   for (const Triangle& t : triangles) {

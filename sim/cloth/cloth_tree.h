@@ -1,11 +1,11 @@
 #pragma once
-/// Tree of boxes over the triangles of all cloths, refitted as they move. It finds the pairs of triangles
-/// that may touch. A connected patch cannot cross itself if its normals all lie in one half-space and its
-/// outline, seen from there, does not cross itself; such a patch is skipped as a whole (Volino and
-/// Magnenat-Thalmann, "Efficient self-collision detection on smoothly discretized surface animations using
-/// geometrical shape regularity", 1994). The triangles around one point are skipped in the same case, unless
-/// their angles at the point could add up to more than a full turn as seen from that side; and so are two
-/// rings of triangles around one triangle.
+/// Bounding-box tree over the triangles of all cloths, which is refitted when they move. It finds the pairs
+/// of triangles that may touch. Consider a connected patch whose normals all lie in one half-space. If the
+/// outline of the patch, projected along the axis of this half-space, does not cross itself, the patch cannot
+/// cross itself either, and is skipped (Volino and Magnenat-Thalmann, "Efficient self-collision detection on
+/// smoothly discretized surface animations using geometrical shape regularity", 1994). The triangles around
+/// one point are skipped in the same case, unless their angles at the point could add up to more than a full
+/// turn as seen from that side. Two rings of triangles around one triangle are treated in the same way.
 
 #include <array>
 #include <bit>
@@ -20,18 +20,19 @@ namespace offstage::sim {
 
 class ClothTree {
  public:
-  /// Builds the tree over triangles that may touch others, at the points of the unstrained cloths.
+  /// Builds the tree over the triangles that collide with cloth. `rest`: positions of the points in the
+  /// unstrained cloths [m].
   void build(std::span<const Triangle> triangles, std::span<const Vec4> rest);
-  /// Fits boxes around the triangles at `from`, enlarged by each point's `margin`, and bounds of their paths
-  /// to `to`.
+  /// Fits the boxes to the paths of the triangles from the positions `from` to the positions `to`, enlarged
+  /// by the `margin` of each point [m].
   void fit(std::span<const Vec4> from, std::span<const Vec4> to, std::span<const Real> margin);
   /// Does what fit() does, for some of the triangles.
   void refit(std::span<const uint32_t> triangles, std::span<const Vec4> from, std::span<const Vec4> to,
              std::span<const Real> margin);
 
-  /// Calls visit(a, b) once for each pair of triangles whose boxes meet on their paths, if one of the two was
-  /// fitted in the last call of fit() or refit(). The order depends on the tree and the boxes alone. `points`
-  /// must be those of that call.
+  /// Calls visit(a, b) once for each pair of triangles whose moving boxes may overlap, if one of the two was
+  /// fitted in the last call of fit() or refit(). `points`: the argument `from` of that call. The order
+  /// depends only on the tree and the boxes.
   template <class Visit>
   void pairs(std::span<const Vec4> points, Visit&& visit) const;
   /// Calls visit(triangle) for triangles whose moving boxes overlap a box at rest.

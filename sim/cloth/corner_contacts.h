@@ -1,7 +1,7 @@
 #pragma once
-/// Contacts of triangles of cloth with bodies: with the corners and edges of boxes, the rims of cylinders and
-/// cones, the vertices of meshes' hulls, and with rounded bodies (round_contacts.h). cloth_contacts.h keeps
-/// the points of cloth out of bodies; these contacts keep out the triangles between the points.
+/// Contacts of cloth triangles with features of bodies: corners and edges of boxes, rims of cylinders and
+/// cones, hull vertices of meshes, and rounded bodies (round_contacts.h). cloth_contacts.h keeps the points
+/// of cloth out of bodies; the contacts here do so for the triangles between the points.
 
 #include <span>
 #include <vector>
@@ -15,15 +15,17 @@ namespace offstage::sim {
 
 class CornerContacts {
  public:
-  /// Sets the triangles, those of cloths that collide with bodies.
+  /// Sets the triangles of all cloths that collide with bodies.
   void assign(std::vector<Triangle> triangles, const ClothPoints& points);
-  /// Finds the features and triangles that can meet in a sub-step of the world of length h.
+  /// Finds the pairs of features and triangles that can touch in a sub-step of the world of length h [s].
   void find(const ClothPoints& points, std::span<ClothBody> bodies, Real h);
   Real mean_edge() const { return 2 * spacing_; }  ///< mean length of the triangles' edges [m]
-  /// Separates features and triangles in a sub-step of cloth of length dt. Appends to `cuts`.
+  /// Separates features and triangles in a sub-step of the cloth of length dt [s]. Displacements that must
+  /// not count as velocity are appended to `cuts`.
   void solve(ClothPoints& points, Real dt, std::vector<VelocityCut>& cuts);
   /// Returns the contacts of rounded dynamic bodies with triangles at the points' current positions,
-  /// including triangles that are up to `reach` thicknesses of the cloth beyond the distance that they keep.
+  /// including triangles whose distance exceeds the contact distance by up to `reach` times the thickness of
+  /// the cloth.
   void collect(const ClothPoints& points, Real reach, std::vector<BodyContact>& found) {
     round_.collect(triangles_, points, bodies_, reach, found);
   }

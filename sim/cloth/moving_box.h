@@ -26,7 +26,7 @@ struct MovingBox {
       high[end] = high[end].max(b.high[end]);
     }
   }
-  /// Whether the boxes may overlap. False: they are separate along one axis during the whole motion.
+  /// Whether the boxes may overlap. False if they are separated along one axis during the whole motion.
   bool may_overlap(const MovingBox& b) const {
     const Corner over = (low[0] - b.high[0]).min(low[1] - b.high[1]);
     const Corner under = (b.low[0] - high[0]).min(b.low[1] - high[1]);

@@ -1,7 +1,8 @@
 #pragma once
-/// Contact of rounded bodies (spheres, capsules, cylinders, cones) with triangles of cloth. Points alone keep
-/// a triangle out of a body whose radius is large against the triangle; a thin rod or a small ball would pass
-/// between them. The place of a triangle that is nearest to the body's axis is swept along the path of both.
+/// Contact of rounded bodies (spheres, capsules, cylinders, cones) with triangles of cloth. If the radius of
+/// a body is large compared with the triangles, contacts of points keep it out; but a thin rod or a small
+/// ball would pass between the points. Here the point of a triangle that is nearest to the body's axis is
+/// swept along the paths of both.
 
 #include <optional>
 #include <span>
@@ -15,18 +16,20 @@ namespace offstage::sim {
 
 class RoundContacts {
  public:
-  /// Whether a triangle whose corners keep the distance `thickness` from the shape can nevertheless come too
-  /// near to the shape between its corners, or let the shape pass. `edge`: greatest length of its edges [m].
+  /// Whether contacts at corners are not sufficient: a triangle whose corners keep the distance `thickness`
+  /// [m] from the shape may still get too close to it, or let it pass. `edge`: greatest length of the
+  /// triangle's edges [m].
   static bool concerns(const Solid& solid, Real edge, Real thickness);
 
   void clear() { near_.clear(); }
-  /// Adds a triangle and a body that can meet in this sub-step of the world.
+  /// Adds a triangle and a body that can touch in this sub-step of the world, by index.
   void add(uint32_t triangle, uint32_t body) { near_.push_back({triangle, body}); }
-  /// Moves triangles out of the bodies in a sub-step of cloth of length dt. Appends to `cuts`.
+  /// Moves triangles out of the bodies in a sub-step of the cloth of length dt [s]. Displacements that must
+  /// not count as velocity are appended to `cuts`.
   void solve(std::span<const Triangle> triangles, ClothPoints& points, std::span<ClothBody> bodies, Real dt,
              std::vector<VelocityCut>& cuts) const;
-  /// Returns the contacts with dynamic bodies at the points' current positions, including triangles that are
-  /// up to `reach` thicknesses of the cloth beyond the distance that they keep.
+  /// Returns the contacts with dynamic bodies at the points' current positions, including triangles whose
+  /// distance exceeds the contact distance by up to `reach` times the thickness of the cloth.
   void collect(std::span<const Triangle> triangles, const ClothPoints& points, std::span<ClothBody> bodies,
                Real reach, std::vector<BodyContact>& found) const;
 

@@ -1,9 +1,9 @@
 #pragma once
-/// Chooses the number of sub-steps for which a search for self-contact pairs is to suffice. A search for many
-/// sub-steps finds many pairs, which all have to be checked, and points leave their predicted paths before
-/// its end. A search for few sub-steps has to be repeated soon. Which is cheaper depends on the motion, so
-/// the work for each second is counted, and neighbouring lengths are tried from time to time. The counts are
-/// numbers of operations, not times: the choice is the same in every run.
+/// Chooses for how many sub-steps a search for self-contact pairs is valid. A search for many sub-steps finds
+/// many pairs, which all have to be checked, and points leave their predicted paths before its end. A search
+/// for few sub-steps has to be repeated soon. Which is cheaper depends on the motion. Therefore the work per
+/// second of simulated time is counted, and a shorter or longer horizon is tried from time to time. The
+/// counts are numbers of operations, not times: the choice is the same in every run.
 
 #include <array>
 #include <cstdint>
@@ -14,10 +14,10 @@ namespace offstage::sim {
 
 class SearchHorizon {
  public:
-  /// Adds operations of the search for pairs, or of checking the pairs, to those of the current period.
+  /// Adds to the number of operations (of searching or checking pairs) in the current period.
   void add_work(Real work) { work_ += work; }
-  /// Ends a period that lasted for `lasted` [s], and begins the next one with a new search. Returns the
-  /// number of sub-steps for which the new search is to suffice.
+  /// Ends a period, which lasted for `lasted` [s] of simulated time, and begins the next one with a new
+  /// search. Returns the number of sub-steps for which the new search must be valid.
   uint32_t next(Real lasted) {
     if (!(lasted > 0)) return kLengths[tried_];  // searched twice in one sub-step: the period goes on
     const Real rate = work_ / lasted;
@@ -31,9 +31,10 @@ class SearchHorizon {
 
  private:
   static constexpr std::array<uint32_t, 7> kLengths = {1, 2, 3, 4, 6, 8, 12};
-  /// Number of periods between two trials, and after a successful trial.
+  /// Number of periods until the next trial of another horizon: kWaitAfterGain after a successful trial,
+  /// otherwise kWait.
   static constexpr uint32_t kWait = 8, kWaitAfterGain = 2;
-  /// Another length is chosen if it takes at most this fraction of the present work.
+  /// Another horizon is chosen if its work is less than this fraction of the current work.
   static constexpr Real kWorthIt = 0.95;
 
   uint32_t neighbour() const {

@@ -2,9 +2,9 @@
 /// Contact of cloth with cloth: of points with triangles, and of edges with edges, at the cloths' thickness
 /// and with friction.
 ///
-/// Cloth that does not cross itself stays so. Pairs whose moves together are shorter than their distance
-/// cannot have crossed. For the others a plane separates the two at the start of the sub-step; if no plane
-/// with the same normal separates them at its end, their moves are shortened.
+/// Cloth that does not cross itself at the start never crosses itself. A pair cannot have crossed if the sum
+/// of its displacements is less than its distance. Any other pair is separated by a plane at the start of the
+/// sub-step. If no plane with the same normal separates it at the end, its displacements are shortened.
 
 #include <array>
 #include <cstdint>
@@ -29,8 +29,9 @@ class SelfContacts {
   /// thickness, and keeps pairs from crossing as far as impulses between two points can. The search for pairs
   /// is repeated only if the known pairs no longer suffice.
   void push_apart(ClothPoints& points, Real dt);
-  /// Finds the pairs that may have crossed with the current moves, or may cross if any move is shortened
-  /// towards the drift of its point. Points of one piece have a common drift.
+  /// Finds the pairs that may have crossed with the current displacements, or that may cross if any
+  /// displacement is shortened towards `drift`. `drift`: for each point, the displacement of the frame in
+  /// which it is shortened [m]; it is the same for all points of a piece.
   void find_doubtful(const ClothPoints& points, Real dt, std::span<const Vec4> drift);
   void find_none() { contacts_.clear(); }
   /// Calls visit(points) for each pair found, with its four points. The first belongs to one partner of the
@@ -51,8 +52,8 @@ class SelfContacts {
   std::span<const uint64_t> active() const {
     return active_;
   }  ///< contacts of the last push_apart(), by cloth
-  /// Points whose moves shorten() shortened, and those of pairs that it could not keep from crossing because
-  /// pins hold them; since the last call.
+  /// Points, since the last call: take_held_back(), those whose displacements shorten() has shortened;
+  /// take_crossed(), those of pairs whose crossing could not be prevented because pins hold them.
   std::vector<uint32_t> take_held_back() { return std::exchange(held_back_, {}); }
   std::vector<uint32_t> take_crossed() { return std::exchange(crossed_, {}); }
 

@@ -1,7 +1,7 @@
 #pragma once
-/// Divides springs into paths. At each end, a spring is followed by the one that continues it most nearly
-/// straight, as in the threads of a weave. Sweeps follow the paths, so that each point is loaded once for two
-/// springs, and several paths are swept at a time (cloth_springs.h).
+/// Divides springs into paths. At each end, a spring is continued by the spring with the smallest change of
+/// direction, like a thread in a weave. A sweep follows the paths, so that each point is loaded once for two
+/// springs. Several paths are swept at the same time (cloth_springs.h).
 
 #include <array>
 #include <cstdint>

@@ -21,9 +21,8 @@ class StretchLimit {
  public:
   using Limit = SpringLimit;
 
-  /// Sets the limits and the ties, such as seams. Ties are shortened together with the limits, but no move is
-  /// shortened because a tie is too long. Both ends of a tie make the same fraction of their moves, so that
-  /// no tie opens.
+  /// Sets the length limits and the ties, for example seams. project() also shortens ties that are too long,
+  /// but shorten() does not check them. It gives both ends of a tie the same fraction, so that no tie opens.
   void assign(std::vector<Limit> limits, std::vector<Limit> ties, std::size_t point_count);
   bool empty() const { return limits_.empty(); }
   /// Length of a tie at the start of the sub-step, and its allowed length from now on [m].
@@ -32,9 +31,9 @@ class StretchLimit {
   }
   void set_tie(std::size_t tie, Real length) { ties_[tie].rest = ties_[tie].longest = length; }
 
-  /// Shortens springs that are too long in a sub-step of length dt, and moves the bodies that hang on them.
-  /// Returns whether there were any. Some may stay too long.
-  /// `kick` and `cuts`: see TautSprings::apply().
+  /// Shortens springs that are too long in a sub-step of length dt [s], and moves the bodies pinned to them.
+  /// Returns whether there were any such springs. Some springs may still be too long afterwards. `kick` and
+  /// `cuts`: see TautSprings::apply().
   bool project(ClothPoints& points, std::span<const Carrier> carriers, Real dt, std::span<const Vec4> kick,
                std::vector<VelocityCut>& cuts);
   /// Whether any spring is too long, not counting those that tear first.
@@ -46,9 +45,9 @@ class StretchLimit {
                     std::span<const Carrier> carriers, Real dt, std::span<const Vec4> kick,
                     std::vector<VelocityCut>& cuts) const;
 
-  /// Lowers fractions of moves where a limit does not hold, and returns whether it did. This ends, because
-  /// with fractions of 0 the lengths are those at the start, where the limits held. Points that a dynamic
-  /// body carries make the same fraction of their moves; other pinned points always make their whole move. On
+  /// Lowers fractions of moves where a limit does not hold, and returns whether it did. Repeated calls come
+  /// to an end, because with fractions of 0 the lengths are those at the start, where the limits held. All
+  /// points pinned to one dynamic body get the same fraction; other pinned points keep the fraction 1. On
   /// entry `lowered` holds the points whose fractions were lowered since their last check, and only their
   /// limits are checked; while all fractions are 1, all limits are. On return it holds the points that this
   /// call lowered.

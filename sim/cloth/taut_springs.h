@@ -1,12 +1,13 @@
 #pragma once
 /// Solves one linear complementarity problem for springs at their greatest length and for contacts of cloth
-/// with dynamic bodies. Its impulses bring the springs to their target length and keep the points out of the
-/// bodies, to first order. So the whole taut cloth stops a heavy body, not only the points that it touches.
+/// with dynamic bodies. The impulses bring the springs to their target length and keep the points out of the
+/// bodies, to first order. In this way the whole taut cloth stops a heavy body, not only the points that
+/// touch it.
 ///
 /// With the rows of J the directions of springs and contacts, and W the inverse masses of points and bodies,
-/// the impulses are the lambda >= 0 of the linear complementarity problem J W J^T lambda >= excess. Conjugate
-/// gradients on the set of rows that act, which changes until none acts in the wrong direction and none
-/// outside is left with an excess.
+/// the impulses are the lambda >= 0 of the linear complementarity problem J W J^T lambda >= excess. An
+/// active-set method solves it: conjugate gradients compute the impulses of the active rows. The active set
+/// changes until no active impulse is negative and no inactive row has an excess.
 
 #include <array>
 #include <span>
@@ -51,10 +52,11 @@ class TautSprings {
   void add(const BodyContact& contact);
   bool any_too_long() const { return any_too_long_; }
   void solve();
-  /// Moves points and bodies by the impulses; they act through a sub-step of length dt. The impulses on
-  /// points that are pinned to anything else are added to their `pin_impulse`. Velocities change by the
-  /// greatest fraction of that which adds no kinetic energy; the rest of the moves of points is appended to
-  /// `cuts`. `kick` is the velocity of points besides that of their moves. The sum of momenta is kept.
+  /// Displaces points and bodies by the impulses of a sub-step of length dt [s]. Impulses on points that are
+  /// pinned to other objects are added to ClothPoints::pin_impulse. The change of velocities is scaled by the
+  /// greatest fraction that adds no kinetic energy; the remainder of the displacements of points is appended
+  /// to `cuts`. `kick`: velocity of each point in addition to displacement / dt. The total momentum is
+  /// conserved.
   void apply(ClothPoints& points, Real dt, std::span<const Vec4> kick, std::vector<VelocityCut>& cuts);
 
  private:

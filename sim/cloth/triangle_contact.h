@@ -1,5 +1,5 @@
 #pragma once
-/// A contact of a place within a triangle of cloth with a body.
+/// Contact of a point within a cloth triangle with a body.
 
 #include <array>
 #include <vector>
@@ -18,12 +18,13 @@ struct TriangleContact {
   std::array<Real, 3> weights;  ///< weights of the triangle's corners
   Vec3 on_body;                 ///< contact point on the body at the end of the sub-step, world [m]
   Vec3 normal;                  ///< unit normal from the body to the triangle
-  /// Distance of the place from the body, minus the distance that it must keep [m]; negative.
+  /// Distance of the point from the body minus the required distance [m]; negative in contact.
   Real gap;
 };
 
-/// Moves the triangle's points and the body apart in a sub-step of cloth of length dt, with Coulomb friction.
-/// An initial overlap is removed slowly, and without a velocity. Appends to `cuts`.
+/// Separates the triangle's points and the body in a sub-step of the cloth of length dt [s], with Coulomb
+/// friction. An overlap at the start is removed slowly and without adding velocity: that part of the
+/// displacements is appended to `cuts`.
 void separate(const TriangleContact& contact, const Triangle& t, ClothPoints& points, ClothBody& body,
               Real dt, std::vector<VelocityCut>& cuts);
 

@@ -21,8 +21,8 @@ namespace offstage::sim {
 template <class Volume>
 class BoundingTree {
  public:
-  /// Nodes lie in depth-first order: the first child of a branch follows it, the second follows the first
-  /// child's subtree.
+  /// Nodes are stored in depth-first order: the first child directly follows its parent, and the second child
+  /// follows the subtree of the first.
   struct Node {
     Volume volume;
     uint32_t size;          ///< number of nodes in the subtree, including this one
@@ -65,7 +65,7 @@ class BoundingTree {
     if (!nodes_.empty()) visit_below(nodes_.front(), 0, visit);
   }
 
-  /// Calls visit(item) for every item in a leaf whose box meets `query`, in an order that depends only on the
+  /// Calls visit(item) for every item in a leaf whose box overlaps `query`. The order depends only on the
   /// tree.
   template <class Visit>
   requires std::same_as<Volume, Aabb>
@@ -82,8 +82,9 @@ class BoundingTree {
     }
   }
 
-  /// Branch and bound: calls distance2(item), the squared distance of an item to p, for every item that can
-  /// be nearer than the smallest value so far, starting from `limit2`. Nearer boxes are visited first.
+  /// Search for the item nearest to p by branch and bound. distance2(item) must return the squared distance
+  /// between an item and p [m^2]. It is called for every item that may be nearer than the smallest distance
+  /// so far, which is `limit2` at first. Nearer boxes are visited first.
   template <class Distance2>
   requires std::same_as<Volume, Aabb>
   void nearest(const Vec3& p, Distance2&& distance2,

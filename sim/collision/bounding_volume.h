@@ -19,18 +19,19 @@ struct BoundingSphere {
   Real radius = 0;  ///< [m]
 };
 
-/// Box along the eigenvectors of the area-weighted covariance of the triangles of the points' convex hull, so
-/// that inner points do not tilt it. The hull is that of the points that are extreme in 24 directions, so it
-/// is exact for up to 24 points. For flat sets one axis is perpendicular to their plane; for straight ones
-/// one axis is along their line. For three points the box is along their longest side, because it is the
-/// smallest. Needs at least one point.
+/// Returns a tight oriented box around at least one point. Its axes are the eigenvectors of the area-weighted
+/// covariance of the surface of the convex hull, so that inner points do not affect them. The hull is
+/// computed from the points that are extreme in 24 directions, and is therefore exact for up to 24 points.
+/// For coplanar points one axis is perpendicular to their plane; for collinear points one axis is along their
+/// line. For three points one axis is along the longest side, which gives the smallest box.
 Obb fit_obb(std::span<const Vec3> points);
-/// Smallest box along the given axes.
+/// Returns the smallest box with the given axes.
 Obb fit_obb(std::span<const Vec3> points, const Mat3& axes);
 
-/// After Ritter, "An efficient bounding sphere" (1990). The two farthest of the six points that are extreme
-/// along the axes give a first diameter, and each point outside enlarges the sphere as little as possible. At
-/// the end the radius is reduced to the distance of the farthest point. Needs at least one point.
+/// Returns a sphere around at least one point, after Ritter, "An efficient bounding sphere" (1990). The two
+/// farthest of the six points that are extreme along the axes give a first diameter, and each point outside
+/// enlarges the sphere as little as possible. At the end the radius is reduced to the distance of the
+/// farthest point.
 BoundingSphere fit_sphere(std::span<const Vec3> points);
 
 }  // namespace offstage::sim

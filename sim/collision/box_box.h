@@ -7,10 +7,10 @@
 
 namespace offstage::sim {
 
-/// Computes the manifold of two boxes without radius, as manifold() does; without points if they are more
-/// than `margin` [m] apart. Returns false, with an empty manifold, if the axes do not give the distance: when
-/// the boxes are separate and a vertex or a parallel edge is closest to an edge, or when edges are parallel
-/// within rounding.
+/// Computes the same manifold as manifold() for two boxes with Convex::radius 0. It has no points if the
+/// boxes are more than `margin` [m] apart. Returns false, with an empty manifold, if the separating axes do
+/// not give the distance: if the boxes are separate and the closest features are a vertex and an edge or two
+/// parallel edges, or if edges are parallel within rounding.
 bool box_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real margin, Manifold& manifold,
                   MoreManifolds* more = nullptr);
 

@@ -1,11 +1,12 @@
 #pragma once
-/// Broad phase (physics H5, H6, E9): the pairs of objects whose boxes meet, by a uniform or multi-level Grid.
+/// Broad phase (physics H5, H6, E9): finds the pairs of objects whose boxes overlap, with a uniform or
+/// multi-level Grid.
 ///
-/// Objects at rest are settled: their grid and their pairs are kept, so a step costs only as much as the
-/// other objects, which are inserted in a second grid at every step. Inserting an unsettled object that did
-/// not move is wasted work. Once this waste equals the cost of settling all objects at rest, they are settled
-/// together. The work is therefore within a small factor of the optimum for any motion, and static objects
-/// eventually cost nothing.
+/// Objects at rest become settled: they are in a grid of their own, which is kept with their pairs. All other
+/// objects are inserted into a second grid at every step, and only they cost time. Inserting an unsettled
+/// object that did not move is wasted work. Once this wasted work equals the cost of settling all objects at
+/// rest, they are settled together. Therefore the work is within a small factor of the optimum for any
+/// motion, and static objects eventually cost nothing.
 
 #include <cstdint>
 #include <span>
@@ -23,9 +24,9 @@ class BroadPhase {
     sizes_.kind = kind;
   }
 
-  /// Adds an object under an index chosen by the caller, below CellTable::kMaxObjects; memory is proportional
-  /// to the greatest index. The box is that of the bounding sphere, or a tighter or swept one. It may be a
-  /// point or infinite, but not empty or NaN.
+  /// Adds an object. `object`: index chosen by the caller, less than CellTable::kMaxObjects; memory is
+  /// proportional to the greatest index. `box`: any box that contains the object, for example a swept one. It
+  /// may be a point or infinite, but not empty or NaN.
   void insert(uint32_t object, const Aabb& box, bool is_static = false);
   /// Changes the box of an object. Objects that did not move need no call. Static objects may be moved, too.
   void move(uint32_t object, const Aabb& box);

@@ -19,10 +19,11 @@ struct IndexPair {
   friend auto operator<=>(const IndexPair&, const IndexPair&) = default;
 };
 
-/// A box as a point in eight dimensions: A meets B exactly if low(A) <= high(B) and -high(A) <= -low(B),
-/// which is one comparison of eight lanes. Rounding to single precision keeps the order, so boxes that meet
-/// in double precision also meet here. If no two compared lanes are equal, the converse holds, too. The
-/// fourth axis distinguishes cells: copies in different cells do not meet.
+/// A box as eight numbers, for a fast overlap test: A overlaps B if and only if low(A) <= high(B) and
+/// -high(A) <= -low(B), which is one comparison of eight lanes. Rounding to single precision preserves order.
+/// Therefore boxes that overlap in double precision also overlap here; if no two compared lanes are equal,
+/// the converse is true as well. The fourth axis has the cell, so that copies in different cells do not
+/// overlap.
 struct alignas(32) CellBox {
   std::array<float, 8> bound;  ///< low x y z, cell, minus high x y z, minus cell
 };
@@ -42,8 +43,8 @@ struct CellRange {
   std::array<int32_t, 3> low, high;  ///< cell coordinates, both inclusive
   CellBox box;                       ///< box of the object; the lanes of its cell are not set
 
-  /// Returns the cells of the same object at a coarser level. The width of cells doubles from level to level,
-  /// so cells of all levels nest.
+  /// Returns the cells of the same object at a coarser level. The cell width doubles from level to level, so
+  /// each cell lies within one cell of the next level.
   CellRange at(int32_t coarser) const;
 };
 
@@ -51,12 +52,12 @@ struct CellRange {
 /// It finds the pairs of which at least one object belongs to its own level. Each pair is thus found at the
 /// coarser of the two levels.
 ///
-/// Every pair is found once. The cells that two objects share are a box of cells. Its low corner is, along
-/// each axis, the low cell of the one or of the other object, and it is the only shared cell of which that is
-/// true. Each copy of an object remembers along which axes its cell is the object's low one: a pair counts
-/// where the two copies together have all three axes. Other cells in the same bucket cause no false pairs:
-/// the cell lanes are equal only for cells that are the same or a multiple of 256 apart, and no object spans
-/// more than kMaxSpan.
+/// Every pair is found only once. The cells that two objects share form a box of cells. The low corner of
+/// this box is the only shared cell that, along each axis, is the lowest cell of at least one of the two
+/// objects. Each copy of an object stores along which axes its cell is the object's lowest one. A pair counts
+/// in the cell where the two copies together have all three axes. Other cells in the same bucket cause no
+/// false pairs: the cell lanes are equal only for cells that are the same or a multiple of 256 apart, and no
+/// object spans more than kMaxSpan.
 class CellTable {
  public:
   static constexpr uint32_t kMaxObjects = 1u << 29;

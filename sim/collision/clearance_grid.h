@@ -1,6 +1,7 @@
 #pragma once
-/// Grid of clearances around a mesh, in cells. One look-up can show that a small sphere does not touch the
-/// mesh; a search for the nearest triangle takes hundreds of times as long.
+/// Grid around a mesh that stores the distance to the surface for each cell, in cells. One look-up can show
+/// that a small sphere does not touch the mesh. A search for the nearest triangle would take hundreds of
+/// times as long.
 
 #include <array>
 #include <cstdint>

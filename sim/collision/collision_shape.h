@@ -1,7 +1,7 @@
 #pragma once
-/// A body's shape as the narrow phase sees it: convex pieces, and a tree over their volumes. A primitive is
-/// one piece. A mesh is represented by the parts of its convex decomposition, or by its triangles if it has
-/// no inside or if its decomposition is only approximate and the body does not need one (see CollisionShape's
+/// A body's shape for the narrow phase: convex pieces, and a bounding tree over them. A primitive is one
+/// piece. A mesh is represented by the parts of its convex decomposition, or by its triangles if it has no
+/// inside or if its decomposition is only approximate and the body does not need one (see CollisionShape's
 /// constructor). The half-space under a plane has no pieces.
 
 #include <optional>

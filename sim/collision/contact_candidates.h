@@ -19,19 +19,20 @@ namespace offstage::sim {
 inline constexpr Real kTilt = 0.05, kRim = 0.001;
 /// Accuracy of separations, as a fraction of the solids' size.
 inline constexpr Real kSeparationRounding = 1e-9;
-/// Sine: a face whose normal is tilted more than this from the separation's normal never gives the contact
-/// normal.
+/// A face never gives the contact normal if the sine of the angle between its normal and the separation's
+/// normal exceeds this.
 inline constexpr Real kMaxTilt = 0.05;
-/// Cosine: a face whose normal is inclined more than this to the separation's normal is not near the other
-/// solid.
+/// A face is not near the other solid if the cosine of the angle between its normal and the separation's
+/// normal is less than this.
 inline constexpr Real kNearFace = 0.9;
-/// Sine: directions inclined less than this count as parallel.
+/// Directions count as parallel if the sine of the angle between them is less than this.
 inline constexpr Real kParallel = 1e-6;
 
 /// Sine: if the inclinations of two faces differ by less than this, the larger solid's face gives the normal,
 /// or A's for solids of equal size. This keeps the ids of points constant while the solids rock.
 inline constexpr Real kAlike = 1e-3;
-/// Whether A's face gives the normal, judged by the tilts and the sizes of both.
+/// Whether A's face, not B's, gives the contact normal. `tilt`: sine of the inclination of each face;
+/// `reach`: size of each solid.
 inline bool a_gives_normal(Real tilt_a, Real tilt_b, Real reach_a, Real reach_b) {
   return reach_a >= reach_b ? tilt_a <= tilt_b + kAlike : tilt_a + kAlike < tilt_b;
 }
@@ -83,10 +84,11 @@ struct Candidates {
   }
 };
 
-/// Selects at most four of the points for the manifold, whose normal is known: all of them, or the deepest,
-/// the farthest from it, the one that spans the largest triangle with both, and the one that adds most area
-/// to this triangle. Depths that differ by less than `slop` count as equal. `more`, if not null, gets up to
-/// four of the remaining points, which are distinguished by their ids.
+/// Selects at most four of the points for the manifold, whose normal must be set. If there are more than
+/// four, the selection is: the deepest point, the point farthest from it, the point that spans the largest
+/// triangle with both, and the point that adds the most area to this triangle. Depths that differ by less
+/// than `slop` [m] count as equal. `more`, if not null, gets up to four of the remaining points; points are
+/// identified by their ids.
 void reduce(Manifold& m, std::span<const Candidate> c, Real slop);
 void reduce(Manifold& m, const Candidates& c, Real slop, Manifold* more = nullptr);
 

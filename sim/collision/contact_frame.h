@@ -23,9 +23,10 @@ ContactFrame contact_frame(const Vec3& n);
 ContactFrame contact_frame_rate(const ContactFrame& frame, const Vec3& n_rate);
 
 /// Returns the rate of the manifold's normal at one of its points while A and B move, according to
-/// NormalSource. The sliding of the contact over the surfaces is included. Exact for faces, straight edges,
-/// vertices, spheres, cylinders and cones; a rim turns as its tangent does. If a point lies on the point or
-/// line of the other body, so that its direction is undefined, the normal turns with the mean of the bodies.
+/// NormalSource. The sliding of the contact over the surfaces is included. The result is exact for faces,
+/// straight edges, vertices, spheres, cylinders and cones; for a rim, its tangent line is used. If the
+/// direction between the features is undefined because they coincide, the normal turns with the mean angular
+/// velocity of both bodies.
 Vec3 normal_rate(const Manifold& m, const ContactPoint& point, const Twist& a, const Twist& b);
 
 }  // namespace offstage::sim

@@ -1,7 +1,7 @@
 #pragma once
-/// Convex solid for GJK, the penetration test and conservative advancement: the support mapping of a core,
-/// and a radius around the core. A sphere is a point with a radius, a capsule is a segment with a radius, so
-/// distances of these round shapes are exact.
+/// Convex solid for GJK, the penetration test and conservative advancement. It consists of a core, given by
+/// its support mapping, and a radius around the core. A sphere is a point with a radius, a capsule is a
+/// segment with a radius, so distances of these round shapes are exact.
 
 #include <array>
 #include <cstdint>
@@ -24,9 +24,10 @@ struct Convex {
   const ConvexPolyhedron* polyhedron = nullptr;
   std::array<const Vec3*, 3> corners{};  ///< corners of a triangle
 
-  /// Returns the farthest point of the core along `d`, which need not be unit. For a polyhedron `vertex` is
-  /// the vertex from which the climb starts, and on return the vertex found. For a box it holds the sign bits
-  /// of the corner, for a segment the end, for a triangle the corner. Other cores do not use it.
+  /// Returns the farthest point of the core along `d`, which need not be unit. `vertex` identifies the point:
+  /// on entry the vertex at which the search of a polyhedron starts, on return the vertex that was found. For
+  /// a box it has the sign bits of the corner, for a segment the index of the end, for a triangle the index
+  /// of the corner. Other cores do not use it.
   Vec3 support(const Vec3& d, uint32_t& vertex) const;
   /// Whether support points are vertices that can be identified by a number.
   bool has_vertices() const {
@@ -48,9 +49,9 @@ Convex convex(const ConvexPolyhedron& polyhedron, Real radius = 0);
 /// segment or a point.
 Convex convex_triangle(const Vec3& a, const Vec3& b, const Vec3& c);
 
-/// Returns a vertex of a polyhedron that is farthest along `d`. Climbs from `start` along the edges to the
-/// top. Checks all vertices if the polyhedron is small, or if a neighbour of the top is level with it within
-/// rounding, because another vertex may then be higher.
+/// Returns a vertex of a polyhedron that is farthest along `d`, by hill climbing along the edges from
+/// `start`. All vertices are checked if the polyhedron is small, or if a neighbour of the found vertex is
+/// equally far within rounding, because a third vertex may then be farther.
 uint32_t support_vertex(const ConvexPolyhedron& p, const Vec3& d, uint32_t start);
 
 }  // namespace offstage::sim

@@ -1,6 +1,6 @@
 #pragma once
-/// Joins the manifolds of one convex piece with the coplanar triangles of a mesh: the piece then lies on the
-/// triangles as on one face, however they divide it.
+/// Joins the manifolds between one convex piece and coplanar triangles of a mesh. The contact is then the
+/// same as on a single face, independently of the triangulation.
 
 #include <cstddef>
 #include <vector>
@@ -11,8 +11,8 @@ namespace offstage::sim {
 
 class CollisionMesh;
 
-/// Joins manifolds from the index `from` on. `mesh_pose` is the pose of the mesh in their frame; `of_b`: the
-/// mesh is B. A joined manifold has the place of its first one.
+/// Joins manifolds in the list from the index `from` on. `mesh_pose`: pose of the mesh in the frame of the
+/// manifolds; `of_b`: whether the mesh is B. A joined manifold replaces the first of its manifolds.
 void join_coplanar(std::vector<Manifold>& manifolds, std::size_t from, const CollisionMesh& mesh,
                    const Pose& mesh_pose, bool of_b);
 

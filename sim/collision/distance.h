@@ -1,8 +1,7 @@
 #pragma once
-/// Signed distance to solids, with the direction in which it grows. A solid is a shape together with its
-/// registered mesh if it has one; points and normals are in the shape's own frame. Distances to the
-/// primitives are exact, inside and outside, and therefore convex functions of the point, which
-/// sphere_sweep.h relies on.
+/// Signed distance to solids, with its gradient. A solid is a shape together with its registered mesh if it
+/// has one; points and normals are in the shape's own frame. Distances to the primitives are exact, inside
+/// and outside, and therefore convex functions of the point, which sphere_sweep.h relies on.
 
 #include <limits>
 
@@ -35,8 +34,8 @@ SurfaceDistance signed_distance(const Plane&, const Vec3& p);
 /// pseudonormal of the nearest feature determines whether the point is inside.
 SurfaceDistance signed_distance(const CollisionMesh& m, const Vec3& p);
 SurfaceDistance signed_distance(const Solid& s, const Vec3& p);
-/// Signed distance if it is less than `limit` [m], >= 0; otherwise any value that is at least `limit`. Much
-/// faster than signed_distance() at points away from a mesh.
+/// Returns the signed distance if it is less than `limit` [m], >= 0; otherwise some value that is at least
+/// `limit`. Much faster than signed_distance() at points away from a mesh.
 SurfaceDistance signed_distance_below(const Solid& s, const Vec3& p, Real limit);
 
 /// Support function: the largest n.x over the points x of a solid; infinite for a plane unless n is +Y.
@@ -46,7 +45,7 @@ Real support(const Solid& s, const Vec3& n);
 Aabb local_bounds(const Solid& s);
 /// Tight box of a placed solid in the world.
 Aabb bounds(const Solid& s, const Pose& pose);
-/// Distance of the farthest point from the frame's origin.
+/// Distance of the solid's farthest point from the origin of its frame [m].
 Real reach(const Solid& s);
 
 }  // namespace offstage::sim

@@ -13,14 +13,14 @@ struct DeepestPoint {
   Vec3 normal;  ///< unit, into A - B
   /// Signed distance of the origin, negative inside: normal.w = distance for the plane through the point.
   Real distance;
-  Vec3 on_a;  ///< the point of A's core from which it results
+  Vec3 on_a;  ///< the corresponding point of A's core
   int iterations = 0;
   bool converged = true;
 };
 
-/// Starts from the simplex that contains the origin or its nearest point, and replaces it by the final face.
-/// If A - B is flat, the distance is 0 within rounding, and the normal is perpendicular to it, on the side of
-/// `sense`.
+/// Computes the surface point of A - B nearest to the origin. `s`: on entry a simplex that contains the
+/// origin or is nearest to it; on return the face that contains the result. If A - B is flat, the distance is
+/// 0 within rounding, and the normal is perpendicular to A - B, on the side of `sense`.
 DeepestPoint deepest_point(const MinkowskiDifference& m, Simplex& s, const Vec3& sense);
 
 }  // namespace offstage::sim

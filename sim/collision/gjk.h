@@ -28,11 +28,12 @@ struct GjkCache {
 /// deepest_point(), which returns the normal of a face of A - B, so the normal is robust near touching.
 Separation gjk(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache& cache);
 
-/// Returns depth and direction of the smallest translation that separates two solids, which are known to
+/// Returns depth and direction of the smallest translation that separates two solids. The solids must
 /// overlap.
 Separation penetration(const Convex& a, const Convex& b, const Pose& a_from_b);
 
-/// Whether A and B have a point in common; ends at the first separating direction.
+/// Whether A and B have a point in common. Faster than gjk(), because it ends at the first separating
+/// direction.
 bool overlap(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache& cache);
 
 }  // namespace offstage::sim

@@ -1,7 +1,7 @@
 #pragma once
-/// A broad phase of two levels (physics A2): each group of objects, such as the links of an articulation, has
-/// one box in the grid and a tree below it, which finds the pairs among its members and with objects that
-/// meet the group's box. Other objects are in the grid itself.
+/// A broad phase of two levels (physics A2). Each group of objects, such as the links of an articulation, has
+/// one box in the grid and a bounding tree. The tree finds pairs among the members, and pairs with objects
+/// that overlap the group's box. All other objects are in the grid itself.
 
 #include <cstdint>
 #include <span>
@@ -18,7 +18,7 @@ class GroupedBroadPhase {
                              Real means_in_cell = CellSizes::kMeansInCell)
       : grid_(kind, means_in_cell) {}
 
-  /// Does what BroadPhase::insert() does; move() and remove(), too, do what those of BroadPhase do.
+  /// insert(), move() and remove() have the same effect as the functions of BroadPhase.
   void insert(uint32_t object, const Aabb& box, bool is_static = false);
   void move(uint32_t object, const Aabb& box);
   void remove(uint32_t object);

@@ -41,8 +41,8 @@ struct Manifold {
   /// a cylinder's side, 0 for a sharp edge, a vertex or a face.
   Real radius_a = 0, radius_b = 0;
   uint32_t count = 0;
-  /// Indices of the pieces of both shapes (CollisionShape::piece()). Of several coplanar triangles it is the
-  /// one in the middle.
+  /// Indices of the pieces of both shapes (CollisionShape::piece()). If coplanar triangles were joined, the
+  /// index of the middle one.
   uint32_t piece_a = 0, piece_b = 0;
   /// Whether the surface of A (of B) is known to continue around the points in the plane perpendicular to the
   /// normal. Otherwise other pieces or bodies may be flush with it.
@@ -50,8 +50,8 @@ struct Manifold {
   std::array<ContactPoint, 4> points;  ///< the deepest first
 };
 
-/// Further manifolds of solids that turn: the points beyond the first four and, where an edge or a vertex
-/// touches, points near a face.
+/// Further manifolds of solids that turn. They have the points beyond the first four and, if an edge or a
+/// vertex touches, points near a face.
 struct MoreManifolds {
   std::array<Manifold, 2> manifolds;
 };
@@ -63,21 +63,21 @@ struct MoreManifolds {
 /// on the radius around an inclined core are placed below the core's points, so all but the deepest are
 /// slightly inside the solid.
 ///
-/// A face that is almost perpendicular to the normal of the separation gives the normal instead, if the gap
-/// along the face's normal is less than a twentieth of the margin shorter. Solids at rest on each other
-/// therefore keep their normal and their points while they rock slightly. If both solids have such a face,
-/// the less inclined one gives the normal; if they are equal (within a thousandth), that of the larger solid,
-/// or A's.
+/// The normal is usually the normal of the separation. If a face is almost perpendicular to it, and the gap
+/// along the face's normal is shorter by less than a twentieth of the margin, the face gives the normal.
+/// Therefore solids at rest on each other keep their normal and their points while they rock slightly. If
+/// both solids have such a face, the less inclined one gives the normal; if they are equally inclined (within
+/// a thousandth), the face of the larger solid, or A's.
 ///
 /// `more`, if not null, gets the points of turning solids that may touch next.
 Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const Separation& s, Real margin,
                   MoreManifolds* more = nullptr);
 
 /// Returns the manifold of a triangle, whose face gives the normal, and the other solid. `up` is the unit
-/// normal away from the triangle, in A's frame. Points are the corners of the other solid's supporting
-/// feature that are in front of the face, and further points of the feature that are level with its deepest
-/// point. `of_b`: the triangle is B. `beyond`: how far points may be outside of the edges (0,1), (1,2), (2,0)
-/// [m]. May have no points.
+/// normal away from the triangle, in A's frame. The points are the corners of the other solid's supporting
+/// feature that are in front of the face, and further points of the feature with the greatest depth. `of_b`:
+/// whether the triangle is B. `beyond`: greatest allowed distance of points outside of the edges (0,1),
+/// (1,2), (2,0) [m]. May have no points.
 Manifold triangle_face_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, bool of_b,
                                 const Vec3& up, const std::array<Real, 3>& beyond, Real margin);
 

@@ -44,12 +44,12 @@ struct SurfaceTriangle {
   Vec3 normal() const;
   /// Corner k, 0 to 2.
   const Vec3& corner(std::size_t k) const;
-  /// Slope of the surface beyond the edge (k, k + 1), as the sine of the angle below the triangle's plane:
-  /// positive at a ridge, negative in a valley, 0 where the surface is flat or ends.
+  /// Slope of the neighbouring triangle across the edge (k, k + 1): sine of its angle below this triangle's
+  /// plane. Positive at a ridge, negative in a valley, 0 if the surface is flat or ends at the edge.
   Real fall(std::size_t k) const;
-  /// Whether a contact at a point of the triangle can push along the unit vector `n` on this side. With
-  /// `guard`, 0 to 1, normals outside of the region of a ridge by less than this fraction of its slope are
-  /// allowed, too.
+  /// Whether a contact at a point of the triangle can push along the unit vector `n` on this side. `guard`, 0
+  /// to 1, also allows normals slightly outside of the region of a ridge: by up to this fraction of its
+  /// slope.
   bool allows(const Vec3& point, const Vec3& n, Real guard = 0) const;
 
  private:

@@ -10,7 +10,7 @@
 
 namespace offstage::sim {
 
-/// Vertex numbers of a point of A's core and one of B's; see Convex::support.
+/// Vertex numbers of a point of A's core and of a point of B's core; see Convex::support().
 struct VertexPair {
   uint32_t a = 0, b = 0;
   bool operator==(const VertexPair&) const = default;
@@ -19,7 +19,7 @@ struct VertexPair {
 /// A support point of A - B.
 struct SupportPoint {
   Vec3 w;  ///< the point
-  Vec3 a;  ///< the point of A's core from which it results
+  Vec3 a;  ///< the corresponding point of A's core
   VertexPair from;
 };
 
@@ -37,7 +37,7 @@ class MinkowskiDifference {
     p.w = p.a - place(b_.support(R_.transpose() * d, p.from.b));
     return p;
   }
-  /// Difference of two vertices.
+  /// Returns the difference of the two vertices with these numbers.
   SupportPoint at(VertexPair from) const {
     const Vec3 a = a_.vertex(from.a);
     return {a - place(b_.vertex(from.b)), a, from};

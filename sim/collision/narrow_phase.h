@@ -19,7 +19,7 @@
 
 namespace offstage::sim {
 
-/// Algorithm that measures pairs of polyhedra. Both give the same results. Round pieces always use GJK.
+/// Algorithm for the distance of two polyhedra. Both give the same results. Round pieces always use GJK.
 enum class DistanceMethod : uint8_t { gjk, vclip };
 
 /// Data of a pair of shapes kept between queries. It makes the next query faster and does not change results
@@ -34,7 +34,8 @@ class PairCache {
     /// unknown. A piece that penetrates a triangle keeps the side from which it came.
     int8_t side_of_a = 0, side_of_b = 0;
   };
-  /// The entry of a pair of pieces, which is created if necessary. Valid until the next call.
+  /// Returns the entry of a pair of pieces, which is created if necessary. The reference is valid until the
+  /// next call of this function.
   Entry& of(uint32_t piece_a, uint32_t piece_b);
   /// The entry of a pair of pieces if it exists, else null.
   const Entry* find(uint32_t piece_a, uint32_t piece_b) const;
@@ -43,7 +44,8 @@ class PairCache {
 
   /// Number of tests in all queries with this cache.
   TestCounts tests;
-  /// Whether the shapes are at their actual, not predicted, poses. Sides are stored only then.
+  /// Whether the shapes are at their actual poses, not at predicted ones. Only then are Entry::side_of_a and
+  /// side_of_b stored.
   bool keeps_sides = true;
 
  private:
@@ -60,8 +62,8 @@ class PairCache {
   std::vector<uint32_t> slots_;
 };
 
-/// Returns the signed distance of the closest, or deepest, two pieces; none if all are farther than `limit`
-/// [m]. A piece inside a hollow shape counts as penetrating, too.
+/// Returns the separation of the two closest (or most deeply penetrating) pieces; empty if all are farther
+/// apart than `limit` [m]. A piece inside a hollow shape also counts as penetrating.
 std::optional<Separation> separation(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b,
                                      PairCache& cache, DistanceMethod method = DistanceMethod::gjk,
                                      Real limit = std::numeric_limits<Real>::infinity());
@@ -90,20 +92,21 @@ struct MovingShape {
 };
 
 /// Returns the time, as a fraction of the step, at which the shapes are within `tolerance` [m], > 0, of each
-/// other. Before it they are never within half of that distance. None if they stay more than half of it
-/// apart. For shapes that are within it at the start, or one inside the other, the time is 0. The method is
-/// conservative advancement over both trees at once, with a bound on the motion per node: Tang, Kim, Manocha,
-/// "C2A: controlled conservative advancement for continuous collision detection of polygonal models" (2009).
+/// other. Before it they are never within half of that distance. Empty if they stay more than half of that
+/// distance apart. The time is 0 for shapes that are within the tolerance at the start, or one inside the
+/// other. The method is conservative advancement over both trees at once, with a bound on the motion per
+/// node: Tang, Kim, Manocha, "C2A: controlled conservative advancement for continuous collision detection of
+/// polygonal models" (2009).
 std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance);
 
-/// Returns the same time, found by bisection of the step as in the book: shapes that overlap at the end have
-/// met before. Impacts of shapes that are apart again at the end are missed.
+/// Returns the same time, found by bisection of the step as in the book: if shapes overlap at the end, there
+/// was an impact before. Impacts of shapes that are separate again at the end are missed.
 std::optional<Impact> bisected_time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance);
 
-/// Returns the time of the next impact of shapes that are within the tolerance at the start and may stay so
-/// or separate. An impact is where their nearest or deepest points approach faster than `speed` [m per step],
-/// > 0, plus the deviation of the turn from a constant rate. The points are sampled along the motion until
-/// the shapes are separate, because conservative advancement makes no progress within the tolerance.
+/// Returns the time of the next impact, as a fraction of the step, of shapes that are within the tolerance at
+/// the start. An impact occurs when their nearest or deepest points approach faster than `speed` [m per
+/// step], > 0, plus the deviation of the rotation from a constant rate. The motion is sampled until the
+/// shapes are separate, because conservative advancement makes no progress within the tolerance.
 std::optional<Impact> time_of_next_impact(const MovingShape& a, const MovingShape& b, Real tolerance,
                                           Real speed);
 

@@ -1,6 +1,7 @@
 #pragma once
-/// The bodies that particles can hit, with their motion during one sub-step, stored for fast rejection tests.
-/// Their motion is given: the effect of particles on a body begins in the next sub-step (P8).
+/// The bodies with which particles can collide, with their motion during one sub-step, stored for fast
+/// rejection tests. The motion is fixed: impulses of particles change it only from the next sub-step on
+/// (physics P8).
 
 #include <algorithm>
 #include <span>
@@ -13,7 +14,7 @@ namespace offstage::sim {
 
 /// A solid that moves from one pose to another during a sub-step at constant rates.
 struct Obstacle {
-  /// `duration` is the sub-step's length [s].
+  /// `duration`: length of the sub-step [s]; `e`: restitution; `mu`: friction.
   Obstacle(const Solid& shape, const Pose& from, const Pose& to, Real duration, Real e, Real mu);
 
   /// Pose at a fraction of the sub-step.
@@ -27,8 +28,8 @@ struct Obstacle {
   /// Unit direction of the friction axis where the surface has the normal n (world) at a fraction of the
   /// sub-step; zero where friction is the same in all directions.
   Vec3 friction_axis_on(const Vec3& n, Real fraction) const;
-  /// K of P8: the velocity that a unit impulse at `arm` from the centre of mass gives to the point there,
-  /// world axes [1/kg].
+  /// Mobility K of physics P8 at the point `arm` from the centre of mass: change of the point's velocity per
+  /// unit of impulse there, world axes [1/kg].
   Mat3 mobility(const Vec3& arm) const;
   bool is_dynamic() const { return inverse_mass > 0; }
   /// Number of straight pieces into which a particle's path is divided. In the frame of a turning solid a
@@ -48,12 +49,12 @@ struct Obstacle {
   /// Distance of the farthest point of the solid from its origin [m].
   Real extent;
   Real restitution, friction;
-  Real cross_friction = 1;  ///< friction across the friction axis over friction along it
+  Real cross_friction = 1;  ///< friction across the friction axis, divided by friction along it
   Vec3 friction_axis =
       Vec3::Zero();       ///< direction of the surface's friction axis, in the solid's frame; zero: none
   uint32_t body = 0;      ///< the world's index of the body
   Real inverse_mass = 0;  ///< inverse mass [1/kg]; 0: particles do not move it
-  /// About the centre of mass, world axes at the end of the sub-step [1/(kg m^2)].
+  /// Inverse inertia about the centre of mass, world axes at the end of the sub-step [1/(kg m^2)].
   Mat3 inverse_inertia = Mat3::Zero();
   Vec3 centre = Vec3::Zero();  ///< centre of mass in the solid's frame
   /// For a dynamic body: velocity of the centre of mass and angular velocity at the end of the sub-step,

@@ -29,9 +29,9 @@ struct SimplexPoint {
   Vec3 on_a(const Simplex& s) const;
 };
 
-/// Returns the point of a simplex of 1-4 points that is nearest to the origin. Three corners are preferred
-/// where two would do within rounding, because the normal of a triangle is accurate however near the origin
-/// is.
+/// Returns the point of a simplex of 1-4 points that is nearest to the origin. If two corners are sufficient
+/// within rounding, three are still preferred, because the normal of a triangle is accurate even if the
+/// origin is very near.
 SimplexPoint nearest_point(const Simplex& s);
 SimplexPoint nearest_on_triangle(const Vec3& p, const Vec3& q, const Vec3& r);
 

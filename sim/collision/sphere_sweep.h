@@ -1,6 +1,6 @@
 #pragma once
-/// First contact of a moving sphere with a solid at rest (physics P3). The sphere's centre runs straight from
-/// a to b.
+/// First contact of a moving sphere with a solid at rest (physics P3). The sphere's centre moves on a
+/// straight line from a to b.
 
 #include <optional>
 
@@ -16,8 +16,8 @@ struct SweepHit {
   Vec3 normal;  ///< outward normal of the feature that is hit
 };
 
-/// Returns the first position where the centre comes within `radius` of the solid while approaching it. A
-/// sphere that starts closer than its radius hits at once if it approaches, and never if it moves away.
+/// Returns the first position at which the sphere touches the solid while approaching it; empty if there is
+/// none. A sphere that overlaps at the start hits immediately if it approaches, and never if it moves away.
 ///
 /// The distance to a convex set along a line is a convex function. Newton's iteration on a convex function
 /// from the near side never passes the root and converges quadratically; where the slope becomes positive,

@@ -5,8 +5,9 @@
 /// time again and again approaches the impact from the safe side, so solids never pass through each other,
 /// however fast or thin they are.
 ///
-/// The rate is that along the separating direction. The contribution of rotation follows from the support of
-/// both solids, and its change is bounded by the largest acceleration. For all points of both solids
+/// The rate is the closing speed along the separating direction. The contribution of rotation is computed
+/// from the support points of both solids, and its change is bounded by the largest acceleration. For all
+/// points of both solids
 ///   gap(t + dt) >= distance - rate dt - acceleration dt^2 / 2.
 
 #include <optional>
@@ -30,24 +31,25 @@ struct MovingConvex {
   const PosePath& path;
 };
 
-/// Returns a time, as a fraction of the step, at which A and B are within `tolerance` [m], > 0, of each
-/// other, and before which they are never within half of it. None if they stay more than half of it apart to
-/// the end. For solids that are within it at the start, the time is 0.
+/// Returns a time, as a fraction of the step, at which the distance of A and B is at most `tolerance` [m], >
+/// 0. Before this time the distance is never less than half of the tolerance. Empty if the distance stays
+/// greater than half of the tolerance until the end. If the distance is within the tolerance at the start,
+/// the time is 0.
 std::optional<Impact> time_of_impact(const MovingConvex& a, const MovingConvex& b, Real tolerance);
 
 /// Returns the time of impact, as time_of_impact() does, of a solid and the half-space below a plane, which
 /// is the xz plane of its path's frame. The normal is that of the plane, in the solid's frame.
 std::optional<Impact> time_of_plane_impact(const MovingConvex& a, const PosePath& plane, Real tolerance);
 
-/// Rotation of a solid's core, as far as it moves the core as a whole.
+/// The part of a solid's rotation that changes the place of its core.
 struct CoreRotation {
   Vec3 velocity = Vec3::Zero();  ///< world [rad per step]
   Real acceleration = 0;  ///< bound of the acceleration of a point at distance 1 from the origin [per step^2]
 };
 
-/// The rotation of a solid at a time of its motion. A round core is in the same place if it turns about its
-/// axis, so only the rotation of the axis counts: a wheel that rolls approaches the floor no faster than its
-/// axle. A point does not turn at all.
+/// The rotation of a solid at a time of its motion. A core that turns about its axis of symmetry stays in
+/// place, so only the rotation of the axis counts: a rolling wheel approaches the floor no faster than its
+/// axle. For a point the rotation is zero.
 CoreRotation core_rotation(const MovingConvex& solid, Real fraction);
 
 /// The distance of two solids at some time, and bounds of its decrease from there on.
@@ -60,8 +62,8 @@ struct Gap {
   Real time_to(Real target) const;
 };
 
-/// Bounds of how fast two solids can approach along `normal` (unit, world, from B to A) at a time of their
-/// motions.
+/// Returns bounds for the approach of two solids along `normal` (unit, world, from B to A) at a `fraction` of
+/// their motions, where they are `distance` [m] apart.
 Gap closing_gap(const MovingConvex& a, const MovingConvex& b, Real fraction, Real distance,
                 const Vec3& normal);
 

@@ -14,7 +14,7 @@
 
 namespace offstage::sim {
 
-/// Numbers of the tests that queries have made.
+/// Numbers of tests in queries.
 struct TestCounts {
   uint64_t volumes = 0;  ///< pairs of volumes of the trees
   uint64_t pieces = 0;   ///< pairs of items, such as triangles or convex parts
@@ -34,7 +34,7 @@ struct NodePair {
 };
 
 /// Stack of pairs of nodes that remain to be visited. Each step down replaces a pair by two, one of which is
-/// visited next, so the size never exceeds the sum of the depths.
+/// visited next. Therefore the size never exceeds the sum of the depths of both trees.
 template <class A, class B>
 class NodePairStack {
  public:
@@ -96,9 +96,10 @@ bool for_each_pair(const BoundingTree<A>& tree_a, const BoundingTree<B>& tree_b,
   return for_each_pair(tree_a, tree_b, a_from_b, visit, counts);
 }
 
-/// Branch and bound: calls distance(item of a, item of b) for every pair that can be nearer than the smallest
-/// value so far, starting from `limit`; nearer volumes first. The placement's margin is not used. The tests
-/// are added to `counts`.
+/// Search for the nearest pair of items by branch and bound. distance(item of a, item of b) must return the
+/// distance of two items [m]. It is called for every pair that may be nearer than the smallest distance so
+/// far, which is `limit` at first; nearer volumes are visited first. The placement's margin is not used. The
+/// tests are added to `counts`.
 template <class A, class B, class Distance>
 void nearest_pair(const BoundingTree<A>& tree_a, const BoundingTree<B>& tree_b, const Placement& a_from_b,
                   Real limit, Distance&& distance, TestCounts& counts) {

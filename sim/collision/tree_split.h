@@ -1,5 +1,5 @@
 #pragma once
-/// Splits the items of a bounding tree, independently of its kind of volume.
+/// Builds the structure of a bounding tree by splitting its items, independently of the kind of volumes.
 
 #include <cstdint>
 #include <span>
@@ -19,7 +19,7 @@ enum class TreeSplit : uint8_t {
   surface_area,
 };
 
-/// Greatest depth of a node, so that a traversal needs only a fixed stack.
+/// Greatest depth of a node. It allows traversals with a stack of fixed size.
 inline constexpr uint32_t kMaxTreeDepth = 64;
 
 struct TreeItem {

@@ -10,10 +10,10 @@
 
 namespace offstage::sim {
 
-/// Computes the manifold of a sphere and a triangle in closed form, in their common frame; `triangle` has the
-/// side of the triangle from which the sphere came, even if the sphere is deep behind it. There are no points
-/// if they are more than `margin` [m] apart or the surface around the triangle is nearer. `of_b`: the
-/// triangle is B.
+/// Computes the manifold of a sphere and a triangle in closed form, in their common frame;
+/// SurfaceTriangle::side is the side from which the sphere came, even if the sphere is now deep behind the
+/// triangle. The manifold has no points if both are more than `margin` [m] apart, or if a neighbouring
+/// triangle is nearer. `of_b`: whether the triangle is B.
 void sphere_triangle_manifold(const Vec3& centre, Real radius, const SurfaceTriangle& triangle,
                               const Pose& mesh_pose, bool of_b, Real margin, Manifold& m);
 

@@ -26,9 +26,8 @@ struct VclipCache {
 
 /// Signed distance of two polyhedra that are not empty. On return `cache` has the closest features: two
 /// vertices, a vertex and an edge or face, or two edges. For overlapping polyhedra it has the features at
-/// which the overlap was found; the depth and the direction of the smallest translation are those of
-/// penetration(). `iterations` counts pairs of features. If rounding would let the walk go in circles, the
-/// result is that of gjk().
+/// which the overlap was found, and penetration() computes the result. Separation::iterations is the number
+/// of visited pairs of features. If the walk enters a cycle because of rounding, gjk() computes the result.
 Separation vclip(const ConvexPolyhedron& a, const ConvexPolyhedron& b, const Pose& a_from_b,
                  VclipCache& cache);
 

@@ -42,7 +42,7 @@ inline Real squared_size(const BoundingSphere& v) {
 /// Frame B placed in frame A, prepared for testing many volumes.
 struct Placement {
   /// `size` bounds the distance of every tested point from the origin of its frame [m]; the allowance for
-  /// rounding is proportional to it. `margin` is how far apart volumes may be and still overlap [m].
+  /// rounding is proportional to it. Volumes count as overlapping if their distance is at most `margin` [m].
   Placement(const Pose& a_from_b, Real size, Real margin)
       : rotation(a_from_b.orientation.normalized().toRotationMatrix()),
         translation(a_from_b.position),
@@ -57,7 +57,7 @@ struct Placement {
   /// orthonormal to a few units.
   static constexpr Real kRounding = 64 * std::numeric_limits<Real>::epsilon();
 
-  Mat3 rotation;  ///< A's axes from B's
+  Mat3 rotation;  ///< rotation matrix from B's axes to A's axes
   Vec3 translation;
   Real slack;  ///< bound of the rounding errors [m]
   Real pad;    ///< margin and slack [m]
@@ -85,7 +85,8 @@ struct BoxPair {
   }
 
  private:
-  /// Gaps for one edge direction of b; `extent_b` is the extent of b along the products.
+  /// Gaps along the cross products of one edge direction of b, with the columns r and |r| = s in a's axes,
+  /// and all edges of a. `extent_b`: half extent of b along these products.
   Lanes product_gaps(Lanes r, Lanes s, Lanes extent_b) const {
     const Lanes a = lanes(half_a);
     return lane_abs(lane_last(offset) * lane_next(r) - lane_next(offset) * lane_last(r)) -
@@ -132,8 +133,9 @@ inline Vec3 point_gaps(const Obb& box, const Vec3& p) {
 template <class Volume>
 inline constexpr bool kIsSphere = std::is_same_v<Volume, BoundingSphere>;
 
-/// A lower bound of the distance of two volumes [m], 0 or less if they may overlap. Exact if one is a sphere;
-/// for boxes, the bound by their own axes. By rounding it may exceed the true distance by the slack.
+/// Returns a lower bound of the distance of two volumes [m], 0 or less if they may overlap. It is exact if
+/// one volume is a sphere; for two boxes only the axes of both boxes are used. Because of rounding it may
+/// exceed the true distance by Placement::slack.
 template <class A, class B>
 Real gap(const A& a, const B& b, const Placement& p) {
   if constexpr (kIsSphere<A> && kIsSphere<B>) {

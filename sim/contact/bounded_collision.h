@@ -1,5 +1,5 @@
 #pragma once
-/// Collisions of clusters with bounded effort, for the fast solver and heaps.
+/// Collision impulses of clusters with a bounded amount of work, for the fast solver and for large heaps.
 
 #include "sim/contact/collision.h"
 

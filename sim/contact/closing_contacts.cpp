@@ -16,8 +16,8 @@ constexpr Real kStopped = 1e-9;
 /// Part of the kinetic energy that a solution may add by rounding.
 constexpr Real kClosingRounding = 1e-9;
 
-/// Time at which a gap closes that changes at the rate `first`, which reaches `last` after `rest`; at least
-/// 0, and more than `rest` if it does not close.
+/// Returns the time until a gap [m] closes [s], at least 0; more than `rest` if it does not close. The rate
+/// of the gap changes linearly from `first` now to `last` after the time `rest`.
 Real closing_time(Real gap, Real first, Real last, Real rest) {
   const Real never = 2 * rest, curve = (last - first) / (2 * rest);
   // gap + first t + curve t^2 = 0, by the form that is accurate for small curves.

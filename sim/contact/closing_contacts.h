@@ -1,10 +1,10 @@
 #pragma once
-/// Contacts that close while other contacts carry a body (physics R9).
+/// Contacts that close within an interval while other contacts already support a body (physics R9).
 ///
-/// One solution for a whole interval carries a body by the contact that closes from the start on, although
-/// the body comes there only later. A ball that rolls over the concave seams of a bowl then loses the work
-/// of its weight over the gap at each seam. Here the interval is divided at the times at which contacts
-/// close; the contacts keep their frames and arms.
+/// If a whole interval is solved at once, a contact that closes within it pushes from the start, before the
+/// body has reached it. A ball that rolls over the concave seams of a bowl then loses a little energy at each
+/// seam: the work of its weight over the gap. Here the interval is divided at the times at which contacts
+/// close. The frames and arms of the contacts stay constant.
 
 #include <optional>
 #include <span>
@@ -19,7 +19,8 @@ namespace offstage::sim {
 struct ClosingPoint {
   Real gap = 0;                 ///< distance at the start [m]; 0: the point touches
   Vec3 surface = Vec3::Zero();  ///< velocity of conveyors [m/s]
-  /// Coefficients of the bias (Contact::bias) as a polynomial of the elapsed part of the interval [m/s].
+  /// Contact::bias as a polynomial of the elapsed fraction of the interval, from 0 to 1: its coefficients,
+  /// lowest degree first [m/s].
   Vec3 bias[3] = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
 
   Vec3 bias_at(Real part) const { return bias[0] + part * (bias[1] + part * bias[2]); }
@@ -33,30 +34,33 @@ struct Displacement {
 
 struct ClosingSolution {
   std::vector<ContactBody> bodies;  ///< bodies with their velocities at the interval's end
-  // With their impulses over the whole interval:
+  // Contacts and bounded rows, with their impulses over the whole interval:
   std::vector<Contact> contacts;
   std::vector<BoundedRow> bounded;
-  std::vector<Vec6> constraints;            ///< impulses of the joints' constraints
+  std::vector<Vec6> constraints;            ///< impulses of the joint constraints over the interval
   std::vector<Displacement> displacements;  ///< displacement of each body in the interval
   ContactWork work;
 };
 
 /// An interval of length `duration` [s].
 struct ClosingProblem {
-  std::span<const ContactBody> start;  ///< velocities at its start
-  std::span<const ContactBody> free;   ///< and at its end, without contacts and bounded rows
-  /// With the targets of points that touch, and guesses of their impulses over the interval.
+  std::span<const ContactBody> start;  ///< bodies with their velocities at the start of the interval
+  std::span<const ContactBody>
+      free;  ///< bodies with the velocities that they would have at its end without contacts and bounded rows
+  /// Contacts, with the targets of the points that touch at the start, and with initial guesses of the
+  /// impulses over the interval.
   std::span<const Contact> contacts;
   std::span<const ClosingPoint> points;  ///< of the contacts
-  /// Impulses are guesses. Rows that act only in a part of the interval, as limits do, are not accepted.
+  /// Joints, with initial guesses of the impulses. Rows that act only in a part of the interval, such as
+  /// limits, are not allowed.
   JointProblem joints;
   Real duration;
   Real budget;  ///< greatest cost of the solution [ns, see ProximalNewton::cost()]
 };
 
-/// Solves an interval in pieces. Points with a gap push from the time on at which it closes, without rebound.
-/// There is no result if they close at more than eight times, or if a solution fails or adds energy, or if
-/// all together cost too much.
+/// Solves an interval in pieces. A point with a gap pushes from the time at which the gap closes, and does
+/// not rebound. Returns no result if there are more than 16 closing times, if a solution fails or adds
+/// energy, or if the total cost exceeds the budget.
 std::optional<ClosingSolution> solve_closing(const ClosingProblem& problem, ProximalNewton& newton);
 
 }  // namespace offstage::sim

@@ -45,8 +45,9 @@ constexpr Real kTie = 1e-6;
 /// the whole system.
 constexpr std::size_t kImpulses = 200, kJointedImpulses = 12;
 
-/// The impulse with normal part du_n and friction at its limit against the direction `d`. None if this
-/// friction would pull the points together faster than the normal impulse separates them.
+/// Returns the impulse that changes the normal velocity by du_n, with friction at its limit against the
+/// direction `d`. None if this friction would pull the points together faster than the normal impulse
+/// separates them.
 std::optional<Vec3> sliding_impulse(const Mat3& K, Real du_n, Real mu, const Vector2d& d) {
   const Real resistance = K(0, 0) - mu * (K(0, 1) * d.x() + K(0, 2) * d.y());
   if (!(resistance > 0)) return std::nullopt;
@@ -54,7 +55,8 @@ std::optional<Vec3> sliding_impulse(const Mat3& K, Real du_n, Real mu, const Vec
   return Vec3(normal, -mu * normal * d.x(), -mu * normal * d.y());
 }
 
-/// A direction for each s in [0, 4), through a point of the boundary of a square; without trigonometry.
+/// Returns a unit direction for each s in [0, 4): s runs along the boundary of a square, which needs no
+/// trigonometry.
 Vector2d direction_at(Real s) {
   const int side = std::min(static_cast<int>(s), 3);
   const Real x = 2 * (s - side) - 1;
@@ -149,7 +151,7 @@ Vec3 separate_slide(const Mat3& K, const Vec3& u, Real du_n, const Vec3& mu) {
   return {du_n / K(0, 0), 0, 0};
 }
 
-/// The impulse for any restitution, without regard to the energy.
+/// Returns the impulse for a restitution. It may add kinetic energy; the caller checks this.
 Vec3 impulse_for(const Mat3& K, const Vec3& u, Real restitution, Real mu_t, Real mu_k) {
   const Real du_n = -(1 + restitution) * u.x();
   const Vec3 stick = K.llt().solve(Vec3(du_n, -u.y(), -u.z()));
@@ -390,7 +392,7 @@ class JointSums {
   std::vector<Real> bounded_;
 };
 
-/// Impulses in the order of the speeds of approach, the fastest first. Contacts with equal speeds collide
+/// Applies impulses one after the other, the fastest approach first. Contacts with equal speeds collide
 /// together, so symmetric scenes stay symmetric and the order of the list does not matter.
 class Sequence {
  public:

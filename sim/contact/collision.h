@@ -13,9 +13,9 @@ namespace offstage::sim {
 
 /// Order of the impulses in a cluster.
 enum class ImpactLaw : uint8_t {
-  simultaneous,  ///< all impulses at once, P_n >= 0 complementary to u_n >= -e u_n(before)
-  /// Impulses at one contact after the other, the fastest approach first; contacts that approach equally fast
-  /// are solved together. Impulses propagate as through Newton's cradle.
+  simultaneous,  ///< solves all impulses together: P_n >= 0 complementary to u_n >= -e u_n(before)
+  /// Solves one contact after the other, the fastest approach first. Contacts that approach equally fast are
+  /// solved together. Impulses propagate as in Newton's cradle.
   sequential
 };
 
@@ -26,8 +26,8 @@ enum class ImpactLaw : uint8_t {
 Vec3 collision_impulse(const Mat3& K, const Vec3& u, Real restitution, Real friction_t, Real friction_k);
 
 /// Resolves a cluster: changes the bodies' velocities, and sets the contacts' targets and total impulses.
-/// `restitution` [0, 1] of each contact; contacts that do not approach have no restitution but may have
-/// impulses. Joints transmit impulses within the same system (A3).
+/// `restitution`: the coefficient of each contact, in [0, 1]. Contacts that do not approach do not bounce but
+/// may have impulses. Joint constraints are part of the same system of equations (physics A3).
 ContactWork collide(std::span<ContactBody> bodies, std::span<Contact> contacts,
                     std::span<const Real> restitution, ImpactLaw law, const JointProblem& joints = {});
 

@@ -14,7 +14,8 @@ class ContactColoring {
   static constexpr uint32_t kLanes = 8, kNone = UINT32_MAX;
   /// Patches of one colour, one per lane; kNone in unused lanes.
   using Batch = std::array<uint32_t, kLanes>;
-  /// Bodies of a patch. kNone for a body that contacts do not move: it may be in many patches of a colour.
+  /// Indices of the two bodies of a patch. kNone stands for a body that contacts do not move; such a body may
+  /// be in several patches of one colour.
   struct Link {
     uint32_t a, b;
   };
@@ -25,8 +26,9 @@ class ContactColoring {
   std::span<const Batch> batches() const { return batches_; }
   /// The batches of colour c begin at begins()[c] and end at begins()[c + 1].
   std::span<const uint32_t> begins() const { return begins_; }
-  /// Batches from this index on have one patch each and must be solved one after the other. They belong to
-  /// bodies with more partners than there are colours.
+  /// Index of the first batch outside of all colours. From this index on, each batch has a single patch, and
+  /// the batches must be solved one after the other. They occur at bodies with more contact partners than
+  /// there are colours.
   uint32_t serial_begin() const { return begins_.back(); }
 
  private:

@@ -20,23 +20,24 @@ struct Island {
   std::vector<Body*> bodies;
   std::vector<ContactPair*> pairs;
   std::vector<Articulation*> articulations;
-  /// System that has moved the island from the interval's start, and can restore its state.
+  /// System that has moved the island since the interval's start, and can restore the state at that time. May
+  /// be null.
   CoupledSystem* motion = nullptr;
-  Real from = 0;  ///< start of the island's interval, since the sub-step's start [s]
+  Real from = 0;  ///< start of the island's interval, counted from the start of the sub-step [s]
 };
 
 class ContactGraph {
  public:
-  /// Updates the pairs to those of the broad phase of which at least one body is dynamic. Existing pairs are
-  /// kept, and new pairs get their surface from `surface_of(a, b)`. Pairs that the broad phase no longer
-  /// reports are removed, unless `adds`. `body_at` returns the body in a slot.
+  /// Updates the list of pairs from the candidates of the broad phase. Candidates without a dynamic body are
+  /// ignored. Existing pairs are kept, and new pairs get their surface from `surface_of(a, b)`. Pairs that
+  /// are not among the candidates are removed if `adds` is false. `body_at(slot)` returns a body.
   template <class BodyAt, class SurfaceOf>
   void update(std::span<const IndexPair> candidates, bool adds, BodyAt&& body_at, SurfaceOf&& surface_of);
 
   void forget(uint32_t slot);  ///< removes all pairs of a body
   void forget_all() { entries_.clear(); }
 
-  /// All pairs in ascending order of their slots.
+  /// Calls f(pair) for all pairs, in ascending order of the bodies' slots.
   template <class F>
   void for_each(F&& f) const {
     for (const Entry& e : entries_) f(*e.pair);
@@ -52,15 +53,16 @@ class ContactGraph {
   std::vector<Entry> entries_, next_;
 };
 
-/// Whether two bodies may touch in the interval: they have contact points.
+/// Whether a pair has contact points, so that the bodies may touch in the interval.
 bool may_touch(const ContactPair& pair);
-/// Whether two bodies touch, or push each other in the interval that was solved last.
+/// Whether two bodies touch, or had a contact force in the last solved interval.
 bool touch_or_push(const ContactPair& pair);
 
-/// Groups awake bodies, which must be in the order of ranks, by links between them, and sets Body::island.
-/// The islands are in the order of their first bodies, without motion or articulations; their memory is
-/// reused. Pairs without contact points are omitted, and so are pairs that do not `connect` their bodies and
-/// are not within one island.
+/// Groups awake bodies into islands by contacts and springs, and sets Body::island. `bodies` must be in the
+/// order of rank. The islands are in the order of their first bodies; Island::motion and
+/// Island::articulations are not set. The memory of `islands` is reused. A pair joins its bodies into one
+/// island if `connect` returns true for it. Islands do not contain pairs without contact points, nor pairs
+/// between different islands.
 void find_islands(std::span<Body* const> bodies, std::span<ContactPair* const> pairs,
                   bool (*connect)(const ContactPair&), std::span<const std::pair<Body*, Body*>> springs,
                   std::vector<Island>& islands);

@@ -1,5 +1,5 @@
 #pragma once
-/// The interval that contacts are solved for.
+/// The time interval for which contacts are solved.
 
 #include "sim/core/types.h"
 
@@ -8,11 +8,10 @@ namespace offstage::sim {
 /// Parameters common to all solutions of an interval.
 struct ContactInterval {
   Real duration;  ///< length [s], > 0
-  Real end;       ///< end, as the world's time [s]
-  /// Length of the sub-step of which the interval is all or a part [s]; sets the rate at which penetration is
-  /// removed.
+  Real end;       ///< end of the interval, world time [s]
+  /// Length of the sub-step that contains the interval [s]. It sets the rate at which penetration is removed.
   Real substep;
-  /// Contacts that approach faster are impacts, WorldDef::collision_speed [m/s].
+  /// Contacts that approach faster than this are impacts [m/s]; equals WorldDef::collision_speed.
   Real impact_speed;
   /// Whether the interval is a whole sub-step without impacts. Only the forces of whole sub-steps are stored
   /// as the initial guess of the next one. The force that stops a body in a short part before or after an

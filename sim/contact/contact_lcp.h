@@ -11,15 +11,15 @@
 
 namespace offstage::sim {
 
-/// Greatest numbers of contacts, and of constraints of joints, that are solved by pivoting. Its work grows
-/// with their third power.
+/// Greatest number of contacts, and greatest number of joint constraints, that are solved by pivoting. The
+/// work of pivoting grows with the third power of these numbers.
 inline constexpr std::size_t kMostLcpContacts = 64, kMostLcpConstraints = 240;
 
 /// Solves the problem of contact_problem.h from zero impulses, with |p_t| <= mu_t p_n and |p_k| <= mu_k p_n
 /// in place of the cone. On success it sets the impulses of contacts and joints and adds their effect to the
-/// bodies' velocities. Otherwise it returns false and changes nothing: for more contacts or constraints than
-/// the limits, contacts with rolling or spinning friction, and where pivoting fails or leaves a residual. In
-/// both cases it adds its work to `work`; a failure is a fall-back.
+/// bodies' velocities. Otherwise it returns false and changes nothing. It fails if the numbers of contacts or
+/// constraints exceed their limits, if a contact has rolling or spinning friction, or if pivoting fails or
+/// leaves a residual. The work is always added to `work`; a failure is counted as a fall-back.
 bool solve_by_lcp(std::span<ContactBody> bodies, std::span<Contact> contacts, const JointProblem& joints,
                   ContactWork& work);
 

@@ -270,8 +270,8 @@ struct Arm {
   }
 };
 
-/// The same for a corner or an edge of one body over a face of the other, if both turn little: to second
-/// order, without rotations. Almost all contacts in a heap are of this kind.
+/// Sets the motion of a corner or an edge of one body over a face of the other, if both turn little. It is
+/// accurate to second order and needs no rotations. Almost all contacts in a heap are of this kind.
 void set_even_motion(const Start& s, const ContactFrame& frame, Real duration, ContactMotion& motion) {
   const Vec3 wa = twist_of(s.a).angular_velocity, wb = twist_of(s.b).angular_velocity, &n = frame.n;
   const bool by_b = s.m.source == NormalSource::face_of_a;

@@ -1,13 +1,13 @@
 #pragma once
 /// Motion of a contact within an interval, predicted from the bodies' motion at its start (physics R9, R11).
 ///
-/// A contact has its arms (from the centres of mass) and its normal n. Both change while the bodies move: a
-/// corner moves with its body, the lowest point of a rim moves along the rim, and the normal turns with its
-/// face or with the line between two centres. A contact solved with the arms and the normal of the interval's
-/// start is accurate only to first order in the interval; a rolling coin would then stand up or fall. Here
-/// the impulse acts at the interval's middle, and the contact conditions apply to the velocities at its end.
-/// Impulse and angular momentum are then accurate to second order, for bodies that move by the mean of old
-/// and new velocity.
+/// A contact has two arms (vectors from the centres of mass) and a normal n. They change while the bodies
+/// move: a corner moves with its body, the lowest point of a rim moves along the rim, and the normal turns
+/// with its face or with the line between two centres. A contact solved with the arms and the normal of the
+/// interval's start is accurate only to first order in the interval; a rolling coin would then stand up or
+/// fall. Here the impulse acts at the interval's middle, and the contact conditions apply to the velocities
+/// at its end. Impulse and angular momentum are then accurate to second order, for bodies that move by the
+/// mean of old and new velocity.
 
 #include "sim/collision/contact_frame.h"
 #include "sim/collision/manifold.h"
@@ -15,14 +15,15 @@
 
 namespace offstage::sim {
 
-/// Position of a contact at one time of the interval.
+/// Geometry of a contact at one time of the interval.
 struct ContactPlace {
   Vec3 normal;  ///< unit, from b to a, world
-  /// Vectors from the bodies' centres of mass (of kinematic bodies: their origins) to the contact [m].
+  /// Vectors to the contact from the centres of mass [m], world axes. For a kinematic body the vector starts
+  /// at the body's origin.
   Vec3 arm_a, arm_b;
-  /// Rotation, since the interval's start, of the contact points of the body whose feature defines the
-  /// contact. They turn with the body, or, on the sides and rims of round bodies, with the meridian that
-  /// faces the other body.
+  /// Rotation of the contact points about the centre of the body whose feature defines the contact, since the
+  /// interval's start. Points usually turn with the body. On the sides and rims of round bodies they turn
+  /// with the meridian that faces the other body.
   Quat turn;
 };
 
@@ -33,39 +34,41 @@ struct ContactMotion {
   /// (n, t, k): gain s + bow s^2, where s increases from -1 at the start through 0 in the middle to 1 at the
   /// end [m/s].
   Vec3 gain = Vec3::Zero(), bow = Vec3::Zero();
-  /// Gain of the normal velocity at points beside it, per metre along the tangents t and k [1/s].
+  /// Additional `gain` of the normal velocity at neighbouring points, per metre of distance along the
+  /// tangents t and k [1/s].
   Real gain_along_t = 0, gain_along_k = 0;
   bool turns = false;  ///< whether any gain differs from 0
 };
 
-/// Whether the feature that defines a contact, and with which it moves, belongs to b.
+/// Whether the feature that defines a contact belongs to body b. The contact moves with this feature.
 bool moves_with_b(NormalSource source);
 
-/// Position of a body's centre of mass at the interval's start; of a kinematic body, its origin.
+/// World position of a body's centre of mass at the interval's start [m]. For a kinematic body, the position
+/// of its origin.
 Vec3 start_centre(const Body& body);
 
-/// Whether contacts may move along a body's surface while it turns: it has rims or round sides and turns
-/// noticeably within `duration` [s].
+/// Whether contacts may move along a body's surface while the body turns. This requires rims or round sides,
+/// and a noticeable rotation within `duration` [s].
 bool runs_along(const Body& body, Real duration);
 
 /// Angular speed at the interval's start at which the axis of a cylinder, cone or frustum turns about the
-/// normal of a contact [rad/s]. The lowest point of a tilted rim moves around the rim at this speed, as that
-/// of a wobbling coin does. 0 if a face or a side lies flat, and for other shapes.
+/// normal of a contact [rad/s]. The lowest point of a tilted rim moves around the rim at this speed, for
+/// example on a wobbling coin. Returns 0 if a face or a side lies flat, and for other shapes.
 Real rim_speed(const Body& body, const Vec3& normal);
 
-/// Predicts the motion of a contact of a manifold. `frame` is the manifold's frame and `place` the contact's
-/// position in the world at the interval's start, in the middle between surfaces that are `gap` apart [m]
-/// (negative: they overlap); `duration` is the length of the interval and `substep` that
-/// of the whole sub-step [s]. Contacts of bodies that turn by more than a radian in a sub-step are not
-/// predicted. A normal that turns too fast to be predicted, as between sharp corners that pass each other, is
-/// kept constant, with the arms of the start.
+/// Predicts the motion of a contact of a manifold. `frame` is the manifold's frame. `place` is the contact's
+/// world position at the interval's start, in the middle between both surfaces. `gap` is the distance of the
+/// surfaces [m], negative in penetration. `duration` is the length of the interval [s], `substep` the length
+/// of the whole sub-step [s]. If a body turns by more than a radian in a sub-step, normal and arms are kept
+/// constant. The same holds if the normal would turn too fast to be predicted, for example where two sharp
+/// corners pass each other.
 ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, const ContactFrame& frame,
                              const Vec3& place, Real gap, Real duration, Real substep);
 
-/// Arm from the centre of mass to a contact feature of a body after the body has turned from one orientation
-/// to another. Corners turn with the body; points of spheres, caps, rims and round sides stay on the side
-/// that faces the other body. `out_from` and `out_to` are the directions to the other body (unit, world)
-/// before and after.
+/// Returns the arm from the centre of mass to a contact feature [m] after the body has turned from
+/// orientation `from` to orientation `to`. `arm` is the arm before. Corners turn with the body; points of
+/// spheres, caps, rims and round sides stay on the side that faces the other body. `out_from` and `out_to`
+/// are the directions to the other body (unit, world) before and after.
 Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3& out_from, const Quat& to,
                 const Vec3& out_to);
 

@@ -79,7 +79,7 @@ void turn_lines(const Manifold& local, const Mat3& axes, Manifold& m) {
   m.edge_b = of_b ? Vec3(axes * local.edge_b) : Vec3(Vec3::Zero());
 }
 
-/// Copies only the points that exist.
+/// Transforms a manifold from the frame `from` to the world; copies only the points that exist.
 void place(const Manifold& local, const Pose& from, Manifold& m) {
   const Frame pose(from);
   m.normal = pose.vector_to_world(local.normal);
@@ -325,8 +325,8 @@ Real ContactPair::free_displacement(const PlacedManifold& m, const Vec3& place, 
   return duration * motion.frame.n.dot(velocity);
 }
 
-/// The contact of a wheel stays below it while its rim turns. So a point found at the end is the same as one
-/// of the start if it is where the feature of that point moves to, on either body.
+/// The contact of a wheel stays below it while the rim turns. Therefore a point at the interval's end is the
+/// same contact as a point at its start if it is where that point's feature has moved, on either body.
 bool ContactPair::predicts(const PlacedManifold& m, const Vec3& normal, const ContactPoint& at_end,
                            Real duration, bool between_points) const {
   const Vec3& n = m.frame.n;
@@ -427,8 +427,8 @@ void ContactPair::add_speculative_contacts(Real duration) {
   }
 }
 
-/// For a pair with a sphere. The force keeps its direction in the world, because the sphere turns under it
-/// when it rolls.
+/// Finds the contact of a pair with a sphere. Its stored force keeps its direction in the world, because a
+/// rolling sphere turns while the force does not.
 void ContactPair::find_one_point(const Pose& a, const Pose& b, Real margin) {
   const bool known = !placed_.empty();
   placed_.resize(1);
@@ -445,7 +445,8 @@ void ContactPair::find_one_point(const Pose& a, const Pose& b, Real margin) {
   f = {last, last, frame_vector(m.frame, world_vector(before, f.mean)), true};
 }
 
-/// The normal force is kept along the new normal however far the bodies have turned, because they may roll.
+/// Converts a stored force to a new frame. The normal force stays along the normal even if the bodies have
+/// turned far, because they may roll.
 PointForce ContactPair::stored_force(const StoredPoint& p, const ContactFrame& frame, const Mat3& a_axes) {
   const auto force = [&](const Vec3& before) -> Vec3 {
     const Real normal = before.dot(p.normal);

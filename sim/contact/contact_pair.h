@@ -1,6 +1,6 @@
 #pragma once
-/// A pair of bodies near each other: their contact points, and the data that is kept between steps. This is
-/// the narrow phase's cache and the forces at the points, which are the initial guess of the next solution.
+/// A pair of bodies near each other, with their contact points. Two kinds of data are kept between steps: the
+/// cache of the narrow phase, and the forces at the points, which are the initial guess of the next solution.
 
 #include <array>
 #include <limits>
@@ -17,19 +17,19 @@ namespace offstage::sim {
 /// Combined surface parameters of two bodies.
 struct PairSurface {
   Real restitution = 0, friction = 0, static_friction = 0;
-  Real cross = 1;                   ///< friction across the friction axis over friction along it
+  Real cross = 1;                   ///< friction across the friction axis, divided by friction along the axis
   Real rolling = 0, spinning = 0;   ///< rolling and spinning friction [m]
   const Body* axis_body = nullptr;  ///< body that defines the friction axis; null: isotropic
   bool conveys = false;             ///< whether a surface is a conveyor
   DistanceMethod method = DistanceMethod::gjk;
-  bool by_triangles = false;  ///< whether impacts are found by the triangles of two meshes
+  bool by_triangles = false;  ///< whether the time of impact is searched between the triangles of two meshes
 };
 
 /// Force at a point of a manifold on body a, in the manifold's frame.
 struct PointForce {
   Vec3 now = Vec3::Zero();   ///< mean over the interval [N]
   Vec3 last = Vec3::Zero();  ///< force at the end of the interval, the initial guess for the next one [N]
-  Vec3 mean = Vec3::Zero();  ///< mean over previous intervals, for the fast solver [N]
+  Vec3 mean = Vec3::Zero();  ///< moving average over previous intervals, for the fast solver [N]
   bool known = false;        ///< whether the point existed in the previous interval
 };
 
@@ -48,7 +48,8 @@ constexpr Real kTouching = 2e-5;
 /// Whether all points of a manifold are near one line.
 bool is_narrow(const Manifold& m);
 
-/// The members that loops over all pairs read are in the first cache line.
+/// Two bodies near each other, and their contacts. Members that are read in loops over all pairs come first,
+/// in one cache line.
 class alignas(64) ContactPair {
  private:
   Body *a_, *b_;
@@ -62,11 +63,12 @@ class alignas(64) ContactPair {
   uint8_t speculative = 0;  ///< number of manifolds that add_speculative_contacts() added
   /// Whether the pair reached its limit of impacts: it is not traced back again in this sub-step.
   bool toi_exhausted = false;
-  /// Whether the contacts of the pair have no restitution in this sub-step: they only limit the approach.
+  /// Whether the contacts of the pair have no restitution in this sub-step. They stop the approach without a
+  /// bounce.
   bool restitution_suppressed = false;
   Real deepest = 0;  ///< deepest overlap that find() has seen in this sub-step [m]
-  /// Whether the island of this pair is moved back to the time of its impacts; otherwise the contact points
-  /// limit the approach.
+  /// Whether the island of this pair is moved back to the times of the pair's impacts. If not, the contact
+  /// points limit the approach.
   bool needs_toi = false;
 
   /// Only `b` may be a plane.
@@ -75,33 +77,35 @@ class alignas(64) ContactPair {
   Body& a() const { return *a_; }
   Body& b() const { return *b_; }
   const PairSurface& surface() const { return surface_; }
-  /// The shapes by which the time of an impact of the two bodies is found.
+  /// Shapes of the two bodies for the search of the time of impact.
   const CollisionShape& impact_shape_a() const { return impact_shape(*a_); }
   const CollisionShape& impact_shape_b() const { return impact_shape(*b_); }
   /// Returns how many tests of bounding volumes and of pairs of pieces were made since the last call.
   TestCounts take_tests() { return std::exchange(cache_.tests, {}); }
 
-  /// Finds the contact points where the bodies at these poses are within `margin` [m] of each other. If their
-  /// relative pose has changed by less than `reuse` [m], the points are reused and only their separations are
-  /// updated. `turning`: see find_manifolds().
+  /// Finds the contact points of the bodies in the given poses. Surfaces must be within `margin` [m] of each
+  /// other. If their relative pose has changed by less than `reuse` [m], the points are reused and only their
+  /// separations are updated. `turning`: see find_manifolds().
   void find(const Pose& a, const Pose& b, Real margin, Real reuse, bool turning);
 
-  /// Adds speculative contacts to the contacts that find() found at the interval's start. Speculative
-  /// contacts are where the freely moving bodies would overlap at the interval's end by more than the
-  /// existing points predict, because fast turning or sliding brings other features together. Their
-  /// separations are chosen such that the velocities at these points over `duration` [s], with the lever arms
-  /// of the start, give the separations at the end.
+  /// Adds speculative contacts to the contacts that find() found at the interval's start. A speculative
+  /// contact is added where the freely moving bodies would overlap at the interval's end by more than the
+  /// existing points predict: fast turning or sliding brings other features together. The separation of such
+  /// a point is chosen so that its velocity over `duration` [s], with the lever arms of the start, gives its
+  /// separation at the end.
   void add_speculative_contacts(Real duration);
 
-  /// Whether the motion of the points of a manifold of this pair over `duration` [s] predicts an overlap that
-  /// is at least as deep at this point, where the bodies have this normal at the interval's end; with
-  /// `between_points`, also if the point lies between two of those points. It may belong to another pair of
-  /// one of the bodies.
+  /// Whether the contacts of a manifold already prevent a predicted overlap. `at_end` is the contact point of
+  /// that overlap at the interval's end, and `normal` its normal. The result is true if the motion of the
+  /// points of `m` over `duration` [s] leads to an overlap that is at least as deep at `at_end`. With
+  /// `between_points`, `at_end` may also lie between two points of `m`. `m` is a manifold of this pair;
+  /// `at_end` may belong to another pair with one of the same bodies.
   bool predicts(const PlacedManifold& m, const Vec3& normal, const ContactPoint& at_end, Real duration,
                 bool between_points) const;
 
-  /// Whether the impact of a point is traced back to, so that the point does not limit the approach. While
-  /// other points touch, it must approach faster than `impact_speed` [m/s].
+  /// Whether the island is moved back to the impact at this point, so that the point must not limit the
+  /// approach before. While other points of the pair touch, this requires an approach faster than
+  /// `impact_speed` [m/s].
   bool awaits_impact(const PlacedManifold& m, const ContactPoint& point, Real impact_speed) const {
     if (!needs_toi || point.separation <= kTouching) return false;
     return separation_ > kTouching ||
@@ -120,12 +124,13 @@ class alignas(64) ContactPair {
   /// The i-th manifold added by add_speculative_contacts(), with its points at their positions at the
   /// interval's end.
   const Manifold& at_end(std::size_t i) const { return at_end_[i]; }
-  /// Replaces the i-th manifold by `m`, which is in world coordinates. A manifold without points is removed
-  /// at the next drop_empty(). separation() remains the separation of the bodies.
+  /// Replaces the i-th manifold by `m`, which is in world coordinates. If `m` has no points, the next
+  /// drop_empty() removes the manifold. separation() is not changed.
   void replace(uint32_t i, const Manifold& m);
   void drop_empty();
 
-  /// Whether the only contact is that of a sphere with a simple shape, found in closed form.
+  /// Whether one body is a sphere and the other a simple shape. The pair then has at most one contact, found
+  /// in closed form.
   bool has_sphere() const { return has_sphere_; }
   /// Whether find() was never called for this pair.
   bool is_new() const { return found_margin_ < 0; }
@@ -163,9 +168,9 @@ class alignas(64) ContactPair {
   void inherit(std::vector<StoredPoint>& points, const Pose& a);
   void reuse(const Pose& a, const Pose& b, const std::vector<StoredPoint>& points);
   void set_frame(PlacedManifold& m) const;
-  /// Displacement of a relative to b along the normal that free motion causes during `duration` [m], at a
-  /// contact of the manifold `m` at the interval's start. `place`: position of the contact, in the middle
-  /// between surfaces that are `gap` apart [m].
+  /// Returns the displacement of a relative to b along the normal, by the free motion during `duration` [m],
+  /// at a contact of the manifold `m`. `place` is the world position of the contact at the interval's start,
+  /// in the middle between both surfaces; `gap` is the distance of the surfaces [m].
   Real free_displacement(const PlacedManifold& m, const Vec3& place, Real gap, Real duration) const;
   PlacedManifold moved_back(const Manifold& at_end, Real duration) const;
 

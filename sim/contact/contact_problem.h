@@ -10,11 +10,11 @@
 /// relative angular velocity w:
 ///   (m_t, m_k) in a disc of radius `rolling` p_n, with the greatest dissipation against (w_t, w_k),
 ///   (p_t, p_k, m_n / s) in a ball of radius mu p_n, with the greatest dissipation against (u_t, u_k, s w_n),
-/// where s = `spinning` / mu. The latter is one law for sliding and spinning, because both are the sliding of
-/// one area of contact. Rolling loses its energy inside the bodies, not by sliding, and has its own law.
-/// For a collision v are the velocities before it, and target = -e u_n of those. For resting contact over a
-/// time h, v are the velocities that the bodies would have after h without contacts; then p / h are the
-/// contact forces, and (u - u(now)) / h the relative accelerations of R9.
+/// where s = `spinning` / mu. Sliding and spinning have one common law, because both are sliding of the same
+/// contact area. Rolling has a separate law, because it loses energy inside the bodies and not by sliding.
+/// For a collision, v are the velocities before it, and target = -e u_n(before). For resting contact over a
+/// time h, v are the velocities that the bodies would have after h without contacts. Then p / h are the
+/// contact forces, and (u - u(now)) / h are the relative accelerations of R9.
 
 #include <cstdint>
 #include <optional>
@@ -44,34 +44,34 @@ struct ContactBody {
   }
 };
 
-/// One point where body a touches body b. Vectors of three numbers are in the order normal, t, k of its
-/// frame.
+/// One point where body a touches body b. Vectors in the contact's frame have the components (n, t, k).
 struct Contact {
   uint32_t a = 0, b = 0;  ///< indices of bodies; not both unmoved
   ContactFrame frame;     ///< n from b to a
   /// Vectors from the centres of mass to the point, world axes [m].
   Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();
-  /// Velocity that is added to the relative velocity of the bodies, due to moving surfaces and the turning of
-  /// the contact's frame [m/s].
+  /// Added to the relative velocity of the bodies, (n, t, k): effect of moving surfaces and of the rotation
+  /// of the contact's frame [m/s].
   Vec3 offset = Vec3::Zero();
-  /// The part of `offset` that is not due to moving surfaces: the velocity terms (physics R9) [m/s].
+  /// The part of `offset` without moving surfaces: the velocity terms of physics R9 [m/s].
   Vec3 bias = Vec3::Zero();
   Real target = 0;  ///< smallest normal velocity after the solution [m/s]
   /// Coulomb's coefficients along t and k. If they are equal, friction has the round cone |p_tk| <= mu p_n;
   /// otherwise each axis has its own limit (R6).
   Real friction_t = 0, friction_k = 0;
-  /// Rolling and spinning friction: the greatest angular impulse about the tangents and about the normal, per
-  /// normal impulse [m].
+  /// Coefficients of rolling and spinning friction: greatest angular impulse about a tangent, and about the
+  /// normal, divided by the normal impulse [m].
   Real rolling = 0, spinning = 0;
   Vec3 impulse = Vec3::Zero();  ///< in: a guess; out: the solution [N s]
-  Vec3 moment = Vec3::Zero();   ///< out: angular impulse (m_n, m_t, m_k), 0 without such friction [N m s]
-  bool is_guessed = false;      ///< whether there is a guess
+  Vec3 moment =
+      Vec3::Zero();         ///< out: angular impulse (m_n, m_t, m_k) of rolling and spinning friction [N m s]
+  bool is_guessed = false;  ///< whether `impulse` holds an initial guess
 
   bool is_isotropic() const { return friction_t == friction_k; }
   bool resists_turning() const { return rolling > 0 || spinning > 0; }
   Vec3 to_world(const Vec3& p) const { return p.x() * frame.n + p.y() * frame.t + p.z() * frame.k; }
   Vec3 to_frame(const Vec3& v) const { return {frame.n.dot(v), frame.t.dot(v), frame.k.dot(v)}; }
-  /// Relative velocity (u_n, u_t, u_k), offset included.
+  /// Relative velocity (u_n, u_t, u_k) of a with respect to b, `offset` included [m/s].
   Vec3 relative_velocity(std::span<const ContactBody> bodies) const {
     return to_frame(bodies[a].velocity_at(arm_a) - bodies[b].velocity_at(arm_b)) + offset;
   }
@@ -81,18 +81,19 @@ struct Contact {
   }
 };
 
-/// K_i of R6: the velocity that a unit impulse at `arm` gives to the body's point there [1/kg], world axes.
+/// Mobility K_i of R6, world axes [1/kg]: multiplied by an impulse at the point `arm`, it gives the change of
+/// velocity of that point.
 Mat3 mobility(const ContactBody& body, const Vec3& arm);
-/// K = K_a + K_b in the contact's frame.
+/// Mobility K_a + K_b of both bodies, in the contact's frame [1/kg].
 Mat3 mobility(const Contact& contact, std::span<const ContactBody> bodies);
 
-/// Adds a contact's impulse to its bodies.
+/// Applies an impulse in the contact's frame [N s] to a, and the opposite impulse to b.
 void apply(const Contact& contact, const Vec3& impulse, std::span<ContactBody> bodies);
 
-/// Adds an angular impulse in the contact's frame to its bodies.
+/// Applies an angular impulse in the contact's frame [N m s] to a, and the opposite one to b.
 void apply_moment(const Contact& contact, const Vec3& moment, std::span<ContactBody> bodies);
 
-/// u of a row of a joint: its relative velocity, offset included [m/s] or [rad/s].
+/// Relative velocity of a bounded row of a joint, offset included [m/s] or [rad/s].
 Real row_speed(const BoundedRow& row, std::span<const ContactBody> bodies);
 
 /// Residual of an approximate solution: the greatest violation of the conditions above [m/s]. Impulses are
@@ -106,9 +107,9 @@ std::optional<std::size_t> worst_contact(std::span<const ContactBody> bodies,
 /// Kinetic energy of the bodies that contacts move [J].
 Real kinetic_energy(std::span<const ContactBody> bodies);
 
-/// Kinetic energy that the contacts' impulses add to bodies, whose velocities are `before` without and
-/// `after` with the impulses [J]. The work of conveyors is not included. A solution without targets and
-/// biases adds none: friction and plastic impacts dissipate.
+/// Kinetic energy that the impulses of the contacts add to the bodies [J]. `before` has the velocities
+/// without the impulses, `after` those with them. The work of conveyors is not included. If all targets and
+/// biases are zero, an exact solution adds no energy, because friction and plastic impacts dissipate.
 Real added_energy(std::span<const ContactBody> before, std::span<const ContactBody> after,
                   std::span<const Contact> contacts);
 
@@ -137,10 +138,10 @@ struct ContactWork {
   void add(const ContactWork& more) { add_figures(*this, more); }
 };
 
-/// Solves the problem by projected Gauss-Seidel, starting at the contacts' impulses, whose effect the bodies'
-/// velocities must already contain. Each sweep solves the contacts one by one in order, until no velocity
-/// changes by more than `tolerance` [m/s]. Returns the number of sweeps. It is the fall-back of the other
-/// solvers.
+/// Solves the problem by projected Gauss-Seidel, the fall-back of the other solvers. It starts from the
+/// contacts' impulses, whose effect must already be included in the velocities of the bodies. A sweep solves
+/// the contacts one by one in order. Sweeps end when no velocity changes by more than `tolerance` [m/s], or
+/// after `max_sweeps`. Returns the number of sweeps.
 uint32_t projected_gauss_seidel(std::span<ContactBody> bodies, std::span<Contact> contacts,
                                 uint32_t max_sweeps, Real tolerance);
 

@@ -10,26 +10,26 @@
 
 namespace offstage::sim {
 
-/// Change of the relative velocity at a contact in an interval of length h that does not depend on the
-/// forces, in the contact's frame: the velocity terms of the relative acceleration (R9).
+/// Returns the force-independent change of the relative velocity at a contact in an interval of length h [s]:
+/// the velocity terms of the relative acceleration (physics R9), times h. Contact's frame [m/s].
 Vec3 velocity_bias(const ContactPair& pair, const PlacedManifold& placed, const ContactPoint& point, Real h);
 
 /// Velocity that conveyors add to the velocity of a relative to b [m/s], world axes.
 Vec3 surface_velocity(const ContactPair& pair);
 
-/// Components of a world vector along n, t and k.
+/// Returns the components of a world vector along n, t and k.
 Vec3 in_frame(const ContactFrame& f, const Vec3& v);
 
-/// Coefficients of friction along t and k at a relative velocity u (contact's frame): the static coefficients
-/// if the contact does not slide.
+/// Returns the coefficients of friction along t and k for a relative velocity u in the contact's frame [m/s].
+/// If the contact does not slide, they are the static coefficients.
 std::pair<Real, Real> friction(const PairSurface& surface, const Vec3& u);
 
-/// Point to which a body's velocity refers [m]: the centre of mass, or the origin of a kinematic body at the
-/// interval's end.
+/// World position of the point to which a body's velocity refers [m]: the centre of mass, or, for a kinematic
+/// body, its origin at the interval's end.
 Vec3 origin(const Body& body);
 
-/// A body that contacts do not move, in the exact solver and in the solver of impacts: asleep, static or
-/// kinematic.
+/// Returns the ContactBody of a body that contacts do not move: asleep, static or kinematic. Used by the
+/// exact solver and the impact solver.
 ContactBody unmoved_body(const Body& body);
 
 /// The inverse inertia in world axes at an orientation.
@@ -42,16 +42,17 @@ Vec3 rotation_vector(const Quat& from, const Quat& to);
 struct IntervalEffect {
   Vec3 impulse, angular_impulse;  ///< [N s], [N m s]
   Vec3 spin;                      ///< expected change of the angular velocity [rad/s]
-  Vec3 shift, turn;               ///< displacement [m] and small rotation vector [rad]
-  Real fraction;                  ///< length of the interval over that of the sub-step
+  Vec3 shift, turn;               ///< displacement of the centre of mass [m] and small rotation vector [rad]
+  Real fraction;                  ///< length of the interval divided by the length of the sub-step
 };
 
 /// Adds the effect of an interval to a body in its state at the end of the free motion.
 ///
 /// The angular momentum is exact, while the orientation is known to second order in the interval. For a thin
 /// body the difference may be a large rotation about its axis, with an energy that no force has supplied. If
-/// the angular momentum has more energy than the expected angular velocity, the body is turned to the
-/// orientation in which both agree, or, if that is far, gets the expected angular velocity.
+/// the energy of the angular momentum exceeds the energy of the expected angular velocity, the body is turned
+/// to an orientation in which both agree. If that orientation is far away, the body gets the expected angular
+/// velocity instead.
 void add_effect(Body& body, const IntervalEffect& effect);
 
 }  // namespace offstage::sim

@@ -8,7 +8,7 @@
 
 namespace offstage::sim {
 
-/// Whether something in an island may do work: a kinematic body, a conveyor or a motor.
+/// Whether a kinematic body, a conveyor or a motor may do work on an island.
 bool can_do_work(const Island& island);
 
 /// Kinetic energy of an island's bodies [J].

@@ -17,8 +17,8 @@ namespace {
 constexpr Real kPushOut = 0.2, kFastestPush = 0.5;
 /// Points that approach faster than this have closed in the interval, not before [m/s].
 constexpr Real kClosing = 1e-3;
-/// Points that approach at a distance faster than this close later in the interval, however near they are, if
-/// it may be divided [m/s].
+/// If the interval may be divided, points with a gap that approach faster than this close later in the
+/// interval, even if the gap is very small [m/s].
 constexpr Real kApproaching = 1e-4;
 /// The intervals of islands with more bodies are not divided: they are heaps, for which it would cost more
 /// than the solution.
@@ -156,8 +156,9 @@ bool ExactContacts::is_safe(const ContactWork& work) const {
   return energy <= kTermsShare * kinetic + mass * push * push / 2;
 }
 
-/// Whether an unmoved body is touched from the interval's start on, and a contact with one that approached
-/// pushes. Bodies that are carried by other moving bodies lose little by one solution.
+/// Whether some contact with an immovable body touches from the interval's start on, and another one pushes
+/// that had a gap at the start or approached faster than kApproaching. Bodies that rest on other moving
+/// bodies lose little energy if the interval is not divided.
 bool ExactContacts::has_closing() const {
   bool touches = false, closes = false;
   for (std::size_t i = 0; i < points_.size(); ++i) {
@@ -321,7 +322,7 @@ void ExactContacts::close_neighbors(const Island& island, Real duration) {
 }
 
 /// Links move together: if some moved by the mean of their velocities and others by the new ones, the joints
-/// would come apart, and their projection would push light links into what stopped them.
+/// would come apart, and their projection would push light links into the obstacle that stopped them.
 void ExactContacts::close_links() {
   for (const Articulation* articulation : joints_.articulations()) {
     const std::span<Body* const> links = articulation->bodies();
@@ -330,7 +331,7 @@ void ExactContacts::close_links() {
   }
 }
 
-/// Joints that reach a stop also stop their bodies.
+/// Marks the bodies of joints that reach a limit as stopped within the interval.
 void ExactContacts::close_stops() {
   for (std::size_t i = 0; i < joints_.bounded().size(); ++i) {
     const BoundedRow& row = joints_.bounded()[i];

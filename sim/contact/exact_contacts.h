@@ -9,21 +9,22 @@
 
 namespace offstage::sim {
 
-/// Solves the contacts of one island to rounding. The bodies have moved freely through the interval from
-/// their `start` to `rigid`; the effect of the contacts is added to this motion. Keep one object per island.
+/// Solves the contacts of one island to rounding. Before, the bodies must have moved freely through the
+/// interval, from Body::start to Body::rigid. The effect of the contacts is added to this motion. Keep one
+/// object per island.
 class ExactContacts {
  public:
   /// How the problem is solved.
   enum class Method : uint8_t {
     proximal,  ///< proximal Newton method on the true friction cone
-    lcp        ///< linear complementarity (contact_lcp.h); where this fails, the method `proximal`
+    lcp        ///< linear complementarity (contact_lcp.h); `proximal` if that fails
   };
   struct Outcome {
     /// False: nothing was changed, because the cost exceeded the budget, or because the result of a fall-back
     /// was unsafe.
     bool is_applied = false;
     ContactWork work;
-    ContactWork lcp;                     ///< work of Method::lcp; with a fall-back, `work` solved the island
+    ContactWork lcp;                     ///< work of Method::lcp; `work` is then only the fall-back's
     const ContactPair* rough = nullptr;  ///< after a fall-back: the pair with the greatest error
   };
   /// Solves the contacts and applies the result. It stops when the cost exceeds `budget` [ns, see

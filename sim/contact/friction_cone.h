@@ -1,11 +1,11 @@
 #pragma once
 /// Coulomb's law of one contact as convex sets for projections:
-/// - the cone of its impulses, (p_t, p_k) within what p_n allows, for the exact solver, which finds p_n and
-///   friction together. It is round for isotropic friction, and a pyramid if each axis has its own limit;
-/// - the section of the cone at a given normal impulse, a disc or a rectangle, for solvers that relax first
-///   p_n and then friction;
-/// - the limits of spinning and rolling.
-/// The fast solver has the sections of eight patches in SIMD lanes (patch_friction.h).
+/// - the friction cone of the impulses (p_n, p_t, p_k), for the exact solver, which computes p_n and friction
+/// together. It is round for isotropic friction, and a pyramid if each axis has its own limit;
+/// - the section of the cone at a given normal impulse, a disc or a rectangle, for solvers that first compute
+/// p_n and then friction;
+/// - the limits of spinning and rolling. The fast solver has its own version for eight patches in SIMD lanes
+/// (patch_friction.h).
 
 #include <algorithm>
 #include <cmath>
@@ -36,18 +36,20 @@ struct ConeProjection {
   ConeRegion region;
 };
 
-/// Projects an impulse q = (n, t, k) [N s] on Coulomb's friction cone of a contact. The apex itself counts as
-/// inside, so that all contacts of a stack at rest close together, and not one after the other from the
-/// bottom up.
+/// Projects an impulse q = (n, t, k) [N s] onto Coulomb's friction cone of a contact. A point at the apex
+/// counts as inside the cone. Otherwise the contacts of a stack at rest would become active one after the
+/// other from the bottom up, not all at once.
 ConeProjection project_on_cone(const Contact& c, const Vec3& q);
 
 /// Derivative of the projection at a point q. It is symmetric, with eigenvalues between 0 and 1.
 Mat3 cone_derivative(const Contact& c, const Vec3& q, const ConeProjection& projection);
 
-/// Shift mu |u_t| of the normal velocity (De Saxce and Feng); for a pyramid mu_t |u_t| + mu_k |u_k|.
+/// Returns the term mu |u_t| that De Saxce and Feng add to the normal velocity [m/s]; for a pyramid, mu_t
+/// |u_t| + mu_k |u_k|. `u` is the relative velocity in the contact's frame.
 Real cone_lift(const Contact& c, const Vec3& u);
 
-/// The nearest allowed impulse to `p`, with tangential limits from the normal impulse `normal` >= 0.
+/// Projects an impulse `p` = (n, t, k) [N s]: its normal part is at least 0, and its tangential part is
+/// within the friction limits of the normal impulse `normal` >= 0.
 inline Vec3 project_on_section(const Contact& c, const Vec3& p, Real normal) {
   Vec3 q(std::max(p.x(), 0.0), p.y(), p.z());
   if (c.is_isotropic()) {
@@ -63,19 +65,19 @@ inline Vec3 project_on_section(const Contact& c, const Vec3& p, Real normal) {
 
 using Tangential = Eigen::Matrix<Real, 2, 1>;  ///< components along t and k
 
-/// A vector, shortened to a length of at most `limit` [>= 0].
+/// Returns a vector, scaled down to the length `limit` >= 0 if it is longer.
 template <class Vector>
 Vector shortened(const Vector& v, Real limit) {
   const Real length = v.norm();
   return length > limit ? Vector(limit / length * v) : v;
 }
 
-/// Greatest arm s for which sliding and spinning friction share one limit [m]. A longer arm belongs to
-/// surfaces that are nearly without friction; sliding and spinning then have separate limits.
+/// Greatest arm s for which sliding and spinning friction share one limit [m]. A longer arm occurs only at
+/// surfaces with very little sliding friction; sliding and spinning then have separate limits.
 inline constexpr Real kLongestSpinArm = 0.1;
 
-/// The arm s at which spinning counts as sliding [m]; 0 if sliding and spinning are limited separately: no
-/// spinning friction, or a friction axis.
+/// The arm s [m]: spinning at the angular velocity w counts as sliding at the velocity s w. Returns 0 if
+/// there is no spinning friction, or if sliding and spinning have separate limits.
 inline Real spin_arm(const Contact& c) {
   const bool is_common = c.is_isotropic() && c.spinning <= kLongestSpinArm * c.friction_t;
   return is_common && c.spinning > 0 ? c.spinning / c.friction_t : 0;

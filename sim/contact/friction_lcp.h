@@ -9,10 +9,10 @@
 namespace offstage::sim {
 
 /// Solves the problem of contact_problem.h from zero impulses, ignoring the contacts' guesses. It sets the
-/// contacts' impulses and adds their effect to the bodies' velocities. Isotropic contacts use the round cone:
-/// their tangents are aligned with the sliding between successive pivoting solutions, and Newton's method on
-/// the cone refines the result. If the residual exceeds rounding, projected Gauss-Seidel continues from that
-/// point.
+/// contacts' impulses and adds their effect to the bodies' velocities. Isotropic contacts have the round
+/// cone: between successive pivoting solutions their tangents are aligned with the direction of sliding, and
+/// Newton's method on the cone refines the result. If the residual exceeds rounding, projected Gauss-Seidel
+/// continues from the result.
 ContactWork solve_by_pivoting(std::span<ContactBody> bodies, std::span<Contact> contacts);
 
 }  // namespace offstage::sim

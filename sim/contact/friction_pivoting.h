@@ -12,13 +12,13 @@
 
 namespace offstage::sim {
 
-/// Contacts as a linear system on impulses: u = A p + b, three rows (n, t, k) for each contact, with the
-/// target normal velocities subtracted from b.
+/// Contacts as a linear system for the impulses: u = A p + b, with three rows (n, t, k) for each contact. The
+/// target normal velocities are subtracted from b.
 struct DenseContacts {
   Eigen::MatrixXd A;                      ///< J M^-1 J^T, symmetric, positive semidefinite [1/kg]
   Eigen::VectorXd b;                      ///< [m/s]
   std::vector<Eigen::Vector2d> friction;  ///< coefficients of friction of each contact, along t and along k
-  /// Dynamic friction: p_t = -mu p_n and p_k = 0 for any tangential velocities.
+  /// For each contact, whether it has dynamic friction: p_t = -mu p_n and p_k = 0 at any tangential velocity.
   std::vector<uint8_t> slides;
   /// Optional: excluded rows. Their normal impulse is fixed at 1, so that the limits of their tangents are
   /// constant. The rows and columns of these normals in A and b are zero.
@@ -34,8 +34,8 @@ struct PivotingResult {
   bool solved = true;
 };
 
-/// Computes the impulses from zero, with a separate limit for each tangent. Contacts are added in cyclic
-/// order beginning with `first`, because a different order may succeed where one fails.
+/// Computes the impulses p [N s], starting from zero, with a separate friction limit for each tangent.
+/// Contacts are added in cyclic order beginning with `first`; if one order fails, another may succeed.
 PivotingResult pivot(const DenseContacts& contacts, std::size_t first, Eigen::VectorXd& p);
 
 }  // namespace offstage::sim

@@ -9,7 +9,7 @@ namespace offstage::sim {
 struct CollisionSettings {
   Real time;             ///< time of the world at which the island collides [s]
   Real substep;          ///< length of the sub-step [s]
-  Real reach;            ///< contacts with a smaller separation belong to the cluster [m]
+  Real reach;            ///< contacts with a smaller separation take part in the collision [m]
   Real collision_speed;  ///< contacts that approach faster bounce [m/s]
   ImpactLaw law;
   bool whole;  ///< true: all contacts of the island; false: only those around the contacts that bounce
@@ -22,8 +22,8 @@ struct CollisionOutcome {
   const ContactPair* rough = nullptr;  ///< after a fall-back: the pair with the greatest error
 };
 
-/// Resolves the collisions among an island's pairs at its bodies' `start` states and changes the velocities
-/// there.
+/// Resolves the collisions of an island's pairs. Reads poses and velocities from Body::start, and changes the
+/// velocities in it.
 CollisionOutcome resolve_collisions(const Island& island, const CollisionSettings& settings);
 
 }  // namespace offstage::sim

@@ -19,7 +19,7 @@ bool has_forces(const Island& island);
 /// The joints of islands as part of a contact problem. Their bodies have the indices Body::row.
 class IslandJoints {
  public:
-  /// Whether springs are rows without bounds, or soft constraints.
+  /// How springs are represented: as rows without bounds, or as soft constraints.
   enum class Springs { rows, constraints };
   /// Collects the joints' constraints and rows for an interval.
   void collect(std::span<const Island* const> islands, const ContactInterval& interval, Springs springs);
@@ -28,23 +28,24 @@ class IslandJoints {
   /// Adds the impulses of a collision to the loads of the joints.
   void store_impact_impulses();
   JointProblem problem() { return {constraints_, bounded_, impulses_}; }
-  /// Stores the joints' impulses after the solution; they are also the next initial guess.
+  /// Stores the impulses of the solution in the joints, as loads over `duration` [s] and as the next initial
+  /// guess.
   void store_impulses(Real duration);
 
   std::span<Articulation* const> articulations() const { return articulations_; }
-  /// The fraction of the interval after which the impulses of an articulation act.
+  /// Fraction of the interval after which the impulses of an articulation are applied, from 0 to 1.
   Real acting_from(std::size_t articulation) const {
     const Articulation& a = *articulations_[articulation];
     return stops_[articulation].value_or(a.has_springs() ? a.kicks_act_from() : kMiddle);
   }
-  /// Whether all impulses act evenly throughout the interval and in the same directions: there are no limits
-  /// near, no springs, and no distance joints.
+  /// Whether all impulses act with constant force and direction throughout the interval. This requires that
+  /// no limit is near, and that there are no springs and no distance joints.
   bool act_throughout() const;
-  /// Removes the parts of the velocities at the interval's end that violate the constraints of the time when
-  /// a limit is reached: the joint forces that would have turned the velocities afterwards end with the
-  /// motion. Articulations that reach no limit are not changed.
+  /// Corrects the velocities at the interval's end of articulations that reach a limit. The components that
+  /// violate the constraints at the time when the limit is reached are removed. Other articulations are not
+  /// changed.
   void project(std::span<ContactBody> bodies, Real end) const;
-  /// For each articulation, the end of its rows among bounded().
+  /// For each articulation, the index in bounded() after its last row.
   std::span<const uint32_t> bounded_ends() const { return bounded_ends_; }
   std::span<const BoundedRow> bounded() const { return bounded_; }
   std::span<const BoundedOrigin> origins() const { return origins_; }

@@ -9,10 +9,10 @@
 
 namespace offstage::sim {
 
-/// Solves the joints (each as a block), the rows with bounds and the contacts one after the other, starting
-/// without impulses, until no velocity of a sweep changes by more than `tolerance` [m/s]. Where all targets
-/// are zero and no link is driven, each step dissipates kinetic energy; so any number of sweeps is safe.
-/// Returns the number of sweeps.
+/// Starts from zero impulses. A sweep solves the joints (each as a block), the rows with bounds and the
+/// contacts one after the other. Sweeps end when no velocity changes by more than `tolerance` [m/s], or after
+/// `max_sweeps`. If all targets are zero and no link is driven, each step dissipates kinetic energy, so that
+/// the result is safe after any number of sweeps. Returns the number of sweeps.
 uint32_t jointed_gauss_seidel(std::span<ContactBody> bodies, std::span<Contact> contacts,
                               const JointProblem& joints, uint32_t max_sweeps, Real tolerance);
 

@@ -46,46 +46,46 @@ struct PatchBatch {
     Lanes x, y, radius;   ///< coordinates along t and k, and distance from the centre [m]
     Lanes mass;           ///< effective mass [kg], 0 in lanes without this point
     Lanes start;          ///< separation at the start of the step [m]
-    Lanes impulse, mean;  ///< impulse of a sub-step, and its mean over the time before [N s]
-    Lanes before;         ///< sum over previous sub-steps [N s]
+    Lanes impulse, mean;  ///< impulse of a sub-step, and its moving average over previous sub-steps [N s]
+    Lanes before;         ///< sum of the impulses of previous sub-steps [N s]
     Lanes shift;  ///< mass times the displacement due to these: during sub-steps [N s], at the end [kg m]
     Lanes push;   ///< part of `shift` that removed penetration [kg m]
   };
 
-  Index a, b, patch;  ///< in unused lanes: the body beyond the last, and kNone
+  Index a, b, patch;  ///< indices; in unused lanes, bodies.size() for a and b, kNone for patch
   std::array<bool, ContactColoring::kLanes> moves_a, moves_b;
   uint32_t count;   ///< greatest number of points in a lane
   float tolerance;  ///< tolerance of the next sweep's rounds [m/s]
-  bool alone;       ///< whether sweeps of other patches do not correct errors of this batch; see prepare()
+  bool alone;       ///< whether no other patch corrects remaining errors; see prepare()
   Vector n, t, k, arm_a, arm_b;
   Lanes inverse_mass_a, inverse_mass_b;
   Symmetric inverse_inertia_a, inverse_inertia_b;
-  /// Twist due to a unit wrench: within the normal group, within the friction group, and of the friction
-  /// group due to the normal group's wrench.
+  /// Mobilities, the twist per unit wrench: within the normal group, within the friction group, and
+  /// (coupling) the twist of the friction group per wrench of the normal group.
   Symmetric normal_mobility, friction_mobility;
   LaneMatrix<Lanes> coupling;
   /// The inverse of friction_mobility. For patches of one point, which have no torque, the inverse of the
   /// part along t and k, and in zz the reciprocal of a bound on its eigenvalues.
   Symmetric friction_stiffness;
   PatchGroups approach;  ///< twist due to the velocities at the start, conveyors included
-  Lanes conveyed;        ///< the part of it along n due to conveyors [m/s]
+  Lanes conveyed;        ///< component of `approach` along n due to conveyors [m/s]
   Lanes friction_t, friction_k;
   bool resists_turning;                  ///< whether a lane has rolling or spinning friction
   Lanes rolling;                         ///< radius of the disc of rolling friction per normal impulse [m]
-  Lanes spin_arm;                        ///< spinning friction over the coefficient of friction [m]
+  Lanes spin_arm;                        ///< spinning friction divided by the coefficient of friction [m]
   Vector rolling_impulse;                ///< about t and k in y and z, like the normal group; x is 0 [N m s]
   Vector rolling_before, rolling_shift;  ///< rolling friction, as Point::before and Point::shift
   /// Friction along t and k, and about n; for the meanings see Point.
   Vector friction_impulse, friction_mean, friction_before, friction_shift;
   /// Sum of the normal impulses with which the friction was computed, if the patch slides; else 0 [N s].
   Lanes pressure;
-  Lanes holds;     ///< all bits set where friction was well within its limit in the last sweep, else 0
-  Lanes renewal;   ///< fraction of the difference by which means follow their impulses
-  Lanes residual;  ///< change of the velocity of the centre in the last sweep [m/s]
+  Lanes holds;     ///< mask: all bits set if friction was well below its limit in the last sweep
+  Lanes renewal;   ///< weight of the new impulse in the moving averages, per sub-step
+  Lanes residual;  ///< change of the velocity of the patch's centre in the last sweep [m/s]
   bool turns;      ///< whether `gain` is used
   std::array<Point, 4> points;
-  PatchGroups gain;  ///< gain of the approach due to turning arms and frames, see ContactPatch
-  Vector bow;        ///< bow of the centre along n, t, k, see ContactPatch
+  PatchGroups gain;  ///< ContactPatch::gain, including gain_along_t and gain_along_k
+  Vector bow;        ///< ContactPatch::bow, along n, t, k
 };
 
 /// The times of a sub-step within a step.
@@ -93,28 +93,28 @@ struct SubstepTime {
   Real substep;   ///< length of the sub-step [s]
   Real elapsed;   ///< time from the step's start to the beginning of the sub-step [s]
   Real duration;  ///< length of the step [s]
-  /// Factors of `gain` and `bow` at its end, see ContactPatch: s at that time, and the sums of s and of s^2
-  /// over previous sub-steps, times their length [s].
+  /// Factors of `gain` and `bow` (see ContactPatch): s at the end of the sub-step, and the sums of s and of
+  /// s^2 over previous sub-steps, multiplied by the length of a sub-step [s].
   float s, s_sum, s2_sum;
 
   SubstepTime(Real substep_, uint32_t index, Real duration_);
 };
 
 /// Fills a batch and applies the impulses of the patches' initial forces over `substep` [s] to the bodies.
-/// There is one more motion than bodies, for unused lanes. `alone`: sweeps of other patches do not correct
-/// what the rounds of a patch leave, because a body of the batch touches only bodies that contacts do not
-/// move.
+/// `motions` has one element more than `bodies`, for unused lanes. `alone`: no other patch corrects the
+/// errors that remain after solving this batch, because one of its bodies touches only bodies that contacts
+/// do not move.
 void prepare(PatchBatch& batch, const PatchBatch::Index& patches, std::span<const ContactPatch> all,
              std::span<const RelaxedBody> bodies, std::span<BodyMotion> motions, Real substep, bool alone);
 
-/// Ends a sub-step; the next one starts with its impulses.
+/// Ends a sub-step. The next sub-step starts from the same impulses.
 void begin_substep(PatchBatch& batch);
 
-/// Solves each patch once, for velocities. The approach at an open gap is limited to the speed that closes
-/// the gap in the sub-step.
+/// Solves each patch of the batch once and updates the velocities in `motions`. At an open gap the approach
+/// is limited to the speed that closes the gap within the sub-step.
 void sweep(PatchBatch& batch, std::span<BodyMotion> motions, const SubstepTime& time);
 
-/// Ends the sub-steps, before push-out begins. From now on Point::shift is mass times displacement.
+/// Ends the sub-steps, before push-out begins. Converts Point::shift to mass times displacement [kg m].
 void end_substeps(PatchBatch& batch, Real substep);
 
 /// Parameters of the removal of penetration.
@@ -123,12 +123,13 @@ struct PushOut {
   Real fraction;     ///< fraction of the depth that one sweep removes
   Real limit;        ///< greatest displacement by push-out in a step [m]
 };
-/// Separates overlapping bodies by moving them without changing their velocities. Where previous push-out
-/// opened a gap, it is undone as far as necessary. Returns for each lane the greatest displacement that was
-/// needed [m].
+/// Separates overlapping bodies by moving them without changing their velocities. If an earlier call opened a
+/// gap, its displacement is undone as far as necessary. Returns, for each lane, the greatest displacement
+/// that a point required, before limits [m].
 FloatLanes push_out(PatchBatch& batch, std::span<BodyMotion> motions, const PushOut& push);
 
-/// Writes the forces to the patches.
+/// Writes the forces and impulses of the step to the patches (the members of ContactPatch marked as out).
+/// `substep`: length of a sub-step [s].
 void report(const PatchBatch& batch, std::span<ContactPatch> patches, Real substep);
 
 }  // namespace offstage::sim

@@ -12,7 +12,7 @@ namespace offstage::sim {
 using PatchVector = PatchBatch::Vector;
 using PatchSymmetric = PatchBatch::Symmetric;
 
-/// Lower bound of the sliding speed of points [m/s].
+/// Smaller sliding speeds of points are replaced by this one, to avoid division by zero [m/s].
 inline constexpr float kSlowestSliding = 1e-6F;
 
 /// Sum of a patch's normal impulses.
@@ -22,8 +22,8 @@ inline FloatLanes pressure(const PatchBatch& p) {
   return sum;
 }
 
-/// Coulomb's limits of the impulses along t and k, and of the angular impulse about n. The latter assumes
-/// that every point's friction is perpendicular to its arm from the centre.
+/// Coulomb's limits of the impulses along t and k [N s], and of the angular impulse about n [N m s]. The
+/// latter assumes that every point's friction is perpendicular to its arm from the centre.
 inline PatchVector friction_limits(const PatchBatch& p) {
   FloatLanes force{}, moment{};
   for (uint32_t i = 0; i < p.count; ++i) {
@@ -34,8 +34,8 @@ inline PatchVector friction_limits(const PatchBatch& p) {
   return {p.friction_t * force, p.friction_k * force, lane_min(p.friction_t, p.friction_k) * moment};
 }
 
-/// Impulses along t and k, projected on the limits: a disc if the coefficients of both axes are equal,
-/// otherwise a rectangle.
+/// Projects impulses along t and k onto the friction limits: a disc if the coefficients of both axes are
+/// equal, otherwise a rectangle.
 inline std::pair<FloatLanes, FloatLanes> projected(const PatchBatch& p, FloatLanes t, FloatLanes k,
                                                    const PatchVector& limits) {
   const FloatLanes size = lane_sqrt(t * t + k * k);
@@ -44,9 +44,10 @@ inline std::pair<FloatLanes, FloatLanes> projected(const PatchBatch& p, FloatLan
   return {round ? scale * t : lane_clamp(t, limits.x), round ? scale * k : lane_clamp(k, limits.y)};
 }
 
-/// The impulses of a patch of one point, along t and k, from the velocities u: those that stop the sliding if
-/// they are within the limits. Otherwise it is a projected gradient step: a step against the velocity, short
-/// enough for convergence, projected on the limits. Its fixed point opposes the sliding exactly.
+/// Returns the friction impulses along t and k of a patch with a single point, for the relative velocity u.
+/// If the impulses that stop the sliding are within the limits, they are the result. Otherwise the result is
+/// a projected gradient step: a step against the velocity, short enough for convergence, projected onto the
+/// limits. At its fixed point friction is exactly opposite to the sliding velocity.
 inline PatchVector coulomb_impulse(const PatchBatch& p, const PatchVector& u, const PatchVector& limits) {
   const PatchSymmetric& S = p.friction_stiffness;
   const PatchVector& old = p.friction_impulse;
@@ -70,8 +71,8 @@ inline PatchVector solution_of(const PatchSymmetric& A, const PatchVector& b) {
   return {first * b.x - y_x * y - z_x * z, y, z};
 }
 
-/// Friction of a patch with sliding and spinning treated separately: first against the sliding up to its
-/// limit, then against the spin.
+/// Returns the friction impulses of a patch with separate limits for sliding and spinning: first against
+/// sliding, then against spinning.
 inline PatchVector separate_impulse(const PatchBatch& p, const PatchVector& u, const PatchVector& limits) {
   const PatchSymmetric& K = p.friction_mobility;
   const PatchVector& old = p.friction_impulse;
@@ -83,10 +84,11 @@ inline PatchVector separate_impulse(const PatchBatch& p, const PatchVector& u, c
 
 /// Friction of a patch that slides or spins with the relative `twist`. Each point has Coulomb friction
 /// against its own velocity, so sliding reduces the friction against spin and vice versa. The friction of a
-/// point is linearized as viscous with the coefficient limit / speed, which gives one linear system per
-/// patch. The speeds are those after separate_impulse(), which is exact without spin. `kIsotropic`:
+/// point is linearized as viscous friction with the coefficient limit / speed, which gives one linear system
+/// per patch. The speeds are the ones after separate_impulse(), which is exact without spin. `kIsotropic`:
 /// friction_t equals friction_k in all lanes, which takes fewer operations. `kSpins`: points have spinning
-/// friction, which is sliding at the distance spin_arm; with a friction axis it has a limit of its own.
+/// friction, treated as sliding at the distance spin_arm. With a friction axis, spinning has a separate
+/// limit.
 template <bool kIsotropic, bool kSpins>
 PatchVector sliding_impulse(const PatchBatch& p, const PatchVector& twist, const PatchVector& limits) {
   std::array<FloatLanes, 4> viscous_t, viscous_k, viscous_n;

@@ -36,11 +36,11 @@ namespace offstage::sim {
 /// Keep one object per island between steps: the factored matrix of nearly the same contacts is reused.
 class ProximalNewton {
  public:
-  /// Solves to a residual of 1e-7 of the velocities (1e-11 m/s at least), or of up to 1e-3 where it converges
-  /// slowly; `residual` of the result says so. Starts from the contacts' impulses,
-  /// which the bodies' velocities must not contain yet. If the bounded iterations do not converge, projected
-  /// Gauss-Seidel continues from their result. If the cost would exceed `budget` [ns, as cost()], there is no
-  /// result and nothing is changed.
+  /// Solves until the residual is at most 1e-7 of the velocities (at least 1e-11 m/s). If convergence is
+  /// slow, a residual of up to 1e-3 of the velocities is accepted; see ContactWork::residual. Starts from the
+  /// contacts' impulses, whose effect must not yet be included in the velocities of the bodies. If the
+  /// iterations reach their limit, projected Gauss-Seidel continues from the last iterate. If the cost would
+  /// exceed `budget` [ns, see cost()], returns no result and changes nothing.
   std::optional<ContactWork> solve(std::span<ContactBody> bodies, std::span<Contact> contacts,
                                    const JointProblem& joints = {},
                                    Real budget = std::numeric_limits<Real>::infinity());
@@ -67,7 +67,8 @@ class ProximalNewton {
     Real spin_limit = 0, roll_limit = 0;
     Real spin_scale() const { return arm > 0 ? arm : 1; }
   };
-  /// A row with bounds: q, p(v), and whether p(v) is within the bounds.
+  /// A row with bounds. `multiplier` is q, `impulse` is p(v), and `is_free`: whether no bound was applied to
+  /// p(v).
   struct Bounded {
     Real multiplier, impulse, rho;
     uint32_t a, b, pair;

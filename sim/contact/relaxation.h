@@ -2,8 +2,8 @@
 /// The fast contact solver (physics N12): time stepping on velocities (Stewart and Trinkle, "An implicit
 /// time-stepping scheme for rigid body dynamics with inelastic collisions and Coulomb friction", 1996) in
 /// many small sub-steps of one sweep of Gauss-Seidel each (Macklin et al., "Small steps in physics
-/// simulation", 2019). Penetration is removed at the end of the step by moving the bodies, in a sweep that is
-/// repeated where displacements are large; this does not affect velocities.
+/// simulation", 2019). At the end of the step, penetration is removed by moving the bodies in one more sweep,
+/// which is repeated where displacements are large. This does not change velocities.
 ///
 /// One sweep leaves an error, which acts on the next sub-step as a change of velocity. The forces of a tall
 /// stack therefore behave like the springs of a spurious oscillator: a mode whose error a sweep reduces by
@@ -12,10 +12,10 @@
 /// damping. Forces at rest equal their mean, and errors that one sweep can remove are removed again, so
 /// neither is changed by this.
 ///
-/// The unit of the solution is the patch, the up to four points of a manifold together. The bodies' relative
-/// twist has six components, the impulses form a wrench of six components, and a symmetric 6 x 6 matrix,
-/// computed once per step, relates the two. All points of a patch are solved in these terms. Eight patches
-/// that share no body are solved at once, one per SIMD lane, colour by colour of the contact graph.
+/// The points of a manifold, at most four, are solved together as a patch. The bodies' relative twist has six
+/// components, the impulses form a wrench of six components, and a symmetric 6 x 6 matrix, computed once per
+/// step, relates the two. All points of a patch are solved in these terms. Eight patches that share no body
+/// are solved at once, one per SIMD lane, colour by colour of the contact graph.
 
 #include <array>
 #include <cstdint>
@@ -65,43 +65,46 @@ struct ContactPatch {
     Real t = 0, k = 0;    ///< coordinates along the tangents, from the patch's centre [m]
     Real separation = 0;  ///< separation at the start of the step, negative in penetration [m]
     Real force = 0;  ///< normal force [N]; in: the guess from the last step; out: at the end of this step
-    Real mean_force = 0;  ///< mean over the time before [N]; in: from the last step, out: updated
-    Real impulse = 0;     ///< out: impulse over the whole step [N s]
-    Real shift = 0;       ///< out: mass times the displacement by this point in the step [kg m]
+    Real mean_force =
+        0;             ///< moving average over previous sub-steps [N]; in: from the last step, out: updated
+    Real impulse = 0;  ///< out: impulse over the whole step [N s]
+    Real shift = 0;  ///< out: effective mass times the displacement that this point causes in the step [kg m]
   };
   uint32_t a = 0, b = 0;  ///< indices of bodies; at least one is movable
   ContactFrame frame;     ///< n from b to a
   /// Vectors from the centres of mass to the patch's centre [m].
   Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();
-  Vec3 offset = Vec3::Zero();  ///< (n, t, k), added to the relative velocity, for moving surfaces [m/s]
+  Vec3 offset = Vec3::Zero();  ///< (n, t, k), added to the relative velocity: effect of moving surfaces [m/s]
   /// Change of the relative velocity at the centre due to turning arms and frames, in (n, t, k): gain s + bow
   /// s^2, where s increases linearly from -1 at the step's start to 1 at its end [m/s]. The normal velocity
   /// also changes by gain_along_t s and gain_along_k s per metre along t and k [1/s].
   Vec3 gain = Vec3::Zero(), bow = Vec3::Zero();
   Real gain_along_t = 0, gain_along_k = 0;
   bool turns = false;  ///< whether any gain differs from 0
-  /// Coulomb's coefficients. If they are equal, friction has the round cone; otherwise each axis has its own
-  /// limit.
+  /// Coulomb's coefficients along t and k. If they are equal, friction has the round cone; otherwise each
+  /// axis has its own limit.
   Real friction_t = 0, friction_k = 0;
   uint32_t count = 0;
   std::array<Point, 4> points;
   /// Friction of all points together: tangential [N] and about the normal [N m]; in and out like
   /// Point::force.
   Real force_t = 0, force_k = 0, torque_n = 0;
-  Vec3 mean_friction = Vec3::Zero();  ///< the mean of these, like Point::mean_force
+  Vec3 mean_friction =
+      Vec3::Zero();  ///< moving average of (force_t, force_k, torque_n), like Point::mean_force
   /// Impulses of friction over the whole step, in the order of mean_friction; see Point::impulse.
   Vec3 friction_impulse = Vec3::Zero();
   /// Effect of friction on positions, in the order of mean_friction; see Point::shift.
   Vec3 friction_shift = Vec3::Zero();
   Real rolling = 0, spinning = 0;  ///< rolling and spinning friction [m]; see Contact
-  /// Rolling friction: angular impulse about t and k, like Point::impulse [N m s], and its Point::shift.
+  /// Out: angular impulse of rolling friction about t and k over the step [N m s], and its effect on
+  /// positions; see Point::impulse and Point::shift.
   Tangential rolling_impulse = Tangential::Zero(), rolling_shift = Tangential::Zero();
 };
 
-/// Sets the points of a patch from a manifold, in the manifold's order. Manifold and frame are in world axes,
-/// and the frame's n is the manifold's normal. `centre_a` and `centre_b` are the bodies' centres of mass. The
-/// patch's centre is the centre of all points or, if `at_deepest`, the deepest point. Returns the separation
-/// of the surfaces at the patch's centre [m].
+/// Sets the points, centre and arms of a patch from a manifold. The points keep their order. Manifold and
+/// frame are in world axes, and the frame's n must be the manifold's normal. `centre_a` and `centre_b` are
+/// the bodies' centres of mass. The patch's centre is the centre of all points or, if `at_deepest`, the
+/// deepest point. Returns the separation of the surfaces at the patch's centre [m].
 Real set_points(ContactPatch& patch, const Manifold& m, const ContactFrame& frame, const Vec3& centre_a,
                 const Vec3& centre_b, bool at_deepest = false);
 
@@ -114,12 +117,12 @@ struct RelaxationDef {
   uint32_t substeps = 8;      ///< > 0
 };
 
-/// The fast solver. An object keeps only its memory between steps, no state.
+/// The fast solver. Between steps an object keeps allocated memory, but no state.
 class RelaxationSolver {
  public:
-  /// Solves the contacts of a step and updates bodies and patches. Penetration is removed gradually; where a
-  /// gap is open, the bodies may approach until it is closed. The result depends on the arguments and their
-  /// order alone, not on threads; oneTBB is used if there is enough work.
+  /// Solves the contacts of a step and updates bodies and patches. Penetration is removed gradually. Where a
+  /// gap is open, the bodies may approach until it is closed. The result depends only on the arguments and
+  /// their order, not on the number of threads. `joints` may be null.
   ContactWork solve(std::span<RelaxedBody> bodies, std::span<ContactPatch> patches, const RelaxationDef& def,
                     RelaxedJoints* joints = nullptr);
 
@@ -142,7 +145,7 @@ class RelaxationSolver {
     finish,
     report
   };
-  /// The blocks of a range may run in any order and at the same time.
+  /// A range of work items that is split into blocks. The blocks may run in any order and in parallel.
   struct Range {
     Stage stage;
     uint32_t begin, end, block_size;

@@ -1,8 +1,8 @@
 #pragma once
-/// Joints in the sub-steps of the fast solver. After the contacts' sweep, the sparse system of each
-/// articulation satisfies all its constraints at once, so neither long chains nor large mass ratios stretch
-/// it. Springs take part in it as soft constraints. Rows with bounds are then solved one after the other,
-/// each using the response of the whole articulation to its impulse.
+/// Joints in the sub-steps of the fast solver. After the sweep over the contacts, one sparse linear system
+/// per articulation satisfies all its constraints at once, so that long chains and large mass ratios do not
+/// stretch joints. Springs are soft constraints of this system. Rows with bounds are then solved one after
+/// the other; the effect of each impulse on the whole articulation is taken into account.
 
 #include <span>
 #include <vector>
@@ -15,13 +15,13 @@ namespace offstage::sim {
 
 struct RelaxedBody;
 
-/// A contact point of a link. The contacts' sweeps see the mass of the link alone, so that a light link would
-/// be pushed into an obstacle by the heavy bodies that it carries. A point that still approaches after the
-/// joints were solved is stopped by an impulse on the whole articulation.
+/// A contact point of a link, solved with the joints. The sweeps over the contacts use only the mass of the
+/// link itself; a light link would then be pushed into an obstacle by heavy bodies that it supports. If the
+/// point still approaches after the joints were solved, an impulse on the whole articulation stops it.
 struct LinkContact {
   uint32_t part;          ///< index of the articulation
   uint32_t patch, point;  ///< indices of the contact
-  BoundedRow row;         ///< the normal velocity; out: its impulse in the whole step
+  BoundedRow row;         ///< row for the normal velocity; out: impulse over the whole step
   Real separation;        ///< separation at the start of the step [m]
 };
 
@@ -32,24 +32,24 @@ class RelaxedJoints {
   RelaxedJoints(const JointProblem& problem, std::span<Articulation* const> articulations,
                 std::span<const uint32_t> bounded_ends, std::span<LinkContact> contacts);
 
-  /// Number of parts of solve(). They are solved in order, since contacts connect them to other bodies.
+  /// Number of parts, one per articulation. Parts must be solved in order, because contacts may connect them.
   uint32_t count() const { return static_cast<uint32_t>(parts_.size()); }
 
   void begin(std::span<const RelaxedBody> bodies, Real duration, uint32_t substeps);
-  /// Begins the first sub-step with the impulses of the last step.
+  /// Applies the impulses of the last step as the initial guess, before the first sub-step.
   void start(uint32_t part, std::span<BodyMotion> motions);
-  /// Solves a part at the end of a sub-step, `elapsed` after the start.
+  /// Solves a part at the end of a sub-step. `elapsed`: time since the start of the step [s].
   void solve(uint32_t part, std::span<BodyMotion> motions, Real elapsed, bool is_last);
   /// Stores the displacements of the links. To be called before overlaps are removed by moving bodies.
   void begin_push(uint32_t part, std::span<const BodyMotion> motions);
-  /// Moves the links of a part so that the displacements since begin_push() agree with the joints. Returns
-  /// the greatest one [m]. Without this, joints would pull bodies back into the overlap at the end of each
-  /// step.
+  /// Moves the links of a part so that the displacements since begin_push() satisfy the joints. Returns the
+  /// greatest displacement of this call [m]. Without this, joints would pull bodies back into the overlap at
+  /// the end of each step.
   Real push_out(uint32_t part, std::span<BodyMotion> motions);
-  /// The links' bodies of a part.
+  /// Indices of the bodies of a part.
   std::span<const uint32_t> bodies(uint32_t part) const { return parts_[part].bodies; }
-  /// Adds the effect of the joints in the step to the bodies, in double precision. `late` is, by body, the
-  /// time by which the displacement by the sub-steps is too large per change of velocity [s].
+  /// Adds the effect of the joints in the step to the bodies, in double precision. `late`: for each body, the
+  /// excess displacement by the sub-steps per change of velocity [s], which is corrected.
   void add_motion(std::span<RelaxedBody> bodies, std::span<const Real> late) const;
   /// Writes the impulses of the whole step to the problem and the contacts.
   void finish();

@@ -9,8 +9,8 @@
 
 namespace offstage::sim {
 
-/// Up to this number of bodies, every solver is fast: in an island, the exact one is always used; in a world,
-/// each collision is resolved at its own time.
+/// Up to this number of bodies, every solver is cheap. Islands of this size always use the exact solver. In
+/// worlds of this size, each collision is resolved at its own time.
 inline constexpr std::size_t kFewBodies = 6;
 
 /// Budget of the exact solver beyond the cost of the fast one, for all islands of a world. A collapsing heap
@@ -21,7 +21,7 @@ class ExactSolverBudget {
   void begin(std::span<Island* const> islands, Real duration);
   /// Records the excess cost of an attempt on an island [ns].
   void spend(Real cost) { debt_ += cost; }
-  /// Remaining fraction of the credit, from 0 to 1.
+  /// Remaining fraction of the budget, from 0 to 1.
   Real left() const { return left_; }
   /// Whether the world is so small that every solver is fast.
   bool is_small() const { return small_; }
@@ -31,9 +31,9 @@ class ExactSolverBudget {
   bool small_ = true;
 };
 
-/// Chooses the exact or the fast solver for an island, judged by the exact solver's cost on similar islands
-/// before. Costs are computed from counted operations and their times on a machine of 2020 [ns], so that the
-/// choice is deterministic.
+/// Chooses the exact or the fast solver for an island, based on the cost of previous attempts with the exact
+/// solver. Costs [ns] are estimated from the number of operations and typical times per operation on a
+/// computer of 2020, so that the choice is deterministic.
 class SolverChoice {
  public:
   /// Returns whether to try the exact solver in this sub-step.

@@ -1,5 +1,6 @@
 #pragma once
-/// Disjoint sets of the numbers below a count. The representative of a set is its smallest member.
+/// Disjoint sets (union-find) of the numbers from 0 to `count` - 1. The representative of a set, which find()
+/// returns, is its smallest member.
 
 #include <algorithm>
 #include <cstdint>

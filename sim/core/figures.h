@@ -1,6 +1,6 @@
 #pragma once
-/// Figures of reports. A struct lists its figures once, each with its name and the rule by which it adds over
-/// steps; adding and printing follow from the list:
+/// Figures: the numbers of a statistics report. A struct lists its figures once, each with a name and the
+/// rule by which several steps are combined. Addition and output are generated from this list:
 ///
 ///   struct Work {
 ///     uint64_t solves = 0;  ///< number of problems
@@ -11,7 +11,8 @@
 ///     }
 ///   };
 ///
-/// A figure may be such a struct itself. If its name is empty, its figures stand among those of the whole.
+/// A figure may be such a struct itself. If its name is empty, its figures are listed directly among those of
+/// the outer struct.
 
 #include <algorithm>
 #include <cstdint>
@@ -45,7 +46,8 @@ void for_each_figure(const Part& part, Visit&& visit) {
   std::apply([&](const auto&... figure) { (visit(figure.name, part.*figure.member), ...); }, Part::figures());
 }
 
-/// Whether the list of a struct has all of its members. Padding is less than the alignment.
+/// Whether the list of a struct has all of its members, judged by the sum of their sizes. Padding is less
+/// than the alignment.
 template <HasFigures Part>
 constexpr bool lists_all_members() {
   constexpr std::size_t kListed = std::apply(

@@ -1,5 +1,5 @@
 #pragma once
-/// Prefetching: data that are read in no regular order are fetched into the cache while other work continues.
+/// Prefetching: loads data with an irregular access pattern into the cache while other work continues.
 
 #include <cstddef>
 

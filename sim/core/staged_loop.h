@@ -22,14 +22,14 @@ inline uint32_t available_threads() {
                   static_cast<uint32_t>(std::max(1, tbb::this_task_arena::max_concurrency())));
 }
 
-/// The part of a stage's blocks with which one thread begins. Other threads take blocks from this part when
-/// their own parts are used up. One counter serves all stages, because they come in order, and the whole
-/// shared state is in one cache line: besides the work of the blocks, passing that line between cores is the
-/// only cost of a stage.
+/// The share of a stage's blocks that one thread processes first. Other threads take blocks from it when
+/// their own shares are finished. Stages are processed in order, so one counter is sufficient for all of
+/// them. The whole shared state is in one cache line; transferring this line between cores is the only
+/// overhead of a stage.
 class alignas(64) BlockShare {
  public:
-  /// Takes one block. Returns how many of the `count` blocks of a stage were taken before, or `count` if none
-  /// is left or the stage is over.
+  /// Takes one block of a stage. Returns its index in this share, from 0 to `count` - 1, or `count` if no
+  /// block is left.
   uint32_t take(uint32_t stage, uint32_t count) {
     uint64_t now = state_.load(std::memory_order_relaxed);
     while (true) {

@@ -31,7 +31,8 @@ inline Mat3 cross_matrix(const Vec3& v) {
   return m;
 }
 
-/// Velocity of the point at `arm` from a body's centre of mass due to a unit impulse there [1/kg].
+/// Returns the mobility of the point at `arm` from a body's centre of mass [1/kg]: its change of velocity per
+/// unit of impulse there, world axes.
 inline Mat3 point_mobility(Real inverse_mass, const Mat3& inverse_inertia, const Vec3& arm) {
   const Mat3 cross = cross_matrix(arm);
   return inverse_mass * Mat3::Identity() - cross * inverse_inertia * cross;

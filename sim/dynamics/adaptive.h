@@ -1,8 +1,8 @@
 #pragma once
 /// Adaptive integration (physics N5): the given time is divided into steps whose error is kept below a
 /// target, by step doubling or by an embedded pair. A step whose error is too large is undone and repeated
-/// with a shorter length. The error is measured in the coordinates: the error of x in the step, or the error
-/// that the rates would cause in x over the whole integration time.
+/// with a shorter length. The error is measured in the coordinates: the error of x itself, and the error in x
+/// that the error of the rates p would cause over the whole given time.
 
 #include "sim/dynamics/integrator.h"
 
@@ -17,7 +17,7 @@ class AdaptiveIntegrator : public Integrator {
             IntegratorWorkspace& work) const final;
 
  protected:
-  /// `error_order`: the error of a step of length h falls as h^error_order.
+  /// `error_order`: the error of a step of length h is proportional to h^error_order.
   explicit AdaptiveIntegrator(int error_order) : error_order_(error_order) {}
 
   /// Prepares for the attempts; called before the first one.
@@ -50,7 +50,7 @@ class StepDoubling final : public AdaptiveIntegrator {
 };
 
 /// The embedded pair of orders 5 and 4 by Dormand and Prince ("A family of embedded Runge-Kutta formulae",
-/// 1980). The result is that of order 5, and the last stage of a step is the first of the next.
+/// 1980). The result has order 5. The last stage of a step is reused as the first stage of the next.
 class DormandPrince final : public AdaptiveIntegrator {
  public:
   DormandPrince() : AdaptiveIntegrator(5) {}

@@ -1,5 +1,5 @@
 #pragma once
-/// A body of the world: its model, which is constant, its state, and its data of the current sub-step.
+/// A body of the world: its constant model, its state, and its data for the current sub-step.
 
 #include <optional>
 #include <vector>
@@ -16,7 +16,8 @@
 
 namespace offstage::sim {
 
-/// The motion of the contacts of a body is predicted if it turns by less than this in a sub-step [rad].
+/// contact_motion() predicts the contacts of a body only if it turns by less than this angle in a sub-step
+/// [rad].
 inline constexpr Real kMostPredictedTurn = 1;
 
 /// The definition of a body, constant from World::add_body() on. `solid` has pointers into the body and to
@@ -26,9 +27,10 @@ struct BodyModel {
   BodyDef def;
   Solid solid;
 
-  /// Created on first use, because a mesh may have to be decomposed for it.
+  /// Shape for collision detection. It is created at the first call, which may have to decompose a mesh.
   const CollisionShape& collision_shape();
-  /// The shape of a mesh by its triangles, for the impacts of two meshes.
+  /// Shape that consists of the triangles of the mesh, for impacts between two meshes. It is created at the
+  /// first call.
   const CollisionShape& triangle_shape();
 
  private:
@@ -41,7 +43,7 @@ struct BodyModel {
   Real extent = 0;       // reach() of the solid; infinite for a plane
 };
 
-/// Data by which a body falls asleep and wakes.
+/// Data that decides when a body falls asleep and wakes.
 struct SleepMemory {
   Real quiet_time = 0;  // how long the body has been almost at rest [s]
   // While it is asleep:
@@ -123,23 +125,26 @@ struct Body : BodyModel {
     body.set_state(start);
     return body;
   }
-  /// The orientation whose inertia turns the contact and joint impulses of the interval into velocities.
-  /// `duration` is the length of the interval and `substep` that of the sub-step of which it is a part [s].
+  /// Returns the orientation at which the inertia is evaluated to convert contact and joint impulses of the
+  /// interval into velocities. `duration`: length of the interval [s]; `substep`: length of the sub-step that
+  /// contains it [s].
   ///
-  /// For compact bodies it is that of the interval's end, so that velocities and momenta agree there. For
-  /// thin bodies it belongs to the time at which the impulses act: the middle, as contact_motion() predicts
-  /// it, or the start if the contacts of the body are not predicted. Then the terms that the solvers leave
-  /// out, I^-1 (dw x I w + w x I dw) h / 2, are at most h |w| |dw|, whereas the impulse on a thin rod would
-  /// spin it about its axis at the end, by a speed that grows with the ratio of its moments of inertia.
+  /// For compact bodies it is the orientation at the interval's end, so that velocities and momenta agree
+  /// there. For thin bodies it is the orientation at the time at which the impulses act: in the middle, or at
+  /// the start if contact_motion() does not predict the contacts of the body. The terms that the solvers
+  /// neglect, I^-1 (dw x I w + w x I dw) h / 2, are then at most h |w| |dw|. With the orientation at the end,
+  /// an impulse on a thin rod would make it spin about its axis, with a speed proportional to the ratio of
+  /// its moments of inertia.
   Quat impulse_orientation(Real duration, Real substep) const;
   /// Path from the interval's start to the current pose.
   PosePath path() const { return {start_pose, pose}; }
-  /// Pose at a time of a sub-step of length h, not before the interval's start.
+  /// Pose at a time since the start of a sub-step of length h [s]. Times before the interval's start give the
+  /// pose at its start.
   Pose placed_at(Real time, Real h) const {
     if (time <= from || !can_move()) return start_pose;
     return path().at((time - from) / (h - from));
   }
-  /// Velocity at the interval's start of the material point at this place of the world.
+  /// Velocity of the body's material point at `place` (world) at the interval's start [m/s].
   Vec3 start_velocity(const Vec3& place) const {
     if (is_awake()) return start_twist.at(place - start.position);
     return is_kinematic() ? drive.at(place - pose.position) : Vec3(Vec3::Zero());
@@ -153,8 +158,8 @@ struct Body : BodyModel {
   }
 };
 
-/// Calls work(i) for each body i, in parallel as for_each_index() does. The memory of each body's interval is
-/// prefetched, because bodies are far apart in memory.
+/// Calls work(i) for each body i in parallel, like for_each_index(). Prefetches the data of each body's
+/// interval, because bodies are scattered in memory.
 template <class Work>
 void for_each_interval(std::span<Body* const> bodies, Work&& work) {
   constexpr std::size_t kAhead = 3;

@@ -34,8 +34,8 @@ struct BodyDef {
   /// Centre of mass in the body's frame [m]; default: the shape's centre of mass.
   std::optional<Vec3> centre = {};
   /// Inertia about the centre of mass, axes of the body's frame [kg m^2]: symmetric, and each principal
-  /// moment at most the sum of the other two. Default: that of the shape about its own centre, scaled to the
-  /// mass.
+  /// moment at most the sum of the other two. Default: the inertia of the shape about its own centre of mass,
+  /// scaled to the mass.
   std::optional<Mat3> inertia = {};
   Real linear_drag = 0;   ///< k_v of F = -k_v v [kg/s]
   Real angular_drag = 0;  ///< k_w of tau = -k_w w [kg m^2/s]
@@ -44,27 +44,29 @@ struct BodyDef {
   Real restitution = 0.5;
   Real friction = 0.5;        ///< dynamic coefficient of Coulomb friction; a pair uses the geometric mean
   Real static_friction = -1;  ///< static coefficient; negative: the same as `friction`
-  /// Dynamic coefficient across friction_axis; negative: the same as along it. In every pair, friction across
-  /// the axis is friction along it times the square root of cross_friction / friction, even if a ContactRule
-  /// sets the friction. Requires `friction` > 0.
+  /// Dynamic coefficient across friction_axis; negative: the same as along it. In every pair, the friction
+  /// across the axis is the friction along it multiplied by the square root of cross_friction / friction.
+  /// This also holds if a ContactRule sets the friction. Requires `friction` > 0.
   Real cross_friction = -1;
-  /// Friction axis, in the body's frame; zero: isotropic. If both bodies of a pair have one, that of the body
-  /// that was added first is used.
+  /// Friction axis, in the body's frame; zero: isotropic. If both bodies of a pair have a friction axis, the
+  /// body that was added first determines the axis.
   Vec3 friction_axis = Vec3::Zero();
-  /// Rolling friction [m], >= 0: the greatest torque about the tangents of a contact, per normal force. It is
-  /// how far the centre of pressure is ahead of the middle of the contact. A pair uses the larger value.
+  /// Rolling friction [m], >= 0: the greatest torque about a tangent of a contact, divided by the normal
+  /// force. It equals the distance between the centre of pressure and the middle of the contact. A pair uses
+  /// the larger value.
   Real rolling_friction = 0;
-  /// Spinning friction [m], >= 0: the greatest torque about the normal of a contact, per normal force. For a
-  /// round contact of radius a it is 3 pi / 16 friction a. A pair uses the larger value.
+  /// Spinning friction [m], >= 0: the greatest torque about the normal of a contact, divided by the normal
+  /// force. For a round contact of radius a it is 3 pi / 16 friction a. A pair uses the larger value.
   Real spinning_friction = 0;
-  /// Velocity of the surface relative to the body, as of a conveyor, in its frame [m/s].
+  /// Velocity of the surface relative to the body, for example of a conveyor, in the body's frame [m/s].
   Vec3 surface_velocity = Vec3::Zero();
   bool collides = true;  ///< whether the body collides with bodies and particles
   KeyframeTrack track;   ///< motion of a kinematic body
-  /// Times between which the body exists [s]. It appears at its initial pose and velocity at the start of the
-  /// first sub-step at or after appear_at, and is removed at the start of the first sub-step at or after
-  /// remove_at. While it does not exist, nothing touches it, and its springs and joints have no effect; its
-  /// joints take the poses of the time when it appears. Its removal releases its springs, joints and pins.
+  /// The body exists from `appear_at` to `remove_at` [s]. It appears at its initial pose and velocity at the
+  /// start of the first sub-step at or after appear_at, and is removed at the start of the first sub-step at
+  /// or after remove_at. While it does not exist, nothing collides with it, and its springs and joints have
+  /// no effect. Its joints are initialized with the poses of the bodies when it appears. Its removal releases
+  /// its springs, joints and pins.
   Real appear_at = 0, remove_at = kInfinity;
 };
 

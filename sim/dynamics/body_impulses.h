@@ -1,8 +1,8 @@
 #pragma once
-/// Impulses of particles on dynamic bodies in a sub-step (physics P8, A3). The bodies move by them from the
-/// next sub-step on, but each collision of a particle already uses the velocity after the previous
-/// collisions. The sum of many impulses therefore never transfers more momentum and energy than there is. An
-/// impulse on a body with joints acts on its whole articulation.
+/// Impulses of particles on dynamic bodies in a sub-step (physics P8, A3). The impulses change the motion of
+/// the bodies from the next sub-step on. Each collision of a particle uses the velocity that the body has
+/// after the previous collisions. Therefore many impulses together never transfer too much momentum or
+/// energy. An impulse on a body with joints acts on its whole articulation.
 
 #include <map>
 #include <span>
@@ -19,32 +19,33 @@ namespace offstage::sim {
 class JointedBodies {
  public:
   virtual ~JointedBodies() = default;
-  /// Returns the 6 x 6 matrix of the velocities that unit impulses and angular impulses on a link give to
-  /// this link, joints included. It is valid for impulses in about the direction of `push`, because an active
-  /// limit of a joint resists only impulses that push against it. May be called from several threads at the
-  /// same time.
+  /// Returns the 6 x 6 mobility of a link, joints included: its change of velocity and angular velocity per
+  /// unit of impulse and angular impulse on it. It is valid for impulses roughly in the direction of `push`,
+  /// because a joint at a limit resists only impulses towards the limit. May be called from several threads
+  /// at the same time.
   virtual Mat6 link_mobility(uint32_t link, const Vec6& push) = 0;
-  /// Adds the velocities of all links due to an impulse on one link, limits included.
+  /// Adds the changes of velocity of all links due to an impulse on one link to `velocities`. Joint limits
+  /// are taken into account.
   virtual void respond(uint32_t link, const Vec6& impulse, std::span<Vec6> velocities) = 0;
   virtual std::size_t link_count() const = 0;
 };
 
 class BodyImpulses {
  public:
-  /// Index of a body in an articulation; null if it has no joints.
+  /// Articulation of a body (null if it has no joints), and its index there.
   struct Link {
     JointedBodies* bodies = nullptr;
     uint32_t index = 0;
   };
 
-  /// Begins a sub-step without impulses. `links` are indexed by Obstacle::body; bodies beyond its end have no
-  /// joints.
+  /// Begins a sub-step and removes all impulses. `links` is indexed by Obstacle::body; bodies beyond its end
+  /// have no joints.
   void begin(std::span<const Link> links);
 
-  /// K of P8: the velocity that a unit impulse at `arm` from the centre of mass gives to the point there,
-  /// world axes [1/kg]; zero for a body that is not dynamic. `push` is the unit direction of the impulse,
-  /// because a joint at its limit yields to one side only. May be called from several threads while no
-  /// impulse is added.
+  /// Mobility K of physics P8 at the point `arm` from the centre of mass: change of the point's velocity per
+  /// unit of impulse there, world axes [1/kg]; zero for a body that is not dynamic. `push`: unit direction of
+  /// the impulse, because a joint at its limit yields to one side only. May be called from several threads
+  /// while no impulse is added.
   Mat3 mobility(const Obstacle& o, const Vec3& arm, const Vec3& push) const;
   /// Velocity of the point at `arm` from the centre of mass, after the impulses so far [m/s].
   Vec3 velocity(const Obstacle& o, const Vec3& arm) const;

@@ -47,8 +47,8 @@ struct PointField {
   uint32_t drop_rate = 0;
 };
 
-/// Moving air: viscous drag F = k (wind - v), in addition to the object's own drag k_own. The wind also acts
-/// through the own drag, by k_own wind. With k = 0 this is its only effect.
+/// Moving air: viscous drag F = k (wind - v), in addition to the object's own drag -k_own v. With k = 0 the
+/// force is k_own wind instead, so that the own drag acts relative to the air.
 struct WindField {
   Vec3 wind = Vec3::Zero();  ///< [m/s]
   Real drag = 0;             ///< k [kg/s], >= 0
@@ -60,7 +60,7 @@ struct WindField {
 /// outside, and nearly a rigid rotation near the axis. It has no divergence.
 struct Vortex {
   Vec3 point = Vec3::Zero();  ///< a point of the axis
-  Vec3 axis = Vec3::UnitY();  ///< direction of the axis, of any length but 0; the rotation is right-handed
+  Vec3 axis = Vec3::UnitY();  ///< direction of the axis (any length except 0); the rotation is right-handed
   /// Circulation Gamma at a large distance [m^2/s]; the speed at the radius is Gamma / (4 pi R).
   Real circulation = 1;
   Real radius = 0.1;  ///< R, the distance of the greatest speed [m], > 0
@@ -68,21 +68,22 @@ struct Vortex {
   Region region;
   uint32_t drop_rate = 0;
 };
-/// Velocity of the air, as if the region were everywhere [m/s].
+/// Velocity of the air at a point, without regard to the region [m/s].
 Vec3 velocity(const Vortex& vortex, const Vec3& point);
 
-/// A damped spring of length 0 between a keyframed point, as a hand or a mouse, and a point of a body or
-/// every particle of the systems: F = -k d - c d'.
+/// A damped spring of rest length 0, F = -k d - c d', between a keyframed point (a hand or a mouse) and a
+/// point of a body, or each particle of the systems.
 struct Grab {
   Vec3 point = Vec3::Zero();  ///< point of the body, in its own frame
-  KeyframeTrack track;        ///< motion of the hand; at least one key, whose orientations are not used
+  KeyframeTrack track;        ///< motion of the hand; at least one key; orientations are not used
   Real stiffness = 100;       ///< k [N/m], >= 0
   Real damping = 10;          ///< c [N s/m], >= 0
   /// Particles farther than this from the hand are not affected [m], > 0.
   Real reach = std::numeric_limits<Real>::infinity();
 };
 
-/// A force at a point of a body, and a torque, both over time. It acts on named bodies only.
+/// A force at a point of a body and a torque, both given over time. It acts only on the bodies in
+/// ForceDef::bodies.
 struct AppliedForce {
   struct Key {
     Real time = 0;                                        ///< [s]
@@ -90,15 +91,16 @@ struct AppliedForce {
     Vec3 torque = Vec3::Zero();                           ///< [N m]
     Interpolation interpolation = Interpolation::linear;  ///< interpolation to the next key
   };
-  /// Keys, at least one, with strictly increasing times; force and torque are constant outside of them.
+  /// At least one key, with strictly increasing times. Before the first key and after the last one, force and
+  /// torque are constant.
   std::vector<Key> keys;
   /// Point of application in the body's frame [m]; default: the centre of mass.
   std::optional<Vec3> point = {};
   bool body_axes = false;  ///< whether force and torque are in the body's axes, not in the world's
 };
 
-/// An impulse away from a point, at the force's start. It acts on each body at its point nearest to the
-/// explosion, so it also turns bodies that are hit off-centre.
+/// An impulse away from a point, at the time ForceDef::start. It acts at the point of a body that is nearest
+/// to the explosion, so that it may also make bodies spin.
 struct Explosion {
   Vec3 point = Vec3::Zero();
   Real impulse = 1;  ///< impulse on a body or a particle at the point of the explosion [N s]
@@ -146,18 +148,20 @@ struct RigidMotion {
   Vec3 velocity, angular_velocity;
 };
 
-/// The force on a body whose centre of mass is at `centre` in its frame, and which has an own `linear_drag`
-/// [kg/s]. Fields act at the centre of mass. Zero if the force is not active, and for an explosion.
+/// Returns the force and torque on a body. `centre`: centre of mass in the body's frame [m]; `linear_drag`:
+/// the body's own drag coefficient [kg/s]. Fields act at the centre of mass. Returns zero if the force is not
+/// active at `time`, and for an explosion.
 Wrench wrench(const ForceDef& def, Real time, const RigidMotion& motion, const Vec3& centre,
               Real linear_drag = 0);
 
-/// The impulse of an explosion on a placed solid with its centre of mass at `centre` (world), and the angular
-/// impulse about it.
+/// Returns the impulse of an explosion on a solid [N s], and the angular impulse about its centre of mass
+/// `centre` (world) [N m s].
 Wrench impulse(const Explosion& explosion, const Solid& solid, const Pose& pose, const Vec3& centre);
-/// The impulse on a particle at a point.
+/// Returns the impulse of an explosion on a particle at a point [N s].
 Vec3 impulse(const Explosion& explosion, const Vec3& point);
 
-/// Drag by moving air: `drag` is that of the field, `own` that of the object (see WindField).
+/// Returns the force of moving air [N]. `drag`: coefficient of the field; `own`: drag coefficient of the
+/// object (see WindField) [kg/s].
 inline Vec3 air_drag(Real drag, Real own, const Vec3& air, const Vec3& velocity) {
   return drag > 0 ? Vec3(drag * (air - velocity)) : Vec3(own * air);
 }

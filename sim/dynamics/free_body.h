@@ -50,11 +50,12 @@ class FreeBody final : public DynamicSystem {
   const BodyForces& forces_;
 };
 
-/// Upper bound of the spin that a body can reach while it rotates freely, by its angular momentum [rad/s].
+/// Upper bound of the angular speed that a body can reach in free rotation with its current angular momentum
+/// [rad/s].
 Real greatest_spin(const RigidBody& body);
 
-/// exp(h w / 2): the rotation by a constant angular velocity w over a time h, by a series that gives the same
-/// bits everywhere.
+/// Returns the rotation by a constant angular velocity w [rad/s] over a time h [s], computed by a series. The
+/// result is bitwise identical on all machines.
 Quat rotation(const Vec3& w, Real h);
 
 /// Advances a body on which only `forces` act from t to t + h. Without drag and fields the centre of mass

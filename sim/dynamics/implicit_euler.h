@@ -6,8 +6,8 @@
 
 namespace offstage::sim {
 
-/// If Newton's method does not converge, the step is halved, down to h / 64. If it does not converge then
-/// either, the last iterate is used and counted as missed.
+/// If Newton's method does not converge, the step is halved, down to h / 64. If it still does not converge,
+/// the last iterate is used and counted in IntegratorReport::missed.
 class ImplicitEuler final : public Integrator {
  public:
   int order() const override { return 1; }

@@ -28,9 +28,9 @@ class DynamicSystem {
                         std::span<Real> dx) const = 0;
   /// Computes dp = dp/dt at time t.
   virtual void force(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const = 0;
-  /// The same, and for each p the rate at which drag reduces it in `damping` [1/s]: minus the derivative of
-  /// dp by p, if it is diagonal. Returns false and writes nothing if forces depend on p in other ways, or if
-  /// this is unknown. The default returns false.
+  /// Computes dp as force() does and, in `damping`, the rate at which drag reduces each element of p [1/s]:
+  /// minus the derivative of dp with respect to p, if this is diagonal. Returns false and writes nothing if
+  /// forces depend on p in other ways, or if this is unknown. The default returns false.
   virtual bool force_and_damping(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp,
                                  std::span<Real> damping) const;
   /// Appends the derivatives of (dx, dp) by (x, p), for implicit integration. Row and column i stand for x_i,
@@ -60,7 +60,7 @@ struct IntegratorReport {
   void add(const IntegratorReport& more) { add_figures(*this, more); }
 };
 
-/// State that belongs to the caller of an integrator, and buffers. One per thread avoids allocation.
+/// Settings, state and buffers of an integrator that the caller keeps between calls. Use one per thread.
 struct IntegratorWorkspace {
   /// Adaptive integrators: greatest error of a coordinate in a step, in the unit of that coordinate.
   Real tolerance = 1e-6;
@@ -77,10 +77,10 @@ struct IntegratorWorkspace {
 enum class IntegratorKind {
   explicit_euler,    ///< N1, order 1
   symplectic_euler,  ///< order 1, energy stays bounded; one evaluation of the forces
-  /// Order 2: forces act at the middle of the step (drift, kick, drift). Symplectic without drag. Drag damps
-  /// by the factor 1 / (1 + z + z^2 / 2), z = h k / m, which is stable for any step. One evaluation of the
-  /// forces if they depend on the rates only by drag (DynamicSystem::force_and_damping), otherwise two. The
-  /// default for particles.
+  /// Order 2: drift, kick, drift; forces are evaluated at the middle of the step. Symplectic without drag.
+  /// Drag damps by the factor 1 / (1 + z + z^2 / 2), z = h k / m, which is stable for any step. One
+  /// evaluation of the forces if they depend on the rates only by drag (DynamicSystem::force_and_damping),
+  /// otherwise two. The default for particles.
   leapfrog,
   midpoint,  ///< N3, RK2, order 2
   rk4,       ///< N4, order 4
@@ -92,9 +92,9 @@ enum class IntegratorKind {
   dormand_prince,     ///< N5, embedded pair of orders 5 and 4
 };
 
-/// Effect of an acceleration a that begins at the start of a step of length h, with drag of the rate k: the
-/// velocity is v + end a at the end, and v + mean a on average. Second order in h k; no overshoot for any h
-/// k.
+/// Effect of a constant acceleration a over a step of length h [s], with drag of the rate k [1/s]. The change
+/// of velocity is `end` * a at the end of the step, and `mean` * a on average over the step. It is accurate
+/// to second order in h k, and never overshoots.
 struct DampedKick {
   DampedKick(Real h, Real k) {
     const Real z = h * k, fraction = h / (1 + z + z * z / 2);
@@ -110,12 +110,11 @@ class Integrator {
   virtual ~Integrator() = default;
   virtual void step(const DynamicSystem& system, Real t, Real h, std::span<Real> x, std::span<Real> p,
                     IntegratorWorkspace& work) const = 0;
-  /// Order of convergence: the error after a given time is proportional to the length of the step to this
-  /// power.
+  /// Order of convergence n: the error after a given time is proportional to (length of the step)^n.
   virtual int order() const = 0;
 };
 
-/// Returns the integrator of a kind, a shared immutable object.
+/// Returns the integrator of a kind. It is a shared, immutable object.
 const Integrator& integrator(IntegratorKind kind);
 
 }  // namespace offstage::sim

@@ -35,10 +35,10 @@ struct CurveSample {
   Eigen::Array<Real, N, 1> rate = Eigen::Array<Real, N, 1>::Zero();
 };
 
-/// Tangent at a key between two segments with the mean rates `before` and `after` and the durations h0 and
-/// h1: that of the parabola through the three keys (Catmull-Rom over uneven times). If limited, each
-/// component is zero at an extremum and otherwise at most three times the smaller mean rate, so that the
-/// cubic is monotone (de Boor and Swartz 1977; Fritsch and Carlson 1980).
+/// Returns the tangent at a key between two segments, which have the mean rates `before` and `after` and the
+/// durations h0 and h1. It is the tangent of the parabola through the three keys (Catmull-Rom for non-uniform
+/// times). If `limited`, each component is zero at an extremum, and otherwise at most three times the smaller
+/// mean rate, so that the cubic is monotone (de Boor and Swartz 1977; Fritsch and Carlson 1980).
 template <int N>
 Eigen::Array<Real, N, 1> key_tangent(const Eigen::Array<Real, N, 1>& before, Real h0,
                                      const Eigen::Array<Real, N, 1>& after, Real h1, bool limited) {
@@ -51,8 +51,9 @@ Eigen::Array<Real, N, 1> key_tangent(const Eigen::Array<Real, N, 1>& before, Rea
   return tangent;
 }
 
-/// The curve at a time in segment i, between the keys i and i + 1 of `count`; `key(i)` returns a CurveKey<N>.
-/// At an open end the tangent is the segment's mean rate; a `loop` is continued periodically.
+/// Returns value and rate of a curve at time t in segment i, between the keys i and i + 1. `count`: number of
+/// keys; `key(i)` returns a CurveKey<N>. At an end of the curve the tangent is the segment's mean rate,
+/// unless `loop`: the curve is then periodic.
 template <int N, class Key>
 CurveSample<N> sample_segment(std::size_t count, Key&& key, bool loop, std::size_t i, Real t) {
   using Value = Eigen::Array<Real, N, 1>;
@@ -83,7 +84,8 @@ CurveSample<N> sample_segment(std::size_t count, Key&& key, bool loop, std::size
           (6 * s2 - 6 * s) / span * (a.value - b.value) + (3 * s2 - 4 * s + 1) * m0 + (3 * s2 - 2 * s) * m1};
 }
 
-/// The segment that contains a time between the first and the last key; `time(i)` is that of key i.
+/// Returns the index of the segment that contains the time t, which must be between the first and the last
+/// key. `time(i)` returns the time of key i.
 template <class Time>
 std::size_t segment_at(std::size_t count, Time&& time, Real t) {
   std::size_t low = 0, high = count - 1;  // time(low) <= t < time(high)

@@ -27,11 +27,11 @@ struct Motion {
 /// Key poses over time, plus an optional constant spin (for wheels and gears, which would need many keys).
 struct KeyframeTrack {
   std::vector<Keyframe> keys;  ///< strictly increasing times; empty: the body stays at its initial pose
-  /// Orientations turn along the shortest arc between two keys if the keys beside them turn about the same
-  /// axis.
+  /// Default interpolation of the keys. Between two keys, orientations follow the shortest arc if the
+  /// neighbouring keys turn about the same axis.
   Interpolation interpolation = Interpolation::monotone;
-  /// Whether the keys repeat with the period keys.back().time - keys.front().time; otherwise the end poses
-  /// are held.
+  /// Whether the keys repeat with the period keys.back().time - keys.front().time. Otherwise the pose is
+  /// constant before the first and after the last key.
   bool loop = false;
   Vec3 spin = Vec3::Zero();  ///< additional rotation about the body's origin, body axes [rad/s]
 

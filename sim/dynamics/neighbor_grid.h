@@ -1,7 +1,8 @@
 #pragma once
-/// Points sorted into cells, for searching neighbours (physics P2, P3). The cells tile a torus:
-/// along each axis they repeat with a power of two, so a table with about as many cells as points serves any
-/// extent. Distant points in the same cell of the torus are excluded by their distance.
+/// Points sorted into grid cells, to search for neighbours (physics P2, P3). The cells tile a torus: along
+/// each axis, cell indices repeat with a period that is a power of two. Therefore a table with about as many
+/// cells as points is sufficient for any extent. Distant points in the same cell of the torus are excluded by
+/// their distance.
 
 #include <algorithm>
 #include <array>
@@ -33,9 +34,9 @@ class NeighborGrid {
         visit_cells(row(run[0].first + i, run[1].first + j), run[2], p, radius, f);
   }
 
-  /// Calls f(index) for the neighbours of the point at a place of the sorted order, such that each pair of
-  /// points is reported only once, for one of the two. The radius must not be greater than the width of a
-  /// cell.
+  /// Calls f(index) for neighbours of the point at position `place` in the sorted order. Over all places,
+  /// each pair of points within `radius` is reported only once. The radius must not be greater than the width
+  /// of a cell.
   template <class F>
   void for_each_pair(std::size_t place, Real radius, F&& f) const {
     const Vec3 p = point(place);

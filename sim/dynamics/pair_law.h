@@ -1,12 +1,12 @@
 #pragma once
 /// Laws of forces between the particles of one or more systems (physics P2). The force on particle 1 of a
-/// pair is -dU/dr1, that on particle 2 the opposite. In a region it is multiplied by the strengths at both
-/// particles. Without a cut-off distance all pairs are computed, which takes time in proportion to the square
-/// of the number of particles; with one, only neighbours are.
+/// pair is -dU/dr1; the force on particle 2 is opposite. In a region it is multiplied by the strengths at
+/// both particles. Without a cut-off distance all pairs are computed, and the time is proportional to the
+/// square of the number of particles. With a cut-off distance only neighbours are computed.
 ///
-/// Systems connected by such a force are integrated together, by the integrator of the first system, or by
-/// that of the world if springs act on one of them. A particle participates from the first whole sub-step of
-/// its life.
+/// Systems connected by such a force are integrated together: by the integrator of the first system, or by
+/// the world's integrator if springs act on one of the systems. A particle participates from the first whole
+/// sub-step of its life.
 
 #include <type_traits>
 

@@ -16,18 +16,20 @@ struct SphereRegion {
   Vec3 centre = Vec3::Zero();
   Real radius = 1;  ///< [m], > 0
 };
-/// Aligned with the world's axes; f belongs to the axis along which the point is nearest to the edge.
+/// A box aligned with the world's axes; f is the smallest value over the three axes.
 struct BoxRegion {
   Vec3 centre = Vec3::Zero();
   Vec3 size = Vec3::Ones();  ///< full edges [m], > 0
 };
 using Region = std::variant<Everywhere, SphereRegion, BoxRegion>;
 
-/// 1 - |f|/R in a sphere, the smallest 1 - |f_i|/(b_i/2) in a box, to the power `drop_rate`; 0 outside.
+/// Returns the strength at a point: d^drop_rate, where d is 1 - |r|/R in a sphere, and the smallest 1 -
+/// |r_i|/(b_i/2) in a box. r is the vector from the centre; the strength is 0 outside.
 Real strength(const Region& region, uint32_t drop_rate, const Vec3& point);
-/// The strengths at several points (x y z of each); returns whether any strength is not 0.
+/// Computes the strengths at several points (x y z of each) in `out`. Returns whether any strength is not 0.
 bool strengths(const Region& region, uint32_t drop_rate, std::span<const Real> points, std::span<Real> out);
-/// Strength at a fraction `depth` of the distance from the edge of the region to its middle.
+/// Returns the strength at a depth below the edge of the region: `depth` is 0 at the edge and 1 in the
+/// middle.
 Real strength_at_depth(Real depth, uint32_t drop_rate);
 
 }  // namespace offstage::sim

@@ -31,10 +31,10 @@ struct RigidBody : RigidState {
   Vec3 angular_velocity(const Quat& q, const Vec3& H) const {
     return q * (inverse_inertia * (q.conjugate() * H));
   }
-  /// H for the angular velocity w.
+  /// Returns the angular momentum H for the orientation q and the angular velocity w.
   Vec3 spin_momentum(const Quat& q, const Vec3& w) const { return q * (inertia * (q.conjugate() * w)); }
-  /// Whether the body's greatest moment of inertia is more than about ten times the least one. tr I tr I^-1
-  /// is 9 for a ball and 10 for a coin.
+  /// Whether the greatest moment of inertia is more than about ten times the smallest one. Measured by tr I
+  /// tr I^-1, which is 9 for a ball and 10 for a coin.
   bool is_thin() const { return inertia.trace() * inverse_inertia.trace() > 26; }
   Pose pose() const { return {position - orientation * centre, orientation}; }
 

@@ -18,9 +18,10 @@ struct Turbulence {
 
   Real speed = 1;        ///< root mean square of the air's speed [m/s], >= 0
   Real scale = 1;        ///< width of the largest eddies [m], > 0
-  uint32_t octaves = 2;  ///< number of sizes of eddies, 1 to kMaxOctaves
+  uint32_t octaves = 2;  ///< number of octaves (sizes of eddies), 1 to kMaxOctaves
   Real lifetime = 0;     ///< lifetime of the largest eddies [s], >= 0; 0: scale / speed, their turnover time
-  /// Velocity of the eddies themselves [m/s]; the mean wind must be a separate field.
+  /// Velocity at which the pattern of eddies moves [m/s]. It does not include a mean wind, which must be a
+  /// separate field.
   Vec3 drift = Vec3::Zero();
   uint32_t seed = 0;  ///< different seeds give different eddies
   Real drag = 0;      ///< k as in WindField [kg/s]

@@ -34,10 +34,11 @@ struct DecompositionSettings {
   /// Greatest number of reflex edges for the exact method; a solid with more is approximated at once.
   uint32_t max_reflex_edges = 2000;
   Real max_error = 0.05;  ///< accepted error of an approximate decomposition, > 0
-  /// Greatest number of approximate parts, unless these miss `max_error`; >= 1.
+  /// Greatest number of approximate parts if these reach `max_error`; >= 1.
   uint32_t max_parts = 64;
-  /// Greatest number of approximate parts, >= max_parts: where max_parts miss the error, as for thin bent
-  /// shells, more are made, up to this number, which has priority over the error.
+  /// Greatest number of approximate parts in any case, >= max_parts. If max_parts are not sufficient for
+  /// `max_error`, for example for thin bent shells, up to this number are created, even if the error remains
+  /// greater.
   uint32_t most_parts = 1024;
   uint32_t resolution = 64;  ///< voxels along the longest side of a mesh with holes
 
@@ -50,23 +51,23 @@ struct ConvexDecomposition {
     exact,        ///< cut along reflex edges: the parts fill the solid
     approximate,  ///< hulls of the solid's pieces; `note` has the reason
     none,         ///< the surface has no inside: no parts
-    hull,         ///< the convex hull, as the settings want
+    hull,         ///< the convex hull, as requested by the settings
   };
   Method method = Method::none;
   std::vector<ConvexPolyhedron> parts;
   /// |volume of the parts - volume of the solid| / volume of the solid.
   Real volume_error = 0;
   /// Upper bound of the volume in which the parts and the solid differ, as a fraction of the solid's volume;
-  /// DecompositionSettings::max_error limits it. 0 for exact parts. For several surfaces that may overlap, an
-  /// estimate with an accuracy of about 1 %, as is `volume_error`.
+  /// DecompositionSettings::max_error limits it. 0 for exact parts. For several surfaces that may overlap,
+  /// this and `volume_error` are estimates with an accuracy of about 1 %.
   Real difference = 0;
   std::string note;  ///< reason why the method is approximate or none; otherwise empty
 };
 
-/// Decomposes a welded mesh with finite coordinates; it may be inside out. The result does not depend on the
-/// number of threads. Parts of the exact method do not overlap, and their volumes sum to that of the solid
-/// within 1e-6. Faces that are flat within 2e-7 of the mesh's diagonal count as flat. Approximate parts
-/// differ from the solid by up to 2 % of its diagonal more than their number demands.
+/// Decomposes a welded mesh with finite coordinates; the mesh may be inside out. The result does not depend
+/// on the number of threads. Parts of the exact method do not overlap, and their volumes sum to that of the
+/// solid within 1e-6. Faces that are flat within 2e-7 of the mesh's diagonal count as flat. Approximate parts
+/// may differ from the solid by up to 2 % of its diagonal more than is necessary for their number.
 ConvexDecomposition decompose(const TriangleMesh& mesh, const MeshTopology& topology,
                               const DecompositionSettings& settings = {});
 

@@ -14,7 +14,8 @@ namespace offstage::sim {
 
 class ConvexPolyhedron {
  public:
-  /// `left` is the face that the edge bounds counter-clockwise, seen from outside; kNoFace on a segment.
+  /// An edge from vertex `tail` to vertex `head`, with the faces on its left and right, seen from outside.
+  /// Both faces are kNoFace for a segment.
   struct Edge {
     uint32_t tail, head;
     uint32_t left, right;
@@ -32,10 +33,10 @@ class ConvexPolyhedron {
   };
 
   ConvexPolyhedron() = default;
-  /// Builds a polyhedron from faces whose vertices are counter-clockwise seen from outside. The caller
-  /// guarantees that it is convex and closed; convex_hull() makes one from any points. Without faces, at most
-  /// two vertices are allowed. Throws std::invalid_argument for an index out of range, a face of less than
-  /// three vertices, or an edge that does not have exactly two faces in opposite directions.
+  /// Builds a polyhedron from faces whose vertices are counter-clockwise seen from outside. The caller must
+  /// make sure that it is convex and closed; convex_hull() creates one from any points. Without faces, at
+  /// most two vertices are allowed. Throws std::invalid_argument for an index out of range, a face of less
+  /// than three vertices, or an edge that does not have exactly two faces in opposite directions.
   ConvexPolyhedron(std::vector<Vec3> vertices, std::span<const std::vector<uint32_t>> faces);
 
   std::span<const Vec3> vertices() const { return vertices_; }
@@ -56,7 +57,7 @@ class ConvexPolyhedron {
     return vertex_neighbours_.row(vertex);
   }
 
-  /// 3 for a solid, 2 for a polygon, 1 for a segment, 0 for a point.
+  /// Dimension: 3 for a solid, 2 for a polygon, 1 for a segment, 0 for a point.
   int dimension() const { return dimension_; }
   /// The mean of the vertices, a point inside.
   const Vec3& centre() const { return centre_; }
@@ -65,7 +66,7 @@ class ConvexPolyhedron {
   /// Box around the vertices.
   const Aabb& box() const { return box_; }
 
-  /// The faces as triangles, one fan for each.
+  /// Returns the faces as triangles, each face divided into a fan.
   TriangleMesh triangles() const;
 
  private:
@@ -92,10 +93,11 @@ class ConvexPolyhedron {
   int dimension_ = 0;
 };
 
-/// A box of full edge lengths `size` about the origin.
+/// Returns a box with the edge lengths `size` [m], centred at the origin.
 ConvexPolyhedron box_polyhedron(const Vec3& size);
 
-/// Greatest height of a vertex above the plane of a face; at most rounding for a convex polyhedron [m].
+/// Greatest height of a vertex above the plane of a face [m]. For a convex polyhedron it is at most a
+/// rounding error.
 Real concavity(const ConvexPolyhedron& p);
 
 }  // namespace offstage::sim

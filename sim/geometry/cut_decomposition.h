@@ -1,10 +1,11 @@
 #pragma once
 /// Approximate convex decomposition of a solid by cut planes. The piece whose hull has the most empty space
-/// is cut in two until the hulls are good enough; then neighbouring parts are merged while that costs little,
-/// and the hulls are trimmed where they bridge hollows. Best-first cuts and mergers as in Mamou and Ghorbel,
-/// "A simple and efficient approach for 3D mesh approximate convex decomposition" (2009), and Wei et al.,
-/// "Approximate convex decomposition for 3D meshes with collision-aware concavity and tree search" (2022);
-/// but the pieces are exact, and so are their volumes. Thin shells are divided into Voronoi cells first.
+/// is cut in two until the hulls are good enough; then neighbouring parts are merged as long as this adds
+/// little volume, and hulls are trimmed where they extend over hollows. Best-first cuts and mergers as in
+/// Mamou and Ghorbel, "A simple and efficient approach for 3D mesh approximate convex decomposition" (2009),
+/// and Wei et al., "Approximate convex decomposition for 3D meshes with collision-aware concavity and tree
+/// search" (2022); but the pieces are exact, and so are their volumes. Thin shells are divided into Voronoi
+/// cells first.
 
 #include <cstddef>
 #include <span>
@@ -18,7 +19,7 @@ namespace offstage::sim {
 struct CutGoal {
   Real max_error = 0.05;       ///< accepted CutDecomposition::error, > 0
   std::size_t max_parts = 64;  ///< greatest number of parts, >= 1; has priority over `max_error`
-  /// Number of parts above which fewer are searched for that also have the accepted error.
+  /// If more parts than this are found, a smaller set with the accepted error is searched for.
   std::size_t enough_parts = 64;
 };
 
@@ -29,9 +30,9 @@ struct CutDecomposition {
   Real error = 0;
 };
 
-/// Decomposes solids, which may touch or overlap each other, of positive volume together. At first tries to
-/// reach the error with few parts, then with as many as allowed. The result does not depend on the number of
-/// threads.
+/// Decomposes several solids together. Each must have a positive volume; they may touch or overlap each
+/// other. First tries to reach the error with few parts, then with as many as allowed. The result does not
+/// depend on the number of threads.
 CutDecomposition decompose_by_cuts(std::span<const SolidPiece> solids, const CutGoal& goal);
 
 }  // namespace offstage::sim

@@ -1,5 +1,5 @@
 #pragma once
-/// Merging of convex parts, at the price of some additional volume.
+/// Merging of convex parts into fewer hulls, which have some additional volume.
 
 #include <cstdint>
 #include <memory>
@@ -23,7 +23,7 @@ struct MergedHull {
 /// A part before the merger.
 struct HullToMerge {
   ConvexPolyhedron hull;
-  uint32_t solid = 0;  ///< parts of one solid do not overlap much; parts of different solids may
+  uint32_t solid = 0;  ///< index of its solid; only parts of different solids may overlap much
 };
 
 /// Merges convex parts; run() can be called several times, with different bounds.
@@ -33,9 +33,9 @@ class HullMerger {
   explicit HullMerger(std::span<const HullToMerge> parts);
   ~HullMerger();
 
-  /// Replaces two parts by their common hull, those with the least additional volume first, while there are
-  /// more than `max_parts` and then while all additional volumes together are at most `budget` [m^3]. Parts
-  /// whose boxes are separate are merged last.
+  /// Repeatedly replaces two parts by their common hull, those with the least additional volume first. It
+  /// continues while there are more than `max_parts` parts, and then as long as the sum of the additional
+  /// volumes is at most `budget` [m^3]. Parts with separate bounding boxes are merged last.
   std::vector<MergedHull> run(std::size_t max_parts, Real budget) const;
 
  private:

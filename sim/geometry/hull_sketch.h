@@ -8,12 +8,14 @@
 
 namespace offstage::sim {
 
-/// The extreme points in about `directions` directions spread evenly, each once, in their order.
+/// Returns the points that are extreme in about `directions` evenly distributed directions, each once and in
+/// the given order.
 std::vector<Vec3> extreme_points(std::span<const Vec3> points, int directions);
 
-/// Volume of the hull of some points; 0 if it is flat. Points that are outside of a face of the growing hull
-/// by less than 1e-9 of the extent do not enlarge it. Of more than 160 points, only the points that are
-/// extreme in 96 directions count, so the result is too small: by up to a few percent for round sets. [m^3]
+/// Returns an estimate of the volume of the convex hull of some points [m^3]; 0 if it is flat. Points that
+/// are outside of the growing hull by less than 1e-9 of the extent are ignored. If there are more than 160
+/// points, only those that are extreme in 96 directions are used; the result is then too small, by up to a
+/// few percent for round sets.
 Real sketched_hull_volume(std::span<const Vec3> points);
 
 }  // namespace offstage::sim

@@ -17,13 +17,14 @@ using TriangleVertices = std::array<Vec3, 3>;
 bool point_in_triangle(const Vec3& p, const TriangleVertices& t);
 bool segments_intersect(const Vec3& p0, const Vec3& p1, const Vec3& q0, const Vec3& q1);
 bool segment_intersects_triangle(const Vec3& p, const Vec3& q, const TriangleVertices& t);
-/// After Guigue and Devillers, "Fast and robust triangle-triangle overlap test using orientation predicates"
-/// (2003).
+/// Whether two triangles intersect, after Guigue and Devillers, "Fast and robust triangle-triangle overlap
+/// test using orientation predicates" (2003).
 bool triangles_intersect(const TriangleVertices& a, const TriangleVertices& b);
 
-/// The box is solid. Thirteen separating axes (Akenine-Moller, "Fast 3D triangle-box overlap testing", 2001).
+/// Whether a triangle intersects a solid box, by thirteen separating axes (Akenine-Moller, "Fast 3D
+/// triangle-box overlap testing", 2001).
 bool triangle_intersects_box(const TriangleVertices& t, const Aabb& box);
-/// The sphere is a solid ball.
+/// Whether a triangle intersects a solid ball.
 bool triangle_intersects_sphere(const TriangleVertices& t, const Vec3& centre, Real radius);
 
 }  // namespace offstage::sim

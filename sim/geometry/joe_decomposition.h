@@ -10,17 +10,20 @@
 
 namespace offstage::sim {
 
-/// Initial limits of a cut, relaxed in steps, at last to zero, if no cut satisfies them; and a bound.
+/// Limits for a cut, and bounds of the method. If no cut satisfies the limits, they are relaxed in steps,
+/// finally to zero.
 struct CutLimits {
   Real dihedral = 0;  ///< smallest angle between the cut and a face it meets [rad]
-  /// Smallest distance of the cut from vertices off it, as a fraction of the mean edge.
+  /// Smallest distance between the cut and vertices that are not on it, as a fraction of the mean edge
+  /// length.
   Real distance = 0;
   // The method fails beyond these bounds.
   std::size_t max_parts = 1024;
-  Real max_work = 5e7;  ///< half-edges of the polyhedra, summed over the planes that are tried
+  Real max_work = 5e7;  ///< bound of the work: for each tried plane, the number of half-edges of the
+                        ///< polyhedron that it cuts, summed
 };
 
-/// Whether the dihedral angle at a half-edge is over pi.
+/// Whether the interior dihedral angle at a half-edge is greater than pi.
 bool is_reflex(const Polyhedron& p, uint32_t half_edge);
 uint32_t count_reflex_edges(const Polyhedron& p);
 
@@ -29,7 +32,7 @@ struct JoeResult {
   std::string failure;            ///< reason of the failure; otherwise empty
 };
 
-/// The failure when there are more parts than allowed.
+/// Returns the text for JoeResult::failure if there are more parts than `limits` allow.
 std::string too_many_parts(const CutLimits& limits);
 
 /// Cuts polyhedra into parts without reflex edges. Points within `tolerance` of a cut count as on it.

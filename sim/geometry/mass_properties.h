@@ -1,6 +1,6 @@
 #pragma once
-/// Volume, centre of mass and inertia of solids (physics N7). Meshes: exact integrals over the polyhedron, as
-/// the sum of the signed tetrahedra between its faces and a point; the same values as the surface integrals
+/// Volume, centre of mass and inertia of solids (physics N7). For meshes the integrals over the polyhedron
+/// are exact: sums over the signed tetrahedra between its faces and a point. They equal the surface integrals
 /// of Mirtich, "Fast and accurate computation of polyhedral mass properties" (1996).
 
 #include "sim/core/types.h"
@@ -26,7 +26,8 @@ struct PrincipalInertia {
 /// otherwise the result is meaningless.
 MassProperties mass_properties(const TriangleMesh& mesh);
 
-/// Closed forms of the primitives. A Plane has volume 0. MeshShape is not accepted (it needs the mesh).
+/// Mass properties of a primitive in closed form. A Plane has the volume 0. MeshShape is not allowed, because
+/// its mesh is not known here.
 MassProperties mass_properties(const Shape& primitive);
 
 PrincipalInertia diagonalise(const Mat3& inertia);

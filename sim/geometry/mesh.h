@@ -31,7 +31,7 @@ struct Edge {
 struct MeshDefects {
   uint32_t border_edges = 0;        ///< edges with one face: the mesh is open
   uint32_t non_manifold_edges = 0;  ///< edges with three or more faces
-  uint32_t flipped_edges = 0;       ///< edges whose two faces run along them in the same direction
+  uint32_t flipped_edges = 0;       ///< edges whose two faces have opposite winding
   uint32_t degenerate_faces = 0;    ///< faces of zero area or with a repeated vertex
   bool inverted = false;            ///< whether the enclosed volume is negative
 
@@ -41,8 +41,9 @@ struct MeshDefects {
 };
 
 /// Merges vertices at the same position (bitwise), removes faces that become degenerate, then unused
-/// vertices. Importers split vertices along texture seams; physics needs them joined. Faces that are wound
-/// otherwise than most of the surface around them are turned, because a contact is on one side of a surface.
+/// vertices. Importers split vertices along texture seams; physics needs them joined. Faces whose winding
+/// differs from most of the surrounding surface are flipped, because contacts depend on the side of a
+/// surface.
 TriangleMesh weld(const TriangleMesh& mesh);
 
 /// Connectivity and normals of a mesh. Every query is O(1).
@@ -62,7 +63,7 @@ class MeshTopology {
 
   /// Unit normal; zero for a degenerate face.
   const Vec3& face_normal(uint32_t face) const { return face_normals_[face]; }
-  /// Unit mean of the normals of the edge's faces.
+  /// Unit vector along the mean of the normals of the edge's faces.
   const Vec3& edge_normal(uint32_t edge) const { return edge_normals_[edge]; }
   const Vec3& vertex_normal(uint32_t vertex) const {
     return vertex_normals_[vertex];

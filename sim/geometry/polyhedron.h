@@ -2,8 +2,8 @@
 /// The boundary of a solid as convex polygons joined along half-edges, which Joe's decomposition cuts
 /// (physics N8, the book's appendix F).
 ///
-/// Connections are defined by the twins of the half-edges alone. Two faces may lie in the same place without
-/// being connected, as the two sides of a cut through a ring do.
+/// Only the twins of half-edges define connections. Two faces may be at the same place without being
+/// connected, for example both sides of a cut through a ring.
 
 #include <cstdint>
 #include <vector>
@@ -15,9 +15,9 @@ namespace offstage::sim {
 
 struct Polyhedron {
   using Plane = ConvexPolyhedron::Plane;
-  /// The face of a half-edge is on its left, seen from outside. `sibling` is another half-edge from the same
-  /// point; the siblings form a cycle, whether or not they are connected around a corner. Set by
-  /// components().
+  /// The face of a half-edge is on its left, seen from outside. `sibling` is another half-edge that leaves
+  /// the same point, set by components(). Siblings form a cycle, even if they are not connected around a
+  /// corner.
   struct HalfEdge {
     uint32_t origin = 0, face = 0, next = 0, previous = 0, twin = 0, sibling = 0;
   };
@@ -56,8 +56,8 @@ struct Polyhedron {
   }
 };
 
-/// The solid around an edge, by angles about the edge: 0 along the face on the left, increasing through the
-/// solid to `angle` at the face on the right.
+/// The solid around an edge, described by angles about the edge [rad]. The angle is 0 at the face on the left
+/// and increases through the solid to `angle` at the face on the right.
 struct Wedge {
   Vec3 along;   ///< unit direction of the edge
   Vec3 normal;  ///< normal of the left face

@@ -14,7 +14,7 @@ struct Cut {
   /// A corner of the cut face, and the side from it to the next corner.
   struct Corner {
     Vec3 point;
-    uint32_t half_edge;  ///< leaves the corner; if `on_edge`, the corner is in its middle
+    uint32_t half_edge;  ///< half-edge that leaves the corner or, if `on_edge`, contains it
     bool on_edge;
     /// Whether the side crosses the face of `half_edge`; otherwise the side is the edge `half_edge`.
     bool across_face;
@@ -26,13 +26,14 @@ struct Cut {
 };
 
 /// Traces the cut face that begins along an edge. The inside of the cut is on the left of the half-edge, seen
-/// from the tip of the plane's normal. Points within `tolerance` of the plane count as on it. Returns nothing
-/// if the cut face has holes or slits, or touches the surface inside; its outline may touch itself at
+/// from the tip of the plane's normal. Points within `tolerance` of the plane count as on it. Empty if the
+/// cut face has holes or slits, or if its inside touches the surface. The outline may touch itself at
 /// vertices.
 std::optional<Cut> trace_cut(const Polyhedron& p, uint32_t half_edge, const Polyhedron::Plane& plane,
                              Real tolerance);
 
-/// Separates a polyhedron along a cut face into two polyhedra, or into one that has the cut face twice.
+/// Cuts a polyhedron along a cut face. Returns two polyhedra, or one that has the cut face twice, if the cut
+/// does not divide it (as in a ring).
 std::vector<Polyhedron> separate(Polyhedron p, const Cut& cut);
 
 }  // namespace offstage::sim

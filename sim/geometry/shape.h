@@ -51,8 +51,8 @@ struct MeshShape {
 
 using Shape = std::variant<Sphere, Box, Capsule, Cylinder, Cone, Plane, MeshShape, Frustum, Ellipsoid>;
 
-/// Whether a shape is round about the y axis of its frame: a capsule, cylinder, cone or frustum. It can lie
-/// on a line of its surface.
+/// Whether a shape is a solid of revolution about the y axis that can rest on a line of its surface: a
+/// capsule, cylinder, cone or frustum.
 inline bool is_round_about_axis(const Shape& shape) {
   return std::holds_alternative<Capsule>(shape) || std::holds_alternative<Cylinder>(shape) ||
          std::holds_alternative<Cone>(shape) || std::holds_alternative<Frustum>(shape);

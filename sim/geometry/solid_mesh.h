@@ -1,7 +1,7 @@
 #pragma once
 /// Solids as closed meshes with the convex solids that fill them: the primitives, and the concave shapes
-/// torus, tube and open box, whose mass properties have closed forms (physics N7). Parts of compounds are
-/// made of them.
+/// torus, tube and open box, whose mass properties have closed forms (physics N7). They are the parts of
+/// compounds.
 
 #include <variant>
 #include <vector>
@@ -42,8 +42,9 @@ struct SolidMesh {
   std::vector<ConvexPolyhedron> parts;
 };
 
-/// Vertices are on the surface of the shape. A torus has 48 parts with 24 corners around the tube; a tube
-/// has 48. Flat sides between vertices deviate by at most 0.9 % of a tube_radius and 0.3 % of a radius.
+/// Vertices are on the surface of the shape. A torus has 48 parts with 24 corners around the tube; a tube has
+/// 48. Flat faces deviate from the round surface by at most 0.9 % of the tube_radius plus 0.3 % of the
+/// radius.
 SolidMesh solid_mesh(const Torus& torus);
 SolidMesh solid_mesh(const Tube& tube);
 SolidMesh solid_mesh(const OpenBox& box);
@@ -67,8 +68,8 @@ struct MassPart {
   Real density = 1000;  ///< [kg/m^3], > 0
 };
 
-/// The sums of rho_i V_i, of their moments, and of their inertias by the parallel axis theorem (the book's
-/// appendix D). Parts that overlap count twice.
+/// Returns the mass, centre of mass and inertia of all parts together, in the frame of the compound; inertias
+/// are added by the parallel axis theorem (the book's appendix D). Overlaps of parts count several times.
 BodyMass sum_of(const std::vector<MassPart>& parts);
 
 }  // namespace offstage::sim

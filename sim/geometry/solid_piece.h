@@ -1,9 +1,9 @@
 #pragma once
-/// Pieces of a solid between cut planes. The surface of a piece is a set of polygons and of caps, which lie
-/// on the cut planes and are known by their outlines alone. Volumes need no more than that, and each cut
-/// closes the surface again, whether or not the surface is connected, manifold or free of self-intersections:
-/// only its edges must cancel, as they do for a closed mesh with consistent winding. Where a surface winds
-/// around a place several times, that place counts several times.
+/// Pieces of a solid between cut planes. The surface of a piece consists of polygons and of caps. Caps lie on
+/// the cut planes and are given only by their outlines, which is sufficient for volumes. Each cut closes the
+/// surface again. The surface need not be connected, manifold or free of self-intersections; only its edges
+/// must cancel, as in a closed mesh with consistent winding. A region that the surface winds around several
+/// times counts several times.
 
 #include <array>
 #include <cstdint>
@@ -44,7 +44,8 @@ struct PieceMoments {
   Vec3 first = Vec3::Zero();  ///< first moment of the volume about the frame's origin [m^4]
 };
 PieceMoments moments(const SolidPiece& piece);
-/// Returns the moments of the part above a plane; equal to moments(cut(...)[0]) within rounding, but faster.
+/// Returns the moments of the part above a plane. They equal moments(cut(...)[0]) within rounding, but are
+/// computed faster.
 PieceMoments moments_above(const SolidPiece& piece, const SolidPiece::Plane& plane);
 
 /// The parts of a piece above and below a plane. Points within `tolerance` of the plane count as on it; a

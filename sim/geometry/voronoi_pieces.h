@@ -1,8 +1,7 @@
 #pragma once
 /// Division of a solid into round cells of about the same size, for thin shells. The hull of a piece of a
-/// curved shell is thicker than the shell, by an amount that grows with the longest extent of the piece along
-/// it. A single cut shortens a piece in one direction only, so a search by single cuts gains little and stops
-/// early.
+/// curved shell is thicker than the shell, and the more so the longer the piece is. A single cut shortens a
+/// piece in one direction only. Therefore a search by single cuts gains little and stops early.
 
 #include <vector>
 
@@ -17,8 +16,8 @@ std::vector<Vec3> spread_centres(const SolidPiece& solid, std::size_t count);
 /// Area of the polygons [m^2].
 Real surface_area(const SolidPiece& solid);
 
-/// The parts of the solid that are nearest to each of the centres. The result does not depend on the number
-/// of threads. Distances below `tolerance` count as zero [m].
+/// Returns, for each centre, the part of the solid that is nearer to it than to any other centre. The result
+/// does not depend on the number of threads. Distances below `tolerance` count as zero [m].
 std::vector<SolidPiece> voronoi_pieces(const SolidPiece& solid, const std::vector<Vec3>& centres,
                                        Real tolerance);
 

@@ -17,8 +17,8 @@ class WindingNumber {
  public:
   explicit WindingNumber(const TriangleMesh& mesh);
 
-  /// Winding number at p: 1 inside a closed surface, 0 outside, in between near holes; within 0.1 of the
-  /// exact sum.
+  /// Returns the winding number at p with an error of at most 0.1: 1 inside a closed surface, 0 outside, and
+  /// values in between near holes.
   Real at(const Vec3& p) const;
 
  private:

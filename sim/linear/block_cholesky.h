@@ -34,15 +34,15 @@ class BlockCholesky {
   using Block = Eigen::Matrix<Real, N, N>;
   using Vector = Eigen::Matrix<Real, N, 1>;
 
-  /// Symbolic analysis of a block sparsity pattern: `pairs` are the rows of the blocks off the diagonal,
-  /// first < second, each once and in ascending order. `kinds`: by default all rows are positive. Does
-  /// nothing if it is already prepared for this structure.
+  /// Analyzes a block sparsity pattern with `rows` rows. `pairs`: (row, column) of each off-diagonal block,
+  /// first < second, without duplicates and in ascending order. `kinds`: properties of each row; by default
+  /// all are positive. Does nothing if the last analysis had the same arguments.
   void analyze(uint32_t rows, std::span<const std::pair<uint32_t, uint32_t>> pairs,
                std::span<const BlockRowKind> kinds = {});
 
-  /// `pairs` are the blocks (first, second) of the upper triangle, in the order of the pairs given to
-  /// analyze(). Returns false, and solve() must not be called, if a pivot does not have its sign within
-  /// rounding.
+  /// Computes the factorization. `pairs`: blocks of the upper triangle, in the order of the pairs given to
+  /// analyze(). Returns false if a pivot does not have the expected sign within rounding; solve() must not be
+  /// called then.
   bool factorize(std::span<const Block> diagonal, std::span<const Block> pairs);
 
   /// Replaces x by A^-1 x.
@@ -51,7 +51,7 @@ class BlockCholesky {
   uint32_t rows() const { return static_cast<uint32_t>(order_.size()); }
   /// Number of blocks of the factor including the diagonal; the cost of solve() is proportional to it.
   std::size_t factor_blocks() const { return row_.size() + order_.size(); }
-  /// Number of products of two blocks in factorize().
+  /// Number of multiplications of two blocks in factorize(), a measure of its cost.
   std::size_t factor_products() const { return products_; }
 
  private:

@@ -1,7 +1,7 @@
 #pragma once
 /// Three numbers in one vector register, with 0 in the fourth lane. Eigen uses scalar arithmetic for vectors
-/// of three. The overlap tests of boxes, of which a query of two meshes makes thousands, take half the time
-/// with registers. Operations and their order are the same as with scalars, so results do not change.
+/// of three. Overlap tests of boxes take half the time with registers, and a query of two meshes needs
+/// thousands of them. Operations and their order are the same as with scalars, so results do not change.
 
 #include <cstdint>
 

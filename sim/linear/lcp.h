@@ -17,7 +17,7 @@ struct LcpSolution {
   Eigen::VectorXd f;                ///< >= 0
   uint32_t pivots = 0;              ///< number of steps of Dantzig's method
   bool fell_back = false;           ///< whether the result is from projected Gauss-Seidel, the fall-back
-  std::vector<uint32_t> unbounded;  ///< indices that no force, however large, brings to a >= 0
+  std::vector<uint32_t> unbounded;  ///< indices at which a >= 0 is impossible for any force
   /// Greatest |min(A_ii f_i, a_i)| over the indices that are not unbounded, in the unit of b.
   Real residual = 0;
 };

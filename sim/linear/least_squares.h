@@ -1,5 +1,5 @@
 #pragma once
-/// Dense least squares by QR factorizations. They are compiled here once, because their templates take
+/// Dense least squares by QR factorizations. They are in a file of their own, because their templates take
 /// seconds to compile.
 
 #include <Eigen/Core>

@@ -21,8 +21,8 @@ class UpdatedCholesky {
   explicit UpdatedCholesky(Eigen::Index capacity);
 
   Eigen::Index size() const { return size_; }
-  /// Appends a row and column with these `couplings` to the others. Returns false and changes nothing if it
-  /// is dependent.
+  /// Appends a row and column. `couplings`: its elements in the existing columns. Returns false and changes
+  /// nothing if the new row is linearly dependent (kDependent).
   bool append(const Eigen::VectorXd& couplings, Real diagonal);
   void remove(Eigen::Index i);
   /// Replaces a right-hand side by the solution.

@@ -17,9 +17,9 @@ class UpdatedQr {
   Eigen::Index size() const { return size_; }
   /// Appends a last row and a last column with the common element `corner`.
   void append(const Eigen::VectorXd& row, const Eigen::VectorXd& column, Real corner);
-  /// Removes a row and a column; those after it move up.
+  /// Removes a row and a column; later rows and columns move up.
   void remove(Eigen::Index row, Eigen::Index column);
-  /// Removes a column and appends `by` as the last one; the columns between move up.
+  /// Removes a column and appends `by` as the last column; later columns move up.
   void replace(Eigen::Index column, const Eigen::VectorXd& by);
   /// Replaces a right-hand side by the solution. Returns false, with x undefined, if the matrix is singular.
   bool solve(Eigen::VectorXd& x) const;

@@ -1,6 +1,6 @@
 #pragma once
-/// A particle that collides with other particles (physics P3), on its straight path through the rest of a
-/// sub-step.
+/// A particle that collides with other particles (physics P3). Its path through the rest of a sub-step is a
+/// straight line.
 
 #include <cmath>
 #include <cstdint>
@@ -21,7 +21,8 @@ struct CollidingParticle {
   Vec3 acceleration;   ///< mean acceleration by forces
   Real from;           ///< time at which the path starts, since the sub-step's start [s]
   Real mass, radius, restitution, friction;
-  /// For a ball that turns: m r^2 / I (kBallTurning) and r times its angular velocity [m/s]; otherwise zero.
+  /// For a particle that rotates as a ball: `turning` is m r^2 / I (kBallTurning), and `surface_spin` is r
+  /// times its angular velocity [m/s]. Otherwise both are zero.
   Real turning;
   Vec3 surface_spin;
   uint32_t system;          ///< number of its system
@@ -29,7 +30,8 @@ struct CollidingParticle {
   bool hits_bodies;
 
   Vec3 at(Real t) const { return position + (t - from) * path_velocity; }
-  /// Changes the velocity by a collision at time t of a sub-step of length h; the forces stay the same.
+  /// Applies a change of velocity [m/s] by a collision at time t of a sub-step of length h [s]. The path
+  /// continues from there under the same acceleration.
   void strike(Real t, Real h, const Vec3& change) {
     const Vec3 after = arrival(t, h) + change;
     position = at(t);
@@ -37,7 +39,8 @@ struct CollidingParticle {
     path_velocity = after + (h - t) / 2 * acceleration;
     from = t;
   }
-  /// Changes the rotation by an impulse where the normal n points from the contact to the centre.
+  /// Changes the rotation by an impulse [N s] at the surface; the unit normal n points from the contact to
+  /// the particle's centre.
   void turn(const Vec3& n, const Vec3& impulse) {
     if (turning > 0) surface_spin -= turning / mass * n.cross(impulse);
   }
@@ -45,7 +48,8 @@ struct CollidingParticle {
   Vec3 angular_velocity() const { return surface_spin / radius; }
   Real inverse_inertia() const { return turning / (mass * radius * radius); }
   Vec3 velocity_at(Real t, Real h) const { return velocity - (h - t) * acceleration; }
-  /// Velocity at time t, scaled to the energy that the particle has at at(t), which is on a straight path.
+  /// Velocity at time t, scaled so that the energy is right at the position at(t), which is on the straight
+  /// path and not on the parabola.
   Vec3 arrival(Real t, Real h) const {
     const Vec3 v = velocity_at(t, h);
     const Vec3 shift = (t - from) * (path_velocity - (velocity_at(from, h) + v) / 2);
@@ -65,17 +69,18 @@ inline Real pair_friction(Real a, Real b) {
   return std::sqrt(a * b);
 }
 
-/// Velocity of the surface of `a` against that of `b` where they touch, n from b to a, by their rotation
-/// alone.
+/// Relative velocity of the surfaces of a and b at their contact due to rotation alone [m/s]. The unit normal
+/// n points from b to a.
 inline Vec3 rolling_velocity(const CollidingParticle& a, const CollidingParticle& b, const Vec3& n) {
   return n.cross(a.surface_spin + b.surface_spin);
 }
-/// Effective mass of two particles for impulses across their normal.
+/// Effective mass of two particles for impulses perpendicular to the contact normal [kg].
 inline Real mass_across(const CollidingParticle& a, const CollidingParticle& b) {
   return 1 / ((1 + a.turning) / a.mass + (1 + b.turning) / b.mass);
 }
 
-/// Time at which two particles meet on their paths before the sub-step's end; n points from b to a.
+/// Time at which two particles touch on their paths, since the sub-step's start [s], and the unit normal from
+/// b to a.
 struct Meeting {
   Real time;
   Vec3 normal;
@@ -101,9 +106,9 @@ struct ParticleStep {
   BodyImpulses& impulses;  ///< impulses on dynamic bodies
 };
 
-/// An approach that is slower than what forces cause within a sub-step is a resting contact, and so is any
-/// approach below the collision speed. Contacts transmit forces, so `acceleration` is the greater one of both
-/// particles.
+/// Whether an approach at `speed` [m/s] is an impact. Otherwise it is a resting contact: it is slower than
+/// the collision speed plus the speed that forces cause within a sub-step. Contacts transmit forces;
+/// therefore `acceleration` must be the greater acceleration of the two particles [m/s^2].
 inline bool is_impact(Real speed, Real acceleration, const ParticleStep& step) {
   return speed > step.collision_speed + acceleration * step.h;
 }
@@ -111,7 +116,7 @@ inline Real greater_acceleration(const CollidingParticle& a, const CollidingPart
   return std::sqrt(std::max(a.acceleration.squaredNorm(), b.acceleration.squaredNorm()));
 }
 
-/// A collision of a particle, for the caller.
+/// A collision of a particle, as reported to the caller. The velocity is the one after the collision.
 struct ParticleStrike {
   uint32_t particle;
   Real time;  ///< time of the collision, since the sub-step's start [s]

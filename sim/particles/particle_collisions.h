@@ -1,7 +1,7 @@
 #pragma once
-/// The collisions of particles with particles (physics P3-P8), for all systems together. After their flight,
-/// the particles are sorted by position and go through their impacts (particle_impacts.h), and then through
-/// resting contact for the rest of the sub-step (particle_contacts.h).
+/// Collisions of particles with particles (physics P3-P8), for all systems together. After free flight the
+/// particles are sorted by position. Then impacts are resolved (particle_impacts.h), and finally resting
+/// contact for the rest of the sub-step (particle_contacts.h).
 
 #include <span>
 #include <vector>
@@ -19,11 +19,12 @@ class ParticleCollisions {
   struct Outcome {
     /// For each particle: whether it touched anything, and whether it is trapped in a body.
     std::vector<uint8_t> touched, trapped;
-    ParticleTally tally;  ///< counts of the system; only those of collisions are set
+    ParticleTally tally;  ///< figures of the system; only those about collisions are set
   };
 
-  /// Moves the particles of systems after their flight (ParticleSystem::fly_all) to the end of the sub-step.
-  /// The systems are in the order of their handles. `lcp_cluster`: see ParticleContacts::solve().
+  /// Moves particles to the end of the sub-step and resolves their collisions. ParticleSystem::fly_all() must
+  /// have been called for each system. The systems must be in the order of their handles. `lcp_cluster`: see
+  /// ParticleContacts::solve().
   void step(std::span<ParticleSystem* const> systems, const ParticleStage& stage, ImpactLaw law,
             Real collision_speed, uint32_t lcp_cluster = 0);
 

@@ -2,11 +2,11 @@
 /// Resting contact of particles with each other and with bodies, including the collisions that
 /// ParticleImpacts leaves (physics P6, P7, P8, R10): a complementarity problem on the velocities at the end
 /// of the sub-step with Coulomb's round cone, as for bodies (contact_problem.h). Particles do not rotate, or
-/// are balls, so a contact's mobility is a number along and one across its normal, and its solution has a
-/// closed form. The problem is solved by projected
-/// Gauss-Seidel from the impulses of the previous sub-step; a heap at rest is its own solution. Particles are
-/// in layers (NeighborGrid), two of which make a slab, and contacts of a slab reach no farther than the
-/// layers beside it. All even slabs can therefore be solved at the same time, then all odd ones.
+/// are balls. Therefore a contact's mobility consists of two numbers, along the normal and perpendicular to
+/// it, and a single contact is solved in closed form. The problem is solved by projected Gauss-Seidel from
+/// the impulses of the previous sub-step; a heap at rest is its own solution. Particles are sorted into
+/// layers (NeighborGrid); two layers form a slab. Contacts of a slab extend at most to the adjacent layers.
+/// Therefore all even slabs can be solved in parallel, and then all odd ones.
 
 #include <algorithm>
 #include <cmath>
@@ -27,8 +27,8 @@ namespace offstage::sim {
 class ParticleContacts {
  public:
   static constexpr uint32_t kNone = ~0u;
-  /// Gaps below this fraction of the radii count as contact, because the impulses of a sub-step may close
-  /// them.
+  /// Gaps smaller than this fraction of the radii count as contacts, because impulses of the sub-step may
+  /// close them.
   static constexpr Real kMargin = 0.1;
 
   /// The particles ordered by layers.
@@ -39,10 +39,10 @@ class ParticleContacts {
     std::span<const uint32_t> before;  ///< index of each particle in the previous solution, or kNone
   };
 
-  /// Clusters of at most `lcp_cluster` contacts are solved by pivoting (contact_lcp.h), the others by
-  /// relaxation. 0: all by relaxation. Moves the particles to the end of their sub-step. Writes their
-  /// positions to `end`, their velocities to the particles, and to `touched` whether they touch anything.
-  /// Appends the reactions of bodies and the collisions of particles.
+  /// Solves the contacts and moves the particles to the end of the sub-step. Clusters of at most
+  /// `lcp_cluster` contacts are solved by pivoting (contact_lcp.h), others by relaxation; 0: all by
+  /// relaxation. Velocities are stored in `particles`, positions in `end`, and in `touched` whether a
+  /// particle touches anything. Impulses on bodies are appended to `reactions`, collisions to `strikes`.
   void solve(std::span<CollidingParticle> particles, const Order& order, const ParticleSearch& search,
              const ParticleImpacts& impacts, const ParticleStep& step, uint32_t lcp_cluster,
              std::span<Vec3> end, std::span<uint8_t> touched, std::vector<Reaction>& reactions,
@@ -56,9 +56,9 @@ class ParticleContacts {
  private:
   static constexpr Real kNever = std::numeric_limits<Real>::infinity();
 
-  /// A contact, with the data that sweeps read. It is in single precision, because a sweep takes as long as
-  /// reading the contacts. The impulses on two particles are opposite all the same, and velocities are in
-  /// double precision.
+  /// A contact, with the data that sweeps read. Numbers are in single precision, because the time of a sweep
+  /// is the time to read the contacts. The impulses on the two particles are nevertheless exactly opposite,
+  /// and velocities are in double precision.
   struct Contact {
     Eigen::Vector3f normal_single;
     Eigen::Vector3f impulse_single;
@@ -70,7 +70,7 @@ class ParticleContacts {
 
     Vec3 normal() const { return normal_single.cast<Real>(); }
     Vec3 impulse() const { return impulse_single.cast<Real>(); }  // on the first particle, world [N s]
-    /// The part of a tangential impulse that friction with this `limit` can transmit.
+    /// Returns a tangential impulse, shortened to the friction `limit` [N s].
     Vec3 held(const Vec3& along, Real limit) const {
       const Real size2 = along.squaredNorm();
       return size2 > limit * limit ? Vec3(limit / std::sqrt(size2) * along) : along;
@@ -90,7 +90,7 @@ class ParticleContacts {
     Vec3 velocity;       // velocity of the surface
     Vec3 friction_axis;  // Obstacle::friction_axis_on() of the surface
 
-    /// Limits the friction along and across the friction axis separately.
+    /// As Contact::held(); with a friction axis, the limits along and across the axis are separate.
     Vec3 held(const Vec3& along, Real limit) const {
       if (friction_axis.isZero()) return Contact::held(along, limit);
       const Vec3 across = normal().cross(friction_axis);
@@ -109,7 +109,7 @@ class ParticleContacts {
     Lanes surface_spin;
     Vec3 at() const { return vector_of(surface_spin); }
   };
-  /// Two particles whose paths would pass through each other.
+  /// Two particles that would pass through each other on their paths.
   struct Passing {
     Real time;
     uint32_t a, b;

@@ -1,6 +1,6 @@
 #pragma once
-/// The forces on each single particle of a system: gravity, viscous drag, a constant force, and the world's
-/// fields, moving air and grabs (physics P2).
+/// The forces that act on each particle of a system independently of other particles: gravity, viscous drag,
+/// a constant force, and the world's fields, moving air and grabs (physics P2).
 
 #include <algorithm>
 #include <span>
@@ -22,7 +22,7 @@ struct ParticleForces {
         drag(def.linear_drag),
         fields(std::move(acting)) {}
 
-  /// Acceleration by the forces that do not depend on position: without `fields`.
+  /// Acceleration by all forces except `fields` [m/s^2]; it does not depend on the position.
   Vec3 acceleration(const Vec3& v, Real mass) const {
     return gravity + (force - drag * (v - wind)) * (1 / mass);
   }
@@ -30,11 +30,12 @@ struct ParticleForces {
   /// if not empty, gets for each particle the rate at which drag reduces its velocity [1/s].
   void accelerate(Real t, std::span<const Real> x, std::span<const Real> v, std::span<const Real> mass,
                   std::span<Real> dv, std::span<Real> damping = {}) const;
-  /// One step of IntegratorKind::leapfrog for consecutive particles on which no field acts.
+  /// Takes one step of IntegratorKind::leapfrog of length h [s] with consecutive particles. `fields` must be
+  /// empty.
   void leapfrog_step(Real h, std::span<Vec3> x, std::span<Vec3> v, std::span<const Real> mass) const;
-  /// Appends the derivatives of (dx/dt, dv/dt) of consecutive particles by (x, v), which begin at the rows
-  /// and columns `at_x` and `at_v`. The change of fields with position is omitted, because it does not make a
-  /// system stiff.
+  /// Appends the derivatives of (dx/dt, dv/dt) of consecutive particles with respect to (x, v). The first row
+  /// and column of x is `at_x`, that of v is `at_v`. The derivatives of fields with respect to position are
+  /// omitted, because they do not make a system stiff.
   void jacobian(Real t, std::span<const Real> x, std::span<const Real> mass, int at_x, int at_v,
                 SparseEntries& entries) const;
 
@@ -43,7 +44,8 @@ struct ParticleForces {
   std::vector<const ForceDef*> fields;  ///< fields of the world that act on the system
 };
 
-/// Consecutive particles in free flight. The state is position and velocity, x y z of each.
+/// Dynamic system of consecutive particles in free flight. Coordinates are positions and rates are velocities
+/// (x y z of each particle).
 class FreeFlight final : public DynamicSystem {
  public:
   FreeFlight(const ParticleForces& forces, std::span<const Real> mass) : forces_(forces), mass_(mass) {}

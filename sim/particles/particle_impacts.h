@@ -1,10 +1,10 @@
 #pragma once
-/// Collisions of particles with particles and bodies, one after the other in the order of time, at their
-/// exact times (physics E6, P3, P5, P6). Particles that touch when one of them is hit form a cluster and are
-/// solved together. The work is bounded: a particle with too many collisions in a sub-step is left to resting
-/// contact (particle_contacts.h), which also prevents tunnelling; all particles are if there are too many
-/// collisions in total. Slow collisions in a crowd are left to it, too, because there are very many of them,
-/// and each depends on all others.
+/// Collisions of particles with particles and bodies at their exact times, one after the other in the order
+/// of time (physics E6, P3, P5, P6). If a hit particle touches others, they form a cluster and are solved
+/// together. The work is bounded. A particle with too many collisions in a sub-step is left to the solver of
+/// resting contact (particle_contacts.h), which also prevents tunnelling. If there are too many collisions in
+/// total, all particles are. Slow collisions in dense crowds are also left to it, because they are very
+/// numerous and depend on each other.
 
 #include <functional>
 #include <queue>
@@ -21,14 +21,16 @@ class ParticleImpacts {
  public:
   static constexpr uint32_t kNone = ~0u;
 
-  /// Resolves the collisions of the particles. `search` must have sorted them and listed their partners.
-  /// Bodies get their impulses through the step; the collisions of particles are appended.
+  /// Resolves the collisions of the particles. Before, ParticleSearch::build() and list_partners() must have
+  /// been called for them. Impulses on bodies are added to ParticleStep::impulses, and collisions are
+  /// appended to `strikes`.
   void resolve(std::span<CollidingParticle> particles, const ParticleSearch& search, const ParticleStep& step,
                std::vector<ParticleStrike>& strikes);
 
-  /// The particles that collided.
+  /// Indices of the particles that collided.
   std::span<const uint32_t> changed() const { return changed_; }
-  /// Obstacle::body of the dynamic body that a particle hit last. The body moves only in the next sub-step.
+  /// Obstacle::body of the dynamic body that a particle hit last; kNone if there is none. The body reacts
+  /// only in the next sub-step.
   uint32_t struck_body(uint32_t particle) const { return struck_body_[particle]; }
   uint64_t count() const { return count_; }
 

@@ -1,7 +1,7 @@
 #pragma once
 /// Search for particles that come near each other on their paths. Each particle has a ball around its path,
-/// in a frame that moves with the mean of all particles. Balls are sorted by size into classes, each a factor
-/// of two wide and with a grid of its own, so that neither large nor fast particles make cells too wide for
+/// in a frame that moves with the mean of all particles. Balls are sorted into size classes, each of which
+/// covers a factor of two and has its own grid. Therefore large or fast particles do not enlarge the cells of
 /// the others.
 
 #include <span>
@@ -16,13 +16,14 @@ class ParticleSearch {
  public:
   static constexpr std::size_t kChunk = 512;
 
-  /// Sorts all particles, or only the `members`. `margin` is the distance that counts as near [m].
+  /// Sorts all particles, or only those with the indices `members`, for a sub-step of length h [s]. Particles
+  /// whose surfaces come within `margin` [m] count as near.
   void build(std::span<const CollidingParticle> particles, Real h, Real margin);
   void build(std::span<const CollidingParticle> particles, std::span<const uint32_t> members, Real h,
              Real margin);
 
-  /// Calls f(index) for the particles whose paths may come near that of `particle`, including itself. The
-  /// state of `particle` may have changed since build().
+  /// Calls f(index) for the particles whose paths may come near the path of `particle`, including `particle`
+  /// itself. The state of `particle` may have changed since build().
   template <class F>
   void for_each_near(const CollidingParticle& particle, F&& f) const {
     const Ball b = ball(particle);
@@ -32,11 +33,12 @@ class ParticleSearch {
       });
   }
 
-  /// Lists for each particle those with which it may collide and whose paths may come near its own. Each pair
-  /// is listed once, for one of the two. All particles must have been sorted.
+  /// Creates the lists for partners(). A list has the particles that may collide with a particle and whose
+  /// paths may come near its path. Each pair is in only one of the two lists. build() must have sorted all
+  /// particles.
   void list_partners(std::span<const CollidingParticle> particles);
-  /// Lists only pairs with at least one `chosen` particle (a flag for each particle); such a pair is listed
-  /// for that particle.
+  /// Creates lists only for `chosen` particles (one flag per particle): pairs with at least one chosen
+  /// particle.
   void list_partners(std::span<const CollidingParticle> particles, std::span<const uint8_t> chosen);
   std::span<const uint32_t> partners(uint32_t i) const {
     const List& list = lists_[i];

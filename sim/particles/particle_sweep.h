@@ -1,8 +1,8 @@
 #pragma once
 /// Moves one particle through a sub-step among obstacles (physics P3-P5). The integrated path is swept
 /// against the bodies, in each body's own frame between its poses, so that neither a fast particle nor a
-/// moving body passes through the other. At a hit the particle is placed at the surface, gets its impulse,
-/// and continues for the remaining time with its new velocity under the same forces.
+/// moving body passes through the other. At a hit the particle is placed at the surface and its velocity is
+/// changed by the impulse. It then continues for the remaining time under the same forces.
 
 #include <array>
 #include <cstdint>
@@ -15,7 +15,8 @@
 
 namespace offstage::sim {
 
-/// A particle before and after the integration without collisions; the sweep replaces the end.
+/// State of a particle before and after the integration without collisions [m], [m/s]. The sweep replaces the
+/// state after it.
 struct ParticlePath {
   Vec3 start, start_velocity;
   Vec3 end, end_velocity;
@@ -28,9 +29,10 @@ struct SweepOutcome {
   bool ejected = false;     ///< whether the particle was inside a body and was projected out (P4)
   bool trapped = false;     ///< whether the particle was inside a body and could not be projected out (P4)
   bool truncated = false;   ///< whether the particle reached the limit of collisions
-  /// Whether the particle strikes a dynamic body, at the fraction `time`, and was left unchanged.
+  /// Whether the particle hits a dynamic body at the fraction `time`, and its path was therefore left
+  /// unchanged; see ParticleSweep().
   bool strikes_body = false;
-  Real time = 0;  ///< time of that strike, as a fraction of the sub-step
+  Real time = 0;  ///< time of that hit, as a fraction of the sub-step
 };
 
 /// A collision of a particle, with the state after it.
@@ -40,7 +42,7 @@ struct Strike {
   Vec3 normal;  ///< normal of the obstacle, towards the particle
 };
 
-/// Results of sweeps besides the paths.
+/// Further results of sweeps: impulses on bodies, and collisions.
 struct SweepLog {
   std::vector<Reaction> reactions;
   std::vector<Strike> strikes;  ///< collisions of the last particle, if requested
@@ -55,14 +57,15 @@ struct ObstacleHit {
   Vec3 normal;        ///< normal of the obstacle
 };
 
-/// Returns the impulse on a particle that meets an obstacle at a fraction of the sub-step with the relative
-/// velocity u, u.n < 0 (P5, P8). `mobility` is that of the obstacle at the contact; zero if the particle does
-/// not move it. `friction` applies along the obstacle's friction axis, and `cross_friction` times this across
-/// it; with a friction axis each direction sticks or slides separately. `turning` is that of a ball that
-/// turns (CollidingParticle).
+/// Returns the impulse on a particle [N s] that hits an obstacle at a fraction of the sub-step (physics P5,
+/// P8). `u`: relative velocity, u.n < 0. `mobility`: mobility of the obstacle at the contact [1/kg]; zero if
+/// the particle does not move it. `friction` applies along the obstacle's friction axis, and `friction` times
+/// Obstacle::cross_friction across it. With a friction axis each direction sticks or slides separately.
+/// `turning`: CollidingParticle::turning.
 Vec3 collision_impulse(const Obstacle& o, Real fraction, Real particle_mass, const Vec3& u, const Vec3& n,
                        Real restitution, Real friction, const Mat3& mobility, Real turning = 0);
-/// Returns the reaction of an impulse on the obstacle.
+/// Returns the reaction on an obstacle to an impulse on a particle at the point `contact` (world) at a
+/// fraction of the sub-step.
 Reaction reaction(const Obstacle& o, const Vec3& contact, Real fraction, const Vec3& impulse_on_particle);
 
 /// The obstacles near one particle's path.
@@ -76,14 +79,14 @@ class NearObstacles {
 
   /// Projects a sphere out of the bodies that contain it, along the nearest face (P4). `start` is its
   /// position at a fraction of the sub-step; `end` is moved by the same displacement. Returns false if this
-  /// fails. `deep`: it was inside by more than rounding and straightened paths can cause. The obstacles found
-  /// must include those near `start` and `end`.
+  /// fails. `deep` is set if the sphere was deeper inside than errors of rounding and of straight paths can
+  /// explain. find() must have been called for `start` and `end`.
   bool eject(Vec3& start, Vec3& end, Real radius, Real fraction, bool& deep);
   /// Returns the first hit of a sphere on its path from a, at a fraction of the sub-step, to b at its end,
   /// among the obstacles found.
   ObstacleHit first_hit(const Vec3& a, const Vec3& b, Real radius, Real from) const;
-  /// Returns the hit of a sphere with one obstacle; none if there is none before `latest`, a fraction of the
-  /// sub-step.
+  /// Returns the hit of a sphere with one obstacle. ObstacleHit::obstacle is null if there is no hit before
+  /// `latest`, a fraction of the sub-step.
   static ObstacleHit hit(const Obstacle& o, const Vec3& a, const Vec3& b, Real radius, Real from,
                          Real latest);
 
@@ -95,9 +98,10 @@ class NearObstacles {
 
 class ParticleSweep {
  public:
-  /// `fixed` and `moving` are the obstacles of a sub-step of length h [s]. With `impulses`, particles that
-  /// strike dynamic bodies change them one after the other. Without, as when many particles are swept in
-  /// parallel, such particles are left unchanged and reported (SweepOutcome::strikes_body).
+  /// `fixed` and `moving` are the obstacles of a sub-step of length h [s]. With `impulses`, each hit of a
+  /// dynamic body changes the body immediately, so particles must be swept one after the other. Without
+  /// `impulses`, particles can be swept in parallel; those that hit a dynamic body are left unchanged and
+  /// reported by SweepOutcome::strikes_body.
   ParticleSweep(const Obstacles& fixed, const Obstacles& moving, const ParticleForces& forces, Real h,
                 SweepLog& log, BodyImpulses* impulses = nullptr)
       : near_(fixed, moving), forces_(forces), h_(h), log_(log), impulses_(impulses) {}
@@ -113,7 +117,7 @@ class ParticleSweep {
     const Obstacle* obstacle;
     Real friction;
     Real fraction;  // start of the contact
-    /// Whether the obstacle was hit and will move away in the next sub-step; until then it only blocks the
+    /// Whether the obstacle was hit and will move away only in the next sub-step. Until then it blocks the
     /// particle.
     bool gives_way;
   };

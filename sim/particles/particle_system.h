@@ -1,8 +1,8 @@
 #pragma once
 /// Internal state of a particle system: its arrays, the new particles of the next sub-step, and the stages of
 /// a sub-step. The stages run over chunks in parallel, and their results do not depend on the chunks.
-/// Particles that collide with particles first fly, then go through their collisions together
-/// (particle_collisions.h), and end their sub-step last.
+/// Particles that collide with particles have three stages: fly_all(), their common collisions
+/// (particle_collisions.h), and end_step().
 
 #include <optional>
 #include <span>
@@ -38,32 +38,34 @@ struct ParticleSystem {
   ParticleSystemDef def;
   ParticleArrays arrays;
   uint64_t next_id = 0;
-  /// For the last particles of the arrays, those added since the last sub-step: time from their birth to the
-  /// end of the sub-step. Negative: the particle exists from the sub-step's start.
+  /// For each particle added since the last sub-step (the last ones of the arrays): time from its birth to
+  /// the end of the coming sub-step [s]. Negative: it exists from the sub-step's start.
   std::vector<Real> since_birth;
 
   uint64_t add(const Particle& p, Real elapsed);
   /// Index of a particle in the arrays; empty if it does not exist any more.
   std::optional<std::size_t> find(uint64_t id) const;
 
-  /// Whether a particle exists during the whole next sub-step.
+  /// Whether particle i exists during the whole coming sub-step.
   bool whole_step(std::size_t i) const {
     const std::size_t old = arrays.size() - since_birth.size();
     return i < old || since_birth[i - old] < 0;
   }
 
-  /// Adds the particles created since the last sub-step in their current state. Each flies for its age so
-  /// far, and exists during the whole next sub-step.
+  /// Moves the particles that were added since the last sub-step along their free flight up to now. From now
+  /// on they exist during whole sub-steps.
   void admit_new_particles(const ParticleForces& forces);
   /// Stores the state at the start of the sub-step, for a CoupledGroup that integrates the system.
   void begin_coupled();
   /// Whether ParticleCollisions resolves the collisions of this system.
   bool hits_particles() const { return def.internal || def.external || def.rotates; }
-  /// For particles that do not collide with particles: integrates, sweeps against bodies, ages and removes.
-  /// In a `coupled` system, the particles for which whole_step() is true are already integrated.
+  /// Advances a system whose particles do not collide with particles: integrates them, sweeps them against
+  /// bodies, and removes those whose life has ended. `coupled`: the particles for which whole_step() is true
+  /// have been integrated already.
   ParticleTally step(const ParticleStage& stage, const ParticleForces& forces, bool coupled);
 
-  /// For particles that collide with particles: integrates without collisions, and stores the initial state.
+  /// For a system whose particles collide with particles: integrates without collisions, and stores the
+  /// initial states for flight().
   void fly_all(const ParticleStage& stage, const ParticleForces& forces, bool coupled);
   /// A particle's flight: initial state and duration.
   struct Flight {
@@ -71,7 +73,8 @@ struct ParticleSystem {
     Real duration;
   };
   Flight flight(std::size_t i) const { return {start_position_[i], start_velocity_[i], duration_[i]}; }
-  /// Ages and removes particles. `touched` and `trapped` are the results of collisions for each particle.
+  /// Increases the age of the particles and removes those whose life has ended. `touched` and `trapped`: see
+  /// ParticleCollisions::Outcome.
   ParticleTally end_step(const ParticleStage& stage, std::span<const uint8_t> touched,
                          std::span<const uint8_t> trapped);
   ParticleEvent collision_event(const ParticleStage& stage, std::size_t i, const Strike& strike) const;

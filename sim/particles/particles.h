@@ -1,5 +1,5 @@
 #pragma once
-/// Particle systems as structures of arrays (physics P1), and the impulse of a collision of particles (P5).
+/// Definition and state of particle systems (physics P1), and the impulse of a particle's collision (P5).
 
 #include <cstdint>
 #include <optional>
@@ -44,7 +44,7 @@ struct ParticleSystemDef {
   bool rotates = false;
   bool dies_on_hit = false;        ///< whether particles are removed at their first collision
   bool report_collisions = false;  ///< whether collisions are reported as ParticleEvent
-  bool report_deaths = false;      ///< whether deaths of age are reported as ParticleEvent
+  bool report_deaths = false;  ///< whether particles that reach their lifespan are reported as ParticleEvent
   IntegratorKind integrator = IntegratorKind::leapfrog;
 };
 
@@ -61,7 +61,7 @@ struct ParticleEvent {
   Real mass = 0, radius = 0, age = 0;
 };
 
-/// Figures of the particles in a step.
+/// Statistics of all particles in a step.
 struct ParticleFigures {
   uint64_t born = 0;
   uint64_t expired = 0;     ///< particles that reached their lifespan or were removed by a collision
@@ -81,7 +81,7 @@ struct ParticleFigures {
   void add(const ParticleFigures& more) { add_figures(*this, more); }
 };
 
-/// The state of one system. All arrays have the same order, that of creation; removal keeps it.
+/// The state of one system. All arrays are in the order of creation, also after removals.
 struct ParticleArrays {
   std::vector<Vec3> position, velocity;
   std::vector<Real> mass, radius, age, lifespan, restitution, friction, charge;
@@ -94,25 +94,25 @@ struct ParticleArrays {
   std::size_t size() const { return position.size(); }
 };
 
-/// The impulse on body 1 in a collision of two bodies of effective mass m12 with the relative velocity u = v1
-/// - v2 and the unit normal n, u.n < 0 (P5): restitution e along n. It sticks tangentially if the friction
-/// cone allows; otherwise it slides with |P_t| = mu P_n against the sliding direction.
+/// Returns the impulse on body 1 in a collision of two bodies [N s] (physics P5). m12: effective mass [kg]; u
+/// = v1 - v2: relative velocity, u.n < 0; n: unit normal. The contact sticks if the friction cone allows it;
+/// otherwise |P_t| = mu P_n against the sliding direction.
 Vec3 collision_impulse(Real m12, const Vec3& u, const Vec3& n, Real restitution, Real friction);
-/// The impulse of round bodies that rotate, with the effective mass `across` for impulses along the surface.
+/// As above, for round bodies that rotate. `across`: effective mass for tangential impulses [kg].
 Vec3 collision_impulse(Real m12, Real across, const Vec3& u, const Vec3& n, Real restitution, Real friction);
 
-/// m r^2 / I of a solid ball: an impulse across its surface moves the surface 1 + kBallTurning times as much
-/// as the centre.
+/// m r^2 / I of a solid ball. A tangential impulse changes the velocity of the surface 1 + kBallTurning times
+/// as much as the velocity of the centre.
 inline constexpr Real kBallTurning = 2.5;
 
-/// A velocity scaled to the energy after a displacement by `shift` under an acceleration a: |v|^2 + 2
-/// a.shift. A hit that was found on a straight path, or a surface in the way, puts a particle beside its
-/// parabola; this conserves its energy. A particle at rest stays at rest.
+/// Returns v scaled so that its square is |v|^2 + 2 a.shift. This conserves the energy of a particle that is
+/// displaced by `shift` [m] under an acceleration a [m/s^2], for example when a hit on a straight path puts
+/// it beside its parabola. A particle at rest stays at rest.
 Vec3 velocity_after_shift(const Vec3& v, const Vec3& a, const Vec3& shift);
 
-/// Time until two spheres touch, which is when the distance of their centres is `distance` (P3). d and u are
-/// the current differences of their centres and of their velocities. Zero if they overlap and approach; none
-/// if they never touch.
+/// Returns the time until the distance of two centres is `distance` [s], when the two spheres touch (physics
+/// P3). d: difference of the centres [m]; u: difference of the velocities [m/s]. Zero if they overlap and
+/// approach; empty if they never touch.
 std::optional<Real> meeting_time(const Vec3& d, const Vec3& u, Real distance);
 
 }  // namespace offstage::sim

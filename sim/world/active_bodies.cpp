@@ -115,8 +115,8 @@ void ActiveBodies::wake_all() {
   while (!sleeping_.empty()) wake(*sleeping_.begin()->second.front());
 }
 
-/// Stores for bodies that fall asleep the springs whose force can change later: those with the other end at a
-/// kinematic body or a particle.
+/// Stores, for bodies that fall asleep, the springs whose force may change later: those whose other end is on
+/// a kinematic body or a particle.
 void ActiveBodies::watch_springs(std::span<Body* const> group) {
   const auto sleeper = [&](const Attachment& end) -> Body* {
     const auto* point = std::get_if<BodyPoint>(&end);
@@ -140,7 +140,7 @@ void ActiveBodies::watch_springs(std::span<Body* const> group) {
   });
 }
 
-/// Wrench on a body at rest by the forces that may change with time.
+/// Force and torque on a sleeping body by the forces that may change with time.
 Wrench ActiveBodies::time_dependent_wrench(const Body& body, Real time) const {
   const RigidMotion at_rest{body.rigid.position, body.rigid.orientation, Vec3::Zero(), Vec3::Zero()};
   Wrench sum;

@@ -1,6 +1,6 @@
 #pragma once
-/// The lists of bodies that move, and sleep: groups of bodies that have been almost at rest for some time are
-/// not simulated until something disturbs them.
+/// Lists of the awake, the kinematic and the sleeping bodies. A group of bodies that has been almost at rest
+/// for some time falls asleep: it is not simulated until something disturbs it.
 
 #include <map>
 #include <span>
@@ -15,7 +15,8 @@ class ActiveBodies {
  public:
   explicit ActiveBodies(const WorldState& world) : world_(world) {}
 
-  /// Awake dynamic bodies, and kinematic bodies that move, by rank. Valid until the next update().
+  /// Awake dynamic bodies, and moving kinematic bodies, each in the order of rank. Valid until the next
+  /// update().
   std::span<Body* const> awake() const { return awake_; }
   std::span<Body* const> kinematic() const { return kinematic_; }
   std::size_t asleep() const { return asleep_; }
@@ -36,18 +37,20 @@ class ActiveBodies {
   /// Updates the lists after changes.
   void update();
 
-  /// Begins a sampling step. From then on all bodies that may have moved in it are collected in stepped().
+  /// Begins a sampling step. All bodies that may move in this step are collected in stepped().
   void begin_step();
   std::span<Body* const> stepped() const { return stepped_; }
   void add_stepped(Body& body) { stepped_.push_back(&body); }
   void forget(Body& body) { std::erase(stepped_, &body); }
 
-  /// Wakes a body and all bodies of its sleeping group, which are returned; none if it is awake.
+  /// Wakes a body and its whole sleeping group, and returns these bodies. Returns an empty list if the body
+  /// is awake.
   std::vector<Body*> wake(Body& body);
   void wake_all();
-  /// Wakes the bodies that a force or a spring has begun to push, or does not support any more.
+  /// Wakes the bodies on which the load by a force field or a spring has changed since they fell asleep.
   void wake_pushed(Real time);
-  /// Lets islands fall asleep at the end of a sub-step of length h from `start` on.
+  /// Puts islands at rest to sleep at the end of a sub-step, which begins at time `start` and has length h
+  /// [s].
   void put_to_sleep(std::span<const Island> islands, Real start, Real h);
   /// Adds the numbers of bodies that woke or fell asleep since the last call to the report.
   void count(StepReport& report);
@@ -68,7 +71,8 @@ class ActiveBodies {
   uint64_t woken_ = 0, put_to_sleep_ = 0;
 };
 
-/// Whether a wrench differs so much from that at rest that it could move a sleeping body.
+/// Whether the wrench `push` differs so much from the wrench `at_rest`, when the body fell asleep, that it
+/// could move the body.
 bool is_pushed(const Body& body, const Wrench& push, const Wrench& at_rest);
 
 }  // namespace offstage::sim

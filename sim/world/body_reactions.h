@@ -14,8 +14,8 @@ class BodyReactions {
   BodyReactions(const WorldState& world, ActiveBodies& active, const JointGroups& joints)
       : world_(world), active_(active), joints_(joints) {}
 
-  /// Applies the impulses in a sub-step that ends at `time` to the momenta of bodies, and through joints to
-  /// whole articulations. The bodies move by them from the next sub-step on.
+  /// Adds the impulses of a sub-step that ends at `time` [s] to the momenta of the bodies. Joints transmit
+  /// them to whole articulations. The positions change from the next sub-step on.
   void apply(std::span<const Reaction> reactions, Real time, StepReport& report);
   void forget(const Body& body) { pending_.erase(body.handle.index); }
 
@@ -23,7 +23,8 @@ class BodyReactions {
   const WorldState& world_;
   ActiveBodies& active_;
   const JointGroups& joints_;
-  std::map<uint32_t, Reaction> pending_;  // too weak to wake the body, by its slot; they are summed
+  std::map<uint32_t, Reaction>
+      pending_;  // by slot of a sleeping body: sum of the impulses so far, too weak to wake it
 };
 
 }  // namespace offstage::sim

@@ -10,7 +10,8 @@ namespace {
 
 /// Cloth is at rest under a body that moves slower than this [m/s].
 constexpr Real kClothRest = 0.05;
-/// A larger change of speed in a sub-step is an impact; that by gravity is a fifth of it [m/s].
+/// A larger change of speed in a sub-step counts as an impact [m/s]. Gravity changes the speed by about a
+/// fifth of it.
 constexpr Real kImpact = 0.2;
 
 }  // namespace
@@ -83,7 +84,7 @@ void ClothMotion::wake_unpinned(std::span<const ClothBody> near) {
   for (Body* body : released) active_.wake(*body);
 }
 
-/// Displaces bodies as cloths have done in this sub-step, and returns the impulses on them.
+/// Applies the displacements of bodies by cloths in this sub-step, and returns the impulses on the bodies.
 std::vector<Reaction> ClothMotion::answer(std::span<const ClothBody> near, Real h) {
   std::vector<Reaction> reactions;
   for (const ClothBody& at : near) {

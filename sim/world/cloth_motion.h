@@ -1,6 +1,7 @@
 #pragma once
-/// Motion of cloths through a sub-step (physics F6-F8). Cloths move after bodies and particles, among the
-/// bodies on the paths of these. Their effect on the velocities of bodies begins in the next sub-step.
+/// Motion of cloths through a sub-step (physics F6-F8). Cloths move after bodies and particles, and collide
+/// with the bodies along the paths of the sub-step. Impulses of cloths change the velocities of bodies from
+/// the next sub-step on.
 
 #include <span>
 #include <vector>
@@ -17,11 +18,12 @@ class ClothMotion {
   /// Updates the list of cloths to step. To be called after a cloth has been added or removed, or has
   /// appeared.
   void arrange();
-  /// Releases the cloth that is pinned to a body.
+  /// Releases all cloth vertices that are pinned to a body.
   void detach(BodyHandle body);
 
   void begin_step();
-  /// Moves all cloths through a sub-step, and the bodies that they displace. Returns the impulses on bodies.
+  /// Moves all cloths through a sub-step, and displaces bodies where cloths push them. Returns the impulses
+  /// on the bodies.
   std::vector<Reaction> step(Real start, Real h);
   /// Adds the statistics of the step to the report.
   void report(StepReport& report);
@@ -36,8 +38,8 @@ class ClothMotion {
   ClothSystem system_;
 };
 
-/// Collides particles with cloths after both have moved through the sub-step of length h from `start` on.
-/// Adds the collisions of systems that report them.
+/// Collides particles with cloths after both have moved through a sub-step, which begins at time `start` and
+/// has length h [s]. Appends the collisions of particle systems that report events to `events`.
 void collide_particles_with_cloths(WorldState& world, Real start, Real h, std::vector<ParticleEvent>& events);
 
 }  // namespace offstage::sim

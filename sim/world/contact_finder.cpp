@@ -13,8 +13,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Distance of contact points in addition to that by the bodies' motion in the interval: at most kMargin [m]
-/// and at most this fraction of the smaller body.
+/// Contact points are searched within the bodies' motion in the interval plus a margin: at most kMargin [m],
+/// and at most kMarginFraction of the size of the smaller body.
 constexpr Real kMargin = 2e-3, kMarginFraction = 0.05;
 /// Motion in an interval, as a fraction of the smaller body, above which the contact points at the start do
 /// not predict later contacts. The limit is larger for the fast solver without restitution, which uses the
@@ -29,9 +29,9 @@ constexpr Real kWide = 0.036;
 /// at most this fraction of the smaller body. Until then only the distances of the points are updated in each
 /// step, to second order.
 constexpr Real kReuse = 1e-4, kReuseFraction = 2e-4, kExactReuse = 1e-8;
-/// A body that is hit without restitution by a body of the same mass gets this fraction of its speed; both
-/// then move together. Impacts are propagated kPassedOn times. The next one would have a sixteenth of the
-/// speed; for less than 7.7 m/s this is within kMargin in a step of 1/240 s.
+/// If a body hits another body of the same mass without restitution, both then move with this fraction of its
+/// speed. Impacts are propagated kPassedOn times. The next one would have a sixteenth of the speed; for less
+/// than 7.7 m/s this is within kMargin in a step of 1/240 s.
 constexpr Real kPassedFraction = 0.5;
 constexpr uint32_t kPassedOn = 3;
 /// Bodies turn if their rotation moves their surfaces by more than this in an interval [m].
@@ -136,7 +136,7 @@ void ContactFinder::move(Body& body, Aabb swept_box, bool again) {
   is_current_ = false;
 }
 
-/// The same unless the path is within the previous box; returns whether the box was changed.
+/// As above, but does nothing if the path is within the previous box. Returns whether the box was changed.
 bool ContactFinder::move(Body& body, bool again) {
   const Aabb swept_box = swept_bounds(body);
   if (!leaves(body, swept_box)) return false;
@@ -260,8 +260,8 @@ void ContactFinder::find_points(ContactPair& pair, Real time, Real h) const {
   choose_event(pair, is_far, left);
 }
 
-/// Chooses whether a pair's next impact is traced back to. `far`: its motion is too large for its contact
-/// points.
+/// Sets ContactPair::needs_toi: whether the island is moved back to the pair's next impact. `far`: whether
+/// the relative motion is too large for the known contact points.
 void ContactFinder::choose_event(ContactPair& pair, bool far, Real left) const {
   pair.needs_toi = far && !pair.toi_exhausted;
   const bool bounces = is_exact_ || pair.surface().restitution > 0;

@@ -19,10 +19,10 @@ class ContactFinder {
       : world_(world), materials_(materials), active_(active), joints_(joints) {}
 
   void use(const CollisionMethods& methods);
-  /// Adds and removes bodies that collide.
+  /// Adds a body to collision detection, or removes it.
   void add(const Body& body);
   void remove(const Body& body);
-  /// Forgets the contacts of a body, and of all bodies.
+  /// Removes the pairs of one body, or of all bodies.
   void forget(const Body& body);
   void forget_all();
   /// Passes the groups of joints to the broad phase. To be called after they have changed.
@@ -43,19 +43,21 @@ class ContactFinder {
   /// Wakes the sleeping bodies near moving bodies, moves the woken bodies through the sub-step, and returns
   /// them.
   std::vector<Body*> wake_touched(FreeMotion& motion, Real start, Real h);
-  /// Extends the pairs to the changed paths of bodies in the sub-step; existing pairs are kept, because
-  /// impacts and islands refer to them. Returns whether there may be new ones; see ContactPair::is_new().
+  /// Adds the pairs that result from changed paths of bodies in the sub-step. Existing pairs are kept,
+  /// because impacts and islands refer to them. Returns whether pairs may have been added; see
+  /// ContactPair::is_new().
   bool follow(std::span<Body* const> bodies);
   /// Adds the pairs of bodies that have been woken.
   void extend() { collect(true); }
   /// Finds the points where a pair's bodies touch at their interval's start, or may touch in the rest of the
   /// sub-step.
   void find_points(ContactPair& pair, Real time, Real h) const;
-  /// Removes the contacts at internal edges of pairs that were found at the same time.
+  /// Removes contacts at internal edges (internal_edges.h). The contact points of all these pairs must have
+  /// been found for the same time.
   void remove_internal_edge_contacts(std::span<ContactPair* const> pairs, Real time, Real h) const;
 
-  /// Whether each collision of this sub-step is resolved at its own time: always by the exact solvers, and by
-  /// the automatic choice while few bodies move.
+  /// Whether each collision of this sub-step is resolved at its own time. This holds for the exact solvers,
+  /// and for SolverKind::automatic while few bodies move.
   bool is_exact() const { return is_exact_; }
 
   /// Adds the statistics of the sub-step to the report.
@@ -78,7 +80,7 @@ class ContactFinder {
   ContactGraph graph_;
   std::vector<ContactPair*> pairs_;
   bool is_current_ = false, is_exact_ = false;
-  uint64_t version_ = 0;  // of the active bodies that the pairs are for
+  uint64_t version_ = 0;  // ActiveBodies::version() for which the pairs were found
 };
 
 }  // namespace offstage::sim

@@ -15,11 +15,12 @@ namespace offstage::sim {
 
 class ContactMaterials {
  public:
-  /// Returns the number of a material; a new name gets a new number.
+  /// Returns the number that identifies a material; a new name gets a new number.
   uint32_t number(const std::string& material);
   void add(const ContactRule& rule) { rules_[std::minmax(number(rule.a), number(rule.b))] = rule; }
-  /// Returns the surface properties of two bodies that meet. Properties that the rule for their materials
-  /// does not give follow from the bodies' own values. `methods`: how the contacts of the bodies are found.
+  /// Returns the combined surface properties of two bodies. The rule for their materials takes precedence;
+  /// properties that it does not set are combined from the values of both bodies. `methods`: the algorithms
+  /// of collision detection.
   PairSurface surface(const Body& a, const Body& b, const CollisionMethods& methods) const;
 
  private:

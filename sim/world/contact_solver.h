@@ -1,5 +1,5 @@
 #pragma once
-/// Contact forces of islands (physics R7-R10): each island is solved by the suitable solver.
+/// Contact forces of islands (physics R7-R10). For each island the exact or the fast solver is chosen.
 
 #include <map>
 #include <span>
@@ -15,7 +15,7 @@ class ContactSolver {
  public:
   explicit ContactSolver(const WorldState& world) : world_(world) {}
 
-  /// Solves all islands of a sub-step of length h, over the whole of it.
+  /// Solves all islands over a whole sub-step, which begins at time `start` and has length h [s].
   void solve_all(std::span<Island> islands, Real start, Real h, StepReport& report);
   /// Solves some islands over an interval within a sub-step.
   void solve(std::span<Island* const> group, const ContactInterval& interval, StepReport& report);
@@ -29,7 +29,7 @@ class ContactSolver {
   FastContacts fast_;
 };
 
-/// Records a pair whose contacts a solver could not solve to its accuracy; null: none.
+/// Adds a pair whose contact forces are inaccurate to StepReport::rough_contacts. Does nothing for null.
 void record_rough_contact(const ContactPair* pair, StepReport& report);
 
 }  // namespace offstage::sim

@@ -43,7 +43,7 @@ void CoupledGroup::add_group(const WorldState& world, ParticleSystem& system) {
   groups_.push_back(std::move(group));
 }
 
-/// New particles take part from their first whole sub-step on.
+/// Adds the forces between particles. New particles participate from their first whole sub-step on.
 void CoupledGroup::add_pair_forces(const WorldState& world) {
   world.force_defs.for_each([&](ForceHandle, const ForceDef& def) {
     if (!def.is_pairwise()) return;

@@ -15,7 +15,7 @@
 
 namespace offstage::sim {
 
-/// The members of a group: those of one component of the CouplingGraph, or of several.
+/// The members of a group: the objects of one or more components of the CouplingGraph.
 struct GroupMembers {
   std::vector<Body*> bodies;
   std::vector<ParticleSystem*> systems;
@@ -40,7 +40,7 @@ class CoupledGroup final : public DynamicSystem {
 
   const JointFigures& joint_figures() const { return joint_figures_; }
 
-  /// Stores the state, and restores the state that was stored last.
+  /// save() stores the state of the members; restore() returns to the state that was stored last.
   void save();
   void restore();
 

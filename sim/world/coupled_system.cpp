@@ -10,7 +10,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Single bodies per task; with fewer than kParallel tasks do not pay.
+/// Number of single bodies per task. With fewer than kParallel bodies, tasks cost more than they save.
 constexpr std::size_t kBlock = 64, kParallel = 256;
 
 std::vector<Body*> awake_bodies(WorldState& world) {

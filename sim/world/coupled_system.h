@@ -1,7 +1,7 @@
 #pragma once
-/// Motion between contacts of bodies, and of the particles that springs hold or that act on each other
-/// (physics E6, R1, R2, P2). A body without springs and joints moves alone; connected objects are integrated
-/// together. The motion of an object does not depend on unconnected objects.
+/// Contact-free motion of bodies, and of particles that have springs or pair forces (physics E6, R1, R2, P2).
+/// A body without springs and joints moves alone; connected objects are integrated together. The motion of an
+/// object does not depend on unconnected objects.
 
 #include <vector>
 
@@ -14,8 +14,9 @@ class CoupledSystem {
   /// Uses all dynamic bodies, and all particle systems with springs or with forces between particles. No
   /// object may be added to the world or removed from it during its lifetime.
   explicit CoupledSystem(WorldState& world, std::span<const ForceDef* const> forces = {});
-  /// Uses these bodies, with their springs, joints and forces, for the rest of a sub-step that a
-  /// CoupledSystem of all objects has begun. They must contain all bodies that are connected() to them.
+  /// Uses the given bodies, with their springs, joints and forces, for the rest of a sub-step that a
+  /// CoupledSystem of all objects has begun. `bodies` must include all bodies that are connected() to one of
+  /// them.
   CoupledSystem(WorldState& world, std::span<Body* const> bodies,
                 std::span<const ForceDef* const> forces = {});
 
@@ -25,12 +26,14 @@ class CoupledSystem {
   /// Whether a particle system is integrated by this object.
   bool holds(const ParticleSystem& system) const;
 
-  /// Advances everything from t to t + h; `tolerance` is for adaptive integrators.
+  /// Advances all members from time t to t + h [s]. `tolerance`: largest error per step of the adaptive
+  /// integrators [m].
   void step(const Integrator& integrator, Real t, Real h, Real tolerance = IntegratorWorkspace{}.tolerance);
 
   /// Stores the state of all members.
   void save();
-  /// Restores the state of bodies, and of the objects connected to them, at the last save().
+  /// Returns the given bodies, and the objects connected to them, to their state at the last save(); without
+  /// an argument, all members.
   void restore(std::span<Body* const> bodies);
   void restore();
 

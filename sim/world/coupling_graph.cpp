@@ -22,7 +22,8 @@ CouplingGraph::CouplingGraph(const WorldState& world) : world_(world) {
   for (std::size_t& parent : parent_) parent = parent_[parent];
 }
 
-/// Calls f(a, b) for each direct connection; either may be null, or both the same.
+/// Calls f(a, b) for each direct connection between two objects. a or b may be null, and both may be the same
+/// object.
 template <class F>
 void CouplingGraph::for_each_link(F&& f) const {
   world_.springs.for_each([&](SpringHandle, const Spring& spring) {
@@ -50,7 +51,7 @@ std::size_t CouplingGraph::component(const Articulation& articulation) const {
   return find(articulation.bodies().front());
 }
 
-/// The object that a spring's end belongs to.
+/// Returns the object at an end of a spring; null if the end cannot move.
 const void* CouplingGraph::object(const Attachment& a) const {
   if (const auto* point = std::get_if<BodyPoint>(&a)) {
     const Body* body = world_.bodies[point->body].get();

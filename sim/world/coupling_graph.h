@@ -17,12 +17,12 @@ class CouplingGraph {
 
   explicit CouplingGraph(const WorldState& world);
 
-  /// A number greater than the numbers of all components.
+  /// Upper bound of the component indices: every index is smaller.
   std::size_t size() const { return objects_.size(); }
-  /// Number that connected objects share; kNone for an object without connections.
+  /// Index of the component that contains the object; kNone for an object without connections.
   std::size_t component(const Body& body) const { return find(&body); }
   std::size_t component(const ParticleSystem& system) const { return find(&system); }
-  /// Number of the component of its ends; kNone if neither end can move.
+  /// Index of the component that contains the ends of the spring; kNone if neither end can move.
   std::size_t component(const Spring& spring) const;
   std::size_t component(const Articulation& articulation) const;
 

@@ -1,7 +1,7 @@
 #pragma once
-/// Motion of bodies through a sub-step without contacts, together with what springs and joints connect to
-/// them (physics E6). The systems that moved them are kept until the next sub-step, because they can restore
-/// the states from which they started.
+/// Contact-free motion of bodies through a sub-step, together with the objects that springs and joints
+/// connect to them (physics E6). The CoupledSystem objects are kept until the next sub-step, because they can
+/// restore their initial states.
 
 #include <memory>
 #include <vector>
@@ -16,14 +16,15 @@ class FreeMotion {
   explicit FreeMotion(WorldState& world) : world_(world) {}
 
   void begin_substep() { systems_.clear(); }
-  /// Moves the bodies, which are all that are awake, and the particles held by springs through a sub-step.
+  /// Moves all awake bodies, and particles with springs or pair forces, through a sub-step. It begins at time
+  /// `start` and has length h [s]. `awake` must contain all awake bodies.
   void move_all(std::span<Body* const> awake, Real start, Real h);
-  /// Moves some bodies, with the objects connected to them, for `duration` from `from` on, which is a time
-  /// since the sub-step's start.
+  /// Moves some bodies, and the objects connected to them, for `duration` [s]. The motion begins at time
+  /// `start` + `from`, where `start` is the start of the sub-step.
   CoupledSystem& move_group(std::span<Body* const> group, Real start, Real from, Real duration);
-  /// The system of all bodies in this sub-step.
+  /// The system that move_all() created in this sub-step.
   CoupledSystem& whole() const { return *systems_.front(); }
-  /// The system that has moved bodies last.
+  /// The system that moved bodies most recently.
   CoupledSystem& last() const { return *systems_.back(); }
   /// Adds the statistics of this sub-step to the report.
   void count(StepReport& report) const;

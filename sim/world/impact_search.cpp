@@ -14,8 +14,8 @@ namespace {
 /// Larger rotations in an interval are divided into pieces of this angle [rad], of which there are at most
 /// kMostTurns.
 constexpr Real kImpactTurn = 0.5, kMostTurns = 512;
-/// With a larger rotation in an interval, the contact forces of its start soon become invalid; the body is
-/// assumed to fly freely [rad].
+/// If a body turns by more than this in an interval [rad], contact forces from its start soon become invalid,
+/// and the body is assumed to fly freely.
 constexpr Real kFastSpin = 3;
 
 /// A path that deviates from its chord by more than kStraight [m] is divided into at most kMostArcs pieces. A
@@ -31,8 +31,8 @@ Real turn_of(const ContactPair& pair) {
   return std::max(spin(pair.a()), spin(pair.b()));
 }
 
-/// Whether a body may touch in an interval with points that are not known at its start: the known points of a
-/// rim or of a round side are those that face the other body now.
+/// Whether a body may touch with points that are not known at the interval's start. The known points of a rim
+/// or of a round side are only those that face the other body at the start.
 bool turns_other_points(const Body& body, Real duration) {
   return runs_along(body, duration) ||
          (std::holds_alternative<Ellipsoid>(body.def.shape) && body.turning_speed() * duration > kTouching);
@@ -43,8 +43,8 @@ uint32_t pieces_of(Real turn) {
   return static_cast<uint32_t>(std::clamp(std::ceil(turn / kImpactTurn), 1.0, kMostTurns));
 }
 
-/// Change of a body's velocity in its interval if it is due to a steady force; zero if the body was stopped
-/// within the interval, which is seen from its position at the end [m/s].
+/// Change of a body's velocity in its interval [m/s], if it is due to a steady force. Zero if the body was
+/// stopped within the interval, which is recognized by its position at the end.
 Vec3 bend(const Body& body, Real h) {
   if (!body.is_awake()) return Vec3::Zero();
   const Vec3 change = body.rigid.velocity() - body.start_twist.velocity;

@@ -134,8 +134,8 @@ void ImpactStage::resolve() {
   }
 }
 
-/// Decides whether an impact of a pair is the last one that is traced back to in the sub-step; `count`
-/// impacts came before it.
+/// Decides whether later impacts of a pair in this sub-step are not traced back, and sets
+/// ContactPair::toi_exhausted. `count`: number of previous impacts; `work`: work of impacts so far [us].
 void ImpactStage::limit(ContactPair& pair, std::size_t count, std::size_t work) {
   const std::size_t most = kMaxImpacts + kImpactsPerBody * active_.awake().size();
   const std::size_t most_work = world_.is_exact() ? kExactImpactWork : kImpactWork;
@@ -146,8 +146,7 @@ void ImpactStage::limit(ContactPair& pair, std::size_t count, std::size_t work) 
   ++report_.impacts.toi_limit_reached;
 }
 
-/// Brings the bodies of a pair, with all that is connected to them, to a time, and merges their islands.
-/// Returns the number of the island.
+/// Moves the islands of a pair's bodies to a time, and merges them. Returns the number of the merged island.
 uint32_t ImpactStage::gather(const ContactPair& pair, Real time) {
   const uint32_t island = pair.a().is_awake() ? pair.a().island : pair.b().island;
   trace_back(islands_[island], time);
@@ -158,8 +157,8 @@ uint32_t ImpactStage::gather(const ContactPair& pair, Real time) {
   return island;
 }
 
-/// Merges an island with all that it is about to hit at a time or later, and with those that these hit: one
-/// solution then replaces many impacts.
+/// Merges an island with the islands that it will hit at `time` or later, and with the islands that those
+/// will hit. One solution then replaces many impacts.
 void ImpactStage::join_pending(uint32_t number, Real time) {
   for (bool grown = true; grown;) {
     grown = false;
@@ -175,8 +174,8 @@ void ImpactStage::join_pending(uint32_t number, Real time) {
   }
 }
 
-/// Suppresses restitution within an island for the rest of this sub-step. Pairs that are so fast that only
-/// tracing back shows where they meet are still traced back to.
+/// Suppresses restitution within an island for the rest of this sub-step. Pairs are still traced back if they
+/// are so fast that their contact points are not known otherwise.
 void ImpactStage::suppress_restitution(uint32_t island) {
   const auto is_outside = [&](const Body& body) { return body.is_awake() && body.island != island; };
   for (ContactPair* pair : contacts_.pairs()) {
@@ -265,9 +264,9 @@ std::size_t ImpactStage::collide(uint32_t number, Real time) {
   return work + static_cast<std::size_t>(outcome.cost / 1000);
 }
 
-/// Continues the motion of an island from an impact to the end of the sub-step. Its velocities have changed,
-/// so other bodies may be in its way and other contacts limit its motion. If so, they join, and all of them
-/// start again.
+/// Continues the motion of an island from an impact to the end of the sub-step. Its velocities have changed.
+/// Therefore it may hit other bodies, and other contacts may limit its motion. In this case the other islands
+/// are merged with it, and the motion is computed again.
 void ImpactStage::continue_from(uint32_t number, Real time) {
   std::size_t bodies = 0;
   int same = 0;  // passes since the last body joined
@@ -295,9 +294,9 @@ void ImpactStage::continue_from(uint32_t number, Real time) {
   }
 }
 
-/// Finds the contacts of an island that continues from `time`. If a body of another island is in its way and
-/// their impact would not be traced back to, that island is merged, and must be moved again; the function
-/// then returns true.
+/// Finds the contacts of an island that continues from `time`. If it will hit a body of another island, and
+/// this impact will not be traced back, the other island is merged. The function then returns true, and the
+/// merged island must be moved again.
 bool ImpactStage::join_next(uint32_t number, Real time) {
   const std::span<ContactPair* const> pairs = contacts_.pairs();
   islands_[number].pairs.clear();
@@ -321,9 +320,9 @@ bool ImpactStage::join_next(uint32_t number, Real time) {
   return joined;
 }
 
-/// Merges the islands into which an island has been pushed by its contact forces since `time`, and finds the
-/// contacts that were too far away for the first search. Returns whether there are any; all bodies must then
-/// be moved again.
+/// Merges the islands that an island overlaps now because its contact forces have moved it since `time`. Also
+/// finds contacts that were too far away for the first search. Returns whether there are any; all bodies must
+/// then be moved again.
 bool ImpactStage::join_overtaken(uint32_t number, Real time) {
   const std::span<ContactPair* const> pairs = contacts_.pairs();
   for (Body* body : islands_[number].bodies)
@@ -359,7 +358,7 @@ bool ImpactStage::join_overtaken(uint32_t number, Real time) {
                      [](const ContactPair* pair) { return !pair->manifolds().empty() && !pair->needs_toi; });
 }
 
-/// Whether any points of a pair may meet within a time.
+/// Whether any points of a pair may touch within the time `left` [s].
 bool ImpactStage::closes(const ContactPair& pair, Real left) const {
   for (const PlacedManifold& m : pair.manifolds())
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
@@ -385,7 +384,8 @@ bool ImpactStage::overlaps_at_end(const ContactPair& pair, Real time) const {
   return false;
 }
 
-/// Bodies that leave their boxes in the broad phase have new neighbours, which may have to be woken.
+/// Updates the pairs of the bodies of an island. Bodies that leave their boxes in the broad phase have new
+/// neighbours, which may have to be woken.
 void ImpactStage::find_pairs_again(uint32_t number) {
   if (!contacts_.follow(islands_[number].bodies)) return;
   std::vector<ContactPair*> near = islands_[number].pairs;

@@ -5,8 +5,8 @@
 /// impacts, later ones are left to the contact solver, which also prevents tunnelling. In a pile with too
 /// many impacts the restitution of slower ones is suppressed for the rest of the sub-step.
 ///
-/// In the same way, a body whose contact point moves far around its rim within the sub-step, as that of a
-/// wobbling coin does, is moved in several pieces of the sub-step, with its contacts updated between them.
+/// The contact point of a wobbling coin moves far around its rim within a sub-step. Such a body is moved in
+/// several pieces of the sub-step, and its contacts are updated between them.
 
 #include <vector>
 
@@ -15,8 +15,9 @@
 
 namespace offstage::sim {
 
-/// The impacts of one sub-step, of length h from `start` on. Islands and pairs are those of the sub-step
-/// without impacts, and the bodies are at its end.
+/// Resolves the impacts of one sub-step, which begins at time `start` and has length h [s]. Before, the
+/// bodies must have moved to the end of the sub-step, and islands and pairs must have been found for this
+/// motion.
 class ImpactStage {
  public:
   ImpactStage(const WorldState& world, const ActiveBodies& active, ContactFinder& contacts,

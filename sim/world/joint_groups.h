@@ -20,17 +20,17 @@ class JointGroups {
   /// Rebuilds the articulations if there were changes since the last call. Returns whether there were any.
   bool update();
 
-  /// For each articulation the slots of its bodies that can collide and move, ordered so that joined bodies
-  /// are adjacent.
+  /// For each articulation, the slots of its bodies that can move and collide. Bodies with a common joint are
+  /// adjacent in the list.
   const std::vector<std::vector<uint32_t>>& colliding() const { return colliding_; }
-  /// Whether two bodies do not collide with each other because of a joint.
+  /// Whether a joint disables collisions between two bodies.
   bool is_collision_disabled(const Body& a, const Body& b) const;
   /// Returns the articulation of the body in a slot; null for a body without joints.
   Articulation* articulation_of(uint32_t slot) const;
   /// The places of bodies in their articulations, by the slots of the bodies.
   std::span<const BodyImpulses::Link> links() const { return links_; }
 
-  /// Breaks the joints whose load in a sub-step of length h exceeded their limits.
+  /// Breaks the joints whose load in a sub-step of length h [s] exceeded their limits, and reports them.
   void break_overloaded(Real h, StepReport& report);
   /// Removes the joints of a body that is removed.
   void detach(const Body& body, ActiveBodies& active);
@@ -44,10 +44,10 @@ class JointGroups {
   std::vector<Articulation*> articulation_of_;        // by slot
 };
 
-/// Joins the bodies in their present poses, at the anchors of the definition.
+/// Initializes a joint for the current poses of its bodies, with the anchors of the definition.
 void fit(Joint& joint);
-/// Joins the bodies of a joint that appears after time 0, in their present poses. Its anchors and axes have
-/// moved with the bodies: with a, or with b if there is no a.
+/// Initializes a joint that appears after time 0, for the current poses of its bodies. Its anchors and axes
+/// have moved with body a, or with body b if there is no a.
 void place_at_bodies(Joint& joint);
 /// Whether a joint prevents an island from falling asleep.
 bool is_driven(const Island& island, Real time);

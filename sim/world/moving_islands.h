@@ -11,7 +11,8 @@ namespace offstage::sim {
 
 class CoupledSystem;
 
-/// Groups the awake bodies by joints, springs and the contacts that `connect` them. `motion` has moved them.
+/// Groups the awake bodies into `islands` by joints, springs and those contacts for which `connect` returns
+/// true. `motion` is the system that has moved the bodies.
 void find_moving_islands(const WorldState& world, std::span<Body* const> awake,
                          std::span<ContactPair* const> pairs, bool (*connect)(const ContactPair&),
                          CoupledSystem& motion, std::vector<Island>& islands);

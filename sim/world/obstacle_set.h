@@ -6,14 +6,15 @@
 
 namespace offstage::sim {
 
-/// A body that moves through a sub-step of length h. Impulses can move a dynamic one, unless it `is_fixed`.
+/// Returns a body as an obstacle that moves along its path in a sub-step of length h [s]. Impulses can move
+/// the obstacle if the body is dynamic and not `is_fixed`.
 Obstacle swept_obstacle(const Body& body, Real h, bool is_fixed = false);
 
 /// The obstacles of a sub-step. Bodies that cannot move are prepared again only after a change (physics E9).
 class ObstacleSet {
  public:
-  /// Prepares a sub-step of length h. `fixes_dynamic`: dynamic bodies do not move in it, which holds while
-  /// particles are prewarmed.
+  /// Prepares a sub-step of length h [s]. `fixes_dynamic`: whether dynamic bodies stand still, as in
+  /// World::prewarm().
   void update(const WorldState& world, const ActiveBodies& active, Real h, bool fixes_dynamic);
   const Obstacles& fixed() const { return fixed_; }
   const Obstacles& moving() const { return moving_; }
@@ -21,7 +22,7 @@ class ObstacleSet {
  private:
   Obstacles fixed_, moving_;
   bool is_current_ = false, fixes_dynamic_ = false;
-  uint64_t version_ = 0;  // of the active bodies that the fixed ones are for
+  uint64_t version_ = 0;  // ActiveBodies::version() for which `fixed_` was prepared
 };
 
 }  // namespace offstage::sim

@@ -17,17 +17,17 @@ class ParticleMotion {
   ParticleMotion(WorldState& world, const ActiveBodies& active, const JointGroups& joints)
       : world_(world), active_(active), joints_(joints) {}
 
-  /// Moves all particles through a sub-step, except those that `coupled` has moved freely: these only
-  /// collide. Returns whether any ended.
+  /// Moves all particles through a sub-step and resolves their collisions. Particles that `coupled` has moved
+  /// already only collide. Returns whether any particle was removed.
   bool step(Real start, Real h, const CoupledSystem& coupled, StepReport& report);
-  /// Impulses on bodies in the last sub-step, by slot.
+  /// Impulses on bodies in the last sub-step, in the order of their slots.
   std::vector<Reaction> reactions() const { return impulses_.sums(); }
   /// Events of the last sub-step.
   std::vector<ParticleEvent>& events() { return events_; }
   void forget(ParticleSystemHandle system);
 
-  /// Begins and ends a time before the film in which bodies stay where they are. Systems that have particles
-  /// when the first such time begins are paused until the last has ended.
+  /// Begin and end a call of World::prewarm(), in which dynamic bodies do not move. Systems that have
+  /// particles when the first call begins are paused until the last call has ended.
   void begin_prewarm(bool is_first);
   void end_prewarm(bool is_last);
 

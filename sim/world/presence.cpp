@@ -1,5 +1,5 @@
-/// Objects that are removed, and bodies, joints and cloths that exist for some time only. The handles of the
-/// latter are valid all the time, so that other objects can refer to them.
+/// Removal of objects, and bodies, joints and cloths that appear or disappear at a given time. Their handles
+/// are valid before they appear and after they disappear, so that other objects can refer to them.
 
 #include "sim/world/world_impl.h"
 

@@ -116,7 +116,7 @@ void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
   active.put_to_sleep(islands, start, h);
 }
 
-/// Moves the particles, which collide with the moving bodies, with each other and push the bodies.
+/// Moves the particles. They collide with the bodies and with each other, and push the bodies.
 void World::Impl::step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report) {
   if (particle_motion.step(start, h, coupled, report)) remove_dead_springs();
   reactions.apply(particle_motion.reactions(), start + h, report);
@@ -127,8 +127,8 @@ void World::Impl::step_cloths(Real start, Real h, StepReport& report) {
   collide_particles_with_cloths(*this, start, h, particle_motion.events());
 }
 
-/// Time before the film, in which only particles move, among bodies that stay where they are or follow their
-/// keys.
+/// Implements World::prewarm(): only particles move; dynamic bodies stand still, and kinematic bodies follow
+/// their tracks.
 StepReport World::Impl::prewarm(Real from, Real to, const BeforeSubStep& before) {
   StepReport report;
   particle_motion.begin_prewarm(now == 0);
@@ -214,8 +214,8 @@ bool World::Impl::is_within_bounds(const Body& body) const {
   return is_finite(body.rigid) && def.bounds.contains(body.rigid.position);
 }
 
-/// Freezes a body that left the world's bounds, or whose state is not finite; the latter at its last finite
-/// state.
+/// Makes a body static that has left the world's bounds or whose state is not finite. In the second case it
+/// gets its last finite pose.
 void World::Impl::retire(Body& body, StepReport& report) {
   if (body.is_dynamic() && !is_finite(body.rigid)) {
     if (report.finite) {

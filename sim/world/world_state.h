@@ -34,13 +34,13 @@ struct WorldState {
   /// Whether each collision is resolved at its own time, and contacts are solved to rounding.
   bool is_exact() const { return def.solver == SolverKind::exact || def.solver == SolverKind::lcp; }
   std::vector<const ForceDef*> active_forces() const;
-  /// Forces on each single particle of a system.
+  /// The forces that act on each particle of a system independently of other particles.
   ParticleForces forces(const ParticleSystem& system) const;
   /// Whether there are forces between particles.
   bool has_pair_forces() const;
   /// Whether the object of an attachment exists.
   bool is_alive(const Attachment& a) const;
-  /// Whether both ends of a spring exist at this time.
+  /// Whether the objects at both ends of a spring currently exist.
   bool acts(const Spring& spring) const;
   Vec3 position(const Attachment& a) const;
 };
