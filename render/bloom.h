@@ -1,7 +1,7 @@
 #pragma once
-/// Adds a glow around parts of the picture that exceed its displayable range, as a lens does. Light above a
-/// threshold is spread by blurs of doubling width (after J. Jimenez, "Next Generation Post Processing in Call
-/// of Duty: Advanced Warfare", 2014).
+/// Adds a glow around very bright parts of a picture, as a camera lens does. Light above a threshold is
+/// spread by a series of blurs; each is twice as wide as the one before (after J. Jimenez, "Next Generation
+/// Post Processing in Call of Duty: Advanced Warfare", 2014).
 
 #include "render/image.h"
 

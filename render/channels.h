@@ -34,23 +34,21 @@ struct Channels {
   int width_px = 0, height_px = 0;
   std::vector<float> depth;             ///< distance along the view axis [m]
   std::vector<Eigen::Vector3f> normal;  ///< unit vector in the world, on the visible side
-  std::vector<uint32_t> id;             ///< id given by set_object; 0: no object
-  std::vector<Eigen::Vector2f> motion;  ///< displacement in the picture since
-                                        ///< Stage::store_previous_transforms [px], x to the right, y down
+  std::vector<uint32_t> id;             ///< id set by Stage::set_object; 0: no object
+  std::vector<Eigen::Vector2f> motion;  ///< movement in the picture since
+                                        ///< Stage::store_previous_transforms [px]; x to the right, y down
 };
 
 /// Names of the objects by id.
 using ObjectNames = std::map<uint32_t, std::string>;
 
-/// Encodes one channel as PNG bytes, in the conventions of public data sets. The PNG text "Comment" states
-/// the encoding.
-/// depth: 16 bits, millimetres; 0 where there is no surface or it is beyond 65.535 m (TUM RGB-D, Kinect).
-/// normal: 16 bits, 32767.5 (1 + n) for x, y, z; 0 0 0 where there is no surface.
-/// id: 8 bits, a unique colour per object: red green blue as one number is id * 0x9E3779 modulo 2^24, and
-/// id = number * 0xB382C9 modulo 2^24; black: no object. The text has a line "id #rrggbb name" for each
-/// object.
-/// motion: 16 bits, 32768 + 64 x, 32768 + 64 y [px]; the third channel is 1 where there is a surface (KITTI
-/// flow).
+/// Encodes one channel as a PNG file in memory, in the conventions of public data sets. The PNG text
+/// "Comment" states the encoding. depth: 16 bits, millimetres; 0 where there is no surface or it is
+/// beyond 65.535 m (TUM RGB-D, Kinect). normal: 16 bits, 32767.5 (1 + n) for x, y, z; 0 0 0 where there is no
+/// surface. id: 8 bits, a unique colour per object: red green blue as one number is id * 0x9E3779 modulo
+/// 2^24, and id = number * 0xB382C9 modulo 2^24; black: no object. The text has a line "id #rrggbb name" for
+/// each object. motion: 16 bits, 32768 + 64 x, 32768 + 64 y [px]; the third channel is 1 where there is a
+/// surface (KITTI flow).
 std::vector<uint8_t> channel_png(const Channels& channels, Channel channel, const ObjectNames& objects);
 
 /// Writes an OpenEXR file. The header's text attribute "objects" lists `objects`, one per line. Throws
@@ -58,8 +56,7 @@ std::vector<uint8_t> channel_png(const Channels& channels, Channel channel, cons
 void write_exr(const std::filesystem::path& path, const Channels& channels, const ChannelChoice& choice,
                const ObjectNames& objects);
 
-/// Returns the channel files of a frame. Their names begin with `stem`: STEM.exr, or STEM.depth.png and so
-/// on.
+/// Returns the paths of the channel files of a frame: STEM.exr, or STEM.depth.png and so on.
 std::vector<std::filesystem::path> channel_files(const std::filesystem::path& stem,
                                                  const ChannelChoice& choice);
 /// Writes the channel files of a frame (see channel_files). Throws FileError.

@@ -13,8 +13,8 @@
 
 namespace offstage::render {
 
-/// Memory of fixed size that a child uses as its standard output or error. Output beyond it is lost, so the
-/// child can neither block nor fill a disk.
+/// A memory file of limited size for the standard output or error of a child. Output beyond the limit is
+/// lost, so the child can neither block nor fill a disk.
 class BoundedCapture {
  public:
   explicit BoundedCapture(std::size_t max_bytes);
@@ -28,8 +28,8 @@ class BoundedCapture {
 
 class ChildProcess {
  public:
-  /// Runs `arguments[0]`, searched in PATH, with these standard streams; -1 is /dev/null. Sets error() if it
-  /// cannot be run.
+  /// Runs the program `arguments[0]`, which is searched in PATH. `in`, `out` and `err`: descriptors of its
+  /// standard streams; -1 is /dev/null. If the program cannot be started, error() is set.
   ChildProcess(const std::vector<std::string>& arguments, int in, int out, int err);
   /// Kills the child if it still runs.
   ~ChildProcess();

@@ -37,7 +37,7 @@ class ClothPass {
   ClothPass();
   /// Uploads the current state of a cloth.
   void prepare(Cloth& cloth);
-  /// Draws the depth of an opaque cloth into the picture. It is exactly the surface that `draw` shades.
+  /// Draws the depth of an opaque cloth into the picture. The depth is exactly that of draw().
   void draw_depth(const Cloth& cloth);
   void draw(const Cloth& cloth, const Features& features);
   /// Draws the surface of a cloth into the targets from which its light is traced.

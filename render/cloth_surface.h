@@ -1,7 +1,6 @@
 #pragma once
-/// Private: the drawn surface of a cloth. The simulated mesh is subdivided until contact creases look round,
-/// and gets smooth normals. A rim as wide as the thickness of the cloth closes its boundary. The depth of
-/// folds is estimated at each vertex, because folds receive less light from the sky.
+/// Private: the drawn surface of a cloth. The simulated mesh is subdivided until creases at contacts look
+/// round, and gets smooth normals. A rim as wide as the cloth is thick closes the boundary.
 
 #include <cstdint>
 #include <span>

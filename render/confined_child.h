@@ -1,6 +1,6 @@
 #pragma once
-/// Runs work on untrusted files in a forked child that can do no harm: limits of time and memory, no network,
-/// no writing, and no files outside of the given folders (sandbox.h). Private to render.
+/// Runs work on untrusted files in a forked child process. The child has limits of time and memory, cannot
+/// use the network, cannot write files, and can only read the given folders (sandbox.h). Private to render.
 
 #include <chrono>
 #include <cstdint>
@@ -15,19 +15,19 @@ namespace offstage::render {
 
 struct ConfinedWork {
   std::string what;  ///< name of the file that is read, for messages
-  /// Size of the file, which determines the limits: 10 s of processor time and 1 s more for each 5 MiB, at
-  /// most 60 s; 1.5 GiB of memory and 16 times the size, at most 4 GiB.
+  /// Size of the file, which determines the limits. Processor time: 10 s plus 1 s per 5 MiB, at most 60 s.
+  /// Memory: 1.5 GiB plus 16 times the size, at most 4 GiB.
   uint64_t file_bytes = 0;
   /// Number of pictures that the file may refer to. Each adds 128 MiB to the limit of memory, up to the same
   /// 4 GiB.
   uint64_t pictures = 0;
   const InputFolders* folders = nullptr;  ///< folders that may be read
   StopTest stop = {};
-  /// A child that gets less than a hundredth of a processor for this long [s] is broken and is killed.
+  /// A child is killed if it uses less than 1 % of a processor for this time.
   std::chrono::seconds standstill{60};
 };
 
-/// The answer of a child, memory-mapped.
+/// The bytes that a child returned, mapped into memory.
 class ChildAnswer {
  public:
   explicit ChildAnswer(int fd);

@@ -1,6 +1,7 @@
 #pragma once
-/// An off-screen OpenGL 4.5 core context, by OSMesa or EGL. Mesa's environment is set first, so that the same
-/// scene gives the same pixels. Both libraries are loaded at run time: a program starts without them.
+/// An off-screen OpenGL 4.5 core context, created by OSMesa or EGL. The environment variables of Mesa are set
+/// first, so that the same scene gives the same pixels. Both libraries are loaded at run time, so that
+/// programs start without them.
 
 #include <memory>
 #include <string>
@@ -20,8 +21,8 @@ enum class GlPlatform {
 
 /// Returns "auto", "osmesa", "egl" or "egl:gpu".
 std::string_view name_of(GlPlatform platform);
-/// Returns the platform with a name as name_of() returns it. Throws std::invalid_argument, which lists the
-/// names.
+/// Returns the platform with a name, as in name_of(). Throws std::invalid_argument with a list of the names
+/// if there is none.
 GlPlatform gl_platform(std::string_view name);
 /// Returns the platform in the environment variable OFFSTAGE_GL, or automatic if it is not set. Throws
 /// std::invalid_argument for an unknown name.
@@ -36,16 +37,17 @@ struct ContextInfo {
   GlPlatform platform = GlPlatform::osmesa;  ///< the platform in use, never automatic
 };
 
-/// Sets and clears the environment variables of Mesa, and chooses the platform of all contexts.
-/// LP_NUM_THREADS becomes `raster_threads`; llvmpipe has one rasterizer for all contexts of a process, so it
-/// should get all processors even if several contexts draw at once. Call once, in main, before any thread
-/// starts, because it uses setenv. Mesa reads the variables when the first context is created. The
-/// environment variable OFFSTAGE_SHADER_CACHE may name an existing folder, in which Mesa keeps compiled
-/// shaders for later processes; without it none are kept. It does not change pixels.
+/// Sets the environment variables of Mesa, and selects the platform of all contexts. Call it once, in main,
+/// before any thread starts, because it uses setenv. Mesa reads the variables when the first context is
+/// created. `raster_threads` is the value of LP_NUM_THREADS. All contexts of a process share the rasterizer
+/// threads of llvmpipe, so this should be the number of processors. The environment variable
+/// OFFSTAGE_SHADER_CACHE may name an existing folder in which Mesa stores compiled shaders for later
+/// processes. It does not change pixels.
 void pin_environment(int raster_threads, GlPlatform platform = gl_platform_of_environment());
 
-/// Owns an OpenGL context, which is current on the thread that created it. Use it only on that thread, and
-/// create no second one there during its lifetime. Throws UnavailableError.
+/// Owns an OpenGL context, which is current on the thread that created it. It must be used only on that
+/// thread, and there must be no second context there during its lifetime. The constructor throws
+/// UnavailableError.
 class Context {
  public:
   Context();

@@ -12,14 +12,14 @@ class FileError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// OSMesa and EGL, a GL feature, ffmpeg or an encoder is missing or failed; the message names the Debian
-/// package.
+/// A library (OSMesa, EGL), a GL feature, ffmpeg or an encoder is missing or failed. The message names the
+/// Debian package to install.
 class UnavailableError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// A wait was ended by a request to stop.
+/// The work was ended by a request to stop.
 class StoppedError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -9,8 +9,8 @@
 
 namespace offstage::render {
 
-/// The channels R, G and B, or Y as grey, of the data window of a flat picture; alpha is 1. `name` is used in
-/// messages. Throws FileError for a broken file, for one without these channels, and for one with more than
+/// Decodes the data window of a flat OpenEXR picture: the channels R, G and B, or Y as grey. Alpha is 1.
+/// `name` is used in messages. Throws FileError if the file is broken, lacks these channels or has more than
 /// `max_pixels` pixels.
 HdrImage decode_exr(std::span<const uint8_t> bytes, const std::string& name, uint64_t max_pixels);
 

@@ -29,8 +29,8 @@ class Descriptor {
 
   int fd() const { return fd_; }
   explicit operator bool() const { return fd_ >= 0; }
-  /// Returns the system's error number, 0 without an error; some file systems report a failed write only
-  /// here.
+  /// Closes the descriptor. Returns the errno value, or 0 for success. Some file systems report a failed
+  /// write only here.
   int close();
 
  private:
@@ -44,7 +44,8 @@ std::string system_reason(int error);
 [[noreturn]] void throw_file_error(const std::filesystem::path& path, const std::string& what,
                                    int error = errno);
 
-/// Polled during waits: returns true to ask for their end. Empty: waits are never ended.
+/// A function that is polled during waits and long work, and returns true to request their end. Empty: there
+/// is no such request.
 using StopTest = std::function<bool()>;
 
 /// Limits the wait for another program: after a request to stop, the program has three seconds to make
@@ -56,6 +57,7 @@ class StopDeadline {
   explicit StopDeadline(const StopTest& stop) : stop_(stop) {}
   /// Call when the other program has read or written something.
   void progressed() { asked_ = false; }
+  /// Polls the StopTest. Returns true if the three seconds are over.
   bool exhausted();
 
  private:
@@ -64,8 +66,8 @@ class StopDeadline {
   std::chrono::steady_clock::time_point since_ = {};  // ... and when
 };
 
-/// Writes all bytes; returns the error number, or 0. Waits if the descriptor is non-blocking; returns
-/// ECANCELED if StopDeadline ended the wait.
+/// Writes all bytes, and waits if the descriptor is non-blocking. Returns 0, an errno value, or ECANCELED if
+/// StopDeadline ended the wait.
 int write_all(int fd, std::span<const uint8_t> bytes, const StopTest& stop = {});
 
 /// Returns the bytes of a regular file. Named pipes, devices and folders are refused at once. Throws

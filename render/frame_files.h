@@ -17,9 +17,10 @@ enum class FrameFormat {
   exr,   ///< half floats, linear light times the exposure, without tone curve; premultiplied alpha
 };
 
-/// The format of a file by its ending: .png, .jpg, .jpeg or .exr; nothing for others.
+/// Returns the format that the ending of a file name selects: .png, .jpg, .jpeg or .exr. Empty for other
+/// endings.
 std::optional<FrameFormat> frame_format(const std::filesystem::path& path);
-/// Returns the endings of files of frames, with their dots.
+/// Returns the supported endings of frame files, with their dots.
 const std::vector<std::string>& frame_endings();
 
 /// Size and settings that are stored in the file of a frame.
@@ -29,8 +30,8 @@ struct FrameFile {
   std::string settings;  ///< settings that the file was written with; empty if offstage did not write it as
                          ///< part of a film
 };
-/// Inspects a file without decoding it. Nothing if it cannot be read, is not of the format of its ending, or
-/// is cut short.
+/// Reads size and settings of a frame file without decoding its pixels. Empty if the file cannot be read, is
+/// truncated, or does not have the format of its ending.
 std::optional<FrameFile> inspect_frame(const std::filesystem::path& path);
 
 /// Writes half floats of linear light: R, G, B, and A if the image is transparent. Throws FileError.

@@ -23,9 +23,9 @@ struct FrameRate {
   std::string text() const;
 };
 
-/// Finds the simplest fraction that rounds to a number: 29.97 becomes 2997/100, 1/0.0625 becomes 16.
-/// Denominators go up to 1 000 000. A number between two such fractions becomes the nearer convergent, which
-/// differs by less than 1e-12. The number must be in (0, 2000].
+/// Returns the simplest fraction that rounds to a number: 29.97 becomes 2997/100, 1/0.0625 becomes 16.
+/// Denominators are at most 1 000 000. If no such fraction rounds to the number, returns the nearest
+/// convergent of its continued fraction, which differs by less than 1e-12. The number must be in (0, 2000].
 FrameRate frame_rate_of(double per_second);
 
 /// Parses "30", "29.97" or "30000/1001". Returns nothing for other text, for a rate that is not positive, or

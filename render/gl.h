@@ -90,7 +90,8 @@ class StreamBuffer {
   std::size_t capacity_ = 0;
 };
 
-/// Sets one float attribute of a vertex array, read from `binding`.
+/// Sets the format of one float attribute of a vertex array, which is read from the buffer at `binding`.
+/// `offset`: in a vertex [bytes].
 void set_attribute(GLuint vertex_array, GLuint attribute, GLuint binding, int components, std::size_t offset);
 
 /// Links a program. Each stage is a list of files of shaders/ joined in order behind #version and `defines`

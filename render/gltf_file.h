@@ -1,6 +1,6 @@
 #pragma once
 /// Private: the container of a glTF 2.0 model (.gltf or .glb): its document, its buffers, and accessors as
-/// numbers. All sizes and offsets are checked against the bytes that are there.
+/// numbers. All sizes and offsets are checked against the size of the data.
 /// Section numbers refer to the glTF 2.0 specification (Khronos Group, 2021).
 
 #include <filesystem>
@@ -15,7 +15,8 @@
 
 namespace offstage::render {
 
-/// An accessor, converted: `count` elements of `width` numbers. Normalised integers are scaled to [0, 1] or
+/// The converted data of an accessor: `count` elements of `width` numbers. Normalised integers are scaled to
+/// [0, 1] or
 /// [-1, 1] (section 3.11).
 struct GltfNumbers {
   std::size_t count = 0;
@@ -38,9 +39,10 @@ class GltfFile {
   GltfValue item(const char* list, std::size_t i) const { return root_.item(list, i); }
   const std::filesystem::path& path() const { return path_; }
 
-  /// The bytes of a buffer view, decompressed.
+  /// Returns the bytes of a buffer view, decompressed if needed.
   std::span<const uint8_t> view(std::size_t index);
-  /// The bytes behind a URI: of a data: URI, or of a file beside the model. `what` is used in messages.
+  /// Returns the bytes of a data: URI, or of the file beside the model that a URI names. `what` is used in
+  /// messages.
   std::vector<uint8_t> resource(const std::string& uri, const std::string& what) const;
 
   /// Reads an accessor of any component type, with sparse values (sections 3.6.2). `width`: the number of
@@ -49,7 +51,7 @@ class GltfFile {
   /// Reads an accessor of unsigned integers with one component (indices).
   std::vector<uint32_t> indices(std::size_t accessor);
 
-  /// Records a line about something ignored or approximated, once.
+  /// Records a warning, once per text.
   void warn(const std::string& line);
   std::vector<std::string> take_warnings() { return std::move(warnings_); }
 

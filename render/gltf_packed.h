@@ -1,6 +1,6 @@
 #pragma once
-/// Private: compressed parts of glTF files, by the libraries Draco, meshoptimizer and WebP. Each of them is
-/// optional when offstage is built; without it the functions throw FileError with its name.
+/// Private: decompresses parts of glTF files with the libraries Draco, meshoptimizer and WebP. Each library
+/// is optional when offstage is built. Without it, its function throws a FileError that names the library.
 
 #include <cstdint>
 #include <map>

@@ -18,8 +18,8 @@ class GltfRig {
   GltfRig(GltfFile& file, GltfGeometry& geometry, std::span<const int> parents,
           std::span<const std::size_t> order);
 
-  /// Adds the primitives of a node's mesh. `instances`: places of the mesh in the node's frame; meshes that
-  /// deform are drawn once, with a warning.
+  /// Adds the primitives of a node's mesh. `instances`: transforms of the instances of the mesh in the node's
+  /// frame. A mesh that deforms is drawn once, with a warning.
   void add_mesh(std::size_t node, std::size_t mesh, std::span<const Eigen::Affine3d> instances);
   /// Index of a node of the file in the rig.
   int index_of(std::size_t node) const { return rig_index_[node]; }

@@ -1,6 +1,6 @@
 #pragma once
-/// Handles of the stage's objects. The renderer shares no header with the simulation, so it has its own type:
-/// a typed index with the generation of its slot, null by default. The stage detects stale handles.
+/// Handles of the objects of a stage. A handle is a typed index with the generation of its slot; it is null
+/// by default. The stage detects stale handles.
 
 #include <compare>
 #include <cstdint>

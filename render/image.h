@@ -30,7 +30,8 @@ struct HdrImage {
   }
 };
 
-/// XXH3-128 of size and pixels as 32 hexadecimal digits. It does not depend on the encoding of a file.
+/// Returns the XXH3-128 hash of size and pixels as 32 hexadecimal digits. It does not depend on the file
+/// format.
 std::string pixel_hash(const Image& image);
 
 /// Difference of two images of the same size. `max_delta` and `mean_delta` are over the RGBA channels in
@@ -46,11 +47,11 @@ struct ImageDifference {
   /// steps, and the mean difference is at most 0.05 steps.
   bool within_tolerance() const;
 };
-/// Throws std::invalid_argument if the sizes differ.
+/// Compares two images. Throws std::invalid_argument if their sizes differ.
 ImageDifference difference(const Image& a, const Image& b);
 /// Returns a copy at most `width_px` wide. Each pixel is the mean of the original pixels that it covers.
 Image reduced(const Image& image, int width_px);
-/// The absolute difference times `gain`, opaque.
+/// Returns an opaque image of the absolute difference times `gain`.
 Image amplified_difference(const Image& a, const Image& b, int gain = 16);
 
 }  // namespace offstage::render

@@ -1,5 +1,5 @@
 #pragma once
-/// Image files. Reading and JPEG by stb, writing PNG by libdeflate.
+/// Reads and writes image files. stb reads images and writes JPEG; libdeflate compresses PNG.
 
 #include <filesystem>
 #include <span>
@@ -25,7 +25,7 @@ Image decode_image(std::span<const uint8_t> bytes, const std::string& name,
 
 inline constexpr uint64_t kMaxLightPixels = uint64_t{1} << 25;  ///< limit for pictures of light: 8192 x 4096
 
-/// Linear light of a picture, and notes on repaired values.
+/// A picture in linear light, with warnings about repaired values.
 struct LightImage {
   HdrImage image;  ///< finite values, at least 0; alpha is 1
   std::vector<std::string> warnings;
@@ -51,8 +51,9 @@ std::vector<uint8_t> encode_jpeg(const Image& image, const std::string& settings
 /// read.
 std::string png_settings(const std::filesystem::path& path);
 
-/// Writes through an OutputFile, so an existing file is complete. A device, or a named pipe that is being
-/// read, is written to directly. Throws FileError with the system's reason, and for a symbolic link.
+/// Writes a file through an OutputFile, so that a file with this name is always complete. Devices, and named
+/// pipes with a reader, are written directly. Throws FileError if this fails, or if `path` is a symbolic
+/// link.
 void write_file_atomically(const std::filesystem::path& path, std::span<const uint8_t> bytes);
 void write_png(const std::filesystem::path& path, const Image& image, const std::string& settings = {});
 

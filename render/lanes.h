@@ -1,6 +1,6 @@
 #pragma once
-/// Private: eight numbers at a time in a vector register (vector extensions of GCC and Clang), and functions
-/// that compute the same for one number and for eight.
+/// Private: SIMD vectors of eight numbers (vector extensions of GCC and Clang), and functions that give the
+/// same results for one number and for eight.
 
 #include <cmath>
 #include <cstdint>

@@ -1,7 +1,8 @@
 #pragma once
-/// Private: the light of surfaces in a sub-frame. The surfaces are drawn into targets and read back, their
-/// light is traced (render/trace), and the shaders read it from textures (shaders/traced.glsl). This is done
-/// once for all opaque objects, then for all glass, and then for each other translucent body.
+/// Private: computes the light of the visible surfaces in a sub-frame. Positions and normals of the surfaces
+/// are drawn into textures and read back. Their light is traced on the CPU (render/trace), and the shaders
+/// read it from textures (shaders/traced.glsl). This is done first for all opaque objects, then for all
+/// glass, and then for each other translucent body.
 
 #include <optional>
 
@@ -16,7 +17,7 @@ class LightPass {
  public:
   /// `depth`: depth buffer of the picture, into which the visible surfaces are drawn. `quick`: see StageDef.
   LightPass(int width_px, int height_px, const gl::Texture& depth, bool quick);
-  /// The scene that rays meet, to be filled and built before trace().
+  /// The scene for ray tracing. It must be filled and built before trace().
   RayScene& scene() { return scene_; }
   const RayScene& scene() const { return scene_; }
   /// Sums over all traced light.
@@ -26,17 +27,17 @@ class LightPass {
   /// Reads the surfaces, traces their light, and binds it for the shaders. `stop`: see Stage::draw.
   void trace(const LightSources& sources, const View& view, const SampleOffsets& offsets,
              const StopTest& stop);
-  /// After trace() of a quick picture: binds the surfaces for shaders/plain.frag.
+  /// Binds the surfaces for shaders/plain.frag. Call it after trace() of a quick picture.
   void bind_surfaces() const;
-  /// After trace(): binds the targets for drawing the surfaces of glass, or of a translucent body, in a part
-  /// of the picture. `depth`: the depth of the picture, so that nearer surfaces hide them. Returns false if
-  /// no pixel of the area is in the picture.
+  /// Binds the targets for drawing the surfaces of glass, or of a translucent body, in a part of the picture.
+  /// Call it after trace(). `depth`: depth buffer of the picture, whose nearer surfaces hide the new ones.
+  /// Returns false if the area is outside of the picture.
   bool begin_part(GLuint depth, const Eigen::AlignedBox2i& area_px);
-  /// Traces the light of glass. The picture must show the opaque objects.
+  /// Traces the light of glass. `picture_framebuffer` must contain the opaque objects.
   void trace_glass(const LightSources& sources, const View& view, const SampleOffsets& offsets,
                    GLuint picture_framebuffer);
-  /// Traces the light of a translucent body. It replaces the light of the opaque objects, which must have
-  /// been drawn.
+  /// Traces the light of a translucent body. It replaces the light of the opaque objects in the textures, so
+  /// these must be drawn before.
   void trace_body(const LightSources& sources, const View& view, const SampleOffsets& offsets);
 
  private:
@@ -59,7 +60,7 @@ class LightPass {
   bool mirrored_is_filled_ = true;  ///< whether any value of the texture of mirrored light is not zero
   gl::Texture lamps_, highlights_;  ///< created when there are lamps
 
-  // Created when there is something translucent.
+  // Created when there is a translucent object.
   gl::Texture part_depth_;
   gl::Framebuffer part_framebuffer_;
   Eigen::AlignedBox2i part_px_;

@@ -1,6 +1,6 @@
 #pragma once
-/// Private: draws lines. Every line is one quad that faces the eye. Lines are drawn instanced and blended
-/// back to front over the finished picture: first the hidden parts, faintly, then the visible parts.
+/// Private: draws lines. Each line is one instanced quad that faces the eye. Lines are blended back to front
+/// over the finished picture: first the hidden parts with their reduced opacity, then the visible parts.
 
 #include <span>
 #include <vector>
@@ -11,7 +11,7 @@
 namespace offstage::render {
 
 struct GpuLine {
-  Vector4f a, b;  ///< w: width at that end
+  Vector4f a, b;  ///< end points; w: width of the line there
   Vector4f color;
 };
 

@@ -12,10 +12,10 @@
 
 namespace offstage::render {
 
-/// An edge that belongs to exactly one triangle, in the order of that triangle.
+/// Two vertices of a boundary edge, in the order of its triangle.
 using BoundaryEdge = std::array<uint32_t, 2>;
 
-/// Edges of exactly one triangle: the boundary of the mesh.
+/// Returns the edges that belong to exactly one triangle: the boundary of the mesh.
 std::vector<BoundaryEdge> boundary_edges(std::span<const uint32_t> triangles);
 
 /// One step of subdivision. Boundaries become cubic B-splines. A boundary vertex stays in place where the

@@ -22,19 +22,18 @@ struct Mesh {
   std::vector<Vector2f> second_uvs = {};  ///< texture coordinates for textures with TextureMap::uv_set 1
   /// Colours of the vertices, linear with straight alpha; used if Material::vertex_colors.
   std::vector<Vector4f> colors = {};
-  /// Direction of increasing u for normal maps; w is 1 or -1, the side of the direction of increasing v.
-  /// Empty: derived from the texture coordinates while drawing.
+  /// Tangents for normal maps: unit direction of increasing u; w: sign of the bitangent, 1 or -1, as in glTF.
+  /// Empty: the shader derives them from the texture coordinates.
   std::vector<Vector4f> tangents = {};
   std::vector<uint32_t> indices;  ///< three per triangle, counter-clockwise seen from outside
-  /// Marks a mesh that stands for an infinite plane. It fades into the sky near its horizon, where it is seen
-  /// at a grazing angle.
+  /// Whether the mesh represents an infinite plane. Such a mesh fades into the sky near the horizon.
   bool endless = false;
 
   Eigen::AlignedBox3f bounds() const;
 };
 
-/// Fills `normals` with area-weighted means, split at edges sharper than `crease_deg` (vertices are
-/// duplicated there).
+/// Sets the normal of each vertex to the area-weighted mean of its triangles. Vertices are duplicated at
+/// edges whose normals differ by more than `crease_deg`, so that these edges stay sharp.
 void compute_normals(Mesh& mesh, float crease_deg = 40);
 
 }  // namespace offstage::render

@@ -1,8 +1,8 @@
 #pragma once
-/// Reads model files and textures: glTF 2.0 by a reader of its own (docs/models.md lists its features), OBJ,
-/// PLY, STL, Collada, FBX and others by assimp.
-/// Both are read in a confined child (confined_child.h has its limits of time and memory), because readers
-/// crash or hang on hostile files; the caller then gets a message.
+/// Reads model files and textures. offstage has its own reader for glTF 2.0 (docs/models.md lists its
+/// features); assimp reads OBJ, PLY, STL, Collada, FBX and others. Files are read in a confined child
+/// (confined_child.h), because readers may crash or hang on hostile files. The caller then gets an error
+/// message.
 
 #include <filesystem>
 #include <string>
@@ -37,8 +37,8 @@ ModelPath split_node(const std::filesystem::path& path);
 Model read_model(const std::filesystem::path& path, const InputFolders& folders = {},
                  const StopTest& stop = {}, bool with_rig = false);
 
-/// Longest side of the box around all that read_model() draws of a whole file [m], also for a path that ends
-/// in #NODE. Reads and throws as read_model() does.
+/// Returns the longest side of the bounding box of a model file [m]. For a path that ends in #NODE, it is
+/// also that of the whole file. Reads and throws as read_model() does.
 float read_file_size(const std::filesystem::path& path, const InputFolders& folders = {},
                      const StopTest& stop = {});
 
@@ -46,11 +46,11 @@ float read_file_size(const std::filesystem::path& path, const InputFolders& fold
 Image read_texture(const std::filesystem::path& path, const InputFolders& folders = {},
                    const StopTest& stop = {});
 
-/// Reads a picture as light (decode_light_image()). Throws as read_model() does.
+/// Reads a picture in linear light; see decode_light_image(). Throws as read_model() does.
 LightImage read_light_image(const std::filesystem::path& path, const InputFolders& folders = {},
                             const StopTest& stop = {});
 
-/// The packages of optional libraries for compressed glTF files without which offstage was built.
+/// Returns the packages of the optional libraries for compressed glTF files that this build lacks.
 std::vector<std::string> missing_model_libraries();
 
 /// Returns the message for a file outside of the folders that may be read.

@@ -31,18 +31,18 @@ struct GpuMesh {
   bool endless = false;                 ///< see Mesh::endless
   bool round = false;                   ///< whether the mesh fills the ball inscribed in its box
   bool boxy = false;                    ///< whether the mesh fills its box, except for a bevel
-  std::unique_ptr<const RayMesh> rays;  ///< the mesh as light rays see it
+  std::unique_ptr<const RayMesh> rays;  ///< the mesh for ray tracing
 
   bool stored = false;         ///< whether the mesh existed at the last Stage::store_previous_transforms()
   gl::Buffer vertices_before;  ///< previous vertices, if they have been replaced; otherwise 0
 
-  /// Stores the present vertices as the start of motion in Channels.
+  /// Stores the current vertices as the previous positions for Channels::motion.
   void store();
-  /// Takes over the stored vertices of `before`, the mesh that this one replaces, if both have as many
-  /// vertices.
+  /// Takes the previous vertices from `before`, the mesh that this one replaces, if both have the same number
+  /// of vertices.
   void store_previous_vertices(GpuMesh& before);
 };
-/// Vertex buffer binding of the positions from which motion in Channels starts.
+/// Vertex buffer binding of the previous positions for Channels::motion.
 inline constexpr GLuint kBeforeBinding = 3;
 
 /// The uniform block of shaders/material.glsl.
@@ -65,17 +65,17 @@ struct GpuMaterial {
   bool thin = false;
   bool two_sided = false;
   bool blended = false;
-  bool glass = false;   ///< whether light passes through and is refracted
+  bool glass = false;   ///< whether the material transmits and refracts light
   bool smooth = false;  ///< whether the material mirrors the scene
   /// Whether the material is fully described by one colour, roughness and fraction of metal.
   bool plain = false;
-  std::unique_ptr<const RayMaterial> rays;  ///< the material as light rays see it
+  std::unique_ptr<const RayMaterial> rays;  ///< the material for ray tracing
 
   /// Whether objects behind the surface are visible through it.
   bool lets_through() const { return blended || glass; }
 };
 
-/// Binds the material's uniforms and textures; `white` stands for missing textures.
+/// Binds the material's uniforms and textures. `white` is bound in place of missing textures.
 void bind_material(const GpuMaterial& material, GLuint white);
 
 GpuMaterial make_gpu_material(const Material& material, std::span<const Image> textures);
@@ -91,7 +91,7 @@ struct Instance {
   std::optional<Eigen::Affine3f> before;  ///< pose at Stage::store_previous_transforms
 
   float scale() const;
-  /// Ball around the instance.
+  /// Centre and radius of the bounding sphere in the world [m].
   Vector3f center() const { return world_from_mesh * mesh->center; }
   float radius() const { return mesh->radius * scale(); }
   /// Whether the instance fills the ball of center() and radius().

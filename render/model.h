@@ -35,7 +35,7 @@ enum class Pattern {
   water
 };
 
-/// Pattern in which the threads of a fabric cross. `none`: no threads, as in leather and rubber.
+/// Weave of a fabric. `none`: no threads, as in leather and rubber.
 enum class Weave { none, plain, twill, satin };
 
 /// Additional properties of a material for cloth.
@@ -57,7 +57,7 @@ struct TextureMap {
   int uv_set = 0;  ///< 0: Mesh::uvs, 1: Mesh::second_uvs
   Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
   bool nearest = false;  ///< whether enlarged texels are squares instead of being interpolated
-  bool mip_maps = true;  ///< whether reduced texels are averaged
+  bool mip_maps = true;  ///< whether minified texels are averaged
   /// Transform of the texture coordinates by rows: (u, v, 1) to the place in the image, v downwards.
   std::array<Vector3f, 2> rows = {Vector3f(1, 0, 0), Vector3f(0, 1, 0)};
 
@@ -91,19 +91,20 @@ struct Material {
   TextureMap specular_texture = {};            ///< sRGB, times `specular`; alpha: see `glossiness`
   float normal_scale = 1;                      ///< factor of the slope of `normal_texture`
   float occlusion_strength = 1;                ///< in [0, 1]
-  /// Points with less alpha are holes and all others are opaque (an alpha mask). 0: alpha blends.
+  /// Alpha mask: points with a smaller alpha are holes, and all others are opaque. 0: alpha blends.
   float alpha_cutoff = 0;
   bool unlit = false;          ///< whether the base colour is shown as it is, without light
   bool thin = false;           ///< whether the surface is a sheet that transmits and does not refract
   bool vertex_colors = false;  ///< whether Mesh::colors multiply the base colour
   bool vertex_alpha = false;   ///< whether some vertex colours are translucent
-  /// Reflectance of a dielectric that faces the eye; ((n - 1) / (n + 1))^2 of its index of refraction n.
+  /// Reflectance of a dielectric at perpendicular incidence: ((n - 1) / (n + 1))^2 for the index of
+  /// refraction n.
   Vector3f specular = {0.04f, 0.04f, 0.04f};
   /// Alpha of `specular_texture` is the glossiness: roughness = 1 - glossiness * alpha. Negative: not used.
   float glossiness = -1;
   float clearcoat = 0;  ///< strength of a layer of lacquer, in [0, 1]
   float clearcoat_roughness = 0;
-  Vector3f sheen_color = Vector3f::Zero();  ///< light scattered at grazing angles, as of velvet
+  Vector3f sheen_color = Vector3f::Zero();  ///< colour of light scattered at grazing angles, as by velvet
 
   /// Whether the material needs more than its first three textures, or a transform of texture coordinates.
   bool is_detailed() const;
@@ -164,13 +165,13 @@ struct Model {
     Vector3f color = Vector3f::Ones();
     float intensity = 1;                  ///< [lx] of directional lights, else [cd]
     float inner_deg = 0, outer_deg = 45;  ///< half angles of a spot's cone: full light, no light
-    float range_m = 0;                    ///< distance at which the file ends its light; 0: none
+    float range_m = 0;                    ///< distance beyond which the light has no effect; 0: no limit
   };
   std::vector<Camera> cameras;
   std::vector<Light> lights;
   std::string unit;  ///< unit of length in the file and how it was found, in words
   enum class UnitSource { stated, none, millimetres };
-  UnitSource unit_source = UnitSource::none;  ///< `millimetres`: none, but customary (STL); taken as metres
+  UnitSource unit_source = UnitSource::none;  ///< `millimetres`: not stated, but usual (STL); read as metres
   /// Longest side of the box around the content of the whole file [m]; empty if only a node was read (see
   /// read_file_size()).
   std::optional<float> file_size;

@@ -19,9 +19,9 @@ std::unique_ptr<Assimp::IOSystem> make_model_files(const InputFolders& folders);
 /// Whether a file name ends in `ending`, in any letter case.
 bool has_ending(const std::filesystem::path& path, const std::string& ending);
 
-/// Finds a file that a model names: by the name given, then by its file name in the model's folder, then by
-/// its file name in other letter case (models often contain paths of another machine). Empty if there is
-/// none.
+/// Finds a file that a model refers to. Tries the given path, then its file name in the model's folder, then
+/// the file name in any letter case, because models often contain paths of another machine. Empty if no file
+/// is found.
 std::filesystem::path find_beside(const std::filesystem::path& folder, std::string name);
 
 }  // namespace offstage::render

@@ -15,7 +15,7 @@ namespace offstage::render {
 
 struct RigNode {
   std::string name;
-  int parent = -1;  ///< an earlier node, -1: none
+  int parent = -1;  ///< index of the parent, which comes before this node; -1: none
   /// Local transform in the rest pose: translation * rotation * scale, or `matrix` if the file has one.
   Vector3f translation = Vector3f::Zero();
   Eigen::Quaternionf rotation = Eigen::Quaternionf::Identity();
@@ -32,18 +32,18 @@ struct RigChannel {
   int node = 0;
   Path path = Path::translation;
   Interpolation interpolation = Interpolation::linear;
-  std::vector<float> times;   ///< times of the keys, not decreasing [s]
+  std::vector<float> times;   ///< times of the keys in ascending order [s]
   std::vector<float> values;  ///< values of each key; with `cubic`: tangent in, value, tangent out
 };
 
 struct RigClip {
   std::string name;
-  float duration = 0;  ///< time of the last key
+  float duration = 0;  ///< time of the last key [s]
   std::vector<RigChannel> channels;
 };
 
 struct RigSkin {
-  std::vector<int> joints;              ///< nodes
+  std::vector<int> joints;              ///< index of the node of each joint
   std::vector<Eigen::Matrix4f> unbind;  ///< inverse bind matrix of each joint
 };
 
@@ -51,7 +51,7 @@ struct RigTarget {
   std::vector<Vector3f> positions, normals;  ///< offset of each vertex of the mesh; empty: none
 };
 
-/// Triangles that move together.
+/// A mesh with one material that moves with a node or a skin.
 struct RigSurface {
   int node = 0;
   int skin = -1;                 ///< -1: none; then the triangles are in the node's frame
@@ -72,12 +72,12 @@ struct ModelRig {
   std::vector<RigSkin> skins;
   std::vector<RigSurface> surfaces;
 
-  /// Index of a clip by its name or by its number from 0; the first one for an empty name, -1 if there is
-  /// none.
+  /// Returns the index of a clip. `name`: its name, or its number from 0, or empty for the first clip.
+  /// Returns -1 if there is none.
   int clip(const std::string& name) const;
 };
 
-/// The state of all nodes at a time.
+/// The state of all nodes at one time.
 struct RigPose {
   std::vector<Eigen::Affine3f> world;       ///< transform of each node, in the model's frame
   std::vector<std::vector<float>> weights;  ///< weights of the morph targets of each node
@@ -86,11 +86,12 @@ struct RigPose {
 /// last key, each channel keeps its value.
 RigPose pose_at(const ModelRig& rig, int clip, float time);
 
-/// The mesh of a surface with its morph targets and skin (section 3.7.3.3); with a skin in the model's frame,
-/// else in that of its node.
+/// Returns the mesh of a surface in a pose, with its morph targets and skin applied (section 3.7.3.3). With a
+/// skin it is in the model's frame, otherwise in the frame of its node.
 Mesh deformed(const ModelRig& rig, const RigSurface& surface, const RigPose& pose);
 
-/// Whether all indices refer to something, all sizes agree and all numbers are finite.
+/// Whether all indices are in range, all sizes agree and all numbers are finite. `materials`: number of
+/// materials.
 bool is_whole(const ModelRig& rig, std::size_t materials);
 
 }  // namespace offstage::render

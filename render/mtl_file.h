@@ -15,7 +15,7 @@
 
 namespace offstage::render {
 
-/// A texture statement, as "map_Kd -s 2 2 1 wood.png".
+/// A texture statement, such as "map_Kd -s 2 2 1 wood.png".
 struct MtlMap {
   std::string file;
   Eigen::Vector2f scale = {1, 1}, offset = {0, 0};  ///< -s and -o
@@ -33,12 +33,11 @@ struct MtlMaterial {
 /// Parses the text of one library.
 void read_mtl(const std::string& text, std::map<std::string, MtlMaterial>& materials);
 
-/// The statements of a library that assimp reads correctly: names, colours and numbers, and textures without
-/// options. Its own reader takes the number of an option's values as fixed and refuses files with statements
-/// such as `decal`.
+/// Returns only the statements that assimp reads correctly: names, colours, numbers, and textures without
+/// options. assimp misreads options with fewer values than usual, and refuses statements such as `decal`.
 std::string mtl_for_assimp(const std::string& text);
 
-/// Reads the libraries that an OBJ file names, as far as they exist in `folders`.
+/// Reads the material libraries that an OBJ file names. Libraries that do not exist in `folders` are ignored.
 std::map<std::string, MtlMaterial> read_mtl_of(const std::filesystem::path& obj, const InputFolders& folders);
 
 }  // namespace offstage::render

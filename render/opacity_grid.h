@@ -1,7 +1,7 @@
 #pragma once
-/// Private: computes how much smoke lies between the sun and a point. Puffs are spread into a coarse grid
-/// whose Z axis points away from the sun. Sums along Z are the optical depth, as in deep opacity maps (Yuksel
-/// and Keyser, 2008). The transmittance is exp(-depth).
+/// Private: computes the optical depth of smoke between the sun and a point. The opacity of puffs is
+/// deposited in a coarse grid whose Z axis points away from the sun. Sums along Z are the optical depth, as
+/// in deep opacity maps (Yuksel and Keyser, 2008). The transmittance is exp(-depth).
 
 #include <array>
 #include <span>
@@ -25,7 +25,7 @@ class OpacityGrid {
   void build(std::span<const Absorber> absorbers, const Vector3f& away);
 
   bool empty() const { return sums_.empty(); }
-  /// Optical depth between the light and a point; it increases along the light.
+  /// Returns the optical depth between the sun and a point, at least 0.
   float depth(const Vector3f& place) const;
   /// Optical depth per metre.
   float density(const Vector3f& place) const;

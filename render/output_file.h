@@ -1,6 +1,6 @@
 #pragma once
-/// The only way in which files are written: under a unique temporary name, flushed to the disk, then renamed.
-/// A file under its final name is complete.
+/// Writes files so that a file under its final name is always complete. A file has a unique temporary name
+/// until it is flushed to the disk; then it is renamed. All outputs are written in this way.
 
 #include <filesystem>
 #include <span>

@@ -18,18 +18,18 @@ class Region {
   /// `round`: the body is the ball inscribed in the box, which is then a cube.
   Region(const Eigen::AlignedBox3f& box, const Eigen::Affine3f& world_from_box, bool round, const View& view);
 
-  /// Whether the body can hide a place in the world, at this depth along the view axis, and the place cannot
-  /// hide the body. A place within the body is behind its surface. On one line of sight, every place behind a
-  /// hidden one is hidden, too.
+  /// Returns whether a point in the world counts as behind the body. `depth`: depth of the point along the
+  /// view axis [m]. A point inside of the body is behind it. If a point is behind the body, all farther
+  /// points on the same line of sight are also behind it.
   bool hides(const Vector3f& place, float depth) const;
-  /// Whether this body can hide `other`. This is decided by a face of either box that separates the two, else
-  /// by the distances of their centres.
+  /// Returns whether this body can hide `other`. If their ranges of depth overlap, a face of either box that
+  /// separates the bodies decides. If there is none, the depths of their centres decide.
   bool is_in_front_of(const Region& other) const;
   bool contains(const Vector3f& place) const;
 
-  /// Sets the visible surface of a body that fills only a small part of its box, such as a wavy cloth: the
-  /// depth along the view axis of its nearest surface for each pixel of `area_px`, by rows, infinite where
-  /// there is none. The surface then decides for points within the box.
+  /// Sets the visible surface of a body that fills only a small part of its box, such as a wavy cloth.
+  /// hides() then uses it for points inside of the box. `depths`: depth of the nearest surface along the view
+  /// axis [m] for each pixel of `area_px`, by rows; infinite where there is none.
   void set_surface(const Eigen::AlignedBox2i& area_px, std::vector<float> depths, const Vector2f& size_px);
 
   const std::array<Vector3f, 8>& corners() const { return corners_; }
@@ -92,8 +92,8 @@ class PaintOrder {
   uint32_t number(Kind kind, uint64_t key) const;
   Place place(Kind kind, uint64_t key) const;
 
-  /// The runs that are drawn after body `body` - 1 and before body `body`, from back to front. For the number
-  /// of bodies: those drawn last, which are nearer to the camera than all bodies.
+  /// Returns the runs that are drawn after body `body` - 1 and before body `body`, from back to front. If
+  /// `body` is the number of bodies, these are the runs in front of all bodies.
   std::span<const Run> runs_before(std::size_t body) const;
   std::size_t run_count() const { return runs_.size(); }
   /// The pixels that the sprites or flakes of a run can change.

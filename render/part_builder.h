@@ -1,6 +1,6 @@
 #pragma once
-/// Private: collects the surfaces of a model file, transformed by their nodes, in one part per material and
-/// kind of vertex, and skips elements that cannot be drawn.
+/// Private: collects the surfaces of a model file in one part per material and kind of vertex. Surfaces are
+/// transformed by their nodes, and elements that cannot be drawn are skipped.
 
 #include <map>
 #include <set>
@@ -50,11 +50,11 @@ class NodeNames {
   std::set<std::string> taken_;
 };
 
-/// Rotation and translation without the scale, which is applied to the triangles. For a node that is flat or
-/// mirrored, the nearest rotation.
+/// Returns the rotation and translation of a transform, without its scale. The result for a flat or mirrored
+/// node has the nearest rotation.
 Eigen::Affine3d turned_and_moved(const Eigen::Affine3d& m);
 
-/// A node with its rigid pose.
+/// Returns a node with a rigid pose.
 Model::Node model_node(std::string name, int parent, const Eigen::Affine3d& rigid);
 
 }  // namespace offstage::render

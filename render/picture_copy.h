@@ -16,8 +16,8 @@ class PictureCopy {
   /// Marks an area of the picture as changed.
   void change(const Eigen::AlignedBox2i& area_px);
   void change_all() { change(all_px_); }
-  /// Updates the copy at least in `area_px` and binds it. Areas that have changed since they were last copied
-  /// are copied, once per change.
+  /// Updates at least `area_px` of the copy, and binds it. Only areas that have changed since the last copy
+  /// are copied.
   void update(GLuint picture, const Eigen::AlignedBox2i& area_px);
 
  private:

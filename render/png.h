@@ -1,5 +1,6 @@
 #pragma once
-/// Private: PNG files by libdeflate (level 1, filter UP: a third of zlib's time, and no larger).
+/// Private: encodes PNG files with libdeflate. Level 1 and the filter UP take a third of zlib's time, and the
+/// files are no larger.
 
 #include <cstdint>
 #include <span>
@@ -8,8 +9,7 @@
 
 namespace offstage::render {
 
-/// Samples row by row from the top down. The samples of a pixel are adjacent; of two bytes the more
-/// significant one is first.
+/// Samples in rows from the top down. The samples of a pixel are adjacent; 16-bit samples are big-endian.
 struct PngPixels {
   int width_px = 0, height_px = 0;
   int channels = 3;  ///< 1 grey, 3 red green blue, 4 with alpha
@@ -19,7 +19,7 @@ struct PngPixels {
   std::string settings = {};  ///< settings of the picture, in ASCII; see png_settings()
 };
 
-/// Throws std::invalid_argument if the sizes are inconsistent.
+/// Returns the bytes of a PNG file. Throws std::invalid_argument if the sizes are inconsistent.
 std::vector<uint8_t> encode_png(const PngPixels& pixels);
 
 inline constexpr std::size_t kPngHeadBytes = 512;  ///< enough of a PNG file for settings_in_png()

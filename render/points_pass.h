@@ -19,8 +19,8 @@ struct GpuPoint {
   Vector4f position, velocity, color;
 };
 
-/// Rotation and pictures of a sprite or flake: angle [rad], two pictures of its sheet, and the fraction of
-/// the second one. In a BlendedPoint, the pictures are layers of the texture.
+/// Rotation and pictures of a sprite or flake: angle [rad], indices of two pictures of its sheet, and the
+/// weight of the second picture. In a BlendedPoint, the indices are layers of the texture.
 using GpuPicture = Vector4f;
 
 /// A sprite or flake of any set.
@@ -31,7 +31,7 @@ struct BlendedPoint {
   /// Light of lamps and from around, a column for each of red, green and blue: the constant and the slope of
   /// an AirRadiance.
   Eigen::Matrix<float, 4, 3> light;
-  Vector2f size_px = Vector2f::Ones();  ///< size of its picture
+  Vector2f size_px = Vector2f::Ones();  ///< size of the picture [px]
 };
 
 struct PointSet {
@@ -56,7 +56,7 @@ struct PointSet {
   /// Whether points are stretched along their motion.
   bool is_stretched() const { return def.style != PointStyle::sphere; }
   bool is_turned() const { return def.style == PointStyle::sprite || def.style == PointStyle::flake; }
-  /// Radius of the ball around everything drawn for a point [m].
+  /// Returns the radius of the bounding sphere of the drawn particle i [m].
   float reach(std::size_t i) const;
 };
 
@@ -70,7 +70,7 @@ class PointsPass {
   void prepare(PointSet& set, const View& view);
   /// Lights and uploads the sprites and flakes of all sets.
   void prepare_blended(const PaintOrder& order, const PuffLight& light);
-  /// The pictures of sprites, for PointSet::pictures.
+  /// Adds the pictures of sprites, and returns them for PointSet::pictures.
   std::shared_ptr<const SpritePictures> add_pictures(SpritePictures pictures) {
     return textures_.add(std::move(pictures));
   }

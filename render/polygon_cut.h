@@ -1,7 +1,7 @@
 #pragma once
-/// Cuts the polygons of model files into triangles. The ear clipping of assimp makes triangles without area
-/// from three corners in a line. Later steps drop these triangles, so solids have holes and cannot be divided
-/// into convex parts exactly.
+/// Triangulates the polygons of model files. The ear clipping of assimp creates triangles of zero area from
+/// three collinear corners. Later steps remove such triangles, so that solids have holes and cannot be
+/// divided exactly into convex parts.
 
 #include <cstdint>
 #include <span>
@@ -11,10 +11,10 @@
 
 namespace offstage::render {
 
-/// Returns the triangles of a simple polygon, three indices of corners each, in the polygon's sense of
-/// rotation. No triangle has zero area; of all ears the one nearest to an equilateral triangle is cut first.
-/// Several corners may lie on one line, and the corners may lie slightly outside of a common plane. Empty if
-/// the polygon has no area, crosses itself or has more than 1024 corners.
+/// Returns the triangles of a simple polygon: three indices of corners each, with the winding order of the
+/// polygon. No triangle has zero area. The ear that is nearest to an equilateral triangle is cut first.
+/// Corners may be collinear, and may lie slightly outside of a common plane. Empty if the polygon has no
+/// area, intersects itself or has more than 1024 corners.
 std::vector<uint32_t> cut_polygon(std::span<const Eigen::Vector3d> corners);
 
 }  // namespace offstage::render

@@ -1,6 +1,6 @@
 #pragma once
-/// Creates meshes of the primitive shapes: centred, axes of revolution along Y, with normals and texture
-/// coordinates.
+/// Creates meshes of primitive shapes with normals and texture coordinates. Shapes are centred at the origin,
+/// and their axes of revolution are along Y. Lengths are in metres.
 
 #include "render/model.h"
 

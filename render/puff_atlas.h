@@ -23,7 +23,7 @@ class PuffAtlas {
   PuffAtlas();
   /// Selects the smallest picture whose texels are no larger than the pixels of a puff `diameter_px` wide.
   Level level(Kind kind, int variant, float diameter_px) const;
-  /// Mean cover over the square, by kind.
+  /// Returns the mean cover over the square for one kind of puff.
   float mean_cover(Kind kind) const { return mean_cover_[static_cast<std::size_t>(kind)]; }
 
  private:

@@ -1,8 +1,8 @@
 #pragma once
-/// Private: computes the light of puffs and drops. The light of a puff is linear in its normal, so that a
-/// pixel costs a few products. Multiply scattered light reaches deeper into smoke than light scattered once;
-/// it is approximated by a sum of weaker terms with slower attenuation (Wrenninge, Kulla and Lundqvist, "Oz:
-/// The Great and Volumetric", 2013).
+/// Private: computes the light of puffs and drops. The radiance of a puff is a linear function of its normal,
+/// so that a pixel needs few operations. Multiple scattering brings light deeper into smoke than single
+/// scattering. It is approximated by a sum of weaker terms with slower attenuation (Wrenninge, Kulla and
+/// Lundqvist, "Oz: The Great and Volumetric", 2013).
 
 #include "render/frame.h"
 #include "render/opacity_grid.h"
@@ -30,10 +30,10 @@ struct PuffLight {
                        const Vector3f& to_eye) const;
   /// Sky light on a white surface with this normal, as in shaders/sky.glsl.
   Vector3f ambient(const Vector3f& normal) const;
-  /// Light of the sky that a surface of this roughness reflects, when a mirror would show this direction.
+  /// Returns the sky light that a surface with this roughness reflects. `direction`: the mirrored direction.
   Vector3f sky_reflection(const Vector3f& direction, float roughness) const;
-  /// Light that fog adds on the way to the eye, and in w the fraction that arrives, as fog_to in
-  /// shaders/sky.glsl.
+  /// Returns the light that fog adds between a point and the eye; w: the transmittance of the fog. Equal to
+  /// fog_to in shaders/sky.glsl.
   Vector4f fog_to(const Vector3f& place) const;
 };
 

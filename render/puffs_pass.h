@@ -1,8 +1,8 @@
 #pragma once
 /// Private: draws smoke and fire. The puffs of all sets are lit once per puff, sorted together and splatted
 /// on the CPU, at reduced resolution where they are large. The result is composited over the scene with
-/// regard to its depth, in one go, or in several runs where other translucent objects lie between puffs. The
-/// attenuation of sunlight in smoke is a grid, which also shadows the scene.
+/// regard to its depth. This needs several runs if other translucent objects are between puffs. A grid stores
+/// the attenuation of sunlight in smoke, which also casts shadows on the scene.
 
 #include <span>
 #include <vector>

@@ -14,8 +14,8 @@ struct ProcessLimits {
 };
 
 /// Limits time and memory (RLIMIT_CPU, RLIMIT_AS, RLIMIT_FSIZE), and disables core dumps. SIGXCPU ends the
-/// process. SIGINT and SIGTERM are ignored, because the parent decides, and so is SIGXFSZ, because the write
-/// fails instead.
+/// process. SIGINT and SIGTERM are ignored, because the parent handles them. SIGXFSZ is ignored, so that the
+/// write fails instead.
 void limit_process(const ProcessLimits& limits);
 
 /// Closes all descriptors above the standard streams except `kept`, so that the child cannot reach outputs

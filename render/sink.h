@@ -15,11 +15,12 @@ namespace offstage::render {
 class FrameSink {
  public:
   virtual ~FrameSink() = default;
-  /// Throws FileError, also when the encoder ended early; the message then contains its last output.
+  /// Writes a frame. Throws FileError if this fails or the encoder ended early; the message then contains the
+  /// last output of the encoder.
   virtual void write(int frame, const Image& image) = 0;
   /// Whether the sink stores linear light. If so, write_linear() must be called after each write().
   virtual bool needs_linear() const { return false; }
-  /// Writes the linear light of a frame, exposed; premultiplied alpha.
+  /// Writes the linear light of a frame, times the exposure, with premultiplied alpha.
   virtual void write_linear(int, const HdrImage&) {}
   /// Completes the output; a video has a temporary name until then. Without this call the destructor discards
   /// partial output.
@@ -65,7 +66,7 @@ std::vector<std::string> video_endings();
 /// Whether a video with this ending keeps transparency; false if it is not an ending of a video.
 bool keeps_alpha(const std::string& ending);
 
-/// Returns those of the supported encoders that ffmpeg offers, for `doctor`; empty if there is no ffmpeg.
+/// Returns the supported encoders that the installed ffmpeg has, for `doctor`; empty if there is no ffmpeg.
 std::vector<std::string> available_encoders();
 
 }  // namespace offstage::render

@@ -21,15 +21,16 @@ struct SkyModel {
 
 SkyModel make_sky(const Sun& sun, const Environment& environment);
 
-/// Radiance of the sky from a unit direction, without the sun's disc; for a picture, the sum of its dim and
-/// its bright part.
+/// Returns the radiance of the sky from a unit direction, without the sun's disc. For a picture, it is the
+/// sum of the dim and the bright part.
 Vector3f sky_radiance(const SkyModel& sky, const Vector3f& direction);
 
-/// Radiance of the sky's colours, even if a picture replaces them.
+/// Returns the radiance of the colour gradient of the sky, even if a picture replaces it.
 Vector3f gradient_radiance(const SkyModel& sky, const Vector3f& direction);
 
-/// Radiance of the sky that a surface of this roughness mirrors; equal to sky_reflection() in
-/// shaders/sky.glsl. `ambient`: light on a white surface whose normal is the direction.
+/// Returns the sky light that a surface with this roughness reflects. `direction`: the mirrored direction;
+/// `ambient`: light on a white surface whose normal is `direction`. Equal to sky_reflection() in
+/// shaders/sky.glsl.
 Vector3f sky_mirrored(const SkyModel& sky, const Vector3f& direction, float roughness,
                       const Vector3f& ambient);
 

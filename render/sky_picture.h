@@ -1,8 +1,8 @@
 #pragma once
 /// A picture of the whole sky (equirectangular projection) as a light source and as a background.
 ///
-/// The picture is divided into two parts that add up to it: a dim part, which rays and prefiltered levels see
-/// without much noise, and a bright part (the sun, windows), whose directions are sampled in proportion to
+/// The picture is the sum of two parts. Rays and prefiltered levels sample the dim part with little noise.
+/// The bright part (the sun, windows) is a light source, whose directions are sampled in proportion to
 /// luminance times solid angle. The centre of the picture is at -Z, its upper edge at +Y, and its right half
 /// at +X.
 
@@ -25,7 +25,7 @@ struct SkyGrid {
   int columns = 0, rows = 0;
   std::vector<Vector3f> values;
 
-  /// Interpolated between the cells, around the edges at the left and right.
+  /// Returns the value in a direction, interpolated between cells. The left and right edges adjoin.
   Vector3f at(const Vector3f& direction) const;
   Vector3f& cell(int column, int row);
   const Vector3f& cell(int column, int row) const;
@@ -37,7 +37,7 @@ struct SkyGrid {
 /// solid angle.
 SkyGrid resampled(const SkyGrid& grid, int columns, int rows);
 
-/// A light with a direction that stands for many.
+/// A directional light that represents the whole bright part of a sky picture.
 struct SkyBeam {
   Vector3f direction = Vector3f::UnitY();
   Vector3f light = Vector3f::Zero();  ///< radiance of a white surface that faces it
@@ -59,8 +59,8 @@ class SkyPicture {
   Vector3f seen(const Vector3f& direction) const { return unpacked_at(direction); }
   /// Radiance of the dim part from a unit direction.
   Vector3f dim(const Vector3f& direction) const;
-  /// Radiance of the dim part that a surface of this roughness mirrors; `direction` is the mirrored
-  /// direction.
+  /// Returns the radiance of the dim part that a surface with this roughness reflects. `direction`: the
+  /// mirrored direction.
   Vector3f mirrored(const Vector3f& direction, float roughness) const;
   /// Light of the dim part on a white surface with normal n: constant + slope * n + n * curvature * n.
   struct Irradiance {
@@ -85,12 +85,13 @@ class SkyPicture {
   Sample sample(const Vector2f& uv) const;
   const SkyBeam& beam() const { return beam_; }  ///< the bright part as a whole
 
-  /// A picture in the format GL_RGB9_E5. background() contains what seen() returns and its reduced levels or,
-  /// if there is a blur, only the blurred picture.
+  /// A picture in the format GL_RGB9_E5.
   struct Packed {
     int columns = 0, rows = 0;
     std::vector<uint32_t> values;
   };
+  /// Returns the background: the picture that seen() reads with its reduced levels, or only the blurred
+  /// picture if there is a blur.
   const std::vector<Packed>& background() const { return background_; }
   std::vector<Packed> levels() const;  ///< prefiltered, as mirrored() reads them
 

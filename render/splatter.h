@@ -1,7 +1,7 @@
 #pragma once
-/// Private: draws many soft particles over each other on the CPU, front to back, by tiles in parallel. Where
-/// the front particles cover a tile, those behind are skipped. llvmpipe would take several times as long,
-/// because every quad goes through its vertex shader and set-up on one thread.
+/// Private: draws many overlapping soft particles on the CPU, front to back, with tiles in parallel.
+/// Particles behind an opaque tile are skipped. llvmpipe would take several times as long, because it runs
+/// the vertex shader and the set-up of all quads on one thread.
 
 #include <cstdint>
 #include <span>
@@ -35,7 +35,7 @@ struct StreakLight {
   float middle[3], rim[3], rim_slope[3];
 };
 
-/// One streak on the screen, drawn as with a soft round pen.
+/// One streak on the screen: a line with soft, round ends.
 struct StreakSplat {
   float x, y;
   float half_x, half_y;
@@ -93,8 +93,8 @@ class StreakBands {
   /// Whether the tiles of a band from `left` to `right` contain streaks, from number `first` on, that were
   /// not drawn yet.
   bool any(int bottom, int left, int right, uint32_t first) const;
-  /// Draws the streaks from `first` on that were not drawn yet over a strip. The distance along the view axis
-  /// is x / (depth + y) of `distance`.
+  /// Draws those streaks from `first` on that were not drawn yet over a strip. `distance` converts values of
+  /// the depth buffer: the distance along the view axis is distance.x / (depth + distance.y) [m].
   void blend_over(const Strip& strip, const Eigen::Vector2f& distance, uint32_t first);
 
  private:

@@ -1,7 +1,6 @@
 #pragma once
-/// Private: the pictures of sprites, as the layers of array textures. Sheets share textures as far as
-/// possible, because sprites of different textures that alternate in depth need one draw call for each
-/// change.
+/// Private: the pictures of sprites, as layers of array textures. Sheets share textures where possible,
+/// because each change of the texture in the drawing order needs another draw call.
 
 #include <cstdint>
 #include <map>

@@ -123,8 +123,8 @@ struct PointsDef {
   SpriteSheet sheet = {};                ///< division of the picture of sprites
 };
 
-/// A line drawn as with a round pen. It faces the eye, is not lit, and casts no shadow. If both ends are
-/// equal it is a dot; with a wide and a narrow end it is the head of an arrow.
+/// A line with round ends. It faces the eye, is not lit, and casts no shadow. A line with equal end points is
+/// a dot. A line with a wide and a narrow end is the head of an arrow.
 struct Line {
   Vector3f a, b;
   Vector4f color;                  ///< linear, straight alpha
@@ -158,7 +158,7 @@ struct SampleOffsets {
 /// Offsets of sub-frame i of n: a fixed low-discrepancy set; all zero for n = 1.
 SampleOffsets sample_offsets(int i, int n);
 
-/// Sums over the values that rays found for light from the sky and other surfaces, and for mirror images.
+/// Sums over the radiance that rays found for indirect light and mirror images.
 struct LightSums {
   double arriving = 0;  ///< luminance of the light of these rays
   /// Luminance that was removed from the brightest rays, which would otherwise be visible as dots.
@@ -173,9 +173,8 @@ struct LightSums {
 
 struct StageDef {
   int width_px = 1280, height_px = 720;
-  /// Whether pictures are less exact and take less time, for looking at a scene while it is edited. The light
-  /// of the sun and of the surroundings is then traced for some of the pixels, and interpolated for the
-  /// others.
+  /// Whether pictures are drawn faster and less exactly, for previews. The light of the sun and indirect
+  /// light are then traced for some of the pixels, and interpolated for the others.
   bool quick = false;
 };
 
@@ -226,21 +225,21 @@ class Stage {
   /// Sets the time of animated surfaces such as ripples and clouds [s].
   void set_time(float time);
 
-  /// Draws one sub-frame and adds it to `sum`, which is sized and cleared first if it does not have the
-  /// stage's size. Throws UnavailableError on a GL error, and StoppedError, without any effect on `sum`, soon
-  /// after `stop` returned true; several threads call it.
+  /// Draws one sub-frame and adds it to `sum`. If `sum` does not have the size of the stage, it is resized
+  /// and cleared first. Throws UnavailableError on a GL error. Several threads call `stop`; soon after it
+  /// returns true, draw() throws StoppedError and does not change `sum`.
   void draw(const SampleOffsets& offsets, HdrImage& sum, const StopTest& stop = {});
-  /// Sums over all sub-frames drawn so far.
+  /// Returns the sums over all sub-frames that were drawn so far.
   LightSums light_sums() const;
 
   /// Sets the object id of an instance in Channels; 0, the default: none.
   void set_object(InstanceHandle instance, uint32_t id);
   void set_object(ClothHandle cloth, uint32_t id);
   void set_object(PointsHandle points, uint32_t id);
-  /// Stores the current transforms, camera included, as the start of motion in Channels.
+  /// Stores the current transforms and camera as the previous ones for Channels::motion.
   void store_previous_transforms();
-  /// Draws depth, normals, ids and motion of the current state. `time`: since store_previous_transforms()
-  /// [s]; the previous positions of balls follow from their velocity.
+  /// Draws depth, normals, ids and motion of the current state. `time`: time since
+  /// store_previous_transforms() [s]. The previous positions of balls are computed from their velocity.
   Channels channels(float time);
 
  private:

@@ -67,7 +67,7 @@ struct Stage::Impl {
     bool glass = false;
     bool fills_region = false;
     Eigen::AlignedBox2i area_px;    ///< area of the picture that the body covers
-    Eigen::AlignedBox2i looked_px;  ///< area of the picture that it shows by refraction
+    Eigen::AlignedBox2i looked_px;  ///< area of the picture that is visible through it by refraction
   };
 
   StageDef def;

@@ -22,8 +22,8 @@ class StreaksPass {
   /// Prepares the streaks of a sub-frame. `light` includes the smoke between sun and streaks. Streaks do not
   /// move during a frame, so only its first sub-frame (`new_frame`) computes their light.
   void prepare(const PaintOrder& order, const View& view, const PuffLight& light, bool new_frame);
-  /// Declares that the streaks from `first` on (index of their keys in the PaintOrder) are behind the next
-  /// object.
+  /// Sets the first streak that is behind the next object, as an index into its keys in the PaintOrder. All
+  /// later streaks are also behind the object.
   void pass(uint32_t first) { first_behind_ = first; }
   /// Draws the streaks behind the next object over an area of the picture; returns the pixels that may have
   /// changed.

@@ -1,6 +1,7 @@
 #pragma once
-/// Short texts in pictures, such as the labels of a contact sheet. There is one simple font (stb_easy_font)
-/// in whole pixels, so it is the same on every machine. Characters that are not ASCII become question marks.
+/// Draws short texts in pictures, such as the labels of a contact sheet. The only font (stb_easy_font)
+/// consists of whole pixels, so texts are the same on every machine. Characters that are not ASCII become
+/// question marks.
 
 #include <array>
 #include <cstdint>

@@ -1,6 +1,6 @@
 #pragma once
-/// Private: colour textures. Mip levels are averaged in linear light on the CPU, where the result is the same
-/// everywhere.
+/// Private: textures of materials and skies. Mip levels are averaged in linear light on the CPU, so that they
+/// are the same on all machines.
 
 #include "render/gl.h"
 #include "render/image.h"

@@ -22,11 +22,12 @@ struct ToneMap {
 float srgb_encode(float linear);
 float srgb_decode(float encoded);
 
-/// Returns the exposure that gives a picture the mean brightness of a sunlit grey of 18 %. It uses the
-/// geometric mean of the luminance, which a lamp or a black corner hardly changes, and is within four stops
-/// of 1.
+/// Returns the exposure at which the mean brightness of a picture is that of a sunlit surface with an albedo
+/// of 18 %. The mean is the geometric mean of the luminance, which small bright or dark areas hardly change.
+/// The result is in [1/16, 16].
 float metered_exposure(const HdrImage& sum, float sample_weight);
 
+/// Converts a sum of sub-frames to a displayable picture.
 Image tone_map(const HdrImage& sum, const ToneMap& options);
 
 /// Smooths jagged edges of high contrast: the anti-aliasing of the draft quality, which has one sub-frame.

@@ -7,8 +7,8 @@
 namespace offstage::render {
 namespace {
 
-constexpr std::size_t kMostTraced = 4096;  // particles at which light is traced, approximately
-constexpr float kCells = 16;               // along the longest side of the box around the particles
+constexpr std::size_t kMostTraced = 4096;  // approximate number of particles at which light is traced
+constexpr float kCells = 16;               // cells along the longest side of the particles' bounding box
 
 }  // namespace
 
@@ -55,7 +55,7 @@ AirField::AirField(const LightTracer& tracer, const SampleOffsets& offsets, std:
 AirLightAround AirField::at(const Vector3f& place) const {
   Sums sum = Sums::Zero();
   for_corners(place, [&](std::size_t corner, float weight) { sum += weight * corners_[corner]; });
-  if (!(sum[0] > 1e-6f)) sum = total_;  // far from the particles that were chosen
+  if (!(sum[0] > 1e-6f)) sum = total_;  // far from the traced particles
   sum /= sum[0];
   AirLightAround result;
   result.sky = sum[1];

@@ -1,7 +1,7 @@
 #pragma once
-/// Private: the light that particles receive from the sky and from objects around them. It changes little
-/// over a short distance, so it is traced at some of the particles and interpolated between them, which also
-/// averages its noise.
+/// Private: a grid of the light that particles receive from the sky and from objects. This light changes
+/// little over a short distance. It is therefore traced at some of the particles only, and interpolated for
+/// the others. The interpolation also averages the noise of the rays.
 
 #include <span>
 #include <vector>
@@ -12,30 +12,30 @@ namespace offstage::render {
 
 class AirField {
  public:
-  /// A particle. `number`: one in [0, 1) that it keeps; it decides whether the light is traced at the
-  /// particle, and along which rays.
+  /// A particle.
   struct Ball {
     Vector3f center;
-    float number;
+    float number;  ///< pseudo-random, in [0, 1), constant; selects the traced particles and their rays
   };
-  /// Traces the light of a sub-frame around `balls`. `open`: see LightTracer::trace_air.
+  /// Traces the light of a sub-frame at some of the `balls`. `open`: see LightTracer::trace_air.
   AirField(const LightTracer& tracer, const SampleOffsets& offsets, std::span<const Ball> balls,
            const AirRadiance& open);
-  /// Returns the light at the centre of one of the balls.
+  /// Returns the interpolated light at a point, which should be the centre of one of the balls.
   AirLightAround at(const Vector3f& place) const;
 
  private:
-  /// Weight of the samples, and sums over them: fraction of the sky, constant and slope of the light.
+  /// The sum of the weights of the samples [0], and weighted sums of their AirLightAround: sky [1], constant
+  /// [2, 5) and slope [5, 14) of the light. The last two numbers are padding.
   using Sums = Eigen::Array<float, 16, 1>;
-  /// Calls each(corner of the grid, weight) for the eight corners around a place.
+  /// Calls each(index in corners_, trilinear weight) for the eight grid corners around a point.
   template <class Each>
   void for_corners(const Vector3f& place, Each&& each) const;
 
-  Vector3f origin_ = Vector3f::Zero();  ///< the first corner of the grid
+  Vector3f origin_ = Vector3f::Zero();  ///< position of the first corner of the grid
   float cell_m_ = 1;
   Eigen::Array3i size_ = Eigen::Array3i::Zero();  ///< numbers of corners along x, y and z
   std::vector<Sums> corners_;
-  Sums total_ = Sums::Zero();
+  Sums total_ = Sums::Zero();  ///< sums over all samples, for points far from any of them
 };
 
 }  // namespace offstage::render

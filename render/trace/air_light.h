@@ -1,5 +1,5 @@
 #pragma once
-/// Private: light that reaches small balls in the air, by rays, for particles.
+/// Private: traces the light of sun and lamps that particles receive. Each particle is a small ball.
 
 #include "render/trace/light_sources.h"
 #include "render/trace/ray_scene.h"
@@ -12,11 +12,11 @@ class AirLight {
   AirLight(const RayScene& scene, const LightSources& sources, const SampleOffsets& offsets)
       : scene_(scene), sources_(sources), disc_(sources.sun, sources.sky.sun_direction), offsets_(offsets) {}
 
-  /// Fraction of the sun's light that objects let through to a ball; smoke is not counted. `number`: one in
-  /// [0, 1) that the ball keeps, which selects the rays.
+  /// Returns the fraction of the sun's light that reaches a ball past all objects, without the effect of
+  /// smoke. `number`: pseudo-random and constant for the ball, in [0, 1); it selects the rays.
   float sun(const Vector3f& center, float radius, float number) const;
-  /// Calls each(radiance of a white surface that faces the lamp, unit vector to the lamp) for all lamps that
-  /// reach a ball.
+  /// Calls each(light, towards) for each lamp that shines in the direction of a ball. `light`: radiance of a
+  /// white surface there that faces the lamp, with shadows. `towards`: unit vector to the lamp.
   template <class Each>
   void for_each_lamp(const Vector3f& center, float radius, float number, Each&& each) const {
     if (sources_.lamps.empty()) return;
@@ -32,7 +32,7 @@ class AirLight {
       each(light, towards);
     }
   }
-  /// Radiance of a white ball so small that lamps light it from all sides.
+  /// Returns the radiance of a white particle that scatters the light of lamps equally in all directions.
   Vector3f lamps_around(const Vector3f& center, float radius, float number) const;
 
  private:

@@ -1,6 +1,6 @@
-/// Light of the sun and of lamps that pieces of glass focus (H. W. Jensen, "Global Illumination using Photon
-/// Maps", 1996). Rays from the sources are refracted by the glass, and their light is added to the pixels
-/// that show the places where they end.
+/// Caustics: light of the sun and of lamps that pieces of glass focus, by photons (H. W. Jensen, "Global
+/// Illumination using Photon Maps", 1996). Photons start at the sources, and glass refracts them. Their light
+/// is added to the pixels that show their end points.
 
 #include <algorithm>
 #include <cmath>
@@ -14,14 +14,15 @@
 namespace offstage::render {
 namespace {
 
-constexpr float kRaysPerPixel = 1;    // that a piece covers, in a sub-frame
-constexpr float kMostRays = 4e5f;     // of a sub-frame
-constexpr float kRaysPerMean = 64;    // over which a pixel of a frame is averaged
-constexpr int kWidestMean_px = 8;     // half-width of the square of pixels
-constexpr int kMostSurfaces = 16;     // of glass that a ray meets
-constexpr float kSameSurface = 0.9f;  // cosine between normals
+constexpr float kRaysPerPixel = 1;    // photons per pixel that a piece of glass covers, in a sub-frame
+constexpr float kMostRays = 4e5f;     // approximate limit of the photons of a sub-frame
+constexpr float kRaysPerMean = 64;    // photons over which a pixel of a frame is averaged
+constexpr int kWidestMean_px = 8;     // largest half-width of the averaged square of pixels
+constexpr int kMostSurfaces = 16;     // largest number of glass surfaces on the path of a photon
+constexpr float kSameSurface = 0.9f;  // least cosine between normals of one surface
 
-/// Pixels that a piece covers, if it is seen from all sides equally: a quarter of its box's surface.
+/// Estimates the number of pixels that a piece covers, from the mean projected area of its box over all
+/// directions, which is a quarter of its surface.
 float pixels_of(const GlassPiece& piece, const LightView& view) {
   const float pixel = view.pixel_m * (piece.center() - view.eye).norm();
   float area = 0;
@@ -29,8 +30,8 @@ float pixels_of(const GlassPiece& piece, const LightView& view) {
   return area / std::max(pixel * pixel, 1e-20f);
 }
 
-/// Area that a pixel shows of a surface [m^2]. Its solid angle is in proportion to the cube of the cosine
-/// between its direction and the axis of the view.
+/// Returns the area of a surface that one pixel covers [m^2]. The solid angle of a pixel is in proportion to
+/// the cube of the cosine between its direction and the view axis.
 float area_of_pixel(const Vector3f& place, const Vector3f& normal, const LightView& view) {
   const Vector3f to_eye = view.eye - place;
   const float depth = (view.clip_from_world * place.homogeneous()).w();
@@ -40,18 +41,19 @@ float area_of_pixel(const Vector3f& place, const Vector3f& normal, const LightVi
 
 }  // namespace
 
-/// The sun, or a lamp: each point of it that belongs to `uv`, as seen from a place.
+/// A source of photons: the sun or a lamp.
 struct LightTracer::Source {
   const Sun* sun;  ///< null: a lamp
   const SunDisc& disc;
   const RayLamp* lamp;
 
+  /// Returns a point of the source as seen from `place`. `uv` is uniform in the unit square.
   LampPoint<float> point(const Vector3f& place, const SquarePoint<float>& uv) const {
     if (sun == nullptr) return lamp->point(from_eigen(place), uv);
     return {from_eigen(disc.direction(uv)), kFar, 1, from_eigen(sun->intensity * sun->color), 0};
   }
-  /// Light that arrives at a face of the box of a piece, whose area is the length of `outward`,
-  /// approximately.
+  /// Estimates the power that arrives at a face of a box without shadows. `middle`: centre of the face;
+  /// `outward`: its outward normal, whose length is its area.
   Vector3f light(const Vector3f& middle, const Vector3f& outward) const {
     const LampPoint<float> at = point(middle, {0.5f, 0.5f});
     // Other points of a lamp may be on the other side of the face, and those of the sky are all around.
@@ -60,14 +62,14 @@ struct LightTracer::Source {
   }
 };
 
-/// Where a ray from a source ends.
+/// The end point and the light of a photon.
 struct LightTracer::Photon {
-  int pixel = -1;  ///< that shows the place; negative: none
+  int pixel = -1;  ///< pixel that shows the end point; negative: none
   Vector3f light = Vector3f::Zero();
 };
 
-// Follows a ray that enters the box around a piece of glass, one of `count`. Of those that meet other glass
-// before it, the rays towards that glass have the light.
+// Traces photon `number` of `count` photons that enter the box around a piece of glass. A photon counts only
+// if this piece is the first surface that it hits. Other pieces have their own photons.
 LightTracer::Photon LightTracer::trace_photon(const GlassPiece& piece, const Source& source, uint32_t number,
                                               float count, const LightView& view,
                                               const VisibleLight& visible) const {
@@ -81,7 +83,7 @@ LightTracer::Photon LightTracer::trace_photon(const GlassPiece& piece, const Sou
       chosen = face;
   if (chosen < 0) return photon;
   const SquarePoint<float> on_face = sampler.next();
-  // A little outside, because a box of glass fills its box.
+  // The photon starts a little outside of the box, because the glass may fill the box.
   const Vector3f entry = piece.center() + 1.001f * (piece.middle_of(chosen) - piece.center()) +
                          (on_face.x - 0.5f) * piece.edges.col((chosen + 1) % 3) +
                          (on_face.y - 0.5f) * piece.edges.col((chosen + 2) % 3);
@@ -123,7 +125,7 @@ LightTracer::Photon LightTracer::trace_photon(const GlassPiece& piece, const Sou
   return photon;
 }
 
-/// Photons per pixel around each place of the picture.
+/// The number of photons per pixel in each block of 8 x 8 pixels.
 class LightTracer::PhotonDensity {
  public:
   PhotonDensity(std::span<const Photon> photons, int width_px, int height_px)
@@ -133,7 +135,7 @@ class LightTracer::PhotonDensity {
         counts_(static_cast<std::size_t>(columns_ * rows_)) {
     for (const Photon& photon : photons) ++counts_[block(column_of(photon.pixel), row_of(photon.pixel))];
   }
-  /// The mean over the block of a pixel and its neighbours.
+  /// Returns the mean density over the block of a pixel and its neighbours.
   float at(int pixel) const {
     float sum = 0;
     int blocks = 0;
@@ -156,7 +158,7 @@ class LightTracer::PhotonDensity {
   std::vector<float> counts_;
 };
 
-// Spreads the light over the pixels of the same surface around.
+// Distributes the light of a photon over the pixels around its end point that show the same surface.
 void LightTracer::add_photon(const Photon& photon, int half_px, const LightView& view, LightBuffer& light) {
   const LightGuide& guide = light.pixels;
   const int x0 = photon.pixel % guide.width_px, y0 = photon.pixel / guide.width_px;
@@ -196,7 +198,7 @@ void LightTracer::add_caustics(const LightView& view, LightBuffer& light) const 
   const VisibleLight visible(light, view);
   std::vector<Photon> photons;
   for (const GlassPiece& piece : sources_.glass) {
-    std::vector<float> powers;  // each ray of a piece has about the same power
+    std::vector<float> powers;  // all photons of a piece get about the same power
     for (const Source& source : sources) {
       float& power = powers.emplace_back(0.0f);
       for (int face = 0; face < 6; ++face)
@@ -217,7 +219,7 @@ void LightTracer::add_caustics(const LightView& view, LightBuffer& light) const 
   }
   std::erase_if(photons, [](const Photon& photon) { return photon.pixel < 0; });
   const PhotonDensity density(photons, light.pixels.width_px, light.pixels.height_px);
-  // One after the other, so that the sums do not depend on the threads.
+  // Light is added in one thread, so that the sums do not depend on the number of threads.
   for (const Photon& photon : photons) {
     const float wanted = kRaysPerMean / (density.at(photon.pixel) * static_cast<float>(view.offsets.count));
     const int half_px = static_cast<int>(std::ceil(0.5f * (std::sqrt(wanted) - 1)));

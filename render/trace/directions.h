@@ -46,7 +46,8 @@ inline LaneVectors all_lanes(const Eigen::Vector3f& v) {
   return {Lanes{} + v.x(), Lanes{} + v.y(), Lanes{} + v.z()};
 }
 
-/// A direction around the unit vector n, with a density in proportion to the cosine.
+/// Returns a unit direction in the hemisphere around the unit vector n. Its density is in proportion to the
+/// cosine of its angle to n.
 template <class T>
 Three<T> cosine_direction(const Three<T>& n, const SquarePoint<T>& uv) {
   const SquarePoint<T> d = on_disc(uv);
@@ -56,19 +57,20 @@ Three<T> cosine_direction(const Three<T>& n, const SquarePoint<T>& uv) {
   return normalized(a * d.x + b * d.y + n * up);
 }
 
-/// A direction, all of which are equally likely.
+/// Returns a unit direction that is uniformly distributed over the sphere.
 inline Eigen::Vector3f even_direction(const SquarePoint<float>& uv) {
   const float y = 1 - 2 * uv.x, across = std::sqrt(std::max(1 - y * y, 0.0f));
   const float turn = 2 * std::numbers::pi_v<float> * uv.y;
   return {across * std::cos(turn), y, across * std::sin(turn)};
 }
 
-/// A normal of the microfacets that are visible from `view`, for GGX with a = roughness^2 (J. Dupuy and
-/// A. Benyoub, "Sampling Visible GGX Normals with Spherical Caps", 2023).
+/// Returns a sample of the GGX microfacet normals that are visible from the direction `view`, for a surface
+/// with the normal n. a: roughness^2. From J. Dupuy and A. Benyoub, "Sampling Visible GGX Normals with
+/// Spherical Caps" (2023).
 Eigen::Vector3f visible_facet(const Eigen::Vector3f& n, const Eigen::Vector3f& view, float a,
                               const SquarePoint<float>& uv);
 
-/// The mirrored direction of a ray that meets a surface with this unit normal.
+/// Returns the direction of a ray after its reflection at a surface with the unit normal n.
 inline Eigen::Vector3f reflected(const Eigen::Vector3f& direction, const Eigen::Vector3f& n) {
   return direction - 2 * direction.dot(n) * n;
 }

@@ -11,7 +11,7 @@
 
 namespace offstage::render::embree {
 
-using Valid = std::array<int, 8>;  ///< -1 for rays that are traced, aligned to 32 bytes
+using Valid = std::array<int, 8>;  ///< -1: the ray is traced, 0: it is not; must be aligned to 32 bytes
 
 #if RTC_VERSION_MAJOR >= 4
 inline void intersect(RTCScene scene, RTCRayHit& ray) {
@@ -20,7 +20,7 @@ inline void intersect(RTCScene scene, RTCRayHit& ray) {
 inline void occluded(RTCScene scene, RTCRay& ray) {
   rtcOccluded1(scene, &ray);
 }
-/// Tests eight rays that are close to each other for any hit.
+/// Tests whether eight coherent rays hit anything.
 inline void occluded(RTCScene scene, const Valid& valid, RTCRay8& rays) {
   RTCOccludedArguments arguments;
   rtcInitOccludedArguments(&arguments);

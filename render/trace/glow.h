@@ -1,8 +1,8 @@
 #pragma once
-/// Private: glowing meshes as light sources. A point of one of them is chosen for each sample. The density of
-/// the choice is known for any point that a ray meets by chance, so that both ways to find light can be
-/// weighted (E. Veach and L. Guibas, "Optimally Combining Sampling Techniques for Monte Carlo Rendering",
-/// 1995).
+/// Private: glowing meshes as light sources. Each sample is a random point of one of the meshes. The
+/// probability density of such samples is also known for points that other rays hit by chance, which is
+/// needed for multiple importance sampling (E. Veach and L. Guibas, "Optimally Combining Sampling Techniques
+/// for Monte Carlo Rendering", 1995).
 
 #include <span>
 #include <vector>
@@ -17,25 +17,26 @@ struct GlowSample {
   Vector3f towards = Vector3f::UnitY();
   float distance = 0;                    ///< [m]
   Vector3f radiance = Vector3f::Zero();  ///< radiance of the point
-  float density = 0;  ///< probability density of the sample, per solid angle; 0: nothing was found
+  float density = 0;  ///< probability density of the direction [1/sr]; 0: there is no sample
 };
 
 class Glow {
  public:
-  /// Adds object `object` of the RayScene. `center` and `radius` are those of a ball around it; `is_ball`: it
-  /// fills that ball. Mesh and material must stay in memory.
+  /// Adds a glowing object. `object`: its number in the RayScene. `center` and `radius`: its bounding sphere
+  /// in the world [m]. `is_ball`: the object is that sphere. `mesh` and `material` must stay in memory.
   void add(unsigned object, const RayMesh& mesh, const RayMaterial& material,
            const Eigen::Affine3f& world_from_mesh, const Vector3f& center, float radius, bool is_ball);
-  /// Keeps the kMost sources with the greatest power. The others give light only where rays meet them by
-  /// chance.
+  /// Keeps the kMost sources with the greatest power. Light of the others is found only by rays that hit them
+  /// by chance.
   void limit();
   bool empty() const { return sources_.empty(); }
-  /// Chooses a source in proportion to an estimate of its light on a surface at `place`, and a point of it in
-  /// proportion to its area, or to its solid angle if it is a ball.
+  /// Returns a random point of a source, as seen from a surface at `place`. A source is chosen in proportion
+  /// to an estimate of its light on the surface. The point is uniformly distributed over the area of a mesh,
+  /// or over the solid angle of a ball. `normal`: unit normal of the surface, or zero for a point in the air.
   GlowSample sample(const Vector3f& place, const Vector3f& normal, float random,
                     const SquarePoint<float>& uv) const;
-  /// The density with which sample() chooses the point that a ray from `place` hit; 0 if it is not on a
-  /// source.
+  /// Returns the probability density with which sample() chooses the direction to `hit` [1/sr]; 0 if the hit
+  /// is not on a source.
   float density(const Vector3f& place, const Vector3f& normal, const Hit& hit) const;
 
   static constexpr std::size_t kMost = 64;
@@ -51,9 +52,9 @@ class Glow {
     bool is_ball;
     float power;
 
-    /// Area of a triangle in the world over the chance to choose it, which is its fraction of the mesh.
+    /// Returns the area of a triangle in the world [m^2], divided by the probability to choose the triangle.
     float area_per_chance(unsigned triangle) const;
-    /// Solid angle of a ball over 2 pi, or 0 from within.
+    /// Returns the solid angle of a ball as seen from `place`, divided by 2 pi; 0 if `place` is in the ball.
     float cap(const Vector3f& place) const;
     GlowSample sample_ball(const Vector3f& place, const SquarePoint<float>& uv) const;
     GlowSample sample_area(const Vector3f& place, float choice, const SquarePoint<float>& uv) const;

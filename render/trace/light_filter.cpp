@@ -11,12 +11,13 @@ namespace offstage::render {
 namespace {
 
 constexpr int kRowsPerFilterTask = 16;
-// Fractions of the mean distance around over which light is taken as even: all light, and noisy light.
+// Fractions of the mean hit distance over which all light, and noisy light, is averaged.
 constexpr float kFractionOfReach = 0.3f, kNoisyFractionOfReach = 0.2f;
-// Least distance around noisy light, as a fraction of the height and in pixels; less leaves noise in corners.
+// Least hit distance that is used for noisy light: the smaller one of a fraction of the picture's height and
+// a number of pixels. Smaller values leave noise in corners.
 constexpr float kLeastNoisyFraction = 0.1f, kLeastNoisy_px = 36;
 constexpr float kNoReach = 1e30f;  // 1 / distance^2: nothing is averaged
-constexpr int kRun = 32;           // pixels that are averaged together
+constexpr int kRun = 32;           // pixels per run; runs of equal values are skipped
 
 void for_filter_rows(int height_px, const auto& each) {
   tbb::parallel_for(tbb::blocked_range<int>(0, height_px, kRowsPerFilterTask), [&](const auto& rows) {
@@ -164,7 +165,7 @@ bool LightValues::Averaging::is_even(int run, int y) {
   return true;
 }
 
-// For eight pixels from x on.
+// Averages the pixels x ... x + 7 of row y.
 template <std::size_t kChannels>
 void LightValues::Averaging::average_lanes(int x, int y) {
   const LaneVectors p = lanes_of(guide_.place, x, y), n = lanes_of(guide_.normal, x, y);
@@ -239,7 +240,7 @@ bool has_any(const LightGuide& guide, int x, int y, const Neighbours& neighbours
   });
 }
 
-/// Fills every other pixel of a row, from the first one on.
+/// Fills every other pixel of a row, starting with pixel `first`.
 void fill_row(const LightGuide& guide, int first, int y, const Neighbours& neighbours,
               std::span<LightPlane* const> planes) {
   constexpr float kLeast = 0.01f;  // weight of a pixel of another surface
@@ -273,8 +274,8 @@ void fill_row(const LightGuide& guide, int first, int y, const Neighbours& neigh
 
 }  // namespace
 
-// The gaps of three quarters of the pixels are filled in two steps: first those in both odd rows and odd
-// columns.
+// Gaps::three_quarters are filled in two steps. The first one fills pixels in both odd rows and odd columns
+// from their diagonal neighbours.
 bool is_gap(Gaps gaps, const LightGuide& guide, int x, int y) {
   if (((x ^ y) & 1) != 0) return has_any(guide, x, y, kBeside);
   return gaps == Gaps::three_quarters && (x & 1) != 0 && has_any(guide, x, y, kDiagonal);
@@ -283,7 +284,7 @@ bool is_gap(Gaps gaps, const LightGuide& guide, int x, int y) {
 void fill_gaps(Gaps gaps, const LightGuide& guide, std::span<LightPlane* const> planes) {
   if (gaps == Gaps::three_quarters)
     for_filter_rows(guide.height_px / 2, [&](int k) { fill_row(guide, 1, 2 * k + 1, kDiagonal, planes); });
-  // Two sets of rows, since each reads those beside it.
+  // First even, then odd rows, because each row reads the rows beside it.
   for (const int first : {0, 1})
     for_filter_rows((guide.height_px - first + 1) / 2,
                     [&](int k) { fill_row(guide, 1 - first, first + 2 * k, kBeside, planes); });
@@ -291,7 +292,7 @@ void fill_gaps(Gaps gaps, const LightGuide& guide, std::span<LightPlane* const> 
 
 namespace {
 
-/// The pixels 2c and 2c + 1 of 16 pixels, for eight columns c.
+/// Returns the pixels 0, 2 ... 14 of 16 pixels.
 Lanes even_pixels(const float* pixels) {
   Lanes a, b;
   __builtin_memcpy(&a, pixels, sizeof(a));
@@ -301,8 +302,8 @@ Lanes even_pixels(const float* pixels) {
 
 }  // namespace
 
-// A coarse pixel c lies between the fine ones 2c and 2c + 1. For each of the two, eight at a time, the
-// nearest coarse pixels are c and its neighbour on that side.
+// The coarse pixel c covers the fine pixels 2c (side 0) and 2c + 1 (side 1). The nearest coarse pixels of
+// each are c and the neighbour of c on that side. Eight fine pixels of one side are computed at a time.
 void interpolate(const LightGuide& fine, const LightGuide& coarse, int y, const CoarseValues& from,
                  const LightPlane* fourth, Eigen::Vector4f* row) {
   const int near_row = y / 2, far_row = std::clamp(near_row + (y % 2 == 0 ? -1 : 1), 0, coarse.height_px - 1);

@@ -1,8 +1,8 @@
 #pragma once
-/// Private: averages the noise of traced light over neighbouring pixels of the same surface: an edge-avoiding
-/// a-trous filter (H. Dammertz et al., 2010), guided by normals and positions, and for the light from all
-/// around by the hit distances (the error bound of G. Ward et al., "A Ray Tracing Solution for Diffuse
-/// Interreflection", 1988), so that dark corners stay narrow.
+/// Private: reduces the noise of traced light by averaging over neighbouring pixels of the same surface. This
+/// is an edge-avoiding a-trous filter (H. Dammertz et al., 2010), guided by normals and positions. Indirect
+/// light is also guided by hit distances, so that dark corners stay narrow (error bound of G. Ward et al., "A
+/// Ray Tracing Solution for Diffuse Interreflection", 1988).
 
 #include <array>
 #include <span>
@@ -14,10 +14,11 @@
 
 namespace offstage::render {
 
-/// A picture of numbers with empty margins at the sides, so that filters need not check for them.
+/// A picture with one float per pixel. It has margins of zeros at its left and right sides, so that filters
+/// may read beyond the ends of a row.
 class LightPlane {
  public:
-  static constexpr int kMargin = 32;  ///< pixels; at least the largest step plus a vector
+  static constexpr int kMargin = 32;  ///< width of a margin [px]; at least the widest filter step plus kLanes
 
   LightPlane() = default;
   LightPlane(int width_px, int height_px)
@@ -25,7 +26,7 @@ class LightPlane {
         values_(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(height_px)) {}
   float* at(int x, int y) { return &values_[index(x, y)]; }
   const float* at(int x, int y) const { return &values_[index(x, y)]; }
-  /// Eight pixels from x on.
+  /// The values of the eight pixels x ... x + 7.
   Lanes lanes(int x, int y) const {
     Lanes result;
     __builtin_memcpy(&result, at(x, y), sizeof(result));
@@ -44,13 +45,14 @@ class LightPlane {
 
 struct LightGuide;
 
-/// How noisy light is in each part of a picture.
+/// The noise of traced light in each block of a picture.
 class LightNoise {
  public:
-  static constexpr int kBlock = 8;  ///< pixels; side of a part
-  /// `brightness`: of the light that one ray found, for each pixel with a surface.
+  static constexpr int kBlock = 8;  ///< side of a block [px]
+  /// `brightness`: for each pixel with a surface, the brightness of the light that one ray found.
   LightNoise(const LightGuide& guide, const LightPlane& brightness);
-  /// Variance over the square of the mean, in the block of a pixel and its neighbours.
+  /// Returns variance / mean^2 of the brightness in the block of a pixel and the eight blocks around it; 0
+  /// where there is no light.
   float relative_variance(int x, int y) const;
 
  private:
@@ -66,27 +68,28 @@ class LightNoise {
   std::vector<Sums> sums_;
 };
 
-/// The surfaces in a picture, which say how far light may be averaged.
+/// The visible surfaces in a picture. They determine how far the filters may average light.
 struct LightGuide {
   LightGuide(int width_px, int height_px);
-  /// From 1 / (distance that a ray went), for each pixel, computes 1 / distance^2 over which light may be
-  /// averaged: a fraction of the mean distance around. `noisy_reach2` is that of further steps, which only
-  /// noisy light needs: light whose variance exceeds the square of its mean. Both are means of the
-  /// neighbourhood, since a single ray says little.
+  /// Computes the distance over which light may be averaged, as 1 / distance^2 [1/m^2], for each pixel. It is
+  /// a fraction of the mean hit distance in the neighbourhood, because one ray says little.
+  /// `inverse_distance`: 1 / hit distance of the ray of each pixel [1/m]. `reach2` is for the first steps of
+  /// the filter. `noisy_reach2` is for the wider steps, which only average light whose variance exceeds the
+  /// square of its mean.
   void find_reach(const LightPlane& inverse_distance, const LightNoise& noise, LightPlane& reach2,
                   LightPlane& noisy_reach2) const;
 
-  /// For eight pixels from x on, the fraction of the 25 pixels around each that have a similar place and
-  /// normal.
+  /// For each of the pixels x ... x + 7, returns the fraction of the 5x5 pixels around it that have a similar
+  /// position and normal, in [0, 1].
   Lanes similar_around(int x, int y) const;
 
   int width_px, height_px;
-  std::array<LightPlane, 3> place, normal;
-  LightPlane filled;         ///< 1: a surface is visible, 0: not
-  LightPlane inverse_size2;  ///< 1 / (width of a pixel on the surface)^2 [1/m^2]
+  std::array<LightPlane, 3> place, normal;  ///< position [m] and unit normal; x, y, z
+  LightPlane filled;                        ///< 1: a surface is visible, 0: not
+  LightPlane inverse_size2;                 ///< 1 / (width of a pixel on the surface)^2 [1/m^2]
 };
 
-/// Values of light at the pixels of a picture, whose surfaces a LightGuide describes.
+/// Light at each pixel of a picture. A LightGuide describes the surfaces of the same picture.
 class LightValues {
  public:
   LightValues() = default;
@@ -95,9 +98,10 @@ class LightValues {
   std::span<LightPlane> channels() { return values_; }
   std::span<const LightPlane> channels() const { return values_; }
 
-  /// Averages over 3x3 pixels that are `step` apart; repeated with 1, 2, 4 ... it has a wide, smooth kernel.
-  /// Only pixels where `filled` is 1 are read and changed. `reach2`: 1 / distance^2 over which the values may
-  /// vary; null: any. Where all values around are equal, nothing is computed.
+  /// Replaces each value by a weighted mean of 3x3 pixels that are `step` pixels apart. Calls with the steps
+  /// 1, 2, 4 ... together have a wide, smooth kernel. Only pixels where `filled` is 1 are read and changed.
+  /// `reach2`: see LightGuide::find_reach; null: the distance is not limited. Runs of pixels that equal all
+  /// pixels around them are copied.
   void average(const LightGuide& guide, const LightPlane& filled, const LightPlane* reach2, int step);
 
  private:
@@ -107,25 +111,28 @@ class LightValues {
   std::vector<float> even_;
 };
 
-/// The pixels whose light a sparse picture leaves out.
+/// The pixels for which no light is traced in a sparse picture.
 enum class Gaps {
-  half,            ///< every other one, as on a chessboard
-  three_quarters,  ///< all in odd rows and columns
+  half,            ///< every other pixel, as on a chessboard
+  three_quarters,  ///< all pixels in odd rows or in odd columns
 };
-/// Whether a pixel is a gap. A pixel without a visible neighbour to take its light from is none.
+/// Returns whether a pixel is a gap. A pixel is not a gap if none of the neighbours that fill_gaps() would
+/// average shows a surface.
 bool is_gap(Gaps gaps, const LightGuide& guide, int x, int y);
-/// Sets the values of gaps to means of four neighbours, above all of those with a similar place and normal.
+/// Sets each gap to a weighted mean of four neighbours. Neighbours with a similar position and normal have
+/// more weight.
 void fill_gaps(Gaps gaps, const LightGuide& guide, std::span<LightPlane* const> planes);
 
-/// Values at half the size, and where they are present.
+/// Light at half the resolution.
 struct CoarseValues {
   const LightValues* values;
-  const LightPlane* filled;
+  const LightPlane* filled;  ///< 1 for pixels that have a value, else 0
 };
 
-/// Writes four values for each of the pixels of row y at full size: three channels, interpolated between
-/// those of four coarse pixels with a similar place and normal, and 1, or four zeros where none is present.
-/// The fourth one is replaced by `fourth` if not null. Rows of the result have no margins.
+/// Interpolates the three channels of `from` for row y of the full resolution, and writes them to `row` as x,
+/// y, z of one vector per pixel. Each is a mean of four coarse pixels, in which those with a similar position
+/// and normal have more weight. w is taken from `fourth`; without it, w is 1, or 0 where no coarse pixel has
+/// a value.
 void interpolate(const LightGuide& fine, const LightGuide& coarse, int y, const CoarseValues& from,
                  const LightPlane* fourth, Eigen::Vector4f* row);
 

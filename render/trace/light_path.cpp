@@ -6,10 +6,10 @@
 namespace offstage::render {
 namespace {
 
-constexpr int kMostBounces = 16;       // between diffuse surfaces
-constexpr int kMostSteps = 32;         // along a path, mirrors and glass included
-constexpr int kAirRays = 8;            // from each point in the air
-constexpr float kSmoothMetal = 0.35f;  // with less roughness, a path goes on in the mirrored direction
+constexpr int kMostBounces = 16;       // largest number of diffuse surfaces on a path
+constexpr int kMostSteps = 32;         // largest number of surfaces on a path, including mirrors and glass
+constexpr int kAirRays = 8;            // rays from each point in the air
+constexpr float kSmoothMetal = 0.35f;  // roughness of metals below which a path is reflected
 
 float fresnel_of_glass(float cosine, float ratio) {
   const float sine2 = ratio * ratio * (1 - cosine * cosine);
@@ -64,7 +64,7 @@ Vector3f light_of_glow(const GlowSample& sample, const Vector3f& normal, const V
   return sample.radiance * (by_chance / (sample.density + by_chance));
 }
 
-// As the sky that the eye sees (shaders/sky.frag), without clouds and the sun's disc.
+// Returns the radiance of the sky as shaders/sky.frag draws it, without clouds and the sun's disc.
 Vector3f LightTracer::sky_seen(const Vector3f& direction) const {
   if (direction.y() >= 0 || sources_.sky.turned.picture) return sky_radiance(sources_.sky, direction);
   const Vector3f level = Vector3f(direction.x(), 0, direction.z()).normalized();
@@ -73,8 +73,9 @@ Vector3f LightTracer::sky_seen(const Vector3f& direction) const {
   return haze + fraction * (sources_.sky.ground - haze);
 }
 
-// The radiance for a ray that leaves the scene. The bright part of a picture also arrives as a lamp at
-// diffuse surfaces, so that paths from there meet its dim part alone; `density`: see Path.
+// Returns the radiance of the sky for a ray that leaves the scene. The bright part of a sky picture is also
+// sampled as a lamp at diffuse surfaces. Paths from diffuse surfaces therefore get its dim part only.
+// `density`: see Path.
 Vector3f LightTracer::sky_met(const Vector3f& direction, bool sharp, float density) const {
   const TurnedSky& turned = sources_.sky.turned;
   if (!turned.picture) return sharp ? sky_seen(direction) : sky_radiance(sources_.sky, direction);
@@ -94,7 +95,8 @@ float LightTracer::sun_visibility(const Vector3f& place, const SquarePoint<float
   return fraction * scene_.transmittance(place, sun_disc_.direction(uv), kFar).mean();
 }
 
-// One lamp is chosen in proportion to its light without shadows.
+// Returns the light of lamps on a white surface, by one shadow ray. One lamp is chosen at random, in
+// proportion to its light without shadows.
 Vector3f LightTracer::lamps_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
                                PixelSampler& sampler) const {
   if (sources_.lamps.empty()) return Vector3f::Zero();
@@ -147,9 +149,9 @@ Vector4f VisibleLight::arriving(int pixel) const {
   return result;
 }
 
-// Moves a path through or off a surface of glass, and adds the light that the surface itself sends back. To
-// keep noise low, a mirror image of less than a tenth is not followed: outside of the glass it is that of the
-// sky, and inside its light is counted with the light that leaves.
+// Refracts or reflects a path at a glass surface, and adds the light that the surface scatters. Returns false
+// if the surface is not glass. To reduce noise, a reflection of less than a tenth is not followed: outside of
+// the glass it shows the sky, and inside its light is added to the refracted light.
 bool LightTracer::follow_glass(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Path& path,
                                FoundLight& found) const {
   const RayMaterial& material = *hit.material;
@@ -164,7 +166,7 @@ bool LightTracer::follow_glass(const Hit& hit, const Vector3f& albedo, PixelSamp
   const Vector3f mirrored_direction = reflected(path.direction, hit.normal);
   if (mirrored >= 0.1f && sampler.next().x < mirrored) {
     path.turn(mirrored_direction, hit);
-    path.by_chance |= mirrored < 0.5f;  // the likelier of both choices causes no bright dots
+    path.by_chance |= mirrored < 0.5f;  // the more likely choice causes no bright dots
     return true;
   }
   const bool came_by_chance = path.by_chance;
@@ -178,7 +180,7 @@ bool LightTracer::follow_glass(const Hit& hit, const Vector3f& albedo, PixelSamp
   return true;
 }
 
-// Light of sun and lamps on a white surface.
+// Returns the light of sun, lamps and glowing meshes on a white surface.
 Vector3f LightTracer::direct_light(const Hit& hit, const Vector3f& from, PixelSampler& sampler) const {
   Vector3f result = Vector3f::Zero();
   const float towards_sun = hit.normal.dot(sources_.sky.sun_direction);
@@ -199,7 +201,8 @@ Vector3f LightTracer::glow_at(const Vector3f& place, const Vector3f& normal, con
   return light.cwiseProduct(scene_.transmittance(place, sample.towards, kBeforeGlow * sample.distance));
 }
 
-// Moves a path off a smooth metal, or adds the light that a smooth layer of varnish mirrors.
+// Reflects a path at a smooth metal and returns true. At other smooth surfaces it adds the sky that their
+// varnish reflects, if the path is sharp, and returns false.
 bool LightTracer::follow_smooth(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, bool sharp,
                                 bool scattered, Path& path, FoundLight& light) const {
   const RayMaterial& material = *hit.material;
@@ -224,13 +227,14 @@ bool LightTracer::follow_smooth(const Hit& hit, const Vector3f& albedo, PixelSam
   return false;
 }
 
-// Radiance that arrives along a path. `met`, if not null, gets the distance of the first hit, and is
-// unchanged without a hit. Mirrors and glass are followed sharply until the first diffuse surface.
+// Returns the radiance that arrives along a path. `met`, if not null, is set to the distance of the first hit
+// [m]; without a hit it is not changed. A path is sharp until it reaches the first diffuse surface.
 LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, const VisibleLight* visible,
                                               float* met) const {
   FoundLight light;
   Vector3f& sum = light.noisy;
-  // Adds radiance at the end of the path; the sky of a path with a density has a weight in place of a limit.
+  // Adds radiance at the end of the path. It is not limited if the path has a density, because it has a
+  // weight.
   const auto add_source = [&](const Vector3f& radiance) {
     (path.by_chance && path.density < 0 ? light.noisy : light.certain) +=
         path.fraction.cwiseProduct(radiance);
@@ -270,7 +274,7 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
       sum += path.fraction.cwiseProduct(albedo);
       return light;
     }
-    // Of glass, as on the screen, only the side towards the eye glows.
+    // Glass only glows on its front, as in the shaders.
     if ((hit.front || material.transmission <= 0) && !material.mean_emission().isZero())
       (path.by_chance ? light.noisy : light.certain) +=
           path.fraction_of_glow(hit, sources_.glow) *
@@ -293,7 +297,7 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
       path.from = off_surface(hit.position, hit.face);
     }
     sum += path.fraction.cwiseProduct(direct_light(hit, path.from, sampler));
-    // Paths end at random in proportion to the light that they can still carry.
+    // Russian roulette: a path survives with a probability in proportion to its remaining light.
     const float survives = std::min(path.fraction.maxCoeff(), 0.95f);
     if (++bounces >= kMostBounces || sampler.next().x >= survives) return light;
     path.fraction /= survives;
@@ -305,8 +309,8 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
   return light;
 }
 
-// The fraction of the sky's light that arrives is the sum over the rays that meet nothing, divided by the sum
-// over all rays. Where nothing is in the way, the light is therefore that of the open sky without noise.
+// The arriving fraction of the sky's light is the sum over the rays without a hit, divided by the sum over
+// all rays. It multiplies the exact light `open`, so that unobstructed points have no noise.
 AirLightAround LightTracer::trace_air(const Vector3f& place, float number, const SampleOffsets& offsets,
                                       const AirRadiance& open) const {
   const auto bits = static_cast<uint32_t>(number * 0x1p24f);
@@ -347,7 +351,7 @@ AirLightAround LightTracer::trace_air(const Vector3f& place, float number, const
     auto slope = result.light.slope.row(c);
     slope = fraction * open.slope.row(c) + arrived.slope.row(c) - fraction * all.slope.row(c) +
             from_objects.slope.row(c);
-    // With few rays, the slope can be so steep that one side would be darker than dark.
+    // With few rays, the slope can be so steep that the light from one side would be negative.
     const float steepness = slope.norm();
     if (steepness > constant) slope *= constant / steepness;
   }

@@ -1,6 +1,5 @@
 #pragma once
-/// Private: the paths of single rays, for light_path.cpp, which follows them, and light_tracer.cpp, which
-/// starts them.
+/// Private: paths of light rays. light_tracer.cpp and caustics.cpp start them; light_path.cpp follows them.
 
 #include <numbers>
 
@@ -8,38 +7,40 @@
 
 namespace offstage::render {
 
-inline constexpr float kFar = 1e9f;  // [m]; nothing is farther away
-// Shadow rays end before the surface that glows, by more than their rounding.
+inline constexpr float kFar = 1e9f;  // length of rays without an end [m]
+// Shadow rays to a glowing surface end at this fraction of the distance, so that rounding errors do not make
+// them hit the surface itself.
 inline constexpr float kBeforeGlow = 1 - 2e-5f;
 
 inline std::size_t index_of(int x, int y, int width) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
 }
 
-/// Fraction of the light along a ray that a surface of glass mirrors.
+/// Returns the fraction of the light along a ray that a glass surface reflects (Fresnel), in [0, 1].
 float mirrored_fraction(const Hit& hit, const Vector3f& direction);
 
-/// Whether rays that enter a piece of glass are scattered at random.
+/// Whether the glass is so rough that refracted rays get a random direction.
 bool is_rough_glass(const RayMaterial& material);
 
-/// Moves a ray through a surface of glass, which it refracts; returns the fraction of the light that the
-/// colour leaves. A solid piece takes half of its colour, as a factor, where the ray enters, and half where
-/// it leaves.
+/// Moves a ray to the other side of a glass surface and refracts its direction. Returns the transmitted
+/// fraction of the light per channel: the colour `albedo` of a thin sheet. A solid piece applies the square
+/// root of its colour where the ray enters and where it leaves.
 Vector3f enter(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Vector3f& from,
                Vector3f& direction);
 
-/// Radiance that a sample of a glowing mesh gives to a white surface, if nothing is between the two. It is
-/// reduced by a weight, because rays that meet the mesh by chance contribute the rest of this light.
+/// Returns the radiance that a white surface scatters from a sample of a glowing mesh, without shadows. It is
+/// weighted by multiple importance sampling, because rays that hit the mesh by chance contribute the rest.
 /// `normal`: shading normal of the surface; `face`: normal of its triangle.
 Vector3f light_of_glow(const GlowSample& sample, const Vector3f& normal, const Vector3f& face);
 
-/// Probability density of a direction, if all are equally likely [1/sr].
+/// Probability density of uniformly distributed directions [1/sr].
 inline constexpr float kEvenDensity = 0.25f / std::numbers::pi_v<float>;
 
-/// Surfaces with less roughness^2 mirror and refract a single direction.
+/// Surfaces with a smaller roughness^2 reflect and refract in a single direction.
 inline constexpr float kSharp = 0.002f;
 
-/// Probability density of a direction that visible_facet() mirrors, for a = roughness^2 [1/sr].
+/// Returns the probability density of directions reflected at a visible_facet() [1/sr]. a: roughness^2; nv,
+/// nh: cosines between the normal and the direction to the eye or the half vector.
 template <class T>
 T mirror_density(T a, T nv, T nh) {
   const T a2 = a * a, d = nh * nh * (a2 - 1.0f) + 1.0f;
@@ -48,8 +49,8 @@ T mirror_density(T a, T nv, T nh) {
   return a < kSharp ? T{} + 1e18f : density;
 }
 
-/// Weight of a direction that was found with density a, and could have been found in another way with density
-/// b: the power heuristic (E. Veach, "Robust Monte Carlo Methods", 1997).
+/// Returns the weight of a direction that one sampling technique chose with density a, if another technique
+/// chooses it with density b: the power heuristic (E. Veach, "Robust Monte Carlo Methods", 1997).
 template <class T>
 T power_heuristic(T a, T b) {
   return a * a / (a * a + b * b + 1e-30f);
@@ -57,21 +58,21 @@ T power_heuristic(T a, T b) {
 
 struct LightTracer::Path {
   Vector3f from, direction;
-  float cone;  ///< angle that the ray stands for [rad]
-  Vector3f fraction = {1, 1, 1};
-  bool mirrored = false;  ///< whether mirrors have reflected the path so far
-  /// Whether its directions depend on random numbers. If not, its hits are a part of the picture at any
-  /// brightness, and not dots of noise.
+  float cone;                     ///< angle of the cone of directions that the ray represents [rad]
+  Vector3f fraction = {1, 1, 1};  ///< throughput of the path per channel
+  bool mirrored = false;          ///< whether mirrors have reflected the path so far
+  /// Whether the directions depend on random numbers. Only such paths can cause bright dots of noise, so only
+  /// their light is limited.
   bool by_chance = false;
-  /// Probability density of the direction [1/sr] if the bright part of the sky was sampled, too; else
-  /// negative.
+  /// Probability density of the direction [1/sr], if the bright part of the sky is also sampled as a lamp;
+  /// otherwise negative.
   float density = -1;
-  /// The last point whose light from glowing meshes is also sampled: on a diffuse surface with this normal,
-  /// or in the air, where the normal is zero.
+  /// Position and normal of the last point at which glowing meshes are also sampled directly. It is on a
+  /// diffuse surface, or in the air with a normal of zero.
   Vector3f sampled_place = Vector3f::Zero(), sampled_normal = Vector3f::Zero();
   bool glow_is_sampled = false;  ///< whether there was such a point
 
-  /// Leaves a diffuse surface, or a point in the air if the normal is zero.
+  /// Continues the path from a diffuse surface, or from a point in the air if `normal` is zero.
   void scatter(const Vector3f& normal, const Vector3f& outgoing) {
     sampled_place = from;
     sampled_normal = normal;
@@ -80,7 +81,8 @@ struct LightTracer::Path {
     by_chance = true;
     density = -1;
   }
-  /// Weight of the glow that a ray meets by chance at a hit, because Glow::sample() finds the same light.
+  /// Returns the weight of emitted light that the path hits by chance, in [0, 1]; Glow::sample() finds the
+  /// rest.
   float fraction_of_glow(const Hit& hit, const Glow& glow) const {
     if (glow.empty() || !glow_is_sampled) return 1;
     const Vector3f outgoing = (hit.position - sampled_place).normalized();
@@ -89,7 +91,7 @@ struct LightTracer::Path {
                           : std::max(outgoing.dot(sampled_normal), 1e-3f) / std::numbers::pi_v<float>;
     return own / (own + glow.density(sampled_place, sampled_normal, hit));
   }
-  /// Leaves a surface in a mirrored direction.
+  /// Continues the path from a surface in a reflected direction.
   void turn(const Vector3f& outgoing, const Hit& hit) {
     mirrored = true;
     density = -1;

@@ -11,21 +11,22 @@
 
 namespace offstage::render {
 
-/// A solid piece of glass, which focuses light, and the box around it.
+/// A solid piece of glass that focuses light, and its oriented bounding box.
 struct GlassPiece {
-  unsigned object;  ///< in the RayScene
-  Vector3f corner;
-  Eigen::Matrix3f edges;  ///< columns: the edges of the box at its corner
+  unsigned object;        ///< number of the object in the RayScene
+  Vector3f corner;        ///< a corner of the box
+  Eigen::Matrix3f edges;  ///< columns: the three edges of the box that start at `corner` [m]
 
   Vector3f center() const { return corner + 0.5f * edges.rowwise().sum(); }
-  /// A vector along edge k, at right angles to the other two, whose length is the area of the side they span.
+  /// Returns the normal of the face between the other two edges, on the side of edge k. Its length is the
+  /// area of the face [m^2].
   Vector3f side(int k) const {
     const Vector3f normal = edges.col((k + 1) % 3).cross(edges.col((k + 2) % 3));
     return normal.dot(edges.col(k)) < 0 ? -normal : normal;
   }
-  /// Outward normal of one of the six faces, whose length is the area of the face; and the middle of the
-  /// face.
+  /// Returns the outward normal of one of the faces 0 ... 5. Its length is the area of the face [m^2].
   Vector3f outward(int face) const { return face < 3 ? -side(face) : side(face - 3); }
+  /// Returns the centre of one of the faces 0 ... 5.
   Vector3f middle_of(int face) const { return center() + (face < 3 ? -0.5f : 0.5f) * edges.col(face % 3); }
   bool contains(const Vector3f& place, float margin_m) const;
 };
@@ -40,15 +41,15 @@ struct LightSources {
   const OpacityGrid* smoke = nullptr;  ///< null: none
 };
 
-/// Light at a point in the air, as the radiance of a white surface there with unit normal n: constant +
-/// slope * n, per channel.
+/// Light at a point in the air. A white surface there with the unit normal n has the radiance
+/// constant + slope * n.
 struct AirRadiance {
   Vector3f constant = Vector3f::Zero();
   Eigen::Matrix3f slope = Eigen::Matrix3f::Zero();  ///< rows: red, green, blue
   Vector3f at(const Vector3f& normal) const { return (constant + slope * normal).cwiseMax(0.0f); }
 };
 
-/// Light at a point in the air from everything but the sun's disc and lamps.
+/// Light at a point in the air from the sky and from objects, without the sun's disc and lamps.
 struct AirLightAround {
   AirRadiance light;
   float sky = 1;  ///< fraction of the sky's light from above the horizon that arrives
@@ -58,7 +59,7 @@ struct AirLightAround {
 class SunDisc {
  public:
   SunDisc(const Sun& sun, const Vector3f& direction);
-  /// The unit direction to the point of the disc that belongs to `uv`.
+  /// Returns the unit direction to a point of the disc. `uv` is uniform in the unit square.
   Vector3f direction(const SquarePoint<float>& uv) const;
   LaneVectors direction(const SquarePoint<Lanes>& uv) const;
 

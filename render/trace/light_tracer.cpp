@@ -17,17 +17,18 @@ namespace offstage::render {
 namespace {
 
 constexpr int kRowsPerTask = 8;
-constexpr uint32_t kRowsPerRound = 4096;                // rows of samples between those of two rounds
-constexpr int kRoundsPerSubFrame = 2, kMostRounds = 8;  // further rounds of light from around
-// Variance of the mean of this light in a sub-frame over its square, from which on further rounds are traced,
-// and the most cells over which the filter averages it.
+constexpr uint32_t kRowsPerRound = 4096;                // offset of the sampler's row from round to round
+constexpr int kRoundsPerSubFrame = 2, kMostRounds = 8;  // limits of the further rounds of indirect light
+// Further rounds are traced where variance / mean^2 of the filtered indirect light exceeds the target. The
+// filter averages at most kMostAveraged cells.
 constexpr float kTargetVariance = 0.0256f, kMostAveraged = 400;
 constexpr float kBrightest =
-    50;  // of light that arrives after bounces; brighter samples would stay visible as dots
-constexpr int kWidestStep = 16;  // of the filter of light from around, in cells
+    50;  // limit of radiance found by random directions; brighter samples would be visible as dots
+constexpr int kWidestStep = 16;  // widest step of the filter of indirect light [cells]
 
-constexpr float kGrazing = 0.02f;      // cosine between light and triangle; with less, it may shadow itself
-constexpr float kSharpMirror = 0.12f;  // with more roughness, mirror images are averaged over pixels
+constexpr float kGrazing =
+    0.02f;  // cosine between light and triangle; below it, a triangle may shadow itself
+constexpr float kSharpMirror = 0.12f;  // roughness above which mirror images are filtered
 
 LaneVectors from_octahedral(Lanes x, Lanes z) {
   const Lanes one = Lanes{} + 1, y = 1 - absolute(x) - absolute(z);
@@ -42,7 +43,7 @@ void set_lane(LaneVectors& lanes, int i, const Vector3f& value) {
   lanes.z[i] = value.z();
 }
 
-/// Indices of eight pixels of a row; -1 beyond its end.
+/// Returns the indices of the pixels x ... x + 7 of a row; -1 beyond its end.
 IntLanes pixels_of_row(const SurfaceBuffer& surfaces, int x, int y) {
   const IntLanes columns = IntLanes{0, 1, 2, 3, 4, 5, 6, 7} + x;
   return columns < surfaces.width_px ? columns + y * surfaces.width_px : IntLanes{} - 1;
@@ -54,7 +55,7 @@ void store(std::span<LightPlane> planes, int x, int y, const LaneVectors& value)
   planes[2].set_lanes(x, y, value.z);
 }
 
-// GGX as in shaders/light.glsl; `most`: its limit.
+// The GGX lobe as in shaders/light.glsl, limited to `most`.
 Lanes lobe_of(Lanes a, Lanes nl, Lanes nv, Lanes nh, Lanes most) {
   const Lanes a2 = a * a, d = nh * nh * (a2 - 1) + 1;
   const Lanes mean = 2 * nl * nv * (1 - a) + (nl + nv) * a;
@@ -63,7 +64,6 @@ Lanes lobe_of(Lanes a, Lanes nl, Lanes nv, Lanes nh, Lanes most) {
 
 }  // namespace
 
-/// Limits light that was found by chance, and adds all light to the sums.
 Vector3f LightTracer::FoundLight::limited(LightSums& sums) const {
   const Vector3f kept = noisy.cwiseMin(kBrightest);
   const Vector3f luminance(0.2126f, 0.7152f, 0.0722f);
@@ -81,7 +81,7 @@ struct LightTracer::Points {
   LaneVectors place, normal, face;
   Lanes roughness;
   IntLanes visible, cloth, mirrors;
-  IntLanes own_mirrors;  ///< so smooth that each pixel needs a mirror image of its own
+  IntLanes own_mirrors;  ///< smooth metals, whose mirror image is traced per pixel
 
   /// `at`: indices of eight pixels; negative: none.
   Points(const SurfaceBuffer& surfaces, IntLanes at) {
@@ -180,8 +180,8 @@ LaneVectors LightTracer::trace_glow(const Points& points, int x, int y, const Li
   return {light.x * seen.x, light.y * seen.y, light.z * seen.z};
 }
 
-// Where a triangle turns away from the light but its smooth normals do not, shadow rays start from the smooth
-// surface, so that the triangle does not shadow itself.
+// Moves the origins of shadow rays onto the smooth surface (RayScene::smooth_place). This is needed where a
+// triangle faces away from the light although its smooth normals face it: the triangle would shadow itself.
 void LightTracer::lift(const Points& points, IntLanes lanes, const LightView& view,
                        LaneVectors& place) const {
   if (!any(lanes)) return;
@@ -229,8 +229,8 @@ LightTracer::LampLight LightTracer::trace_lamps(const Points& points, const Ligh
     const LaneVectors h = normalized(point.towards + to_eye);
     const Lanes wide = 0.5f * lamp.def().radius / larger(point.distance, none + 1e-6f) + 0.002f;
     const Lanes m = 1 - clamped_to(dot(to_eye, h), 0, 1);
-    // A lamp is a single bright point in the mirror; lamps that rays hit therefore also have a weight in
-    // place of a limit.
+    // The highlight is limited, because one point represents the lamp. If rays can also hit the lamp, a
+    // weight makes the limit unnecessary.
     const Lanes most = point.density > 0.0f ? none + 1e12f : none + 40;
     const Lanes lobe =
         lobe_of(smaller(larger(rough * rough, wide), none + 1), nl, nv, clamped_to(dot(n, h), 0, 1), most);
@@ -248,7 +248,7 @@ LightTracer::LampLight LightTracer::trace_lamps(const Points& points, const Ligh
 
 namespace {
 
-/// The values of up to eight pixels of a row, from x on.
+/// Returns the values of the pixels x ... x + 7 of a row, without those beyond its end.
 std::span<Vector4f> row_part(std::vector<Vector4f>& values, int x, int y, int width) {
   return std::span(values).subspan(index_of(x, y, width),
                                    static_cast<std::size_t>(std::min(kLanes, width - x)));
@@ -274,8 +274,8 @@ Vector3f LightTracer::mirrored_light(const Point& point, const LightView& view, 
   return radiance(path, sampler, &visible).limited(sums);
 }
 
-// Positions and normals of eight pixels, which guide the filter. `size_px`: width of the area that a value
-// represents.
+// Stores the positions and normals of eight pixels, which guide the filter. `size_px`: width of the area that
+// a value represents [px].
 void LightTracer::set_guide(const Points& points, int x, int y, const LightView& view, float size_px,
                             LightGuide& guide) {
   const Lanes none{};
@@ -287,14 +287,14 @@ void LightTracer::set_guide(const Points& points, int x, int y, const LightView&
   store(guide.normal, x, y, points.normal);
 }
 
-// The visible fraction of the sun at eight pixels.
+// Returns the visible fraction of the sun at eight pixels.
 Lanes LightTracer::sun_at(const Points& points, const SquarePoint<Lanes>& on_sun,
                           const LightView& view) const {
   const LaneVectors to_sun = all_lanes(sources_.sky.sun_direction);
   const Lanes towards_sun = dot(points.normal, to_sun);
   IntLanes sunny = points.visible & (towards_sun > 0.0f);
   LaneVectors place = points.place;
-  if (any(points.cloth)) {  // lit through
+  if (any(points.cloth)) {  // cloth is also lit from behind
     sunny = points.visible & (points.cloth | sunny);
     const IntLanes behind = points.cloth & (towards_sun * dot(points.face, points.normal) < 0.0f);
     const LaneVectors through = place - points.face * (4 * Points::off_surface_m(place));
@@ -307,7 +307,7 @@ Lanes LightTracer::sun_at(const Points& points, const SquarePoint<Lanes>& on_sun
   return sun_visibility(place, sunny, on_sun);
 }
 
-// The visible fraction of the sun at a row of a sparse picture, except in its gaps.
+// Traces the visible fraction of the sun for the pixels of a row of a sparse picture that are no gaps.
 void LightTracer::trace_sparse_sun(const SurfaceBuffer& surfaces, int y, const LightView& view,
                                    LightBuffer& light) const {
   LightPlane& sun = light.direct.channels()[0];
@@ -331,7 +331,7 @@ void LightTracer::trace_sparse_sun(const SurfaceBuffer& surfaces, int y, const L
   if (count > 0) trace_collected();
 }
 
-// The light of sun and lamps at eight pixels of a row.
+// Traces the light of sun, lamps and glowing meshes at eight pixels of a row.
 void LightTracer::trace_pixels(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
                                LightBuffer& light) const {
   const Points points(surfaces, pixels_of_row(surfaces, x, y));
@@ -350,8 +350,8 @@ void LightTracer::trace_pixels(const SurfaceBuffer& surfaces, int x, int y, cons
   lamps.store(row_part(light.lamps, x, y, width), row_part(light.highlights, x, y, width));
 }
 
-// Indices of the pixels of eight cells of a row whose light is computed: another one in each sub-frame, if
-// there is a surface.
+// Returns the index of the pixel that represents each of eight cells of a row. The four pixels of a cell take
+// turns in the sub-frames; pixels without a surface are skipped.
 IntLanes LightTracer::pixels_of_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view) {
   const int columns = (surfaces.width_px + 1) / 2;
   IntLanes at = IntLanes{} - 1;
@@ -366,8 +366,8 @@ IntLanes LightTracer::pixels_of_cells(const SurfaceBuffer& surfaces, int x, int 
   return at;
 }
 
-// The light from around at eight cells of a row, by one path for each. Rounds after the first one are
-// averaged with those before.
+// Traces one path of indirect light for each of eight cells of a row. The result of a further round is
+// averaged with the rounds before it.
 void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, int round, IntLanes active,
                               const LightView& view, LightBuffer& light, LightSums& sums) const {
   const int k = view.offsets.index;
@@ -378,7 +378,7 @@ void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, int r
   const Points points(surfaces, pixels_of_cells(surfaces, x, y, view));
   if (!view.sparse && round == 0) set_guide(points, x, y, view, 2, light.cells);
   const Lanes none{};
-  const int shift = view.sparse ? 1 : 0;  // numbers of samples without those of gaps
+  const int shift = view.sparse ? 1 : 0;  // numbers the cells that are no gaps without holes
   const uint32_t row = (static_cast<uint32_t>(y) >> shift) + static_cast<uint32_t>(round) * kRowsPerRound;
   Sampler<UintLanes> samplers((UintLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<uint32_t>(x)) >> shift,
                               UintLanes{} + row, k, view.offsets.count);
@@ -413,8 +413,8 @@ void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, int r
   light.brightness.set_lanes(x, y, around.x + around.y + around.z);
 }
 
-// Further rounds for the cells where the mean over the filter and all sub-frames would still be noisy: where
-// light comes from small bright areas, near corners, and on narrow surfaces.
+// Traces further rounds for cells whose filtered light would still be noisy. This happens where light comes
+// from small bright areas, near corners, and on narrow surfaces.
 void LightTracer::refine_cells(const SurfaceBuffer& surfaces, const LightNoise& noise, const LightView& view,
                                LightBuffer& light) const {
   const LightGuide& cells = light.cells;
@@ -447,7 +447,7 @@ void LightTracer::fill_sparse(LightBuffer& light) {
   fill_gaps(Gaps::three_quarters, light.cells, cells);
 }
 
-// Calls each(y) for all rows in parallel. A request to stop is noticed between the tasks of all threads.
+// Calls each(y) for all rows in parallel. Each task of kRowsPerTask rows first checks for a request to stop.
 void LightTracer::for_rows(int height, const auto& each) const {
   std::atomic<bool> stopped = false;
   tbb::parallel_for(tbb::blocked_range<int>(0, height, kRowsPerTask), [&](const auto& rows) {
@@ -457,7 +457,8 @@ void LightTracer::for_rows(int height, const auto& each) const {
   if (stopped) throw StoppedError("the light is no longer needed");
 }
 
-// `each` gets sums of its own for each row, so that the total does not depend on the threads.
+// Calls each(y, sums) for all rows in parallel and returns the total. Each row has its own sums, so that the
+// total does not depend on the threads.
 LightSums LightTracer::sum_over_rows(int height, const auto& each) const {
   std::vector<LightSums> rows(static_cast<std::size_t>(height));
   for_rows(height, [&](int y) { each(y, rows[static_cast<std::size_t>(y)]); });
@@ -531,7 +532,7 @@ void LightTracer::trace_arriving(const SurfaceBuffer& surfaces, const LightView&
   });
 }
 
-// Smooth metals have a mirror image in each pixel, other surfaces in each cell.
+// Traces mirror images: per pixel for smooth metals, per cell for other surfaces.
 void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& view,
                                 const VisibleLight& visible, LightBuffer& light) const {
   const int width = surfaces.width_px;
@@ -567,7 +568,7 @@ void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& 
   });
 }
 
-// The ray from the eye is followed from just before the surface.
+// Returns the light that arrives at the eye through a glass surface. The path starts just before the surface.
 Vector3f LightTracer::light_through(const Point& point, PixelSampler& sampler, const VisibleLight& visible,
                                     LightSums& sums) const {
   Path path{.from = off_surface(point.place, point.view), .direction = -point.view, .cone = 1e-3f};

@@ -1,7 +1,7 @@
 #pragma once
-/// Private: computes the light that arrives at the visible surfaces of a sub-frame by rays: sun and lamps
-/// with their shadows, the light from the sky and from other surfaces, and mirror images. The shaders combine
-/// it with the material.
+/// Private: traces the light that arrives at the visible surfaces of a sub-frame. It consists of the light of
+/// sun and lamps with shadows, the light from the sky and from other surfaces, and mirror images. The shaders
+/// combine this light with the materials.
 
 #include <array>
 #include <cstdint>
@@ -14,19 +14,19 @@
 
 namespace offstage::render {
 
-/// The visible surfaces in a picture or a part of it, one value per pixel, rows from the bottom up.
+/// The visible surfaces in a picture or in a part of a picture: one value per pixel, rows from the bottom up.
 struct SurfaceBuffer {
   int width_px = 0, height_px = 0;
-  /// Position; w: roughness, plus the flags below; negative: nothing is visible.
+  /// Position in the world [m]; w: roughness plus the flags below, or negative where nothing is visible.
   std::vector<Vector4f> places;
   /// Smooth normal and normal of the triangle, both on the visible side, in octahedral coordinates.
   std::vector<std::array<uint16_t, 4>> normals;
 
-  /// Added to the roughness: the surface shows a mirror image; it is cloth; it is metal.
+  /// Flags that are added to the roughness: the surface shows a mirror image, is cloth, is metal.
   static constexpr float kMirrors = 2, kCloth = 4, kMetal = 8;
 };
 
-/// Light at the surfaces, in the units of the shaders: the radiance of a white surface.
+/// Light at the visible surfaces, as the radiance of a white surface.
 struct LightBuffer {
   LightBuffer(int width_px, int height_px);
 
@@ -35,17 +35,17 @@ struct LightBuffer {
       arriving;  ///< light from the sky and other surfaces; w: fraction of the sun that is visible
   std::vector<Vector4f> mirrored;    ///< light from the mirrored direction; w: 1 where it was computed
   bool has_mirrors = false;          ///< whether any surface mirrors; if not, `mirrored` is not updated
-  std::vector<Vector4f> lamps;       ///< diffuse light of lamps; empty: there are none
-  std::vector<Vector4f> highlights;  ///< lobes of lamps, without reflectance; w: their Fresnel factor
+  std::vector<Vector4f> lamps;       ///< diffuse light of lamps; empty if there are no lamps
+  std::vector<Vector4f> highlights;  ///< specular light of lamps, without reflectance; w: Fresnel factor
   LightSums sums;
 
-  // In between. Light from around is computed for cells of 2x2 pixels.
+  // Intermediate values. Indirect light is traced per cell of 2x2 pixels.
   LightGuide pixels, cells;
   LightValues direct;           ///< for each pixel: visible fraction of the sun, and diffuse light of lamps
-  LightValues glow;             ///< for each pixel: light of glowing meshes; empty: there are none
-  LightValues around, mirrors;  ///< for each cell: diffuse light from around, and mirrored light
+  LightValues glow;             ///< for each pixel: light of glowing meshes; empty if there are none
+  LightValues around, mirrors;  ///< for each cell: diffuse indirect light, and mirrored light
   LightPlane inverse_distance, brightness, reach2, noisy_reach2;  ///< see LightGuide::find_reach
-  /// For each cell, 1 if a surface in it mirrors, or mirrors roughly, else 0.
+  /// For each cell: 1 if its surface has a mirror image that is traced per cell, or a blurred one; else 0.
   LightPlane with_mirror, with_rough_mirror;
 };
 
@@ -58,27 +58,28 @@ struct GlassBuffer {
   LightSums sums;
 };
 
-/// The camera and size of a picture of the surfaces.
+/// The camera of a SurfaceBuffer, and the samples of its sub-frame.
 struct LightView {
   Vector3f eye;
   Eigen::Matrix4f clip_from_world;
-  float pixel_m;  ///< width of a pixel at distance 1
+  float pixel_m;  ///< width of a pixel at a distance of 1 m [m]
   SampleOffsets offsets;
-  bool sparse = false;  ///< whether the light of most pixels is interpolated; see Gaps
+  bool sparse = false;  ///< whether most pixels get interpolated light; see Gaps
 };
 
-/// Light of the visible surfaces, for rays that meet them again: it has no noise and costs no further rays.
+/// The light of the visible surfaces, for rays that hit these surfaces. It is filtered already, and such a
+/// ray needs no further bounces.
 class VisibleLight {
  public:
-  /// `picture`: colours of the opaque objects, rows from the bottom up; empty: not known.
+  /// `picture`: the picture of the opaque objects, rows from the bottom up; empty if it is not available.
   VisibleLight(const LightBuffer& light, const LightView& view, std::span<const Vector4f> picture = {})
       : light_(light), view_(view), picture_(picture) {}
-  /// Index of the pixel that shows a point; negative if it is not visible.
+  /// Returns the index of the pixel that shows the hit point, or -1 if the point is not visible.
   int find(const Hit& hit) const;
   bool has_picture() const { return !picture_.empty(); }
   Vector3f color(int pixel) const { return picture_[static_cast<std::size_t>(pixel)].head<3>(); }
-  /// Light that the surface in a pixel receives from the sky, other surfaces and lamps; w: fraction of the
-  /// sun that is visible from it.
+  /// Returns the light at the surface in a pixel from the sky, other surfaces and lamps; w: visible fraction
+  /// of the sun.
   Vector4f arriving(int pixel) const;
 
  private:
@@ -89,12 +90,13 @@ class VisibleLight {
 
 class LightTracer {
  public:
-  /// `stop` is called by several threads; after it returned true, trace() throws StoppedError.
+  /// `scene` and `sources` must outlive this object. Several threads call `stop`; once it returns true, the
+  /// functions for surfaces throw StoppedError.
   LightTracer(const RayScene& scene, const LightSources& sources, StopTest stop = {});
 
+  /// Computes the light at all opaque surfaces of the picture.
   void trace(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
-  /// Computes the light at the surfaces of a translucent body in a part of the picture. `visible`: light of
-  /// the opaque objects.
+  /// Computes the light at the surfaces of a translucent body. `visible`: light of the opaque objects.
   void trace_body(const SurfaceBuffer& surfaces, const LightView& view, const VisibleLight& visible,
                   LightBuffer& light) const;
 
@@ -103,8 +105,8 @@ class LightTracer {
   void trace_glass(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
                    const VisibleLight& behind, GlassBuffer& glass) const;
 
-  /// Traces the light that a point in the air receives from everything but the sun's disc and lamps.
-  /// `number`, in [0, 1), selects the rays. `open`: the light of the sky where nothing hides it.
+  /// Traces the light at a point in the air from the sky and from objects, without the sun's disc and lamps.
+  /// `number`, in [0, 1), selects the rays. `open`: the light of the sky without objects.
   AirLightAround trace_air(const Vector3f& place, float number, const SampleOffsets& offsets,
                            const AirRadiance& open) const;
 
@@ -112,11 +114,12 @@ class LightTracer {
   struct Point;   ///< a visible surface
   struct Points;  ///< eight visible surfaces
   struct Path;    ///< a path of light rays, traced from the eye
-  /// Light that a path found.
+  /// Radiance that arrives along a path.
   struct FoundLight {
-    Vector3f noisy = Vector3f::Zero();  ///< light found by random directions, which is noisy
-    /// Light found without random directions, or weighted because a lamp was sampled, too.
+    Vector3f noisy = Vector3f::Zero();  ///< light found by random directions
+    /// Light found without random directions, or with a weight because its source is also sampled.
     Vector3f certain = Vector3f::Zero();
+    /// Returns the sum of both parts, the noisy one limited to a maximum brightness. Adds to `sums`.
     Vector3f limited(LightSums& sums) const;
   };
   FoundLight radiance(Path path, PixelSampler& sampler, const VisibleLight* visible = nullptr,

@@ -1,5 +1,5 @@
 #pragma once
-/// Private: a lamp as a light source with an area, and the bright part of the sky's picture as another.
+/// Private: area light sources for rays: lamps, and the bright part of a sky picture.
 
 #include "render/sky_picture.h"
 #include "render/stage.h"
@@ -8,29 +8,29 @@
 
 namespace offstage::render {
 
-/// A point of a lamp as seen from one place, or from eight.
+/// A point of a lamp as seen from one place, or points as seen from eight places.
 template <class T>
 struct LampPoint {
-  Three<T> towards;  ///< unit direction from the place to the point
-  T distance;        ///< [m]
-  T fraction;  ///< fraction of the lamp's intensity that arrives at a surface there that faces the point
-  Three<T> arriving;  ///< radiance of a white surface: `fraction` times the intensity of the lamp
-  T density;  ///< probability density of the direction, if rays meet the lamp, too; otherwise 0 [1/sr]
+  Three<T> towards;   ///< unit direction from the place to the point
+  T distance;         ///< [m]
+  T fraction;         ///< fraction of the intensity that arrives at a surface which faces the point
+  Three<T> arriving;  ///< radiance of a white surface: `fraction` times intensity and colour
+  T density;          ///< probability density of the direction [1/sr]; 0 for lamps that rays cannot hit
 };
 
 class RayLamp {
  public:
-  /// `within_glass`: whether a solid piece of glass contains it.
+  /// `within_glass`: whether the lamp is inside of a solid piece of glass.
   explicit RayLamp(const Lamp& lamp, bool within_glass = false);
-  /// The bright part of the picture of a sky, which must have one.
+  /// Creates a lamp from the bright part of a sky picture. `sky` must have a picture.
   explicit RayLamp(const TurnedSky& sky);
-  /// The point of the lamp that belongs to `uv`. `place` is where the light arrives.
+  /// Returns a point of the lamp as seen from `place`. `uv` is uniform in the unit square.
   LampPoint<float> point(const Three<float>& place, const SquarePoint<float>& uv) const;
   LampPoint<Lanes> point(const LaneVectors& place, const SquarePoint<Lanes>& uv) const;
   const Lamp& def() const { return def_; }
-  /// Whether it is the bright part of the sky's picture.
+  /// Whether this is the bright part of the sky's picture.
   bool is_sky() const { return sky_.picture != nullptr; }
-  /// How its shadow rays to the surfaces of the picture meet glass that focuses light.
+  /// Whether glass that focuses light blocks the shadow rays from visible surfaces to this lamp.
   RayScene::Focus focus() const { return focus_; }
 
  private:
@@ -40,7 +40,7 @@ class RayLamp {
 
   Lamp def_;
   RayScene::Focus focus_ = RayScene::Focus::blocks;
-  /// The sky, if the bright part of its picture is the lamp. Without a picture, the lamp is `def_`.
+  /// The sky whose picture is the lamp. If it has no picture, the lamp is `def_`.
   TurnedSky sky_;
   Vector3f right_, up_;
   float cone_factor_ = 0, cone_offset_ = 1;

@@ -1,6 +1,6 @@
 #pragma once
-/// Private: materials as light rays see them. Primary surfaces are shaded by the shaders; later hits of a ray
-/// are shaded with the values from here.
+/// Private: materials for ray tracing. Shaders shade the visible surfaces; these materials are for surfaces
+/// that rays hit.
 
 #include <memory>
 #include <span>
@@ -13,7 +13,7 @@ struct Hit;
 
 class RayMaterial {
  public:
-  /// Keeps reduced copies of the textures of colour and emission.
+  /// Copies the textures of colour and emission at a reduced size.
   explicit RayMaterial(const Material& material, std::span<const Image> textures);
 
   float metallic = 0, roughness = 0.5f;
@@ -22,15 +22,15 @@ class RayMaterial {
   float translucency = 0;  ///< cloth: fraction of the scattered light that leaves on the other side
   bool thin = false, unlit = false, vertex_colors = false;
 
-  /// Colour and opacity at a point. `footprint`: width of the averaged area [m].
+  /// Returns the linear colour and the opacity (w) at a point. `footprint`: width of the averaged area [m].
   Vector4f color(const Hit& hit, float footprint) const;
-  /// Radiance that the surface emits at these texture coordinates, and the mean of this radiance over the
-  /// surface.
+  /// Returns the radiance that the surface emits at these texture coordinates.
   Vector3f emission_at(const Vector2f& uv) const;
+  /// Returns the mean of the emitted radiance over the texture.
   const Vector3f& mean_emission() const { return mean_emission_; }
-  /// Whether no light passes anywhere.
+  /// Whether the whole surface blocks light.
   bool is_opaque() const { return opaque_; }
-  /// Fraction of the light that passes through the surface along a shadow ray.
+  /// Returns the fraction of the light that passes the surface along a shadow ray, per channel.
   Vector3f transmittance(const Hit& hit, const Vector3f& direction) const;
 
  private:

@@ -1,7 +1,7 @@
 #pragma once
-/// Private: the scene as light rays see it: triangles and balls with their materials, in bounding volume
-/// hierarchies by Embree. Embree only selects the object and the triangle; the point that is hit is computed
-/// here, so that its bits do not depend on Embree's version.
+/// Private: the scene for ray tracing: triangles and balls with their materials, in bounding volume
+/// hierarchies by Embree. Embree only finds the object and the triangle. The hit point is computed here, so
+/// that its bits do not depend on Embree's version.
 
 #include <cstdint>
 #include <limits>
@@ -27,23 +27,24 @@ struct DeleteRayTree {
 };
 using RayTree = std::unique_ptr<RTCSceneTy, DeleteRayTree>;
 
-/// Version of Embree and its instruction set, for example "Embree 3.13.5 avx2".
+/// Returns the version of Embree and its instruction set, for example "Embree 3.13.5 avx2".
 std::string ray_library();
 
 /// A mesh with its hierarchy, which is built on first use.
 class RayMesh {
  public:
-  /// Copies the data that rays need. `normals`: as many as positions.
+  /// Copies the data that rays need. `normals`: one for each position.
   RayMesh(const Mesh& mesh, const std::vector<Vector3f>& normals);
   RTCSceneTy* tree() const;
-  /// Corners of a triangle in the world.
+  /// Returns the corners of a triangle in the world.
   std::array<Vector3f, 3> corners(unsigned triangle, const Eigen::Affine3f& world_from_mesh) const;
-  /// Texture coordinates at the barycentric coordinates of the second and third corner.
+  /// Returns the texture coordinates at a point of a triangle. `barycentric`: weights of its second and third
+  /// corner.
   Vector2f uv_at(unsigned triangle, const Vector2f& barycentric) const;
-  /// Area of all triangles, in the mesh's own units.
+  /// Returns the area of all triangles, in square units of the mesh.
   float area() const;
-  /// Chooses a triangle by a number in [0, 1), with a probability in proportion to its area; chance_of()
-  /// returns this probability.
+  /// Chooses a triangle with a probability in proportion to its area. `choice`: random number in [0, 1).
+  /// chance_of() returns the probability of a triangle.
   unsigned triangle_at(float choice) const;
   float chance_of(unsigned triangle) const;
 
@@ -56,19 +57,19 @@ class RayMesh {
  private:
   const std::vector<float>& areas() const;
   mutable RayTree tree_;
-  mutable std::vector<float> area_up_to_;  ///< sums over the triangles; computed on first use
+  mutable std::vector<float> area_up_to_;  ///< sum of the areas up to each triangle; computed on first use
 };
 
 /// The first hit of a ray.
 struct Hit {
   float distance = 0;  ///< distance along the ray [m]
   Vector3f position = Vector3f::Zero();
-  Vector3f normal = Vector3f::Zero();  ///< smooth, on the side of the ray's origin
+  Vector3f normal = Vector3f::Zero();  ///< smooth unit normal, on the side of the ray's origin
   Vector3f face = Vector3f::Zero();    ///< unit normal of the triangle, on the side of the ray's origin
-  bool front = true;
+  bool front = true;                   ///< whether the ray hits the front of the surface
   const RayMaterial* material = nullptr;
-  float translucency = 0;  ///< translucency of a cloth, else 0
-  /// Number of the object in the scene, and of the triangle in its mesh.
+  float translucency = 0;  ///< translucency of a cloth; 0 for other objects
+  /// Number of the object in the RayScene, and of the triangle in its mesh.
   unsigned object = 0, triangle = 0;
   Vector3f object_position = Vector3f::Zero();  ///< position in the object's frame, for patterns
   Vector3f object_normal = Vector3f::Zero();
@@ -85,40 +86,43 @@ class RayScene {
 
   /// Removes all objects.
   void clear();
-  /// Returns the object's number. The mesh and the material must stay in memory until clear().
-  /// `focuses`: the light of the sun that it refracts is traced, see Focus.
+  /// Adds a mesh and returns the object's number. `mesh` and `material` must stay in memory until clear().
+  /// `focuses`: whether the object is glass that focuses light; see Focus.
   unsigned add(const RayMesh& mesh, const RayMaterial& material, const Eigen::Affine3f& world_from_mesh,
                bool casts_shadow, bool focuses = false);
   static constexpr unsigned kNone = ~0u;  ///< returned in place of a number if the mesh has no triangles
-  /// The lists must stay in memory until clear(). Positions must be finite.
+  /// Adds a cloth. The lists must stay in memory until clear(). Positions must be finite. `texture_from_uv`:
+  /// factors from ClothVertex::uv to texture coordinates.
   void add_cloth(std::span<const ClothVertex> vertices, std::span<const uint32_t> indices,
                  const RayMaterial& material, const Vector2f& texture_from_uv, bool casts_shadow);
-  /// Adds `count` balls. `balls` points to the position and radius of the first one, `colors` to its colour;
-  /// those of the next ball follow after `stride` bytes.
+  /// Adds `count` balls. `balls` points to the position and radius (w) of the first ball, `colors` to its
+  /// colour. The values of the next ball follow after `stride` bytes.
   void add_balls(const Vector4f* balls, const Vector4f* colors, std::size_t stride, std::size_t count,
                  const RayMaterial& material, bool casts_shadow);
-  /// Soft discs that face every ray, and only cast shadows.
+  /// Adds soft discs that face every ray. They only cast shadows. Arguments as for add_balls(); `softness`:
+  /// see PointsDef.
   void add_sprites(const Vector4f* balls, const Vector4f* colors, std::size_t stride, std::size_t count,
                    float softness);
-  /// Builds the hierarchy over all objects.
+  /// Builds the hierarchy of all objects. Must be called before rays are traced.
   void build();
 
   bool empty() const { return objects_.empty(); }
-  /// Whether the objects that focus light let it pass straight through, as an approximation, or block it,
-  /// because their refracted light is added.
+  /// How shadow rays treat objects that focus light. `passes`: light passes in a straight line, which is an
+  /// approximation. `blocks`: the object blocks light, because its refracted light is added as caustics.
   enum class Focus { passes, blocks };
-  /// Fraction of the light that arrives along a segment: 0 behind an opaque object, and the product of the
-  /// transmittances of translucent ones. `direction` is a unit vector.
+  /// Returns the transmittance of a segment per channel: 0 behind an opaque object, otherwise the product of
+  /// the transmittances of the translucent objects. `direction` is a unit vector; `length` [m].
   Vector3f transmittance(const Vector3f& from, const Vector3f& direction, float length,
                          Focus focus = Focus::passes) const;
-  /// Fractions of the light that arrives along eight segments. Only those whose `active` is -1 are computed;
-  /// the others get 0.
+  /// Returns the transmittances of eight segments. Only segments whose `active` is -1 are traced; the others
+  /// get 0.
   LaneVectors transmittance(const LaneVectors& from, const LaneVectors& direction, Lanes length,
                             IntLanes active, Focus focus = Focus::passes) const;
-  /// Returns false if the ray meets nothing within `length` [m].
+  /// Finds the first hit of a ray. Returns false if the ray hits nothing within `length` [m].
   bool first_hit(const Vector3f& from, const Vector3f& direction, float length, Hit& hit) const;
-  /// The point `place` of a mesh that is visible from `eye`, moved onto the surface that its smooth normals
-  /// suggest (J. Hanika, "Hacking the Shadow Terminator", 2021). Other points stay.
+  /// Moves the point `place` of a mesh, which is visible from `eye`, onto the curved surface that the smooth
+  /// normals of its triangle describe (J. Hanika, "Hacking the Shadow Terminator", 2021). Returns points of
+  /// other objects unchanged.
   Vector3f smooth_place(const Vector3f& eye, const Vector3f& place) const;
 
  private:
@@ -133,12 +137,13 @@ class RayScene {
   bool has_translucent_ = false;
 };
 
-// A point computed in single precision is off by a few units in the last place of its coordinates.
+// Distances by which off_surface() moves a point, relative to its largest coordinate and at least. The error
+// of a point in single precision is a few units in the last place of its coordinates.
 inline constexpr float kUnitsOffSurface = 32 * std::numeric_limits<float>::epsilon();
 inline constexpr float kLeastOffSurface_m = 1e-7f;
 
-/// A point moved off the surface so that a ray from there does not meet the surface itself because of
-/// rounding. `face`: unit normal on the side of the ray.
+/// Returns the origin of a ray from a point of a surface. It is moved off the surface, so that rounding does
+/// not make the ray hit that surface. `face`: unit normal of the triangle, on the side of the ray.
 inline Vector3f off_surface(const Vector3f& position, const Vector3f& face) {
   return position + face * (kUnitsOffSurface * position.cwiseAbs().maxCoeff() + kLeastOffSurface_m);
 }

@@ -1,9 +1,9 @@
 #pragma once
-/// Private: low-discrepancy samples for the pixels of a sub-frame. Pixels are numbered along a Morton curve,
-/// and each takes the next samples of one Sobol sequence, so that those of neighbouring pixels and of all
-/// sub-frames complement each other (A. Ahmed and P. Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo
-/// Sampling Error via Hierarchical Ordering of Pixels", 2020). Order and values are scrambled per dimension
-/// (B. Burley, "Practical Hash-based Owen Scrambling", 2020).
+/// Private: low-discrepancy samples for the pixels of a sub-frame. Pixels are numbered along a Morton curve.
+/// In this order, each pixel takes the next samples of one Sobol sequence. The samples of neighbouring pixels
+/// and of all sub-frames therefore complement each other (A. Ahmed and P. Wonka, "Screen-Space Blue-Noise
+/// Diffusion of Monte Carlo Sampling Error via Hierarchical Ordering of Pixels", 2020). Order and values are
+/// scrambled per dimension (B. Burley, "Practical Hash-based Owen Scrambling", 2020).
 
 #include <bit>
 #include <cstdint>
@@ -19,20 +19,21 @@ struct SquarePoint {
   F x, y;
 };
 
-/// U: uint32_t for one pixel, or UintLanes for eight pixels.
+/// One sample of a pixel or ray: a sequence of pairs of coordinates. U: uint32_t for one pixel, or UintLanes
+/// for eight pixels.
 template <class U>
 class Sampler {
  public:
   using F = std::conditional_t<std::is_same_v<U, uint32_t>, float, Lanes>;
 
-  /// Sample `index` of `count` of the pixel (x, y), both below 65536.
+  /// Starts sample `index` of `count` samples of the pixel (x, y). x and y must be below 65536.
   Sampler(U x, U y, int index, int count) : Sampler(spread(x) | spread(y) << 1, index, count) {}
-  /// Sample `index` of `count` of a ray with this number, where rays are numbered without gaps.
+  /// Starts sample `index` of `count` samples of a ray. Rays should be numbered from 0 without gaps.
   Sampler(U number, int index, int count)
-      : reversed_index_(reversed(number * std::bit_ceil(static_cast<uint32_t>(count)) +
-                                 static_cast<uint32_t>(index))) {}
+      : reversed_index_(
+            reversed(number * std::bit_ceil(static_cast<uint32_t>(count)) + static_cast<uint32_t>(index))) {}
 
-  /// The next two coordinates, each in [0, 1).
+  /// Returns the next two coordinates, each in [0, 1).
   SquarePoint<F> next() {
     const uint32_t salt = mixed(++pairs_);
     const U k = reversed(permuted(reversed_index_, salt));
@@ -63,8 +64,8 @@ class Sampler {
     v = (v & 0x33333333u) << 2 | (v >> 2 & 0x33333333u);
     return (v & 0x55555555u) << 1 | (v >> 1 & 0x55555555u);
   }
-  // The second dimension of the Sobol sequence: its matrix is Pascal's triangle modulo 2, which is a
-  // Kronecker power of [1 1; 0 1].
+  // Computes the second dimension of the Sobol sequence. Its generator matrix is Pascal's triangle modulo 2,
+  // which is a Kronecker power of [1 1; 0 1].
   static U pascal(U v) {
     v ^= v >> 1 & 0x55555555u;
     v ^= v >> 2 & 0x33333333u;
@@ -77,8 +78,8 @@ class Sampler {
     v = (v ^ v >> 15) * 0x846CA68Bu;
     return v ^ v >> 16;
   }
-  // Each bit is changed by a hash of the lower ones, which permutes the halves of [0, 2^32) recursively if
-  // the bits are reversed before and after.
+  // Changes each bit by a hash of the lower bits. If the bits are reversed before and after, this is an Owen
+  // scrambling: it permutes the halves of [0, 2^32) recursively.
   static U permuted(U v, uint32_t salt) {
     v ^= v * 0x3D20ADEAu;
     v += salt;
@@ -93,11 +94,12 @@ class Sampler {
 
 using PixelSampler = Sampler<uint32_t>;
 
-/// Selects one of a sequence of items in proportion to their weights, by one random number in [0, 1).
+/// Selects one of a sequence of items with a probability in proportion to its weight. It needs one random
+/// number in [0, 1).
 class WeightedChoice {
  public:
   explicit WeightedChoice(float random) : random_(random) {}
-  /// Whether the item, of positive weight, is selected in place of the one before.
+  /// Offers the next item. Returns true if it replaces the selected item. `weight` must be positive.
   bool take(float weight) {
     sum_ += weight;
     const float chance = weight / sum_;
@@ -108,7 +110,7 @@ class WeightedChoice {
   }
   float weight() const { return weight_; }  ///< weight of the selected item
   float sum() const { return sum_; }        ///< sum of all weights
-  /// A random number in [0, 1) that does not depend on the selection.
+  /// Returns a random number in [0, 1) that is independent of the selection.
   float rest() const { return random_ < 0 ? 0.0f : random_ < 1 ? random_ : 0x1.fffffep-1f; }
 
  private:
