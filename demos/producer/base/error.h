@@ -26,8 +26,8 @@ struct Problem {
   std::string describe() const;
 };
 
-/// An invalid scene, with the problems found. If there are more than kMostProblems, one further entry gives
-/// the number of the others, which are left out.
+/// An invalid scene, with the problems found. Of more than kMostProblems problems only the first ones are
+/// listed; the last entry then gives the number of the others.
 class SceneError : public std::runtime_error {
  public:
   explicit SceneError(std::vector<Problem> problems);

@@ -16,11 +16,11 @@ class Interrupted : public std::runtime_error {
   int signal_;
 };
 
-/// Installs the handlers for SIGINT and SIGTERM. Ignores SIGPIPE and SIGXFSZ, so that a closed pipe or the
-/// limit of a file's size is an error of the write.
+/// Installs the handlers for SIGINT and SIGTERM. Ignores SIGPIPE and SIGXFSZ, so that writing fails with an
+/// error if a pipe is closed or a file reaches its size limit.
 void install_signal_handlers();
 
-/// Returns the signal that asked the run to end, or 0.
+/// Returns the number of the signal that asked the run to end, or 0 if there was none.
 int interrupt_signal();
 
 }  // namespace offstage::producer

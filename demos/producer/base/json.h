@@ -1,6 +1,6 @@
 #pragma once
-/// JSON text as a tree in which every value and every key has its position, so that messages can refer to it.
-/// Comments are allowed; repeated keys are not.
+/// JSON text as a tree. Every value and every key has its position in the text, for messages. Comments are
+/// allowed; repeated keys are not.
 
 #include <cstdint>
 #include <string>
@@ -64,14 +64,14 @@ inline constexpr int kMaxDepth = 64;  ///< greatest depth of nested lists and ob
 /// in 64 bits, or repeated keys.
 Node parse_json(std::string_view text, const std::string& name, int file = 0);
 
-/// Converts to compact JSON, or with line breaks if `indent` > 0. Numbers are the shortest text that reads
-/// back to the same bits.
+/// Converts to JSON: compact if `indent` is 0, otherwise on several lines with this indentation. Each number
+/// is the shortest text that reads back to the same bits.
 std::string to_text(const Node& node, int indent = 0);
 
 /// Returns the description of a value for messages: `the string "abc"`, `-1`, `[0,0,0]`, `an object`.
 std::string describe(const Node& node);
 
-/// A key as a step of a JSON pointer ("/" and "~" escaped), with the slash in front.
+/// Converts a key to a step of a JSON pointer, with a leading slash; "/" and "~" in the key are escaped.
 std::string pointer_step(std::string_view key);
 
 }  // namespace offstage::producer

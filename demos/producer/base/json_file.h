@@ -15,8 +15,8 @@ namespace offstage::producer {
 /// Greatest number of frames in a JSON file of offstage.
 inline constexpr int kMostFrames = 1'000'000'000;
 
-/// An object in a JSON file of offstage. A missing key has its default; a value of the wrong type throws
-/// render::FileError "FILE: /key: must be a text, got 3".
+/// An object in a JSON file of offstage. The functions return the given default for a missing key. They throw
+/// render::FileError for a value of the wrong type, such as "FILE: /key: must be a text, got 3".
 class JsonObject {
  public:
   JsonObject(std::filesystem::path file, std::string path, nlohmann::json json)
@@ -29,9 +29,10 @@ class JsonObject {
   int count(const std::string& key, int otherwise, int most) const;
   /// The objects of a list; none if the key is missing.
   std::vector<JsonObject> objects(const std::string& key) const;
-  /// The value without a check of its type; null if it is missing.
+  /// Returns a value of any type; null if the key is missing.
   nlohmann::json value(const std::string& key) const;
 
+  /// Throws render::FileError: the value of `key` must be `allowed`.
   [[noreturn]] void refuse(const std::string& key, const std::string& allowed) const;
   const std::filesystem::path& file() const { return file_; }
 
@@ -41,8 +42,8 @@ class JsonObject {
   nlohmann::json json_;
 };
 
-/// Reads such a file; nothing if there is no file, or if its content is not an object. Throws
-/// render::FileError for a file that cannot be read or is not regular.
+/// Reads a JSON file. Returns nothing if the file does not exist or does not contain a JSON object. Throws
+/// render::FileError if it cannot be read or is not a regular file.
 std::optional<JsonObject> read_json_file(const std::filesystem::path& file);
 
 }  // namespace offstage::producer

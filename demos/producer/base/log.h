@@ -10,18 +10,17 @@
 
 namespace offstage::producer {
 
-/// Prints the name of a finished output as a line of standard output. Does nothing if standard output was
-/// closed from the start.
+/// Prints the name of a finished output on standard output. Does nothing if note_closed_output() was called.
 void print_output_name(const std::string& name);
-/// Records that standard output was closed from the start.
+/// Records that standard output was already closed when the program started.
 void note_closed_output();
 
-/// Writes whole lines. A visible status line is removed first, so that the two never mix. Any thread may call
-/// it.
+/// Writes complete lines to standard error. Removes a visible status line first, so that the texts do not
+/// mix. Any thread may call this function.
 void write_log(std::string_view lines);
 
-/// Shows a status line, which later calls replace, on a terminal. It must have no line break and be no wider
-/// than terminal_width(). An empty text removes it.
+/// Shows a status line on a terminal. Later calls replace it; an empty text removes it. The text must have no
+/// line break and at most terminal_width() columns.
 void show_status(std::string_view line);
 /// Keeps the status line visible and continues below it.
 void end_status_line();

@@ -6,7 +6,8 @@
 
 namespace offstage::producer {
 
-/// The characters <, >, & and " as entities; control characters that XML 1.0 does not allow become '?'.
+/// Replaces the characters <, >, & and " by entities, and control characters that XML 1.0 does not allow by
+/// '?'.
 std::string escape_markup(std::string_view text);
 
 }  // namespace offstage::producer

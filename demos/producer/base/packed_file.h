@@ -26,6 +26,7 @@ struct FileKind {
   std::string_view name;
 };
 
+/// Returns the bytes of a file: the header and the compressed payload.
 std::vector<uint8_t> pack(const FileKind& kind, std::span<const uint8_t> payload);
 /// Returns the decompressed payload of a file's bytes. Throws render::FileError, which names the file
 /// `source`.
@@ -73,8 +74,9 @@ class ByteReader {
     for (int i = 0; i < V::SizeAtCompileTime; ++i) v[i] = take<typename V::Scalar>();
     return v;
   }
-  /// Reads the number of records that follow, of at least `record_size` bytes each. Throws if the data are
-  /// too short for them, before memory is allocated.
+  /// Reads the number of records that follow. Each record has at least `record_size` bytes. Throws
+  /// render::FileError if the remaining data are too short, so that the caller never allocates too much
+  /// memory.
   std::size_t take_count(std::size_t record_size) {
     const auto n = take<uint64_t>();
     if (n > bytes_.size() / record_size)

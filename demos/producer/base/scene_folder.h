@@ -1,6 +1,6 @@
 #pragma once
-/// Folders that may contain the files of a scene: its own folder, those that come with the program, and those
-/// given by --allow.
+/// Folders from which a scene may read files: the scene's own folder, the folders of the installation, and
+/// the folders given by --allow.
 
 #include <filesystem>
 #include <string>

@@ -9,9 +9,10 @@
 
 namespace offstage::producer {
 
-/// Returns the first of these folders that exists, or an empty path: `installed` in the folder that
-/// OFFSTAGE_DATA names; `installed` in ../share/offstage, seen from the program; `source` in the source tree
-/// from which the program was compiled.
+/// Returns the first of the following folders that exists, or an empty path:
+/// - $OFFSTAGE_DATA/`installed`;
+/// - ../share/offstage/`installed`, relative to the folder of the program;
+/// - `source` in the source tree from which the program was compiled.
 std::filesystem::path shipped_folder(std::string_view installed, std::string_view source);
 
 /// Returns the file of a model named by a scene, FILE or FILE#NODE: relative to the scene's folder or, if

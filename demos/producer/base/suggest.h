@@ -7,8 +7,8 @@
 
 namespace offstage::producer {
 
-/// During its lifetime, this thread compares a limited number of words, so that the time to refuse a text
-/// with very many errors is proportional to its length. After that no suggestions are made.
+/// Limits the number of words that this thread compares during the object's lifetime. Beyond the limit no
+/// suggestions are made. A text with very many errors is thus refused in a time proportional to its length.
 class SuggestionBudget {
  public:
   SuggestionBudget();
@@ -20,12 +20,12 @@ class SuggestionBudget {
   std::size_t before_;
 };
 
-/// Smallest number of insertions, deletions, replacements and swaps of neighbours that change one word to the
-/// other.
+/// Returns the least number of edits that change one word to the other: insertions, deletions, replacements
+/// and swaps of neighbouring characters.
 std::size_t edit_distance(std::string_view a, std::string_view b);
 
-/// Returns the candidate nearest to `word` (the first of equals) if it is similar enough for a typing error,
-/// else an empty text.
+/// Returns the candidate nearest to `word`, if it is similar enough for a typing error; otherwise an empty
+/// text. Of equally near candidates, the first one is returned.
 std::string nearest(std::string_view word, std::span<const std::string> candidates);
 
 /// Returns "; did you mean 'x'?" if there is a similar candidate, else "; known: 'a', 'b'", or `if_none`

@@ -11,7 +11,7 @@
 
 namespace offstage::producer {
 
-/// The time within a clip at a time of the film [s].
+/// Returns the time within the clip [s]. `duration`: length of the clip [s]; `time`: time of the film [s].
 double clip_time(const ModelAnimation& animation, double duration, double time);
 
 /// The pieces of a model that collide, with their shapes at the start of a clip. Scaling of nodes during the
@@ -20,9 +20,9 @@ double clip_time(const ModelAnimation& animation, double duration, double time);
 std::vector<AnimatedPiece> collision_pieces(const render::ModelRig& rig, int clip,
                                             const DecompositionCache& cache);
 
-/// Motion of a piece over a film of the length `end` [s]. `own`: the motion of the body; `rest`: its initial
-/// pose; `scale`: scale factor of the model. The animation is sampled 120 times per second. Where it starts
-/// again in a pose other than its last one, the piece jumps.
+/// Returns the motion of a piece in a film that ends at `end` [s]. `own`: motion of the body; `rest`: initial
+/// pose of the body; `scale`: scale factor of the model. The animation is sampled 120 times per second. If
+/// the first pose of a looping animation differs from the last one, the piece jumps.
 sim::KeyframeTrack piece_track(const render::ModelRig& rig, const AnimatedPiece& piece,
                                const ModelAnimation& animation, const sim::KeyframeTrack& own,
                                const sim::Pose& rest, double scale, double end);

@@ -26,7 +26,7 @@ class ArticulationBuilder {
     b.material = material;
     return b;
   }
-  /// `a` and `b` are whole names; b empty: the world.
+  /// Adds a joint. `a` and `b` are full names of bodies; an empty `b` is the world.
   Joint& joint(const std::string& part, const std::string& a, const std::string& b, const Vec3& anchor) {
     Joint& j = parts.joints.emplace_back();
     j.where = where_;
@@ -36,6 +36,7 @@ class ArticulationBuilder {
     j.anchor = anchor;
     return j;
   }
+  /// Returns the full name of a part: NAME/PART.
   std::string own(const std::string& part) const { return name_ + "/" + part; }
 
   Parts parts;

@@ -7,8 +7,8 @@
 
 namespace offstage::producer {
 
-/// Adds the bodies and joints of the articulations of `scene` to `flat`, and a copy of each joint for the
-/// copies of its bodies. Problems with the number of copies go to `errors` and `warnings`.
+/// Adds the bodies and joints of all articulations in `scene` to `flat`. Also copies each joint once for each
+/// copy of its bodies. Problems with the number of copies are added to `errors` and `warnings`.
 void expand_joints(const Scene& scene, Scene& flat, std::vector<Problem>& errors,
                    std::vector<Problem>& warnings);
 
@@ -17,7 +17,7 @@ bool has_rope(sim::JointType type);
 /// The length of a joint for which has_rope() is true, at time 0 [m].
 Real rope_length(const Joint& joint);
 
-/// Converts a joint without its bodies.
+/// Converts a joint. The caller sets the bodies.
 sim::JointDef joint_def(const Joint& joint);
 
 }  // namespace offstage::producer

@@ -24,8 +24,8 @@ class BodyPlaces {
             Eigen::Translation3f(body->position.cast<float>()) * body->orientation.cast<float>();
   }
 
-  /// Returns the pose of a body, which is in `moving` if the body can move. Throws std::out_of_range for an
-  /// unknown name.
+  /// Returns the pose of a body. `moving`: Snapshot::bodies, which has the poses of moving bodies. Throws
+  /// std::out_of_range for an unknown name.
   Eigen::Affine3f at(const std::string& name, const std::vector<BodySample>& moving) const {
     const auto slot = slots_.find(name);
     if (slot == slots_.end()) return fixed_.at(name);

@@ -10,8 +10,7 @@
 
 namespace offstage::producer {
 
-/// Numbers that identify the mesh of a shape: shapes with equal numbers share a mesh. Not for MeshFile and
-/// Compound.
+/// Returns numbers that identify the mesh of a shape. Shapes of one type with equal numbers share a mesh.
 std::vector<float> shape_key(const sim::Sphere& s);
 std::vector<float> shape_key(const sim::Box& s);
 std::vector<float> shape_key(const sim::Capsule& s);
@@ -24,7 +23,7 @@ std::vector<float> shape_key(const sim::Torus& s);
 std::vector<float> shape_key(const sim::Tube& s);
 std::vector<float> shape_key(const sim::OpenBox& s);
 
-/// Half the size of the box around a shape, in its frame [m].
+/// Returns half the size of the shape's bounding box, in the frame of the shape [m].
 Vec3 half_extent(const sim::Sphere& s);
 Vec3 half_extent(const sim::Box& s);
 Vec3 half_extent(const sim::Capsule& s);
@@ -38,20 +37,22 @@ Vec3 half_extent(const sim::Tube& s);
 Vec3 half_extent(const sim::OpenBox& s);
 Vec3 half_extent(const Compound& s);
 
-/// The solids of a torus, tube, open box or compound; none for other shapes.
+/// Returns the solids of which a torus, tube, open box or compound consists; none for other shapes.
 std::vector<sim::SolidMesh> solids_of(const Shape& shape);
 
-/// Whether a body collides by the parts or triangles of a mesh: mesh files and the shapes of solids_of().
+/// Whether the collision shape of a body is a mesh: a mesh file, or a shape for which solids_of() is not
+/// empty.
 bool is_mesh(const Body& body);
 
-/// Numbers that identify the solids of a shape: shapes with equal numbers have equal solids.
+/// Returns numbers that identify the result of solids_of(). Shapes with equal numbers have equal solids.
 std::vector<float> solids_key(const Shape& shape);
 
-/// The inertia matrix of a body that has `inertia`.
+/// Returns the inertia matrix [kg m^2] that the scene gives for a body; nothing if it has no `inertia`.
 std::optional<sim::Mat3> inertia_of(const Body& body);
 
-/// Mass, centre and inertia of a body by its shape and densities, with the body's own mass, centre and
-/// inertia in place of these if it has them. None for a mesh file, which is not read here, and for a plane.
+/// Computes mass, centre of mass and inertia from the shape and the densities. Values that the scene gives
+/// for the body replace the computed ones. Returns nothing for a plane and for a mesh file, which is not read
+/// here.
 std::optional<sim::BodyMass> mass_by_shape(const Body& body);
 
 /// Returns the first error in the sizes of a shape or of its parts, with the key relative to the shape; empty

@@ -1,5 +1,5 @@
 #pragma once
-/// Converts the camera of a scene to the view at a time.
+/// Computes the view of the scene's camera at any time.
 
 #include <vector>
 

@@ -1,6 +1,5 @@
 #pragma once
-/// Conversion of a scene's cloths to those of the simulation, in their flat state, and the look of their
-/// fabrics.
+/// Converts cloths of a scene to undeformed cloths of the simulation, and gives the look of their fabrics.
 
 #include <optional>
 #include <string>
@@ -22,7 +21,7 @@ inline constexpr std::size_t kMaxClothVertices = 250'000;
 struct FlatCloth {
   sim::ClothDef def;         ///< definition of the cloth, without pins, which need the bodies
   std::vector<Vec3> places;  ///< positions of its vertices in its own frame, without those of cords [m]
-  std::vector<Eigen::Vector2f> uvs;  ///< coordinates along the cloth, of all vertices [m]
+  std::vector<Eigen::Vector2f> uvs;  ///< coordinates along the cloth for all vertices [m]
   std::vector<uint32_t> cord_ends;   ///< for each cord, the index of its last vertex
 
   std::vector<uint32_t> triangles() const;  ///< Returns the triangles as three vertices each.
@@ -47,16 +46,16 @@ std::vector<uint32_t> pinned_vertices(const ClothPin& pin, const Cloth& cloth, c
 const PinScope& scope_of(const ClothPin& pin);
 /// Error message for a pin that holds no vertex, with the extent of the cloth.
 std::string selects_nothing(const FlatCloth& flat);
-/// Returns the pairs of vertices that a seam joins. Throws std::invalid_argument if its sides differ in
-/// length, or are not those of a grid.
+/// Returns the pairs of vertices that a seam joins. Throws std::invalid_argument if the sides have different
+/// numbers of vertices, or if the cloth is not a grid.
 std::vector<sim::ClothSeam> sewn_vertices(const ClothSeam& seam, const Cloth& cloth, const FlatCloth& flat);
 
-/// Returns the look of a fabric, for cloths without a material. A material without `fabric` takes the fabric
-/// part of this look.
+/// Returns the look of a fabric, which cloths without a material have. A material that does not set `fabric`
+/// uses the thread properties of this look.
 render::Material fabric_look(const std::string& fabric);
 
-/// Returns why an explicit integrator is unstable for a cloth of this scene, with the spring and the longest
-/// step.
+/// Returns an error message if the cloth's explicit integrator is unstable, with the spring that causes this
+/// and the longest stable step. Returns nothing if it is stable.
 std::optional<std::string> instability_of(const Scene& scene, const sim::ClothDef& cloth);
 
 }  // namespace offstage::producer

@@ -15,12 +15,12 @@
 
 namespace offstage::producer {
 
-/// The particle system of a group or a source. That of a source reports the events to which its child
-/// particles react.
+/// Returns the particle system of a group or a source. The system of a source also reports the events that
+/// start its sub-emitters.
 sim::ParticleSystemDef system_def(const std::string& name, const sim::ParticleSystemDef& behaviour);
 sim::ParticleSystemDef system_def(const std::string& name, const ParticleSource& source);
 
-/// Returns the definition without its body and, for a model, without the triangles of its surface.
+/// Returns the definition of an emitter. The caller sets its body and the triangles of a model surface.
 effects::EmitterDef emitter_def(const Emitter& emitter, uint64_t seed);
 effects::SplitDef split_def(const ParticleSource& source, const std::string& name, uint64_t seed);
 /// Returns the definition for a child that a trail or an event of its parent emits.

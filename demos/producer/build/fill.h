@@ -1,5 +1,5 @@
 #pragma once
-/// Places that fill a volume at a packing; see Fill in the scene.
+/// Positions that fill a volume; see Fill in scene/values.h.
 
 #include <cstddef>
 #include <vector>
@@ -8,9 +8,9 @@
 
 namespace offstage::producer {
 
-/// Returns the centres of the places, ordered from below, relative to the centre of the volume; fill.position
-/// is not added. `spacing` [m], > 0. At most `most` places are returned, and one more to show that there
-/// would be more. The order and the places depend only on the arguments.
+/// Returns the positions [m] in ascending order of height, relative to the centre of the volume (without
+/// fill.position). `spacing` is in m and greater than 0. A result of `most` + 1 positions means that the
+/// volume has room for more than `most`. The result depends only on the arguments.
 std::vector<Vec3> fill_places(const Fill& fill, Real spacing, std::size_t most);
 
 }  // namespace offstage::producer

@@ -9,7 +9,7 @@
 
 namespace offstage::producer {
 
-/// Returns the definition without the objects on which it acts.
+/// Converts a force. The caller sets the objects on which it acts.
 sim::ForceDef force_def(const Force& force);
 
 /// Names of the objects on which a force acts.

@@ -11,11 +11,12 @@
 
 namespace offstage::producer {
 
-/// The sun, which may be a light of a model file; without one, a sun of intensity 0.
+/// Returns the sun of the scene, which may be a light of a model file. A scene without a sun gets one with
+/// intensity 0.
 render::Sun sun_of(const Scene& scene, const ModelLibrary& models);
 /// Returns the environment without the picture of the sky, which the caller sets.
 render::Environment environment_of(const Scene& scene);
-/// The lights of a scene other than the sun at a time [s], in scene order.
+/// Returns all lights except the sun, in scene order. `time` is the time of the film [s].
 std::vector<render::Lamp> lamps_of(const Scene& scene, const ModelLibrary& models, double time,
                                    const BodyPlaces& places, const std::vector<BodySample>& moving);
 /// The names of the lights that lamps_of() returns; empty for a light without a name.

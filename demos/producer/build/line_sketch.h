@@ -10,17 +10,18 @@
 
 namespace offstage::producer {
 
-/// A linear colour of the given hue; one turn is the full circle. Hues look equally bright (Ottosson, "A
-/// perceptual color space for image processing", 2020).
+/// Returns a linear colour of the given hue; 1 is the full colour circle. All hues look equally bright
+/// (Ottosson, "A perceptual color space for image processing", 2020).
 Eigen::Vector3f hue_color(double turns);
-/// Colours of neighbouring numbers are very different: hues by the golden ratio.
+/// Returns the i-th of a series of clearly different colours. Successive hues differ by 0.618 of the colour
+/// circle.
 Eigen::Vector3f distinct_color(std::size_t i);
 
-/// Collects the lines of one overlay. The lines of an object that are added in the same order have the same
-/// ids.
+/// Collects the lines of one overlay. A line has the same id in every frame if its object's lines are added
+/// in the same order.
 class LineSketch {
  public:
-  /// Begins the lines of an object with a unique number.
+  /// Begins the lines of the object with the unique number `id`.
   void object(uint64_t id);
 
   void line(const sim::Vec3& a, const sim::Vec3& b, const Eigen::Vector4f& color, float width_a = 1,

@@ -1,6 +1,6 @@
 #pragma once
-/// Objects of a scene that follow from the data of files: articulations from the node trees of models,
-/// particles from point clouds, and particles that fill models.
+/// Reads the files that define objects of a scene: the node trees of articulations, point clouds, and models
+/// that are filled with copies or particles.
 
 #include <vector>
 
@@ -13,7 +13,8 @@ namespace offstage::producer {
 /// `errors`.
 void read_links(Scene& scene, const SceneFolder& folder, std::vector<Problem>& errors);
 
-/// Appends the points of files to the places of their particle groups. Errors are added to `errors`.
+/// Reads the point files of particle groups and appends their points to ParticleGroup::places. Errors are
+/// added to `errors`.
 void read_clouds(Scene& scene, const SceneFolder& folder, std::vector<Problem>& errors);
 
 /// Reads the models that fills of bodies, cloths, emitters and particle groups name. Errors are added to

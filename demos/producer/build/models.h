@@ -18,8 +18,8 @@
 
 namespace offstage::producer {
 
-/// A part of an animated model that collides on its own: a node with its triangles, or the convex hull of the
-/// skin that follows a bone. Unscaled, in the frame of its node without the node's scale.
+/// A colliding part of an animated model: the triangles of a node, or the convex hull of the skin around a
+/// bone. The model's scale and the node's scale are not applied; coordinates are in the node's frame.
 struct AnimatedPiece {
   std::string name;  ///< name of the node
   int node = 0;      ///< index in the rig
@@ -30,8 +30,8 @@ struct AnimatedPiece {
 class ModelLibrary {
  public:
   ModelLibrary() = default;
-  /// Called with a description of the next step that takes seconds, and with "" at its end. May throw to stop
-  /// the work.
+  /// Called with a description before each step that may take seconds, and with "" after it. It may throw to
+  /// stop the work.
   using StepCallback = std::function<void(const std::string& step)>;
 
   /// Reads every model and texture that the (flat) scene names, relative to `folder` (or see `model_file`),
@@ -53,7 +53,7 @@ class ModelLibrary {
   const render::Image& texture(const std::string& file) const { return textures_.at(file); }
   /// The picture of the sky; null if the scene has none.
   const std::shared_ptr<const render::SkyPicture>& sky() const { return sky_; }
-  /// A model that was decomposed into convex parts, and the time this took (short if they were on disk).
+  /// A model that was decomposed into convex parts, and the duration. Parts from the cache take little time.
   struct Decomposed {
     std::string file;
     std::size_t triangles = 0;
@@ -66,7 +66,7 @@ class ModelLibrary {
   const std::string& digest() const { return digest_; }
 
  private:
-  /// Adds a problem for each sheet whose pictures would not have whole pixels.
+  /// Adds a problem for each sprite sheet whose size in pixels is not divisible by its rows and columns.
   void check_sheets(const Scene& scene, std::vector<Problem>& problems) const;
   /// Reads the picture of the sky, and returns its pixels for the digest.
   std::vector<float> read_sky(const Scene& scene, const SceneFolder& folder, std::vector<Problem>& problems,
@@ -101,8 +101,8 @@ ChosenScale automatic_scale(Real largest_side, render::Model::UnitSource unit);
 /// Returns the factor for a model that was read; Model::file_size must be known.
 ChosenScale automatic_scale(const render::Model& model);
 
-/// Scale factor that brings a model to the size of its use: `scale` times the factor that fits its bounding
-/// box into the box `fit`, if there is one. Axes along which the model is flat do not count. `likely`: the
+/// Returns the total scale factor of a model: `scale`, times the factor that fits the model's bounding box of
+/// size `size` into the box `fit` if that is given. Axes along which the model is flat are ignored. `likely`:
 /// factor of automatic_scale().
 Real fitted_scale(const ModelScale& scale, const std::optional<Vec3>& fit, const Vec3& size, Real likely);
 Real fitted_scale(const ModelScale& scale, const std::optional<Vec3>& fit, const render::Model& model);

@@ -1,7 +1,7 @@
 #pragma once
-/// The objects of a scene as they are drawn: which entry of a Snapshot has the state of which object, and the
-/// object's id in Channels. The simulation writes snapshots by this table; the stage, the exporters and the
-/// bindings read them by it.
+/// Maps the objects of a scene to the entries of a Snapshot that have their states, and to their ids in
+/// Channels. The simulation uses this table to write snapshots; the stage, the exporters and the bindings use
+/// it to read them.
 
 #include <cstdint>
 #include <optional>
@@ -47,11 +47,11 @@ struct ObjectTable {
   std::vector<RodEntry> rods;
   std::vector<ClothEntry> cloths;
   std::vector<PointsEntry> point_sets;  ///< groups, then sources in the order of for_each_source()
-  // The first of its rods, for each spring, joint and cloth of the scene.
+  // Index of the first rod of each spring, joint and cloth of the scene.
   std::vector<std::size_t> rod_of_spring, rod_of_joint, rod_of_cloth;
 };
 
-/// Names of the ids in Channels.
+/// Returns the names of the objects, by their ids in Channels.
 render::ObjectNames object_names(const Scene& scene);
 
 }  // namespace offstage::producer

@@ -29,7 +29,7 @@ class Overlays {
   /// Returns the lines of each overlay for the current state of the world, in scene order; none for the parts
   /// of bodies, which are not lines.
   std::vector<LineSet> lines(const sim::World& world) const;
-  /// Must be called as time advances, for overlays of past states.
+  /// Records the current state for overlays that draw past states. Must be called as time advances.
   void record(const sim::World& world);
 
  private:

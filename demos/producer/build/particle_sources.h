@@ -24,7 +24,8 @@ class LookRamps {
  public:
   LookRamps(const ParticleLook& look, uint64_t seed, const std::string& name);
 
-  /// Look of the particles at `time`. `places`: the particles of a group, which may have individual colours.
+  /// Returns the particles as drawn at `time` [s]. `places`: initial states of a group's particles, which may
+  /// have individual colours; null for a source.
   PointSet points(const sim::ParticleArrays& particles, Real time,
                   const std::vector<ParticlePlace>* places) const;
 
@@ -46,7 +47,7 @@ class ParticleSources {
   /// Throws SceneError for an emitter with invalid parameters.
   ParticleSources(const Scene& scene, const ModelLibrary& models, sim::World& world, const FindBody& body);
 
-  /// Time before 0 at which the first particles are created [s].
+  /// Returns how long before time 0 the first particles are created [s]; 0 if no emitter prewarms.
   Real prewarm() const;
 
   /// Adds the particles that are created in (start, end] to the world. Must be called before each sub-step.
@@ -58,7 +59,7 @@ class ParticleSources {
   };
   Counts counts() const;
 
-  /// One set for each source, in the order of for_each_source() over the emitters.
+  /// Appends one point set for each source, in the order of for_each_source() over the emitters.
   void add_points(const sim::World& world, std::vector<PointSet>& sets) const;
   /// Calls visit(full name, system, look) in the same order.
   template <class Visit>

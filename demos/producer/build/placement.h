@@ -1,8 +1,8 @@
 #pragma once
 /// Copies of bodies, cloths and emitters in rows, rings, grids, volumes and at random places.
 ///
-/// The four kinds multiply: a repeat of a grid of a fill of a scatter. The same scene gives the same copies,
-/// bit for bit.
+/// The four kinds multiply: `repeat` copies the grid, `grid` the fill, `fill` the scattered copies. The same
+/// scene gives exactly the same copies.
 
 #include <cstdint>
 #include <string>
@@ -18,9 +18,9 @@ namespace offstage::producer {
 inline constexpr std::size_t kMostBodies = 200'000;
 inline constexpr int kMaxCopies = 100'000;  ///< limit for one object
 
-/// A rigid motion of the world from an original, with all its keyframes, to one of its copies.
+/// One copy of an object. `motion` applies to the original and to all its keyframes.
 struct PlacedCopy {
-  sim::Pose motion;    ///< transform of the copy from the original, both in world coordinates
+  sim::Pose motion;    ///< maps the original to the copy, in world coordinates
   Real scale = 1;      ///< factor of the object's size
   std::string suffix;  ///< suffix of its name: "_0", "_1" ...
 };

@@ -26,7 +26,7 @@ const Body& body_of(const Scene& scene, const std::string& name);
 /// Returns the camera of the model file that an entry of the scene selects; null if there is none.
 const render::Model::Camera* find_camera(const ModelCamera& camera, const Scene& scene,
                                          const ModelLibrary& models);
-/// Whether an entry of the scene's lights contains a light of its file.
+/// Whether an entry of the scene's lights selects the light `light` of its file.
 bool has_light(const ModelLights& lights, const FileLight& light);
 
 /// Pose of a camera or light of the file that a body shows, in the body's frame, at a time of the film [s].

@@ -32,8 +32,8 @@ class DivergedError : public std::runtime_error {
   std::string state_;
 };
 
-/// Figures of a run: those of all steps together, with the contacts and the penetration also at the end of
-/// the run.
+/// Statistics of a run: the figures of all steps together. Contacts and penetration are also given for the
+/// end of the run.
 struct SimulationTotals : sim::StepFigures {
   uint64_t waiting = 0, skipped = 0;  ///< counts of the emitters
   uint64_t most_contacts = 0;         ///< greatest number of contact points of bodies at the end of a frame
@@ -48,24 +48,24 @@ struct SimulationTotals : sim::StepFigures {
   double step_s = 0;         ///< longest internal step [s]
 };
 
-/// Collision meshes of models, by the model's data, its scale and its decomposition.
+/// Collision meshes. The key contains the model's data, its scale and its decomposition settings.
 using CollisionMeshes = std::map<std::string, std::shared_ptr<const sim::CollisionMesh>>;
 
 class Simulation {
  public:
-  /// Takes the meshes of an earlier simulation from `shared`, unless it is null, and leaves its own there, so
-  /// that the next version of a scene need not compute them. Throws SceneError for errors that only building
-  /// finds: an open mesh as a dynamic body, an emitter with invalid parameters.
+  /// Builds the simulation of a scene. `shared` (may be null) keeps collision meshes between simulations, so
+  /// that the next version of a scene does not compute them again. Throws SceneError for errors that are
+  /// found only here, such as an open mesh as a dynamic body.
   Simulation(const Scene& scene, const ModelLibrary& models, CollisionMeshes* shared = nullptr);
 
-  /// Called at the start of every internal step, with its time, if set: for traces.
+  /// Sets a function that is called at the start of every sub-step with its time [s]. Traces use it.
   void on_substep(std::function<void(double time)> callback) { on_substep_ = std::move(callback); }
 
   /// Advances by one frame. Prewarming and the time skipped by `output.start` take several calls, during
   /// which frame() is 0. Throws DivergedError.
   void advance();
   int frame() const { return frame_; }
-  /// Number of calls of advance() from the start to a frame.
+  /// Returns how many calls of advance() lead from the start to a frame.
   int advances_to(int frame) const { return prewarm_pieces_ + skipped_pieces() + frame; }
 
   Snapshot snapshot() const;
@@ -102,8 +102,8 @@ class Simulation {
   void for_each_particle_system(const std::function<void(const std::string&, const sim::ParticleArrays&,
                                                          const PointSet&)>& visit) const;
 
-  /// The object that is not finite, and the state of all others, as JSON text; it is saved when a run
-  /// diverges.
+  /// Returns the name of the object that is not finite and the state of all others, as JSON text. The text is
+  /// saved when a run diverges.
   std::string state_dump(const sim::NonFinite& lost) const;
 
  private:

@@ -28,7 +28,8 @@ struct RodSample {
   Eigen::Vector3f a, b;
 };
 
-/// Particles of one group or emitter. `ids` ascend; `ages` show when a particle was created within the frame.
+/// Particles of one group or source, in ascending order of their ids. `ages` show when within the frame a new
+/// particle was created.
 struct PointSet {
   std::vector<render::Point> points;
   std::vector<float> ages;   ///< [s]
@@ -67,11 +68,11 @@ struct Snapshot {
   uint64_t point_count() const;
 };
 
-/// Returns the bytes of a snapshot: magic, format version, checksum (XXH3-64), zstd payload. `key` is that of
-/// the run.
+/// Converts a snapshot to bytes: magic word, format version, checksum (XXH3-64), zstd-compressed payload.
+/// `key` identifies the run.
 std::vector<uint8_t> serialize(const Snapshot& snapshot, std::string_view key = {});
-/// Throws render::FileError, naming `source`, for bytes that are damaged, cut short, of another version or of
-/// a run with another key.
+/// Converts bytes back to a snapshot. Throws render::FileError, which names the file `source`, if the bytes
+/// are damaged, truncated, of another format version, or from a run with another key.
 Snapshot deserialize(std::span<const uint8_t> bytes, const std::string& source, std::string_view key = {});
 
 }  // namespace offstage::producer

@@ -7,7 +7,7 @@
 
 namespace offstage::producer {
 
-/// Draws the texts for the time of `moment` on a finished frame.
+/// Draws the text overlays that are visible at the time of `moment` on a finished frame.
 void write_texts(const Scene& scene, const Snapshot& moment, render::Image& image);
 
 }  // namespace offstage::producer

@@ -105,7 +105,7 @@ ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
 /// Reads the models of a scene, and appends warnings to `warnings` instead of printing them.
 ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
                          const LogOptions& log_options, std::vector<Problem>& warnings);
-/// Key of all settings that decide the pixels of a scene's frames.
+/// Returns a hash of all settings that determine the pixels of a scene's frames.
 std::string frame_settings(const LoadedScene& loaded, const ModelLibrary& models, render::GlPlatform gl);
 /// Prints JSON as indented lines "key: value".
 void print_readable(const nlohmann::ordered_json& json, int indent = 0);
@@ -115,7 +115,8 @@ void write_text_file(const std::string& path, const std::string& text);
 /// Writes to the first name of STEM.EXT, STEM-2.EXT, ... that does not exist, and returns it.
 std::string write_numbered_file(const std::string& stem, const std::string& ending, const std::string& text);
 
-/// Checks before the work that a file can be written after it. An empty name is ignored. Throws OutputError.
+/// Throws OutputError if an output file could not be written. Called before a long run. An empty name is
+/// ignored.
 void check_file(const std::string& file, bool force);
 void check_distinct(const std::string& a, const std::string& b);
 /// Throws OutputError unless the name ends in .png.
@@ -126,7 +127,7 @@ int checked_frame(const Scene& scene, double number);
 /// Returns the frame nearest to a time [s]. Throws std::invalid_argument for a time outside of the film.
 int frame_at(const Scene& scene, double time);
 inline constexpr int kSmallSide_px = 320;  ///< side of the pictures of a sheet
-/// A size such as "320x180" for small pictures of a scene: its aspect ratio, with the given longer side.
+/// Returns a size such as "320x180" that has the scene's aspect ratio and the given longer side [pixels].
 std::string small_size(const Scene& scene, int longer_side_px);
 
 }  // namespace offstage::producer

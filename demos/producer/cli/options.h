@@ -33,7 +33,8 @@ struct SceneOptions {
   DecompositionCache decompositions() const {
     return no_cache ? DecompositionCache() : DecompositionCache::of_user();
   }
-  /// Returns the shorthands as overrides, then `set`. Throws std::invalid_argument for an invalid one.
+  /// Returns the overrides of the scene: first those of options such as --fps, then `set`. Throws
+  /// std::invalid_argument for an invalid value.
   std::vector<std::string> overrides() const;
   bool from_standard_input() const { return file == kStandardInput; }
 };
@@ -51,7 +52,8 @@ void add_overrides(CLI::App& command, SceneOptions& scene);
 void add_scene(CLI::App& command, SceneOptions& scene);
 void add_timing(CLI::App& command, SceneOptions& scene);
 void add_quality(CLI::App& command, SceneOptions& scene);
-/// Adds the options for quality and size: of a whole picture, or of each small picture of a contact sheet.
+/// Adds the options for quality and size of a whole picture (add_picture), or of each small picture of a
+/// contact sheet (add_small_picture).
 void add_picture(CLI::App& command, SceneOptions& scene);
 void add_small_picture(CLI::App& command, SceneOptions& scene);
 void add_log_options(CLI::App& command, LogOptions& log_options);

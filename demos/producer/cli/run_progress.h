@@ -11,13 +11,12 @@
 
 namespace offstage::producer {
 
-/// Prints the progress of a run; it is called as a ProgressCallback. The scene and the models must outlive
-/// this object.
+/// A ProgressCallback that prints the progress of a run. The scene and the models must outlive this object.
 class RunProgress {
  public:
   RunProgress(const Scene& scene, const ModelLibrary& models, const LogOptions& log_options);
   void operator()(const Progress& progress);
-  /// Ends the terminal's line.
+  /// Keeps the latest progress on a terminal and continues below it.
   void finish() { printer_.finish(); }
 
  private:
@@ -33,7 +32,8 @@ class RunProgress {
 
 /// Writes the statistics of a run to `stats_file`, unless that is empty, and prints its warnings and notes.
 void report_run(const RunStats& stats, const LogOptions& log_options, const std::string& stats_file);
-/// Returns the exit code of an interrupted run; prints how far it came and `advice`, how to continue.
+/// Prints the number of finished frames of an interrupted run, and `advice` on how to continue. Returns the
+/// exit code.
 int interrupted(const RunStats& stats, int total, const std::string& advice);
 
 }  // namespace offstage::producer

@@ -1,6 +1,6 @@
 #pragma once
-/// The constant parts of a film for other programs: meshes, materials and the objects that use them. A
-/// Snapshot has the positions of the objects; the indices here refer to its lists.
+/// The data of a film that do not change over time, for export: meshes, materials and the objects that use
+/// them. Snapshots have the positions of the objects; the indices here refer to the lists of a Snapshot.
 
 #include <cstdint>
 #include <optional>
@@ -90,10 +90,11 @@ class FilmParts {
   CameraRig camera_;
 };
 
-/// Places the cylinder of a rod between its ends; nothing if the rod does not exist any more.
+/// Returns the transform that places the cylinder of a rod between its ends; nothing if the rod no longer
+/// exists.
 std::optional<Eigen::Affine3f> rod_transform(const RodSample& rod);
 
-/// Triangles of a cloth at a frame, and texture coordinates of its points.
+/// Triangles, texture coordinates and normals of a cloth at a frame.
 struct ClothSurface {
   const std::vector<uint32_t>* triangles;
   std::vector<Eigen::Vector2f> uvs;

@@ -6,8 +6,8 @@
 
 namespace offstage::producer {
 
-/// The samples of one value. Other programs interpolate between two samples, so a value that was constant is
-/// sampled once more just before it changes.
+/// The samples of one value. Other programs interpolate between samples. A value that was constant therefore
+/// gets an additional sample at the last frame before it changes.
 template <class T>
 class SampleTrack {
  public:

@@ -1,6 +1,5 @@
 #pragma once
-/// Collects bytes that are produced frame by frame and needed as a whole at the end, in an unnamed temporary
-/// file.
+/// An unnamed temporary file for bytes that are produced frame by frame and are needed together at the end.
 
 #include <cstdint>
 #include <filesystem>

@@ -30,7 +30,8 @@ std::string text(const Eigen::Vector2f& v);
 std::string text(const Eigen::Vector3f& v);
 /// Text of a quatf, with the real part first.
 std::string text(const Eigen::Quaternionf& q);
-/// Text of a matrix4d. It is for row vectors, so it is the transpose of Eigen's matrix.
+/// Text of a matrix4d. USD multiplies row vectors by a matrix, so the text has the transpose of Eigen's
+/// matrix.
 std::string text(const Eigen::Matrix4f& transform);
 /// Text of a token.
 std::string text(const std::string& token);

@@ -58,7 +58,7 @@ constexpr Limits over(Real low, Real high) {
   return {.low = low, .high = high, .open_low = true};
 }
 
-/// Factors of size: with lengths of up to 1e9 m, no derived quantity overflows.
+/// Range of scale factors. With lengths of up to 1e9 m, no derived quantity overflows.
 inline constexpr Limits kScale{.low = 1e-9, .high = 1e9};
 
 /// Narrows the limits of a size, mass or coefficient to the range of its unit: lengths to [1e-9, 1e9] m,
@@ -91,7 +91,7 @@ class Reader {
     path_.resize(length);
   }
   Where where(Position at) const;
-  /// The first kMostProblems are stored, the rest are counted.
+  /// Reports a problem. The first kMostProblems are stored; the others are only counted.
   void fail(Position at, std::string what) {
     if (is_full())
       ++more_;
@@ -107,16 +107,17 @@ class Reader {
   std::optional<Real> number(const Node& node, const Spec& spec);
   /// Reads an integer; 1e6 and 3.0 are integers.
   std::optional<int64_t> integer(const Node& node, const Spec& spec);
-  /// Returns the list in `node` if it is one and has from `least` to `most` items.
+  /// Returns the list in `node`. Otherwise, or if it does not have `least` to `most` items, reports a problem
+  /// and returns null.
   const List* list(const Node& node, std::string_view allowed, std::size_t least = 0,
                    std::size_t most = SIZE_MAX);
   /// Returns the index in `names` of the string in `node`.
   std::optional<std::size_t> choice(const Node& node, std::span<const std::string> names);
-  /// Returns the index in `names` of the key "type" of an object; without that key 0, unless the key is
-  /// required.
+  /// Returns the index in `names` of an object's "type". An object without that key has index 0, unless the
+  /// key is `required`. Reports a problem and returns nothing for other values.
   std::optional<std::size_t> type(const Node& node, std::span<const std::string> names, bool required);
-  /// Calls read(i, value) for each key of an object that is specs[i], with that key's path. Reports unknown
-  /// keys (except "type" if the object is `tagged`) and missing required keys. `name` is the name of the
+  /// Calls read(i, value) for each key of an object that has the name of specs[i], while the path includes
+  /// the key. Reports unknown keys (except "type" if `tagged`) and missing required keys. `name` names the
   /// object in messages.
   void keys(const Node& node, std::string_view name, std::span<const Spec* const> specs, bool tagged,
             const std::function<void(std::size_t, const Node&)>& read);

@@ -20,7 +20,7 @@ namespace offstage::producer {
 
 /// Folder of the presets; empty if there is none.
 std::filesystem::path presets_folder();
-/// Returns their names in order.
+/// Returns the names of all presets, sorted.
 std::vector<std::string> preset_names();
 /// Returns the file of a preset. Throws SceneError with the existing names if there is none of that name.
 std::filesystem::path preset_file(const std::string& name, const SceneFolder& scene_folder = {});
@@ -33,8 +33,9 @@ struct EffectParts {
   std::size_t first_emitter = 0, emitters = 0, first_force = 0, forces = 0;
 };
 
-/// Merges presets into the emitters that name one, and adds those of effects to the emitters and forces of
-/// the tree. Values of a wrong type are left unchanged, for the reader to report.
+/// Merges the preset of each emitter that names one into that emitter. Also appends the emitters and forces
+/// of all effects to the lists of the tree. Values of a wrong type stay unchanged; the reader reports them
+/// later.
 std::vector<EffectParts> apply_presets(SceneSource& source, const SceneFolder& folder,
                                        std::vector<Problem>& problems);
 

@@ -21,11 +21,12 @@ struct Findings {
 /// `folder`. Problems have only the path of a value; the caller adds file and line.
 Findings check_scene(const Scene& scene, const Scene& flat, const SceneFolder& folder);
 
-/// Returns the longest step at which the integrator is stable for a damped spring of stiffness k and damping
-/// c on a reduced mass m.
+/// Returns the longest step [s] at which the integrator is stable for a damped spring. `k`: stiffness [N/m];
+/// `c`: damping [N s/m]; `m`: reduced mass [kg].
 Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real c, Real m);
 
-/// Returns an error message if a drag [kg/s] is too large for m, a mass or a moment of inertia.
+/// Returns an error message if a drag coefficient is too large for `m`: a linear drag [kg/s] with a mass
+/// [kg], or an angular drag [kg m^2/s] with a moment of inertia [kg m^2].
 std::optional<std::string> drag_problem(const Scene& scene, sim::IntegratorKind integrator, Real drag,
                                         Real m);
 /// Returns an error message if a position is outside of the world.

@@ -6,6 +6,7 @@
 
 namespace offstage::producer {
 
+/// Adds the problems to `findings`; `flat` is the same scene with placements expanded to copies.
 void check_film(const Scene& scene, const Scene& flat, const SceneFolder& folder, Findings& findings);
 
 }  // namespace offstage::producer

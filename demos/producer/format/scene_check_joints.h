@@ -5,6 +5,7 @@
 
 namespace offstage::producer {
 
+/// Adds the problems to `findings`; `flat` is the same scene with placements expanded to copies.
 void check_joints(const Scene& scene, const Scene& flat, Findings& findings);
 
 }  // namespace offstage::producer

@@ -21,7 +21,7 @@ struct ParticleBound {
   std::string name;
   uint64_t alive = 0;
 };
-/// Bounds for each particle system of a flat scene.
+/// Returns the bound of each particle system. `scene` must have its copies expanded.
 std::vector<ParticleBound> particle_bounds(const Scene& scene);
 
 }  // namespace offstage::producer

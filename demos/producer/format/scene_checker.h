@@ -30,6 +30,7 @@ const T* find_named(const std::vector<T>& objects, const std::string& name) {
   return it == objects.end() ? nullptr : &*it;
 }
 
+/// Returns an index as a step of a JSON pointer: "/3".
 inline std::string step(std::size_t i) {
   return "/" + std::to_string(i);
 }
@@ -55,7 +56,7 @@ class CheckBase {
   Findings& findings_;
 };
 
-/// Base of the checks of several kinds of objects. `flat` is the scene with its copies.
+/// Base class of the checks. `flat` is the scene with its copies expanded.
 class SceneChecker : protected CheckBase {
  protected:
   SceneChecker(const Scene& scene, const Scene& flat, const SceneFolder& folder, Findings& findings)

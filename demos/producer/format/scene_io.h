@@ -1,6 +1,6 @@
 #pragma once
-/// Scene files: reading with every problem reported at once, and the schema and the reference made from the
-/// same table.
+/// Reads scene files and reports all their problems at once. Also generates the schema and the reference from
+/// the table of keys.
 
 #include <filesystem>
 #include <string>
@@ -15,7 +15,7 @@ namespace offstage::producer {
 
 struct LoadedScene {
   Scene scene;
-  SceneFolder folder;  ///< folder of relative files
+  SceneFolder folder;  ///< folder to which file names in the scene are relative
   std::vector<Problem> warnings;
   /// The scene with all overrides and defaults, as compact JSON; it determines the result of a run.
   std::string canonical;

@@ -17,8 +17,8 @@ struct SceneSource {
   std::vector<std::string> files;  ///< names of the files to which positions refer
   Node root;
 
-  /// Position of the value at a JSON pointer; if it was not given, position of the object that would contain
-  /// it.
+  /// Returns the position of the value at a JSON pointer. If the value is missing, returns the position of
+  /// the nearest object that would contain it.
   Where locate(const std::string& path) const;
 };
 
@@ -29,8 +29,8 @@ inline constexpr const char* kStandardInputName = "<stdin>";
 /// Returns the text of a regular file of at most kMostTextBytes. Throws SceneError if it cannot be read.
 std::string read_text(const std::filesystem::path& file);
 
-/// Returns all of standard input, which is read once and stored. Throws SceneError if it cannot be read or is
-/// longer than 256 MiB.
+/// Returns the whole text of standard input. The first call reads and stores it. Throws SceneError if it
+/// cannot be read or is longer than 256 MiB.
 const std::string& standard_input();
 
 /// Parses `text` and its includes. Included files are searched beside the file that names them (`folder` for
@@ -39,12 +39,12 @@ const std::string& standard_input();
 /// itself.
 SceneSource read_source(std::string_view text, const std::string& name, const SceneFolder& folder);
 
-/// Merges `top` into `base`, object by object; an object with a "type" replaces one of another type.
+/// Merges `top` into `base`, key by key, also in nested objects. An object replaces one with another "type".
 void merge(Node& base, Node top);
 
-/// Sets a value of the tree as "path=value" says. A path has the form /emitters/0/rate or emitters.rain.rate;
-/// a value that is not JSON is taken as a string. Missing parts of the tree are created; a missing list gets
-/// the items that it has in `defaults`. Adds to `problems` if the path does not exist.
+/// Sets a value of the tree. `override` is "path=value", with a path such as /emitters/0/rate or
+/// emitters.rain.rate. A value that is not JSON becomes a string. Missing objects are created; a missing list
+/// is copied from `defaults`. Adds a problem if the path does not exist.
 void apply_override(SceneSource& source, const std::string& override, const Node& defaults,
                     std::vector<Problem>& problems);
 

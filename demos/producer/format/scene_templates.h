@@ -16,7 +16,7 @@ std::span<const EmbeddedText> templates();
 std::vector<std::string> template_names();
 /// The value of a template's key "description".
 std::string template_description(std::string_view text);
-/// A template as a scene of its own: the word SCENE in its comments becomes the file's name.
+/// Returns the text of a scene file made from a template. `file` replaces the word SCENE in its comments.
 std::string scene_from_template(std::string_view text, const std::string& file);
 
 }  // namespace offstage::producer

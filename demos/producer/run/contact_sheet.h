@@ -14,16 +14,16 @@ struct SheetCell {
   std::string fault = {};
 };
 
-/// Draws the sheet, cell after cell in rows of `columns`. Text that is too long is cut: labels at their
-/// start, where paths differ least, the heading at its end.
+/// Draws a sheet with `columns` pictures per row. Text that is too long is shortened: the heading at its end,
+/// labels at their start, because the ends of paths differ most.
 render::Image contact_sheet(const std::vector<std::string>& heading, const std::vector<SheetCell>& cells,
                             int columns);
 
 /// Throws std::invalid_argument if a sheet of this many pictures would be too large for a PNG.
 void check_sheet_size(std::size_t cells, int columns, int width_px, int height_px);
 
-/// Number of columns for this many pictures of one series: one row for a few, otherwise about as many columns
-/// as rows, with the fewest empty cells.
+/// Returns the number of columns for a series of `cells` pictures: a single row for a few pictures, otherwise
+/// about as many columns as rows, with as few empty cells as possible.
 int columns_for(std::size_t cells);
 
 }  // namespace offstage::producer

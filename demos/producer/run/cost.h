@@ -1,6 +1,6 @@
 #pragma once
-/// Cost of a scene: how the work is distributed over its objects, and how long the film takes on this
-/// machine, by a short trial.
+/// Estimates the cost of a scene: the share of each object, and, from a short trial run, the time that the
+/// film takes on this machine.
 
 #include <cstdint>
 #include <optional>
@@ -19,7 +19,7 @@ struct ObjectCost {
   std::string kind, name;   ///< "cloth", "sheet"
   std::size_t count = 1;    ///< number of copies
   std::string size;         ///< "1681 vertices"
-  std::string advice;       ///< advice how to make the object cheaper
+  std::string advice;       ///< advice on how to reduce the object's cost
   double simulation_s = 0;  ///< time per second of film
   double drawing_s = 0;     ///< time per frame
   uint64_t particles = 0;   ///< for an emitter: greatest number of particles alive at once

@@ -20,7 +20,7 @@ std::string csv_field(std::string_view text);
 class CsvRows {
  public:
   CsvRows& text(std::string_view value);
-  /// Stores the first number that is not finite.
+  /// Appends a number. After a number that is not finite, finite() returns false.
   CsvRows& number(double value);
   CsvRows& vector(const sim::Vec3& v) { return number(v.x()).number(v.y()).number(v.z()); }
   CsvRows& count(uint64_t value);

@@ -1,6 +1,6 @@
 #pragma once
-/// A film in steps for many machines: one simulation, the drawing in chunks, one encoding. Each step is a
-/// shell script that can be run again at any time, so it works with any queue system.
+/// Distributes a film over many machines in three steps: simulation, drawing in chunks, and encoding. Each
+/// step is a shell script that can be repeated at any time, so any job scheduler can run it.
 
 #include <filesystem>
 #include <string>

@@ -1,7 +1,7 @@
 #pragma once
-/// Properties that determine the bits of a picture besides the scene: GL, C library, processor class,
-/// compiler. Golden images are compared exactly if the fingerprints are equal, and within a tolerance
-/// otherwise.
+/// The fingerprint of a machine: the properties, besides the scene, that determine the bits of a picture.
+/// These are GL, C library, processor class and compiler. Golden images are compared exactly if the
+/// fingerprints are equal, otherwise within a tolerance.
 
 #include <string>
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Existing frames in a folder, found by their pattern and checked before use.
+/// Finds and checks the existing frames that match a pattern.
 
 #include <filesystem>
 #include <string>

@@ -1,6 +1,6 @@
 #pragma once
-/// One writer for each output. The lock is advisory (flock). The kernel holds it as long as the process runs,
-/// so a killed run leaves no lock behind.
+/// A lock that allows only one process to write an output. The lock is advisory (flock). The kernel holds it
+/// as long as the process runs, so a killed run leaves no lock behind.
 
 #include <filesystem>
 #include <functional>
@@ -22,9 +22,9 @@ class OutputLock {
   OutputLock(OutputLock&& other) noexcept;
   OutputLock& operator=(OutputLock&& other) noexcept;
 
-  /// Takes the lock of an output of which several processes write parts: shared if `may_share` returns true,
-  /// otherwise exclusive, to prepare the output and then call share(). Waits up to ten seconds while another
-  /// process prepares it.
+  /// Takes the lock of an output whose parts are written by several processes. The lock is shared if
+  /// `may_share` returns true. Otherwise it is exclusive: the caller prepares the output and then calls
+  /// share(). Waits up to ten seconds while another process prepares the output.
   static OutputLock of_part(std::filesystem::path file, const std::string& output,
                             const std::function<bool()>& may_share);
   /// Lets other processes share the lock.

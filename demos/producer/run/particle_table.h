@@ -1,6 +1,6 @@
 #pragma once
-/// A table of all particles over the frames of a film: of groups, emitters, and their child particles. It is
-/// streamed, so that its size is limited by the disk alone.
+/// Writes a table of all particles in all frames of a film: particles of groups and emitters, and child
+/// particles. Rows are written immediately, so only the disk limits the size of the table.
 ///
 /// Columns: frame, time [s], system, id, age [s], position [m], velocity [m/s], radius as drawn [m], colour
 /// and opacity as drawn. A file with the ending .bin is binary: one line of JSON with the names of the

@@ -94,7 +94,7 @@ class Pipeline {
     const std::lock_guard lock(mutex_);
     return failure_ != nullptr;
   }
-  /// Throws the first exception that ended a stage, if any. Must be called after the threads have ended.
+  /// Throws the first exception passed to fail(), if any. Must be called after the threads have ended.
   void rethrow_failure() const {
     if (failure_) std::rethrow_exception(failure_);
   }

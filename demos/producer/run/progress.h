@@ -30,7 +30,7 @@ class ProgressPrinter {
  public:
   explicit ProgressPrinter(ProgressStyle style);
   void operator()(const Progress& progress);
-  /// Ends the terminal's line.
+  /// Keeps the latest progress on a terminal and continues below it.
   void finish();
 
  private:

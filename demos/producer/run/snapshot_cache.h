@@ -32,7 +32,7 @@ class SnapshotCache {
   void open(const std::string& key, int frames);
   /// Whether open() would find this simulation.
   bool holds(const std::string& key, int frames) const;
-  /// Publishes the generation by one rename, and removes the generations that nobody reads or writes.
+  /// Publishes the generation by a single rename. Removes old generations that no process reads or writes.
   void publish();
   /// Removes the generation that was begun.
   void discard();

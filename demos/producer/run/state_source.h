@@ -1,6 +1,6 @@
 #pragma once
-/// Where the frame loop gets the states of a film from: the simulation, a cache on disk, or the memory of
-/// earlier simulations.
+/// Provides the states of a film to the frame loop: from the simulation, from a cache on disk, or from states
+/// of earlier simulations in memory.
 
 #include <functional>
 #include <memory>
@@ -20,8 +20,8 @@ class StateSource {
   virtual ~StateSource() = default;
   /// Number of calls of Simulation::advance() that at() needs for all frames up to `frame`.
   virtual int advances_to(int frame) = 0;
-  /// The state of a frame; null if `on_advance` returned false before. Frames are requested in ascending
-  /// order. Throws DivergedError, and FileError for a cache.
+  /// Returns the state of a frame; null if `on_advance` has stopped the simulation first. Frames are
+  /// requested in ascending order. Throws DivergedError, and FileError for a cache.
   virtual std::shared_ptr<const Snapshot> at(int frame, const OnAdvance& on_advance) = 0;
   /// Adds further data of the latest state.
   virtual void describe(FrameJob&) const {}

@@ -1,5 +1,5 @@
 #pragma once
-/// Data of a sweep: the values with which a scene is run, and the table of results.
+/// Data of a parameter sweep: the varied values of the scene, and the table of results.
 
 #include <cstddef>
 #include <string>

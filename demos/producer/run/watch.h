@@ -11,8 +11,8 @@
 namespace offstage::producer {
 
 /// Returns all files that a scene file names, directly or indirectly: includes, models and their parts,
-/// textures; and those named by `overrides`. In doubt a name counts as a file. Missing or damaged files are
-/// included, because they may be repaired.
+/// textures; and the files named by `overrides`. A text that may or may not be a file name is included.
+/// Missing or damaged files are included, too, because they may be repaired.
 std::set<std::filesystem::path> files_of_scene(const std::filesystem::path& scene,
                                                const std::vector<std::string>& overrides);
 

@@ -1,6 +1,6 @@
 #pragma once
-/// The cloths of a scene; see scene.h. Positions of pins and seams are those of the flat cloth in its own
-/// frame, so that copies of a cloth are pinned alike.
+/// The cloths of a scene; see scene.h. Pins, seams and cords select vertices by positions on the undeformed
+/// cloth, in the cloth's own frame. All copies of a cloth therefore have the same pins.
 
 #include <array>
 #include <optional>
@@ -14,8 +14,8 @@
 
 namespace offstage::producer {
 
-/// A rectangle in the plane y = 0 of the cloth's frame with its front towards +Y: left to right is along x,
-/// top to bottom along z.
+/// A rectangle in the plane y = 0 of the cloth's frame, centred on the origin. Its front faces +Y. Left to
+/// right is along +X, top to bottom along +Z.
 struct GridShape {
   Eigen::Vector2d size = {1, 1};
   Eigen::Vector2i cells = {40, 40};
@@ -23,11 +23,11 @@ struct GridShape {
 /// A closed sphere around the origin of the cloth's frame.
 struct SphereCloth {
   Real radius = 0.1;
-  int divisions = 3;  ///< number of divisions of the triangles of an icosahedron into four
+  int divisions = 3;  ///< how often each triangle of an icosahedron is divided into four
 };
 using ClothShape = std::variant<GridShape, MeshFile, SphereCloth>;
 
-/// Values that replace those of the cloth's fabric.
+/// Values of a cloth that replace values of its fabric. A value that is not set stays as in the fabric.
 struct FabricChanges {
   std::optional<Real> areal_density, stretch, shear, bend, damping, friction, self_friction, thickness, drag,
       lift, max_stretch, max_shear, bend_damping, stretch_damping, shear_damping, bend_spring_damping,
@@ -41,8 +41,8 @@ enum class Corner { top_left, top_right, bottom_left, bottom_right };
 /// The object to which a pin attaches the selected vertices.
 struct PinScope {
   Where where;
-  std::string body;  ///< name of the body; empty: the vertices stay at their positions
-  Real until = 1e30;
+  std::string body;   ///< name of the body; empty: the vertices are fixed in the world
+  Real until = 1e30;  ///< time at which the pin releases its vertices [s]
 };
 struct CornerPin : PinScope {
   std::vector<Corner> corners = {Corner::top_left, Corner::top_right, Corner::bottom_left,
@@ -50,11 +50,13 @@ struct CornerPin : PinScope {
 };
 struct SidePin : PinScope {
   Side side = Side::top;
-  int every = 1;  ///< holds every n-th vertex of the side, from the first
+  int every = 1;  ///< the pin holds every n-th vertex of the side, starting with the first
 };
+/// Holds the vertex nearest to a point.
 struct NearestPin : PinScope {
   Vec3 point = Vec3::Zero();
 };
+/// Holds all vertices inside a box whose edges are parallel to the axes of the cloth's frame.
 struct BoxPin : PinScope {
   Vec3 centre = Vec3::Zero();
   Vec3 size = Vec3::Ones();
@@ -65,7 +67,7 @@ using ClothPin = std::variant<CornerPin, SidePin, NearestPin, BoxPin>;
 struct SideSeam {
   Where where;
   Side a = Side::left, b = Side::right;
-  bool reversed = false;  ///< whether the first vertex of one side is sewn to the last of the other
+  bool reversed = false;  ///< whether the first vertex of `a` is sewn to the last vertex of `b`
 };
 /// A seam between the two vertices nearest to the points `a` and `b`.
 struct PointSeam {
@@ -74,7 +76,7 @@ struct PointSeam {
 };
 using ClothSeam = std::variant<SideSeam, PointSeam>;
 
-/// A cord that hangs on the vertex nearest to a point. Points are in the cloth's frame.
+/// A cord. One end is attached to the vertex nearest to `from`. Points are in the cloth's frame.
 struct ClothCord {
   Where where;
   Vec3 from = Vec3::Zero();
@@ -95,8 +97,8 @@ struct Cloth {
   std::string name;
   ClothShape shape = GridShape{};
   std::string fabric = "cotton";
-  FabricChanges changes;  ///< in the file, the keys of the changes are keys of the cloth
-  std::string material;   ///< name; empty: the look of the fabric
+  FabricChanges changes;  ///< in the file, these keys are keys of the cloth itself
+  std::string material;   ///< name of the material; empty: the look of the fabric
   Vec3 position = Vec3::Zero();
   Quat orientation = Quat::Identity();
   Vec3 velocity = Vec3::Zero();
@@ -118,7 +120,7 @@ struct Cloth {
   Real remove_at = 1e30;
   bool visible = true;
   bool casts_shadow = true;
-  Placement placement;  ///< in the file, the keys of the placement are keys of the cloth
+  Placement placement;  ///< in the file, these keys are keys of the cloth itself
 };
 
 }  // namespace offstage::producer

@@ -1,5 +1,5 @@
 #pragma once
-/// Effects of a scene: presets at a place; see scene.h and presets.h.
+/// Effects of a scene: presets that are placed in it; see scene.h and presets.h.
 
 #include <string>
 #include <vector>
@@ -9,18 +9,18 @@
 
 namespace offstage::producer {
 
-/// For emitters and forces of a preset, by their names: the keys to replace.
+/// Changes to a preset: an object that maps the name of an emitter or force to the keys that are replaced.
 struct Overrides {
   Node node = Object{};
 };
 
-/// All emitters and forces of a preset.
+/// A use of a preset: it adds all emitters and forces of the preset to the scene.
 struct Effect {
   Where where;
   std::string preset;
-  std::string name;  ///< prefix of the names of its emitters and forces; default: the preset's name
+  std::string name;  ///< prefix for the names of its objects; default: the preset's name
   Vec3 position = Vec3::Zero();
-  std::string body;  ///< body with which its emitters move; the position is then in the body's frame
+  std::string body;  ///< body that carries the emitters; `position` is then in its frame
   Real start = 0;
   Overrides overrides;
 };

@@ -24,15 +24,16 @@ namespace offstage::producer {
 
 enum class LookStyle { sprite, streak, sphere, smoke, fire, flake, drop, spark, mesh };
 
-/// A small object that is drawn for each particle, scaled so that it just fits into the particle's ball.
+/// A mesh that is drawn for each particle. It is scaled so that it just fits into a sphere with the
+/// particle's radius.
 struct LookMesh {
   Shape shape = sim::Box{};
   std::string material;       ///< name; empty: the default material, or that of the model file
-  std::optional<Vec3> axis;   ///< axis of `angle_deg` and `spin_deg_per_s`; default: random, per particle
+  std::optional<Vec3> axis;   ///< axis of rotation; default: a random axis for each particle
   bool along_motion = false;  ///< whether the mesh's +Y axis points along the velocity
 };
 
-/// Look of particles. Omitted values are those of the style; see points_def().
+/// Look of particles. The style gives the values that are not set; see points_def().
 struct ParticleLook {
   LookStyle style = LookStyle::sprite;
   Color color;
@@ -41,24 +42,25 @@ struct ParticleLook {
   std::vector<std::pair<Real, Real>> temperature_over_age;
   std::vector<std::pair<Real, Real>> size_over_age;  ///< [age 0..1, factor]
   effects::RampKind ramp = effects::RampKind::linear;
-  Real color_deviation = 0;  ///< deviation of brightness, per particle
-  /// Deviation of red, green, blue, alpha, per particle.
+  Real color_deviation = 0;  ///< deviation of the brightness between particles
+  /// Deviations of red, green, blue and alpha between particles.
   Eigen::Vector4d channel_deviation = Eigen::Vector4d::Zero();
   std::optional<bool> additive, lit, casts_shadow;
   std::optional<Real> softness, stretch, taper, metallic, roughness;
   std::string texture;  ///< picture of sprites; empty: a soft disc
   std::optional<render::SpriteSheet> sheet;
-  std::optional<LookMesh> mesh;  ///< object that the style `mesh` draws, which needs one
-  Varying angle_deg = 0.0;       ///< angle of a new particle
+  std::optional<LookMesh> mesh;  ///< what the style `mesh` draws; required by that style
+  Varying angle_deg = 0.0;       ///< angle of a particle at its birth time [degrees]
   Varying spin_deg_per_s = 0.0;
 
-  /// Whether the rotation of a particle can be seen in its look.
+  /// Whether a rotation of a particle changes its appearance.
   bool turns() const;
 };
 
-/// The look for the stage, with the defaults of its style.
+/// Converts a look for the stage. Values that are not set get the default of the style.
 render::PointsDef points_def(const ParticleLook& look);
 
+/// Initial state of one particle of a group.
 struct ParticlePlace {
   Vec3 position = Vec3::Zero();
   Vec3 velocity = Vec3::Zero();
@@ -69,9 +71,9 @@ struct ParticlePlace {
 struct ParticleGroup {
   Where where;
   std::string name;
-  /// Particles one by one; after loading, the particles of the file and of `fill` follow.
+  /// Particles that are listed one by one. Loading appends the particles of `file` and of `fill`.
   std::vector<ParticlePlace> places;
-  std::optional<Fill> fill;  ///< adds places
+  std::optional<Fill> fill;  ///< volume that is filled with further particles
   std::string file;          ///< PLY or OBJ file; empty: none
   ModelScale scale;
   std::optional<Vec3> fit;       ///< see MeshFile::fit
@@ -90,18 +92,18 @@ struct ParticleGroup {
   ParticleLook look;
 };
 
-/// Splitting of particles into others of the same kind, from a given age on. Percentages are those of the
+/// Splits each particle into several of the same kind when it reaches a given age. Percentages refer to the
 /// parent's values.
 struct Split : effects::SplitDef {
-  int delay_steps = 0;  ///< replaces `delay`: number of sub-steps of world.step
+  int delay_steps = 0;  ///< delay as a number of steps of length world.step; replaces `delay`
 };
 
 struct TrailSource;
 struct EventSource;
 struct AgeSource;
 
-/// The keys common to all sources of particles: properties of the particles, and their child particles. Each
-/// source has a particle system of its own.
+/// The keys that all sources of particles have: the properties of the new particles, and the sources that
+/// emit their child particles. Each source has its own particle system.
 struct ParticleSource : effects::NewParticles {
   Where where;
   std::string name;
@@ -114,17 +116,18 @@ struct ParticleSource : effects::NewParticles {
   std::vector<EventSource> on_collision, on_death;
 };
 
-/// Particles that every parent leaves behind.
+/// Releases child particles along the path of each parent particle.
 struct TrailSource : ParticleSource, effects::TrailRelease {
   TrailSource();
 };
 
-/// Particles that are released at an event of a parent.
+/// Releases child particles at an event of a parent particle, such as its death.
 struct EventSource : ParticleSource, effects::EventRelease {
   EventSource();
 };
+/// Releases child particles when a parent particle reaches an age.
 struct AgeSource : EventSource {
-  Real age = 1;
+  Real age = 1;  ///< [s]
 };
 
 /// A rectangle from which particles are released along `direction`.
@@ -134,7 +137,7 @@ struct PlaneSurface {
   Real turn_deg = 0;  ///< rotation of the rectangle about its direction
   Eigen::Vector2d size = {0.1, 0.1};
 
-  /// Maps +Y to the direction by the smallest rotation, after the turn.
+  /// Returns the rotation about +Y by `turn_deg`, followed by the smallest rotation from +Y to `direction`.
   Quat orientation() const;
 };
 struct SphereSurface {
@@ -153,36 +156,36 @@ struct MeshSurface {
   Quat orientation = Quat::Identity();
 };
 enum class Face { top, bottom, left, right, front, back };
-/// A face of the emitter's body: of a box, or the flat top and bottom of a round shape. Without a body, a
-/// face of a cube.
+/// A face of the emitter's body. The body is a box, or a round shape with a flat top and bottom. An emitter
+/// without a body has its own box, given here.
 struct FaceSurface {
   Face face = Face::top;
-  Vec3 position = Vec3::Zero();  ///< centre of the cube
-  Vec3 size = Vec3::Ones();      ///< size of the cube
+  Vec3 position = Vec3::Zero();  ///< centre of the emitter's own box
+  Vec3 size = Vec3::Ones();      ///< size of the emitter's own box
 };
 using EmitterSurface = std::variant<PlaneSurface, SphereSurface, DiscSurface, MeshSurface, FaceSurface>;
-/// Returns the face of a body's shape, or of the surface's own cube if it is null; none if the shape has no
-/// such face.
+/// Returns the face of a body's shape. If `body` is null, returns the face of the surface's own box. Returns
+/// nothing if the shape has no such face.
 std::optional<EmitterSurface> face_of(const FaceSurface& surface, const struct Body* body);
 
-/// The position of a surface, whatever its kind.
+/// Returns the position of a surface of any kind.
 Vec3& position_of(EmitterSurface& surface);
 const Vec3& position_of(const EmitterSurface& surface);
 
 struct Emitter : ParticleSource, effects::EmitterRelease {
-  std::string preset;  ///< already merged into the emitter when a scene is read
-  std::string body;    ///< name of the body with which the emitter moves; empty: fixed in the world
+  std::string preset;  ///< name of a preset; a loaded emitter already contains its values
+  std::string body;    ///< name of the body that carries the emitter; empty: fixed in the world
   EmitterSurface surface = PlaneSurface{};
   Placement placement;
 };
 
-/// What makes a source emit particles: a trail or an event of its parent. If neither is set, the source is an
-/// emitter.
+/// Describes how a source emits particles: along the path of a parent (`trail`) or at an event of a parent
+/// (`event`). If both are null, the source is an emitter.
 struct Emission {
   const TrailSource* trail = nullptr;
   const EventSource* event = nullptr;
   effects::Trigger trigger = effects::Trigger::collision;
-  Real age = 0;  ///< age for the trigger `age`
+  Real age = 0;  ///< age at which the trigger `age` emits [s]
 };
 
 namespace detail {
@@ -218,9 +221,8 @@ void visit_tree(const ParticleSource& source, const ParticleSource* parent, cons
 
 }  // namespace detail
 
-/// Calls visit(source, parent, name, emission) for an emitter and all of its child particles, parents first.
-/// The name of a child is that of its parent, a slash, and its own name. This is also the order of their
-/// point sets.
+/// Calls visit(source, parent, name, emission) for an emitter and all sources of its child particles, parents
+/// before children. The name of a child is "PARENT/CHILD". Snapshots have their point sets in the same order.
 template <class F>
 void for_each_source(const Emitter& emitter, F&& visit) {
   detail::visit_tree(emitter, nullptr, emitter.name, {}, visit);

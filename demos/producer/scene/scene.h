@@ -1,8 +1,8 @@
 #pragma once
-/// The scene as plain structs, as described by a file, before anything is built. Where a key means the same
-/// as a field of a definition of the simulation or of the effects, the struct contains that definition. The
-/// tables in format/ give each key its field, unit, range and help text, once, for the loader, the schema and
-/// the reference. SI units; angles are in degrees if a name ends in `_deg`.
+/// The scene as plain structs, with the values of its file, before anything is built. Some structs contain a
+/// definition of the simulation or the effects library, whose fields are then keys of the scene. The tables
+/// in format/ define the unit, range and help text of each key, for the loader, the schema and the reference.
+/// Units are SI units; angles are in degrees if a name ends in `_deg`.
 
 #include <array>
 #include <optional>
@@ -50,10 +50,11 @@ struct FabricLook {
   std::optional<Color> back_color;  ///< default: the colour of the front
 };
 
-/// Look and contact properties.
-/// `surface`: by the coordinates of the surface; `triplanar`: from the three sides of the body.
+/// Mapping of a texture. `surface` uses the texture coordinates of the mesh; `triplanar` projects the texture
+/// along the three axes of the body.
 enum class TextureProjection { surface, triplanar };
 
+/// Look and contact properties of a surface.
 struct Material {
   Where where;
   std::string name;
@@ -82,7 +83,8 @@ struct Material {
   Real rolling_friction = 0, spinning_friction = 0;
 };
 
-/// Contact properties of two materials, which replace those combined from both.
+/// Contact properties for a pair of materials. They replace the values that are otherwise combined from both
+/// materials.
 struct ContactRule : sim::ContactRule {
   Where where;
   std::array<std::string, 2> materials;  ///< names, in any order; they become `a` and `b`
@@ -97,9 +99,9 @@ struct ModelLook {
   Quat orientation = Quat::Identity();
 };
 
-/// An animation of a body's model file that is played.
+/// The animation that a body's model plays.
 struct ModelAnimation {
-  std::string clip;  ///< name, or number from 0; empty: the first one
+  std::string clip;  ///< name of the clip, or its index from 0; empty: the first clip
   Real speed = 1;
   Real start = 0;  ///< time at which the animation starts; until then its first pose is held
   bool loop = true;
@@ -107,8 +109,8 @@ struct ModelAnimation {
 
 struct BodyKey {
   Real time = 0;
-  std::optional<Vec3> position;     ///< default: the body's
-  std::optional<Quat> orientation;  ///< default: the body's
+  std::optional<Vec3> position;     ///< default: position of the body
+  std::optional<Quat> orientation;  ///< default: orientation of the body
   /// Interpolation to the next key; default: the interpolation of the body.
   std::optional<sim::Interpolation> interpolation;
 };
@@ -127,8 +129,8 @@ struct Body {
   Vec3 angular_velocity = Vec3::Zero();
   Real density = 1000;
   Real mass = 0;
-  std::optional<Vec3> centre;   ///< centre of mass, in the body's frame; default: the shape's centre of mass
-  std::optional<Vec3> inertia;  ///< moments Ixx, Iyy, Izz about the centre of mass; default: the shape's
+  std::optional<Vec3> centre;   ///< centre of mass, in the body's frame; default: computed from the shape
+  std::optional<Vec3> inertia;  ///< Ixx, Iyy, Izz about the centre of mass; default: from the shape
   Vec3 inertia_products = Vec3::Zero();  ///< Ixy, Iyz, Izx of the inertia matrix, with `inertia`
   Real linear_drag = 0;
   Real angular_drag = 0;
@@ -145,7 +147,7 @@ struct Body {
   Real remove_at = 1e30;
   Placement placement;  ///< in the file, the keys of the placement are keys of the body
 
-  /// Whether the parts of its shape move by an animation.
+  /// Whether an animation moves the parts of the body's collision shape.
   bool has_animated_shape() const { return animation && !model && std::holds_alternative<MeshFile>(shape); }
 };
 
@@ -177,70 +179,70 @@ struct LineLook {
 
 enum class BoundingVolumeKind { aabb, obb, sphere };
 
-/// The bounding tree of a mesh body, one level at a time.
+/// Draws one level of the bounding-volume tree of a mesh body.
 struct TreeOverlay : LineLook {
   Where where;
   std::string body;
   BoundingVolumeKind volume = BoundingVolumeKind::obb;
   Varying level = 3.0;  ///< 0: the root; between two integers the levels fade into each other
 };
-/// The convex parts of a mesh body in colours, instead of the body.
+/// Draws the convex parts of a mesh body in different colours, instead of the body.
 struct PartsOverlay {
   Where where;
   std::string body;
-  Varying explode = 0.0;  ///< additional distance of the parts from the centre, as a fraction
+  Varying explode = 0.0;  ///< moves the parts away from the centre, by this fraction of their distance
 };
-/// The closest points of two bodies, or the penetration of one in the other.
+/// Draws the closest points of two bodies, or their penetration if they overlap.
 struct ClosestOverlay : LineLook {
   Where where;
   std::string a, b;
   Color color{{1, 0.75f, 0.1f, 1}};
   Color penetrating{{1, 0.08f, 0.05f, 1}};
 };
-/// Contact points of bodies and the directions of their forces: the contacts of the simulation, and contacts
-/// by geometry for bodies that are not dynamic, for which the simulation has none.
+/// Draws contact points of bodies and the directions of their forces. The simulation has no contacts between
+/// bodies that are not dynamic; for them the contact points are computed from the geometry.
 struct ContactsOverlay : LineLook {
   Where where;
   std::string a, b;      ///< names of two bodies; both empty: all pairs of bodies
-  Real margin = 0.01;    ///< distance that counts as touching, for contacts by geometry
+  Real margin = 0.01;    ///< greatest distance of a contact computed from the geometry [m]
   Real size = 0.06;      ///< radius of the ring around a point; its arrow is four times as long
   Real force_scale = 0;  ///< length of an arrow per newton of the contact's force
   Color color{{1, 0.75f, 0.1f, 1}};
 };
-/// Velocities of bodies, as arrows from their centres of mass.
+/// Draws velocities of bodies as arrows from their centres of mass.
 struct VelocitiesOverlay : LineLook {
   Where where;
-  std::string body;        ///< empty: all that move
+  std::string body;        ///< empty: all moving bodies
   Real scale = 0.2;        ///< length per m/s
   Real angular_scale = 0;  ///< length of a second arrow along the axis of rotation, per rad/s
   Color color{{0.2f, 0.8f, 1, 1}};
   Color angular_color{{1, 0.3f, 0.8f, 1}};
 };
-/// Islands: a box around each body, in the colour of its island.
+/// Draws a box around each body, in the colour of its island.
 struct IslandsOverlay : LineLook {
   Where where;
   Real asleep = 0.25;  ///< brightness of bodies that are asleep
 };
-/// Joints: their positions, their free axes, and their loads.
+/// Draws the positions, free axes and loads of joints.
 struct JointsOverlay : LineLook {
   Where where;
-  std::string joint;     ///< empty: all
+  std::string joint;     ///< empty: all joints
   Real size = 0.08;      ///< radius of the ring around an axis; the axis is drawn four times as long
-  Real force_scale = 0;  ///< length of an arrow per newton on a; 0: none
+  Real force_scale = 0;  ///< length of an arrow per newton on body a; 0: no arrows
   Color color{{1, 0.45f, 0.1f, 1}};
   Color force_color{{0.2f, 0.8f, 1, 1}};
 };
-/// The threads of cloths, coloured by strain: blue at rest, red where stretched.
+/// Draws the threads of cloths in colours of their strain, from blue (0) to red (`strain`).
 struct ClothOverlay : LineLook {
   Where where;
-  std::string cloth;   ///< empty: all
-  Real strain = 0.05;  ///< strain of a red thread
+  std::string cloth;   ///< empty: all cloths
+  Real strain = 0.05;  ///< strain at which a thread is red
 };
-/// Past positions of the centres of mass of bodies.
+/// Draws the paths along which the centres of mass of bodies have moved.
 struct TrailsOverlay : LineLook {
   Where where;
   std::string body;            ///< empty: all dynamic bodies
-  Real duration = 1;           ///< time span
+  Real duration = 1;           ///< time span of the path [s]
   std::optional<Color> color;  ///< default: a different colour for each body
 };
 enum class TextPlace { top_left, top_right, bottom_left, bottom_right, center };
@@ -249,9 +251,9 @@ struct TextOverlay {
   Where where;
   std::string text = "{time}";
   TextPlace place = TextPlace::bottom_left;
-  Real size = 0.035;  ///< height of a line, as a fraction of the picture's
+  Real size = 0.035;  ///< height of a line of text, as a fraction of the picture's height
   Color color{{1, 1, 1, 1}};
-  Real from = 0;  ///< start of its display
+  Real from = 0;  ///< time at which the text appears [s]
   std::optional<Real> until;
 };
 /// Lines and text over the picture that show the state of the simulation.
@@ -264,8 +266,8 @@ struct Lens {
   std::optional<Real> focal_mm;  ///< replaces fov_deg
   Real aperture = 0;
   Real focus = 0;
-  std::string focus_on;          ///< body; replaces `focus`
-  std::string look_at;           ///< body; replaces the target
+  std::string focus_on;          ///< body on which the camera focuses; replaces `focus`
+  std::string look_at;           ///< body to which the camera points; replaces the target
   std::vector<std::string> fit;  ///< bodies that are to fill the picture
 };
 struct StaticCamera : Lens {
@@ -296,11 +298,11 @@ struct FollowCamera : Lens {
   Vec3 offset = {0, 2, 6};  ///< position of the eye relative to the body, world axes
   Vec3 look_offset = Vec3::Zero();
 };
-/// A camera of the model file that a body shows. Its field of view comes from the file.
+/// A camera of a body's model file. The file gives its field of view.
 struct ModelCamera : Lens {
   Where where;
   std::string body;
-  std::string name;  ///< empty: the first one
+  std::string name;  ///< name of the camera in the file; empty: the first camera
 };
 using Camera = std::variant<StaticCamera, KeyframedCamera, OrbitCamera, FollowCamera, ModelCamera>;
 
@@ -310,8 +312,8 @@ struct NamedCamera {
   std::string name;
   Camera camera = StaticCamera{};
 };
-inline constexpr const char* kMainCamera = "main";  ///< name of Scene::camera
-inline constexpr const char* kAllCameras = "all";   ///< all of them
+inline constexpr const char* kMainCamera = "main";  ///< selects Scene::camera
+inline constexpr const char* kAllCameras = "all";   ///< selects all cameras
 
 struct SunLight {
   Vec3 direction = {0.45, 0.75, 0.5};  ///< direction towards the sun
@@ -320,10 +322,10 @@ struct SunLight {
   Real size_deg = 1.5;
   bool shadows = true;
 };
-/// The keys that all lights near the scene have: all but the sun.
+/// The keys of all lights that have a position, which are all lights except the sun.
 struct LampBase {
   Where where;
-  std::string body;  ///< body that carries it; empty: none
+  std::string body;  ///< body that carries the light; empty: fixed in the world
   Vec3 position = {0, 3, 0};
   Color color{{1, 0.85f, 0.65f, 1}};
   Varying intensity = 10.0;  ///< brightness of a white surface 1 m away that faces it
@@ -342,7 +344,7 @@ struct AreaLight : LampBase {
   Vec3 target = Vec3::Zero();
   Eigen::Vector2d size = {1, 1};
 };
-/// Lights of the model file that a body shows.
+/// Lights of a body's model file.
 struct ModelLights {
   Where where;
   std::string body;
@@ -376,11 +378,13 @@ struct EnvironmentSettings {
   std::optional<SkyPictureSettings> picture;
 };
 
-/// Sub-frames per frame: draft 1 and an edge filter, preview 4, final 16. Never changes the physics.
+/// Number of sub-frames per frame: draft 1 (with an edge filter), preview 4, final 16. The quality never
+/// changes the simulation.
 enum class Quality { draft, preview, final };
 int subframes(Quality quality);
 
-/// `automatic`: the exposure is chosen for each frame, such that all frames have the same mean brightness.
+/// Choice of the exposure. `automatic` chooses it for each frame so that all frames have the same mean
+/// brightness.
 enum class Metering { fixed, automatic };
 
 struct RenderSettings {
@@ -389,7 +393,7 @@ struct RenderSettings {
   Real shutter = 0.5;  ///< fraction of the frame time during which the shutter is open
   Varying exposure = 1.0;
   Metering metering = Metering::fixed;
-  Real bloom = 0.12;  ///< fraction of the light beyond white that is spread as glow
+  Real bloom = 0.12;  ///< fraction of the light brighter than white that spreads as glow
   render::ToneCurve tone_curve = render::ToneCurve::filmic;
 };
 
@@ -416,11 +420,11 @@ struct Scene {
   std::vector<Body> bodies;
   std::vector<ParticleGroup> particles;
   std::vector<Emitter> emitters;
-  /// Presets at places; after loading, their emitters and forces are among the others.
+  /// Presets that are placed in the scene. Loading moves their emitters and forces to the lists of the scene.
   std::vector<Effect> effects;
   std::vector<Spring> springs;
   std::vector<Joint> joints;
-  /// When copies are expanded, these are replaced by their bodies and joints.
+  /// Ready-made articulations. Expanding the copies replaces them by their bodies and joints.
   std::vector<ArticulationTemplate> articulations;
   std::vector<Cloth> cloths;
   std::vector<Force> forces;
