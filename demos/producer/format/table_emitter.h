@@ -106,7 +106,7 @@ template <>
 struct Names<effects::Axis> {
   static constexpr std::array kNames = {"normal", "velocity"};
 };
-/// Keys that all sub-emitters have: those of collisions, of deaths and of ages.
+/// Keys that all sub-emitters have: `on_collision`, `on_death` and `on_age`.
 template <class T>
 Fields<T> event_fields() {
   return with_offspring(Fields<T>{

@@ -41,7 +41,7 @@ struct JointBehaviour {
   std::optional<std::array<Real, 2>> limits;
   std::optional<std::array<Real, 2>> length_limits;  ///< least and greatest length of a rope [m]
   std::optional<std::array<Real, 2>> limits_deg;     ///< limits of rotation [degrees]
-  std::optional<Real> swing_deg;  ///< greatest angle of swing of a spherical joint [degrees]
+  std::optional<Real> swing_deg;  ///< greatest swing of a spherical or universal joint [degrees]
   Real restitution = 0;           ///< coefficient of restitution at the limits
   Real stiffness = 0;             ///< stiffness of a spherical joint [N m/rad]
   Real friction = 0, damping = 0;
