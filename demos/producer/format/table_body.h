@@ -1,6 +1,6 @@
 #pragma once
-/// The keys of an entry of `bodies`, with its model, animation and keyframes. Those of its shape are in
-/// table_shape.h, those of its copies in table_placement.h.
+/// The keys of an entry of `bodies`, with its model, animation and keyframes. table_shape.h has the keys of
+/// its shape, and table_placement.h has the keys of its copies.
 
 #include <array>
 

@@ -1,5 +1,5 @@
 #pragma once
-/// The keys of an entry of `effects`, which names a preset.
+/// The keys of an entry of `effects`. Each entry names a preset.
 
 #include "producer/format/values.h"
 #include "producer/scene/effects.h"

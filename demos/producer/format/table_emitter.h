@@ -1,6 +1,7 @@
 #pragma once
-/// The keys of an entry of `emitters`: the surface, the times of its releases, and the new particles, which
-/// can split, leave trails, and release other particles at an age, a death or a collision.
+/// The keys of an entry of `emitters`: its surface, the times at which it releases particles, and the
+/// properties of the particles. Particles can split and leave trails. They can also release other particles
+/// at an age, a death or a collision.
 
 #include <array>
 
@@ -72,7 +73,7 @@ struct Table<ParticleSource> {
         .with(&T::behaviour);
   }
 };
-/// Appends the keys of child particles, which all sources have.
+/// Appends the keys of child particles, which all sources of particles have.
 template <class T>
 Fields<T> with_offspring(Fields<T> fields) {
   return std::move(fields).then({
@@ -107,7 +108,7 @@ template <>
 struct Names<effects::Axis> {
   static constexpr std::array kNames = {"normal", "velocity"};
 };
-/// Keys that all sub-emitters have: those of collisions, of deaths and of ages.
+/// Returns the keys that all sub-emitters have, whether they react to a collision, a death or an age.
 template <class T>
 Fields<T> event_fields() {
   return with_offspring(Fields<T>{

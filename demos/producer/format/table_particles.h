@@ -1,6 +1,6 @@
 #pragma once
-/// The keys of an entry of `particles`, a group of particles that are placed one by one; and the keys by
-/// which all particles move and collide, which emitters have, too.
+/// The keys of an entry of `particles`, a group of particles that are placed one by one. Also the keys for
+/// the motion and the collisions of particles, which groups and emitters have in common.
 
 #include "producer/format/table_particle_look.h"
 #include "producer/format/table_placement.h"

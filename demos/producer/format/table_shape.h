@@ -7,7 +7,7 @@
 
 namespace offstage::producer {
 
-/// Help of the keys `scale` and `fit`, which every object with a model file has.
+/// Help texts of the keys `scale` and `fit`, which every object with a model file has.
 inline constexpr const char* kModelScaleHelp =
     "scale factor of the model; `auto` converts the likely unit of the file to metres (docs/models.md). "
     "`offstage info FILE` shows the factor";
