@@ -133,7 +133,7 @@ void add_to(XXH3_state_t* hash, const render::Model& model) {
                              static_cast<float>(light.kind)};
     XXH3_128bits_update(hash, numbers, sizeof numbers);
   }
-  // The automatic scale depends on the whole file, of which this may be a node.
+  // The automatic scale depends on the whole file, but this model may be a single node of it.
   const float file_size = model.file_size.value_or(0);
   XXH3_128bits_update(hash, &file_size, sizeof file_size);
   XXH3_128bits_update(hash, &model.unit_source, sizeof model.unit_source);
@@ -171,11 +171,11 @@ void for_each_look(const Scene& scene, Visit visit) {
                     [&](const ParticleSource& source, const auto&...) { visit(source.look, source.where); });
 }
 
-/// All files named by a scene, with the first place that names each.
+/// All files that a scene names. Each is stored with the first place in the scene that names it.
 struct Files {
   std::map<std::string, Where> models, textures;
-  std::set<std::string> animated;   ///< those of the models that are read with their animations
-  std::set<std::string> automatic;  ///< those of the models whose scale depends on the size of their file
+  std::set<std::string> animated;   ///< model files that are read with their animations
+  std::set<std::string> automatic;  ///< model files used with an automatic scale and without `fit`
 };
 
 Files files_of(const Scene& scene) {

@@ -20,7 +20,8 @@ std::string quoted(std::span<const std::string> names) {
   return text;
 }
 
-/// An object in a default is reduced to its type: {} stands for all of its own defaults.
+/// Returns a default as the reference shows it: each object is reduced to its type, and {} stands for an
+/// object with all of its own defaults.
 Node abridged(const Node& node) {
   if (const List* list = node.as<List>()) {
     List items;
@@ -32,7 +33,7 @@ Node abridged(const Node& node) {
   return type ? Object{{"type", *type}} : Object{};
 }
 
-/// Adds a key to its object's entry: the description of its value, and its help.
+/// Adds a key to the entry of its object, with the description of its value and its help text.
 void describe_key(const Spec& spec, Description value, const std::optional<Node>& initial,
                   ObjectEntry& entry) {
   Row row{spec.key, value.type, spec.unit, spec.limits.range(), "none", spec.help};
@@ -62,7 +63,8 @@ void describe_tag(const std::string& tag, bool required, ObjectEntry& entry) {
 Limits within_unit(Limits limits, std::string_view unit) {
   if (limits.low != 0) return limits;
   const auto narrow = [&](Real low, Real high) {
-    if (limits.open_low) limits.low = low;  // stays open: a varying number still needs a "min"
+    if (limits.open_low)
+      limits.low = low;  // the bound stays excluded, so that a varying number still needs a "min"
     limits.high = std::min(limits.high, high);
   };
   if (unit == "m")

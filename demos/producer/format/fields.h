@@ -1,9 +1,9 @@
 #pragma once
-/// One description of each key of the scene format, from which reading, writing, the schema and the reference
-/// follow.
+/// The parts of the table of keys. Each key of the scene format is described once. The reader, the writer,
+/// the schema and the reference all use this description.
 ///
-/// Table<T> lists the keys of a struct T as Fields<T>; Codec<V> defines the JSON form of a value of type V.
-/// scene_table.h says where a new key goes.
+/// Table<T> lists the keys of a struct T as Fields<T>. Codec<V> defines the JSON form of a value of type V.
+/// scene_table.h says to which file a new key is added.
 
 #include <cstddef>
 #include <cstdint>
@@ -39,17 +39,19 @@ struct Limits {
 
   bool bounded() const { return low > -kInfinity || high < kInfinity; }
   bool allows(Real v) const { return (open_low ? v > low : v >= low) && (open_high ? v < high : v <= high); }
-  std::string range() const;                      ///< text for a table: "> 0", "0 .. 1"
-  std::string rule(std::string_view unit) const;  ///< text for a sentence: "greater than 0 m"
-  void add_to(Object& schema) const;              ///< adds minimum, exclusiveMaximum ...
+  std::string range() const;                      ///< the range as in a table: "> 0", "0 .. 1"
+  std::string rule(std::string_view unit) const;  ///< the range as in a sentence: "greater than 0 m"
+  void add_to(Object& schema) const;              ///< adds "minimum", "exclusiveMaximum" and so on
 };
 inline constexpr Limits kPositive{.low = 0, .open_low = true};
 inline constexpr Limits kNotNegative{.low = 0};
 inline constexpr Limits kFraction{.low = 0, .high = 1};
 inline constexpr Limits kDirection{.nonzero = true};
+/// From `low` to `high`, both included.
 constexpr Limits between(Real low, Real high) {
   return {.low = low, .high = high};
 }
+/// Greater than `low` and less than `high`.
 constexpr Limits inside(Real low, Real high) {
   return {.low = low, .high = high, .open_low = true, .open_high = true};
 }
@@ -58,18 +60,19 @@ constexpr Limits over(Real low, Real high) {
   return {.low = low, .high = high, .open_low = true};
 }
 
-/// Range of scale factors. With lengths of up to 1e9 m, no derived quantity overflows.
+/// Range of scale factors. A length of at most 1e9 m times such a factor causes no overflow in quantities
+/// computed from it.
 inline constexpr Limits kScale{.low = 1e-9, .high = 1e9};
 
 /// Narrows the limits of a size, mass or coefficient to the range of its unit: lengths to [1e-9, 1e9] m,
-/// masses to at most 1e30 kg, densities to [1e-12, 1e12] kg/m^3, coefficients to at most 1e30. Where 0 itself
-/// is allowed, it stays the lower limit. Limits whose lower end is not 0 are returned unchanged.
+/// masses to at most 1e30 kg, densities to [1e-12, 1e12] kg/m^3, coefficients to at most 1e30. If the given
+/// limits allow 0, the result allows 0, too. Limits whose lower end is not 0 are returned unchanged.
 Limits within_unit(Limits limits, std::string_view unit);
 
 struct Required {};
 inline constexpr Required kRequired;
 
-/// Name, help, unit and limits of one key; whether it is required.
+/// Name, help text, unit and limits of one key, and whether the key is required.
 struct Spec {
   std::string key, help, unit;
   Limits limits;
@@ -82,7 +85,7 @@ class Reader {
   /// `files`: names of the files to which Position::file refers.
   explicit Reader(std::span<const std::string> files) : files_(files) {}
 
-  /// Runs f while one step is appended to the path in messages.
+  /// Appends `step` to the path in messages, runs f, and removes the step again.
   template <class F>
   void within(std::string_view step, F&& f) {
     const std::size_t length = path_.size();
@@ -90,6 +93,7 @@ class Reader {
     f();
     path_.resize(length);
   }
+  /// Returns the file, line, column and path that a message about `at` shows.
   Where where(Position at) const;
   /// Reports a problem. The first kMostProblems are stored; the others are only counted.
   void fail(Position at, std::string what) {
@@ -103,22 +107,24 @@ class Reader {
   /// Reports the problem "must be ALLOWED, got VALUE", such as "must be a number, got true".
   void refuse(const Node& node, std::string_view allowed);
 
-  /// Returns the number in `node` if it is one, within the limits.
+  /// Returns the number in `node`. If it is not a number, or not within the limits, reports a problem and
+  /// returns nothing.
   std::optional<Real> number(const Node& node, const Spec& spec);
-  /// Reads an integer; 1e6 and 3.0 are integers.
+  /// Returns the integer in `node`, otherwise like number(). The numbers 1e6 and 3.0 are integers, too.
   std::optional<int64_t> integer(const Node& node, const Spec& spec);
-  /// Returns the list in `node`. Otherwise, or if it does not have `least` to `most` items, reports a problem
-  /// and returns null.
+  /// Returns the list in `node`. If it is not a list of `least` to `most` items, reports a problem and
+  /// returns null. `allowed` names the expected value in the message.
   const List* list(const Node& node, std::string_view allowed, std::size_t least = 0,
                    std::size_t most = SIZE_MAX);
-  /// Returns the index in `names` of the string in `node`.
+  /// Returns the index of the string in `node` within `names`. If it is not one of the names, reports a
+  /// problem and returns nothing.
   std::optional<std::size_t> choice(const Node& node, std::span<const std::string> names);
-  /// Returns the index in `names` of an object's "type". An object without that key has index 0, unless the
-  /// key is `required`. Reports a problem and returns nothing for other values.
+  /// Returns the index of an object's "type" within `names`. An object without the key "type" has index 0,
+  /// unless the key is `required`. In all other cases, reports a problem and returns nothing.
   std::optional<std::size_t> type(const Node& node, std::span<const std::string> names, bool required);
-  /// Calls read(i, value) for each key of an object that has the name of specs[i], while the path includes
-  /// the key. Reports unknown keys (except "type" if `tagged`) and missing required keys. `name` names the
-  /// object in messages.
+  /// Calls read(i, value) for each member of an object whose key is described by specs[i]. During the call,
+  /// the path in messages includes the key. Reports unknown keys and missing required keys; if `tagged`, the
+  /// key "type" is known. Messages call the object `name`.
   void keys(const Node& node, std::string_view name, std::span<const Spec* const> specs, bool tagged,
             const std::function<void(std::size_t, const Node&)>& read);
 
@@ -131,13 +137,13 @@ class Reader {
   std::size_t more_ = 0;
 };
 
-/// Description of a kind of value: as JSON Schema, and in one word for the reference.
+/// Description of a kind of value: as JSON Schema, and as a short text for the reference.
 struct Description {
   Object schema;
   std::string type;
 };
 
-/// One row of the reference.
+/// One row of a table in the reference.
 struct Row {
   std::string key, type, unit, range, initial, help;
 };
@@ -145,19 +151,20 @@ struct Row {
 struct ObjectEntry {
   std::string name, help;
   std::vector<Row> rows;
-  Object properties;                      ///< key to JSON Schema
-  List required;                          ///< keys
+  Object properties;                      ///< JSON Schema of each key
+  List required;                          ///< keys that are required
   std::vector<std::string> alternatives;  ///< names of the objects to choose from
 
   Node definition() const;  ///< JSON Schema
 };
-/// All objects of the format. Each comes after the first object that refers to it.
+/// All objects of the format. An object is listed after the first object that refers to it.
 class Catalogue {
  public:
-  /// Returns a reference to the named object; `describe` fills in its entry the first time.
+  /// Returns a reference to the object `name`. The first call for a name adds its entry, and calls `describe`
+  /// to fill it in.
   Description refer(const std::string& name, std::string_view help,
                     const std::function<void(ObjectEntry&)>& describe);
-  /// Returns a reference to a schema that many keys share.
+  /// Stores a schema that many keys share under `name`, and returns a reference to it.
   Object share(const std::string& name, const Node& schema);
 
   const std::deque<ObjectEntry>& objects() const { return objects_; }
@@ -169,13 +176,16 @@ class Catalogue {
 };
 
 /// Reads, writes and describes a value of type V, by three static functions:
-/// - `void read(Reader&, const Node&, const Spec&, V& out)` leaves a usable `out` if the value is wrong;
-/// - `Node write(const V&)`, or `std::optional<Node>` where a value can be absent;
+/// - `void read(Reader&, const Node&, const Spec&, V& out)`. For a wrong value it reports a problem and
+/// leaves
+///   a usable value in `out`.
+/// - `Node write(const V&)`, or `std::optional<Node> write(const V&)` if the value can be absent.
 /// - `Description describe(Catalogue&, const Spec&)`.
 template <class V>
 struct Codec;
 
-/// The keys of T: `kName`, `kHelp` and `static Fields<T> fields()`.
+/// The keys of T. Each specialization has `static Fields<T> fields()`. An object of the format also has
+/// `kName` and `kHelp`; without them, the keys are a part of other objects.
 template <class T>
 struct Table;
 template <class T>
@@ -183,9 +193,9 @@ concept Tabled = requires {
   Table<T>::kName;
 };
 
-/// The codec of one type, with the type erased: values are given by their address. The code below does not
-/// depend on the types of values and objects; otherwise two hundred keys would be as many classes of
-/// functions to compile.
+/// A codec with its type erased: it takes the addresses of values. The code of keys and objects therefore
+/// does not depend on their types. Otherwise the compiler would generate this code for each of two hundred
+/// keys.
 struct ValueKind {
   void (*read)(Reader&, const Node&, const Spec&, void* out);
   std::optional<Node> (*write)(const void* value);
@@ -199,7 +209,7 @@ inline constexpr ValueKind kValueKind = {
     [](const void* value) -> std::optional<Node> { return Codec<V>::write(*static_cast<const V*>(value)); },
     [](Catalogue& all, const Spec& spec) { return Codec<V>::describe(all, spec); }};
 
-/// A key of an object: its Spec, and the position of its value in the object.
+/// A key of an object: its Spec, its codec, and the position of its value in the object.
 struct Key {
   Spec spec;
   const ValueKind* kind;
@@ -228,7 +238,7 @@ std::ptrdiff_t offset_in(const Part& part) {
   return reinterpret_cast<const std::byte*>(&part) - reinterpret_cast<const std::byte*>(&initial_object<T>());
 }
 
-/// A key of objects of type T, from one of its members.
+/// A key of objects of type T, whose value is a member of T.
 template <class T>
 struct Field : Key {
   template <class M, class C>
@@ -244,10 +254,10 @@ struct Field : Key {
       : Key(key, help, unit, limits, required, kValueKind<M>, offset_in<T>(initial_object<T>().*member)) {}
 };
 
-/// Adds the keys of a part at `offset` in the object.
+/// Appends the keys of a part to the keys of an object. `offset`: position of the part in the object [bytes].
 void append(std::vector<Key>& keys, std::span<const Key> part, std::ptrdiff_t offset);
 
-/// The keys of T, in the order of the reference.
+/// The keys of T, in the order in which the reference lists them.
 template <class T>
 class Fields {
  public:
@@ -310,7 +320,7 @@ struct Codec<T> {
   }
 };
 
-/// Names of an enumeration's values, in their order: `static constexpr std::array kNames`.
+/// Names of the values of an enumeration, in the order of the values: `static constexpr std::array kNames`.
 template <class E>
 struct Names;
 
@@ -327,9 +337,9 @@ struct Codec<E> {
   static Description describe(Catalogue&, const Spec&) { return describe_names(Names<E>::kNames); }
 };
 
-/// Names of the alternatives of a variant, which the key "type" distinguishes: `kName`, `kHelp`, `kTags` with
-/// one name for each alternative, and `kRequired`; if it is false, an object without "type" is the first
-/// alternative.
+/// Names of the alternatives of a variant. The key "type" tells which alternative an object is. A
+/// specialization has `kName`, `kHelp`, `kTags` with one name for each alternative, and `kRequired`. If
+/// `kRequired` is false, an object without "type" is the first alternative.
 template <class V>
 struct Tags;
 

@@ -18,7 +18,8 @@ std::string text_of(const Node* node) {
   return text ? *text : "";
 }
 
-/// Returns the list at a key of an object, created if there is none; null if the value is not a list.
+/// Returns the list at a key of an object. Creates the list if the key is missing. Returns null if the value
+/// is not a list.
 List* list_in(Node& object, std::string_view key) {
   if (Node* node = object.find(key)) return node->as<List>();
   Object* members = object.as<Object>();
@@ -68,7 +69,7 @@ class Layer {
     problems_.push_back({{file, at.at.line, at.at.column, path}, what});
   }
 
-  /// Returns the tree of a preset, or null with a problem.
+  /// Returns the tree of a preset. If it cannot be read, adds a problem and returns null.
   const Node* preset(const std::string& name, const Node& at, const std::string& path) {
     if (const auto known = presets_.find(name); known != presets_.end()) return &known->second;
     try {
@@ -120,8 +121,8 @@ class Layer {
     emitter = std::move(base);
   }
 
-  /// Adds the items of a preset's list, with the keys that replace theirs; returns their number. Removes
-  /// their names from `unused`.
+  /// Appends the items of a preset's list to the list of the scene, with their overrides applied. Removes the
+  /// names of the items from `unused`. Returns the number of items.
   std::size_t add_items(const Node& tree, std::string_view key, const Node* overrides,
                         std::vector<std::string>& unused) {
     const Node* items = tree.find(key);

@@ -18,29 +18,30 @@
 
 namespace offstage::producer {
 
-/// Folder of the presets; empty if there is none.
+/// Returns the folder of the presets; an empty path if there is none.
 std::filesystem::path presets_folder();
 /// Returns the names of all presets, sorted.
 std::vector<std::string> preset_names();
-/// Returns the file of a preset. Throws SceneError with the existing names if there is none of that name.
+/// Returns the file of a preset. If there is no preset of that name, throws SceneError with the existing
+/// names.
 std::filesystem::path preset_file(const std::string& name, const SceneFolder& scene_folder = {});
-/// Returns the description of a preset. Throws SceneError.
+/// Returns the description of a preset. Throws SceneError if there is no such preset or its file is invalid.
 std::string preset_description(const std::string& name);
 
-/// The emitters and forces of a scene that come from an effect.
+/// The ranges of a scene's emitters and forces that come from one effect.
 struct EffectParts {
-  std::size_t effect = 0;
+  std::size_t effect = 0;  ///< index of the effect
   std::size_t first_emitter = 0, emitters = 0, first_force = 0, forces = 0;
 };
 
-/// Merges the preset of each emitter that names one into that emitter. Also appends the emitters and forces
-/// of all effects to the lists of the tree. Values of a wrong type stay unchanged; the reader reports them
-/// later.
+/// Completes each emitter that names a preset with the keys of that preset. Also appends the emitters and
+/// forces of all effects to the lists of the tree, and returns where they are. Adds an error for an unknown
+/// or invalid preset to `problems`. Values of a wrong type stay unchanged; the reader reports them later.
 std::vector<EffectParts> apply_presets(SceneSource& source, const SceneFolder& folder,
                                        std::vector<Problem>& problems);
 
-/// Sets name, place, body and time of the objects that come from effects, and removes the effects from the
-/// scene.
+/// Applies the name, position, body and start of each effect to its emitters and forces. Then removes the
+/// effects from the scene.
 void place_effects(Scene& scene, const std::vector<EffectParts>& parts);
 
 }  // namespace offstage::producer

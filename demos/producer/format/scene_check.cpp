@@ -26,8 +26,8 @@ namespace {
 
 constexpr Real kUnlimited = std::numeric_limits<Real>::infinity();
 
-/// The mass that resists a force; infinite for a body that is not dynamic; nothing for a mesh, which is not
-/// read here.
+/// Returns the mass that resists a force on a body [kg]: infinity for a body that is not dynamic, and nothing
+/// for a mesh, because model files are not read here.
 std::optional<Real> mass_of(const Body& body) {
   if (body.motion != sim::MotionType::dynamic) return kUnlimited;
   if (body.mass > 0) return body.mass;
@@ -36,7 +36,8 @@ std::optional<Real> mass_of(const Body& body) {
   return mass ? std::optional(mass->mass) : std::nullopt;
 }
 
-/// The smallest principal moment of inertia of a body; nothing for a mesh, which is not read here.
+/// Returns the smallest principal moment of inertia of a body [kg m^2]; nothing for a mesh, because model
+/// files are not read here.
 std::optional<Real> least_moment_of(const Body& body) {
   const auto by_shape = mass_by_shape(body);
   if (!by_shape) return {};
@@ -66,7 +67,8 @@ class Checker : SceneChecker {
     for (const Force& force : scene_.forces)
       std::visit(
           [&](const auto& f) {
-            if (!f.where.path.empty()) check_force(f);  // otherwise its type was invalid, and it was not read
+            if (!f.where.path.empty())
+              check_force(f);  // an empty path: its type was invalid, so it was not read
           },
           force);
     check_film(scene_, flat_, folder_, findings_);
@@ -121,7 +123,7 @@ class Checker : SceneChecker {
     if (!name.empty() && !find_named(scene_.materials, name))
       fail(path, "there is no material '" + name + "'" + suggestion(name, names_of(scene_.materials)));
   }
-  /// Checks the file of a model: beside the scene, or one that comes with offstage.
+  /// Checks the file of a model. The file is in a folder of the scene, or it comes with offstage.
   void check_model(const std::string& path, const std::string& file) {
     const std::string wrong = file.empty() ? "" : folder_.wrong_file(model_file(file, folder_));
     if (!wrong.empty()) fail(path, wrong);
@@ -295,7 +297,7 @@ class Checker : SceneChecker {
 
   // --- Springs ---
 
-  /// The mass at an end; nothing if it is unknown or invalid.
+  /// Returns the mass at an end of a spring [kg]; nothing if the mass is unknown or invalid.
   std::optional<Real> check_end(const SpringEnd& end, const std::string& path) {
     if (!end.body.empty() && !end.particles.empty()) {
       fail(path, "must name a body or a particle, not both");
@@ -322,7 +324,7 @@ class Checker : SceneChecker {
     return {};
   }
 
-  /// Their bodies exist only in the flat scene.
+  /// Checks the materials of bodies that articulations made. These bodies exist only in the flat scene.
   void check_materials_of_articulations() {
     std::set<std::pair<std::string, std::string>> seen;
     for (const Body& body : flat_.bodies)
@@ -395,7 +397,7 @@ class Checker : SceneChecker {
     check_period(field, field.start, field.end);
     check_region(field.where.path, field.region, field.drop_rate);
   }
-  /// Whether a list names a body, or its original.
+  /// Whether a list names a body itself, or the original of which the body is a copy.
   bool names(const std::vector<std::string>& bodies, const Body& body) const {
     return std::ranges::any_of(bodies, [&](const std::string& name) {
       const Body* original = find_named(scene_.bodies, name);

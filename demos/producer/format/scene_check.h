@@ -1,6 +1,7 @@
 #pragma once
-/// Checks of a scene beyond the types and ranges of its keys: names that exist, times that increase, files
-/// that exist, springs that are stable at the step, emitters with valid parameters.
+/// Checks of a scene beyond the types and ranges of its keys. For example: names and files must exist, the
+/// times of keys must increase, springs must be stable at the sub-step, and emitters must have valid
+/// parameters.
 
 #include <filesystem>
 #include <optional>
@@ -17,19 +18,19 @@ struct Findings {
   std::vector<Problem> errors, warnings;
 };
 
-/// Checks a scene; `flat` is the same scene with placements expanded to copies. Files are searched in
-/// `folder`. Problems have only the path of a value; the caller adds file and line.
+/// Checks a scene. `flat` is the same scene with placements expanded to copies. File names are relative to
+/// `folder`. The problems contain only the path of a value; the caller adds file and line.
 Findings check_scene(const Scene& scene, const Scene& flat, const SceneFolder& folder);
 
 /// Returns the longest step [s] at which the integrator is stable for a damped spring. `k`: stiffness [N/m];
 /// `c`: damping [N s/m]; `m`: reduced mass [kg].
 Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real c, Real m);
 
-/// Returns an error message if a drag coefficient is too large for `m`: a linear drag [kg/s] with a mass
-/// [kg], or an angular drag [kg m^2/s] with a moment of inertia [kg m^2].
+/// Returns an error message if a drag coefficient is too large for the mass or moment of inertia `m`: a
+/// linear drag [kg/s] with a mass [kg], or an angular drag [kg m^2/s] with a moment of inertia [kg m^2].
 std::optional<std::string> drag_problem(const Scene& scene, sim::IntegratorKind integrator, Real drag,
                                         Real m);
-/// Returns an error message if a position is outside of the world.
+/// Returns an error message if a position is outside of `world.bounds`; otherwise nothing.
 std::optional<std::string> outside(const Scene& scene, const Vec3& position);
 
 }  // namespace offstage::producer

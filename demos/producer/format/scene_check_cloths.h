@@ -9,7 +9,8 @@
 namespace offstage::producer {
 
 /// Adds the problems of the cloths of a scene to `findings`; `flat` is the same scene with placements
-/// expanded to copies. Checks that need the triangles of a file are made when the simulation is built.
+/// expanded to copies. Does not read model files; checks that need their triangles are made when the
+/// simulation is built.
 void check_cloths(const Scene& scene, const Scene& flat, const SceneFolder& folder, Findings& findings);
 
 }  // namespace offstage::producer

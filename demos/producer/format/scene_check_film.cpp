@@ -21,7 +21,7 @@ class FilmChecker : SceneChecker {
     for (const Overlay& overlay : scene_.overlays)
       std::visit(
           [&](const auto& o) {
-            // Otherwise its type was invalid, and it was not read.
+            // An empty path: its type was invalid, so it was not read.
             if (!o.where.path.empty()) check_overlay(o);
           },
           overlay);
@@ -106,7 +106,8 @@ class FilmChecker : SceneChecker {
     check_view(camera.offset, camera.look_offset, path);
   }
 
-  /// The body shows a model file, whose cameras and lights are known when it is read.
+  /// Checks that a body shows a model file. The cameras and lights in the file are checked later, when the
+  /// file is read.
   void check_model_body(const std::string& path, const std::string& name) {
     const Body* body = named_body(path, name);
     if (body && !body->model && !std::holds_alternative<MeshFile>(body->shape))
@@ -127,7 +128,7 @@ class FilmChecker : SceneChecker {
     if (!lens.look_at.empty()) check_body_name(path + "/look_at", lens.look_at);
     for (std::size_t i = 0; i < lens.fit.size(); ++i) check_body_name(path + "/fit" + step(i), lens.fit[i]);
   }
-  /// Their names become parts of file names.
+  /// Checks the names of cameras, which become parts of file names.
   void check_cameras() {
     constexpr std::size_t kMostLetters = 64;
     check_camera(scene_.camera, "/camera");

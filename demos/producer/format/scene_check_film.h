@@ -6,7 +6,8 @@
 
 namespace offstage::producer {
 
-/// Adds the problems to `findings`; `flat` is the same scene with placements expanded to copies.
+/// Adds the problems of a scene's film to `findings`. `flat` is the same scene with placements expanded to
+/// copies. File names are relative to `folder`.
 void check_film(const Scene& scene, const Scene& flat, const SceneFolder& folder, Findings& findings);
 
 }  // namespace offstage::producer

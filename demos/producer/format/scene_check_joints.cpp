@@ -14,7 +14,8 @@ namespace offstage::producer {
 namespace {
 
 constexpr Real kMostSteering = 35;  // [degrees]
-/// The sub-step must be short enough for the free motion of a link, which is faster the shorter it is.
+/// Greatest number of links of an elastic chain. The shorter a link is, the faster it vibrates, and the
+/// shorter the sub-step must be.
 constexpr int kMostElasticLinks = 32;
 
 class JointChecker : CheckBase {
@@ -28,7 +29,7 @@ class JointChecker : CheckBase {
     for (const ArticulationTemplate& articulation : scene_.articulations)
       std::visit(
           [this](const auto& a) {
-            if (!a.where.path.empty()) check(a);  // otherwise its type was invalid, and it was not read
+            if (!a.where.path.empty()) check(a);  // an empty path: its type was invalid, so it was not read
           },
           articulation);
   }

@@ -16,14 +16,14 @@ namespace offstage::producer {
 namespace {
 
 constexpr Real kMostParticles = 2e7;
-constexpr Real kTolerance = 1.01;  // an ending and a beginning particle at the same time are both counted
+constexpr Real kTolerance = 1.01;  // a particle that ends and one that begins at the same time both count
 constexpr Real kSmallest = 1e-6;   // radius [m]
 
 Real film_end(const Scene& scene) {
   return scene.output.start + scene.output.duration;
 }
 
-/// Smallest width of a surface; infinite for a model, which is not read here.
+/// Returns the smallest width of a surface [m]; infinity for a model, because model files are not read here.
 Real spread_of(const EmitterSurface& surface) {
   return std::visit(
       []<class S>(const S& s) {
@@ -228,7 +228,7 @@ class ParticleChecker : CheckBase {
 
   void check_count(const Emitter& emitter) {
     const int copies = copy_count(emitter.placement);
-    bool refused = false;  // child particles of a refused source are not reported again
+    bool refused = false;  // after an error, the child particles are not checked
     bound_sources(emitter, film_end(scene_),
                   [&](const ParticleSource& source, const std::string&, const SourceBound& bound) {
                     if (!refused) refused = check_bound(emitter, source, bound, copies);
@@ -236,7 +236,8 @@ class ParticleChecker : CheckBase {
     too_many_ = too_many_ || refused;
   }
 
-  /// Returns whether it is refused.
+  /// Reports an error or warnings about the number of particles of a source. Returns whether there is an
+  /// error.
   bool check_bound(const Emitter& emitter, const ParticleSource& source, const SourceBound& bound,
                    int copies) {
     const std::string& path = source.where.path;

@@ -13,10 +13,10 @@ namespace offstage::producer {
 /// expanded to copies.
 void check_particles(const Scene& scene, const Scene& flat, Findings& findings);
 
-/// The names of all particle systems: of groups, of emitters, and of their child particles.
+/// Returns the names of all particle systems: groups, emitters and child particles.
 std::vector<std::string> particle_names(const Scene& scene);
 
-/// Greatest number of particles that the system of this name has at one time.
+/// Upper bound of the number of particles that a system has at the same time.
 struct ParticleBound {
   std::string name;
   uint64_t alive = 0;

@@ -1,5 +1,5 @@
 #pragma once
-/// The common part of the checks of a scene: the scene, the findings, and the checks of names, files and
+/// Base classes of the checks of a scene. They hold the scene and the findings, and check names, files and
 /// times.
 
 #include <algorithm>
@@ -30,7 +30,7 @@ const T* find_named(const std::vector<T>& objects, const std::string& name) {
   return it == objects.end() ? nullptr : &*it;
 }
 
-/// Returns an index as a step of a JSON pointer: "/3".
+/// Returns an index as a step of a JSON pointer, such as "/3".
 inline std::string step(std::size_t i) {
   return "/" + std::to_string(i);
 }
@@ -101,7 +101,7 @@ class SceneChecker : protected CheckBase {
   const Scene& scene_;
   const Scene& flat_;
   const SceneFolder& folder_;
-  std::map<std::string, const Body*> bodies_;  // including copies, by name
+  std::map<std::string, const Body*> bodies_;  // bodies of the flat scene, by name
 };
 
 }  // namespace offstage::producer

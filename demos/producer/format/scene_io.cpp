@@ -43,7 +43,7 @@ void name_everything(Scene& scene, const std::string& file) {
     if (std::string& name = named(scene.forces[i]).name; name.empty()) name = "force_" + std::to_string(i);
 }
 
-/// Replaces the problems beyond kMostProblems by their number.
+/// Keeps the first kMostProblems problems, and replaces the others by one that gives their number.
 void count_the_rest(std::vector<Problem>& problems, std::size_t more) {
   if (problems.size() > kMostProblems) {
     more += problems.size() - kMostProblems;
@@ -52,7 +52,8 @@ void count_the_rest(std::vector<Problem>& problems, std::size_t more) {
   if (more > 0) problems.push_back({{}, "and " + std::to_string(more) + " more problems"});
 }
 
-/// Refuses a scene whose description alone would take too much memory.
+/// Throws SceneError for a scene with so many bodies that their descriptions alone would take too much
+/// memory.
 void check_count(const SceneSource& source) {
   const Node* bodies = source.root.find("bodies");
   const List* list = bodies ? bodies->as<List>() : nullptr;
@@ -79,7 +80,7 @@ std::vector<Problem> drop_retired_keys(SceneSource& source) {
 }
 
 void append(std::vector<Problem>& all, const std::vector<Problem>& more, const SceneSource& source) {
-  // Finding a position takes time; problems that are only counted do not need one.
+  // Finding a position takes time. Problems that are only counted need no position.
   constexpr std::size_t kLocated = 4 * kMostProblems;
   for (const Problem& problem : more)
     all.push_back({all.size() < kLocated ? source.locate(problem.where.path) : problem.where, problem.what});
@@ -109,7 +110,7 @@ LoadedScene parse_scene(std::string_view text, const std::string& name, const Sc
   Reader reader(source.files);
   read_scene(reader, source.root, described);
   errors.insert(errors.end(), reader.problems().begin(), reader.problems().end());
-  // The picture has its own sun.
+  // A picture of the sky has its own sun, so the default sun is removed.
   if (described.environment.picture && source.root.find("lights") == nullptr) described.lights.clear();
   place_effects(described, from_effects);
   name_everything(described, name);

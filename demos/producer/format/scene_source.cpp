@@ -59,7 +59,8 @@ std::vector<std::string> names_in(const List& list) {
   return names;
 }
 
-/// The item that a step names: by index, else by its key "name".
+/// Returns the index of the item that a step names, by its index or by its key "name"; nothing if there is no
+/// such item.
 std::optional<std::size_t> find_item(const List& list, const std::string& step) {
   if (const auto index = to_index(step)) return *index < list.size() ? index : std::nullopt;
   const std::vector<std::string> names = names_in(list);
@@ -68,7 +69,7 @@ std::optional<std::size_t> find_item(const List& list, const std::string& step) 
   return static_cast<std::size_t>(it - names.begin());
 }
 
-/// Gives all nodes of a tree one position: that of the override from which it comes.
+/// Sets the position of all nodes of a tree to `at`, the position of the override from which the tree comes.
 void stamp(Node& node, Position at) {
   node.at = at;
   if (List* list = node.as<List>())
@@ -85,7 +86,8 @@ void stamp(Node& node, Position at) {
 
 void merge(Node& base, Node top, bool at_root);
 
-/// The same value for all names of a file, as far as the system can tell.
+/// Returns a path that is the same for all names of a file. If the path cannot be resolved, returns it
+/// unchanged.
 fs::path identity_of(const fs::path& file) {
   std::error_code error;
   fs::path identity = fs::weakly_canonical(file, error);
@@ -98,7 +100,7 @@ class Includer {
 
   std::vector<Problem> problems;
 
-  /// The tree of one text with all of its includes.
+  /// Returns the tree of one text, merged with all of its includes.
   Node read(std::string_view text, const std::string& name, const fs::path& folder) {
     const int file = static_cast<int>(files_.size());
     files_.push_back(name);
@@ -129,7 +131,7 @@ class Includer {
     return all;
   }
 
-  /// Files being read, each included by the one before.
+  /// The files that are being read. Each is included by the previous one.
   std::vector<fs::path> open;
 
  private:
@@ -180,8 +182,8 @@ class Includer {
   const SceneFolder& scene_;
 };
 
-/// Merges `top` into `base`; an object with a "type" replaces one of another type. Lists at the root are
-/// concatenated.
+/// Merges `top` into `base`. An object with a "type" replaces an object of another type. If `at_root`, lists
+/// are concatenated.
 void merge(Node& base, Node top, bool at_root) {
   Object* below = base.as<Object>();
   Object* above = top.as<Object>();
@@ -254,7 +256,7 @@ const std::string& standard_input() {
     while (true) {
       pollfd input{STDIN_FILENO, POLLIN, 0};
       constexpr int kWait_ms = 200;
-      const int ready = ::poll(&input, 1, kWait_ms);  // limited, so that a signal ends the wait
+      const int ready = ::poll(&input, 1, kWait_ms);  // the wait is limited, so that signals are noticed
       if (interrupt_signal()) throw Interrupted(interrupt_signal());
       if (ready == 0 || (ready < 0 && errno == EINTR)) continue;
       const ssize_t got = ::read(STDIN_FILENO, part.data(), part.size());
@@ -292,7 +294,8 @@ void apply_override(SceneSource& source, const std::string& override, const Node
   const Position here{file, 0, 0};
   const std::vector<std::string> steps = split_path(override.substr(0, equals));
   Node* node = &source.root;
-  const Node* guide = &defaults;  // the value at the same place in a scene of defaults
+  const Node* guide =
+      &defaults;  // the value at the same path in a scene with all defaults; null if there is none
   std::string path;
   for (std::size_t i = 0; i < steps.size(); ++i) {
     const std::string& step = steps[i];

@@ -22,24 +22,27 @@ struct SceneSource {
   Where locate(const std::string& path) const;
 };
 
-/// Name of standard input as a scene file on the command line and in messages.
+/// Names of standard input as a scene file: on the command line, and in messages.
 inline constexpr std::string_view kStandardInput = "-";
 inline constexpr const char* kStandardInputName = "<stdin>";
 
 /// Returns the text of a regular file of at most kMostTextBytes. Throws SceneError if it cannot be read.
 std::string read_text(const std::filesystem::path& file);
 
-/// Returns the whole text of standard input. The first call reads and stores it. Throws SceneError if it
-/// cannot be read or is longer than 256 MiB.
+/// Returns the whole text of standard input. The first call reads the text and stores it for later calls.
+/// Throws SceneError if the text cannot be read or is longer than 256 MiB, and Interrupted after a
+/// signal.
 const std::string& standard_input();
 
-/// Parses `text` and its includes. Included files are searched beside the file that names them (`folder` for
-/// `text`). Objects are merged key by key, and the including file has priority; lists at the top are
-/// concatenated, included first. Throws SceneError for a text that is not JSON, cannot be read, or includes
-/// itself.
+/// Parses `text` and its includes. Names of included files are relative to the file that names them; in
+/// `text`, they are relative to `folder`. Objects are merged key by key, and the including file has priority.
+/// Lists at the root are concatenated; the items of included files come first. Throws SceneError for a text
+/// that is not JSON, for a file that cannot be read, and for a file that includes itself. `name`: file name
+/// of `text` in messages.
 SceneSource read_source(std::string_view text, const std::string& name, const SceneFolder& folder);
 
-/// Merges `top` into `base`, key by key, also in nested objects. An object replaces one with another "type".
+/// Merges `top` into `base`, key by key, also in nested objects. Values of `top` have priority. An object
+/// replaces an object that has another "type".
 void merge(Node& base, Node top);
 
 /// Sets a value of the tree. `override` is "path=value", with a path such as /emitters/0/rate or

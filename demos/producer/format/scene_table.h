@@ -21,18 +21,19 @@
 /// - `render`: table_render.h
 /// - `output`: table_output.h
 ///
-/// A new key at the top of the file is a line in scene_table.cpp. A new kind of value is a Codec in values.h;
-/// fields.h has the parts of which a table is made.
+/// A new key at the top of the file is a line in scene_table.cpp. For a new kind of value, add a
+/// Codec to values.h. fields.h has the parts of which a table is made.
 
 #include "producer/format/fields.h"
 #include "producer/scene/scene.h"
 
 namespace offstage::producer {
 
+/// Reads a scene. `in` collects the problems.
 void read_scene(Reader& in, const Node& node, Scene& out);
 /// Writes a scene with every key, including defaults.
 Node write_scene(const Scene& scene);
-/// Returns the scene first, then every object in it.
+/// Returns the descriptions of all objects of the format, the scene itself first.
 Catalogue scene_catalogue();
 
 }  // namespace offstage::producer

@@ -1,6 +1,6 @@
 #pragma once
-/// The keys of an entry of `bodies`, with its model, animation and keyframes. Those of its shape are in
-/// table_shape.h, those of its copies in table_placement.h.
+/// The keys of an entry of `bodies`, with its model, animation and keyframes. table_shape.h has the keys of
+/// its shape, and table_placement.h has the keys of its copies.
 
 #include <array>
 
@@ -44,11 +44,9 @@ template <>
 struct Table<ModelAnimation> {
   static constexpr const char* kName = "animation";
   static constexpr const char* kHelp =
-      "An animation of a glTF 2.0 file: nodes, skins and morph targets. Only static and kinematic bodies "
-      "have "
-      "animated shapes. Each node with triangles then collides as they do, and each bone as the convex hull "
-      "of "
-      "the skin around it.";
+      "An animation of a glTF 2.0 file: nodes, skins and morph targets. Only static and kinematic bodies can "
+      "have animated shapes. In such a shape, each node with triangles collides as a kinematic body, and so "
+      "does each bone, as the convex hull of the skin around it.";
   static Fields<ModelAnimation> fields() {
     using T = ModelAnimation;
     return {
@@ -96,7 +94,7 @@ struct Table<Body> {
         {"friction_axis", &T::friction_axis,
          "direction in the body's frame along which the material's `friction` applies; across it, "
          "`cross_friction` applies; zero: friction is the same in all directions. If both bodies of a "
-         "contact have an axis, the one of the body that is listed first in the scene is used"},
+         "contact have an axis, the contact uses the axis of the body that is listed first in the scene"},
         {"surface_velocity", &T::surface_velocity,
          "velocity of the surface relative to the body, as on a conveyor belt; in the body's frame", "m/s"},
         {"collides", &T::collides, "whether the body collides with bodies, particles and cloths"},
@@ -106,9 +104,8 @@ struct Table<Body> {
         {"interpolation", &T::interpolation, kInterpolationHelp},
         {"loop", &T::loop, "repeats the keyframes; otherwise the last pose is held"},
         {"appear_at", &T::appear_at,
-         "time at which the body appears, at its pose and velocity of time 0; its joints join it to the "
-         "other bodies "
-         "in their poses of that time",
+         "time at which the body appears, at its pose and velocity of time 0; its joints then connect it to "
+         "the other bodies, in their poses at that time",
          "s", kNotNegative},
         {"remove_at", &T::remove_at,
          "time at which the body is removed, with its springs, joints and cloth pins; must be later than "

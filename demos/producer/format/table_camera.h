@@ -43,11 +43,13 @@ struct Table<CameraKey> {
     return {{"time", &CameraKey::time, "time of the key; times must increase", "s"},
             {"eye", &CameraKey::eye, "position of the camera", "m"},
             {"target", &CameraKey::target, "point that the camera looks at", "m"},
-            {"fov_deg", &CameraKey::fov_deg, "vertical field of view at this key; default: the camera's",
-             "degrees", inside(0, 180)},
-            {"focus", &CameraKey::focus, "focus distance at this key; default: the camera's", "m", kPositive},
+            {"fov_deg", &CameraKey::fov_deg,
+             "vertical field of view at this key; default: the field of view of the camera", "degrees",
+             inside(0, 180)},
+            {"focus", &CameraKey::focus,
+             "focus distance at this key; default: the focus distance of the camera", "m", kPositive},
             {"interpolation", &CameraKey::interpolation,
-             "interpolation from this key to the next; default: the camera's"}};
+             "interpolation from this key to the next; default: the interpolation of the camera"}};
   }
 };
 template <>
@@ -94,10 +96,8 @@ struct Table<ModelCamera> {
   static constexpr const char* kName = "model_camera";
   static constexpr const char* kHelp =
       "A camera of the glTF file that a body shows. It moves with the body and with the animation that the "
-      "body "
-      "plays. Its field of view is that of the file, unless `focal_mm` is given; `offstage info FILE` lists "
-      "the "
-      "cameras of a file.";
+      "body plays. Its field of view comes from the file, unless `focal_mm` is given. `offstage info FILE` "
+      "lists the cameras of a file.";
   static Fields<ModelCamera> fields() {
     using T = ModelCamera;
     return Fields<T>{{"body", &T::body, "name of the body that shows the file", kRequired},
@@ -108,7 +108,8 @@ struct Table<ModelCamera> {
 template <>
 struct Tags<Camera> {
   static constexpr const char* kName = "camera";
-  static constexpr const char* kHelp = "The camera. Up is +Y, except for cameras of files.";
+  static constexpr const char* kHelp =
+      "The camera. Its up direction is +Y, except that a camera of a model file has its own.";
   static constexpr std::array kTags = {"static", "keyframes", "orbit", "follow", "model"};
   static constexpr bool kRequired = false;
 };

@@ -52,7 +52,8 @@ struct Table<FabricChanges> {
     using T = FabricChanges;
     return {
         {"areal_density", &T::areal_density,
-         "mass per area; default of this and the next keys: the value of the fabric", "kg/m^2", kPositive},
+         "mass per area; default of this key and all keys up to `min_bend_radius`: the value of the fabric",
+         "kg/m^2", kPositive},
         {"stretch", &T::stretch, "force per width at a strain of 1, along the threads", "N/m", kPositive},
         {"shear", &T::shear, "shear modulus times thickness: shear force per width at a shear angle of 1",
          "N/m", kNotNegative},
@@ -76,12 +77,14 @@ struct Table<FabricChanges> {
          "`springs`",
          "", between(0, 10)},
         {"friction", &T::friction,
-         "coefficient of friction against bodies; of cloth and body the geometric mean is used", "",
-         kNotNegative},
+         "coefficient of friction against bodies; a contact uses the geometric mean of the values of cloth "
+         "and body",
+         "", kNotNegative},
         {"self_friction", &T::self_friction, "coefficient of friction between cloths", "", kNotNegative},
         {"thickness", &T::thickness, "distance that cloth keeps from bodies and from other layers", "m",
          over(0, 1)},
-        {"drag", &T::drag, "pressure coefficient of air flow perpendicular to the cloth", "", kNotNegative},
+        {"drag", &T::drag, "coefficient of the pressure of an air flow perpendicular to the cloth", "",
+         kNotNegative},
         {"lift", &T::lift, "coefficient of the force across an oblique air flow; at most `drag`", "",
          kNotNegative},
         {"max_stretch", &T::max_stretch,
@@ -90,8 +93,8 @@ struct Table<FabricChanges> {
          "largest length diagonally to the threads relative to the rest length; 0: no limit", "",
          kNotNegative},
         {"min_bend_radius", &T::min_bend_radius,
-         "smallest radius to which the cloth bends, from its shape at rest; 0: no limit. It is kept with "
-         "either `bend_model`, on any mesh, and has no effect on cells larger than itself",
+         "smallest radius to which the cloth bends from its shape at rest; 0: no limit. The limit works with "
+         "either `bend_model` and on any mesh. It has no effect where cells are larger than this radius",
          "m", kNotNegative},
     };
   }
@@ -178,7 +181,8 @@ struct Table<SideSeam> {
 template <>
 struct Table<PointSeam> {
   static constexpr const char* kName = "point_seam";
-  static constexpr const char* kHelp = "Two vertices that are sewn together: those nearest to two points.";
+  static constexpr const char* kHelp =
+      "Two vertices that are sewn together: the vertices nearest to two points.";
   static Fields<PointSeam> fields() {
     return {{"a", &PointSeam::a, "first point, in the cloth's frame", "m"},
             {"b", &PointSeam::b, "second point, in the cloth's frame", "m"}};
@@ -196,15 +200,16 @@ template <>
 struct Table<ClothCord> {
   static constexpr const char* kName = "cloth_cord";
   static constexpr const char* kHelp =
-      "A string or spring that hangs on a vertex of a cloth. With one segment it is a spring, which pushes, "
-      "too; with more it is a string. It has mass and collides with bodies.";
+      "A string or spring that hangs on a vertex of a cloth. A cord of one segment is a spring, which also "
+      "resists compression. A cord of several segments is a string. Cords have mass and collide with bodies.";
   static Fields<ClothCord> fields() {
     using T = ClothCord;
     return {
         {"from", &T::from, "start of the cord: the vertex nearest to this point, in the cloth's frame", "m"},
         {"to", &T::to, "other end of the cord: its position at time 0, in the cloth's frame", "m"},
         {"held", &T::held,
-         "whether the other end is held, at its place in the world or on `body`; false: it hangs free"},
+         "whether the other end is held at its position at time 0, in the world or on `body`; false: it "
+         "hangs free"},
         {"body", &T::body, "name of the body that holds the other end; empty: the world"},
         {"until", &T::until, "time at which the other end is released", "s", kNotNegative},
         {"length", &T::length,
@@ -235,7 +240,7 @@ struct Table<Cloth> {
     using T = Cloth;
     return Fields<T>{
         {"name", &T::name, "unique name; default: cloth_N, where N is the index in the list"},
-        {"shape", &T::shape, "shape of the flat cloth"},
+        {"shape", &T::shape, "shape of the cloth at rest"},
         {"fabric", &T::fabric, "name of the fabric; `offstage presets` lists them"},
     }
         .with(&T::changes)
@@ -251,23 +256,25 @@ struct Table<Cloth> {
             {"collides", &T::collides, "whether the cloth collides with bodies and particles"},
             {"self_collision", &T::self_collision,
              "collides with itself, and with other cloths that have `self_collision`"},
-            {"tear", &T::tear, "length relative to the rest length at which threads tear, above 1; 0: never",
+            {"tear", &T::tear,
+             "length at which threads tear, relative to their rest length; must be above 1; 0: they never "
+             "tear",
              "", kNotNegative},
             {"pressure", &T::pressure,
-             "excess of the pressure inside a closed cloth over the pressure of the air, at the initial "
+             "pressure inside a closed cloth above the pressure of the surrounding air, at the initial "
              "volume",
              "Pa"},
             {"inflate_time", &T::inflate_time,
-             "time in which the gas of `pressure` is let in, at a constant rate; 0: it is present from "
-             "the start",
+             "time in which the gas that causes `pressure` flows in, at a constant rate; 0: the gas is "
+             "present from the start",
              "s", kNotNegative},
             {"gas_density", &T::gas_density,
-             "density of the gas of `pressure`, which causes buoyancy: helium has 0.17, hydrogen 0.084; "
-             "default: `air_density`",
+             "density of the gas that causes `pressure`; a gas lighter than air gives buoyancy: helium has "
+             "0.17, hydrogen 0.084; default: `air_density`",
              "kg/m^3", kNotNegative},
             {"ram_pressure", &T::ram_pressure,
-             "fraction of the stagnation pressure of the air at the mouth of an open cloth that builds up "
-             "inside: about 1 for a parachute",
+             "for an open cloth: pressure that builds up inside, as a fraction of the stagnation pressure of "
+             "the air at its mouth; about 1 for a parachute",
              "", kNotNegative},
             {"air_density", &T::air_density, "density of the surrounding air; 0: no air", "kg/m^3",
              kNotNegative},

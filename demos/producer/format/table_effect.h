@@ -1,5 +1,5 @@
 #pragma once
-/// The keys of an entry of `effects`, which names a preset.
+/// The keys of an entry of `effects`. Each entry names a preset.
 
 #include "producer/format/values.h"
 #include "producer/scene/effects.h"
@@ -32,12 +32,14 @@ struct Table<Effect> {
     using T = Effect;
     return {{"preset", &T::preset, "name of the preset", kRequired},
             {"name", &T::name,
-             "prefix of the names of its emitters and forces, followed by a slash; empty: the preset's name"},
+             "prefix of the names of the effect's emitters and forces, followed by a slash; empty: the "
+             "preset's name"},
             {"position", &T::position, "position of the preset's origin, in the world or in the body's frame",
              "m"},
-            {"body", &T::body, "name of the body that its emitters move with; empty: none"},
+            {"body", &T::body, "name of the body with which the effect's emitters move; empty: none"},
             {"start", &T::start, "time added to all times of the preset", "s", kNotNegative},
-            {"overrides", &T::overrides, "for each emitter or force, by name, the keys to replace"}};
+            {"overrides", &T::overrides,
+             "keys to replace: an object for each emitter or force, under its name in the preset"}};
   }
 };
 

@@ -1,6 +1,7 @@
 #pragma once
-/// The keys of an entry of `emitters`: the surface, the times of its releases, and the new particles, which
-/// can split, leave trails, and release other particles at an age, a death or a collision.
+/// The keys of an entry of `emitters`: its surface, the times at which it releases particles, and the
+/// properties of the particles. Particles can split and leave trails. They can also release other particles
+/// at an age, a death or a collision.
 
 #include <array>
 
@@ -25,7 +26,7 @@ struct Table<Split> {
     using T = Split;
     return {
         {"enabled", &T::enabled, "whether particles split at all"},
-        {"count", &T::count, "number of children of one split, rounded", "", between(0, 1000)},
+        {"count", &T::count, "number of children per split, rounded to an integer", "", between(0, 1000)},
         {"age", &T::age, "age of a particle at its first split", "s", kPositive},
         {"delay", &T::delay, "time from one split of a particle to its next", "s", kPositive},
         {"delay_steps", &T::delay_steps,
@@ -60,10 +61,11 @@ struct Table<ParticleSource> {
         {"mass", &T::mass, "mass of a particle; 0: computed from density and radius", "kg", kNotNegative},
         {"lifespan", &T::lifespan, "age at which a particle is removed", "s", kPositive},
         {"restitution", &T::restitution,
-         "coefficient of restitution; of particle and body the larger value is used", "", kFraction},
+         "coefficient of restitution; a contact uses the larger value of particle and body", "", kFraction},
         {"friction", &T::friction,
-         "coefficient of dynamic friction; of particle and body the geometric mean is used", "",
-         kNotNegative},
+         "coefficient of dynamic friction; a contact uses the geometric mean of the values of particle and "
+         "body",
+         "", kNotNegative},
         {"charge", &T::charge, "electric charge of a particle", "C"},
         {"max_alive", &T::max_alive, "largest number of particles that exist at once", "", between(1, 2e7)},
         {"look", &T::look, "how particles are drawn"},
@@ -71,7 +73,7 @@ struct Table<ParticleSource> {
         .with(&T::behaviour);
   }
 };
-/// Appends the keys of child particles, which all sources have.
+/// Appends the keys of child particles, which all sources of particles have.
 template <class T>
 Fields<T> with_offspring(Fields<T> fields) {
   return std::move(fields).then({
@@ -90,8 +92,8 @@ struct Table<TrailSource> {
     using T = TrailSource;
     return with_offspring(Fields<T>{
         {"name", &T::name,
-         "name, which follows the parent's name and a slash; default: trails_N, where N is the index in the "
-         "list"},
+         "last part of the full name, after the parent's name and a slash; default: trails_N, where N is the "
+         "index in the list"},
         {"rate", &T::rate, "particles released per second by each parent", "1/s", between(0, 1e5)},
         {"start_age", &T::start_age, "age of the parent at which the trail starts", "s", kNotNegative},
         {"end_age", &T::end_age, "age of the parent at which the trail ends", "s", kNotNegative},
@@ -106,7 +108,7 @@ template <>
 struct Names<effects::Axis> {
   static constexpr std::array kNames = {"normal", "velocity"};
 };
-/// Keys that all sub-emitters have: `on_collision`, `on_death` and `on_age`.
+/// Returns the keys that all sub-emitters have: `on_collision`, `on_death` and `on_age`.
 template <class T>
 Fields<T> event_fields() {
   return with_offspring(Fields<T>{
@@ -116,8 +118,8 @@ Fields<T> event_fields() {
        "least speed of the parent after the event; slower parents create no particles", "m/s", kNotNegative},
       {"count", &T::count, "number of particles for each event, rounded", "", kCounts},
       {"axis", &T::axis,
-       "axis of the release: `normal` is the normal of the surface that was hit (without a collision, as "
-       "`velocity`); `velocity` is the parent's velocity"},
+       "axis of the release: `velocity` is the parent's velocity; `normal` is the normal of the surface that "
+       "the parent hit, or the parent's velocity if it hit none"},
       {"velocity_percent", &T::velocity_percent,
        "fraction of the parent's velocity that a new particle starts with; `speed` is added along the axis",
        "%"},
@@ -133,8 +135,8 @@ struct Table<EventSource> {
   static Fields<EventSource> fields() {
     using T = EventSource;
     return Fields<T>{{"name", &T::name,
-                      "name, which follows the parent's name and a slash; empty: on_collision_N or "
-                      "on_death_N, where N is the index in the list"}}
+                      "last part of the full name, after the parent's name and a slash; empty: "
+                      "on_collision_N or on_death_N, where N is the index in the list"}}
         .then(event_fields<T>());
   }
 };
@@ -145,8 +147,8 @@ struct Table<AgeSource> {
   static Fields<AgeSource> fields() {
     using T = AgeSource;
     return Fields<T>{{"name", &T::name,
-                      "name, which follows the parent's name and a slash; default: on_age_N, where N is the "
-                      "index in the list"},
+                      "last part of the full name, after the parent's name and a slash; default: on_age_N, "
+                      "where N is the index in the list"},
                      {"age", &T::age, "age of the parent", "s", kNotNegative}}
         .then(event_fields<T>());
   }
@@ -192,9 +194,8 @@ struct Table<MeshSurface> {
     return {
         {"file", &MeshSurface::file, "model file", kRequired},
         {"scale", &MeshSurface::scale,
-         "scale factor of the model; `auto`: from the file's likely unit to metres (docs/models.md; "
-         "`offstage info FILE` "
-         "shows it)",
+         "scale factor of the model; `auto` converts the likely unit of the file to metres (docs/models.md). "
+         "`offstage info FILE` shows the factor",
          "", kPositive},
         {"position", &MeshSurface::position, "position of the model's origin, in the emitter's frame", "m"},
         {"orientation", &MeshSurface::orientation, "orientation of the model, in the emitter's frame"}};
@@ -209,8 +210,8 @@ struct Table<FaceSurface> {
   static constexpr const char* kName = "face_surface";
   static constexpr const char* kHelp =
       "A face of the emitter's body, which releases particles along its normal: a face of a box, or the flat "
-      "top or "
-      "bottom of a cylinder, cone or frustum. Without a body, a face of a cuboid.";
+      "top or bottom of a cylinder, cone or frustum. Without a body, it is a face of the cuboid that "
+      "`position` and `size` give.";
   static Fields<FaceSurface> fields() {
     using T = FaceSurface;
     return {{"face", &T::face,
@@ -266,8 +267,9 @@ struct Table<Emitter> {
         {"direction", &T::direction,
          "direction of release, in the frame of the body or in the world; zero: the normal of the surface"},
         {"inherit_velocity", &T::inherit_velocity,
-         "fraction of the velocity of the body's point that a new particle gets, in addition to its own", "",
-         kNotNegative},
+         "fraction of the body's velocity at the point of release that is added to a new particle's own "
+         "velocity",
+         "", kNotNegative},
         {"recoil", &T::recoil,
          "each new particle pushes the body back with its momentum relative to the body; dynamic bodies "
          "only"},
@@ -276,9 +278,8 @@ struct Table<Emitter> {
          "other"},
         {"rate", &T::rate, "number of particles released one by one per second", "1/s", between(0, 1e9)},
         {"rate_per_metre", &T::rate_per_metre,
-         "number of particles released evenly along each metre of the path of the body, in addition to the "
-         "others; needs a "
-         "`body`",
+         "number of particles released evenly along each metre of the path of the body, in addition to "
+         "`rate`, `count` and `bursts`; needs a `body`",
          "1/m", between(0, 1e9)},
         {"count", &T::count, "number of particles released together in every `interval`, rounded", "",
          kCounts},

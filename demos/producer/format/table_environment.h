@@ -27,9 +27,10 @@ struct Table<SkyPictureSettings> {
          kRequired},
         {"turn_deg", &T::turn_deg, "turns the picture counter-clockwise, as seen from above", "deg"},
         {"blur_deg", &T::blur_deg,
-         "standard deviation of a blur of the background; the light stays. 0: sharp", "deg", between(0, 90)},
+         "standard deviation of a blur of the background, which does not change the light; 0: sharp", "deg",
+         between(0, 90)},
         {"visible", &T::visible,
-         "if false, the picture only lights the scene and is mirrored by it; the background shows the "
+         "if false, the picture only lights the scene and appears in reflections; the background shows the "
          "colours"}};
   }
 };

@@ -14,7 +14,8 @@ struct Names<render::Weave> {
 template <>
 struct Table<FabricLook> {
   static constexpr const char* kName = "fabric_look";
-  static constexpr const char* kHelp = "Appearance of a cloth in addition to that of its material.";
+  static constexpr const char* kHelp =
+      "Appearance of a cloth, in addition to the appearance of its material.";
   static Fields<FabricLook> fields() {
     using T = FabricLook;
     return {

@@ -37,7 +37,7 @@ template <>
 struct Tags<sim::Region> {
   static constexpr const char* kName = "region";
   static constexpr const char* kHelp =
-      "Where a field acts: on particles inside, and on bodies whose centre of mass is inside.";
+      "The region in which a field acts: on particles inside, and on bodies whose centre of mass is inside.";
   static constexpr std::array kTags = {"everywhere", "sphere", "box"};
   static constexpr bool kRequired = false;
 };
@@ -50,12 +50,11 @@ inline constexpr const char* kDropRateHelp =
 inline constexpr const char* kParticlesHelp =
     "names of particle groups, emitters, or child particles, such as rain/splash";
 inline constexpr const char* kClothsHelp =
-    "names of cloths: of one copy, or of all copies; moving air acts on each triangle, other forces act on "
-    "the whole "
-    "cloth, distributed by mass";
+    "names of cloths; a name without the number of a copy means all copies. Moving air acts on each "
+    "triangle, other forces act on the whole cloth, distributed by mass";
 inline constexpr const char* kBodiesHelp =
-    "names of the bodies on which the force acts: of one copy, or of all copies; if this and the next two "
-    "keys are empty, the force acts on all dynamic bodies and all cloths";
+    "names of the bodies on which the force acts; a name without the number of a copy means all copies. If "
+    "`bodies`, `particles` and `cloths` are all empty, the force acts on all dynamic bodies and all cloths";
 inline constexpr const char* kForceNameHelp =
     "unique name; default: force_N, where N is the index in the list";
 inline constexpr const char* kAirDragHelp =
@@ -87,7 +86,7 @@ Fields<T> pair_keys(Fields<T> own) {
       {{"particles", &T::particles, "names of groups and emitters whose particles act on each other",
         kRequired},
        {"cut_off", &T::cut_off,
-        "distance from which on particles do not act on each other, which saves much time; 0: no limit", "m",
+        "particles at a greater distance do not act on each other, which saves much time; 0: no limit", "m",
         kNotNegative},
        {"region", &T::region, "region in which the force acts"},
        {"drop_rate", &T::drop_rate, kDropRateHelp, "", kDropRate},
@@ -191,15 +190,17 @@ struct Table<AppliedForce> {
     return {
         {"name", &T::name, kForceNameHelp},
         {"bodies", &T::bodies,
-         "names of the dynamic bodies on which the force acts: of one copy, or of all copies", kRequired},
+         "names of the dynamic bodies on which the force acts; a name without the number of a copy means all "
+         "copies",
+         kRequired},
         {"point", &T::point, "point of application in the body's frame; default: the centre of mass", "m"},
         {"axes", &T::axes,
-         "axes of `force` and `torque`: those of the `world`, or those that turn with the `body`"},
+         "axes of `force` and `torque`: `world` axes are fixed, `body` axes turn with the body"},
         {"force", &T::force, "force, without keyframes", "N"},
         {"torque", &T::torque, "torque in addition to the torque of `force`, without keyframes", "N m"},
         {"keyframes", &T::keyframes,
-         "force and torque over time, instead of `force` and `torque`; constant before the first and after "
-         "the last"},
+         "force and torque over time, instead of `force` and `torque`; constant before the first key and "
+         "after the last key"},
         {"interpolation", &T::interpolation, kInterpolationHelp},
         {"start", &T::start, "time at which the force starts", "s", kNotNegative},
         {"end", &T::end, "time at which the force ends", "s", kNotNegative}};
@@ -220,7 +221,7 @@ struct Table<Explosion> {
         {"time", &T::time, "time of the explosion", "s", kNotNegative},
         {"point", &T::point, "centre of the explosion", "m"},
         {"impulse", &T::impulse, "impulse on an object at the centre; negative: towards the centre", "N s"},
-        {"radius", &T::radius, "distance from which on there is no effect", "m", kPositive},
+        {"radius", &T::radius, "distance from the centre at which the effect ends", "m", kPositive},
         {"drop_rate", &T::drop_rate,
          "exponent of the decrease from the centre to zero at the radius; 0: uniform", "", kDropRate}};
   }
@@ -229,15 +230,16 @@ template <>
 struct Table<VortexField> {
   static constexpr const char* kName = "vortex";
   static constexpr const char* kHelp =
-      "Air that rotates about an axis; at the distance r from it, its speed is circulation r / (2 pi (r^2 + "
-      "radius^2)).";
+      "Air that rotates about an axis. At the distance r from the axis, the speed of the air is circulation "
+      "r / (2 pi (r^2 + radius^2)).";
   static Fields<VortexField> fields() {
     using T = VortexField;
     return field_keys(Fields<T>{
         {"name", &T::name, kForceNameHelp},
         {"point", &T::point, "a point of the axis", "m"},
         {"axis", &T::axis, "direction of the axis; the air turns by the right-hand rule", "", kDirection},
-        {"circulation", &T::circulation, "strength of the vortex; negative: the other direction", "m^2/s"},
+        {"circulation", &T::circulation, "strength of the vortex; negative: the air turns the other way",
+         "m^2/s"},
         {"radius", &T::radius, "distance from the axis at which the air is fastest", "m", kPositive},
         {"drag", &T::drag, kAirDragHelp, "kg/s", kNotNegative}});
   }
@@ -255,8 +257,7 @@ struct Table<TurbulenceField> {
         {"octaves", &T::octaves, "number of eddy sizes, each half of the previous one", "", between(1, 8)},
         {"lifetime", &T::lifetime, "lifetime of the largest eddies; 0: their turnover time, scale / speed",
          "s", kNotNegative},
-        {"drift", &T::drift, "velocity at which the eddies move; the mean wind is not part of this force",
-         "m/s"},
+        {"drift", &T::drift, "velocity at which the eddies move; it adds no mean wind", "m/s"},
         {"seed", &T::seed, "seed of the random numbers that place the eddies", "", between(0, 1e9)},
         {"drag", &T::drag, kAirDragHelp, "kg/s", kNotNegative}});
   }
@@ -271,7 +272,7 @@ struct Table<GravitationForce> {
         Fields<T>{{"name", &T::name, kForceNameHelp},
                   {"constant", &T::constant, "gravitational constant", "N m^2/kg^2", kNotNegative},
                   {"softening", &T::softening,
-                   "radius over which masses are spread, which keeps forces finite", "m", kNotNegative}});
+                   "radius over which each mass is spread, so that forces stay finite", "m", kNotNegative}});
   }
 };
 template <>
@@ -280,19 +281,19 @@ struct Table<CoulombForce> {
   static constexpr const char* kHelp = "Electrostatic force between charged particles.";
   static Fields<CoulombForce> fields() {
     using T = CoulombForce;
-    return pair_keys(
-        Fields<T>{{"name", &T::name, kForceNameHelp},
-                  {"constant", &T::constant, "Coulomb constant", "N m^2/C^2", kNotNegative},
-                  {"softening", &T::softening,
-                   "radius over which charges are spread, which keeps forces finite", "m", kNotNegative}});
+    return pair_keys(Fields<T>{
+        {"name", &T::name, kForceNameHelp},
+        {"constant", &T::constant, "Coulomb constant", "N m^2/C^2", kNotNegative},
+        {"softening", &T::softening, "radius over which each charge is spread, so that forces stay finite",
+         "m", kNotNegative}});
   }
 };
 template <>
 struct Table<LennardJonesForce> {
   static constexpr const char* kName = "lennard_jones";
   static constexpr const char* kHelp =
-      "Force that keeps particles at a distance, as between atoms: repulsion closer than 1.12 sigma, "
-      "attraction beyond.";
+      "The force between atoms: particles closer than 1.12 sigma repel each other, others attract each "
+      "other.";
   static Fields<LennardJonesForce> fields() {
     using T = LennardJonesForce;
     return pair_keys(

@@ -37,8 +37,10 @@ struct Table<JointMotor> {
   static Fields<JointMotor> fields() {
     using T = JointMotor;
     return {{"mode", &T::mode,
-             "quantity that the motor controls: a speed, or a position relative to that at time 0"},
-            {"target", &T::target, "target in degrees or metres, or per second; `keys` override it"},
+             "quantity that the motor controls: a speed, or a position relative to the position at time 0"},
+            {"target", &T::target,
+             "target position in degrees or metres, or target speed in degrees or metres per second; `keys` "
+             "replace it"},
             {"keys", &T::keys, "targets over time"},
             {"interpolation", &T::interpolation, kInterpolationHelp},
             {"smooth", &T::smooth, "whether a `monotone` curve has zero speed at every key"},
@@ -60,16 +62,12 @@ struct Table<JointBehaviour> {
          "degrees of freedom: `spherical` rotates freely; `fixed` has none; `revolute` rotates about the "
          "axis; `prismatic` slides along the axis; `universal` rotates about two axes; `distance` keeps the "
          "distance of the anchors, as a rod does, or with limits or a motor as a rope or a winch; `gear` "
-         "couples the "
-         "rotation of `a` about `axis` with that of `b` about `second_axis`: angle of a + `ratio` * angle of "
-         "b = 0; "
-         "`rack` couples it with the displacement of `b` along `second_axis`: displacement = `ratio` * "
-         "angle; `screw` "
-         "rotates about the axis and moves `ratio` metres along it per turn; `pulley` is a rope from "
-         "`anchor` over "
-         "`pulley_a` and `pulley_b` to `anchor_b`. A gear and a rack only couple motions: other joints hold "
-         "their "
-         "bodies, on a carrier that does not turn"},
+         "couples the rotation of `a` about `axis` to the rotation of `b` about `second_axis`: angle of a + "
+         "`ratio` * angle of b = 0; `rack` couples the rotation of `a` about `axis` to the displacement of "
+         "`b` along `second_axis`: displacement = `ratio` * angle; `screw` rotates about the axis and moves "
+         "`ratio` metres along it per turn; `pulley` is a rope from `anchor` over `pulley_a` and `pulley_b` "
+         "to `anchor_b`. Gears and racks only couple motions: their bodies need other joints, which hold "
+         "them on a carrier that does not turn"},
         {"axis", &T::axis, "axis of rotation or sliding; for a spherical joint, axis of the twist", "",
          kDirection},
         {"second_axis", &T::second_axis,
@@ -88,17 +86,15 @@ struct Table<JointBehaviour> {
          "joint: a rope has [-its length, 0]",
          "m"},
         {"length_limits", &T::length_limits,
-         "instead of `limits`: least and greatest length of a rope, of a distance joint or a pulley; of a "
-         "pulley, the "
-         "length from `anchor` to `pulley_a` plus `ratio` times that from `anchor_b` to `pulley_b`. A pulley "
-         "without "
-         "limits keeps its length from getting larger",
+         "instead of `limits`: least and greatest length of the rope of a distance joint or a pulley. The "
+         "length of a pulley's rope is the distance from `anchor` to `pulley_a` plus `ratio` times the "
+         "distance from `anchor_b` to `pulley_b`. Without limits, it cannot get longer than at the start",
          "m", kNotNegative},
         {"limits_deg", &T::limits_deg, "least and greatest angle; for a spherical joint, of the twist",
          "degrees"},
         {"swing_deg", &T::swing_deg,
-         "largest angle between the axes of a spherical joint, or of rotation about the second axis of a "
-         "universal joint",
+         "spherical joint: largest angle between the axes of the two bodies; universal joint: largest angle "
+         "of rotation about the second axis",
          "degrees", between(0, 180)},
         {"restitution", &T::restitution,
          "coefficient of restitution at `limits`, `length_limits`, `limits_deg` and `swing_deg`, for speeds "
@@ -123,29 +119,27 @@ template <>
 struct Table<Joint> {
   static constexpr const char* kName = "joint";
   static constexpr const char* kHelp =
-      "Connects two bodies, or a body and the world, in their poses at time 0. Where bodies have copies, "
-      "each copy of `a` is joined to the copy of `b` with the same number, or to the single `b` if that has "
-      "no copies.";
+      "Connects two bodies, or a body and the world, in their poses at time 0. If `a` has copies, each copy "
+      "is joined to the copy of `b` with the same number, or to `b` itself if `b` has no copies.";
   static Fields<Joint> fields() {
     using T = Joint;
-    return Fields<T>{{"name", &T::name, "unique name; default: joint_N, where N is the index in the list"},
-                     {"a", &T::a, "name of a body", kRequired},
-                     {"b", &T::b, "name of a body; empty: the world"},
-                     {"anchor", &T::anchor, "point at which the bodies are joined", "m"},
-                     {"anchor_b", &T::anchor_b,
-                      "other end of a distance joint or pulley, on `b`; point of `b` of a rack", "m"},
-                     {"pulley_a", &T::pulley_a, "fixed point over which the rope of `a` runs", "m"},
-                     {"pulley_b", &T::pulley_b, "fixed point over which the rope of `b` runs", "m"}}
+    return Fields<T>{
+        {"name", &T::name, "unique name; default: joint_N, where N is the index in the list"},
+        {"a", &T::a, "name of a body", kRequired},
+        {"b", &T::b, "name of a body; empty: the world"},
+        {"anchor", &T::anchor, "point at which the bodies are joined", "m"},
+        {"anchor_b", &T::anchor_b, "distance joint or pulley: the end on `b`; rack: a point of `b`", "m"},
+        {"pulley_a", &T::pulley_a, "fixed point over which the rope of `a` runs", "m"},
+        {"pulley_b", &T::pulley_b, "fixed point over which the rope of `b` runs", "m"}}
         .with(&T::behaviour)
-        .then({{"collide", &T::collide, "the two bodies also collide with each other"},
+        .then({{"collide", &T::collide, "whether the two bodies also collide with each other"},
                {"appear_at", &T::appear_at,
-                "time from which on the joint acts; it then joins the bodies in their poses of that time, "
-                "and its "
-                "anchors and axes have moved with the bodies",
+                "time at which the joint starts to act. It joins the bodies in their poses at that time; "
+                "until then its anchors and axes move with the bodies",
                 "s", kNotNegative},
                {"remove_at", &T::remove_at,
                 "time at which the joint is removed; must be later than `appear_at`", "s", kPositive},
-               {"visible", &T::visible, "a distance joint is drawn as a straight rod"},
+               {"visible", &T::visible, "whether a distance joint is drawn, as a straight rod"},
                {"radius", &T::radius, "radius of the rod", "m", kPositive},
                {"material", &T::material, "name of the rod's material; empty: grey"}});
   }
@@ -155,7 +149,8 @@ template <>
 struct Table<Chain> {
   static constexpr const char* kName = "chain";
   static constexpr const char* kHelp =
-      "Links in a row from one point to another: bodies NAME/link_0 and on, joints NAME/joint_0 and on.";
+      "Links in a row from one point to another: bodies NAME/link_0, NAME/link_1 and so on, and joints "
+      "NAME/joint_0, NAME/joint_1 and so on.";
   static Fields<Chain> fields() {
     using T = Chain;
     return {
@@ -180,9 +175,8 @@ struct Table<Chain> {
         {"bend_stiffness", &T::bend_stiffness,
          "flexural rigidity (Young's modulus times second moment of area) of an elastic rod that is "
          "unstressed as it is laid out; twisting has the same stiffness. A joint between links of the length "
-         "l "
-         "resists with this / l per radian, so the rod bends alike for any number of links, at most 32. The "
-         "bodies that hold its ends clamp them",
+         "l has the stiffness `bend_stiffness` / l per radian, so the rod bends alike for any number of "
+         "links, at most 32. The bodies that hold the ends of the chain clamp them",
          "N m^2", kNotNegative},
         {"friction", &T::friction, "dry friction of each joint", "N m", kNotNegative},
         {"damping", &T::damping, "viscous damping of each joint", "N m s", kNotNegative},
@@ -194,7 +188,7 @@ struct Table<Ragdoll> {
   static constexpr const char* kName = "ragdoll";
   static constexpr const char* kHelp =
       "A standing person who faces +Z and collapses when the film starts: bodies NAME/pelvis, chest, head, "
-      "upper_arm_left and so on, with joints that bend as those of people.";
+      "upper_arm_left and so on, with joints that bend as human joints do.";
   static Fields<Ragdoll> fields() {
     using T = Ragdoll;
     return Fields<T>{
@@ -204,8 +198,10 @@ struct Table<Ragdoll> {
         {"velocity", &T::velocity, "velocity of the figure at time 0", "m/s"},
         {"height", &T::height, "height of the figure", "m", between(0.1, 10)},
         {"density", &T::density, "density of the body parts", "kg/m^3", kPositive},
-        {"stiffness", &T::stiffness, "dry friction of the joints: 0 rotates freely, 1 is a limp adult", "",
-         kNotNegative},
+        {"stiffness", &T::stiffness,
+         "factor of the dry friction of the joints: with 0 they rotate freely, with 1 they are as stiff as "
+         "in a limp adult",
+         "", kNotNegative},
         {"skin", &T::skin, "name of the material of head, hands and feet; empty: grey"},
         {"shirt", &T::shirt, "name of the material of trunk and arms; empty: grey"},
         {"trousers", &T::trousers, "name of the material of pelvis and legs; empty: grey"}}
@@ -216,7 +212,7 @@ template <>
 struct Table<Bridge> {
   static constexpr const char* kName = "bridge";
   static constexpr const char* kHelp =
-      "Planks hinged to each other between two banks: bodies NAME/plank_0 and on.";
+      "Planks hinged to each other between two banks: bodies NAME/plank_0, NAME/plank_1 and so on.";
   static Fields<Bridge> fields() {
     using T = Bridge;
     return {
@@ -314,16 +310,16 @@ struct Table<ModelTree> {
         {"orientation", &T::orientation, "orientation of the model, about `position`"},
         {"velocity", &T::velocity, "velocity of all links at time 0", "m/s"},
         {"scale", &T::scale,
-         "scale factor of the model; `auto`: from the file's likely unit to metres "
-         "(docs/models.md; `offstage info FILE` "
-         "shows it)",
+         "scale factor of the model; `auto` converts the likely unit of the file to metres (docs/models.md). "
+         "`offstage info FILE` shows the factor",
          "", kPositive},
         {"density", &T::density, "density of the links", "kg/m^3", kPositive},
         {"base", &T::base,
-         "name of the body that holds the uppermost nodes, or `world`; empty: they are free"},
+         "name of the body that holds the uppermost nodes, or `world`; empty: these nodes are free"},
         {"material", &T::material, "name of a material; empty: the materials of the file"},
-        {"collides", &T::collides, "links collide with all objects that they are not joined to"},
-        {"joints", &T::joints, "joints that are not spherical, or have a motor or limits"},
+        {"collides", &T::collides, "whether links collide with all objects that they are not joined to"},
+        {"joints", &T::joints,
+         "the joints that are not plain spherical joints, such as joints with a motor or limits"},
         {"friction", &T::friction, "dry friction of the other joints", "N m", kNotNegative},
         {"damping", &T::damping, "viscous damping of the other joints", "N m s", kNotNegative}}
         .with(&T::placement);

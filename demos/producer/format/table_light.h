@@ -26,15 +26,15 @@ template <>
 struct Table<LampBase> {
   static Fields<LampBase> fields() {
     using T = LampBase;
-    return {
-        {"body", &T::body,
-         "name of the body that carries the light; position and target are then in its frame; empty: none"},
-        {"position", &T::position, "position of the light", "m"},
-        {"color", &T::color, "colour of the light"},
-        {"intensity", &T::intensity,
-         "brightness of a white surface that faces the light 1 m away; a number or a curve over time", "",
-         kNotNegative},
-        {"shadows", &T::shadows, "casts shadows"}};
+    return {{"body", &T::body,
+             "name of the body that carries the light; `position` and `target` are then in the body's frame; "
+             "empty: none"},
+            {"position", &T::position, "position of the light", "m"},
+            {"color", &T::color, "colour of the light"},
+            {"intensity", &T::intensity,
+             "brightness of a white surface that faces the light 1 m away; a number or a curve over time", "",
+             kNotNegative},
+            {"shadows", &T::shadows, "casts shadows"}};
   }
 };
 template <>
@@ -88,7 +88,8 @@ struct Table<ModelLights> {
         {"body", &T::body, "name of the body that shows the file", kRequired},
         {"name", &T::name, "name of the light's node in the file; empty: all lights"},
         {"intensity", &T::intensity,
-         "factor of their intensities; files by Blender in watts need about 0.001", "", kNotNegative},
+         "factor of the intensities in the file; files that Blender wrote in watts need about 0.001", "",
+         kNotNegative},
         {"radius", &T::radius, "radius of point and spot lights, which have none in the file", "m",
          kPositive},
         {"size_deg", &T::size_deg, "angular diameter of a directional light, which becomes the scene's sun",

@@ -60,14 +60,14 @@ struct Table<Material> {
         {"texture_angle_deg", &T::texture_angle_deg,
          "turns the texture counter-clockwise, about its centre or, with `triplanar`, the body's axes",
          "deg"},
-        {"two_sided", &T::two_sided, "back faces are lit and drawn as well"},
+        {"two_sided", &T::two_sided, "whether back faces are lit and drawn as well"},
         {"fabric", &T::fabric,
          "appearance of the threads on cloths; default: the appearance of the cloth's fabric"},
         {"restitution", &T::restitution,
-         "coefficient of restitution; of two materials the larger value is used", "", kFraction},
+         "coefficient of restitution; a contact uses the larger value of its two materials", "", kFraction},
         {"friction", &T::friction,
-         "coefficient of dynamic friction; of two materials the geometric mean is used, as for the next two "
-         "keys",
+         "coefficient of dynamic friction; a contact uses the geometric mean of the values of its two "
+         "materials, also for `static_friction` and `cross_friction`",
          "", kNotNegative},
         {"static_friction", &T::static_friction,
          "coefficient of static friction between bodies; default: `friction`", "", kNotNegative},
@@ -78,14 +78,13 @@ struct Table<Material> {
         {"rolling_friction", &T::rolling_friction,
          "greatest torque against rolling, per contact force, between bodies: the distance by which the "
          "centre of pressure is ahead of the middle of the contact. A ball of radius r decelerates by 5/7 g "
-         "times this / r. "
-         "Steel on steel has about 1e-5 m, a ball on carpet 1e-3 m; of two materials the larger value is "
-         "used",
+         "`rolling_friction` / r. Steel on steel has about 1e-5 m, a ball on carpet 1e-3 m; a contact uses "
+         "the larger value of its two materials",
          "m", kNotNegative},
         {"spinning_friction", &T::spinning_friction,
          "greatest torque against spinning about the contact's normal, per contact force, between bodies: "
          "about 0.6 times `friction` times the radius of the contact area. It shares its limit with sliding "
-         "friction; of two materials the larger value is used",
+         "friction; a contact uses the larger value of its two materials",
          "m", kNotNegative},
     };
   }
@@ -106,8 +105,8 @@ struct Table<ContactRule> {
          "given by the materials applies; default: the value that follows from the two materials",
          "", kNotNegative},
         {"static_friction", &T::static_friction,
-         "coefficient of static friction; default: `friction` of this rule if given, or else from the "
-         "materials",
+         "coefficient of static friction; default: the `friction` of this rule if given, otherwise the value "
+         "that follows from the two materials",
          "", kNotNegative},
         {"rolling_friction", &T::rolling_friction,
          "coefficient of rolling friction; default: the value that follows from the two materials", "m",

@@ -46,12 +46,11 @@ struct Table<PartsOverlay> {
       "The convex parts of a body with a mesh, each in its own colour, drawn instead of the body.";
   static Fields<PartsOverlay> fields() {
     using T = PartsOverlay;
-    return {
-        {"body", &T::body, "name of a body with a mesh", kRequired},
-        {"explode", &T::explode,
-         "outward displacement of the parts, as a fraction of their distance from the centre; a number or a "
-         "curve over time",
-         "", between(0, 100)}};
+    return {{"body", &T::body, "name of a body with a mesh", kRequired},
+            {"explode", &T::explode,
+             "outward displacement of each part, as a fraction of its distance from the centre; a number or "
+             "a curve over time",
+             "", between(0, 100)}};
   }
 };
 template <>
@@ -111,7 +110,8 @@ template <>
 struct Table<IslandsOverlay> {
   static constexpr const char* kName = "islands_overlay";
   static constexpr const char* kHelp =
-      "Islands of dynamic bodies that contacts connect: a box around each body in the colour of its island.";
+      "Islands, groups of dynamic bodies connected by contacts: a box around each body in the colour of its "
+      "island.";
   static Fields<IslandsOverlay> fields() {
     using T = IslandsOverlay;
     return Fields<T>{{"asleep", &T::asleep, "brightness of sleeping bodies", "", kFraction}}

@@ -30,9 +30,9 @@ struct Table<render::SpriteSheet> {
         {"columns", &T::columns, "number of pictures in a row", "", between(1, render::kMostSheetPictures)},
         {"rows", &T::rows, "number of rows", "", between(1, render::kMostSheetPictures)},
         {"fps", &T::fps, "pictures per second of a particle's age", "1/s", kNotNegative},
-        {"blend", &T::blend, "each picture fades to the next; false: they change at once"},
-        {"loop", &T::loop, "the first picture follows the last; false: the last one stays"},
-        {"random_start", &T::random_start, "particles start with different pictures"}};
+        {"blend", &T::blend, "whether each picture fades to the next; false: pictures change at once"},
+        {"loop", &T::loop, "whether the first picture follows the last; false: the last picture stays"},
+        {"random_start", &T::random_start, "whether particles start with different pictures"}};
   }
 };
 template <>
@@ -43,14 +43,14 @@ struct Table<LookMesh> {
       "ball; its own size has no effect.";
   static Fields<LookMesh> fields() {
     using T = LookMesh;
-    return {{"shape", &T::shape, "what is drawn; not a plane"},
+    return {{"shape", &T::shape, "shape that is drawn; not a plane"},
             {"material", &T::material,
              "name of its material; empty: the material of the model file, or a default material"},
             {"axis", &T::axis,
              "axis of `angle_deg` and `spin_deg_per_s`, in the mesh's axes; default: a random axis for each "
              "particle",
              "", kDirection},
-            {"along_motion", &T::along_motion, "the mesh's +Y axis points along the velocity"}};
+            {"along_motion", &T::along_motion, "whether the mesh's +Y axis points along the velocity"}};
   }
 };
 template <>
@@ -58,7 +58,7 @@ struct Table<ParticleLook> {
   static constexpr const char* kName = "look";
   static constexpr const char* kHelp =
       "How particles are drawn. The style gives the default of each key. `sprite`: soft disc; `streak`: lit "
-      "line along the motion, with a shadow; `drop`: the same without a shadow; `sphere`: lit ball; `smoke`: "
+      "line along the motion, with a shadow; `drop`: streak without a shadow; `sphere`: lit ball; `smoke`: "
       "puff that is shadowed by the smoke in front of it; `fire`: glowing flame; `flake`: snow or dust; "
       "`spark`: glowing point with a tail; `mesh`: small object.";
   static Fields<ParticleLook> fields() {
@@ -69,8 +69,8 @@ struct Table<ParticleLook> {
         {"color_over_age", &T::color_over_age,
          "multiplies `color`; age 0 is the birth time, 1 the end of the lifespan"},
         {"temperature_over_age", &T::temperature_over_age,
-         "multiplies both by the colour of a black body of this temperature and its brightness relative "
-         "to the hottest key",
+         "multiplies the colour by the colour of a black body of this temperature, and by its brightness "
+         "relative to the hottest key",
          "K", kTemperature},
         {"size_over_age", &T::size_over_age, "multiplies the drawn radius", "", kNotNegative},
         {"ramp", &T::ramp, "interpolation between the keys over age"},
@@ -78,10 +78,12 @@ struct Table<ParticleLook> {
          kFraction},
         {"channel_deviation", &T::channel_deviation,
          "standard deviations of red, green, blue and opacity between particles", "", kNotNegative},
-        {"additive", &T::additive, "adds light instead of covering; default: true for sparks and fire"},
-        {"lit", &T::lit,
-         "lit by sun and sky; if false, the colour is emitted light; default: true except for sparks and "
+        {"additive", &T::additive,
+         "whether particles add light to the background instead of covering it; default: true for sparks and "
          "fire"},
+        {"lit", &T::lit,
+         "whether sun and sky light the particles; if false, their colour is emitted light; default: true "
+         "except for sparks and fire"},
         {"casts_shadow", &T::casts_shadow,
          "casts a shadow; default: true for sprites, streaks, spheres and smoke"},
         {"softness", &T::softness, "width of the soft rim as a fraction of the radius; default: 0.5", "",
@@ -97,8 +99,8 @@ struct Table<ParticleLook> {
         {"metallic", &T::metallic, "for spheres: 0 is a dielectric, 1 a metal; default: 0", "", kFraction},
         {"roughness", &T::roughness, "for spheres: 0 is a mirror, 1 is dull; default: 0.3", "", kFraction},
         {"texture", &T::texture,
-         "image file that is drawn for each sprite, times its colour; empty: a soft disc. The longer side is "
-         "the particle's diameter"},
+         "image file that is drawn for each sprite, multiplied by the sprite's colour; empty: a soft disc. "
+         "The longer side of the image is the particle's diameter"},
         {"sheet", &T::sheet,
          "division of the texture into the pictures of a flip-book; default: the texture is one picture"},
         {"mesh", &T::mesh, "the object that the style `mesh` draws, with its own material"},
@@ -107,7 +109,8 @@ struct Table<ParticleLook> {
          "mesh; "
          "for sprites with a texture, flakes and meshes",
          "degrees"},
-        {"spin_deg_per_s", &T::spin_deg_per_s, "speed of this rotation", "degrees/s"},
+        {"spin_deg_per_s", &T::spin_deg_per_s, "speed of the rotation that starts at `angle_deg`",
+         "degrees/s"},
     };
   }
 };

@@ -1,6 +1,6 @@
 #pragma once
-/// The keys of an entry of `particles`, a group of particles that are placed one by one; and the keys by
-/// which all particles move and collide, which emitters have, too.
+/// The keys of an entry of `particles`, a group of particles that are placed one by one. Also the keys for
+/// the motion and the collisions of particles, which groups and emitters have in common.
 
 #include "producer/format/table_particle_look.h"
 #include "producer/format/table_placement.h"
@@ -59,11 +59,13 @@ struct Table<ParticleGroup> {
          "points; "
          "empty: none"},
         {"scale", &T::scale,
-         "scale factor of the file's points; `auto`: from the file's likely unit to metres (docs/models.md)",
+         "scale factor of the file's points; `auto` converts the likely unit of the file to metres "
+         "(docs/models.md)",
          "", kScale},
         {"fit", &T::fit,
-         "edges of a box; the points get the largest size with which they fit, before `scale`", "m",
-         kPositive},
+         "edges of a box. The points get the largest size that fits into the box; `scale` then multiplies "
+         "that size",
+         "m", kPositive},
         {"position", &T::position, "position of the file's origin", "m"},
         {"orientation", &T::orientation, "orientation of the file's axes"},
         {"max_points", &T::max_points, "greatest number of points; a file with more is thinned out evenly",
@@ -71,10 +73,11 @@ struct Table<ParticleGroup> {
         {"radius", &T::radius, "radius of each particle", "m", kPositive},
         {"mass", &T::mass, "mass of each particle", "kg", kPositive},
         {"restitution", &T::restitution,
-         "coefficient of restitution; of particle and body the larger value is used", "", kFraction},
+         "coefficient of restitution; a contact uses the larger value of particle and body", "", kFraction},
         {"friction", &T::friction,
-         "coefficient of dynamic friction; of particle and body the geometric mean is used", "",
-         kNotNegative},
+         "coefficient of dynamic friction; a contact uses the geometric mean of the values of particle and "
+         "body",
+         "", kNotNegative},
         {"charge", &T::charge, "electric charge of each particle", "C"},
         {"appear_at", &T::appear_at, "time at which the particles appear", "s", kNotNegative},
         {"remove_at", &T::remove_at,

@@ -26,7 +26,7 @@ template <>
 struct Table<Grid> {
   static constexpr const char* kName = "grid";
   static constexpr const char* kHelp =
-      "Copies on a grid, centred on the original in x and z, and upwards from it in y.";
+      "Copies on a grid. The grid is centred on the original in x and z, and extends upwards from it in y.";
   static Fields<Grid> fields() {
     return {{"count", &Grid::count, "number of copies along x, y and z", "", between(1, kMaxCopies)},
             {"spacing", &Grid::spacing, "distance between neighbours along x, y and z", "m"}};
@@ -107,7 +107,8 @@ struct Table<Fill> {
         {"position", &Fill::position,
          "centre of the volume: relative to the original, or in the world for a particle group", "m"},
         {"spacing", &Fill::spacing,
-         "distance between neighbours; 0: the diameter of the particles; copies of bodies need a distance",
+         "distance between neighbours; 0: the diameter of the particles. For copies of bodies it must be "
+         "given",
          "m", kNotNegative},
         {"packing", &Fill::packing,
          "arrangement of the centres: `hexagonal` is the closest (balls that touch fill 74 %), `cubic` is a "

@@ -7,14 +7,13 @@
 
 namespace offstage::producer {
 
-/// Help of the keys `scale` and `fit`, which every object with a model file has.
+/// Help texts of the keys `scale` and `fit`, which every object with a model file has.
 inline constexpr const char* kModelScaleHelp =
-    "scale factor of the model; `auto`: from the file's likely unit to metres (docs/models.md; `offstage "
-    "info "
-    "FILE` shows it)";
+    "scale factor of the model; `auto` converts the likely unit of the file to metres (docs/models.md). "
+    "`offstage info FILE` shows the factor";
 inline constexpr const char* kModelFitHelp =
-    "edges of a box along the model's axes; the model gets the largest size with which it fits, whatever its "
-    "unit; `scale` then multiplies that size";
+    "edges of a box along the model's axes. The model gets the largest size that fits into the box, whatever "
+    "its unit; `scale` then multiplies that size";
 
 template <>
 struct Table<sim::Sphere> {
@@ -73,20 +72,18 @@ template <>
 struct Table<MeshDecomposition> {
   static constexpr const char* kName = "decomposition";
   static constexpr const char* kHelp =
-      "How a model is divided into the convex parts with which a dynamic body collides. Its mass is that of "
-      "the model itself.";
+      "Division of a model into the convex parts with which a dynamic body collides. The mass is computed "
+      "from the model itself, not from the parts.";
   static Fields<MeshDecomposition> fields() {
     return {
         {"method", &MeshDecomposition::method,
-         "`exact`: exact convex parts if at most 1024 suffice, else as `approximate`; `approximate`: parts "
-         "within `max_error`; `auto`: exact if at most `max_parts` (64) suffice, else approximate; `hull`: "
-         "only "
-         "the convex hull. A static or kinematic body without exact parts collides by its triangles, unless "
-         "the "
-         "method is `hull`"},
+         "`exact`: exact convex parts if at most 1024 suffice, otherwise approximate parts; `approximate`: "
+         "parts that differ from the model by at most `max_error`; `auto`: exact parts if at most "
+         "`max_parts` (64) suffice, otherwise approximate parts; `hull`: only the convex hull. A static or "
+         "kinematic body without exact parts collides by its triangles, unless the method is `hull`"},
         {"max_error", &MeshDecomposition::max_error,
-         "for `approximate`: accepted volume in which the parts and the model differ, as a fraction of the "
-         "model's volume; a larger fraction takes fewer parts",
+         "for `approximate`: greatest volume in which the parts and the model may differ, as a fraction of "
+         "the model's volume; a larger fraction needs fewer parts",
          "", between(0.001, 1)},
         {"max_parts", &MeshDecomposition::max_parts,
          "greatest number of parts; has priority over `max_error`. Default: 64, and up to 1024 if the error "
@@ -116,7 +113,7 @@ struct Table<MeshFile> {
         {"scale", &MeshFile::scale, kModelScaleHelp, "", kScale},
         {"fit", &MeshFile::fit, kModelFitHelp, "m", kPositive},
         {"decomposition", &MeshFile::decomposition,
-         "criteria of the convex parts with which a dynamic body collides; not for cloths and particles"}};
+         "division into the convex parts with which a dynamic body collides; not for cloths and particles"}};
   }
 };
 template <>
@@ -191,27 +188,27 @@ struct Table<CompoundPart> {
     return {{"shape", &T::shape, "shape of the part"},
             {"position", &T::position, "position of the part in the body's frame", "m"},
             {"orientation", &T::orientation, "orientation of the part in the body's frame"},
-            {"density", &T::density, "density of the part; default: the body's", "kg/m^3", kPositive},
+            {"density", &T::density, "density of the part; default: the density of the body", "kg/m^3",
+             kPositive},
             {"material", &T::material,
-             "name of the material with which the part is drawn; empty: that of the body. Friction and "
-             "restitution are "
-             "always those of the body's material"}};
+             "name of the material with which the part is drawn; empty: the body's material. Friction and "
+             "restitution always come from the body's material"}};
   }
 };
 template <>
 struct Table<Compound> {
   static constexpr const char* kName = "compound";
   static constexpr const char* kHelp =
-      "Several shapes that form one rigid body, such as a hammer. Mass, centre of mass and inertia are the "
-      "sums over "
-      "the parts; where parts overlap, both count. Round parts collide with 32 to 48 flat sides.";
+      "Several shapes that form one rigid body, such as a hammer. The mass and the inertia are sums over the "
+      "parts; where two parts overlap, the mass of both counts. Round parts collide with 32 to 48 flat "
+      "sides.";
   static Fields<Compound> fields() { return {{"parts", &Compound::parts, "parts; at least one", kRequired}}; }
 };
 template <>
 struct Tags<Shape> {
   static constexpr const char* kName = "shape";
   static constexpr const char* kHelp =
-      "Collision shape of a body, which is also drawn unless the body has a `model`.";
+      "Collision shape of a body. It is also drawn, unless the body has a `model`.";
   static constexpr std::array kTags = {"sphere", "box",      "capsule", "cylinder",  "cone",
                                        "plane",  "mesh",     "frustum", "ellipsoid", "torus",
                                        "tube",   "open_box", "compound"};

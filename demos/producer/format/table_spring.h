@@ -24,7 +24,7 @@ struct Table<Spring> {
     using T = Spring;
     return {
         {"name", &T::name, "unique name; default: spring_N, where N is the index in the list"},
-        {"a", &T::a, "one end"},
+        {"a", &T::a, "first end of the spring"},
         {"b", &T::b, "the second end of the spring"},
         {"stiffness", &T::stiffness, "force per extension", "N/m", kNotNegative},
         {"damping", &T::damping, "force per speed of extension", "N s/m", kNotNegative},

@@ -70,7 +70,7 @@ struct Table<sim::CollisionMethods> {
          "misses it; `bisection` halves the sub-step of bodies that overlap at its end, and misses bodies "
          "that passed through each other"},
         {"trees", &T::trees,
-         "volumes of the bounding trees over the convex parts and triangles of meshes: axis-aligned boxes "
+         "volumes of the trees that bound the convex parts and triangles of meshes: axis-aligned boxes "
          "(`aabb`), oriented boxes (`obb`) or spheres; `mixed` has spheres for dynamic bodies and "
          "axis-aligned boxes for the others"},
         {"tree_split", &T::tree_split,
@@ -78,7 +78,7 @@ struct Table<sim::CollisionMethods> {
          "the midpoints"},
         {"mesh_pairs", &T::mesh_pairs,
          "pieces of two meshes between which the time of impact is searched: their convex `parts` or their "
-         "`triangles`; contact points are always those of the parts, and a compound always uses its parts"},
+         "`triangles`; contact points always come from the parts, and a compound always uses its parts"},
         {"cell_factor", &T::cell_factor,
          "for `broad_phase: grid`: width of a cell in mean diameters of the bodies", "", between(0.1, 100)}};
   }
@@ -101,11 +101,11 @@ struct Table<WorldSettings> {
          "greatest error per sub-step of a coordinate that an adaptive integrator or `dormand_prince` allows",
          "m", between(1e-14, 1)},
         {"solver", &T::solver,
-         "contact solver: `exact` computes contact forces to rounding and each collision at its own time; "
-         "`fast` does a bounded amount of work; `auto` uses `exact` where it is not slower, and resolves "
-         "each collision at its own time while at most six bodies are awake; `lcp` is as "
-         "`exact`, with forces by Dantzig's and Baraff's pivoting for groups of at most 64 contacts, whose "
-         "friction has separate limits along two tangents, and leaves other groups to `exact`"},
+         "contact solver: `exact` computes contact forces to rounding accuracy, and each collision at its "
+         "own time; `fast` does a bounded amount of work; `auto` uses `exact` where it is not slower, and "
+         "resolves each collision at its own time while at most six bodies are awake; `lcp` works as "
+         "`exact`, except that groups of at most 64 contacts get their forces by Dantzig's and Baraff's "
+         "pivoting, with separate limits of friction along two tangents"},
         {"impact", &T::impact,
          "how collisions at the same time are resolved: `simultaneous` solves them together; `sequential` "
          "solves one after the other, so that an impact travels through a row of balls"},
@@ -122,7 +122,7 @@ struct Table<WorldSettings> {
         {"sleep", &T::sleep, "bodies at rest are not simulated until something reaches them"},
         {"bounds", &T::bounds, "half the edge of the cube around the origin that all objects must stay in",
          "m", kPositive},
-        {"seed", &T::seed, "changes all random numbers of the scene", "", kNotNegative},
+        {"seed", &T::seed, "seed of all random numbers of the scene", "", kNotNegative},
     };
   }
 };

@@ -265,7 +265,7 @@ Description Codec<Quat>::describe(Catalogue& all, const Spec&) {
 
 namespace {
 
-/// The value of two hexadecimal digits as a fraction of 255; negative if they are invalid.
+/// Returns the value of two hexadecimal digits divided by 255; a negative number if a digit is invalid.
 float hex_fraction(std::string_view digits) {
   int value = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value, 16);

@@ -32,7 +32,8 @@ struct Codec<Real> {
   static Node write(const Real& value);
   static Description describe(Catalogue& all, const Spec& spec);
 };
-/// A number of single precision, as in structs of the renderer. It is read and written as any other number.
+/// A number of single precision, which structs of the renderer use. Its JSON form is that of any other
+/// number.
 template <>
 struct Codec<float> {
   static void read(Reader& in, const Node& node, const Spec& spec, float& out) {
@@ -67,14 +68,16 @@ struct Codec<uint64_t> {
   static Node write(const uint64_t& value);
   static Description describe(Catalogue& all, const Spec& spec);
 };
-/// [w, x, y, z], or {"axis": [x, y, z], "angle_deg": a}. Normalized; zero is refused.
+/// [w, x, y, z], or {"axis": [x, y, z], "angle_deg": a}. The value is normalized when it is read; a zero
+/// quaternion or axis is an error.
 template <>
 struct Codec<Quat> {
   static void read(Reader& in, const Node& node, const Spec& spec, Quat& out);
   static Node write(const Quat& value);
   static Description describe(Catalogue& all, const Spec& spec);
 };
-/// "#rrggbb" or "#rrggbbaa" in sRGB, in short "#rgb" or "#rgba", or [r, g, b] or [r, g, b, a], linear.
+/// "#rrggbb" or "#rrggbbaa" in sRGB, their short forms "#rgb" and "#rgba", or a list of linear components
+/// [r, g, b] or [r, g, b, a].
 template <>
 struct Codec<Color> {
   static void read(Reader& in, const Node& node, const Spec& spec, Color& out);
@@ -103,7 +106,8 @@ struct Codec<ModelScale> {
   static Description describe(Catalogue& all, const Spec& spec);
 };
 /// A number, {"mean", "deviation", "min", "max", "clip"}, {"range": [a, b]} or {"curve": [[time, value],
-/// ...]}. All possible values must be within the limits; a closed limit also truncates a normal distribution.
+/// ...]}. All possible values must be within the limits. A limit that is itself allowed also truncates a
+/// normal distribution.
 template <>
 struct Codec<Varying> {
   static void read(Reader& in, const Node& node, const Spec& spec, Varying& out);
@@ -122,7 +126,7 @@ inline constexpr const char* kInterpolationHelp =
 
 Description describe_vector(Description item, int size, bool nonzero);
 
-/// [x, y, z]; limits apply to each component.
+/// A vector as a list, such as [x, y, z]. Limits apply to each component.
 template <class S, int N>
 struct Codec<Eigen::Matrix<S, N, 1>> {
   using V = Eigen::Matrix<S, N, 1>;
@@ -170,7 +174,7 @@ struct Codec<std::array<V, N>> {
 
 Description describe_age_key(const Description& age, const Description& value);
 
-/// [age, value] with age in [0, 1]; limits apply to the value.
+/// A key over age: [age, value] with an age in [0, 1]. Limits apply to the value.
 template <class V>
 struct Codec<std::pair<Real, V>> {
   static void read(Reader& in, const Node& node, const Spec& spec, std::pair<Real, V>& out) {

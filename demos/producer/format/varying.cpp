@@ -15,9 +15,9 @@ using effects::Curve;
 using effects::Normal;
 using effects::Uniform;
 
-constexpr Real kUnbounded = 1e300;  // Normal's bounds when there are none
+constexpr Real kUnbounded = 1e300;  // bound of a Normal that has no bound
 
-/// The keys of a normal distribution for a number of the given kind.
+/// The keys of a normal distribution, for a number with the given Spec.
 struct NormalSpecs {
   Spec mean, deviation, min, max, clip;
 
@@ -31,8 +31,8 @@ struct NormalSpecs {
   std::array<const Spec*, 5> all() const { return {&mean, &deviation, &min, &max, &clip}; }
 };
 
-/// Closed limits truncate a distribution; an open limit, like "greater than 0", has no smallest value at
-/// which to truncate.
+/// A limit that is itself allowed truncates a distribution. An excluded limit, such as "greater than 0", does
+/// not: there is no smallest allowed value at which to truncate.
 Normal within(const Limits& limits) {
   Normal normal;
   if (!limits.open_low) normal.min = std::max(normal.min, limits.low);
@@ -117,7 +117,7 @@ void Codec<Varying>::read(Reader& in, const Node& node, const Spec& spec, Varyin
   else
     v = read_normal(in, node, spec);
   if (in.problems().size() > before) return;
-  // Only a normal distribution can still be outside of the limits: through an open one.
+  // Only a normal distribution can still exceed the limits, where a limit itself is excluded.
   if (!spec.limits.allows(effects::lower_bound(v)))
     return in.fail(node.at,
                    "can become too small: must be " + spec.limits.rule(spec.unit) + "; give \"min\"");

@@ -26,7 +26,7 @@ int width_of(const std::string& text) {
   return kTextScale * render::text_width_px(text);
 }
 
-/// Returns the end of a text that is too wide.
+/// Returns the text if it fits into the width, otherwise ".." and as much of its end as fits.
 std::string cut_start(std::string text, int width_px) {
   if (width_of(text) <= width_px) return text;
   while (!text.empty() && width_of(".." + text) > width_px) text.erase(0, 1);
@@ -39,7 +39,7 @@ std::string cut_end(std::string text, int width_px) {
   return text + "..";
 }
 
-/// Splits a text to lines of whole words of at most this width; longer words are cut.
+/// Splits a text into lines of at most this width, at spaces. A word that is wider than a line is cut.
 std::vector<std::string> wrapped(const std::string& text, int width_px) {
   std::vector<std::string> lines;
   std::istringstream words(text);
@@ -80,7 +80,7 @@ void paste(render::Image& sheet, const render::Image& picture, int left, int top
 
 /// Sizes of the parts of a sheet [px].
 struct Layout {
-  int columns, rows, width, height;  // width and height are those of a picture
+  int columns, rows, width, height;  // width and height of one picture
   int label_lines, heading_lines;
 
   int cell_width() const { return width + kGap_px; }
@@ -98,7 +98,7 @@ Layout layout_of(const std::vector<std::string>& heading, const std::vector<Shee
     layout.height = std::max(layout.height, cell.picture.height_px);
     layout.label_lines = std::max(layout.label_lines, static_cast<int>(cell.label.size()));
   }
-  constexpr int kLeastWidth = 160, kLeastHeight = 90;  // used if every run failed
+  constexpr int kLeastWidth = 160, kLeastHeight = 90;  // size of the cells if there is no picture at all
   layout.width = std::max(layout.width, kLeastWidth);
   layout.height = std::max(layout.height, kLeastHeight);
   return layout;

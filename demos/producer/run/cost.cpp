@@ -20,13 +20,13 @@ using std::chrono::steady_clock;
 
 // Time of one unit of work on one core [s], from tests/bench/RESULTS.md.
 constexpr double kBody_s = 3e-6;                   // a sub-step of a body in contact
-constexpr double kPart_s = 2e-6;                   // the same of each further convex part
+constexpr double kPart_s = 2e-6;                   // the same for each further convex part of the body
 constexpr double kJoint_s = 5e-6;                  // a sub-step of a joint
 constexpr double kVertex_s = 0.10e-6;              // a sub-step of a cloth's vertex
 constexpr double kFoldingVertex_s = 0.16e-6;       // the same with self-collision
 constexpr double kFreeParticle_s = 0.015e-6;       // a sub-step of a particle
-constexpr double kParticle_s = 0.1e-6;             // the same where it collides with bodies
-constexpr double kPackedParticle_s = 1e-6;         // the same where it collides with other particles
+constexpr double kParticle_s = 0.1e-6;             // the same if it collides with bodies
+constexpr double kPackedParticle_s = 1e-6;         // the same if it collides with other particles
 constexpr double kTriangle_s = 0.1e-6;             // a sub-frame of a triangle with its shadow
 constexpr double kClothPicture_s = 0.09;           // time per sub-frame of a cloth, independent of its mesh
 constexpr double kPixel_s = 40e-3 / (1280 * 720);  // a sub-frame of a pixel of ground
@@ -53,7 +53,7 @@ std::string with_spaces(uint64_t number) {
   return digits;
 }
 
-/// The costs of a scene's objects, copies with their original.
+/// Computes the costs of a scene's objects. Copies are counted with their original.
 class CostTable {
  public:
   CostTable(const Scene& scene, const ModelLibrary& models)
@@ -172,7 +172,8 @@ double seconds_since(steady_clock::time_point start) {
 /// Thrown to end a trial within a frame, after the current sub-step.
 struct TrialOver {};
 
-/// Simulates for at most this time, but at least one sub-step; returns film time and computing time [s].
+/// Simulates until the computing time reaches `limit_s`, but at least one sub-step. Returns the film time and
+/// the computing time [s].
 std::pair<double, double> try_simulation(const Scene& scene, Simulation& simulation, double limit_s) {
   const auto start = steady_clock::now();
   double reached = 0;
@@ -204,13 +205,15 @@ double try_drawing(const Scene& scene, const ModelLibrary& models, const Simulat
   render::Context context;
   Picture picture(draft, models, context);
   const Snapshot state = simulation.snapshot();
-  picture.draw(state, state);  // compiles shader programs, which a film does once
+  picture.draw(state,
+               state);  // not measured, because it compiles shader programs, which a film does only once
   const auto start = steady_clock::now();
   picture.draw(state, state);
   return seconds_since(start) * subframes(scene.render.quality) / (scale * scale);
 }
 
-/// Factor of the work if there are as many particles as possible.
+/// Returns the factor by which the work grows if the number of particles grows from `alive` to the greatest
+/// possible number.
 double growth(const std::vector<ObjectCost>& objects, double ObjectCost::*work, uint64_t alive) {
   double all = 0, of_particles = 0;
   uint64_t most = 0;

@@ -57,7 +57,7 @@ CsvFile::CsvFile(const std::filesystem::path& path, const std::string& header) :
 
 CsvFile::~CsvFile() {
   if (!file_) return;
-  try {  // keeps the rows written so far; they are lost if the disk or the memory is full
+  try {  // keeps the rows collected so far; if the disk or the memory is full, they are lost
     flush();
     file_->commit_as(path_.string() + ".partial");
   } catch (const std::exception&) {

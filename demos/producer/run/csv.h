@@ -1,5 +1,6 @@
 #pragma once
-/// Tables as comma-separated values (RFC 4180): texts are quoted if necessary, numbers have all their digits.
+/// Tables as comma-separated values (RFC 4180). Texts are quoted if necessary. Numbers are written with all
+/// digits that are needed to read the same value again.
 
 #include <filesystem>
 #include <optional>
@@ -12,8 +13,8 @@
 
 namespace offstage::producer {
 
-/// Returns a text as a field: quoted, with its own quotes doubled, if it contains a comma, a quote or a line
-/// break.
+/// Returns a text as a field of a table. A text that contains a comma, a quote or a line break is put in
+/// quotes, and its own quotes are doubled.
 std::string csv_field(std::string_view text);
 
 /// Builds rows of a table.
@@ -39,17 +40,17 @@ class CsvRows {
   bool first_ = true, finite_ = true;
 };
 
-/// A table that grows row by row. It gets its name on close(); a table that is not closed keeps the ending
-/// .partial.
+/// A table in a file, which grows row by row. Until close() the file's name has the additional ending
+/// .partial. A table that is never closed keeps this ending.
 class CsvFile {
  public:
-  /// Throws render::FileError, as the other functions do.
+  /// Begins the file with a header line. Throws render::FileError; so do write() and close().
   CsvFile(const std::filesystem::path& path, const std::string& header);
   ~CsvFile();
   CsvFile(const CsvFile&) = delete;
   CsvFile& operator=(const CsvFile&) = delete;
 
-  /// Throws NotFinite and writes nothing if a number of the rows is not finite.
+  /// Appends rows. If one of their numbers is not finite, throws NotFinite and writes nothing.
   void write(const CsvRows& rows);
   void close();
 

@@ -66,7 +66,8 @@ std::vector<FarmScript> step_scripts(const FarmPlan& plan) {
   scripts.push_back({"simulate.sh", head(plan, "simulates the film once, for all chunks") +
                                         "[ ! -e done/simulate ] || exit 0\ntry " +
                                         command_text(plan, simulate) + "\ntouch done/simulate\n"});
-  // With --resume a finished chunk keeps its frames; partial files of a crashed machine are drawn again.
+  // With --resume, finished frames of the chunk are kept, and partial files of a crashed machine are drawn
+  // again.
   scripts.push_back(
       {"chunk.sh", head(plan, "draws one part of the frames") + "chunk=${1:-$SLURM_ARRAY_TASK_ID}\ntry " +
                        command_text(plan, render) +

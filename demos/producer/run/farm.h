@@ -9,12 +9,15 @@
 namespace offstage::producer {
 
 struct FarmPlan {
-  std::filesystem::path program, scene, out, work;  ///< absolute
-  std::vector<std::string> simulate_options;        ///< options of `simulate`, which affect the motion
-  std::vector<std::string> render_options;   ///< of `render`: simulate_options, and options of the picture
-  std::string key;                           ///< hash of the settings of the simulation and of the pictures
-  int chunks = 8, retries = 2, threads = 0;  ///< threads 0: all available
-  bool encodes = true;                       ///< false: the frames are the output
+  /// Absolute paths: the program offstage, the scene, the output, and the folder of the farm.
+  std::filesystem::path program, scene, out, work;
+  std::vector<std::string> simulate_options;  ///< options of `simulate`, which affect the motion
+  /// Options of `render`: simulate_options, and options that affect only the picture.
+  std::vector<std::string> render_options;
+  std::string key;  ///< hash of all settings that affect the simulation or the pictures
+  /// Number of chunks, of repetitions of a failed step, and of threads; 0 threads: all available.
+  int chunks = 8, retries = 2, threads = 0;
+  bool encodes = true;  ///< whether the frames are encoded to a video; false: the frames are the output
   std::filesystem::path frames() const { return encodes ? work / "frames" / "####.png" : out; }
 };
 
@@ -24,30 +27,32 @@ struct SlurmOptions {
   std::vector<std::string> more;  ///< further options, passed on unchanged
 };
 
-/// A script in the folder `work`, with its file name.
+/// File name and text of a script in the folder FarmPlan::work.
 struct FarmScript {
   std::string name, text;
 };
-/// Returns simulate.sh, chunk.sh (its argument, or SLURM_ARRAY_TASK_ID, is the number of the chunk) and
-/// encode.sh.
+/// Returns the scripts of the three steps: simulate.sh, chunk.sh and encode.sh. chunk.sh takes the number of
+/// the chunk from its argument or from the environment variable SLURM_ARRAY_TASK_ID.
 std::vector<FarmScript> step_scripts(const FarmPlan& plan);
-/// Returns submit.sh, which submits the steps to Slurm with their dependencies and writes the job numbers to
-/// the file `jobs`.
+/// Returns submit.sh. This script submits the steps to Slurm, with their dependencies, and writes the job
+/// numbers to the file `jobs`. `chunks`: numbers of the chunks to draw.
 FarmScript slurm_script(const FarmPlan& plan, const SlurmOptions& slurm, const std::vector<int>& chunks);
 
-/// Progress of a farm, according to its folder.
+/// Progress of a farm, as the files in its folder show it.
 struct FarmState {
   bool simulated = false, encoded = false;
-  std::vector<int> missing;  ///< unfinished chunks
+  std::vector<int> missing;  ///< numbers of the unfinished chunks
   int frames = 0;            ///< number of existing frames
 };
+/// Reads the progress of a farm from its folder.
 FarmState farm_state(const FarmPlan& plan);
 
-/// Writes and reads "farm.json" in the folder, which --resume and --status need. Both throw FileError.
+/// write_farm() writes the plan to "farm.json" in the folder `work`; read_farm() reads it. The options
+/// --resume and --status need this file. Both functions throw FileError.
 void write_farm(const FarmPlan& plan);
 FarmPlan read_farm(const std::filesystem::path& work);
 
-/// Quotes a word for the shell if necessary.
+/// Returns a word as it is written in a shell script: in quotes if necessary.
 std::string shell_word(const std::string& word);
 
 }  // namespace offstage::producer

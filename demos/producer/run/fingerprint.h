@@ -1,7 +1,7 @@
 #pragma once
-/// The fingerprint of a machine: the properties, besides the scene, that determine the bits of a picture.
-/// These are GL, C library, processor class and compiler. Golden images are compared exactly if the
-/// fingerprints are equal, otherwise within a tolerance.
+/// The fingerprint of a machine. The bits of a picture depend on the scene and on the machine's GL, C
+/// library, class of processor and compiler. The fingerprint names these four. Golden images are compared
+/// exactly if the fingerprints are equal, otherwise within a tolerance.
 
 #include <string>
 
@@ -9,12 +9,14 @@
 
 namespace offstage::producer {
 
-/// "x86-64-v3 AuthenticAMD" or "other ...".
+/// Returns the instruction set and the vendor of the processor, such as "x86-64-v3 AuthenticAMD". A processor
+/// without AVX2, BMI and FMA is "other VENDOR".
 std::string cpu_class();
 
+/// Returns the fingerprint of this machine, for pictures that a GL context draws.
 std::string fingerprint(const render::ContextInfo& context);
 
-/// Number of processors that this process may use (its affinity), at least 1.
+/// Returns the number of processors that this process may use, according to its affinity; at least 1.
 int available_processors();
 
 }  // namespace offstage::producer

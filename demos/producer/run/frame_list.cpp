@@ -11,7 +11,7 @@
 namespace offstage::producer {
 namespace {
 
-/// Parses an integer at the start of `text` and removes it.
+/// Returns the integer at the start of `text` and removes it from the text. Returns nothing if there is none.
 std::optional<int> take_number(std::string_view& text) {
   int value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);

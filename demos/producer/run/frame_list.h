@@ -1,18 +1,19 @@
 #pragma once
-/// Selection of frames of a film: "1-30,40,50-90x2", and the n-th of several equal chunks.
+/// Selects frames of a film: from a list such as "1-30,40,50-90x2", or one of several equal chunks.
 
 #include <string>
 #include <vector>
 
 namespace offstage::producer {
 
-/// Returns frames in ascending order, each once. Items are k, a-b or a-bxstep; negative numbers count from
-/// the end (-1 is the last frame). Empty text: all. Throws std::invalid_argument with the allowed values for
-/// invalid text or a frame outside of 1..count.
+/// Returns the frames in a list, in ascending order and each once. The items are separated by commas and have
+/// the form k, a-b or a-bxstep. Negative numbers count from the end: -1 is the last frame. An empty text
+/// means all frames. For an invalid text, or a frame outside of 1..count, throws std::invalid_argument with
+/// the allowed values.
 std::vector<int> parse_frames(const std::string& text, int count);
 
-/// Returns the i-th of n contiguous parts, "i/n" with i from 1; their sizes differ by at most one frame.
-/// Throws std::invalid_argument.
+/// Divides the frames into n contiguous parts, whose sizes differ by at most one frame, and returns the i-th
+/// part. `chunk` is "i/n", with i from 1. Throws std::invalid_argument for an invalid `chunk`.
 std::vector<int> chunk_of(const std::vector<int>& frames, const std::string& chunk);
 
 }  // namespace offstage::producer

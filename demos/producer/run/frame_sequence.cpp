@@ -17,7 +17,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// "shot_####.png" for shot_0007.png: the last run of digits becomes #. Empty if there is none.
+/// Returns the pattern to which a file name belongs: its last group of digits is replaced by #. For example,
+/// shot_0007.png gives shot_####.png. Returns an empty text for a name without digits.
 std::string pattern_of(const std::string& name) {
   const auto is_digit = [](unsigned char c) { return std::isdigit(c) != 0; };
   const auto last = std::find_if(name.rbegin(), name.rend(), is_digit);
@@ -34,7 +35,7 @@ bool is_displayed(const fs::path& path) {
   return format == render::FrameFormat::png || format == render::FrameFormat::jpeg;
 }
 
-/// The pattern of most pictures of a folder, for advice in messages.
+/// Returns the pattern to which most pictures of a folder belong. Messages give it as advice.
 std::string usual_pattern(const fs::path& folder) {
   std::map<std::string, int> counts;
   std::error_code error;

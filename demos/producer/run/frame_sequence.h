@@ -21,9 +21,9 @@ struct FrameSequence {
   int left_out = 0;                   ///< number of missing frames between the first and the last
 };
 
-/// Finds the frames of a pattern such as frames/####.png, or of a folder, which means ####.png in it. Every
-/// file must be a complete PNG of the same size, and numbers must be consecutive unless gaps are allowed.
-/// Throws OutputError for an invalid pattern, and FileError with the frame.
+/// Finds the frames of a pattern such as frames/####.png. A folder stands for the pattern ####.png in it. All
+/// files must be complete PNG files of one size. Their numbers must be consecutive, unless gaps are allowed.
+/// Throws OutputError for an invalid pattern, and FileError for an invalid or missing frame.
 FrameSequence find_sequence(const std::string& pattern, bool allow_gaps);
 
 }  // namespace offstage::producer

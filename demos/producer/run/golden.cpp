@@ -43,7 +43,8 @@ void write_golden_text(const fs::path& path, const std::string& text) {
   render::write_file_atomically(path, {reinterpret_cast<const uint8_t*>(text.data()), text.size()});
 }
 
-/// The source recorded in a golden; empty if there is none, or if the file is not a golden.
+/// Returns the source that a golden records. Returns an empty text if it records none, or if the file is not
+/// a golden.
 std::string source_of(const fs::path& golden) {
   const std::optional<JsonObject> json = read_json_file(golden);
   return json ? json->text("source") : "";
@@ -60,7 +61,7 @@ std::string file_name_of(const std::string& name) {
   return out.empty() ? "scene" : out;
 }
 
-/// The golden in the folder with this source.
+/// Returns the name of the golden in the folder that records this source; nothing if there is none.
 std::optional<std::string> golden_made_of(const fs::path& folder, const std::string& source) {
   std::vector<std::string> names;
   if (!fs::is_directory(folder)) return {};
@@ -71,7 +72,7 @@ std::optional<std::string> golden_made_of(const fs::path& folder, const std::str
   return *std::ranges::min_element(names);
 }
 
-/// The line of the verdict for one frame; sets `pass`.
+/// Returns the line of the verdict about one frame, and sets `pass`.
 std::string judge_frame(const GoldenFrame& expected, const GoldenFrame& actual, bool same_class, bool& pass) {
   const bool same_state = expected.state_hash == actual.state_hash;
   if (same_state && expected.pixel_hash == actual.pixel_hash) return "identical";

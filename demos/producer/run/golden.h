@@ -1,7 +1,7 @@
 #pragma once
-/// Image-hash regression: for a few frames of a scene drawn small, a golden stores the hash of the
-/// simulation's state, the hash of the pixels, and the picture itself. The state is compared first: if it is
-/// equal and the pixels differ, the renderer has changed.
+/// Regression tests of pictures. A golden belongs to a scene. For a few frames, drawn small, it stores the
+/// picture, the hash of its pixels, and the hash of the simulation's state. States are compared first: if
+/// they are equal and the pixels differ, the renderer has changed.
 
 #include <filesystem>
 #include <set>
@@ -14,7 +14,7 @@
 
 namespace offstage::producer {
 
-/// The settings of goldens, as overrides of the scene.
+/// Returns the settings with which goldens are drawn, as overrides of the scene.
 std::vector<std::string> golden_overrides();
 
 struct GoldenFrame {
@@ -24,54 +24,59 @@ struct GoldenFrame {
 };
 
 struct Golden {
-  std::string scene;   ///< name of the golden, with which the names of its files begin
+  std::string scene;   ///< name of the golden; the names of its files begin with it
   std::string source;  ///< the scene's file, relative to the folder of goldens; empty: not recorded
+  /// Reason for the latest change of the golden, and fingerprint of the machine that drew it.
   std::string reason, fingerprint;
   std::vector<GoldenFrame> frames;
 };
 
-/// Folders with the simulated states of a golden's frames, so that they can be drawn again without
-/// simulation; empty: none.
+/// Folders with the simulated states of a golden's frames. With these states, the frames can be drawn again
+/// without simulation. An empty name means no folder.
 struct GoldenStates {
   std::string keep;  ///< folder to which the states of the golden frames are written
   std::string from;  ///< folder from which the states are read, instead of simulating
 };
 
-/// The golden of a scene file in a folder. A golden records its scene file, so two scenes of the same name in
-/// different folders have two goldens; the second one is named after its folder and file.
+/// The golden of a scene file, in a folder of goldens. Each golden records its scene file. Two scenes of the
+/// same name in different folders therefore have two goldens; the name of the second golden contains the
+/// names of the scene's folder and file.
 struct GoldenPlace {
   std::string name;     ///< name of the golden's files
   std::string source;   ///< path of the scene, relative to the folder, with links resolved
   bool exists = false;  ///< whether the golden exists and belongs to this scene
-  /// Source of the golden, if that file does not exist any more: the scene is assumed to have been moved.
+  /// Source that the golden records, if that file no longer exists. The scene was probably moved from there.
+  /// Empty: the scene was not moved.
   std::string moved_from;
 };
-/// Finds the golden by its source, else by the scene's name if the golden of that name has no source or one
-/// that does not exist any more. Otherwise the result is an unused name for a new golden. `taken` are names
-/// that are already in use. Throws FileError for a folder that cannot be read, or if no name is free.
+/// Finds the golden that records the scene file as its source. If there is none, takes the golden that has
+/// the scene's name, provided that it has no source or its source no longer exists. If there is none either,
+/// returns an unused name for a new golden. `taken`: further names that are in use. Throws FileError for a
+/// folder that cannot be read, or if no name is free.
 GoldenPlace find_golden(const std::filesystem::path& folder, const LoadedScene& scene,
                         const std::filesystem::path& scene_file, const std::set<std::string>& taken = {});
 
-/// Draws the golden frames of a scene that was loaded with golden_overrides(): an early and a late one.
-/// Throws Interrupted.
+/// Draws an early and a late frame of a scene, which must have been loaded with golden_overrides(). Throws
+/// Interrupted after a signal.
 Golden draw_golden(const LoadedScene& scene, int threads, const GoldenStates& states = {},
                    const ProgressCallback& progress = {});
 
-/// Reads and writes FOLDER/<name>.json and its pictures FOLDER/<name>-####.png. Throws FileError.
+/// Read and write the file FOLDER/<name>.json and the pictures FOLDER/<name>-####.png. Both throw FileError.
 Golden read_golden(const std::filesystem::path& folder, const std::string& name);
 void write_golden(const std::filesystem::path& folder, const Golden& golden);
 
 struct Verdict {
   bool pass = true;
-  std::string text;        ///< result, one line per frame
-  std::string difference;  ///< the first line about a difference; empty if there is none
+  std::string text;        ///< result of the comparison, one line per frame
+  std::string difference;  ///< the first line of `text` about a difference; empty if there is none
 };
 
-/// Compares two goldens: exactly for the same fingerprint, otherwise within the tolerance.
+/// Compares two goldens. The comparison is exact if their fingerprints are equal; otherwise it has a
+/// tolerance.
 Verdict judge(const Golden& expected, const Golden& actual);
 
-/// Writes the expected image, the actual image and the amplified difference of each frame, and an HTML page;
-/// returns the path of the page.
+/// Writes an HTML page about a comparison to a folder, and returns the path of the page. For each frame, also
+/// writes the expected image, the actual image and their amplified difference.
 std::filesystem::path write_report(const std::filesystem::path& folder, const Golden& expected,
                                    const Golden& actual, const Verdict& verdict);
 

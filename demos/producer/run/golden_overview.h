@@ -11,7 +11,7 @@ namespace offstage::producer {
 
 struct ReportedScene {
   TestResult result;
-  std::string page;  ///< page of the scene, relative to the folder of the report; empty: it has none
+  std::string page;  ///< page about the scene, relative to the folder of the report; empty: there is none
 };
 
 /// Writes FOLDER/index.html and returns its path. Throws render::FileError.

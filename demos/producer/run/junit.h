@@ -14,11 +14,12 @@ struct TestResult {
   double seconds = 0;      ///< [s]
   Outcome outcome = Outcome::passed;
   std::string kind;     ///< kind of the failure or error
-  std::string message;  ///< one line; empty if passed
-  std::string output;   ///< output lines, for every outcome
+  std::string message;  ///< message of the failure or error, one line; empty if passed
+  std::string output;   ///< output of the test, for every outcome
 };
 
-/// Writes one <testsuites> element with one <testsuite>, as Jenkins, GitLab and pytest do.
+/// Returns the XML text: one <testsuites> element with one <testsuite>, the form that Jenkins, GitLab and
+/// pytest use. `suite`: name of the test suite.
 std::string junit_xml(const std::string& suite, std::span<const TestResult> results);
 
 }  // namespace offstage::producer

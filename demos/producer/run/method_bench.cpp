@@ -16,8 +16,8 @@
 namespace offstage::producer {
 namespace {
 
-/// Adds a method for each value of a key except the present one. `dependent`: keys that only some values
-/// allow, with their defaults.
+/// Adds a method for each value of a key except its present value. `dependent`: a further override of these
+/// methods, which resets a key that is allowed with only some of the values; empty: none.
 template <class E>
 void add_others(const std::string& key, E present, std::vector<Method>& methods,
                 const std::string& dependent = {}) {
@@ -157,7 +157,7 @@ std::string to_text(const std::vector<MethodResult>& results) {
   std::string text;
   for (const ResultRow& row : rows) {
     std::string line;
-    for (std::size_t i = 0; i < row.size(); ++i)  // texts to the left, numbers to the right
+    for (std::size_t i = 0; i < row.size(); ++i)  // texts are aligned to the left, numbers to the right
       line += i == 0 || i + 1 == row.size() ? fmt::format("{:<{}}  ", row[i], width[i])
                                             : fmt::format("{:>{}}  ", row[i], width[i]);
     text += line.substr(0, line.find_last_not_of(' ') + 1) + "\n";

@@ -30,7 +30,7 @@ nlohmann::ordered_json to_json(const Manifest& m, const fs::path& pattern) {
           {"fps", fps_json(m.fps)}};
 }
 
-/// The number of the frame of a channel file; nothing for other files.
+/// Returns the frame number of a channel file; nothing for other files.
 std::optional<int> channel_number(const fs::path& stem, const fs::path& file) {
   const std::string name = file.filename().string();
   std::optional<int> number;
@@ -42,7 +42,7 @@ std::optional<int> channel_number(const fs::path& stem, const fs::path& file) {
   return std::ranges::find(known, file) != known.end() ? number : std::nullopt;
 }
 
-/// The channel files of a film of any length in its folder.
+/// Returns all channel files in a folder, for any frame number.
 std::vector<fs::path> channels_in(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;
@@ -148,7 +148,7 @@ std::vector<fs::path> files_of_frames(const fs::path& folder) {
       if (number && *number >= 1 && *number <= count) files.push_back(file);
     }
   }
-  // Last, because until then the next run can use it to find the rest.
+  // The manifest is removed last. If the removal is interrupted, the next run can still find the other files.
   files.push_back(folder / kManifestName);
   return files;
 }
@@ -199,7 +199,9 @@ FrameFolder prepare_frames(const fs::path& pattern, const ChannelFiles& channels
   }
   render::remove_leftovers(folder);
   const std::optional<JsonObject> old = read_json_file(manifest_path);
-  const bool same_settings = is_ours(old, pattern, manifest);  // without a manifest the frames are unknown
+  const bool same_settings =
+      is_ours(old, pattern,
+              manifest);  // false without a manifest, because the settings of the frames are then unknown
   if (!same_settings && existing != Existing::replace && fs::exists(manifest_path, error))
     throw OutputError(
         folder.string() +
@@ -220,7 +222,7 @@ FrameFolder prepare_frames(const fs::path& pattern, const ChannelFiles& channels
         std::ranges::all_of(channels.of(frame), [](const fs::path& p) { return fs::exists(p); });
     if (existing == Existing::keep && found == Found::own && has_channels) kept.insert(frame);
   }
-  if (!same_settings && existing == Existing::replace)  // all of them before the new manifest is written
+  if (!same_settings && existing == Existing::replace)  // all old frames, before the new manifest is written
     for (const fs::path& file : files_of_frames(folder)) fs::remove(file, error);
   for (const int frame : frames)
     if (!kept.contains(frame)) result.missing.push_back(frame);

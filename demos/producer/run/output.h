@@ -1,5 +1,6 @@
 #pragma once
-/// Output of a render: the meaning of OUT, existing files, and the manifest with which a run can be resumed.
+/// The output of a render. Parses the argument OUT, handles existing files, and writes the manifest, which
+/// makes it possible to resume a run.
 
 #include <filesystem>
 #include <memory>
@@ -16,7 +17,7 @@
 
 namespace offstage::producer {
 
-/// Output exists and may not be overwritten, or OUT is invalid.
+/// Thrown if output exists and must not be overwritten, or if OUT is invalid.
 class OutputError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -33,27 +34,27 @@ struct OutputTarget {
   std::filesystem::path path;  ///< pattern of the frames, or file of the video
 };
 
-/// Throws OutputError for an unknown ending, and for the number patterns of other programs (f%04d.png), with
-/// the equivalent pattern.
+/// Parses the argument OUT. Throws OutputError for an unknown ending. Also throws OutputError for a number
+/// pattern of another program, such as f%04d.png; the message gives the equivalent pattern with #.
 OutputTarget parse_output(const std::string& out);
 
-/// Converts a pattern of another program (%04d of C, $F4, {:04}) to one with #. Empty if it is not such a
-/// pattern.
+/// Converts a number pattern of another program (%04d, $F4 or {:04}) to a pattern with #. Returns an empty
+/// text for any other text.
 std::string hash_pattern(const std::string& pattern);
 
-/// Identifies the frames in a folder.
+/// Description of the film whose frames are in a folder.
 struct Manifest {
   std::string scene;     ///< name of the scene
-  std::string settings;  ///< its settings_key()
+  std::string settings;  ///< settings_key() of the scene
   int width_px = 0, height_px = 0, frames = 0;
   render::FrameRate fps;
 };
 
-/// A frame rate in JSON: a number if it is an integer, else a fraction such as "30000/1001".
+/// Returns a frame rate in JSON: an integer as a number, any other rate as a fraction such as "30000/1001".
 nlohmann::ordered_json fps_json(const render::FrameRate& fps);
 
-/// Kinds and stem of the channel files; '#' in the stem stands for the frame number, as in
-/// render::frame_path.
+/// The channels and formats to write, and the common part of the names of their files. '#' in the stem stands
+/// for the frame number, as in render::frame_path.
 struct ChannelFiles {
   render::ChannelChoice choice;
   std::filesystem::path stem;
@@ -63,50 +64,57 @@ struct ChannelFiles {
   }
 };
 
-/// Returns the stem of the channel files of a frame pattern. If the frames themselves are EXR files, a suffix
-/// keeps the names distinct.
+/// Returns the stem of the channel files that belong to a pattern of frames. If the frames themselves are EXR
+/// files, the stem has a suffix, so that channel files get other names than frames.
 std::filesystem::path channels_stem(const std::filesystem::path& pattern);
 
-/// Files of all channels and formats that a frame may have.
+/// Returns the names of all channel files that a frame may have, in all formats.
 std::vector<std::filesystem::path> all_channel_files(const std::filesystem::path& stem, int frame);
 
 enum class Existing { refuse, keep, replace };
 
-/// A folder of frames that only this run writes, or which it shares with runs that draw other frames of the
-/// same film.
+/// A locked folder of frames. Either only this run writes to the folder, or it shares the folder with runs
+/// that draw other frames of the same film.
 struct FrameFolder {
   OutputLock lock;
   std::vector<int> missing;  ///< frames to be drawn
 };
 
-/// Prepares a folder of frames: locks it, checks or writes the manifest, and finds the frames to be drawn. A
-/// frame is kept if it has the settings of this run. Frames with other settings are never mixed in: they are
-/// refused or, with Existing::replace, removed before the new manifest is written. Files that are not frames
-/// of a film are refused, too, unless they are to be replaced. Throws OutputError, also if another process
-/// writes there, or FileError. `channels` belong to the frames: a frame without one of its channel files is
-/// drawn again.
+/// Prepares a folder of frames: locks it, checks or writes the manifest, and finds the frames to be drawn.
+/// - Existing::refuse: existing frames are an error.
+/// - Existing::keep: frames with the settings of this run and with all channel files are kept. Incomplete
+/// frames
+///   are drawn again. Frames with other settings, and files that are not frames of a film, are an error.
+/// - Existing::replace: existing frames are drawn again. Frames with other settings are removed before the
+/// new
+///   manifest is written.
+///
+/// Throws OutputError for these errors and if another process writes to the folder. Throws FileError if a
+/// file cannot be written.
 FrameFolder prepare_frames(const std::filesystem::path& pattern, const ChannelFiles& channels,
                            const std::vector<int>& frames, const Manifest& manifest, Existing existing);
 
-/// Returns the files that the manifest of a folder lists: frames, their channels, the manifest itself.
+/// Returns the existing files of the film that the manifest of a folder describes: the frames, their
+/// channels, and the manifest itself.
 std::vector<std::filesystem::path> files_of_frames(const std::filesystem::path& folder);
 
-/// Removes exactly these files, and the folder if it is then empty.
+/// Removes the files of files_of_frames(), and the folder if it is then empty.
 void remove_frames(const std::filesystem::path& folder);
 
-/// Folder of the channels of a video: FILM.channels.
+/// Returns the folder for the channels of a video: FILM.channels.
 std::filesystem::path channels_folder(const std::filesystem::path& video);
 
-/// Whether a folder contains channels of an earlier film.
+/// Returns whether a folder contains channel files, which then belong to an earlier film.
 bool holds_channels(const std::filesystem::path& folder);
 
 /// Removes all channel files of any frame and format, and the folder if it is then empty.
 void remove_channels(const std::filesystem::path& folder);
 
-/// Creates the folder for the channels of a video. Existing channels are refused or, with `replace`, removed.
+/// Creates the folder for the channels of a video. With `replace`, removes existing channels; otherwise
+/// throws OutputError if the folder is not empty. Throws FileError if the folder cannot be created.
 void prepare_channels(const std::filesystem::path& folder, bool replace);
 
-/// Returns the number in a file name that matches a pattern; nothing for other files.
+/// Returns the frame number in a file name that matches a pattern; nothing if the name does not match.
 std::optional<int> frame_number(const std::filesystem::path& pattern, const std::filesystem::path& file);
 
 }  // namespace offstage::producer

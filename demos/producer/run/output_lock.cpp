@@ -61,7 +61,7 @@ OutputLock OutputLock::of_part(fs::path file, const std::string& output,
   }
 }
 
-/// Writes the owner to the file; on a full disk it stays empty.
+/// Writes a description of this process to the file. On a full disk, the file stays empty.
 void OutputLock::sign() {
   const std::string owner = owner_text();
   if (lock_ && ::ftruncate(lock_.fd(), 0) == 0 && ::pwrite(lock_.fd(), owner.data(), owner.size(), 0) < 0)
@@ -70,7 +70,7 @@ void OutputLock::sign() {
 
 void OutputLock::refuse(const std::string& output) {
   const std::string owner = owner_in(lock_.fd());
-  lock_.close();  // it belongs to another process
+  lock_.close();  // so that the destructor does not remove the file of the other process
   throw OutputError(output + ": is being written by " + owner +
                     "; wait for its end, or choose another output");
 }
@@ -94,7 +94,7 @@ void OutputLock::share() {
 }
 
 bool OutputLock::take(int mode, const std::string& output) {
-  constexpr int kTries = 100;  // repeated if owners remove the file between open and lock
+  constexpr int kTries = 100;  // the file is opened again if its owner removed it between open and lock
   for (int i = 0; i < kTries; ++i) {
     lock_ = render::Descriptor(
         ::open(file_.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666));
@@ -115,7 +115,7 @@ bool OutputLock::take(int mode, const std::string& output) {
 }
 
 fs::path OutputLock::beside(const fs::path& output) {
-  constexpr std::size_t kLongest = 240;  // of the 255 bytes that a name may have
+  constexpr std::size_t kLongest = 240;  // a file name may have 255 bytes
   return output.parent_path() / ("." + output.filename().string().substr(0, kLongest) + ".lock");
 }
 

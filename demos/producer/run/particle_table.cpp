@@ -74,7 +74,7 @@ ParticleTable::ParticleTable(const std::filesystem::path& path, const Simulation
 
 ParticleTable::~ParticleTable() {
   if (!binary_) return;
-  try {  // keeps the rows written so far
+  try {  // keeps the rows collected so far
     flush();
     binary_->commit_as(path_.string() + ".partial");
   } catch (const std::exception&) {

@@ -3,9 +3,9 @@
 /// particles. Rows are written immediately, so only the disk limits the size of the table.
 ///
 /// Columns: frame, time [s], system, id, age [s], position [m], velocity [m/s], radius as drawn [m], colour
-/// and opacity as drawn. A file with the ending .bin is binary: one line of JSON with the names of the
-/// systems and the columns with their types as in NumPy, then the rows as packed little-endian records, in
-/// which `system` is the index of the name. Every other file is CSV.
+/// and opacity as drawn. A file with the ending .bin is binary. It begins with one line of JSON, which has
+/// the names of the systems and, as in NumPy, the columns with their types. The rows follow as packed
+/// little-endian records, in which `system` is an index into the names. Every other file is CSV.
 
 #include <filesystem>
 #include <optional>
@@ -19,15 +19,15 @@ namespace offstage::producer {
 
 class ParticleTable {
  public:
-  /// Throws render::FileError, as the other functions do.
+  /// Begins the file. Throws render::FileError; so do record() and close().
   ParticleTable(const std::filesystem::path& path, const Simulation& simulation);
   ~ParticleTable();
   ParticleTable(const ParticleTable&) = delete;
   ParticleTable& operator=(const ParticleTable&) = delete;
 
-  /// Appends one row for each particle.
+  /// Appends one row for each particle. `time`: time of the frame [s].
   void record(int frame, double time);
-  /// Completes the file; one that is not completed keeps the ending .partial.
+  /// Completes the file. A file that is not completed keeps the additional ending .partial.
   void close();
 
  private:

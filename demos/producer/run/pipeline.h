@@ -1,6 +1,6 @@
 #pragma once
-/// The queue between the simulation, the drawing threads and the sink. It is bounded, keeps the order, and
-/// handles failures in one place.
+/// The queue between the simulation, the drawing threads and the sink. It limits the number of frames in
+/// memory, returns them in order, and handles failures in one place.
 
 #include <condition_variable>
 #include <deque>
@@ -17,7 +17,7 @@
 
 namespace offstage::producer {
 
-/// A frame to draw. Snapshots are immutable; each is used by two neighbouring frames, so they are shared.
+/// A frame to draw. Two neighbouring frames use the same snapshot, so snapshots are shared and never change.
 struct FrameJob {
   int index = 0;  // index in the list of frames
   int frame = 0;
@@ -33,7 +33,7 @@ struct RenderedFrame {
   double render_ms = 0;
   render::Channels channels;  // empty unless requested
   render::HdrImage linear;    // empty unless the sink needs it
-  render::LightSums light;    // of this frame
+  render::LightSums light;    // sums of light in this frame
 };
 
 /// Passes frames to the drawing threads and returns the finished frames in order. At most `window` frames are
@@ -42,7 +42,7 @@ class Pipeline {
  public:
   explicit Pipeline(int window) : window_(window) {}
 
-  /// Waits for room; returns false if the run has failed.
+  /// Adds a frame to draw. Waits until there is room in the window. Returns false if the run has failed.
   bool push(FrameJob frame_job) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return failure_ || frame_job.index < next_rendered_ + window_; });
@@ -51,11 +51,14 @@ class Pipeline {
     changed_.notify_all();
     return true;
   }
+  /// Tells the threads that no further frames will be added.
   void finish_jobs() {
     const std::lock_guard lock(mutex_);
     all_produced_ = true;
     changed_.notify_all();
   }
+  /// Waits for the next frame to draw and returns it; nothing if there are no more frames or the run has
+  /// failed.
   std::optional<FrameJob> take_job() {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return failure_ || all_produced_ || !jobs_.empty(); });
@@ -72,7 +75,8 @@ class Pipeline {
     rendered_.emplace(index, std::move(rendered));
     changed_.notify_all();
   }
-  /// Returns the next finished frame in order; none after the last one or if the run has failed.
+  /// Waits for the next finished frame, in order, and returns it; nothing after the last frame or if the run
+  /// has failed.
   std::optional<RenderedFrame> take_rendered() {
     std::unique_lock lock(mutex_);
     const auto ready = [&] { return !rendered_.empty() && rendered_.begin()->first == next_rendered_; };
@@ -85,6 +89,7 @@ class Pipeline {
     changed_.notify_all();
     return rendered;
   }
+  /// Ends the run with an exception. Only the first exception is stored.
   void fail(std::exception_ptr error) {
     const std::lock_guard lock(mutex_);
     if (!failure_) failure_ = std::move(error);
@@ -110,7 +115,7 @@ class Pipeline {
   std::exception_ptr failure_;
 };
 
-/// Runs `work`, and passes an exception of it to the pipeline, which ends the run.
+/// Runs `work`. An exception that it throws is passed to Pipeline::fail(), which ends the run.
 template <class F>
 void guarded(Pipeline& pipeline, F&& work) {
   try {

@@ -35,8 +35,8 @@ double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-/// Counts simulated and finished frames for the progress of a run; the simulating and the writing thread
-/// share it.
+/// Counts simulated and finished frames, and reports the progress of a run. The thread that simulates and the
+/// thread that writes share one object.
 class ProgressMeter {
  public:
   /// `drawing_ms`: initial estimate of the drawing time of a frame.
@@ -54,7 +54,7 @@ class ProgressMeter {
     report();
     simulating_since_ = Clock::now();
   }
-  /// Call when the simulation continues after waiting for the drawing.
+  /// Must be called when the simulation continues after it has waited for the drawing.
   void simulation_goes_on() { simulating_since_ = Clock::now(); }
   void finished_one(double sim_ms, double render_ms, double encode_ms, uint64_t particles) {
     const std::lock_guard lock(mutex_);
@@ -70,7 +70,7 @@ class ProgressMeter {
   }
 
  private:
-  /// Simulated and finished frames are weighted by their mean times.
+  /// Computes the progress, with the mean times of simulated and finished frames as weights, and reports it.
   void report() {
     constexpr double kKnown = 0.02;  // fraction of the work after which the rest can be estimated
     const auto mean = [](double sum, int count, double guess) { return count > 0 ? sum / count : guess; };
@@ -91,12 +91,12 @@ class ProgressMeter {
   Progress latest_;
   double simulation_ms_ = 0, drawing_ms_ = 0;
   const Clock::time_point start_ = Clock::now();
-  Clock::time_point simulating_since_ = start_;  // used by the simulating thread
+  Clock::time_point simulating_since_ = start_;  // only the simulating thread uses it
 };
 
 class LiveSource : public StateSource {
  public:
-  /// `kept` receives the requested states, unless it is empty; `keep_at_most` as in RenderJob.
+  /// The requested states are written to `kept`, unless it is empty. `keep_at_most`: see RenderJob.
   LiveSource(const Scene& scene, const ModelLibrary& models, std::optional<SnapshotCache>& kept,
              std::optional<uint64_t> keep_at_most)
       : simulation_(scene, models),
@@ -387,7 +387,7 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
     const double sim_ms = ms_since(step_start);
     const auto write_start = Clock::now();
     if (cache) cache->write(simulation.snapshot());
-    // The start of the next sub-step records that state.
+    // With rows for every sub-step, the next sub-step records this state at its start.
     const bool at_step = job.trace_every_step && frame < total;
     if (!at_step) record(simulation.world().time());
     stats.encode.add(ms_since(write_start));
@@ -446,7 +446,7 @@ RunStats visit_frames(const LoadedScene& loaded, const ModelLibrary& models, con
   return stats;
 }
 
-/// The keys of a material that Simulation reads; the others are its look.
+/// The keys of a material that the simulation reads. The other keys are its look.
 constexpr std::array kPhysicalKeys = {
     "name",           "restitution",      "friction",         "static_friction",
     "cross_friction", "rolling_friction", "spinning_friction"};
@@ -469,7 +469,7 @@ std::string simulation_key(const LoadedScene& loaded, const ModelLibrary& models
 
 std::string settings_key(const LoadedScene& loaded, const ModelLibrary& models) {
   auto scene = nlohmann::ordered_json::parse(loaded.canonical);
-  // They are not visible in any frame. The drawn camera is `camera`.
+  // These keys do not affect any frame. The camera that is drawn is `camera`.
   for (const char* key : {"name", "description", "cameras"}) scene.erase(key);
   return text_hash(std::string(version()) + scene.dump() + models.digest());
 }
@@ -478,7 +478,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Adds the figures of a part.
+/// Adds the figures of a part of the results to a JSON object.
 template <sim::HasFigures Part>
 void add_figures(const Part& part, Json& json) {
   sim::for_each_figure(part, [&](std::string_view name, const auto& value) {

@@ -30,7 +30,7 @@ std::string left_text(const Progress& p) {
   return p.eta_s > 0 ? duration_text(p.eta_s) + " left" : "";
 }
 
-/// Figures of the latest frame, the most important first.
+/// Returns figures of the latest frame as texts, the most important first.
 std::vector<std::string> details_of(const Progress& p) {
   std::vector<std::string> details;
   for (const auto& [name, ms] :
@@ -75,7 +75,7 @@ std::string progress_bar(const Progress& p, int width) {
   std::string text = fmt::format("  {:3.0f} %", std::floor(100 * fraction));
   std::vector<std::string> parts = {frames_text(p), left_text(p)};
   for (std::string& detail : details_of(p)) parts.push_back(std::move(detail));
-  // Depends only on the width, so that the line does not move.
+  // The length of the bar depends only on the width, so that the text beside it does not move.
   const int bar = std::clamp(width / 4, kShortestBar, kLongestBar);
   const int room = width - 1 - (bar + 2);  // some terminals wrap when the last column is written
   if (room < kPercent) return width > kPercent ? text.substr(2) : "";

@@ -1,6 +1,6 @@
 #pragma once
-/// Display of a run's progress: one line with a bar on a terminal, occasional plain lines in a log file, JSON
-/// lines for programs, nothing on a pipe.
+/// Displays the progress of a run: as a line with a bar on a terminal, as occasional plain lines in a log
+/// file, or as JSON lines for programs. A pipe gets nothing by default.
 
 #include <chrono>
 #include <condition_variable>
@@ -12,25 +12,25 @@
 
 namespace offstage::producer {
 
-/// `automatic`: a bar on a terminal, plain lines if standard error is a file, else nothing.
+/// `automatic` means a bar if standard error is a terminal, plain lines if it is a file, otherwise none.
 enum class ProgressStyle { automatic, bar, plain, json, none };
 
-/// Resolves `automatic` for the current standard error; other styles are returned unchanged.
+/// Returns the style that `automatic` means for the current standard error. Returns other styles unchanged.
 ProgressStyle resolved(ProgressStyle style);
 
-/// "8 s", "2 min 05 s", "1 h 20 min".
+/// Returns a duration as text, rounded up: "8 s", "2 min 05 s", "1 h 20 min".
 std::string duration_text(double seconds);
 
-/// The line on a terminal: bar, percentage, frames, time left, and as many figures of the latest frame as fit
-/// into `width` columns. ASCII.
+/// Returns the line for a terminal of `width` columns, in ASCII: bar, percentage, frames, remaining time, and
+/// as many figures of the latest frame as fit.
 std::string progress_bar(const Progress& progress, int width);
 
-/// Writes to standard error. Must be called by one thread at a time.
+/// Prints the progress to standard error. Must be called by one thread at a time.
 class ProgressPrinter {
  public:
   explicit ProgressPrinter(ProgressStyle style);
   void operator()(const Progress& progress);
-  /// Keeps the latest progress on a terminal and continues below it.
+  /// Ends the line of the progress on a terminal. Later output begins below it.
   void finish();
 
  private:
@@ -39,7 +39,8 @@ class ProgressPrinter {
   std::chrono::steady_clock::time_point last_{};
 };
 
-/// Shows a long step of the set-up while it runs: with the elapsed seconds on a terminal, once in a log file.
+/// Shows a long step of the set-up, such as reading models, while this object exists. A terminal shows the
+/// elapsed seconds; a log file gets one line.
 class StepNotice {
  public:
   StepNotice(ProgressStyle style, std::string what);
@@ -55,7 +56,7 @@ class StepNotice {
   std::mutex mutex_;
   std::condition_variable ended_;
   bool end_ = false;
-  std::thread thread_;  // last, so that it ends first
+  std::thread thread_;  // the last member, because it must end before the others are destroyed
 };
 
 }  // namespace offstage::producer

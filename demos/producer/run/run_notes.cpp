@@ -7,7 +7,8 @@
 namespace offstage::producer {
 namespace {
 
-/// The body in the note is the one with most fall-backs.
+/// Returns the warning about contacts whose solver did not converge. It names the body with the most such
+/// cases.
 std::string note_of_rough_contacts(const SimulationTotals& t) {
   const auto& [name, count] =
       *std::ranges::max_element(t.rough_bodies, {}, [](const auto& entry) { return entry.second; });

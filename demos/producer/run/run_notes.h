@@ -1,5 +1,5 @@
 #pragma once
-/// Problems and notable events of a simulation, as sentences.
+/// Describes problems and notable events of a simulation in sentences.
 
 #include <string>
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace offstage::producer {
 
-/// One sentence each, beginning with "warning: " or "note: " and naming the object concerned.
+/// Returns one text for each problem or event. It begins with "warning: " or "note: " and names the object.
 std::vector<std::string> notes_of(const SimulationTotals& totals);
 
 }  // namespace offstage::producer

@@ -41,23 +41,23 @@ struct Series {
   std::function<double(const FrameFigures&)> value;
 };
 
-/// A rounded number; -0 is written as 0.
+/// Returns a rounded number as text; -0 becomes "0".
 std::string label(double value) {
   return fmt::format("{:g}", std::abs(value) < 1e-12 ? 0.0 : value);
 }
 
-/// Round numbers within a range, about `count` of them.
+/// Returns about `count` round numbers between `low` and `high`, in equal steps.
 std::vector<double> ticks(double low, double high, int count) {
   const double rough = (high - low) / count, power = std::pow(10, std::floor(std::log10(rough)));
   const double fraction = rough / power;
   const double step = power * (fraction <= 1 ? 1 : fraction <= 2 ? 2 : fraction <= 5 ? 5 : 10);
   std::vector<double> result;
-  // The margin includes the last one if rounding puts it slightly beyond the range.
+  // The margin keeps the last number if a rounding error puts it slightly above `high`.
   for (double k = std::ceil(low / step); k * step <= high + 1e-6 * step; ++k) result.push_back(k * step);
   return result;
 }
 
-/// Lines over the film's time as an inline drawing.
+/// Returns a plot of some figures over the time of the film, as an inline drawing.
 std::string plot(const std::string& title, const std::vector<FrameFigures>& figures,
                  const std::vector<Series>& all) {
   constexpr double kWidth = 1000, kHeight = 220, kLeft = 70, kRight = 25, kTop = 28, kBottom = 24;
@@ -91,7 +91,7 @@ std::string plot(const std::string& title, const std::vector<FrameFigures>& figu
     svg += fmt::format("<polyline fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\" points=\"", s.color);
     for (const FrameFigures& f : figures) svg += fmt::format("{:.1f},{:.1f} ", x(f.time), y(s.value(f)));
     svg += "\"/>\n";
-    if (all.size() == 1) continue;  // the title names it
+    if (all.size() == 1) continue;  // a single line needs no legend, because the title names it
     svg += fmt::format("<text x=\"{}\" y=\"18\" text-anchor=\"end\" style=\"fill:{}\">{}</text>\n", legend,
                        s.color, s.name);
     legend -= 110;

@@ -1,5 +1,5 @@
 #pragma once
-/// One self-contained HTML page about a run: pictures, plots, settings and hashes.
+/// Makes a self-contained HTML page about a run: pictures, plots, settings and hashes.
 
 #include <string>
 
@@ -8,7 +8,8 @@
 
 namespace offstage::producer {
 
-/// `settings`: settings_key(). The stats must be those of a job with `report`.
+/// Returns the page as text. `settings`: the result of settings_key(). `stats` must come from a RenderJob
+/// with `report` set.
 std::string run_report(const LoadedScene& loaded, const std::string& settings, const RunStats& stats);
 
 }  // namespace offstage::producer

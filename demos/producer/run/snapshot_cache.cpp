@@ -65,7 +65,7 @@ void SnapshotCache::create(const std::string& key, int frames, bool force) {
   std::string name = (folder_ / (std::string(kGenerationPrefix) + "XXXXXX")).string();
   if (::mkdtemp(name.data()) == nullptr) render::throw_file_error(folder_, "cannot create a folder");
   generation_ = name;
-  // Mkdtemp sets narrower permissions.
+  // mkdtemp() gives permissions to the owner alone.
   fs::permissions(generation_, fs::status(folder_, error).permissions(), error);
   hold_ = open_folder(generation_);
   ::flock(hold_.fd(), LOCK_EX | LOCK_NB);
@@ -78,7 +78,7 @@ void SnapshotCache::open(const std::string& key, int frames) {
   const auto refuse = [&](const std::string& what) {
     throw render::FileError(folder_.string() + ": " + what);
   };
-  constexpr int kTries = 10;  // repeated if a writer publishes the next generation meanwhile
+  constexpr int kTries = 10;  // opened again if a writer publishes the next generation meanwhile
   for (int i = 0; i < kTries; ++i) {
     const std::optional<JsonObject> published = read_json_file(path);
     if (!published && !generations_in(folder_).empty())
@@ -132,7 +132,7 @@ void SnapshotCache::publish() {
   remove_old_generations();
 }
 
-/// Removes the generations that no process holds, except the published one and this one.
+/// Removes the generations that no process uses, except the published generation and the one of this object.
 void SnapshotCache::remove_old_generations() const {
   const std::optional<JsonObject> published = read_json_file(folder_ / kFile);
   const std::string kept = published ? published->text("generation") : "";

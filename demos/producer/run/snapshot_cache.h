@@ -1,6 +1,7 @@
 #pragma once
-/// A folder with the snapshots of one simulation at a time. Each run writes a generation, a folder of its
-/// own, and publishes it as a whole; a reader keeps the generation that it opened.
+/// A cache: a folder with the snapshots of one simulation. Each run writes its snapshots to a new folder in
+/// the cache, a generation, and publishes it when it is complete. A reader keeps using the generation that it
+/// opened.
 
 #include <filesystem>
 #include <string>
@@ -16,10 +17,11 @@ class SnapshotCache {
   /// Version of the folder's layout and of the snapshots in it. Folders of other versions are refused
   /// (docs/cache.md).
   static constexpr int kFormat = 4;
-  static constexpr const char* kFile = "cache.json";  ///< names the published generation and its simulation
+  static constexpr const char* kFile =
+      "cache.json";  ///< this file names the published generation and its simulation
   static constexpr std::string_view kGenerationPrefix =
       "generation-";  ///< prefix of the folders with snapshots
-  /// "000012.snap"
+  /// Returns the file name of the snapshot of a frame, such as "000012.snap".
   static std::string file_name(int frame);
 
   explicit SnapshotCache(std::filesystem::path folder) : folder_(std::move(folder)) {}
@@ -30,7 +32,7 @@ class SnapshotCache {
   /// Opens the published generation for reading. Throws FileError if the folder contains no cache, an
   /// unfinished one, or one of another simulation.
   void open(const std::string& key, int frames);
-  /// Whether open() would find this simulation.
+  /// Returns whether open() would succeed.
   bool holds(const std::string& key, int frames) const;
   /// Publishes the generation by a single rename. Removes old generations that no process reads or writes.
   void publish();
@@ -39,8 +41,9 @@ class SnapshotCache {
   /// Removes the generations that are not published and that no process holds.
   void remove_unused_generations() const { remove_old_generations(); }
 
-  /// Write or read the snapshot of a frame, in the generation that was begun or opened. Both throw FileError;
-  /// read() also for a snapshot of another run. write() returns the size of the snapshot [bytes].
+  /// write() adds a snapshot to the generation that was begun, and returns its size [bytes]. read() returns
+  /// the snapshot of a frame from the generation that was opened. Both throw FileError; read() also throws it
+  /// for a snapshot of another run.
   uint64_t write(const Snapshot& snapshot) const;
   Snapshot read(int frame) const;
 

@@ -1,6 +1,6 @@
 #pragma once
-/// Provides the states of a film to the frame loop: from the simulation, from a cache on disk, or from states
-/// of earlier simulations in memory.
+/// A source of a film's states for the frame loop: the simulation, a cache on disk, or states of earlier
+/// simulations in memory.
 
 #include <functional>
 #include <memory>
@@ -18,14 +18,15 @@ class StateSource {
   using OnAdvance = std::function<bool()>;
 
   virtual ~StateSource() = default;
-  /// Number of calls of Simulation::advance() that at() needs for all frames up to `frame`.
+  /// Returns how often Simulation::advance() must be called for all frames up to `frame`.
   virtual int advances_to(int frame) = 0;
-  /// Returns the state of a frame; null if `on_advance` has stopped the simulation first. Frames are
-  /// requested in ascending order. Throws DivergedError, and FileError for a cache.
+  /// Returns the state of a frame; null if `on_advance` returned false before. Frames must be requested in
+  /// ascending order. Throws DivergedError if the simulation diverges, and FileError if a cache cannot be
+  /// read.
   virtual std::shared_ptr<const Snapshot> at(int frame, const OnAdvance& on_advance) = 0;
-  /// Adds further data of the latest state.
+  /// Adds data of the latest state to a frame job: its contacts and its energy, if they are known.
   virtual void describe(FrameJob&) const {}
-  /// Adds the figures of the simulation up to the latest state.
+  /// Adds the figures of the simulation, from its start to the latest state.
   virtual void add_totals(RunStats&) const {}
 };
 

@@ -22,7 +22,7 @@ using Json = nlohmann::ordered_json;
   throw std::invalid_argument("--vary " + text + ": " + what);
 }
 
-/// Splits a text at separators outside of brackets and quotes.
+/// Splits a text at those separators that are not inside brackets or quotes.
 std::vector<std::string> split_outside(const std::string& text, char separator) {
   std::vector<std::string> parts(1);
   int depth = 0;
@@ -48,7 +48,7 @@ std::optional<double> to_number(const std::string& text) {
   return value;
 }
 
-/// The values of "a:b:step"; nothing if the text does not have this form.
+/// Returns the values of "a:b:step"; nothing if `values` contains no colon. Throws for an invalid range.
 std::optional<std::vector<std::string>> range(const std::string& text, const std::string& values) {
   const std::vector<std::string> parts = split_outside(values, ':');
   if (parts.size() < 2) return {};
@@ -62,12 +62,12 @@ std::optional<std::vector<std::string>> range(const std::string& text, const std
   const auto [first, last, step] = numbers;
   if (step == 0 || (last - first) * step < 0)
     refuse_sweep(text, "the step is 0 or has the wrong sign, so it never reaches the last value");
-  constexpr double kSlack = 1e-9;  // fraction of a step: 0:1:0.1 has 11 values
+  constexpr double kSlack = 1e-9;  // tolerance as a fraction of a step, so that 0:1:0.1 has 11 values
   const double steps = std::floor((last - first) / step + kSlack);
   if (!(steps < static_cast<double>(kMostCombinations)))
     refuse_sweep(text, fmt::format("has {:.0f} values; the limit is {} runs", steps + 1, kMostCombinations));
   std::vector<std::string> all;
-  constexpr double kZero = 1e-12;  // fraction of a step: rounding error of 0 in -1:1:0.1
+  constexpr double kZero = 1e-12;  // tolerance as a fraction of a step, so that -1:1:0.1 contains exactly 0
   for (int i = 0; i <= static_cast<int>(steps); ++i) {
     const double value = first + i * step;
     all.push_back(fmt::format("{:.12g}", std::abs(value) < kZero * std::abs(step) ? 0.0 : value));

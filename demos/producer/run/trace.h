@@ -1,6 +1,7 @@
 #pragma once
 /// CSV tables of a simulation. Values are written with all their digits, so that they can be checked against
-/// closed forms. A value that is not finite throws CsvFile::NotFinite.
+/// closed forms. The constructors and record() throw render::FileError. record() throws CsvFile::NotFinite
+/// for a value that is not finite.
 
 #include <filesystem>
 #include <string>
@@ -10,7 +11,7 @@
 
 namespace offstage::producer {
 
-/// Motion of all objects: time, object, position, orientation, velocities.
+/// Table of the motion of all objects. Columns: time, object, position, orientation, velocities.
 class Trace {
  public:
   Trace(const std::filesystem::path& path, const Simulation& simulation);
@@ -25,7 +26,8 @@ class Trace {
   const Simulation& simulation_;
 };
 
-/// State of cloths: time, cloth, points, strain, contacts, shortened moves and the volume inside.
+/// Table of the state of cloths. Columns: time, cloth, number of points, strain, contacts, shortened moves,
+/// and enclosed volume.
 class ClothTrace {
  public:
   ClothTrace(const std::filesystem::path& path, const Simulation& simulation);
@@ -39,7 +41,7 @@ class ClothTrace {
   const Simulation& simulation_;
 };
 
-/// Vertices of cloths: time, cloth, vertex, position, velocity.
+/// Table of the vertices of cloths. Columns: time, cloth, vertex, position, velocity.
 class ClothPointTrace {
  public:
   ClothPointTrace(const std::filesystem::path& path, const Simulation& simulation);
@@ -53,8 +55,8 @@ class ClothPointTrace {
   const Simulation& simulation_;
 };
 
-/// State and loads of joints: time, joint, anchor on a, force and torque on a, the free coordinate and its
-/// speed, distance of the anchors, 1 if it is broken.
+/// Table of the state and loads of joints. Columns: time, joint, anchor on body a, force and torque on body
+/// a, the free coordinate and its speed, distance between the anchors, and 1 for a broken joint.
 class JointTrace {
  public:
   JointTrace(const std::filesystem::path& path, const Simulation& simulation);
@@ -68,7 +70,8 @@ class JointTrace {
   const Simulation& simulation_;
 };
 
-/// Contact points of bodies: time, the two bodies, point, normal from b to a, force on a, separation.
+/// Table of the contact points of bodies. Columns: time, bodies a and b, point, normal from b to a, force on
+/// a, separation.
 class ContactTrace {
  public:
   ContactTrace(const std::filesystem::path& path, const Simulation& simulation);

@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 
 constexpr std::chrono::milliseconds kPollingInterval{250};
 
-/// The bytes of a regular file, or nothing.
+/// Returns the bytes of a regular file; nothing if it cannot be read.
 std::string file_bytes(const fs::path& file) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return {};
@@ -51,7 +51,7 @@ void collect_strings(const Node& node, std::vector<std::string>& strings) {
     for (const Member& member : *object) collect_strings(member.value, strings);
 }
 
-/// The quoted strings of a text that is currently not valid JSON.
+/// Returns possible file names in a text that is currently not valid JSON: its pieces between quotes.
 std::vector<std::string> quoted_strings(const std::string& text) {
   std::vector<std::string> strings;
   std::istringstream lines(text);
@@ -72,7 +72,7 @@ std::vector<std::string> strings_in_json(const std::string& text, const fs::path
   return strings;
 }
 
-/// File names at the ends of lines of an OBJ or MTL file.
+/// Returns the file names at the ends of lines in an OBJ or MTL file.
 std::vector<std::string> names_in_obj(const std::string& text) {
   std::vector<std::string> names;
   std::istringstream lines(text);
@@ -135,7 +135,7 @@ FileWatch::FileWatch(std::set<fs::path> files, Method method) : files_(std::move
     std::set<fs::path> folders;
     for (const fs::path& file : files_) {
       folders.insert(file.has_parent_path() ? file.parent_path() : ".");
-      std::error_code error;  // a link is written at its target
+      std::error_code error;  // a link is resolved, because writing to it changes its target
       if (const fs::path real = fs::canonical(file, error); !error) folders.insert(real.parent_path());
     }
     // Folders are watched instead of files, because editors write a new file and rename it.
@@ -178,7 +178,8 @@ void FileWatch::wait(std::chrono::milliseconds limit) {
 }
 
 void FileWatch::settle(std::chrono::milliseconds still) {
-  constexpr int kMostRounds = 50;  // a file that is written all the time is read in its current state
+  constexpr int kMostRounds =
+      50;  // after this, a file that never stops changing is used in its current state
   Stamps last = stamps();
   for (int round = 0; round < kMostRounds; ++round) {
     std::this_thread::sleep_for(still);

@@ -1,5 +1,5 @@
 #pragma once
-/// The files of a scene, and detection of their changes.
+/// Finds the files of a scene, and detects when they change.
 
 #include <chrono>
 #include <filesystem>
@@ -10,13 +10,13 @@
 
 namespace offstage::producer {
 
-/// Returns all files that a scene file names, directly or indirectly: includes, models and their parts,
-/// textures; and the files named by `overrides`. A text that may or may not be a file name is included.
-/// Missing or damaged files are included, too, because they may be repaired.
+/// Returns all files that a scene file or `overrides` name, directly or indirectly: includes, models and
+/// their parts, and textures. If it is uncertain whether a text is a file name, the text is included. Missing
+/// or damaged files are included, too, because they may be repaired later.
 std::set<std::filesystem::path> files_of_scene(const std::filesystem::path& scene,
                                                const std::vector<std::string>& overrides);
 
-/// Hash of the contents of files; it does not change if a file is only touched.
+/// Returns a hash of the contents of files. Times of files do not affect it.
 std::string contents_hash(const std::set<std::filesystem::path>& files);
 
 /// Detects changes by comparing times and sizes. The system's notifications (inotify) only make this faster,
@@ -30,10 +30,10 @@ class FileWatch {
   FileWatch(const FileWatch&) = delete;
   FileWatch& operator=(const FileWatch&) = delete;
 
-  /// Whether a file has changed since the construction, or was created or removed.
+  /// Returns whether a file has changed, or was created or removed, since the construction of this object.
   bool changed() const;
-  /// Waits for `limit` at most; less if something happens in a folder that contains one of the files, or if a
-  /// signal arrives.
+  /// Waits for at most `limit`. Returns earlier if something changes in the folder of one of the files, or if
+  /// a signal arrives.
   void wait(std::chrono::milliseconds limit);
   /// Waits until the files have not changed for the duration `still`, because an editor may write a file in
   /// several steps.
