@@ -133,8 +133,8 @@ class Clipping {
 
 // Kinds of contact
 
-/// Sine of the angle between the normal of a face of `reference` and that of the separation; more than
-/// kMaxTilt if the face cannot give the normal.
+/// Returns the sine of the angle between a face of `reference` and the plane perpendicular to the normal of
+/// the separation. Returns 2, more than kMaxTilt, if the face cannot give the contact normal.
 Real tilt(const Body& reference, const SupportingFeature& f, const Body& incident, uint32_t incident_vertex,
           const Separation& s, Real tolerance) {
   constexpr Real kNever = 2;
