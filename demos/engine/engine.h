@@ -92,8 +92,8 @@ class Engine {
     Engine& engine_;
   };
 
-  /// Makes this version the current one; `camera` replaces the scene's camera. Returns the key of its film
-  /// and a number that increases with every call.
+  /// Makes this version the current one; `camera`, if set, replaces the scene's camera. Returns the key of
+  /// its film and a number that increases with every call.
   Run show(Loaded scene, const std::optional<ViewCamera>& camera);
   /// Returns the key of a version's pictures in the store, for pictures with the scene's own camera.
   std::string film_of(const producer::LoadedScene& scene) const;
@@ -103,7 +103,7 @@ class Engine {
   /// Sets the frame that the user sees. This frame is drawn first. It is refined when there are no changes
   /// for a while and the film is not playing.
   void look_at(int frame, bool playing);
-  /// Reads model files again after they have changed.
+  /// Call this when model files have changed: versions shown from now on read them again.
   void forget_models();
   /// Returns the name of the object that is visible at a position of a frame; see FilmRun::pick(). The name
   /// is empty if there is no object or the frame has no state yet.
