@@ -7,7 +7,7 @@
 namespace offstage::python {
 namespace {
 
-/// A frame as Python sees it. Its pictures are numpy arrays that share the memory of the frame.
+/// A frame as Python sees it. Its pictures are numpy arrays that take over the memory of the C++ frame.
 struct PythonFrame {
   int number;
   double time;
