@@ -25,7 +25,8 @@ Vec3 start_direction(const MinkowskiDifference& m, const GjkCache& cache) {
   return cache.direction.squaredNorm() > 0 ? cache.direction : m.centre();
 }
 
-/// Start simplex: that of the last query, or the support point along its normal.
+/// Returns the start simplex: the simplex of the last query or, if there is none or the cores have no
+/// vertices, the support point along the start direction.
 Simplex first_simplex(const MinkowskiDifference& m, const GjkCache& cache) {
   Simplex s;
   if (m.has_vertices() && cache.size > 0) {
