@@ -40,7 +40,7 @@ std::vector<ParticleContacts::Cluster> ParticleContacts::find_clusters(uint32_t 
   return clusters;
 }
 
-/// Solves the contacts of one cluster; returns false and changes nothing if pivoting fails.
+/// Solves the contacts of one cluster. Returns false and changes nothing if the pivoting method fails.
 bool ParticleContacts::solve_cluster(const Cluster& cluster, ContactWork& work) {
   std::vector<uint32_t> members;
   for (const uint32_t k : cluster.pairs) members.insert(members.end(), {pairs_[k].a, pairs_[k].b});
