@@ -185,8 +185,9 @@ void Articulation::begin_motion(Real t, Real h) {
   }
 }
 
-/// `still_a` and `still_b` hold the motion of driven links, to which the result refers. The poses are those
-/// `before` the time of the velocities [s].
+/// Returns the place of joint j, with velocities at `time` [s]. The poses of driven links are taken at `time
+/// - before`. The result refers to `motion` and, for driven links, to `still_a` and `still_b`, which this
+/// function sets.
 JointPlace Articulation::place_of(std::size_t j, Real time, std::span<const LinkMotion> motion,
                                   LinkMotion& still_a, LinkMotion& still_b, Real before) const {
   const auto& [a, b, count] = system_.joints()[j];
@@ -388,7 +389,8 @@ Eigen::VectorXd Articulation::stop_impulses() const {
   return solve_lcp((mobility + mobility.transpose()) / 2, speed).f;
 }
 
-/// Treats the limits that the push presses against as constraints.
+/// Returns the mobility of a link. Joint limits that the impulse `push` would exceed are treated as
+/// constraints.
 Mat6 Articulation::link_mobility(uint32_t link, const Vec6& push) {
   const std::lock_guard lock(responding_);
   place_for_impulses();

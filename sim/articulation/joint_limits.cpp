@@ -159,9 +159,10 @@ class RowMaker {
     Real fraction;  ///< fraction of the interval before it
     Real target;    ///< speed away from the limit at the interval's end
   };
-  /// The speed with which the coordinate reaches the limit is reversed, and the acceleration of the free
-  /// motion acts in the rest of the interval; a joint without restitution stays at its limit. `side` is 1 for
-  /// a lower limit and -1 for an upper one.
+  /// Returns the impact at a limit; nothing if there is none in the interval. The impact reverses the speed
+  /// of the coordinate, times the restitution. In the rest of the interval the acceleration of the free
+  /// motion acts. A joint without restitution stays at its limit. `side`: 1 for a lower limit, -1 for an
+  /// upper limit.
   std::optional<Stop> stop(const Direction& row, Real limit, int side) const {
     const Real gap = side * (row.start.error - limit), left = side * (row.end.error - limit);
     if (!(left < 0) || gap < 0) return std::nullopt;

@@ -61,7 +61,8 @@ JointRow length_row(const JointPlace& p, Real length) {
 
 constexpr Real kWholeTurn = 2 * std::numbers::pi;
 
-/// Columns: the second axis, perpendicular to the axis; the third; the axis.
+/// Returns right-handed orthonormal axes as columns. The last column is `axis`. The first column is `second`
+/// without its component along the axis, or any perpendicular direction if this is zero.
 Mat3 axes_along(const Vec3& axis, const Vec3& second) {
   Mat3 m;
   m.col(2) = axis.normalized();

@@ -130,8 +130,9 @@ Vec3 ParticleSweep::fly(const Vec3& v, Real mass, Real duration, const Vec3& ext
   return v + DampedKick(duration, forces_.drag / mass).end * (forces_.acceleration(v, mass) + extra);
 }
 
-/// Moves the particle to the hit, applies the impulse (P5), and integrates the rest of its path. Returns
-/// false if it strikes a body, because other particles may strike it earlier.
+/// Moves the particle to the hit, applies the impulse (P5), and integrates the rest of its path. If the
+/// particle hits a dynamic body for whose impulses the caller is not prepared, returns false and moves
+/// nothing, because other particles may hit this body earlier.
 bool ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real from, const Vec3& extra,
                             SweepOutcome& outcome) {
   const Obstacle& o = *hit.obstacle;
