@@ -1,6 +1,7 @@
 #pragma once
-/// Boxes that fall, slide and rest: a minimal combination of free motion, collision detection and the fast
-/// contact solver, for testing the solver. The scenes are those of the peer benchmarks.
+/// Boxes that fall, slide and rest, for tests of the fast contact solver. The simulation is a minimal
+/// combination of free motion, collision detection and this solver. The scenes are the same as in the
+/// benchmarks against other engines.
 
 #include <algorithm>
 #include <array>
@@ -163,7 +164,8 @@ class BoxScene {
     manifolds_.push_back(m);
   }
 
-  /// Points are matched by their features; the remaining ones, whose features changed, by their positions.
+  /// Initial guess: copies the forces of the last step to a patch. Points are matched by their features.
+  /// Points whose features changed are matched by position.
   static void reuse(const Kept& kept, const Manifold& m, ContactPatch& p) {
     p.force_t = kept.patch.force_t;
     p.force_k = kept.patch.force_k;
@@ -223,7 +225,7 @@ inline BoxScene brick_wall(int count) {
   return s;
 }
 
-/// A box on an incline; downhill is +x.
+/// A box on an inclined plane that descends towards +x.
 inline BoxScene box_on_incline(Real degrees) {
   BoxScene s;
   const Quat q(Eigen::AngleAxisd(-degrees * std::numbers::pi / 180, Vec3::UnitZ()));

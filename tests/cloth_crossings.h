@@ -1,6 +1,7 @@
 #pragma once
-/// Counts pairs of triangles of a cloth that cut each other and share no corner: the independent check of its
-/// self-collision. The sides of a tear, whose points lay on each other, count as sharing it.
+/// An independent check of a cloth's self-collision: counts the pairs of its triangles that intersect and
+/// have no common corner. The two sides of a tear count as having a common corner, because their points were
+/// the same before the tear.
 
 #include <vector>
 

@@ -1,5 +1,5 @@
 #pragma once
-/// The shadow of a cloth from straight above, for drape coefficients.
+/// Area of a cloth as seen from above, for drape coefficients.
 
 #include <algorithm>
 #include <array>
@@ -10,7 +10,8 @@
 
 namespace offstage::sim {
 
-/// Area of the shadow that a cloth throws straight down [m^2], on squares of 0.5 mm around a centre.
+/// Returns the area that a cloth covers when seen from above [m^2]. Only the square of 0.32 m around `centre`
+/// is counted, in cells of 0.5 mm.
 inline Real shadow_area(const ClothView& cloth, const Vec3& centre) {
   constexpr int kSquares = 640;
   constexpr Real kSquare = 5e-4;

@@ -18,14 +18,14 @@ class ConvexOracle {
   ConvexOracle(const ConvexPolyhedron& a, const ConvexPolyhedron& b, const Pose& a_from_b)
       : a_(a, {}), b_(b, a_from_b), scale_(a.reach() + b.reach() + a_from_b.position.norm()) {}
 
-  /// Distance and normal as gjk() and vclip() return them. Closest points are given only for separate solids,
-  /// because deepest points are not unique.
+  /// Returns the signed distance and the normal, as gjk() and vclip() do. Closest points are given only for
+  /// separate solids, because deepest points are not unique.
   Separation signed_distance() {
     for (const Vec3& n : a_.normals) separate(n);
     for (const Vec3& n : b_.normals) separate(n);
     if (!(axis_.distance > 0)) separate_by_edges();
-    // Coplanar flat solids and touching solids have a separating axis with distance zero; the features then
-    // decide.
+    // For coplanar flat solids and for touching solids the separating axis has the distance zero. The
+    // distances of the features then give the result.
     if (std::isfinite(axis_.distance) && axis_.distance < -1e-13 * scale_) return axis_;
     vertices_to_faces(a_, b_, 1);
     vertices_to_faces(b_, a_, -1);
@@ -49,7 +49,7 @@ class ConvexOracle {
     std::vector<Vec3> vertices, normals;
   };
 
-  /// Keeps the separation along an axis, or its opposite, if it is the largest so far.
+  /// Tests an axis in both directions; keeps the separation along it if it is the largest so far.
   void separate(const Vec3& axis) {
     for (const Vec3& n : {axis, Vec3(-axis)}) {
       Real low = std::numeric_limits<Real>::infinity(), high = -low;
@@ -114,7 +114,7 @@ class ConvexOracle {
     }
   }
 
-  /// The points at which the common perpendicular of two edges meets both.
+  /// Distances of edges to edges, at the feet of their common perpendicular.
   void edges_to_edges() {
     for (const ConvexPolyhedron::Edge& e : a_.shape.edges())
       for (const ConvexPolyhedron::Edge& f : b_.shape.edges()) {

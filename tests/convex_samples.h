@@ -1,6 +1,6 @@
 #pragma once
-/// Random convex polyhedra, and pairs of them in positions that are difficult for distance algorithms: face
-/// on face, edge along edge, touching exactly, within rounding of touching, very different in size.
+/// Random convex polyhedra, and pairs of them that are difficult for distance algorithms. Examples: parallel
+/// faces or edges, exact contact, gaps of the size of rounding errors, very different sizes.
 
 #include <array>
 #include <cmath>
@@ -36,8 +36,8 @@ class Dice {
   uint64_t next_ = 0;
 };
 
-/// A polyhedron about the origin, roughly `size` wide: the hull of points in a ball or on a sphere, a box, a
-/// prism, a needle, a plate, a polygon, a segment or a point.
+/// Returns a random polyhedron around the origin, roughly `size` [m] wide. It is the hull of points in a ball
+/// or on a sphere, a box, a prism, a needle, a plate, a polygon, a segment or a point.
 inline ConvexPolyhedron random_polyhedron(Dice& dice, uint32_t points, Real size) {
   enum Kind { kCloud, kSphere, kBox, kPrism, kNeedle, kPlate, kPolygon, kSegment, kPoint };
   constexpr std::array kKinds = {kCloud, kCloud, kCloud,  kCloud, kSphere,  kSphere,  kSphere,  kBox,
@@ -67,7 +67,8 @@ struct ConvexPair {
   Separation exact() const { return brute_force_separation(a, b, a_from_b); }
 };
 
-/// B rotated at random, not at all, or so that one of its faces or edges is parallel to one of A's.
+/// Returns a rotation of B: random, none, or one that makes a face or edge of B parallel to a face or edge of
+/// A.
 inline Quat feature_rotation(const ConvexPair& pair, Dice& dice) {
   const auto &a = pair.a, &b = pair.b;
   const uint32_t choice = dice.index(5);
@@ -81,8 +82,9 @@ inline Quat feature_rotation(const ConvexPair& pair, Dice& dice) {
   return choice == 2 ? Quat::Identity() : dice.rotation();
 }
 
-/// Two polyhedra of up to `points` vertices, from 1 mm to 100 m, that are apart, touching or overlapping.
-/// Besides random positions there are some in which B is moved to a given distance along the normal.
+/// Returns two polyhedra of up to `points` vertices and of sizes from 1 mm to 100 m. They are apart, touch or
+/// overlap. In some pairs the position of B is random; in others B is moved along the normal to a certain
+/// distance from A.
 inline ConvexPair random_pair(Dice& dice, uint32_t points) {
   const Real size = std::pow(10, dice.uniform(-3, 2)),
              smaller = size * (dice.chance(0.5) ? 1 : dice.uniform(0.01, 1));

@@ -1,5 +1,6 @@
 #pragma once
-/// Heaps of falling bodies. A test limits the counted work of a step, a benchmark measures its time.
+/// Scenes in which bodies fall on a heap. A test limits the counted work of a step; a benchmark measures the
+/// time of a step.
 
 #include <array>
 #include <cmath>
@@ -20,7 +21,8 @@ inline const char* name_of(Heap heap) {
   return kNames[static_cast<std::size_t>(heap)];
 }
 
-/// A vertical tube above a funnel with a closed bottom, as one open mesh that faces inwards.
+/// Returns a vertical tube above a funnel with a closed bottom. It is one open mesh whose front faces point
+/// inwards.
 inline TriangleMesh silo_mesh() {
   constexpr uint32_t kAround = 32;
   constexpr std::array<std::array<Real, 2>, 4> kProfile = {{{0.1, 0}, {0.1, 0.1}, {0.5, 0.5}, {0.5, 4}}};
@@ -44,7 +46,7 @@ inline TriangleMesh silo_mesh() {
   return mesh;
 }
 
-/// Hills of half a metre on a grid with cells of half a metre.
+/// Returns a terrain with hills 0.5 m high, on a grid with cells of 0.5 m.
 inline TriangleMesh terrain_mesh() {
   constexpr uint32_t kCells = 24;
   TriangleMesh mesh;
@@ -62,7 +64,8 @@ inline TriangleMesh terrain_mesh() {
   return mesh;
 }
 
-/// A torso of two links and a head, with arms and legs of two links each, lying on its back along x.
+/// Adds a figure that lies on its back along x: a torso of two links, a head, and two links for each arm and
+/// leg.
 inline void add_ragdoll(World& world, const Pose& at) {
   const auto limb = [&](const Vec3& from, const Vec3& to, Real radius, Real mass) {
     BodyDef def{.shape = Capsule{radius, std::max((to - from).norm() - 2 * radius, 0.01)},
@@ -103,7 +106,7 @@ inline void add_ragdoll(World& world, const Pose& at) {
   }
 }
 
-/// A heap at its start, before any contacts.
+/// Returns the world of a heap at the start, before there are any contacts.
 inline World heap_scene(Heap heap, SolverKind solver = SolverKind::automatic, Real step = 1.0 / 240) {
   World world({.max_step = step, .solver = solver});
   const Scatter random{11};

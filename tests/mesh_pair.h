@@ -1,7 +1,7 @@
 #pragma once
-/// Pairs of triangles of two meshes that intersect or are close, by the traversal of two trees that the
-/// narrow phase uses (sim/collision/tree_pair.h). All results are in the frame of the first mesh, A;
-/// `a_from_b` places the second one in it.
+/// Finds pairs of triangles of two meshes that intersect or are close. It uses the same traversal of two
+/// trees as the narrow phase (sim/collision/tree_pair.h). All results are in the frame of the first mesh, A;
+/// `a_from_b` is the pose of the second mesh, B, in this frame.
 
 #include <algorithm>
 #include <cmath>
@@ -31,7 +31,7 @@ struct TrianglePair {
   friend auto operator<=>(const TrianglePair&, const TrianglePair&) = default;
 };
 
-/// Two triangles with their closest points. If they intersect, both points are a common point.
+/// Two triangles and their closest points. If the triangles intersect, both points are the same common point.
 struct CloseTriangles {
   TrianglePair triangles;
   ClosestPoints points;
@@ -69,7 +69,8 @@ Placement mesh_placement(const MeshTree<A>& a, const MeshTree<B>& b, const Pose&
   return Placement(a_from_b, std::max(a.tree.reach(), b.tree.reach()), margin);
 }
 
-/// Whether any two triangles intersect. A mesh completely inside another does not.
+/// Whether any triangle of A intersects a triangle of B. The result is false if one mesh is completely inside
+/// the other.
 template <class A, class B>
 bool surfaces_intersect(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& a_from_b) {
   const Placement place = mesh_placement(a, b, a_from_b);
@@ -80,8 +81,8 @@ bool surfaces_intersect(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& 
 }
 
 /// Appends all pairs of intersecting triangles to `pairs`, each once, in an order that depends on the trees.
-/// They are exactly those for which triangles_intersect() is true after the vertices of B are rounded to A's
-/// frame.
+/// The result is exact: it contains the pairs for which triangles_intersect() is true after the vertices of B
+/// were transformed to A's frame, with rounding.
 template <class A, class B>
 void intersecting_triangles(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& a_from_b,
                             std::vector<TrianglePair>& pairs) {

@@ -1,6 +1,6 @@
 #pragma once
-/// Brute force over all pairs of triangles of two meshes, as the reference for all nine combinations of tree
-/// kinds.
+/// Tests all pairs of triangles of two meshes by brute force, as a reference for the nine combinations of
+/// kinds of trees.
 
 #include <vector>
 
@@ -19,7 +19,7 @@ inline TriangleMesh bumpy_sphere(uint32_t around, uint32_t rings, uint64_t seed)
   return mesh;
 }
 
-/// A random rotation, and a random translation of at most `reach`.
+/// Returns a random rotation and a random translation of at most `reach` [m].
 inline Pose random_pose(uint64_t i, Real reach) {
   const Scatter random{17};
   const auto value = [&](uint64_t k) { return 2 * random.uniform(i, k) - 1; };
@@ -45,7 +45,7 @@ void for_each_brute_pair(const TriangleMesh& a, const TriangleMesh& b, const Pos
     for (uint32_t j = 0; j < of_b.size(); ++j) visit(TrianglePair{i, j}, of_a[i], of_b[j]);
 }
 
-/// The intersecting pairs in order. Pairs whose bounding boxes are apart are skipped.
+/// Returns the intersecting pairs in ascending order. Pairs whose bounding boxes do not overlap are skipped.
 inline std::vector<TrianglePair> brute_pairs(const TriangleMesh& a, const TriangleMesh& b,
                                              const Pose& a_from_b) {
   const auto of_a = triangles_of(a, Placement(Pose(), 0, 0)),
@@ -72,7 +72,8 @@ struct AllTrees {
   SphereTree sphere;
 };
 
-/// A mesh with one of its trees. A function, because Clang 14 deduces no template arguments of aggregates.
+/// Combines a mesh with one of its trees. This function exists because Clang 14 does not deduce the template
+/// arguments of aggregates.
 template <class Volume>
 MeshTree<Volume> mesh_tree(const TriangleMesh& mesh, const BoundingTree<Volume>& tree) {
   return {mesh, tree};

@@ -8,7 +8,7 @@ namespace offstage {
 struct Scatter {
   uint64_t seed = 0;
 
-  /// A number in [0, 1) that is a function of the seed and both arguments.
+  /// Returns a number in [0, 1) that depends only on the seed and both arguments.
   double uniform(uint64_t i, uint64_t k) const {
     uint64_t x = 0x9e3779b97f4a7c15u * (seed * 1'000'003 + i * 64 + k + 1);
     x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;

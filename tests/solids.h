@@ -13,8 +13,8 @@
 
 namespace offstage::sim {
 
-/// A solid made of the unit cubes of a grid for which `filled(i, j, k)` is true; only its outer faces are in
-/// the mesh. The volume is the number of cubes.
+/// Returns a solid made of unit cubes: cube (i, j, k) of a grid is a part of it if `filled(i, j, k)` is true.
+/// The mesh has no faces between two cubes. The volume is the number of cubes.
 template <class Filled>
 TriangleMesh cubes(int nx, int ny, int nz, Filled&& filled) {
   const auto solid = [&](int i, int j, int k) {
@@ -82,8 +82,9 @@ inline TriangleMesh star_prism(uint32_t points, Real outer, Real inner, Real hei
   return star_shaped_prism(outline, height);
 }
 
-/// Rotates a closed profile (radius, height), counter-clockwise with the radius to the right, about the y
-/// axis. Points on the axis become poles.
+/// Returns the solid of revolution of a closed profile about the y axis. The points of the profile are
+/// (radius, height), counter-clockwise if the radius axis points to the right. Points on the axis become
+/// poles.
 inline TriangleMesh lathe(const std::vector<Eigen::Vector2d>& profile, uint32_t around) {
   TriangleMesh soup;
   const auto n = static_cast<uint32_t>(profile.size());
@@ -151,7 +152,8 @@ inline TriangleMesh bowl(Real outer, Real inner, uint32_t around, uint32_t rings
   return lathe(profile, around);
 }
 
-/// The mesh rotated, scaled and translated by random amounts that depend on `seed`.
+/// Returns the mesh rotated at random, moved by up to 1 along each axis, and then scaled by `scale`. The
+/// random numbers depend only on `seed`.
 inline TriangleMesh placed_at_random(TriangleMesh mesh, Real scale, uint64_t seed) {
   const Scatter random{seed};
   const auto signed_unit = [&](uint64_t k) { return 2 * random.uniform(0, k) - 1; };

@@ -251,7 +251,8 @@ bool Engine::answer_picks() {
   return true;
 }
 
-/// The visible frame comes first, then the film in order.
+/// Draws the visible frame if its draft is missing; otherwise simulates or draws the first missing frame.
+/// Returns whether there was work.
 bool Engine::advance_film() {
   if (!film_ || failed_) return false;
   int frame = 0;
@@ -333,7 +334,8 @@ bool Engine::advance_pinned(const FilmResources& resources) {
   return true;
 }
 
-/// Processes one version at a time; after an order in between, the version is started again.
+/// Draws the picture of the next version of the sweep. A new request interrupts this, and the version is then
+/// started again later. Returns whether there was work.
 bool Engine::advance_sweep(const FilmResources& resources) {
   Loaded version;
   CellEvent event;

@@ -1,7 +1,7 @@
 #pragma once
-/// Computes frames and figures of a scene. One thread simulates and draws; requests take effect within one
-/// frame. Only the latest version of the scene counts: an older run ends at once, and its results stay in
-/// memory of a bounded size.
+/// The engine computes the frames and the statistics of a scene while the scene is edited. One thread
+/// simulates and draws; a request takes effect within one frame. A new version of the scene ends the work on
+/// the previous version. Finished frames and states of older versions stay in stores of a bounded size.
 
 #include <atomic>
 #include <condition_variable>
@@ -20,7 +20,8 @@
 
 namespace offstage::engine {
 
-/// A frame is available in the store. Frame 0 is a picture of the time before frame 1.
+/// Event: a frame was drawn and is in the store. Frame 0 shows the scene during the simulated time before
+/// frame 1.
 struct FrameEvent {
   uint64_t run = 0;
   std::string film;
@@ -31,31 +32,32 @@ struct FrameEvent {
   std::optional<producer::FrameFigures> figures;
   render::Camera camera;
 };
-/// Progress of the film.
+/// Event: the progress of the film has changed.
+
 struct FilmEvent {
   enum class Phase { loading, lead_in, running, complete, failed };
   uint64_t run = 0;
   std::string film;
   Phase phase = Phase::loading;
-  double lead_in = 0;      ///< simulated fraction of the time before frame 1
-  int simulated = 0;       ///< number of frames
-  std::string message;     ///< reason of a failure, or the file being loaded
-  std::string statistics;  ///< JSON, after the simulation is complete
+  double lead_in = 0;      ///< finished fraction of the simulation before frame 1, 0 to 1
+  int simulated = 0;       ///< number of simulated frames
+  std::string message;     ///< reason for a failure, or name of the file that is being loaded
+  std::string statistics;  ///< statistics of the run as JSON; empty until the simulation is complete
   std::vector<std::string> notes;
 };
-/// A picture of a sweep is finished.
+/// Event: a picture of a sweep is finished or has failed.
 struct CellEvent {
   uint64_t sweep = 0;
   int index = 0;
-  std::string fault;  ///< reason if there is no picture; otherwise empty
+  std::string fault;  ///< reason why there is no picture; empty if there is one
   uint64_t particles = 0;
 };
 using EngineEvent = std::variant<FrameEvent, FilmEvent, CellEvent>;
 
 struct EngineSettings {
   Eigen::Vector2i draft_px = {640, 360};
-  std::size_t frame_bytes = 192u << 20;       ///< limit for compressed pictures
-  std::size_t physics_bytes = kPhysicsBytes;  ///< limit for states
+  std::size_t frame_bytes = 192u << 20;       ///< limit of the memory for compressed pictures [bytes]
+  std::size_t physics_bytes = kPhysicsBytes;  ///< limit of the memory for states [bytes]
   producer::DecompositionCache decompositions;
 };
 
@@ -64,7 +66,8 @@ class Engine {
   using OnEvent = std::function<void(const EngineEvent&)>;
   using Loaded = std::shared_ptr<const producer::LoadedScene>;
 
-  /// `on_event` is called on the engine's thread; it may only call `frame` and `ranges` of the engine.
+  /// Starts the engine's thread. `on_event` is called on this thread; the only functions of the engine that
+  /// it may call are frame() and ranges().
   Engine(EngineSettings settings, OnEvent on_event);
   /// Ends the run within one frame.
   ~Engine();
@@ -75,8 +78,9 @@ class Engine {
     uint64_t number = 0;
     std::string film;
   };
-  /// While a Hold exists, the engine begins no new work and aborts drafts in progress. The processors are
-  /// then free for the next request: work done between the arrival of a change and show() would be useless.
+  /// While a Hold exists, the engine begins no new work and aborts drafts in progress. Work between the
+  /// arrival of a change and the call of show() would be useless, and would slow down the preparation of the
+  /// new version.
   class Hold {
    public:
     explicit Hold(Engine& engine) : engine_(engine) { ++engine_.holds_; }
@@ -88,20 +92,24 @@ class Engine {
     Engine& engine_;
   };
 
-  /// Shows this version from now on. Returns a number that increases with every call.
+  /// Makes this version the current one; `camera`, if set, replaces the scene's camera. Returns the key of
+  /// its film and a number that increases with every call.
   Run show(Loaded scene, const std::optional<ViewCamera>& camera);
-  /// Key under which the store has the pictures of a version that are drawn with the scene's own camera.
+  /// Returns the key of a version's pictures in the store, for pictures with the scene's own camera.
   std::string film_of(const producer::LoadedScene& scene) const;
-  /// Sets a second version whose frames are kept and, in idle time, completed; null: none.
+  /// Sets a second version, for comparison with the current one. Its frames are removed from the store last,
+  /// and missing frames are drawn in idle time. Null removes it.
   void pin(Loaded scene);
-  /// Sets the frame that the user sees. It is drawn first, and refined when nothing changes or plays.
+  /// Sets the frame that the user sees. This frame is drawn first. It is refined when there are no changes
+  /// for a while and the film is not playing.
   void look_at(int frame, bool playing);
-  /// Reads model files again after they have changed.
+  /// Call this when model files have changed: versions shown from now on read them again.
   void forget_models();
-  /// Name of the object that is visible at a position of a frame, as FilmRun::pick() returns it; empty also
-  /// if the frame is not available.
+  /// Returns the name of the object that is visible at a position of a frame; see FilmRun::pick(). The name
+  /// is empty if there is no object or the frame has no state yet.
   std::future<std::string> pick(int frame, double x, double y);
-  /// Draws a small frame of each of these versions; ends an earlier sweep. Returns its number.
+  /// Starts a sweep: one small picture of `frame` for each of these versions. It replaces an earlier sweep. A
+  /// null version gets a CellEvent with a fault. Returns the number of the sweep.
   uint64_t sweep(std::vector<Loaded> versions, int frame);
   void stop_sweep() { sweep({}, 1); }
 
@@ -110,7 +118,7 @@ class Engine {
   }
   std::shared_ptr<const std::string> cell(uint64_t sweep, int index) const;
   std::vector<std::pair<int, int>> ranges(const std::string& film) const { return frames_.ranges(film); }
-  /// Figures of the simulated frames of the current version.
+  /// Returns the statistics of each frame of the current version that is simulated so far.
   std::vector<producer::FrameFigures> figures() const;
   std::size_t bytes() const { return frames_.bytes(); }
   std::size_t most_bytes() const { return frames_.most_bytes(); }
@@ -146,10 +154,10 @@ class Engine {
   void report_frame(int frame, Detail detail);
   void report_film(FilmEvent::Phase phase, const std::string& message = "");
   void fail(const std::string& what);
-  /// Whether there is a request of any kind.
+  /// Whether there is an unprocessed request of any kind.
   bool is_stale() const { return ending_ || holds_ > 0 || requested_ != taken_; }
-  /// Whether there is, or soon will be, another version or camera. Other requests, such as the frames of a
-  /// film that plays, let a draft finish first.
+  /// Whether another version or camera was requested, or is about to be (see Hold). Other requests, such as
+  /// the next frame of a playing film, do not abort a draft.
   bool is_outdated() const { return ending_ || holds_ > 0 || runs_ != run_; }
 
   const EngineSettings settings_;
@@ -157,7 +165,7 @@ class Engine {
   FrameStore frames_;
   PhysicsStore physics_;
 
-  mutable std::mutex mutex_;  // for the members below, up to those of the thread
+  mutable std::mutex mutex_;  // protects the members below, up to those that only the thread uses
   std::condition_variable woken_;
   std::atomic<uint64_t> requested_ = 0;  // increases with every request to the thread
   std::atomic<bool> ending_ = false;

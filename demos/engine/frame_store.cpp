@@ -61,7 +61,7 @@ std::size_t FrameStore::bytes() const {
 
 void FrameStore::make_room() {
   while (bytes_ > most_bytes_ && !films_.empty()) {
-    // The film that was not used for the longest time; of protected films the first frames, when nothing else
+    // The least recently used film loses its first frame. Protected films lose frames only when no other film
     // is left.
     const auto rank = [&](const auto& entry) {
       return std::pair(std::ranges::find(protected_, entry.first) != protected_.end(), entry.second.used);

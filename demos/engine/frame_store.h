@@ -1,6 +1,6 @@
 #pragma once
-/// Drawn frames, in memory of a bounded size: compressed pictures of the latest versions of a scene. Those of
-/// the least recently used version are removed first.
+/// Stores drawn frames as compressed pictures, in memory of a bounded size. If the limit is exceeded,
+/// pictures of the least recently used version of the scene are removed first.
 
 #include <cstdint>
 #include <map>
@@ -24,19 +24,19 @@ struct StoredFrame {
   render::Camera camera;  ///< camera with which the frame was drawn
 };
 
-/// Pictures by film and frame. A refined picture is returned in place of the draft on request; the draft is
-/// kept for playing. All threads may use it.
+/// Pictures by film and frame. A frame can have a draft and refined pictures at the same time, because
+/// playing uses the drafts. Safe from several threads.
 class FrameStore {
  public:
   explicit FrameStore(std::size_t most_bytes) : most_bytes_(most_bytes) {}
 
   void put(const std::string& film, int frame, StoredFrame picture);
-  /// The best picture of a frame with at most this detail.
+  /// Returns the stored picture of a frame with the highest detail up to `most`; empty if there is none.
   std::optional<StoredFrame> get(const std::string& film, int frame, Detail most = Detail::final);
   bool has(const std::string& film, int frame, Detail detail) const;
-  /// Frames with a draft, as first and last of each range.
+  /// Returns the frames that have a draft, as ranges (first frame, last frame) in ascending order.
   std::vector<std::pair<int, int>> ranges(const std::string& film) const;
-  /// Sets the films whose frames are removed last.
+  /// Sets the films whose frames are removed only when no frames of other films are left.
   void protect(std::vector<std::string> films);
   std::size_t bytes() const;
   std::size_t most_bytes() const { return most_bytes_; }

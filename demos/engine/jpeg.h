@@ -1,5 +1,5 @@
 #pragma once
-/// JPEG of frames, for a browser.
+/// Encodes frames as JPEG for a browser.
 
 #include <memory>
 #include <string>
@@ -16,7 +16,7 @@ class JpegWriter {
   JpegWriter(const JpegWriter&) = delete;
   JpegWriter& operator=(const JpegWriter&) = delete;
 
-  /// The bytes of a JPEG file; `quality` from 1 to 100. Throws std::runtime_error.
+  /// Returns the bytes of a JPEG file. `quality`: 1 to 100. Throws std::runtime_error if encoding fails.
   std::string write(const render::Image& image, int quality);
 
  private:

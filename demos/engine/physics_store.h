@@ -1,5 +1,5 @@
 #pragma once
-/// Simulated states and their figures, in memory of a bounded size. Those of the least recently used
+/// Stores simulated states and their statistics, in memory of a bounded size. The least recently used
 /// simulations are removed first. The store also keeps the collision meshes of the latest simulation for the
 /// next one.
 
@@ -17,17 +17,17 @@ namespace offstage::engine {
 
 /// The states of one simulation so far.
 struct Physics {
-  /// State of each frame, from frame 1; null: not stored.
+  /// State of each frame; element 0 is frame 1. Null: the state is not stored.
   std::vector<std::shared_ptr<const producer::Snapshot>> states;
-  std::vector<producer::FrameFigures> figures;  ///< figures of each frame, from frame 1
-  std::optional<producer::RunStats> totals;     ///< figures of the whole simulation, after its last frame
-  std::vector<std::string> notes;               ///< problems during the simulation, as sentences
+  std::vector<producer::FrameFigures> figures;  ///< statistics of each frame; element 0 is frame 1
+  std::optional<producer::RunStats> totals;  ///< statistics of the whole simulation; set after its last frame
+  std::vector<std::string> notes;            ///< problems during the simulation, as sentences
 };
 
-inline constexpr std::size_t kPhysicsBytes = 384u << 20;  ///< usual limit for states
+inline constexpr std::size_t kPhysicsBytes = 384u << 20;  ///< default limit of the memory for states [bytes]
 
-/// Simulations by key. The current one is never removed, but its states beyond the bound are not stored; they
-/// are simulated again on request. For one thread.
+/// Simulations by key. The simulation to which states are added is never removed. Its states beyond the
+/// memory limit are not stored; a caller that needs one simulates again. Not safe from several threads.
 class PhysicsStore {
  public:
   explicit PhysicsStore(std::size_t most_bytes) : most_bytes_(most_bytes) {}

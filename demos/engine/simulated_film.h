@@ -1,5 +1,5 @@
 #pragma once
-/// The states of a film, frame by frame: from the store, or simulated into it.
+/// Provides the states of a film, frame by frame. A state comes from the store, or is simulated and stored.
 
 #include <memory>
 #include <optional>
@@ -11,10 +11,10 @@
 
 namespace offstage::engine {
 
-/// Where a state is not in the store, the film is simulated from its start up to that state.
+/// If a state is not in the store, the film is simulated up to that state, if necessary from its start.
 class SimulatedFilm : public producer::StateSource {
  public:
-  /// `key` names the simulation in the store. `last` is the last frame that is needed, which is the same for
+  /// `key` names the simulation in the store. `last` is the last frame to simulate; it must be the same for
   /// all films with this key. The scene, the models and the store must outlive this object.
   SimulatedFilm(const producer::Scene& scene, const producer::ModelLibrary& models, PhysicsStore& store,
                 std::string key, int last);
@@ -31,11 +31,12 @@ class SimulatedFilm : public producer::StateSource {
   void simulate();
   /// Time of the simulation [s].
   double time() const { return simulation_ ? simulation_->world().time() : 0; }
-  /// The state of the simulation, which must have begun; it may be before frame 1.
+  /// Returns the current state of the simulation, also before frame 1. simulate() must have been called
+  /// before.
   producer::Snapshot current() const { return simulation_->snapshot(); }
-  /// The latest simulated frame, or 0 before the first.
+  /// Number of the latest simulated frame; 0 before frame 1.
   int simulated_to() const { return simulation_ ? simulation_->frame() : 0; }
-  /// Finished fraction of the work before frame 1.
+  /// Finished fraction of the simulation before frame 1, 0 to 1.
   double lead_in() const;
 
   int advances_to(int frame) override;
@@ -57,7 +58,8 @@ class SimulatedFilm : public producer::StateSource {
   std::shared_ptr<Physics> physics_;
   std::optional<producer::Simulation> simulation_;
   std::optional<sim::Energy> energy_start_;
-  std::shared_ptr<const producer::Snapshot> latest_[2];  // also used if the store has no room
+  std::shared_ptr<const producer::Snapshot>
+      latest_[2];  // kept here because the store may have no room for them
   int advances_ = 0;
 };
 

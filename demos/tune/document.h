@@ -1,5 +1,6 @@
 #pragma once
-/// The text of a scene during tuning: its file, undo and redo, and the versions of the session.
+/// The text of a scene that is edited on the tuning page, with its file, undo and redo, and all versions of
+/// the session.
 
 #include <chrono>
 #include <cstdint>
@@ -11,7 +12,7 @@
 
 namespace offstage::tune {
 
-/// A version of the scene's text that the page has shown.
+/// A version of the scene's text.
 struct Version {
   uint64_t id = 0;
   std::string label;               ///< description of the change: "rate", "pasted text"
@@ -20,7 +21,8 @@ struct Version {
   std::string text;
 };
 
-/// Thrown if the file has changed since it was last read.
+/// Exception: another program has changed the file since it was last read or written. `theirs` is the file's
+/// current content.
 struct FileConflict {
   std::string theirs;
 };
@@ -37,31 +39,33 @@ class Document {
   /// Content of the file when it was last read or written.
   const std::string& saved() const { return saved_; }
 
-  /// Creates a new version. Several changes of one `group` (a drag, a sequence of typing) are one undo step;
-  /// a change with an empty group is a step of its own. Returns false if the text has not changed.
+  /// Makes `text` the current version; `label` and `paths` describe the change. Consecutive changes with the
+  /// same non-empty `group` (a drag, a sequence of typing) form one undo step. Returns false, without a new
+  /// version, if the text is the same.
   bool change(std::string text, std::string label, std::vector<std::string> paths, const std::string& group);
   bool undo();
   bool redo();
   bool can_undo() const { return now_ > 0; }
   bool can_redo() const { return now_ + 1 < history_.size(); }
-  /// Label of the step that undo or redo would make.
+  /// Labels of the changes that undo() and redo() would revert or repeat; empty if there is none.
   std::string undo_label() const { return can_undo() ? history_[now_].label : ""; }
   std::string redo_label() const { return can_redo() ? history_[now_ + 1].label : ""; }
 
-  /// Versions of this session, oldest first, including those that were undone. The oldest are removed when
-  /// the versions take too much memory.
+  /// Versions of this session, oldest first, including versions that were undone. The oldest versions are
+  /// removed when there are too many or they take too much memory.
   const std::deque<Version>& versions() const { return versions_; }
-  /// Returns the version with this number, or null.
+  /// Returns the version with this id; null if there is none or it was removed.
   const Version* find(uint64_t id) const;
 
-  /// Writes the text to the file atomically. Throws FileConflict, and writes nothing, if the file has changed
-  /// since it was last read; FileError if it cannot be written.
+  /// Writes the text to the file atomically. If the file was changed by another program, throws FileConflict
+  /// and writes nothing. Throws render::FileError if the file cannot be written.
   void save();
-  /// Current content of the file, if it differs from that when it was last read.
+  /// Returns the file's current content if another program has changed it since it was last read or written;
+  /// otherwise nothing.
   std::optional<std::string> changed_outside() const;
-  /// Makes the text of the file a new version.
+  /// Makes `theirs`, the file's current content, a new version.
   void reload(const std::string& theirs);
-  /// Keeps the own text; saving will replace the current content of the file.
+  /// Keeps the text of this session. `theirs` is the file's current content, which save() may then overwrite.
   void keep_own(const std::string& theirs) { saved_ = theirs; }
 
  private:

@@ -5,7 +5,8 @@
 
 namespace offstage::tune {
 
-/// Presets of effects: name, description, and names of the emitters and forces.
+/// Returns the presets of effects, each with its name, its description, and the names of its emitters and
+/// forces.
 nlohmann::ordered_json presets_list();
 
 }  // namespace offstage::tune

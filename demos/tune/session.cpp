@@ -96,7 +96,8 @@ std::vector<std::string> Session::muted_paths(const std::string& text) const {
   return paths;
 }
 
-/// With `with_view`: without the muted objects, and with the overlays of the page.
+/// Parses the scene's text; errors are returned. `with_view`: leave out the muted objects, and add the
+/// overlays of the page.
 Session::Parsed Session::parse(const std::string& text, bool with_view) const {
   Parsed parsed;
   std::vector<std::string> muted;
@@ -117,7 +118,8 @@ Session::Parsed Session::parse(const std::string& text, bool with_view) const {
   return parsed;
 }
 
-/// Shows the current text; if it is not a valid scene, the latest valid version stays visible.
+/// Makes the engine show the current text. If it is not a valid scene, the latest valid version stays
+/// visible.
 void Session::show() {
   Parsed parsed = parse(document_.text(), true);
   errors_ = std::move(parsed.errors);

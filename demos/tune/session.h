@@ -1,6 +1,6 @@
 #pragma once
-/// A tuning session: one scene file, its text, the engine that shows it, and the connected tabs. Uses JSON
-/// and is independent of HTTP.
+/// A tuning session: one scene file, its text, the engine that computes the frames, and the connected browser
+/// tabs. The interface uses JSON and is independent of HTTP.
 
 #include <atomic>
 #include <map>
@@ -20,7 +20,7 @@
 
 namespace offstage::tune {
 
-/// Reply to a request: an HTTP status, and an object.
+/// Reply to a request: an HTTP status and a JSON object.
 struct Reply {
   int status = 200;
   nlohmann::ordered_json body = nlohmann::ordered_json::object();
@@ -30,26 +30,28 @@ class Session {
  public:
   using Json = nlohmann::ordered_json;
 
-  /// Throws SceneError if the file cannot be read; a text that is not a valid scene is shown with its errors.
-  /// Its files may be beside it and in the `allowed` folders.
+  /// Reads the scene from `file`. Throws SceneError if the file cannot be read. If its text is not a valid
+  /// scene, the session starts and reports the errors. The scene may refer to files in its own folder and in
+  /// the `allowed` folders.
   Session(const std::string& file, engine::EngineSettings settings, std::vector<std::string> allowed = {});
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  /// The complete state, for a new tab.
+  /// Returns the complete state of the session, for a new tab.
   Json state();
   Json figures() const;
   Json versions();
-  /// The text of a version; null if it was removed.
+  /// Returns the text of a version; null if there is no such version or it was removed.
   Json version_text(uint64_t id);
-  /// Handles a change: `what` is the last part of the address, such as "edit". Only the writing tab may
-  /// change the scene.
+  /// Handles a request of a tab. `what` is the last part of the address, such as "edit". Only the writer (see
+  /// Tabs) may change the scene; a change by another tab is refused with status 423. Errors are reported by
+  /// the status of the reply.
   Reply post(const std::string& what, const nlohmann::json& request, const std::string& tab);
 
   Tabs& tabs() { return tabs_; }
   engine::Engine& engine() { return *engine_; }
-  /// Ends the streams and stops watching files.
+  /// Ends the event streams of all tabs and stops watching the scene's files.
   void close();
 
  private:
@@ -88,9 +90,9 @@ class Session {
   Tabs tabs_;
   engine::Engine::Loaded shown_;  // the latest valid version
   std::vector<Problem> errors_, warnings_;
-  uint64_t revision_ = 0;  // increases when the document known to the tabs is outdated
+  uint64_t revision_ = 0;  // increases with every change of the document that is sent to the tabs
   engine::Engine::Run run_;
-  std::map<uint64_t, std::string> films_;  // films of versions
+  std::map<uint64_t, std::string> films_;  // key of the film of each version, by the version's id
   std::optional<engine::ViewCamera> camera_;
   Json overlays_ = Json::array();
   std::set<std::string> muted_;

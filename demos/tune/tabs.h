@@ -1,6 +1,8 @@
 #pragma once
-/// The browser tabs of a session. Each has one stream and a mailbox with the latest message of each kind: a
-/// slow tab misses replaced messages, and never blocks others or uses more memory.
+/// The browser tabs of a session. Each tab has one event stream, and a mailbox with the latest message of
+/// each kind. A slow tab therefore misses some messages, but does not block other tabs or use more and more
+/// memory. One tab is the writer, which may change the scene; the other tabs only show it. Safe from several
+/// threads.
 
 #include <chrono>
 #include <condition_variable>
@@ -23,16 +25,18 @@ class Tabs {
     std::string json;
   };
 
-  /// Opens the stream of a tab and returns its ticket; an earlier stream of the same tab ends. Returns
-  /// nothing if there are already kMostTabs others. The first tab is the writer.
+  /// Opens the stream of a tab and returns its ticket. An earlier stream of the same tab ends. Returns
+  /// nothing if kMostTabs other tabs are open, or after close_all(). If there is no writer, the tab becomes
+  /// the writer.
   std::optional<uint64_t> open(const std::string& tab);
-  /// Ends a stream, unless the tab has a newer one. The tab that has been open longest becomes the writer.
+  /// Removes a tab, unless it has a newer stream than this ticket's. If it was the writer, the tab that has
+  /// been open longest becomes the writer.
   void close(const std::string& tab, uint64_t ticket);
   void close_all();
 
   /// Puts a message into every mailbox.
   void post(const std::string& kind, const std::string& json);
-  /// The next message of a stream. `over`: the stream has ended.
+  /// Result of wait(): a message, or nothing at the time limit. `over`: the stream has ended.
   struct Next {
     std::optional<Message> message;
     bool over = false;
@@ -41,7 +45,7 @@ class Tabs {
 
   /// The tab that may change the scene; empty if none is open.
   std::string writer() const;
-  /// Makes an open tab the writer.
+  /// Makes a tab the writer; returns false if the tab is not open.
   bool take_over(const std::string& tab);
   std::size_t count() const;
   bool has_room() const { return count() < kMostTabs; }

@@ -5,7 +5,8 @@
 
 namespace offstage::tune {
 
-/// Serves the page of a scene until a signal ends it, and prints its address. Returns an exit code.
+/// Serves the tuning page of a scene and prints its address, until a signal ends the program. Returns an exit
+/// code.
 int tune_command(const producer::TuneOptions& options);
 
 }  // namespace offstage::tune

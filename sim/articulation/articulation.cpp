@@ -13,19 +13,20 @@
 namespace offstage::sim {
 namespace {
 
-/// Limits of the projection: at most kMostSteps steps of Newton's method, until the constraint errors are
-/// below kTogether [m]; velocities are projected to the same accuracy [m/s].
+/// The projection uses at most kMostSteps steps of Newton's method. It ends when the constraint errors are
+/// below kTogether [m]. Velocities are projected until their errors are below the same number [m/s].
 constexpr int kMostSteps = 8;
 constexpr Real kTogether = 1e-12;
 /// Largest correction of a constraint error in one step [m], because the linearization is poor beyond this.
 constexpr Real kFarApart = 0.1;
 constexpr Real kSmall = 1e-4;
 constexpr int kVelocitySteps = 2;
-/// A joint that leaves its limit faster than this is not in contact with it [m/s], [rad/s].
+/// A joint that moves away from its limit faster than this does not touch the limit [m/s], [rad/s].
 constexpr Real kLeaving = 1e-6;
 /// Velocities that violate the constraints by less than this count as unchanged since settle() [m/s].
 constexpr Real kDisturbed = 1e-7;
-/// Greatest phase of a vibration under the tension of the joints between two kicks [rad].
+/// Greatest phase of a vibration between two kicks [rad]. The vibration is caused by the tension in the
+/// joints.
 constexpr Real kKickPhase = 1;
 
 bool is_moved(const Body* body) {
@@ -75,7 +76,7 @@ Vec6 join(const Vec3& linear, const Vec3& angular) {
   return v;
 }
 
-/// Whether whole turns change its constraint.
+/// Whether whole turns of the bodies change the constraint of a joint.
 bool is_offset_by_turns(const Joint& joint) {
   return joint.def.is_coupling() || joint.def.type == JointType::screw;
 }
@@ -171,7 +172,8 @@ Real Articulation::kicks_needed(Real duration) const {
 }
 
 void Articulation::begin_motion(Real t, Real h) {
-  // The mean acceleration over the motion, because the velocities of kinematic links may jump at keys.
+  // This is the mean acceleration over the motion, because the velocities of kinematic links may jump at
+  // keyframes.
   const auto acceleration = [&](const Body* body) -> Driven {
     if (!body || !body->is_kinematic()) return {};
     const LinkMotion before = link_motion(body, t), after = link_motion(body, t + h);
@@ -183,8 +185,9 @@ void Articulation::begin_motion(Real t, Real h) {
   }
 }
 
-/// `still_a` and `still_b` hold the motion of driven links, to which the result refers. The poses are those
-/// `before` the time of the velocities [s].
+/// Returns the place of joint j, with velocities at `time` [s]. The poses of driven links are taken at `time
+/// - before`. The result refers to `motion` and, for driven links, to `still_a` and `still_b`, which this
+/// function sets.
 JointPlace Articulation::place_of(std::size_t j, Real time, std::span<const LinkMotion> motion,
                                   LinkMotion& still_a, LinkMotion& still_b, Real before) const {
   const auto& [a, b, count] = system_.joints()[j];
@@ -265,9 +268,9 @@ void Articulation::read_sprung_rows(Real t, Real h, std::span<const LinkMotion> 
   }
 }
 
-/// Factors the system of the constraints of read_rows(), with the inertia that springs add to the links:
-/// light links that projections turned against stiff springs would be thrown back by them. Returns the
-/// system, or null if the constraints are too degenerate.
+/// Factorizes the system of the constraints of read_rows(), with the inertia that springs add to the links.
+/// Without this inertia a projection could turn light links far against stiff springs, which would then throw
+/// them back. Returns the system, or null if the constraints are too degenerate.
 JointSystem* Articulation::factorize_inert(Real time) {
   if (!has_springs() || kick_duration_ == 0) return system_.factorize(rows_, mobility_) ? &system_ : nullptr;
   system_.update(rows_);
@@ -300,7 +303,8 @@ void Articulation::kick(Real t, Real h, std::span<const LinkMotion> motion,
   }
 }
 
-/// The force and torque, or impulses, that the rows of a joint exert on its body a.
+/// Returns the force and torque that the rows of a joint exert on its body a. If `impulse` is an impulse, the
+/// result is an impulse and an angular impulse.
 Wrench Articulation::wrench(std::size_t j, const JointRows& rows, const Vec6& impulse,
                             std::span<const LinkMotion> motion) const {
   const Vec6 on_a = rows.on_a * impulse;
@@ -356,7 +360,8 @@ void Articulation::find_stops() {
   }
 }
 
-/// Applies the constraint impulses that follow from impulses on single links.
+/// Completes velocity changes from impulses on single links: adds the constraint impulses that keep the
+/// joints together.
 void Articulation::pass_on(std::span<Vec6> velocities) {
   system_.relative(velocities, change_);
   for (Vec6& c : change_) c = -c;
@@ -370,7 +375,7 @@ void Articulation::find_response(uint32_t link, const Vec6& impulse) {
   pass_on(response_);
 }
 
-/// Returns the impulses of the limits for which no link in the response moves beyond a limit.
+/// Returns the impulses of the limits that prevent every joint of the response from moving beyond its limits.
 Eigen::VectorXd Articulation::stop_impulses() const {
   const auto n = static_cast<Eigen::Index>(stops_.size());
   Eigen::MatrixXd mobility(n, n);
@@ -384,7 +389,8 @@ Eigen::VectorXd Articulation::stop_impulses() const {
   return solve_lcp((mobility + mobility.transpose()) / 2, speed).f;
 }
 
-/// Treats the limits that the push presses against as constraints.
+/// Returns the mobility of a link. Joint limits that the impulse `push` would exceed are treated as
+/// constraints.
 Mat6 Articulation::link_mobility(uint32_t link, const Vec6& push) {
   const std::lock_guard lock(responding_);
   place_for_impulses();

@@ -8,11 +8,11 @@ namespace offstage::sim {
 namespace {
 
 constexpr Real kInfinite = std::numeric_limits<Real>::infinity();
-/// Fraction of the violation of a limit that a step removes, and the greatest speed of the removal [rad/s],
-/// [m/s].
+/// kPushOut: fraction of the violation of a limit that a step removes. kFastestPush: greatest speed of this
+/// correction [rad/s], [m/s].
 constexpr Real kPushOut = 0.2, kFastestPush = 2;
-/// A limit within kNear of the coordinate has a row; limits within kReached take part in collisions [rad],
-/// [m].
+/// A limit whose distance from the coordinate is at most kNear has a row. A limit within kReached takes part
+/// in collisions [rad], [m].
 constexpr Real kNear = 0.02, kReached = 1e-4;
 /// Links that turn by more than this in an interval are not predicted [rad].
 constexpr Real kMostTurn = 1;
@@ -22,7 +22,8 @@ constexpr Real kClosing = 1e-3;
 /// Slots of Joint::efforts.
 enum Slot : std::size_t { kLimit = 0, kSwing = 1, kMotor = 2, kFriction = 3, kDamping = 6, kSpring = 9 };
 
-/// A direction of a joint at the interval's start, where the impulses of the interval act, and at its end.
+/// A direction of a joint, at the interval's start and at its end. The impulses of the interval act along the
+/// direction at the start.
 struct Direction {
   JointRow start, acting, end;
 };
@@ -82,7 +83,7 @@ class RowMaker {
  private:
   Real least_swing() const { return def_.type == JointType::universal ? -def_.swing : -kInfinite; }
 
-  /// The free coordinate including whole turns.
+  /// The free coordinate of the joint, including whole turns.
   Direction free() const {
     const auto row = [&](const JointPlace& place) { return free_row(def_, place, joint_.length); };
     Direction d{row(start_), row(acting_), row(end_)};
@@ -115,9 +116,10 @@ class RowMaker {
     return r;
   }
 
-  /// The same with the change of the speed by which the direction turns from the interval's start to its end.
-  /// It is for limits alone: with motors it makes nothing more accurate that is known, and the gripper of
-  /// demos/scenes/robot_arm.json, whose contacts the exact solver often leaves to its fall-back, diverged.
+  /// Returns a row that also includes the change of speed due to the rotation of the direction from the
+  /// interval's start to its end. It is used only for limits. For motors no case is known in which it
+  /// improves accuracy. With it, the gripper of demos/scenes/robot_arm.json diverged, because the exact
+  /// solver often leaves its contacts to the fall-back.
   BoundedRow turning_with(const Direction& d) const {
     BoundedRow r = bounded(d);
     const auto turn = [&](const LinkMotion& motion) { return h_ * motion.angular_velocity.norm(); };
@@ -132,12 +134,12 @@ class RowMaker {
     return row.on_a.head<3>().dot(at.a.velocity) + row.on_a.tail<3>().dot(at.a.angular_velocity) +
            row.on_b.head<3>().dot(at.b.velocity) + row.on_b.tail<3>().dot(at.b.angular_velocity);
   }
-  /// The speed of the coordinate at the interval's end, without the effect of the rows.
+  /// The speed of the coordinate at the interval's end, before the impulses of the rows are applied.
   Real speed(const Direction& d) const { return speed(d.end, end_); }
 
-  /// The coordinate at the interval's start for which the mean of the speeds at both ends leads to its end,
-  /// without the effect of the rows. From there, the row's target leads exactly to the wanted coordinate.
-  /// Links with springs move with the speed of the end.
+  /// Returns a coordinate for the interval's start. From it, the mean of the speeds at both ends leads to the
+  /// coordinate at the interval's end, before the impulses of the rows are applied. With this start, the
+  /// row's target leads exactly to the wanted coordinate. Links with springs move with the speed at the end.
   Real at_start(const Direction& d) const {
     return d.end.error - h_ / 2 * ((is_kicked_ ? speed(d) : speed_at_start(d)) + speed(d));
   }
@@ -152,14 +154,15 @@ class RowMaker {
     add(row, slot, closes);
   }
 
-  /// The impact at a limit that the free motion reaches in this interval.
+  /// An impact at a limit that the free motion reaches in this interval.
   struct Stop {
     Real fraction;  ///< fraction of the interval before it
     Real target;    ///< speed away from the limit at the interval's end
   };
-  /// The speed with which the coordinate reaches the limit is reversed, and the acceleration of the free
-  /// motion acts in the rest of the interval; a joint without restitution stays at its limit. `side` is 1 for
-  /// a lower limit and -1 for an upper one.
+  /// Returns the impact at a limit; nothing if there is none in the interval. The impact reverses the speed
+  /// of the coordinate, times the restitution. In the rest of the interval the acceleration of the free
+  /// motion acts. A joint without restitution stays at its limit. `side`: 1 for a lower limit, -1 for an
+  /// upper limit.
   std::optional<Stop> stop(const Direction& row, Real limit, int side) const {
     const Real gap = side * (row.start.error - limit), left = side * (row.end.error - limit);
     if (!(left < 0) || gap < 0) return std::nullopt;
@@ -183,7 +186,7 @@ class RowMaker {
     return true;
   }
 
-  /// Adds a row for the nearer of both limits. If they are equal, the coordinate is held.
+  /// Adds a row for the nearer of the two limits. If both limits are equal, the row fixes the coordinate.
   void add_range(const Direction& row, std::size_t slot, Real lower, Real upper) {
     if (!is_kicked_ && lower < upper &&
         (add_stop_within(row, slot, lower, 1) || add_stop_within(row, slot, upper, -1)))
@@ -234,7 +237,7 @@ class RowMaker {
     add_guessed(r, kMotor, std::abs(speed_at_start(row) - r.target) > kClosing);
   }
 
-  /// Friction and damping of all free directions.
+  /// Adds rows for the friction and the damping of all free directions.
   void add_resistance() {
     std::vector<Direction> free_directions;
     switch (def_.type) {

@@ -15,7 +15,8 @@ Vec6 concatenate(const Vec3& linear, const Vec3& angular) {
   return v;
 }
 
-/// t . (anchor a - anchor b) = 0, where t is fixed in b. With s from b's centre to a's anchor,
+/// The row of the constraint t . (anchor a - anchor b) = 0, where t is fixed in b. With s from b's centre to
+/// a's anchor,
 ///   dC/dt = t . s',  s' = v_a(anchor) - v_b - w_b x s   (as seen from b).
 /// Besides the accelerations, d2C/dt2 contains t . (w_a x (w_a x r_a) - w_b x (w_b x s) - 2 w_b x s').
 JointRow slide_row(const JointPlace& p, const Vec3& t) {
@@ -26,8 +27,8 @@ JointRow slide_row(const JointPlace& p, const Vec3& t) {
           t.dot(wa.cross(turning) - wb.cross(wb.cross(s)) - 2 * wb.cross(seen))};
 }
 
-/// Both anchors coincide, along the world's axes. Besides the accelerations, d2C/dt2 contains w_a x (w_a x
-/// r_a) - w_b x (w_b x r_b).
+/// Adds the rows that keep both anchors at the same point, one row for each world axis. Besides the
+/// accelerations, d2C/dt2 contains w_a x (w_a x r_a) - w_b x (w_b x r_b).
 void add_meeting_rows(const JointPlace& p, JointRows& rows) {
   const Vec3 &wa = p.a.angular_velocity, &wb = p.b.angular_velocity;
   rows.on_a.topLeftCorner<3, 3>().setIdentity();
@@ -39,14 +40,14 @@ void add_meeting_rows(const JointPlace& p, JointRows& rows) {
   rows.count = 3;
 }
 
-/// u . v = 0, where u is fixed in a and v in b.
+/// The row of the constraint u . v = 0, where u is fixed in a and v is fixed in b.
 JointRow perpendicular_row(const JointPlace& p, const Vec3& u, const Vec3& v) {
   const Vec3 n = u.cross(v), &wa = p.a.angular_velocity, &wb = p.b.angular_velocity;
   const Vec3 n_rate = wa.cross(u).cross(v) + u.cross(wb.cross(v));
   return {concatenate(Vec3::Zero(), n), concatenate(Vec3::Zero(), -n), u.dot(v), n_rate.dot(wa - wb)};
 }
 
-/// |anchor a - anchor b| = length.
+/// The row of the constraint |anchor a - anchor b| = length.
 JointRow length_row(const JointPlace& p, Real length) {
   const Vec3 &wa = p.a.angular_velocity, &wb = p.b.angular_velocity;
   const Real now = p.apart.norm();
@@ -60,7 +61,8 @@ JointRow length_row(const JointPlace& p, Real length) {
 
 constexpr Real kWholeTurn = 2 * std::numbers::pi;
 
-/// Columns: the second axis, perpendicular to the axis; the third; the axis.
+/// Returns right-handed orthonormal axes as columns. The last column is `axis`. The first column is `second`
+/// without its component along the axis, or any perpendicular direction if this is zero.
 Mat3 axes_along(const Vec3& axis, const Vec3& second) {
   Mat3 m;
   m.col(2) = axis.normalized();
@@ -71,18 +73,20 @@ Mat3 axes_along(const Vec3& axis, const Vec3& second) {
   return m;
 }
 
-/// Rotation of a link about its joint axis since the joint was created; within half a turn.
+/// Rotation of a link about its joint axis since the joint was created, between minus and plus half a turn
+/// [rad].
 Real angle_since(const Mat3& axes, const Mat3& at_creation) {
   return angle_of(axes.col(0).dot(at_creation.col(1)), axes.col(0).dot(at_creation.col(0)));
 }
 
-/// The constraint of a coupling, with its changes by one turn of a and of b.
+/// The constraint of a coupling. It also has the changes of the constraint's error due to one full turn of a
+/// and of b.
 struct Coupling {
   JointRow row;
   Real turn_a = 0, turn_b = 0;
 };
 
-/// The axis of each wheel is fixed in it, so that its rate does no work: the row has no bias.
+/// The axis of each wheel is fixed in the wheel. Its rate of change does no work, so the row has no bias.
 Coupling gear_coupling(const JointDef& def, const JointPlace& p, Real length) {
   const Real a = angle_since(p.axes_a, frame_axes(def, false)),
              b = angle_since(p.axes_b, frame_axes(def, true));
@@ -92,8 +96,8 @@ Coupling gear_coupling(const JointDef& def, const JointPlace& p, Real length) {
           def.ratio * kWholeTurn};
 }
 
-/// b's anchor moves along a direction of the world, which is its place in the world when the joint was
-/// created.
+/// The anchor of b moves along a direction that is fixed in the world. It is the direction at the creation of
+/// the joint.
 Coupling rack_coupling(const JointDef& def, const JointPlace& p, Real length) {
   const Vec3 d = def.second_axis.normalized(), &wb = p.b.angular_velocity;
   const Real a = angle_since(p.axes_a, frame_axes(def, false));
@@ -125,7 +129,8 @@ Coupling coupling(const JointDef& def, const JointPlace& p, Real length) {
   return def.type == JointType::rack ? rack_coupling(def, p, length) : screw_coupling(def, p, length);
 }
 
-/// The change by whole turns that brings the constraint's error nearest to 0: angles jump by a turn.
+/// Returns the multiple of whole turns that brings the constraint's error nearest to 0. It is needed because
+/// the measured angles jump by a whole turn.
 Real nearest_turns(const Coupling& c) {
   Real best = 0;
   for (const int a : {-1, 0, 1})
@@ -142,7 +147,8 @@ JointRow coupling_row(const JointDef& def, const JointPlace& p, Real length) {
   return c.row;
 }
 
-/// Length of the rope of a pulley from its fixed point to a body's anchor: the part of the row on this body.
+/// Adds the part of a pulley's row that acts on one body. Returns the length of the rope from the fixed point
+/// to the anchor of this body [m].
 Real add_strand(const LinkMotion& link, const Vec3& arm, const Vec3& from, Real factor, Vec6& on,
                 JointRow& row) {
   const Vec3 offset = link.position + arm - from;

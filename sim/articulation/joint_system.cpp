@@ -5,7 +5,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Links with more joints than this get rows of their own.
+/// Links with more joints than this get rows of their own in the matrix.
 constexpr uint32_t kFewJoints = 3;
 /// Fraction of the diagonal that is added if the matrix is not plain; kMore times that if it is not enough.
 /// At the stages of an integrator loops are not closed exactly, and dependent constraints contradict each
@@ -13,8 +13,8 @@ constexpr uint32_t kFewJoints = 3;
 /// grow against each other.
 constexpr Real kRegularization = 1e-6, kMore = 100;
 constexpr int kAttempts = 3, kRefinements = 8;
-/// Refinement ends at a residual of kExact times the requested change; a step is at most kLongest times the
-/// preconditioner's.
+/// The refinement ends when the residual is below kExact times the requested change. A step is at most
+/// kLongest times as long as the step of the preconditioner.
 constexpr Real kExact = 1e-12, kLongest = 2;
 
 }  // namespace
@@ -140,7 +140,8 @@ bool JointSystem::factorize(Matrix<N>& m) {
   return false;
 }
 
-/// The diagonal of a joint's block of the matrix for impulses: its rows times their responses.
+/// Computes the diagonal block of a joint in the matrix for impulses: the joint's rows times the responses to
+/// their impulses.
 template <int N>
 Eigen::Matrix<Real, N, 1> JointSystem::own_diagonal(std::size_t joint) const {
   Eigen::Matrix<Real, N, 1> sum = Eigen::Matrix<Real, N, 1>::Zero();
@@ -185,8 +186,8 @@ void JointSystem::apply(std::span<const Vec6> impulses, std::span<Vec6> velociti
   }
 }
 
-/// Conjugate gradients with the factor as preconditioner. The eigenvalues are 1, except for the effect of the
-/// added diagonal.
+/// Improves the impulses by conjugate gradients with the factorization as preconditioner. The eigenvalues of
+/// the preconditioned matrix are 1, apart from the effect of the addition to the diagonal.
 void JointSystem::refine(std::span<const Vec6> change, std::span<Vec6> impulses) {
   const auto dot = [](std::span<const Vec6> a, std::span<const Vec6> b) {
     Real sum = 0;

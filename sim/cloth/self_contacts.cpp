@@ -88,14 +88,15 @@ bool boxes_apart(std::span<const Vec4> start, std::span<const Vec4> end, const s
   return over.cwiseMax(under).maxCoeff() > reach;
 }
 
-/// The least of n (x_i - x_j) over the points i of the first and j of the second.
+/// Smallest n . (x_i - x_j) over the points i of the pair's first element and the points j of the second.
 Real separation(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool edges, const Vec4& n) {
   const Real h0 = n.dot(x[p[0]]), h1 = n.dot(x[p[1]]), h2 = n.dot(x[p[2]]), h3 = n.dot(x[p[3]]);
   return edges ? std::min(h0, h1) - std::max(h2, h3) : h0 - std::max({h1, h2, h3});
 }
 
-/// Whether a plane with the normal n (of any length) separates both by more than `reach`, at the start and at
-/// the end: then it does so on all of their straight paths, since the heights above it change linearly.
+/// Whether a plane with the normal n (of any length) separates both elements by more than `reach` [m] at the
+/// start and at the end. It then separates them all the time, because the points move on straight lines and
+/// their heights above the plane change linearly.
 bool plane_separates(std::span<const Vec4> start, std::span<const Vec4> end, const std::array<uint32_t, 4>& p,
                      bool edges, const Vec4& n, Real reach) {
   const Real from = separation(start, p, edges, n);
@@ -104,13 +105,14 @@ bool plane_separates(std::span<const Vec4> start, std::span<const Vec4> end, con
   return least > 0 && least * least > reach * reach * n.squaredNorm();
 }
 
-/// From the middle of the second to that of the first.
+/// Vector from the middle of the pair's second element to the middle of the first one [m]; for two edges
+/// twice that vector, because only the direction is used.
 Vec4 middle_to_middle(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool edges) {
   if (edges) return x[p[0]] + x[p[1]] - x[p[2]] - x[p[3]];
   return x[p[0]] - (x[p[1]] + x[p[2]] + x[p[3]]) / 3;
 }
 
-/// Normal to both edges, or of the triangle, towards the first of the two.
+/// Normal of the pair, not unit, towards its first element: perpendicular to both edges, or to the triangle.
 Vec4 common_normal(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool edges) {
   const Vec3 p0 = place(x, p[0]), p1 = place(x, p[1]), p2 = place(x, p[2]), p3 = place(x, p[3]);
   const Vec3 n = edges ? (p1 - p0).cross(p3 - p2) : (p2 - p1).cross(p3 - p1);
@@ -121,7 +123,7 @@ Real least_distance(Real distance, Real nearest) {
   return (1 - 1e-9) * std::max(kLeft * distance, std::min(distance, nearest));
 }
 
-/// How many of a pair's points belong to the first of the two.
+/// Number of a pair's four points that belong to its first element.
 std::size_t first_side(bool edges) {
   return edges ? 2 : 1;
 }

@@ -42,8 +42,8 @@ class BoundingTree {
   /// A tree of one item.
   static BoundingTree of_one(const Volume& volume);
 
-  /// Fits the volumes to the moved vertices of a mesh with the same triangles. Oriented boxes keep their
-  /// axes.
+  /// Fits the volumes to the vertices of a mesh with the same triangles, after the vertices have moved.
+  /// Oriented boxes keep their axes.
   void refit(const TriangleMesh& mesh);
   void refit(std::span<const Aabb> boxes) requires std::same_as<Volume, Aabb>;
 
@@ -56,7 +56,7 @@ class BoundingTree {
 
   /// Returns the volume of all items; an empty box, or a point at the origin, if there are none.
   Volume bounds() const { return nodes_.empty() ? Volume() : nodes_.front().volume; }
-  /// Upper bound of the distance of all items from the frame's origin [m].
+  /// Returns an upper bound of the distance of any item's points from the origin of the frame [m].
   Real reach() const;
 
   /// Calls visit(level, volume, is_leaf) for every node in depth-first order; the root is at level 0.
@@ -82,9 +82,10 @@ class BoundingTree {
     }
   }
 
-  /// Search for the item nearest to p by branch and bound. distance2(item) must return the squared distance
-  /// between an item and p [m^2]. It is called for every item that may be nearer than the smallest distance
-  /// so far, which is `limit2` at first. Nearer boxes are visited first.
+  /// Searches for the item that is nearest to p, by branch and bound. The caller records the result in
+  /// distance2(). distance2(item) must return the squared distance between an item and p [m^2]. It is called
+  /// for every item that may be nearer than the smallest distance so far, which is `limit2` at first. Nearer
+  /// boxes are visited first.
   template <class Distance2>
   requires std::same_as<Volume, Aabb>
   void nearest(const Vec3& p, Distance2&& distance2,

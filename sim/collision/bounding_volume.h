@@ -25,13 +25,13 @@ struct BoundingSphere {
 /// For coplanar points one axis is perpendicular to their plane; for collinear points one axis is along their
 /// line. For three points one axis is along the longest side, which gives the smallest box.
 Obb fit_obb(std::span<const Vec3> points);
-/// Returns the smallest box with the given axes.
+/// Returns the smallest box with the given axes around at least one point.
 Obb fit_obb(std::span<const Vec3> points, const Mat3& axes);
 
-/// Returns a sphere around at least one point, after Ritter, "An efficient bounding sphere" (1990). The two
-/// farthest of the six points that are extreme along the axes give a first diameter, and each point outside
-/// enlarges the sphere as little as possible. At the end the radius is reduced to the distance of the
-/// farthest point.
+/// Returns a sphere around at least one point, after Ritter, "An efficient bounding sphere" (1990). Of the
+/// six points that are extreme along the axes, the two that are farthest apart give the first diameter. Each
+/// point outside then enlarges the sphere as little as possible. At the end the radius is reduced to the
+/// distance of the farthest point.
 BoundingSphere fit_sphere(std::span<const Vec3> points);
 
 }  // namespace offstage::sim

@@ -11,8 +11,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Sine of the angle below which two edges have no axis of their own. The error of omitting it is this
-/// fraction of their length.
+/// If the sine of the angle between two edges is below this, their cross product is not used as an axis. The
+/// resulting error is at most this fraction of the edges' length.
 constexpr Real kNoAxis = 1e-10;
 /// Greatest rounding error of the crossing of two edges, or of the gap along their common perpendicular, as a
 /// fraction of the sizes.
@@ -81,8 +81,8 @@ void try_products(const Gaps& gaps, const Mat3& rotation, Real rounding, Axis& b
     }
 }
 
-/// Returns the closest points if they are where two edges cross; none if they are not, or if rounding may
-/// hide it.
+/// Returns the closest points if they are inside two edges. Returns nothing if they are not, or if this is
+/// uncertain because of rounding.
 std::optional<Separation> edge_separation(const Convex& a, const Convex& b, const Placed& at,
                                           const Axis& axis, Real rounding) {
   const Vec3 u = Vec3::Unit(axis.a), w = at.rotation.col(axis.b), cross = u.cross(w);
@@ -200,7 +200,7 @@ class FaceContact {
     for (uint32_t k = 0; k < count_; ++k) sum += corners_[k].at;
     return sum / std::max(1u, count_);
   }
-  /// Whether a corner that is not higher than this is over the face itself.
+  /// Whether a corner whose height is at most `height` is over the face.
   bool has_corner_over_face(Real height) const {
     for (uint32_t k = 0; k < count_; ++k) {
       const Vec3& p = corners_[k].at;
@@ -214,7 +214,8 @@ class FaceContact {
 
   static uint32_t side_id(const Face& f, uint32_t k) { return edge_id(f.tag(k), f.tag(k + 1)); }
 
-  /// Id of a crossing. Neighbouring sides of the reference face meet in its vertex.
+  /// Id of a crossing. If both sides are neighbouring sides of the reference face, the crossing is a vertex
+  /// of this face.
   uint32_t crossing(uint32_t side, uint32_t cut, uint32_t cut_id) const {
     if (side < kReference) return crossing_id(1 - body_, side_id(other_, side), cut_id);
     return vertex_id(body_, face_.tag((side - kReference + 1) % 4 == cut ? cut : side - kReference));
@@ -338,7 +339,7 @@ bool box_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real m
   const Vec3 along = by_a ? Vec3(Vec3::Unit(face_a)) : Vec3(at.rotation.col(face_b));
   const Vec3 n = edges ? edges->normal : Vec3((along.dot(at.translation) > 0 ? -1 : 1) * along);
 
-  // As in manifold(): of the faces that may give the normal, the less inclined one is used.
+  // As in manifold(): if a face of each box can give the normal, the less inclined face is used.
   const Real rounding = kSeparationRounding * size, tolerance = kTilt * margin + rounding,
              slop = kRim * margin + rounding;
   const Tilted of_a = tilted_face(-n, gaps.a, axis.gap, tolerance),

@@ -9,8 +9,8 @@ namespace offstage::sim {
 
 /// Computes the same manifold as manifold() for two boxes with Convex::radius 0. It has no points if the
 /// boxes are more than `margin` [m] apart. Returns false, with an empty manifold, if the separating axes do
-/// not give the distance: if the boxes are separate and the closest features are a vertex and an edge or two
-/// parallel edges, or if edges are parallel within rounding.
+/// not give the distance. This is the case for separate boxes whose closest features are a vertex and an
+/// edge, two parallel edges, or edges that are parallel within rounding.
 bool box_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real margin, Manifold& manifold,
                   MoreManifolds* more = nullptr);
 

@@ -96,8 +96,8 @@ std::span<const IndexPair> BroadPhase::pairs() {
   return pairs_;
 }
 
-/// Calls find(job, candidates) for each job in parallel. The results are stored by job, so they do not depend
-/// on threads. Keeps the pairs that are valid.
+/// Calls find(job, candidates) for each job, in parallel, and keeps the candidates whose boxes really
+/// overlap. The results are stored by job, so they do not depend on the threads.
 template <class Find>
 void BroadPhase::search(std::size_t jobs, Find&& find) {
   const std::size_t first = block_count_;

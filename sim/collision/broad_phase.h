@@ -2,11 +2,11 @@
 /// Broad phase (physics H5, H6, E9): finds the pairs of objects whose boxes overlap, with a uniform or
 /// multi-level Grid.
 ///
-/// Objects at rest become settled: they are in a grid of their own, which is kept with their pairs. All other
-/// objects are inserted into a second grid at every step, and only they cost time. Inserting an unsettled
-/// object that did not move is wasted work. Once this wasted work equals the cost of settling all objects at
-/// rest, they are settled together. Therefore the work is within a small factor of the optimum for any
-/// motion, and static objects eventually cost nothing.
+/// Objects at rest can become settled. Settled objects are in a separate grid, which is kept from step to
+/// step together with their pairs. All other objects are inserted into a second grid at every step, and only
+/// these cost time. Work for an unsettled object that did not move is wasted. When the wasted work has
+/// reached the cost of settling all objects at rest, these objects are settled together. Therefore the work
+/// is within a small factor of the optimum for any motion, and static objects eventually cost nothing.
 
 #include <cstdint>
 #include <span>
@@ -18,7 +18,7 @@ namespace offstage::sim {
 
 class BroadPhase {
  public:
-  /// `means_in_cell`, > 0: width of a cell of the uniform grid in mean diameters.
+  /// `means_in_cell`: width of a cell of the uniform grid as a multiple of the objects' mean diameter; > 0.
   explicit BroadPhase(GridKind kind = GridKind::multilevel, Real means_in_cell = CellSizes::kMeansInCell)
       : means_in_cell_(means_in_cell) {
     sizes_.kind = kind;

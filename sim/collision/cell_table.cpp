@@ -20,7 +20,7 @@ CellLanes lanes(const CellBox& box) {
   return CellLanes(box.bound.data(), stdx::vector_aligned);
 }
 
-/// Upper limits for the lanes of another box that meets this one.
+/// Returns the limits that no lane of another box exceeds if the boxes overlap.
 CellLanes limits(const CellBox& box) {
   const Half low(box.bound.data(), stdx::vector_aligned),
       minus_high(box.bound.data() + 4, stdx::vector_aligned);
@@ -45,8 +45,9 @@ CellBox in_cell(CellBox box, float cell) {
 }
 
 /// Calls visit(hash, cell lane, axes along which this is the object's low cell) for the cells of a range, in
-/// blocks of 2 x 2 x 2. Nearly every object has one or two cells along an axis, unpredictably. One loop over
-/// those of the eight cells that are in the range is therefore faster than three nested loops.
+/// blocks of 2 x 2 x 2. Nearly every object has one or two cells along each axis, and the processor cannot
+/// predict which. One loop over the cells of a block that are in the range is therefore faster than three
+/// nested loops.
 template <class Visit>
 void for_each_cell(const CellRange& range, Visit&& visit) {
   const auto& [x0, y0, z0] = range.low;

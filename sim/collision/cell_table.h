@@ -22,16 +22,16 @@ struct IndexPair {
 /// A box as eight numbers, for a fast overlap test: A overlaps B if and only if low(A) <= high(B) and
 /// -high(A) <= -low(B), which is one comparison of eight lanes. Rounding to single precision preserves order.
 /// Therefore boxes that overlap in double precision also overlap here; if no two compared lanes are equal,
-/// the converse is true as well. The fourth axis has the cell, so that copies in different cells do not
-/// overlap.
+/// the converse is true as well. The fourth axis contains the number of the cell, so copies in different
+/// cells do not overlap.
 struct alignas(32) CellBox {
   std::array<float, 8> bound;  ///< low x y z, cell, minus high x y z, minus cell
 };
 
 /// Pairs in the order in which they were found.
 struct CandidatePairs {
-  std::vector<IndexPair> meeting;  ///< pairs whose boxes meet
-  /// Pairs whose boxes meet in single precision; to be tested in double precision.
+  std::vector<IndexPair> meeting;  ///< pairs whose boxes overlap
+  /// Pairs whose boxes overlap in single precision; the caller must test them in double precision.
   std::vector<IndexPair> doubtful;
   std::size_t compared = 0;  ///< number of boxes compared
 };
@@ -64,9 +64,9 @@ class CellTable {
   static constexpr int32_t kMaxSpan = 64;
 
   /// Inserts objects, ordered from the finest level to this one; the level's own objects begin at
-  /// `first_own`. Ranges are at the levels of their objects. If `other`, the table of the same level for
-  /// other objects, is given (built or not), finer objects are omitted from buckets in which neither table
-  /// has an object of this level, because they have no partner there.
+  /// `first_own`. Each range is at the level of its object. `other`, if not null, is the table of the same
+  /// level in the other grid, built or not. Finer objects are then omitted from buckets in which neither
+  /// table has an object of this level, because they have no partner there.
   void build(int32_t level, std::span<const CellRange> objects, std::size_t first_own,
              const CellTable* other);
   /// Removes all objects; keeps the memory.
@@ -83,7 +83,7 @@ class CellTable {
   void find_pairs_with(const CellTable& other, uint32_t first, uint32_t end, CandidatePairs& out) const;
 
  private:
-  /// A copy of an object for one cell that its box touches, before it is inserted. `hash` is that of the
+  /// A copy of an object for one cell that its box touches, before it is inserted. `hash` is the hash of the
   /// cell.
   struct Listed {
     uint32_t hash;

@@ -1,7 +1,7 @@
 #pragma once
-/// Grid around a mesh that stores the distance to the surface for each cell, in cells. One look-up can show
-/// that a small sphere does not touch the mesh. A search for the nearest triangle would take hundreds of
-/// times as long.
+/// A grid around a mesh. Each cell stores the distance to the mesh's surface, as a number of cells. One
+/// look-up can prove that a small sphere does not touch the mesh. A search for the nearest triangle would
+/// take hundreds of times as long.
 
 #include <array>
 #include <cstdint>
@@ -13,11 +13,12 @@ namespace offstage::sim {
 
 class ClearanceGrid {
  public:
-  /// `solid`: the mesh has an inside, which counts as not clear.
+  /// `solid`: whether the mesh has an inside. Points inside then do not count as clear.
   ClearanceGrid(const TriangleMesh& mesh, bool solid);
 
-  /// Returns true only if a sphere (mesh frame) neither touches the surface nor is inside it. The test is
-  /// conservative: it may return false for a clear sphere within three cells of the surface.
+  /// Returns true only if a sphere (mesh frame) neither touches the surface nor is inside the mesh. The test
+  /// is conservative: for a sphere within three cells of the surface the result may be false although the
+  /// sphere is clear.
   bool is_clear(const Vec3& centre, Real radius) const;
   /// Returns true only if a point is not inside. It may return false for an outside point whose cell contains
   /// the surface.

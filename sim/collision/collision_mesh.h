@@ -1,5 +1,6 @@
 #pragma once
-/// A registered mesh with the data that registration computes once, in the mesh's own frame (physics E2).
+/// A registered mesh, with data that are computed once and then shared by all bodies with this mesh (physics
+/// E2). All data are in the frame of the mesh.
 
 #include <map>
 #include <memory>
@@ -45,13 +46,13 @@ class CollisionMesh {
   /// The convex decomposition. It is computed at the first call, which may take seconds. Several threads may
   /// call this.
   const ConvexDecomposition& decomposition() const;
-  /// Tree over the boxes of the decomposition's parts, whose items are their indices.
+  /// Bounding tree of the parts of the decomposition. Its items are the indices of the parts.
   const AabbTree& part_tree() const;
-  /// Trees of other kinds over the triangles or over the parts. Computed at the first call for each kind;
-  /// safe from several threads.
+  /// Returns a bounding tree of the given kind, over the triangles or over the parts. It is computed at the
+  /// first call for each kind. Several threads may call this.
   const PieceTree& piece_tree(bool of_triangles, const TreeChoice& choice) const;
-  /// Grid of the free space around the mesh. Computed at the first call, which takes about 10 ms; safe from
-  /// several threads.
+  /// Returns the clearance grid around the mesh. It is computed at the first call, which takes about 10 ms.
+  /// Several threads may call this.
   const ClearanceGrid& clearance_grid() const;
 
  private:

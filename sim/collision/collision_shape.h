@@ -1,8 +1,8 @@
 #pragma once
 /// A body's shape for the narrow phase: convex pieces, and a bounding tree over them. A primitive is one
-/// piece. A mesh is represented by the parts of its convex decomposition, or by its triangles if it has no
-/// inside or if its decomposition is only approximate and the body does not need one (see CollisionShape's
-/// constructor). The half-space under a plane has no pieces.
+/// piece. A mesh is represented by the parts of its convex decomposition or by its triangles. Triangles are
+/// used if the mesh has no inside, or if its decomposition is only approximate and the body does not need one
+/// (see CollisionShape's constructor). The half-space under a plane has no pieces.
 
 #include <optional>
 #include <variant>
@@ -35,7 +35,8 @@ class CollisionShape {
 
   uint32_t piece_count() const { return pieces_; }
   Convex piece(uint32_t index) const;
-  /// Calls f(tree) for the tree of its pieces, whose items are their indices. Not available for a plane.
+  /// Calls f(tree) with the tree of the pieces and returns the result. The tree's items are the indices of
+  /// the pieces. Not available for a plane.
   template <class F>
   decltype(auto) with_tree(F&& f) const {
     switch (tree_.index()) {
@@ -75,7 +76,7 @@ class CollisionShape {
   bool triangles_ = false, by_triangles_ = false;
 };
 
-/// Calls f(tree of a, tree of b), each of its own kind.
+/// Calls f(tree of a, tree of b) and returns the result. The two trees may be of different kinds.
 template <class F>
 decltype(auto) with_trees(const CollisionShape& a, const CollisionShape& b, F&& f) {
   return a.with_tree(

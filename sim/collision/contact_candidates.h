@@ -14,8 +14,8 @@ namespace offstage::sim {
 
 /// Fractions of the margin within which solids count as touching. kTilt: how much the gap along the normal of
 /// a face may be smaller than the separation, and how far parallel edges may pass each other. kRim: how far a
-/// point may lie outside of a face, and how much the true deepest point of a rim may be deeper than that of
-/// its polygon.
+/// point may lie outside of a face, and how much deeper the true deepest point of a rim may be than the
+/// deepest corner of its polygon.
 inline constexpr Real kTilt = 0.05, kRim = 0.001;
 /// Accuracy of separations, as a fraction of the solids' size.
 inline constexpr Real kSeparationRounding = 1e-9;
@@ -28,8 +28,9 @@ inline constexpr Real kNearFace = 0.9;
 /// Directions count as parallel if the sine of the angle between them is less than this.
 inline constexpr Real kParallel = 1e-6;
 
-/// Sine: if the inclinations of two faces differ by less than this, the larger solid's face gives the normal,
-/// or A's for solids of equal size. This keeps the ids of points constant while the solids rock.
+/// If the sines of the inclinations of two faces differ by less than this, the face of the larger solid gives
+/// the normal; for solids of equal size, A's face. The ids of the points therefore stay constant while the
+/// solids rock.
 inline constexpr Real kAlike = 1e-3;
 /// Whether A's face, not B's, gives the contact normal. `tilt`: sine of the inclination of each face;
 /// `reach`: size of each solid.
@@ -37,7 +38,7 @@ inline bool a_gives_normal(Real tilt_a, Real tilt_b, Real reach_a, Real reach_b)
   return reach_a >= reach_b ? tilt_a <= tilt_b + kAlike : tilt_a + kAlike < tilt_b;
 }
 
-// Names of features. A body's name is 0 for A and 1 for B; tags are SupportingFeature's.
+// Ids of contact points. `body` is 0 for A and 1 for B; tags are defined by SupportingFeature.
 
 inline uint32_t mixed(uint32_t x, uint32_t y) {
   const uint64_t h = ((uint64_t{x} << 32 | y) + 0x9e3779b97f4a7c15u) * 0xbf58476d1ce4e5b9u;
@@ -58,7 +59,7 @@ inline uint32_t closest_id(uint32_t body) {
   return mixed(2, body);
 }
 
-/// A ContactPoint without default values, because many are allocated.
+/// A ContactPoint without default values, so that an array of many costs no initialization.
 struct Candidate {
   Vec3 on_a, on_b;
   Real separation;

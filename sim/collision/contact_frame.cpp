@@ -8,7 +8,7 @@ namespace {
 /// Two points closer than this have no defined direction [m].
 constexpr Real kCoincident = 1e-12;
 
-/// Rate of n = u x w / |u x w| for lines u and w that turn with the bodies, up to the sign.
+/// Time derivative of n = +-(u x w) / |u x w|, where the direction u turns with A and w with B.
 Vec3 crossing_rate(const Manifold& m, const Twist& a, const Twist& b) {
   const Vec3 &u = m.edge_a, &w = m.edge_b, cross = u.cross(w);
   const Vec3 rate =
@@ -16,9 +16,9 @@ Vec3 crossing_rate(const Manifold& m, const Twist& a, const Twist& b) {
   return cross.dot(m.normal) < 0 ? Vec3(-rate) : rate;
 }
 
-/// Rate of n = d / |d|, where d leads from a point or line of B to one of A. The nearest point of a line
-/// slides along it, which does not change d across n and the line. For the direction e of a line, n.e = 0
-/// gives n'.e = -n.e'.
+/// Time derivative of n = d / |d|, where d leads from a point or line of B to a point or line of A. The
+/// nearest point of a line slides along it, which does not change d across n and the line. For the direction
+/// e of a line, n.e = 0 gives n'.e = -n.e'.
 Vec3 pointing_rate(const Manifold& m, const ContactPoint& point, const Twist& a, const Twist& b) {
   const Vec3 &n = m.normal, p = point.on_a + m.radius_a * n, q = point.on_b - m.radius_b * n;
   const Real distance = (p - q).dot(n);

@@ -1,7 +1,7 @@
 #pragma once
 /// The frame of a contact and its rotation with the bodies (physics R11). Resting contact needs the second
-/// derivative of the gap, and with it the rates of the normal and of the tangents. All vectors are in one
-/// frame that does not turn; rotate the vectors first if a manifold is in the frame of a body.
+/// derivative of the gap, which contains the time derivatives of the normal and the tangents. All vectors are
+/// in one frame that does not turn; rotate the vectors first if a manifold is in the frame of a body.
 
 #include "sim/collision/manifold.h"
 #include "sim/core/twist.h"
@@ -9,7 +9,8 @@
 
 namespace offstage::sim {
 
-/// Right-handed orthonormal axes: normal n and two tangents t and k = n x t; or their time derivatives [1/s].
+/// Right-handed orthonormal axes: the normal n, and the tangents t and k = n x t. The type also serves for
+/// the time derivatives of these axes [1/s].
 struct ContactFrame {
   Vec3 n, t, k;
 };
@@ -19,14 +20,14 @@ struct ContactFrame {
 /// component becomes the smallest.
 ContactFrame contact_frame(const Vec3& n);
 
-/// Returns the rate of contact_frame(n) when n changes at `n_rate`, which must be perpendicular to n.
+/// Returns the time derivative of contact_frame(n). `n_rate`: time derivative of n, perpendicular to n [1/s].
 ContactFrame contact_frame_rate(const ContactFrame& frame, const Vec3& n_rate);
 
-/// Returns the rate of the manifold's normal at one of its points while A and B move, according to
-/// NormalSource. The sliding of the contact over the surfaces is included. The result is exact for faces,
-/// straight edges, vertices, spheres, cylinders and cones; for a rim, its tangent line is used. If the
-/// direction between the features is undefined because they coincide, the normal turns with the mean angular
-/// velocity of both bodies.
+/// Returns the time derivative of the manifold's normal at one of its points while A and B move [1/s]. It
+/// depends on the features that define the normal (NormalSource), and includes the sliding of the contact
+/// over the surfaces. The result is exact for faces, straight edges, vertices, spheres, cylinders and cones;
+/// for a rim, its tangent line is used. If the direction between the features is undefined because they
+/// coincide, the normal turns with the mean angular velocity of both bodies.
 Vec3 normal_rate(const Manifold& m, const ContactPoint& point, const Twist& a, const Twist& b);
 
 }  // namespace offstage::sim

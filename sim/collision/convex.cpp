@@ -31,14 +31,16 @@ Vec3 corner(const Vec3& half, uint32_t bits) {
   return {bits & 1 ? half.x() : -half.x(), bits & 2 ? half.y() : -half.y(), bits & 4 ? half.z() : -half.z()};
 }
 
-/// Support point of a disc about Y at a height; its centre if all points of the rim are equally far.
+/// Support point of a disc about the Y axis at y = `height`. If d is along Y, all points of the disc are
+/// equally far along d, and the centre is returned.
 Vec3 rim(const Vec3& d, Real radius, Real height) {
   const Real rho = std::sqrt(d.x() * d.x() + d.z() * d.z());
   if (!(rho > 0)) return {0, height, 0};
   return {radius * (d.x() / rho), height, radius * (d.z() / rho)};
 }
 
-/// Support point of a cone or frustum: its top if that is higher along d than the rim of the base.
+/// Support point of a cone or frustum: a point of the top if the top reaches farther along d than the base,
+/// otherwise a point of the base's rim.
 Vec3 cone_support(const Vec3& half, const Vec3& d) {
   if (half.z() > 0) {
     const Real rho = std::sqrt(d.x() * d.x() + d.z() * d.z());
@@ -50,7 +52,8 @@ Vec3 cone_support(const Vec3& half, const Vec3& d) {
   return rim(d, half.x(), -half.y());
 }
 
-/// Support point of an ellipsoid: the affine image of that of the unit ball.
+/// Support point of an ellipsoid. The ellipsoid is the unit ball scaled by `half` along the axes, so its
+/// support point is the scaled support point of the ball.
 Vec3 ellipsoid_support(const Vec3& half, const Vec3& d) {
   const Vec3 scaled = half.cwiseProduct(d);
   const Real length = scaled.norm();

@@ -16,37 +16,37 @@ struct Convex {
   enum class Core : uint8_t { point, segment, triangle, box, cylinder, cone, ellipsoid, polyhedron };
 
   Core core = Core::point;
-  /// Size of the core: half sizes of a box; (radius, half height, unused) of a cylinder; (radius, half
-  /// height, radius of the top) of a cone, whose top is 0 unless it is a frustum; half axes of an ellipsoid;
-  /// half height in y of a segment.
+  /// Size of the core [m]. Box: half sizes. Cylinder: (radius, half height, unused). Cone or frustum: (radius
+  /// of the base, half height, radius of the top), where a cone's top has radius 0. Ellipsoid: half axes.
+  /// Segment: half length in y.
   Vec3 half = Vec3::Zero();
   Real radius = 0;  ///< around the core [m]
   const ConvexPolyhedron* polyhedron = nullptr;
   std::array<const Vec3*, 3> corners{};  ///< corners of a triangle
 
-  /// Returns the farthest point of the core along `d`, which need not be unit. `vertex` identifies the point:
-  /// on entry the vertex at which the search of a polyhedron starts, on return the vertex that was found. For
-  /// a box it has the sign bits of the corner, for a segment the index of the end, for a triangle the index
-  /// of the corner. Other cores do not use it.
+  /// Returns the farthest point of the core along `d`, which need not be unit. `vertex`: on return the number
+  /// of the point. It consists of the sign bits of a box's corner, or is the index of a segment's end or of a
+  /// triangle's or polyhedron's vertex. On entry it is the vertex at which the search on a polyhedron starts.
+  /// Other cores do not use it.
   Vec3 support(const Vec3& d, uint32_t& vertex) const;
   /// Whether support points are vertices that can be identified by a number.
   bool has_vertices() const {
     return core != Core::cylinder && core != Core::cone && core != Core::ellipsoid;
   }
-  /// The vertex of the core with this number, as support() gives it; an invalid number is mapped to a valid
+  /// Returns the vertex of the core with a number from support(). An invalid number is mapped to some valid
   /// vertex.
   Vec3 vertex(uint32_t number) const;
   /// A point inside the core.
   Vec3 centre() const;
-  /// Distance of the farthest point, radius included, from the frame's origin [m].
+  /// Greatest distance of the solid's points from the origin of the frame, including the radius [m].
   Real reach() const;
 };
 
 /// Returns the convex solid of a primitive. MeshShape and Plane are not accepted.
 Convex convex(const Shape& primitive);
 Convex convex(const ConvexPolyhedron& polyhedron, Real radius = 0);
-/// Returns a triangle that refers to its vertices, which must outlive it. A triangle without area acts as a
-/// segment or a point.
+/// Returns a triangle as a convex solid. It refers to the three vertices, which must outlive it. A triangle
+/// without area acts as a segment or a point.
 Convex convex_triangle(const Vec3& a, const Vec3& b, const Vec3& c);
 
 /// Returns a vertex of a polyhedron that is farthest along `d`, by hill climbing along the edges from

@@ -11,8 +11,9 @@ namespace offstage::sim {
 
 class CollisionMesh;
 
-/// Joins manifolds in the list from the index `from` on. `mesh_pose`: pose of the mesh in the frame of the
-/// manifolds; `of_b`: whether the mesh is B. A joined manifold replaces the first of its manifolds.
+/// Joins the manifolds of the list from index `from` on. `mesh_pose`: pose of the mesh in the frame of the
+/// manifolds. `of_b`: whether the mesh is B. A joined manifold takes the place of the first of its parts; the
+/// others are removed.
 void join_coplanar(std::vector<Manifold>& manifolds, std::size_t from, const CollisionMesh& mesh,
                    const Pose& mesh_pose, bool of_b);
 

@@ -1,7 +1,7 @@
 #pragma once
-/// Signed distance to solids, with its gradient. A solid is a shape together with its registered mesh if it
-/// has one; points and normals are in the shape's own frame. Distances to the primitives are exact, inside
-/// and outside, and therefore convex functions of the point, which sphere_sweep.h relies on.
+/// Signed distance of points to solids, with its gradient. A solid is a shape, with its registered mesh if it
+/// is a mesh. Points and normals are in the frame of the shape. Distances to primitives are exact inside and
+/// outside. They are therefore convex functions of the point; sphere_sweep.h relies on this.
 
 #include <limits>
 
@@ -11,7 +11,7 @@
 
 namespace offstage::sim {
 
-/// Distance of a point to a surface, negative inside, with its unit gradient at the point.
+/// Distance of a point to a surface [m], negative inside, and the unit gradient of the distance at the point.
 struct SurfaceDistance {
   Real distance = std::numeric_limits<Real>::infinity();
   Vec3 normal = Vec3::UnitY();
@@ -30,22 +30,23 @@ SurfaceDistance signed_distance(const Cone& c, const Vec3& p);
 SurfaceDistance signed_distance(const Frustum& c, const Vec3& p);
 SurfaceDistance signed_distance(const Ellipsoid& e, const Vec3& p);
 SurfaceDistance signed_distance(const Plane&, const Vec3& p);
-/// Signed distance to a mesh. It is positive on both sides of a mesh that is not solid; for a solid mesh, the
-/// pseudonormal of the nearest feature determines whether the point is inside.
+/// Returns the signed distance to a mesh. For a mesh that is not solid it is positive on both sides. For a
+/// solid mesh, the pseudonormal of the nearest feature determines whether the point is inside.
 SurfaceDistance signed_distance(const CollisionMesh& m, const Vec3& p);
 SurfaceDistance signed_distance(const Solid& s, const Vec3& p);
 /// Returns the signed distance if it is less than `limit` [m], >= 0; otherwise some value that is at least
 /// `limit`. Much faster than signed_distance() at points away from a mesh.
 SurfaceDistance signed_distance_below(const Solid& s, const Vec3& p, Real limit);
 
-/// Support function: the largest n.x over the points x of a solid; infinite for a plane unless n is +Y.
+/// Returns the support function: the largest n.x of all points x of a solid [m]. For a plane it is infinite
+/// unless n is +Y.
 Real support(const Solid& s, const Vec3& n);
 
-/// Tight box of a solid in its own frame; infinite for a plane.
+/// Returns the smallest box around a solid, in the solid's frame. The box of a plane is infinite.
 Aabb local_bounds(const Solid& s);
-/// Tight box of a placed solid in the world.
+/// Returns the smallest box around a solid at a pose, in world coordinates.
 Aabb bounds(const Solid& s, const Pose& pose);
-/// Distance of the solid's farthest point from the origin of its frame [m].
+/// Returns the greatest distance of the solid's points from the origin of its frame [m].
 Real reach(const Solid& s);
 
 }  // namespace offstage::sim

@@ -1,14 +1,16 @@
 #pragma once
 /// Penetration depth by the expanding polytope algorithm: van den Bergen, "Proximity queries and penetration
-/// depth computation on 3D game objects" (2001). A polytope inside A - B grows by support points beyond its
-/// face nearest to the origin, until that face is a face of A - B. Distances of faces are signed, so touching
-/// is not a special case: an origin slightly outside gets a small positive distance along the same normal.
+/// depth computation on 3D game objects" (2001). The algorithm starts with a polytope inside A - B. It
+/// repeatedly adds the support point beyond the face that is nearest to the origin, until that face is a face
+/// of A - B. Distances of faces are signed, so touching is not a special case: an origin slightly outside
+/// gets a small positive distance along the same normal.
 
 #include "sim/collision/simplex.h"
 
 namespace offstage::sim {
 
-/// The surface point of A - B nearest to an origin that is inside, or slightly outside.
+/// The point of the surface of A - B that is nearest to the origin. The origin is inside A - B, or slightly
+/// outside.
 struct DeepestPoint {
   Vec3 normal;  ///< unit, into A - B
   /// Signed distance of the origin, negative inside: normal.w = distance for the plane through the point.

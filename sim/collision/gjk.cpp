@@ -10,19 +10,23 @@ namespace {
 constexpr int kMaxGjkIterations = 100;
 // Accepted gap between the bounds of the distance, in units of the rounding of a point.
 constexpr Real kTolerance = 4;
-// In units of the rounding of a point; the direction between nearer cores is undefined.
+// Cores that are closer than this have no defined direction between them; in units of the rounding of a
+// point.
 constexpr Real kTouchingRoundings = 64;
-// Fraction of the size: if GJK stalls at a smaller distance, the expanding polytope decides.
+// If GJK makes no progress at a distance below this fraction of the size, the expanding polytope algorithm
+// computes the result.
 constexpr Real kNear = 1e-9;
 constexpr Real kGjkLevel = 1 + 1e-14;  // ratio of squares that differ by rounding
 constexpr Real kAccepted = 1e-12;      // fraction of the size: with a smaller gap a stalled query is accepted
 
-/// Start direction: the last normal, or from the centre of B to that of A.
+/// Returns the start direction: the normal of the last query, or else the direction from B's centre to A's
+/// centre.
 Vec3 start_direction(const MinkowskiDifference& m, const GjkCache& cache) {
   return cache.direction.squaredNorm() > 0 ? cache.direction : m.centre();
 }
 
-/// Start simplex: that of the last query, or the support point along its normal.
+/// Returns the start simplex: the simplex of the last query or, if there is none or the cores have no
+/// vertices, the support point along the start direction.
 Simplex first_simplex(const MinkowskiDifference& m, const GjkCache& cache) {
   Simplex s;
   if (m.has_vertices() && cache.size > 0) {
@@ -41,7 +45,7 @@ void store(const Simplex& s, const Vec3& direction, GjkCache& cache) {
   cache.direction = direction;
 }
 
-/// Separation of the solids from the closest points of their cores.
+/// Converts the separation of the cores to the separation of the solids with their radii.
 Separation around_cores(const MinkowskiDifference& m, Real distance, const Vec3& normal, const Vec3& on_a) {
   Separation s;
   s.distance = distance - m.radius();

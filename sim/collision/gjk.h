@@ -1,9 +1,9 @@
 #pragma once
-/// Distance between convex solids by the algorithm of Gilbert, Johnson and Keerthi (1988), physics R4: the
-/// point of the Minkowski difference A - B that is nearest to the origin, found by simplices. The
-/// sub-algorithm is that of Montanari, Petrinic, Barbieri, "Improving the GJK algorithm for faster and more
-/// reliable distance queries between convex objects" (2017). Support points of polyhedra are found by
-/// climbing from the last vertex, and a query starts from the simplex of the last query.
+/// Distance between convex solids by the algorithm of Gilbert, Johnson and Keerthi (1988), physics R4. It
+/// finds the point of the Minkowski difference A - B that is nearest to the origin with a sequence of
+/// simplices. The distance sub-algorithm is by Montanari, Petrinic, Barbieri, "Improving the GJK algorithm
+/// for faster and more reliable distance queries between convex objects" (2017). Support points of polyhedra
+/// are found by climbing from the last vertex, and a query starts from the simplex of the last query.
 
 #include <array>
 #include <cstdint>
@@ -22,13 +22,14 @@ struct GjkCache {
   Vec3 direction = Vec3::Zero();     ///< last normal, in A's frame; zero before the first query
 };
 
-/// Signed distance of A and B. Exact to rounding between cores with vertices, at any position. With a
-/// cylinder or a cone accurate to 1e-12 of the size when apart and to 1e-10 in penetration (about 0.5 % of
-/// those are slightly worse, which `converged` reports). Cores that overlap or touch are passed to
-/// deepest_point(), which returns the normal of a face of A - B, so the normal is robust near touching.
+/// Signed distance of A and B. For cores with vertices the result is exact up to rounding. If a core is
+/// round, such as a cylinder or a cone, the error is at most 1e-12 of the size for separate solids. In
+/// penetration it is at most 1e-10; about 0.5 % of these cases are slightly worse, and `converged` is then
+/// false. Cores that overlap or touch are passed to deepest_point(). It returns the normal of a face of A -
+/// B, so the normal is reliable even if the solids barely touch.
 Separation gjk(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache& cache);
 
-/// Returns depth and direction of the smallest translation that separates two solids. The solids must
+/// Returns the depth and the direction of the smallest translation that separates two solids, which must
 /// overlap.
 Separation penetration(const Convex& a, const Convex& b, const Pose& a_from_b);
 

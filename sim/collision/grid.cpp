@@ -9,7 +9,7 @@
 namespace offstage::sim {
 namespace {
 
-// Cell coordinates are below this; far from the origin cells are larger.
+// Cell coordinates are smaller than this. Therefore objects far from the origin get larger cells.
 constexpr Real kMaxCoordinate = 0x1p29;
 // Greatest number of cells of an object; in the multi-level grid no object comes near it.
 constexpr Real kMaxCells = CellTable::kMaxSpan;
@@ -73,7 +73,7 @@ void Grid::assign(const CellSizes& sizes, std::span<const uint32_t> objects, std
   });
 }
 
-/// Builds the table of a level, with its own objects and all finer ones.
+/// Builds the table of a level, which contains the objects of this level and of all finer levels.
 void Grid::build(std::size_t level, const CellTable* other) {
   tables_[level].build(static_cast<int32_t>(level), std::span(ranges_).first(begin_[level + 1]),
                        begin_[level], other);

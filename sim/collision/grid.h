@@ -4,12 +4,12 @@
 ///
 /// An object of the multi-level grid with diameter d belongs to the level whose cells have a width L with
 /// kMinInCell <= d/L < 2 kMinInCell. L is a power of two metres, where the book uses a power of two times
-/// d_min/k_min. Therefore neither the level of an object nor the cells of a level depend on the smallest
-/// object, levels exist only while they have objects, and coarser cells follow from finer ones by a bit
-/// shift. Objects are inserted at their own and every coarser level, as in the book; moving objects only
-/// where they can find a partner. (Inserting each object only at its own level and looking up coarser cells
-/// took a tenth longer if all objects move, and twice as long if many are at rest, because contiguous data
-/// are compared fastest.) The uniform grid has a single level whose width is given.
+/// d_min/k_min. Therefore the level of an object and the cells of a level do not depend on the smallest
+/// object. Levels exist only while they have objects, and a coarser cell follows from a finer one by a bit
+/// shift. As in the book, objects are inserted at their own level and at every coarser level. Moving objects
+/// are inserted only where they can find a partner. (Inserting each object only at its own level and looking
+/// up coarser cells took a tenth longer if all objects move, and twice as long if many are at rest, because
+/// contiguous data are compared fastest.) The uniform grid has a single level whose width is given.
 
 #include <array>
 #include <cstdint>
@@ -27,15 +27,15 @@ enum class GridKind {
 
 /// Cell widths, and the level of a box. A box's diameter is its longest side.
 struct CellSizes {
-  /// Width of a cell of the uniform grid in mean diameters (the book's k).
+  /// Width of a cell of the uniform grid, as a multiple of the mean diameter (the book's k).
   static constexpr Real kMeansInCell = 2;
   /// Smallest diameter of a level's own objects, in cells of the multi-level grid (the book's k_min). Cells
   /// of two to four diameters were the fastest.
   static constexpr Real kMinInCell = 0.25;
-  /// Levels count from 0 to kLevels - 1, starting at the width 2^kFinest m, which suits objects of a
-  /// micrometre.
+  /// Levels have the numbers 0 to kLevels - 1. The cells of level 0 are 2^kFinest m wide, which is fine
+  /// enough for objects of a micrometre.
   static constexpr int32_t kFinest = -18, kLevels = 64;
-  /// Greatest distance of cells from the origin [m].
+  /// Objects that reach farther than this from the origin are not inserted in cells [m].
   static constexpr Real kMaxReach = 0x1p40;
   /// Used instead of a level for objects that are too large or too far away for cells.
   static constexpr int32_t kNone = -1;
@@ -61,11 +61,11 @@ class Grid {
   /// The objects that are too large, or too far away, for the cells.
   std::span<const uint32_t> large() const { return large_; }
 
-  /// For a grid at rest: builds the complete tables that are needed for pairs with the objects of `moving`
-  /// and do not exist yet. Returns the number of copies of objects in cells.
+  /// For the grid of objects at rest: builds the complete tables that are needed for pairs with the objects
+  /// of `moving`, unless they exist already. Returns the number of copies of objects in cells.
   std::size_t enter_to_stay(const Grid& moving);
-  /// For a moving grid: builds all tables, for pairs among its objects and with those of `resting`. Returns
-  /// the number of copies of objects in cells.
+  /// For the grid of moving objects: builds all tables that are needed for pairs among its own objects and
+  /// for pairs with the objects of `resting`. Returns the number of copies of objects in cells.
   std::size_t enter_to_pair(const Grid& resting);
 
   /// Tables by level. Tables that cannot contain a pair are not built.

@@ -16,7 +16,8 @@ GroupTree::GroupTree(std::span<const uint32_t> members)
   place(1, members, 0);
 }
 
-/// Places the members in their order into the leaves from left to right; returns the first that remains.
+/// Places the members, in their order, into the leaves below `node` from left to right. Returns the index of
+/// the first member that is not placed yet.
 std::size_t GroupTree::place(std::size_t node, std::span<const uint32_t> members, std::size_t next) {
   if (is_leaf(node)) {
     members_[node - members.size()] = members[next];
@@ -45,7 +46,7 @@ void GroupTree::find_pairs(const GroupTree& other, std::vector<IndexPair>& pairs
   find_between(1, other, 1, pairs);
 }
 
-/// The larger of the two nodes is opened first.
+/// Appends the pairs between two subtrees. The larger of the two nodes is replaced by its children first.
 void GroupTree::find_between(std::size_t node, const GroupTree& other, std::size_t other_node,
                              std::vector<IndexPair>& pairs) const {
   const Aabb &box = boxes_[node], &other_box = other.boxes_[other_node];

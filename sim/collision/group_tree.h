@@ -1,7 +1,8 @@
 #pragma once
 /// Bounding tree of a group of objects, such as the links of an articulation (physics A2). It is a balanced
-/// hierarchy whose leaves are the boxes of the objects, ordered so that neighbours are adjacent and branches
-/// are connected parts of the group. It is refitted as the objects move, and never rebuilt.
+/// tree whose leaves are the boxes of the objects. The order of the leaves is given by the caller, so that
+/// each branch can be a connected part of the group. The tree is refitted when the objects move, and never
+/// rebuilt.
 
 #include <span>
 #include <vector>
@@ -21,7 +22,8 @@ class GroupTree {
   void refit(std::span<const Aabb> boxes);
   const Aabb& bounds() const { return boxes_[1]; }
 
-  // These functions append the pairs whose boxes have a common point, the lesser object first.
+  // The next functions append the pairs of objects whose boxes have a common point. The lesser index comes
+  // first in each pair.
   void find_own_pairs(std::vector<IndexPair>& pairs) const;
   void find_pairs(uint32_t object, const Aabb& box, std::vector<IndexPair>& pairs) const;
   void find_pairs(const GroupTree& other, std::vector<IndexPair>& pairs) const;

@@ -30,7 +30,7 @@ void GroupedBroadPhase::remove(uint32_t object) {
   group_of_[object] = kAbsent;
 }
 
-/// Its members are single objects from now on.
+/// Dissolves a group. Its members are single objects from now on.
 void GroupedBroadPhase::dissolve(uint32_t number) {
   groups_[number].is_whole = false;
   const std::span<const uint32_t> members = groups_[number].tree.members();

@@ -18,14 +18,14 @@ class GroupedBroadPhase {
                              Real means_in_cell = CellSizes::kMeansInCell)
       : grid_(kind, means_in_cell) {}
 
-  /// insert(), move() and remove() have the same effect as the functions of BroadPhase.
+  /// insert(), move() and remove() have the same meaning as the functions of BroadPhase.
   void insert(uint32_t object, const Aabb& box, bool is_static = false);
   void move(uint32_t object, const Aabb& box);
   void remove(uint32_t object);
   bool contains(uint32_t object) const { return object < group_of_.size() && group_of_[object] != kAbsent; }
 
-  /// Sets the groups. Their objects must be in the broad phase, must not be static, and are each in one group
-  /// at most.
+  /// Sets the groups. Every object of a group must be in the broad phase and must not be static. An object
+  /// can be in one group only.
   void set_groups(std::span<const std::vector<uint32_t>> groups);
 
   /// Returns the same pairs as BroadPhase::pairs() does.

@@ -22,7 +22,7 @@ struct Body {
   uint32_t name;  ///< 0 for A, 1 for B
 
   Vec3 local(const Vec3& d) const { return rotation.transpose() * d; }
-  /// Farthest point of the surface.
+  /// Returns the point of the surface that is farthest along d.
   Vec3 support(const Vec3& d, uint32_t vertex) const {
     return rotation * convex.support(local(d), vertex) + translation + convex.radius * d;
   }
@@ -41,8 +41,8 @@ struct Body {
 
 // Clipping
 
-/// A corner of the part of the incident feature over the reference face, and the side that leaves it: a side
-/// of the incident feature, or of the reference face if kMaxCorners is added.
+/// A corner of the clipped incident feature, and the side that begins at this corner. The side is a side of
+/// the incident feature or, with kMaxCorners added to its number, a side of the reference face.
 struct Corner {
   Vec3 point;
   uint32_t id;
@@ -72,11 +72,12 @@ class Clipping {
       part_.add({incident.corners[k].point, vertex_id(incident_body.name, incident.corners[k].tag), k});
   }
 
-  /// Cuts at all sides; points may be outside of them by `slop`.
+  /// Cuts at all sides of the reference face. Points that are outside of a side by at most `slop` [m] are
+  /// kept.
   void cut_all(Real slop) {
     for (uint32_t k = 0; k < reference_.count && part_.count > 0; ++k) cut(k, slop);
   }
-  /// Cuts at the k-th side.
+  /// Cuts at side k of the reference face.
   void cut(uint32_t k, Real slop) {
     const Vec3& corner = reference_.corners[k].point;
     const Vec3& next = reference_.corners[(k + 1) % reference_.count].point;
@@ -112,7 +113,8 @@ class Clipping {
     return edge_id(tag_of(f, k), tag_of(f, k + 1));
   }
 
-  /// Id of a crossing. Two neighbouring sides of the reference face meet in its vertex.
+  /// Id of a crossing. If both sides are neighbouring sides of the reference face, the crossing is a vertex
+  /// of this face.
   uint32_t id_of_crossing(uint32_t side, uint32_t reference_side) const {
     const uint32_t cut = side_id(reference_, reference_side);
     if (side < kMaxCorners) return crossing_id(incident_body_.name, side_id(incident_, side), cut);
@@ -133,8 +135,8 @@ class Clipping {
 
 // Kinds of contact
 
-/// Sine of the angle between the normal of a face of `reference` and that of the separation; more than
-/// kMaxTilt if the face cannot give the normal.
+/// Returns the sine of the angle between a face of `reference` and the plane perpendicular to the normal of
+/// the separation. Returns 2, more than kMaxTilt, if the face cannot give the contact normal.
 Real tilt(const Body& reference, const SupportingFeature& f, const Body& incident, uint32_t incident_vertex,
           const Separation& s, Real tolerance) {
   constexpr Real kNever = 2;
@@ -146,14 +148,15 @@ Real tilt(const Body& reference, const SupportingFeature& f, const Body& inciden
   return s.distance - gap <= tolerance ? sine : kNever;
 }
 
-/// Whether the surface turns through its contact when the solid rolls.
+/// Whether the solid can roll, so that the material of its surface moves through the contact point.
 bool is_round(const Convex& c) {
   using Core = Convex::Core;
   return c.core == Core::point || c.core == Core::segment || c.core == Core::cylinder ||
          c.core == Core::cone || c.core == Core::ellipsoid;
 }
 
-/// Whether a point is above or below a face; it may be outside of the sides by `slop`.
+/// Whether a point is directly above or below a face. It may be outside of the face's sides by at most `slop`
+/// [m].
 bool is_over(const SupportingFeature& face, const Vec3& point, Real slop) {
   for (uint32_t k = 0; k < face.count; ++k) {
     const Vec3& corner = face.corners[k].point;
@@ -202,8 +205,8 @@ bool is_near(const Body& body, const SupportingFeature& f) {
   return f.is_face() && f.normal.dot(body.outward) > kNearFace;
 }
 
-/// Adds the ends of the segment along which two edges run side by side, if they are parallel and are the
-/// closest features.
+/// If two parallel edges are the closest features, adds the ends of the segment along which they run side by
+/// side.
 void parallel_edges(Manifold& m, const Body& a, const SupportingFeature& of_a, const Body& b,
                     const SupportingFeature& of_b, Real distance, Real margin, Real tolerance) {
   if (of_a.count < 2 || of_b.count < 2) return;

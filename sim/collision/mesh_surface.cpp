@@ -9,9 +9,9 @@
 namespace offstage::sim {
 namespace {
 
-/// Fraction of the square of its longest edge: a triangle of less area has no reliable normal.
+/// A triangle with a smaller area than this fraction of its longest edge squared has no reliable normal.
 constexpr Real kSliver = 1e-5;
-/// Greatest number of slivers in a row that are skipped.
+/// Greatest number of consecutive slivers that are skipped.
 constexpr int kMostSlivers = 16;
 /// Sine: normals that are outside of a region by less than this are allowed, because normals are not more
 /// accurate.
@@ -37,8 +37,8 @@ std::size_t longest_edge(const TriangleMesh& mesh, const Triangle& t) {
   return longest;
 }
 
-/// Direction from an edge into its triangle, or into one that has the edge on its side: unit and
-/// perpendicular to the edge; zero if the triangle has no area.
+/// Returns the unit vector that is perpendicular to an edge and points into a triangle at this edge. It is
+/// zero if the triangle has no area.
 Vec3 inward(const TriangleMesh& mesh, uint32_t face, const Vec3& from, const Vec3& to) {
   const Vec3 along = (to - from).normalized();
   Vec3 best = Vec3::Zero();

@@ -1,8 +1,8 @@
 #pragma once
 /// Contact normals that the surface of a triangle mesh allows. A contact at an edge or a vertex pushes only
-/// along the directions of that feature's Voronoi region: those in which no other triangle around it is
-/// nearer. An edge between coplanar triangles allows only their normal, and a concave edge allows none, so
-/// neither stops objects that slide over it.
+/// in directions inside the Voronoi region of this feature. In these directions no other feature of the
+/// surface is nearer. An edge between coplanar triangles allows only their normal, and a concave edge allows
+/// none, so neither stops objects that slide over it.
 
 #include <array>
 #include <cstdint>
@@ -12,12 +12,12 @@
 
 namespace offstage::sim {
 
-/// Surroundings of each triangle of a mesh; computed once.
+/// The neighbours of each triangle of a mesh. Computed once for each mesh.
 class MeshSurface {
  public:
   MeshSurface(const TriangleMesh& mesh, const MeshTopology& topology);
 
-  /// The triangles across the edges (0,1), (1,2), (2,0) of a face, skipping slivers; kNoFace at a border.
+  /// The neighbours of a face across its edges (0,1), (1,2), (2,0). Slivers are skipped. kNoFace at a border.
   const std::array<uint32_t, 3>& across(uint32_t face) const { return faces_[face].across; }
   /// Whether a vertex of the face is at a border of the mesh, beyond which the surface is unknown.
   bool is_at_border(uint32_t face) const { return faces_[face].at_border; }

@@ -1,7 +1,7 @@
 #pragma once
-/// The Minkowski difference A - B = {a - b} of two cores in A's frame, by its support mapping. It contains
-/// the origin if the cores overlap; otherwise its point nearest to the origin is the vector between their
-/// closest points.
+/// The Minkowski difference A - B = {a - b} of two cores in A's frame, represented by its support mapping. It
+/// contains the origin if the cores overlap. Otherwise its point nearest to the origin is the vector between
+/// the closest points of the cores.
 
 #include <limits>
 

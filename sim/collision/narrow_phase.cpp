@@ -16,9 +16,9 @@
 namespace offstage::sim {
 namespace {
 
-/// Triangles that are nearer have no reliable direction between their closest points [m].
+/// Below this distance of two triangles, the direction between their closest points is not reliable [m].
 constexpr Real kLeastTriangleDistance = 1e-9;
-/// Up to this number of entries of a PairCache, all are compared.
+/// A PairCache with at most this number of entries is searched linearly.
 constexpr std::size_t kFewEntries = 8;
 constexpr uint32_t kNoEntry = ~0u;
 
@@ -48,14 +48,15 @@ bool are_triangles(const CollisionShape& a, const CollisionShape& b) {
   return a.is_by_triangles() && b.is_by_triangles();
 }
 
-/// The triangle `t`, in the frame of its mesh, placed by a pose.
+/// Returns the vertices of the triangle `t` transformed by a pose.
 TriangleVertices placed_vertices(const Convex& t, const Pose& pose) {
   TriangleVertices v = vertices_of(t);
   for (Vec3& p : v) p = pose.point_to_world(p);
   return v;
 }
 
-/// Two triangles by their closest points (2.4, appendix A). If they intersect, GJK gives the depth.
+/// Returns the separation of two triangles from their closest points (2.4, appendix A). If they intersect,
+/// GJK computes the depth.
 Separation measure_triangles(const Convex& a, const Convex& b, const Pose& a_from_b,
                              PairCache::Entry& entry) {
   const ClosestPoints closest = closest_on_triangles(vertices_of(a), placed_vertices(b, a_from_b));
@@ -86,8 +87,9 @@ Separation plane_separation(const Convex& a, const Pose& a_from_plane) {
   return s;
 }
 
-/// Side of a triangle on which a piece is that may penetrate it: the previous side, or that of a
-/// neighbouring triangle, or else the side of the piece's centre, given by its height over the front.
+/// Returns the side of a triangle on which a piece is, even if the piece penetrates the triangle. It is the
+/// previous side if this is known, or else the side known for a neighbouring triangle, or else the side on
+/// which the piece's centre is.
 template <class SideOfFace>
 int side_of_penetrating(const SurfaceTriangle& t, Real height, int before, SideOfFace&& side_of_face) {
   if (before != 0) return before;
@@ -186,7 +188,8 @@ class PiecePair {
     return e ? e->side_of_b : 0;
   }
 
-  /// `centre` (of the sphere) and `mesh_pose` are in A's frame.
+  /// Appends the manifold of a sphere and a triangle. `centre` of the sphere and `mesh_pose` are in A's
+  /// frame.
   void find_sphere(SurfaceTriangle triangle, const Convex& sphere, const Vec3& centre, const Pose& mesh_pose,
                    bool of_b, Real margin, std::vector<Manifold>& found) {
     if (triangle.mesh->surface.is_sliver(triangle.face)) return;
@@ -237,8 +240,9 @@ class PiecePair {
   Convex a_, b_;
 };
 
-/// Depth of a shape inside a hollow one whose pieces it does not touch, in the hollow one's frame. The shape
-/// is pushed out along the direction from its centre to the surface. None if it is outside.
+/// Depth of a shape that is inside a hollow shape without touching its pieces, in the frame of the hollow
+/// shape. The inner shape is pushed out in the direction from its centre to the nearest point of the surface.
+/// There is no result if it is outside.
 struct Inside {
   Real depth;
   Vec3 outward, deepest;  // hollow's frame
@@ -279,7 +283,7 @@ std::optional<Separation> containment(const CollisionShape& a, const CollisionSh
 
 }  // namespace
 
-/// The slot of a pair of pieces: the one that holds it, or the free one where it belongs.
+/// Returns the slot that contains a pair of pieces, or else the free slot in which it must be stored.
 std::size_t PairCache::slot_of(uint32_t piece_a, uint32_t piece_b) const {
   const std::size_t mask = slots_.size() - 1;
   // Fibonacci hashing: the high bits of the product depend on all bits of both numbers.

@@ -1,9 +1,9 @@
 #pragma once
 /// Narrow phase: distance, contacts and time of impact of two shapes of any kind at given poses (physics
-/// R3-R5, R12). Pairs of their convex pieces are found by traversing both trees, and each pair is measured by
-/// GJK, V-Clip or, for distances of two shapes by_triangles, the closest points of two triangles.
-/// Everything is reported in the frame of the first shape, A, with normals from B to A. Only the second shape
-/// can be a plane.
+/// R3-R5, R12). Pairs of convex pieces are found by traversing both trees. Each pair is measured by GJK or
+/// V-Clip. The distance of two shapes with Options::by_triangles is measured by the closest points of two
+/// triangles. All results are in the frame of the first shape, A, and normals point from B to A. Only the
+/// second shape can be a plane.
 
 #include <cstdint>
 #include <limits>
@@ -19,7 +19,8 @@
 
 namespace offstage::sim {
 
-/// Algorithm for the distance of two polyhedra. Both give the same results. Round pieces always use GJK.
+/// Algorithm for the distance of two polyhedra. Both algorithms give the same results. Round pieces always
+/// use GJK.
 enum class DistanceMethod : uint8_t { gjk, vclip };
 
 /// Data of a pair of shapes kept between queries. It makes the next query faster and does not change results
@@ -30,16 +31,17 @@ class PairCache {
     uint32_t piece_a, piece_b;
     GjkCache gjk;
     VclipCache vclip;
-    /// For pieces that are triangles: the side on which the other piece is (SurfaceTriangle::side); 0 if
-    /// unknown. A piece that penetrates a triangle keeps the side from which it came.
+    /// For a piece that is a triangle: the side of the triangle on which the other piece is
+    /// (SurfaceTriangle::side); 0 if unknown. While the other piece penetrates the triangle, the side does
+    /// not change.
     int8_t side_of_a = 0, side_of_b = 0;
   };
-  /// Returns the entry of a pair of pieces, which is created if necessary. The reference is valid until the
-  /// next call of this function.
+  /// Returns the entry of a pair of pieces. The entry is created if it does not exist. The reference is valid
+  /// until the next call of this function.
   Entry& of(uint32_t piece_a, uint32_t piece_b);
-  /// The entry of a pair of pieces if it exists, else null.
+  /// Returns the entry of a pair of pieces; null if there is none.
   const Entry* find(uint32_t piece_a, uint32_t piece_b) const;
-  /// Removes the entries that were not used since the last call.
+  /// Removes the entries that of() has not returned since the last call of this function.
   void forget_unused();
 
   /// Number of tests in all queries with this cache.
@@ -57,18 +59,18 @@ class PairCache {
   void rebuild_slots();
 
   std::vector<Used> entries_;  // in the order of their first use
-  /// Hash table with linear probing: entries by their pieces, or kNoEntry. At most half of it is in use.
-  /// Empty while there are so few entries that all are compared.
+  /// Hash table with linear probing: indices of entries by their pieces, or kNoEntry. At most half of the
+  /// table is in use. The table is empty while there are few entries, because a linear search is then faster.
   std::vector<uint32_t> slots_;
 };
 
-/// Returns the separation of the two closest (or most deeply penetrating) pieces; empty if all are farther
-/// apart than `limit` [m]. A piece inside a hollow shape also counts as penetrating.
+/// Returns the separation of the two closest (or most deeply penetrating) pieces; empty if all pairs of
+/// pieces are farther apart than `limit` [m]. A piece inside a hollow shape also counts as penetrating.
 std::optional<Separation> separation(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b,
                                      PairCache& cache, DistanceMethod method = DistanceMethod::gjk,
                                      Real limit = std::numeric_limits<Real>::infinity());
 
-/// Signed distance of two pieces without a cache.
+/// Returns the separation of piece i of A and piece j of B, without a cache.
 Separation piece_separation(const CollisionShape& a, uint32_t i, const CollisionShape& b, uint32_t j,
                             const Pose& a_from_b);
 
@@ -77,7 +79,7 @@ bool touching(const CollisionShape& a, const CollisionShape& b, const Pose& a_fr
 bool touching(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b);
 
 /// Appends the manifolds of all pairs of pieces within `margin` [m] of each other, in an order that depends
-/// only on the shapes. For every method, two boxes use the separating axis test, and spheres use closed
+/// only on the shapes. Whatever the method is, two boxes use the separating axis test, and spheres use closed
 /// forms. If the shapes turn relative to each other (`turning`), points that may touch next are added as
 /// further manifolds (`more` of manifold()). The manifolds of a piece with coplanar triangles are joined.
 void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose& a_from_b, Real margin,
@@ -88,7 +90,8 @@ void find_manifolds(const CollisionShape& a, const CollisionShape& b, const Pose
 struct MovingShape {
   const CollisionShape& shape;
   const PosePath& path;
-  TestCounts* counts = nullptr;  ///< tests are added to these counts, if they are given for the first shape
+  TestCounts* counts =
+      nullptr;  ///< if not null in the first shape, the tests of the query are added to these counts
 };
 
 /// Returns the time, as a fraction of the step, at which the shapes are within `tolerance` [m], > 0, of each
@@ -99,8 +102,8 @@ struct MovingShape {
 /// polygonal models" (2009).
 std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance);
 
-/// Returns the same time, found by bisection of the step as in the book: if shapes overlap at the end, there
-/// was an impact before. Impacts of shapes that are separate again at the end are missed.
+/// Returns the same time as time_of_impact(), found by bisection of the step as in the book. An impact is
+/// detected only if the shapes overlap at the end of the step.
 std::optional<Impact> bisected_time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance);
 
 /// Returns the time of the next impact, as a fraction of the step, of shapes that are within the tolerance at

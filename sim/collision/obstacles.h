@@ -1,7 +1,6 @@
 #pragma once
-/// The bodies with which particles can collide, with their motion during one sub-step, stored for fast
-/// rejection tests. The motion is fixed: impulses of particles change it only from the next sub-step on
-/// (physics P8).
+/// The bodies with which particles can collide, and their motion during one sub-step. The motion is not
+/// changed within the sub-step: impulses of particles change it from the next sub-step on (physics P8).
 
 #include <algorithm>
 #include <span>
@@ -32,9 +31,9 @@ struct Obstacle {
   /// unit of impulse there, world axes [1/kg].
   Mat3 mobility(const Vec3& arm) const;
   bool is_dynamic() const { return inverse_mass > 0; }
-  /// Number of straight pieces into which a particle's path is divided. In the frame of a turning solid a
-  /// straight path is curved; the pieces deviate from it by at most kChordError of the particle's radius. The
-  /// number is bounded.
+  /// Number of straight pieces into which a particle's path is divided in the solid's frame. There a straight
+  /// path is curved if the solid turns. The pieces deviate from the curve by at most kChordError of the
+  /// particle's radius, unless the upper limit of the number is reached.
   int pieces(Real particle_radius) const;
   /// Box in the world around all positions of the solid during the sub-step.
   Aabb swept_bounds() const;
@@ -46,7 +45,7 @@ struct Obstacle {
   /// Mean velocity and angular velocity over the sub-step, world axes [m/s], [rad/s].
   Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
   Real turn = 0;  ///< angle turned [rad]
-  /// Distance of the farthest point of the solid from its origin [m].
+  /// Greatest distance of the solid's points from the origin of its frame [m].
   Real extent;
   Real restitution, friction;
   Real cross_friction = 1;  ///< friction across the friction axis, divided by friction along it
@@ -69,7 +68,7 @@ struct Reaction {
   Vec3 angular_impulse;  ///< angular impulse about the centre of mass [N m s]
 };
 
-/// A set of obstacles: planes in a list, the others in a tree of swept boxes.
+/// A set of obstacles. Planes are in a list; all other obstacles are in a tree of swept boxes.
 class Obstacles {
  public:
   Obstacles() = default;
@@ -77,8 +76,8 @@ class Obstacles {
 
   std::span<const Obstacle> all() const { return obstacles_; }
 
-  /// Calls visit(obstacle) for the obstacles that a sphere may touch on its path from a to b (world) at any
-  /// time of the sub-step.
+  /// Calls visit(obstacle) for each obstacle that a sphere may touch on its path from a to b (world) within
+  /// the sub-step. The test is conservative.
   template <class Visit>
   void near_path(const Vec3& a, const Vec3& b, Real radius, Visit&& visit) const {
     for (const PlanePath& plane : planes_)
@@ -100,7 +99,7 @@ class Obstacles {
     Real start_offset, end_offset;
     uint32_t obstacle;
 
-    /// Smallest height of the two points above the two planes.
+    /// Returns the smallest of the heights of both points above the plane at the start and at the end.
     Real height(const Vec3& a, const Vec3& b) const {
       return std::min(std::min(start_normal.dot(a), start_normal.dot(b)) - start_offset,
                       std::min(end_normal.dot(a), end_normal.dot(b)) - end_offset);

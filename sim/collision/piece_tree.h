@@ -17,10 +17,10 @@ struct TreeChoice {
   friend auto operator<=>(const TreeChoice&, const TreeChoice&) = default;
 };
 
-/// A tree of one of the kinds, in the order of TreeVolume.
+/// A bounding tree of any kind; the alternatives are in the order of TreeVolume.
 using PieceTree = std::variant<AabbTree, ObbTree, SphereTree>;
 
-/// A tree of the chosen kind, from the same arguments as BoundingTree.
+/// Returns a tree of the chosen kind. `items`: see the constructors of BoundingTree.
 template <class Items>
 PieceTree make_tree(const Items& items, const TreeChoice& choice) {
   switch (choice.volume) {

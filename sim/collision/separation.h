@@ -1,5 +1,5 @@
 #pragma once
-/// Result of a distance query of two convex solids, for all algorithms.
+/// Result of a distance query for two convex solids; all algorithms use this type.
 
 #include "sim/core/types.h"
 

@@ -5,7 +5,7 @@
 namespace offstage::sim {
 namespace {
 
-// Fraction of the distance of the corners: an origin beyond an edge by less than this counts as on it.
+// An origin that is beyond an edge by less than this fraction of the corners' distance counts as on the edge.
 constexpr Real kOnEdge = 1e-15;
 constexpr Real kFlatAngle2 = 1e-24;  // squared sine of the angle below which a triangle has no normal
 constexpr Real kRounding = 1e-13;    // rounding error of a volume, relative to the product of its edges

@@ -26,7 +26,7 @@ class SmallHull {
   const Vec3& diameter() const { return diameter_; }
 
  private:
-  /// Returns the point for which f is largest, with this value.
+  /// Returns the point with the largest f(point), and this value.
   template <class F>
   std::pair<uint32_t, Real> farthest(F&& f) const;
   void grow_from(uint32_t a, uint32_t b, uint32_t c);
@@ -71,7 +71,8 @@ void SmallHull::grow_from(uint32_t a, uint32_t b, uint32_t c) {
   const Vec3 normal = diameter_.cross(points_[c] - points_[a]).normalized();
   const auto height = [&](const Vec3& p) { return normal.dot(p - points_[a]); };
   auto [d, most] = farthest([&](const Vec3& p) { return std::abs(height(p)); });
-  // A flat set gets an apex on either side, so low that it does not change the result.
+  // A flat set of points gets an additional point on each side, so near to the plane that the result does not
+  // change.
   constexpr Real kFlat = 1e-9, kApex = 1e-6;
   if (most <= kFlat * diameter_.norm()) {
     const Vec3 middle = (points_[a] + points_[b] + points_[c]) / 3, up = kApex * diameter_.norm() * normal;

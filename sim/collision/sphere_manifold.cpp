@@ -10,7 +10,7 @@ namespace {
 
 using Core = Convex::Core;
 
-/// Fraction of the size: nearer to a core than this, the direction from it is undefined.
+/// If a point is nearer to a core than this fraction of the size, the direction between them is undefined.
 constexpr Real kNoDirection = 1e-12;
 
 /// The nearest point on the surface of a core, in the core's frame.

@@ -5,8 +5,8 @@
 
 namespace offstage::sim {
 
-/// Whether sphere_manifold() supports this pair: one is a sphere, and the other a sphere, a capsule or a box
-/// without radius.
+/// Whether sphere_manifold() supports this pair: one solid is a sphere, and the other is a sphere, a capsule
+/// or a box without radius.
 bool is_sphere_pair(const Convex& a, const Convex& b);
 
 /// Computes the manifold of two placed solids, with one point, or with none if they are more than `margin`

@@ -10,8 +10,8 @@ namespace offstage::sim {
 
 struct SweepHit {
   Real fraction;  ///< fraction of the path from a to b
-  /// Distance of the centre from the surface at that point: the sphere's radius, or less if it started
-  /// closer.
+  /// Distance of the sphere's centre from the surface at this position [m]. It is the sphere's radius, or
+  /// less if the sphere overlapped the solid at the start.
   Real distance;
   Vec3 normal;  ///< outward normal of the feature that is hit
 };

@@ -1,6 +1,7 @@
 #pragma once
-/// The feature of a convex solid that faces a direction: the face, edge or vertex that rests on a plane
-/// perpendicular to it. Contact manifolds (manifold.h) are made of two of them.
+/// The supporting feature of a convex solid in a direction: the face, edge or vertex with which the solid
+/// would rest on a plane perpendicular to the direction. A contact manifold (manifold.h) is computed from the
+/// supporting features of two solids.
 
 #include <array>
 #include <cstdint>
@@ -23,9 +24,8 @@ struct SupportingFeature {
   Vec3 normal = Vec3::Zero();               ///< unit outward normal of a face
   Vec3 on_face = Vec3::Zero();  ///< a point of the plane of a face; corners may lie slightly lower
   uint32_t vertex = 0;          ///< start vertex for Convex::support() in this direction
-  /// For a segment or point: the unit direction of the edge at which a plane perpendicular to the direction
-  /// touches, or the tangent of a rim; zero for a vertex. And the distance from the surface to the line about
-  /// which a round side turns, at the given point (its radius of curvature) [m].
+  /// For a segment or point: `edge` is the unit direction of the touching edge, or the tangent of a rim; zero
+  /// for a vertex. `rod` is the radius of curvature of a round side at this point [m].
   Vec3 edge = Vec3::Zero();
   Real rod = 0;
 
@@ -35,15 +35,16 @@ struct SupportingFeature {
   void place(const Mat3& rotation, const Vec3& translation);
 };
 
-/// Returns the feature with the largest part within `slack` of the plane that touches the solid and has the
-/// unit normal `d`. For a polyhedron it is the face at the support vertex with the largest such part
-/// (projected on the plane), for a cylinder or cone the flat side or a line of the round side. Discs are
-/// given as regular polygons on the rim, and faces with many corners by their most distant corners.
+/// Returns the feature that rests on the plane with the unit normal `d` that touches the solid. It is the
+/// feature with the largest part within `slack` [m] of the plane. For a polyhedron it is one of the faces at
+/// the support vertex; for a cylinder or cone it is the flat side or a line of the round side. A disc is
+/// returned as a regular polygon on its rim, and a face with many corners is reduced to its most distant
+/// corners.
 SupportingFeature supporting_feature(const Convex& c, const Vec3& d, Real slack);
 
-/// Returns the edge or point that faces `d`, but never a face. For a polyhedron it is the edge at the support
-/// vertex that is perpendicular to `d`, or else the one with the longest part within `slack`; for a rim it is
-/// a point. `on_surface` is the touching point of the core.
+/// Returns the edge or point that faces `d`, but never a face. For a polyhedron it is an edge at the support
+/// vertex. An edge perpendicular to `d` is preferred; otherwise the edge with the longest part within `slack`
+/// [m] is returned. For a rim it is a point. `on_surface` is the touching point of the core.
 SupportingFeature supporting_edge(const Convex& c, const Vec3& d, Real slack, const Vec3& on_surface);
 
 }  // namespace offstage::sim

@@ -38,15 +38,16 @@ Real round_radius(const Shape& shape) {
   return 0;
 }
 
-/// Vector from the axis of a surface of revolution to the body's centre of mass, in the body's frame. It is
-/// not 0 where a scene gives the centre.
+/// Vector from the axis of a surface of revolution to the body's centre of mass, in the body's frame [m]. It
+/// can differ from 0 if the scene sets the centre of mass.
 Vec3 centre_off_axis(const Body& body) {
   return body.is_awake() ? Vec3(body.rigid.centre.x(), 0, body.rigid.centre.z()) : Vec3(Vec3::Zero());
 }
 
-/// Rotation of the points of a surface of revolution that stay on the side that faces the other body while
-/// the body turns: that of the meridian. `arm` starts on the axis; see turned_arm() for the other arguments.
-/// Points elsewhere turn with the body, and so do all points where the other body is on the axis.
+/// Returns the rotation of a point on a surface of revolution while the body turns. A point that faces the
+/// other body stays on the side of that body, so it turns with the meridian that faces the other body. Other
+/// points turn with the body, and so do all points if the other body is on the axis. `arm` is the vector from
+/// the axis to the point; see turned_arm() for the other arguments.
 Quat meridian_turn(const Vec3& arm, const Quat& from, const Vec3& out_from, const Quat& to,
                    const Vec3& out_to) {
   const auto radial = [](const Quat& orientation, const Vec3& v) {

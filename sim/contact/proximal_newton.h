@@ -57,9 +57,10 @@ class ProximalNewton {
     uint32_t turning;  // index into turnings_; kNone without rolling and spinning friction
   };
   /// Rolling and spinning friction of a point. The vectors have the components (s, t, k): spinning friction,
-  /// and rolling friction about t and k [N m s]. The limits are those of the last multipliers, so the
-  /// minimized function stays convex. With an `arm` [m], the spinning friction is divided by it and shares
-  /// the cone of the point; its velocity is then arm * w_n, and its penalty that of the point.
+  /// and rolling friction about t and k [N m s]. The limits follow from the multipliers of the last update,
+  /// not from the current impulses, so the minimized function stays convex. If `arm` [m] is > 0, spinning
+  /// friction and sliding friction share one friction cone. The impulse of spinning friction is then divided
+  /// by `arm`, its velocity is arm * w_n, and its penalty equals the penalty of the point.
   struct Turning {
     Vec3 multiplier = Vec3::Zero(), impulse = Vec3::Zero(), shifted = Vec3::Zero(), fixed = Vec3::Zero();
     Real arm = 0, rho = 0, mobility = 0;

@@ -188,7 +188,7 @@ class RelaxationSolver {
   std::vector<FloatLanes> last_;      // velocities at the end of the previous sub-step
   std::vector<FloatLanes> greatest_;  // by component, the greatest change of velocity in a sub-step
   std::vector<Real> late_;            // by body: see finish() [s]
-  std::vector<SubstepTime> times_;    // and that of the sub-step after the last one
+  std::vector<SubstepTime> times_;    // time of each sub-step, and of one more after the last
   std::vector<Range> ranges_;
   // Sweeps are numbered from 1; a body stores the number of the last sweep in which it was hit.
   uint32_t sweeps_ = 0, push_sweep_ = 0;  // the latter: the first sweep of the push-out

@@ -8,12 +8,12 @@
 namespace offstage::sim {
 namespace {
 
-/// The next step is kSafety times the one that would just meet the target; its change is limited to the two
-/// other factors.
+/// The next step is kSafety times the step that would just meet the target. kLeastChange and kGreatestChange
+/// limit the ratio of consecutive steps.
 constexpr Real kSafety = 0.8, kLeastChange = 0.1, kGreatestChange = 4;
 
-/// r^(1/n) for r in [0, 5^n], by Newton's method from above. It converges monotonically, so the bits are the
-/// same everywhere.
+/// Returns r^(1/n) for r in [0, 5^n], by Newton's method. The iteration starts above the root and converges
+/// monotonically. Unlike std::pow, the result has the same bits on every machine.
 Real root(Real r, int n) {
   Real y = 5;
   for (int i = 0; i < 60; ++i) {
@@ -38,8 +38,8 @@ Real step_change(Real target, Real error, int error_order) {
   return kSafety * root(target / error, error_order);
 }
 
-/// The greatest error of (x, p) = work.next at time t, in the unit of the coordinates: that of x itself, or
-/// the error that the rates would cause in x within the time `span`.
+/// Returns the greatest error of (x, p) = work.next at time t, in the unit of the coordinates. It is the
+/// greater one of the error of x itself and the error of the rates times `span` [s].
 Real error_of(const DynamicSystem& system, Real t, Real span, IntegratorWorkspace& work) {
   work.x.resize(work.next_x.size());
   work.p.resize(work.next_p.size());
@@ -103,7 +103,7 @@ void StepDoubling::attempt(const DynamicSystem& system, Real t, Real h, std::spa
 }
 
 void StepDoubling::accept(IntegratorWorkspace& work) const {
-  // To leading order, the error of the whole step is 2^order times that of the two halves.
+  // To leading order, the error of the whole step is 2^order times the error of the two half steps.
   const Real fraction = 1.0 / ((1 << inner_.order()) - 1);
   array(work.next_x) += fraction * array(work.error_x);
   array(work.next_p) += fraction * array(work.error_p);
@@ -122,7 +122,7 @@ constexpr Real kCoefficients[kStages][kStages - 1] = {
     {19372.0 / 6561, -25360.0 / 2187, 64448.0 / 6561, -212.0 / 729},
     {9017.0 / 3168, -355.0 / 33, 46732.0 / 5247, 49.0 / 176, -5103.0 / 18656},
     {35.0 / 384, 0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84}};
-// Weights of the fifth order minus those of the fourth.
+// The weights of the fifth order minus the weights of the fourth order.
 constexpr Real kErrorWeights[kStages] = {71.0 / 57600,      0,          -71.0 / 16695, 71.0 / 1920,
                                          -17253.0 / 339200, 22.0 / 525, -1.0 / 40};
 

@@ -20,7 +20,7 @@ const CollisionShape& BodyModel::triangle_shape() {
 Motion Body::motion(Real now, Real time) const {
   if (is_kinematic()) return def.track.at(time, def.pose);
   if (!is_dynamic()) return {.pose = pose};
-  // Extrapolated with the current velocities.
+  // The pose is extrapolated with the current velocities.
   const Real dt = time - now;
   const Vec3 v = rigid.velocity(), w = rigid.angular_velocity();
   const Real rate = w.norm();

@@ -22,7 +22,7 @@ constexpr Real kKick = 0.05, kNutation = 0.2, kMostKicks = 1000;
 /// Accepted relative error of the energy of a free rotation, which is constant.
 constexpr Real kRotationEnergy = 1e-3;
 
-/// The quaternion in a body's coordinates.
+/// Returns the quaternion that is stored in the coordinates of a body.
 Eigen::Map<Eigen::Vector4d> turn_of(std::span<Real> x) {
   return Eigen::Map<Eigen::Vector4d>(&x[3]);
 }
@@ -63,10 +63,10 @@ void integrate(RigidBody& body, const BodyForces& forces, const Integrator& inte
 
 namespace {
 
-/// The free rotation of a body that may turn by many radians in a sub-step. Its kinetic energy is split in
-/// that of a symmetric top, whose motion has a closed form, and a term of one axis, whose motion is also
-/// exact; the two are applied alternately (Touma and Wisdom, "Lie-Poisson integrators for rigid body dynamics
-/// in the solar system", 1994). The angular momentum is conserved exactly, and the energy does not drift.
+/// The free rotation of a body that may turn by many radians in a sub-step. Its kinetic energy is split into
+/// the energy of a symmetric top and a term of one axis. The motion of each part has a closed form, and the
+/// two motions are applied alternately (Touma and Wisdom, "Lie-Poisson integrators for rigid body dynamics in
+/// the solar system", 1994). The angular momentum is conserved exactly, and the energy does not drift.
 class SplitRotation {
  public:
   explicit SplitRotation(const RigidBody& body) : H_(body.angular_momentum) {
@@ -103,7 +103,7 @@ class SplitRotation {
   }
 
  private:
-  /// Rotation by the difference of an axis from the middle one.
+  /// Rotates the body by the term of one axis: the difference of this axis from the middle one.
   void turn(Quat& q, int axis, Real h) const {
     const Real along = (q.conjugate() * H_)[axis];
     q = q * rotation(along * (inverse_[axis] - inverse_[1]) * Vec3::Unit(axis), h);

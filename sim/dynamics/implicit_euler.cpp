@@ -10,8 +10,8 @@ namespace offstage::sim {
 namespace {
 
 constexpr int kIterations = 16;
-/// Newton's method ends after a correction below kConverged relative to the coordinates, or to a millimetre
-/// if they are smaller, because the next one would be about its square.
+/// Newton's method ends after a correction below kConverged times the coordinates, or times kLeastScale [m]
+/// if they are smaller. The next correction would be about the square of this one.
 constexpr Real kConverged = 1e-9, kLeastScale = 1e-3;
 constexpr Real kShortest = 1.0 / 64;
 
@@ -27,7 +27,7 @@ class ImplicitStep {
         slope_(size_),
         velocity_(x_size) {}
 
-  /// Improves `y` until it solves y = y0 + h f(t + h, y); false if that fails.
+  /// Improves `y` until it solves y = y0 + h f(t + h, y). Returns false if the iteration fails.
   bool solve(Real t, Real h, const Eigen::VectorXd& y0, Eigen::VectorXd& y) {
     for (int i = 0; i < kIterations; ++i) {
       evaluate(t + h, y);
@@ -55,7 +55,8 @@ class ImplicitStep {
     ++report_.evaluations;
   }
 
-  /// Factors of 1 - h df/dy. The pattern is the same for all states, so it is analysed once.
+  /// Factorizes 1 - h df/dy at the state y. The sparsity pattern is the same for all states, so it is
+  /// analysed only once.
   bool factorize(Real t, Real h, const Eigen::VectorXd& y) {
     entries_.clear();
     system_.jacobian(t, head(y), tail(y), entries_);

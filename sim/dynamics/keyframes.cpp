@@ -8,15 +8,16 @@
 namespace offstage::sim {
 namespace {
 
-/// Below this rotation the Jacobians are linear [rad].
+/// For rotations below this angle, the Jacobians are approximated linearly [rad].
 constexpr Real kSmallAngle = 1e-4;
 
 Interpolation kind(const KeyframeTrack& track, std::size_t i) {
   return track.keys[i].interpolation.value_or(track.interpolation);
 }
 
-/// Mean angular velocity between the keys i and i + 1, along the shortest arc [rad/s]. Its axis is that of
-/// the rotation, so it is the same in the axes of both keys. A jump has no rate.
+/// Returns the mean angular velocity between the keys i and i + 1, along the shortest arc [rad/s]. It is
+/// along the axis of the rotation, so it has the same components in the axes of both keys. For a jump it is
+/// zero.
 Vec3 turn_rate(const KeyframeTrack& track, std::size_t i) {
   const Keyframe &a = track.keys[i], &b = track.keys[i + 1];
   if (kind(track, i) == Interpolation::step) return Vec3::Zero();
@@ -48,9 +49,9 @@ struct TurnSample {
   Vec3 angular_velocity;  // world [rad/s]
 };
 
-/// Orientation in segment i: a curve of rotation vectors from its first key, of the same kind as that of
-/// positions. The angular velocities at the keys follow from the mean ones of the segments beside them, so
-/// they do not jump.
+/// Returns the orientation at time t in segment i. It follows a curve of rotation vectors relative to the
+/// segment's first key; positions follow a curve of the same kind. The angular velocity at a key is computed
+/// from the mean angular velocities of the segments on both sides, so it does not jump.
 TurnSample turn_on_segment(const KeyframeTrack& track, std::size_t i, Real t) {
   const Keyframe &a = track.keys[i], &b = track.keys[i + 1];
   const Real span = b.time - a.time, s = (t - a.time) / span;
@@ -97,7 +98,7 @@ Motion on_segment(const KeyframeTrack& track, std::size_t i, Real t) {
   return out;
 }
 
-/// Start of the period of a loop that contains a time.
+/// Returns the start of the period that contains time t, for a track that is repeated.
 Real round_start(const KeyframeTrack& track, Real t) {
   const Real first = track.keys.front().time, period = track.keys.back().time - first;
   return first + period * std::floor((t - first) / period);
@@ -116,7 +117,7 @@ Motion on_keys(const KeyframeTrack& track, Real t, const Pose& rest) {
                     t);
 }
 
-/// Equality within the rounding of the numbers in a scene.
+/// Whether two poses are equal within the rounding of the numbers in a scene file.
 bool same(const Pose& a, const Pose& b) {
   constexpr Real kRounding = 1e-9;
   return (a.position - b.position).norm() < kRounding &&

@@ -27,8 +27,8 @@ Aabb bounding_box(std::span<const Vec3> points) {
 
 }  // namespace
 
-/// Chooses about as many cells as the points' box contains, but not many more than there are points; longer
-/// axes wrap first.
+/// Chooses the number of cells along each axis. There are about as many cells as the box of the points
+/// contains, but not many more than points. If the number must be reduced, the longer axes wrap around first.
 void NeighborGrid::choose_torus(std::span<const Vec3> points) {
   const Aabb box = bounding_box(points);
   std::array<Real, 3> extent;

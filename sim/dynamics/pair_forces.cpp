@@ -15,7 +15,7 @@ namespace {
 
 /// Particles per task.
 constexpr std::size_t kPairChunk = 32;
-/// Squared distance below which a force without a length scale does not increase any more [m^2].
+/// Below this squared distance, a force without a length scale does not increase any more [m^2].
 constexpr Real kLeastSquare = 1e-30;
 
 Real root_node(Real x) {
@@ -97,7 +97,7 @@ Real weight(const LennardJones&, const PairMember&) {
   return 1;
 }
 
-/// The particles on which a law acts, at a stage.
+/// The particles on which a force law acts, at one stage of the integration.
 struct Cloud {
   template <class Law>
   Cloud(const Law& law, std::span<const PairMember> members, std::span<const Real> state)
@@ -138,7 +138,7 @@ struct Cloud {
   std::optional<NeighborGrid> grid;
 
  private:
-  /// Sorts particles so that neighbours are close in memory.
+  /// Sorts the particles by cells, so that neighbours are close in memory.
   void sort_by_cells() {
     grid.emplace().build(points, cut_off);
     for (std::size_t i = 0; i < size(); ++i) member[i] = grid->at(i);
@@ -149,7 +149,7 @@ struct Cloud {
   }
 };
 
-/// The force on particle i from all others.
+/// Returns the force of all other particles on particle i [N].
 template <class Kernel>
 Vec3 force_by_all(const Kernel& kernel, const Cloud& c, std::size_t i) {
   LaneVector<Lanes> sum{};
@@ -180,7 +180,7 @@ void for_each_parallel(std::size_t size, F&& f) {
   });
 }
 
-/// Calls f(law) if the force acts between particles.
+/// Calls f(law) if the force is one that acts between particles.
 template <class F>
 void with_law(const ForceDef& def, F&& f) {
   std::visit(

@@ -5,7 +5,7 @@
 namespace offstage::sim {
 namespace {
 
-/// 1 in the middle of a region, linear to 0 at the edge, negative outside.
+/// Returns 1 in the middle of a region, 0 at its edge, linear values in between, and negative values outside.
 template <class Point>
 Real depth(const Everywhere&, const Point&) {
   return 1;
@@ -19,7 +19,7 @@ Real depth(const BoxRegion& b, const Point& point) {
   return 1 - ((point - b.centre).cwiseAbs().array() / (b.size / 2).array()).maxCoeff();
 }
 
-/// Integer power by multiplication, for the same bits everywhere.
+/// Returns an integer power by multiplication. Unlike std::pow, it gives the same bits on every machine.
 Real power(Real base, uint32_t exponent) {
   Real result = 1;
   for (; exponent > 0; exponent /= 2, base *= base)

@@ -7,7 +7,7 @@
 namespace offstage::sim {
 namespace {
 
-/// A point on an edge of a triangle, as a candidate for the nearest.
+/// A point on an edge of a triangle that may be the nearest point.
 struct EdgePoint {
   TrianglePoint at;
   Real squared_distance;
@@ -34,8 +34,8 @@ void keep_nearer(ClosestPoints& best, const Vec3& on_a, const Vec3& on_b) {
   if (d2 < best.squared_distance) best = {on_a, on_b, d2};
 }
 
-/// Tries the points where the edges of `edges` cross the plane of `t`, with the points of `t` nearest to
-/// them.
+/// For each edge of `edges` that crosses the plane of `t`, tests the crossing point together with the point
+/// of `t` nearest to it.
 template <class Keep>
 void for_each_crossing(const TriangleVertices& edges, const TriangleVertices& t, Keep&& keep) {
   const Vec3 n = (t[1] - t[0]).cross(t[2] - t[0]);
@@ -49,8 +49,8 @@ void for_each_crossing(const TriangleVertices& edges, const TriangleVertices& t,
   }
 }
 
-/// Returns a point that two intersecting triangles share, within rounding: where an edge pierces the other
-/// triangle, or else the closest points of the features.
+/// Returns a common point of two intersecting triangles, exact up to rounding. It is a point where an edge
+/// pierces the other triangle; if none is found, the closest points of the features are returned.
 ClosestPoints shared_point(const TriangleVertices& a, const TriangleVertices& b, ClosestPoints best) {
   for_each_crossing(a, b, [&](const Vec3& p, const Vec3& q) { keep_nearer(best, p, q); });
   for_each_crossing(b, a, [&](const Vec3& p, const Vec3& q) { keep_nearer(best, q, p); });
@@ -67,8 +67,8 @@ Real closest_on_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
   return along < length2 ? along / length2 : 1;
 }
 
-// By Voronoi regions of the triangle, after Ericson, "Real-Time Collision Detection" (2005), 5.1.5, but with
-// the areas from cross products.
+// Tests the Voronoi regions of the triangle, as Ericson, "Real-Time Collision Detection" (2005), 5.1.5, but
+// computes the areas from cross products.
 TrianglePoint closest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
   const Real d1 = ab.dot(ap), d2 = ac.dot(ap), d3 = ab.dot(bp), d4 = ac.dot(bp), d5 = ab.dot(cp),
@@ -85,9 +85,9 @@ TrianglePoint closest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, c
   return {a + v * ab + w * ac, {1 - v - w, v, w}};
 }
 
-// The common perpendicular of the two lines gives the fraction s along p. It is clamped to the segment, then
-// the nearest t along q is found and clamped, then the nearest s again. The squared distance is convex, so
-// each step is the minimum over the remaining freedom.
+// The common perpendicular of the two lines gives the fraction s along p. This s is clamped to the segment.
+// Then the nearest t along q is computed and clamped, and then the nearest s again. The squared distance is
+// convex, so each step is the minimum over the remaining freedom.
 ClosestPoints closest_on_segments(const Vec3& p0, const Vec3& p1, const Vec3& q0, const Vec3& q1) {
   const Vec3 dp = p1 - p0, dq = q1 - q0, n = dp.cross(dq);
   const Real n2 = n.squaredNorm();

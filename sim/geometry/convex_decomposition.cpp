@@ -22,13 +22,14 @@ namespace {
 /// Distances below this fraction of a mesh's diagonal count as zero. Files store coordinates in single
 /// precision, so faces that were modelled flat are flat within 1e-7.
 constexpr Real kSamePlace = 2e-7;
-/// Accepted difference between the volume of the exact parts and that of the solid, as a fraction.
+/// Accepted difference between the total volume of the exact parts and the volume of the solid, as a
+/// fraction.
 constexpr Real kExact = 1e-6;
 
-/// Bound of CutLimits::max_work if an approximation will do.
+/// Value of CutLimits::max_work if an approximate decomposition is accepted, too.
 constexpr Real kQuickWork = 3e7;
 
-/// Least factor by which the number of parts grows if the error is missed.
+/// Smallest factor by which the number of parts is increased if the error is too large.
 constexpr Real kMoreParts = 1.25;
 
 /// Number of points for estimated errors.
@@ -140,7 +141,7 @@ ExactResult decompose_exactly(const TriangleMesh& mesh, const MeshTopology& topo
   return result;
 }
 
-/// Returns the same surface with faces reversed, for a positive volume.
+/// Returns the mesh with all faces reversed, which changes the sign of its volume.
 TriangleMesh turned_over(TriangleMesh mesh) {
   for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
   return mesh;
@@ -174,8 +175,9 @@ struct BoundedWinding {
   Aabb box;
 };
 
-/// Replaces the errors, which count overlapping solids twice, by those of the unions of the solids and of the
-/// parts, estimated by points in a regular pattern.
+/// Estimates the errors of a decomposition again for solids that overlap, because the existing errors count
+/// common volumes twice. The new errors compare the union of the solids with the union of the parts, at the
+/// points of a regular grid.
 void estimate_errors(const std::vector<SolidPiece>& solids, ConvexDecomposition& result) {
   Aabb box;
   for (const ConvexPolyhedron& part : result.parts) box.extend(part.box());
@@ -218,10 +220,10 @@ Real volume_of(const std::vector<SolidPiece>& solids) {
   return volume;
 }
 
-/// Parts with the accepted error, if a number up to `most_parts` has it. A patch of a shell of the thickness
-/// t whose sides are a and b along the principal curvatures k_a and k_b has a hull that is larger by the
-/// fraction (|k_a| a^2 + |k_b| b^2) / (12 t), so the error falls as 1 / n with the number n of parts.
-/// docs/models.md has the least number of trimmed parts.
+/// Returns parts with the accepted error, if at most `most_parts` parts are sufficient for it. A patch of a
+/// shell of the thickness t whose sides are a and b along the principal curvatures k_a and k_b has a hull
+/// that is larger by the fraction (|k_a| a^2 + |k_b| b^2) / (12 t), so the error is proportional to 1 / n for
+/// n parts. docs/models.md has the least number of trimmed parts.
 CutDecomposition cuts_within(const std::vector<SolidPiece>& solids, const DecompositionSettings& settings) {
   CutDecomposition best;
   for (Real count = settings.max_parts;;) {

@@ -22,7 +22,8 @@ constexpr Real kCoplanar = 1e-10;  // fraction of the extent: a nearer point cou
 
 using Loops = std::vector<std::vector<uint32_t>>;
 
-/// State of Qhull, freed in all cases. Its messages go to a temporary file that is discarded.
+/// The state of Qhull. The destructor frees it in all cases. Messages of Qhull go to a temporary file, which
+/// is discarded.
 class Qhull {
  public:
   Qhull() : log_(std::tmpfile()) { qh_zero(&qh_, log_); }
@@ -57,8 +58,8 @@ class Qhull {
   std::FILE* log_;
 };
 
-/// Line or plane through extreme points of the set. It uses no sums, so distant and repeated points do not
-/// reduce its accuracy.
+/// A line or plane through extreme points of a set. No sums are used, so distant and repeated points do not
+/// reduce the accuracy.
 struct Frame {
   int dimension;  // dimension of the set: 0-3
   Vec3 origin, along, normal;
@@ -102,7 +103,7 @@ ConvexPolyhedron segment_hull(std::span<const Vec3> points, const Frame& frame) 
   return {{*low, *high}, {}};
 }
 
-/// Hull of a flat set by Andrew's monotone chain. It has two faces, one for each side.
+/// Returns the hull of a flat set by Andrew's monotone chain. It has two faces, one for each side.
 ConvexPolyhedron polygon_hull(std::span<const Vec3> points, const Frame& frame) {
   const Vec3 across = frame.normal.cross(frame.along);
   struct Flat {
@@ -187,7 +188,7 @@ class FaceMerger {
     }
   }
 
-  /// Flood fill from a triangle over neighbours that lie in its plane.
+  /// Collects a group by a flood fill from a triangle over neighbours in the same plane.
   void gather(uint32_t seed, uint32_t group) {
     const Vec3 normal = area(seed).normalized();
     const Real offset = normal.dot(corner(seed, 0));
@@ -226,7 +227,7 @@ class FaceMerger {
     return loop.size() == sides.size() ? loop : std::vector<uint32_t>{};
   }
 
-  /// Removes the vertices of only two polygons, which lie inside an edge.
+  /// Removes vertices that belong to only two polygons. They lie inside a straight edge.
   void drop_straight_vertices(Loops& loops) const {
     std::vector<uint32_t> uses(points_.size(), 0);
     for (const auto& loop : loops)
@@ -245,7 +246,7 @@ class FaceMerger {
   std::vector<std::vector<uint32_t>> members_;
 };
 
-/// Keeps the vertices that the faces use, in the order of the points.
+/// Builds a polyhedron from the vertices that the faces use. The order of the points is kept.
 ConvexPolyhedron compact(std::span<const Vec3> points, Loops faces) {
   std::vector<uint32_t> place(points.size(), kNoFace);
   for (const auto& face : faces)

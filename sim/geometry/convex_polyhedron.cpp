@@ -11,8 +11,8 @@ namespace offstage::sim {
 
 namespace {
 
-/// A power of two that brings the largest coordinate to about 1, so that products of coordinates neither
-/// overflow nor vanish. Multiplying by it is exact.
+/// Returns the power of two that scales the largest coordinate to about 1. Products of scaled coordinates
+/// neither overflow nor underflow, and the scaling is exact.
 Real scale_to_one(const std::vector<Vec3>& points) {
   constexpr int kMost = 1000;  // 2^1000 and its inverse are finite
   Real largest = 0;
@@ -48,7 +48,7 @@ ConvexPolyhedron::ConvexPolyhedron(std::vector<Vec3> vertices, std::span<const s
   dimension_ = face_count() > 2 ? 3 : face_count() == 2 ? 2 : static_cast<int>(edges_.size());
 }
 
-/// Pairs the directed sides of the faces, then lists the edges by vertex.
+/// Finds the edges by pairing the directed sides of the faces, and lists the edges of each vertex.
 void ConvexPolyhedron::find_edges() {
   struct Side {
     uint32_t low, high, slot, face;

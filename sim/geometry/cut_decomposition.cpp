@@ -19,7 +19,8 @@ namespace {
 constexpr Real kOnCutPlane = 2e-7;
 /// Trimming moves faces by at most this fraction of the solid's diagonal.
 constexpr Real kTrim = 0.02;
-/// More pieces than wanted parts are cut before mergers, by these factors: of whole solids, of Voronoi cells.
+/// Before merging, the solids are cut into more pieces than the wanted number of parts. kMorePieces is the
+/// factor for cuts of whole solids, kMoreCells for cuts of Voronoi cells.
 constexpr Real kMorePieces = 1.5, kMoreCells = 1.25;
 /// Excess of the hulls up to which pieces are cut, and up to which they are merged, in accepted errors.
 /// Trimming removes a part of it, which only the trial shows.
@@ -54,7 +55,8 @@ class SolidCutter {
   }
 
  private:
-  /// Cells of each solid, with numbers in proportion to the surfaces.
+  /// Returns Voronoi cells of all solids. The number of cells of a solid is proportional to the area of its
+  /// surface.
   std::vector<HulledPiece> voronoi_cells() const {
     std::vector<Real> areas;
     Real total = 0;
@@ -73,8 +75,8 @@ class SolidCutter {
     return cells;
   }
 
-  /// Cuts the piece with the most excess, until the excess of all is small or there are `factor` times the
-  /// wanted parts.
+  /// Repeatedly cuts the piece with the largest excess. Ends when the excess of all pieces is small, or there
+  /// are `factor` times as many pieces as wanted parts.
   void cut_worst(std::vector<HulledPiece>& pieces, Real factor) const {
     const Real wanted = static_cast<Real>(goal_.max_parts), accepted = goal_.max_error * whole_;
     while (static_cast<Real>(pieces.size()) < factor * wanted) {
@@ -96,7 +98,8 @@ class SolidCutter {
     std::erase_if(pieces, [](const HulledPiece& p) { return p.hull.dimension() < 3; });
   }
 
-  /// The decomposition with the fewest parts that has the accepted error, or else with the smallest error.
+  /// Merges pieces. Returns the decomposition with the fewest parts whose error is accepted; if there is
+  /// none, the decomposition with the smallest error.
   CutDecomposition merged(const std::vector<HulledPiece>& pieces) const {
     std::vector<HullToMerge> hulls;
     Real excess = 0;

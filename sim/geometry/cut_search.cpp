@@ -24,12 +24,12 @@ using SearchPlane = SolidPiece::Plane;
 constexpr int kAlongAxis = 7, kRefined = 4;
 /// Number of flat sides and of reflex edges whose planes are tried.
 constexpr std::size_t kFlatPlanes = 8, kReflexTried = 6;
-/// Weight of compact sides against small hulls; thin shells need it, because no single cut makes their hulls
-/// smaller.
+/// Weight of compactness in the cost of a cut, relative to the volume of the hulls. Thin shells need it,
+/// because no single cut makes their hulls smaller.
 constexpr Real kCompact = 1;
-/// Axes that differ by less than this are tried once [1 - cosine].
+/// Two axes count as the same if 1 minus the cosine of their angle is less than this.
 constexpr Real kSameDirection = 1e-3;
-/// Least sine of the angle of a sharp reflex edge.
+/// A reflex edge is sharp if the sine of its angle is at least this.
 constexpr Real kSharp = 0.09;
 
 struct RatedPlane {
@@ -73,10 +73,10 @@ class CutSearch {
   }
 
  private:
-  /// A plane nearer than this many tolerances to the end of a piece does not divide it.
+  /// A plane that is closer to the end of a piece than this many tolerances does not divide the piece.
   static constexpr Real kThin = 100;
 
-  /// The principal axes of the points, and those of the frame.
+  /// Returns the principal axes of the points and the axes of the frame.
   std::vector<Vec3> axes() const {
     std::vector<Vec3> list;
     const auto add = [&](const Vec3& axis) {
@@ -100,7 +100,7 @@ class CutSearch {
     return {low, high};
   }
 
-  /// Adds a plane if it divides the piece and is not in the list.
+  /// Adds a plane to the list if it divides the piece and is not yet in the list.
   void add_plane(const SearchPlane& plane, std::vector<RatedPlane>& planes) const {
     for (const RatedPlane& other : planes)
       if (1 - std::abs(other.plane.normal.dot(plane.normal)) < 1e-9 &&
@@ -111,7 +111,7 @@ class CutSearch {
       planes.push_back({plane});
   }
 
-  /// Adds the planes of the largest polygons that have surface on both sides.
+  /// Adds the planes of the largest polygons, if the piece has surface on both sides of the plane.
   void add_flat_sides(std::vector<RatedPlane>& planes) const {
     std::vector<std::pair<Real, SearchPlane>> sides;
     for (std::size_t k = 0; k < solid_.polygon_count(); ++k) {
@@ -131,7 +131,8 @@ class CutSearch {
       if (planes.size() < most) add_plane(side.second, planes);
   }
 
-  /// Adds planes through the longest and sharpest reflex edges: those of the faces, and between them.
+  /// Adds planes through the longest and sharpest reflex edges: the planes of the two faces, and planes
+  /// between them.
   void add_reflex(const std::vector<ReflexEdge>& reflex, std::vector<RatedPlane>& planes) const {
     const Aabb box = piece_.hull.box();
     std::vector<std::pair<Real, const ReflexEdge*>> here;
@@ -159,7 +160,8 @@ class CutSearch {
     return best;
   }
 
-  /// Volume of the two hulls, plus a fraction of the excess that is larger the less compact the sides are.
+  /// Returns the cost of a cut: the volume of both hulls plus a fraction of the excess. The less compact the
+  /// two sides are, the larger is this fraction.
   Real cost(const SearchPlane& plane) const {
     std::array<std::vector<Vec3>, 2> sides;
     std::vector<Real> height;
@@ -187,7 +189,8 @@ class CutSearch {
            kCompact * piece_.excess * (1 - compactness(plane));
   }
 
-  /// Fraction of the piece's spread that the cut removes: the distance of the centres of the sides.
+  /// Returns the fraction of the piece's spread that the cut removes. It follows from the distance between
+  /// the centres of both sides.
   Real compactness(const SearchPlane& plane) const {
     const PieceMoments &all = piece_.moments, above = moments_above(solid_, plane);
     const Real f = above.volume / all.volume;

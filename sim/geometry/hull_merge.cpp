@@ -18,9 +18,10 @@ namespace {
 
 constexpr Real kApart = std::numeric_limits<Real>::infinity();
 constexpr uint32_t kSeveral = 0xffffffff;
-/// Hulls of more vertices are compared by extreme points in so many directions.
+/// Hulls with more vertices than this are represented, in comparisons, by their extreme points in this many
+/// directions.
 constexpr std::size_t kManyVertices = 192;
-/// Faces of a hull by which another is cut.
+/// Greatest number of faces of a hull by which another hull is cut.
 constexpr std::size_t kMainPlanes = 96;
 /// Distances below this fraction of a hull's extent count as zero.
 constexpr Real kOnPlane = 1e-9;
@@ -49,8 +50,8 @@ std::vector<SolidPiece::Plane> main_planes(const ConvexPolyhedron& p) {
   return planes;
 }
 
-/// Volume of the intersection, too large by a little if `b` has very many faces. Fastest if `a` is the
-/// smaller one.
+/// Returns the volume of the intersection of two hulls [m^3]. It is slightly too large if `b` has more than
+/// kMainPlanes faces. The function is faster if `a` is the smaller hull.
 Real common_volume(const ConvexPolyhedron& a, const ConvexPolyhedron& b) {
   if (a.dimension() < 3 || b.dimension() < 3) return 0;
   const Real tolerance = kOnPlane * a.box().diagonal().norm();
@@ -63,7 +64,7 @@ Real common_volume(const ConvexPolyhedron& a, const ConvexPolyhedron& b) {
   return rest.points.empty() ? 0 : std::max(0.0, moments(rest).volume);
 }
 
-/// A similar hull of few vertices, for comparisons.
+/// Returns a similar hull with few vertices, for comparisons.
 ConvexPolyhedron thinned(const ConvexPolyhedron& p) {
   if (p.vertices().size() <= kManyVertices) return p;
   return convex_hull(extreme_points(p.vertices(), static_cast<int>(kManyVertices)));
@@ -131,7 +132,7 @@ class HullMerger::Mergers {
     return best;
   }
 
-  /// The hull replaces the first part; the second is removed.
+  /// Joins a pair of parts. The common hull replaces the first part, and the second part is removed.
   void join(const Pair& pair) {
     const auto erase = [&](auto& list) { list.erase(list.begin() + static_cast<std::ptrdiff_t>(pair.b)); };
     MergedHull &kept = parts_[pair.a], &gone = parts_[pair.b];

@@ -13,7 +13,7 @@ constexpr std::size_t kFewPoints = 160;
 constexpr int kSpread = 96;
 constexpr Real kSketchFlat = 1e-9;  // fraction of the extent
 
-/// Directions spread evenly over the sphere, along a spiral.
+/// Returns directions that are spread evenly over the sphere, along a spiral.
 std::vector<Vec3> spread_directions(int count) {
   std::vector<Vec3> list;
   // Cosine and sine of the golden angle, which turns each direction to the next.
@@ -29,8 +29,8 @@ std::vector<Vec3> spread_directions(int count) {
   return list;
 }
 
-/// The hull of points that are added one by one: faces that see a new point are replaced by faces from their
-/// outline to the point.
+/// A hull to which points are added one by one. The faces that are visible from a new point are replaced by
+/// faces between their outline and the point.
 class HullSketch {
  public:
   explicit HullSketch(std::span<const Vec3> points)
@@ -55,7 +55,7 @@ class HullSketch {
     bool alive;
   };
 
-  /// The point that is farthest by a measure.
+  /// Returns the point with the largest measure(point).
   template <class Measure>
   uint32_t farthest(Measure&& measure) const {
     uint32_t best = 0;
@@ -68,7 +68,7 @@ class HullSketch {
     return best;
   }
 
-  /// Makes a tetrahedron of four points far apart; returns false for a flat set.
+  /// Starts the hull with a tetrahedron of four points that are far apart. Returns false if the set is flat.
   bool start() {
     if (points_.size() < 4) return false;
     const Vec3& first = points_[0];
@@ -98,7 +98,7 @@ class HullSketch {
     owner(i, j) = owner(j, k) = owner(k, i) = index;
   }
 
-  /// The face that is on the left of an edge.
+  /// Returns the face on the left of the directed edge.
   uint32_t& owner(uint32_t from, uint32_t to) { return owner_[from * points_.size() + to]; }
 
   void add(uint32_t p) {

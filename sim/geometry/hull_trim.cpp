@@ -14,13 +14,13 @@ using TrimPlane = SolidPiece::Plane;
 
 /// Number of depths that are tried for each face.
 constexpr int kDepths = 6;
-/// Most faces of one hull that are moved.
+/// Greatest number of faces of one hull that are moved.
 constexpr int kMostTrims = 24;
-/// A face that the surface covers by more than this fraction does not bridge a hollow.
+/// If the surface of the solid covers more than this fraction of a face, the face does not bridge a hollow.
 constexpr Real kCovered = 0.5;
 /// A face moves by at most this fraction of the hull's extent along its normal.
 constexpr Real kMostOfHull = 0.25;
-/// Most of the pieces' volume that may be lost outside of their hull, as a fraction.
+/// Greatest fraction of the pieces' volume that may end up outside of their trimmed hull.
 constexpr Real kMostLost = 0.03;
 /// Distances below this fraction of the hull's extent count as zero.
 constexpr Real kOnFace = 1e-6;
@@ -87,14 +87,14 @@ class HullTrimmer {
     return trim;
   }
 
-  /// Extent of the hull below one of its faces.
+  /// Returns the extent of the hull along the normal of one of its faces [m].
   Real extent(const TrimPlane& face) const {
     Real depth = 0;
     for (const Vec3& v : hull_.vertices()) depth = std::max(depth, face.offset - face.normal.dot(v));
     return depth;
   }
 
-  /// The planes of the largest faces that the surface does not cover.
+  /// Returns the planes of the largest faces that the surface of the solid does not cover.
   std::vector<TrimPlane> bridges() const {
     std::vector<std::pair<Real, TrimPlane>> list;
     for (uint32_t f = 0; f < hull_.face_count(); ++f) {
@@ -114,7 +114,7 @@ class HullTrimmer {
     return planes;
   }
 
-  /// Area of the polygons and caps on a plane.
+  /// Returns the area of the polygons and caps that lie on a plane [m^2].
   Real covered(const TrimPlane& plane) const {
     Real area = 0;
     const auto on_plane = [&](const Vec3& p) {

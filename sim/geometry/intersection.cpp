@@ -136,7 +136,7 @@ bool triangles_intersect(const TriangleVertices& a, const TriangleVertices& b) {
   if (one_sided(side_b)) return false;
   if (all_zero(side_a) && all_zero(side_b))
     return !(collinear(a) && collinear(b) && skew(a, b)) && coplanar_intersect(a, b);
-  // A triangle without a plane is the union of its edges.
+  // A triangle without area has no plane; it is treated as the union of its edges.
   if (all_zero(side_a)) return any_edge_intersects(b, a);
   if (all_zero(side_b)) return any_edge_intersects(a, b);
   // Each triangle cuts the common line of the planes in an interval that ends on the edges at the triangle's

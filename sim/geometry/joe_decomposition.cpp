@@ -21,7 +21,8 @@ constexpr std::array<Real, 5> kRelaxed = {1, 0.5, 0.25, 0.1, 0};
 /// (F.2).
 constexpr std::array<Real, 5> kFractions = {0.25, 0.5, 0.75, 0.375, 0.625};
 constexpr std::size_t kMaxCandidates = 12;
-/// Angles are ordered in steps of this size, so that rounding does not order equal ones [rad].
+/// Angles are rounded to multiples of this before they are ordered, so that rounding errors do not decide the
+/// order of equal angles [rad].
 constexpr Real kSameAngle = 1e-4;
 /// Number of reflex edges with an acceptable cut that are compared before the best of their cuts is made.
 constexpr int kCompared = 8;
@@ -74,7 +75,8 @@ struct Merit {
   Real distance = std::numeric_limits<Real>::infinity();  ///< distance of the nearest vertex off the cut [m]
 };
 
-/// Distance from a plane to the nearest vertex off it, which limits how short the new edges can be.
+/// Returns the distance from a plane to the nearest vertex that is not on it [m]. It limits how short the new
+/// edges can be.
 Real least_distance(const Polyhedron& p, const Polyhedron::Plane& plane, Real tolerance) {
   Real least = std::numeric_limits<Real>::infinity();
   for (const Vec3& v : p.points)
@@ -83,7 +85,8 @@ Real least_distance(const Polyhedron& p, const Polyhedron::Plane& plane, Real to
   return least;
 }
 
-/// Returns nothing if a side of the cut is not inside the solid, which only rounding can cause.
+/// Returns the quality of a cut. Returns nothing if a side of the cut is not inside the solid, which only
+/// rounding can cause.
 std::optional<Merit> merit(const Polyhedron& p, const Cut& cut, Real tolerance) {
   Merit m;
   m.distance = least_distance(p, cut.plane, tolerance);
@@ -136,8 +139,8 @@ class Decomposer {
   }
 
  private:
-  /// The reflex edges, those with the largest angles first: cuts through sharp edges resolve the most of the
-  /// flat ones.
+  /// Returns the reflex edges, in descending order of their angles. Cuts through sharp edges often resolve
+  /// flatter ones, too.
   static std::vector<uint32_t> reflex_edges(const Polyhedron& p) {
     std::vector<std::pair<Real, uint32_t>> order;
     for (uint32_t h = 0; h < p.half_edges.size(); ++h)
@@ -149,8 +152,8 @@ class Decomposer {
     return edges;
   }
 
-  /// Returns the best of the acceptable cuts of the first edges that have one, under the strictest limits
-  /// that allow any.
+  /// Returns the best acceptable cut of the first kCompared edges that have one. The limits are relaxed until
+  /// there is an acceptable cut; nothing if there is none.
   std::optional<RatedCut> best_cut(const Polyhedron& p, const std::vector<uint32_t>& reflex) {
     const Real edge = mean_edge(p);
     std::optional<RatedCut> best;
@@ -192,7 +195,7 @@ class Decomposer {
 
 bool is_reflex(const Polyhedron& p, uint32_t h) {
   const Real angle = wedge(p, h).angle;
-  // A fin without thickness has an angle of 0 or, by rounding, of a full turn.
+  // The angle of a fin without thickness is 0 or, because of rounding, a full turn.
   return angle > std::numbers::pi + kFlatFace && angle < 2 * std::numbers::pi - kFlatFace;
 }
 

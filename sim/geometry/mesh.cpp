@@ -9,7 +9,7 @@
 namespace offstage::sim {
 namespace {
 
-/// The bits of a position; -0 counts as +0.
+/// The bits of a position, for exact comparison. -0 counts as +0.
 struct PositionKey {
   std::array<uint64_t, 3> bits;
 
@@ -47,7 +47,7 @@ Real corner_angle(const TriangleMesh& mesh, const Triangle& t, std::size_t k) {
   return std::atan2(u.cross(v).norm(), u.dot(v));
 }
 
-/// One side of a face, stored under its lower vertex.
+/// One side of a face. It is stored with the side's vertex of lower index.
 struct HalfEdge {
   uint32_t other;  // the higher vertex
   uint32_t face;
@@ -117,9 +117,9 @@ Real signed_volume6(const TriangleMesh& mesh) {
   return volume;
 }
 
-/// Turns faces so that two faces with a common edge run along it in opposite directions, which gives the
-/// surface two sides. In each part of the surface that is joined by such edges the faces with the smaller
-/// area are turned. A part with only one side, such as a Moebius strip, stays as it is.
+/// Reverses faces until two faces with a common edge run along it in opposite directions, so that the surface
+/// has a consistent front side. In each connected part of the surface, the orientation with the smaller total
+/// area is reversed. A part with only one side, such as a Moebius strip, stays as it is.
 void unify_winding(TriangleMesh& mesh) {
   struct Neighbour {
     uint32_t face;
@@ -253,9 +253,9 @@ MeshTopology::MeshTopology(const TriangleMesh& mesh) {
     vertex_neighbours_[next[e.vertices[1]]++] = e.vertices[0];
   }
 
-  // Normals by feature. Those of edges and vertices are also the pseudonormals that determine inside and
-  // outside (Baerentzen and Aanaes, "Signed distance computation using the angle weighted pseudonormal",
-  // 2005).
+  // Normals of faces, edges and vertices. The normals of edges and vertices are also the pseudonormals that
+  // determine inside and outside (Baerentzen and Aanaes, "Signed distance computation using the angle
+  // weighted pseudonormal", 2005).
   face_normals_.resize(faces);
   vertex_normals_.assign(vertices, Vec3::Zero());
   for (std::size_t face = 0; face < faces; ++face) {

@@ -10,7 +10,7 @@ namespace {
 
 using Loop = std::vector<uint32_t>;
 
-/// Sine of the turn at a vertex below which the polygon counts as straight there.
+/// If the sine of the turn at a vertex is less than this, the polygon counts as straight there.
 constexpr Real kFlatPolygon = 1e-6;
 
 Real cross(const Vec2& a, const Vec2& b) {
@@ -88,7 +88,7 @@ class Divider {
     return is_reflex(loop, k) ? left_of_next || left_of_last : left_of_next && left_of_last;
   }
 
-  /// Whether a ray from a vertex leaves no reflex angle on either side.
+  /// Whether a cut along a ray from a vertex leaves no reflex angle on either side of the ray.
   bool straightens(const Loop& loop, std::size_t k, const Vec2& d) const {
     return sine(side_from(loop, k), d) > -kFlatPolygon && sine(side_into(loop, k), d) > -kFlatPolygon;
   }
@@ -110,7 +110,8 @@ class Divider {
     return true;
   }
 
-  /// Returns the diagonal from a reflex vertex that removes most reflex angles; among equals the shortest.
+  /// Returns the diagonal from a reflex vertex that removes the most reflex angles. Among equally good
+  /// diagonals it is the shortest.
   std::size_t best_diagonal(const Loop& loop, std::size_t from) const {
     std::size_t best = loop.size();
     std::tuple<int, Real> best_cost{0, std::numeric_limits<Real>::infinity()};

@@ -31,7 +31,7 @@ Real thickness(const TriangleMesh& mesh, uint32_t face, Real area2) {
   return longest > 0 ? area2 / longest : 0;
 }
 
-/// Triangles that lie in common planes with their neighbours.
+/// Connected regions of triangles that lie in one plane.
 struct FlatRegions {
   std::vector<FacePlane> planes;               // of each region
   std::vector<std::vector<uint32_t>> members;  // triangles of each region, in their order
@@ -83,13 +83,14 @@ FlatRegions flat_regions(const TriangleMesh& mesh, const MeshTopology& topology,
   return regions;
 }
 
-/// A side of a polygon: a vertex and the mesh's edge from it to the next one; kNone for a new diagonal.
+/// A side of a polygon: a vertex, and the mesh's edge from it to the next vertex. The edge is kNone for a new
+/// diagonal.
 struct PolygonSide {
   uint32_t from, edge;
 };
 using Polygon = std::vector<PolygonSide>;
 
-/// The outline of a region, or nothing if it has holes or touches itself.
+/// Returns the outline of a region; empty if the region has holes or its outline touches itself.
 Polygon outline_of(const TriangleMesh& mesh, const MeshTopology& topology, const FlatRegions& regions,
                    uint32_t region) {
   struct Outward {
@@ -114,8 +115,9 @@ Polygon outline_of(const TriangleMesh& mesh, const MeshTopology& topology, const
   return outline;
 }
 
-/// Convex polygons that fill a region: those of its outline, so that the way in which a file divides a
-/// polygon into triangles, slivers among them, does not matter; or else its triangles.
+/// Returns convex polygons that fill a region. They are computed from the region's outline, so that it does
+/// not matter how a file divides a polygon into triangles. If this is not possible, the triangles of the
+/// region are returned.
 std::vector<Polygon> polygons_of(const TriangleMesh& mesh, const MeshTopology& topology,
                                  const FlatRegions& regions, uint32_t region, Real tolerance) {
   std::vector<Polygon> polygons;

@@ -138,25 +138,26 @@ class Tracer {
   Real height_at_head(uint32_t h) const { return height_[p_.head(h)]; }
   Vec2 flat(const Vec3& d) const { return {x_axis_.dot(d), y_axis_.dot(d)}; }
 
-  /// The same number for both half-edges of an edge.
+  /// Returns the number of an edge, which is the same for both of its half-edges.
   uint32_t edge(uint32_t h) const { return std::min(h, p_.half_edges[h].twin); }
 
-  /// Marks i as passed; returns false if it was passed before.
+  /// Marks element i as visited; returns false if it was visited before.
   static bool pass(std::vector<bool>& seen, uint32_t i) {
     if (seen[i]) return false;
     seen[i] = true;
     return true;
   }
 
-  /// Intersection of the plane with an edge; the same point for both half-edges.
+  /// Returns the intersection of the plane with an edge. It is exactly the same point for both half-edges.
   Vec3 crossing(uint32_t h) const {
     uint32_t a = p_.origin(h), b = p_.head(h);
     if (a > b) std::swap(a, b);
     return p_.points[a] + height_[a] / (height_[a] - height_[b]) * (p_.points[b] - p_.points[a]);
   }
 
-  /// Returns where the plane leaves a face that it enters at the origin or in the middle of a half-edge whose
-  /// head is below. Faces are convex, so this is where the outline comes up again.
+  /// Returns the point where the plane leaves a face. It enters the face at the origin or inside a half-edge
+  /// whose head is below the plane. Faces are convex, so it leaves the face where the face's outline comes up
+  /// to the plane again.
   Corner far_side(uint32_t h) const {
     uint32_t k = p_.half_edges[h].next;
     while (height_at_head(k) < 0) k = p_.half_edges[k].next;
@@ -164,10 +165,10 @@ class Tracer {
     return {p_.head_point(k), p_.half_edges[k].next, false, false};
   }
 
-  /// Chooses the next side from a vertex: the one with the smallest angle inside the cut face (F.2). Other
-  /// corners of the surface at the same point are considered, too, because where a solid touches itself at a
-  /// point its surroundings are divided among several corners. They must be better by a margin, which
-  /// excludes the other side of an earlier cut. Returns false if there is no next side.
+  /// Chooses the next side from a vertex: the one with the smallest angle inside the cut face (F.2). If a
+  /// solid touches itself at a point, its surface has several corners at this point, so the other corners are
+  /// considered, too. They must be better by a margin; this excludes the other side of an earlier cut.
+  /// Returns false if there is no next side.
   bool turn(Corner& at, const Vec3& from, uint32_t edge_back) const {
     const Vec2 back = flat(from - at.point);
     const uint32_t here = at.half_edge;

@@ -84,7 +84,7 @@ SolidMesh ring(const std::vector<Vec2>& profile) {
   return solid;
 }
 
-/// Half of the circle about the origin, from the bottom to the top.
+/// Returns half of a circle about the origin, from the bottom to the top.
 std::vector<Vec2> half_circle(Real radius, uint32_t sides) {
   const std::vector<Vec2> circle = unit_circle(sides);
   std::vector<Vec2> points;
@@ -149,7 +149,7 @@ TriangleMesh mesh_of(const MeshShape&) {
   return {};
 }
 
-/// Inertia about a point of a mass whose centre is at `arm` from it.
+/// Returns the inertia of a point mass at `arm` about the origin of the arm [kg m^2].
 Mat3 point_inertia(Real mass, const Vec3& arm) {
   return mass * (arm.squaredNorm() * Mat3::Identity() - arm * arm.transpose());
 }
@@ -158,7 +158,8 @@ Mat3 about_y(Real across, Real along) {
   return Vec3(across, along, across).asDiagonal();
 }
 
-/// Floor and walls of an open box, without overlap: the walls along z stand between those along x.
+/// Returns the floor and the walls of an open box. They do not overlap, because the walls along z stand
+/// between the walls along x.
 std::array<Aabb, 5> slabs(const OpenBox& b) {
   const Vec3 out = b.size / 2, in = out - Vec3::Constant(b.thickness);
   return {Aabb(-out, Vec3(out.x(), -in.y(), out.z())),
@@ -206,7 +207,8 @@ SolidMesh solid_mesh(const Tube& tube) {
 SolidMesh solid_mesh(const OpenBox& box) {
   const Vec3 out = box.size / 2, in = out - Vec3::Constant(box.thickness);
   SolidMesh solid;
-  // Outside without its top, the inside with its faces turned around, and the rim between both.
+  // The mesh consists of the outside without its top, the inside with reversed faces, and the rim between
+  // them.
   add_cuboid(-out, out, solid.mesh);
   add_cuboid(-in, Vec3(in.x(), out.y(), in.z()), solid.mesh);
   std::vector<Triangle> kept;

@@ -15,12 +15,12 @@ namespace {
 
 using Index3 = Eigen::Array3i;
 
-/// Lower bounds of the mean winding number of the inside: for a solid, and for both sides of a surface
-/// together.
+/// Lower bounds of the mean winding number of the inside. kHardlyInside is for a solid; kSurelyInside is for
+/// both sides of a surface together.
 constexpr Real kHardlyInside = 0.6, kSurelyInside = 0.9;
 /// Number of times that the surface of voxels is smoothed.
 constexpr int kSmoothings = 2;
-/// Greatest difference between the volume with closed holes and that of the voxels, as a fraction.
+/// Greatest relative difference between the volume with closed holes and the volume of the voxels.
 constexpr Real kSameSolid = 0.1;
 
 /// The voxels of a mesh's box, and whether the centre of each is inside.
@@ -37,8 +37,8 @@ class VoxelGrid {
     return size_ * size_ * size_ * static_cast<Real>(std::count(inside_.begin(), inside_.end(), 1));
   }
 
-  /// The boundary between the inside and the outside, of one quadrilateral for each side of a voxel. Its
-  /// corners are moved so that the steps of the voxels disappear.
+  /// Returns the boundary between the inside and the outside, with one quadrilateral for each side of a
+  /// voxel. The corners are moved so that the steps of the voxels disappear.
   SolidPiece surface() const {
     SolidPiece piece = squares();
     for (int k = 0; k < kSmoothings; ++k) smooth(piece);
@@ -73,7 +73,7 @@ class VoxelGrid {
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = sums[i] / counts[i];
   }
 
-  /// The boundary between the inside and the outside, as squares.
+  /// Returns the boundary between the inside and the outside, as squares.
   SolidPiece squares() const {
     SolidPiece piece;
     std::map<std::size_t, uint32_t> places;
@@ -152,8 +152,8 @@ class VoxelGrid {
   std::vector<char> inside_;  // not bool, because threads write neighbouring elements
 };
 
-/// The mesh with a fan of triangles for each connected piece of its border, so that the net number of faces
-/// along each edge is zero.
+/// Returns the mesh with its holes closed by a fan of triangles for each connected piece of the border. The
+/// faces along each edge then cancel in pairs of opposite directions.
 TriangleMesh with_closed_holes(TriangleMesh mesh) {
   std::map<std::array<uint32_t, 2>, int> net;
   for (const Triangle& t : mesh.triangles)
@@ -193,8 +193,8 @@ void turn_over(SolidPiece& piece) {
     std::reverse(piece.corners.begin() + piece.first[k], piece.corners.begin() + piece.first[k + 1]);
 }
 
-/// The connected pieces of a surface, each with its own vertices alone. One piece, the surface, if there are
-/// more than `most`.
+/// Returns the connected pieces of a surface, each with only its own vertices. If there are more than `most`
+/// pieces, returns the whole surface as one piece.
 std::vector<TriangleMesh> connected_pieces(const TriangleMesh& mesh, std::size_t most) {
   DisjointSets shells(mesh.vertices.size());
   for (const Triangle& t : mesh.triangles) {
@@ -218,7 +218,8 @@ Aabb box_of(const TriangleMesh& mesh) {
   return box;
 }
 
-/// The solid of one piece of a surface; without points if it has no inside. `voxel`: size of the voxels [m].
+/// Returns the solid of one piece of a surface. The solid has no points if the piece has no inside. `voxel`:
+/// size of the voxels [m].
 SolidPiece solid_of_piece(const TriangleMesh& mesh, Real voxel) {
   const Aabb box = box_of(mesh);
   const bool was_closed = MeshTopology(mesh).defects().closed();
@@ -236,7 +237,7 @@ SolidPiece solid_of_piece(const TriangleMesh& mesh, Real voxel) {
   return grid.surface();
 }
 
-/// Whether a closed piece is inside out, and so a cavity of another.
+/// Whether a closed piece is inside out. It is then a cavity of another piece.
 bool is_cavity(const TriangleMesh& piece) {
   return MeshTopology(piece).defects().closed() && moments(solid_piece(piece)).volume < 0;
 }

@@ -37,7 +37,7 @@ uint32_t corner_after(const SolidPiece& piece, uint32_t begin, uint32_t end, uin
 /// One half of a cut, under construction.
 class HalfBuilder {
  public:
-  /// `points`: of the whole piece and of the crossings, to which the corners refer.
+  /// `points`: the points of the whole piece and the crossings; corners are indices of these points.
   explicit HalfBuilder(const std::vector<Vec3>& points) : points_(points) {}
 
   void add_polygon(const std::vector<uint32_t>& polygon) {
@@ -180,8 +180,9 @@ class PieceCutter {
     return sum;
   }
 
-  /// The part of a cap on one side. Along the line where the planes meet, its outline is closed where the cap
-  /// is: a sweep along the line counts how often the outline encloses each interval.
+  /// Returns the part of a cap on one side of the cut plane. Its outline must be closed along the line where
+  /// both planes meet. A sweep along the line counts how often the outline encloses each interval, and adds
+  /// sides where the cap is.
   SolidPiece::Cap clipped(const SolidPiece::Cap& cap, Real sign) const {
     SolidPiece::Cap part{cap.plane, {}};
     std::map<uint32_t, int> ends;  // number of sides that end at a point on the line, less those that begin
@@ -259,8 +260,8 @@ void add_cap_above(const SolidPiece& piece, const SolidPiece::Cap& cap, const Cu
                    const std::vector<Real>& height, const Vec3& apex, PyramidSum& sum) {
   if (cap.sides.empty()) return;
   const Vec3 across = plane.normal - plane.normal.dot(cap.plane.normal) * cap.plane.normal;
-  // A point where the planes meet, so that closing sides along that line add nothing. Parallel planes do not
-  // meet, and the cap is on one side.
+  // The apex is on the line where the planes meet, so that the closing sides along this line contribute
+  // nothing. Parallel planes do not meet; the cap is then on one side.
   const uint32_t any = cap.sides.front()[0];
   Vec3 corner = piece.points[any] - apex;
   if (const Real square = across.squaredNorm(); square > 1e-20) corner -= height[any] / square * across;

@@ -10,11 +10,11 @@
 namespace offstage::sim {
 namespace {
 
-/// Points on the surface for each centre, and iterations.
+/// Number of points on the surface for each centre, and number of iterations.
 constexpr std::size_t kSamplesEach = 40;
 constexpr int kLloyd = 40;
 
-/// Points spread over the polygons in proportion to their areas.
+/// Returns points that are spread over the polygons in proportion to their areas.
 std::vector<Vec3> surface_samples(const SolidPiece& solid, std::size_t count) {
   struct Corner3 {
     Vec3 a, b, c;
@@ -48,7 +48,7 @@ std::vector<Vec3> surface_samples(const SolidPiece& solid, std::size_t count) {
   return samples;
 }
 
-/// Points that are each farthest from those before.
+/// Returns points of which each is farthest from the points before it.
 std::vector<Vec3> far_points(const std::vector<Vec3>& samples, std::size_t count) {
   std::vector<Vec3> chosen = {samples.front()};
   std::vector<Real> distance(samples.size(), kInfinity);
@@ -73,8 +73,8 @@ std::size_t nearest(const std::vector<Vec3>& centres, const Vec3& p) {
   return best;
 }
 
-/// The cell of one centre: bisectors with the other centres, nearest first, cut off all points that are
-/// nearer to those.
+/// Returns the cell of one centre. The bisecting planes with the other centres, in ascending order of
+/// distance, cut off all points that are nearer to another centre.
 SolidPiece cell_of(const SolidPiece& solid, const std::vector<Vec3>& centres, std::size_t k, Real tolerance) {
   const Vec3& centre = centres[k];
   std::vector<std::pair<Real, std::size_t>> others;

@@ -9,8 +9,8 @@ namespace offstage::sim {
 namespace {
 
 constexpr std::size_t kCollisionChunk = 1024;
-/// Thickness of the layers in greatest radii. Partners in contact are in neighbouring layers unless they are
-/// fast.
+/// Thickness of the layers as a multiple of the greatest radius. Particles in contact are in neighbouring
+/// layers unless they are fast.
 constexpr Real kLayer = 3;
 /// Increase of the search distance of partners, as a multiple of the change of the paths. The middle and half
 /// the length of each path change by at most half of it, and by as much again if a particle was created
@@ -73,7 +73,7 @@ CollidingParticle ParticleCollisions::make_particles(const ParticleSystem& syste
   g.velocity = p.velocity[i];
   g.acceleration = duration > 0 ? Vec3((g.velocity - flight.velocity) / duration) : Vec3::Zero();
   g.path_velocity = duration > 0 ? Vec3(displacement / duration) : g.velocity;
-  // A difference by rounding does not count.
+  // Rounding errors do not count as a difference.
   if ((displacement - duration * g.velocity).norm() <= 1e-14 * (1 + p.position[i].norm()))
     g.path_velocity = g.velocity;
   g.from = h - duration;

@@ -12,11 +12,11 @@ namespace offstage::sim {
 namespace {
 
 constexpr std::size_t kContactChunk = ParticleSearch::kChunk;
-/// Cosine: contacts whose normals differ by less belong to one surface.
+/// Contacts belong to the same surface if the cosine of the angle between their normals is greater than this.
 constexpr Real kSameSurface = 0.95;
 
-/// Calls f(distance, normal) for the points of a solid's surface within `reach` of p (in its own frame): the
-/// nearest point or, for a mesh, that of each triangle.
+/// Calls f(distance, normal) for points of a solid's surface within `reach` [m] of p, in the solid's frame.
+/// For a mesh these are the nearest points of all triangles; for other solids it is the nearest point only.
 template <class F>
 void for_each_surface(const Solid& solid, const Vec3& p, Real reach, F&& f) {
   if (!solid.mesh) {
@@ -35,7 +35,8 @@ void for_each_surface(const Solid& solid, const Vec3& p, Real reach, F&& f) {
   });
 }
 
-/// The part of an impulse that a contact can transmit with its current normal.
+/// Returns the part of an impulse that a contact can transmit with its current normal: no tension, and
+/// friction within its limit.
 Vec3 admissible(const Vec3& impulse, const Vec3& normal, Real friction) {
   const Real pressing = impulse.dot(normal);
   if (!(pressing > 0)) return Vec3::Zero();
@@ -150,8 +151,8 @@ void ParticleContacts::find_surfaces(uint32_t i, NearObstacles& near, Found& fou
   }
 }
 
-/// Adds the contact of particle i with a surface that it meets, or that is at the distance `gap` at the end.
-/// Each surface is added once; those from `first` on were found for this particle.
+/// Adds the contact of particle i with a surface that it hits, or whose distance is `gap` [m] at the end.
+/// Each surface is added only once. `first`: index of the first contact that was found for this particle.
 void ParticleContacts::add_surface(uint32_t i, const Obstacle& o, const Vec3& normal, Real gap, Real time,
                                    bool meets, std::size_t first, Found& found) const {
   for (std::size_t k = first; k < found.surfaces.size(); ++k)

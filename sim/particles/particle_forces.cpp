@@ -5,7 +5,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Number of particles in a block, so that intermediate data stay in the first-level cache.
+/// Number of particles in a block. It is small, so that intermediate data stay in the first-level cache.
 constexpr std::size_t kBlock = 64;
 
 /// Particles at a stage of an integration, with their accelerations.
@@ -104,7 +104,8 @@ void add(const Other&, const Run&) {
                 "every other kind must be handled here");
 }
 
-/// Rate at which the force on a particle decreases with its position and its velocity [N/m, N s/m].
+/// Stiffness and damping of a force on a particle: its negative derivatives with respect to position [N/m]
+/// and velocity [N s/m].
 struct Stiffness {
   Real by_position = 0, by_velocity = 0;
 };
@@ -144,7 +145,8 @@ void ParticleForces::leapfrog_step(Real h, std::span<Vec3> x, std::span<Vec3> v,
 
 bool FreeFlight::force_and_damping(Real t, std::span<const Real> x, std::span<const Real> p,
                                    std::span<Real> dp, std::span<Real> damping) const {
-  // One rate for each particle is copied to its three coordinates, from the last one on.
+  // The rate of each particle is copied to its three coordinates. The loop starts with the last particle,
+  // because the copies are made in place.
   const std::size_t count = mass_.size();
   forces_.accelerate(t, x, p, mass_, dp, damping.first(count));
   for (std::size_t i = count; i-- > 0;)

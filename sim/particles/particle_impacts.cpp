@@ -10,14 +10,14 @@ namespace {
 
 constexpr std::size_t kImpactChunk = 512;
 constexpr uint32_t kMaxImpactsOfParticle = 1000;
-/// Greatest number of collisions in a sub-step that are resolved one after the other.
+/// Greatest number of collisions in a sub-step that are resolved in sequence.
 constexpr std::size_t kMaxImpacts = 5000;
 /// A particle with this many neighbours at small gaps is in a crowd.
 constexpr uint32_t kCrowd = 4;
 constexpr Real kNeighbourGap = 0.1;
 /// Particles touch if their gap is below this fraction of the distance of their centres.
 constexpr Real kTouching = 1e-6;
-/// A larger cluster is left to resting contact.
+/// Collisions of larger clusters are left to the solver of resting contacts.
 constexpr std::size_t kMaxCluster = 16;
 /// Number of changed particles that are searched one by one before they are sorted.
 constexpr std::size_t kMaxUnsorted = 128;
@@ -66,7 +66,7 @@ void ParticleImpacts::count_neighbours() {
       });
 }
 
-/// Whether a collision is left to resting contact: it is in a crowd, and slow enough.
+/// Whether a collision is left to the solver of resting contacts, because it is in a crowd and slow enough.
 bool ParticleImpacts::is_left_to_resting_contact(uint32_t i, uint32_t j, Real speed) const {
   return std::max(neighbours_[i], neighbours_[j]) >= kCrowd &&
          speed * step_->h < particles_[i].radius + particles_[j].radius;
@@ -118,7 +118,8 @@ void ParticleImpacts::find_obstacle(uint32_t i, NearObstacles& near, Add&& add) 
   add(Impact{time, i, kNone, stamp_[i], 0, hit.normal, hit.obstacle});
 }
 
-/// Calls f for the particles, unchanged or changed, that may come near a particle's path.
+/// Calls f for each particle that may come near the path of a particle, whether or not its own path has
+/// changed.
 template <class F>
 void ParticleImpacts::for_each_near(const CollidingParticle& particle, F&& f) const {
   search_->for_each_near(particle, [&](uint32_t k) {
@@ -175,7 +176,8 @@ void ParticleImpacts::collide_particles(const Impact& impact) {
   find_again(impact.b);
 }
 
-/// The two particles and all particles that touch them, directly or through others, at that time.
+/// Returns the two particles of an impact and all particles that touch them at that time, directly or through
+/// other particles.
 std::vector<uint32_t> ParticleImpacts::cluster(const Impact& impact) const {
   std::vector<uint32_t> members = {impact.a, impact.b};
   for (std::size_t m = 0; m < members.size(); ++m) {

@@ -10,9 +10,9 @@
 
 namespace offstage::sim {
 
-/// Particles that touch each other form a cluster with their contacts. Bodies do not connect clusters,
-/// because their velocities are given in this stage. Clusters of more than `most` contacts are counted as
-/// fall-backs.
+/// Returns the clusters: groups of particles that touch each other, with their contacts. Bodies do not
+/// connect clusters, because the velocities of bodies are given in this stage. Clusters of more than `most`
+/// contacts are counted as fall-backs and not returned.
 std::vector<ParticleContacts::Cluster> ParticleContacts::find_clusters(uint32_t most) {
   DisjointSets sets(particles_.size());
   for (const Pair& c : pairs_) sets.join(c.a, c.b);
@@ -40,7 +40,7 @@ std::vector<ParticleContacts::Cluster> ParticleContacts::find_clusters(uint32_t 
   return clusters;
 }
 
-/// Solves the contacts of one cluster; returns false and changes nothing if pivoting fails.
+/// Solves the contacts of one cluster. Returns false and changes nothing if the pivoting method fails.
 bool ParticleContacts::solve_cluster(const Cluster& cluster, ContactWork& work) {
   std::vector<uint32_t> members;
   for (const uint32_t k : cluster.pairs) members.insert(members.end(), {pairs_[k].a, pairs_[k].b});

@@ -13,8 +13,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Sweeps of Gauss-Seidel end when one changes no velocity by more than this [m/s], or after a limit of work.
-/// Few contacts are solved exactly; many contacts converge over several sub-steps.
+/// The Gauss-Seidel sweeps end when a sweep changes no velocity by more than this [m/s], or when a limit of
+/// work is reached. Few contacts are solved exactly; many contacts converge over several sub-steps.
 constexpr Real kTolerance = 1e-7;
 constexpr std::size_t kMaxContactVisits = 1'000'000;
 constexpr std::size_t kMinSweeps = 30, kMaxSweeps = 1000;
@@ -27,7 +27,7 @@ constexpr int kMaxSlides = 4;
 constexpr uint32_t kStreams = 4;
 constexpr std::size_t kRelaxationChunk = ParticleSearch::kChunk;
 
-/// The load of resting particles on a body in a sub-step.
+/// The total impulse of resting particles on a body in a sub-step.
 struct Load {
   const Obstacle* obstacle;
   Vec3 impulse = Vec3::Zero(), angular_impulse = Vec3::Zero();
@@ -42,9 +42,9 @@ struct Heap {
   Real mass = 0;     ///< [kg]
 };
 
-/// Limits the load on a body. A load against the body's motion can at most stop it. Beyond that, the body
-/// gets no more momentum than the particles that load it have brought relative to it, and no more angular
-/// momentum than this at the greatest lever arm.
+/// Limits the impulses of resting particles on each body. An impulse against the body's motion can at most
+/// stop the body. Any further momentum is limited to the momentum of these particles relative to the body.
+/// The angular momentum is limited to this momentum times the greatest lever arm.
 void limit_loads(std::span<Reaction> reactions, std::map<uint32_t, Load>& loads) {
   for (const Reaction& r : reactions)
     if (const auto load = loads.find(r.body); load != loads.end()) {
@@ -81,12 +81,12 @@ Lanes lanes_of(const Eigen::Vector3f& v) {
 Lanes fourth(Lanes v) {
   return __builtin_shufflevector(v, v, 3, 3, 3, 3);
 }
-/// x y z 0.
+/// Returns (x, y, z, 0).
 Lanes without_fourth(Lanes v) {
   return __builtin_shufflevector(v, Lanes{}, 0, 1, 2, 4);
 }
 
-/// The part of a tangential impulse that friction with this limit can transmit.
+/// Returns a tangential impulse, shortened to the limit of friction.
 template <class Contact>
 [[gnu::always_inline]] inline Lanes held_lanes(const Contact& c, Lanes along, Real limit) {
   if constexpr (requires { c.friction_axis; }) {
@@ -96,8 +96,8 @@ template <class Contact>
   return size2 > limit * limit ? limit / std::sqrt(size2) * along : along;
 }
 
-/// Change of the impulse that brings a contact with the relative velocity u to its target, within Coulomb's
-/// cone.
+/// Returns the change of a contact's impulse that changes its relative velocity from u to the target. The
+/// total impulse stays within Coulomb's cone.
 template <class Contact>
 [[gnu::always_inline]] inline Lanes correct(Contact& c, Lanes normal, Lanes u) {
   const Lanes before = lanes_of(c.impulse_single);
@@ -173,7 +173,7 @@ void ParticleContacts::start_motion() {
   return turns_.empty() ? u : u + lane_cross(normal, turns_[c.particle].surface_spin);
 }
 
-// The fourth lane of normals and impulses is 0, so that masses remain.
+// The fourth lane of normals and impulses is 0, so the mass in the fourth lane of a particle does not change.
 [[gnu::always_inline]] inline void ParticleContacts::apply(const Pair& c, Lanes normal, Lanes impulse) {
   Lanes &a = motion_[c.a].velocity, &b = motion_[c.b].velocity;
   a += fourth(a) * impulse;
@@ -359,7 +359,7 @@ void ParticleContacts::keep_outside(uint32_t i, NearObstacles& near, Vec3& end, 
   }
 }
 
-/// Records the collisions of a particle's contacts; those of pairs are recorded for both particles.
+/// Records the collisions at the contacts of a particle. A collision of two particles is recorded for both.
 void ParticleContacts::report(uint32_t i, Found& found) const {
   const auto strike = [&](const auto& c, uint32_t particle, const Vec3& normal) {
     if (c.is_impact && c.acts())

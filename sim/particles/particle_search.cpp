@@ -57,8 +57,8 @@ void ParticleSearch::build(std::span<const CollidingParticle> particles, std::sp
   for (SizeClass& c : classes_) c.grid.build(c.centres, 2 * c.radius * (1 + 1e-9));
 }
 
-/// Makes the lists of partners. `for_each_partner` is called with the size class of a particle, its place
-/// there, and a function that takes the index of each partner.
+/// Makes the lists of partners. for_each_partner(size class, place in the class, f) must call f with the
+/// index of each partner of the particle at this place.
 template <class ForEachPartner>
 void ParticleSearch::list(std::span<const CollidingParticle> particles, ForEachPartner&& for_each_partner) {
   struct Range {

@@ -17,10 +17,10 @@ constexpr Real kSkin = 1e-10;
 constexpr int kMaxHits = 8;
 /// Greatest number of projections out of bodies; each removes one layer of overlapping bodies.
 constexpr int kMaxEjections = 4;
-/// Overlap, relative to the radius, up to which the straight pieces of paths around turning bodies can be the
-/// cause.
+/// Overlaps up to this fraction of the particle's radius can be caused by dividing paths around turning
+/// bodies into straight pieces.
 constexpr Real kDriftDepth = Obstacle::kChordError;
-/// Passes over simultaneous contacts; two at right angles need one.
+/// Number of passes over simultaneous contacts. Two contacts at right angles need only one.
 constexpr int kContactPasses = 8;
 
 /// Whether a sphere, in the solid's frame, certainly does not touch the solid.
@@ -117,20 +117,22 @@ ObstacleHit NearObstacles::hit(const Obstacle& o, const Vec3& a, const Vec3& b, 
   return {};
 }
 
-/// Whether the particle already hit this obstacle in this sub-step. The obstacle then moves away, but only in
-/// the next one.
+/// Whether the particle already hit this obstacle in this sub-step. The obstacle reacts to the impulse, but
+/// only from the next sub-step on.
 bool ParticleSweep::was_struck(const Obstacle& o) const {
   return std::any_of(contacts_.begin(), contacts_.begin() + static_cast<std::ptrdiff_t>(contact_count_),
                      [&](const Contact& c) { return c.gives_way && c.obstacle == &o; });
 }
 
-/// Velocity after free flight: to second order in the drag, exact for constant forces.
+/// Returns the velocity after free flight. It is exact for constant forces, and accurate to second order in
+/// the drag.
 Vec3 ParticleSweep::fly(const Vec3& v, Real mass, Real duration, const Vec3& extra) const {
   return v + DampedKick(duration, forces_.drag / mass).end * (forces_.acceleration(v, mass) + extra);
 }
 
-/// Moves the particle to the hit, applies the impulse (P5), and integrates the rest of its path. Returns
-/// false if it strikes a body, because other particles may strike it earlier.
+/// Moves the particle to the hit, applies the impulse (P5), and integrates the rest of its path. If the
+/// particle hits a dynamic body for whose impulses the caller is not prepared, returns false and moves
+/// nothing, because other particles may hit this body earlier.
 bool ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real from, const Vec3& extra,
                             SweepOutcome& outcome) {
   const Obstacle& o = *hit.obstacle;
@@ -196,9 +198,9 @@ void ParticleSweep::add_contact(const Contact& contact) {
   contacts_[contact_count_++] = contact;
 }
 
-/// Moves the particle over the remaining time. Where forces would press it into a surface on which it rests,
-/// an impulse without restitution compensates them. Over the time this is the normal force and Coulomb
-/// friction.
+/// Moves the particle for the remaining time. Forces that would press it into a surface on which it rests are
+/// compensated by an impulse without restitution. Divided by the time, this impulse is the normal force and
+/// Coulomb friction.
 void ParticleSweep::finish(ParticlePath& path, Real duration, const Vec3& extra) {
   Vec3 v = fly(path.start_velocity, path.mass, duration, extra);
   const Vec3 predicted = path.start + duration * path.start_velocity;

@@ -12,7 +12,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Particles per task; the state of a chunk stays in the second-level cache between integration and sweep.
+/// Number of particles per task. The state of such a chunk stays in the second-level cache between
+/// integration and sweep.
 constexpr std::size_t kChunk = 1024;
 /// Steps per second for particles created before the sub-step, and greatest number of these steps.
 constexpr Real kStepsBefore = 120, kMostStepsBefore = 10000;
@@ -23,7 +24,7 @@ std::size_t chunk_count(std::size_t n) {
   return (n + kChunk - 1) / kChunk;
 }
 
-/// Range of elements of an array.
+/// Returns a part of an array as a span.
 template <class T>
 std::span<T> part(std::vector<T>& v, std::size_t begin, std::size_t end) {
   return std::span(v).subspan(begin, end - begin);
@@ -92,7 +93,8 @@ void ParticleSystem::fly(const ParticleForces& forces, Real t, Real h, std::size
   t = std::max(t, 0.0);
   if (def.integrator == IntegratorKind::leapfrog && forces.fields.empty())
     return forces.leapfrog_step(h, x, v, mass);
-  // Otherwise the previous particle, and thus the threads, would affect the result.
+  // Otherwise the result would depend on the previous particle of the thread, and thus on the number of
+  // threads.
   scratch.integrator.next_step = 0;
   integrator(def.integrator).step(FreeFlight(forces, mass), t, h, flat(x), flat(v), scratch.integrator);
 }
@@ -176,7 +178,7 @@ SweepOutcome ParticleSystem::sweep(const ParticleStage& stage, const ParticleFor
   return outcome;
 }
 
-/// Ends a particle's sub-step; `spent` means that it was removed by a collision.
+/// Ends the sub-step of a particle. `spent`: whether a collision removed it.
 void ParticleSystem::end(const ParticleStage& stage, std::size_t i, bool spent, bool trapped,
                          ParticleTally& tally) {
   tally.removed += trapped;
@@ -261,8 +263,8 @@ ParticleTally ParticleSystem::step(const ParticleStage& stage, const ParticleFor
   return sum_up(tallies);
 }
 
-/// Particles that strike dynamic bodies are processed one after the other, in the order of time: each meets a
-/// body with the velocity after the previous ones.
+/// Processes the particles that hit dynamic bodies in sequence, in the order of time. Each particle hits a
+/// body whose velocity includes the previous impulses.
 void ParticleSystem::strike_bodies(const ParticleStage& stage, const ParticleForces& forces,
                                    std::vector<Striker> strikers, ParticleTally& tally) {
   std::sort(strikers.begin(), strikers.end(), [](const Striker& a, const Striker& b) {

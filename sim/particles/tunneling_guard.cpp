@@ -16,13 +16,14 @@ namespace {
 
 /// Two particles whose paths are shorter than this fraction of their radii cannot pass each other.
 constexpr Real kShort = 0.5;
-/// Distance at which particles stop, as a fraction of their initial distance or of that at which they touch:
-/// smaller than contact allows.
+/// Particles stop at this fraction of their initial distance or of the distance at which they touch. It is
+/// smaller than the distances that the contact solver allows.
 constexpr Real kNearest = 0.992;
 
 }  // namespace
 
-/// Sets the paths to the ends; returns whether any is long, in the frame that moves with the mean.
+/// Sets the paths to the new ends. Returns whether any path is long, relative to the mean motion of all
+/// particles.
 bool ParticleContacts::predict_paths(std::span<const Vec3> end) {
   const std::size_t n = particles_.size();
   const Real h = step_->h;
@@ -41,7 +42,8 @@ bool ParticleContacts::predict_paths(std::span<const Vec3> end) {
   return std::find(is_long_.begin(), is_long_.end(), 1) != is_long_.end();
 }
 
-/// Finds when two particles come too near each other after a time, given where they stop as far as known.
+/// Finds the time after which two particles come too near each other. Stops that are already known are taken
+/// into account.
 template <class Add>
 void ParticleContacts::find_passing(uint32_t i, uint32_t j, Real after, Add&& add) const {
   const CollidingParticle &a = paths_[i], &b = paths_[j];

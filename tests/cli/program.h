@@ -13,17 +13,18 @@ struct Outcome {
   std::string out, err;
 };
 
-/// Runs `build/offstage ARGS` in `folder`; `before` is shell text put in front ("ulimit -f 1;", "VAR=value").
+/// Runs `build/offstage ARGS` in `folder`; `before` is shell text in front of the command, such as "ulimit -f
+/// 1;" or "VAR=value".
 Outcome offstage(const std::string& args, const std::filesystem::path& folder,
                  const std::string& before = {});
 
 std::string read_file(const std::filesystem::path& path);
 void write_file(const std::filesystem::path& path, const std::string& text);
 
-/// All regular files below a folder, including hidden ones: contents by relative name.
+/// Returns the contents of all regular files below a folder, by relative path. Hidden files are included.
 std::map<std::string, std::string> contents(const std::filesystem::path& folder);
 
-/// A new empty folder that is removed with the object.
+/// A new empty folder. The destructor removes it with its contents.
 class TemporaryFolder {
  public:
   TemporaryFolder();

@@ -1,5 +1,5 @@
 #pragma once
-/// Particles that emitters added to a world, reconstructed from the particles at its end.
+/// Reconstructs when and where emitters created particles, from the particles at the end of a simulation.
 
 #include <vector>
 
@@ -7,7 +7,7 @@
 
 namespace offstage::effects {
 
-/// A particle at its own birth, assuming that nothing has acted on it since.
+/// The state of a particle at its creation, computed on the assumption that no force acted on it afterwards.
 struct Birth {
   Real time;
   Vec3 position, velocity;
@@ -23,7 +23,7 @@ inline std::vector<Birth> births_of(const sim::World& world, sim::ParticleSystem
   return births;
 }
 
-/// A world without forces.
+/// Returns a world without gravity and other forces.
 inline sim::World empty_world(Real max_step = 1.0 / 240) {
   return sim::World({.gravity = Vec3::Zero(),
                      .max_step = max_step,

@@ -19,15 +19,15 @@ class Background {
 
   pid_t pid() const { return pid_; }
   void send(int signal) const;
-  /// Waits for the program and returns its exit code or 128 + signal; after `seconds` it is killed and the
-  /// result is -1.
+  /// Waits for the program. Returns its exit code, or 128 + the number of the signal that ended it. After
+  /// `seconds`, kills the program and returns -1.
   int end(double seconds = 60);
 
  private:
   pid_t pid_;
 };
 
-/// Waits until `file` exists; false after a minute.
+/// Waits until `file` exists and returns true; returns false after one minute.
 bool appears(const std::filesystem::path& file);
 
 }  // namespace offstage::test

@@ -6,7 +6,8 @@
 
 namespace offstage::test {
 
-/// `usual`, multiplied by OFFSTAGE_FAULTS_FACTOR, which the tests with the label "long" set.
+/// Returns `usual` times the environment variable OFFSTAGE_FAULTS_FACTOR, or `usual` if the variable is not
+/// set. Tests with the label "long" set it.
 inline int tries_of(int usual) {
   const char* factor = std::getenv("OFFSTAGE_FAULTS_FACTOR");
   return usual * (factor ? std::max(1, std::atoi(factor)) : 1);

@@ -1,6 +1,6 @@
 #pragma once
-/// Random scenes, and invariants that must hold in each of them. A scene is a function of its seed, so a seed
-/// suffices to reproduce a failure: see random_scenes_test.cpp.
+/// Random scenes, and invariants that must hold in each of them. A scene depends only on its seed, so the
+/// seed is sufficient to reproduce a failure; see random_scenes_test.cpp.
 
 #include <cstdint>
 #include <optional>
@@ -11,12 +11,13 @@
 
 namespace offstage::sim {
 
-/// The definition of a world; bodies and meshes are referred to by their index in the lists.
+/// The definition of a world. Joints and springs refer to bodies, and bodies to meshes, by their index in the
+/// lists.
 struct RandomScene {
   struct Body {
     BodyDef def;
     std::optional<std::size_t> mesh;  ///< used instead of the shape
-    Real reach = 0;                   ///< radius of a ball around the body's centre that contains it [m]
+    Real reach = 0;  ///< radius of a ball around the body's centre that contains the body [m]
   };
   struct Joint {
     JointDef def;
@@ -49,7 +50,7 @@ enum class Parts { bodies, all };
 
 RandomScene random_scene(uint64_t seed, Parts parts);
 
-/// A listing of the scene, one object a line, in the words of the scene format.
+/// Returns a description of the scene, one object per line, in the terms of the scene format.
 std::string text(const RandomScene& scene);
 
 World make_world(const RandomScene& scene);
@@ -58,10 +59,10 @@ World make_world(const RandomScene& scene);
 struct Findings {
   bool finite = true;
   std::vector<std::string> lost;  ///< bodies that left the world or the room
-  Real energy_gain = 0;           ///< greatest rise above the lowest energy so far [J]
+  Real energy_gain = 0;           ///< greatest increase of the energy over its minimum so far [J]
   Real energy_scale = 1;          ///< scale of the scene's energies [J]
-  Real gained_at = 0;             ///< time of the greatest rise [s]
-  Real penetration = 0;           ///< penetration at the time when it exceeded the allowed one most [m]
+  Real gained_at = 0;             ///< time of the greatest increase [s]
+  Real penetration = 0;           ///< penetration at the time of its greatest excess over the allowed one [m]
   Real allowed_penetration = 0;   ///< allowed penetration at that time, see Overlap in random_scene.cpp [m]
   Real momentum_error = 0, angular_momentum_error = 0;  ///< relative to the greatest sum of the magnitudes of
                                                         ///< their parts
@@ -73,7 +74,7 @@ struct Findings {
 /// Runs a scene to its end.
 Findings simulate(const RandomScene& scene);
 
-/// Describes the violated invariants; empty if there are none.
+/// Returns a description of the violated invariants; empty if there are none.
 std::string faults(const RandomScene& scene, const Findings& findings);
 
 }  // namespace offstage::sim

@@ -3,7 +3,8 @@
 
 namespace offstage::producer {
 
-/// Its model file is LICENSE in the source folder, because the format only checks that the file exists.
+/// The scene. Its model file is LICENSE in the source folder; the tests of the format only check that the
+/// file exists.
 inline constexpr const char* kSampleScene = R"({
   "$schema": "scene.schema.json",
   "version": 1,

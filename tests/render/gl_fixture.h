@@ -1,6 +1,6 @@
 #pragma once
-/// Shared by the tests that draw: one context for all of them on the main thread, and access to the pixels of
-/// small pictures.
+/// Shared by the tests that draw: one OpenGL context on the main thread for all tests, and access to the
+/// pixels of small pictures.
 
 #include <gtest/gtest.h>
 
@@ -40,7 +40,7 @@ inline Vector4f center_pixel(const HdrImage& image) {
   return pixel(image, image.width_px / 2, image.height_px / 2);
 }
 
-/// The pixel at which a camera shows a point of the world [px].
+/// Returns the position in the picture at which a camera shows a point of the world [px].
 inline Vector2f project(const Camera& camera, const Vector3f& point, int width_px, int height_px) {
   const Vector3f forward = (camera.target - camera.eye).normalized();
   const Vector3f right = forward.cross(camera.up).normalized(), up = right.cross(forward);

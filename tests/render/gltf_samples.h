@@ -48,7 +48,7 @@ constexpr int gltf_type() {
   return kUint32;
 }
 
-/// `document` may be changed freely before text() is called.
+/// A glTF file in preparation. Tests may change `document` in any way before they call text().
 class GltfSample {
  public:
   GltfSample() {
@@ -71,7 +71,7 @@ class GltfSample {
     document["extensionsUsed"].push_back(name);
     return material()["extensions"][name] = Json::object();
   }
-  /// Its colour is shown as it is.
+  /// Makes the material unlit, so that its colour is shown unchanged.
   void make_unlit() { extension("KHR_materials_unlit"); }
 
   template <class T>
@@ -105,7 +105,7 @@ class GltfSample {
            bool normalized = false) {
     primitive()["attributes"][attribute] = accessor(values, type, normalized);
   }
-  /// A texture from an encoded image; `extra` are further members of the texture.
+  /// Adds a texture with an encoded PNG image and returns its index.
   int texture(const std::vector<uint8_t>& encoded, const Json& sampler = Json::object()) {
     document["images"].push_back({{"uri", "data:image/png;base64," + base64_of(encoded)}});
     document["samplers"].push_back(sampler);

@@ -1,5 +1,5 @@
 #pragma once
-/// A model file drawn alone, whose pixels follow from its format.
+/// Draws a model file alone, to compare its pixels with what the file format requires.
 
 #include <algorithm>
 #include <cmath>
@@ -18,8 +18,9 @@ namespace offstage::render {
 inline const Vector3f kPureBlack(0, 0, 0), kPureRed(1, 0, 0), kPureGreen(0, 1, 0), kPureBlue(0, 0, 1),
     kPureWhite(1, 1, 1);
 
-/// For tests/render/model_sheet.sh: writes a picture into the folder OFFSTAGE_MODEL_SHEET, named by the test
-/// that draws it, if that variable is set. A picture like the one before is left out.
+/// Writes a picture for tests/render/model_sheet.sh into the folder of the environment variable
+/// OFFSTAGE_MODEL_SHEET; does nothing if the variable is not set. The file has the name of the current test.
+/// A picture that is equal to the last one is not written.
 inline void put_on_sheet(const HdrImage& light) {
   const char* folder = std::getenv("OFFSTAGE_MODEL_SHEET");
   if (folder == nullptr) return;
@@ -37,7 +38,7 @@ inline void put_on_sheet(const HdrImage& light) {
   write_png(std::filesystem::path(folder) / name, image);
 }
 
-/// A model, seen from z = 5, without any light unless it is set.
+/// A picture of a model, seen from z = 5 m. There is no light unless a test adds some.
 class ModelPicture {
  public:
   explicit ModelPicture(const std::filesystem::path& file) : model_(read_model(file)) {
@@ -55,7 +56,7 @@ class ModelPicture {
     small_.stage.set_sun(
         {.direction = direction.normalized(), .color = {1, 1, 1}, .intensity = intensity, .shadows = false});
   }
-  /// A sky and ground of one colour all around.
+  /// Sets a sky and a ground of the same colour.
   void set_sky(const Vector3f& color) {
     small_.stage.set_environment({.zenith = color, .horizon = color, .ground = color, .visible = false});
   }
@@ -65,7 +66,7 @@ class ModelPicture {
   }
   Stage& stage() { return small_.stage; }
   const Model& model() const { return model_; }
-  /// Colour and alpha at a point of the square.
+  /// Draws the model and returns the colour and alpha at the point (x, y) of the plane z = 0 [m].
   Vector4f at(float x, float y) { return at(draw(), x, y); }
   Vector4f at(const HdrImage& image, float x, float y) const {
     const Vector2f place = project(camera_, {x, y, 0}, 96, 64);
@@ -94,7 +95,7 @@ inline void expect_color(const Vector3f& color, const Vector3f& expected, float 
       << color.transpose() << " for " << expected.transpose();
 }
 
-/// A PNG of a row or column of colours, RGB in {0, 255}.
+/// Returns a PNG file with these pixels, row by row from the top. `colors`: RGBA, 0 to 1.
 inline std::vector<uint8_t> encoded_texels(int width, int height, const std::vector<Vector4f>& colors) {
   Image image{width, height, {}};
   for (const Vector4f& c : colors)

@@ -18,7 +18,7 @@
 
 namespace offstage::render {
 
-/// A new empty folder that is removed with the object.
+/// A new empty folder. The destructor removes it with its contents.
 class ScratchFolder {
  public:
   ScratchFolder() {
@@ -53,8 +53,8 @@ inline std::string file_content(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-/// Runs `body` in a forked child for at most `limit_s` seconds and returns the status of waitpid; the exit
-/// code is 0 if `body` returns true.
+/// Runs `body` in a forked child for at most `limit_s` seconds. Returns the status from waitpid(). The
+/// child's exit code is 0 if `body` returns true.
 inline int status_of_child(const std::function<bool()>& body, unsigned limit_s = 60) {
   const pid_t child = ::fork();
   if (child == 0) {
@@ -71,7 +71,7 @@ inline int status_of_child(const std::function<bool()>& body, unsigned limit_s =
   return status;
 }
 
-/// The standard output of a shell command.
+/// Runs a shell command and returns its standard output.
 inline std::string output_of(const std::string& command) {
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(::popen(command.c_str(), "r"), ::pclose);
   std::string text;
@@ -81,7 +81,8 @@ inline std::string output_of(const std::string& command) {
   return text;
 }
 
-/// The message of the exception of type E that `body` throws; empty if it throws none.
+/// Calls `body` and returns the message of the exception of type E that it throws; empty if there is no
+/// exception.
 template <class E>
 std::string message_of(const std::function<void()>& body) {
   try {

@@ -1,6 +1,6 @@
 #pragma once
-/// Shared by the tests of bodies in contact: each test runs with both solvers and with the book's, and bodies
-/// do not sleep unless the test is about sleep.
+/// Shared by the tests of bodies in contact. Each test runs with the exact and the fast solver and with the
+/// book's solver (`lcp`). Bodies do not sleep unless the test is about sleep.
 
 #include <algorithm>
 #include <string>
@@ -27,7 +27,7 @@ inline std::string solver_name(const testing::TestParamInfo<SolverKind>& info) {
 
 class BothSolvers : public testing::TestWithParam<SolverKind> {
  protected:
-  /// Whether the solver works to rounding.
+  /// Whether the solver's results are exact up to rounding.
   static bool is_exact() { return GetParam() == SolverKind::exact || is_lcp(); }
   static bool is_lcp() { return GetParam() == SolverKind::lcp; }
   /// The definition of a world with the solver under test.
@@ -39,20 +39,20 @@ class BothSolvers : public testing::TestWithParam<SolverKind> {
   }
 };
 
-/// Instances of a suite for both solvers, and for the book's (`lcp`) in place of the exact one; `kind` is
-/// Solvers, or Long for tests that take minutes.
+/// Instantiates a suite for the exact, the fast and the book's solver (`lcp`). `kind` is Solvers, or Long for
+/// tests that take minutes.
 #define OFFSTAGE_BOTH_SOLVERS(kind, suite) \
   INSTANTIATE_TEST_SUITE_P(                \
       kind, suite, testing::Values(SolverKind::exact, SolverKind::fast, SolverKind::lcp), solver_name)
 
-/// Instances of a suite for all solvers, including `auto`.
+/// Instantiates a suite for all solvers, including `auto`.
 #define OFFSTAGE_ALL_SOLVERS(kind, suite)                                                           \
   INSTANTIATE_TEST_SUITE_P(                                                                         \
       kind, suite,                                                                                  \
       testing::Values(SolverKind::exact, SolverKind::fast, SolverKind::automatic, SolverKind::lcp), \
       solver_name)
 
-/// Accumulated reports of many steps: counts are added, other figures are the greatest values.
+/// Combined reports of many steps: counts are added; of other values the greatest one is kept.
 struct Tally {
   Real penetration = 0;
   uint64_t collisions = 0, tracebacks = 0, toi_limit_reached = 0, exact_fallbacks = 0, fast_fallbacks = 0,
@@ -74,7 +74,7 @@ struct Tally {
   }
 };
 
-/// Steps the world for `seconds`.
+/// Steps the world for `seconds` and returns the combined reports.
 inline Tally run(World& world, Real seconds, Real sampling = 1.0 / 240) {
   Tally all;
   const Real end = world.time() + seconds - sampling / 2;
@@ -87,7 +87,7 @@ inline Pose incline(Real angle) {
   return {Vec3::Zero(), Quat(Eigen::AngleAxisd(-angle, Vec3::UnitZ()))};
 }
 
-/// A pose above such a plane at a height, with the up axis along the plane's normal.
+/// Returns a pose at `height` [m] above the plane incline(angle), with the y axis along the plane's normal.
 inline Pose over_incline(Real angle, Real height, const Quat& turn = Quat::Identity()) {
   const Pose plane = incline(angle);
   return {plane.point_to_world({0, height, 0}), plane.orientation * turn};

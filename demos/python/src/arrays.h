@@ -20,7 +20,7 @@ namespace py = pybind11;
 
 /// Three numbers from any sequence or array.
 using Triple = std::array<double, 3>;
-/// [w, x, y, z]
+/// A quaternion [w, x, y, z] from any sequence or array.
 using Quadruple = std::array<double, 4>;
 
 inline sim::Vec3 vec(const Triple& v) {
@@ -39,7 +39,7 @@ inline py::array_t<double> array(const sim::Quat& q) {
   return py::array_t<double>(4, wxyz);
 }
 
-/// A new (n, 3) array.
+/// Returns a new (n, 3) array with one vector in each row.
 template <class Scalar, class List>
 py::array_t<Scalar> rows(const List& vectors) {
   py::array_t<Scalar> out({static_cast<py::ssize_t>(vectors.size()), py::ssize_t{3}});
@@ -49,13 +49,14 @@ py::array_t<Scalar> rows(const List& vectors) {
   return out;
 }
 
-/// A new array of numbers.
+/// Returns a new array with a copy of the numbers.
 template <class T>
 py::array_t<T> numbers(std::span<const T> values) {
   return py::array_t<T>(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
-/// The (n, 3) rows of an array passed from Python.
+/// Converts an (n, 3) array from Python to vectors. Throws an exception that contains `name` if the shape is
+/// different.
 inline std::vector<sim::Vec3> vectors(const py::array_t<double, py::array::c_style | py::array::forcecast>& a,
                                       const char* name) {
   if (a.ndim() != 2 || a.shape(1) != 3)
@@ -65,7 +66,7 @@ inline std::vector<sim::Vec3> vectors(const py::array_t<double, py::array::c_sty
   return out;
 }
 
-/// An array over memory that `owner` keeps alive; read-only, without a copy.
+/// Returns a read-only array that refers to `data` without a copy. `owner` keeps the memory alive.
 template <class T>
 py::array view(std::vector<py::ssize_t> shape, std::vector<py::ssize_t> strides, const T* data,
                py::handle owner) {
@@ -74,7 +75,7 @@ py::array view(std::vector<py::ssize_t> shape, std::vector<py::ssize_t> strides,
   return out;
 }
 
-/// An array that takes ownership of a vector, without a copy.
+/// Returns an array that takes ownership of a vector, without a copy.
 template <class T, class Element>
 py::array_t<T> taken(std::vector<Element>&& values, std::vector<py::ssize_t> shape) {
   auto* kept = new std::vector<Element>(std::move(values));

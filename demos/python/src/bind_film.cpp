@@ -1,4 +1,4 @@
-// render(): films as iterators.
+// render(): returns a film as an iterator over its frames.
 
 #include "bindings.h"
 #include "film.h"
@@ -7,7 +7,7 @@
 namespace offstage::python {
 namespace {
 
-/// A frame for Python. Pictures become arrays without a copy.
+/// A frame as Python sees it. Its pictures are numpy arrays that take over the memory of the C++ frame.
 struct PythonFrame {
   int number;
   double time;

@@ -15,7 +15,7 @@ namespace {
 using producer::Snapshot;
 using SnapshotPointer = std::shared_ptr<const Snapshot>;
 
-/// Converts "emitters.0.rate": 200 to an override as on the command line.
+/// Converts a dict such as {"emitters.0.rate": 200} to overrides in the form of the command line.
 std::vector<std::string> overrides_of(const py::dict& set) {
   const py::object dumps = py::module_::import("json").attr("dumps");
   std::vector<std::string> overrides;
@@ -68,7 +68,8 @@ std::vector<std::string> names_of_cloths(const producer::Scene& scene) {
   return names;
 }
 
-/// Fields of the elements of a list in a snapshot, as a strided view.
+/// Returns an array that shows one field of all elements of a list in a snapshot, without a copy. `first`:
+/// the field of the first element; `width`: numbers per element.
 template <class Element, class Scalar>
 py::array fields(const std::vector<Element>& list, const Scalar* first, py::ssize_t width, py::handle owner) {
   const auto n = static_cast<py::ssize_t>(list.size());

@@ -48,7 +48,7 @@ class ThreadStage {
     changed_.notify_all();
   }
 
-  /// Runs `work` with the stage on its thread and returns the result. Passes on its exceptions.
+  /// Runs work(stage) on the stage's thread, waits, and returns the result. Throws the exceptions of `work`.
   template <class F>
   auto with(F&& work) {
     using Result = std::invoke_result_t<F, render::Stage&>;

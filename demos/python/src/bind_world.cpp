@@ -62,7 +62,8 @@ void take_methods(Keywords& k, sim::WorldDef& def) {
     throw std::invalid_argument("particle_cluster: must be 1 to 64");
 }
 
-/// Adds the figures of a part. The names of parts and figures are joined by an underscore.
+/// Adds the figures (statistics) of a part to a dict. A key is the name of the part and the name of the
+/// figure, joined by an underscore.
 template <sim::HasFigures Part>
 void add_figures(const Part& part, const std::string& prefix, py::dict& d) {
   sim::for_each_figure(part, [&](std::string_view name, const auto& value) {
@@ -96,7 +97,7 @@ py::dict step(LiveWorld& w, double sampling_time, const py::object& before) {
   return to_dict(report);
 }
 
-/// Steps several worlds at the same time, each on one thread.
+/// Steps several worlds in parallel, each on one thread.
 std::vector<bool> step_all(const std::vector<LiveWorld*>& worlds, double sampling_time, int threads) {
   if (!(sampling_time > 0)) throw std::invalid_argument("sampling_time: must be > 0");
   if (std::set<LiveWorld*>(worlds.begin(), worlds.end()).size() != worlds.size())
@@ -126,7 +127,8 @@ py::dict body_dict(const LiveWorld& w, sim::BodyHandle body) {
   return d;
 }
 
-/// (n, 13) array of many bodies: position, orientation [w, x, y, z], velocity, angular velocity.
+/// Returns the states of bodies as an (n, 13) array with the columns position [m], orientation [w, x, y, z],
+/// velocity [m/s] and angular velocity [rad/s].
 py::array_t<double> body_states(const LiveWorld& w, const std::vector<sim::BodyHandle>& bodies) {
   py::array_t<double> out({static_cast<py::ssize_t>(bodies.size()), py::ssize_t{13}});
   double* row = out.mutable_data();

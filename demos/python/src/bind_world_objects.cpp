@@ -52,7 +52,8 @@ void take_optional(Keywords& k, const char* name, std::optional<sim::Vec3>& valu
   if (numbers) value = vec(*numbers);
 }
 
-/// Moments about the axes of the body's frame, or a matrix.
+/// Reads `inertia` [kg m^2]: three moments about the axes of the body's frame, or a 3 x 3 matrix; nothing if
+/// it is not given.
 std::optional<sim::Mat3> take_inertia(Keywords& k) {
   const py::object given = k.take_object("inertia");
   if (given.is_none()) return {};
@@ -116,7 +117,8 @@ sim::ParticleSystemHandle add_particle_system(LiveWorld& w, const py::kwargs& kw
   return *w.systems.insert(w.world.add_particle_system(def)).first;
 }
 
-/// Values for n particles: one number for all of them, or an array.
+/// Returns n values, one for each particle. `value` is a number for all particles, an array, or None, which
+/// selects `otherwise`.
 std::vector<double> per_particle(const py::object& value, double otherwise, std::size_t n, const char* name) {
   if (value.is_none()) return std::vector<double>(n, otherwise);
   const auto a = DoubleArray::ensure(value);
@@ -351,7 +353,7 @@ sim::ClothHandle finish_cloth(LiveWorld& w, sim::ClothDef def, Keywords& k, cons
   return *w.cloths.insert(w.world.add_cloth(def)).first;
 }
 
-/// The fabric `fabric`, with the values that are given beside it.
+/// Reads the fabric: the preset with the name `fabric`, changed by the other keywords that are given.
 effects::Fabric take_fabric(Keywords& k) {
   std::string name = "cotton";
   k.take("fabric", name);

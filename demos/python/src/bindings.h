@@ -1,5 +1,5 @@
 #pragma once
-/// The parts of the module.
+/// Functions that add the parts of the module.
 
 #include <pybind11/pybind11.h>
 
@@ -13,7 +13,7 @@ void bind_scene(py::module_& m);  ///< Scene, Simulation, Snapshot, caches
 void bind_film(py::module_& m);   ///< render()
 void bind_world(py::module_& m);  ///< World, handles, step_all()
 void bind_shapes(py::module_& m);
-void bind_building(py::class_<LiveWorld>& world);  ///< calls that add objects to a world
+void bind_building(py::class_<LiveWorld>& world);  ///< methods of World that add objects
 void bind_stage(py::module_& m);                   ///< Stage
 
 }  // namespace offstage::python

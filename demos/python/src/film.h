@@ -1,6 +1,6 @@
 #pragma once
-/// A film that is consumed frame by frame: simulation and drawing run ahead of the consumer on a separate
-/// thread.
+/// A film whose frames are taken one by one by the caller. A separate thread simulates and draws a few frames
+/// ahead.
 
 #include <condition_variable>
 #include <deque>
@@ -29,9 +29,9 @@ struct SharedScene {
 };
 
 struct FilmJob {
-  std::vector<int> frames;                     ///< ascending
-  bool images = true;                          ///< false: only states and channels
-  bool channels = false;                       ///< whether frames have depth, normals, ids and motion
+  std::vector<int> frames;  ///< ascending
+  bool images = true;       ///< whether frames have pictures; false: only states and channels
+  bool channels = false;    ///< whether frames have the channels depth, normals, ids and motion
   std::optional<std::filesystem::path> cache;  ///< folder from which states are read instead of simulating
 };
 
@@ -46,18 +46,18 @@ struct FilmFrame {
 class Film {
  public:
   Film(std::shared_ptr<const SharedScene> scene, FilmJob job);
-  /// Ends the work; the frame in progress is finished first.
+  /// Cancels the film and waits until the frame in progress is finished.
   ~Film();
 
-  /// Waits for the next frame; none at the end, or after cancel(). Passes on exceptions of the simulating and
-  /// the drawing thread.
+  /// Waits for the next frame and returns it; nothing after the last frame or after cancel(). Throws the
+  /// exceptions of the simulation and the drawing.
   std::optional<FilmFrame> next();
   void cancel();
   int total() const { return static_cast<int>(job_.frames.size()); }
-  int done() const;  ///< number of consumed frames
+  int done() const;  ///< number of frames that the caller has taken
 
  private:
-  static constexpr std::size_t kAhead = 3;  // greatest number of frames that wait for the consumer
+  static constexpr std::size_t kAhead = 3;  // greatest number of finished frames that wait for the caller
 
   void produce();
   bool push(FilmFrame frame);

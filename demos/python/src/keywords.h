@@ -1,5 +1,5 @@
 #pragma once
-/// Keyword arguments of calls, and arrays as arguments.
+/// Reading of keyword arguments from Python.
 
 #include <map>
 #include <set>
@@ -15,7 +15,8 @@ namespace offstage::python {
 using DoubleArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using IndexArray = py::array_t<uint32_t, py::array::c_style | py::array::forcecast>;
 
-/// Returns the value that belongs to a word. Throws std::invalid_argument, which lists the allowed words.
+/// Returns the value of a word in a table. If the word is unknown, throws std::invalid_argument with the name
+/// of the argument and the allowed words.
 template <class T>
 T chosen(const std::map<std::string, T>& words, const std::string& word, const char* name) {
   const auto it = words.find(word);
@@ -59,7 +60,7 @@ class Keywords {
     taken_.insert(name);
     return given_.contains(name) ? py::object(given_[name]) : py::none();
   }
-  /// Throws TypeError for an unknown keyword.
+  /// Throws TypeError if there is a keyword that was not read. `function`: name for the message.
   void finish(const char* function) const {
     for (const auto& [key, value] : given_)
       if (!taken_.contains(key.cast<std::string>()))
