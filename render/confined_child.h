@@ -43,8 +43,9 @@ class ChildAnswer {
 };
 
 /// Runs `job` in a child process; its argument is the descriptor of a memory file for the answer. Throws
-/// FileError with the message of `job`, or with how the child ended: too slow, too much memory, killed,
-/// crashed. Throws StoppedError after a request to stop, and UnavailableError if no process can be started.
+/// FileError with the message of `job`, or with the reason why the child failed: time limit, memory limit,
+/// signal or crash. Throws StoppedError after a request to stop, and UnavailableError if no process can be
+/// started.
 ChildAnswer run_confined(const ConfinedWork& work, const std::function<void(int)>& job);
 
 }  // namespace offstage::render

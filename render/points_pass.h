@@ -101,7 +101,7 @@ class PointsPass {
   std::vector<GpuPoint> ordered_;
   gl::StreamBuffer blended_buffer_;
   std::vector<BlendedPoint> blended_;  ///< all sprites, then all flakes, each back to front
-  /// The first of a run of blended points with pictures in the same texture.
+  /// A run of blended points that share a texture of pictures.
   struct PictureRun {
     std::size_t first;
     GLuint pictures;

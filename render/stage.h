@@ -56,7 +56,7 @@ struct Lamp {
   bool shadows = true;
 };
 
-/// Sky, ambient light from it, and fog towards its horizon.
+/// The sky with its ambient light, and the fog. Colours are radiances.
 struct Environment {
   Vector3f zenith = {0.20f, 0.42f, 0.88f};
   Vector3f horizon = {0.95f, 1.05f, 1.15f};
@@ -114,8 +114,8 @@ struct PointsDef {
   bool lit = true;
   bool casts_shadow = true;  ///< whether particles cast shadows on the scene, and smoke also on other smoke
   float softness = 0.5f;     ///< width of the fade at the rim, as a fraction of the radius, in [0, 1]
-  /// Streaks are velocity * stretch_s long. Other styles, except balls, are lengthened by the same distance
-  /// [s].
+  /// Exposure time that determines the length of streaks [s]: velocity * stretch_s. Other styles, except
+  /// balls, are lengthened by the same distance.
   float stretch_s = 1.0f / 60;
   /// Fraction by which a streak fades towards its tail, in [0, 1]: 0 for a drop, 1 for a spark.
   float taper = 0;
