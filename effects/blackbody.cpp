@@ -12,7 +12,7 @@ using Eigen::Vector3d;
 constexpr int kEntries = 512;
 constexpr double kColdest = 500, kHottest = 15'000;
 
-/// A Gaussian lobe with different widths below and above its middle [nm].
+/// Returns a Gaussian lobe with different widths below and above its middle; all arguments in [nm].
 double lobe(double wavelength, double middle, double below, double above) {
   const double t = (wavelength - middle) * (wavelength < middle ? below : above);
   return std::exp(-t * t / 2);
@@ -27,13 +27,13 @@ Vector3d observer(double nm) {
           1.217 * lobe(nm, 437.0, 0.0845, 0.0278) + 0.681 * lobe(nm, 459.0, 0.0385, 0.0725)};
 }
 
-/// Planck's law without its constant factor.
+/// Returns the spectral radiance by Planck's law, without the constant factor.
 double radiance(double nm, double kelvin) {
   const double second_constant = 1.438776877e7;  // h c / k [nm K]
   return std::pow(nm / 560, -5) / std::expm1(second_constant / (nm * kelvin));
 }
 
-/// X, Y, Z without a constant factor.
+/// Returns the colour of a black body as X, Y, Z, without a constant factor.
 Vector3d seen(double kelvin) {
   Vector3d sum = Vector3d::Zero();
   for (double nm = 360; nm <= 830; nm += 5) sum += radiance(nm, kelvin) * observer(nm);
@@ -54,8 +54,8 @@ Entry entry(double kelvin) {
   return {(rgb / luminance).cast<float>(), std::log(xyz.y())};
 }
 
-/// Tabulated over the inverse temperature, as a function of which colour and the logarithm of luminance are
-/// nearly linear.
+/// Returns the table of colours. Its entries are equally spaced in the inverse temperature, because colour
+/// and the logarithm of luminance are nearly linear functions of it.
 const std::array<Entry, kEntries>& table() {
   static const std::array<Entry, kEntries> entries = [] {
     std::array<Entry, kEntries> made;

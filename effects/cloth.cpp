@@ -64,7 +64,7 @@ void spread_mass(ClothDef& def, Real areal_density) {
   }
 }
 
-/// Fraction of the critical damping of springs of a kind.
+/// Returns the damping of springs of a kind, as a fraction of the critical damping.
 Real damping_of(const Fabric& f, SpringKind kind) {
   const std::optional<Real>& own = kind == SpringKind::stretch ? f.stretch_damping
                                    : kind == SpringKind::shear ? f.shear_damping
@@ -72,7 +72,8 @@ Real damping_of(const Fabric& f, SpringKind kind) {
   return own.value_or(f.damping);
 }
 
-/// Adds a spring with its fraction of the critical damping of its two points, if it has any stiffness.
+/// Adds a spring if its stiffness is not 0. Its damping is a fraction of the critical damping for the masses
+/// of its two points.
 void add_spring(ClothDef& def, uint32_t a, uint32_t b, Real stiffness, const Fabric& fabric, SpringKind kind,
                 std::array<uint32_t, 2> counterpart = {}) {
   const auto distance = [&](uint32_t i, uint32_t j) { return (def.vertices[i] - def.vertices[j]).norm(); };
@@ -93,7 +94,7 @@ Real bend_stiffness(Real bend, Real w, Real h) {
   return 16 * bend * w / (h * h * h * kAngle * kAngle);
 }
 
-/// An icosahedron with the circumscribed radius 1.
+/// Returns an icosahedron inscribed in a sphere with radius 1.
 sim::TriangleMesh icosahedron() {
   // Corners of three rectangles whose sides are in the golden ratio.
   const Real golden = (1 + std::sqrt(5.0)) / 2, size = std::sqrt(1 + golden * golden);
@@ -120,7 +121,7 @@ sim::TriangleMesh icosahedron() {
   return mesh;
 }
 
-/// Divides each triangle of a sphere with the radius 1 into four.
+/// Divides each triangle into four; the new vertices are on the sphere with radius 1.
 sim::TriangleMesh divided(const sim::TriangleMesh& mesh) {
   sim::TriangleMesh finer{mesh.vertices, {}};
   std::map<std::pair<uint32_t, uint32_t>, uint32_t> middles;
@@ -162,7 +163,8 @@ ClothDef grid_cloth(const GridSize& size, const sim::Pose& pose, const Fabric& f
         def.triangles.insert(def.triangles.end(), {Triangle{a, d, b}, Triangle{b, d, e}});
     }
   spread_mass(def, fabric.areal_density);
-  // Along a thread a spring represents the width between its neighbours, at the border half of it.
+  // A spring along a thread represents a strip that is as wide as the distance between threads. At the border
+  // the strip is half as wide.
   const auto width = [](uint32_t k, uint32_t last, Real step) {
     return k == 0 || k == last ? step / 2 : step;
   };

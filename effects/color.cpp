@@ -5,7 +5,8 @@
 namespace offstage::effects {
 
 Rgba StartColor::of(const RandomStream& random, uint64_t id) const {
-  // Properties of the random numbers for drawing, different from those of the simulation.
+  // Numbers that select the random numbers for drawing. They differ from the numbers that the simulation
+  // uses.
   constexpr uint32_t kBrightness = 1u << 24, kChannel = kBrightness + 1;
   const auto varied = [&](float middle, float spread, uint32_t property) {
     if (spread == 0) return middle;

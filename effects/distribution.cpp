@@ -31,13 +31,14 @@ Real value_at(const Curve& curve, Real t) {
   return v0 + (v1 - v0) * ((t - t0) / (t1 - t0));
 }
 
-/// Truncation at one deviation uses only quantiles from the middle of the distribution.
+/// Returns the value for a uniform random number u. A distribution that is truncated at one standard
+/// deviation uses only quantiles from its middle.
 Real value_at(const Normal& n, Real u) {
   const Real p = n.clip ? kBelowOneDeviation + u * (1 - 2 * kBelowOneDeviation) : u;
   return std::clamp(n.mean + n.deviation * normal_quantile(p), n.min, n.max);
 }
 
-/// Bound of a normal distribution on the side of `sign`.
+/// Returns the bound of a normal distribution: the upper one for `sign` 1, the lower one for -1.
 Real bound(const Normal& n, int sign) {
   const Real reach = n.clip || n.deviation == 0 ? n.deviation : kInfinity;
   const Real end = std::clamp(n.mean + sign * reach, n.min, n.max);

@@ -10,11 +10,11 @@
 namespace offstage::effects {
 namespace {
 
-/// A release that was interrupted for lack of room continues after this time at the latest, even if its
+/// A release that was interrupted because there was no room continues after at most this time, even if its
 /// particles are slow [s].
 constexpr Real kMaxClearing = 1;
-/// Number of places on a mesh that are tried for one particle. When half of the surface is occupied, random
-/// free places become hard to find.
+/// Number of random places on a mesh that are tried for one particle. If half of the surface is occupied,
+/// most random places are not free.
 constexpr uint32_t kTries = 64;
 
 std::string owner(const EmitterDef& def) {
@@ -74,7 +74,8 @@ void Emitter::stop(Real time) {
   schedule_.stop(time);
 }
 
-/// Collects all particles due up to `end`, in order of time; at equal times postponed ones come first.
+/// Collects all releases that are due up to the time `end` [s], in order of time. At equal times, postponed
+/// releases come first.
 void Emitter::collect_due(Real end) {
   if (end > stopped_) std::erase_if(waiting_, [&](const Release& r) { return r.time > stopped_; });
   const auto still_waiting = std::stable_partition(waiting_.begin(), waiting_.end(),
@@ -110,13 +111,14 @@ void Emitter::emit(sim::World& world, Real start, Real end) {
   collect_along_path(world, start, end);
   std::stable_sort(due_.begin(), due_.end(),
                    [](const Release& a, const Release& b) { return a.time < b.time; });
-  // The list grows during the loop, because the rest of a release may still be due in this sub-step.
+  // The list may grow during the loop, because the postponed rest of a release may be due within this
+  // sub-step.
   for (std::size_t i = 0; i < due_.size(); ++i) release(world, Release(due_[i]), start, end);
   report_.waiting = 0;
   for (const Release& r : waiting_) report_.waiting += r.count;
 }
 
-/// Largest diameter of the next `count` particles.
+/// Returns the largest diameter of the next `count` particles [m].
 Real Emitter::largest_diameter(uint64_t count, Real birth_time) const {
   Real radius = upper_bound(def_.particles.radius);
   if (std::isinf(radius)) {
@@ -154,7 +156,7 @@ void Emitter::release(sim::World& world, const Release& r, Real start, Real end)
   number_ += r.count - allowed;
 }
 
-/// Postpones the rest of a release, in order of time among the others.
+/// Postpones the rest of a release; the list of postponed releases stays in order of time.
 void Emitter::wait(const Release& rest, Real end) {
   if (rest.time > stopped_) return;
   auto& list = rest.time <= end ? due_ : waiting_;
@@ -195,7 +197,7 @@ void Emitter::begin_cells(const Cells& cells, uint64_t count) {
   turn_ = Draws(random_, round, 0).uniforms(kTurn);
 }
 
-/// Places particles up to the first one without room, which comes first next time.
+/// Places particles until there is no room for the next one; the next call starts with that particle.
 uint64_t Emitter::place_apart(sim::World& world, const Batch& batch) {
   spacing_.reset(batch.count, batch.diameter);
   for (uint64_t k = 0; k < batch.count; ++k, ++number_) {

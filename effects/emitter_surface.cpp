@@ -26,7 +26,7 @@ uint64_t at_least_one(Real n) {
   return static_cast<uint64_t>(std::clamp(std::floor(n + 1e-9), 1.0, 1e12));
 }
 
-/// Uniformly distributed rotation (Shoemake, "Uniform random rotations", Graphics Gems III).
+/// Returns a uniformly distributed random rotation (Shoemake, "Uniform random rotations", Graphics Gems III).
 sim::Quat random_rotation(const std::array<Real, 3>& u) {
   const SinCos a = sincos(2 * kPi * u[1]), b = sincos(2 * kPi * u[2]);
   const Real p = std::sqrt(1 - u[0]), q = std::sqrt(u[0]);
@@ -114,7 +114,7 @@ Place ReleaseSurface::anywhere(const std::array<Real, 3>& u) const {
   }
 }
 
-/// Equal steps of height are equal areas (Archimedes).
+/// Equal steps of height correspond to equal areas of the sphere (Archimedes).
 Place ReleaseSurface::on_sphere(Real height, Real angle) const {
   const SinCos a = sincos(angle);
   const Real r = std::sqrt(std::max(0.0, 1 - height * height));

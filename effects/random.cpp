@@ -6,8 +6,8 @@
 namespace offstage::effects {
 namespace {
 
-/// The finalizer of MurmurHash3 with the constants of SplitMix64: every bit of the input affects every bit of
-/// the output.
+/// Mixes bits with the finalizer of MurmurHash3 and the constants of SplitMix64. Every bit of the input
+/// affects every bit of the output.
 uint64_t mix(uint64_t x) {
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
   x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
@@ -22,7 +22,7 @@ uint64_t random_bits(uint64_t seed, uint64_t stream, uint64_t index, uint32_t pr
   return uint64_t{words[1]} << 32 | words[0];
 }
 
-/// c[0] + c[1] x + c[2] x^2 ...
+/// Returns c[0] + c[1] x + c[2] x^2 + ...
 template <std::size_t N>
 Real polynomial(const Real (&c)[N], Real x) {
   Real sum = c[N - 1];
@@ -30,8 +30,8 @@ Real polynomial(const Real (&c)[N], Real x) {
   return sum;
 }
 
-/// Natural logarithm of a normal positive number: x = 2^k m with m near 1, and log m = 2 artanh((m - 1) / (m
-/// + 1)).
+/// Returns the natural logarithm of a positive normal number. It uses x = 2^k m with m near 1, and log m = 2
+/// artanh((m - 1) / (m + 1)).
 Real logarithm(Real x) {
   int k;
   Real m = std::frexp(x, &k);  // exact
@@ -87,8 +87,8 @@ Permutation::Permutation(uint64_t n, uint64_t key) : n_(n), key_(key), half_bits
 
 uint64_t Permutation::operator()(uint64_t i) const {
   const uint64_t mask = (uint64_t{1} << half_bits_) - 1;
-  // The network permutes up to four times as many numbers; repeated application, starting at i, leads back to
-  // a number below n.
+  // The network permutes up to 4 n numbers. If it is applied repeatedly, starting at i, it eventually gives a
+  // number below n.
   do {
     uint64_t left = i >> half_bits_, right = i & mask;
     for (uint64_t round = 0; round < 6; ++round) {

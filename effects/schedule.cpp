@@ -13,11 +13,11 @@ namespace {
 constexpr Real kNever = std::numeric_limits<Real>::infinity();
 /// Time for which a random rate keeps its value [s].
 constexpr Real kRateWindow = 0.1;
-/// Number of windows without a particle after which a random rate counts as zero for ever: almost three
-/// hours.
+/// If this many consecutive windows (almost three hours) have no particle, a random rate counts as zero for
+/// ever.
 constexpr int kMaxIdleWindows = 100'000;
 
-/// Time at which the integral of a rate over time, from t on, reaches 1.
+/// Returns the time at which the integral of a rate over time, starting at t, reaches 1 [s].
 Real curve_birth_time(const Varying& rate, const Curve& curve, Real t) {
   const auto at = [&](Real time) { return std::max(0.0, sample(rate, 0.5, time)); };
   Real need = 1;
@@ -61,7 +61,7 @@ bool Schedule::open(Real time) const {
          });
 }
 
-/// Time of the next particle of `rate` after that at `last`.
+/// Returns the time of the next particle after the particle at the time `last`, according to the rate [s].
 Real Schedule::next_birth_time(Real last) {
   if (const auto* constant = std::get_if<Real>(&rate_))
     return *constant > 0 ? start_ + static_cast<Real>(singles_ + 1) / *constant : kNever;

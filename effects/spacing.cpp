@@ -7,7 +7,7 @@ namespace offstage::effects {
 namespace {
 
 constexpr uint32_t kNone = 0xffffffff;
-/// Limits the size of the table; longer chains are slower, but correct.
+/// Upper limit of the table's size. If it is reached, searches are slower but still correct.
 constexpr uint64_t kMaxBuckets = uint64_t{1} << 24;
 
 using Cell = Eigen::Matrix<int64_t, 3, 1>;

@@ -42,7 +42,7 @@ void Trail::emit(sim::World& world, Real start, Real end) {
   }
 }
 
-/// Adds the particles that particle i leaves in the sub-step or, if it is new, since its creation.
+/// Adds the particles that particle i leaves behind in the sub-step; for a new particle, since its creation.
 void Trail::leave(sim::World& world, std::size_t i, bool is_new, Real start, Real end) {
   const sim::ParticleArrays& p = world.particles(parents_);
   const Draws draw(random_, p.id[i], start);

@@ -11,9 +11,9 @@
 namespace offstage::effects {
 namespace {
 
-/// Integers up to this are exact; larger bounds are useless.
+/// Greatest number up to which all integers are exact. Larger bounds would be useless.
 constexpr Real kSaturated = 0x1p53;
-/// A finite substitute for infinity, because infinity times zero is not a number.
+/// Used instead of infinity, because infinity times zero is not a number.
 constexpr Real kHuge = 1e300;
 constexpr Real kEver = std::numeric_limits<Real>::infinity();
 
@@ -37,8 +37,9 @@ Real highest_rate(const Varying& rate) {
   return std::clamp(upper_bound(rate), 0.0, kMaxRate);
 }
 
-/// Greatest number of particles released between start and end within any time `window`, ends included,
-/// because an age that is a sum of sub-steps may be slightly less than the lifespan by rounding.
+/// Returns the greatest number of particles that are released between `start` and `end` within any interval
+/// of the length `window` [s]. Both ends of the interval are included, because rounding may make an age,
+/// which is a sum of sub-steps, slightly less than the lifespan.
 Real most_released(const EmitterDef& def, Real start, Real end, Real window) {
   const Real rate = highest_rate(def.release.rate), interval = lower_bound(def.release.interval),
              length = end - start;
@@ -60,8 +61,8 @@ Real largest_release(const EmitterDef& def) {
   return count;
 }
 
-/// Whether particles may be postponed for lack of room. On a mesh this is hard to determine, so the result is
-/// true.
+/// Whether particles may be postponed because there is no room. For a mesh this is hard to determine, so the
+/// result is true.
 bool can_wait(const EmitterDef& def) {
   if (def.release.overlap) return false;
   const ReleaseSurface surface(def.surface);
@@ -71,8 +72,9 @@ bool can_wait(const EmitterDef& def) {
          count > static_cast<Real>(surface.cells(2 * radius).count());
 }
 
-/// Number of descendants of a particle and itself. It has `left` splits left, of which `own` fit into its
-/// lifespan; `each` splits fit into the lifespan of each child.
+/// Returns the number of particles that come from one particle, itself included. The particle may still split
+/// `left` times; `own` of these splits fit into its lifespan, and `each` splits fit into the lifespan of each
+/// child.
 Real family(Real children, int left, int own, int each) {
   // Number for a child at the start of its life, by splits left; smaller depths are computed first.
   std::vector<std::vector<Real>> size(static_cast<std::size_t>(left) + 1);
@@ -95,7 +97,8 @@ WorstCase bounded(Real born, Real lifespan, Real at_once, Real rate, uint64_t ma
   return {saturated(born), std::min(saturated(alive), max_alive), lifespan, at_once, rate};
 }
 
-/// The bound if each parent has `children`, all within the time `after` its own creation.
+/// Returns the bound if each parent creates `children` particles, all within the time `after` its own
+/// creation [s].
 WorstCase bounded_children(const WorstCase& parents, Real children, Real after, Real lifespan,
                            uint64_t max_alive) {
   const Real at_once = parents.at_once + (parents.rate > 0 ? parents.rate * after : 0);
@@ -124,8 +127,8 @@ WorstCase worst_case(const EmitterDef& def, Real duration) {
 WorstCase worst_case(const SplitDef& def, const WorstCase& parents, bool same_system) {
   if (!def.enabled) return {};
   const Real first = lower_bound(def.age), delay = lower_bound(def.delay);
-  // The first split is at `first`, the others follow at intervals of `delay`, all before the end of the
-  // lifespan.
+  // Number of splits within a lifespan. The first split is at `first`; the others follow at intervals of
+  // `delay`.
   const auto splits_in = [&](Real life) {
     return life > first ? static_cast<int>(std::min<Real>(def.depth, up((life - first) / delay))) : 0;
   };

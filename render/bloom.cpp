@@ -9,7 +9,7 @@
 namespace offstage::render {
 namespace {
 
-// Red, green, blue and an unused value, so that a pixel is one register.
+// A pixel as one register: red, green, blue and an unused value.
 typedef float Rgb __attribute__((vector_size(16)));
 
 struct Layer {
@@ -34,8 +34,8 @@ bool has_glow(const HdrImage& sum, float threshold) {
   return false;
 }
 
-// The light above the threshold, at half the size. A pixel that is a hundred times too bright, such as a
-// glint of the sun, is limited to ten times, because it would flicker.
+// Writes the light above the threshold, at half the size. A pixel that is a hundred times too bright, such as
+// a glint of the sun, is limited to ten times, because it would flicker.
 void extract(const HdrImage& sum, float threshold, Layer& out) {
   const float most = 10 * threshold;
   tbb::parallel_for(0, out.height, [&](int y) {
@@ -56,7 +56,8 @@ void extract(const HdrImage& sum, float threshold, Layer& out) {
   });
 }
 
-// Half the size by the binomial filter 1 3 3 1 in both directions, which is smooth enough for bright dots.
+// Returns a layer of half the size. It uses the binomial filter 1 3 3 1 in both directions, which is smooth
+// enough for bright dots.
 Layer half_of(const Layer& in) {
   Layer out((in.width + 1) / 2, (in.height + 1) / 2);
   constexpr std::array<float, 4> kWeights = {0.125f, 0.375f, 0.375f, 0.125f};
@@ -73,7 +74,7 @@ Layer half_of(const Layer& in) {
   return out;
 }
 
-// Value of a layer at a pixel of a layer twice as large.
+// Returns the interpolated value of a layer at the pixel (x, y) of a layer twice as large.
 inline Rgb enlarged(const Layer& in, int x, int y) {
   const int sx = x / 2 - 1 + (x & 1), sy = y / 2 - 1 + (y & 1);
   const float fx = (x & 1) != 0 ? 0.25f : 0.75f, fy = (y & 1) != 0 ? 0.25f : 0.75f;

@@ -1,4 +1,4 @@
-// channel_png, channel_files and write_channels of channels.h.
+// Implements channel_png(), channel_files() and write_channels() of channels.h.
 
 #include <array>
 #include <cmath>

@@ -65,9 +65,9 @@ ProcessLimits limits_of(const ConfinedWork& work) {
                   " s of processor time; the file is broken or too large");
 }
 
-/// Detects a child that does not work any more: in the last minute it used less than a hundredth of the time.
-/// On a busy machine a child gets less than all of its time, but not that little. Its processor time has a
-/// separate limit.
+/// Detects a child that hangs: its processor time in the last minute was less than a hundredth of a minute.
+/// On a busy machine a working child gets less than the full time, but more than this. Its processor time has
+/// a separate limit.
 class Standstill {
  public:
   Standstill(pid_t child, std::chrono::seconds interval) : interval_(interval) {

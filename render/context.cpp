@@ -26,8 +26,8 @@ constexpr std::array<std::pair<std::string_view, GlPlatform>, 4> kPlatforms = {
      {"egl", GlPlatform::egl},
      {"egl:gpu", GlPlatform::egl_gpu}}};
 
-// One mutex for the whole process, as Mesa's environment and glad's function pointers are. The first context
-// replaces `automatic` by an available platform.
+// The mutex of the process, because Mesa's environment variables and glad's function pointers are global,
+// too. The first context replaces `automatic` by an available platform.
 std::mutex platform_mutex;
 GlPlatform chosen_platform = GlPlatform::automatic;
 
@@ -36,7 +36,7 @@ std::unique_ptr<PlatformContext> make_context_of(GlPlatform platform) {
                                         : make_egl_context(platform == GlPlatform::egl_gpu);
 }
 
-/// Creates a context of the chosen platform, current on this thread.
+/// Creates a context of the chosen platform and makes it current on this thread.
 std::pair<std::unique_ptr<PlatformContext>, GlPlatform> make_platform_context() {
   const std::lock_guard lock(platform_mutex);
   if (chosen_platform != GlPlatform::automatic) return {make_context_of(chosen_platform), chosen_platform};
@@ -104,8 +104,8 @@ GlPlatform gl_platform_of_environment() {
 
 namespace {
 
-/// Removes the variables that change or trace a Mesa driver's pixels: all variables of these families except
-/// those that say where its parts are installed.
+/// Removes the environment variables that change or trace the pixels of a Mesa driver. These are all
+/// variables of some families, except the ones that specify where parts of Mesa are installed.
 void clear_driver_variables() {
   constexpr std::array<std::string_view, 14> kFamilies = {
       "MESA_", "GALLIUM_",  "GALLIVM_", "LP_",  "ST_",   "DRAW_",   "TGSI_",

@@ -1,6 +1,6 @@
-// filter_edges of tone_map.h: after T. Lottes, "FXAA" (NVIDIA, 2009), in integers. A pixel on an edge of high
-// contrast is mixed with its neighbour across the edge, by a weight that depends on its distance from the end
-// of the edge.
+// Implements filter_edges() of tone_map.h in integers, after T. Lottes, "FXAA" (NVIDIA, 2009). A pixel on an
+// edge of high contrast is mixed with its neighbour across the edge, by a weight that depends on its distance
+// from the end of the edge.
 
 #include <algorithm>
 #include <cstdlib>
@@ -49,7 +49,7 @@ void mark_edges(const Luma& luma, int y, int width, std::vector<uint8_t>& mark) 
   }
 }
 
-// Mixing of a pixel: `weight` in 1/256 of its neighbour `dx, dy`.
+// How a pixel is mixed with its neighbour at (dx, dy): `weight` is the neighbour's fraction in 1/256.
 struct Mix {
   int dx = 0, dy = 0, weight = 0;
 };
@@ -68,7 +68,7 @@ Mix mix_of(const Luma& luma, const Image& image, int x, int y) {
   if (std::abs(m[-across] - m[0]) > std::abs(m[across] - m[0])) across = -across;
   const int gradient = std::abs(m[across] - m[0]);
 
-  // Twice the brightness on the edge itself; an end is where it changes by half the gradient.
+  // Twice the brightness on the edge itself. The edge ends where this value changes by half the gradient.
   const int edge = m[0] + m[across];
   const auto search = [&](int step, int limit) {
     int n = 1;
@@ -89,7 +89,7 @@ Mix mix_of(const Luma& luma, const Image& image, int x, int y) {
   const bool steps_here = (end_value < 0) != (2 * m[0] - edge < 0);
   int weight = steps_here ? 128 - 256 * near / (back + ahead) : 0;
 
-  // A pixel that differs from all its neighbours is mixed slightly, too.
+  // A pixel that differs from all its neighbours is also mixed slightly.
   const int around = 2 * (m[-1] + m[1] + m[-s] + m[s]) + m[-s - 1] + m[-s + 1] + m[s - 1] + m[s + 1];
   const int range = std::max({m[-1], m[1], m[-s], m[s], m[0]}) - std::min({m[-1], m[1], m[-s], m[s], m[0]});
   const int stands_out = std::min(256, std::abs(around / 12 - m[0]) * 256 / range);

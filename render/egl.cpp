@@ -1,5 +1,5 @@
-// EGL without a surface: Mesa's surfaceless platform for llvmpipe, devices for GPUs. The few functions used
-// are declared here, so that only libEGL.so.1 is needed, and only at run time.
+// EGL without a surface. llvmpipe is used through Mesa's surfaceless platform, GPUs through EGL devices. The
+// few necessary functions are declared here, so that only libEGL.so.1 is needed, and only at run time.
 
 #include <algorithm>
 #include <array>
@@ -13,7 +13,7 @@
 namespace offstage::render {
 namespace {
 
-// Constants and types of the Khronos registry of EGL.
+// Constants and types from the EGL registry of Khronos.
 using Display = void*;
 using EglHandle = void*;
 using Device = void*;
@@ -41,7 +41,7 @@ struct EglLibrary {
   unsigned (*make_current)(Display, void* draw, void* read, EglHandle) = nullptr;
   unsigned (*destroy_context)(Display, EglHandle) = nullptr;
   unsigned (*release_thread)() = nullptr;
-  // Functions of extensions; null if they are missing.
+  // Functions of extensions; null if the extension is missing.
   Display (*get_platform_display)(unsigned platform, void* native, const int* attributes) = nullptr;
   unsigned (*query_devices)(int most, Device* devices, int* count) = nullptr;
   const char* (*query_device_string)(Device, int name) = nullptr;
@@ -84,7 +84,7 @@ bool has_word(const char* list, std::string_view word) {
   return false;
 }
 
-/// Error code of the last call, for a message.
+/// Returns the error code of the last call, for a message.
 std::string error_code() {
   std::array<char, 8> digits{};
   std::to_chars(digits.data(), digits.data() + digits.size(), egl().get_error(), 16);
@@ -98,7 +98,7 @@ std::vector<Device> devices() {
   if (egl().query_devices == nullptr || egl().query_device_string == nullptr ||
       !egl().query_devices(kMost, found.data(), &count))
     throw UnavailableError("libEGL cannot list devices; upgrade it: apt-get install " + kPackages);
-  // Parentheses, because braces would make a list of the two iterators.
+  // Parentheses are necessary, because braces would make a list of the two iterators.
   return std::vector<Device>(found.begin(), found.begin() + count);
 }
 
@@ -158,7 +158,7 @@ std::unique_ptr<PlatformContext> make_software_context() {
   }
 }
 
-/// Returns the first GPU on which a context can be created; the following ones are not tried.
+/// Returns the display of the first GPU on which a context can be created. The GPUs after it are not tried.
 Display first_gpu() {
   std::string reasons;
   for (const Device device : devices()) {

@@ -1,4 +1,4 @@
-// The EXR files of channels.h, frame_files.h and exr.h.
+// Reads and writes EXR files: implements functions of channels.h, frame_files.h and exr.h.
 
 #include "render/exr.h"
 
@@ -25,7 +25,7 @@
 namespace offstage::render {
 namespace {
 
-/// A file in memory, which is then written to the disk as a whole.
+/// An output file in memory, which is then written to the disk as a whole.
 class Buffer : public Imf::OStream {
  public:
   Buffer() : Imf::OStream("memory") {}
@@ -44,7 +44,7 @@ class Buffer : public Imf::OStream {
   std::size_t at_ = 0;
 };
 
-/// Bytes in memory as a file.
+/// An input file whose bytes are in memory.
 class Bytes : public Imf::IStream {
  public:
   explicit Bytes(std::span<const uint8_t> bytes) : Imf::IStream("memory"), bytes_(bytes) {}

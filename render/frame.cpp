@@ -15,7 +15,8 @@ Vector4f vec4(const Vector3f& v, float w = 0) {
   return {v.x(), v.y(), v.z(), w};
 }
 
-// Returns a unit vector perpendicular to `direction`, a continuous function of it except at the vertical.
+// Returns a unit vector perpendicular to `direction`. It is a continuous function of `direction`, except
+// where `direction` is vertical.
 Vector3f perpendicular(const Vector3f& direction) {
   const Vector3f other = std::abs(direction.y()) < 0.99f ? Vector3f::UnitY() : Vector3f::UnitX();
   return other.cross(direction).normalized();
@@ -144,7 +145,7 @@ FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& en
   frame.ray_x = vec4(x);
   frame.ray_y = vec4(y);
   frame.depth = {n * f / (f - n), n / (f - n), n, f};
-  // The dither of every pixel is evenly distributed over [0, 1) in the sub-frames.
+  // Over the sub-frames, the dither value of every pixel is evenly distributed over [0, 1).
   frame.sun_direction = vec4(jittered_sun(sun, offsets.light),
                              static_cast<float>(offsets.index) / static_cast<float>(offsets.count));
   frame.sun_radiance = vec4(sun.color * sun.intensity, 0.5f * sun.size_deg * kRadians);

@@ -26,7 +26,7 @@ class FileParts {
     if (file_ && ::fstat(file_.fd(), &info) == 0 && S_ISREG(info.st_mode)) size_ = info.st_size;
   }
   off_t size() const { return size_; }
-  /// Returns fewer bytes at the end of the file.
+  /// Returns `count` bytes from the position `from`; fewer at the end of the file.
   std::vector<uint8_t> read(off_t from, std::size_t count) const {
     std::vector<uint8_t> bytes(count);
     const ssize_t got = size_ > 0 ? ::pread(file_.fd(), bytes.data(), count, from) : 0;

@@ -29,8 +29,8 @@ std::string FrameRate::text() const {
 }
 
 FrameRate frame_rate_of(double per_second) {
-  // Convergents p/q of the continued fraction; each is the best fraction with a denominator of at most its
-  // size.
+  // Convergents p/q of the continued fraction. Each convergent is the best approximation among fractions with
+  // a denominator of at most q.
   int64_t p = 1, q = 0, p_before = 0, q_before = 1;
   double rest = per_second;
   constexpr int kMostTerms = 64;

@@ -21,7 +21,7 @@ constexpr uint32_t kGlbMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinaryChunk
 
 enum GltfComponent { kByte = 5120, kUnsignedByte, kShort, kUnsignedShort, kUnsignedInt = 5125, kFloat };
 
-/// Extensions of which everything is drawn, or that do not change the picture.
+/// Extensions that are fully supported or do not change the picture.
 constexpr std::array kGltfExtensions = {"KHR_mesh_quantization",
                                         "KHR_texture_transform",
                                         "KHR_materials_unlit",
@@ -65,7 +65,8 @@ T load_as(const uint8_t* bytes) {
   return value;
 }
 
-/// One component as a number. Section 3.11 has the formulas of normalised integers.
+/// Returns one component as a number. Section 3.11 of the specification has the formulas for normalised
+/// integers.
 float gltf_component(const uint8_t* bytes, std::size_t type, bool normalized) {
   const auto scaled = [&](float value, float high) {
     return normalized ? std::max(value / high, -1.0f) : value;
@@ -86,7 +87,7 @@ float gltf_component(const uint8_t* bytes, std::size_t type, bool normalized) {
   }
 }
 
-/// An unsigned integer; 0 for other types.
+/// Returns one component as an unsigned integer; 0 if it has another type.
 uint32_t gltf_index(const uint8_t* bytes, std::size_t type, bool /*normalized*/) {
   switch (type) {
     case kUnsignedByte:
@@ -120,7 +121,7 @@ bool is_known_extension(const std::string& name) {
   return std::ranges::find(kGltfExtensions, name) != kGltfExtensions.end();
 }
 
-/// The names of all extensions in a document, without those in application data (`extras`).
+/// Returns the names of all extensions in a document. Application data (`extras`) are not searched.
 std::set<std::string> extensions_within(const GltfValue::Json& document) {
   std::set<std::string> names;
   std::vector<const GltfValue::Json*> stack = {&document};  // explicit, because the depth depends on the file

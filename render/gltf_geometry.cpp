@@ -18,7 +18,7 @@ std::vector<Eigen::Matrix<float, N, 1>> vectors(const GltfNumbers& numbers) {
   return result;
 }
 
-/// Strips and fans as triangles, with the orientation of section 3.7.2.1.
+/// Converts strips and fans to triangles with the orientation of section 3.7.2.1.
 std::vector<uint32_t> as_triangles(const std::vector<uint32_t>& indices, std::size_t mode) {
   std::vector<uint32_t> result;
   const std::size_t n = indices.size();
@@ -32,7 +32,7 @@ std::vector<uint32_t> as_triangles(const std::vector<uint32_t>& indices, std::si
   return result;
 }
 
-/// Scales integers as a normalised accessor asks for (section 3.11).
+/// Scales the integers of a normalised accessor to [0, 1] or [-1, 1] (section 3.11).
 void normalize(const GltfValue& accessor, std::vector<float>& values) {
   if (!accessor.flag("normalized")) return;
   const std::size_t type = accessor.size("componentType", 0);
@@ -52,7 +52,8 @@ struct GltfGeometry::Source {
   std::optional<DracoMesh> draco;
   std::size_t vertices = 0;
 
-  /// Numbers of an attribute; empty if the primitive lacks it. `width` 0: any.
+  /// Returns the numbers of an attribute; empty if the primitive does not have it. `width`: expected number
+  /// of components; 0 allows any.
   GltfNumbers attribute(GltfFile& file, const std::string& name, int width) const {
     const GltfValue attributes = primitive.child("attributes");
     GltfNumbers result;

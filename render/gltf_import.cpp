@@ -16,7 +16,7 @@ namespace {
 
 using Eigen::Affine3d;
 
-/// Rotation by a quaternion [x, y, z, w]; zero counts as none.
+/// Returns the rotation of a quaternion [x, y, z, w]. Zero counts as no rotation.
 Eigen::Quaterniond gltf_rotation(const Eigen::Vector4d& q) {
   const Eigen::Quaterniond rotation(q.w(), q.x(), q.y(), q.z());
   return q.norm() > 1e-12 ? rotation.normalized() : Eigen::Quaterniond::Identity();
@@ -201,7 +201,8 @@ class GltfImporter {
     if (rig_) rig_->add_mesh(index, mesh, instances);
   }
 
-  /// EXT_mesh_gpu_instancing; without it, the node itself.
+  /// Returns the transforms of a node's instances (EXT_mesh_gpu_instancing). Without the extension there is
+  /// one instance, the node itself.
   std::vector<Affine3d> instances_of(const GltfValue& node) {
     const GltfValue instancing = node.extension("EXT_mesh_gpu_instancing");
     if (!instancing.exists()) return {Affine3d::Identity()};
@@ -265,7 +266,8 @@ class GltfImporter {
            "lights are ignored: no node of the file's scene has a usable light");
   }
 
-  /// The default material is the last one; it is kept if a part uses it, or if there is no other.
+  /// Removes the default material, which is the last one, unless a part uses it or there is no other
+  /// material.
   void drop_unused_default() {
     const auto last = static_cast<int>(model_.materials.size() - 1);
     const bool used =

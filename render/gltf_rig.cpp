@@ -32,7 +32,7 @@ RigNode rig_node(const GltfValue& source, std::size_t index) {
   return node;
 }
 
-/// Without triangles that cannot be drawn.
+/// Removes triangles that cannot be drawn.
 void keep_good_triangles(Mesh& mesh) {
   std::vector<uint32_t> good;
   const auto fine = [&](uint32_t v) { return v < mesh.positions.size() && mesh.positions[v].allFinite(); };
@@ -126,7 +126,7 @@ RigSurface GltfRig::surface_of(const GltfPrimitive& primitive) {
   return surface;
 }
 
-/// As PartBuilder collects the surfaces of a model at rest.
+/// Adds a rigid surface, in the same way as PartBuilder adds the surfaces of a model without animation.
 void GltfRig::add_rigid(RigSurface surface, std::span<const Eigen::Affine3d> instances) {
   Model collected;
   PartBuilder builder(collected);

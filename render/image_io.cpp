@@ -46,7 +46,7 @@ FileError unreadable_image(const std::string& name, const std::string& why) {
   return FileError(name + ": cannot be read as an image: " + why);
 }
 
-/// The size that the file declares, checked before anything is decoded.
+/// Checks the size that the file declares, before anything is decoded.
 void check_image_size(int width, int height, const std::string& name, uint64_t max_pixels) {
   const std::string size =
       "it has " + std::to_string(width) + "x" + std::to_string(height) + " pixels; at most ";
@@ -66,14 +66,15 @@ void check_declared_size(std::span<const uint8_t> bytes, const std::string& name
 template <class T>
 using StbPixels = std::unique_ptr<T, void (*)(void*)>;
 
-/// stb_image reads zeros behind the end of its input in silence, and so draws files that are cut short with
-/// black or grey rows. Here it gets a copy with zeros behind the end, and a file of which it reads them is
-/// refused. `load(context)` calls its function for pixels of type T.
+/// For a truncated file, stb_image silently reads zeros beyond the end of its input and returns black or grey
+/// rows. Therefore it gets a copy with additional zeros at the end, and a file is refused if stb_image has
+/// read these zeros. `load(context)` calls its function for pixels of type T.
 template <class T, class Load>
 StbPixels<T> decode_whole(std::span<const uint8_t> bytes, const std::string& name, Load load) {
   int width = 0, height = 0, channels = 0;
   stbi_info_from_memory(bytes.data(), static_cast<int>(bytes.size()), &width, &height, &channels);
-  // More than a decoder reads at once: rows, but all pixels of PNM files.
+  // The number of additional zeros is more than a decoder reads at once: a few rows, or all pixels of a PNM
+  // file.
   const std::size_t rows = bytes[0] == 'P' ? static_cast<std::size_t>(height) : 4;
   std::vector<uint8_t> padded(bytes.size() + 4 * static_cast<std::size_t>(width) * rows + 65536);
   std::ranges::copy(bytes, padded.begin());

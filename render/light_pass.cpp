@@ -28,7 +28,8 @@ void clear_surfaces(GLuint framebuffer) {
   glClearNamedFramebufferfv(framebuffer, GL_COLOR, 1, flat.data());
 }
 
-/// `colors`: 0 if the colours of surfaces are not written.
+/// Makes all targets of surfaces writable. `colors`: texture for the colours of surfaces; 0 if they are not
+/// written.
 void write_to_all(GLuint framebuffer, const gl::Texture& normals, GLuint colors) {
   glNamedFramebufferTexture(framebuffer, GL_COLOR_ATTACHMENT1, normals, 0);
   if (colors != 0) glNamedFramebufferTexture(framebuffer, GL_COLOR_ATTACHMENT2, colors, 0);
@@ -149,7 +150,7 @@ void LightPass::trace_glass(const LightSources& sources, const View& view, const
   glBindFramebuffer(GL_READ_FRAMEBUFFER, picture_framebuffer);
   glReadPixels(0, 0, all_px_.sizes().x(), all_px_.sizes().y(), GL_RGBA, GL_FLOAT, picture_.data());
   const LightView seen = light_view(view, offsets);
-  // The textures have these values of the opaque objects already, so their memory can be used.
+  // These values of the opaque objects are already in the textures, so their memory can be used again.
   glass_light_.mirrored.swap(light_.mirrored);
   glass_light_.highlights.swap(light_.highlights);
   LightTracer(scene_, sources)

@@ -7,7 +7,7 @@
 namespace offstage::render {
 namespace {
 
-/// The part of a line in front of the near plane, if there is one.
+/// Returns the part of a line in front of the near plane; nothing if there is none.
 std::optional<Line> in_front(Line line, const View& view) {
   const float a = view.depth_of(line.a) - view.near_m, b = view.depth_of(line.b) - view.near_m;
   if (a < 0 && b < 0) return std::nullopt;

@@ -40,8 +40,8 @@ Affine3d to_eigen(const aiMatrix4x4& m) {
   return result;
 }
 
-/// FBX has a unit, in centimetres; the readers of other formats convert to metres, or the formats have no
-/// unit.
+/// Returns the unit of a file [m]. Files of FBX state their unit in centimetres. For other formats the reader
+/// converts to metres, or the format has no unit.
 double metres_per_unit(const aiScene& scene) {
   double centimetres = 100;
   float single = 0;
@@ -58,7 +58,7 @@ Model::UnitSource unit_source_of(const std::filesystem::path& path) {
   return has_ending(path, ".stl") || has_ending(path, ".3mf") ? Source::millimetres : Source::none;
 }
 
-/// The unit of a file in words; for formats without units, the assumed one.
+/// Returns the unit of a file in words; for formats without units, the unit that is assumed.
 std::string unit_of(const aiScene& scene, const std::filesystem::path& path) {
   if (is_gltf(path)) return "1 m, as the format defines (glTF)";
   if (has_ending(path, ".dae")) return "stated by the file (Collada) and converted to metres";
@@ -70,12 +70,12 @@ std::string unit_of(const aiScene& scene, const std::filesystem::path& path) {
   return "none in this format; 1 m is assumed";
 }
 
-/// assimp's v increases upwards for every format.
+/// Converts texture coordinates: v increases upwards in assimp, and downwards here.
 Vector2f top_down(const aiVector3D& uv) {
   return {static_cast<float>(uv.x), 1 - static_cast<float>(uv.y)};
 }
 
-/// Colours of classic formats are sRGB.
+/// Converts a colour of a classic format from sRGB to linear light.
 Vector4f linear_color(const aiColor4D& c) {
   const auto decode = [](float value) { return srgb_decode(std::clamp(value, 0.0f, 1.0f)); };
   return {decode(static_cast<float>(c.r)), decode(static_cast<float>(c.g)), decode(static_cast<float>(c.b)),
@@ -136,7 +136,8 @@ class AssimpSurfaces {
     if (has_colors) add_colors(material, out);
   }
 
-  /// Readers leave colours empty, or their alpha at 0, where a file has none.
+  /// Adds the vertex colours. If a file has no colours or no alpha, some readers of assimp leave the colours
+  /// empty or the alpha at 0.
   void add_colors(std::size_t material, Mesh& out) {
     if (std::ranges::all_of(out.colors, [](const Vector4f& c) { return c.isZero(); }))
       return out.colors.clear();
@@ -202,8 +203,8 @@ std::string reason(const Assimp::Importer& importer) {
   return error.empty() ? "no reason given" : error;
 }
 
-/// Names what the file has and the reader drops. Files of FBX are searched, because their animations are not
-/// read.
+/// Returns the names of things that the file contains but that are not read. Files of FBX are searched,
+/// because their animations are not read.
 std::vector<std::string> ignored_by_assimp(const aiScene& scene) {
   std::vector<std::string> lines;
   const auto add = [&lines](std::size_t count, const char* what) {
@@ -222,7 +223,7 @@ std::vector<std::string> ignored_by_assimp(const aiScene& scene) {
   return lines;
 }
 
-/// Divides the polygons of more than four corners into triangles, where cut_polygon() can.
+/// Divides the polygons with more than four corners into triangles, if cut_polygon() can.
 void cut_polygons(aiMesh& mesh) {
   const std::span faces(mesh.mFaces, mesh.mNumFaces);
   if (std::ranges::all_of(faces, [](const aiFace& face) { return face.mNumIndices < 5; })) return;
@@ -250,7 +251,7 @@ void cut_polygons(aiMesh& mesh) {
     face.mIndices = new unsigned[cut[f].size()];
     std::ranges::copy(cut[f], face.mIndices);
   }
-  // assimp stops the program if a mesh that has polygons by its types has none.
+  // assimp aborts the program if the types of a mesh include polygons but the mesh has none.
   mesh.mPrimitiveTypes |= aiPrimitiveType_TRIANGLE;
   if (std::ranges::all_of(cut, [](const auto& face) { return face.size() < 4; }))
     mesh.mPrimitiveTypes &= ~static_cast<unsigned>(aiPrimitiveType_POLYGON);

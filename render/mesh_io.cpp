@@ -17,9 +17,10 @@
 #include "render/model_files.h"
 #include "render/point_cloud.h"
 
-// With files that any fuzzer finds within minutes, assimp overflows its stack, loops, or allocates the size
-// that a header claims, and the libraries for compressed data may do so. Therefore a confined child imports
-// the model and returns it in a memory file. Only that child can crash, and the caller gets a message.
+// With malformed files, which a fuzzer finds within minutes, assimp overflows its stack, loops, or allocates
+// whatever size a header states. The libraries for compressed data may do the same. Therefore a confined
+// child process imports the model and returns it in a memory file. Only that child can crash; the caller then
+// gets a message.
 
 namespace offstage::render {
 namespace {
@@ -86,7 +87,7 @@ void transfer_rig(Archive& archive, ModelRig& rig) {
   });
 }
 
-/// Calls `archive` for all members of a model; the same list serves writing and reading.
+/// Calls `archive` for all members of a model. The same list is used for writing and for reading.
 template <class Archive>
 void transfer(Archive& archive, Model& model) {
   archive.list(model.parts, [&](Model::Part& part) {
@@ -254,7 +255,8 @@ bool is_whole(const Model::Light& light, const ModelRig& rig) {
          (light.kind != Model::Light::Kind::spot || cone > 0) && cone <= 90 && std::isfinite(light.range_m);
 }
 
-/// All indices refer to something and all sizes agree. What this accepts can be drawn and simulated safely.
+/// Whether a model is consistent: all indices are valid and all sizes agree. Such a model can be drawn and
+/// simulated safely.
 bool is_whole(const Model& model) {
   const auto refers = [](int index, std::size_t size) {
     return index >= 0 && static_cast<std::size_t>(index) < size;
@@ -291,13 +293,14 @@ bool is_whole(const Model& model) {
          is_whole(model.rig, model.materials.size());
 }
 
-/// Edges of the box around a model [m].
+/// Returns the longest edge of the box around a model [m].
 float longest_side(const Model& model) {
   const Eigen::AlignedBox3f box = model.bounds();
   return box.isEmpty() ? 0 : box.sizes().maxCoeff();
 }
 
-/// The folders that a child may read: the given ones or, if there are none, that of the file itself.
+/// Returns the folders that a child may read: the given folders or, if there are none, the folder of the
+/// file.
 InputFolders readable(const std::filesystem::path& path, const InputFolders& folders) {
   return folders.folders().empty() ? InputFolders({path.parent_path()}) : folders;
 }
@@ -306,7 +309,8 @@ void check_folder(const std::filesystem::path& path, const InputFolders& folders
   if (!folders.folders().empty() && !folders.contain(path)) throw FileError(outside_of_folders(path));
 }
 
-/// Number of pictures in the folder of a model and the folders in it, to which the model may refer.
+/// Returns the number of pictures in the folder of a model and its subfolders. The model may refer to these
+/// pictures.
 uint64_t pictures_beside(const std::filesystem::path& model) {
   constexpr int kMostEntries = 4096, kMostDepth = 2;
   namespace fs = std::filesystem;
@@ -324,8 +328,8 @@ uint64_t pictures_beside(const std::filesystem::path& model) {
   return pictures;
 }
 
-/// Number of pictures in a file, by the first bytes of PNG, JPEG and WebP and by data URIs. Counting stops
-/// where more no longer changes the limits.
+/// Returns the number of pictures inside a file. It counts the first bytes of PNG, JPEG and WebP pictures,
+/// and data URIs. Counting stops when more pictures would not change the limits of the child.
 uint64_t pictures_inside(const std::filesystem::path& model) {
   constexpr uint64_t kMostCounted = 32;
   constexpr std::size_t kBlock = std::size_t{1} << 20, kBehind = 16;
@@ -499,7 +503,8 @@ LightImage read_light_image(const std::filesystem::path& path, const InputFolder
     archive.array(light.image.rgba);
     archive.list(light.warnings, [&](std::string& line) { archive.array(line); });
   };
-  // A picture of 16 bits or of floats takes more memory than its file: as eight pictures.
+  // A picture of 16 bits or of floats takes more memory than its file suggests, so it counts as eight
+  // pictures.
   const ChildAnswer answer = run_confined(
       {.what = path.string(), .file_bytes = size, .pictures = 8, .folders = &allowed, .stop = stop},
       [&](int memory) {

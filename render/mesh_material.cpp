@@ -41,7 +41,7 @@ class MaterialImporter {
                    Model& model)
       : scene_(scene), folder_(folder), folders_(folders), model_(model) {}
 
-  /// Adds what assimp does not read of an MTL file to the material that was appended last.
+  /// Adds the properties of an MTL file that assimp does not read to the material that was appended last.
   void add_mtl(const MtlMaterial& source) {
     Material& look = model_.materials.back();
     if (source.roughness) look.roughness = clamped(*source.roughness);
@@ -92,7 +92,7 @@ class MaterialImporter {
   }
 
  private:
-  /// Of MTL files, assimp sees only textures that are drawn.
+  /// For MTL files, assimp only gets the textures that are drawn.
   void name_ignored(const aiMaterial& source, const std::string& name) {
     constexpr std::pair<aiTextureType, const char*> kIgnoredTextures[] = {
         {aiTextureType_NORMALS, "normal map"},        {aiTextureType_NORMAL_CAMERA, "normal map"},
@@ -115,7 +115,8 @@ class MaterialImporter {
     }
   }
 
-  /// Colours of classic materials are sRGB, those of physically based materials are linear.
+  /// Reads the base colour. Colours of classic materials are sRGB; colours of physically based materials are
+  /// linear.
   static void read_color(const aiMaterial& source, bool gltf, bool opaque, Material& material) {
     aiColor4D color(0.8f, 0.8f, 0.8f, 1);
     float opacity = 1, gloss = 0;
@@ -161,7 +162,7 @@ class MaterialImporter {
     return linear ? clamped(value) : srgb_decode(clamped(value));
   }
 
-  /// Applies the options of a texture. The coordinates of MTL start at the bottom.
+  /// Applies the options of a texture in an MTL file, whose coordinates start at the bottom.
   static void lay(const MtlMap& map, TextureMap& texture) {
     texture.rows[0] = {map.scale.x(), 0, map.offset.x()};
     texture.rows[1] = {0, map.scale.y(), 1 - map.scale.y() - map.offset.y()};
@@ -207,7 +208,7 @@ class MaterialImporter {
     model_.textures.push_back(std::move(normals));
   }
 
-  /// Index of the first existing texture among `types`, or -1.
+  /// Returns the index of the first texture of the material among `types`; -1 if there is none.
   int texture(const aiMaterial& source, std::initializer_list<aiTextureType> types, bool opaque,
               unsigned* uv_set = nullptr) {
     for (const aiTextureType type : types) {

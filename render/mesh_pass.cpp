@@ -15,7 +15,7 @@ struct Vertex {
 };
 static_assert(sizeof(Vertex) == 32);
 
-/// Data that few meshes have.
+/// Vertex data that only a few meshes have.
 struct VertexDetails {
   Vector2f second_uv;
   Vector4f color, tangent;
@@ -195,7 +195,7 @@ bool Instance::is_ball() const {
 }
 
 MeshPass::MeshPass(bool quick) : quick_(quick), white_(make_white_texture()) {
-  // Values for meshes without these attributes.
+  // Sets the values that are used for meshes without these attributes.
   glVertexAttrib4f(kColor, 1, 1, 1, 1);
   glVertexAttrib4f(kTangent, 0, 0, 0, 1);
 }

@@ -9,8 +9,8 @@
 namespace offstage::render {
 namespace {
 
-// Hash of a position by its bits, so that vertices that were split at seams of the texture are still smoothed
-// together.
+// Hash of the bits of a position. Positions are compared exactly, so that vertices that were split at seams
+// of a texture are smoothed together.
 struct PositionHash {
   std::size_t operator()(const std::array<float, 3>& p) const {
     uint64_t hash = 0;
@@ -49,7 +49,7 @@ Fans find_fans(const Mesh& mesh) {
   return fans;
 }
 
-// Twice the area times the unit normal of each triangle.
+// Returns the unit normal of each triangle times twice its area.
 std::vector<Vector3f> area_normals(const Mesh& mesh) {
   std::vector<Vector3f> result(mesh.indices.size() / 3);
   for (std::size_t t = 0; t < result.size(); ++t) {

@@ -14,7 +14,7 @@ namespace {
 
 constexpr uint64_t kMaxBytes = uint64_t{2} << 30;
 
-/// A file in memory.
+/// An input file of assimp whose bytes are in memory.
 class ModelStream : public Assimp::IOStream {
  public:
   explicit ModelStream(std::vector<uint8_t> bytes) : bytes_(std::move(bytes)) {}

@@ -17,7 +17,7 @@ std::size_t width_of(const RigChannel& channel, std::size_t targets) {
   return channel.path == Path::weights ? targets : channel.path == Path::rotation ? 4 : 3;
 }
 
-/// Value of a channel at a time (appendix C of the specification).
+/// Returns the value of a channel at a time (appendix C of the glTF specification).
 std::vector<float> value_at(const RigChannel& channel, std::size_t width, float time) {
   const std::vector<float>& times = channel.times;
   const bool cubic = channel.interpolation == Step::cubic;
@@ -58,7 +58,7 @@ Affine3f local_transform(const RigNode& node) {
   return local;
 }
 
-/// Each triangle gets its own normal; the mesh has no shared vertices.
+/// Gives each triangle its own normal. The mesh must not have shared vertices.
 void make_flat(Mesh& mesh) {
   mesh.normals.assign(mesh.positions.size(), Vector3f::UnitY());
   for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {

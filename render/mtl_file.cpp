@@ -31,7 +31,7 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-/// Takes the first word off a line.
+/// Removes the first word from a line and returns it.
 std::string_view next_word(std::string_view& line) {
   line = trimmed(line);
   const auto end = static_cast<std::size_t>(std::ranges::find_if(line, is_blank) - line.begin());
@@ -55,7 +55,7 @@ std::string lower_case(std::string_view text) {
   return result;
 }
 
-/// One to three numbers; a missing second one is `missing`.
+/// Reads one to three numbers and returns the first two. A missing second number becomes `missing`.
 Eigen::Vector2f next_pair(std::string_view& line, float missing) {
   Eigen::Vector2f result(missing, missing);
   for (int k = 0; k < 3; ++k) {

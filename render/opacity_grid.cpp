@@ -7,7 +7,7 @@ namespace offstage::render {
 namespace {
 
 constexpr int kOpacityCells = 72;  // number of cells along the longest side
-// Upper limit for a typical puff, because finer cells would show single puffs.
+// Greatest number of cells per radius of a typical puff. Finer cells would show single puffs.
 constexpr float kCellsPerRadius = 2;
 
 // Corners of a tetrahedron: four points within a puff that represent it.

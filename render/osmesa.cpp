@@ -1,5 +1,5 @@
 // OSMesa. Its few functions are declared here, because GL/osmesa.h includes Mesa's gl.h, which conflicts with
-// glad's, and Mesa 25.1 and later have neither header nor library.
+// the header of glad. Mesa 25.1 and later have neither the header nor the library.
 
 #include <array>
 #include <cstdint>

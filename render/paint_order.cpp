@@ -13,15 +13,15 @@
 namespace offstage::render {
 namespace {
 
-// A key contains, from the most significant bit: the number of layers in front, the depth, which is not
-// negative, so its bits are ordered, and the number of the point.
+// A sort key contains, from the most significant bit: the number of layers in front, the depth, and the
+// number of the point. The depth is not negative, so the order of its bits is the order of the depths.
 constexpr int kNumberBits = 27, kOrderDepthBits = 31;
 constexpr std::size_t kMostLayers = std::size_t{1} << (64 - kNumberBits - kOrderDepthBits);
 constexpr uint32_t kMostPoints = uint32_t{1} << kNumberBits;
 
-// Each kind is drawn by another program, run by run. If the number of alternating runs is larger than
-// kMostRuns, neighbours in depth are merged to kSlices slices, in which the kinds are drawn one after the
-// other.
+// Each kind of particle is drawn by another shader program, in runs of particles of one kind. If the number
+// of alternating runs is larger than kMostRuns, neighbours in depth are merged to kSlices slices, in which
+// the kinds are drawn one after the other.
 constexpr std::size_t kMostRuns = 24, kSlices = 6;
 
 uint64_t depth_and_layer(uint64_t key) {
@@ -252,7 +252,7 @@ void PaintOrder::find_runs(std::size_t bodies) {
     pieces.back().last = ++at[next];
   }
 
-  // Merges pieces of one layer to slices, and pieces of one kind in a slice to a run.
+  // Merges the pieces of a layer into slices, and the pieces of the same kind in a slice into a run.
   const std::size_t joined = pieces.size() > kMostRuns + bodies ? (pieces.size() + kSlices - 1) / kSlices : 1;
   std::vector<std::pair<std::size_t, Run>> runs;
   for (std::size_t p = 0; p < pieces.size();) {

@@ -15,7 +15,8 @@ std::vector<Vector3f> moved_positions(const Mesh& mesh, const Eigen::Affine3d& w
   return positions;
 }
 
-/// The mean normal of the faces around each vertex, weighted by their areas; zero where there are none.
+/// Returns, for each vertex, the mean normal of the faces around it, weighted by area; zero if there are no
+/// faces.
 std::vector<Eigen::Vector3d> face_normals(const Mesh& mesh) {
   std::vector<Eigen::Vector3d> sums(mesh.positions.size(), Eigen::Vector3d::Zero());
   for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
@@ -30,14 +31,14 @@ std::vector<Eigen::Vector3d> face_normals(const Mesh& mesh) {
   return sums;
 }
 
-/// Transformed normals; empty if the mesh has none. Those that are no directions are replaced by the mean of
-/// their faces, and counted in `replaced`.
+/// Returns the transformed normals; empty if the mesh has none. A normal without a direction is replaced by
+/// the mean normal of the faces around its vertex, and counted in `replaced`.
 std::vector<Vector3f> moved_normals(const Mesh& mesh, const Eigen::Affine3d& world_from_mesh,
                                     std::size_t& replaced) {
   if (mesh.normals.empty() || mesh.normals.size() != mesh.positions.size()) return {};
   const Eigen::Matrix3d linear = world_from_mesh.linear();
-  // The cofactor matrix is the inverse transpose times the determinant; the sign compensates that of the
-  // determinant for mirrored nodes.
+  // The cofactor matrix is the inverse transpose times the determinant. For mirrored nodes the determinant is
+  // negative, which the sign compensates.
   Eigen::Matrix3d cofactor;
   cofactor << linear.col(1).cross(linear.col(2)), linear.col(2).cross(linear.col(0)),
       linear.col(0).cross(linear.col(1));
@@ -59,7 +60,7 @@ std::vector<Vector3f> moved_normals(const Mesh& mesh, const Eigen::Affine3d& wor
   return normals;
 }
 
-/// A mirror reverses the side of the direction of increasing v.
+/// Transforms a tangent. A mirroring transform reverses the side to which v increases.
 Vector4f moved_tangent(const Vector4f& tangent, const Eigen::Affine3d& world_from_mesh, bool mirrored) {
   const Eigen::Vector3d t = world_from_mesh.linear() * tangent.head<3>().cast<double>();
   const double length = t.norm();

@@ -40,8 +40,8 @@ class SigpipeBlock {
   bool was_pending_ = false;
 };
 
-/// Standard output. A pipe is opened a second time, so that it can be non-blocking for this process and stay
-/// blocking for others that share it.
+/// Standard output. If it is a pipe, it is opened a second time. It can then be non-blocking for this process
+/// and stay blocking for other processes that share it.
 class StandardOutput {
  public:
   explicit StandardOutput(StopTest stop) : stop_(std::move(stop)) {
@@ -63,7 +63,8 @@ class StandardOutput {
   Descriptor own_;
 };
 
-/// BT.709 luma and colour differences, limited range, in 16-bit fixed point, rounded.
+/// Converts a colour to BT.709 luma and colour differences of limited range. The computation is in 16-bit
+/// fixed point and rounded.
 std::array<uint8_t, 3> yuv_from_rgb(const uint8_t* rgb) {
   const int r = rgb[0], g = rgb[1], b = rgb[2];
   const int half = 1 << 15;

@@ -32,7 +32,8 @@ void append_chunk(std::vector<uint8_t>& out, std::string_view name, std::span<co
   close_chunk(out, start);
 }
 
-/// Each row as its difference to the row above, after a byte for the filter type.
+/// Returns the filtered rows. Each row is a byte for the filter type, and then the differences to the row
+/// above.
 std::vector<uint8_t> filtered(const PngPixels& pixels, std::size_t row_bytes) {
   constexpr uint8_t kUp = 2;
   const auto rows = static_cast<std::size_t>(pixels.height_px);

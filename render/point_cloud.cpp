@@ -15,12 +15,12 @@
 namespace offstage::render {
 namespace {
 
-/// Takes lines and words from text.
+/// Reads lines and words from a text.
 class Text {
  public:
   explicit Text(std::string_view text) : rest_(text) {}
 
-  /// The next line without its end; nothing at the end.
+  /// Returns the next line without its line end; nothing at the end of the text.
   std::optional<std::string_view> line() {
     if (rest_.empty()) return {};
     const std::size_t end = std::min(rest_.find('\n'), rest_.size());
@@ -117,7 +117,7 @@ double ply_value(const uint8_t* bytes, PlyNumber type, bool big_endian) {
   return 0;
 }
 
-/// Largest value of a colour of this type.
+/// Returns the number of this type that stands for a colour of 1.
 float full_color(PlyNumber type) {
   return type == PlyNumber::uint8 ? 255.0f : type == PlyNumber::uint16 ? 65535.0f : 1.0f;
 }
@@ -174,7 +174,7 @@ PlyHeader read_ply_header(Text& text) {
   throw FileError("its header is too long");
 }
 
-/// Finds the properties by name; throws for missing coordinates.
+/// The columns of the properties, found by name. Throws if coordinates are missing.
 struct PlyColumns {
   std::array<std::size_t, 3> position;
   std::optional<std::array<std::size_t, 3>> color;

@@ -17,14 +17,14 @@ namespace {
 constexpr GLuint kPictureUnit = 1;
 constexpr float kCorner = std::numbers::sqrt2_v<float>;  // distance of the corner of a picture, in radii
 
-// The finalizer of splitmix64, mapped to a number in [0, 1).
+// Returns a number in [0, 1) that depends only on `id`: the finalizer of SplitMix64, scaled.
 float number_of_its_own(uint64_t id) {
   id = (id ^ (id >> 30)) * 0xBF58476D1CE4E5B9ull;
   id = (id ^ (id >> 27)) * 0x94D049BB133111EBull;
   return static_cast<float>((id ^ (id >> 31)) >> 40) * 0x1p-24f;
 }
 
-/// The pictures of a sheet that a particle shows at its age.
+/// Returns the pictures of a sheet that a particle shows at its current age.
 GpuPicture picture_of(const Point& point, const PointsDef& def, float random_number) {
   const SpriteSheet& sheet = def.sheet;
   const int count = sheet.columns * sheet.rows;
@@ -203,7 +203,8 @@ void PointsPass::draw_blended(PointStyle style, uint32_t first, uint32_t last) {
   const uint32_t end = begin + (last - first);
   glVertexArrayVertexBuffer(blended_array_, 0, blended_buffer_, 0, sizeof(BlendedPoint));
   glBindVertexArray(blended_array_);
-  // Neighbours with other pictures are drawn by further calls, between which as little as possible changes.
+  // Consecutive particles with other pictures need a separate draw call. As little state as possible changes
+  // between two calls.
   auto run = std::upper_bound(picture_runs_.begin(), picture_runs_.end(), std::size_t{begin},
                               [](std::size_t place, const PictureRun& r) { return place < r.first; });
   std::optional<bool> with_pictures;

@@ -15,13 +15,13 @@ constexpr std::size_t kMostCorners = 1024;  // the time grows with the square, i
 /// Areas below this fraction of the square of the polygon's extent count as zero.
 constexpr double kNoArea = 1e-12;
 
-/// Twice the area of a triangle; > 0 if it is counter-clockwise.
+/// Returns twice the area of a triangle; > 0 if it is counter-clockwise.
 double doubled_area(const Vector2d& a, const Vector2d& b, const Vector2d& c) {
   const Vector2d u = b - a, v = c - a;
   return u.x() * v.y() - u.y() * v.x();
 }
 
-/// The remaining polygon while its ears are cut off.
+/// Cuts ears off a polygon; its members are the remaining polygon.
 class EarCutter {
  public:
   explicit EarCutter(std::vector<Vector2d> corners) : at_(std::move(corners)), left_(at_.size()) {
@@ -72,8 +72,8 @@ class EarCutter {
     return best;
   }
 
-  /// Area over the square of the longest side, if the corner is an ear: a triangle without other corners in
-  /// it or on its sides. Otherwise 0.
+  /// Returns the quality of an ear: its area divided by the square of its longest side. The corner is an ear
+  /// if no other corner is inside its triangle or on its sides; otherwise the result is 0.
   double fitness(uint32_t corner) const {
     const Vector2d &a = at_[before_[corner]], &b = at_[corner], &c = at_[after_[corner]];
     const double area = doubled_area(a, b, c);

@@ -10,7 +10,7 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 
-// A point of the half-section of a body of revolution. Two consecutive points at one position make a sharp
+// A point of the profile of a body of revolution. Two consecutive points at the same position make a sharp
 // edge.
 struct ProfilePoint {
   float radius, y;
@@ -68,8 +68,8 @@ std::vector<float> box_lines(float half, float bevel) {
   return {-half, bevel - half, half - bevel, half};
 }
 
-// Adds the point of the rounded box for a point of the sharp one; it is at the distance `bevel` from the
-// inner box.
+// Adds the vertex of a rounded box that corresponds to a point of the sharp box. Its distance from the inner
+// box is `bevel` [m].
 void add_box_vertex(Mesh& mesh, const Vector3f& point, const Vector3f& half, float bevel,
                     const Vector3f& face_normal) {
   const Vector3f inner_half = half - Vector3f::Constant(bevel);
@@ -205,7 +205,7 @@ Mesh make_tube(float radius, float height, float thickness, int segments) {
 
 Mesh make_open_box(const Vector3f& size, float thickness) {
   Mesh mesh;
-  // A rectangle with its corner, its two edges in the order that makes its normal their cross product.
+  // Adds a rectangle with a corner and two edges u and v. Its normal is along u x v.
   const auto add = [&](const Vector3f& corner, const Vector3f& u, const Vector3f& v) {
     const auto first = static_cast<uint32_t>(mesh.positions.size());
     const Vector3f normal = u.cross(v).normalized();

@@ -23,7 +23,7 @@ float lattice(int x, int y, int z, uint32_t seed) {
   return static_cast<float>(scramble(key) >> 8) * 0x1p-23f - 1;
 }
 
-// Noise in [-1, 1] that varies over a distance of 1.
+// Returns noise in [-1, 1] whose details have a size of about 1.
 float noise(const Vector3f& p, uint32_t seed) {
   const Vector3f base = p.array().floor();
   const Vector3f f = p - base;
@@ -36,7 +36,7 @@ float noise(const Vector3f& p, uint32_t seed) {
   return mix(mix(row(0, 0), row(1, 0), w.y()), mix(row(0, 1), row(1, 1), w.y()), w.z());
 }
 
-// Density of the puff at a point of the unit ball, at most about 1.
+// Returns the density of a puff at a point of the unit ball; at most about 1.
 float density(PuffAtlas::Kind kind, const Vector3f& p, uint32_t seed) {
   const bool flame = kind == PuffAtlas::Kind::flame;
   const float r = p.norm();

@@ -7,7 +7,8 @@
 namespace offstage::render {
 namespace {
 
-// Sunlight scattered in smoke at an optical depth: once, a few times and many times.
+// Returns the fraction of sunlight that arrives at an optical depth in smoke. It is the sum of light that was
+// scattered once, a few times and many times.
 float sun_fraction(float depth, float albedo) {
   return 0.68f * std::exp(-depth) +
          albedo * (0.3f * std::exp(-0.35f * depth) + 0.12f * albedo * std::exp(-0.1f * depth));
@@ -38,7 +39,7 @@ AirRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vecto
     depth += 0.25f * d;
     slope += d / (4 * reach) * corner;
   }
-  // Smoke above reduces the light from around. Steps grow, because distant smoke needs no detail.
+  // Smoke above reduces the ambient light. The steps become longer, because distant smoke needs no detail.
   float above = 0, step = grid.cell_m();
   Vector3f p = place;
   for (int k = 0; k < 4 && !grid.empty(); ++k, step *= 2) {

@@ -23,7 +23,8 @@ PuffAtlas::Kind kind_of(const PointSet& set) {
   return set.def.style == PointStyle::fire ? PuffAtlas::Kind::flame : PuffAtlas::Kind::smoke;
 }
 
-// Several independent numbers of a puff from its number in [0, 1), which has 24 bits.
+// Several independent random properties of a puff, derived from its random number in [0, 1), which has 24
+// bits.
 struct Shape {
   int variant;
   bool mirrored;
@@ -93,7 +94,7 @@ void PuffsPass::measure(const PaintOrder& order, const View& view, float pixel_m
 
 namespace {
 
-/// The picture that puffs are drawn into.
+/// The picture into which puffs are drawn.
 struct PuffScreen {
   const View& view;
   Vector2f half_size;  // [px]
@@ -120,7 +121,7 @@ Eigen::Matrix3f place_puff(const PointSet& set, std::size_t i, const PuffScreen&
   s.opacity = std::min(point.color.w(), 1.0f) * thinning * thinning *
               std::clamp(0.5f * (s.depth - view.near_m) / drawn, 0.0f, 1.0f);
 
-  // A puff that is near enough to fill the picture fades out before the eye is inside it.
+  // A puff near the eye fills the picture. It fades out before the eye is inside it.
   const float apart = std::clamp(0.5f * s.depth / radius - 1, 0.0f, 1.0f);
   s.opacity *= std::max(apart, std::clamp(2 - radius_px / (kNearestPuff * screen.half_size.y()), 0.0f, 1.0f));
 
@@ -244,8 +245,9 @@ void PuffsPass::read_depth(std::span<const Splat> splats, const FrameUniforms& f
   depths_.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer);
   glReadPixels(left, bottom, width, height, GL_DEPTH_COMPONENT, GL_FLOAT, depths_.data());
-  // Alternately the nearest and the farthest of the pixels, so that compositing finds both sides of every
-  // edge (Jansen and Bavoil, "Fast Rendering of Opacity Mapped Particles", 2011). A nearer depth is greater.
+  // Takes alternately the nearest and the farthest of the pixels, so that compositing finds both sides of
+  // every edge (Jansen and Bavoil, "Fast Rendering of Opacity Mapped Particles", 2011). A nearer depth is
+  // greater.
   tbb::parallel_for(y0, y1, [&](int y) {
     for (int x = x0; x < x1; ++x) {
       const bool nearest = ((x ^ y) & 1) != 0;

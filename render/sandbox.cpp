@@ -72,7 +72,7 @@ sock_filter answer(uint32_t action) {
   return statement(BPF_RET | BPF_K, action);
 }
 
-/// Allows a system call that opens files if the argument with its flags is read-only.
+/// Allows a system call that opens files, but only if its flags argument requests read-only access.
 void allow_opening(std::vector<sock_filter>& program, uint32_t call, std::size_t flags_argument) {
   constexpr uint32_t kChanges = O_ACCMODE | O_CREAT | O_TRUNC | O_APPEND;  // O_RDONLY is 0
   // The less significant half comes first.

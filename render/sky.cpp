@@ -78,8 +78,8 @@ std::array<float, 9> sky_basis(const Vector3f& n) {
 
 std::array<Vector3f, 9> sky_irradiance(const SkyModel& sky) {
   if (sky.turned.picture) return sky.turned.irradiance();
-  // Squares of the constants of the real spherical harmonics times the factors of the cosine lobe over pi (1,
-  // 2/3, 1/4).
+  // The squares of the constants of the real spherical harmonics, times the factors of the cosine lobe
+  // divided by pi (1, 2/3, 1/4).
   constexpr float pi = std::numbers::pi_v<float>;
   constexpr std::array<float, 9> kWeights = {1 / (4 * pi),     0.5f / pi,      0.5f / pi,
                                              0.5f / pi,        3.75f / pi / 4, 3.75f / pi / 4,

@@ -18,7 +18,7 @@ std::size_t sky_cell(int column, int row, int columns) {
   return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(column);
 }
 
-/// Coordinates in [0, 1] from the upper left corner.
+/// Returns the coordinates of a direction in a sky picture, in [0, 1] from the upper left corner.
 Vector2f sky_coordinates(const Vector3f& direction) {
   const float u = 0.5f + std::atan2(direction.x(), -direction.z()) * (0.5f / kSkyPi);
   const float v = std::acos(std::clamp(direction.y(), -1.0f, 1.0f)) / kSkyPi;
@@ -57,7 +57,7 @@ Vector3f sky_interpolated(int columns, int rows, const Vector3f& direction, Get 
   return (1 - t) * upper + t * lower;
 }
 
-// Three mantissas of 9 bits and one exponent, as in the extension EXT_texture_shared_exponent.
+// The format has three mantissas of 9 bits and one exponent, as in the extension EXT_texture_shared_exponent.
 constexpr int kSharedMantissaBits = 9, kSharedExponentBias = 15, kMostSharedExponent = 31;
 
 uint32_t packed_color(const Vector3f& color) {
@@ -219,8 +219,8 @@ SkyPicture::SkyPicture(const HdrImage& image, float blur_deg) {
   prefilter();
 }
 
-// The bright part is what exceeds four times the mean luminance of the dim part. The mean decreases from
-// round to round, because less and less is left in the dim part; any limit gives the same sum of both.
+// The bright part is the radiance above four times the mean luminance of the dim part. The mean decreases
+// from round to round, because less and less is left in the dim part; any limit gives the same sum of both.
 void SkyPicture::split() {
   constexpr float kTimesMean = 4;
   constexpr int kRounds = 8;

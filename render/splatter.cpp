@@ -103,8 +103,8 @@ inline void draw_lanes(const StreakSplat& s, float dx, float dy, std::size_t at,
   through -= seen * s.cover;
 }
 
-// The part of a row that a splat covers, `dy` above its centre, as left and right ends relative to the
-// centre.
+// Returns the part of a row that a splat covers, as left and right ends relative to the centre. The row is
+// `dy` above the centre.
 inline std::array<float, 2> span_of(const Splat& s, float) {
   return {-s.half_x, s.half_x};
 }
@@ -132,7 +132,8 @@ void draw_splat(const S& s, int tile_x, int tile_y, Tile& tile) {
   }
 }
 
-// Includes the scale of bytes in the numbers: cover is byte / 255, a normal is byte / 127.5 - 1.
+// Returns the splat with its factors scaled for texels in bytes: cover is byte / 255, a normal is byte /
+// 127.5 - 1.
 Splat in_bytes(Splat s) {
   s.opacity /= 255;
   for (auto& r : s.radiance) {

@@ -87,8 +87,8 @@ struct TextureGroup {
   }
 };
 
-/// A mip level in the corner of a larger one. Its edges are continued, so that filters find nothing else
-/// there.
+/// Returns a mip level in the corner of a larger picture. The rest is filled by repeating the edges, so that
+/// filters do not mix in other colours.
 std::vector<uint8_t> padded_level(const std::vector<uint8_t>& level, int width, int height, int to_width,
                                   int to_height) {
   if (width == to_width && height == to_height) return level;

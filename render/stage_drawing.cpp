@@ -11,7 +11,7 @@ namespace {
 // Texture units of shaders/sky.glsl and sky.frag.
 constexpr GLuint kSkyLevelsUnit = 23, kSkyBackgroundUnit = 24;
 
-/// The particles that the light around them changes.
+/// Returns the particles whose look depends on the light around them.
 std::vector<AirField::Ball> lit_particles(const PaintOrder& order) {
   std::vector<AirField::Ball> result;
   using enum PaintOrder::Kind;
@@ -28,7 +28,7 @@ std::vector<AirField::Ball> lit_particles(const PaintOrder& order) {
 
 }  // namespace
 
-// The sky and its picture as textures.
+// Uploads the sky and its picture as textures.
 void Stage::Impl::prepare_sky() {
   sky = make_sky(sun, environment);
   const std::shared_ptr<const SkyPicture>& picture_of_sky = environment.picture;
@@ -55,7 +55,7 @@ void Stage::Impl::draw_sky() {
   glDrawArrays(GL_TRIANGLES, 0, 3);
 }
 
-// The plain surfaces of a quick picture.
+// Draws the plain surfaces of a quick picture.
 void Stage::Impl::draw_plain() {
   Features defines = features;
   defines.push_back("FLAT 1");
@@ -102,7 +102,8 @@ void Stage::Impl::prepare_lamps(std::span<PointSet* const> sets) {
   if (sky.turned.picture && !sky.seen_as_colors) features.push_back("SKY_SEEN 1");
 }
 
-// Depth and surfaces of everything opaque. The depth also limits later shading to what is visible.
+// Draws the depth and the surfaces of all opaque objects. The depth also limits later shading to visible
+// points.
 void Stage::Impl::draw_surfaces(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets) {
   glBindFramebuffer(GL_FRAMEBUFFER, picture.framebuffer);
   const float nothing[4] = {0, 0, 0, 0};
@@ -167,7 +168,7 @@ void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<
   light_pass.trace(light_sources, view, offsets, stop);
 }
 
-// The light of the nearest surfaces of glass. Rays find the surfaces behind them.
+// Traces the light of the nearest surfaces of glass. Rays find the surfaces behind them.
 void Stage::Impl::trace_glass(const View& view, const SampleOffsets& offsets) {
   ScreenArea area(view, 0);
   for (const Instance* instance : mesh_pass.translucent()) {
@@ -299,8 +300,8 @@ void Stage::Impl::draw_run(const PaintOrder::Run& run, const View& view, const F
   picture.behind.change(area);
 }
 
-// The light of the nearest surfaces of one body other than glass; surfaces behind them in the same pixel show
-// the same light.
+// Traces the light of the nearest surfaces of a translucent body that is not glass. Its other surfaces in the
+// same pixel get the same light.
 void Stage::Impl::trace_body(const TranslucentBody& body, const View& view, const SampleOffsets& offsets) {
   if (!light_pass.begin_part(picture.depth, body.area_px)) return;
   glDisable(GL_BLEND);
@@ -382,7 +383,8 @@ void Stage::Impl::draw_lines(const View& view) {
   });
 }
 
-// Adds the picture by bands, which fit into the processor's cache; rows are from the bottom up.
+// Adds the picture to the sum in bands of rows that fit into the processor's cache. OpenGL's rows are from
+// the bottom up.
 void Stage::Impl::add_picture(const FrameUniforms& frame, HdrImage& sum) {
   glBindFramebuffer(GL_READ_FRAMEBUFFER, picture.framebuffer);
   const std::size_t row = static_cast<std::size_t>(sum.width_px) * 4;

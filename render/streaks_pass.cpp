@@ -25,7 +25,7 @@ Vector3f drop_light(const PuffLight& light, const GpuPoint& point, const Vector3
          light.air.lamps_around(place, radius, number);
 }
 
-// Position on the screen [px], and distance along the view axis.
+// Returns the position on the screen [px] and, as z, the distance along the view axis [m].
 Vector3f project(const View& view, const Vector3f& place, const Vector2f& half_size) {
   const Vector4f clip = view.clip_from_world * place.homogeneous();
   return {(clip.x() / clip.w() + 1) * half_size.x(), (clip.y() / clip.w() + 1) * half_size.y(), clip.w()};
@@ -55,7 +55,7 @@ StreakLight light_of(const GpuPoint& point, const PointsDef& def, const View& vi
   return s;
 }
 
-/// The splat of a streak without its light.
+/// Returns the splat of a streak without its light.
 StreakSplat splat_of(const GpuPoint& point, const PointsDef& def, const View& view, float pixel_m,
                      const Vector2f& half_size) {
   const Vector3f center = point.position.head<3>();
@@ -88,7 +88,7 @@ StreakSplat splat_of(const GpuPoint& point, const PointsDef& def, const View& vi
   s.inverse_reach = 0.5f / drawn;
   s.opacity =
       std::min(point.color.w(), 1.0f) * (radius / drawn) * std::clamp(0.5f * room / drawn, 0.0f, 1.0f);
-  // A drop near the lens would be a bar across the picture.
+  // A drop near the lens fades out, because it would be a bar across the picture.
   const float apart = std::clamp(0.1f * distance / view.near_m - 1, 0.0f, 1.0f);
   s.opacity *= std::max(apart, std::clamp(2 - radius_px / (kNearestStreak * half_size.y()), 0.0f, 1.0f));
   s.cover = def.additive ? 0.0f : 1.0f;

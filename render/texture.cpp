@@ -29,7 +29,8 @@ uint8_t encode(float value, TextureContent content) {
   return static_cast<uint8_t>(std::clamp(encoded, 0.0f, 1.0f) * 255 + 0.5f);
 }
 
-// Halves the size; colours are weighted by their alpha, so that cut-out parts leave no fringe.
+// Returns an image of half the size. Colours are weighted by their alpha, so that cut-out parts leave no
+// fringe.
 Image half_size(const Image& image, TextureContent content, const ChannelTable& decode) {
   Image half{std::max(image.width_px / 2, 1), std::max(image.height_px / 2, 1), {}};
   half.rgba.reserve(half.pixel_count() * 4);
@@ -58,7 +59,7 @@ Image half_size(const Image& image, TextureContent content, const ChannelTable& 
   return half;
 }
 
-/// Fraction of the pixels whose alpha, times `factor`, reaches the cutoff.
+/// Returns the fraction of the pixels whose alpha, times `factor`, reaches the cutoff.
 double coverage_of(const Image& image, float cutoff, float factor) {
   std::size_t count = 0;
   for (std::size_t i = 3; i < image.rgba.size(); i += 4)
@@ -73,7 +74,7 @@ Image with_coverage(const Image& image, float cutoff, double coverage) {
     const float middle = std::sqrt(low * high);
     (coverage_of(image, cutoff, middle) < coverage ? low : high) = middle;
   }
-  // A level of few pixels cannot have every fraction; the nearer of both sides is taken.
+  // A level with few pixels cannot have every fraction, so the nearer one of two possible fractions is used.
   const double below = coverage - coverage_of(image, cutoff, low),
                above = coverage_of(image, cutoff, high) - coverage;
   const float factor = below < above ? low : high;

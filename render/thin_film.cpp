@@ -10,20 +10,22 @@ namespace {
 using Eigen::Array3d;
 using std::numbers::pi;
 
-/// Fresnel reflectance at perpendicular incidence.
+/// Returns the Fresnel reflectance at perpendicular incidence.
 double reflectance_between(double n1, double n2) {
   const double r = (n1 - n2) / (n1 + n2);
   return r * r;
 }
 
-/// Index of refraction against air of a surface that reflects a fraction below 1.
+/// Returns the index of refraction, relative to air, of a surface with this reflectance, which must be below
+/// 1.
 double index_of_refraction(double reflectance) {
   const double root = std::sqrt(std::clamp(reflectance, 0.0, 0.9999));
   return (1 + root) / (1 - root);
 }
 
-/// The Fourier transform of the eye's sensitivity to the wave number as linear RGB, at a path difference [m]
-/// and a phase shift for each channel; about (1, 1, 1) without both.
+/// Returns the Fourier transform of the eye's sensitivity as a function of the wave number, as linear RGB.
+/// `path_m`: path difference; `shift`: phase shift of each channel [rad]. If both are 0, the result is about
+/// (1, 1, 1).
 Array3d film_sensitivity(double path_m, const Array3d& shift) {
   const double phase = 2 * pi * path_m;
   const Array3d value(5.4856e-13, 4.4201e-13, 5.2481e-13), place(1.6810e6, 1.7953e6, 2.2084e6),

@@ -55,8 +55,8 @@ inline uint32_t look_up(const uint16_t* table, float value) {
   return table[std::clamp(cell, 0, kCellCount)];
 }
 
-// A threshold in [0, kStep) by the R2 sequence of M. Roberts folded to a triangle wave: close to blue noise,
-// without a table.
+// Returns a dither threshold in [0, kStep). It is the R2 sequence of M. Roberts, folded to a triangle wave.
+// This is close to blue noise and needs no table.
 inline uint32_t dither_threshold(uint32_t x, uint32_t y) {
   const uint32_t phase = x * 3242174889u + y * 2447445413u;
   const uint32_t folded = phase ^ (phase & 0x80000000u ? 0xFFFFFFFFu : 0u);

@@ -16,7 +16,7 @@
 namespace offstage::render {
 namespace {
 
-/// Contents of a container. `whole`: its parts fill the file and the last one exists.
+/// Contents of a container file. `whole`: whether its parts fill the file and the last part exists.
 struct Contents {
   bool whole = false;
   uint64_t frames = 0;
@@ -107,7 +107,8 @@ class Matroska {
   static constexpr uint64_t kSegment = 0x18538067, kCluster = 0x1F43B675, kBlockGroup = 0xA0, kBlock = 0xA1,
                             kSimpleBlock = 0xA3;
 
-  /// Reads a variable-size number; the marker bit is kept in ids. Nothing for a number of unknown size.
+  /// Reads a number of variable size. `keep_marker`: keep the marker bit, as ids do. Returns nothing if the
+  /// number means an unknown size.
   std::optional<uint64_t> number(uint64_t& at, bool keep_marker) {
     const uint8_t first = file_.byte(at);
     int length = 1;
@@ -231,7 +232,7 @@ std::string wrong_with_video(const std::filesystem::path& path, const std::files
     if (found.frames == expected) return {};
     return "it has " + std::to_string(found.frames) + " of " + std::to_string(frames) + " frames";
   }
-  // Time stamps are rounded, and the last frame may be displayed for another time than intended.
+  // Time stamps are rounded, and the duration of the last frame may differ from the intended one.
   const double frame_s = seconds / frames, rounding_s = 0.011;
   if (found.frames > 0 && found.frames <= expected && *found.seconds > seconds - 1.5 * frame_s - rounding_s)
     return {};

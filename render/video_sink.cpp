@@ -51,7 +51,7 @@ std::vector<std::string> list_encoders(const std::string& program) {
   return names;
 }
 
-/// The same, but the program is run only once per process.
+/// Returns the same as list_encoders(), but runs each program only once per process.
 std::vector<std::string> known_encoders(const std::string& program) {
   static std::mutex mutex;
   static std::string known_program;
@@ -83,8 +83,8 @@ struct FrameChannel {
   }
 };
 
-/// Sends all bytes; returns the error number, or 0. ECANCELED after a request to stop, EAGAIN for a stuck
-/// encoder.
+/// Sends all bytes. Returns 0 or an error number: ECANCELED after a request to stop, EAGAIN if the encoder
+/// hangs.
 int send_all(int socket, std::span<const uint8_t> bytes, const StopTest& stop) {
   StopDeadline patience(stop);
   auto last = std::chrono::steady_clock::now();

@@ -8,12 +8,13 @@ namespace {
 
 /// Greatest number of times at which contacts close.
 constexpr int kMostClosings = 16;
-/// Smaller gaps are closed [m]. Gaps that close this soon after another one close with it, as a fraction of
-/// the interval: the points of a wheel come to a seam together, apart from rounding.
+/// kClosed: smaller gaps count as closed [m]. kTogether: gaps that close within this fraction of the interval
+/// after another gap close at the same time as that gap. Example: apart from rounding, all points of a wheel
+/// reach a seam of a surface at the same time.
 constexpr Real kClosed = 1e-11, kTogether = 1e-3;
-/// Contacts that approach more slowly need not be stopped [m/s].
+/// Contacts that approach at a lower speed than this need not be stopped [m/s].
 constexpr Real kStopped = 1e-9;
-/// Part of the kinetic energy that a solution may add by rounding.
+/// Fraction of the kinetic energy that a solution may add because of rounding.
 constexpr Real kClosingRounding = 1e-9;
 
 /// Returns the time until a gap [m] closes [s], at least 0; more than `rest` if it does not close. The rate
@@ -88,9 +89,9 @@ class Pieces {
     result_.work.add(*work);
     return now ? added_energy(before, bodies_, closed_) <= kClosingRounding * kinetic_energy(before) : true;
   }
-  /// Changes a row of the whole interval to one of its rest, or of the instant `now`. Efforts are constant
-  /// over the interval. At an instant, motors and friction of limited strength, soft motors and dampers do
-  /// nothing, and a motor of any strength keeps its speed.
+  /// Changes a row of the whole interval to a row of its rest or, with `now`, of an impact at the current
+  /// time. Forces and torques are constant over the interval. In an impact, motors and friction of limited
+  /// strength, soft motors and dampers have no effect. A motor of unlimited strength keeps its speed.
   void set_row(BoundedRow& row, bool now) const {
     const Real rest = 1 - time_ / problem_.duration;
     row.impulse *= now ? 0 : rest;
@@ -129,7 +130,8 @@ class Pieces {
     return c.frame.n.dot(bodies[c.a].velocity_at(c.arm_a) - bodies[c.b].velocity_at(c.arm_b)) +
            problem_.points[i].surface.x();
   }
-  /// Time until the next contact closes, which is beyond the end if none does.
+  /// Returns the time until the next contact closes [s]; a time beyond the end of the interval if no contact
+  /// closes.
   Real next_closing() {
     const Real rest = problem_.duration - time_;
     Real next = 2 * rest;
@@ -140,7 +142,8 @@ class Pieces {
     }
     return next;
   }
-  /// Moves by a time, with velocities that change at a constant rate to those of bodies_.
+  /// Advances the state by `duration` [s]. The velocities change at a constant rate towards the velocities in
+  /// bodies_.
   void advance(Real duration) {
     const Real part = duration / (problem_.duration - time_);
     add_impulses(part);

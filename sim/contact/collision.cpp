@@ -24,12 +24,12 @@ constexpr Real kRounding = 1e-13;  ///< relative rounding error of products of i
 /// Number of arcs of the circle of directions; each is searched for a change of sign.
 constexpr int kArcs = 64;
 constexpr int kHalvings = 60;  ///< bisection steps: to the last bit
-/// Solutions of a cluster in the search for the restitution that conserves the energy.
+/// Greatest number of solutions of a cluster in the search for the restitution that conserves energy.
 constexpr int kSolves = 20;
 constexpr Real kKeptEnergy = 1e-9;  ///< fraction of the energy added by restitution that may be lost instead
 constexpr std::size_t kDense = 24;  ///< clusters of at most this many contacts are solved by pivoting
 constexpr Real kAcceptedResidual = 1e-6;  ///< fraction of the velocities: accepted residual of an impact
-/// Fraction of the velocities: a result with a larger residual is rejected.
+/// A result whose residual is larger than this fraction of the velocities is rejected.
 constexpr Real kRoughResidual = 1e-3;
 constexpr uint32_t kCollisionSweeps = 200, kPlasticSweeps = 400, kJointedSweeps = 60;
 /// Limits with bounded effort: updates of single contacts, by sweeps or in a sequence (60 ns each), and those
@@ -39,15 +39,16 @@ constexpr std::size_t kUpdates = 4'000, kMoreUpdates = 1'000;
 constexpr int kBoundedSolves = 3;
 constexpr Real kJointBudget = 1e6;
 constexpr Real kResting = 1e-11;  ///< fraction of the fastest approach of all: slower approaches are ignored
-/// Fraction of the fastest remaining approach: contacts that differ by less collide together.
+/// Contacts collide together if their speeds of approach differ by less than this fraction of the greatest
+/// one.
 constexpr Real kTie = 1e-6;
 /// Limits of the number of impulses per contact of a sequence; with joints each impulse takes a solution of
 /// the whole system.
 constexpr std::size_t kImpulses = 200, kJointedImpulses = 12;
 
 /// Returns the impulse that changes the normal velocity by du_n, with friction at its limit against the
-/// direction `d`. None if this friction would pull the points together faster than the normal impulse
-/// separates them.
+/// direction `d`. Returns nothing if this friction would pull the points together faster than the normal
+/// impulse separates them.
 std::optional<Vec3> sliding_impulse(const Mat3& K, Real du_n, Real mu, const Vector2d& d) {
   const Real resistance = K(0, 0) - mu * (K(0, 1) * d.x() + K(0, 2) * d.y());
   if (!(resistance > 0)) return std::nullopt;
@@ -66,8 +67,8 @@ Vector2d direction_at(Real s) {
   return Vector2d(turn[0] + turn[1] * x, turn[2] + turn[3] * x).normalized();
 }
 
-/// Friction on the round cone against the sliding that remains after the impact: d and u_tk(after) are
-/// parallel. With P_n = du_n / D(d), D(d) = K_nn - mu K_n,tk.d, their cross product times D is
+/// Friction on the round cone. It acts against the sliding velocity after the impact, so d and u_tk(after)
+/// are parallel. With P_n = du_n / D(d), D(d) = K_nn - mu K_n,tk.d, their cross product times D is
 ///   g(d) = d x (D u_tk + du_n (K_tk,n - mu K_tk d)),
 /// a trigonometric polynomial of the second degree with at most four roots. With a diagonal K one root is the
 /// direction of sliding before the impact. If there are several, the one nearest to this direction is used.
@@ -170,7 +171,7 @@ Real approach(const Contact& c, std::span<const ContactBody> bodies) {
   return std::max(0.0, -c.relative_velocity(bodies).x());
 }
 
-/// Limit of a solution's work: unlimited, or a bounded number of operations.
+/// Limit of the work for a solution: unlimited, or a bounded number of operations.
 enum class Effort : uint8_t { full, bounded };
 
 /// Solves few contacts by pivoting and many by sweeps, whose impulses are improved by the proximal method if
@@ -203,7 +204,8 @@ void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, 
   --work.solves;
 }
 
-/// The collision of a cluster. Its restitutions are scaled down by the factor that conserves the energy.
+/// The collision of a cluster of contacts. If it would add energy, all restitutions are scaled down by the
+/// factor that conserves energy.
 class Cluster {
  public:
   Cluster(std::span<ContactBody> bodies, std::span<Contact> contacts, std::span<const Real> restitution,
@@ -240,8 +242,8 @@ class Cluster {
     return work;
   }
 
-  /// Whether the effort allows only a number of sweeps. Their residual is not a failure, because contacts
-  /// that still approach collide again.
+  /// Whether the limit of work allows only a number of sweeps. Their residual does not count as a failure,
+  /// because contacts that still approach collide again.
   bool is_swept() const {
     return effort_ == Effort::bounded && joints_.empty() && contacts_.size() > kFewContacts;
   }
@@ -249,7 +251,8 @@ class Cluster {
     return is_swept() || work.residual <= kRoughResidual * fastest_;
   }
 
-  /// Sweeps from zero impulses at first, then from those of the last solution.
+  /// Makes some sweeps. The first call starts with zero impulses, later calls start with the impulses of the
+  /// last solution.
   ContactWork go_on_sweeping() {
     const std::size_t updates = has_swept_ ? kMoreUpdates : kUpdates;
     if (!has_swept_)
@@ -263,11 +266,11 @@ class Cluster {
     return static_cast<uint32_t>(std::max<std::size_t>(updates / contacts_.size(), 1));
   }
 
-  /// Scales the restitutions down until no energy is added; `energy` is what they add unscaled. Without
-  /// restitution p.u+ <= 0 at each contact, so the sum of p.(u + u+) / 2 is negative: the search has a lower
-  /// end. While the same contacts close and slide, the energy is a quadratic function of the factor, and
-  /// false position finds its zero in a few steps. Halving the weight of an end that stays (the Illinois
-  /// rule) prevents slow convergence.
+  /// Scales the restitutions down until no energy is added. `energy`: the energy that the unscaled
+  /// restitutions add [J]. Without restitution p.u+ <= 0 at each contact, so the sum of p.(u + u+) / 2 is
+  /// negative: the search has a lower end. While the same contacts close and slide, the energy is a quadratic
+  /// function of the factor, and false position finds its zero in a few steps. Halving the weight of an end
+  /// that stays (the Illinois rule) prevents slow convergence.
   ContactWork soften(ContactWork work, Real energy) {
     work.restitution_reduced = 1;
     struct End {
@@ -300,8 +303,8 @@ class Cluster {
   }
 
   /// Targets may contradict each other: a body cannot bounce off one face and be stopped by the opposite one.
-  /// Those of a plastic impact never contradict each other without driven bodies. Gauss-Seidel from zero
-  /// impulses is also safe, because each of its steps dissipates energy.
+  /// Without driven bodies, the targets of a plastic impact never contradict each other. Gauss-Seidel from
+  /// zero impulses is also safe, because each of its steps dissipates energy.
   ContactWork solve_plastic(ContactWork work) {
     work.add(solve_with(0));
     work.solves = work.fallbacks = 1;
@@ -392,8 +395,8 @@ class JointSums {
   std::vector<Real> bounded_;
 };
 
-/// Applies impulses one after the other, the fastest approach first. Contacts with equal speeds collide
-/// together, so symmetric scenes stay symmetric and the order of the list does not matter.
+/// Applies impulses in sequence, always to the contact that approaches fastest. Contacts with equal speeds
+/// collide together, so symmetric scenes stay symmetric and the order of the list does not matter.
 class Sequence {
  public:
   Sequence(std::span<ContactBody> bodies, std::span<Contact> contacts, std::span<const Real> restitution,
@@ -472,7 +475,7 @@ class Sequence {
     sums_.add_last();
   }
 
-  /// Ends a sequence that has reached its limit by a plastic impact of all contacts.
+  /// Ends a sequence that has reached its limit: all contacts collide at once in a plastic impact.
   void end_at_once() {
     std::vector<Vec3> impulses;
     for (const Contact& c : contacts_) impulses.push_back(c.impulse);

@@ -26,13 +26,14 @@ constexpr Real kLcpAccepted = 1e-8;
 /// solvable.
 constexpr Real kConstraintAccepted = 1e-9, kConstraintSoftness = 1e-11;
 constexpr int kRefinements = 3;
-/// Fraction of the mobility without joints below which a row's mobility is only rounding.
+/// If joints reduce the mobility of a row to less than this fraction, the remaining mobility is only a
+/// rounding error.
 constexpr Real kImmobile = 1e-10;
 /// A tangential impulse within this fraction of its limit slides.
 constexpr Real kAtLimit = 1e-9;
 /// Orders of the contacts that are tried.
 constexpr std::size_t kOrders = 2;
-/// Stands for a bound of a joint's impulse that does not exist; larger than any impulse [N s].
+/// Used for a missing bound of a joint's impulse. It is larger than any impulse [N s].
 constexpr Real kUnbounded = 1e15;
 
 /// The source of three rows of the pivoting: a contact, or a bounded row of a joint.
@@ -65,7 +66,7 @@ class IslandLcp {
   /// Adds `sign` times a row of a body's twist to the Jacobian.
   void add(Index row, uint32_t body, const Vec6& on);
   MatrixXd response(const MatrixXd& jacobian) const;
-  /// The row of a bounded coordinate's impulse, or of a contact's normal impulse.
+  /// Returns the row of the impulse of bounded coordinate i, or of the normal impulse of contact i.
   Index row_of(std::size_t i) const { return static_cast<Index>(3 * i + (problem_.held[i] ? 1 : 0)); }
 
   std::span<ContactBody> bodies_;
@@ -215,7 +216,8 @@ bool IslandLcp::eliminate_constraints() {
   return true;
 }
 
-/// The greatest velocity of the problem, or velocity by the impulse of one row alone [m/s].
+/// Returns a scale of the velocities: the greatest velocity of the problem, or the greatest velocity that the
+/// impulse of one row alone causes [m/s].
 Real IslandLcp::scale() const {
   Real s = problem_.b.cwiseAbs().maxCoeff();
   for (Index i = 0; i < p_.size(); ++i) s = std::max(s, problem_.A(i, i) * std::abs(p_[i]));

@@ -18,15 +18,15 @@ constexpr Real kPredictable = 0.8;
 /// Sine of the angle between an axis of revolution and the contact's direction: below it the direction around
 /// the axis is too inaccurate to follow.
 constexpr Real kUpright = 0.02;
-/// Cosine: points of a surface of revolution farther than this from the meridian that faces the other body
-/// are fixed in the body.
+/// Points of a surface of revolution are fixed in the body if the cosine of their angle from the meridian
+/// that faces the other body is less than this.
 constexpr Real kFacing = 0.97;
-/// Sine: the crossing of lines with a smaller angle is undefined.
+/// If the sine of the angle between two lines is less than this, their crossing is undefined.
 constexpr Real kParallel = 0.05;
 
 using Vec2 = Eigen::Vector2d;
 
-/// Round about its axis of revolution: the sides and rims of cylinders and cones.
+/// Whether a shape has sides and rims that are round about an axis: cylinders, cones and frustums.
 bool is_revolved(const Shape& shape) {
   return std::holds_alternative<Cylinder>(shape) || std::holds_alternative<Cone>(shape) ||
          std::holds_alternative<Frustum>(shape);
@@ -106,8 +106,8 @@ bool has_lines(NormalSource s) {
   return s == NormalSource::edges || s == NormalSource::edge_of_a || s == NormalSource::edge_of_b;
 }
 
-/// Direction of a line of a body after a rotation. The tangent of a rim is taken where the rim faces the
-/// other body; the line of a round side turns with the axis in any case.
+/// Returns the direction of a line of a body after the body has turned. For a rim it is the tangent at the
+/// point that faces the other body. The line of a round side turns with the axis.
 Vec3 turned_edge(const Body& body, const Vec3& edge, const Carried& now, const Vec3& arm, const Vec3& out) {
   const Quat& from = start_orientation(body);
   if (!is_revolved(body.def.shape)) return now.turn * edge;
@@ -124,7 +124,8 @@ struct Lines {
   Vec3 of_a, of_b;
 };
 
-/// Normal after a time, according to its source; not unit, and meaningless if the directions are undefined.
+/// Returns the normal after a time, from the features that define it. It is not a unit vector. It is
+/// meaningless if the directions are undefined.
 Vec3 turned_normal(const Start& s, const Carried& a, const Carried& b, const Lines& lines) {
   const Vec3& n = s.m.normal;
   switch (s.m.source) {
@@ -140,7 +141,7 @@ Vec3 turned_normal(const Start& s, const Carried& a, const Carried& b, const Lin
     default:
       break;
   }
-  // From the point or line of B behind the surface to that of A.
+  // The vector from B's point or line behind the surface to A's point or line.
   const Real depth_a = s.gap / 2 + s.m.radius_a, depth_b = s.gap / 2 + s.m.radius_b;
   const Vec3 core_a = s.arm_a + depth_a * n, core_b = s.arm_b - depth_b * n;
   const Real distance = depth_a + depth_b;
@@ -153,7 +154,7 @@ Vec3 turned_normal(const Start& s, const Carried& a, const Carried& b, const Lin
   return length > 0.5 * distance && distance > 0 ? Vec3(between / length) : Vec3(Vec3::Zero());
 }
 
-/// Point of line A nearest to line B, perpendicular to the normal; relative to A's centre.
+/// Returns the point of line A at which it crosses line B as seen along the normal, relative to A's centre.
 Vec3 crossing(const Vec3& on_a, const Vec3& from_b_to_a, const Lines& lines, const Vec3& n) {
   const Real area = lines.of_a.cross(lines.of_b).dot(n);
   return on_a - from_b_to_a.cross(lines.of_b).dot(n) / area * lines.of_a;
@@ -206,7 +207,7 @@ bool place_after(const Start& s, Real time, ContactPlace& place) {
   return true;
 }
 
-/// The frame after the smallest rotation to another normal.
+/// Returns a contact frame after the smallest rotation that gives it another normal.
 ContactFrame turned_frame(const ContactFrame& f, const Vec3& n) {
   if (n == f.n) return f;
   const auto turn = [&](const Vec3& tangent) {
@@ -219,7 +220,8 @@ Vec3 components(const ContactFrame& f, const Vec3& v) {
   return {f.n.dot(v), f.t.dot(v), f.k.dot(v)};
 }
 
-/// Change of the relative velocity due to a change of place, in the frame of the middle.
+/// Change of the relative velocity due to the motion of the contact, in the contact frame at the middle of
+/// the interval.
 struct Gain {
   Vec3 velocity;
   Real along_t, along_k;
@@ -252,7 +254,8 @@ void set_gain(const Start& s, const ContactPlace& start, const ContactPlace& end
   motion.turns = true;
 }
 
-/// For two spheres, whose rotation does not move the contact. This is every contact in a heap of balls.
+/// Returns the place of the contact of two spheres. Their rotation does not move the contact. All contacts in
+/// a heap of balls are of this kind.
 ContactPlace between_spheres(const Start& s, Real time) {
   const Vec3 between =
       (s.m.radius_a + s.m.radius_b) * s.m.normal + time * (twist_of(s.a).velocity - twist_of(s.b).velocity);
@@ -337,7 +340,8 @@ Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3&
     return with_body(arm) + to * (facing(to, out_to) - facing(from, out_from));
   }
   if (!is_revolved(shape)) return with_body(arm);
-  // The angle from the meridian that faces the other body is kept. It is only the error of the manifold.
+  // The angle of the point from the meridian that faces the other body does not change; it is only an error
+  // of the manifold.
   const Vec3 off_axis = centre_off_axis(body), from_axis = arm + from * off_axis;
   return meridian_turn(from_axis, from, out_from, to, out_to) * from_axis - to * off_axis;
 }

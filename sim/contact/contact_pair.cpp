@@ -14,14 +14,15 @@ namespace {
 
 /// Points closer to each other than this are identical, even if their ids differ [m].
 constexpr Real kSame = 5e-3;
-/// Factor of the squared distance of points with equal ids, which are preferred.
+/// For points with equal ids the squared distance is multiplied by this, so that they are preferred.
 constexpr Real kSameFeature = 1.0 / 16;
-/// From more points on, candidates are looked up rather than compared one by one.
+/// If there are more points than this, candidates are looked up and not compared one by one.
 constexpr std::size_t kManyPoints = 16;
 /// Cosine: a contact can continue another one only if their normals are at most this different.
 constexpr Real kAlong = 0.7;
-/// An overlap at an interval's end is expected if it exceeds the prediction of an existing point by less than
-/// kExpected. The point must be within kNear, and its normal must differ by less than this cosine [m].
+/// An overlap at the end of an interval is expected if it exceeds the prediction of an existing point by less
+/// than kExpected [m]. This point must be within kNear [m], and the cosine of the angle between the normals
+/// must exceed kSameNormal.
 constexpr Real kSameNormal = 0.999, kNear = 0.02, kExpected = 2e-4;
 /// Fraction of the spread of points that is added to make it invertible.
 constexpr Real kFlat = 1e-6;
@@ -58,7 +59,7 @@ Vec3 frame_vector(const ContactFrame& f, const Vec3& v) {
   return {f.n.dot(v), f.t.dot(v), f.k.dot(v)};
 }
 
-/// A pose for many vectors: the rotation matrix is computed once.
+/// A pose for transforming many vectors. Its rotation matrix is computed only once.
 struct Frame {
   explicit Frame(const Pose& pose) : position(pose.position), axes(pose.orientation.toRotationMatrix()) {}
 
@@ -71,7 +72,7 @@ struct Frame {
   Mat3 axes;
 };
 
-/// Most normals are those of faces and have no lines.
+/// Most normals are normals of faces, for which there are no lines to turn.
 void turn_lines(const Manifold& local, const Mat3& axes, Manifold& m) {
   const bool of_a = local.source == NormalSource::edges || local.source == NormalSource::edge_of_a;
   const bool of_b = local.source == NormalSource::edges || local.source == NormalSource::edge_of_b;
@@ -79,7 +80,7 @@ void turn_lines(const Manifold& local, const Mat3& axes, Manifold& m) {
   m.edge_b = of_b ? Vec3(axes * local.edge_b) : Vec3(Vec3::Zero());
 }
 
-/// Transforms a manifold from the frame `from` to the world; copies only the points that exist.
+/// Transforms a manifold from the frame `from` to the world. Only the existing points are copied.
 void place(const Manifold& local, const Pose& from, Manifold& m) {
   const Frame pose(from);
   m.normal = pose.vector_to_world(local.normal);
@@ -124,12 +125,12 @@ Weights weights(const Manifold& m, const ContactFrame& frame, const Pose& a, con
 }
 
 /// A rim over a face. A manifold represents a disc by a polygon. If the disc leans, its lowest point is
-/// between two corners, and using a corner instead would make the contact jump along the rim. The corners
-/// beside the lowest point are omitted: they touch when the contact runs along the rim, not by their velocity
-/// at the start.
+/// between two corners, and a corner in its place would make the contact jump along the rim. The corners
+/// beside the lowest point are omitted, because they touch when the contact moves along the rim and not
+/// because of their velocity at the start.
 class LeaningRim {
  public:
-  /// `core` is the shape's frame in the manifold's frame, `out` is the direction towards the face.
+  /// `core`: pose of the shape in the frame of the manifold. `out`: direction towards the face.
   LeaningRim(const Shape& shape, const Pose& core, const Vec3& out) : core_(core) {
     if (!std::holds_alternative<Cylinder>(shape) && !std::holds_alternative<Cone>(shape) &&
         !std::holds_alternative<Frustum>(shape))
@@ -140,7 +141,8 @@ class LeaningRim {
   }
   bool leans() const { return facing_ != Eigen::Vector2d::Zero(); }
 
-  /// Moves points near the meridian that faces the other body to this meridian.
+  /// Returns a point of the rim; if it is near the meridian that faces the other body, it is moved to this
+  /// meridian.
   Vec3 lowered(const Vec3& place) const {
     const Vec3 local = core_.point_to_body(place);
     const Real radius = std::hypot(local.x(), local.z());
@@ -190,7 +192,8 @@ void follow_rims(Manifold& m, const Body& a, const Body& b, const Pose& a_from_b
     if (!rim.is_beside(on_rim(m.points[k]), low)) m.points[m.count++] = m.points[k];
 }
 
-/// Velocity of the material point at an arm without contacts: the mean of start and end of the interval.
+/// Returns the velocity of the material point at an arm without contacts, as the mean of its velocities at
+/// the start and the end of the interval.
 Vec3 free_velocity(const Body& body, const Vec3& arm) {
   if (!body.is_awake()) return body.is_kinematic() ? body.drive.at(arm) : Vec3(Vec3::Zero());
   const Twist mean{(body.start_twist.velocity + body.rigid.velocity()) / 2,
@@ -365,7 +368,7 @@ bool ContactPair::predicts(const PlacedManifold& m, const Vec3& normal, const Co
   return false;
 }
 
-/// Transforms the contacts of the interval's end back to its start, each feature with its body.
+/// Transforms the contacts at the end of the interval back to its start. Each feature moves with its body.
 PlacedManifold ContactPair::moved_back(const Manifold& at_end, Real duration) const {
   const Ends a(*a_), b(*b_);
   const auto back = [](const Ends& body, const Vec3& v) {

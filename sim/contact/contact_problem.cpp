@@ -9,7 +9,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Angular velocity due to a unit angular impulse, in the contact's frame [1/(kg m^2)].
+/// Returns the relative angular velocity due to a unit angular impulse, in the contact's frame [1/(kg m^2)].
 Mat3 angular_mobility(const Contact& c, std::span<const ContactBody> bodies) {
   Mat3 axes;
   axes << c.frame.n, c.frame.t, c.frame.k;
@@ -21,14 +21,14 @@ Real tangential_bound(const Mat3& m) {
   return std::max(m(1, 1), m(2, 2)) + std::abs(m(1, 2));
 }
 
-/// Friction of one contact: the impulse along t and k, and the moment.
+/// Friction of one contact: the impulse along t and k [N s], and the angular impulse [N m s].
 struct Friction {
   Tangential force;
   Vec3 moment;
 };
 
-/// A step against the velocities u and w, projected on the limits for the normal impulse `normal`. K and W:
-/// mobility() and angular_mobility().
+/// Returns the friction after a step against the velocities u and w, projected on the limits of friction for
+/// the normal impulse `normal` [N s]. K and W: mobility() and angular_mobility().
 Friction friction_step(const Contact& c, const Vec3& u, const Vec3& w, Real normal, const Mat3& K,
                        const Mat3& W) {
   const Real k = tangential_bound(K), arm = spin_arm(c);
@@ -53,7 +53,7 @@ Friction friction_step(const Contact& c, const Vec3& u, const Vec3& w, Real norm
   return next;
 }
 
-/// Natural residual of friction_step(), as a velocity [m/s].
+/// Returns the natural residual of friction_step(), as a velocity [m/s].
 Real turning_violation(const Contact& c, std::span<const ContactBody> bodies) {
   const Mat3 K = mobility(c, bodies), W = angular_mobility(c, bodies);
   const Friction next = friction_step(c, c.relative_velocity(bodies), c.relative_spin(bodies),
@@ -63,7 +63,8 @@ Real turning_violation(const Contact& c, std::span<const ContactBody> bodies) {
                   (next.moment - c.moment).norm() * W.trace() * radius);
 }
 
-/// Natural residual: p is the solution if a step against u and a projection return p.
+/// Returns the natural residual [m/s]. The impulse p is the solution if a step against u and a projection
+/// lead back to p.
 Real violation(const Contact& c, std::span<const ContactBody> bodies) {
   if (c.resists_turning()) {
     const Real approach = c.relative_velocity(bodies).x() - c.target;

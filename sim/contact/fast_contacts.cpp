@@ -11,7 +11,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Separation of points that do not take part [m].
+/// Separation that is given to points that must not take part [m].
 constexpr Real kOutOfReach = 1e3;
 
 /// Whether points of a body may be left out if its next impact is traced back to: pieces of which no point is
@@ -68,7 +68,7 @@ void set_motion(ContactPatch& patch, const ContactMotion& motion, NormalSource s
   patch.gain_along_k = motion.gain_along_k;
 }
 
-/// Sets a patch from a manifold with its initial forces. Nothing of the patch's earlier use remains.
+/// Sets all data of a patch from a manifold and its initial forces.
 void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifold& m,
                const ContactInterval& interval) {
   const Real duration = interval.duration;
@@ -97,7 +97,8 @@ void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifol
   patch.force_k = last.y();
   patch.torque_n = last.z();
   patch.mean_friction = mean;
-  // The next impact of the pair is traced back to, so its point does not push before.
+  // The step will be traced back to the next impact of the pair, so the point of this impact must not push
+  // before it.
   if (!pair.needs_toi || !waits_for_impacts(pair.a()) || !waits_for_impacts(pair.b())) return;
   for (uint32_t k = 0; k < patch.count; ++k) {
     if (!pair.awaits_impact(m, m.manifold.points[k], interval.impact_speed)) continue;
@@ -146,7 +147,7 @@ void FastContacts::collect(std::span<const Island* const> islands) {
     }
 }
 
-/// The contact points of links, by articulation.
+/// Collects the contact points of links, grouped by articulation.
 void FastContacts::collect_link_contacts() {
   link_contacts_.clear();
   if (joints_.articulations().empty()) return;

@@ -6,7 +6,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Limits of the pyramid that are active: the sign of p_t, then that of p_k; 0: not active.
+/// The active limits of the pyramid: the sign of p_t and the sign of p_k, or 0 for a limit that is not
+/// active.
 struct Reached {
   ConeRegion region;
   int t, k;

@@ -26,14 +26,14 @@ constexpr Real kGoodEnough = 1e-5;  ///< greatest residual of the other methods;
 constexpr Real kSliding = 1e-9;     ///< slowest tangential speed that counts as sliding
 constexpr Real kRank =
     1e-11;  ///< fraction of the greatest pivot: redundant contacts make the matrix singular
-/// Fraction of the diagonal that is added to it for pivoting, so that redundant contacts share their load in
-/// a unique way.
+/// For pivoting, this fraction of the diagonal is added to the diagonal, so that redundant contacts share
+/// their load in a unique way.
 constexpr Real kSoftness = 1e-7;
 constexpr std::size_t kRounds = 4;  ///< number of rounds of pivoting, with other tangents and another order
 constexpr int kNewtonSteps = 25, kStepsInVain = 10, kStepHalvings = 6, kFallbacks = 4;
 constexpr uint32_t kSweeps = 200;
 
-/// One body of a contact: its part of u is J (v, w).
+/// One body of a contact. Its contribution to the relative velocity u is J (v, w).
 struct Side {
   uint32_t body;
   Mat36 J, J_inverse_mass;
@@ -119,7 +119,8 @@ FrictionSolver::FrictionSolver(std::span<ContactBody> bodies, std::span<Contact>
   problem_.slides.assign(contacts.size(), 0);
 }
 
-/// Turns the tangents of a contact, so that t becomes `direction`, which is given in the old tangents.
+/// Rotates the tangents of a contact so that t becomes `direction`. `direction` has components along the old
+/// tangents.
 void FrictionSolver::turn(std::size_t i, const Vector2d& direction) {
   const Real length = direction.norm();
   if (!(length > 0)) return;
@@ -308,7 +309,8 @@ void FrictionSolver::solve_by_newton(ContactWork& work) {
   if (residual(bodies_, contacts_) > least) set_impulses(before);
 }
 
-/// Gauss-Seidel approaches the solution from anywhere, but slowly; Newton is fast near the solution.
+/// Gauss-Seidel approaches the solution from any start, but slowly. Newton's method is fast near the
+/// solution.
 void FrictionSolver::fall_back(ContactWork& work) {
   ++work.fallbacks;
   for (int k = 0; k < kFallbacks && residual(bodies_, contacts_) > kAccepted * scale_; ++k) {

@@ -138,7 +138,7 @@ bool Pivoting::find_direction(Index m, Real sign) {
   return true;
 }
 
-/// Where the force reaches mu F_n, which changes, too.
+/// Finds where the friction force reaches its limit mu F_n; the limit changes within the step, too.
 void Pivoting::block_on_limits(Index t, Block& first) const {
   const Real mu = friction(t), limit = mu * F_[t - t % 3], change = mu * dF_[t - t % 3];
   if (change - dF_[t] < -noise_) first.consider((limit - F_[t]) / (dF_[t] - change), t, State::high);
@@ -258,8 +258,9 @@ void Pivoting::change(const Block& block) {
     close(block.row);
 }
 
-/// Whether row m needs no more force; if so, sets its state. If a normal is dependent and the others already
-/// make its velocity right, its load is transferred back to them until it is zero or one of them leaves.
+/// Returns whether row m needs no more force; if so, sets its state. If a normal is dependent and the others
+/// already make its velocity right, its load is transferred back to them until it is zero or one of them
+/// leaves.
 bool Pivoting::is_settled(Index m) {
   if (m % 3 == 0) {
     if (F_[m] > 0) return std::abs(a_[m]) <= zero_ && enter(m);
@@ -294,7 +295,7 @@ bool Pivoting::turns_back(const Block& last, State before) const {
   }
 }
 
-/// Ends a step at row m itself. Returns false if the path has led back to no force, or to the wrong limit.
+/// Ends a step at row m itself. Returns false if the path has led back to zero force, or to the wrong limit.
 bool Pivoting::end_step(const Block& block, Index m) {
   if (block.to == State::broken) {
     F_[m] = 0;

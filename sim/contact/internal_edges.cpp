@@ -15,16 +15,16 @@
 namespace offstage::sim {
 namespace {
 
-/// Cosine: normals with a smaller angle count as equal.
+/// Two normals count as equal if the cosine of the angle between them is greater than this.
 constexpr Real kSameDirection = 1 - 1e-10;
-/// Fraction of the body's extent by which clipping may put points outside of their surface.
+/// Clipping may put points outside of their surface by up to this fraction of the body's extent.
 constexpr Real kClipped = 2e-3;
 /// Cosines: a surface continues a face if its own normal differs by less than kGoesOn; a contact pushes along
 /// the surface's own normal if it differs by less than kOwnNormal.
 constexpr Real kGoesOn = 0.999, kOwnNormal = 0.9;
 /// Height over a face at which the surface beside it is sampled, as a multiple of the greatest flush step.
 constexpr Real kLookOver = 3;
-/// The contacts of a body are not compared with each other if there are more.
+/// If a body has more contacts than this, they are not compared with each other.
 constexpr std::size_t kMostContacts = 512;
 /// Lateral distance at which the surface is sampled, as a multiple of the greatest flush step. With kLookOver
 /// the direction from an edge to the sample is 18 degrees from the normal.
@@ -59,8 +59,8 @@ SurfaceDistance piece_distance(const CollisionShape& shape, uint32_t piece, cons
 /// The start and the end of an interval.
 constexpr bool kBothEnds[] = {false, true};
 
-/// A manifold seen from body X, which it shares with other manifolds; Y is the other body. What the
-/// comparisons of all views with each other use is stored.
+/// A manifold seen from one of its bodies, X, which has other manifolds, too. Y is the other body. The view
+/// stores the data that are needed for comparing it with the other views of X.
 struct View {
   View(ContactPair& of, uint32_t i, bool is_speculative, const Manifold& manifold, bool x_is_first)
       : pair(&of),
@@ -86,7 +86,7 @@ struct View {
   const Vec3& on_y(uint32_t k) const { return x_is_a ? m->points[k].on_b : m->points[k].on_a; }
   const Vec3& on_x(uint32_t k) const { return x_is_a ? m->points[k].on_a : m->points[k].on_b; }
   Real separation() const { return m->points[deepest].separation; }
-  /// The piece of Y at a point.
+  /// Returns the piece of Y at point k.
   uint32_t piece_at(uint32_t k) const {
     return y().collision_shape().is_plane() || !y().collision_shape().surface() ? y_piece
                                                                                 : m->points[k].piece;
@@ -107,7 +107,7 @@ struct Verdict {
   Manifold instead;
 };
 
-/// The contacts of one body X at a time.
+/// The contacts of one body X at one time.
 class BodyContacts {
  public:
   BodyContacts(const Body& x, std::span<ContactPair* const> pairs, Real time, Real h)
@@ -174,7 +174,7 @@ class BodyContacts {
     return sum / v.m->count;
   }
 
-  /// The point of a contact that is highest above a face.
+  /// Returns the point of a contact that is highest in the direction `up`.
   static Vec3 highest(const View& v, const Vec3& up) {
     Vec3 best = v.on_y(0);
     for (uint32_t k = 1; k < v.m->count; ++k)
@@ -206,7 +206,7 @@ class BodyContacts {
                                 known.x_is_a ? v.normal : Vec3(-v.normal), point, h_ - time_, between);
   }
 
-  /// The point of a piece that is farthest in a direction.
+  /// Returns the point of a piece that is farthest in the direction d.
   static Vec3 farthest(Body& body, uint32_t piece, const Pose& at, const Vec3& d) {
     const Convex convex = body.collision_shape().piece(piece);
     const Vec3 local = at.vector_to_body(d);
@@ -228,8 +228,8 @@ class BodyContacts {
   }
 
   /// Returns a new normal for a contact that is level with or below a face on which the same piece lies, if
-  /// the surface at the contact, seen from above the face, does not have the contact's normal. It is the
-  /// surface's own normal, or that of the face if the surface only continues the face.
+  /// the surface at the contact, seen from above the face, does not have the contact's normal. The new normal
+  /// is the surface's own normal, or the normal of the face if the surface only continues the face.
   std::optional<Vec3> normal_instead(const View& v, const View& face) const {
     const Vec3 n = v.normal, up = face.normal;
     if (v.x_piece != face.x_piece || n.dot(up) > kSameDirection) return std::nullopt;
@@ -288,7 +288,8 @@ class BodyContacts {
     });
   }
 
-  /// The manifold of a contact with another normal, towards X, that is fixed in Y.
+  /// Returns the manifold of a contact without its points, and with another normal. This normal points
+  /// towards X and is fixed in Y.
   static Manifold without_points(const View& v, const Vec3& normal) {
     Manifold m = *v.m;
     m.normal = v.x_is_a ? normal : Vec3(-normal);
@@ -324,7 +325,8 @@ class BodyContacts {
     return distance(v, foot - look * up - 2 * look * across).normal.dot(up) < -kGoesOn;
   }
 
-  /// A point of a contact, moved to the surface of Y's piece; clipping can put it slightly outside.
+  /// Returns point k of a contact, moved to the surface of Y's piece, because clipping can put it slightly
+  /// outside.
   Vec3 on_surface(const View& v, uint32_t k) const {
     const SurfaceDistance off = distance(v, v.piece_at(k), v.on_y(k));
     return v.on_y(k) - std::max(0.0, off.distance) * off.normal;
@@ -351,7 +353,7 @@ class BodyContacts {
            distance(v, over + aside).normal.dot(up) > kGoesOn;
   }
 
-  /// The contact of X's piece with the slope that begins at a contact.
+  /// Returns the contact of X's piece with the slope that begins at a contact.
   Manifold on_slope(const View& v, const View& face, const Vec3& normal) const {
     const Pose plane{highest(v, face.normal), rotation_between(Vec3::UnitY(), normal)};
     const Pose x = pose(v.x(), false), y = pose(v.y(), false);

@@ -6,7 +6,7 @@
 namespace offstage::sim {
 
 bool has_forces(const Island& island) {
-  // Springs are in the free motion; their rows act on what changes it.
+  // The free motion already includes the springs. Their rows react to the changes of this motion.
   const auto has_other_rows = [](const Joint* joint) { return joint->has_rows_besides_spring(); };
   return !island.pairs.empty() ||
          std::any_of(island.articulations.begin(), island.articulations.end(), [&](const Articulation* a) {
@@ -30,8 +30,9 @@ void IslandJoints::collect_constraints(const Island& island, Springs springs, Pl
   }
 }
 
-/// The impulses act in the middle of the interval. Those of a limit that is reached act from then on: they
-/// would otherwise change the angular momentum, by the motion of the joint between both times.
+/// The impulses act in the middle of the interval. The impulses of a limit that is reached within the
+/// interval act from that time on. Otherwise the motion of the joint between the two times would change the
+/// angular momentum.
 void IslandJoints::place(Articulation& a, const ContactInterval& interval) {
   const Real from = a.has_springs() ? a.kicks_act_from() : kMiddle;
   a.place_within(interval.end, interval.duration, from, interval.substep);

@@ -16,7 +16,7 @@ Vec6 twist_of(std::span<const ContactBody> bodies, uint32_t body) {
   return v;
 }
 
-/// Velocity change of a body due to an impulse [force, torque].
+/// Returns the velocity change of a body due to an impulse and an angular impulse.
 Vec6 response_of(std::span<const ContactBody> bodies, uint32_t body, const Vec6& impulse) {
   if (body == kUnmoved) return Vec6::Zero();
   return LinkMobility{bodies[body].inverse_mass, bodies[body].inverse_inertia}.velocity(impulse);

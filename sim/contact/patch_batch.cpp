@@ -17,8 +17,8 @@ namespace {
 /// A sweep solves a patch in rounds, until one changes its velocities by less than this [m/s] or the limit is
 /// reached. A resting patch takes one round. An impact takes more, because otherwise some points would
 /// penetrate. A patch without an initial guess is solved completely at first, because otherwise it would slip
-/// during the first sweeps. Where no sweep of another patch corrects what the rounds leave, they go on
-/// longer: the load would jump between the ends of a narrow line of contact, and a coin on its rim would
+/// during the first sweeps. If no sweep of another patch corrects the remaining error, there are more rounds.
+/// Otherwise the load would jump between the ends of a narrow line of contact, and a coin on its rim would
 /// rock.
 constexpr float kSettled = 0.01F, kAlone = 1e-5F, kSolved = 1e-6F;
 constexpr uint32_t kPatchRounds = 20, kLoneRounds = 60;
@@ -30,10 +30,11 @@ float settled(const PatchBatch& p) {
 }
 
 /// Fractions of the difference between an impulse and its mean: what a sub-step subtracts from the impulse,
-/// and what it adds to the mean. Slow modes with frequencies near the latter are damped most. The mean of a
+/// and what it adds to the mean. Slow modes whose frequency is near kRenewal are damped most. The mean of a
 /// patch without an initial guess is its impulse.
 constexpr float kReturn = 0.03F, kRenewal = 0.01F;
-/// Up to this fraction of its limit, squared, friction sticks; from the second fraction on it slides.
+/// Friction sticks up to the fraction kHolds of its limit, and slides from the fraction kSlides on. Both
+/// fractions are of squared values.
 constexpr float kHolds = 0.96F, kSlides = 0.999F;
 /// Greatest factor by which sliding friction follows a later increase of the normal impulses. A larger one
 /// could reverse the sliding.
@@ -57,7 +58,7 @@ Vector columns(FloatLanes a, FloatLanes b, FloatLanes c, FloatLanes d) {
   return {_mm256_shuffle_ps(low_ab, low_cd, 0x44), _mm256_shuffle_ps(low_ab, low_cd, 0xEE),
           _mm256_shuffle_ps(high_ab, high_cd, 0x44)};
 }
-/// The inverse of columns(), with 0 in the last column.
+/// The inverse of columns(). The last column is 0.
 std::array<FloatLanes, 4> rows(const Vector& v) {
   const FloatLanes zero{};
   const FloatLanes low_xy = _mm256_unpacklo_ps(v.x, v.y), low_z = _mm256_unpacklo_ps(v.z, zero);
@@ -65,7 +66,8 @@ std::array<FloatLanes, 4> rows(const Vector& v) {
   return {_mm256_shuffle_ps(low_xy, low_z, 0x44), _mm256_shuffle_ps(low_xy, low_z, 0xEE),
           _mm256_shuffle_ps(high_xy, high_z, 0x44), _mm256_shuffle_ps(high_xy, high_z, 0xEE)};
 }
-/// The first halves of both registers, or the second ones.
+/// Returns a register with the first halves of both registers; second_halves() does the same with the second
+/// halves.
 FloatLanes first_halves(FloatLanes a, FloatLanes b) {
   return _mm256_permute2f128_ps(a, b, 0x20);
 }
@@ -96,7 +98,7 @@ void scatter(const LaneTwist& v, std::span<BodyMotion> motions, const PatchBatch
   }
 }
 
-/// Relative velocity at the centre.
+/// Returns the relative velocity at the centre of each patch [m/s].
 Vector relative_velocity(const PatchBatch& p, const LaneTwist& a, const LaneTwist& b) {
   return a.linear + cross(a.angular, p.arm_a) - b.linear - cross(b.angular, p.arm_b);
 }
@@ -411,7 +413,7 @@ FloatLanes greatest(const Vector& v) {
   return lane_max(lane_abs(v.x), lane_max(lane_abs(v.y), lane_abs(v.z)));
 }
 
-// Patches of one point, as those of round bodies: no moments
+// Patches of one point, as round bodies have: no moments
 
 /// A velocity or impulse at the point, along n, t and k.
 using Single = Vector;
@@ -420,7 +422,8 @@ Single in_frame(const PatchBatch& p, const Vector& v) {
   return {dot(p.n, v), dot(p.t, v), dot(p.k, v)};
 }
 
-/// The same as solve_normal() and solve_friction() for one point. They return the change.
+/// These two functions do the same as solve_normal() and solve_friction() for patches of one point. They
+/// return the change.
 Single solve_single_normal(PatchBatch& p, Single& u, FloatLanes gap) {
   PatchBatch::Point& q = p.points[0];
   const FloatLanes next = lane_max(q.impulse - q.mass * (u.x + gap), FloatLanes{});

@@ -50,10 +50,10 @@ constexpr std::size_t kMixed = 5;
 /// Fraction of the mobility of a joint's constraints; makes dependent constraints solvable.
 constexpr Real kRegularization = 1e-11;
 constexpr uint32_t kMaxFactorizations = 300;
-/// Cost of operations [ns]: per contact, and per block of the factor.
+/// Cost of operations, per contact and per block of the factorization [ns].
 constexpr Real kSetUp = 150, kEvaluation = 80, kAssembly = 150, kSolve = 25, kProduct = 80;
 
-/// A third of the trace of mobility().
+/// Returns the mean eigenvalue of mobility(): a third of its trace.
 Real mean_mobility(const ContactBody& body, const Vec3& r) {
   const Mat3& I = body.inverse_inertia;
   return body.inverse_mass + (r.squaredNorm() * I.trace() - r.dot(I * r)) / 3;
@@ -197,8 +197,8 @@ void ProximalNewton::number_bodies(std::span<const ContactBody> bodies, std::spa
   }
 }
 
-/// Finds the pairs of bodies that share a contact or a row with bounds, and those of the constraints' rows
-/// with their bodies.
+/// Finds the off-diagonal blocks of the matrix: pairs of bodies that share a contact or a row with bounds,
+/// and pairs of a constraint's row and one of its bodies.
 void ProximalNewton::find_pairs(std::span<const Contact> contacts) {
   const auto row = [this](uint32_t body) { return body == kUnmoved ? kNone : row_of_body_[body]; };
   pairs_.clear();
@@ -221,7 +221,7 @@ void ProximalNewton::find_pairs(std::span<const Contact> contacts) {
   std::fill(kinds_.begin() + rows, kinds_.end(), BlockRowKind{.is_negative = true, .is_empty = true});
 }
 
-/// Index of the block of two rows; kNone if one of them does not move.
+/// Returns the index of the block of two rows; kNone if one of the rows belongs to a body that does not move.
 uint32_t ProximalNewton::pair_of(uint32_t row, uint32_t other) const {
   if (row == kNone || other == kNone) return kNone;
   const std::pair<uint32_t, uint32_t> pair = std::minmax(row, other);
@@ -338,7 +338,7 @@ void ProximalNewton::set_joints() {
   if (!joints_.empty() || factor_.rows() != direction_.size()) is_factored_ = false;
 }
 
-/// Violation of the joints' constraints by the velocities.
+/// Returns the greatest violation of the joints' constraints by the velocities [m/s].
 Real ProximalNewton::constraint_speed() const {
   Real worst = 0;
   for (std::size_t j = 0; j < constraints_.size(); ++j)
@@ -346,7 +346,7 @@ Real ProximalNewton::constraint_speed() const {
   return worst;
 }
 
-/// J (v - v0) of a joint.
+/// Returns J (v - v0) of joint j.
 Vec6 ProximalNewton::violation(std::size_t j) const {
   const Constraint& c = constraints_[j];
   const JointRows& rows = *joints_.constraints[j].rows;
@@ -489,7 +489,7 @@ void ProximalNewton::gradient(std::span<const Contact> contacts) {
   }
 }
 
-/// The greatest velocity that the unbalanced impulses give to a body.
+/// Returns the greatest velocity that the unbalanced impulses give to a body [m/s].
 Real ProximalNewton::gradient_speed() const {
   Real worst = 0;
   for (std::size_t row = 0; row < gradient_.size(); ++row) {
@@ -597,7 +597,7 @@ bool ProximalNewton::descend(std::span<const Contact> contacts) {
   return false;
 }
 
-/// Sets q := p and g := mu |u_t|; returns the changes.
+/// Sets q := p and g := mu |u_t|. Returns the greatest changes of both.
 ProximalNewton::Change ProximalNewton::update_multipliers(std::span<const Contact> contacts) {
   Change change;
   for (std::size_t i = 0; i < contacts.size(); ++i) {

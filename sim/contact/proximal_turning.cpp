@@ -8,7 +8,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Penalty times angular mobility; like that of contacts.
+/// Penalty of rolling and spinning friction times the angular mobility; the same value as for contacts.
 constexpr Real kTurningStiffness = 1e5;
 
 using Vec4 = Eigen::Matrix<Real, 4, 1>;
@@ -147,7 +147,7 @@ Real ProximalNewton::turning_lift(const Contact& c, const Point& p, const Vec3& 
   return c.friction_t * Vec3(u.y(), u.z(), turning_speed(c, p).x()).norm();
 }
 
-/// Whether an open contact has no impulse with these velocities, the lift included.
+/// Whether an open contact has no impulse at the relative velocity u. The lift is included.
 bool ProximalNewton::stays_open(const Contact& c, const Point& p, const Vec3& u) const {
   if (p.turning == kNone || turnings_[p.turning].arm == 0)
     return project_on_cone(c, -p.rho * u).region == ConeRegion::apex;
@@ -155,7 +155,7 @@ bool ProximalNewton::stays_open(const Contact& c, const Point& p, const Vec3& u)
   return project_on_round_cone(c.friction_t, q).region == ConeRegion::apex;
 }
 
-/// Called after the point's multiplier was set.
+/// Updates rolling and spinning friction of a point. The multiplier of the point must be updated before.
 void ProximalNewton::update_turning(const Contact& c, Point& p, Change& change) {
   Turning& t = turnings_[p.turning];
   const Vec3 rho(t.arm > 0 ? p.rho : t.rho, t.rho, t.rho);
@@ -166,7 +166,8 @@ void ProximalNewton::update_turning(const Contact& c, Point& p, Change& change) 
   const Real before = t.spin_limit + t.roll_limit;
   t.spin_limit = c.spinning * p.multiplier.x();
   t.roll_limit = c.rolling * p.multiplier.x();
-  // The velocity that the change of the limits causes at most, where a limit is reached.
+  // If a limit is reached, the change of the limits counts as a change of g. It is converted to the greatest
+  // velocity that it can cause.
   Vec3 within = t.multiplier;
   within.tail<2>() = shortened(Tangential(within.tail<2>()), t.roll_limit);
   if (t.arm == 0) within.x() = std::clamp(within.x(), -t.spin_limit, t.spin_limit);

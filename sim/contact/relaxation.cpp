@@ -17,7 +17,7 @@ namespace {
 /// greatest overlap in heaps was the same.
 constexpr Real kPushFraction = 0.5, kMaxPush = 3;
 
-/// With fewer batches a second thread does not pay.
+/// With fewer batches than this, a second thread would not save time.
 constexpr std::size_t kSerialBatches = 48;
 /// A sweep that changes the velocity of a patch by more than this marks its bodies as hit [m/s]. Their other
 /// contacts get another sweep before the bodies move, because otherwise they would penetrate; this is
@@ -36,7 +36,7 @@ constexpr Real kPress = 3e-4, kPassedOn = 1e-4;
 /// A sub-step whose change of velocity is more than this many times the mean contains an impact.
 constexpr Real kUneven = 2.5;
 
-/// Points within this distance of the deepest one along the normal are equally deep [m].
+/// Points whose depth differs from the deepest point's depth by less than this count as equally deep [m].
 constexpr Real kAsDeep = 5e-5;
 
 constexpr uint32_t kBatchesPerBlock = 4, kBodiesPerBlock = 128;
@@ -277,7 +277,7 @@ void RelaxationSolver::push(uint32_t i, const Range& range, Real threshold) {
   strike(p, range.sweep, push_out(p, motions_, how), threshold);
 }
 
-/// Contacts of links that the joints moved far are pushed again.
+/// Contacts of links that the joints have moved far get another push-out sweep.
 void RelaxationSolver::push_joints(uint32_t part, const Range& range) {
   if (!(joints_->push_out(part, motions_) > kPassedOn)) return;
   for (const uint32_t body : joints_->bodies(part)) struck_[body] = range.sweep;

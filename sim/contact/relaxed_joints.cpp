@@ -29,7 +29,7 @@ Vec6 twist(const FloatLanes& lanes) {
   return v;
 }
 
-/// Change of velocity since the step's start.
+/// Returns the change of a body's velocity since the start of the step.
 Vec6 change_of(const BodyMotion& m) {
   return twist(m.velocity);
 }
@@ -49,7 +49,8 @@ void add_to(BodyMotion& m, const Vec6& v) {
   m.velocity += lanes(v);
 }
 
-/// Change of velocity without contacts and rows with bounds.
+/// Returns the change of a body's velocity since the start of the step, without contacts and rows with
+/// bounds.
 Vec6 free_change(const RelaxedBody& b, Real elapsed) {
   Vec6 v;
   v << b.free_acceleration, b.free_angular_acceleration;

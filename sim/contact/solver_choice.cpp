@@ -7,8 +7,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Islands of at most kFewBodies bodies always use the exact solver, in a world whose fast solution takes
-/// less than this [ns].
+/// If the fast solution of the whole world takes less than this [ns], islands of at most kFewBodies bodies
+/// always use the exact solver.
 constexpr Real kSmall = 1e5;
 /// Cost of the fast solver per point and sub-step [ns].
 constexpr Real kFastPoint = 60;

@@ -9,10 +9,11 @@
 namespace offstage::sim {
 namespace {
 
-/// Passes over the contacts, and the deviation at a contact at which they end [m].
+/// kPasses: greatest number of passes over the contacts. They end earlier when the deviation at each contact
+/// is less than the second constant [m].
 constexpr int kPasses = 30;
 constexpr Real kEnough = 1e-9;
-/// Friction below this fraction of its limit holds the bodies [1].
+/// Friction below this fraction of its limit holds the bodies together at the contact.
 constexpr Real kHolds = 0.99;
 
 bool sticks(const PairSurface& surface, const Vec3& force) {

@@ -65,11 +65,11 @@ class alignas(64) BlockShare {
 };
 
 /// Calls run(stage, block) for each block of each stage for which is_needed(stage) is true. A stage begins
-/// when all blocks of the stages before it are done. Stage has block_count(). is_needed() may depend on the
-/// stages before, but not on the stage's own blocks. In each stage a thread begins with the same part of the
-/// blocks, whose data may still be in its cache, and then helps other threads. It waits only for blocks that
-/// are in progress, so the loop ends even if no other thread joins. Limits: 16 million stages, and a million
-/// blocks for each thread.
+/// when all blocks of the stages before it are done. `Stage` must have a function block_count(). is_needed()
+/// may depend on the stages before, but not on the blocks of the same stage. In each stage a thread begins
+/// with the same part of the blocks, whose data may still be in its cache, and then helps other threads. It
+/// waits only for blocks that are in progress, so the loop ends even if no other thread joins. Limits: 16
+/// million stages, and a million blocks for each thread.
 template <class Stage, class IsNeeded, class Run>
 void run_stages(std::span<Stage> stages, uint32_t threads, IsNeeded&& is_needed, Run&& run) {
   if (threads == 1) {

@@ -1,8 +1,8 @@
 #pragma once
 /// Cholesky factorization L S L^T of a sparse symmetric matrix of N x N blocks, one row of blocks for each
-/// body or joint; S has a sign for each row: all are positive if the matrix is definite. Rows are eliminated
-/// in an order of approximate minimum degree, so that a stack or a chain of n costs O(n), a wall about
-/// O(n^1.5) (physics N11, A1).
+/// body or joint. S is a diagonal matrix with a sign for each row; all signs are positive if the matrix is
+/// positive definite. Rows are eliminated in an order of approximate minimum degree, so that a stack or a
+/// chain of n costs O(n), a wall about O(n^1.5) (physics N11, A1).
 ///
 /// With bodies as positive rows and joints as negative rows the matrix is quasi-definite (Vanderbei,
 /// "Symmetric quasidefinite matrices", 1995). It has this factorization in any order of elimination in which

@@ -1,7 +1,8 @@
 #pragma once
-/// Three numbers in one vector register, with 0 in the fourth lane. Eigen uses scalar arithmetic for vectors
-/// of three. Overlap tests of boxes take half the time with registers, and a query of two meshes needs
-/// thousands of them. Operations and their order are the same as with scalars, so results do not change.
+/// Vectors of three numbers in one vector register, with 0 in the fourth lane. Eigen uses scalar arithmetic
+/// for vectors of three numbers. Overlap tests of boxes take half the time with registers, and a query of two
+/// meshes needs thousands of them. Operations and their order are the same as with scalars, so results do not
+/// change.
 
 #include <cstdint>
 

@@ -22,9 +22,9 @@ struct LcpSolution {
   Real residual = 0;
 };
 
-/// Finds f such that a = A f + b >= 0, f >= 0, f.a = 0. A may be singular, as it is with redundant contacts;
-/// some of the dependent rows then keep f = 0. If no such f exists (b is outside of the range of A),
-/// `unbounded` lists the indices at which a < 0 remains.
+/// Finds f such that a = A f + b >= 0, f >= 0, f.a = 0. A may be singular, for example for redundant
+/// contacts. Some of the dependent rows then have f = 0. If no such f exists (b is outside of the range of
+/// A), `unbounded` lists the indices at which a < 0 remains.
 LcpSolution solve_lcp(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
 
 }  // namespace offstage::sim

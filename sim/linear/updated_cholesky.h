@@ -10,8 +10,8 @@
 
 namespace offstage::sim {
 
-/// The factor L L^T of the current rows and columns, in the order in which they were appended. Each operation
-/// is O(n^2).
+/// The factorization L L^T of the current rows and columns, in the order in which they were appended. Each
+/// operation is O(n^2).
 class UpdatedCholesky {
  public:
   /// A row whose pivot is less than this fraction of its diagonal counts as a linear combination of the rows
