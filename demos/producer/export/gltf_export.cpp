@@ -1,5 +1,5 @@
-// glTF 2.0 as one binary file (.glb): Khronos Group, "glTF 2.0 Specification". Bodies are animated nodes,
-// cloths meshes with a morph target per frame.
+// glTF 2.0 as one binary file (.glb): Khronos Group, "glTF 2.0 Specification". Bodies are animated nodes, and
+// cloths are meshes with a morph target for each frame.
 
 #include <algorithm>
 #include <array>
@@ -96,13 +96,14 @@ class GltfBuffer {
   Spool spool_;
 };
 
-/// A range of frames in which a cloth has the same triangles, as a mesh with a morph target for each frame.
+/// A range of frames in which a cloth has the same triangles. In the file it is a mesh with a morph target
+/// for each frame after the first.
 struct ClothStretch {
   std::vector<int> frames;
   std::vector<uint32_t> triangles;
   std::vector<Eigen::Vector2f> uvs;
-  std::vector<Vector3f> points, normals;  // at its first frame
-  // accessors of positions and normals, for each frame after the first
+  std::vector<Vector3f> points, normals;  // at the first frame of the range
+  // Accessors of the positions and normals, for each frame after the first.
   std::vector<std::pair<int, int>> targets;
 };
 
@@ -358,7 +359,7 @@ class GltfExport : public FilmExport {
         break;
       }
       Json matrix = Json::array();
-      // both are in column order
+      // Eigen and glTF both store matrices by columns.
       for (int i = 0; i < 16; ++i) matrix.push_back(part.body_from_part.data()[i]);
       nodes_.push_back({{"mesh", mesh}, {"matrix", std::move(matrix)}});
       children.push_back(nodes_.size() - 1);
@@ -394,7 +395,8 @@ class GltfExport : public FilmExport {
     }
   }
 
-  /// At each frame one target has the weight 1; between frames the cloth is interpolated linearly.
+  /// Animates the weights of the morph targets. At each frame, one target has the weight 1. Between frames,
+  /// the cloth is interpolated linearly.
   void animate_weights(const ClothStretch& stretch, int node) {
     const std::size_t targets = stretch.targets.size();
     std::vector<float> times, weights((targets + 1) * targets, 0);
@@ -405,7 +407,7 @@ class GltfExport : public FilmExport {
     add_channel(times, weights, 1, node, "weights", "LINEAR");
   }
 
-  /// The mesh of a range of frames is shown during these frames only: otherwise its scale is zero.
+  /// Shows the mesh of a range of frames only during these frames. At other times its scale is zero.
   void animate_presence(const ClothRecord& record, std::size_t i, int node) {
     SampleTrack<Vector3f> scale;
     for (const int frame : frames_) {

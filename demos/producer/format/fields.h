@@ -177,8 +177,7 @@ class Catalogue {
 
 /// Reads, writes and describes a value of type V, by three static functions:
 /// - `void read(Reader&, const Node&, const Spec&, V& out)`. For a wrong value it reports a problem and
-/// leaves
-///   a usable value in `out`.
+///   leaves a usable value in `out`.
 /// - `Node write(const V&)`, or `std::optional<Node> write(const V&)` if the value can be absent.
 /// - `Description describe(Catalogue&, const Spec&)`.
 template <class V>
