@@ -65,7 +65,7 @@ class BenchProgress {
   std::chrono::steady_clock::time_point start_, shown_{};
 };
 
-/// Simulates a scene with each algorithm that it can choose, and prints a table of the results.
+/// Simulates a scene with each algorithm that it can select, and prints a table of the results.
 int bench_command(const BenchOptions& options) {
   const LoadedScene loaded = load(options.scene, options.log.quiet);
   check_file(options.csv, options.force);

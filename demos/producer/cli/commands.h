@@ -94,7 +94,8 @@ using TuneCommand = std::function<int(const TuneOptions&)>;
 
 /// Returns `threads`, or the number of available processors if `threads` is 0.
 int threads_or_all(int threads);
-/// Limits the simulation to a number of threads as long as the returned object exists; 0: all available.
+/// Limits the simulation to a number of threads while the returned object exists. 0 threads mean all
+/// available processors.
 tbb::global_control simulation_threads(int threads);
 
 /// Loads a scene with the overrides of the options, then `more_overrides`. Prints its warnings to standard

@@ -19,7 +19,8 @@ namespace offstage::producer {
 namespace {
 
 struct NewOptions {
-  std::string name, from;  ///< file and template; empty template: the one named like the file, or "basic"
+  std::string name,
+      from;  ///< file and template; empty template: the template named like the file, or "basic"
   bool list = false, force = false;
 };
 

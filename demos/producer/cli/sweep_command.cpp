@@ -65,7 +65,7 @@ struct Sweep {
   fs::path finished;  // folder of the finished runs until all are finished
 };
 
-/// "emitters.0.rate=200, world.seed=3"
+/// Returns the values of a combination as text, such as "emitters.0.rate=200, world.seed=3".
 std::string name_of(const Sweep& sweep, const Run& run) {
   std::string name;
   for (std::size_t i = 0; i < run.values.size(); ++i)

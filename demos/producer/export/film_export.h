@@ -19,7 +19,7 @@ class FilmExport {
   virtual void write(const Snapshot& snapshot) = 0;
   /// Completes the output. A single file has a temporary name until then. Throws render::FileError.
   virtual void close() = 0;
-  /// Describes the objects and properties of the film that the format cannot express, one per text.
+  /// Returns one note for each kind of object or property of the film that the format cannot express.
   virtual std::vector<std::string> notes() const { return {}; }
 };
 

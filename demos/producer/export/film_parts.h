@@ -50,7 +50,7 @@ struct FilmRod {
 
 struct FilmCloth {
   std::string name;
-  Real appear_at = 0, remove_at = 1e30;  ///< [s]
+  Real appear_at = 0, remove_at = 1e30;  ///< times between which the cloth exists [s]
   std::size_t cloth = 0;                 ///< index in Snapshot::cloths
   std::size_t material = 0;
   std::vector<uint32_t> triangles;  ///< triangles of the untorn cloth, as indices of its vertices

@@ -40,7 +40,8 @@ class GltfBuffer {
  public:
   explicit GltfBuffer(const fs::path& file) : file_(file), spool_(file.parent_path()) {}
 
-  /// Adds data and returns the index of its accessor. `target`: the usage of the data; 0: other.
+  /// Adds data and returns the index of its accessor. `target`: usage of the data, as a glTF constant; 0:
+  /// neither vertices nor indices.
   int add(std::span<const float> numbers, int width, int target = 0, bool with_bounds = false) {
     const char* type = width == 1 ? "SCALAR" : width == 2 ? "VEC2" : width == 3 ? "VEC3" : "VEC4";
     Json accessor = {{"bufferView", add_view(bytes_of(numbers), target)},
@@ -136,7 +137,8 @@ void append(const Quaternionf& q, std::vector<float>& out) {
   out.insert(out.end(), q.coeffs().data(), q.coeffs().data() + 4);  // x, y, z, w
 }
 
-/// Returns the rotation from -Z, the viewing direction of cameras and lights in glTF, to a direction.
+/// Returns a rotation that turns -Z to `direction`, and +Y towards `up`. In glTF, cameras and lights look
+/// along -Z.
 Quaternionf look_rotation(const Vector3f& direction, const Vector3f& up) {
   const Vector3f z = -direction.normalized();
   Vector3f x = up.cross(z);

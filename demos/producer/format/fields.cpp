@@ -12,7 +12,7 @@ Object reference_to(const std::string& name) {
   return {{"$ref", "#/definitions/" + name}};
 }
 
-/// "a", "b" or "c"
+/// Returns names as a list for messages, such as "a", "b" or "c".
 std::string quoted(std::span<const std::string> names) {
   std::string text;
   for (std::size_t i = 0; i < names.size(); ++i)

@@ -336,9 +336,9 @@ struct Codec<E> {
   static Description describe(Catalogue&, const Spec&) { return describe_names(Names<E>::kNames); }
 };
 
-/// Names of the alternatives of a variant. The key "type" tells which alternative an object is. A
-/// specialization has `kName`, `kHelp`, `kTags` with one name for each alternative, and `kRequired`. If
-/// `kRequired` is false, an object without "type" is the first alternative.
+/// Names of the alternatives of a variant. The key "type" names the alternative. A specialization has
+/// `kName`, `kHelp`, `kTags` with one name for each alternative, and `kRequired`. If `kRequired` is false, an
+/// object without "type" is the first alternative.
 template <class V>
 struct Tags;
 

@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 // --- Paths ---
 
-/// A JSON pointer (/a/0/b), or the same with dots (a.0.b), as steps.
+/// Splits a path into its steps. The path is a JSON pointer (/a/0/b) or has dots (a.0.b).
 std::vector<std::string> split_path(std::string_view path) {
   const bool pointer = path.starts_with('/');
   if (pointer) path.remove_prefix(1);

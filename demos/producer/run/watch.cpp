@@ -33,7 +33,7 @@ std::string file_bytes(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// Whether a text may be a file name: short, with an ending that begins with a letter.
+/// Returns whether a text may be a file name: it must be short and have an ending that begins with a letter.
 bool is_name(const std::string& text) {
   constexpr std::size_t kLongestName = 4096, kLongestEnding = 8;
   if (text.empty() || text.size() > kLongestName || text.find_first_of("\n\"*?") != std::string::npos)
