@@ -59,8 +59,8 @@ struct RenderOptions {
   std::string frames, chunk;
   std::string format = "rgba";  ///< format of the frames on standard output
   std::string cache, stats, report;
-  std::vector<std::string>
-      cameras;  ///< names of the cameras to draw, or kAllCameras; empty: the scene's `camera`
+  /// Names of the cameras to draw, or kAllCameras; empty: the scene's `camera`.
+  std::vector<std::string> cameras;
   /// Folder for the states of a film with several cameras: the first camera writes them, the others read
   /// them. Empty: none.
   std::string states;

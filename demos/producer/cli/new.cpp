@@ -19,8 +19,8 @@ namespace offstage::producer {
 namespace {
 
 struct NewOptions {
-  std::string name,
-      from;  ///< file and template; empty template: the template named like the file, or "basic"
+  /// File and template. Empty template: the template named like the file, or "basic".
+  std::string name, from;
   bool list = false, force = false;
 };
 

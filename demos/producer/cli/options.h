@@ -24,8 +24,8 @@ struct SceneOptions {
   std::optional<std::string> fps;  ///< a number, or a fraction such as 30000/1001
   std::optional<double> duration;
   std::optional<uint64_t> seed;
-  std::vector<std::string>
-      channels;  ///< channels: depth, normal, id, motion; empty: the channels of the scene
+  /// Channels: depth, normal, id, motion. Empty: the channels of the scene.
+  std::vector<std::string> channels;
   std::optional<std::string> channel_format;
   std::string camera;              ///< name of the camera to draw; empty: the scene's `camera`
   std::vector<std::string> allow;  ///< additional folders for the scene's files

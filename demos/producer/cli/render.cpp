@@ -38,8 +38,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr uint64_t kStatesBytes = 4ull
-                                  << 30;  // limit on the states that are kept on the disk for further cameras
+// Limit on the states that are kept on the disk for further cameras.
+constexpr uint64_t kStatesBytes = 4ull << 30;
 
 struct Plan {
   LoadedScene loaded;
@@ -47,8 +47,8 @@ struct Plan {
   std::vector<int> frames;
   std::string settings;
   int threads = 1, jobs = 1;
-  bool through_frames =
-      false;  // whether frames are drawn first and a video is made of them, which can be resumed
+  // Whether frames are drawn first and a video is then made of them, which can be resumed.
+  bool through_frames = false;
   fs::path frames_pattern;  // pattern of these frames
   ChannelFiles channels;
 };

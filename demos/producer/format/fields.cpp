@@ -63,8 +63,8 @@ void describe_tag(const std::string& tag, bool required, ObjectEntry& entry) {
 Limits within_unit(Limits limits, std::string_view unit) {
   if (limits.low != 0) return limits;
   const auto narrow = [&](Real low, Real high) {
-    if (limits.open_low)
-      limits.low = low;  // the bound stays excluded, so that a varying number still needs a "min"
+    // An excluded bound stays excluded, so that a varying number still needs a "min".
+    if (limits.open_low) limits.low = low;
     limits.high = std::min(limits.high, high);
   };
   if (unit == "m")

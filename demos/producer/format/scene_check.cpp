@@ -67,8 +67,8 @@ class Checker : SceneChecker {
     for (const Force& force : scene_.forces)
       std::visit(
           [&](const auto& f) {
-            if (!f.where.path.empty())
-              check_force(f);  // an empty path: its type was invalid, so it was not read
+            // An empty path: its type was invalid, so it was not read.
+            if (!f.where.path.empty()) check_force(f);
           },
           force);
     check_film(scene_, flat_, folder_, findings_);

@@ -178,8 +178,8 @@ void FileWatch::wait(std::chrono::milliseconds limit) {
 }
 
 void FileWatch::settle(std::chrono::milliseconds still) {
-  constexpr int kMostRounds =
-      50;  // after this, a file that never stops changing is used in its current state
+  // A file that never stops changing is finally used in its current state.
+  constexpr int kMostRounds = 50;
   Stamps last = stamps();
   for (int round = 0; round < kMostRounds; ++round) {
     std::this_thread::sleep_for(still);
