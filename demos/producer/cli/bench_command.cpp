@@ -19,14 +19,14 @@ namespace {
 struct BenchOptions {
   SceneOptions scene;
   std::string csv;
-  int repeat = 1;       ///< runs of each method
-  double limit_s = 60;  ///< longest run
+  int repeat = 1;       ///< number of runs of each method
+  double limit_s = 60;  ///< longest time of a run [s]
   int threads = 0;
   bool force = false;
   LogOptions log;
 };
 
-/// Says which method runs: a status line on a terminal, a line for each run in a log file.
+/// Shows which method runs: in a status line on a terminal, or with a line for each run in a log file.
 class BenchProgress {
  public:
   BenchProgress(const LogOptions& log_options, std::size_t runs)
@@ -65,7 +65,7 @@ class BenchProgress {
   std::chrono::steady_clock::time_point start_, shown_{};
 };
 
-/// Simulates a scene by each of the algorithms that it can choose from, and prints a table.
+/// Simulates a scene with each algorithm that it can select, and prints a table of the results.
 int bench_command(const BenchOptions& options) {
   const LoadedScene loaded = load(options.scene, options.log.quiet);
   check_file(options.csv, options.force);
@@ -80,7 +80,7 @@ int bench_command(const BenchOptions& options) {
   for (int round = 0; round < options.repeat; ++round)
     for (std::size_t i = 0; i < methods.size(); ++i) {
       progress.begin(methods[i].name);
-      if (round > 0 && !results[i].fault.empty()) continue;  // it would end early again
+      if (round > 0 && !results[i].fault.empty()) continue;  // a further run would end early, too
       const MethodResult result = run_method(methods[i].name, scenes[i], models, options.limit_s,
                                              [&](double fraction) { progress(fraction); });
       progress.end(result);

@@ -44,15 +44,16 @@ constexpr const char* kFooter =
 void open_standard_streams() {
   for (int fd = 0; fd <= 2; ++fd) {
     if (fcntl(fd, F_GETFD) >= 0) continue;
-    // Takes the lowest free number. Writing to standard output then fails, so results are not lost silently.
+    // open() takes the lowest free number. Standard output is opened for reading only, so that writing to it
+    // fails and results are not lost silently.
     open("/dev/null", fd == 2 ? O_WRONLY : O_RDONLY);
     if (fd == 1) note_closed_output();
   }
 }
 
-/// Called when memory is exhausted where no exception can pass: in a thread, or in a destructor during
-/// another exception. The program ends with the same line and exit code; unfinished files keep their
-/// temporary names.
+/// Ends the program when an exception cannot be caught: in a thread, or in a destructor during another
+/// exception. If memory is exhausted, the message and the exit code are the usual ones. Unfinished files keep
+/// their temporary names.
 [[noreturn]] void end_program() {
   try {
     if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
@@ -65,12 +66,12 @@ void open_standard_streams() {
   std::abort();
 }
 
-/// Installed before the construction of static objects, which needs memory, too.
+/// Runs before static objects are constructed, because memory can be exhausted there, too.
 [[gnu::constructor(101)]] void install_end() {
   std::set_terminate(end_program);
 }
 
-/// If results could not be written, the command has failed.
+/// Writes buffered results to standard output. Returns `code`, or the code of a failed run if writing fails.
 int flushed(int code) {
   if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return code;
   log("offstage: standard output: {}\n", std::strerror(errno));
@@ -93,7 +94,7 @@ bool is_scene_name(std::string_view argument) {
   return argument == kStandardInput || argument.ends_with(".json");
 }
 
-/// Whether the arguments have a scene in place of a command; it is then rendered.
+/// Returns whether the arguments have a scene file in place of a command. Such a scene is rendered.
 bool lacks_command(const std::vector<const char*>& arguments, const std::vector<std::string>& commands) {
   if (arguments.size() < 2) return false;
   const std::string_view first = arguments[1];
@@ -105,7 +106,7 @@ bool lacks_command(const std::vector<const char*>& arguments, const std::vector<
          std::any_of(arguments.begin() + 1, arguments.end(), is_scene_name);
 }
 
-/// Error message for a word that is not a command; empty if there is none.
+/// Returns an error message if the first argument is not a command; otherwise an empty text.
 std::string wrong_command(const std::vector<const char*>& arguments,
                           const std::vector<std::string>& commands) {
   if (arguments.size() < 2 || std::string_view(arguments[1]).starts_with('-')) return {};
@@ -138,7 +139,7 @@ Command add_tune(CLI::App& app, const TuneCommand& run) {
   return {command, [options, run] { return run(*options); }};
 }
 
-/// In the order in which --help lists them.
+/// Adds all commands, in the order in which --help lists them.
 std::vector<Command> add_commands(CLI::App& app, const TuneCommand& tune, const WatchCommand& watch) {
   return {add_render(app, watch), add_new(app),     add_tune(app, tune), add_encode(app), add_frame(app),
           add_sheet(app),         add_sweep(app),   add_simulate(app),   add_bench(app),  add_export(app),

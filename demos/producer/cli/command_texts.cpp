@@ -17,7 +17,7 @@ namespace {
 /// An option or a positional argument of a command.
 struct Argument {
   std::vector<std::string> names;    ///< "-o", "--output"; for a positional argument, its placeholder
-  std::vector<std::string> choices;  ///< the values it accepts, if they are few
+  std::vector<std::string> choices;  ///< the allowed values, if there are only a few
   std::string help, environment;
   bool takes_value = false, required = false, positional = false, repeated = false;
 };
@@ -27,14 +27,14 @@ struct CommandText {
   std::vector<Argument> options, positionals;
 };
 
-/// The words between braces in the name of a type, such as TEXT:{exr,png}.
+/// Returns the words between braces in the name of a type: "exr" and "png" for TEXT:{exr,png}.
 std::vector<std::string> choices_in(const std::string& type) {
   const std::size_t open = type.find('{'), close = type.find('}');
   if (open == std::string::npos || close == std::string::npos) return {};
   return CLI::detail::split(type.substr(open + 1, close - open - 1), ',');
 }
 
-/// A text of several lines as one.
+/// Returns a text with its line breaks replaced by spaces.
 std::string in_one_line(std::string text) {
   for (char& c : text)
     if (c == '\n') c = ' ';
@@ -79,7 +79,7 @@ std::string with_replaced(std::string text, std::string_view what, std::string_v
   return text;
 }
 
-/// Quotes a text for all supported shells.
+/// Returns a text in quotes that all supported shells understand.
 std::string shell_word(const std::string& text) {
   return "'" + with_replaced(text, "'", "'\\''") + "'";
 }

@@ -10,11 +10,12 @@ class App;
 
 namespace offstage::producer {
 
-/// A manual page of section 1, as roff.
+/// Returns the manual page of the program (section 1), as roff.
 std::string manual_page(const CLI::App& program);
 
-/// The completion script of "bash", "zsh" or "fish": commands, their options, the values an option chooses
-/// from, and files everywhere else. Throws std::invalid_argument for another shell.
+/// Returns the completion script for a shell: "bash", "zsh" or "fish". The script completes commands, options
+/// and the allowed values of options, and file names everywhere else. Throws std::invalid_argument for
+/// another shell.
 std::string shell_completion(const CLI::App& program, std::string_view shell);
 
 }  // namespace offstage::producer

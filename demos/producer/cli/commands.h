@@ -17,20 +17,20 @@
 
 namespace offstage::producer {
 
-/// A command in the command line.
+/// A command of the program.
 struct Command {
-  CLI::App* arguments;  ///< belongs to the program's command line
+  CLI::App* arguments;  ///< arguments of the command; owned by the program's CLI::App
   std::function<int()>
-      /// Runs the command with the options that were parsed. Returns an exit code; errors are exceptions.
+      /// Runs the command with the parsed options and returns the exit code. Throws an exception for an
+      /// error.
       run;
 };
 
 struct RenderOptions;
-/// The function behind `render --watch`, which is in a library that depends on this one: see
-/// engine/watch_command.h.
+/// Runs `render --watch`. The function is in a library that depends on this one: see engine/watch_command.h.
 using WatchCommand = std::function<int(const RenderOptions&)>;
 
-// Each adds a command with its options to the program's command line.
+// Each function adds a command with its options to the program's command line.
 Command add_render(CLI::App& app, const WatchCommand& watch);
 Command add_new(CLI::App& app);
 Command add_encode(CLI::App& app);
@@ -57,9 +57,10 @@ struct RenderOptions {
   LogOptions log;
   std::string out;
   std::string frames, chunk;
-  std::string format = "rgba";  ///< format of standard output
+  std::string format = "rgba";  ///< format of the frames on standard output
   std::string cache, stats, report;
-  std::vector<std::string> cameras;  ///< cameras to draw, or kAllCameras; empty: the scene's `camera`
+  /// Names of the cameras to draw, or kAllCameras; empty: the scene's `camera`.
+  std::vector<std::string> cameras;
   /// Folder for the states of a film with several cameras: the first camera writes them, the others read
   /// them. Empty: none.
   std::string states;
@@ -68,14 +69,16 @@ struct RenderOptions {
   bool resume = false, force = false, dry_run = false, watch = false;
   render::GlPlatform gl = render::GlPlatform::automatic;
 
-  // These are set by render --watch.
+  // `render --watch` sets the following members.
   std::function<bool()> stop;  ///< see RenderJob::stop
-  /// Makes RenderJob::states for a film that ends with the frame `last`; empty: none.
+  /// Makes RenderJob::states for a film whose last frame is `last`. Empty: the film is simulated.
   std::function<std::unique_ptr<StateSource>(const LoadedScene&, const ModelLibrary&, int last)> states_of;
-  bool prints_name = true;  ///< whether the name of the complete output is printed
+  bool prints_name = true;  ///< whether to print the name of the output when it is complete
 };
+/// Runs the command `render` and returns the exit code.
 int render_command(const RenderOptions& options);
-/// Default output of a scene: SCENE.mp4 in the current folder. Throws OutputError for standard input.
+/// Returns the default output for a scene: SCENE.mp4 in the current folder. Throws OutputError if the scene
+/// is read from standard input.
 std::string default_film(const std::string& scene_file);
 
 struct TuneOptions {
@@ -86,47 +89,53 @@ struct TuneOptions {
   int threads = 0;
   render::GlPlatform gl = render::GlPlatform::automatic;
 };
-/// The function behind `tune`, which is in a library that depends on this one: see tune/tune_command.h.
+/// Runs the command `tune`. The function is in a library that depends on this one: see tune/tune_command.h.
 using TuneCommand = std::function<int(const TuneOptions&)>;
 
-/// Number of threads, or the number of available processors if it is 0.
+/// Returns `threads`, or the number of available processors if `threads` is 0.
 int threads_or_all(int threads);
-/// Limits the simulation to this number of threads during its lifetime.
+/// Limits the simulation to a number of threads while the returned object exists. 0 threads mean all
+/// available processors.
 tbb::global_control simulation_threads(int threads);
 
-/// Loads a scene, prints its warnings to standard error unless quiet.
+/// Loads a scene with the overrides of the options, then `more_overrides`. Prints its warnings to standard
+/// error unless `quiet`. Throws SceneError.
 LoadedScene load(const SceneOptions& options, bool quiet,
                  const std::vector<std::string>& more_overrides = {});
 void print_warnings(const std::vector<Problem>& warnings);
-/// Reads the models of a scene, and shows steps that take long. Prints warnings unless quiet. Throws
-/// Interrupted between two models, and the exceptions of ModelLibrary.
+/// Reads the models of a scene, and shows steps that take long. Prints warnings, unless the options say
+/// quiet. Throws the exceptions of ModelLibrary. After a signal it throws Interrupted before the next model.
 ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
                          const LogOptions& log_options);
-/// Reads the models of a scene, and appends warnings to `warnings` instead of printing them.
+/// As above, but appends warnings to `warnings` instead of printing them.
 ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
                          const LogOptions& log_options, std::vector<Problem>& warnings);
 /// Returns a hash of all settings that determine the pixels of a scene's frames.
 std::string frame_settings(const LoadedScene& loaded, const ModelLibrary& models, render::GlPlatform gl);
-/// Prints JSON as indented lines "key: value".
+/// Prints JSON to standard output as lines "key: value". `indent`: number of spaces before each line.
 void print_readable(const nlohmann::ordered_json& json, int indent = 0);
 /// Returns the error message for an invalid frame rate.
 std::string wrong_frame_rate(const std::string& text);
+/// Writes a text to a file. Throws render::FileError.
 void write_text_file(const std::string& path, const std::string& text);
-/// Writes to the first name of STEM.EXT, STEM-2.EXT, ... that does not exist, and returns it.
+/// Writes a text to a new file, and returns its name: the first of STEM.EXT, STEM-2.EXT, STEM-3.EXT and so on
+/// that does not exist. `ending` is ".EXT".
 std::string write_numbered_file(const std::string& stem, const std::string& ending, const std::string& text);
 
-/// Throws OutputError if an output file could not be written. Called before a long run. An empty name is
-/// ignored.
+/// Checks before a long run that an output file can be written. Otherwise throws OutputError. An existing
+/// file is an error unless `force`. An empty name means that there is no such file.
 void check_file(const std::string& file, bool force);
+/// Throws OutputError if two outputs are the same file.
 void check_distinct(const std::string& a, const std::string& b);
 /// Throws OutputError unless the name ends in .png.
 void check_png(const std::string& file);
 
-/// Converts a number to a frame. Throws std::invalid_argument if the film has no such frame.
+/// Converts a number to a frame number. Throws std::invalid_argument if the film has no such frame.
 int checked_frame(const Scene& scene, double number);
-/// Returns the frame nearest to a time [s]. Throws std::invalid_argument for a time outside of the film.
+/// Returns the number of the frame nearest to a time [s]. Throws std::invalid_argument for a time outside of
+/// the film.
 int frame_at(const Scene& scene, double time);
-inline constexpr int kSmallSide_px = 320;  ///< side of the pictures of a sheet
+inline constexpr int kSmallSide_px = 320;  ///< longer side of each picture of a contact sheet [pixels]
 /// Returns a size such as "320x180" that has the scene's aspect ratio and the given longer side [pixels].
 std::string small_size(const Scene& scene, int longer_side_px);
 

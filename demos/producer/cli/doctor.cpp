@@ -31,7 +31,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Hash of a small picture of a lit ball on a plane, which tests the whole drawing.
+/// Draws a small picture of a lit ball on a plane, and returns the hash of its pixels. This tests the whole
+/// drawing.
 std::string test_render_hash(render::Context& context) {
   render::Stage stage(context, {.width_px = 128, .height_px = 72});
   const auto material = stage.add_material({});
@@ -73,8 +74,8 @@ Json describe_egl_devices() {
   }
 }
 
-/// Runs `describe` in a separate process: Mesa reads its environment once per process, and a driver that
-/// crashes or hangs becomes an "error".
+/// Runs `describe` in a separate process, for two reasons. Mesa reads its environment only once per process.
+/// And a driver that crashes or hangs then gives only an "error" in the result.
 Json in_child(const std::function<Json()>& describe) {
   constexpr std::chrono::seconds kLimit{60};
   std::array<int, 2> ends{};
@@ -116,7 +117,7 @@ Json in_child(const std::function<Json()>& describe) {
                                         : std::string("the driver ended the process")}};
 }
 
-/// Reports GL on every platform, the devices of EGL, encoders, and the processor.
+/// Reports the GL of each platform, the EGL devices, the encoders, and the processor.
 int doctor_command() {
   using render::GlPlatform;
   Json json = {{"offstage", version_text()}};

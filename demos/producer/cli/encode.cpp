@@ -28,7 +28,7 @@ namespace offstage::producer {
 namespace {
 
 struct EncodeOptions {
-  std::vector<std::string> frames;  ///< one pattern
+  std::vector<std::string> frames;  ///< the pattern of the frames, as the only item
   LogOptions log;
   std::string out;
   std::optional<std::string> fps;  ///< default: the rate of the manifest beside the frames, or 30
@@ -37,7 +37,7 @@ struct EncodeOptions {
 
 namespace fs = std::filesystem;
 
-/// The frame rate in the manifest beside the frames, if it belongs to them.
+/// Returns the frame rate from the manifest in the folder of the frames, if the manifest belongs to them.
 std::optional<render::FrameRate> rate_of_manifest(const fs::path& pattern) {
   const std::optional<JsonObject> manifest = read_json_file(pattern.parent_path() / "manifest.json");
   if (!manifest || manifest->text("pattern") != pattern.filename().string()) return {};
@@ -58,7 +58,7 @@ bool is_transparent(const render::Image& image) {
   return false;
 }
 
-/// Whether the frames need an alpha channel. A fully opaque one is not needed.
+/// Returns whether the frames need an alpha channel. They do not if all their pixels are opaque.
 bool any_transparent(const FrameSequence& sequence) {
   return sequence.may_be_transparent && std::ranges::any_of(sequence.frames, [](const SequenceFrame& frame) {
            if (interrupt_signal()) throw Interrupted(interrupt_signal());
@@ -91,7 +91,7 @@ void check_not_a_frame(const EncodeOptions& options, const FrameSequence& sequen
       throw OutputError(options.out + ": is an input frame and would be overwritten; choose another output");
 }
 
-/// Encodes all frames; returns the number of encoded frames, which is smaller if a signal ended it.
+/// Encodes all frames. Returns the number of encoded frames, which is smaller after a signal.
 std::size_t encode(const FrameSequence& sequence, const render::VideoDef& def,
                    const LogOptions& log_options) {
   const auto sink = render::make_video_sink(def);

@@ -29,7 +29,7 @@ struct ExportOptions {
   bool force = false;
 };
 
-/// Refuses existing output before the work begins.
+/// Throws OutputError before the work begins if the output already exists.
 void check_target(const ExportTarget& target, const std::vector<int>& frames, bool force) {
   render::create_parent_folders(target.path);
   if (!target.sequence()) return check_file(target.path.string(), force);

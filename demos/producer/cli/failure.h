@@ -1,5 +1,5 @@
 #pragma once
-/// Errors of a command: a message, an exit code and a short name of the kind.
+/// Converts errors of commands to a message, an exit code and a short name of the kind of error.
 
 #include <exception>
 #include <functional>
@@ -13,11 +13,11 @@ struct Failure {
   std::string message;  ///< the message that the program prints, without a line break at its end
 };
 
-/// Describes any exception except those of an interrupt (Interrupted, render::StoppedError), which are
-/// rethrown.
+/// Describes an exception. Rethrows Interrupted and render::StoppedError, which are not errors.
 Failure describe_failure(const std::exception_ptr& error);
 
-/// Returns the exit code of a command; an exception becomes a message and an exit code of its own.
+/// Runs a command and returns its exit code. If the command throws an exception, prints a message and returns
+/// the exit code for this kind of exception.
 int reported(const std::function<int()>& command);
 
 }  // namespace offstage::producer

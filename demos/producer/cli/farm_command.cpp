@@ -46,7 +46,7 @@ struct FarmOptions {
 
 namespace fs = std::filesystem;
 
-/// The folder of a farm: FILM.mp4.farm, or the folder above the frames.
+/// Returns the folder of a farm: FILM.mp4.farm, or the folder that contains the folder of the frames.
 fs::path default_work(const OutputTarget& target) {
   if (target.kind == OutputKind::video) return target.path.string() + ".farm";
   const fs::path folder = target.path.parent_path();
@@ -102,7 +102,7 @@ void check_scene(const FarmOptions& options, FarmPlan& plan) {
                          .alpha = loaded.scene.environment.background == Background::transparent});
 }
 
-/// An existing folder of a farm is continued with --resume if it belongs to the same film.
+/// Prepares the folder of a farm. An existing farm is continued with --resume if it is for the same film.
 void prepare_work(const FarmOptions& options, const FarmPlan& plan) {
   const bool there = fs::exists(plan.work / "farm.json");
   if (there && !options.resume && !options.force)
@@ -130,8 +130,8 @@ void prepare_work(const FarmOptions& options, const FarmPlan& plan) {
   write_farm(plan);
 }
 
-/// Runs a script of the farm's folder and writes its output to a log. Returns an error message; nothing if it
-/// succeeded.
+/// Runs a script in the farm's folder, and writes the script's output to a log. Returns an error message;
+/// nothing if the script succeeded.
 std::optional<std::string> run_script(const FarmPlan& plan, const std::vector<std::string>& arguments,
                                       const std::string& log_name) {
   const fs::path log_file = plan.work / "logs" / log_name;
@@ -230,7 +230,7 @@ int print_status(const FarmOptions& options) {
   return state.encoded ? kOk : kRunFailed;
 }
 
-/// Renders a film in steps on many machines, or reports their progress.
+/// Renders a film in steps on many machines, or reports the progress of the steps.
 int farm_command(const FarmOptions& options) {
   if (!options.status.empty()) return print_status(options);
   if (options.scene.file.empty() || options.out.empty())

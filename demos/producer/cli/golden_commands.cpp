@@ -36,7 +36,7 @@ struct BlessOptions {
 
 struct CompareOptions {
   std::vector<std::string> inputs;  ///< scenes, or two pictures, or two folders of frames
-  SceneOptions scene;               ///< options for each scene; its file name is not used
+  SceneOptions scene;               ///< options for all scenes; its member `file` is not used
   std::string golden, report, junit;
   GoldenStates states;
   int threads = 0;
@@ -116,7 +116,7 @@ struct Comparison {
   TestResult result;
   int code = kOk;
   fs::path page;              // page of the report; empty: none
-  std::exception_ptr thrown;  // the reason why there is no result
+  std::exception_ptr thrown;  // the error because of which there is no result
 };
 
 void compare_scene(const CompareOptions& options, const std::string& file, Comparison& comparison) {
@@ -187,7 +187,8 @@ void write_overview(const CompareOptions& options, const std::vector<Comparison>
   fmt::print("see {}\n", fs::absolute(write_report_overview(options.report, scenes)).string());
 }
 
-/// Errors take precedence over differences, and the first error over later ones.
+/// Returns the exit code of the command. An error takes precedence over differences, and the first error over
+/// later ones.
 int exit_code(const std::vector<Comparison>& comparisons) {
   int code = kOk;
   for (const Comparison& c : comparisons) {

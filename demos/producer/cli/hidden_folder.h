@@ -6,11 +6,11 @@
 
 namespace offstage::producer {
 
-/// A hidden folder in the folder of an output: on the same file system, so that finished files are moved by a
-/// rename. The destructor removes the folder.
+/// A hidden folder beside an output. It is on the same file system, so finished files can be moved by a
+/// rename. The destructor removes the folder and the files in it.
 class HiddenFolder {
  public:
-  /// Creates the folder ".OUTPUT.PURPOSE-NUMBER". Throws std::filesystem::filesystem_error.
+  /// Creates the folder ".OUTPUT.PURPOSE-NUMBER". Throws std::filesystem::filesystem_error if that fails.
   HiddenFolder(const std::filesystem::path& output, const std::string& purpose);
   ~HiddenFolder();
   HiddenFolder(const HiddenFolder&) = delete;

@@ -45,7 +45,7 @@ Json describe(const sim::ConvexDecomposition& decomposition) {
   return json;
 }
 
-/// Returns advice for a model that has an unlikely size; empty for a likely one.
+/// Returns advice for a model of an unlikely size; an empty text for a model of a likely size.
 std::string size_hint(float largest_side) {
   constexpr float kHuge = 100, kTiny = 0.005f;  // [m]
   if (largest_side > kHuge)
@@ -140,7 +140,7 @@ Json describe_model(const std::filesystem::path& path, const DecompositionCache&
   return json;
 }
 
-/// The models that are divided into convex parts.
+/// Describes the models that are divided into convex parts.
 Json models_json(const ModelLibrary& models) {
   Json list = Json::array();
   for (const ModelLibrary::Decomposed& model : models.decomposed()) {
@@ -269,7 +269,7 @@ std::string write_numbered_file(const std::string& stem, const std::string& endi
   constexpr int kMost = 10'000;
   for (int i = 1; i <= kMost; ++i) {
     const std::string name = stem + (i == 1 ? "" : "-" + std::to_string(i)) + ending;
-    // O_EXCL: the file is created here, or the name is in use.
+    // With O_EXCL, opening fails if the file already exists.
     const render::Descriptor made(::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
     if (!made && errno == EEXIST) continue;
     if (!made) render::throw_file_error(name, "cannot be created");

@@ -19,7 +19,8 @@ namespace offstage::producer {
 namespace {
 
 struct NewOptions {
-  std::string name, from;  ///< file and template; empty template: that of this name, or "basic"
+  /// File and template. Empty template: the template named like the file, or "basic".
+  std::string name, from;
   bool list = false, force = false;
 };
 
@@ -42,7 +43,7 @@ std::string_view template_text(const std::string& name) {
                                           list_of_templates()));
 }
 
-/// The file name in the form in which it is typed in a shell.
+/// Returns the file name as one types it in a shell.
 std::string typed(const std::string& file) {
   if (file.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_./-") ==
       std::string::npos)
@@ -82,7 +83,7 @@ int new_command(const NewOptions& options) {
     fmt::print("{}", list_of_templates());
     return kOk;
   }
-  // `offstage new rain` means the template of that name.
+  // `offstage new rain` uses the template "rain".
   std::filesystem::path path = options.name;
   const std::string stem = path.stem().string();
   const std::vector<std::string> names = template_names();

@@ -24,16 +24,17 @@ struct SceneOptions {
   std::optional<std::string> fps;  ///< a number, or a fraction such as 30000/1001
   std::optional<double> duration;
   std::optional<uint64_t> seed;
-  std::vector<std::string> channels;  ///< depth, normal, id, motion; empty: those of the scene
+  /// Channels: depth, normal, id, motion. Empty: the channels of the scene.
+  std::vector<std::string> channels;
   std::optional<std::string> channel_format;
   std::string camera;              ///< name of the camera to draw; empty: the scene's `camera`
   std::vector<std::string> allow;  ///< additional folders for the scene's files
-  bool no_cache = false;           ///< whether the cache of convex parts is neither read nor written
+  bool no_cache = false;           ///< whether to ignore the cache of convex parts, and not to write it
 
   DecompositionCache decompositions() const {
     return no_cache ? DecompositionCache() : DecompositionCache::of_user();
   }
-  /// Returns the overrides of the scene: first those of options such as --fps, then `set`. Throws
+  /// Returns the overrides of the scene: first the values of options such as --fps, then `set`. Throws
   /// std::invalid_argument for an invalid value.
   std::vector<std::string> overrides() const;
   bool from_standard_input() const { return file == kStandardInput; }
@@ -44,10 +45,10 @@ struct LogOptions {
   bool quiet = false, verbose = false;
 };
 
-// Each adds options to a command, which are parsed into the last argument.
+// Each function adds options to a command. Their parsed values are stored in the last argument.
 void add_allow(CLI::App& command, std::vector<std::string>& allow);
-/// Adds the options that override values of the scene, its seed and its folders. add_scene() adds the scene
-/// file, too.
+/// Adds the options that override values of the scene and its seed, and that allow further folders.
+/// add_scene() also adds the argument for the scene file.
 void add_overrides(CLI::App& command, SceneOptions& scene);
 void add_scene(CLI::App& command, SceneOptions& scene);
 void add_timing(CLI::App& command, SceneOptions& scene);

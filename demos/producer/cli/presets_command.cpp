@@ -19,7 +19,7 @@ namespace {
 
 struct ArticulationPreset {
   std::string name, help;
-  ArticulationTemplate made;  ///< with every default
+  ArticulationTemplate made;  ///< articulation with all defaults
 };
 
 std::vector<ArticulationPreset> articulation_presets() {
@@ -31,7 +31,7 @@ std::vector<ArticulationPreset> articulation_presets() {
   return presets;
 }
 
-/// The preset in the form of a scene.
+/// Returns the text of the preset as part of a scene.
 std::string preset_text(const ArticulationPreset& preset) {
   Scene scene;
   scene.articulations.push_back(preset.made);
@@ -40,7 +40,7 @@ std::string preset_text(const ArticulationPreset& preset) {
   return to_text(all.as<List>()->front(), 2);
 }
 
-/// Lists all presets with a line each, or prints the text of one.
+/// Lists all presets, one per line, or prints the text of one preset.
 int presets_command(const std::string& name) {
   if (const effects::FabricPreset* preset = effects::find_fabric(name)) {
     const effects::Fabric& f = preset->fabric;

@@ -38,7 +38,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr uint64_t kStatesBytes = 4ull << 30;  // limit for the states for further cameras, on the disk
+// Limit on the states that are kept on the disk for further cameras.
+constexpr uint64_t kStatesBytes = 4ull << 30;
 
 struct Plan {
   LoadedScene loaded;
@@ -46,8 +47,9 @@ struct Plan {
   std::vector<int> frames;
   std::string settings;
   int threads = 1, jobs = 1;
-  bool through_frames = false;  // a video that can be resumed: first frames, then the video
-  fs::path frames_pattern;      // pattern of these frames
+  // Whether frames are drawn first and a video is then made of them, which can be resumed.
+  bool through_frames = false;
+  fs::path frames_pattern;  // pattern of these frames
   ChannelFiles channels;
 };
 
@@ -64,7 +66,7 @@ render::VideoDef video_def(const Plan& plan, const std::function<bool()>& stop =
 int print_plan(const Plan& plan) {
   const Scene& scene = plan.loaded.scene;
   const double pixels = double(scene.render.size.x()) * scene.render.size.y();
-  constexpr double kPngBytesPerPixel = 0.8;  // measured over the gallery
+  constexpr double kPngBytesPerPixel = 0.8;  // mean over the scenes of the gallery
   const nlohmann::ordered_json json = {
       {"scene", scene.name},
       {"output", plan.target.kind == OutputKind::pipe ? "-" : plan.target.path.string()},
@@ -83,7 +85,7 @@ int print_plan(const Plan& plan) {
   return kOk;
 }
 
-/// Warns of, or refuses, what the format of the frames cannot hold.
+/// Checks that the format of the frames suits the scene. Warns if it loses data, or throws an exception.
 void check_format(const Plan& plan) {
   if (plan.target.kind != OutputKind::frames) return;
   const Scene& scene = plan.loaded.scene;
@@ -119,7 +121,7 @@ Plan make_plan(const RenderOptions& options, const ModelLibrary& models, LoadedS
   return plan;
 }
 
-/// Makes the video from finished frames, and then removes the frames. Returns false if interrupted.
+/// Makes the video from finished frames. Returns false after a signal.
 bool assemble_video(const Plan& plan) {
   auto video = render::make_video_sink(video_def(plan));
   for (const int frame : plan.frames) {
@@ -190,7 +192,7 @@ int render_to_frames(const Plan& plan, const ModelLibrary& models, const RenderO
     if (!assemble_video(plan)) stats.interrupted_by = interrupt_signal();
   }
   if (plan.through_frames && !stats.interrupted_by) {
-    folder.lock = {};  // its file would prevent the folder from being removed
+    folder.lock = {};  // releases the lock, whose file would prevent the removal of the folder
     remove_frames(plan.frames_pattern.parent_path());
   }
   report_run(stats, options.log, options.stats);
@@ -203,8 +205,8 @@ int render_to_frames(const Plan& plan, const ModelLibrary& models, const RenderO
 }
 
 int render_to_video(const Plan& plan, const ModelLibrary& models, const RenderOptions& options) {
-  // A part of a film must neither look like the whole film nor replace one, so it gets its name only with all
-  // frames.
+  // An incomplete film must not look like a complete one, and must not replace one. So the film gets its name
+  // only when it has all frames.
   render::VideoDef def = video_def(plan, options.stop);
   const OutputLock lock = lock_film(plan);
   const fs::path partial = def.path.replace_extension(".partial" + plan.target.path.extension().string());
@@ -214,7 +216,7 @@ int render_to_video(const Plan& plan, const ModelLibrary& models, const RenderOp
   if (!stats.interrupted_by) {
     fs::rename(partial, plan.target.path);
     if (!plan.channels.choice.any())
-      remove_channels(channels_folder(plan.target.path));  // those of an earlier film
+      remove_channels(channels_folder(plan.target.path));  // channels of an earlier film
   }
   report_run(stats, options.log, options.stats);
   if (!stats.interrupted_by) {
@@ -235,7 +237,7 @@ int render_to_pipe(const Plan& plan, const ModelLibrary& models, const RenderOpt
   return stats.interrupted_by ? interrupted(stats, static_cast<int>(plan.frames.size()), "") : kOk;
 }
 
-/// The output of one of several cameras: film-NAME.mp4, or frames/NAME/####.png.
+/// Returns the output for one of several cameras: film-NAME.mp4, or frames/NAME/####.png.
 std::string output_of_camera(const std::string& out, const std::string& camera) {
   const OutputTarget target = parse_output(out);
   if (target.kind == OutputKind::pipe)
@@ -253,8 +255,8 @@ std::string file_of_camera(const std::string& file, const std::string& camera) {
                    .string();
 }
 
-/// Draws several cameras one after the other. Only the first one simulates; the states are kept for the
-/// others unless the run is resumed, in which each camera may lack other frames.
+/// Renders the films of several cameras one after the other. Only the first film is simulated; its states are
+/// kept for the others. A resumed run keeps no states, because each film may lack different frames.
 int render_cameras(const RenderOptions& options) {
   const LoadedScene loaded = load(options.scene, true);
   const std::vector<std::string> known = camera_names(loaded.scene);
@@ -286,7 +288,7 @@ int render_cameras(const RenderOptions& options) {
 }  // namespace
 
 std::string frame_settings(const LoadedScene& loaded, const ModelLibrary& models, render::GlPlatform gl) {
-  // Its pixels differ.
+  // A GPU draws pixels that differ from the pixels of the processor.
   return settings_key(loaded, models) + (gl == render::GlPlatform::egl_gpu ? "-gpu" : "");
 }
 
@@ -369,7 +371,7 @@ int render_command(const RenderOptions& given) {
 
   const auto threads = simulation_threads(options.threads);
   render::pin_environment(plan.threads, options.gl);
-  render::Context();  // reports a missing library before anything is written
+  render::Context();  // throws if a library is missing, before anything is written
   if (plan.target.kind == OutputKind::pipe) return render_to_pipe(plan, models, options);
   if (plan.target.kind == OutputKind::frames || plan.through_frames)
     return render_to_frames(plan, models, options);

@@ -1,6 +1,6 @@
 #pragma once
-/// Messages of a command about its run: the progress, a note if the run will take long, and warnings and
-/// notes at the end.
+/// Prints messages about a run: the progress, a note if the run will take long, and the warnings and notes at
+/// the end.
 
 #include <chrono>
 #include <string>
@@ -16,7 +16,7 @@ class RunProgress {
  public:
   RunProgress(const Scene& scene, const ModelLibrary& models, const LogOptions& log_options);
   void operator()(const Progress& progress);
-  /// Keeps the latest progress on a terminal and continues below it.
+  /// Ends the line of the progress on a terminal. Later output begins below it.
   void finish() { printer_.finish(); }
 
  private:
@@ -30,10 +30,11 @@ class RunProgress {
   const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-/// Writes the statistics of a run to `stats_file`, unless that is empty, and prints its warnings and notes.
+/// Writes the statistics of a run to `stats_file`, unless this name is empty. Then prints the warnings and
+/// notes of the run.
 void report_run(const RunStats& stats, const LogOptions& log_options, const std::string& stats_file);
-/// Prints the number of finished frames of an interrupted run, and `advice` on how to continue. Returns the
-/// exit code.
+/// Prints how many of the `total` frames an interrupted run has finished, and `advice` on how to continue.
+/// Returns the exit code of the command.
 int interrupted(const RunStats& stats, int total, const std::string& advice);
 
 }  // namespace offstage::producer

@@ -26,13 +26,13 @@ struct SheetOptions {
   SceneOptions scene;
   LogOptions log;
   std::string out;
-  int count = 12, columns = 0;  ///< columns 0: chosen by the count
+  int count = 12, columns = 0;  ///< columns 0: chosen according to the count
   int threads = 0;
   bool force = false;
   render::GlPlatform gl = render::GlPlatform::automatic;
 };
 
-/// Evenly distributed frames from the first to the last; for one frame, the middle.
+/// Returns `count` evenly distributed frames from the first to the last; for a count of 1, the middle frame.
 std::vector<int> spread_frames(int count, int total) {
   count = std::min(count, total);
   if (count == 1) return {(total + 1) / 2};

@@ -38,7 +38,7 @@ struct SweepOptions {
   std::vector<std::string> vary;
   std::vector<double> at;  ///< times [s]; empty: the middle of the film
   std::string out, csv;    ///< csv empty: beside the sheet
-  int columns = 0;         ///< 0: chosen by the variations
+  int columns = 0;         ///< 0: chosen according to the variations
   int threads = 0, jobs = 0;
   bool resume = false, force = false, quiet = false;
   render::GlPlatform gl = render::GlPlatform::automatic;
@@ -53,7 +53,7 @@ struct Run {
   LoadedScene scene;
   std::vector<int> frames;
   Figures figures;
-  std::vector<render::Image> pictures;  // one per frame; none if it failed
+  std::vector<render::Image> pictures;  // one for each frame; none if the run failed
   std::string fault;
   int code = kOk;
 };
@@ -65,7 +65,7 @@ struct Sweep {
   fs::path finished;  // folder of the finished runs until all are finished
 };
 
-/// "emitters.0.rate=200, world.seed=3"
+/// Returns the values of a combination as text, such as "emitters.0.rate=200, world.seed=3".
 std::string name_of(const Sweep& sweep, const Run& run) {
   std::string name;
   for (std::size_t i = 0; i < run.values.size(); ++i)
@@ -75,7 +75,7 @@ std::string name_of(const Sweep& sweep, const Run& run) {
 
 // --- Before the work ---
 
-/// The frames at the given times, each once; the middle one if there are none.
+/// Returns the frames at the given times, each once; the middle frame if no times are given.
 std::vector<int> frames_of(const Scene& scene, const std::vector<double>& times) {
   if (times.empty()) return {(scene.frame_count() + 1) / 2};
   std::vector<int> frames;
@@ -102,7 +102,7 @@ class SweepFindings {
   std::vector<Problem> found_;
 };
 
-/// Loads the scene of every combination. Throws SceneError with the problems of all of them.
+/// Loads the scene of every combination. Throws SceneError with the problems of all scenes.
 void load_runs(const SweepOptions& options, Sweep& sweep) {
   SceneOptions base = options.scene;
   const LoadedScene unvaried = load(base, options.quiet);
@@ -163,7 +163,8 @@ void check_outputs(const SweepOptions& options, const Sweep& sweep) {
 
 // --- Finished runs on disk ---
 
-/// A name that contains everything on which the result depends, so that only valid results are found.
+/// Returns a hash of everything on which the result of a run depends. It names the files of the result, so a
+/// result is found again only if it is still valid.
 std::string key_of(const Run& run, const ModelLibrary& models) {
   return text_hash(settings_key(run.scene, models) + fmt::format(" {}", fmt::join(run.frames, ",")));
 }
@@ -176,7 +177,7 @@ void keep(const Run& run, const fs::path& folder, const std::string& key) {
   for (std::size_t i = 0; i < run.pictures.size(); ++i)
     render::write_png(picture_path(folder, key, run.frames[i]), run.pictures[i]);
   const Json json = {{"figures", run.figures}, {"fault", run.fault}, {"code", run.code}};
-  // Last, so that its presence shows that the result is complete.
+  // This file is written last, so that its presence shows that the result is complete.
   write_text_file((folder / (key + ".json")).string(), json.dump() + "\n");
 }
 
@@ -190,14 +191,15 @@ bool restore(Run& run, const fs::path& folder, const std::string& key) {
     run.code = json("code").get<int>();
     for (const int frame : run.frames)
       if (run.fault.empty()) run.pictures.push_back(render::read_image(picture_path(folder, key, frame)));
-  } catch (const std::exception&) {  // damaged: run it again
+  } catch (const std::exception&) {  // the files are damaged, so the run is repeated
     run.pictures.clear();
     return false;
   }
   return true;
 }
 
-/// Removes the files that keep() wrote, named by hexadecimal keys, and the folder if it is then empty.
+/// Removes the files that keep() wrote, whose names begin with hexadecimal keys. Then removes the folder if
+/// it is empty.
 void remove_finished(const fs::path& folder) {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
@@ -230,8 +232,8 @@ void fail(Run& run, const std::string& fault, int code) {
   run.pictures.clear();
 }
 
-/// Simulates and draws one combination. Impossible physics or models are a result, too. Returns false if
-/// interrupted.
+/// Simulates and draws one combination. An error of the simulation or of a model is stored in the run as its
+/// result. Returns false after a signal.
 bool produce(Run& run, const SweepOptions& options, const fs::path& folder) {
   try {
     std::vector<Problem> warnings;
@@ -263,7 +265,8 @@ double available_memory_mb() {
   return INFINITY;
 }
 
-/// Processes the runs on several threads. The first run is done alone and shows the memory of one run.
+/// Processes the runs on several threads. The first run is done alone, to measure how much memory a run
+/// needs.
 class Crew {
  public:
   Crew(Sweep& sweep, const SweepOptions& options) : sweep_(sweep), options_(options) {}

@@ -24,13 +24,13 @@ namespace {
 struct ValidateOptions {
   SceneOptions scene;
   bool json = false;
-  bool no_estimate = false;  ///< no estimate of the cost, which takes a short trial
+  bool no_estimate = false;  ///< whether to omit the estimate of the cost, which needs a short trial
   render::GlPlatform gl = render::GlPlatform::automatic;
 };
 
 using Json = nlohmann::ordered_json;
 
-/// Greatest number of particles of a scene, in total and by name.
+/// Returns the greatest number of particles of a scene, in total and for each particle system.
 struct MostParticles {
   uint64_t alive = 0;
   Json by_name = Json::object();
@@ -44,8 +44,8 @@ MostParticles most_particles(const Scene& scene) {
   return most;
 }
 
-/// Adds warnings for bodies that overlap at the start, the deepest first. The simulation separates them,
-/// which moves them.
+/// Adds warnings for bodies that overlap at the start, the deepest overlap first. The simulation pushes such
+/// bodies apart, which changes their motion.
 void add_overlaps(const Scene& scene, const Simulation& simulation, std::vector<Problem>& warnings) {
   constexpr double kVisible = 1e-3;
   constexpr std::size_t kMost = 5;
@@ -94,7 +94,7 @@ Json cost_json(const CostEstimate& cost) {
   return json;
 }
 
-/// "about 12 s", or "about 12 s, up to 30 s with all particles"
+/// Returns a text such as "about 12 s", or "about 12 s, up to 30 s with all particles".
 std::string film_text(const CostEstimate& cost) {
   constexpr double kWorthSaying = 1.3;
   std::string text = "about " + duration_text(cost.film_s);
@@ -121,7 +121,7 @@ void print_cost(const Scene& scene, const CostEstimate& cost) {
                cost.objects.front().advice);
 }
 
-/// The cost; a trial that diverges is a warning.
+/// Estimates the cost of the scene. If the trial diverges, adds a warning.
 std::optional<CostEstimate> tried(const LoadedScene& loaded, const ModelLibrary& models,
                                   Simulation& simulation, std::vector<Problem>& warnings) {
   try {
@@ -160,7 +160,7 @@ int validate_command(const ValidateOptions& options) {
     LoadedScene loaded = load_scene(file, options.scene.overrides(), options.scene.allow);
     const LogOptions log_options{.progress = ProgressStyle::automatic, .quiet = options.json};
     const ModelLibrary models = load_models(loaded, options.scene, log_options, loaded.warnings);
-    Simulation simulation(loaded.scene, models);  // finds the errors that only building shows
+    Simulation simulation(loaded.scene, models);  // throws for errors that only the construction finds
     add_overlaps(loaded.scene, simulation, loaded.warnings);
     std::optional<CostEstimate> cost;
     if (!options.no_estimate) {

@@ -1,6 +1,6 @@
 #pragma once
-/// Export of films to other programs: the states of the simulation as USD, glTF, PLY, OBJ or CSV. An exporter
-/// gets the same snapshots as the drawing.
+/// Exports films to other programs, as USD, glTF, PLY, OBJ or CSV. An exporter gets the same snapshots of the
+/// simulation from which frames are drawn.
 
 #include <filesystem>
 #include <memory>
@@ -15,11 +15,11 @@ namespace offstage::producer {
 class FilmExport {
  public:
   virtual ~FilmExport() = default;
-  /// Writes a frame; frames must come in ascending order. Throws render::FileError.
+  /// Writes a frame. Must be called with frames in ascending order. Throws render::FileError.
   virtual void write(const Snapshot& snapshot) = 0;
-  /// Completes the output. A single file has a temporary name until then.
+  /// Completes the output. A single file has a temporary name until then. Throws render::FileError.
   virtual void close() = 0;
-  /// Describes the objects and properties that the format cannot hold, one per line; empty if there are none.
+  /// Returns one note for each kind of object or property of the film that the format cannot express.
   virtual std::vector<std::string> notes() const { return {}; }
 };
 
@@ -31,15 +31,15 @@ struct ExportTarget {
   bool sequence() const { return path.filename().string().find('#') != std::string::npos; }
 };
 
-/// Parses the output OUT. Throws std::invalid_argument for an ending other than .usda, .glb, .ply, .obj and
-/// .csv, and for a single file where the format needs a file per frame, or a pattern where it needs a single
-/// file.
+/// Parses the argument OUT. The ending of the name gives the format: .usda, .glb, .ply, .obj or .csv. PLY and
+/// OBJ need a pattern, because they have a file for each frame; the other formats need a single file.
+/// Otherwise throws std::invalid_argument.
 ExportTarget parse_export(const std::string& out);
 
-/// `parts` must outlive the exporter. Throws render::FileError.
+/// Makes the exporter for a target. `parts` must outlive the exporter. Throws render::FileError.
 std::unique_ptr<FilmExport> make_export(const ExportTarget& target, const FilmParts& parts);
 
-// The exporters of the formats.
+// Each function makes the exporter for one format.
 std::unique_ptr<FilmExport> make_usd_export(const std::filesystem::path& file, const FilmParts& parts);
 std::unique_ptr<FilmExport> make_gltf_export(const std::filesystem::path& file, const FilmParts& parts);
 std::unique_ptr<FilmExport> make_ply_export(const std::filesystem::path& pattern, const FilmParts& parts);

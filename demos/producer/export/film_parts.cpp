@@ -27,7 +27,7 @@ Affine3f placed(const Vec3& position, const Quat& orientation, Real scale) {
          Eigen::Scaling(to_float(scale));
 }
 
-/// Replaces the renderer's ground mesh, which reaches to the horizon, by a simple square.
+/// Returns a square that replaces the renderer's mesh of the ground, which reaches to the horizon.
 render::Mesh ground_square() {
   constexpr float r = kGroundHalf_m;
   return {.positions = {{-r, 0, -r}, {-r, 0, r}, {r, 0, r}, {r, 0, -r}},
@@ -36,7 +36,8 @@ render::Mesh ground_square() {
           .indices = {0, 1, 2, 0, 2, 3}};
 }
 
-/// A mesh whose texture coordinates are those that a texture of its material reads.
+/// Returns a mesh with the texture coordinates at which a texture of its material is read: from the right
+/// set, and transformed.
 render::Mesh with_coordinates_of(const render::TextureMap& map, const render::Mesh& mesh) {
   render::Mesh result = mesh;
   if (map.is_plain()) return result;
@@ -205,7 +206,8 @@ class FilmParts::Builder {
   UniqueNames names_, material_names_;
   std::map<std::vector<float>, std::size_t> meshes_done_;
   std::map<std::string, std::size_t> materials_done_;
-  /// Parts by file, and by whether they have the materials of the file.
+  /// The parts that were made for each model file. The flag tells whether they have the materials of the
+  /// file.
   std::map<std::pair<std::string, bool>, std::pair<std::size_t, std::size_t>> models_done_;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-/// The data of a film that do not change over time, for export: meshes, materials and the objects that use
-/// them. Snapshots have the positions of the objects; the indices here refer to the lists of a Snapshot.
+/// The data of a film that do not change over time, for export: meshes, materials, and the objects that use
+/// them. The positions of the objects are in snapshots; indices here refer to the lists of a Snapshot.
 
 #include <cstdint>
 #include <optional>
@@ -24,7 +24,7 @@ struct FilmMaterial {
   std::optional<render::Image> texture;  ///< texture of the base colour
 };
 
-/// A mesh in the frame of a body.
+/// A mesh with a material, placed in the frame of a body. `mesh` and `material` are indices in FilmParts.
 struct FilmPart {
   std::size_t mesh = 0, material = 0;
   Eigen::Affine3f body_from_part = Eigen::Affine3f::Identity();
@@ -32,7 +32,7 @@ struct FilmPart {
 
 struct FilmBody {
   std::string name;
-  std::optional<std::size_t> slot;  ///< index in Snapshot::bodies; none: the body never moves
+  std::optional<std::size_t> slot;  ///< index in Snapshot::bodies; empty: the body never moves
   BodySample place;                 ///< pose at time 0
   std::vector<FilmPart> parts;
   Real appear_at = 0, remove_at = 1e30;  ///< times between which the object exists [s]
@@ -50,18 +50,18 @@ struct FilmRod {
 
 struct FilmCloth {
   std::string name;
-  Real appear_at = 0, remove_at = 1e30;  ///< [s]
+  Real appear_at = 0, remove_at = 1e30;  ///< times between which the cloth exists [s]
   std::size_t cloth = 0;                 ///< index in Snapshot::cloths
   std::size_t material = 0;
-  std::vector<uint32_t> triangles;   ///< triangles of the cloth before it tears
-  std::vector<Eigen::Vector2f> uvs;  ///< texture coordinates of the intact cloth's vertices, over its bounds,
-                                     ///< v upwards
+  std::vector<uint32_t> triangles;  ///< triangles of the untorn cloth, as indices of its vertices
+  /// Texture coordinates of the vertices of the untorn cloth: 0 .. 1 over its extent, v upwards.
+  std::vector<Eigen::Vector2f> uvs;
 };
 
 struct FilmPoints {
   std::string name;
   std::size_t set = 0;  ///< index in Snapshot::point_sets
-  bool glows = false;   ///< whether the particles emit light of their colour
+  bool glows = false;   ///< whether the particles emit light in their colour
 };
 
 /// The meshes, materials and objects of a film. Invisible objects are omitted. Names are unique among objects
@@ -80,6 +80,7 @@ class FilmParts {
   std::vector<std::string> lamps;  ///< names of the lights, in the order of lamps_at()
   render::Sun sun;
 
+  /// Return the camera and the lights at the time of a snapshot.
   render::Camera camera_at(const Snapshot& snapshot) const;
   std::vector<render::Lamp> lamps_at(const Snapshot& snapshot) const;
 
@@ -90,20 +91,21 @@ class FilmParts {
   CameraRig camera_;
 };
 
-/// Returns the transform that places the cylinder of a rod between its ends; nothing if the rod no longer
-/// exists.
+/// Returns the transform that places the unit cylinder of a rod between the rod's ends, in the world. Returns
+/// nothing if the rod does not exist.
 std::optional<Eigen::Affine3f> rod_transform(const RodSample& rod);
 
-/// Triangles, texture coordinates and normals of a cloth at a frame.
+/// Triangles, texture coordinates and normals of a cloth in a frame.
 struct ClothSurface {
   const std::vector<uint32_t>* triangles;
   std::vector<Eigen::Vector2f> uvs;
-  std::vector<Eigen::Vector3f> normals;  ///< normals of the points: means of the triangles' normals, weighted
-                                         ///< by area
+  /// Normals of the vertices: the means of the normals of their triangles, weighted by area.
+  std::vector<Eigen::Vector3f> normals;
 };
+/// Returns the surface of a cloth in a frame. `cloth` and `sample` must outlive the result.
 ClothSurface cloth_surface(const FilmCloth& cloth, const ClothSample& sample);
 
-/// Returns notes on the features of the scene's looks that USD and glTF files cannot express, one line each.
+/// Returns one note for each feature of the scene's materials that USD and glTF files cannot express.
 std::vector<std::string> look_notes(const Scene& scene);
 
 }  // namespace offstage::producer

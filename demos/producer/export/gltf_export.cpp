@@ -1,5 +1,5 @@
-// glTF 2.0 as one binary file (.glb): Khronos Group, "glTF 2.0 Specification". Bodies are animated nodes,
-// cloths meshes with a morph target per frame.
+// glTF 2.0 as one binary file (.glb): Khronos Group, "glTF 2.0 Specification". Bodies are animated nodes, and
+// cloths are meshes with a morph target for each frame.
 
 #include <algorithm>
 #include <array>
@@ -40,7 +40,8 @@ class GltfBuffer {
  public:
   explicit GltfBuffer(const fs::path& file) : file_(file), spool_(file.parent_path()) {}
 
-  /// Adds data and returns the index of its accessor. `target`: the usage of the data; 0: other.
+  /// Adds data and returns the index of its accessor. `target`: usage of the data, as a glTF constant; 0:
+  /// neither vertices nor indices.
   int add(std::span<const float> numbers, int width, int target = 0, bool with_bounds = false) {
     const char* type = width == 1 ? "SCALAR" : width == 2 ? "VEC2" : width == 3 ? "VEC3" : "VEC4";
     Json accessor = {{"bufferView", add_view(bytes_of(numbers), target)},
@@ -96,13 +97,14 @@ class GltfBuffer {
   Spool spool_;
 };
 
-/// A range of frames in which a cloth has the same triangles, as a mesh with a morph target for each frame.
+/// A range of frames in which a cloth has the same triangles. In the file it is a mesh with a morph target
+/// for each frame after the first.
 struct ClothStretch {
   std::vector<int> frames;
   std::vector<uint32_t> triangles;
   std::vector<Eigen::Vector2f> uvs;
-  std::vector<Vector3f> points, normals;  // at its first frame
-  // accessors of positions and normals, for each frame after the first
+  std::vector<Vector3f> points, normals;  // at the first frame of the range
+  // Accessors of the positions and normals, for each frame after the first.
   std::vector<std::pair<int, int>> targets;
 };
 
@@ -135,7 +137,8 @@ void append(const Quaternionf& q, std::vector<float>& out) {
   out.insert(out.end(), q.coeffs().data(), q.coeffs().data() + 4);  // x, y, z, w
 }
 
-/// Returns the rotation from -Z, the viewing direction of cameras and lights in glTF, to a direction.
+/// Returns a rotation that turns -Z to `direction`, and +Y towards `up`. In glTF, cameras and lights look
+/// along -Z.
 Quaternionf look_rotation(const Vector3f& direction, const Vector3f& up) {
   const Vector3f z = -direction.normalized();
   Vector3f x = up.cross(z);
@@ -358,7 +361,7 @@ class GltfExport : public FilmExport {
         break;
       }
       Json matrix = Json::array();
-      // both are in column order
+      // Eigen and glTF both store matrices by columns.
       for (int i = 0; i < 16; ++i) matrix.push_back(part.body_from_part.data()[i]);
       nodes_.push_back({{"mesh", mesh}, {"matrix", std::move(matrix)}});
       children.push_back(nodes_.size() - 1);
@@ -394,7 +397,8 @@ class GltfExport : public FilmExport {
     }
   }
 
-  /// At each frame one target has the weight 1; between frames the cloth is interpolated linearly.
+  /// Animates the weights of the morph targets. At each frame, one target has the weight 1. Between frames,
+  /// the cloth is interpolated linearly.
   void animate_weights(const ClothStretch& stretch, int node) {
     const std::size_t targets = stretch.targets.size();
     std::vector<float> times, weights((targets + 1) * targets, 0);
@@ -405,7 +409,7 @@ class GltfExport : public FilmExport {
     add_channel(times, weights, 1, node, "weights", "LINEAR");
   }
 
-  /// The mesh of a range of frames is shown during these frames only: otherwise its scale is zero.
+  /// Shows the mesh of a range of frames only during these frames. At other times its scale is zero.
   void animate_presence(const ClothRecord& record, std::size_t i, int node) {
     SampleTrack<Vector3f> scale;
     for (const int frame : frames_) {

@@ -1,5 +1,5 @@
-// PLY (Stanford polygon format), binary little-endian: one file per frame. Surfaces are vertices with faces,
-// particles vertices without.
+// PLY (Stanford polygon format), binary little-endian: one file per frame. Surfaces are vertices with faces.
+// Particles are vertices without faces.
 
 #include <algorithm>
 #include <bit>

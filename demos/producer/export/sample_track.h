@@ -1,17 +1,17 @@
 #pragma once
-/// Values over frames, stored only where they change.
+/// Stores values over frames, but only at frames where they change.
 
 #include <utility>
 #include <vector>
 
 namespace offstage::producer {
 
-/// The samples of one value. Other programs interpolate between samples. A value that was constant therefore
-/// gets an additional sample at the last frame before it changes.
+/// The samples of one value over the frames. Other programs interpolate between samples. If a value changes
+/// after it was constant, there is therefore an additional sample at the last frame before the change.
 template <class T>
 class SampleTrack {
  public:
-  /// Must be called with ascending frames.
+  /// Adds the value at a frame. Frames must be in ascending order.
   void add(int frame, const T& value) {
     if (samples_.empty()) {
       samples_.emplace_back(frame, value);
@@ -23,7 +23,7 @@ class SampleTrack {
     latest_ = frame;
   }
   const std::vector<std::pair<int, T>>& samples() const { return samples_; }
-  /// Whether the value never changes.
+  /// Returns whether the value is the same at all frames.
   bool constant() const { return samples_.size() == 1; }
 
  private:

@@ -1,5 +1,6 @@
 #pragma once
-/// An unnamed temporary file for bytes that are produced frame by frame and are needed together at the end.
+/// Temporary storage on the disk for bytes that are produced frame by frame and are needed together at the
+/// end.
 
 #include <cstdint>
 #include <filesystem>
@@ -10,6 +11,7 @@
 
 namespace offstage::producer {
 
+/// An unnamed temporary file. append() and copy_to() throw render::FileError.
 class Spool {
  public:
   /// Creates the file in `folder`, the folder of the output, because the system's temporary folder may be
@@ -18,8 +20,9 @@ class Spool {
 
   void append(std::span<const uint8_t> bytes);
   void append(std::string_view text) { append({reinterpret_cast<const uint8_t*>(text.data()), text.size()}); }
+  /// Returns the number of appended bytes.
   uint64_t size() const { return size_; }
-  /// Appends all collected bytes to another file.
+  /// Appends all bytes of this file to another file.
   void copy_to(render::OutputFile& file);
 
  private:

@@ -1,4 +1,5 @@
-// USD as text (.usda): "Universal Scene Description", openusd.org. Metres, Y up, time codes are frames.
+// USD as text (.usda): "Universal Scene Description", openusd.org. Lengths are in metres, Y is up, and time
+// codes are frames.
 
 #include <cmath>
 #include <memory>
@@ -25,7 +26,8 @@ using Eigen::Affine3f;
 using Eigen::Quaternionf;
 using Eigen::Vector3f;
 
-/// Writes "name.timeSamples = { 1: a, 2: b, }", or "name = a" for a constant value.
+/// Returns the text of an attribute: "name.timeSamples = { 1: a, 2: b, }", or "name = a" for a constant
+/// value.
 template <class T>
 std::string sampled(std::string_view attribute, const SampleTrack<T>& track) {
   if (track.samples().empty()) return {};
@@ -63,7 +65,7 @@ class SpooledAttribute {
 struct PoseTrack {
   SampleTrack<Vector3f> position;
   SampleTrack<Quaternionf> orientation;
-  SampleTrack<std::string> visibility;  // of bodies that exist for some time only
+  SampleTrack<std::string> visibility;  // empty for bodies that exist during the whole film
 
   void add(int frame, const Vector3f& p, Quaternionf q) {
     // q and -q are the same rotation, but an interpolation between opposite signs would take the long way
@@ -114,7 +116,7 @@ struct LampTracks {
   render::Lamp first;
 };
 
-/// A camera or light that looks along -Z of its own frame.
+/// Returns the transform of a camera or light at `from`. In its own frame, it looks along -Z.
 Eigen::Matrix4f looking(const Vector3f& from, const Vector3f& direction, const Vector3f& up) {
   const Vector3f z = -direction.normalized();
   Vector3f x = up.cross(z);

@@ -11,9 +11,10 @@
 
 namespace offstage::producer::usd {
 
-/// Returns a valid prim name of USD: letters, digits and '_', not beginning with a digit.
+/// Converts a name to a valid prim name of USD, which has only letters, digits and '_', and does not begin
+/// with a digit.
 std::string prim_name(std::string_view name);
-/// Makes prim names unique below one parent.
+/// Makes prim names that are unique among the children of one prim.
 class PrimNames {
  public:
   std::string operator()(std::string_view name);
@@ -22,21 +23,22 @@ class PrimNames {
   std::set<std::string> taken_;
 };
 
-/// Text of a quoted string.
+/// Returns a text as a quoted string of USD.
 std::string quoted(std::string_view text);
 
+// Each function returns a value in the text format of USD.
 std::string text(float value);
 std::string text(const Eigen::Vector2f& v);
 std::string text(const Eigen::Vector3f& v);
-/// Text of a quatf, with the real part first.
+/// A quatf, with the real part first.
 std::string text(const Eigen::Quaternionf& q);
-/// Text of a matrix4d. USD multiplies row vectors by a matrix, so the text has the transpose of Eigen's
-/// matrix.
+/// A matrix4d. In USD, a row vector is multiplied by the matrix from the right, so the text has the transpose
+/// of `transform`.
 std::string text(const Eigen::Matrix4f& transform);
-/// Text of a token.
+/// A token.
 std::string text(const std::string& token);
 
-/// Text of a list: "[a, b, ...]".
+/// Returns a list of values: "[a, b, ...]".
 template <class T>
 std::string list(std::span<const T> values) {
   std::string out = "[";

@@ -1,5 +1,5 @@
 #pragma once
-/// All surfaces and particles of a frame in world coordinates, for formats without a scene graph.
+/// All surfaces and particles of a frame in world coordinates. Formats without a scene graph need this form.
 
 #include <cstdint>
 #include <string>
@@ -10,7 +10,8 @@
 
 namespace offstage::producer {
 
-/// Surfaces of one object with one material. Vertices and indices are those of WorldGeometry.
+/// The surfaces of one object that have one material: a range of the vertices and a range of the indices in
+/// WorldGeometry.
 struct GeometryGroup {
   std::string object;
   std::size_t material = 0;
@@ -33,7 +34,7 @@ struct WorldGeometry {
   std::vector<GeometryParticles> particles;
 };
 
-/// `snapshot` must outlive the result.
+/// Returns the surfaces and particles of a frame. `snapshot` must outlive the result.
 WorldGeometry world_geometry(const FilmParts& parts, const Snapshot& snapshot);
 
 }  // namespace offstage::producer

@@ -12,7 +12,7 @@ Object reference_to(const std::string& name) {
   return {{"$ref", "#/definitions/" + name}};
 }
 
-/// "a", "b" or "c"
+/// Returns names as a list for messages, such as "a", "b" or "c".
 std::string quoted(std::span<const std::string> names) {
   std::string text;
   for (std::size_t i = 0; i < names.size(); ++i)
@@ -63,8 +63,8 @@ void describe_tag(const std::string& tag, bool required, ObjectEntry& entry) {
 Limits within_unit(Limits limits, std::string_view unit) {
   if (limits.low != 0) return limits;
   const auto narrow = [&](Real low, Real high) {
-    if (limits.open_low)
-      limits.low = low;  // the bound stays excluded, so that a varying number still needs a "min"
+    // An excluded bound stays excluded, so that a varying number still needs a "min".
+    if (limits.open_low) limits.low = low;
     limits.high = std::min(limits.high, high);
   };
   if (unit == "m")

@@ -177,8 +177,7 @@ class Catalogue {
 
 /// Reads, writes and describes a value of type V, by three static functions:
 /// - `void read(Reader&, const Node&, const Spec&, V& out)`. For a wrong value it reports a problem and
-/// leaves
-///   a usable value in `out`.
+///   leaves a usable value in `out`.
 /// - `Node write(const V&)`, or `std::optional<Node> write(const V&)` if the value can be absent.
 /// - `Description describe(Catalogue&, const Spec&)`.
 template <class V>
@@ -337,9 +336,9 @@ struct Codec<E> {
   static Description describe(Catalogue&, const Spec&) { return describe_names(Names<E>::kNames); }
 };
 
-/// Names of the alternatives of a variant. The key "type" tells which alternative an object is. A
-/// specialization has `kName`, `kHelp`, `kTags` with one name for each alternative, and `kRequired`. If
-/// `kRequired` is false, an object without "type" is the first alternative.
+/// Names of the alternatives of a variant. The key "type" names the alternative. A specialization has
+/// `kName`, `kHelp`, `kTags` with one name for each alternative, and `kRequired`. If `kRequired` is false, an
+/// object without "type" is the first alternative.
 template <class V>
 struct Tags;
 

@@ -67,8 +67,8 @@ class Checker : SceneChecker {
     for (const Force& force : scene_.forces)
       std::visit(
           [&](const auto& f) {
-            if (!f.where.path.empty())
-              check_force(f);  // an empty path: its type was invalid, so it was not read
+            // An empty path: its type was invalid, so it was not read.
+            if (!f.where.path.empty()) check_force(f);
           },
           force);
     check_film(scene_, flat_, folder_, findings_);
@@ -190,7 +190,7 @@ class Checker : SceneChecker {
         fail(path + "/mesh/shape/decomposition", "is for bodies; particles have no convex parts");
     }
   }
-  /// Friction across an axis needs a material that defines it and a body with a friction_axis.
+  /// Checks `cross_friction`, which has an effect only if a body with a `friction_axis` has the material.
   void check_grain(const Material& material) {
     bool any = false;
     for (const Body& body : scene_.bodies) any = any || (body.material == material.name && has_grain(body));
@@ -397,7 +397,7 @@ class Checker : SceneChecker {
     check_period(field, field.start, field.end);
     check_region(field.where.path, field.region, field.drop_rate);
   }
-  /// Whether a list names a body itself, or the original of which the body is a copy.
+  /// Returns whether a list names a body itself, or the original of which the body is a copy.
   bool names(const std::vector<std::string>& bodies, const Body& body) const {
     return std::ranges::any_of(bodies, [&](const std::string& name) {
       const Body* original = find_named(scene_.bodies, name);

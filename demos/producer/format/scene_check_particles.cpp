@@ -50,7 +50,7 @@ class ParticleChecker : CheckBase {
   }
 
  private:
-  /// Groups and sources share one set of names, because forces refer to both.
+  /// Checks that names are unique among all groups and sources, because forces refer to both by name.
   void check_names() {
     std::map<std::string, std::string> owners;
     std::set<std::string> reported;

@@ -63,8 +63,8 @@ void check_count(const SceneSource& source) {
                                                    " are possible: each takes up to 10 kB");
 }
 
-/// Removes keys that had a meaning in earlier versions, so that old scenes can be read. Returns a warning for
-/// each.
+/// Removes keys that had a meaning only in earlier versions, so that old scenes can be read. Returns a
+/// warning for each of these keys.
 std::vector<Problem> drop_retired_keys(SceneSource& source) {
   constexpr std::pair<const char*, const char*> kRetired[] = {{"environment", "occlusion"},
                                                               {"render", "shadow_map"}};

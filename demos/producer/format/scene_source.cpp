@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 // --- Paths ---
 
-/// A JSON pointer (/a/0/b), or the same with dots (a.0.b), as steps.
+/// Splits a path into its steps. The path is a JSON pointer (/a/0/b) or has dots (a.0.b).
 std::vector<std::string> split_path(std::string_view path) {
   const bool pointer = path.starts_with('/');
   if (pointer) path.remove_prefix(1);
@@ -294,8 +294,8 @@ void apply_override(SceneSource& source, const std::string& override, const Node
   const Position here{file, 0, 0};
   const std::vector<std::string> steps = split_path(override.substr(0, equals));
   Node* node = &source.root;
-  const Node* guide =
-      &defaults;  // the value at the same path in a scene with all defaults; null if there is none
+  // The value at the same path in a scene with all defaults; null if there is none.
+  const Node* guide = &defaults;
   std::string path;
   for (std::size_t i = 0; i < steps.size(); ++i) {
     const std::string& step = steps[i];

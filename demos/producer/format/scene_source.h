@@ -30,8 +30,7 @@ inline constexpr const char* kStandardInputName = "<stdin>";
 std::string read_text(const std::filesystem::path& file);
 
 /// Returns the whole text of standard input. The first call reads the text and stores it for later calls.
-/// Throws SceneError if the text cannot be read or is longer than 256 MiB, and Interrupted after a
-/// signal.
+/// Throws SceneError if the text cannot be read or is longer than 256 MiB, and Interrupted after a signal.
 const std::string& standard_input();
 
 /// Parses `text` and its includes. Names of included files are relative to the file that names them; in

@@ -21,8 +21,8 @@
 /// - `render`: table_render.h
 /// - `output`: table_output.h
 ///
-/// A new key at the top of the file is a line in scene_table.cpp. For a new kind of value, add a
-/// Codec to values.h. fields.h has the parts of which a table is made.
+/// A new key at the top of the file is a line in scene_table.cpp. For a new kind of value, add a Codec to
+/// values.h. fields.h has the parts of which a table is made.
 
 #include "producer/format/fields.h"
 #include "producer/scene/scene.h"

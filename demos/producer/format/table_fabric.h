@@ -1,5 +1,5 @@
 #pragma once
-/// The keys of the look of fabrics.
+/// The keys of `fabric` in an entry of `materials`: the appearance of cloth.
 
 #include <array>
 

@@ -257,7 +257,7 @@ struct Table<TurbulenceField> {
         {"octaves", &T::octaves, "number of eddy sizes, each half of the previous one", "", between(1, 8)},
         {"lifetime", &T::lifetime, "lifetime of the largest eddies; 0: their turnover time, scale / speed",
          "s", kNotNegative},
-        {"drift", &T::drift, "velocity at which the eddies move; it adds no mean wind", "m/s"},
+        {"drift", &T::drift, "velocity at which the eddies move; this force adds no mean wind", "m/s"},
         {"seed", &T::seed, "seed of the random numbers that place the eddies", "", between(0, 1e9)},
         {"drag", &T::drag, kAirDragHelp, "kg/s", kNotNegative}});
   }

@@ -88,7 +88,8 @@ struct Table<JointBehaviour> {
         {"length_limits", &T::length_limits,
          "instead of `limits`: least and greatest length of the rope of a distance joint or a pulley. The "
          "length of a pulley's rope is the distance from `anchor` to `pulley_a` plus `ratio` times the "
-         "distance from `anchor_b` to `pulley_b`. Without limits, it cannot get longer than at the start",
+         "distance from `anchor_b` to `pulley_b`. Without limits, the rope of a pulley cannot get longer "
+         "than at the start",
          "m", kNotNegative},
         {"limits_deg", &T::limits_deg, "least and greatest angle; for a spherical joint, of the twist",
          "degrees"},

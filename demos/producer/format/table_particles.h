@@ -55,9 +55,8 @@ struct Table<ParticleGroup> {
         {"places", &T::places, "one entry for each particle"},
         {"fill", &T::fill, "volume that is filled with further particles"},
         {"file", &T::file,
-         "PLY or OBJ file whose points become particles after those of `places`, with the colours of the "
-         "points; "
-         "empty: none"},
+         "PLY or OBJ file whose points become further particles, after the particles of `places`, with the "
+         "colours of the points; empty: none"},
         {"scale", &T::scale,
          "scale factor of the file's points; `auto` converts the likely unit of the file to metres "
          "(docs/models.md)",

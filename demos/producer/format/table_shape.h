@@ -208,7 +208,7 @@ template <>
 struct Tags<Shape> {
   static constexpr const char* kName = "shape";
   static constexpr const char* kHelp =
-      "Collision shape of a body. It is also drawn, unless the body has a `model`.";
+      "Collision shape of a body. The shape is also drawn, unless the body has a `model`.";
   static constexpr std::array kTags = {"sphere", "box",      "capsule", "cylinder",  "cone",
                                        "plane",  "mesh",     "frustum", "ellipsoid", "torus",
                                        "tube",   "open_box", "compound"};

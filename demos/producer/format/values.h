@@ -76,8 +76,8 @@ struct Codec<Quat> {
   static Node write(const Quat& value);
   static Description describe(Catalogue& all, const Spec& spec);
 };
-/// "#rrggbb" or "#rrggbbaa" in sRGB, their short forms "#rgb" and "#rgba", or a list of linear components
-/// [r, g, b] or [r, g, b, a].
+/// "#rrggbb" or "#rrggbbaa" in sRGB, their short forms "#rgb" and "#rgba", or a list of linear components [r,
+/// g, b] or [r, g, b, a].
 template <>
 struct Codec<Color> {
   static void read(Reader& in, const Node& node, const Spec& spec, Color& out);

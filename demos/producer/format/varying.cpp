@@ -83,7 +83,7 @@ Curve read_curve(Reader& in, const Node& node, const Spec& spec) {
   return curve;
 }
 
-/// "varying_over_0", "varying_from_0_to_1"
+/// Returns the name of the schema of varying numbers with some limits, such as "varying_over_0".
 std::string schema_name(const Limits& limits) {
   std::string name = "varying";
   if (limits.low > -kInfinity) name += (limits.open_low ? "_over_" : "_from_") + to_text(limits.low);

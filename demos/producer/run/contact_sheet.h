@@ -22,8 +22,8 @@ render::Image contact_sheet(const std::vector<std::string>& heading, const std::
 /// Throws std::invalid_argument if a sheet of this many pictures would be too large for a PNG.
 void check_sheet_size(std::size_t cells, int columns, int width_px, int height_px);
 
-/// Returns a number of columns for `cells` pictures. A few pictures form a single row. Otherwise there are
-/// about as many columns as rows, and as few empty cells as possible.
+/// Returns a suitable number of columns for a sheet of `cells` pictures. A few pictures form a single row.
+/// Otherwise there are about as many columns as rows, and as few empty cells as possible.
 int columns_for(std::size_t cells);
 
 }  // namespace offstage::producer

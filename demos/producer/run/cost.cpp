@@ -20,13 +20,13 @@ using std::chrono::steady_clock;
 
 // Time of one unit of work on one core [s], from tests/bench/RESULTS.md.
 constexpr double kBody_s = 3e-6;                   // a sub-step of a body in contact
-constexpr double kPart_s = 2e-6;                   // the same for each further convex part of the body
+constexpr double kPart_s = 2e-6;                   // a sub-step of each further convex part of the body
 constexpr double kJoint_s = 5e-6;                  // a sub-step of a joint
 constexpr double kVertex_s = 0.10e-6;              // a sub-step of a cloth's vertex
-constexpr double kFoldingVertex_s = 0.16e-6;       // the same with self-collision
+constexpr double kFoldingVertex_s = 0.16e-6;       // a sub-step of a vertex with self-collision
 constexpr double kFreeParticle_s = 0.015e-6;       // a sub-step of a particle
-constexpr double kParticle_s = 0.1e-6;             // the same if it collides with bodies
-constexpr double kPackedParticle_s = 1e-6;         // the same if it collides with other particles
+constexpr double kParticle_s = 0.1e-6;             // a sub-step of a particle that collides with bodies
+constexpr double kPackedParticle_s = 1e-6;         // a sub-step of a particle that collides with particles
 constexpr double kTriangle_s = 0.1e-6;             // a sub-frame of a triangle with its shadow
 constexpr double kClothPicture_s = 0.09;           // time per sub-frame of a cloth, independent of its mesh
 constexpr double kPixel_s = 40e-3 / (1280 * 720);  // a sub-frame of a pixel of ground
@@ -193,7 +193,8 @@ std::pair<double, double> try_simulation(const Scene& scene, Simulation& simulat
   return {reached, seconds_since(start)};
 }
 
-/// Computing time of a frame of the film, estimated from a draft of at most 1280x720.
+/// Returns the estimated computing time of a frame of the film [s]. Draws a draft of at most 1280x720 pixels
+/// and scales its time to the size and quality of the film.
 double try_drawing(const Scene& scene, const ModelLibrary& models, const Simulation& simulation) {
   constexpr double kMostPixels = 1280 * 720;
   Scene draft = scene;
@@ -205,8 +206,8 @@ double try_drawing(const Scene& scene, const ModelLibrary& models, const Simulat
   render::Context context;
   Picture picture(draft, models, context);
   const Snapshot state = simulation.snapshot();
-  picture.draw(state,
-               state);  // not measured, because it compiles shader programs, which a film does only once
+  // The first drawing is not measured, because it compiles shader programs, which a film does only once.
+  picture.draw(state, state);
   const auto start = steady_clock::now();
   picture.draw(state, state);
   return seconds_since(start) * subframes(scene.render.quality) / (scale * scale);

@@ -15,7 +15,7 @@ struct FarmPlan {
   /// Options of `render`: simulate_options, and options that affect only the picture.
   std::vector<std::string> render_options;
   std::string key;  ///< hash of all settings that affect the simulation or the pictures
-  /// Number of chunks, of repetitions of a failed step, and of threads; 0 threads: all available.
+  /// Number of chunks; number of times that a failed step is repeated; number of threads (0: all available).
   int chunks = 8, retries = 2, threads = 0;
   bool encodes = true;  ///< whether the frames are encoded to a video; false: the frames are the output
   std::filesystem::path frames() const { return encodes ? work / "frames" / "####.png" : out; }

@@ -29,7 +29,7 @@ std::string pattern_of(const std::string& name) {
   return pattern;
 }
 
-/// Whether a video can be made of such a file.
+/// Returns whether a file has a format of which a video can be made.
 bool is_displayed(const fs::path& path) {
   const auto format = render::frame_format(path);
   return format == render::FrameFormat::png || format == render::FrameFormat::jpeg;

@@ -1,6 +1,6 @@
 #pragma once
-/// Compares the algorithms between which a scene can choose. The film is simulated with each of them. A table
-/// then lists their cost, their work and their errors.
+/// Compares the algorithms that a scene can select. The film is simulated with each of them. A table then
+/// lists their cost, their work and their errors.
 
 #include <functional>
 #include <optional>
@@ -54,8 +54,8 @@ using MethodProgress = std::function<void(double fraction)>;
 MethodResult run_method(const std::string& name, const LoadedScene& loaded, const ModelLibrary& models,
                         double limit_s, const MethodProgress& progress = {});
 
-/// Merges the result of a further run of the same method into `result`: keeps the shorter time. A further run
-/// that ended early is ignored.
+/// Sets the time of `result` to the shorter time of two runs of the same method. If the run `again` ended
+/// early, its time is ignored.
 void merge(MethodResult& result, const MethodResult& again);
 
 /// Return the results as a table: to_text() with aligned columns, to_csv() as CSV. Deviations are relative to

@@ -199,9 +199,8 @@ FrameFolder prepare_frames(const fs::path& pattern, const ChannelFiles& channels
   }
   render::remove_leftovers(folder);
   const std::optional<JsonObject> old = read_json_file(manifest_path);
-  const bool same_settings =
-      is_ours(old, pattern,
-              manifest);  // false without a manifest, because the settings of the frames are then unknown
+  // Without a manifest, the settings of the frames are unknown.
+  const bool same_settings = is_ours(old, pattern, manifest);
   if (!same_settings && existing != Existing::replace && fs::exists(manifest_path, error))
     throw OutputError(
         folder.string() +

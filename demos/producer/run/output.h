@@ -83,11 +83,10 @@ struct FrameFolder {
 /// Prepares a folder of frames: locks it, checks or writes the manifest, and finds the frames to be drawn.
 /// - Existing::refuse: existing frames are an error.
 /// - Existing::keep: frames with the settings of this run and with all channel files are kept. Incomplete
-/// frames
-///   are drawn again. Frames with other settings, and files that are not frames of a film, are an error.
+///   frames are drawn again. Frames with other settings, and files that are not frames of a film, are an
+///   error.
 /// - Existing::replace: existing frames are drawn again. Frames with other settings are removed before the
-/// new
-///   manifest is written.
+///   new manifest is written.
 ///
 /// Throws OutputError for these errors and if another process writes to the folder. Throws FileError if a
 /// file cannot be written.

@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// "process 123 on host, since 2026-01-02 03:04:05"
+/// Describes this process: "process 123 on HOST, since 2026-01-02 03:04:05".
 std::string owner_text() {
   char host[256] = {};
   ::gethostname(host, sizeof host - 1);

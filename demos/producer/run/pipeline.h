@@ -51,7 +51,7 @@ class Pipeline {
     changed_.notify_all();
     return true;
   }
-  /// Tells the threads that no further frames will be added.
+  /// Must be called when no further frames will be added. Ends the waits for further frames.
   void finish_jobs() {
     const std::lock_guard lock(mutex_);
     all_produced_ = true;

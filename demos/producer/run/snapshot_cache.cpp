@@ -26,7 +26,7 @@ render::Descriptor open_folder(const fs::path& folder) {
   return render::Descriptor(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
 }
 
-/// "000012.snap"
+/// Returns the file name of a snapshot, such as "000012.snap".
 bool is_snapshot_name(const std::string& name) {
   constexpr std::string_view kEnding = ".snap";
   return name.size() > kEnding.size() && name.ends_with(kEnding) &&
@@ -132,7 +132,7 @@ void SnapshotCache::publish() {
   remove_old_generations();
 }
 
-/// Removes the generations that no process uses, except the published generation and the one of this object.
+/// Removes the generations that no process uses, except the published generation and `generation_`.
 void SnapshotCache::remove_old_generations() const {
   const std::optional<JsonObject> published = read_json_file(folder_ / kFile);
   const std::string kept = published ? published->text("generation") : "";

@@ -17,10 +17,10 @@ class SnapshotCache {
   /// Version of the folder's layout and of the snapshots in it. Folders of other versions are refused
   /// (docs/cache.md).
   static constexpr int kFormat = 4;
-  static constexpr const char* kFile =
-      "cache.json";  ///< this file names the published generation and its simulation
-  static constexpr std::string_view kGenerationPrefix =
-      "generation-";  ///< prefix of the folders with snapshots
+  /// This file names the published generation and its simulation.
+  static constexpr const char* kFile = "cache.json";
+  /// Prefix of the names of folders with snapshots.
+  static constexpr std::string_view kGenerationPrefix = "generation-";
   /// Returns the file name of the snapshot of a frame, such as "000012.snap".
   static std::string file_name(int frame);
 

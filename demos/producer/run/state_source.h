@@ -14,7 +14,7 @@ struct RunStats;
 
 class StateSource {
  public:
-  /// Called after every call of Simulation::advance(). Returns whether the simulation goes on.
+  /// Called after every call of Simulation::advance(). Returns whether the simulation continues.
   using OnAdvance = std::function<bool()>;
 
   virtual ~StateSource() = default;

@@ -33,7 +33,7 @@ std::string file_bytes(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// Whether a text may be a file name: short, with an ending that begins with a letter.
+/// Returns whether a text may be a file name: it must be short and have an ending that begins with a letter.
 bool is_name(const std::string& text) {
   constexpr std::size_t kLongestName = 4096, kLongestEnding = 8;
   if (text.empty() || text.size() > kLongestName || text.find_first_of("\n\"*?") != std::string::npos)
@@ -178,8 +178,8 @@ void FileWatch::wait(std::chrono::milliseconds limit) {
 }
 
 void FileWatch::settle(std::chrono::milliseconds still) {
-  constexpr int kMostRounds =
-      50;  // after this, a file that never stops changing is used in its current state
+  // A file that never stops changing is finally used in its current state.
+  constexpr int kMostRounds = 50;
   Stamps last = stamps();
   for (int round = 0; round < kMostRounds; ++round) {
     std::this_thread::sleep_for(still);
