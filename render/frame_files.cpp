@@ -57,7 +57,7 @@ std::optional<FrameFile> inspect_png(const std::filesystem::path& path) {
                    (kind & 4) != 0 || kind == kPalette, png_settings(path)};
 }
 
-/// Follows the segments up to the pixels.
+/// Reads the segments of a JPEG file up to its pixels.
 std::optional<FrameFile> inspect_jpeg(const std::filesystem::path& path) {
   constexpr int kStartOfImage = 0xD8, kEndOfImage = 0xD9, kStartOfScan = 0xDA, kComment = 0xFE;
   constexpr int kMostSegments = 1000;

@@ -67,8 +67,8 @@ class FileView {
   std::array<uint8_t, 4096> buffer_{};
 };
 
-/// MP4 and QuickTime (ISO/IEC 14496-12): visits boxes; moov/trak/mdia/minf/stbl/stsz contains the number of
-/// samples.
+/// MP4 and QuickTime (ISO/IEC 14496-12): visits the boxes between two positions of the file. The number of
+/// frames is in the box moov/trak/mdia/minf/stbl/stsz.
 void visit_boxes(FileView& file, uint64_t at, uint64_t end, Contents& found, bool& index) {
   while (at + 8 <= end) {
     uint64_t length = file.big(at, 4), head = 8;

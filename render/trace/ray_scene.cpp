@@ -16,10 +16,10 @@ namespace {
 // Groups of objects that a ray may leave out.
 constexpr unsigned kOpaqueCaster = 1, kTranslucentCaster = 2, kFocusingCaster = 4, kNoCaster = 8, kAll = 15,
                    kSprite = 16;
-// Those that reduce the light along a shadow ray.
+// The groups of objects that reduce the light along a shadow ray.
 constexpr unsigned kDimming = kTranslucentCaster | kFocusingCaster | kSprite;
 
-/// Those that block a shadow ray.
+/// Returns the groups of objects that block a shadow ray.
 constexpr unsigned blocking(RayScene::Focus focus) {
   return focus == RayScene::Focus::blocks ? kOpaqueCaster | kFocusingCaster : kOpaqueCaster;
 }
@@ -79,8 +79,8 @@ void set_ray(RTCRay& ray, const Vector3f& from, const Vector3f& direction, float
   ray.flags = 0;
 }
 
-/// Barycentric coordinates of the corners b and c where a ray meets the plane of a triangle, clamped to the
-/// triangle.
+/// Returns the barycentric coordinates, for the corners b and c, of the point where a ray meets the plane of
+/// a triangle. They are clamped to the triangle.
 Vector2f barycentric(const Vector3f& from, const Vector3f& direction, const Vector3f& a, const Vector3f& b,
                      const Vector3f& c) {
   const Vector3f ab = b - a, ac = c - a, p = direction.cross(ac);
@@ -183,9 +183,11 @@ struct RayScene::Object {
   std::size_t stride = 0;
   float softness = -1;  ///< of sprites; negative: not sprites
 
-  /// Fraction of the light that passes a sprite along a ray; `behind`: distance of the far side of its ball.
+  /// Returns the fraction of the light that passes a sprite along a ray; `behind`: distance of the far side
+  /// of its ball.
   float transmittance(unsigned sprite, const Vector3f& from, const Vector3f& direction, float& behind) const;
-  /// The point at which a ray hits a triangle of a mesh, on the surface that the smooth normals suggest.
+  /// Returns the point at which a ray hits a triangle of a mesh, moved to the smooth surface that the vertex
+  /// normals suggest.
   Vector3f smoothed(unsigned triangle, const Vector3f& from, const Vector3f& direction) const;
   void describe(unsigned triangle, const Vector3f& from, const Vector3f& direction, Hit& hit) const;
 
@@ -417,7 +419,7 @@ Vector3f RayScene::transmittance(const Vector3f& from, const Vector3f& direction
 
 namespace {
 
-/// Which of eight segments meet an object of some group.
+/// Returns which of eight segments meet an object of the given groups.
 IntLanes blocked(RTCScene tree, const LaneVectors& from, const LaneVectors& direction, Lanes length,
                  IntLanes active, unsigned mask) {
   if (!any(active)) return IntLanes{};

@@ -194,7 +194,7 @@ class FaceContact {
     for (uint32_t k = 0; k < count_; ++k) least = std::min(least, corners_[k].at[2]);
     return least;
   }
-  /// Mean of the corners.
+  /// Returns the mean of the corners.
   Vec3 middle() const {
     Vec3 sum = Vec3::Zero();
     for (uint32_t k = 0; k < count_; ++k) sum += corners_[k].at;

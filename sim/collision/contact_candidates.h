@@ -50,11 +50,11 @@ inline uint32_t vertex_id(uint32_t body, uint32_t tag) {
 inline uint32_t edge_id(uint32_t tag, uint32_t other_tag) {
   return mixed(std::min(tag, other_tag) + 2, std::max(tag, other_tag));
 }
-/// Id of the crossing of an edge of one body and an edge of the other.
+/// Returns the id of the crossing of an edge of one body and an edge of the other body.
 inline uint32_t crossing_id(uint32_t body_x, uint32_t edge_x, uint32_t edge_y) {
   return body_x == 0 ? mixed(edge_x, edge_y) : mixed(edge_y, edge_x);
 }
-/// Id of a contact at the closest point of a body, where that point is not one of the body's corners.
+/// Returns the id of a contact at the closest point of a body, if this point is not a corner of the body.
 inline uint32_t closest_id(uint32_t body) {
   return mixed(2, body);
 }

@@ -11,13 +11,13 @@ namespace {
 
 using Vec2 = Eigen::Vector2d;
 
-/// v / |v|, or `fallback` if v is zero.
+/// Returns v / |v|, or `fallback` if v is zero.
 Vec3 direction(const Vec3& v, const Vec3& fallback) {
   const Real norm = v.norm();
   return norm > 0 ? Vec3(v / norm) : fallback;
 }
 
-/// Point of a solid of revolution about Y in its half plane: (distance from the axis, height).
+/// Converts a point to the half plane of a solid of revolution about Y: (distance from the axis, height).
 Vec2 to_profile(const Vec3& p) {
   return {std::sqrt(p.x() * p.x() + p.z() * p.z()), p.y()};
 }
@@ -143,10 +143,10 @@ SurfaceDistance signed_distance(const Frustum& c, const Vec3& p) {
 
 namespace {
 
-/// The parameter t of the point y_i = r_i^2 p_i / (t + r_i^2) of an ellipsoid that is nearest to p: the root
-/// of F(t) = sum (r_i p_i / (t + r_i^2))^2 - 1 beyond the pole of the smallest radius (Eberly, "Distance from
-/// a point to an ellipse, an ellipsoid, or a hyperellipsoid", 2013). F falls and is convex there, so Newton's
-/// iteration from below the root never passes it.
+/// Returns the parameter t of the point y_i = r_i^2 p_i / (t + r_i^2) of an ellipsoid that is nearest to p:
+/// the root of F(t) = sum (r_i p_i / (t + r_i^2))^2 - 1 beyond the pole of the smallest radius (Eberly,
+/// "Distance from a point to an ellipse, an ellipsoid, or a hyperellipsoid", 2013). F falls and is convex
+/// there, so Newton's iteration from below the root never passes it.
 Real nearest_parameter(const Vec3& r, const Vec3& p, Real least) {
   constexpr int kMostSteps = 100;
   Real t = least;
@@ -214,7 +214,8 @@ SurfaceDistance signed_distance(const Plane&, const Vec3& p) {
 
 namespace {
 
-/// Distance to the nearest triangle, if any is nearer than the square root of `limit2`.
+/// Returns the distance to the nearest triangle, if a triangle is nearer than the square root of `limit2`
+/// [m^2].
 SurfaceDistance mesh_distance(const CollisionMesh& m, const Vec3& p, Real limit2) {
   Real best2 = limit2;
   uint32_t face = 0;

@@ -13,7 +13,8 @@ constexpr Real kHeightTolerance = 64;
 constexpr Real kCurvedTolerance = 1e-10;  // the same for curved cores, as a fraction of the size
 // Fraction of the size: at greater depth the point gives the direction of the normal.
 constexpr Real kDeep = 1e-6;
-// Fraction of the size: an early end with a smaller gap between the bounds is accepted.
+// If the iteration ends early, its result is accepted if the gap between the bounds is less than this
+// fraction of the size.
 constexpr Real kAcceptedGap = 1e-9;
 
 using Index = uint16_t;
@@ -150,7 +151,7 @@ class ExpandingPolytope {
     dead_[dead_size_++] = f;
   }
 
-  /// The same edge seen from the neighbouring face.
+  /// Returns the same edge as an edge of the neighbouring face.
   HorizonEdge across(Index f, std::size_t k) const {
     const Index other = faces_[f].neighbour[k];
     const auto& back = faces_[other].neighbour;
@@ -210,7 +211,7 @@ class ExpandingPolytope {
   std::array<Index, kMaxFaces> dead_;
 };
 
-/// A direction perpendicular to `u`.
+/// Returns some direction perpendicular to `u`.
 Vec3 any_perpendicular(const Vec3& u) {
   int axis;
   u.cwiseAbs().minCoeff(&axis);
@@ -235,7 +236,8 @@ class TetrahedronMaker {
     }
     return true;
   }
-  /// Unit vector perpendicular to the span of the simplex, as far as possible along `sense`.
+  /// Returns a unit vector perpendicular to the point, line or plane that the simplex spans. Of all such
+  /// vectors it is the nearest to `sense`.
   Vec3 across(const Vec3& sense) const {
     if (s_.size == 3) return normal_.dot(sense) < 0 ? Vec3(-normal_) : normal_;
     const Vec3 n = s_.size == 2 ? Vec3(sense - along_.dot(sense) * along_) : sense;
@@ -244,7 +246,7 @@ class TetrahedronMaker {
   }
 
  private:
-  // Fraction of the size: corners nearer than this to the line or plane of others are replaced.
+  // A corner that is nearer to the line or plane of the others than this fraction of the size is replaced.
   static constexpr Real kWide = 1e-6;
 
   const Vec3& w(std::size_t i) const { return s_.points[i].w; }
@@ -253,7 +255,7 @@ class TetrahedronMaker {
     if (have == 2) along_ = (w(1) - w(0)).normalized();
     if (have == 3) normal_ = (w(1) - w(0)).cross(w(2) - w(0)).normalized();
   }
-  /// Distance from the point, line or plane of the first corners.
+  /// Returns the distance of x from the point, line or plane of the first `have` corners.
   Real distance(std::size_t have, const Vec3& x) const {
     const Vec3 d = x - w(0);
     return have == 1 ? d.norm() : have == 2 ? d.cross(along_).norm() : std::abs(d.dot(normal_));

@@ -13,7 +13,7 @@ namespace offstage::sim {
 namespace {
 
 constexpr int kMaxMeshAdvances = 2000;
-/// Number of points of the motion at which shapes that touch are sampled.
+/// Number of times within the step at which touching shapes are sampled.
 constexpr int kLooks = 32;
 
 /// A lower bound of the distance of two volumes along a direction from B to A, in A's frame.
@@ -78,7 +78,7 @@ DirectedGap directed_gap(const A& a, const B& b, const Placement& p) {
   }
 }
 
-/// Greatest distance of a volume's points from the frame's origin [m].
+/// Returns the greatest distance of a volume's points from the origin of the frame [m].
 Real volume_reach(const Aabb& box) {
   return box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).norm();
 }
@@ -202,7 +202,7 @@ Real unevenness(const MovingShape& s) {
   return s.path.turn() * s.path.max_acceleration(s.shape.hull().reach()) / 24;
 }
 
-/// Velocity of the material point that is at `place` [m per step].
+/// Returns the velocity of the material point that is at `place` [m per step].
 Vec3 velocity(const PosePath& path, Real fraction, const Vec3& place) {
   return path.velocity() + path.angular_velocity(fraction).cross(place - path.at(fraction).position);
 }

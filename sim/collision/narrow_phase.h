@@ -106,10 +106,11 @@ std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b,
 /// detected only if the shapes overlap at the end of the step.
 std::optional<Impact> bisected_time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance);
 
-/// Returns the time of the next impact, as a fraction of the step, of shapes that are within the tolerance at
-/// the start. An impact occurs when their nearest or deepest points approach faster than `speed` [m per
-/// step], > 0, plus the deviation of the rotation from a constant rate. The motion is sampled until the
-/// shapes are separate, because conservative advancement makes no progress within the tolerance.
+/// Returns the time of the next impact, as a fraction of the step, for shapes that are within the tolerance
+/// at the start; empty if there is none. An impact occurs when their nearest or deepest points approach
+/// faster than `speed` [m per step], > 0, plus the deviation of the rotation from a constant rate. The motion
+/// is sampled until the shapes are separate, because conservative advancement makes no progress within the
+/// tolerance.
 std::optional<Impact> time_of_next_impact(const MovingShape& a, const MovingShape& b, Real tolerance,
                                           Real speed);
 

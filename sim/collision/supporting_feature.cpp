@@ -18,7 +18,7 @@ constexpr Real kFlat = 1e-5;
 /// solids are accurate to the square root of the accuracy of distances.
 constexpr Real kAcross = 1e-4;
 
-/// Tags of the ends of the line on a round side; rims use the tags below.
+/// First tag for the ends of a line on a round side. The corners on rims have smaller tags.
 constexpr uint32_t kLineTag = 2 * kMaxFeatureCorners;
 
 /// Directions around the circle, by halving angles with square roots, for the same bits on every machine.
@@ -39,7 +39,8 @@ const std::array<Eigen::Vector2d, kMaxFeatureCorners>& circle() {
   return points;
 }
 
-/// Fraction of a length that lies within `slack`, if its far end rises by `rise`.
+/// Returns the fraction of a length that is within `slack` [m] of a plane, if its near end is on the plane
+/// and its far end is `rise` [m] away.
 Real fraction_within(Real slack, Real rise) {
   return rise > slack ? slack / rise : 1;
 }
@@ -108,7 +109,7 @@ SupportingFeature box_edge(const Convex& c, const Vec3& d, Real slack) {
 
 // Triangle
 
-/// The side of the triangle that faces d; an edge if it has no area.
+/// Returns the side of the triangle that faces d; an edge if the triangle has no area.
 SupportingFeature triangle_face(const Convex& c, const Vec3& d, Real slack) {
   const Vec3 &p = *c.corners[0], &q = *c.corners[1], &r = *c.corners[2];
   const Vec3 area = (q - p).cross(r - p);
@@ -125,8 +126,8 @@ SupportingFeature triangle_face(const Convex& c, const Vec3& d, Real slack) {
   return f;
 }
 
-/// Of the two edges at the touching corner, the one perpendicular to d, or else the one with the longest part
-/// within `slack`.
+/// Returns one of the two edges at the touching corner: an edge perpendicular to d, or else the edge with the
+/// longest part within `slack` [m].
 SupportingFeature triangle_edge(const Convex& c, const Vec3& d, Real slack) {
   uint32_t corner = 0;
   const Vec3 top = c.support(d, corner);
@@ -162,7 +163,7 @@ void spread_corners(SupportingFeature& f, const ConvexPolyhedron& p, std::span<c
   }
 }
 
-/// The face, together with the vertices around it that are almost in its plane.
+/// Returns a face together with the vertices around it that are almost in its plane.
 SupportingFeature flat_part(const ConvexPolyhedron& p, uint32_t face) {
   const ConvexPolyhedron::Plane& plane = p.plane(face);
   const std::span<const uint32_t> loop = p.face_vertices(face);
@@ -194,7 +195,8 @@ SupportingFeature flat_part(const ConvexPolyhedron& p, uint32_t face) {
   return f;
 }
 
-/// Part of the edge from one vertex to another that is within `slack` of the first one along d.
+/// Returns the part of an edge that is within `slack` [m] of its first vertex along d, as a vector from this
+/// vertex.
 Vec3 part_within(const ConvexPolyhedron& p, uint32_t from, uint32_t to, const Vec3& d, Real slack) {
   const Vec3 edge = p.vertex(to) - p.vertex(from);
   return fraction_within(slack, -d.dot(edge)) * edge;
@@ -295,7 +297,7 @@ RoundSide round_side(const Convex& c, const Vec3& d) {
   return side;
 }
 
-/// Radius of the upper or the lower disc.
+/// Returns the radius of the upper or the lower disc [m].
 Real disc_radius(const Convex& c, bool up) {
   return up && c.core == Convex::Core::cone ? c.half.z() : c.half.x();
 }

@@ -9,21 +9,23 @@
 namespace offstage::sim {
 namespace {
 
-/// Enough for all pairs whose bound of the rate is at most a hundred times the true rate.
+/// Greatest number of advances. It is sufficient for pairs whose bound of the rate is at most a hundred times
+/// the true rate.
 constexpr int kMaxAdvances = 2000;
 
 Pose relative(const Pose& a, const Pose& b) {
   return {a.point_to_body(b.position), a.orientation.conjugate() * b.orientation};
 }
 
-/// The largest d.p over the points of a placed core, relative to its frame's origin; d is in the world.
+/// Returns the largest d.p of all points of a core in its orientation, relative to the origin of its frame. d
+/// is in world axes.
 Real extent(const Convex& shape, const Quat& orientation, const Vec3& d) {
   const Vec3 local = orientation.conjugate() * d;
   uint32_t start = 0;
   return local.dot(shape.support(local, start));
 }
 
-/// Distance of the farthest point of the core from the frame's origin [m].
+/// Returns the greatest distance of the core's points from the origin of the frame [m].
 Real core_reach(const Convex& shape) {
   return shape.reach() - shape.radius;
 }

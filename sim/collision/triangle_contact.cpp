@@ -10,8 +10,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Fraction of a ridge's slope by which a face that approaches the ridge may be outside of the ridge's
-/// region, because it may turn into that region within the step.
+/// The normal of a face that approaches a ridge may be outside of the ridge's region by up to this fraction
+/// of the ridge's slope, because the face may turn into the region within the step.
 constexpr Real kGuard = 0.5;
 /// Sine: the surface beyond an edge is a valley if it rises by more than this.
 constexpr Real kValley = 1e-3;

@@ -1,8 +1,8 @@
 #pragma once
 /// Distance between convex polyhedra by the Voronoi Clip algorithm: Mirtich, "V-Clip: fast and robust
-/// polyhedral collision detection" (1998), physics R4. It walks from feature to neighbouring feature of both
-/// polyhedra until each closest point lies in the other feature's Voronoi region. Started from the features
-/// of the last step, it ends almost at once.
+/// polyhedral collision detection" (1998), physics R4. The algorithm moves from one feature of a polyhedron
+/// to a neighbouring feature, until each closest point lies in the Voronoi region of the other feature. If it
+/// starts from the features of the last step, it needs only a few moves.
 
 #include <cstdint>
 

@@ -209,7 +209,7 @@ void Pivoting::leave(Index row) {
   columns_.erase(c);
 }
 
-/// Updates the column of a normal after a change of its tangents' fractions.
+/// Updates the column of a contact's normal force after fraction() of one of its tangents has changed.
 void Pivoting::update_normal(Index normal) {
   const auto c = std::find(columns_.begin(), columns_.end(), normal);
   if (c == columns_.end()) return;

@@ -51,7 +51,7 @@ struct LaneTwist {
   Vector linear, angular;
 };
 
-/// In each half of four rows of four numbers, the first three columns.
+/// Transposes a matrix of four rows in each half of the registers, and returns the first three columns.
 Vector columns(FloatLanes a, FloatLanes b, FloatLanes c, FloatLanes d) {
   const FloatLanes low_ab = _mm256_unpacklo_ps(a, b), low_cd = _mm256_unpacklo_ps(c, d);
   const FloatLanes high_ab = _mm256_unpackhi_ps(a, b), high_cd = _mm256_unpackhi_ps(c, d);

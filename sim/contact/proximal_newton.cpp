@@ -59,7 +59,8 @@ Real mean_mobility(const ContactBody& body, const Vec3& r) {
   return body.inverse_mass + (r.squaredNorm() * I.trace() - r.dot(I * r)) / 3;
 }
 
-/// J^T W J of a point at arms r, s: velocity at the point is v - [r] w.
+/// Returns J_r^T W J_s, where J maps a body's velocities (v, w) to the velocity v - [r] w of its point at the
+/// arm r.
 Mat6 block(const Mat3& W, const Vec3& r, const Vec3& s) {
   const Mat3 R = cross_matrix(r), Ws = -W * cross_matrix(s);
   Mat6 m;
@@ -356,8 +357,8 @@ Vec6 ProximalNewton::violation(std::size_t j) const {
   return v;
 }
 
-/// Changes the velocities to the nearest ones, in the norm of the masses, that satisfy the joints'
-/// constraints.
+/// Changes the velocities as little as possible so that they satisfy the joints' constraints. The change is
+/// measured by its kinetic energy.
 void ProximalNewton::satisfy_constraints() {
   factor_.analyze(static_cast<uint32_t>(direction_.size()), pairs_, kinds_);
   add_constraint_blocks();

@@ -69,7 +69,8 @@ void ProximalNewton::set_turning(std::span<const ContactBody> bodies, const Cont
   turnings_.push_back(t);
 }
 
-/// (s w_n, w_t, w_k), with s = 1 if spinning friction has a limit of its own.
+/// Returns (s w_n, w_t, w_k), where w is the relative angular velocity of the bodies in the contact's frame.
+/// The scale s is 1 if spinning friction has a limit of its own.
 Vec3 ProximalNewton::turning_speed(const Contact& c, const Point& p) const {
   const Turning& t = turnings_[p.turning];
   Vec3 w = Vec3::Zero();

@@ -108,7 +108,7 @@ inline FloatLanes lane_clamp(FloatLanes x, FloatLanes limit) {
 inline FloatLanes lane_inverse(FloatLanes x) {
   return x > 0 ? 1 / x : FloatLanes{};
 }
-/// Square roots of all lanes, correctly rounded as std::sqrt.
+/// Returns the square roots of all lanes, correctly rounded as in std::sqrt().
 inline Lanes lane_sqrt(Lanes x) {
   return _mm256_sqrt_pd(x);
 }

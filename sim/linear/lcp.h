@@ -1,8 +1,8 @@
 #pragma once
-/// Contact forces without friction: the linear complementarity problem of a symmetric positive semidefinite
-/// matrix, by Dantzig's method (physics N9; Baraff, "Fast contact force computation for nonpenetrating rigid
-/// bodies", 1994). Contacts are added one at a time, and the forces change so that all contacts added before
-/// stay solved.
+/// Solves linear complementarity problems with a symmetric positive semidefinite matrix, such as contact
+/// forces without friction, by Dantzig's method (physics N9; Baraff, "Fast contact force computation for
+/// nonpenetrating rigid bodies", 1994). Contacts are added one at a time, and the forces change so that all
+/// contacts added before stay solved.
 
 #include <cstdint>
 #include <vector>
