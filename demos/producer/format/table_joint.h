@@ -39,7 +39,8 @@ struct Table<JointMotor> {
     return {{"mode", &T::mode,
              "quantity that the motor controls: a speed, or a position relative to the position at time 0"},
             {"target", &T::target,
-             "target position in degrees or metres, or target speed in degrees or metres per second; `keys` "
+             "target position in degrees or metres, or target speed in degrees per second or metres per "
+             "second; `keys` "
              "replace it"},
             {"keys", &T::keys, "targets over time"},
             {"interpolation", &T::interpolation, kInterpolationHelp},
