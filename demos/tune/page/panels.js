@@ -86,7 +86,10 @@ export async function saveFile() {
 
 function drawBanner() {
   const box = byId('banner'), doc = store.doc, mine = isWriter() || !store.writer;
-  box.hidden = !(doc?.theirs || !mine);
+  const shown = !mine ? 'read-only' : doc?.theirs ? 'file' : '';
+  if (box.dataset.shown === shown) return;  // new buttons would lose a click in progress
+  box.dataset.shown = shown;
+  box.hidden = shown === '';
   if (box.hidden) return;
   if (!mine) {
     box.replaceChildren(el('span', {}, 'Another tab is editing this scene. This tab is read-only.'), el('button', {onclick: () => send('write')}, 'Edit here'));
