@@ -16,8 +16,9 @@ constexpr float kFractionOfReach = 0.3f, kNoisyFractionOfReach = 0.2f;
 // Least hit distance that is used for noisy light: the smaller one of a fraction of the picture's height and
 // a number of pixels. Smaller values leave noise in corners.
 constexpr float kLeastNoisyFraction = 0.1f, kLeastNoisy_px = 36;
-constexpr float kNoReach = 1e30f;  // 1 / distance^2: nothing is averaged
-constexpr int kRun = 32;           // pixels per run; runs of equal values are skipped
+constexpr float kSameSurface = 0.9f;  // least cosine between two normals of one surface
+constexpr float kNoReach = 1e30f;     // 1 / distance^2: nothing is averaged
+constexpr int kRun = 32;              // pixels per run; runs of equal values are skipped
 
 void for_filter_rows(int height_px, const auto& each) {
   tbb::parallel_for(tbb::blocked_range<int>(0, height_px, kRowsPerFilterTask), [&](const auto& rows) {
@@ -40,34 +41,29 @@ LightGuide::LightGuide(int width, int height)
       inverse_size2(width, height) {}
 
 LightNoise::LightNoise(const LightGuide& guide, const LightPlane& brightness)
-    : columns_((guide.width_px + kBlock - 1) / kBlock),
-      rows_((guide.height_px + kBlock - 1) / kBlock),
-      sums_(static_cast<std::size_t>(columns_ * rows_)) {
-  tbb::parallel_for(0, rows_, [&](int row) {
-    for (int y = row * kBlock; y < std::min((row + 1) * kBlock, guide.height_px); ++y) {
+    : blocks_(guide.width_px, guide.height_px) {
+  constexpr int kSide = PixelBlocks<Sums>::kSide;
+  tbb::parallel_for(0, blocks_.rows(), [&](int row) {
+    for (int y = row * kSide; y < std::min((row + 1) * kSide, guide.height_px); ++y) {
       const float *value = brightness.at(0, y), *filled = guide.filled.at(0, y);
-      for (int x = 0; x < guide.width_px; ++x) {
-        Sums& sums = at(x / kBlock, row);
-        sums.count += filled[x];
-        sums.value += filled[x] * value[x];
-        sums.square += filled[x] * value[x] * value[x];
-      }
+      for (int x = 0; x < guide.width_px; ++x)
+        blocks_.at(x, y) += {filled[x], filled[x] * value[x], filled[x] * value[x] * value[x]};
     }
   });
 }
 
 float LightNoise::relative_variance(int x, int y) const {
-  const int column = x / kBlock, row = y / kBlock;
-  Sums total;
-  for (int r = std::max(row - 1, 0); r <= std::min(row + 1, rows_ - 1); ++r)
-    for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns_ - 1); ++c) {
-      const Sums& part = at(c, r);
-      total.count += part.count;
-      total.value += part.value;
-      total.square += part.square;
-    }
+  const Sums total = blocks_.sum_around(x, y);
   if (!(total.value > 0)) return 0;
   return std::max(total.count * total.square / (total.value * total.value) - 1, 0.0f);
+}
+
+bool LightGuide::shows(int x, int y, const Eigen::Vector3f& position,
+                       const Eigen::Vector3f& unit_normal) const {
+  if (*filled.at(x, y) == 0) return false;
+  const Eigen::Vector3f own = at(normal, x, y);
+  const float off = own.dot(at(place, x, y) - position);
+  return own.dot(unit_normal) > kSameSurface && off * off * *inverse_size2.at(x, y) < 1;
 }
 
 void LightGuide::find_reach(const LightPlane& inverse_distance, const LightNoise& noise, LightPlane& reach2,

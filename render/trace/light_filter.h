@@ -4,6 +4,7 @@
 /// light is also guided by hit distances, so that dark corners stay narrow (error bound of G. Ward et al., "A
 /// Ray Tracing Solution for Diffuse Interreflection", 1988).
 
+#include <algorithm>
 #include <array>
 #include <span>
 #include <vector>
@@ -45,27 +46,54 @@ class LightPlane {
 
 struct LightGuide;
 
-/// The noise of traced light in each block of a picture.
+/// A value for each block of 8 x 8 pixels of a picture. T has +=.
+template <class T>
+class PixelBlocks {
+ public:
+  static constexpr int kSide = 8;  ///< width and height of a block [px]
+  PixelBlocks(int width_px, int height_px)
+      : columns_((width_px + kSide - 1) / kSide),
+        rows_((height_px + kSide - 1) / kSide),
+        values_(static_cast<std::size_t>(columns_ * rows_)) {}
+  int rows() const { return rows_; }
+  /// The value of the block that contains pixel (x, y).
+  T& at(int x, int y) { return values_[index(x / kSide, y / kSide)]; }
+  /// Returns the sum over the block that contains pixel (x, y) and its neighbours.
+  T sum_around(int x, int y) const {
+    const int column = x / kSide, row = y / kSide;
+    T sum{};
+    for (int r = std::max(row - 1, 0); r <= std::min(row + 1, rows_ - 1); ++r)
+      for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns_ - 1); ++c)
+        sum += values_[index(c, r)];
+    return sum;
+  }
+
+ private:
+  std::size_t index(int column, int row) const { return static_cast<std::size_t>(row * columns_ + column); }
+
+  int columns_, rows_;
+  std::vector<T> values_;
+};
+
+/// The noise of light in each block of a picture.
 class LightNoise {
  public:
-  static constexpr int kBlock = 8;  ///< side of a block [px]
-  /// `brightness`: for each pixel with a surface, the brightness of the light that one ray found.
+  /// `brightness`: light that one ray found, for each pixel with a surface.
   LightNoise(const LightGuide& guide, const LightPlane& brightness);
-  /// Returns variance / mean^2 of the brightness in the block of a pixel and the eight blocks around it; 0
-  /// where there is no light.
+  /// Returns variance / mean^2 over the block that contains pixel (x, y) and its neighbours.
   float relative_variance(int x, int y) const;
 
  private:
   struct Sums {
     float count = 0, value = 0, square = 0;
+    Sums& operator+=(const Sums& more) {
+      count += more.count;
+      value += more.value;
+      square += more.square;
+      return *this;
+    }
   };
-  Sums& at(int column, int row) { return sums_[static_cast<std::size_t>(row * columns_ + column)]; }
-  const Sums& at(int column, int row) const {
-    return sums_[static_cast<std::size_t>(row * columns_ + column)];
-  }
-
-  int columns_, rows_;
-  std::vector<Sums> sums_;
+  PixelBlocks<Sums> blocks_;
 };
 
 /// The visible surfaces in a picture. They determine how far the filters may average light.
@@ -82,6 +110,12 @@ struct LightGuide {
   /// For each of the pixels x ... x + 7, returns the fraction of the 5x5 pixels around it that have a similar
   /// position and normal, in [0, 1].
   Lanes similar_around(int x, int y) const;
+  /// Whether pixel (x, y) shows the surface at a point with this unit normal.
+  bool shows(int x, int y, const Eigen::Vector3f& position, const Eigen::Vector3f& unit_normal) const;
+  /// Position [m] or normal of a pixel; `planes`: place or normal.
+  static Eigen::Vector3f at(const std::array<LightPlane, 3>& planes, int x, int y) {
+    return {*planes[0].at(x, y), *planes[1].at(x, y), *planes[2].at(x, y)};
+  }
 
   int width_px, height_px;
   std::array<LightPlane, 3> place, normal;  ///< position [m] and unit normal; x, y, z

@@ -132,14 +132,8 @@ int VisibleLight::find(const Hit& hit) const {
         y < static_cast<float>(guide.height_px)))
     return -1;
   const int column = static_cast<int>(x), row = static_cast<int>(y);
-  if (*guide.filled.at(column, row) == 0) return -1;
-  const auto three = [&](const std::array<LightPlane, 3>& planes) {
-    return Vector3f(*planes[0].at(column, row), *planes[1].at(column, row), *planes[2].at(column, row));
-  };
-  const Vector3f normal = three(guide.normal);
-  const float off = normal.dot(three(guide.place) - hit.position);
-  const bool same = normal.dot(hit.normal) > 0.9f && off * off * *guide.inverse_size2.at(column, row) < 1;
-  return same ? static_cast<int>(index_of(column, row, guide.width_px)) : -1;
+  if (!guide.shows(column, row, hit.position, hit.normal)) return -1;
+  return static_cast<int>(index_of(column, row, guide.width_px));
 }
 
 Vector4f VisibleLight::arriving(int pixel) const {
@@ -320,7 +314,7 @@ AirLightAround LightTracer::trace_air(const Vector3f& place, float number, const
     sum.slope += 2.0f / kAirRays * radiance * direction.transpose();
   };
   float above = 0, above_arrived = 0;
-  LightSums removed;
+  LightSums removed;  // not reported: the statistics are about surfaces
   for (int k = 0; k < kAirRays; ++k) {
     PixelSampler sampler(bits >> 12, bits & 4095, kAirRays * offsets.index + k, kAirRays * offsets.count);
     Path path{.from = place, .direction = even_direction(sampler.next()), .cone = 0.5f};
@@ -334,14 +328,16 @@ AirLightAround LightTracer::trace_air(const Vector3f& place, float number, const
     add(all, there, direction);
     if (direction.y() > 0) above += there.sum();
     if (direction.y() > 0 && free) above_arrived += there.sum();
-    if (k > 0 || sources_.glow.empty()) continue;
+  }
+  if (!sources_.glow.empty()) {
+    PixelSampler sampler(bits >> 12, bits & 4095, offsets.index, offsets.count);
     const float choice = sampler.next().x;
     const GlowSample sample = sources_.glow.sample(place, Vector3f::Zero(), choice, sampler.next());
-    if (!(sample.density > 0)) continue;
     const Vector3f seen = scene_.transmittance(place, sample.towards, kBeforeGlow * sample.distance);
-    add(from_objects,
-        kAirRays * kEvenDensity / (sample.density + kEvenDensity) * seen.cwiseProduct(sample.radiance),
-        sample.towards);
+    if (sample.density > 0)
+      add(from_objects,
+          kAirRays * kEvenDensity / (sample.density + kEvenDensity) * seen.cwiseProduct(sample.radiance),
+          sample.towards);
   }
   AirLightAround result{.light = {}, .sky = above > 0 ? above_arrived / above : 1};
   for (int c = 0; c < 3; ++c) {

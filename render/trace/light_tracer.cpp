@@ -145,8 +145,8 @@ LightTracer::LightTracer(const RayScene& scene, const LightSources& sources, Sto
       stop_(std::move(stop)),
       sun_disc_(sources.sun, sources.sky.sun_direction) {}
 
-Lanes LightTracer::sun_visibility(const LaneVectors& place, IntLanes active,
-                                  const SquarePoint<Lanes>& uv) const {
+Lanes LightTracer::sun_visibility(const LaneVectors& place, IntLanes active, const SquarePoint<Lanes>& uv,
+                                  RayScene::Focus focus) const {
   Lanes fraction = active ? Lanes{} + 1 : Lanes{};
   if (sources_.smoke != nullptr) {
     for (int i = 0; i < kLanes; ++i)
@@ -154,7 +154,7 @@ Lanes LightTracer::sun_visibility(const LaneVectors& place, IntLanes active,
   }
   if (!sources_.sun.shadows) return fraction;
   const LaneVectors light =
-      scene_.transmittance(place, sun_disc_.direction(uv), Lanes{} + kFar, active, RayScene::Focus::blocks);
+      scene_.transmittance(place, sun_disc_.direction(uv), Lanes{} + kFar, active, focus);
   return fraction * ((light.x + light.y + light.z) * (1.0f / 3));
 }
 
@@ -220,9 +220,10 @@ LightTracer::LampLight LightTracer::trace_lamps(const Points& points, const Ligh
     if (!any(lit)) continue;
     LaneVectors arriving = point.arriving * (lit ? nl : none);
     if (lamp.def().shadows) {
+      const RayScene::Focus focus = lamp.is_focused() ? view.focus : RayScene::Focus::passes;
       LaneVectors place = points.place;
       lift(points, lit & (dot(points.face, point.towards) < kGrazing), view, place);
-      const LaneVectors seen = scene_.transmittance(place, point.towards, point.distance, lit, lamp.focus());
+      const LaneVectors seen = scene_.transmittance(place, point.towards, point.distance, lit, focus);
       arriving = {arriving.x * seen.x, arriving.y * seen.y, arriving.z * seen.z};
     }
     diffuse = diffuse + arriving;
@@ -304,7 +305,7 @@ Lanes LightTracer::sun_at(const Points& points, const SquarePoint<Lanes>& on_sun
   }
   if (sources_.sun.intensity <= 0) sunny = IntLanes{};
   lift(points, sunny & ~points.cloth & (dot(points.face, to_sun) < kGrazing), view, place);
-  return sun_visibility(place, sunny, on_sun);
+  return sun_visibility(place, sunny, on_sun, view.focus);
 }
 
 // Traces the visible fraction of the sun for the pixels of a row of a sparse picture that are no gaps.
@@ -468,8 +469,10 @@ LightSums LightTracer::sum_over_rows(int height, const auto& each) const {
 }
 
 void LightTracer::trace(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const {
-  trace_arriving(surfaces, view, light);
-  if (!sources_.glass.empty()) add_caustics(view, light);
+  LightView focused = view;
+  focused.focus = RayScene::Focus::blocks;
+  trace_arriving(surfaces, focused, light);
+  if (!sources_.glass.empty()) add_caustics(focused, light);
   if (light.has_mirrors) trace_mirrors(surfaces, view, VisibleLight(light, view), light);
 }
 

@@ -65,6 +65,8 @@ struct LightView {
   float pixel_m;  ///< width of a pixel at a distance of 1 m [m]
   SampleOffsets offsets;
   bool sparse = false;  ///< whether most pixels get interpolated light; see Gaps
+  /// How shadow rays from the surfaces meet glass. With `blocks`, the light that glass focuses is added.
+  RayScene::Focus focus = RayScene::Focus::passes;
 };
 
 /// The light of the visible surfaces, for rays that hit these surfaces. It is filtered already, and such a
@@ -135,7 +137,8 @@ class LightTracer {
   Vector3f lamps_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
                     PixelSampler& sampler) const;
   float sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const;
-  Lanes sun_visibility(const LaneVectors& place, IntLanes active, const SquarePoint<Lanes>& uv) const;
+  Lanes sun_visibility(const LaneVectors& place, IntLanes active, const SquarePoint<Lanes>& uv,
+                       RayScene::Focus focus) const;
   Vector3f light_through(const Point& point, PixelSampler& sampler, const VisibleLight& visible,
                          LightSums& sums) const;
   Vector3f mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler,
@@ -159,11 +162,11 @@ class LightTracer {
                         LightGuide& guide);
   void trace_cells(const SurfaceBuffer& surfaces, int x, int y, int round, IntLanes active,
                    const LightView& view, LightBuffer& light, LightSums& sums) const;
-  struct Source;
+  struct Beam;
   struct Photon;
-  class PhotonDensity;
-  Photon trace_photon(const GlassPiece& piece, const Source& source, uint32_t number, float count,
-                      const LightView& view, const VisibleLight& visible) const;
+  Photon trace_photon(const Beam& beam, uint32_t number, float count, const LightView& view,
+                      const VisibleLight& visible) const;
+  std::vector<Beam> beams_to(const GlassPiece& piece) const;
   static void add_photon(const Photon& photon, int half_px, const LightView& view, LightBuffer& light);
   void add_caustics(const LightView& view, LightBuffer& light) const;
   void refine_cells(const SurfaceBuffer& surfaces, const LightNoise& noise, const LightView& view,

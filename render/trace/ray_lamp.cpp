@@ -3,7 +3,7 @@
 namespace offstage::render {
 
 RayLamp::RayLamp(const Lamp& lamp, bool within_glass) : def_(lamp) {
-  if (within_glass || !lamp.shadows) focus_ = RayScene::Focus::passes;
+  is_focused_ = lamp.shadows && !within_glass;
   def_.direction.normalize();
   const Vector3f side = std::abs(def_.direction.y()) < 0.99f ? Vector3f::UnitY() : Vector3f::UnitX();
   right_ = def_.direction.cross(side).normalized();

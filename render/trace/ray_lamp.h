@@ -4,7 +4,6 @@
 #include "render/sky_picture.h"
 #include "render/stage.h"
 #include "render/trace/directions.h"
-#include "render/trace/ray_scene.h"
 
 namespace offstage::render {
 
@@ -30,8 +29,8 @@ class RayLamp {
   const Lamp& def() const { return def_; }
   /// Whether this is the bright part of the sky's picture.
   bool is_sky() const { return sky_.picture != nullptr; }
-  /// Whether glass that focuses light blocks the shadow rays from visible surfaces to this lamp.
-  RayScene::Focus focus() const { return focus_; }
+  /// Whether the light that glass focuses is traced: the lamp casts shadows and is not inside of glass.
+  bool is_focused() const { return is_focused_; }
 
  private:
   template <class T>
@@ -39,7 +38,7 @@ class RayLamp {
   LampPoint<float> point_of_sky(const SquarePoint<float>& uv) const;
 
   Lamp def_;
-  RayScene::Focus focus_ = RayScene::Focus::blocks;
+  bool is_focused_ = true;
   /// The sky whose picture is the lamp. If it has no picture, the lamp is `def_`.
   TurnedSky sky_;
   Vector3f right_, up_;

@@ -12,6 +12,7 @@ namespace {
 
 const Environment kNoLight{.intensity = 0, .visible = false};
 const Material kPlaster{.color = {1, 1, 1, 1}, .roughness = 1};
+const Material kGrey{.color = {0.6f, 0.6f, 0.6f, 1}, .roughness = 1};
 
 Environment even_sky(float radiance) {
   const Vector3f all = Vector3f::Constant(radiance);
@@ -196,6 +197,51 @@ TEST_F(TracedLight, OfTheSunIsFocusedByABallOfGlass) {
   const float lost = (without - sum()) / met;
   EXPECT_GT(lost, 0.05f);
   EXPECT_LT(lost, 0.25f);
+}
+
+// Photons end at opaque surfaces only. Panes behind glass are lit straight through it, and not dark.
+TEST_F(TracedLight, ReachesPanesBehindGlass) {
+  s.add(make_box({4, 0.05f, 4}), {.color = {1, 1, 1, 0.6f}, .roughness = 1});
+  look({.eye = {0, 1.5f, 3}, .target = {0, 0, 0}, .fov_deg = 40});
+  const auto brightness = [&] { return mean_around(mean_of(s, 4), place_of({0, 0, 0}), 3); };
+  s.stage.set_sun({.direction = {0, 1, 0}, .intensity = 2});
+  const float by_sun = brightness();
+  s.stage.set_sun({.intensity = 0, .shadows = false});
+  const std::array lamp = {Lamp{.position = {0, 9, 0}, .intensity = Vector3f::Constant(100)}};
+  s.stage.set_lamps(lamp);
+  const float by_lamp = brightness();
+  s.add(make_box({2, 0.2f, 2}), {.color = {1, 1, 1, 1}, .roughness = 0, .transmission = 1}, {0, 2.5f, 0});
+  EXPECT_NEAR(brightness() / by_lamp, 0.9f, 0.15f);
+  s.stage.set_lamps({});
+  s.stage.set_sun({.direction = {0, 1, 0}, .intensity = 2});
+  EXPECT_NEAR(brightness() / by_sun, 0.9f, 0.15f);
+}
+
+// A room that only a small sunlit patch of its floor lights. Rays seldom find the patch, so its walls get
+// further paths.
+TEST_F(TracedLight, OfASmallBrightPatchHasLittleNoise) {
+  constexpr float kHole = 0.15f, kWall = 0.1f, kBeside = (1 - kHole) / 2;
+  const auto wall = [&](const Vector3f& size, const Vector3f& center) {
+    s.add(make_box(size), kGrey, center);
+  };
+  for (const float side : {-1.0f, 1.0f}) {
+    wall({kWall, 2.2f, 2.2f}, {side, 0, 0});
+    wall({2.2f, 2.2f, kWall}, {0, 0, 1.2f * side});
+    wall({2.2f, kWall, kBeside * 2}, {0, 1, side * (kHole + kBeside)});  // the ceiling around a hole
+    wall({kBeside * 2, kWall, 2.2f}, {side * (kHole + kBeside), 1, 0});
+  }
+  wall({2.2f, kWall, 2.4f}, {0, -1, 0});
+  s.stage.set_sun({.direction = {0, 1, 0}, .color = {1, 1, 1}, .intensity = 30, .size_deg = 0.5f});
+  look({.eye = {0.3f, 0.2f, 1}, .target = {-0.3f, 0.1f, -1}, .fov_deg = 70});
+  const HdrImage picture = mean_of(s, 4), reference = mean_of(s, 64);
+  float error2 = 0, sum2 = 0;
+  for (int y = 10; y < 80; ++y)
+    for (int x = 10; x < 150; ++x) {
+      const float light = pixel(reference, x, y).y(), off = pixel(picture, x, y).y() - light;
+      error2 += off * off;
+      sum2 += light * light;
+    }
+  EXPECT_LT(std::sqrt(error2 / sum2), 0.25f);  // 0.16; without the further paths 0.41
 }
 
 // The furnace for particles: inside a closed ball, they have the light of its wall, whatever the sky outside.
