@@ -365,14 +365,14 @@ bool touching(const CollisionShape& a, const CollisionShape& b, const Pose& a_fr
   assert(!a.is_plane());
   if (b.is_plane()) return plane_separation(a.hull(), a_from_b).distance <= 0;
   const bool as_triangles = are_triangles(a, b);
-  const auto is_collision_disabled = [&](uint32_t i, uint32_t j) {
+  const auto are_separated = [&](uint32_t i, uint32_t j) {
     const Convex p = a.piece(i), q = b.piece(j);
     if (as_triangles) return !triangles_intersect(vertices_of(p), placed_vertices(q, a_from_b));
     GjkCache fresh;
     return !overlap(p, q, a_from_b, fresh);
   };
   const bool apart = with_trees(a, b, [&](const auto& tree_a, const auto& tree_b) {
-    return for_each_pair(tree_a, tree_b, placement(a, b, a_from_b, 0), is_collision_disabled, counts);
+    return for_each_pair(tree_a, tree_b, placement(a, b, a_from_b, 0), are_separated, counts);
   });
   return !apart || containment(a, b, a_from_b);
 }

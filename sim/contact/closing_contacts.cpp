@@ -6,22 +6,23 @@
 namespace offstage::sim {
 namespace {
 
-/// Greatest number of times at which contacts close.
+/// Greatest number of times in an interval at which contacts close.
 constexpr int kMostClosings = 16;
-/// kClosed: smaller gaps count as closed [m]. kTogether: gaps that close within this fraction of the interval
-/// after another gap close at the same time as that gap. Example: apart from rounding, all points of a wheel
-/// reach a seam of a surface at the same time.
+/// Gaps smaller than kClosed count as closed [m]. Contacts close together if their closing times differ by
+/// less than the fraction kTogether of the interval: apart from rounding, all points of a wheel reach a seam
+/// of a surface at the same time.
 constexpr Real kClosed = 1e-11, kTogether = 1e-3;
 /// Contacts that approach at a lower speed than this need not be stopped [m/s].
 constexpr Real kStopped = 1e-9;
 /// Fraction of the kinetic energy that a solution may add because of rounding.
 constexpr Real kClosingRounding = 1e-9;
 
-/// Returns the time until a gap [m] closes [s], at least 0; more than `rest` if it does not close. The rate
-/// of the gap changes linearly from `first` now to `last` after the time `rest`.
+/// Returns the time until a gap [m] closes [s], at least 0, or more than `rest` if it does not close. The
+/// speed at which the gap changes [m/s] is `first` now and `last` after the time `rest`, and linear in
+/// between.
 Real closing_time(Real gap, Real first, Real last, Real rest) {
   const Real never = 2 * rest, curve = (last - first) / (2 * rest);
-  // gap + first t + curve t^2 = 0, by the form that is accurate for small curves.
+  // Solves gap + first t + curve t^2 = 0 by the formula that is accurate for small curves.
   const Real root = first * first - 4 * curve * gap;
   if (root < 0) return never;
   const Real sum = -first + std::sqrt(root);
@@ -29,7 +30,8 @@ Real closing_time(Real gap, Real first, Real last, Real rest) {
   return 2 * gap / sum;
 }
 
-/// State of the solution at a time of the interval.
+/// Solves an interval in pieces, from one closing of contacts to the next. The state is that of the current
+/// time.
 class Pieces {
  public:
   Pieces(const ClosingProblem& problem, ProximalNewton& newton)
@@ -59,8 +61,9 @@ class Pieces {
   }
 
  private:
-  /// Solves the closed contacts and the joints in bodies_, whose velocities do not contain their impulses,
-  /// for the rest of the interval, or for the instant `now`.
+  /// Solves the closed contacts and the joints: for the rest of the interval, or for an impact at the current
+  /// time if `now`. bodies_ must hold the velocities without the impulses of this solution, and gets those
+  /// with them. Returns false if the solver failed or the impact would add energy.
   bool solve_closed(bool now) {
     const Real elapsed = time_ / problem_.duration;
     closed_.clear();
@@ -89,9 +92,9 @@ class Pieces {
     result_.work.add(*work);
     return now ? added_energy(before, bodies_, closed_) <= kClosingRounding * kinetic_energy(before) : true;
   }
-  /// Changes a row of the whole interval to a row of its rest or, with `now`, of an impact at the current
-  /// time. Forces and torques are constant over the interval. In an impact, motors and friction of limited
-  /// strength, soft motors and dampers have no effect. A motor of unlimited strength keeps its speed.
+  /// Adapts a row of the whole interval to the rest of the interval or, with `now`, to an impact at the
+  /// current time. Forces and torques are constant over the interval. In an impact, motors and friction of
+  /// limited strength, soft motors and dampers have no effect. A motor of unlimited strength keeps its speed.
   void set_row(BoundedRow& row, bool now) const {
     const Real rest = 1 - time_ / problem_.duration;
     row.impulse *= now ? 0 : rest;
@@ -102,7 +105,7 @@ class Pieces {
     if (row.softness > 0 || std::isfinite(row.lower)) row.lower = row.upper = 0;
     row.target = row_speed(row, bodies_);
   }
-  /// Adds a part of the impulses of the last solution.
+  /// Adds the fraction `part` of the impulses of the last solution to the result.
   void add_impulses(Real part) {
     for (std::size_t k = 0; k < rows_.size(); ++k) {
       result_.contacts[rows_[k]].impulse += part * closed_[k].impulse;
@@ -112,7 +115,7 @@ class Pieces {
       result_.bounded[k].impulse += part * bounded_[k].impulse;
     for (std::size_t k = 0; k < reactions_.size(); ++k) result_.constraints[k] += part * reactions_[k];
   }
-  /// Solves from now to the end of the interval with the contacts that are closed.
+  /// Solves the closed contacts and the joints from the current time to the end of the interval.
   bool solve_rest() {
     const Real part = 1 - time_ / problem_.duration;
     bodies_ = now_;
@@ -182,10 +185,13 @@ class Pieces {
   ProximalNewton& newton_;
   ClosingSolution result_;
   Real time_ = 0, cost_ = 0;
-  std::vector<Real> gaps_, closing_;       // of each contact: now, 0 if closed; and the time until it closes
-  std::vector<Vec3> guesses_;              // impulse of each contact in the whole interval
-  std::vector<ContactBody> now_, bodies_;  // velocities now, and at the end of the interval
-  // The last solution; rows_ has the index of each contact.
+  /// By contact: the current gap [m], 0 if it is closed; the time until it closes [s].
+  std::vector<Real> gaps_, closing_;
+  /// By contact: the impulse over the whole interval.
+  std::vector<Vec3> guesses_;
+  /// The velocities at the current time, and at the end of the interval.
+  std::vector<ContactBody> now_, bodies_;
+  /// The contacts of the last solution; rows_ has the index of each in the problem.
   std::vector<Contact> closed_;
   std::vector<uint32_t> rows_;
   std::vector<BoundedRow> bounded_;

@@ -32,18 +32,18 @@ constexpr Real kAcceptedResidual = 1e-6;  ///< fraction of the velocities: accep
 /// A result whose residual is larger than this fraction of the velocities is rejected.
 constexpr Real kRoughResidual = 1e-3;
 constexpr uint32_t kCollisionSweeps = 200, kPlasticSweeps = 400, kJointedSweeps = 60;
-/// Limits with bounded effort: updates of single contacts, by sweeps or in a sequence (60 ns each), and those
-/// of later solutions of the same cluster; solutions in the search for the restitution; cost of a solution
-/// with joints [ns].
+/// Limits under Effort::bounded. kUpdates: updates of single contacts in a sweep or a sequence (60 ns each);
+/// kMoreUpdates: those in later solutions of the same cluster. kBoundedSolves: solutions in the search for
+/// the restitution. kJointBudget: cost of a solution with joints [ns].
 constexpr std::size_t kUpdates = 4'000, kMoreUpdates = 1'000;
 constexpr int kBoundedSolves = 3;
 constexpr Real kJointBudget = 1e6;
-constexpr Real kResting = 1e-11;  ///< fraction of the fastest approach of all: slower approaches are ignored
+constexpr Real kResting = 1e-11;  ///< speeds of approach below this fraction of the greatest one are ignored
 /// Contacts collide together if their speeds of approach differ by less than this fraction of the greatest
 /// one.
 constexpr Real kTie = 1e-6;
-/// Limits of the number of impulses per contact of a sequence; with joints each impulse takes a solution of
-/// the whole system.
+/// Greatest number of impulses per contact of a sequence, without and with joints. With joints, each impulse
+/// takes a solution of the whole system.
 constexpr std::size_t kImpulses = 200, kJointedImpulses = 12;
 
 /// Returns the impulse that changes the normal velocity by du_n, with friction at its limit against the
@@ -67,8 +67,9 @@ Vector2d direction_at(Real s) {
   return Vector2d(turn[0] + turn[1] * x, turn[2] + turn[3] * x).normalized();
 }
 
-/// Friction on the round cone. It acts against the sliding velocity after the impact, so d and u_tk(after)
-/// are parallel. With P_n = du_n / D(d), D(d) = K_nn - mu K_n,tk.d, their cross product times D is
+/// Computes the impulse of sliding friction on the round cone. The friction acts against the sliding velocity
+/// after the impact, so d and u_tk(after) are parallel. With P_n = du_n / D(d), D(d) = K_nn - mu K_n,tk.d,
+/// their cross product times D is
 ///   g(d) = d x (D u_tk + du_n (K_tk,n - mu K_tk d)),
 /// a trigonometric polynomial of the second degree with at most four roots. With a diagonal K one root is the
 /// direction of sliding before the impact. If there are several, the one nearest to this direction is used.
@@ -85,7 +86,7 @@ class RoundSlide {
   }
 
  private:
-  /// D u_tk(after).
+  /// Returns D u_tk(after) for friction along -d.
   Vector2d sliding(const Vector2d& d) const {
     const Vector2d coupling = K_.block<2, 1>(1, 0);
     return (K_(0, 0) - mu_ * coupling.dot(d)) * u_.tail<2>() +
@@ -152,7 +153,7 @@ Vec3 separate_slide(const Mat3& K, const Vec3& u, Real du_n, const Vec3& mu) {
   return {du_n / K(0, 0), 0, 0};
 }
 
-/// Returns the impulse for a restitution. It may add kinetic energy; the caller checks this.
+/// Returns the impulse for a restitution. This impulse may add kinetic energy, which the caller must check.
 Vec3 impulse_for(const Mat3& K, const Vec3& u, Real restitution, Real mu_t, Real mu_k) {
   const Real du_n = -(1 + restitution) * u.x();
   const Vec3 stick = K.llt().solve(Vec3(du_n, -u.y(), -u.z()));
@@ -251,8 +252,8 @@ class Cluster {
     return is_swept() || work.residual <= kRoughResidual * fastest_;
   }
 
-  /// Makes some sweeps. The first call starts with zero impulses, later calls start with the impulses of the
-  /// last solution.
+  /// Makes a bounded number of sweeps. The first call starts with zero impulses; later calls start with the
+  /// impulses of the previous call.
   ContactWork go_on_sweeping() {
     const std::size_t updates = has_swept_ ? kMoreUpdates : kUpdates;
     if (!has_swept_)
@@ -266,11 +267,11 @@ class Cluster {
     return static_cast<uint32_t>(std::max<std::size_t>(updates / contacts_.size(), 1));
   }
 
-  /// Scales the restitutions down until no energy is added. `energy`: the energy that the unscaled
+  /// Finds the factor of the restitutions at which no energy is added. `energy`: the energy that the unscaled
   /// restitutions add [J]. Without restitution p.u+ <= 0 at each contact, so the sum of p.(u + u+) / 2 is
-  /// negative: the search has a lower end. While the same contacts close and slide, the energy is a quadratic
-  /// function of the factor, and false position finds its zero in a few steps. Halving the weight of an end
-  /// that stays (the Illinois rule) prevents slow convergence.
+  /// negative. The factor therefore lies between 0 and 1. While the same contacts close and slide, the energy
+  /// is a quadratic function of the factor, and false position finds its zero in a few steps. Halving the
+  /// weight of an end that stays (the Illinois rule) prevents slow convergence.
   ContactWork soften(ContactWork work, Real energy) {
     work.restitution_reduced = 1;
     struct End {
@@ -302,9 +303,10 @@ class Cluster {
     return work;
   }
 
-  /// Targets may contradict each other: a body cannot bounce off one face and be stopped by the opposite one.
-  /// Without driven bodies, the targets of a plastic impact never contradict each other. Gauss-Seidel from
-  /// zero impulses is also safe, because each of its steps dissipates energy.
+  /// Solves the impact without restitution, after the solution with restitution has failed. Targets with
+  /// restitution may contradict each other: a body cannot bounce off one face and be stopped by the opposite
+  /// one. Without driven bodies, the targets of a plastic impact never do. If this solution fails too,
+  /// Gauss-Seidel starts from zero impulses, which is safe because each of its steps dissipates energy.
   ContactWork solve_plastic(ContactWork work) {
     work.add(solve_with(0));
     work.solves = work.fallbacks = 1;
@@ -335,8 +337,8 @@ class Cluster {
     return energy - kRounding * static_cast<Real>(kDense) * size;
   }
 
-  /// For an inexact result: scales the impulses down. The energy added by s p is s (p.u + s p.(u+ - u) / 2),
-  /// which is zero at the largest allowed s.
+  /// Scales the impulses of an inexact result down until they add no energy. The energy that s p adds is s
+  /// (p.u + s p.(u+ - u) / 2), which is zero at the largest allowed s.
   void shrink() {
     Real first = 0, second = 0;
     for (std::size_t i = 0; i < contacts_.size(); ++i) {
@@ -424,7 +426,7 @@ class Sequence {
         return work_;
       }
       work_.iterations += next_.size();
-      if (joints_.empty() && is_collision_disabled())
+      if (joints_.empty() && share_no_body())
         for (const std::size_t i : next_) collide_alone(i);
       else
         collide_together();
@@ -443,8 +445,8 @@ class Sequence {
       if (approach(contacts_[i], bodies_) >= (1 - kTie) * fastest) next_.push_back(i);
   }
 
-  /// Whether no two of the next contacts share a movable body, so that each is solved in closed form.
-  bool is_collision_disabled() {
+  /// Whether no two of the next contacts share a movable body. Each of them is then solved in closed form.
+  bool share_no_body() {
     hit_.clear();
     for (const std::size_t i : next_)
       for (const uint32_t body : {contacts_[i].a, contacts_[i].b})

@@ -11,7 +11,8 @@ namespace {
 
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
 
-/// Rows of the awake bodies of a pair.
+/// The rows of the two bodies of a pair in the list of awake bodies; kNone for a body that is not in the
+/// list.
 struct Link {
   uint32_t a = kNone, b = kNone;
   bool connects = true;
@@ -31,7 +32,7 @@ bool may_touch(const ContactPair& pair) {
 
 bool touch_or_push(const ContactPair& pair) {
   if (pair.touching() > 0) return true;
-  if (pair.needs_toi) return false;  // these are left out of the solution
+  if (pair.needs_toi) return false;  // such pairs are left out of the solution
   for (const PlacedManifold& m : pair.manifolds())
     for (uint32_t k = 0; k < m.manifold.count; ++k)
       if (m.forces[k].now != Vec3::Zero()) return true;

@@ -20,10 +20,10 @@ using Eigen::VectorXd;
 
 /// Fraction of the diagonal that is added to it, so that redundant contacts share their load in a unique way.
 constexpr Real kFraction = 1e-7;
-/// Greatest residual of a solution, as a fraction of the greatest velocity, or velocity by one impulse alone.
+/// Greatest accepted residual, as a fraction of scale().
 constexpr Real kLcpAccepted = 1e-8;
-/// The same for the constraints of joints, and the fraction of the diagonal that makes redundant ones
-/// solvable.
+/// kConstraintAccepted: the same for the constraints of joints. kConstraintSoftness: fraction of the diagonal
+/// that is added, so that redundant constraints can be solved.
 constexpr Real kConstraintAccepted = 1e-9, kConstraintSoftness = 1e-11;
 constexpr int kRefinements = 3;
 /// If joints reduce the mobility of a row to less than this fraction, the remaining mobility is only a
@@ -31,16 +31,16 @@ constexpr int kRefinements = 3;
 constexpr Real kImmobile = 1e-10;
 /// A tangential impulse within this fraction of its limit slides.
 constexpr Real kAtLimit = 1e-9;
-/// Orders of the contacts that are tried.
+/// Number of orders in which the contacts are tried.
 constexpr std::size_t kOrders = 2;
-/// Used for a missing bound of a joint's impulse. It is larger than any impulse [N s].
+/// Replaces a missing bound of a joint's impulse; larger than any impulse [N s].
 constexpr Real kUnbounded = 1e15;
 
 /// The source of three rows of the pivoting: a contact, or a bounded row of a joint.
 struct RowOrigin {
   uint32_t index;
   bool is_joint;
-  /// impulse = shift + sign p
+  /// impulse = shift + sign p, with the unknown p of the pivoting.
   Real sign = 1, shift = 0;
 };
 
@@ -63,7 +63,7 @@ class IslandLcp {
   Real residual() const;
   Real scale() const;
   bool apply();
-  /// Adds `sign` times a row of a body's twist to the Jacobian.
+  /// Adds the row `on` of a body's twist to a row of the Jacobian.
   void add(Index row, uint32_t body, const Vec6& on);
   MatrixXd response(const MatrixXd& jacobian) const;
   /// Returns the row of the impulse of bounded coordinate i, or of the normal impulse of contact i.
@@ -75,11 +75,11 @@ class IslandLcp {
   std::vector<Index> column_;  // by body; -1: not moved
   Index columns_ = 0;
   std::vector<RowOrigin> origins_;
-  MatrixXd J_, response_;    // response_: M^-1 J^T, of the bodies without joints
-  MatrixXd G_, G_response_;  // the same for the constraints
-  MatrixXd reaction_;        // impulses of the constraints by unit impulses of the rows
+  MatrixXd J_, response_;    // response_: M^-1 J^T, where M has only the bodies without joints
+  MatrixXd G_, G_response_;  // the Jacobian of the constraints, and its M^-1 G^T
+  MatrixXd reaction_;        // impulses of the constraints due to unit impulses of the rows
   DenseContacts problem_;
-  VectorXd p_, shifts_;  // shifts_: impulses of bounded rows that act in any case
+  VectorXd p_, shifts_;  // shifts_: RowOrigin::shift of each row
   bool has_friction_ = false;
 };
 
@@ -123,8 +123,8 @@ void IslandLcp::set_contact(uint32_t i) {
   has_friction_ |= c.friction_t > 0 || c.friction_k > 0;
 }
 
-/// A row with one bound is a normal; one with two is a tangent of a contact whose normal impulse is 1, so
-/// that its limits are constant.
+/// Sets the rows of a bounded row of a joint. A row with one bound is treated as a normal. A row with two
+/// bounds is treated as a tangent of a contact whose normal impulse is 1, so that its limits are constant.
 void IslandLcp::set_bounded(uint32_t i) {
   const BoundedRow& row = joints_.bounded[i];
   const bool low = std::isfinite(row.lower), high = std::isfinite(row.upper), is_normal = low != high;
@@ -173,9 +173,10 @@ void IslandLcp::set_rows() {
     if (origins_[i].is_joint) shifts_[row_of(i)] = origins_[i].sign * origins_[i].shift;
 }
 
-/// With S = G M^-1 G^T, the constraints answer impulses p by -S^-1 G M^-1 J^T p, which reduces the mobility
-/// to J M^-1 J^T - (G M^-1 J^T)^T S^-1 (G M^-1 J^T). Redundant constraints make S singular; a small fraction
-/// of its diagonal and a few refinements give one of its solutions.
+/// Eliminates the constraints of the joints. With S = G M^-1 G^T, impulses p cause the constraint impulses
+/// -S^-1 G M^-1 J^T p, which reduce the mobility to J M^-1 J^T - (G M^-1 J^T)^T S^-1 (G M^-1 J^T). Redundant
+/// constraints make S singular; a small addition to its diagonal and a few refinements give one of its
+/// solutions.
 bool IslandLcp::eliminate_constraints() {
   Index rows = 0;
   for (const JointConstraint& c : joints_.constraints) rows += c.rows->count;
@@ -224,7 +225,7 @@ Real IslandLcp::scale() const {
   return s;
 }
 
-/// Natural residual with separate limits [m/s].
+/// Returns the natural residual [m/s]. Friction has a separate limit for each tangent.
 Real IslandLcp::residual() const {
   const VectorXd u = problem_.A * p_ + problem_.b;
   Real worst = 0;
@@ -271,9 +272,9 @@ bool IslandLcp::pivot_all(ContactWork& work) {
   return false;
 }
 
-/// Removes the error by kFraction: the rows whose velocity must be zero are solved again with the same
-/// softness, from the impulses found, so that only the remaining error is softened. Sliding tangents follow
-/// their normals.
+/// Removes the error due to kFraction. The rows whose velocity must be zero are solved again with the same
+/// softness, starting from the current impulses, so only the remaining error is softened. The friction of
+/// sliding tangents follows their normal impulses.
 void IslandLcp::refine() {
   const VectorXd u = problem_.A * p_ + problem_.b;
   std::vector<Index> active;

@@ -10,8 +10,7 @@ namespace {
 
 /// The arms of bodies that turn by less than this in an interval are not rotated [rad].
 constexpr Real kStraight = 2e-4;
-/// Up to this rotation the path of a corner is nearly straight and its velocity changes at a constant rate
-/// [rad].
+/// If bodies turn by less than this in an interval, the path of a corner is treated as a parabola [rad].
 constexpr Real kEven = 0.1;
 /// Cosine of the greatest predicted rotation of a normal within an interval.
 constexpr Real kPredictable = 0.8;
@@ -65,7 +64,7 @@ Quat meridian_turn(const Vec3& arm, const Quat& from, const Vec3& out_from, cons
   return cosine > 0.1 ? to * Quat(cosine, 0, sine, 0) * from.conjugate() : to * from.conjugate();
 }
 
-/// State of a body at a time after the interval's start, extrapolated by its velocities at the start.
+/// State of a body at a time after the interval's start, if it keeps the velocities of the start.
 struct Carried {
   Vec3 shift = Vec3::Zero();  // displacement of the centre of mass, or of the origin
   Quat orientation, turn = Quat::Identity();
@@ -89,12 +88,12 @@ Carried carried(const Body& body, Real time) {
   return c;
 }
 
-/// Data of a contact at the interval's start.
+/// The two bodies and the manifold of a contact at the interval's start.
 struct Start {
   const Body &a, &b;
   const Manifold& m;
   Vec3 arm_a, arm_b;
-  Real gap;      // distance of the surfaces at the contact, which is in the middle between them
+  Real gap;      // distance of the surfaces [m]; the contact is in the middle between them
   Vec3 sliding;  // velocity of a's material at the contact relative to b's
 };
 
@@ -106,8 +105,8 @@ bool has_lines(NormalSource s) {
   return s == NormalSource::edges || s == NormalSource::edge_of_a || s == NormalSource::edge_of_b;
 }
 
-/// Returns the direction of a line of a body after the body has turned. For a rim it is the tangent at the
-/// point that faces the other body. The line of a round side turns with the axis.
+/// Returns the direction of a line of a body after the body has turned. The line of a rim is the tangent at
+/// the point that faces the other body. The line of a round side turns with the axis.
 Vec3 turned_edge(const Body& body, const Vec3& edge, const Carried& now, const Vec3& arm, const Vec3& out) {
   const Quat& from = start_orientation(body);
   if (!is_revolved(body.def.shape)) return now.turn * edge;
@@ -124,8 +123,8 @@ struct Lines {
   Vec3 of_a, of_b;
 };
 
-/// Returns the normal after a time, from the features that define it. It is not a unit vector. It is
-/// meaningless if the directions are undefined.
+/// Returns the normal after a time, computed from the features that define it. It is not a unit vector. It is
+/// meaningless if the features do not define a direction, as two parallel lines.
 Vec3 turned_normal(const Start& s, const Carried& a, const Carried& b, const Lines& lines) {
   const Vec3& n = s.m.normal;
   switch (s.m.source) {
@@ -154,7 +153,7 @@ Vec3 turned_normal(const Start& s, const Carried& a, const Carried& b, const Lin
   return length > 0.5 * distance && distance > 0 ? Vec3(between / length) : Vec3(Vec3::Zero());
 }
 
-/// Returns the point of line A at which it crosses line B as seen along the normal, relative to A's centre.
+/// Returns the point where line A crosses line B as seen along the normal, relative to A's centre.
 Vec3 crossing(const Vec3& on_a, const Vec3& from_b_to_a, const Lines& lines, const Vec3& n) {
   const Real area = lines.of_a.cross(lines.of_b).dot(n);
   return on_a - from_b_to_a.cross(lines.of_b).dot(n) / area * lines.of_a;
@@ -220,8 +219,8 @@ Vec3 components(const ContactFrame& f, const Vec3& v) {
   return {f.n.dot(v), f.t.dot(v), f.k.dot(v)};
 }
 
-/// Change of the relative velocity due to the motion of the contact, in the contact frame at the middle of
-/// the interval.
+/// Change of the relative velocity because the contact moves, in the contact frame at the middle of the
+/// interval.
 struct Gain {
   Vec3 velocity;
   Real along_t, along_k;
@@ -274,8 +273,9 @@ struct Arm {
   }
 };
 
-/// Sets the motion of a corner or an edge of one body over a face of the other, if both turn little. It is
-/// accurate to second order and needs no rotations. Almost all contacts in a heap are of this kind.
+/// Sets the motion of a corner or an edge of one body over a face of the other. Both bodies must turn by less
+/// than kEven. The result is accurate to second order and needs no rotations. Almost all contacts in a heap
+/// are of this kind.
 void set_even_motion(const Start& s, const ContactFrame& frame, Real duration, ContactMotion& motion) {
   const Vec3 wa = twist_of(s.a).angular_velocity, wb = twist_of(s.b).angular_velocity, &n = frame.n;
   const bool by_b = s.m.source == NormalSource::face_of_a;

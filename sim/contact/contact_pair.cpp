@@ -24,14 +24,15 @@ constexpr Real kAlong = 0.7;
 /// than kExpected [m]. This point must be within kNear [m], and the cosine of the angle between the normals
 /// must exceed kSameNormal.
 constexpr Real kSameNormal = 0.999, kNear = 0.02, kExpected = 2e-4;
-/// Fraction of the spread of points that is added to make it invertible.
+/// This fraction of their spread is added to the spread of points, so that its matrix can be inverted.
 constexpr Real kFlat = 1e-6;
 
 Pose between(const Pose& a, const Pose& b) {
   return {a.point_to_body(b.position), a.orientation.conjugate() * b.orientation};
 }
 
-/// Greatest displacement of a point of a solid with the given reach between two poses.
+/// Returns an upper bound of the distance that a point of a solid moves from one pose to another. `reach`:
+/// greatest distance of its points from the centre.
 Real difference(const Pose& p, const Pose& q, Real reach) {
   const Real half_sine = (p.orientation.coeffs() - q.orientation.coeffs()).norm();
   return (p.position - q.position).norm() + 2 * half_sine * reach;
@@ -72,7 +73,8 @@ struct Frame {
   Mat3 axes;
 };
 
-/// Most normals are normals of faces, for which there are no lines to turn.
+/// Turns the lines of a manifold into the world. The normal of a face, which is the most frequent one, has
+/// none.
 void turn_lines(const Manifold& local, const Mat3& axes, Manifold& m) {
   const bool of_a = local.source == NormalSource::edges || local.source == NormalSource::edge_of_a;
   const bool of_b = local.source == NormalSource::edges || local.source == NormalSource::edge_of_b;
@@ -99,8 +101,9 @@ void place(const Manifold& local, const Pose& from, Manifold& m) {
   }
 }
 
-/// Fractions of the points of a force at `centre`, in a's frame like `frame`. Their sum is 1, and if `centre`
-/// is among the points, their weighted mean is `centre`: they are linear over the plane of the points.
+/// Fractions of a force that the points of a manifold get, so that the force acts at `centre` (in a's frame,
+/// as `frame`). Their sum is 1. They are linear over the plane of the points, so that their weighted mean is
+/// `centre` if it lies among the points.
 using Weights = std::array<Real, 4>;
 Weights weights(const Manifold& m, const ContactFrame& frame, const Pose& a, const Vec3& centre) {
   const uint32_t count = m.count;
@@ -113,7 +116,7 @@ Weights weights(const Manifold& m, const ContactFrame& frame, const Pose& a, con
   }
   Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
   for (uint32_t k = 0; k < count; ++k) spread += (at[k] - middle) * (at[k] - middle).transpose();
-  // For collinear or equal points the spread is singular; a small addition has no other effect.
+  // The spread of collinear or equal points is singular. The addition does not change the result otherwise.
   spread += kFlat * (spread.trace() + kSame * kSame) * Eigen::Matrix2d::Identity();
   const Eigen::Vector2d slope = -spread.inverse() * middle;
   Weights result{};
@@ -124,10 +127,10 @@ Weights weights(const Manifold& m, const ContactFrame& frame, const Pose& a, con
   return result;
 }
 
-/// A rim over a face. A manifold represents a disc by a polygon. If the disc leans, its lowest point is
-/// between two corners, and a corner in its place would make the contact jump along the rim. The corners
-/// beside the lowest point are omitted, because they touch when the contact moves along the rim and not
-/// because of their velocity at the start.
+/// Corrects the points of a rim over a face. A manifold represents a disc by a polygon. The lowest point of a
+/// leaning disc is between two corners, and a corner in its place would make the contact jump along the rim.
+/// The corners next to the lowest point are omitted: they touch because the contact moves along the rim,
+/// which their velocity at the start does not show.
 class LeaningRim {
  public:
   /// `core`: pose of the shape in the frame of the manifold. `out`: direction towards the face.
@@ -141,7 +144,7 @@ class LeaningRim {
   }
   bool leans() const { return facing_ != Eigen::Vector2d::Zero(); }
 
-  /// Returns a point of the rim; if it is near the meridian that faces the other body, it is moved to this
+  /// Returns a point of the rim. A point near the meridian that faces the other body is moved to this
   /// meridian.
   Vec3 lowered(const Vec3& place) const {
     const Vec3 local = core_.point_to_body(place);
@@ -159,7 +162,8 @@ class LeaningRim {
   }
 
  private:
-  /// Cosine of half the angle between corners; sine of the smallest lean; fraction of the radius.
+  /// kNearest: cosine of half the angle between two corners. kLeast: sine of the smallest lean. kSameHeight:
+  /// heights that differ by less than this fraction of the radius are equal.
   static constexpr Real kNearest = 0.9951847, kLeast = 0.02, kSameHeight = 1e-6;
   Real towards(const Vec3& local) const { return local.x() * facing_.x() + local.z() * facing_.y(); }
 
@@ -192,8 +196,8 @@ void follow_rims(Manifold& m, const Body& a, const Body& b, const Pose& a_from_b
     if (!rim.is_beside(on_rim(m.points[k]), low)) m.points[m.count++] = m.points[k];
 }
 
-/// Returns the velocity of the material point at an arm without contacts, as the mean of its velocities at
-/// the start and the end of the interval.
+/// Returns the velocity that the material point at an arm has without contacts: the mean of its velocities at
+/// the start and at the end of the interval.
 Vec3 free_velocity(const Body& body, const Vec3& arm) {
   if (!body.is_awake()) return body.is_kinematic() ? body.drive.at(arm) : Vec3(Vec3::Zero());
   const Twist mean{(body.start_twist.velocity + body.rigid.velocity()) / 2,
@@ -201,8 +205,8 @@ Vec3 free_velocity(const Body& body, const Vec3& arm) {
   return mean.at(arm);
 }
 
-/// Poses of a body at the start and, if it moves freely, at the end of the interval. The position is that of
-/// start_centre().
+/// Poses of a body at the start of the interval and, if it moves freely, at its end. Their position is the
+/// one of start_centre().
 struct Ends {
   explicit Ends(const Body& body)
       : start{start_centre(body), body.is_awake() ? body.start.orientation : body.start_pose.orientation},
@@ -233,7 +237,8 @@ ContactPair::ContactPair(Body& a, Body& b, const PairSurface& surface)
       is_on_plane_(b.collision_shape().is_plane()),
       has_sphere_(is_sphere_pair(a, b)) {
   if (!surface.by_triangles) return;
-  for (Body* body : {&a, &b}) body->triangle_shape();  // created here, because pairs are used in parallel
+  // The shapes are created here, because pairs are processed in parallel.
+  for (Body* body : {&a, &b}) body->triangle_shape();
 }
 
 void ContactPair::find(const Pose& a, const Pose& b, Real margin, Real reuse_within, bool turning) {
@@ -328,8 +333,9 @@ Real ContactPair::free_displacement(const PlacedManifold& m, const Vec3& place, 
   return duration * motion.frame.n.dot(velocity);
 }
 
-/// The contact of a wheel stays below it while the rim turns. Therefore a point at the interval's end is the
-/// same contact as a point at its start if it is where that point's feature has moved, on either body.
+/// While a wheel rolls, its contact stays below it and the rim turns. Therefore a point at the interval's end
+/// is the same contact as a point at its start if the feature of the start's point has moved there, on either
+/// body.
 bool ContactPair::predicts(const PlacedManifold& m, const Vec3& normal, const ContactPoint& at_end,
                            Real duration, bool between_points) const {
   const Vec3& n = m.frame.n;
@@ -368,7 +374,8 @@ bool ContactPair::predicts(const PlacedManifold& m, const Vec3& normal, const Co
   return false;
 }
 
-/// Transforms the contacts at the end of the interval back to its start. Each feature moves with its body.
+/// Returns the contacts at the end of the interval, moved back to its start. Each feature moves with its
+/// body.
 PlacedManifold ContactPair::moved_back(const Manifold& at_end, Real duration) const {
   const Ends a(*a_), b(*b_);
   const auto back = [](const Ends& body, const Vec3& v) {
@@ -387,7 +394,7 @@ PlacedManifold ContactPair::moved_back(const Manifold& at_end, Real duration) co
                       ends.start.orientation, side * m.normal);
   };
   // The bodies slide along each other in the interval. The contact moves with the feature that defines it, as
-  // in contact_motion(): a point beside the axis of a thin body would set it spinning.
+  // in contact_motion(). Otherwise it would lie beside the axis of a thin body and set the body spinning.
   const bool by_b = moves_with_b(m.source);
   for (uint32_t k = 0; k < m.count; ++k) {
     ContactPoint& p = m.points[k];
@@ -405,7 +412,7 @@ PlacedManifold ContactPair::moved_back(const Manifold& at_end, Real duration) co
 void ContactPair::add_speculative_contacts(Real duration) {
   if (has_sphere_) return;
   const Pose a_from_b = between(a_->pose, b_->pose);
-  // Triangles divide the line on which a cylinder lies differently at the end.
+  // At the end, other triangles divide the line on which a cylinder lies.
   const bool between_points = a_->collision_shape().surface() || b_->collision_shape().surface();
   static thread_local std::vector<Manifold> found;
   found.clear();
@@ -460,7 +467,8 @@ PointForce ContactPair::stored_force(const StoredPoint& p, const ContactFrame& f
   return {last, last, force(p.mean), true};
 }
 
-/// The points keep their positions on their bodies; the normal keeps its direction in a.
+/// Places the points again for the current poses. They keep their positions on their bodies; the normal keeps
+/// its direction in a.
 void ContactPair::reuse(const Pose& a, const Pose& b, const std::vector<StoredPoint>& points) {
   if (found_.empty()) {
     found_.resize(placed_.size());
@@ -502,7 +510,8 @@ void ContactPair::set_frame(PlacedManifold& m) const {
   m.frame.k = n.cross(m.frame.t);
 }
 
-/// Forces are stored in a's frame. (The tangents of a frame can jump although its normal hardly moves.)
+/// Stores the points with their forces in a's frame. The tangents of a contact frame can jump although its
+/// normal hardly moves.
 void ContactPair::store_points(std::vector<StoredPoint>& points) const {
   if (placed_.empty()) return;
   const Frame at(placed_at_);
@@ -517,15 +526,15 @@ void ContactPair::store_points(std::vector<StoredPoint>& points) const {
   }
 }
 
-/// Points that existed before keep their forces; they are identified by their ids, or else by distance. Each
-/// stored force is used once, otherwise the forces of a pair that is found repeatedly would grow without
+/// Gives the stored forces to the points that existed before, which are recognized by id or else by distance.
+/// Each stored force is used once. Otherwise the forces of a pair that is found repeatedly would grow without
 /// limit.
 void ContactPair::restore_forces(std::vector<StoredPoint>& points, const Pose& pose) {
   const Frame a(pose);
-  // Two models of many parts have thousands of points; then only those are compared that are near along x or
-  // belong to the same features.
+  // Two models of many parts have thousands of points. Then only points that are near along x or have the
+  // same id are compared.
   const bool are_many = points.size() > kManyPoints;
-  // Different pairs of parts have points of the same features.
+  // Points of different pairs of parts may have the same id.
   const Real same_feature = kSame / std::sqrt(kSameFeature);
   static thread_local std::vector<std::pair<Real, uint32_t>> by_x;
   static thread_local std::vector<std::tuple<uint32_t, Real, uint32_t>> by_id;  // and by x
@@ -549,7 +558,7 @@ void ContactPair::restore_forces(std::vector<StoredPoint>& points, const Pose& p
       Real nearest = kSame * kSame;
       const auto compare = [&](StoredPoint& p) {
         const Real distance = (p.on_a - on_a).squaredNorm() * (p.id == point.id ? kSameFeature : 1);
-        // Of equally near points, the first one counts.
+        // The first of several equally near points is used.
         if (p.taken || distance > nearest || (distance == nearest && (!best || best < &p))) return;
         nearest = distance;
         best = &p;
@@ -592,7 +601,7 @@ void ContactPair::inherit(std::vector<StoredPoint>& points, const Pose& a) {
     Real pressure = 0;
     for (StoredPoint* remembered : left) {
       StoredPoint& p = *remembered;
-      // Directions are kept in the world, however far a rolling body has turned.
+      // Directions are kept in the world, even if a rolling body has turned far.
       const Vec3 before = placed_at_.vector_to_world(p.normal);
       if (p.taken || !(before.dot(m.frame.n) > kAlong)) continue;
       const auto along_normal = [&](const Vec3& f) {

@@ -78,8 +78,9 @@ Real violation(const Contact& c, std::span<const ContactBody> bodies) {
   return k * (p - c.impulse).cwiseAbs().maxCoeff();
 }
 
-/// Second half of a sweep's work at a contact with rolling or spinning friction, after the change of its
-/// normal impulse, which is not applied yet. Returns the greatest change of velocity [m/s].
+/// Solves the friction of a contact with rolling or spinning friction, after the change of its normal
+/// impulse. Also applies this change, which the bodies do not contain yet. Returns the greatest change of
+/// velocity [m/s].
 Real turn_step(Contact& c, const Vec3& before, const Vec3& u, const Mat3& K, std::span<ContactBody> bodies) {
   const Mat3 W = angular_mobility(c, bodies);
   const Friction next = friction_step(c, u, c.relative_spin(bodies), c.impulse.x(), K, W);
@@ -173,8 +174,8 @@ uint32_t projected_gauss_seidel(std::span<ContactBody> bodies, std::span<Contact
       Vec3 u = c.relative_velocity(bodies);
       const Vec3 before = c.impulse;
       c.impulse.x() = std::max(0.0, before.x() - (u.x() - c.target) / K(0, 0));
-      // Friction against the velocity that remains after the change of the normal impulse. The larger of both
-      // diagonal elements makes the step safe.
+      // Friction acts against the velocity that remains after the change of the normal impulse. The larger of
+      // both diagonal elements makes the step safe.
       u += (c.impulse.x() - before.x()) * K.col(0);
       if (c.resists_turning()) {
         change = std::max(change, turn_step(c, before, u, K, bodies));

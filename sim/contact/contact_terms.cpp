@@ -10,14 +10,14 @@ namespace {
 
 /// Below this sliding speed, static friction applies [m/s].
 constexpr Real kSlip = 1e-3;
-/// Fraction of the energy of rotation by which the result of a sub-step may exceed the expectation for a thin
-/// body.
+/// A thin body may exceed its expected energy of rotation by this fraction after a sub-step.
 constexpr Real kSpinExcess = 1e-3;
-/// Cosine of the greatest angle by which a body is turned to agree with its angular momentum.
+/// Cosine of the greatest angle by which the orientation of a body is corrected to agree with its angular
+/// momentum.
 constexpr Real kAligned = 0.995;
 
-/// The material point of a round body that represents a point of its surface: on the axis, or at the centre.
-/// The surface turns through the contact; these points do not.
+/// Returns the material point of a round body that represents a place on its surface: a point of the axis, or
+/// the centre. The surface turns through the contact; these points do not.
 Vec3 core_point(const Body& body, const Vec3& place) {
   const Shape& shape = body.def.shape;
   if (std::holds_alternative<Sphere>(shape)) return body.start_pose.position;
@@ -27,7 +27,7 @@ Vec3 core_point(const Body& body, const Vec3& place) {
 }
 
 struct PointRates {
-  /// Motion of a material point at the start; the acceleration is that without forces, w x (w x r).
+  /// Motion of a material point at the start. The acceleration is the one without forces, w x (w x r).
   Vec3 velocity, acceleration;
 };
 
@@ -41,7 +41,7 @@ PointRates rates(const Body& body, const Vec3& place) {
 }
 
 Twist twist(const Body& body) {
-  // Twist at the origin of the world.
+  // The twist refers to the origin of the world.
   if (body.is_awake()) {
     const Vec3& w = body.start_twist.angular_velocity;
     return {body.start_twist.velocity - w.cross(body.start.position), w};
@@ -62,17 +62,18 @@ Real spin(const Body& body) {
   return body.is_kinematic() ? body.drive.angular_velocity.squaredNorm() : 0;
 }
 
-/// Rotation by a rotation vector, by series. It is accurate enough for the rotation of contacts in a step,
-/// and needs no trigonometry, whose last bits differ between libraries.
+/// Returns the rotation by a rotation vector, computed by series. It is accurate enough for the rotation of
+/// contacts in a step, and needs no trigonometric functions, whose last bits differ between libraries.
 Quat rotation(const Vec3& v) {
   const Real s = v.squaredNorm() / 4;
   const Real sine = 1 - s / 6 * (1 - s / 20 * (1 - s / 42)), cosine = 1 - s / 2 * (1 - s / 12 * (1 - s / 30));
   return Quat(cosine, sine * v.x() / 2, sine * v.y() / 2, sine * v.z() / 2);
 }
 
-/// Turns a body to the orientation in which its angular momentum has the direction that belongs to the
-/// expected angular velocity, if it has more energy by a fraction of the expected or of the free energy
-/// (twice the energy). If that is farther than `farthest`, the body gets the expected angular velocity [rad].
+/// Corrects a body whose rotation has more energy than expected, by more than `fraction` of the larger of the
+/// expected and the free energy (`free_energy` is twice the energy). The orientation is turned so that the
+/// angular momentum has the direction that belongs to the angular velocity `expected`. If this takes a
+/// rotation of more than `farthest` [rad], the body gets the expected angular velocity instead.
 void agree_with_spin(RigidBody& r, const Vec3& expected, Real free_energy, Real fraction, Real farthest) {
   const Vec3 wanted = r.spin_momentum(r.orientation, expected);
   const Real energy = expected.dot(wanted), excess = r.angular_velocity().dot(r.angular_momentum) - energy;
@@ -166,8 +167,8 @@ void add_effect(Body& body, const IntervalEffect& effect) {
   if (effect.turn != Vec3::Zero()) r.orientation = (rotation(effect.turn) * r.orientation).normalized();
   r.momentum += effect.impulse;
   r.angular_momentum += effect.angular_impulse;
-  // The orientation is uncertain by the turn due to the impulses, whose time in the interval is unknown, and
-  // to second order by the whole turn in the interval.
+  // The orientation is uncertain for two reasons: the time of the impulses within the interval is unknown,
+  // and the whole turn in the interval has an effect of second order.
   if (r.is_thin()) {
     const Real turned = rotation_vector(body.start.orientation, r.orientation).squaredNorm();
     agree_with_spin(r, expected, free_energy, effect.fraction * kSpinExcess, effect.turn.norm() + turned);

@@ -21,8 +21,8 @@ bool can_do_work(const Island& island) {
                        return drives(&p->a()) || drives(&p->b()) || p->surface().conveys;
                      }) ||
          std::any_of(island.articulations.begin(), island.articulations.end(), [&](const Articulation* a) {
-           // The joints of an elastic rod return energy: bent to its lowest point, it has next to no kinetic
-           // energy, and would creep back.
+           // The joints of an elastic rod return energy. A rod at its lowest point has hardly any kinetic
+           // energy; with a limit on the energy it would creep back.
            const auto has_spring = [](const Joint* j) { return j->def.stiffness > 0; };
            if (std::count_if(a->joints().begin(), a->joints().end(), has_spring) > 1) return true;
            return std::any_of(a->joints().begin(), a->joints().end(), [&](const Joint* j) {

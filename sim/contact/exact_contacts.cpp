@@ -15,10 +15,10 @@ namespace {
 
 /// Fraction of a penetration that a step removes, and the greatest speed of the removal [m/s].
 constexpr Real kPushOut = 0.2, kFastestPush = 0.5;
-/// Points that approach faster than this have closed in the interval, not before [m/s].
+/// Points that approach faster than this closed within the interval, and not before it [m/s].
 constexpr Real kClosing = 1e-3;
-/// If the interval may be divided, points with a gap that approach faster than this close later in the
-/// interval, even if the gap is very small [m/s].
+/// In an interval that may be divided, points with a gap close later if they approach faster than this, even
+/// if the gap is very small [m/s].
 constexpr Real kApproaching = 1e-4;
 /// The intervals of islands with more bodies are not divided: they are heaps, for which it would cost more
 /// than the solution.
@@ -28,15 +28,15 @@ constexpr std::size_t kMostDivided = 6;
 constexpr Real kMostTurned = 0.1;
 /// Greatest cost of a solution and its division [ns, see ProximalNewton::cost()].
 constexpr Real kMostDivision = 2e6;
-/// Uncertainty of the approach of a resting contact, as a fraction of the normal velocity due to rotation in
-/// half an interval.
+/// Uncertainty of the speed of approach at a resting contact. It is this fraction of the change of the normal
+/// velocity due to rotation in half an interval.
 constexpr Real kTurningShare = 0.5;
 /// A stopped body also stops its neighbours where they would overlap by more than kOverlap [m]; this is
 /// repeated for their neighbours, in at most kBlockPasses passes.
 constexpr int kBlockPasses = 20;
 constexpr Real kOverlap = 1e-6;
-/// The result of a fall-back is rejected if its residual is larger than kRough [m/s], or if it adds energy
-/// beyond the rounding fraction.
+/// The result of a fall-back is rejected if its residual is larger than kRough [m/s], or if it adds more than
+/// the fraction kEnergyRounding of the energy.
 constexpr Real kRough = 1e-2, kEnergyRounding = 1e-9;
 /// Fraction of the kinetic energy that the velocity terms of a solution may add in a step.
 constexpr Real kTermsShare = 0.02;
@@ -51,7 +51,8 @@ Real turning_of_corners(const Body& body) {
   return (spin - spin.dot(axis) * axis).norm();
 }
 
-/// `linear` is the bias at the end of a contact that does not turn.
+/// Returns the data of a contact for the division of the interval. `linear`: the bias at the interval's end,
+/// if the contact does not turn.
 ClosingPoint closing_point(Real gap, const Vec3& surface, const ContactMotion& motion, const Vec3& linear) {
   if (!motion.turns) return {.gap = gap, .surface = surface, .bias = {Vec3::Zero(), linear, Vec3::Zero()}};
   const Vec3 &gain = motion.gain, &bow = motion.bow;  // of s = 2 part - 1
@@ -114,7 +115,7 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
   return outcome;
 }
 
-/// Solves by linear complementarity; if that fails or the result is unsafe, nothing is changed.
+/// Solves the contacts by linear complementarity. If this fails or the result is unsafe, nothing is changed.
 bool ExactContacts::solve_lcp(ContactWork& work) {
   const std::vector<Contact> guesses = contacts_;
   const std::vector<BoundedRow> rows(joints_.bounded().begin(), joints_.bounded().end());
@@ -130,12 +131,12 @@ bool ExactContacts::solve_lcp(ContactWork& work) {
   return false;
 }
 
-/// Whether the solution can be applied. Contacts that push a body out of overlaps from two sides have no
-/// solution; their unbounded impulses nearly cancel, and the rest throws bodies away. The velocity terms of
-/// R9 are wrong if a thin body turns far in a step. Moving surfaces, motors and friction in joints may do
-/// work. All other forces may only dissipate energy, apart from the speed at which overlaps are removed and a
-/// small fraction for those terms. Energy that motors and friction take away is counted, since a limit or a
-/// contact against which a motor pushes returns a part of it.
+/// Whether the solution can be applied. It is rejected in these cases. Contacts that push a body out of
+/// overlaps from two sides have no solution: their unbounded impulses nearly cancel, and the remainder throws
+/// bodies away. The velocity terms of R9 are wrong if a thin body turns far in a step. Moving surfaces,
+/// motors and friction in joints may do work; all other forces may only dissipate energy, apart from the
+/// speed at which overlaps are removed and a small fraction for the velocity terms. Energy that motors and
+/// friction take away is counted, since a limit or a contact that holds against a motor returns a part of it.
 bool ExactContacts::is_safe(const ContactWork& work) const {
   if (work.fallbacks > 0 && work.residual > kRough) return false;
   Real energy = added_energy(free_, bodies_, contacts_);
@@ -156,9 +157,9 @@ bool ExactContacts::is_safe(const ContactWork& work) const {
   return energy <= kTermsShare * kinetic + mass * push * push / 2;
 }
 
-/// Whether some contact with an immovable body touches from the interval's start on, and another one pushes
-/// that had a gap at the start or approached faster than kApproaching. Bodies that rest on other moving
-/// bodies lose little energy if the interval is not divided.
+/// Whether a contact with an immovable body touches from the interval's start on, and another contact pushes
+/// that had a gap at the start or approached faster than kApproaching. Without such contacts the interval
+/// need not be divided: bodies that rest on other moving bodies lose little energy.
 bool ExactContacts::has_closing() const {
   bool touches = false, closes = false;
   for (std::size_t i = 0; i < points_.size(); ++i) {
@@ -170,7 +171,8 @@ bool ExactContacts::has_closing() const {
   return touches && closes;
 }
 
-/// Replaces the solution by one that is divided at the times at which contacts close, if that is safe.
+/// Replaces the solution by one that is divided at the times at which contacts close. Returns false, without
+/// a change, if that is unsafe or too expensive.
 bool ExactContacts::divide_at_closings(const Island& island, const ContactInterval& interval, Real budget,
                                        ContactWork& work) {
   std::vector<ContactBody> start = free_;
@@ -234,8 +236,8 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       c.offset = in_frame(c.frame, surface);
       if (touches) c.bias = motion.turns ? Vec3(motion.gain + motion.bow) : velocity_bias(pair, m, point, h);
       c.offset += c.bias;
-      // The sub-step's length is used, because in a very short rest of a sub-step after an impact the speed
-      // would be unbounded.
+      // This is the length of the sub-step. The rest of a sub-step after an impact can be very short, and the
+      // speed would then be unbounded.
       c.target = touches ? std::min(-kPushOut * point.separation / interval.substep, kFastestPush)
                          : -point.separation / h;
       std::tie(c.friction_t, c.friction_k) = friction(pair.surface(), u);
@@ -254,18 +256,18 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
     }
 }
 
-/// Constant forces over the interval move a body by half of the change of velocity times the time, and those
-/// of a joint that reaches a limit by its whole change of velocity times the rest of the interval. If a
-/// contact of the body closed in the interval, or opened and closed again, the force acts only in a part of
-/// it. The body then moves by its new velocity throughout the interval, which is what the contact's target
-/// assumes.
+/// Moves the bodies by the solution. Forces that are constant over the interval move a body by half of the
+/// change of velocity times the time. The force of a joint that reaches a limit acts on the rest of the
+/// interval only, with the whole change of velocity. If a contact of the body closed in the interval, or
+/// opened and closed again, its force also acts only in a part of the interval. The body then moves by its
+/// new velocity throughout the interval, as the contact's target assumes.
 void ExactContacts::move_bodies(const Island& island, const ContactInterval& interval) {
   const Real duration = interval.duration;
   closing_.assign(bodies_.size(), 0);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
     if (approach_[i] > kClosing && contacts_[i].impulse.x() > 0)
       closing_[contacts_[i].a] = closing_[contacts_[i].b] = 1;
-  // Links with springs move by the velocities of the end in any case.
+  // Links with springs move by the velocities at the end in any case.
   std::vector<uint8_t> is_kicked(bodies_.size(), 0);
   for (const Articulation* a : joints_.articulations())
     if (a->has_springs())
@@ -297,9 +299,9 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
   }
 }
 
-/// A stopped body moves less far than one that is not stopped, although their new velocities are equal: by
-/// half of the change of velocity in the interval. If this would cause an overlap, the other body counts as
-/// stopped, too.
+/// Marks bodies as stopped that a stopped neighbour would overlap. A stopped body moves less far than one
+/// that is not stopped, although both get equal velocities: the difference is half of the change of velocity
+/// times the interval. If this would cause an overlap, the other body counts as stopped, too.
 void ExactContacts::close_neighbors(const Island& island, Real duration) {
   const auto displacement = [&](uint32_t i, const Vec3& arm) {
     const Vec3 end = bodies_[i].velocity_at(arm);
@@ -321,8 +323,9 @@ void ExactContacts::close_neighbors(const Island& island, Real duration) {
   }
 }
 
-/// Links move together: if some moved by the mean of their velocities and others by the new ones, the joints
-/// would come apart, and their projection would push light links into the obstacle that stopped them.
+/// Marks all links of an articulation as stopped if one of them is. If some links moved by the mean of their
+/// velocities and others by the new ones, the joints would come apart, and their projection would push light
+/// links into the obstacle that stopped them.
 void ExactContacts::close_links() {
   for (const Articulation* articulation : joints_.articulations()) {
     const std::span<Body* const> links = articulation->bodies();

@@ -11,11 +11,12 @@
 namespace offstage::sim {
 namespace {
 
-/// Separation that is given to points that must not take part [m].
+/// Separation of points that must not push [m].
 constexpr Real kOutOfReach = 1e3;
 
-/// Whether points of a body may be left out if its next impact is traced back to: pieces of which no point is
-/// known yet may meet first, and a thin body may spin far in the rest of the sub-step.
+/// Whether points of a body can be left out when its next impact will be traced back to. They cannot for two
+/// kinds of bodies: pieces that have no known point may meet first, and a thin body may spin far in the rest
+/// of the sub-step.
 bool waits_for_impacts(Body& body) {
   const CollisionShape& shape = body.collision_shape();
   return (shape.is_plane() || shape.piece_count() == 1) && !(body.is_dynamic() && body.rigid.is_thin());
@@ -35,7 +36,7 @@ RelaxedBody relaxed(const Body& body, const ContactInterval& interval) {
     b.velocity = body.drive.velocity;
     b.angular_velocity = body.drive.angular_velocity;
     if (!interval.is_whole) return b;
-    // Constant acceleration to the pose at the end, with the velocity at the end.
+    // The acceleration is constant, and leads to the pose and the velocity at the end.
     const Vec3 mean = (body.pose.position - body.start_pose.position) / duration;
     const Vec3 mean_spin = rotation_vector(body.start_pose.orientation, body.pose.orientation) / duration;
     b.free_acceleration = 2 / duration * (b.velocity - mean);
@@ -46,8 +47,8 @@ RelaxedBody relaxed(const Body& body, const ContactInterval& interval) {
   return b;
 }
 
-/// Motion of the contact at the patch's centre, where the surfaces are `gap` apart. The points move with the
-/// body that defines the contact. They lie at different heights over the other body.
+/// Sets the motion of the contact at the patch's centre, where the surfaces are `gap` apart. The points move
+/// with the body that defines the contact, and lie at different heights over the other body.
 void set_motion(ContactPatch& patch, const ContactMotion& motion, NormalSource source, Real gap) {
   patch.arm_a = motion.middle.arm_a;
   patch.arm_b = motion.middle.arm_b;
@@ -97,8 +98,8 @@ void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifol
   patch.force_k = last.y();
   patch.torque_n = last.z();
   patch.mean_friction = mean;
-  // The step will be traced back to the next impact of the pair, so the point of this impact must not push
-  // before it.
+  // The step will be traced back to the next impact of the pair. The point of this impact must not push
+  // before that.
   if (!pair.needs_toi || !waits_for_impacts(pair.a()) || !waits_for_impacts(pair.b())) return;
   for (uint32_t k = 0; k < patch.count; ++k) {
     if (!pair.awaits_impact(m, m.manifold.points[k], interval.impact_speed)) continue;

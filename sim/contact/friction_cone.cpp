@@ -18,8 +18,8 @@ constexpr Reached kPyramid[] = {
     {ConeRegion::high_low, 1, -1}, {ConeRegion::high_high, 1, 1},
 };
 
-/// Derivative of the projection on the plane or line on which these limits are active: P P^T / P^2 for p_n
-/// and the limited axes; the other axis is not changed.
+/// Returns the derivative of the projection on the face or edge of the pyramid where these limits are active:
+/// P P^T / P^2 for p_n and the limited axes. The derivative for the other axis is 1.
 Mat3 pyramid_derivative(const Contact& c, int t, int k) {
   const Vec3 along(1, t * c.friction_t, k * c.friction_k);
   Mat3 D = along * along.transpose() / along.squaredNorm();

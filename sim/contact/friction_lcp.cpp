@@ -24,8 +24,8 @@ constexpr Real kAccurate = 1e-12;   ///< residual of a solution that is exact to
 constexpr Real kAccepted = 1e-10;   ///< greatest residual at which pivoting ends; else other methods continue
 constexpr Real kGoodEnough = 1e-5;  ///< greatest residual of the other methods; else the fall-back solves
 constexpr Real kSliding = 1e-9;     ///< slowest tangential speed that counts as sliding
-constexpr Real kRank =
-    1e-11;  ///< fraction of the greatest pivot: redundant contacts make the matrix singular
+constexpr Real kRank = 1e-11;       ///< pivots below this fraction of the greatest count as zero: redundant
+                                    ///< contacts make the matrix singular
 /// For pivoting, this fraction of the diagonal is added to the diagonal, so that redundant contacts share
 /// their load in a unique way.
 constexpr Real kSoftness = 1e-7;
@@ -54,7 +54,8 @@ std::array<Side, 2> sides_of(const Contact& c, std::span<const ContactBody> bodi
   return {side(c.a, c.arm_a, 1), side(c.b, c.arm_b, -1)};
 }
 
-/// R9: blocks for contacts that share a body. Immovable bodies have no inverse mass and add nothing.
+/// Returns the matrix of R9. It has a block for each two contacts that share a body. Immovable bodies have no
+/// inverse mass and add nothing.
 MatrixXd delassus_matrix(std::span<const ContactBody> bodies, std::span<const Contact> contacts) {
   std::vector<std::array<Side, 2>> sides;
   for (const Contact& c : contacts) sides.push_back(sides_of(c, bodies));
@@ -136,8 +137,9 @@ void FrictionSolver::turn(std::size_t i, const Vector2d& direction) {
       Vector2d(axis_[i].x() * d.x() - axis_[i].y() * d.y(), axis_[i].y() * d.x() + axis_[i].x() * d.y());
 }
 
-/// Aligns the tangents with the sliding of the solution, which then has dynamic friction, or with the force,
-/// if the limits of the axes allow more than the cone. Returns false if nothing has to change.
+/// Aligns the tangents of a contact. With dynamic friction, t gets the direction of sliding. Otherwise t gets
+/// the direction of the friction force, if that is within the limits of the axes but outside of the cone.
+/// Returns false if nothing has to change.
 bool FrictionSolver::realign(std::size_t i, const Vector2d& force, Real normal, const Vector2d& sliding) {
   const bool slid = problem_.slides[i] != 0;
   problem_.slides[i] = 0;
@@ -164,7 +166,8 @@ bool FrictionSolver::realign() {
   return changed;
 }
 
-/// Row of the cone: p_tk - mu p_n y / |y| if y = p_tk - u_tk / K is outside of it, else u_tk.
+/// Sets the rows of a contact with a round cone: p_tk - mu p_n y / |y| if y = p_tk - u_tk / K is outside of
+/// the cone, else u_tk.
 void FrictionSolver::round_friction_row(Index row, const Vec3& p, const Vec3& y, bool with_jacobian) {
   const Real mu = problem_.friction[static_cast<std::size_t>(row / 3)].x(), rho = step_size(row);
   const Real limit = mu * std::max(p.x(), 0.0), length = y.tail<2>().norm();
@@ -200,8 +203,8 @@ void FrictionSolver::axis_friction_row(Index row, Index axis, const Vec3& p, con
   if (p.x() > 0) line[row] = y[axis] > 0 ? -mu : mu;
 }
 
-/// The natural residual as in residual(), in r_ [N s], and its generalized Jacobian (Alart and Curnier,
-/// 1991). Returns its norm as a velocity.
+/// Evaluates the natural residual in r_ [N s] and, on request, its generalized Jacobian (Alart and Curnier,
+/// 1991). Returns the norm of the residual as a velocity [m/s].
 Real FrictionSolver::evaluate(const VectorXd& p, bool with_jacobian) {
   const VectorXd u = problem_.A * p + problem_.b;
   r_.resize(p.size());
@@ -223,9 +226,9 @@ Real FrictionSolver::evaluate(const VectorXd& p, bool with_jacobian) {
   return std::sqrt(sum);
 }
 
-/// Newton's method on the cone: near the solution each step squares the error. Steps that increase the
-/// residual are halved. If that does not help, a kink of the cone is in the way, and the full step passes
-/// beyond it.
+/// Improves the solution by Newton's method on the cone. Near the solution each step squares the error. Steps
+/// that increase the residual are halved. If halving does not help, a kink of the cone is in the way, and the
+/// full step passes beyond it.
 Real FrictionSolver::polish(VectorXd& best, ContactWork& work) {
   VectorXd p = best;
   Real worst = evaluate(p, false), least = worst;
@@ -294,8 +297,8 @@ void FrictionSolver::solve_by_rounds(ContactWork& work) {
   }
 }
 
-/// Pivoting may cycle among redundant contacts that just touch. The proximal method converges for these, but
-/// not to the last digits.
+/// Solves by the proximal method. Pivoting may cycle among redundant contacts that just touch. The proximal
+/// method converges for these, but not to the last digits.
 void FrictionSolver::solve_by_newton(ContactWork& work) {
   const VectorXd before = impulses();
   const Real least = residual(bodies_, contacts_);
@@ -309,8 +312,8 @@ void FrictionSolver::solve_by_newton(ContactWork& work) {
   if (residual(bodies_, contacts_) > least) set_impulses(before);
 }
 
-/// Gauss-Seidel approaches the solution from any start, but slowly. Newton's method is fast near the
-/// solution.
+/// Solves by Gauss-Seidel and Newton's method in turn. Gauss-Seidel approaches the solution from any start,
+/// but slowly. Newton's method is fast near the solution.
 void FrictionSolver::fall_back(ContactWork& work) {
   ++work.fallbacks;
   for (int k = 0; k < kFallbacks && residual(bodies_, contacts_) > kAccepted * scale_; ++k) {

@@ -14,15 +14,16 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr Real kSatisfied = 1e-11;  ///< fraction of the greatest |b|
-constexpr Real kNoise = 1e-12;      ///< fraction of the greatest rate: smaller rates count as zero
+constexpr Real kSatisfied = 1e-11;  ///< velocities below this fraction of the greatest |b| count as zero
+constexpr Real kNoise = 1e-12;      ///< rates below this fraction of the greatest rate count as zero
 constexpr Real kDependent = UpdatedCholesky::kDependent;
 constexpr int kAttempts = 4;
 constexpr uint8_t kMoves = 4;  ///< changes of one row in steps of no length after which it counts as a cycle
 
-/// free is Baraff's ZA: no velocity, and any force within the limits. high and low are his MaxF and MinF.
-/// held is a row without velocity that depends on free ones: its force stays constant. fixed: not yet added,
-/// or F_t is determined by F_n. broken: a normal without force.
+/// State of a row. free is Baraff's ZA: no velocity, and any force within the limits. high and low are his
+/// MaxF and MinF: the force is at a limit. held: a row without velocity that depends linearly on free rows;
+/// its force stays constant. fixed: a row that is not yet added, or a tangent whose force F_n determines.
+/// broken: a normal without force.
 enum class State : uint8_t { fixed, free, held, high, low, broken };
 
 class Pivoting {
@@ -77,7 +78,7 @@ class Pivoting {
   VectorXd a_, dF_, da_, x_;
   Real zero_, noise_ = 0;
   std::vector<State> states_;
-  std::vector<uint8_t> moves_;         ///< per row: changes since the last step of some length
+  std::vector<uint8_t> moves_;         ///< by row: changes since the last step whose length was not zero
   std::vector<Index> rows_, columns_;  ///< rows and columns of the factor
   UpdatedQr factor_;
   PivotingResult result_;
@@ -103,8 +104,8 @@ Pivoting::Pivoting(const DenseContacts& contacts, VectorXd& F)
     }
 }
 
-/// F_t / F_n if the normal force determines it. The normal's column then contains this multiple of the
-/// tangent's column.
+/// Returns F_t / F_n of a tangent whose force the normal force determines. The normal's column then contains
+/// this multiple of the tangent's column.
 Real Pivoting::fraction(Index tangent) const {
   switch (state(tangent)) {
     case State::high:
@@ -138,7 +139,7 @@ bool Pivoting::find_direction(Index m, Real sign) {
   return true;
 }
 
-/// Finds where the friction force reaches its limit mu F_n; the limit changes within the step, too.
+/// Finds where the friction force reaches its limit mu F_n. The limit also changes within the step.
 void Pivoting::block_on_limits(Index t, Block& first) const {
   const Real mu = friction(t), limit = mu * F_[t - t % 3], change = mu * dF_[t - t % 3];
   if (change - dF_[t] < -noise_) first.consider((limit - F_[t]) / (dF_[t] - change), t, State::high);
@@ -258,9 +259,9 @@ void Pivoting::change(const Block& block) {
     close(block.row);
 }
 
-/// Returns whether row m needs no more force; if so, sets its state. If a normal is dependent and the others
-/// already make its velocity right, its load is transferred back to them until it is zero or one of them
-/// leaves.
+/// Whether row m needs no more force; if so, sets its state. A normal row may depend linearly on others that
+/// already give it the right velocity. Its load is then transferred to them, until it is zero or one of them
+/// changes its state.
 bool Pivoting::is_settled(Index m) {
   if (m % 3 == 0) {
     if (F_[m] > 0) return std::abs(a_[m]) <= zero_ && enter(m);
@@ -295,7 +296,8 @@ bool Pivoting::turns_back(const Block& last, State before) const {
   }
 }
 
-/// Ends a step at row m itself. Returns false if the path has led back to zero force, or to the wrong limit.
+/// Ends a step at row m itself. Returns false if the path has led back to zero force, or to the opposite
+/// limit.
 bool Pivoting::end_step(const Block& block, Index m) {
   if (block.to == State::broken) {
     F_[m] = 0;

@@ -17,17 +17,17 @@ namespace {
 
 /// Two normals count as equal if the cosine of the angle between them is greater than this.
 constexpr Real kSameDirection = 1 - 1e-10;
-/// Clipping may put points outside of their surface by up to this fraction of the body's extent.
+/// Clipping may put points outside of their surface, by up to this fraction of the body's extent.
 constexpr Real kClipped = 2e-3;
-/// Cosines: a surface continues a face if its own normal differs by less than kGoesOn; a contact pushes along
-/// the surface's own normal if it differs by less than kOwnNormal.
+/// Cosines. A surface continues a face if the angle between both normals has a cosine of at least kGoesOn. A
+/// contact pushes along the surface's own normal if the cosine is at least kOwnNormal.
 constexpr Real kGoesOn = 0.999, kOwnNormal = 0.9;
 /// Height over a face at which the surface beside it is sampled, as a multiple of the greatest flush step.
 constexpr Real kLookOver = 3;
 /// If a body has more contacts than this, they are not compared with each other.
 constexpr std::size_t kMostContacts = 512;
-/// Lateral distance at which the surface is sampled, as a multiple of the greatest flush step. With kLookOver
-/// the direction from an edge to the sample is 18 degrees from the normal.
+/// Lateral distance at which the surface is sampled, as a multiple of the greatest flush step. With
+/// kLookOver, the direction from an edge to the sample is at 18 degrees to the normal.
 constexpr Real kLookBeside = 1;
 /// Contacts of a slope are searched this far beyond the contact that they replace [m].
 constexpr Real kSlopeMargin = 2e-3;
@@ -59,8 +59,8 @@ SurfaceDistance piece_distance(const CollisionShape& shape, uint32_t piece, cons
 /// The start and the end of an interval.
 constexpr bool kBothEnds[] = {false, true};
 
-/// A manifold seen from one of its bodies, X, which has other manifolds, too. Y is the other body. The view
-/// stores the data that are needed for comparing it with the other views of X.
+/// A manifold seen from body X, one of its two bodies, if X also has other manifolds. Y is the other body.
+/// The view stores the data for comparing it with the other views of X.
 struct View {
   View(ContactPair& of, uint32_t i, bool is_speculative, const Manifold& manifold, bool x_is_first)
       : pair(&of),
@@ -93,7 +93,7 @@ struct View {
   }
   bool continues() const { return x_is_a ? m->continues_b : m->continues_a; }
   bool is_face() const { return m->source == (x_is_a ? NormalSource::face_of_b : NormalSource::face_of_a); }
-  /// An internal edge is a line, or a point on a line.
+  /// Whether the contact touches along a line or at a point, as a contact at an internal edge does.
   bool may_be_at_internal_edge() const {
     if (continues() || y().collision_shape().is_plane() || !is_narrow(*m)) return false;
     return !is_face() || !std::holds_alternative<Sphere>(x().def.shape);
@@ -154,7 +154,7 @@ class BodyContacts {
     };
     std::size_t last = views_.size();
     for (const auto& [contact, by, normal] : hidden) {
-      // If two contacts hide each other, both are kept.
+      // If each of two contacts hides the other, both are kept.
       if (contact == last || is_hidden(by)) continue;
       last = contact;
       const View& v = views_[contact];
@@ -182,8 +182,8 @@ class BodyContacts {
     return best;
   }
 
-  /// Whether the known points of X on flush surfaces predict all points of a speculative contact: X moves on
-  /// from one tile to the next, and the force at its first tile holds it over the second one, too.
+  /// Whether the known points of X on flush surfaces predict all points of a speculative contact. This is so
+  /// if X moves on from one tile to the next: the force at the first tile also holds X over the second one.
   bool is_predicted(const View& v) const {
     for (uint32_t k = 0; k < v.m->count; ++k)
       if (std::none_of(views_.begin(), views_.end(),
@@ -198,7 +198,7 @@ class BodyContacts {
     const Body& y = known.y();
     const Vec3 at_end = pose(y, true).point_to_world(pose(y, false).point_to_body(known.on_y(known.deepest)));
     if (up.dot(v.on_y(k) - at_end) > flush_) return false;
-    // The tiles divide the line on which X lies differently at the end.
+    // At the end, other tiles divide the line on which X lies.
     const bool between = known.pair != v.pair || is_round_about_axis(x_.def.shape);
     ContactPoint point = v.m->points[k];
     if (known.x_is_a != v.x_is_a) std::swap(point.on_a, point.on_b);
@@ -215,8 +215,8 @@ class BodyContacts {
   }
 
   /// Whether X turns into a contact beside a face on which it lies, as a box does that tips over an edge of
-  /// the face: the contact and the lowest point of X approach faster than the point on the face. The lowest
-  /// point of a body that slides, rolls or lands does not.
+  /// the face. Then both the contact and the lowest point of X approach faster than the point on the face. If
+  /// X slides, rolls or lands, its lowest point does not.
   bool tips_into(const View& v, const View& face) const {
     const Vec3 up = face.normal;
     const auto speed = [&](const View& to, const Vec3& place) {
@@ -227,9 +227,9 @@ class BodyContacts {
            speed(v, farthest(v.x(), v.x_piece, pose(x_, false), -up)) < tips;
   }
 
-  /// Returns a new normal for a contact that is level with or below a face on which the same piece lies, if
-  /// the surface at the contact, seen from above the face, does not have the contact's normal. The new normal
-  /// is the surface's own normal, or the normal of the face if the surface only continues the face.
+  /// Returns a new normal for a contact at or below the level of a face on which the same piece of X lies. It
+  /// is needed if the surface at the contact, seen from above the face, does not have the contact's normal.
+  /// It is the surface's own normal, or the normal of the face if the surface only continues the face.
   std::optional<Vec3> normal_instead(const View& v, const View& face) const {
     const Vec3 n = v.normal, up = face.normal;
     if (v.x_piece != face.x_piece || n.dot(up) > kSameDirection) return std::nullopt;
@@ -268,9 +268,9 @@ class BodyContacts {
     return is_slope && is_ramp(v, top, up, across) ? std::optional(own) : std::nullopt;
   }
 
-  /// Whether a piece of X that lies on a face keeps another piece of X apart from Y: throughout the interval
-  /// the other piece is nowhere lower than the point that lies on the face, and Y's piece is nowhere above
-  /// the plane of the face.
+  /// Whether a piece of X that lies on a face keeps another piece of X away from a piece of Y. This holds if,
+  /// throughout the interval, the other piece of X is nowhere lower than the point that lies on the face, and
+  /// Y's piece is nowhere above the plane of the face.
   bool keeps_apart(const View& face, const View& v) const {
     if (face.x_piece == v.x_piece || v.normal.dot(face.normal) > kGoesOn ||
         v.y().collision_shape().is_plane())
@@ -288,8 +288,8 @@ class BodyContacts {
     });
   }
 
-  /// Returns the manifold of a contact without its points, and with another normal. This normal points
-  /// towards X and is fixed in Y.
+  /// Returns a contact's manifold with a new normal and without its points. The new normal points towards X
+  /// and is fixed in Y.
   static Manifold without_points(const View& v, const Vec3& normal) {
     Manifold m = *v.m;
     m.normal = v.x_is_a ? normal : Vec3(-normal);
@@ -300,8 +300,9 @@ class BodyContacts {
     return m;
   }
 
-  /// The contact with the normal of a face that keeps_apart(). It still holds a leg that stands on the edge
-  /// of something as high as the face; points below the face are out of reach.
+  /// Returns a contact with the normal of the face that keeps its piece away (keeps_apart()). The contact
+  /// still holds a leg that stands on the edge of an object as high as the face. Points below the face are
+  /// left out.
   Manifold upright(const View& v, const View& face) const {
     const Vec3 up = face.normal;
     Manifold m = without_points(v, up);
@@ -317,8 +318,9 @@ class BodyContacts {
     return m;
   }
 
-  /// Whether Y is part of the ground, or lies on a face of its own as a wedge does. In a heap a box may stand
-  /// on another one with an edge. This is not the foot of a slope, and it would change from step to step.
+  /// Whether a contact is at the foot of a slope: Y is part of the ground, or lies on a face of its own as a
+  /// wedge does. In a heap a box may stand with an edge on another one. That is no slope, and it would change
+  /// from step to step.
   bool is_ramp(const View& v, const Vec3& foot, const Vec3& up, const Vec3& across) const {
     if (!v.y().is_dynamic()) return true;
     const Real look = kLookOver * flush_;
@@ -332,7 +334,8 @@ class BodyContacts {
     return v.on_y(k) - std::max(0.0, off.distance) * off.normal;
   }
 
-  /// Distance of a place in the world from a piece of Y, the one of the contact by default.
+  /// Returns the distance of a place in the world from a piece of Y; by default it is the piece of the
+  /// contact.
   SurfaceDistance distance(const View& v, const Vec3& place) const { return distance(v, v.y_piece, place); }
   SurfaceDistance distance(const View& v, uint32_t piece, const Vec3& place) const {
     const Pose y = pose(v.y(), v.speculative);
@@ -341,8 +344,8 @@ class BodyContacts {
     return d;
   }
   /// Whether Y's surface below a place is a face with the normal `up`, at least on one side along a
-  /// direction. Above a convex edge or a corner the nearest point of Y is on the edge, directly below, for
-  /// many directions of `up`. This alone does not prove a face.
+  /// direction. Above a convex edge or a corner the nearest point of Y lies directly below for many
+  /// directions of `up`. So the nearest point alone does not prove a face.
   bool is_flat(const View& v, const Vec3& over, const Vec3& up, const Vec3& along) const {
     const CollisionShape& shape = v.y().collision_shape();
     const bool is_triangle =
@@ -353,7 +356,7 @@ class BodyContacts {
            distance(v, over + aside).normal.dot(up) > kGoesOn;
   }
 
-  /// Returns the contact of X's piece with the slope that begins at a contact.
+  /// Returns the contact of X's piece with the slope that begins at the contact `v`.
   Manifold on_slope(const View& v, const View& face, const Vec3& normal) const {
     const Pose plane{highest(v, face.normal), rotation_between(Vec3::UnitY(), normal)};
     const Pose x = pose(v.x(), false), y = pose(v.y(), false);
@@ -376,7 +379,8 @@ class BodyContacts {
         add(p);
     }
     if (m.count > 0) return m;
-    // A narrow slope, such as the side of a cone, ends before the corners of X: it touches X where it begins.
+    // A narrow slope, such as the side of a cone, ends before the corners of X. Then X touches it where it
+    // begins.
     for (uint32_t k = 0; k < v.m->count; ++k) {
       const Real separation = normal.dot(v.on_x(k) - plane.position);
       if (separation < least) return {};
@@ -388,7 +392,7 @@ class BodyContacts {
   const Body& x_;
   Real time_, h_, flush_;
   std::vector<View> views_;
-  std::vector<const View*> faces_;  // of Y, on which X lies
+  std::vector<const View*> faces_;  // contacts of Y on whose faces X lies
 };
 
 /// The pairs of one body.
@@ -397,8 +401,9 @@ struct Group {
   std::vector<ContactPair*> pairs;
 };
 
-/// Returns groups for the movable bodies that have a contact that may be at an internal edge, in the order of
-/// their slots; and before them, one by one, the pairs of immovable bodies with bodies of several pieces.
+/// Returns groups of pairs, in the order of the bodies' slots: one for each movable body that has a contact
+/// that may be at an internal edge. Before them, each pair of an immovable body with a body of several pieces
+/// is a group of its own.
 std::vector<Group> groups_with_internal_edges(std::span<ContactPair* const> pairs) {
   constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
   std::vector<Group> groups;

@@ -56,7 +56,7 @@ struct CollisionCluster {
         contacts.push_back(c);
         pairs.push_back(&pair);
         bounces.push_back(u.x() < -collision_speed);
-        // In a sequence, the impulse of another contact may hit a resting contact.
+        // In a sequence, the impulse of another contact can make a resting contact collide.
         restitution.push_back(bounces.back() || law == ImpactLaw::sequential ? pair.surface().restitution
                                                                              : 0);
       }
@@ -72,11 +72,11 @@ struct CollisionCluster {
   }
 };
 
-/// Collides the contacts of a large cluster that the impact reaches. These are the contacts around the
-/// bouncing ones, then also those that the impulses make approach faster than `speed` and the contacts around
-/// them, until there are no more. The other contacts have no impulse, which is then their solution. A cluster
-/// with more than kCluster contacts or too many extensions is truncated; the omitted contacts block
-/// afterwards as resting contacts.
+/// Collides the part of a large cluster that the impact reaches: the bouncing contacts and those around them.
+/// Contacts that the impulses make approach faster than `speed` follow with those around them, until there
+/// are no more. The other contacts get no impulse, which is then their solution. A cluster with more than
+/// kCluster contacts or too many extensions is truncated; afterwards the omitted contacts block as resting
+/// contacts.
 ContactWork collide_reached(CollisionCluster& cluster, Real speed, ImpactLaw law,
                             const JointProblem& joints) {
   std::vector<uint8_t> taken(cluster.contacts.size(), 0);

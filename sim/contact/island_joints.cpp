@@ -6,7 +6,7 @@
 namespace offstage::sim {
 
 bool has_forces(const Island& island) {
-  // The free motion already includes the springs. Their rows react to the changes of this motion.
+  // The free motion already includes the springs. Their rows react to changes of this motion.
   const auto has_other_rows = [](const Joint* joint) { return joint->has_rows_besides_spring(); };
   return !island.pairs.empty() ||
          std::any_of(island.articulations.begin(), island.articulations.end(), [&](const Articulation* a) {
@@ -14,7 +14,7 @@ bool has_forces(const Island& island) {
          });
 }
 
-/// `place` evaluates the constraints of an articulation.
+/// Collects the rows of the constraints. `place` evaluates the constraints of an articulation.
 template <class Place>
 void IslandJoints::collect_constraints(const Island& island, Springs springs, Place&& place) {
   const auto row = [](const Articulation& a, uint32_t link) {
@@ -30,8 +30,8 @@ void IslandJoints::collect_constraints(const Island& island, Springs springs, Pl
   }
 }
 
-/// The impulses act in the middle of the interval. The impulses of a limit that is reached within the
-/// interval act from that time on. Otherwise the motion of the joint between the two times would change the
+/// Evaluates the constraints at the time at which the impulses act: the middle of the interval, or the time
+/// at which a limit is reached. If the joint moved between the two times, the impulses would change the
 /// angular momentum.
 void IslandJoints::place(Articulation& a, const ContactInterval& interval) {
   const Real from = a.has_springs() ? a.kicks_act_from() : kMiddle;
@@ -43,7 +43,8 @@ void IslandJoints::place(Articulation& a, const ContactInterval& interval) {
 }
 
 bool IslandJoints::act_throughout() const {
-  // The direction of a distance joint turns with its ends. Limits have one finite bound.
+  // Rows do not act throughout if they belong to a distance joint, whose direction turns with its ends, or to
+  // a limit, which has one finite bound.
   const auto is_distance = [](const Joint* joint) { return joint->def.type == JointType::distance; };
   return std::none_of(stops_.begin(), stops_.end(), [](const auto& stop) { return stop.has_value(); }) &&
          std::none_of(articulations_.begin(), articulations_.end(),
@@ -110,7 +111,7 @@ void IslandJoints::collect_for_collision(const Island& island, Real time, Real s
   impulses_.assign(constraints_.size(), Vec6::Zero());
 }
 
-/// Wrench of a bounded row's impulse on its joint.
+/// Returns the wrench that a bounded row's impulse exerts on its joint.
 Wrench IslandJoints::wrench(std::size_t i, Real impulse) const {
   const Vec6 on_a = impulse * bounded_[i].on_a;
   return {on_a.head<3>(), on_a.tail<3>() - origins_[i].arm.cross(on_a.head<3>())};

@@ -45,7 +45,7 @@ class JointBlock {
     factor_.compute(stiffness);
   }
 
-  /// Greatest change of a velocity.
+  /// Solves the constraints and adds the impulses to `sum`. Returns the greatest change of a velocity.
   Real solve(std::span<ContactBody> bodies, Vec6& sum) const {
     const Vec6 error = velocity(bodies) - start_;
     const Vec6 impulse = -factor_.solve(error);
@@ -90,8 +90,8 @@ uint32_t jointed_gauss_seidel(std::span<ContactBody> bodies, std::span<Contact> 
   std::vector<JointBlock> blocks;
   for (const JointConstraint& joint : joints.constraints) blocks.emplace_back(joint, bodies);
   for (uint32_t sweep = 1; sweep <= max_sweeps; ++sweep) {
-    // The joints come last, so that a bounded number of sweeps leaves an error in the contacts, and none in
-    // the joints.
+    // The joints come last. A bounded number of sweeps then leaves an error in the contacts, and none in the
+    // joints.
     const std::vector<ContactBody> before(bodies.begin(), bodies.end());
     projected_gauss_seidel(bodies, contacts, 1, tolerance);
     Real change = 0;

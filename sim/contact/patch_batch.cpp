@@ -14,12 +14,12 @@
 namespace offstage::sim {
 namespace {
 
-/// A sweep solves a patch in rounds, until one changes its velocities by less than this [m/s] or the limit is
-/// reached. A resting patch takes one round. An impact takes more, because otherwise some points would
-/// penetrate. A patch without an initial guess is solved completely at first, because otherwise it would slip
-/// during the first sweeps. If no sweep of another patch corrects the remaining error, there are more rounds.
-/// Otherwise the load would jump between the ends of a narrow line of contact, and a coin on its rim would
-/// rock.
+/// A sweep solves a patch in rounds, until a round changes its velocities by less than this [m/s] or the
+/// limit is reached. kSettled: a resting patch takes one round; an impact takes more, because otherwise some
+/// points would penetrate. kSolved: a patch without an initial guess is solved completely at first, because
+/// otherwise it would slip during the first sweeps. kAlone: no other patch moves these bodies, so no later
+/// sweep corrects the remaining error; without more rounds the load would jump between the ends of a narrow
+/// line of contact, and a coin on its rim would rock.
 constexpr float kSettled = 0.01F, kAlone = 1e-5F, kSolved = 1e-6F;
 constexpr uint32_t kPatchRounds = 20, kLoneRounds = 60;
 uint32_t rounds(const PatchBatch& p) {
@@ -29,12 +29,12 @@ float settled(const PatchBatch& p) {
   return p.alone ? kAlone : kSettled;
 }
 
-/// Fractions of the difference between an impulse and its mean: what a sub-step subtracts from the impulse,
-/// and what it adds to the mean. Slow modes whose frequency is near kRenewal are damped most. The mean of a
+/// Each sub-step moves an impulse by the fraction kReturn of its difference from its running mean, and the
+/// mean by the fraction kRenewal. Slow modes whose frequency is near kRenewal are damped most. The mean of a
 /// patch without an initial guess is its impulse.
 constexpr float kReturn = 0.03F, kRenewal = 0.01F;
-/// Friction sticks up to the fraction kHolds of its limit, and slides from the fraction kSlides on. Both
-/// fractions are of squared values.
+/// Friction sticks below the fraction kHolds of its limit, and slides above the fraction kSlides. Both are
+/// fractions of squared values.
 constexpr float kHolds = 0.96F, kSlides = 0.999F;
 /// Greatest factor by which sliding friction follows a later increase of the normal impulses. A larger one
 /// could reverse the sliding.
@@ -110,8 +110,8 @@ Groups relative(const PatchBatch& p, const LaneTwist& a, const LaneTwist& b) {
           {dot(p.t, linear), dot(p.k, linear), dot(p.n, angular)}};
 }
 
-/// The normal velocity of a point from the normal group of a twist; and the wrench of a normal impulse at the
-/// point.
+/// point_part() returns the normal velocity of a point, from the normal group of a twist. point_wrench()
+/// returns the wrench of a normal impulse at the point.
 FloatLanes point_part(const PatchBatch::Point& q, const Vector& normal) {
   return normal.x + q.y * normal.y - q.x * normal.z;
 }
@@ -129,7 +129,8 @@ void apply(const PatchBatch& p, const Groups& wrench, LaneTwist& a, LaneTwist& b
   b.angular = b.angular - p.inverse_inertia_b * (cross(p.arm_b, force) + torque);
 }
 
-// Response of one body to a unit impulse (or angular impulse) along each axis: R6's K for patches.
+// Response of one body to a unit impulse, or angular impulse, along each axis. It gives the K of R6 for a
+// patch.
 
 struct Row {
   Vector linear, angular;  // the axis as a wrench about the centre of mass
@@ -422,8 +423,8 @@ Single in_frame(const PatchBatch& p, const Vector& v) {
   return {dot(p.n, v), dot(p.t, v), dot(p.k, v)};
 }
 
-/// These two functions do the same as solve_normal() and solve_friction() for patches of one point. They
-/// return the change.
+/// These two functions replace solve_normal() and solve_friction() for patches of one point, and also return
+/// the change.
 Single solve_single_normal(PatchBatch& p, Single& u, FloatLanes gap) {
   PatchBatch::Point& q = p.points[0];
   const FloatLanes next = lane_max(q.impulse - q.mass * (u.x + gap), FloatLanes{});
@@ -447,8 +448,8 @@ Single solve_single_friction(PatchBatch& p, Single& u) {
   return {FloatLanes{}, t, k};
 }
 
-/// Change of the twist at the end of a sub-step, and of the displacement before, due to turning arms and
-/// frames.
+/// Returns the change of the relative twist at the end of a sub-step because arms and frames turn.
+/// turning_displacement() returns the displacement until its start.
 Groups turning_velocity(const PatchBatch& p, const SubstepTime& time) {
   const FloatLanes s = _mm256_set1_ps(time.s), s2 = s * s;
   return {s * p.gain.normal + Vector{s2 * p.bow.x, FloatLanes{}, FloatLanes{}},
@@ -469,16 +470,16 @@ Groups relative_now(const PatchBatch& p, const LaneTwist& a, const LaneTwist& b,
   return {u.normal + gain.normal, u.friction + gain.friction};
 }
 
-/// Whether friction changes the normal velocity noticeably in any lane. Between balls it does not.
+/// Whether friction changes the normal velocity noticeably in any lane. Between two balls it does not.
 bool is_coupled(const PatchBatch& p) {
   constexpr float kNoticeable = 1e-4F;  // squared fraction
   const FloatLanes &x = p.coupling.x.x, &y = p.coupling.y.x, &K = p.normal_mobility.xx;
   return _mm256_movemask_ps(FloatLanes(x * x + y * y > kNoticeable * K * K)) != 0;
 }
 
-/// For rolling bodies the normal impulse and the friction depend on each other so strongly that alternating
-/// between them converges slowly. If the point neither separates nor slides, all three impulses are solved as
-/// one system. Returns the change, and sets `all` if this was the case in all lanes.
+/// Solves the normal impulse and the friction of a point as one system, if the point neither separates nor
+/// slides. For rolling bodies they depend on each other so strongly that solving them in turn converges
+/// slowly. Returns the change, and sets `all` if this was possible in all lanes.
 Single solve_single_rolling(PatchBatch& p, Single& u, FloatLanes gap, bool& all) {
   const Symmetric& F = p.friction_mobility;
   const Symmetric K{p.normal_mobility.xx, p.coupling.x.x, p.coupling.y.x, F.xx, F.xy, F.yy};
@@ -503,7 +504,7 @@ Single solve_single_rolling(PatchBatch& p, Single& u, FloatLanes gap, bool& all)
   return d;
 }
 
-/// Approach of the points since the start, in the normal group's terms.
+/// Returns the approach of the points since the start, in the normal group's terms.
 Vector moved_normal(const PatchBatch& p, std::span<const BodyMotion> motions, const SubstepTime& time) {
   const LaneTwist a = gather<&BodyMotion::shift>(motions, p.a), b = gather<&BodyMotion::shift>(motions, p.b);
   const Vector& v = p.approach.normal;
@@ -600,7 +601,7 @@ void begin_substep(PatchBatch& p) {
   p.rolling_shift = p.rolling_shift + p.rolling_before;
 }
 
-// Friction uses the normal impulses of this sweep, and its effect on the normal velocities is corrected
+// The friction uses the normal impulses of this sweep. Its effect on the normal velocities is corrected
 // afterwards.
 void sweep(PatchBatch& p, std::span<BodyMotion> motions, const SubstepTime& time) {
   if (is_single(p)) return sweep_single(p, motions, time);
