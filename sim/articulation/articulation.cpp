@@ -23,10 +23,9 @@ constexpr Real kSmall = 1e-4;
 constexpr int kVelocitySteps = 2;
 /// A joint that moves away from its limit faster than this does not touch the limit [m/s], [rad/s].
 constexpr Real kLeaving = 1e-6;
-/// Velocities that violate the constraints by less than this count as unchanged since settle() [m/s].
+/// A velocity that violates the constraints by less than this has not changed since settle() [m/s].
 constexpr Real kDisturbed = 1e-7;
-/// Greatest phase of a vibration between two kicks [rad]. The vibration is caused by the tension in the
-/// joints.
+/// Greatest phase by which the tension in the joints lets a link swing between two kicks [rad].
 constexpr Real kKickPhase = 1;
 
 bool is_moved(const Body* body) {
@@ -134,8 +133,9 @@ Articulation::Articulation(std::vector<Joint*> joints)
   }
 }
 
-/// A link that a force F pulls at a lever arm r swings with w^2 = F K / r, where K is its mobility at the
-/// joint, perpendicular to the arm. A chain of such links swings at up to twice this frequency.
+/// Returns the greatest angular frequency at which tension swings the links [1/s]. A link that a force F
+/// pulls at a lever arm r swings with w^2 = F K / r, where K is its mobility at the joint, perpendicular to
+/// the arm. A chain of such links swings at up to twice this frequency.
 Real Articulation::greatest_frequency() const {
   Real greatest = 0;
   for (std::size_t j = 0; j < joints_.size(); ++j) {
@@ -155,8 +155,9 @@ Real Articulation::greatest_frequency() const {
   return std::sqrt(greatest);
 }
 
-/// A link of the mass m in a rod under the force F has the frequency of greatest_frequency(), or with the
-/// inertia that the springs add to short waves (physics A8), at most sqrt(F / 2 h sqrt(m k)).
+/// Returns the number of kicks for which a phase stays below kKickPhase. A link of mass m in a rod under the
+/// force F swings with greatest_frequency(). With the inertia that the springs add to short waves (physics
+/// A8), the frequency is at most sqrt(F / 2 h sqrt(m k)).
 Real Articulation::kicks_needed(Real duration) const {
   Real most = duration * greatest_frequency();
   Real sprung = 0;
@@ -185,8 +186,8 @@ void Articulation::begin_motion(Real t, Real h) {
   }
 }
 
-/// Returns the place of joint j, with velocities at `time` [s]. The poses of driven links are taken at `time
-/// - before`. The result refers to `motion` and, for driven links, to `still_a` and `still_b`, which this
+/// Returns the place of joint j. Velocities are taken at `time` [s], and the poses of driven links at `time -
+/// before`. The result refers to `motion` and, for driven links, to `still_a` and `still_b`, which this
 /// function sets.
 JointPlace Articulation::place_of(std::size_t j, Real time, std::span<const LinkMotion> motion,
                                   LinkMotion& still_a, LinkMotion& still_b, Real before) const {
@@ -244,9 +245,9 @@ void Articulation::add_forces(Real t, std::span<const LinkMotion> motion,
   }
 }
 
-/// Appends to the constraints of read_rows() the rows of springs and dampers. With the speed u after a kick,
-/// their torque is -k (theta + h u) - c u: as an impulse p, u + softness p = -h k theta softness. `error` is
-/// minus the right-hand side less the present speed.
+/// Appends the rows of springs and dampers to the constraints of read_rows(). With the speed u after a kick,
+/// their torque is -k (theta + h u) - c u. As an equation for the impulse p: u + softness p = -h k theta
+/// softness. A row's `error` is the present speed minus the right-hand side.
 void Articulation::read_sprung_rows(Real t, Real h, std::span<const LinkMotion> motion) {
   LinkMotion still_a, still_b;
   softened_ = 1;

@@ -22,8 +22,8 @@ constexpr Real kClosing = 1e-3;
 /// Slots of Joint::efforts.
 enum Slot : std::size_t { kLimit = 0, kSwing = 1, kMotor = 2, kFriction = 3, kDamping = 6, kSpring = 9 };
 
-/// A direction of a joint, at the interval's start and at its end. The impulses of the interval act along the
-/// direction at the start.
+/// A direction of a joint at the interval's start and end, and at the time for which the impulses are placed
+/// (`acting`).
 struct Direction {
   JointRow start, acting, end;
 };
@@ -67,7 +67,7 @@ class RowMaker {
     for (std::size_t i = 0; i < 3; ++i) add_guessed(spring_row(i), kSpring + i, false);
   }
 
-  /// See first_stop().
+  /// Returns the first impact at a limit; see first_stop() in the header.
   std::optional<Real> first_stop() const {
     std::optional<Real> first;
     const auto look = [&](const Direction& row, Real lower, Real upper) {
@@ -83,7 +83,7 @@ class RowMaker {
  private:
   Real least_swing() const { return def_.type == JointType::universal ? -def_.swing : -kInfinite; }
 
-  /// The free coordinate of the joint, including whole turns.
+  /// Returns the free coordinate of the joint, which counts whole turns.
   Direction free() const {
     const auto row = [&](const JointPlace& place) { return free_row(def_, place, joint_.length); };
     Direction d{row(start_), row(acting_), row(end_)};
@@ -116,10 +116,10 @@ class RowMaker {
     return r;
   }
 
-  /// Returns a row that also includes the change of speed due to the rotation of the direction from the
-  /// interval's start to its end. It is used only for limits. For motors no case is known in which it
-  /// improves accuracy. With it, the gripper of demos/scenes/robot_arm.json diverged, because the exact
-  /// solver often leaves its contacts to the fall-back.
+  /// Returns a row that also contains the change of speed because the direction turns within the interval. It
+  /// is used only for limits. For motors no case is known in which it improves accuracy. With it, the gripper
+  /// of demos/scenes/robot_arm.json diverged, because the exact solver often leaves its contacts to the
+  /// fall-back.
   BoundedRow turning_with(const Direction& d) const {
     BoundedRow r = bounded(d);
     const auto turn = [&](const LinkMotion& motion) { return h_ * motion.angular_velocity.norm(); };
@@ -137,9 +137,9 @@ class RowMaker {
   /// The speed of the coordinate at the interval's end, before the impulses of the rows are applied.
   Real speed(const Direction& d) const { return speed(d.end, end_); }
 
-  /// Returns a coordinate for the interval's start. From it, the mean of the speeds at both ends leads to the
-  /// coordinate at the interval's end, before the impulses of the rows are applied. With this start, the
-  /// row's target leads exactly to the wanted coordinate. Links with springs move with the speed at the end.
+  /// Returns the coordinate from which the mean of the speeds at both ends leads to the coordinate at the
+  /// interval's end, both without the impulses of the rows. If the row's target starts here, it leads exactly
+  /// to the wanted coordinate. Links with springs move with the speed at the end.
   Real at_start(const Direction& d) const {
     return d.end.error - h_ / 2 * ((is_kicked_ ? speed(d) : speed_at_start(d)) + speed(d));
   }
@@ -159,17 +159,17 @@ class RowMaker {
     Real fraction;  ///< fraction of the interval before it
     Real target;    ///< speed away from the limit at the interval's end
   };
-  /// Returns the impact at a limit; nothing if there is none in the interval. The impact reverses the speed
-  /// of the coordinate, times the restitution. In the rest of the interval the acceleration of the free
-  /// motion acts. A joint without restitution stays at its limit. `side`: 1 for a lower limit, -1 for an
-  /// upper limit.
+  /// Returns the impact at a limit, or nothing if there is none in the interval. The impact reverses the
+  /// speed of the coordinate and multiplies it by the restitution. In the rest of the interval the
+  /// acceleration of the free motion acts. A joint without restitution stays at its limit. `side`: 1 for a
+  /// lower limit, -1 for an upper limit.
   std::optional<Stop> stop(const Direction& row, Real limit, int side) const {
     const Real gap = side * (row.start.error - limit), left = side * (row.end.error - limit);
     if (!(left < 0) || gap < 0) return std::nullopt;
     const Real before = side * speed_at_start(row), after = side * speed(row), fraction = gap / (gap - left);
     const Real impact = before + fraction * (after - before);
     const Real restitution = impact < -JointDef::kBounceSpeed ? def_.restitution : 0;
-    // A joint that rests at its limit approaches it by as much as the forces of an interval make it.
+    // A joint that rests at its limit still approaches it, by the speed that the forces of an interval cause.
     if (restitution == 0 && !(impact < -std::max(kClosing, std::abs(after - before)))) return std::nullopt;
     return Stop{fraction, std::max(0.0, (1 - fraction) * (after - before) - restitution * impact)};
   }
@@ -199,7 +199,7 @@ class RowMaker {
     }
     const bool is_low = below <= above;
     const Real side = is_low ? 1 : -1, limit = is_low ? lower : upper;
-    // A joint that rests at its limit, or leaves it, is held by a constant force in the whole interval.
+    // A constant force throughout the interval holds a joint that rests at its limit or leaves it.
     const bool closes = is_kicked_ || side * speed_at_start(row) <
                                           -std::max(kClosing, std::abs(speed(row) - speed_at_start(row)));
     const Real gap = side * ((closes ? at_start(row) : row.start.error) - limit);
@@ -268,8 +268,8 @@ class RowMaker {
     }
   }
 
-  /// The torque of a spring and its damper in the free motion changes by h (h k + c) times the change of the
-  /// speed.
+  /// Returns the row of a spring and its damper about an axis. In the free motion, their torque changes by h
+  /// (h k + c) times the change of the speed.
   BoundedRow spring_row(std::size_t axis) const {
     const Direction row = turning(static_cast<Eigen::Index>(axis));
     BoundedRow r = bounded(row);

@@ -15,8 +15,8 @@ Vec6 concatenate(const Vec3& linear, const Vec3& angular) {
   return v;
 }
 
-/// The row of the constraint t . (anchor a - anchor b) = 0, where t is fixed in b. With s from b's centre to
-/// a's anchor,
+/// Returns the row of the constraint t . (anchor a - anchor b) = 0, where t is fixed in b. With the vector s
+/// from b's centre to a's anchor,
 ///   dC/dt = t . s',  s' = v_a(anchor) - v_b - w_b x s   (as seen from b).
 /// Besides the accelerations, d2C/dt2 contains t . (w_a x (w_a x r_a) - w_b x (w_b x s) - 2 w_b x s').
 JointRow slide_row(const JointPlace& p, const Vec3& t) {
@@ -40,14 +40,14 @@ void add_meeting_rows(const JointPlace& p, JointRows& rows) {
   rows.count = 3;
 }
 
-/// The row of the constraint u . v = 0, where u is fixed in a and v is fixed in b.
+/// Returns the row of the constraint u . v = 0, where u is fixed in a and v is fixed in b.
 JointRow perpendicular_row(const JointPlace& p, const Vec3& u, const Vec3& v) {
   const Vec3 n = u.cross(v), &wa = p.a.angular_velocity, &wb = p.b.angular_velocity;
   const Vec3 n_rate = wa.cross(u).cross(v) + u.cross(wb.cross(v));
   return {concatenate(Vec3::Zero(), n), concatenate(Vec3::Zero(), -n), u.dot(v), n_rate.dot(wa - wb)};
 }
 
-/// The row of the constraint |anchor a - anchor b| = length.
+/// Returns the row of the constraint |anchor a - anchor b| = length.
 JointRow length_row(const JointPlace& p, Real length) {
   const Vec3 &wa = p.a.angular_velocity, &wb = p.b.angular_velocity;
   const Real now = p.apart.norm();
@@ -73,20 +73,20 @@ Mat3 axes_along(const Vec3& axis, const Vec3& second) {
   return m;
 }
 
-/// Rotation of a link about its joint axis since the joint was created, between minus and plus half a turn
-/// [rad].
+/// Returns the rotation of a link about its joint axis since the joint was created, between minus and plus
+/// half a turn [rad].
 Real angle_since(const Mat3& axes, const Mat3& at_creation) {
   return angle_of(axes.col(0).dot(at_creation.col(1)), axes.col(0).dot(at_creation.col(0)));
 }
 
-/// The constraint of a coupling. It also has the changes of the constraint's error due to one full turn of a
-/// and of b.
+/// The row of a gear, rack or screw, and the changes of its error due to one full turn of a and of b.
 struct Coupling {
   JointRow row;
   Real turn_a = 0, turn_b = 0;
 };
 
-/// The axis of each wheel is fixed in the wheel. Its rate of change does no work, so the row has no bias.
+/// The axis of each wheel is fixed in the wheel. The change of its direction does no work, so the row has no
+/// bias.
 Coupling gear_coupling(const JointDef& def, const JointPlace& p, Real length) {
   const Real a = angle_since(p.axes_a, frame_axes(def, false)),
              b = angle_since(p.axes_b, frame_axes(def, true));
@@ -96,8 +96,8 @@ Coupling gear_coupling(const JointDef& def, const JointPlace& p, Real length) {
           def.ratio * kWholeTurn};
 }
 
-/// The anchor of b moves along a direction that is fixed in the world. It is the direction at the creation of
-/// the joint.
+/// The anchor of b moves along a direction that is fixed in the world: the direction when the joint was
+/// created.
 Coupling rack_coupling(const JointDef& def, const JointPlace& p, Real length) {
   const Vec3 d = def.second_axis.normalized(), &wb = p.b.angular_velocity;
   const Real a = angle_since(p.axes_a, frame_axes(def, false));
@@ -113,7 +113,7 @@ Real screw_angle(const JointPlace& p) {
 
 Coupling screw_coupling(const JointDef& def, const JointPlace& p, Real length) {
   const Vec3 z = p.axes_b.col(2);
-  const Real lead = def.ratio / kWholeTurn;  // per radian
+  const Real lead = def.ratio / kWholeTurn;  // travel per radian [m]
   JointRow row = slide_row(p, z);
   const JointRow turning = turning_row(z);
   row.on_a -= lead * turning.on_a;
@@ -129,8 +129,8 @@ Coupling coupling(const JointDef& def, const JointPlace& p, Real length) {
   return def.type == JointType::rack ? rack_coupling(def, p, length) : screw_coupling(def, p, length);
 }
 
-/// Returns the multiple of whole turns that brings the constraint's error nearest to 0. It is needed because
-/// the measured angles jump by a whole turn.
+/// Returns the multiple of whole turns to subtract from the constraint's error, so that it is nearest to 0.
+/// The measured angles jump by whole turns.
 Real nearest_turns(const Coupling& c) {
   Real best = 0;
   for (const int a : {-1, 0, 1})
@@ -268,7 +268,8 @@ JointRow free_row(const JointDef& def, const JointPlace& p, Real length) {
     row = turning_row(za);
     row.error = angle_of(-ya.dot(xb), xa.dot(xb));
   } else {
-    // Angle after the smallest rotation of one axis onto the other. It is undefined if they are opposite.
+    // The angle is that of the smallest rotation from one axis to the other. It is undefined if they are
+    // opposite.
     const Real both = std::max(1 + za.dot(zb), 0.05);
     row = turning_row((za + zb) / both);
     const Mat3 between = p.axes_b.transpose() * p.axes_a;
@@ -302,14 +303,14 @@ Vec3 rotation_vector(const JointPlace& place) {
 Real angle_of(Real y, Real x) {
   const Real r = std::sqrt(x * x + y * y);
   if (r == 0) return 0;
-  // First half the angle, which is within a right angle, then two more halvings.
+  // The angle is halved once, which makes it less than a right angle, and then twice more.
   Real t = x >= 0 ? y / (r + x) : (y < 0 ? -1 : 1) * ((r - x) / std::max(std::abs(y), 1e-300));
   if (x < 0 && y == 0) return std::numbers::pi;
   const bool steep = std::abs(t) > 1;
   if (steep) t = 1 / t;
   t /= 1 + std::sqrt(1 + t * t);
   t /= 1 + std::sqrt(1 + t * t);
-  // Series of atan for an argument of at most tan(pi / 16).
+  // The series of atan, for an argument of at most tan(pi / 16).
   const Real s = t * t;
   Real sum = 0;
   for (int k = 23; k > 0; k -= 2) sum = 1.0 / k - s * sum;

@@ -5,12 +5,12 @@
 namespace offstage::sim {
 namespace {
 
-/// Links with more joints than this get rows of their own in the matrix.
+/// Links with more joints than this are hubs: they get rows of their own in the matrix.
 constexpr uint32_t kFewJoints = 3;
-/// Fraction of the diagonal that is added if the matrix is not plain; kMore times that if it is not enough.
-/// At the stages of an integrator loops are not closed exactly, and dependent constraints contradict each
-/// other by about the square of the gap. The added fraction must be larger than this, or their impulses would
-/// grow against each other.
+/// Fraction of the diagonal that is added if the matrix is not plain, and its factor for each further
+/// attempt. At the stages of an integrator, loops are not closed exactly, and dependent constraints
+/// contradict each other by about the square of the gap. The added fraction must be larger than this error,
+/// or the impulses of these constraints would grow against each other.
 constexpr Real kRegularization = 1e-6, kMore = 100;
 constexpr int kAttempts = 3, kRefinements = 8;
 /// The refinement ends when the residual is below kExact times the requested change. A step is at most
@@ -26,7 +26,7 @@ JointSystem::JointSystem(uint32_t links, std::vector<Topology> joints) : joints_
       if (link != kDriven) ++degree[link];
   const auto grounded = static_cast<uint32_t>(std::count_if(
       joints_.begin(), joints_.end(), [](const Topology& j) { return j.a == kDriven || j.b == kDriven; }));
-  // All driven bodies together count as one node, if there are any.
+  // All driven bodies together count as one node.
   has_loops_ = joints_.size() > links - (grounded == 0 ? 1u : 0u);
   hub_row_.assign(links, kDriven);
   for (uint32_t link = 0; link < links; ++link)
@@ -132,7 +132,8 @@ bool JointSystem::factorize(Matrix<N>& m) {
   for (int attempt = 0; attempt < kAttempts; ++attempt, fraction *= kMore) {
     for (std::size_t j = 0; j < joints_.size(); ++j) {
       m.diagonal[j].diagonal() *= 1 + fraction;
-      // Between hubs the block is empty; its fraction is that of the block without rows for hubs.
+      // The diagonal block of a joint between two hubs is empty. Its addition is then a fraction of the block
+      // that it would have without rows for hubs.
       if (kinds_[j].is_empty) m.diagonal[j].diagonal() += fraction * own_diagonal<N>(j);
     }
     if (m.factor.factorize(m.diagonal, m.off)) return true;
@@ -140,7 +141,7 @@ bool JointSystem::factorize(Matrix<N>& m) {
   return false;
 }
 
-/// Computes the diagonal block of a joint in the matrix for impulses: the joint's rows times the responses to
+/// Returns the diagonal of a joint's block in a matrix for impulses: the joint's rows times the responses to
 /// their impulses.
 template <int N>
 Eigen::Matrix<Real, N, 1> JointSystem::own_diagonal(std::size_t joint) const {

@@ -19,7 +19,7 @@ Real fastest_point(const Body& body) {
   return body.rigid.velocity().norm() + body.rigid.angular_velocity().norm() * body.extent;
 }
 
-/// Wrench of a spring on a sleeping body at one of its ends.
+/// Returns the wrench of a spring on a sleeping body, which is at one or both of its ends.
 Wrench spring_push(const WorldState& world, const Spring& spring, const Body& body, Real time) {
   const auto motion = [&](const Attachment& end) -> Motion {
     if (const auto* p = std::get_if<ParticlePoint>(&end)) {
@@ -48,9 +48,10 @@ Wrench spring_push(const WorldState& world, const Spring& spring, const Body& bo
 
 }  // namespace
 
-/// Solvers and collision tests depend slightly on the order of bodies and contacts, and small differences
-/// grow in a pile. Therefore the order does not depend on when bodies were added: they are ordered by their
-/// initial positions from below, and bodies at the same position by their other properties.
+/// Ranks the bodies. Solvers and collision tests depend slightly on the order of bodies and contacts, and
+/// small differences grow in a pile. Therefore the order does not depend on when bodies were added: it
+/// follows their initial positions from below, and bodies at the same position are ordered by their other
+/// properties.
 void ActiveBodies::rank() {
   if (std::exchange(is_ranked_, true)) return;
   constexpr std::size_t kKeys = 15;
@@ -115,8 +116,8 @@ void ActiveBodies::wake_all() {
   while (!sleeping_.empty()) wake(*sleeping_.begin()->second.front());
 }
 
-/// Stores, for bodies that fall asleep, the springs whose force may change later: those whose other end is on
-/// a kinematic body or a particle.
+/// Stores the springs of bodies that fall asleep whose force may change later. Their other end is on a moving
+/// kinematic body or on a particle.
 void ActiveBodies::watch_springs(std::span<Body* const> group) {
   const auto sleeper = [&](const Attachment& end) -> Body* {
     const auto* point = std::get_if<BodyPoint>(&end);
@@ -140,7 +141,7 @@ void ActiveBodies::watch_springs(std::span<Body* const> group) {
   });
 }
 
-/// Force and torque on a sleeping body by the forces that may change with time.
+/// Returns the wrench on a sleeping body from those forces that may change with time.
 Wrench ActiveBodies::time_dependent_wrench(const Body& body, Real time) const {
   const RigidMotion at_rest{body.rigid.position, body.rigid.orientation, Vec3::Zero(), Vec3::Zero()};
   Wrench sum;
@@ -184,8 +185,8 @@ void ActiveBodies::put_to_sleep(std::span<const Island> islands, Real start, Rea
     const bool quiet = std::all_of(island.bodies.begin(), island.bodies.end(), [](const Body* body) {
       return body->sleep.quiet_time >= kQuietTime && body->is_dynamic();
     });
-    // A body with changing or missing support is not at rest: at the top of its flight it is quiet only for a
-    // moment.
+    // A body in an island that is driven is not at rest. A body without support is quiet only for a moment,
+    // at the top of its flight.
     if (!quiet || is_driven(island, start + h)) continue;
     const bool pushed = std::any_of(island.pairs.begin(), island.pairs.end(), [](const ContactPair* pair) {
       const Body& other = pair->a().is_awake() ? pair->b() : pair->a();

@@ -8,10 +8,10 @@
 namespace offstage::sim {
 namespace {
 
-/// Cloth is at rest under a body that moves slower than this [m/s].
+/// Cloth is at rest under a body if it moves there at less than this [m/s].
 constexpr Real kClothRest = 0.05;
-/// A larger change of speed in a sub-step counts as an impact [m/s]. Gravity changes the speed by about a
-/// fifth of it.
+/// A change of a body's speed in a sub-step counts as an impact above this [m/s]. Gravity changes the speed
+/// by about a fifth of it.
 constexpr Real kImpact = 0.2;
 
 }  // namespace
@@ -35,7 +35,7 @@ void ClothMotion::begin_step() {
       [](ClothHandle, const std::unique_ptr<Cloth>& cloth) { cloth->report = {.finite = !cloth->stopped}; });
 }
 
-/// The bodies that cloths may touch in a sub-step of length h, and those that hold pins.
+/// Returns the bodies that cloths may touch in a sub-step of length h, and the bodies that hold pins.
 std::vector<ClothBody> ClothMotion::bodies_near_cloths(Real h) const {
   std::vector<uint8_t> holds(world_.bodies.slot_count(), 0);
   world_.cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
@@ -55,7 +55,7 @@ std::vector<ClothBody> ClothMotion::bodies_near_cloths(Real h) const {
       velocity = body->rigid.velocity();
       spin = body->rigid.angular_velocity();
     } else {
-      obstacle.inverse_mass = 0;  // asleep: cloth does not move it until the body wakes
+      obstacle.inverse_mass = 0;  // asleep: cloth does not move the body until it wakes
     }
     near.emplace_back(obstacle, h, velocity, spin, body->def.surface_velocity);
     near.back().collides = body->def.collides;
@@ -71,7 +71,7 @@ std::vector<Reaction> ClothMotion::step(Real start, Real h) {
   return answer(near, h);
 }
 
-/// Wakes sleeping bodies whose pins do not hold cloth any more.
+/// Wakes sleeping bodies that no longer hold cloth by pins.
 void ClothMotion::wake_unpinned(std::span<const ClothBody> near) {
   std::vector<Body*> released;
   active_.for_each_asleep([&](Body& body) {
@@ -91,7 +91,7 @@ std::vector<Reaction> ClothMotion::answer(std::span<const ClothBody> near, Real 
     Body& body = world_.body_at(at.obstacle().body);
     const bool left = std::exchange(body.on_cloth, at.touched) && !at.touched;
     if (!body.is_dynamic()) continue;
-    // It sleeps while the cloth below it is at rest, and wakes when that moves or goes away.
+    // A body on cloth sleeps while the cloth is at rest. It wakes when the cloth moves or leaves it.
     if (left || at.touching_speed > kClothRest) active_.wake(body);
     if (body.asleep && at.pin_load()) {
       const Wrench pull{at.pin_load()->impulse / h, at.pin_load()->angular_impulse / h};
@@ -99,9 +99,9 @@ std::vector<Reaction> ClothMotion::answer(std::span<const ClothBody> near, Real 
       if (is_pushed(body, pull, *body.sleep.pins)) active_.wake(body);
     }
     if (!at.touched || body.asleep) continue;
-    // The body stays where cloth touched it. If it were put back to its position without cloth, it would drag
-    // the cloth along each time. Cloth between two bodies acts only on their velocities, unless there is an
-    // impact.
+    // The body stays where cloth touched it. If the body returned to its position without cloth, it would
+    // drag the cloth along each time. Cloth that is pinched between two bodies acts only on their velocities,
+    // unless there is an impact.
     if (!at.pinches || at.reaction().impulse.norm() > kImpact * body.rigid.mass) {
       body.pose = at.end();
       body.rigid.place(body.pose);

@@ -12,8 +12,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Distance beyond the border of a triangle at which a particle still meets it, in radii, because triangles
-/// bend as they move.
+/// A particle also hits a triangle up to this distance beyond its border, in radii, because triangles bend as
+/// they move.
 constexpr Real kSlack = 0.1;
 
 struct ClothTriangle {
@@ -23,7 +23,7 @@ struct ClothTriangle {
 
 struct ClothHit {
   const ClothTriangle* triangle;
-  Real fraction = 2;  // time as a fraction of the sub-step; above 1: no hit
+  Real fraction = 2;  // time of the hit as a fraction of the sub-step; above 1: no hit
   Vec3 weights;       // weights of the corners
   Vec3 normal;        // towards the particle
   Real overlap;       // overlap at the end [m]
@@ -33,8 +33,8 @@ Vec3 unit_normal(const Vec3& a, const Vec3& b, const Vec3& c) {
   return (b - a).cross(c - a).stableNormalized();
 }
 
-/// Finds the earliest hit of a sphere on its straight path from p0 to p1 with a triangle, whose path is
-/// straight, too.
+/// Finds the earliest hit of a sphere with a triangle, if that is earlier than `first`. The sphere moves
+/// straight from p0 to p1; the corners of the triangle move straight, too.
 void find_hit(const ClothTriangle& t, const Vec3& p0, const Vec3& p1, Real radius, ClothHit& first) {
   const auto from = [&](std::size_t k) { return t.cloth->before[t.corners[k]]; };
   const auto to = [&](std::size_t k) { return t.cloth->points[t.corners[k]]; };
@@ -42,7 +42,8 @@ void find_hit(const ClothTriangle& t, const Vec3& p0, const Vec3& p1, Real radiu
   const Real height0 = n0.dot(p0 - from(0)), side = height0 < 0 ? -1 : 1;
   const Real gap0 = side * height0 - radius, gap1 = side * n1.dot(p1 - to(0)) - radius;
   if (gap1 >= 0) return;
-  // First the contact of its surface; then, over a crease, the passage of its centre.
+  // First the surface of the particle is tested. At a crease it may miss every triangle, so its centre is
+  // tested next.
   for (const Real reach : {radius, 0.0}) {
     const Real before = gap0 + radius - reach, after = gap1 + radius - reach;
     if (after >= 0) return;

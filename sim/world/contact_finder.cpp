@@ -16,27 +16,27 @@ namespace {
 /// Contact points are searched within the bodies' motion in the interval plus a margin: at most kMargin [m],
 /// and at most kMarginFraction of the size of the smaller body.
 constexpr Real kMargin = 2e-3, kMarginFraction = 0.05;
-/// Motion in an interval, as a fraction of the smaller body, above which the contact points at the start do
-/// not predict later contacts. The limit is larger for the fast solver without restitution, which uses the
-/// points only as limits of the approach.
+/// If bodies move more than this in an interval, as a fraction of the smaller body's size, the contact points
+/// at the start do not predict later contacts. The limit is larger for the fast solver without restitution,
+/// for which the points only limit the approach.
 constexpr Real kFar = 0.25, kFarWithoutBounce = 1;
 /// Margin of bodies in the broad phase: a fraction of their size, plus their motion in this many steps.
 constexpr Real kRoom = 0.03, kSteps = 2;
-/// Fraction of the extent: a greater deviation from the chord occurs only for rotations of more than half a
-/// radian.
+/// Greatest deviation of a path from its chord, as a fraction of the extent. Only rotations of more than half
+/// a radian exceed it.
 constexpr Real kWide = 0.036;
-/// Greatest relative motion of bodies for which their contact points are reused: at most this length [m] and
-/// at most this fraction of the smaller body. Until then only the distances of the points are updated in each
-/// step, to second order.
+/// Contact points are reused while the relative motion of the bodies is at most this length [m] and at most
+/// this fraction of the smaller body's size. Meanwhile only the separations are updated in each step, to
+/// second order.
 constexpr Real kReuse = 1e-4, kReuseFraction = 2e-4, kExactReuse = 1e-8;
-/// If a body hits another body of the same mass without restitution, both then move with this fraction of its
-/// speed. Impacts are propagated kPassedOn times. The next one would have a sixteenth of the speed; for less
-/// than 7.7 m/s this is within kMargin in a step of 1/240 s.
+/// A body that hits another body of the same mass without restitution moves on with this fraction of its
+/// speed, and so does the other body. Impacts are propagated kPassedOn times. The next one would have a
+/// sixteenth of the speed; for less than 7.7 m/s this is within kMargin in a step of 1/240 s.
 constexpr Real kPassedFraction = 0.5;
 constexpr uint32_t kPassedOn = 3;
-/// Bodies turn if their rotation moves their surfaces by more than this in an interval [m].
+/// Bodies count as turning if their rotation moves their surfaces by more than this in an interval [m].
 constexpr Real kTurning = 2e-4;
-/// Bodies with more relative motion than this in an interval may touch with other features [m].
+/// Bodies with more relative motion than this in an interval may touch at other features by its end [m].
 constexpr Real kFastPair = 3e-3;
 Real smaller_extent(const Body& a, const Body& b) {
   return std::min(a.extent, b.extent);
@@ -81,7 +81,7 @@ void sort_by_rank(std::span<const RankedPair> pairs, std::size_t bodies, std::ve
   for (const RankedPair& p : order) sorted.push_back(p.pair);
 }
 
-/// Whether the path is not within the box in the broad phase.
+/// Whether the box of a body's path is not within its box in the broad phase.
 bool leaves(const Body& body, const Aabb& swept_box) {
   return body.collides() && !body.swept.contains(swept_box);
 }
@@ -122,10 +122,10 @@ void ContactFinder::clear() {
   is_current_ = false;
 }
 
-/// Gives the box of a body's path to the broad phase, enlarged by a margin. If repeated in a sub-step
-/// (`again`), the previous box is included.
+/// Gives the box of a body's path, enlarged by a margin, to the broad phase. With `again`, in the same
+/// sub-step, the previous box is included.
 void ContactFinder::move(Body& body, Aabb swept_box, bool again) {
-  // Margin for some more steps like this one.
+  // The margin covers a few more steps like this one.
   const Vec3 shift = kSteps * (body.pose.position - body.start_pose.position);
   const Vec3 room = Vec3::Constant(kRoom * body.extent);
   swept_box.min() += shift.cwiseMin(0) - room;
@@ -136,7 +136,7 @@ void ContactFinder::move(Body& body, Aabb swept_box, bool again) {
   is_current_ = false;
 }
 
-/// As above, but does nothing if the path is within the previous box. Returns whether the box was changed.
+/// Does the same only if the path is not within the previous box. Returns whether the box was changed.
 bool ContactFinder::move(Body& body, bool again) {
   const Aabb swept_box = swept_bounds(body);
   if (!leaves(body, swept_box)) return false;
@@ -144,8 +144,8 @@ bool ContactFinder::move(Body& body, bool again) {
   return true;
 }
 
-/// Collects the pairs of bodies whose paths come near each other. With `again`, within a sub-step, existing
-/// pairs are kept.
+/// Collects the pairs of bodies whose paths come near each other. With `again`, in the same sub-step,
+/// existing pairs are kept.
 void ContactFinder::collect(bool again) {
   if (std::exchange(is_current_, true) && version_ == active_.version()) return;
   version_ = active_.version();
@@ -163,8 +163,8 @@ void ContactFinder::collect(bool again) {
   sort_by_rank(ranked, world_.bodies.size(), pairs_);
 }
 
-/// Computes a bound of the speed that an impact in the sub-step can give to each body, propagated from body
-/// to body with decreasing fractions.
+/// Computes for each body an upper bound of the speed that an impact in the sub-step can give to it. The
+/// bound is propagated from body to body, and decreases each time.
 void ContactFinder::propagate_impact_speeds(Real h) {
   for (Body* body : active_.awake()) body->impact_speed_bound = 0;
   if (is_exact_) return;  // the exact solver resolves each impact at its own time
@@ -226,8 +226,7 @@ void ContactFinder::find(Real h) {
   remove_internal_edge_contacts(pairs_, 0, h);
 }
 
-/// Bound of the relative motion of a pair's bodies in the rest of the sub-step, and the motion for which its
-/// contact points are sufficient [m].
+/// Returns an upper bound of the relative motion of a pair's bodies in the rest of the sub-step [m].
 Real ContactFinder::motion_bound(const ContactPair& pair, Real left) const {
   return (pair.speed_bound() + 2 * world_.def.gravity.norm() * left) * left;
 }
@@ -260,8 +259,8 @@ void ContactFinder::find_points(ContactPair& pair, Real time, Real h) const {
   choose_event(pair, is_far, left);
 }
 
-/// Sets ContactPair::needs_toi: whether the island is moved back to the pair's next impact. `far`: whether
-/// the relative motion is too large for the known contact points.
+/// Sets ContactPair::needs_toi, which requests the trace-back of the island to the pair's next impact. `far`:
+/// whether the relative motion is too large for the known contact points.
 void ContactFinder::choose_event(ContactPair& pair, bool far, Real left) const {
   pair.needs_toi = far && !pair.toi_exhausted;
   const bool bounces = is_exact_ || pair.surface().restitution > 0;

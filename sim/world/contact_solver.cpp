@@ -18,9 +18,9 @@ namespace {
 /// removed; it counts as a fall-back if it is larger than the usual error of the velocity terms.
 constexpr Real kAddedByJoints = 1e-3, kUsualExcess = 0.02;
 
-/// Projects the bodies onto the joints, which the motion by contacts and limits satisfies only approximately.
-/// If links turn far in a step, the kinetic energy may then exceed `most_energy` [J]; in this case the
-/// relative velocities of the links are reduced.
+/// Projects the bodies onto the joints, because contacts and limits move them so that the joints are
+/// satisfied only approximately. If links turn far in a step, the kinetic energy may then exceed
+/// `most_energy` [J]; in this case the relative velocities of the links are reduced.
 JointFigures settle_joints(const Island& island, Real end, Real most_energy) {
   JointFigures tally;
   for (Articulation* articulation : island.articulations) {
@@ -37,9 +37,9 @@ JointFigures settle_joints(const Island& island, Real end, Real most_energy) {
   return tally;
 }
 
-/// Upper bound of an island's kinetic energy after its contacts are solved [J]. Contacts and joints dissipate
-/// energy, except for the error of their velocity terms. `fraction`: length of the interval divided by the
-/// sub-step.
+/// Returns an upper bound of an island's kinetic energy after its contacts are solved [J]. Contacts and
+/// joints dissipate energy, except for the error of their velocity terms. `fraction`: length of the interval
+/// divided by the sub-step.
 Real most_energy(const Island& island, Real fraction) {
   if (island.articulations.empty() || can_do_work(island)) return std::numeric_limits<Real>::infinity();
   return (1 + kAddedByJoints * fraction) * kinetic_energy(island);

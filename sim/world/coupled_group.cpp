@@ -8,13 +8,14 @@
 namespace offstage::sim {
 namespace {
 
-/// The motion of articulations is integrated in pieces: greatest rotation of a body and greatest phase of the
-/// fastest swinging in a piece [rad], and greatest number of pieces.
+/// The motion of articulations is integrated in at most kMostPieces pieces. In a piece a link turns by at
+/// most kTurn, the fastest swing advances its phase by at most kSwing, and a body spins by at most kSpin
+/// [rad].
 constexpr Real kTurn = 0.12, kSwing = 1, kSpin = 1, kMostPieces = 64;
-/// A piece is halved if a joint error exceeds kGap [m], [rad], or if the change of the kinetic energy differs
-/// from the work of the forces by more than these fractions of the kinetic energy, of the work, and of the
-/// work that the forces would do on free bodies at rest. Halvings are bounded in depth and, per sub-step, in
-/// number.
+/// A piece is halved in two cases: a joint error exceeds kGap [m], [rad], or the change of the kinetic energy
+/// differs too much from the work of the forces. The accepted difference is the fraction kEnergyFraction of
+/// the kinetic energy, plus kWorkFraction of the work and of the work that the forces would do on free bodies
+/// at rest. The depth of the halvings and their number in a sub-step are bounded.
 constexpr Real kGap = 1e-4, kEnergyFraction = 1e-4, kWorkFraction = 1e-2;
 constexpr int kMostHalvings = 128, kDeepestHalving = 8;
 
@@ -43,7 +44,7 @@ void CoupledGroup::add_group(const WorldState& world, ParticleSystem& system) {
   groups_.push_back(std::move(group));
 }
 
-/// Adds the forces between particles. New particles participate from their first whole sub-step on.
+/// Adds the forces between particles. New particles take part from their first whole sub-step on.
 void CoupledGroup::add_pair_forces(const WorldState& world) {
   world.force_defs.for_each([&](ForceHandle, const ForceDef& def) {
     if (!def.is_pairwise()) return;
@@ -164,7 +165,7 @@ void CoupledGroup::force(Real t, std::span<const Real> x, std::span<const Real> 
   for (const Jointed& j : articulations_) add_joint_forces(j, t, x, p, dp);
 }
 
-/// Computes in `dp` the forces of the motion between kicks, except those of joints.
+/// Computes in `dp` the forces that act between two kicks, except those of joints.
 void CoupledGroup::set_free_forces(Real t, std::span<const Real> x, std::span<const Real> p,
                                    std::span<Real> dp) const {
   set_all_forces(t, x, p, dp);
@@ -190,8 +191,8 @@ void CoupledGroup::set_all_forces(Real t, std::span<const Real> x, std::span<con
   }
 }
 
-/// Available for particles with forces between each other; the forces of springs and bodies depend on the
-/// velocities in other ways.
+/// Returns false unless the group consists of particles with forces between each other: forces of springs and
+/// bodies depend on the velocities in other ways.
 bool CoupledGroup::force_and_damping(Real t, std::span<const Real> x, std::span<const Real> p,
                                      std::span<Real> dp, std::span<Real> damping) const {
   if (!bodies_.empty() || !springs_.empty()) return false;
@@ -201,7 +202,7 @@ bool CoupledGroup::force_and_damping(Real t, std::span<const Real> x, std::span<
   return true;
 }
 
-/// The links of an articulation, with the forces on them.
+/// The links of an articulation, and the force and torque on each.
 struct CoupledGroup::Links {
   std::vector<LinkMotion> motion;
   std::vector<LinkMobility> mobility;
@@ -234,8 +235,8 @@ void CoupledGroup::add_joint_forces(const Jointed& jointed, Real t, std::span<co
   }
 }
 
-/// Changes the velocities of links with springs by all forces from t to t + h. They then move without forces
-/// (physics A8).
+/// Changes the velocities of links with springs by all forces from t to t + h. Until the next kick they move
+/// without forces (physics A8).
 void CoupledGroup::kick(Real t, Real h, IntegratorWorkspace& work) {
   work.dp.resize(p_.size());
   set_all_forces(t, x_, p_, work.dp);
@@ -252,7 +253,7 @@ void CoupledGroup::kick(Real t, Real h, IntegratorWorkspace& work) {
   }
 }
 
-/// The number of kicks in a step.
+/// Returns the number of kicks in a step.
 Real CoupledGroup::kicks(Real h) const {
   Real count = 1;
   for (const Jointed& j : articulations_)
@@ -260,8 +261,9 @@ Real CoupledGroup::kicks(Real h) const {
   return std::min(count, kMostPieces);
 }
 
-/// No fixed-step integrator is accurate if bodies turn, or swing, by much more than this in a step. Links
-/// under high tension swing like the masses of a vibrating string.
+/// Returns the number of pieces into which a step is divided. No fixed-step integrator is accurate if bodies
+/// turn, or swing, by much more than kTurn or kSwing in a step. Links under high tension swing like the
+/// masses of a vibrating string.
 Real CoupledGroup::pieces(Real h) const {
   Real fastest = 0, tightest = 0, spin = 0;
   for (const Body* body : bodies_) spin = std::max(spin, greatest_spin(body->rigid));
@@ -297,8 +299,8 @@ void CoupledGroup::store(std::span<const Real> x, std::span<const Real> p) {
 void CoupledGroup::step(const Integrator& integrator, Real t, Real h, IntegratorWorkspace& work) {
   for (const Jointed& j : articulations_) j.articulation->transmit_impulses(t, joint_figures_);
   load(x_, p_);
-  // The shortest step that an adaptive integrator found for any member. It is stored in the bodies; without
-  // bodies it is unknown.
+  // The next step is the shortest that an adaptive integrator found for any member. Only bodies store it, so
+  // a group without bodies starts without one.
   work.next_step = 0;
   for (const Body* body : bodies_)
     if (const Real next = body->rigid.next_step; next > 0)
@@ -364,9 +366,9 @@ CoupledGroup::EnergyRate CoupledGroup::energy_rate(Real t, IntegratorWorkspace& 
 }
 
 /// Advances by a piece from t to t + h and projects the joints. Joints can make a link rotate much faster
-/// than the initial speeds suggest: if the axes and the arm of a universal joint become coplanar, a light
-/// link flips. Then the energy differs from the work of the forces, and the piece is halved. If halving does
-/// not help, the links are slowed down until no energy is gained.
+/// than the initial speeds suggest: a light link flips if the axes of a universal joint become coplanar with
+/// its arm. Then the energy differs from the work of the forces, and the piece is halved. If halving does not
+/// help, the links are slowed down until no energy is gained.
 void CoupledGroup::advance(const Integrator& integrator, Real t, Real h, int depth, int& halvings,
                            IntegratorWorkspace& work) {
   const std::vector<Real> x = x_, p = p_;
@@ -403,8 +405,8 @@ void CoupledGroup::advance(const Integrator& integrator, Real t, Real h, int dep
     ++joint_figures_.unsolved;  // the members do not move in this piece
   }
   for (const Jointed& j : articulations_) {
-    // The projection of the joints changes the angular momentum. (After contacts this is wanted: there the
-    // projection reverses displacements by the contacts.)
+    // The projection of the joints changes the angular momentum, which is restored. (After contacts the
+    // change is wanted: that projection reverses displacements by the contacts.)
     const bool is_free = !is_held(*j.articulation);
     const CommonMotion common = is_free ? common_motion(j.articulation->bodies()) : CommonMotion{};
     j.articulation->settle(t + h, joint_figures_);
@@ -440,7 +442,7 @@ void CoupledGroup::restore() {
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     RigidBody& body = bodies_[i]->rigid;
     body.next_step = saved_steps_[i];
-    // The exact bits are restored, because normalizing again might change the last one.
+    // The exact bits are restored, because another normalization might change the last one.
     body.orientation.coeffs() = Eigen::Map<const Eigen::Vector4d>(&saved_x_[kBodyX * i + 3]);
   }
 }

@@ -1,12 +1,13 @@
-/// Derivatives of the forces in a group of coupled objects, for implicit integration (physics N2). The blocks
-/// are the edges of the interaction graph.
+/// Derivatives of the forces in a group of coupled objects, for implicit integration (physics N2). The matrix
+/// has one block for each edge of the coupling graph.
 
 #include "sim/dynamics/rigid_jacobian.h"
 #include "sim/world/coupled_group.h"
 
 namespace offstage::sim {
 
-/// Derivatives of a spring's end by the state of its object, and of that object's rates by a force there.
+/// Derivatives at an end of a spring: of its place and velocity by the state of its object, and of that
+/// object's rates by a force at the end.
 struct CoupledGroup::EndDerivative {
   using Matrix3X = Eigen::Matrix<Real, 3, Eigen::Dynamic, 0, 3, 13>;
   using MatrixX3 = Eigen::Matrix<Real, Eigen::Dynamic, 3, 0, 13, 3>;

@@ -53,7 +53,7 @@ void CoupledSystem::gather(WorldState& world, std::span<Body* const> bodies, boo
     return;
   }
   const CouplingGraph graph(world);
-  // Groups in the order of their first members, which does not depend on addresses.
+  // The groups are ordered by their first members, and so do not depend on addresses.
   std::vector<std::size_t> index(graph.size(), CouplingGraph::kNone);
   std::vector<GroupMembers> networks;
   const auto has_network = [&](std::size_t component) { return index[component] != CouplingGraph::kNone; };

@@ -22,7 +22,7 @@ CouplingGraph::CouplingGraph(const WorldState& world) : world_(world) {
   for (std::size_t& parent : parent_) parent = parent_[parent];
 }
 
-/// Calls f(a, b) for each direct connection between two objects. a or b may be null, and both may be the same
+/// Calls f(a, b) for each direct connection of two objects. a or b may be null, and both may be the same
 /// object.
 template <class F>
 void CouplingGraph::for_each_link(F&& f) const {

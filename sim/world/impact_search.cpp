@@ -11,16 +11,15 @@
 namespace offstage::sim {
 namespace {
 
-/// Larger rotations in an interval are divided into pieces of this angle [rad], of which there are at most
-/// kMostTurns.
+/// Larger rotations in an interval are divided into at most kMostTurns pieces of this angle [rad].
 constexpr Real kImpactTurn = 0.5, kMostTurns = 512;
-/// If a body turns by more than this in an interval [rad], contact forces from its start soon become invalid,
-/// and the body is assumed to fly freely.
+/// If a body turns by more than this in an interval [rad], the contact forces of the interval's start soon
+/// become invalid, and the body is assumed to fly freely.
 constexpr Real kFastSpin = 3;
 
-/// A path that deviates from its chord by more than kStraight [m] is divided into at most kMostArcs pieces. A
-/// force counts as steady if the position at the end agrees with the mean velocity within the fraction
-/// kSteady of the change of velocity.
+/// A path that deviates from its chord by more than kStraight [m] is divided into at most kMostArcs pieces.
+/// The force counts as steady if the position at the end agrees with the mean velocity. The accepted
+/// difference is the fraction kSteady of the change of velocity.
 constexpr Real kStraight = 1e-5, kMostArcs = 8, kSteady = 0.05;
 Real spin(const Body& body) {
   return body.is_awake() ? body.start_twist.angular_velocity.norm() : 0;
@@ -31,7 +30,7 @@ Real turn_of(const ContactPair& pair) {
   return std::max(spin(pair.a()), spin(pair.b()));
 }
 
-/// Whether a body may touch with points that are not known at the interval's start. The known points of a rim
+/// Whether a body may touch at points that are not known at the interval's start. The known points of a rim
 /// or of a round side are only those that face the other body at the start.
 bool turns_other_points(const Body& body, Real duration) {
   return runs_along(body, duration) ||
@@ -43,8 +42,8 @@ uint32_t pieces_of(Real turn) {
   return static_cast<uint32_t>(std::clamp(std::ceil(turn / kImpactTurn), 1.0, kMostTurns));
 }
 
-/// Change of a body's velocity in its interval [m/s], if it is due to a steady force. Zero if the body was
-/// stopped within the interval, which is recognized by its position at the end.
+/// Returns the change of a body's velocity in its interval, if it is due to a steady force [m/s]. Returns
+/// zero if the body was stopped within the interval, which its position at the end shows.
 Vec3 bend(const Body& body, Real h) {
   if (!body.is_awake()) return Vec3::Zero();
   const Vec3 change = body.rigid.velocity() - body.start_twist.velocity;
@@ -53,7 +52,7 @@ Vec3 bend(const Body& body, Real h) {
   return steady ? change : Vec3(Vec3::Zero());
 }
 
-/// Pose at a time of its interval, on the parabola of a steady force.
+/// Returns the pose at a time of the interval, on the parabola of a steady force.
 Pose on_arc(const Body& body, Real time, Real h) {
   Pose pose = body.placed_at(time, h);
   if (time > body.from)
@@ -61,9 +60,9 @@ Pose on_arc(const Body& body, Real time, Real h) {
   return pose;
 }
 
-/// Time at which two bodies touch after conservative advancement has ended within its tolerance: the rest of
-/// the gap closes at the speed of the nearest points. Otherwise bounces would be early by the tolerance, and
-/// the errors would add up.
+/// Returns the time at which two bodies touch, after conservative advancement has ended within its tolerance.
+/// The rest of the gap closes at the speed of the nearest points. Without this correction, bounces would be
+/// early by the tolerance, and the errors would add up.
 Real touching_fraction(const Impact& impact, const PosePath& a, const PosePath& b) {
   const Separation& s = impact.separation;
   if (impact.fraction == 0 || !(s.distance > 0)) return impact.fraction;
@@ -77,15 +76,15 @@ Real touching_fraction(const Impact& impact, const PosePath& a, const PosePath& 
   return impact.fraction + std::min(s.distance / closing, 1 - impact.fraction);
 }
 
-/// A body in free rotation through its interval.
+/// Follows the free rotation of a body through its interval.
 class Tumbling {
  public:
-  /// A body that spins fast flies under gravity; the position of any other body is interpolated on a straight
-  /// line.
+  /// `spins_fast`: the body flies under gravity. Otherwise its position is interpolated on a straight line.
   Tumbling(const Body& body, const WorldDef& def, bool spins_fast, Real h)
       : body_(body), def_(def), spins_fast_(spins_fast), h_(h), turning_(body.at_start()), now_(body.from) {}
 
-  /// Pose at a time of the sub-step of length h, not before the time of the last call.
+  /// Returns the pose at a time of the sub-step of length h, which must not be before the time of the last
+  /// call.
   Pose continue_from(Real time) {
     if (!body_.is_awake()) return body_.placed_at(time, h_);
     fly(turning_, {def_.gravity, {}}, integrator(def_.integrator), now_, time - now_, work_);
@@ -113,14 +112,15 @@ std::optional<Impact> first_impact(const MovingShape& a, const MovingShape& b, c
              : time_of_impact(a, b, kTouching / 2);
 }
 
-/// A path describes at most half a turn, so faster rotations are divided into pieces.
+/// Returns the time of impact of two bodies that turn far. A path describes at most half a turn, so the
+/// motion is divided into pieces.
 std::optional<Real> tumbling_impact_time(const ContactPair& pair, const WorldDef& def, Real from, Real h,
                                          Real turn, TestCounts& tests) {
   const bool spins_fast = turn > kFastSpin;
   Tumbling body_a(pair.a(), def, spins_fast, h), body_b(pair.b(), def, spins_fast, h);
   Pose begin_a = body_a.continue_from(from), begin_b = body_b.continue_from(from);
   const uint32_t pieces = pieces_of(turn);
-  // Bodies that touch now have just met.
+  // Bodies that touch at the start have just collided with each other.
   const bool touches = pair.separation() <= kTouching;
   for (uint32_t i = 0; i < pieces; ++i) {
     const Real begin = from + (h - from) * i / pieces, end = from + (h - from) * (i + 1) / pieces;
@@ -132,13 +132,13 @@ std::optional<Real> tumbling_impact_time(const ContactPair& pair, const WorldDef
     const bool met = (i == 0 && touches) || ((impact = first_impact(a, b, def)) && impact->fraction == 0);
     if (met) impact = time_of_next_impact(a, b, kTouching / 2, def.collision_speed * (end - begin));
     if (impact) return begin + impact->fraction * (end - begin);
-    // The effect of the contact has ended by then, or the contact must be found again.
+    // The force of the contact at the start has ended by then, or the contact must be found again.
     if (spins_fast && touches) return end;
   }
   return std::nullopt;
 }
 
-/// Time at which bodies that touch at some points will touch at their other known points.
+/// Returns the time at which bodies that already touch at some points touch at their other known points.
 std::optional<Real> point_impact_time(const ContactPair& pair, const WorldDef& def, Real h) {
   const Body &a = pair.a(), &b = pair.b();
   const Real from = std::max(a.is_awake() ? a.from : 0, b.is_awake() ? b.from : 0);

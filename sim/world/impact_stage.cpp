@@ -18,8 +18,9 @@ constexpr std::size_t kMaxImpacts = 128, kImpactsPerBody = 4;
 /// Limits of the work of impacts in a sub-step, for the fast and for the exact solver [us]. In a pile each
 /// impact moves many bodies and causes hundreds of other impacts.
 constexpr std::size_t kImpactWork = 2000, kExactImpactWork = 80'000;
-/// Work of an impact for each body and contact point that is moved again, and for each near pair that is not
-/// of two spheres; work of a search for the time of impact of a pair for each piece of its path [us].
+/// Work of an impact: for each body and contact point that is moved again (kPointWork), and for each near
+/// pair that is not two spheres (kPairWork). kLookWork: work of a search for the time of impact of a pair,
+/// for each piece of its path [us].
 constexpr std::size_t kPointWork = 1, kPairWork = 3, kLookWork = 3;
 /// After this multiple of the limit, no pair is traced back in the rest of the sub-step.
 constexpr std::size_t kLastWork = 3;
@@ -29,18 +30,18 @@ constexpr std::size_t kLastWork = 3;
 /// would be solved once for each piece.
 constexpr Real kRimTurn = 0.1, kMostRimPieces = 16;
 constexpr std::size_t kMostRimBodies = 8;
-/// Greatest number of times that an island continues again from the same impact for new contacts of the same
-/// bodies.
+/// Greatest number of times that an island continues from the same impact because new contacts of the same
+/// bodies were found.
 constexpr int kMostPasses = 4;
 /// Contact points with a smaller separation take part in a collision [m].
 constexpr Real kCluster = 1e-4;
 
-/// Whether a body moves in the island of this number.
+/// Whether a body is awake and belongs to this island.
 bool is_in(const Body& body, uint32_t island) {
   return body.is_awake() && body.island == island;
 }
 
-/// Work of moving an island again [us].
+/// Returns the work of moving an island again [us].
 std::size_t impact_work(const Island& island) {
   std::size_t work = island.bodies.size();
   for (const ContactPair* pair : island.pairs)
@@ -48,8 +49,8 @@ std::size_t impact_work(const Island& island) {
   return kPointWork * work;
 }
 
-/// Speed that the forces in the rest of its interval, of this duration, have given to the points of a body
-/// [m/s].
+/// Returns the speed that forces have given to the points of a body in the rest of its interval, which lasts
+/// `duration` [m/s].
 Real speed_by_forces(const Body& body, Real duration) {
   const Vec3 shift = body.rigid.position - body.start.position;
   const Real slip = (shift - duration * body.start_twist.velocity).norm() / duration;
@@ -81,7 +82,7 @@ std::size_t ImpactStage::search(IsWanted&& is_wanted) {
   return work;
 }
 
-/// Adds the times at which the contacts of pairs whose contact point moves around a rim are updated.
+/// Adds events that update the contacts of pairs whose contact point moves around a rim.
 void ImpactStage::add_rim_updates() {
   for (ContactPair* pair : contacts_.pairs()) {
     if (pair->touching() == 0) continue;
@@ -98,8 +99,8 @@ void ImpactStage::resolve() {
   std::size_t work = search([](const ContactPair&) { return true; });
   add_rim_updates();
   if (pending_.empty()) return;
-  // An impact moves back only bodies that are connected to it by forces. Most others in an island are merely
-  // near; they join if the impact sends a body their way.
+  // An impact moves back only bodies to which it is connected by forces. Most others in an island are only
+  // near; they join if the impact sends a body towards them.
   find_moving_islands(world_, active_.awake(), contacts_.pairs(), touch_or_push, motion_.whole(), islands_);
 
   const std::size_t most_work = world_.is_exact() ? kExactImpactWork : kImpactWork;
@@ -134,7 +135,7 @@ void ImpactStage::resolve() {
   }
 }
 
-/// Decides whether later impacts of a pair in this sub-step are not traced back, and sets
+/// Decides whether later impacts of a pair in this sub-step are traced back, and if not, sets
 /// ContactPair::toi_exhausted. `count`: number of previous impacts; `work`: work of impacts so far [us].
 void ImpactStage::limit(ContactPair& pair, std::size_t count, std::size_t work) {
   const std::size_t most = kMaxImpacts + kImpactsPerBody * active_.awake().size();
@@ -146,7 +147,8 @@ void ImpactStage::limit(ContactPair& pair, std::size_t count, std::size_t work) 
   ++report_.impacts.toi_limit_reached;
 }
 
-/// Moves the islands of a pair's bodies to a time, and merges them. Returns the number of the merged island.
+/// Moves the islands of a pair's two bodies to a time, and merges them. Returns the number of the merged
+/// island.
 uint32_t ImpactStage::gather(const ContactPair& pair, Real time) {
   const uint32_t island = pair.a().is_awake() ? pair.a().island : pair.b().island;
   trace_back(islands_[island], time);
@@ -157,8 +159,8 @@ uint32_t ImpactStage::gather(const ContactPair& pair, Real time) {
   return island;
 }
 
-/// Merges an island with the islands that it will hit at `time` or later, and with the islands that those
-/// will hit. One solution then replaces many impacts.
+/// Merges an island with all islands that it will hit at `time` or later, and with those that these will hit.
+/// One solution then replaces many impacts.
 void ImpactStage::join_pending(uint32_t number, Real time) {
   for (bool grown = true; grown;) {
     grown = false;
@@ -185,7 +187,7 @@ void ImpactStage::suppress_restitution(uint32_t island) {
   }
 }
 
-/// Moves an island back to a time, with the contact forces until then.
+/// Moves an island back to a time, with the effect of the contact forces until then.
 void ImpactStage::trace_back(Island& island, Real time) {
   if (island.from >= time) return;
   island.motion->restore(island.bodies);
@@ -218,12 +220,12 @@ void ImpactStage::join(uint32_t into, uint32_t other) {
   y.articulations.clear();
 }
 
-/// Collides an island's bodies with each other and with the bodies that they touch at a time, and continues
-/// their motion from there. Returns its work [us].
+/// Collides an island's bodies with each other and with other bodies that they touch at a time, and continues
+/// their motion from there. Returns the work of this [us].
 std::size_t ImpactStage::collide(uint32_t number, Real time) {
   const std::span<ContactPair* const> pairs = contacts_.pairs();
-  // Bodies that they touch join the island, and in turn the bodies that those touch. The points of a pair are
-  // found again when its second body has joined, because that body was moved back.
+  // Bodies of other islands that these bodies touch join the island, and then their own neighbours. The
+  // points of a pair are found again when its second body has joined, because that body was moved back.
   std::vector<uint8_t> members(pairs.size(), 0);
   std::size_t work = 0;
   for (bool grown = true; grown;) {
@@ -264,16 +266,16 @@ std::size_t ImpactStage::collide(uint32_t number, Real time) {
   return work + static_cast<std::size_t>(outcome.cost / 1000);
 }
 
-/// Continues the motion of an island from an impact to the end of the sub-step. Its velocities have changed.
-/// Therefore it may hit other bodies, and other contacts may limit its motion. In this case the other islands
-/// are merged with it, and the motion is computed again.
+/// Continues the motion of an island from an impact to the end of the sub-step. Its velocities have changed,
+/// so it may hit other bodies, and other contacts may limit its motion. In this case the other islands are
+/// merged with it, and the motion is computed again.
 void ImpactStage::continue_from(uint32_t number, Real time) {
   std::size_t bodies = 0;
   int same = 0;  // passes since the last body joined
   for (bool joined = true; joined; ++same) {
     if (islands_[number].bodies.size() > bodies) same = 0;
     bodies = islands_[number].bodies.size();
-    if (same > kMostPasses) {  // the last motion stands
+    if (same > kMostPasses) {  // the result of the last pass is kept
       ++report_.impacts.toi_limit_reached;
       return;
     }
@@ -321,8 +323,8 @@ bool ImpactStage::join_next(uint32_t number, Real time) {
 }
 
 /// Merges the islands that an island overlaps now because its contact forces have moved it since `time`. Also
-/// finds contacts that were too far away for the first search. Returns whether there are any; all bodies must
-/// then be moved again.
+/// finds contacts that were too far away for the first search. Returns whether any were found; all bodies
+/// must then be moved again.
 bool ImpactStage::join_overtaken(uint32_t number, Real time) {
   const std::span<ContactPair* const> pairs = contacts_.pairs();
   for (Body* body : islands_[number].bodies)
@@ -335,7 +337,7 @@ bool ImpactStage::join_overtaken(uint32_t number, Real time) {
     if ((!has_a && !has_b) || pair.needs_toi) continue;
     const Body& other = has_a ? pair.b() : pair.a();
     const bool is_inside = has_a == has_b || !other.is_awake();
-    // The known points inside have limited the approach.
+    // The known points of this pair have limited its approach.
     if (is_inside && !pair.manifolds().empty()) continue;
     if (std::max(pair.a().impact_speed_bound, pair.b().impact_speed_bound) * (h_ - time) > kTouching)
       contacts_.find_points(pair, time, h_);
@@ -350,7 +352,8 @@ bool ImpactStage::join_overtaken(uint32_t number, Real time) {
     joined = true;
   }
   if (joined || new_inside.empty()) return joined;
-  // Points at internal edges do not limit the motion. They would be found and removed again and again.
+  // Points at internal edges do not limit the motion. If they were kept, they would be found and removed
+  // again and again.
   std::vector<ContactPair*> inside = islands_[number].pairs;
   inside.insert(inside.end(), new_inside.begin(), new_inside.end());
   contacts_.remove_internal_edge_contacts(inside, time, h_);
@@ -358,7 +361,7 @@ bool ImpactStage::join_overtaken(uint32_t number, Real time) {
                      [](const ContactPair* pair) { return !pair->manifolds().empty() && !pair->needs_toi; });
 }
 
-/// Whether any points of a pair may touch within the time `left` [s].
+/// Whether any contact point of a pair may close within the time `left` [s].
 bool ImpactStage::closes(const ContactPair& pair, Real left) const {
   for (const PlacedManifold& m : pair.manifolds())
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
@@ -369,7 +372,7 @@ bool ImpactStage::closes(const ContactPair& pair, Real left) const {
   return false;
 }
 
-/// Whether the points of a pair at a time overlap at the end of the sub-step.
+/// Whether any point of a pair, as it was at `time`, overlaps at the end of the sub-step.
 bool ImpactStage::overlaps_at_end(const ContactPair& pair, Real time) const {
   const auto displacement = [&](const Body& body, const Vec3& place) {
     const Vec3 local = body.placed_at(time, h_).point_to_body(place);
@@ -384,8 +387,8 @@ bool ImpactStage::overlaps_at_end(const ContactPair& pair, Real time) const {
   return false;
 }
 
-/// Updates the pairs of the bodies of an island. Bodies that leave their boxes in the broad phase have new
-/// neighbours, which may have to be woken.
+/// Updates the pairs of an island's bodies. Bodies that leave their boxes in the broad phase have new
+/// neighbours. Sleeping ones wake, and form an island of their own.
 void ImpactStage::find_pairs_again(uint32_t number) {
   if (!contacts_.follow(islands_[number].bodies)) return;
   std::vector<ContactPair*> near = islands_[number].pairs;

@@ -18,7 +18,8 @@ bool is_dynamic(const Body* body) {
   return body && body->is_dynamic();
 }
 
-/// Slots of the colliding bodies of a component that can move, ordered so that joined bodies are adjacent.
+/// Returns the slots of a component's colliding bodies, except immovable ones. Bodies connected by a joint
+/// are adjacent where possible.
 std::vector<uint32_t> colliding_links(std::span<Joint* const> component) {
   std::map<const Body*, std::vector<const Body*>> neighbours;
   const Body* first = nullptr;
@@ -43,8 +44,8 @@ std::vector<uint32_t> colliding_links(std::span<Joint* const> component) {
   return slots;
 }
 
-/// Whether the joint keeps its bodies moving: by a motor that moves now or later, or by a moving kinematic
-/// link.
+/// Whether a joint keeps its bodies moving: by a motor that moves now or later, or by a kinematic link that
+/// moves.
 bool drives(const Joint& joint, Real time) {
   const Motor& motor = joint.def.motor;
   const bool has_keys_left = motor.targets.size() > 1 && motor.targets.back().time > time;

@@ -22,7 +22,7 @@ void ParticleMotion::end_prewarm(bool is_last) {
   is_prewarming_ = false;
 }
 
-/// Whether a system is paused while others are prewarmed.
+/// Whether a system does not move, because other systems are being prewarmed.
 bool ParticleMotion::waits(ParticleSystemHandle system) const {
   return is_prewarming_ && std::find(waiting_.begin(), waiting_.end(), system) != waiting_.end();
 }
@@ -58,7 +58,8 @@ bool ParticleMotion::step(Real start, Real h, const CoupledSystem& coupled, Step
   return any_removed;
 }
 
-/// Moves the particles that collide with particles, of all systems together. Returns the work of pivoting.
+/// Moves the particles that collide with other particles, of all systems together. Returns the work of the
+/// solver.
 ContactWork ParticleMotion::collide(const ParticleStage& stage, const CoupledSystem& coupled) {
   std::vector<ParticleSystem*> colliding;
   world_.systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {

@@ -22,7 +22,7 @@ bool is_finite(const RigidBody& b) {
 }
 
 /// Returns the smallest number of equal sub-steps of a duration that are not longer than `longest`. A ratio
-/// that is an integer within rounding is rounded to it.
+/// within rounding of an integer counts as that integer.
 uint32_t substep_count(Real duration, Real longest) {
   const Real ratio = duration / longest;
   return static_cast<uint32_t>(std::clamp(std::ceil(ratio * (1 - 1e-12)), 1.0, kMaxSubsteps));
@@ -73,8 +73,7 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
   active.update();
   begin_bodies(start, end);
   if (!active.awake().empty() || !active.kinematic().empty() || !springs.empty() || !systems.empty()) {
-    // For few bodies a task arena of several threads would cost more than it gains, in particular on a busy
-    // machine.
+    // With few bodies, several threads would cost more time than they save, in particular on a busy machine.
     const auto bodies_move = [&] { move_bodies(start, h, report); };
     if (active.awake().size() < kWorthThreads && !has_pair_forces())
       serial.execute(bodies_move);
@@ -103,7 +102,7 @@ void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
     contact_solver.solve_all(islands, start, h, report);
     ImpactStage(*this, active, contacts, contact_solver, free_motion, islands, start, h, report).resolve();
   } else {
-    // Islands of the last sub-step with awake bodies must not fall asleep again.
+    // The islands of the last sub-step have no awake bodies any more; they must not fall asleep again.
     islands.clear();
     contacts.clear();
   }
@@ -169,7 +168,7 @@ void World::Impl::begin_kinematic(Real start, Real end) {
   for (Body* body : active.kinematic()) {
     const Motion motion = body->def.track.at(end, body->def.pose);
     if (body->def.track.jumps(start, end)) {
-      // The body jumps to the new pose: nothing is swept along in between.
+      // The body jumps to the new pose, and sweeps nothing on the way.
       wake_neighbours(*body);
       body->pose = motion.pose;
     }
@@ -214,8 +213,8 @@ bool World::Impl::is_within_bounds(const Body& body) const {
   return is_finite(body.rigid) && def.bounds.contains(body.rigid.position);
 }
 
-/// Makes a body static that has left the world's bounds or whose state is not finite. In the second case it
-/// gets its last finite pose.
+/// Makes a body static that has left the world's bounds or whose state is not finite. A body whose state is
+/// not finite gets its last finite pose.
 void World::Impl::retire(Body& body, StepReport& report) {
   if (body.is_dynamic() && !is_finite(body.rigid)) {
     if (report.finite) {
