@@ -9,8 +9,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Greatest product of the rate at which the air changes velocities and the time for which a linearisation is
-/// kept.
+/// A linearisation is kept until the air may have changed the velocities by this fraction.
 constexpr Real kMostChange = 0.1;
 /// Longest time for which a linearisation is kept, because normals turn [s].
 constexpr Real kLongestHold = 1.0 / 240;
@@ -59,8 +58,8 @@ void AirDrag::renew(ClothPoints& points, Real dt, uint32_t substeps, uint32_t st
   const uint32_t held = std::min(substeps, substeps_until_change(points, dt));
   left_ = held - 1;
   span_ = held * dt;
-  // N implicit steps of a linear force -J v let v fall by J t (1 - fraction J t (N + 1) / 2N): of second
-  // order with this fraction of J.
+  // N implicit steps of a linear force -J v reduce v by the factor 1 - J t (1 - fraction J t (N + 1) / 2N).
+  // The reduction is of second order with this fraction of J.
   fraction_ = static_cast<Real>(held) * steps / (static_cast<Real>(held) * steps + 1);
   for (std::size_t k = first_; k < first_ + n; ++k) points.acceleration[k] = points.outer[k];
   const ClothDef& def = cloth_->def;
@@ -86,7 +85,7 @@ void AirDrag::begin(Real h) {
     const auto& r = resistance_[i].at;
     const Real xx = 1 + h * r[0], yy = 1 + h * r[1], zz = 1 + h * r[2], xy = h * r[4], yz = h * r[5],
                zx = h * r[6];
-    // The inverse by cofactors.
+    // The inverse is computed from cofactors.
     const Real a = yy * zz - yz * yz, b = zx * yz - xy * zz, c = xy * yz - yy * zx;
     const Real scale = 1 / (xx * a + xy * b + zx * c);
     const auto loss = [&](Real cofactor) { return static_cast<float>(1 - scale * cofactor); };
@@ -102,7 +101,7 @@ void AirDrag::begin(Real h) {
   }
 }
 
-/// Linear drag of fields and hands.
+/// Adds the linear drag of fields.
 void AirDrag::drag_points(ClothPoints& points) {
   for (std::size_t i = 0; i < from_.size(); ++i) {
     const Real rate = points.field_drag[first_ + i];
@@ -112,12 +111,12 @@ void AirDrag::drag_points(ClothPoints& points) {
   }
 }
 
-/// F = c |u| D u with D = (C_D - C_L) 1 + C_L n n^T, a third to each corner. Its derivative is c (|u| D + D u
-/// u^T / |u|); with D u u^T D / u.D u in place of D u u^T it is symmetric, and exact for air along the normal
-/// and along the cloth. Where air stops the triangle within the time of the linearisation, the implicit
-/// fraction of the first term is increased, so that the triangle does not rebound. Together they are the
-/// exact c |u| D of u / (1 + k u t) along u then as well. Four triangles are computed at a time, one in each
-/// lane of a register.
+/// Adds the force of the air on each triangle: F = c |u| D u with D = (C_D - C_L) 1 + C_L n n^T, a third to
+/// each corner. The exact derivative is c (|u| D + D u u^T / |u|). Here D u u^T D / u.D u replaces D u u^T,
+/// which makes it symmetric, and keeps it exact for air along the normal and along the cloth. Where air stops
+/// the triangle within the time of the linearisation, the implicit fraction of the first term is increased,
+/// so that the triangle does not rebound. With both terms the result is exact along u, too: the velocity
+/// falls as u / (1 + k u t). Four triangles are computed at a time, one in each lane of a register.
 void AirDrag::drag_triangles(ClothPoints& points) {
   const std::size_t n = from_.size();
   wind_.resize(n);
@@ -133,7 +132,7 @@ void AirDrag::drag_triangles(ClothPoints& points) {
   }
 }
 
-/// Adds the forces on `count` triangles from a first one on, and their slopes, to those of their corners.
+/// Adds the forces on `count` triangles, from index `first` on, and their derivatives to their corners.
 void AirDrag::drag_triangles(const ClothPoints& points, std::size_t first, std::size_t count) {
   const ClothAir& air = cloth_->def.air;
   const auto& triangles = cloth_->triangles;
@@ -182,10 +181,11 @@ void AirDrag::drag_triangles(const ClothPoints& points, std::size_t first, std::
   }
 }
 
-/// An open cloth that faces the air stops the air that enters its mouth. Inside, the stagnation pressure
-/// builds up, everywhere the same. A fan over its border would close the surface, whose area vectors then add
-/// up to zero: the area vector of the mouth is the opposite of the cloth's. The pressure follows the mean
-/// velocity; each corner has the part of its slope that belongs to its area.
+/// Adds the pressure inside an open cloth that faces the air. Its mouth stops the air that enters, and the
+/// stagnation pressure builds up, equal everywhere inside. A fan over the border would close the surface, and
+/// the area vectors of a closed surface add up to zero. So the area vector of the mouth is the opposite of
+/// the cloth's. The pressure follows the mean velocity; its derivative is distributed over the corners by
+/// their areas.
 void AirDrag::catch_air(ClothPoints& points) {
   const ClothDef& def = cloth_->def;
   Vec3 cap = Vec3::Zero();

@@ -14,8 +14,8 @@ constexpr Real kNearBendLimit = 0.8;
 constexpr Real kBendTolerance = 1e-4;
 constexpr int kMaxBendSweeps = 60;
 /// Fraction of its excess that a patch keeps if it exceeded the limit already at the start of the sub-step.
-/// The limit does not consider springs: they would undo a sudden correction in the next sub-step, and the
-/// cloth would vibrate.
+/// The limit does not consider springs: in the next sub-step they would undo a full correction, and the cloth
+/// would vibrate.
 constexpr Real kKeepsOfExcess = 0.5;
 
 }  // namespace
@@ -76,7 +76,7 @@ void BendLimit::push(const ClothPoints& points, const Row& row, Real impulse) {
   }
 }
 
-/// Applies the impulses of the last sub-step as the initial guess.
+/// Solves for the impulses of all rows. The impulses of the last sub-step are the initial guess.
 void BendLimit::solve(const ClothPoints& points) {
   move_.assign(count_, Vec4::Zero());
   for (const Row& row : rows_)
@@ -98,8 +98,8 @@ void BendLimit::solve(const ClothPoints& points) {
   }
 }
 
-/// Moves the points by the impulses. Velocities change by the greatest fraction of them that adds no kinetic
-/// energy: a place that was bent too far before gets no velocity from its correction.
+/// Moves the points by the impulses. The velocities change by the greatest fraction of the moves that adds no
+/// kinetic energy. So the correction of a place that was bent too far before gives it no velocity.
 void BendLimit::apply(ClothPoints& points, Real dt, std::span<const Vec4> kick,
                       std::vector<VelocityCut>& cuts) {
   std::vector<Vec4> cut(count_, Vec4::Zero());

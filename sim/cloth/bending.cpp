@@ -12,28 +12,30 @@
 namespace offstage::sim {
 namespace {
 
-/// Greatest weight of a gradient times the size of the fan: beyond it, its points lie so near to a conic that
-/// they do not determine a quadratic polynomial.
+/// Limit of the gradient's greatest weight times the size of the fan. With a greater weight, the points lie
+/// so near to a conic that they do not determine a quadratic polynomial.
 constexpr Real kLargestWeight = 4;
-/// Weight of the second derivatives by the jumps of gradients, relative to those by recovered gradients. The
-/// former resist shapes that alternate from point to point, which the latter miss.
+/// Weight of the energy of the jump patches, relative to that of the recovered patches. The second
+/// derivatives by jumps resist shapes that alternate from point to point; those by recovered gradients miss
+/// such shapes.
 constexpr Real kJumpFraction = 0.05;
-/// Curvature of a patch by jumps over the curvature that it counts as. Beside a border or a crease of a
-/// smooth surface, the two can differ by as much as the curvature itself.
+/// Divisor of a jump patch's curvature, whose weights contain sqrt(kJumpFraction): it counts half. Next to a
+/// border or a crease of a smooth surface, the curvature by jumps can be too large by as much as the
+/// curvature itself.
 const Real kRoughCounts = 2 * std::sqrt(kJumpFraction);
 constexpr int kFilterIterations = 80;
-/// If the square of the step times the fastest frequency is above this, conjugate gradients take so many
-/// iterations that a factorisation is faster, up to this number of points.
+/// If the square of the step times the fastest frequency is above this, conjugate gradients need so many
+/// iterations that a factorisation is faster. It is used up to kMostFactorized points.
 constexpr Real kManyIterations = 20;
 constexpr std::size_t kMostFactorized = 30000;
-/// Square of the accepted residual over the right side.
+/// Square of the accepted residual, as a fraction of the square of the right side.
 constexpr Real kFilterTolerance2 = 1e-14;
-/// Curvature times size below which a triangle is flat at rest.
+/// A triangle is flat at rest if its curvature times its size is below this.
 constexpr Real kFlatAtRest = 1e-7;
 constexpr uint32_t kNoTriangle = ~0u, kNoPoint = ~0u;
 
 using Vec2 = Eigen::Vector2d;
-/// Weights of points in a gradient or in second derivatives (xx, yy, sqrt(2) xy).
+/// Weight of each point in a gradient, and in the second derivatives (xx, yy, sqrt(2) xy).
 using GradientWeights = std::map<uint32_t, Vec2>;
 using HessianWeights = std::map<uint32_t, Vec3>;
 
@@ -41,13 +43,13 @@ struct FlatPoint {
   uint32_t point;
   Vec2 place;
 };
-/// A triangle in the plane into which it was unfolded.
+/// A triangle after it was unfolded into a plane.
 struct FlatTriangle {
   uint32_t triangle;
   std::array<Vec2, 3> corners;
 };
 
-/// Adds scale times the gradient of the linear function on a triangle.
+/// Adds `scale` times the gradient of the linear function on a triangle.
 void add_gradient(const Triangle& t, const std::array<Vec2, 3>& corners, Real scale,
                   GradientWeights& weights) {
   const Vec2 b = corners[1] - corners[0], c = corners[2] - corners[0];
@@ -58,7 +60,7 @@ void add_gradient(const Triangle& t, const std::array<Vec2, 3>& corners, Real sc
   }
 }
 
-/// The cloth, and its triangles unfolded into the plane of any of them.
+/// A cloth at rest. Its triangles can be unfolded into the plane of any one of them.
 class Unfolding {
  public:
   Unfolding(std::span<const Vec3> rest, std::span<const Triangle> triangles)
@@ -86,7 +88,7 @@ class Unfolding {
     }
   }
 
-  /// A triangle as it lies in its own plane: from its first corner along x.
+  /// Returns a triangle in its own plane: the first corner is at the origin, and the first edge is along x.
   FlatTriangle own_plane(uint32_t t) const {
     const Triangle& own = triangles_[t];
     const Vec3 ab = rest_[own[1]] - rest_[own[0]], ac = rest_[own[2]] - rest_[own[0]];
@@ -95,7 +97,8 @@ class Unfolding {
   }
   uint32_t neighbour(uint32_t t, std::size_t k) const { return neighbours_[t][k]; }
 
-  /// The triangles around a point in the plane of the first of them, and those around their points if `wide`.
+  /// Returns the triangles around a point, unfolded into the plane of one of them. With `wide` it adds the
+  /// triangles around their points.
   std::vector<FlatTriangle> fan(uint32_t point, bool wide) const {
     std::vector<FlatTriangle> found;
     if (first_at_[point] == kNoTriangle) return found;
@@ -118,7 +121,7 @@ class Unfolding {
     return found;
   }
 
-  /// Triangle u beyond edge k of one that lies in the plane already.
+  /// Unfolds triangle u, the neighbour across edge k of the unfolded triangle `from`.
   FlatTriangle unfold(uint32_t u, const FlatTriangle& from, std::size_t k) const {
     const Triangle& t = triangles_[from.triangle];
     FlatTriangle result{u, {}};
@@ -143,17 +146,17 @@ class Unfolding {
   std::span<const Vec3> rest_;
   std::span<const Triangle> triangles_;
   std::vector<std::array<uint32_t, 3>> neighbours_;
-  std::vector<uint32_t> first_at_;  // a triangle at each point
+  std::vector<uint32_t> first_at_;  // by point: one of its triangles
 };
 
-/// The gradient at a point, in the plane of the first triangle of its fan.
+/// The weights of the gradient at a point, in the plane of the first triangle of its fan.
 struct Recovered {
   std::vector<FlatTriangle> fan;
   GradientWeights weights;
 };
 
-/// Fits a quadratic polynomial to all points. Returns the weights of the points in its gradient at the first
-/// point; empty if the points do not determine a polynomial.
+/// Fits a quadratic polynomial to the values at the points. Returns the weights of the points in its gradient
+/// at the first point, or nothing if the points do not determine a polynomial.
 std::optional<GradientWeights> polynomial_gradient(std::span<const FlatPoint> points) {
   if (points.size() < 6) return {};
   Real size = 0;
@@ -173,8 +176,8 @@ std::optional<GradientWeights> polynomial_gradient(std::span<const FlatPoint> po
   return weights;
 }
 
-/// Recovers the gradient at a point. `clamped`: flag of each triangle. At a clamped triangle the gradient of
-/// this triangle is used, and the others are ignored.
+/// Recovers the gradient at a point. `clamped`: by triangle, whether it is clamped. A point of clamped
+/// triangles gets the mean of their gradients, without the others.
 Recovered recover(const Unfolding& unfolding, std::span<const Triangle> triangles,
                   std::span<const uint8_t> clamped, uint32_t point) {
   Recovered result{unfolding.fan(point, false), {}};
@@ -204,7 +207,7 @@ Recovered recover(const Unfolding& unfolding, std::span<const Triangle> triangle
       return result;
     }
   }
-  result.fan = unfolding.fan(point, false);  // a strip too narrow for a polynomial
+  result.fan = unfolding.fan(point, false);  // the strip is too narrow for a polynomial
   average([](uint32_t) { return true; });
   return result;
 }
@@ -214,7 +217,8 @@ void add_outer_product(const Vec2& a, const Vec2& b, uint32_t point, HessianWeig
       Vec3(a.x() * b.x(), a.y() * b.y(), (a.x() * b.y() + a.y() * b.x()) / std::numbers::sqrt2);
 }
 
-/// Second derivatives on a triangle: of the linear function between the gradients recovered at its corners.
+/// Returns the second derivatives on a triangle. They are the derivatives of the linear function that has the
+/// recovered gradients at the three corners.
 HessianWeights recovered_hessian(const FlatTriangle& own, const Triangle& t,
                                  std::span<const std::optional<Recovered>> recovered) {
   HessianWeights weights;
@@ -223,8 +227,8 @@ HessianWeights recovered_hessian(const FlatTriangle& own, const Triangle& t,
   for (std::size_t k = 0; k < 3; ++k) {
     const Recovered& at = *recovered[t[k]];
     const auto in_fan = std::ranges::find(at.fan, own.triangle, &FlatTriangle::triangle);
-    if (in_fan == at.fan.end()) continue;  // another sheet that only touches at this point
-    // From the fan's plane to the triangle's own.
+    if (in_fan == at.fan.end()) continue;  // another sheet touches only at this point
+    // The rotation from the fan's plane to the triangle's own plane.
     const Vec2 there = (in_fan->corners[1] - in_fan->corners[0]).normalized();
     const Vec2 here = (own.corners[1] - own.corners[0]).normalized();
     Eigen::Matrix2d turn;
@@ -235,8 +239,9 @@ HessianWeights recovered_hessian(const FlatTriangle& own, const Triangle& t,
   return weights;
 }
 
-/// The same by the jumps of the gradients of the triangles: the boundary integral of the means of both sides
-/// over the area (Onate and Zarate, "Rotation-free triangular plate and shell elements", 2000).
+/// Returns the second derivatives from the jumps of the gradients at the edges: a boundary integral of the
+/// mean of both sides, divided by the area (Onate and Zarate, "Rotation-free triangular plate and shell
+/// elements", 2000).
 HessianWeights jump_hessian(const Unfolding& unfolding, const FlatTriangle& own,
                             std::span<const Triangle> triangles) {
   HessianWeights weights;
@@ -248,7 +253,7 @@ HessianWeights jump_hessian(const Unfolding& unfolding, const FlatTriangle& own,
     const Vec2 edge = own.corners[(k + 1) % 3] - own.corners[k], outward(edge.y(), -edge.x());
     GradientWeights jump;
     const FlatTriangle other = unfolding.unfold(u, own, k);
-    // The triangle on the other side may have the opposite winding.
+    // The triangle on the other side may have the opposite winding, which does not change its gradient.
     add_gradient(triangles[u], other.corners, 1 / doubled, jump);
     add_gradient(triangles[own.triangle], own.corners, -1 / doubled, jump);
     for (const auto& [point, w] : jump) add_outer_product(outward, w, point, weights);
@@ -256,10 +261,10 @@ HessianWeights jump_hessian(const Unfolding& unfolding, const FlatTriangle& own,
   return weights;
 }
 
-/// The two patches of a triangle: by recovered gradients, and by jumps of gradients.
+/// The two patches of a triangle: one by recovered gradients, the other by jumps of gradients.
 struct TrianglePatches {
   Real area;
-  Vec3 rest;  // unstressed curvature, of the first
+  Vec3 rest;  // unstressed curvature of the first patch
   HessianWeights smooth, rough;
 };
 
@@ -284,7 +289,7 @@ bool has_area(std::span<const Vec3> rest, const Triangle& t) {
   return (rest[t[1]] - rest[t[0]]).cross(rest[t[2]] - rest[t[0]]).norm() > 0;
 }
 
-/// Cross product of two edges of a triangle: twice its area, along its normal.
+/// Returns the cross product of two edges of a triangle: a vector along its normal, twice its area long.
 Vec3 cross_of(const Triangle& t, std::span<const Vec4> x) {
   const Vec3 a = x[t[0]].head<3>();
   return (x[t[1]].head<3>() - a).cross(x[t[2]].head<3>() - a);
@@ -335,8 +340,9 @@ void ClothBending::set_clamps(std::span<const uint32_t> clamp) {
   if (std::ranges::count(changed, 1) > 0) build(changed, std::vector<uint8_t>(rest_.size(), 0));
 }
 
-/// The triangles whose patches depend on changed ones. `near` are the corners that these had before.
-/// Gradients are recovered from up to two rings of triangles around a point.
+/// Returns by triangle whether its patches depend on changed triangles. `near`: by point, whether it was a
+/// corner of a changed triangle before the change. Gradients are recovered from up to two rings of triangles
+/// around a point.
 std::vector<uint8_t> ClothBending::affected(std::span<const uint8_t> changed,
                                             std::vector<uint8_t> near) const {
   for (std::size_t t = 0; t < triangles_.size(); ++t)
@@ -351,8 +357,8 @@ std::vector<uint8_t> ClothBending::affected(std::span<const uint8_t> changed,
   return result;
 }
 
-/// Builds the patches of changed triangles and of those that depend on them; the others stay. The result is
-/// that of building all, to the last bit. `moved_corners`: see affected().
+/// Builds the patches of changed triangles and of those that depend on them, and keeps the others. The result
+/// equals that of building all patches to the last bit. `moved_corners` is the argument `near` of affected().
 void ClothBending::build(std::span<const uint8_t> changed, std::vector<uint8_t> moved_corners) {
   const std::vector<uint8_t> builds = affected(changed, std::move(moved_corners));
   const auto old_patches = std::exchange(patches_, {});
@@ -361,7 +367,7 @@ void ClothBending::build(std::span<const uint8_t> changed, std::vector<uint8_t> 
   factor_.reset();
   const Unfolding unfolding(rest_, triangles_);
   std::vector<std::optional<Recovered>> recovered(rest_.size());
-  std::vector<uint8_t> rows(rest_.size(), 0);  // of the matrix that change
+  std::vector<uint8_t> rows(rest_.size(), 0);  // by point: whether its row of the matrix changes
   std::size_t old = 0;
   for (uint32_t t = 0; t < triangles_.size(); ++t) {
     for (; old < old_patches.size() && old_patches[old].triangle == t; ++old) {
@@ -403,11 +409,11 @@ void ClothBending::add_patch(Patch patch, std::span<const uint32_t> points, std:
   weights_.insert(weights_.end(), weights.begin(), weights.end());
 }
 
-/// Computes the given rows, and keeps the others. Both halves add up their entries in the order of the
-/// patches, and stay equal to the last bit.
+/// Computes the given rows of the matrix, and keeps the others. Both halves of the symmetric matrix add up
+/// their entries in the order of the patches, and so stay equal to the last bit.
 void ClothBending::build_matrix(std::span<const uint8_t> rows) {
   const std::size_t n = masses_.size();
-  // The places in points_ and weights_ of each point, and the patch of each place.
+  // The places of each point in points_ and weights_, and the patch of each place.
   std::vector<std::size_t> first(n + 1, 0);
   for (uint32_t point : points_) ++first[point + 1];
   for (std::size_t i = 0; i < n; ++i) first[i + 1] += first[i];
@@ -477,8 +483,8 @@ void ClothBending::build_matrix(std::span<const uint8_t> rows) {
 
 void ClothBending::multiply(std::span<const Vec4> p, Real scale, std::span<Vec4> y) const {
   for (std::size_t i = 0; i + 1 < upper_row_.size(); ++i) {
-    // Differences make the result independent of the cloth's place. There are two sums, because otherwise
-    // each addition would wait for the previous one.
+    // Differences of positions make the result independent of the cloth's place. There are two sums, because
+    // each addition to a single sum would wait for the previous one.
     const Vec4 own = p[i];
     Vec4 a = Vec4::Zero(), b = a;
     const auto couple = [&](std::size_t k, Vec4& sum) {
@@ -510,8 +516,8 @@ void ClothBending::add_damped_forces(std::span<const Vec4> x, std::span<const Ve
   if (curved_) add_rest_forces(x, 1, f);
 }
 
-/// Forces by the term -n b0 of the energy: along the normal at all points of a patch, and at the triangle's
-/// own corners by the rotation of its normal.
+/// Adds the forces by the term -n b0 of the energy. They act along the normal: on all points of a patch, and
+/// on the triangle's own corners because its normal turns with them.
 void ClothBending::add_rest_forces(std::span<const Vec4> x, Real scale, std::span<Vec4> f) const {
   for (const Patch& patch : patches_) {
     if (patch.rest == Vec3::Zero()) continue;
@@ -535,7 +541,7 @@ void ClothBending::add_rest_forces(std::span<const Vec4> x, Real scale, std::spa
   }
 }
 
-/// H x - n b0 of a patch, with the normal of its triangle.
+/// Returns the curvature H x - n b0 of a patch, where n is the normal of its triangle.
 Mat3 ClothBending::excess_curvature(const Patch& patch, std::span<const Vec4> x, const Vec3& normal) const {
   const Vec3 a = x[triangles_[patch.triangle][0]].head<3>();
   Mat3 h = Mat3::Zero();
@@ -573,7 +579,7 @@ void ClothBending::add_gradient(std::size_t index, std::span<const Vec4> x,
   for (uint32_t k = patch.first; k < patch.first + patch.count; ++k)
     gradient.emplace_back(points_[k], padded(direction * weights_[k]));
   if (patch.rest == Vec3::Zero() || !(cross.squaredNorm() > 0)) return;
-  // By the rotation of the normal, as in add_rest_forces().
+  // This part is due to the rotation of the normal, as in add_rest_forces().
   const Vec3 turning = direction * patch.rest;
   for (std::size_t k = 0; k < 3; ++k) {
     const Vec3 edge = (x[own[(k + 2) % 3]] - x[own[(k + 1) % 3]]).head<3>();
@@ -581,8 +587,8 @@ void ClothBending::add_gradient(std::size_t index, std::span<const Vec4> x,
   }
 }
 
-/// Factorizes M + stiff K, unless the last factor is for the same values. Lengths of equal steps may differ
-/// by rounding; they are compared in single precision.
+/// Factorizes M + stiff K, unless the last factor has the same values. Lengths of equal steps may differ by
+/// rounding, so `stiff` is compared in single precision.
 void ClothBending::factorize(std::span<const Real> masses, std::span<const Real> inverse_masses, Real stiff) {
   const auto rounded = static_cast<float>(stiff);
   if (factor_ && factor_stiff_ == rounded && std::ranges::equal(factor_masses_, inverse_masses)) return;
@@ -618,14 +624,14 @@ bool ClothBending::filter(std::span<const Real> masses, std::span<const Real> in
   residual_.assign(n, Vec4::Zero());
   image_.resize(n);
   direction_.resize(n);
-  multiply(moves, -stiff, residual_);  // M moves less (M + stiff K) moves
+  multiply(moves, -stiff, residual_);  // M moves - (M + stiff K) moves
   if (stiff * fastest_ > kManyIterations && n <= kMostFactorized) {
     factorize(masses, inverse_masses, stiff);
     filter_directly(inverse_masses, moves);
     return true;
   }
   Real scale = 0, rr = 0;
-  // Preconditioned by the masses alone, so that every iteration keeps the momentum.
+  // The masses alone are the preconditioner, so that every iteration keeps the momentum.
   const auto precondition = [&](const Vec4& r, std::size_t i) { return Vec4(r / masses[i]); };
   for (std::size_t i = 0; i < n; ++i) {
     if (!(inverse_masses[i] > 0)) residual_[i].setZero();

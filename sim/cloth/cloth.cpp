@@ -119,7 +119,7 @@ std::string problem(const ClothDef& def) {
 
 Real enclosed_volume(std::span<const Vec3> points, std::span<const Triangle> triangles) {
   if (triangles.empty()) return 0;
-  // Seen from one of its points, so that a place far from the origin costs no digits.
+  // Coordinates relative to one of the points keep their precision far from the origin.
   const Vec3& o = points[triangles[0][0]];
   Real six_fold = 0;
   for (const Triangle& t : triangles)

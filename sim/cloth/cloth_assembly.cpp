@@ -1,4 +1,4 @@
-/// The part of ClothSystem that lays out the points and springs of all cloths after each other.
+/// The part of ClothSystem that joins the points and springs of all cloths to common arrays.
 
 #include <algorithm>
 
@@ -17,7 +17,7 @@ void ClothSystem::assign(std::vector<Cloth*> cloths) {
   changed_ = true;
 }
 
-/// Lays out the points and springs of all cloths after each other.
+/// Joins the points and springs of all cloths to common arrays, one cloth after the other.
 void ClothSystem::assemble() {
   changed_ = false;
   points_ = {};
@@ -28,7 +28,7 @@ void ClothSystem::assemble() {
   first_spring_.clear();
   bend_limits_.clear();
   std::vector<StretchLimit::Limit> limits, ties;
-  std::vector<Triangle> colliding, touching;  // cloth; bodies
+  std::vector<Triangle> colliding, touching;  // with cloth; with bodies
   for (uint32_t c = 0; c < cloths_.size(); ++c) {
     Cloth& cloth = *cloths_[c];
     cloth.assign_bending();

@@ -5,7 +5,8 @@
 namespace offstage::sim {
 namespace {
 
-/// A pose moved by a shift of its point `centre` (body frame) and a small turn about it.
+/// Returns a pose after its point `centre` (body frame) has moved by `shift`, and the body has turned about
+/// it by a small angle.
 Pose moved(const Pose& pose, const Vec3& centre, const Vec3& shift, const Vec3& turn) {
   if (shift == Vec3::Zero() && turn == Vec3::Zero()) return pose;
   const Vec3 place = pose.point_to_world(centre) + shift;
@@ -16,7 +17,7 @@ Pose moved(const Pose& pose, const Vec3& centre, const Vec3& shift, const Vec3& 
   return result;
 }
 
-/// Adds the mass matrix of a point mass at `arm` from the centre.
+/// Adds the mass matrix of a point mass at the lever arm `arm`.
 void add_point_mass(Real mass, const Vec3& arm, Mat6& matrix) {
   const Mat3 cross = cross_matrix(arm);
   matrix.topLeftCorner<3, 3>().diagonal().array() += mass;
@@ -41,11 +42,11 @@ void ClothBody::fall_along_parabola(const Vec3& gravity) {
       (obstacle_.end.point_to_world(obstacle_.centre) - obstacle_.start.point_to_world(obstacle_.centre)) /
       h_;
   const Vec3 bow = (velocity_ - mean) * h_;
-  // A greater change of velocity is an impact.
+  // An impact causes a greater change of velocity.
   if (bow.norm() <= gravity.norm() * h_ * h_) bow_ = bow;
 }
 
-/// The pose on the path that the world computed, without the displacement due to cloth.
+/// Returns the pose on the path that the world computed, without displacement by cloth.
 Pose ClothBody::on_path(Real fraction) const {
   Pose pose = obstacle_.at(fraction);
   pose.position -= fraction * (1 - fraction) * bow_;

@@ -12,17 +12,17 @@ namespace offstage::sim {
 namespace {
 
 constexpr std::size_t kChunk = 1024;
-/// Fraction of an overlap that is taken back per sub-step of the world where a body lies on cloth that is
-/// supported: it is small, because the world moves the body only a sub-step later.
+/// Fraction of an overlap that is removed per sub-step of the world where a body lies on supported cloth. It
+/// is small, because the world moves the body only one sub-step later.
 constexpr Real kStabilization = 0.3;
-/// Two normals with a cosine below this face each other: cloth between them is pinched.
+/// Two normals face each other if the cosine of their angle is below this. Cloth between them is pinched.
 constexpr Real kFacing = -0.5;
 constexpr int kStopSweeps = 30;
 
 }  // namespace
 
-/// Finds the bodies near a point: those that it can reach within twice the distance that both move at their
-/// current speeds.
+/// Finds the bodies near a point. Near means within twice the distance that the two move relative to each
+/// other at their current speeds in a sub-step.
 void ClothContacts::look(const ClothPoints& points, uint32_t i, std::vector<Near>& found) const {
   const Vec3 p = points.at(i);
   const Vec3 v = points.velocity[i].head<3>();
@@ -58,7 +58,7 @@ void ClothContacts::find(const ClothPoints& points, std::span<const uint8_t> col
   const auto chunk = [&](std::size_t c) {
     for (std::size_t i = c * kChunk, end = std::min(points.size(), i + kChunk); i < end; ++i) {
       seen_at_[i] = points.at(i);
-      // Distance that acceleration may add; gravity alone causes 0.2 mm in 1/240 s.
+      // Acceleration may add this distance; gravity alone adds 0.2 mm in 1/240 s.
       seen_reach_[i] = points.thickness[i] + 2 * h * points.velocity[i].norm();
       if (collides[i]) look(points, static_cast<uint32_t>(i), found[c]);
     }
@@ -99,12 +99,13 @@ void ClothContacts::find_runaways(const ClothPoints& points) {
   near_.erase(std::unique(near_.begin(), near_.end(), same), near_.end());
 }
 
-/// Whether a point is nearer to a body than the cloth's thickness and `reach`, or came through its surface.
+/// Whether the gap between a point and a body is less than `reach`, or the point went through the surface.
+/// The gap is the distance minus the cloth's thickness. Sets `t`.
 bool ClothContacts::touch(const ClothPoints& points, Near& near, Real reach, Touch& t) const {
   ClothBody& body = bodies_[near.body];
   const Real thickness = points.thickness[near.point];
   const Vec3 place = body.end().point_to_body(points.at(near.point));
-  // The distance changes by no more than the point moves.
+  // The distance changes at most by the move of the point.
   const Real moved = (place - near.place).norm();
   if (near.distance - moved >= thickness + reach) return false;
   const Vec3 from = body.start().point_to_body(points.start_at(near.point));
@@ -117,7 +118,7 @@ bool ClothContacts::touch(const ClothPoints& points, Near& near, Real reach, Tou
       t.normal = body.end().vector_to_world(hit->normal);
       t.on_body = body.end().point_to_world(centre - hit->distance * hit->normal);
       near.place = place;
-      near.distance = -2 * thickness;  // unknown: it may be on the far side
+      near.distance = -2 * thickness;  // the distance is unknown: the point may be on the far side
       return t.gap < reach;
     }
   }
@@ -163,7 +164,7 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
     if (count == 0) continue;
     active_[points.cloth[point]] += count;
     touched_[points.cloth[point]] = 1;
-    // Fixed bodies come last, so that their surfaces are kept best.
+    // Contacts with fixed bodies come last. Errors at their surfaces are then smallest.
     std::stable_sort(touches_.begin(), touches_.end(), [](const Touch& a, const Touch& b) {
       return a.body->is_dynamic() > b.body->is_dynamic();
     });
@@ -183,8 +184,8 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
   }
 }
 
-/// Resolves the contact of two bodies that pinch a point, on velocities: the bodies must not approach. The
-/// point also transmits friction between them, which is more than its own mass could.
+/// Solves the contact of two bodies that pinch a point: their velocities must not approach. The point also
+/// transmits friction between them, which may be more than its own mass could cause.
 void ClothContacts::pinch(Touch& a, Touch& b, Real friction) {
   const Vec3 n = (a.normal - b.normal).normalized();
   const Real mobility = a.body->mobility(a.on_body, n) + b.body->mobility(b.on_body, n);
@@ -209,7 +210,7 @@ void ClothContacts::pinch(Touch& a, Touch& b, Real friction) {
   b.body->apply_impulse(held * along, b.on_body);
 }
 
-/// Contact of a body with a point that is pinned to the world or to another body.
+/// Solves the contact of a body with a point that is pinned to the world or to another body.
 void ClothContacts::block(Touch& t, ClothBody* holder) {
   if (holder == t.body) return;
   const Real mobility =

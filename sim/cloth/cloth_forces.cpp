@@ -10,13 +10,13 @@ namespace {
 
 constexpr Real kAirDensity = 1.2;  // of leaking gas without a density of its own [kg/m^3]
 
-/// Volume inside, at least a tenth of that at rest: a cloth that is crushed flat does not burst, and the
-/// remains of a torn cloth, which enclose nothing, do not keep their gas [m^3].
+/// Returns the volume inside a cloth [m^3], at least a tenth of the volume at rest. This minimum keeps cloth
+/// that is crushed flat from bursting. It also lets torn cloth, which encloses nothing, lose its gas.
 Real gas_volume(const Cloth& cloth) {
   return std::max(cloth.gas.volume(cloth.points, cloth.triangles), 0.1 * cloth.rest_volume);
 }
 
-/// Overpressure that the gas filled in so far would have at the current volume if none had leaked [Pa].
+/// Returns the overpressure without leaks: that of the gas filled in so far at the current volume [Pa].
 Real overpressure(const Cloth& cloth) {
   const Real let_in = cloth.age < cloth.def.inflate_time ? cloth.age / cloth.def.inflate_time : 1;
   return let_in * cloth.def.pressure * cloth.rest_volume / gas_volume(cloth);
@@ -32,7 +32,7 @@ bool leaks(const Cloth& cloth) {
   return cloth.def.pressure != 0 && cloth.version > 0 && cloth.gas.remaining_fraction() > 0 && !cloth.stopped;
 }
 
-/// The points of one cloth as their accelerations are made.
+/// The points of one cloth, to which forces are added.
 struct Run {
   const Cloth& cloth;
   std::size_t first;
@@ -42,9 +42,9 @@ struct Run {
 
   std::size_t size() const { return cloth.points.size(); }
   Vec3 at(std::size_t i) const { return points.at(first + i); }
-  /// A force on the whole cloth gives each point its fraction by mass.
+  /// Adds a force on the whole cloth. Each point gets a fraction in proportion to its mass.
   void accelerate(std::size_t i, const Vec3& force) { points.outer[first + i] += padded(force / total_mass); }
-  /// Adds a force `drag` times (velocity - the point's velocity) (air_drag.h).
+  /// Adds the force drag * (velocity - velocity of the point); see air_drag.h.
   void drag(std::size_t i, Real drag, const Vec3& velocity) {
     accelerate(i, drag * velocity);
     points.field_drag[first + i] += drag / total_mass;
@@ -106,7 +106,7 @@ void add(const PairLaw&, Run&) {
   static_assert(kIsPairLaw<PairLaw>);
 }
 
-/// A pressure inside, the same on all triangles.
+/// Adds a pressure inside the cloth, equal on all triangles.
 void push_out(Run& run, Real pressure) {
   for (const Triangle& t : run.cloth.triangles) {
     const Vec3 a = run.at(t[0]);
@@ -116,9 +116,9 @@ void push_out(Run& run, Real pressure) {
   }
 }
 
-/// The pressure of a gas at rest grows downwards by its weight, and so does that of the air. The corners of a
-/// triangle get the forces of a pressure that is linear over it. The force on a closed cloth is then exactly
-/// that of Archimedes, and acts at the centre of the volume.
+/// Adds the effect of the weight of gas and air. The pressure of a gas at rest grows downwards by its weight.
+/// The corners of a triangle get the forces of a pressure that is linear over it. So the force on a closed
+/// cloth is exactly that of Archimedes, and acts at the centre of the volume.
 void lift(Run& run, const Vec3& gravity) {
   const Cloth& cloth = run.cloth;
   if (!cloth.def.gas_density) return;
@@ -136,7 +136,7 @@ void lift(Run& run, const Vec3& gravity) {
   }
 }
 
-/// The overpressure that acts [Pa]; `lift` adds the weight of the gas.
+/// Returns the current overpressure [Pa], without the weight of the gas, which lift() adds.
 Real acting_pressure(const Cloth& cloth) {
   return cloth.gas.remaining_fraction() * overpressure(cloth);
 }
@@ -148,15 +148,16 @@ void inflate(Run& run, const Vec3& gravity) {
   lift(run, gravity);
 }
 
-/// Mass of the gas and the air that a skin of unit area moves when it bursts [kg/m^2]: that of a sphere of
-/// radius R that oscillates in air, rho_air R / 2, and of the gas in it, rho_gas R (Lamb, Hydrodynamics, art.
-/// 92). It is ten times that of the skin of a balloon, which without it would fly off faster than the gas.
+/// Returns the mass of the gas and air that a skin of unit area moves when it bursts [kg/m^2]. For a sphere
+/// of radius R that oscillates in air, this is rho_air R / 2 and rho_gas R for the gas in it (Lamb,
+/// Hydrodynamics, art. 92). It is ten times the mass of a balloon's skin, which would otherwise move away
+/// faster than the gas.
 Real moved_with_skin(const Cloth& cloth) {
   const Real radius = std::cbrt(3 * cloth.rest_volume / (4 * std::numbers::pi));
   return cloth.gas.remaining_fraction() * radius * (cloth.def.air.density / 2 + gas_density(cloth));
 }
 
-/// Sets the points' masses. Those of a torn skin move the gas, too.
+/// Sets the points' masses. The masses of a torn skin include the gas that it moves.
 void set_inertia(Run& run) {
   std::vector<Real> inertia = run.cloth.masses;
   if (leaks(run.cloth)) {

@@ -7,13 +7,13 @@
 namespace offstage::sim {
 namespace {
 
-/// A smaller remaining fraction of the overpressure counts as none.
+/// A smaller fraction of the overpressure counts as none.
 constexpr Real kLeastGas = 1e-3;
 
 }  // namespace
 
 void ClothGas::assign(std::span<const Triangle> triangles) {
-  // Edges without a counterpart in the opposite direction, by their start.
+  // Border edges, sorted by their start: they have no counterpart in the opposite direction.
   std::map<std::pair<uint32_t, uint32_t>, int> count;
   for (const Triangle& t : triangles)
     for (std::size_t k = 0; k < 3; ++k) ++count[{t[k], t[(k + 1) % 3]}];
@@ -40,7 +40,7 @@ Vec3 ClothGas::centre(const Hole& hole, std::span<const Vec3> points) const {
 
 Real ClothGas::volume(std::span<const Vec3> points, std::span<const Triangle> triangles) const {
   if (triangles.empty()) return 0;
-  // Seen from one of its points, so that a place far from the origin costs no digits.
+  // Coordinates relative to one of the points keep their precision far from the origin.
   const Vec3& o = points[triangles[0][0]];
   Real six_fold = 0;
   const auto add = [&](const Vec3& a, const Vec3& b, const Vec3& c) {
@@ -68,8 +68,8 @@ Real ClothGas::hole_area(std::span<const Vec3> points) const {
 
 void ClothGas::leak(std::span<const Vec3> points, Real volume, Real pressure, Real density, Real h) {
   if (holes_.empty() || !(volume > 0) || !(remaining_fraction_ > 0)) return;
-  // The fraction s falls as ds/dt = -s Q / V with the flow Q = kDischarge A sqrt(2 p s / density). Over a
-  // step in which area and volume stay, 1 / sqrt(s) grows linearly with the time.
+  // The remaining fraction s decreases as ds/dt = -s Q / V, with the flow Q = kDischarge A sqrt(2 p s /
+  // density). If area and volume are constant during a step, 1 / sqrt(s) grows linearly with the time.
   const Real flow = kDischarge * hole_area(points) * std::sqrt(2 * std::abs(pressure) / density);
   const Real root = 1 / (1 / std::sqrt(remaining_fraction_) + h * flow / (2 * volume));
   remaining_fraction_ = root * root;

@@ -1,5 +1,5 @@
-/// The part of ClothSystem for pinned points. They are pinned to the world, or to bodies, on which the cloth
-/// exerts forces.
+/// The part of ClothSystem for pinned points. Points are pinned to the world or to bodies, and the cloth
+/// exerts forces on these bodies.
 
 #include <algorithm>
 
@@ -7,7 +7,7 @@
 
 namespace offstage::sim {
 
-/// Pinned points have no inverse mass in this sub-step of the world.
+/// Finds the pinned points of this sub-step of the world. They have no inverse mass in it.
 void ClothSystem::find_held(Real time, std::span<ClothBody> bodies) {
   held_.clear();
   carriers_.clear();
@@ -46,7 +46,7 @@ void ClothSystem::attach(uint32_t point, ClothBody& body, const Vec3& place) {
   points_.carried[point] = 1;
 }
 
-/// Triangles whose corners are all pinned to one body are clamped.
+/// Marks triangles as clamped whose corners are all pinned to the same body.
 void ClothSystem::set_clamps(std::size_t c) {
   Cloth& cloth = *cloths_[c];
   if (cloth.bending.empty()) return;
@@ -66,9 +66,9 @@ void ClothSystem::move_held() {
   }
 }
 
-/// Applies the impulses at pins to the bodies. A body moves in the same way as the points of the cloth:
-/// impulses at the start of the sub-step act at once, impulses at its end act from the next sub-step on, and
-/// half of those in between acts at once. Bodies carry the mass of their pinned points, so they also provide
+/// Applies the impulses at pins to the bodies. Bodies move in the same way as points of the cloth: impulses
+/// at the start of the sub-step act at once, impulses at its end act from the next sub-step on, and half of
+/// the impulses within it acts at once. Bodies carry the mass of their pinned points, so they also provide
 /// the impulse that accelerates these points.
 void ClothSystem::apply_pin_impulses_to_bodies(Real dt) {
   const auto impulse_on = [&](uint32_t i) {
@@ -95,7 +95,7 @@ void ClothSystem::apply_pin_impulses_to_bodies(Real dt) {
       held.body->record_pin_impulse(impulse_on(held.point), points_.at(held.point));
 }
 
-/// Fraction of the impulses of a cloth's springs that moves bodies already in the sub-step.
+/// Returns the fraction of the springs' impulses that moves bodies already in this sub-step.
 Real ClothSystem::fraction_at_once(std::size_t cloth, Real dt) const {
   switch (cloths_[cloth]->def.integrator) {
     case ClothIntegrator::implicit:
@@ -110,7 +110,8 @@ Real ClothSystem::fraction_at_once(std::size_t cloth, Real dt) const {
   return 1;
 }
 
-/// Applies to bodies the impulses of contacts and of the stretch limit on the points that they hold.
+/// Applies the impulses of contacts and of the stretch limit on pinned points to the bodies that hold these
+/// points.
 void ClothSystem::push_holders(Real dt) {
   for (const Held& held : held_) {
     Vec4& pin_impulse = points_.pin_impulse[held.point];

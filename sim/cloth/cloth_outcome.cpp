@@ -10,7 +10,7 @@
 namespace offstage::sim {
 namespace {
 
-/// A cloth with a point that is faster than this has diverged [m/s]; waves along a thread are ten times
+/// A cloth diverges if one of its points is faster than this [m/s]. Waves along a thread are ten times
 /// slower.
 constexpr Real kLostSpeed = 5000;
 
@@ -51,7 +51,7 @@ bool ClothSystem::any_tears() const {
   return false;
 }
 
-/// Tears cloths after a fraction of the world's sub-step, and continues with the torn cloths.
+/// Tears cloths after a fraction of the world's sub-step. The rest of the sub-step uses the torn cloths.
 void ClothSystem::tear_within(const ClothWeather& weather, Real fraction) {
   time_ = weather.time + fraction * weather.h;
   write_back();
@@ -68,7 +68,8 @@ void ClothSystem::tear_within(const ClothWeather& weather, Real fraction) {
   corner_contacts_.find(points_, bodies_, weather.h);
 }
 
-/// Tears the threads that are too long, and reports the first tear.
+/// Tears the threads of a cloth that are too long, and reports its first tear. Returns the number of torn
+/// springs.
 uint32_t ClothSystem::tear_at(std::size_t c, Real time) {
   Cloth& cloth = *cloths_[c];
   ClothTear first{.time = time};
@@ -112,7 +113,7 @@ void ClothSystem::measure() {
   }
 }
 
-/// Stops cloths that diverge, before the search for their contacts: in a scattered cloth, nearly all pairs of
+/// Stops cloths that diverge, before their contacts are searched: in a scattered cloth nearly all pairs of
 /// triangles may touch, and the search would take too long.
 void ClothSystem::stop_diverged(Real dt) {
   const Real farthest2 = kLostSpeed * kLostSpeed * dt * dt;
@@ -126,7 +127,7 @@ void ClothSystem::stop_diverged(Real dt) {
   }
 }
 
-/// A cloth with non-finite numbers stays at its last finite state.
+/// Stops a cloth with non-finite numbers, and puts it back to its last finite state.
 void ClothSystem::stop(Cloth& cloth, std::size_t first) {
   cloth.stopped = true;
   cloth.report.finite = false;

@@ -12,31 +12,33 @@ namespace {
 
 /// Number of springs in a block, and the least number for which several threads are faster.
 constexpr std::size_t kBlock = 2048, kWorthThreads = 60000;
-/// Springs that are too stiff for the step are clamped, because one symmetric sweep would leave so much of
-/// the explicit step's excess that it grows. The ratio depends on all springs at both points. Without
-/// damping, a flat weave is stable up to h^2 k (1/m_a + 1/m_b) = 10. A weave sheared by 30 degrees is stable
-/// up to 2 to 3, and so is a mesh of triangles, where six springs meet (measured; an exact solution has no
-/// such limit). kMaxRatioOfAll limits them to 3.5 and 2.3.
+/// Springs that are too stiff for the step are clamped. Otherwise the error that one symmetric sweep leaves
+/// of the explicit step would grow. The limit of h^2 k (1/m_a + 1/m_b) depends on all springs at both points.
+/// Without damping, a flat weave is stable up to 10, a weave sheared by 30 degrees up to 2 to 3, and a mesh
+/// of triangles, where six springs meet, up to 2 to 3 (measured; an exact solution has no such limit).
+/// kMaxRatioOfAll limits the sheared weave to 3.5 and the mesh to 2.3.
 constexpr Real kMaxRatio = 6, kMaxRatioOfAll = 14;
-/// Limit of the step squared times the sum of k e / (l m) of the springs at both points, with the elongation
-/// e and the length l: the explicit step is stable up to 4 (Anderson and Morley, 1985). The remainder up to 4
-/// is a reserve for the stretch that a sub-step of the world adds.
+/// Limit of h^2 times the sum of k e / (l m) over the springs at both points, with the elongation e and the
+/// length l. The explicit step is stable up to 4 (Anderson and Morley, 1985). The rest is a reserve for the
+/// stretch that a sub-step of the world adds.
 constexpr Real kMaxAcross = 3;
-/// Up to this length over rest length, kMaxRatioOfAll keeps that limit: 3 / 14 > 1 - 1 / 1.14.
+/// Springs up to this multiple of their rest length obey kMaxAcross if they obey kMaxRatioOfAll: 3 / 14 > 1 -
+/// 1 / 1.14.
 constexpr Real kShortEnough = 1.14;
 /// A spring softer than this is never clamped.
 constexpr Real kSoftRatio = 0.5;
-/// Points as near as this have no direction between them [m^2].
+/// Points whose squared distance is below this have no direction between them [m^2].
 constexpr Real kNoLength2 = 1e-24;
 /// Mobility of a spring between two pinned points, which avoids a division by zero [1/kg].
 constexpr Real kNoMobility = 1e-100;
 
-/// Rounding of a stiffness that equals the limit of the step.
+/// A stiffness counts as equal to the limit of the step within this fraction.
 constexpr Real kRounding = 1e-5;
 
 typedef float SpringFloats __attribute__((vector_size(16)));
 
-/// Calls act(n) for the numbers of four chains, written out so that the state of each stays in registers.
+/// Calls act(n) for n = 0 to 3, the four chains of a sweep. The calls are written out so that the state of
+/// each chain stays in registers.
 template <class Act>
 [[gnu::always_inline]] inline void in_turns(Act&& act) {
   act(0);
@@ -58,7 +60,7 @@ inline FourVectors widened(const std::array<SpringFloats, 3>& v) {
 }  // namespace
 
 void ClothSprings::assign(std::span<const ClothSpring> springs, const ClothPoints& points) {
-  std::vector<Real> around(points.size(), 0);  // sum of k / m of the springs at each point
+  std::vector<Real> around(points.size(), 0);  // by point: sum of k / m of its springs
   for (const ClothSpring& s : springs)
     for (uint32_t end : {s.a, s.b}) around[end] += s.stiffness / points.mass[end];
   material_.clear();
@@ -81,11 +83,11 @@ void ClothSprings::assign(std::span<const ClothSpring> springs, const ClothPoint
   elastic_.clear();
   counterparts_.clear();
   batch_.clear();
-  std::vector<std::size_t> ends;  // of the batches of each colour
+  std::vector<std::size_t> ends;  // by colour: the end of its batches
   for (std::size_t i = 0; i < order.size();) {
     const uint32_t own = color_of(order[i]);
     // The last colour gets the paths for which no other colour is left, at points with very many springs.
-    // They are swept one at a time.
+    // These paths are swept one at a time.
     const std::size_t most = own + 1 == kPathColors ? 1 : kLanes;
     std::size_t end = i;
     while (end < order.size() && end < i + most && color_of(order[end]) == own) ++end;
@@ -101,7 +103,7 @@ void ClothSprings::assign(std::span<const ClothSpring> springs, const ClothPoint
   set_longest_step();
 }
 
-/// Paths of equal or decreasing length.
+/// Adds paths of equal or decreasing length as one batch.
 void ClothSprings::add_batch(std::span<const SpringPath* const> paths, std::span<const ClothSpring> springs) {
   Batch batch{row_.size(), paths[0]->springs.size(), kNone};
   const auto has_counterpart = [&](uint32_t spring) { return springs[spring].counterpart_rest > 0; };
@@ -114,7 +116,7 @@ void ClothSprings::add_batch(std::span<const SpringPath* const> paths, std::span
     Counterparts counterparts{};
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       const SpringPath& path = *paths[std::min(lane, paths.size() - 1)];
-      // Lanes without a path and the ends of shorter ones are read, but have no strength.
+      // Lanes without a path, and the rest of shorter paths, are read but have no stiffness.
       row.point[lane] = path.points[std::min(k, path.points.size() - 1)];
       counterparts.a[lane] = counterparts.b[lane] = row.point[lane];
       elastic.spring[lane] = kNoSpring;
@@ -144,7 +146,7 @@ void ClothSprings::add_stages(std::span<const std::size_t> color_ends) {
     if (begin == end) return;
     std::size_t longest = 1;
     for (std::size_t i = begin; i < end; ++i) longest = std::max(longest, batch_[i].length);
-    // Paths of the last colour may share points.
+    // Paths of the last colour may share points, so they are swept in order.
     const bool alone = color + 1 == kPathColors;
     const std::size_t block = alone ? end - begin : (kBlock / (kLanes * kChains * longest) + 1) * kChains;
     (kind == Stage::apply ? apply_ : relax_).push_back({kind, begin, end, block, alone});
@@ -160,7 +162,7 @@ void ClothSprings::set_longest_step() {
   longest_step_ = std::sqrt(square);
 }
 
-/// Elongations of the springs of a row, whose lengths are known.
+/// Returns the elongations of the springs of a row, from their lengths [m].
 inline Lanes ClothSprings::elongations(const Batch& batch, std::size_t r, Lanes length, const Vec4* x) const {
   const Lanes own = length - elastic_[r].rest;
   if (batch.counterparts == kNone) return own;
@@ -170,8 +172,8 @@ inline Lanes ClothSprings::elongations(const Batch& batch, std::size_t r, Lanes 
   return c.rest > none ? (own - lane_root(d.dot(d)) + c.rest) / 2 : own;
 }
 
-/// Calls look(batch, row, d) for the springs of each row, with the vectors d from their second points to the
-/// first.
+/// Calls look(batch, row, d) for each row, where d holds the vectors from the second to the first points of
+/// its springs.
 template <class Look>
 inline void ClothSprings::for_rows(const Vec4* x, Look&& look) const {
   for (const Batch& batch : batch_) {
@@ -192,7 +194,7 @@ void ClothSprings::adapt_to_stretch(const ClothPoints& points) {
   });
   const bool is_stretched = (too_long[0] | too_long[1] | too_long[2] | too_long[3]) != 0;
   if (!is_stretched && !is_stretched_) return;
-  std::vector<Real> across(points.size(), 0);  // sum of k e / (l m) of the springs at each point
+  std::vector<Real> across(points.size(), 0);  // by point: sum of k e / (l m) of its springs
   for_rows(x, [&](const Batch& batch, std::size_t r, const FourVectors& d) {
     const Lanes length = lane_root(d.dot(d)), elongation = elongations(batch, r, length, x);
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
@@ -209,7 +211,7 @@ void ClothSprings::adapt_to_stretch(const ClothPoints& points) {
   }
   is_stretched_ = is_stretched;
   set_longest_step();
-  if (clamped_ > 0 || prepared_for_ > longest_step_) prepared_for_ = -1;  // otherwise no stiffness changes
+  if (clamped_ > 0 || prepared_for_ > longest_step_) prepared_for_ = -1;  // else no stiffness changes
 }
 
 void ClothSprings::apply(ClothPoints& points, std::span<Vec4> moves) {
@@ -239,7 +241,7 @@ void ClothSprings::run(std::span<const Stage> stages, ClothPoints& points, std::
 }
 
 /// Prepares the values that depend only on the length of the step and on which points are pinned. Lengths of
-/// equal steps may differ by rounding errors of times; they are compared in single precision.
+/// equal steps may differ by rounding, so they are compared in single precision.
 void ClothSprings::begin(const ClothPoints& points, Real step) {
   const Real h = static_cast<float>(step);
   if (h == prepared_for_ && points.inverse_mass == inverse_mass_) return;
@@ -273,8 +275,8 @@ void ClothSprings::begin(const ClothPoints& points, Real step) {
   }
 }
 
-/// Calls act(lane) for the lanes of a row that have its point. Most rows have it in all, and their registers
-/// are then used without a detour by memory.
+/// Calls act(lane) for the lanes of a row that have a point. Most rows have one in every lane. The calls are
+/// then written out, so that the values stay in registers.
 template <class Act>
 inline void ClothSprings::for_lanes(const Row& row, Act&& act) {
   if (row.count == kLanes) {
@@ -287,7 +289,7 @@ inline void ClothSprings::for_lanes(const Row& row, Act&& act) {
   for (std::size_t lane = 0; lane < row.count; ++lane) act(lane);
 }
 
-/// Adds impulses to pinned points.
+/// Adds the impulses of a row of springs to the pinned points among its points.
 void ClothSprings::pass_on(ClothPoints& points, const Row& row, const FourVectors& impulse) {
   for (uint32_t lane = 0; lane < row.count; ++lane)
     if ((row.held >> lane & 1) != 0)
@@ -300,7 +302,7 @@ inline void ClothSprings::store(std::span<Vec4> moves, const Row& row, const Fou
   for_lanes(row, put);
 }
 
-/// The explicit step, and the directions for the sweep.
+/// Makes the explicit step of a batch, and stores the directions of the springs for the sweep.
 void ClothSprings::apply(ClothPoints& points, std::span<Vec4> moves, const Batch& batch) {
   const Vec4* const x = points.start.data();
   FourVectors at = FourVectors::of(x, row_[batch.first].point), before = {};
@@ -327,9 +329,8 @@ void ClothSprings::apply(ClothPoints& points, std::span<Vec4> moves, const Batch
   give(row_[batch.first + batch.length], before);
 }
 
-/// Relaxes the springs of a row, whose points have the moves `at` and `next`; `after` is the row of the
-/// latter. Gauss-Seidel on the impulses, which are zero at first: the equation of a spring is
-/// r + impulse / c = 0.
+/// Relaxes the springs of a row by Gauss-Seidel on their impulses, which are zero at first: r + impulse / c =
+/// 0 for each spring. `at` and `next`: moves of the points of this row and of the row `after` it.
 inline void ClothSprings::relax(ClothPoints& points, Row& row, const Row& after, FourVectors& at,
                                 FourVectors& next) {
   const FourVectors axis = widened(row.axis);
@@ -360,8 +361,8 @@ inline void ClothSprings::relax_backward(ClothPoints& points, std::span<Vec4> mo
   next = at;
 }
 
-/// Up to kChains batches of one colour in turns: each row of a batch waits for the result of the previous
-/// one, and meanwhile the processor can work on the others.
+/// Sweeps up to kChains batches of one colour in turns. Each row of a batch waits for the result of the
+/// previous one; meanwhile the processor can work on the other batches.
 void ClothSprings::sweep_forward(ClothPoints& points, std::span<Vec4> moves, std::span<const Batch> batches) {
   std::array<FourVectors, kChains> at;
   for (std::size_t n = 0; n < batches.size(); ++n)

@@ -8,13 +8,14 @@
 namespace offstage::sim {
 namespace {
 
-/// Number of solutions for contacts with bodies and the stretch limit together.
+/// Greatest number of rounds that solve contacts with bodies and the stretch limit together.
 constexpr int kMaxTurns = 16;
 /// Greatest number of sub-steps of cloth in one of the world.
 constexpr Real kMaxParts = 1000;
-/// Greatest distance that a body may approach cloth in a sub-step, in edges of triangles.
+/// Greatest distance by which a body may approach cloth in a sub-step, as a fraction of the mean edge of the
+/// triangles.
 constexpr Real kMostApproach = 0.1;
-/// Greatest relative displacement of the ends of a spring in a sub-step, in lengths of the spring.
+/// Greatest relative displacement of a spring's ends in a sub-step, as a fraction of the spring's length.
 constexpr Real kMostStrain = 1;
 /// Greatest number of parts into which a sub-step is divided for these two limits.
 constexpr Real kMostDivision = 16;
@@ -28,7 +29,7 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
   parts_ = parts_in(weather.h, speed);
   dt_ = weather.h / parts_;
   time_ = weather.time + weather.h;
-  Real since_look = 0;  // distance moved by the fastest body [m]
+  Real since_look = 0;  // distance moved by the fastest body since the last search [m]
   for (Real k = 0; k < parts_; ++k) {
     for (Cloth* cloth : cloths_) cloth->age += dt_;
     apply_air(dt_, parts_ - k);
@@ -38,8 +39,8 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
     next.h = dt_;
     for (std::size_t c = 0; c < cloths_.size(); ++c)
       if (step_leak(*cloths_[c], first_[c], next, points_)) air_[c].expire();
-    // A body that moves by more than an edge of the cloth in a sub-step of the world must meet the holes that
-    // it has torn.
+    // A body that moves by more than an edge of the cloth in a sub-step of the world must pass through the
+    // holes that it has torn. So torn cloth is updated on the way.
     since_look += speed * dt_;
     if (since_look > corner_contacts_.mean_edge() && k + 1 < parts_) {
       since_look = 0;
@@ -50,8 +51,8 @@ void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies)
   write_back();
 }
 
-/// Prepares the values that are constant in a sub-step of the world: outer forces, pins, and bodies that
-/// points may touch.
+/// Prepares the values that are constant in a sub-step of the world: forces from outside, pins, and the
+/// bodies near the points.
 void ClothSystem::begin_step(const ClothWeather& weather, std::span<ClothBody> bodies) {
   if (changed_) assemble();
   bodies_ = bodies;
@@ -70,16 +71,17 @@ void ClothSystem::begin_step(const ClothWeather& weather, std::span<ClothBody> b
   corner_contacts_.find(points_, bodies, weather.h);
 }
 
-/// Returns the number of sub-steps of cloth in one of the world, if bodies approach it at `speed`.
+/// Returns into how many sub-steps of cloth a sub-step of the world is divided, if bodies approach it at
+/// `speed` [m/s].
 Real ClothSystem::parts_in(Real h, Real speed) const {
   Real longest = h;
   for (const Cloth* cloth : cloths_) longest = std::min(longest, cloth->def.substep);
   const Real shortest = longest / kMostDivision;
   if (speed > 0)
     longest = std::min(longest, std::max(kMostApproach * corner_contacts_.mean_edge() / speed, shortest));
-  // In one long sub-step, the moves of fast cloth such as torn skin would be shortened only far from where
-  // they began. Springs between points with and without shortened moves would then gain much more energy than
-  // motion loses.
+  // Fast cloth such as torn skin needs short sub-steps. In a long one, its moves would be shortened only far
+  // from their start. Springs between points with and without shortened moves would then gain much more
+  // energy than the motion loses.
   if (const Real rate = fastest_strain_rate(); rate > 0)
     longest = std::min(longest, std::max(kMostStrain / rate, shortest));
   return std::clamp(std::ceil(h / longest * (1 - 1e-12)), 1.0, kMaxParts);
@@ -103,9 +105,10 @@ void ClothSystem::substep(Real from, Real to, Real dt) {
   end_substep(dt);
 }
 
-/// Bodies push cloth off their path. Where springs are too long, contacts and springs are solved together,
-/// and linearised again in each iteration. That includes bodies that cloth does not touch in this sub-step
-/// but soon may: cloth under a body often flies ahead of it for a sub-step.
+/// Solves the contacts of cloth with bodies, which push it off their path. Where springs are too long,
+/// contacts and springs are solved together, and linearised again in each round. This includes bodies that
+/// cloth does not touch in this sub-step but soon may: cloth under a body often moves ahead of it for a
+/// sub-step.
 void ClothSystem::touch_bodies(Real dt) {
   contacts_.find_runaways(points_);
   corner_contacts_.solve(points_, dt, cuts_);
@@ -119,8 +122,8 @@ void ClothSystem::touch_bodies(Real dt) {
   }
 }
 
-/// Contacts of triangles with dynamic bodies. An initial overlap is removed slowly, because the correction
-/// counts as velocity.
+/// Collects the contacts of triangles with dynamic bodies. An initial overlap is removed slowly, because the
+/// correction counts as velocity.
 void ClothSystem::collect_triangles() {
   const std::size_t first = body_contacts_.size();
   corner_contacts_.collect(points_, 1, body_contacts_);
@@ -132,8 +135,8 @@ void ClothSystem::collect_triangles() {
   }
 }
 
-/// The greatest relative speed of both ends of a spring over its length at rest, in cloths with
-/// self-collision [1/s].
+/// Returns the greatest relative speed of both ends of a spring divided by its length at rest [1/s], in
+/// cloths with self-collision.
 Real ClothSystem::fastest_strain_rate() const {
   Real fastest2 = 0;
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
@@ -150,8 +153,8 @@ void ClothSystem::adapt_springs() {
     if (cloths_[c]->def.integrator == ClothIntegrator::relaxed) springs_[c].adapt_to_stretch(points_);
 }
 
-/// Updates the drag of the air before a sub-step of length `dt`; `left` sub-steps of the world's sub-step
-/// remain.
+/// Updates the drag of the air before a sub-step of length `dt`. `left`: how many sub-steps of cloth remain
+/// in the world's sub-step.
 void ClothSystem::apply_air(Real dt, Real left) {
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     const bool relaxed = cloths_[c]->def.integrator == ClothIntegrator::relaxed;
@@ -159,7 +162,7 @@ void ClothSystem::apply_air(Real dt, Real left) {
   }
 }
 
-/// Number of steps of the springs in a sub-step of a `relaxed` cloth.
+/// Returns the number of steps of the springs in a sub-step of a cloth with the integrator `relaxed`.
 uint32_t ClothSystem::spring_steps(std::size_t cloth, Real dt) const {
   if (cloths_[cloth]->def.soften) return 1;
   const Real longest = std::max(springs_[cloth].longest_step(), kShortestSpringStep);

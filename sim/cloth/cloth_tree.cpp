@@ -16,15 +16,16 @@ namespace {
 /// A patch is flat enough if all its normals have at least this cosine with a common direction.
 constexpr float kLeaning = 0.3F;
 
-/// The same for the triangles around a point: an angle a then appears as at most 2 atan(tan(a / 2) / cosine)
-/// < a / cosine.
+/// The same limit for the triangles around a point. An angle a between them then appears as less than a /
+/// cosine: it is at most 2 atan(tan(a / 2) / cosine).
 constexpr float kStarLeaning = 0.7F;
-/// Factor by which strain may increase a triangle's angles.
+/// Strain may increase the angles of a triangle by this factor.
 constexpr Real kStrainedAngle = 1.15;
 
 constexpr uint32_t kNone = ~0u;
 
-/// The triangle across each edge; none at borders and where more than two meet.
+/// Returns by triangle the neighbour across each edge; kNone at borders and where more than two triangles
+/// meet.
 std::vector<std::array<uint32_t, 3>> neighbours(std::span<const Triangle> triangles) {
   std::vector<std::array<uint32_t, 3>> beside(triangles.size(), {kNone, kNone, kNone});
   struct Edge {
@@ -46,7 +47,7 @@ std::vector<std::array<uint32_t, 3>> neighbours(std::span<const Triangle> triang
   return beside;
 }
 
-/// Twice the area of a triangle in the plane.
+/// Returns twice the signed area of a triangle in the plane.
 Real turn(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
   return (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x());
 }
@@ -63,15 +64,16 @@ std::vector<uint32_t> pieces(std::span<const Triangle> triangles, std::size_t po
   return piece;
 }
 
-/// Unit normal of a triangle; zero without an area.
+/// Returns the unit normal of a triangle, or zero if it has no area.
 Vec4 unit_normal(const Triangle& t, std::span<const Vec4> x) {
   const Vec4 n = (x[t[1]] - x[t[0]]).cross3(x[t[2]] - x[t[0]]);
   const Real size = n.norm();
   return size > 0 ? Vec4(n / size) : Vec4(Vec4::Zero());
 }
 
-/// Directions evenly over the sphere, at most 20 degrees from any other: those with the components 0 0 1, 1 1
-/// 1, 0 1 2 and 1 2 2 in any order and with any signs. The last two of 64 are zero.
+/// 62 directions that cover the sphere evenly: every direction is within 20 degrees of one of them. They have
+/// the components 0 0 1, 1 1 1, 0 1 2 and 1 2 2 in any order and with any signs. The last two of the 64 are
+/// zero.
 struct Directions {
   alignas(32) std::array<std::array<float, 64>, 3> axis = {};
 
@@ -88,7 +90,7 @@ struct Directions {
           ++count;
         }
   }
-  /// The mean of some of them.
+  /// Returns the mean of some of the directions; `some` has a bit for each.
   Vec3 mean(uint64_t some) const {
     Vec3 sum = Vec3::Zero();
     for (; some != 0; some &= some - 1) {
@@ -135,7 +137,7 @@ void ClothTree::build(std::span<const Triangle> triangles, std::span<const Vec4>
 void ClothTree::build_stars(std::span<const Vec4> rest) {
   stars_.assign(rest.size(), {});
   std::vector<Real> angle(rest.size(), 0);
-  std::vector<uint32_t> joined(rest.size(), 0);  // neighbours in a star that share an edge
+  std::vector<uint32_t> joined(rest.size(), 0);  // by point: neighbours in its star that share an edge
   for (std::size_t t = 0; t < triangles_.size(); ++t)
     for (std::size_t k = 0; k < 3; ++k) {
       const Triangle& p = triangles_[t];
@@ -150,7 +152,7 @@ void ClothTree::build_stars(std::span<const Vec4> rest) {
     Star& star = stars_[i];
     star.first = first;
     first += star.count;
-    // Each edge that leads from the point counts once for the triangle that it is the first edge of.
+    // Every shared edge at the point counts once: for the triangle whose edge starts at the point.
     const bool closed = joined[i] == star.count, fan = joined[i] + 1 == star.count;
     const Real seen = angle[i] * kStrainedAngle / kStarLeaning;
     star.simple = (closed && seen < 4 * std::numbers::pi) || (fan && seen < 2 * std::numbers::pi);
@@ -161,11 +163,12 @@ void ClothTree::build_stars(std::span<const Vec4> rest) {
     for (uint32_t i : triangles_[order_[place]]) around_[stars_[i].first + taken[i]++] = place;
 }
 
-/// The triangles that share a point with any that shares a point with a triangle.
+/// Finds for each triangle the two rings around it: the triangles that share a point with one that shares a
+/// point with it.
 void ClothTree::build_rings() {
   ring_.clear();
   first_in_ring_ = {0};
-  std::vector<uint32_t> seen_by(order_.size(), kNone);  // at each place: the last triangle that met it
+  std::vector<uint32_t> seen_by(order_.size(), kNone);  // by place: the last triangle whose rings contain it
   for (uint32_t at = 0; at < order_.size(); ++at) {
     const std::size_t first = ring_.size();
     const auto add = [&](uint32_t place) {
@@ -204,8 +207,9 @@ void ClothTree::fit_star(Star& star) const {
                });
 }
 
-/// Two rings of triangles are seen as one sheet from a direction towards which all of them lean steeply: at
-/// none of their points is there a notch or a slit, as `simple` stars tell.
+/// Finds out whether the two rings around a triangle appear as one sheet from some direction. They do if all
+/// of their triangles lean steeply towards this direction and if all stars are `simple`, so that there is no
+/// notch or slit at any point.
 void ClothTree::fit_rings() {
   views_around_.assign(stars_.size(), ~Views{0});
   for (const Triangle& t : triangles_) {
@@ -218,8 +222,8 @@ void ClothTree::fit_rings() {
   }
 }
 
-/// Whether the outline of a patch, seen along a direction towards which it leans, crosses itself: sweeps over
-/// its segments.
+/// Whether the outline of a patch crosses itself, seen along a direction towards which the patch leans. The
+/// test sweeps over the segments of the outline.
 bool ClothTree::outline_crosses(std::span<const Vec4> points, const Node& node) const {
   if (node.count <= EightBoxes::kCount) return true;  // testing its triangles one by one costs no more
   const Vec3 normal = kDirections.mean(node.views);
@@ -254,7 +258,8 @@ bool ClothTree::outline_crosses(std::span<const Vec4> points, const Node& node) 
   return false;
 }
 
-/// Parts between pieces first; a piece is halved along its longest axis.
+/// Builds the tree over a range of triangles. It first separates connected pieces, and then halves each piece
+/// along its longest axis.
 uint32_t ClothTree::build_below(const std::vector<Vec4>& centres, uint32_t first, uint32_t count) {
   const auto at = static_cast<uint32_t>(nodes_.size());
   nodes_.emplace_back();
@@ -265,7 +270,7 @@ uint32_t ClothTree::build_below(const std::vector<Vec4>& centres, uint32_t first
   if (count <= EightBoxes::kCount) return at;
   uint32_t half = (count / 2 + EightBoxes::kCount - 1) / EightBoxes::kCount * EightBoxes::kCount;
   if (!nodes_[at].connected) {
-    // Where the piece in the middle begins or, if that is the first, ends.
+    // The start of the piece in the middle or, if this is the first piece, its end.
     const auto begin = order_.begin() + first;
     const uint32_t middle = piece_[*(begin + half)];
     const auto same = [&](uint32_t t) { return piece_[t] == middle; };
@@ -349,7 +354,7 @@ void ClothTree::fit_node(uint32_t at) {
   }
 }
 
-/// The nodes above newly fitted triangles, children before their parents.
+/// Fits the nodes above newly fitted triangles; children come before their parents.
 void ClothTree::fit_above() {
   for (auto k = static_cast<uint32_t>(nodes_.size()); k-- > 0;) {
     Node& node = nodes_[k];

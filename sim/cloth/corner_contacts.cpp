@@ -9,10 +9,11 @@
 namespace offstage::sim {
 namespace {
 
-/// Triangles that are steeper than this against a feature's outward direction do not lie over it.
+/// A triangle lies over a feature if the cosine between its normal and the feature's outward direction is at
+/// least this.
 constexpr Real kLeastCosine = 0.3;
-constexpr int kMaxSamples = 32;            // of an edge
-constexpr std::size_t kMaxCorners = 2000;  // of a mesh
+constexpr int kMaxSamples = 32;            // per edge
+constexpr std::size_t kMaxCorners = 2000;  // per mesh
 
 int samples(Real length, Real spacing, int least) {
   return std::clamp(static_cast<int>(std::ceil(length / spacing)), least, kMaxSamples);
@@ -41,7 +42,8 @@ std::vector<CornerContacts::Corner> CornerContacts::corners(const Solid& solid) 
   const auto rim = [&](Real radius, Real y, Real up, Real depth) {
     const int count = std::max(8, 2 * samples(std::numbers::pi * radius, spacing_, 4));
     for (int k = 0; k < count; ++k) {
-      // Samples of a quarter circle by the tangent of half the angle: nearly even, and without a sine.
+      // The samples of a quarter circle come from the tangent of half the angle: they are nearly even, and
+      // need no sine.
       const Real t = 4.0 * k / count, quarter = std::floor(t), s = t - quarter;
       const Real half = s * (std::numbers::sqrt2 - 1), d = 1 + half * half;  // tan of half the angle
       Vec3 around((1 - half * half) / d, 0, 2 * half / d);

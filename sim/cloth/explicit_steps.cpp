@@ -7,7 +7,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Accelerations at positions and velocities of a run; 0 for pinned points.
+/// Computes the accelerations of a cloth's points from positions and velocities; 0 for pinned points.
 void accelerate(const ClothPoints& points, const ClothRange& cloth, const SpringRun& x, const SpringRun& v,
                 SpringRun& a) {
   std::fill(a.begin(), a.end(), Vec4::Zero());
@@ -33,7 +33,8 @@ void accelerate(const ClothPoints& points, const ClothRange& cloth, const Spring
   }
 }
 
-/// Velocities gained in a step h of a run that began with v, with the drag of the gain implicit.
+/// Applies drag to the velocities `gain` that a cloth gains in a step h from the velocities v. The drag of
+/// the gain is implicit.
 void drag_gains(const ClothRange& cloth, const SpringRun& v, Real h, SpringRun& gain) {
   if (cloth.air.empty()) return;
   cloth.air.begin(h);
@@ -41,7 +42,7 @@ void drag_gains(const ClothRange& cloth, const SpringRun& v, Real h, SpringRun& 
     gain[i] = cloth.air.respond(i, gain[i] + h * cloth.air.change(i, v[i]));
 }
 
-/// Adds the impulses of springs on pinned points over the time h.
+/// Adds the impulses that springs exert on pinned points within the time h.
 void pass_on(ClothPoints& points, const ClothRange& cloth, const SpringRun& x, const SpringRun& v, Real h,
              Real dt) {
   if (!cloth.bending.empty()) {

@@ -5,11 +5,11 @@ namespace offstage::sim {
 namespace {
 
 constexpr int kMaxIterations = 300;
-/// Square of the accepted residual over the right side, in the preconditioner's norm.
+/// Square of the accepted residual as a fraction of the right side's, in the preconditioner's norm.
 constexpr Real kTolerance2 = 1e-12;
 
-/// The system of an implicit step of cloth, backward Euler (step_implicit()). Its matrix has a block alpha u
-/// u^T + beta 1 for each spring between its ends, the matrix of bending, and the masses.
+/// The linear system of an implicit step of cloth by backward Euler (step_implicit()). Its matrix consists of
+/// the masses, the matrix of bending, and a block alpha u u^T + beta 1 for each spring, between its ends.
 class ImplicitSystem {
  public:
   ImplicitSystem(const ClothPoints& points, const ClothRange& cloth, Real h)
@@ -43,7 +43,7 @@ class ImplicitSystem {
     for (Mat3& b : block_) b = b.inverse().eval();
   }
 
-  /// y = A p, 0 for pinned points.
+  /// Computes y = A p; y is 0 for pinned points.
   void multiply(const SpringRun& p, SpringRun& y) const {
     for (std::size_t i = 0; i < p.size(); ++i) y[i] = points_.mass[cloth_.begin + i] * p[i];
     for (std::size_t i = 0; i < drag_.size(); ++i) y[i] += dragged(i, p[i]);
@@ -60,7 +60,7 @@ class ImplicitSystem {
     clear_held(y);
   }
 
-  /// Adds the impulses of springs on pinned points, if all points move with v through the step.
+  /// Adds the impulses of springs on pinned points, for points that move with v throughout the step.
   void pass_on(ClothPoints& points, const SpringRun& v, Real h) const {
     if (bending_ > 0) {
       SpringRun force(v.size(), Vec4::Zero());
@@ -84,13 +84,13 @@ class ImplicitSystem {
     for (std::size_t i = 0; i < r.size(); ++i) z[i] = padded(block_[i] * r[i].head<3>());
   }
 
-  /// Impulse of the linear part of the drag on point i at a velocity.
+  /// Returns the impulse of the linear part of the drag on point i at the velocity v.
   Vec4 dragged(std::size_t i, const Vec4& v) const {
     return drag_.empty() ? Vec4(Vec4::Zero()) : padded(drag_[i] * v.head<3>());
   }
 
-  /// M v + h (spring forces + M a), 0 for pinned points. The drag is that of its velocity, plus the linear
-  /// terms.
+  /// Returns M v + h (spring forces + M a), plus the part of the drag that the matrix does not contain; 0 for
+  /// pinned points.
   SpringRun right_side(const SpringRun& v, Real h) const {
     SpringRun b(v.size());
     for (std::size_t i = 0; i < b.size(); ++i) {
@@ -121,10 +121,10 @@ class ImplicitSystem {
 
   const ClothPoints& points_;
   const ClothRange& cloth_;
-  Real bending_;  // factor of its matrix
+  Real bending_;  // factor of the matrix of bending
   std::vector<Link> links_;
-  std::vector<Mat3> block_;  // inverse
-  std::vector<Mat3> drag_;   // of each point; none without air
+  std::vector<Mat3> block_;  // by point: inverse of its diagonal block
+  std::vector<Mat3> drag_;   // by point; empty without air
 };
 
 Real dot(const SpringRun& a, const SpringRun& b) {
@@ -133,7 +133,8 @@ Real dot(const SpringRun& a, const SpringRun& b) {
   return sum;
 }
 
-/// Preconditioned conjugate gradients from a guess v, whose held points keep it.
+/// Solves by preconditioned conjugate gradients from the guess v. Pinned points keep their velocity in v.
+/// Returns false if the limit of iterations was reached.
 bool solve(const ImplicitSystem& system, const SpringRun& b, SpringRun& v) {
   SpringRun r(v.size()), z(v.size()), y(v.size());
   system.multiply(v, y);
@@ -159,7 +160,7 @@ bool solve(const ImplicitSystem& system, const SpringRun& b, SpringRun& v) {
   return false;
 }
 
-/// The error of the solution in the momentum of a free cloth is distributed over all of its points.
+/// Distributes the momentum error of the solution over all points of a free cloth.
 void keep_momentum(const ClothPoints& points, const ClothRange& cloth, const ImplicitSystem& system,
                    const SpringRun& b, SpringRun& v) {
   Vec4 lost = Vec4::Zero();

@@ -7,8 +7,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Up to this value of the square of the step times the fastest frequency of bending, damping included,
-/// bending is stable as an explicit force.
+/// Bending is stable as an explicit force if the square of the step times the fastest frequency, damping
+/// included, is at most this.
 constexpr Real kSoftBending = 0.25;
 
 /// Bending in a sub-step of step_relaxed().
@@ -20,17 +20,18 @@ class RelaxedBending {
     is_stiff_ = dt * (dt + damping_) * bending.fastest() > kSoftBending;
     force_.assign(cloth.end - cloth.begin, Vec4::Zero());
     if (is_stiff_) return;
-    // Called once for the whole sub-step.
+    // The damped force is computed once for the whole sub-step.
     bending.add_damped_forces(cloth.part(points.start), cloth.part(points.velocity), force_);
   }
   bool is_stiff() const { return is_stiff_; }
 
-  /// The gain of a point by bending that is not stiff, which is the same in each step; 0 for pinned points.
+  /// Returns the change of a point's move by bending that is not stiff; 0 for pinned points. It is equal in
+  /// all steps.
   Vec4 steady_gain(const ClothPoints& points, std::size_t i) const {
     return h_ * h_ * points.inverse_mass[cloth_.begin + i] * force_[i];
   }
-  /// Adds the effect of a step on pinned points to their `pin_impulse` and, of stiff bending, that on the
-  /// others to the moves.
+  /// Adds the effect of a step: on pinned points to their `pin_impulse`, and that of stiff bending on other
+  /// points to the moves.
   void apply(ClothPoints& points, std::span<Vec4> moves) {
     if (is_stiff_) {
       std::fill(force_.begin(), force_.end(), Vec4::Zero());
@@ -45,7 +46,7 @@ class RelaxedBending {
     }
   }
 
-  /// Removes the motion that stiff bending does not allow; returns whether the tolerance was reached.
+  /// Damps the part of the moves that stiff bending resists. Returns whether the tolerance was reached.
   bool filter(ClothPoints& points, std::span<Vec4> moves) {
     const Real stiff = h_ * (h_ + damping_);
     const std::span<Vec4> own = moves.subspan(cloth_.begin, force_.size());
@@ -80,7 +81,7 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
   if (bends) bending.emplace(points, cloth, dt, h);
   if (drags) cloth.air.begin(h);
   springs.begin(points, h);
-  // The move without springs, whose drag is that of the velocity before the step.
+  // Computes a point's move without springs. Its drag is taken at the velocity before the step.
   const auto coast = [&](std::size_t i, const Vec4& v) {
     velocity[i] = v;
     moves[i] = v + gain[i];
@@ -111,7 +112,7 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
   for (std::size_t i = 0; i < n; ++i) {
     const std::size_t k = cloth.begin + i;
     if (held(i)) {
-      points.pin_impulse[k] *= steps;  // impulses times the whole sub-step
+      points.pin_impulse[k] *= steps;  // the sum of the impulses times the whole sub-step
     } else {
       points.position[k] = x[i];
       if (steps > 1) kick[k] = velocity[i] / h - (x[i] - from[i]) / dt;

@@ -8,15 +8,15 @@
 namespace offstage::sim {
 namespace {
 
-/// A path is sampled every this fraction of the radius, so that nothing passes between two of them.
+/// Paths are sampled at this fraction of the radius, so that nothing passes between two samples.
 constexpr Real kSampleSpacing = 0.5;
 constexpr int kMaxPathSamples = 256;
 /// Number of iterations of the search for the point of a triangle that is nearest to an axis.
 constexpr int kMaxAxisSteps = 8;
-/// A contact nearer to a corner than this is left to the contacts of points.
+/// A contact is left to the contacts of points if a corner of the triangle has more than this weight.
 constexpr Real kWithin = 0.99;
 
-/// The segment from -half to half along y around which a shape is rounded, and its radius.
+/// A shape that is the set of all points within a radius of a segment along y, from -half to half.
 struct Rounding {
   Real half, radius;
 };
@@ -31,7 +31,7 @@ std::optional<Rounding> rounding(const Solid& solid) {
   return {};
 }
 
-/// The point of a triangle nearest to the segment, by alternating projections.
+/// Returns the point of a triangle that is nearest to the segment, by alternating projections.
 TrianglePoint nearest_to_axis(const Rounding& shape, const std::array<Vec3, 3>& t) {
   const auto on_axis = [&](const Vec3& p) { return Vec3(0, std::clamp(p.y(), -shape.half, shape.half), 0); };
   Vec3 axis = on_axis((t[0] + t[1] + t[2]) / 3);
@@ -48,7 +48,8 @@ TrianglePoint nearest_to_axis(const Rounding& shape, const std::array<Vec3, 3>& 
 }  // namespace
 
 bool RoundContacts::concerns(const Solid& solid, Real edge, Real thickness) {
-  // Between two points at this distance a straight edge is nearer by edge^2 / (8 (radius + thickness)).
+  // Midway between two points at this distance, a straight edge is nearer to the shape by edge^2 / (8 (radius
+  // + thickness)).
   const std::optional<Rounding> shape = rounding(solid);
   return shape && edge * edge > 8 * (shape->radius + thickness) * (1 - kTriangleDistance) * thickness;
 }

@@ -10,33 +10,33 @@
 namespace offstage::sim {
 namespace {
 
-/// The search finds pairs up to this distance beyond contact, in thicknesses. Points may deviate from their
-/// predicted paths by half of it.
+/// The search finds pairs whose gap is up to this many thicknesses. Points may deviate from their predicted
+/// paths by half of it.
 constexpr Real kMargin = 0.8;
-/// The same for pairs that are searched again while the other points keep their predicted paths; these may
-/// deviate by a quarter.
+/// The margin for pairs that are searched again while the other points keep their predicted paths. The other
+/// points may deviate by a quarter of kMargin.
 constexpr Real kStrayMargin = 1.5 * kMargin;
-/// Up to one in this many points, only their own pairs are searched again.
+/// If at most one in this many points deviates, only the pairs of these points are searched again.
 constexpr std::size_t kFew = 3;
-/// Work of fitting a triangle's box, of testing a pair, and of finding its closest points, relative to
-/// checking a known pair in a sub-step (measured).
+/// Work of fitting a triangle's box, of testing a pair, and of finding its closest points. The unit is the
+/// check of a known pair in a sub-step (measured).
 constexpr std::size_t kFitWork = 10;
 constexpr Real kPairWork = 3, kClosestWork = 8;
-/// Pairs that are near each other in the cloth at rest are not pushed apart beyond this fraction of their
-/// distance there.
+/// Pairs that are near each other in the cloth at rest are pushed apart only to this fraction of their
+/// distance at rest.
 constexpr Real kRestFraction = 0.8;
 /// Fraction of an overlap that is removed per sub-step, so that layers do not fly apart.
 constexpr Real kSelfRecovery = 0.05;
-/// Fraction of the distance that must remain, so that a plane always separates a pair. A pair that is nearer
-/// than this fraction of its thickness does not approach further, because its distance, and with it its side,
-/// would soon be lost in rounding.
+/// kLeft: fraction of the distance of a pair that remains in a sub-step, so that a plane always separates it.
+/// kNearest: a pair nearer than this fraction of its thickness does not approach further, because its
+/// distance and its side would soon be lost in rounding.
 constexpr Real kLeft = 0.1, kNearest = 0.02;
 /// Distance below which the normal is undefined [m].
 constexpr Real kNoSide = 1e-9;
-/// Least length that remains along a unit vector in single precision.
+/// A unit vector in single precision has at least this length.
 constexpr Real kUnit = 1 - 1e-6;
-/// Number of sweeps over the pairs that would cross, and the factor by which their kept distance exceeds the
-/// necessary one.
+/// Number of sweeps over the pairs that would cross. The distance that they keep exceeds the necessary one by
+/// the factor kBeyondLeast.
 constexpr int kSideSweeps = 8;
 constexpr Real kBeyondLeast = 1.01;
 /// Moves are halved until they are below this fraction, and then set to 0.
@@ -47,9 +47,9 @@ Vec3 place(std::span<const Vec4> points, uint32_t i) {
 }
 
 struct Closest {
-  std::array<Real, 4> weights;  // 1, -b or 1 - s, s, -(1 - t), -t
-  Vec4 apart;                   // from the second's to the first's point
-  bool inner;                   // edges: neither point is an end
+  std::array<Real, 4> weights;  // of the points: 1, -b or 1 - s, s, -(1 - t), -t
+  Vec4 apart;                   // from the second element's nearest point to the first element's
+  bool inner;                   // of two edges: neither nearest point is an end
 };
 
 Real fraction_along(const Vec3& p, const Vec3& a, const Vec3& b) {
@@ -88,15 +88,15 @@ bool boxes_apart(std::span<const Vec4> start, std::span<const Vec4> end, const s
   return over.cwiseMax(under).maxCoeff() > reach;
 }
 
-/// Smallest n . (x_i - x_j) over the points i of the pair's first element and the points j of the second.
+/// Returns the smallest n . (x_i - x_j), over the points i of the pair's first element and j of its second.
 Real separation(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool edges, const Vec4& n) {
   const Real h0 = n.dot(x[p[0]]), h1 = n.dot(x[p[1]]), h2 = n.dot(x[p[2]]), h3 = n.dot(x[p[3]]);
   return edges ? std::min(h0, h1) - std::max(h2, h3) : h0 - std::max({h1, h2, h3});
 }
 
 /// Whether a plane with the normal n (of any length) separates both elements by more than `reach` [m] at the
-/// start and at the end. It then separates them all the time, because the points move on straight lines and
-/// their heights above the plane change linearly.
+/// start and at the end. Points move on straight lines, so their heights above the plane change linearly, and
+/// the plane separates them all the time.
 bool plane_separates(std::span<const Vec4> start, std::span<const Vec4> end, const std::array<uint32_t, 4>& p,
                      bool edges, const Vec4& n, Real reach) {
   const Real from = separation(start, p, edges, n);
@@ -112,7 +112,8 @@ Vec4 middle_to_middle(std::span<const Vec4> x, const std::array<uint32_t, 4>& p,
   return x[p[0]] - (x[p[1]] + x[p[2]] + x[p[3]]) / 3;
 }
 
-/// Normal of the pair, not unit, towards its first element: perpendicular to both edges, or to the triangle.
+/// Returns the normal of the pair towards its first element, of any length: perpendicular to both edges, or
+/// to the triangle.
 Vec4 common_normal(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool edges) {
   const Vec3 p0 = place(x, p[0]), p1 = place(x, p[1]), p2 = place(x, p[2]), p3 = place(x, p[3]);
   const Vec3 n = edges ? (p1 - p0).cross(p3 - p2) : (p2 - p1).cross(p3 - p1);
@@ -123,7 +124,7 @@ Real least_distance(Real distance, Real nearest) {
   return (1 - 1e-9) * std::max(kLeft * distance, std::min(distance, nearest));
 }
 
-/// Number of a pair's four points that belong to its first element.
+/// Returns how many of a pair's four points belong to its first element.
 std::size_t first_side(bool edges) {
   return edges ? 2 : 1;
 }
@@ -155,7 +156,8 @@ void SelfContacts::assign(std::vector<Triangle> triangles, const ClothPoints& po
   horizon_ = -1;
 }
 
-/// Keeps the pairs of two triangles' points and edges that may touch within the horizon, if `wanted(points)`.
+/// Adds the pairs of the points and edges of two triangles that may touch within the horizon, if
+/// `wanted(points)`.
 template <class Wanted>
 void SelfContacts::add_pairs(const ClothPoints& points, uint32_t ta, uint32_t tb, Real slack,
                              Wanted&& wanted) {
@@ -201,7 +203,7 @@ void SelfContacts::add(const ClothPoints& points, const std::array<uint32_t, 4>&
   pairs_.back().travel = travelled(pairs_.back());
 }
 
-/// Predicts that a point keeps its velocity in this sub-step until the horizon.
+/// Predicts the path of a point until the horizon: it keeps its velocity of this sub-step.
 void SelfContacts::predict(const ClothPoints& points, std::size_t i, Real dt) {
   const Vec4 velocity = (points.position[i] - points.start[i]) / dt;
   predicted_velocity_[i] = velocity;
@@ -225,12 +227,12 @@ bool SelfContacts::expired(Real dt) const {
   return since_ + dt > horizon_ * (1 + 1e-9);
 }
 
-/// Distance of a point from its predicted path.
+/// Returns the deviation of a point from its predicted path.
 Vec4 SelfContacts::off_course(const ClothPoints& points, std::size_t i, Real dt) const {
   return points.position[i] - predicted_from_[i] - (since_ + dt) * predicted_velocity_[i];
 }
 
-/// Whether any point is so far from its predicted path that the known pairs no longer suffice.
+/// Whether any point deviates so far from its predicted path that the known pairs no longer suffice.
 bool SelfContacts::strayed(const ClothPoints& points, Real dt) const {
   if (expired(dt)) return true;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -240,8 +242,8 @@ bool SelfContacts::strayed(const ClothPoints& points, Real dt) const {
   return false;
 }
 
-/// Searches from the positions at the start of the sub-step, with the velocities in it. If only a few points
-/// deviated before the horizon, only their pairs are searched again, up to the horizon.
+/// Searches for pairs, from the positions at the start of the sub-step with the velocities in it. If only a
+/// few points deviated before the horizon, only their pairs are searched again, up to the same horizon.
 void SelfContacts::search_again(const ClothPoints& points, Real dt) {
   if (expired(dt)) return search(points, dt);
   std::vector<uint8_t> strays(points.size(), 0);
@@ -268,8 +270,8 @@ void SelfContacts::search_again(const ClothPoints& points, Real dt) {
   length_.add_work(static_cast<Real>(points.size() + kFitWork * seeking.size()));
 }
 
-/// The points of a pair whose heights above a plane through `origin`, at the places `at(point)`, are lowest
-/// on the first side and highest on the second.
+/// Returns two points of a pair, by their heights above a plane through `origin`: the lowest of the first
+/// element and the highest of the second. at(point) returns the place of a point.
 template <class At>
 SelfContacts::Sides SelfContacts::sides_of(const Pair& pair, const Vec4& normal, const Vec4& origin,
                                            At&& at) {
@@ -296,8 +298,8 @@ SelfContacts::Contact SelfContacts::look(const ClothPoints& points, uint32_t k) 
   return {k, c.weights, normal, pair.distance, c.inner};
 }
 
-/// Lower bound of the distance of a pair, along its separating direction at the last check, if its points
-/// make any fractions of their current moves.
+/// Returns a lower bound of the distance of a pair, along its separating direction at the last check. It
+/// holds for any fractions of the points' current moves.
 Real SelfContacts::left_between(const ClothPoints& points, const Pair& pair, std::span<const Vec4> drift) {
   const Vec4 normal = padded(pair.normal.cast<Real>());
   const Vec4& origin = points.start[pair.points[0]];
@@ -311,8 +313,8 @@ Real SelfContacts::left_between(const ClothPoints& points, const Pair& pair, std
   return (first - second) * kUnit;
 }
 
-/// The pairs that may come nearer than `reach(pair)` if points make any fractions of their moves beyond the
-/// drifts.
+/// Collects the pairs that may come nearer than `reach(pair)`, for any fractions of the points' moves
+/// relative to their drifts.
 template <class Reach>
 void SelfContacts::gather(const ClothPoints& points, Real dt, std::span<const Vec4> drift, Reach&& reach) {
   if (strayed(points, dt)) search_again(points, dt);
@@ -344,7 +346,7 @@ void SelfContacts::find_doubtful(const ClothPoints& points, Real dt, std::span<c
   gather(points, dt, drift, [](const Pair& pair) { return least_distance(pair.distance, pair.nearest); });
 }
 
-/// One sweep, with friction.
+/// Makes one sweep that keeps the thickness between all pairs, with friction.
 void SelfContacts::keep_thickness(ClothPoints& points) {
   active_.assign(points.cloth.back() + 1, 0);
   for (const Contact& c : contacts_) {
@@ -379,9 +381,10 @@ void SelfContacts::keep_thickness(ClothPoints& points) {
   }
 }
 
-/// Keeps pairs from crossing by impulses along the normal of the plane between them, on the point of each
-/// that would go farthest beyond it. Pairs that are left to shorten() have their points stopped in all
-/// directions. Springs to points that still move then gain energy, and many pressed layers jam.
+/// Keeps pairs from crossing by impulses along the normal of the plane between them. The impulse acts on that
+/// point of each element that would go farthest beyond the plane. Pairs that remain are left to shorten(),
+/// which stops points in all directions. Springs to points that still move then gain energy, and many pressed
+/// layers jam.
 void SelfContacts::keep_sides(ClothPoints& points) const {
   bool again = true;
   for (int sweep = 0; again && sweep < kSideSweeps; ++sweep) {

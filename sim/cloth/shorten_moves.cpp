@@ -1,9 +1,9 @@
 /// The part of ClothSystem that shortens the moves of a sub-step until no spring is too long and no cloth has
 /// passed through cloth.
 ///
-/// Moves are shortened in the frame of a piece of cloth, which moves with its mean velocity: otherwise flying
-/// and falling cloth would be slowed down in the air. Shortening acts like forces within the piece, so a
-/// piece that only dynamic bodies hold keeps its momentum together with them.
+/// Moves are shortened relative to a frame that moves with the mean velocity of the piece of cloth. Otherwise
+/// flying and falling cloth would be slowed down in the air. Shortening acts like forces within the piece. So
+/// a piece that only dynamic bodies hold keeps its momentum together with these bodies.
 
 #include <algorithm>
 #include <cmath>
@@ -16,15 +16,15 @@
 namespace offstage::sim {
 namespace {
 
-/// Greatest number of rounds of shortening moves. If a limit is violated after them, all points return to
-/// their start.
+/// Greatest number of rounds of shortening moves. If a limit is still violated after them, all points return
+/// to their start.
 constexpr int kMaxRounds = 64;
-/// Greatest number of rounds for bodies that turn.
+/// Greatest number of passes for bodies that turn.
 constexpr int kMaxPasses = 6;
 
 }  // namespace
 
-/// Connects pieces that may cross each other, and those that hang on one body.
+/// Joins pieces that may cross each other, and pieces that are pinned to the same body, to one frame.
 void ClothSystem::find_frames() {
   pieces_.forget();
   self_contacts_.for_doubtful([&](const auto& p) { pieces_.join(p[0], p[3]); });
@@ -61,8 +61,8 @@ const ClothBody* ClothSystem::nearby_other_body(uint32_t point) {
   return carrier == carriers_.end() || &frame_of(carrier->points[0]) != &frame ? near : nullptr;
 }
 
-/// A free piece that a single free body pushes gets the frame of that body: in the world's frame, it would be
-/// left behind inside the body.
+/// Chooses the frame of a point's piece. A free piece that a single free body pushes gets the frame of that
+/// body: in the world's frame, it would be left behind inside the body.
 void ClothSystem::choose_frame(uint32_t point) {
   Frame& frame = frame_of(point);
   const ClothBody* near = frame.rests ? nullptr : nearby_other_body(point);
@@ -75,8 +75,9 @@ void ClothSystem::choose_frame(uint32_t point) {
     frame.rests = true;
 }
 
-/// Finds the move of each frame: that of its leader, of its pusher, or the mean move of the piece and the
-/// bodies that hang on it; zero if the piece is near another body. Returns whether any frame moves.
+/// Computes the move of each frame. It is the move of its leader or of its pusher, or the mean move of the
+/// piece and the bodies that hang on it, or zero if the piece is near another body. Returns whether any frame
+/// moves.
 bool ClothSystem::find_drifts() {
   find_frames();
   const auto all_rest = [&] { return std::ranges::all_of(frames_, &Frame::rests); };
@@ -105,8 +106,8 @@ bool ClothSystem::find_drifts() {
 }
 
 /// Shortens moves until no spring is too long and no pair has crossed. A move that was shortened in a moving
-/// frame follows a path that the search for pairs did not consider, so it is checked again in the world's
-/// frame.
+/// frame follows a path that the search for pairs did not consider. It is therefore checked again in the
+/// world's frame.
 void ClothSystem::shorten_moves(Real dt) {
   const bool self = !self_contacts_.empty();
   if (limit_.empty() && !self) return;
@@ -117,7 +118,7 @@ void ClothSystem::shorten_moves(Real dt) {
   find_doubtful();
   if (!limit_.any_beyond(points_) && !(self && self_contacts_.any_crossed(points_))) {
     if (self) self_contacts_.end_substep(points_, dt);
-    return;  // most sub-steps: whole moves are allowed, in whatever frame
+    return;  // most sub-steps end here: whole moves are allowed in every frame
   }
   const bool any_drifts = find_drifts();
   add_momenta(1, dt);
@@ -130,7 +131,7 @@ void ClothSystem::shorten_moves(Real dt) {
   if (any_drifts) find_doubtful();
   bool any = any_drifts ? shorten_in_pieces() : shorten_until_valid(kInWorld);
   if (any_drifts) {
-    self_contacts_.take_crossed();  // in the world's frame none has to
+    self_contacts_.take_crossed();  // these pairs need not cross in the world's frame
     drift_.assign(points_.size(), Vec4::Zero());
     if (any && self) find_doubtful();
     if (any && self) shorten_until_valid(kInWorld);
@@ -160,7 +161,7 @@ bool ClothSystem::shorten_in_pieces() {
   const bool any = shorten_until_valid(kInPiece);
   shift_starts(-1);
   if (!any) return false;
-  // A free piece as a whole moves on as it would have.
+  // The centre of mass of a free piece moves on as without shortening.
   const auto is_loose = [](const Frame& frame) {
     return !frame.rests && !frame.leader && !frame.pusher && !frame.carries;
   };
@@ -183,7 +184,7 @@ void ClothSystem::add_momenta(Real sign, Real dt) {
       frame_of(cut.point).momentum -= sign * points_.mass[cut.point] / dt * cut.move;
 }
 
-/// Velocities of all points at the end of the sub-step.
+/// Returns the velocities of all points at the end of the sub-step.
 std::vector<Vec4> ClothSystem::end_velocities(Real dt) const {
   std::vector<Vec4> velocity(points_.size());
   for (uint32_t i = 0; i < points_.size(); ++i)
@@ -193,8 +194,8 @@ std::vector<Vec4> ClothSystem::end_velocities(Real dt) const {
   return velocity;
 }
 
-/// Returns for each piece that no fixed object holds twice the kinetic energy of its points relative to the
-/// mean velocity of the points and of the bodies that hang on them, which is stored in the frames.
+/// Returns, for each piece that no fixed object holds, twice the kinetic energy of its points relative to the
+/// mean velocity. The mean includes the bodies that hang on the piece, and is stored in the frames.
 std::vector<Real> ClothSystem::inner_energies(std::span<const Vec4> velocity) {
   for (Frame& frame : frames_) frame.velocity.setZero();
   const auto add = [](Frame& frame, Real mass, const Vec4& v) {
@@ -212,10 +213,10 @@ std::vector<Real> ClothSystem::inner_energies(std::span<const Vec4> velocity) {
   return energy;
 }
 
-/// Returns for each free piece twice the energy that springs gained by shortening, at least 0: their energy
-/// now less that with the points at `whole`. Other pieces get 0: their moves are shortened in each sub-step,
-/// and removing the gain from their motion each time would stop a flag in the wind or cloth on a turning
-/// ball.
+/// Returns, for each free piece, twice the energy that its springs gained by shortening, at least 0. The gain
+/// is their energy now minus their energy with the points at `whole`. Other pieces get 0: their moves are
+/// shortened in each sub-step, and removing the gain from their motion each time would stop a flag in the
+/// wind or cloth on a turning ball.
 std::vector<Real> ClothSystem::elastic_gains(std::span<const Vec4> whole) {
   std::vector<Real> gain(frames_.size(), 0);
   for (const ClothSpring& s : all_springs_) {
@@ -233,9 +234,10 @@ std::vector<Real> ClothSystem::elastic_gains(std::span<const Vec4> whole) {
   return gain;
 }
 
-/// Different fractions of equal moves compress the springs between points, and the momentum of the piece is
-/// restored. Both add energy. This slows the motion within the piece to the energy that it had with the
-/// points at `whole` and the velocity `before`, less the energy that springs gained.
+/// Slows the motion within each piece, so that shortening adds no energy. Shortening different fractions of
+/// equal moves compresses the springs between the points, and restoring the momentum of the piece also adds
+/// energy. The remaining energy is that with the points at `whole` and the velocity `before`, minus the gain
+/// of the springs.
 void ClothSystem::remove_energy_gains(std::span<const Vec4> whole, std::span<const Vec4> before,
                                       std::span<const Vec4> velocity) {
   const std::vector<Real> first = inner_energies(before), now = inner_energies(velocity);
@@ -248,8 +250,8 @@ void ClothSystem::remove_energy_gains(std::span<const Vec4> whole, std::span<con
   }
 }
 
-/// Restores the momentum that pieces and the bodies that hang on them lost by shortening. Pieces that a fixed
-/// object holds lost it to that object.
+/// Restores the momentum that shortening took from pieces and the bodies that hang on them. Pieces held by a
+/// fixed object lost their momentum to that object.
 void ClothSystem::restore_momenta() {
   for (uint32_t i = 0; i < points_.size(); ++i)
     if (const Frame& frame = frame_of(i); !frame.anchored && points_.inverse_mass[i] > 0)
@@ -263,8 +265,8 @@ void ClothSystem::restore_momenta() {
   }
 }
 
-/// Shortens moves relative to the points' starts; returns whether any was shortened. Records `how` for these
-/// points.
+/// Shortens the points' moves from their starts, until all limits hold. Records `how` for the shortened
+/// points. Returns whether any move was shortened.
 bool ClothSystem::shorten_until_valid(Shortened how) {
   bool any = false, turned = false;
   // The points of a body that turns do not move straight, so they are checked again.
@@ -277,7 +279,7 @@ bool ClothSystem::shorten_until_valid(Shortened how) {
   return any;
 }
 
-/// The same with straight paths. `turned` gets whether moves of bodies were shortened.
+/// Shortens moves once, as if all paths were straight. Sets `turned` if moves of bodies were shortened.
 bool ClothSystem::shorten_straight(Shortened how, bool& turned) {
   fractions_.assign(points_.size(), 1);
   bool again = true, any = false;
@@ -306,7 +308,7 @@ bool ClothSystem::shorten_straight(Shortened how, bool& turned) {
   return any;
 }
 
-/// A body that hangs on cloth at its stretch limit makes only a fraction of its displacement.
+/// Shortens the displacement of a body that hangs on cloth at its stretch limit.
 void ClothSystem::shorten_carrier(Carrier& carrier, Real fraction) {
   ClothBody& body = *carrier.body;
   const uint32_t first = carrier.points[0];
@@ -318,7 +320,8 @@ void ClothSystem::shorten_carrier(Carrier& carrier, Real fraction) {
   carrier.place(points_);
 }
 
-/// A cloth at its limit stops bodies as one rigid whole with the bodies that it hangs on.
+/// Stops bodies at cloths whose moves were shortened. Such a cloth acts as one rigid body together with the
+/// bodies on which it hangs.
 void ClothSystem::stop_bodies(Real dt) {
   const std::vector<Real> recoil = recoils();
   const auto whole = whole_velocities(recoil, end_velocities(dt));
@@ -338,7 +341,7 @@ void ClothSystem::stop_bodies(Real dt) {
   }
 }
 
-/// The dynamic bodies that hold pins of a cloth.
+/// Returns the dynamic bodies that hold pins of a cloth.
 std::vector<const Carrier*> ClothSystem::carriers_of(std::size_t cloth) const {
   std::vector<const Carrier*> found;
   for (const Carrier& carrier : carriers_)
@@ -347,8 +350,8 @@ std::vector<const Carrier*> ClothSystem::carriers_of(std::size_t cloth) const {
   return found;
 }
 
-/// Returns for each cloth the inverse of its mass together with that of the bodies that hold it; 0 if a fixed
-/// object holds it.
+/// Returns, for each cloth, the inverse of its mass together with the mass of the bodies that hold it [1/kg];
+/// 0 if a fixed object holds it.
 std::vector<Real> ClothSystem::recoils() const {
   std::vector<Real> mass;
   for (const Cloth* cloth : cloths_)
@@ -363,8 +366,9 @@ std::vector<Real> ClothSystem::recoils() const {
   return recoil;
 }
 
-/// Returns for each cloth its mean velocity together with the bodies that hold it, or that of the immovable
-/// body that holds it; empty if several such bodies hold it, or one that turns.
+/// Returns, for each cloth, its mean velocity together with the bodies that hold it. If one immovable body
+/// holds it, this is the velocity of that body. It is empty if several such bodies hold the cloth, or one
+/// that turns.
 std::vector<std::optional<Vec3>> ClothSystem::whole_velocities(std::span<const Real> recoil,
                                                                std::span<const Vec4> velocity) const {
   std::vector<std::optional<Vec3>> whole(cloths_.size(), Vec3(Vec3::Zero()));

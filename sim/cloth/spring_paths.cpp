@@ -11,7 +11,7 @@ namespace {
 constexpr Real kStraight = 0.7;
 constexpr uint32_t kPathEnd = ~0u;
 
-/// The springs at each point.
+/// Finds the springs at each point.
 class SpringStars {
  public:
   SpringStars(std::span<const ClothSpring> springs, std::size_t point_count) : first_(point_count + 1, 0) {
@@ -35,7 +35,7 @@ uint32_t other_end(const ClothSpring& s, uint32_t point) {
   return s.a == point ? s.b : s.a;
 }
 
-/// For each end of a spring, the next spring of its path; kPathEnd: the path ends there.
+/// By spring: for each of its two ends, the next spring of its path; kPathEnd if the path ends there.
 using Continuations = std::vector<std::array<uint32_t, 2>>;
 
 uint32_t& at_end(Continuations& next, std::span<const ClothSpring> springs, uint32_t spring, uint32_t point) {
@@ -100,7 +100,7 @@ std::vector<SpringPath> spring_paths(std::span<const ClothSpring> springs, const
   return paths;
 }
 
-/// Greedy: each path gets the first colour that none of its points has.
+/// Colours paths greedily: each path gets the first colour that no path at its points has.
 std::vector<uint32_t> path_colors(std::span<const SpringPath> paths, std::size_t point_count) {
   constexpr uint32_t kLast = kPathColors - 1;
   std::vector<uint64_t> used(point_count, 0);

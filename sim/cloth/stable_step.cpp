@@ -6,9 +6,9 @@
 
 namespace offstage::sim {
 
-/// The eigenvalues of M^-1 K are below the greatest K_a / m_a + K_b / m_b over springs, where K_i is the sum
-/// of the stiffnesses at a point (as of the Laplacian of a graph, Anderson and Morley, 1985). The bound for
-/// damping is the same with dampings in place of stiffnesses.
+/// Returns the longest stable steps. The eigenvalues of M^-1 K are below the greatest K_a / m_a + K_b / m_b
+/// over all springs, where K_i is the sum of the stiffnesses at point i (as for the Laplacian of a graph;
+/// Anderson and Morley, 1985). The bound for damping has dampings in place of stiffnesses.
 StableStep largest_stable_step(const ClothDef& def) {
   StableStep result;
   const bool is_rk4 = def.integrator == ClothIntegrator::rk4;
@@ -22,8 +22,8 @@ StableStep largest_stable_step(const ClothDef& def) {
   for (uint32_t i = 0; i < def.springs.size(); ++i) {
     const ClothSpring& s = def.springs[i];
     const Real omega2 = stiffness[s.a] + stiffness[s.b], delta = damping[s.a] + damping[s.b];
-    // Symplectic Euler: h^2 omega^2 + 2 h delta < 4. Runge-Kutta: its region holds the left half of a disc of
-    // radius 2.6.
+    // Symplectic Euler is stable for h^2 omega^2 + 2 h delta < 4. The region of stability of Runge-Kutta
+    // contains the left half of a disc of radius 2.6.
     const Real step = is_rk4 ? 2.6 / std::max(std::sqrt(omega2), delta)
                              : 4 / (delta + std::sqrt(delta * delta + 4 * omega2));
     if (step < result.step) result = {step, i, false};

@@ -8,17 +8,18 @@ namespace offstage::sim {
 namespace {
 
 constexpr uint8_t kSweeps = 8;
-/// Number of solutions for all springs that are too long, each linearised at the result of the previous one.
+/// Number of rounds that solve for all springs that are too long. Each is linearised at the result of the
+/// previous one.
 constexpr int kSolves = 4;
-/// Slack of the check against rounding, far below the guaranteed accuracy.
+/// Fraction by which lengths may exceed a limit because of rounding; far below the guaranteed accuracy.
 constexpr Real kSlack = 1e-12;
 
-/// The greatest s in [0, 1] with |k1 + s k2| <= longest; 0 if there is none.
+/// Returns the greatest s in [0, 1] with |k1 + s k2| <= longest, or 0 if there is none.
 Real greatest_fraction(const Vec4& k1, const Vec4& k2, Real longest) {
   const Real a = k2.squaredNorm(), b = k1.dot(k2), c = k1.squaredNorm() - longest * longest;
   const Real root = b * b - a * c;
   if (!(a > 0) || !(root >= 0)) return 0;
-  // The larger root (-b + sqrt(root)) / a, without cancellation.
+  // This is the larger root (-b + sqrt(root)) / a, in a form without cancellation.
   const Real s = b > 0 ? -c / (b + std::sqrt(root)) : (std::sqrt(root) - b) / a;
   return std::clamp(s * (1 - kSlack), 0.0, 1.0);
 }
@@ -44,7 +45,7 @@ bool StretchLimit::project(ClothPoints& points, std::span<const Carrier> carrier
   bool all_hold = true;
   if (!sweep(points, all_hold)) return false;
   if (carriers.empty())
-    return true;  // points without bodies are light, so the sweeps and the shortening of moves suffice
+    return true;  // points without bodies are light: the sweeps and the shortening of moves are enough
   for (int round = 0; round < kSolves && !all_hold; ++round) {
     TautSprings taut(points, carriers);
     for (const auto* some : {&limits_, &ties_})
@@ -80,24 +81,24 @@ void StretchLimit::project_with(std::span<const BodyContact> contacts, ClothPoin
   taut.apply(points, dt, kick, cuts);
 }
 
-/// Whether any spring was too long. `all_hold` gets whether all limits now hold, apart from those for which
-/// bodies have to move.
+/// Shortens springs that are too long by sweeps over all of them. Returns whether any was too long. Sets
+/// `all_hold` to whether all limits now hold, except those for which bodies have to move.
 bool StretchLimit::sweep(ClothPoints& points, bool& all_hold) const {
   Vec4* const x = points.position.data();
   const Real* const w = points.inverse_mass.data();
   bool again = true, any = false;
-  std::vector<uint8_t> moved_in(points.size(), 0);  // the sweep; 0: none
+  std::vector<uint8_t> moved_in(points.size(), 0);  // by point: the last sweep that moved it; 0: none
   for (uint8_t sweep = 1; sweep <= kSweeps && again; ++sweep) {
     again = false;
     const auto draw = [&](const Limit& l) {
-      // The result is unchanged where no point has moved since.
+      // If neither point has moved since the last sweep, the result is unchanged.
       if (sweep > 1 && moved_in[l.a] < sweep - 1 && moved_in[l.b] < sweep - 1) return;
       const Vec4 d = x[l.a] - x[l.b];
       const Real length2 = d.squaredNorm();
       if (length2 <= l.longest * l.longest) return;
       any = true;
       if (!l.tears && (points.carried[l.a] || points.carried[l.b])) {
-        all_hold = false;  // to be solved together with the body
+        all_hold = false;  // it is solved together with the body
         return;
       }
       const Real mass = w[l.a] + w[l.b];
@@ -173,7 +174,7 @@ void StretchLimit::look(const Limit& l, const ClothPoints& points, MoveFractions
   const Vec4 move_b = points.position[l.b] - points.start[l.b];
   const Vec4 d = points.start[l.a] - points.start[l.b];
   const Vec4 move = fractions[l.a] * move_a - fractions[l.b] * move_b;
-  // A spring that began too long must not get longer.
+  // A spring that was too long at the start must not get longer.
   const Real allowed2 = std::max(l.longest * l.longest, d.squaredNorm());
   if ((d + move).squaredNorm() <= allowed2 * (1 + kSlack)) return;
   const auto can_shorten = [&](uint32_t i) {
@@ -185,7 +186,7 @@ void StretchLimit::look(const Limit& l, const ClothPoints& points, MoveFractions
   free_a ? k2 += fractions[l.a]* move_a : k1 += fractions[l.a] * move_a;
   free_b ? k2 -= fractions[l.b]* move_b : k1 -= fractions[l.b] * move_b;
   Real s = greatest_fraction(k1, k2, std::sqrt(std::max(allowed2, k1.squaredNorm())));
-  if (s > 1 - 1e-9) s = 0;  // no progress to rounding
+  if (s > 1 - 1e-9) s = 0;  // within rounding there is no progress
   if (free_a) {
     fractions[l.a] *= s;
     lowered.push_back(l.a);

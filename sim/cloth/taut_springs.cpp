@@ -6,13 +6,13 @@
 namespace offstage::sim {
 namespace {
 
-/// Fraction of its elongation beyond the target that a spring keeps if it began the sub-step there. A body
-/// that hangs on it is stopped, but not thrown back.
+/// If a spring was beyond its target length at the start of the sub-step, it keeps this fraction of its
+/// excess. A body that hangs on it is stopped, but not thrown back.
 constexpr Real kKeepsBeyondAim = 0.9;
-/// The impulses of other springs may make a spring too long if it is above this fraction of the allowed
-/// elongation.
+/// A spring takes part if its elongation is above this fraction of the allowed one: the impulses of other
+/// springs may make it too long.
 constexpr Real kNearLimit = 0.3;
-/// Accepted fraction of the greatest excess.
+/// Accepted excess of a spring, as a fraction of the greatest initial excess.
 constexpr Real kLeftOfExcess = 3e-3;
 constexpr int kMaxSets = 12, kMaxTautIterations = 200;
 
@@ -51,7 +51,8 @@ uint32_t TautSprings::mean_place(const BodyContact& contact) {
 Real TautSprings::compliance_at(uint32_t place, const Vec4& direction) const {
   const Place& at = places_[place];
   if (at.point == kNone && at.body == kNone) {
-    // Corners on one body are treated as independent, because the value only scales and preconditions.
+    // Corners on the same body are treated as independent: the value is used only for scaling and
+    // preconditioning.
     const MeanPlace& mean = *std::ranges::find(mean_places_, place, &MeanPlace::place);
     Real sum = 0;
     for (std::size_t k = 0; k < 3; ++k)
@@ -96,7 +97,7 @@ void TautSprings::add(const BodyContact& contact) {
   add_row(place, spot, padded(contact.normal), -contact.gap);
 }
 
-/// Sums impulses on places and bodies.
+/// Adds up the impulses on each place and each body.
 void TautSprings::gather(std::span<const Real> impulses) {
   moves_.assign(places_.size(), Vec4::Zero());
   impulses_.assign(bodies_.size(), Vec6::Zero());
@@ -114,7 +115,7 @@ void TautSprings::gather(std::span<const Real> impulses) {
   }
 }
 
-/// y = J W J^T x.
+/// Computes y = J W J^T x.
 void TautSprings::multiply(std::span<const Real> x, std::span<Real> y) {
   gather(x);
   for (std::size_t b = 0; b < bodies_.size(); ++b) impulses_[b] = bodies_[b].mobility * impulses_[b];
@@ -134,7 +135,8 @@ void TautSprings::multiply(std::span<const Real> x, std::span<Real> y) {
     y[k] = rows_[k].direction.dot(moves_[rows_[k].first] - moves_[rows_[k].second]);
 }
 
-/// Conjugate gradients on the rows that act. False: the limit of iterations was reached.
+/// Solves for the rows of the acting set by conjugate gradients. Returns false if the limit of iterations was
+/// reached.
 bool TautSprings::solve_acting() {
   const std::size_t n = rows_.size();
   Real worst = 0;
@@ -171,8 +173,8 @@ bool TautSprings::solve_acting() {
   return false;
 }
 
-/// Removes rows that act in the wrong direction from the set, and adds those with an excess; returns whether
-/// the set changed.
+/// Removes rows with an impulse in the wrong direction from the acting set, and adds rows with an excess.
+/// Returns whether the set changed.
 bool TautSprings::change_set() {
   bool changed = false;
   for (std::size_t k = 0; k < rows_.size(); ++k)
@@ -195,8 +197,8 @@ void TautSprings::solve() {
   for (int set = 0; set < kMaxSets; ++set)
     if (!solve_acting() || !change_set()) break;
   for (Real& impulse : lambda_) impulse = std::max(impulse, 0.0);
-  // A solution that reached the limit of sets or iterations must not add energy, so the best length along it
-  // is used.
+  // A solution that reached the limit of sets or iterations must not add energy. So it is scaled by the
+  // factor with the least energy.
   multiply(lambda_, image_);
   Real gain = 0, curvature = 0;
   for (std::size_t k = 0; k < rows_.size(); ++k) {
@@ -207,10 +209,10 @@ void TautSprings::solve() {
   for (Real& impulse : lambda_) impulse *= scale;
 }
 
-/// The greatest c from 0 to 1 for which c times the gathered impulses p adds no kinetic energy to the
-/// velocities v: c p.v + c^2 p.W p / 2 <= 0, where W is the inverse mass matrix. Without it, impulses that
-/// correct an error of earlier sub-steps (a spring that was already too long, an overlap that already
-/// existed) would add energy. Moving pins may add energy, because the object that moves them does work.
+/// Returns the greatest c in [0, 1] for which c times the gathered impulses p adds no kinetic energy to the
+/// velocities v: c p.v + c^2 p.W p / 2 <= 0, where W is the inverse mass matrix. Otherwise energy would come
+/// from impulses that correct an error of earlier sub-steps, such as an overlap that already existed. Moving
+/// pins may add energy, because the object that moves them does work.
 Real TautSprings::velocity_fraction(Real dt, std::span<const Vec4> kick,
                                     std::span<const VelocityCut> cuts) const {
   Real work = 0, inertial = 0;

@@ -6,13 +6,14 @@
 namespace offstage::sim {
 namespace {
 
-/// Distance to which a tear relieves the cloth around it in a step, in lengths of the broken spring.
+/// A tear relieves the cloth around it up to this distance in a step, as a multiple of the broken spring's
+/// length.
 constexpr Real kRelief = 2;
 
 struct Broken {
   uint32_t spring;
   bool at_border;
-  Real ratio;  // of length over rest length
+  Real ratio;  // length over rest length
 };
 
 bool holds(const Triangle& t, uint32_t point) {
@@ -26,7 +27,8 @@ std::vector<uint32_t> triangles_around(const Cloth& cloth, uint32_t point) {
   return around;
 }
 
-/// The neighbours of a point, once for each triangle.
+/// Returns the neighbours of a point. A neighbour appears once for each triangle that it shares with the
+/// point.
 std::vector<uint32_t> points_around(const Cloth& cloth, uint32_t point) {
   std::vector<uint32_t> around;
   for (uint32_t t : triangles_around(cloth, point))
@@ -36,7 +38,7 @@ std::vector<uint32_t> points_around(const Cloth& cloth, uint32_t point) {
   return around;
 }
 
-/// Whether some edge from the point has a triangle on one side alone.
+/// Whether the point is on a border: one of its edges has a triangle on one side only.
 bool is_at_border(const Cloth& cloth, uint32_t point) {
   const std::vector<uint32_t> around = points_around(cloth, point);
   return std::any_of(around.begin(), around.end(),
@@ -70,7 +72,7 @@ Real rest_area(const Cloth& cloth, const Triangle& t) {
   return (cloth.rest[t[1]] - a).cross(cloth.rest[t[2]] - a).norm() / 2;
 }
 
-/// Triangles at a point, each of which shares an edge with another one.
+/// Triangles at a point that are connected by shared edges.
 struct Fan {
   std::vector<uint32_t> triangles;
 
@@ -83,7 +85,8 @@ struct Fan {
     for (uint32_t t : triangles) sum += rest_area(cloth, cloth.triangles[t]);
     return sum;
   }
-  /// Measures to which degree a direction from the point leads into one of the triangles.
+  /// Returns the greatest cosine between a direction from the point and the directions to the triangles'
+  /// centres.
   Real faces(const Cloth& cloth, uint32_t point, const Vec3& direction) const {
     Real most = -1;
     for (uint32_t t : triangles)
@@ -93,8 +96,8 @@ struct Fan {
   }
 };
 
-/// Returns the fans at a point, if edges across the plane through it with this normal do not connect
-/// triangles. Zero: no plane.
+/// Returns the fans at a point. Edges do not connect triangles on different sides of the plane through the
+/// point with this normal. A zero normal is no plane.
 std::vector<Fan> fans_at(const Cloth& cloth, uint32_t point, const Vec3& normal) {
   std::vector<uint32_t> left = triangles_around(cloth, point);
   const auto is_beyond = [&](uint32_t t) {
@@ -121,7 +124,7 @@ std::vector<Fan> fans_at(const Cloth& cloth, uint32_t point, const Vec3& normal)
   return fans;
 }
 
-/// Gives every fan but the first a point of its own, and springs to the fans that they belong to.
+/// Gives every fan except the first a point of its own, and moves springs to the fans to which they belong.
 void part(Cloth& cloth, uint32_t point, const std::vector<Fan>& fans) {
   const auto fans_with = [&](uint32_t i) {
     std::vector<std::size_t> with;
@@ -129,7 +132,7 @@ void part(Cloth& cloth, uint32_t point, const std::vector<Fan>& fans) {
       if (fans[f].holds_point(cloth, i)) with.push_back(f);
     return with;
   };
-  // Those across the tear are cut.
+  // Springs across the tear are cut.
   std::erase_if(cloth.springs, [&](const ClothSpring& s) {
     if (s.a == point || s.b == point) return false;
     const std::vector<std::size_t> a = fans_with(s.a), b = fans_with(s.b);
@@ -144,7 +147,7 @@ void part(Cloth& cloth, uint32_t point, const std::vector<Fan>& fans) {
   Real area = 0;
   for (const Fan& fan : fans) area += fan.area(cloth);
   const Real mass = cloth.masses[point];
-  std::vector<uint32_t> own(fans.size(), point);  // the point of each fan
+  std::vector<uint32_t> own(fans.size(), point);  // by fan: its point
   for (std::size_t f = 0; f < fans.size(); ++f) {
     const Real fraction = area > 0 ? fans[f].area(cloth) / area : 1.0 / static_cast<Real>(fans.size());
     if (f == 0) {
@@ -174,7 +177,7 @@ void part(Cloth& cloth, uint32_t point, const std::vector<Fan>& fans) {
       with.push_back(
           static_cast<std::size_t>(std::max_element(fans.begin(), fans.end(), less) - fans.begin()));
     }
-    // A tear along an edge gives each side half of its threads.
+    // A tear along an edge gives each side half of the edge's threads.
     s.stiffness /= static_cast<Real>(with.size());
     s.damping /= static_cast<Real>(with.size());
     for (std::size_t j = 0; j < with.size(); ++j) {
@@ -191,8 +194,8 @@ void part(Cloth& cloth, uint32_t point, const std::vector<Fan>& fans) {
   ++cloth.version;
 }
 
-/// Separates the cloth at a point, and then parts that only a single point connects. Returns false if all
-/// triangles are on one side.
+/// Separates the cloth at a point, and then parts that are connected by a single point only. Returns false if
+/// all triangles are on one side of the plane.
 bool split(Cloth& cloth, uint32_t point, const Vec3& normal) {
   const std::vector<Fan> fans = fans_at(cloth, point, normal);
   if (fans.size() < 2) return false;
@@ -230,7 +233,7 @@ uint32_t tear(Cloth& cloth, ClothTear first_tear) {
     const uint32_t first = a_first ? s.a : s.b, second = a_first ? s.b : s.a;
     const Vec3 along = cloth.rest[second] - cloth.rest[first];
     if (split(cloth, first, along) || split(cloth, second, -along)) continue;
-    // A thread without triangles: only the spring breaks.
+    // A thread without triangles breaks without a tear: only its spring is removed.
     std::erase_if(cloth.springs,
                   [&](const ClothSpring& k) { return k.a == s.a && k.b == s.b && k.kind == s.kind; });
   }

@@ -30,7 +30,7 @@ void separate(const TriangleContact& c, const Triangle& t, ClothPoints& points, 
     const Real friction = std::sqrt(points.friction[t[0]] * body.obstacle().friction);
     impulse -= std::min(length, friction * push) / (total * length) * slip;
   }
-  // The removal of an initial overlap gives neither side a velocity.
+  // Removing an initial overlap gives no velocity to either side.
   const Vec3 recovery = std::min(push, -kTriangleRecovery * before) / total * c.normal;
   for (std::size_t k = 0; k < 3; ++k) {
     const Real w = points.inverse_mass[t[k]];
