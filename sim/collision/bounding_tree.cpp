@@ -49,8 +49,8 @@ void fit_boxes(AabbTree& tree, std::span<AabbTree::Node> nodes, ItemBox&& item_b
   }
 }
 
-/// Oriented boxes and spheres enclose all points of the subtree, which is tighter than enclosing the
-/// children.
+/// Fits each oriented box or sphere to all points of its subtree. The result is tighter than a fit to the
+/// volumes of the children.
 template <class Tree>
 void fit_points(Tree& tree, std::span<typename Tree::Node> nodes, const TriangleMesh& mesh, bool fresh) {
   std::vector<Vec3> points;

@@ -16,8 +16,8 @@ namespace {
 constexpr int kDirections = kSmallHullPoints / 2;
 using Heights = Eigen::Array<Real, kDirections, 1>;
 
-/// Axes with an even distribution: through the vertices of an icosahedron, and through those vertices of its
-/// dual dodecahedron that are not the vertices of a cube.
+/// Returns evenly distributed axes: through the vertices of an icosahedron, and through the vertices of the
+/// dual dodecahedron that are not also vertices of a cube.
 Eigen::Array<Real, kDirections, 3> even_directions() {
   constexpr Real kGolden = std::numbers::phi;
   Eigen::Matrix<Real, kDirections, 3> d;
@@ -57,8 +57,8 @@ std::span<const Vec3> extreme_points(std::span<const Vec3> points, std::array<Ve
   return kept;
 }
 
-/// Axes along the longest edge and the normal of a triangle: those of its smallest box, which has twice its
-/// area.
+/// Returns the axes of a triangle's smallest box, which has twice the triangle's area: along the longest
+/// edge, and the normal.
 Mat3 triangle_axes(const Vec3& p, const Vec3& q, const Vec3& r) {
   const std::array<Vec3, 3> edges = {q - p, r - q, p - r};
   const Vec3 longest = *std::max_element(edges.begin(), edges.end(), [](const Vec3& a, const Vec3& b) {

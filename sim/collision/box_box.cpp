@@ -57,7 +57,7 @@ int largest(Lanes x) {
   return x[2] > x[best] ? 2 : best;
 }
 
-/// Axis of the largest gap: the product of two edges, or the normal of a face if `edges` is false.
+/// The axis of the largest gap. It is the product of two edges or, if `edges` is false, the normal of a face.
 struct Axis {
   Real gap;
   bool edges;
@@ -65,8 +65,8 @@ struct Axis {
 };
 
 /// Takes the product of two axes if the normalized gap along it is the largest so far. It must exceed the gap
-/// of a face by more than rounding, because an edge that lies on a face spans the normal of the face with
-/// every edge of it.
+/// of a face by more than rounding: an edge that lies on a face gives, with every edge of that face, the
+/// face's own normal.
 void try_products(const Gaps& gaps, const Mat3& rotation, Real rounding, Axis& best) {
   Real least = best.gap + rounding;
   for (int b = 0; b < 3; ++b)
@@ -81,8 +81,8 @@ void try_products(const Gaps& gaps, const Mat3& rotation, Real rounding, Axis& b
     }
 }
 
-/// Returns the closest points if they are inside two edges. Returns nothing if they are not, or if this is
-/// uncertain because of rounding.
+/// Returns the closest points of two edges if both are inside their edges. Returns nothing if they are not,
+/// or if rounding makes this uncertain.
 std::optional<Separation> edge_separation(const Convex& a, const Convex& b, const Placed& at,
                                           const Axis& axis, Real rounding) {
   const Vec3 u = Vec3::Unit(axis.a), w = at.rotation.col(axis.b), cross = u.cross(w);
@@ -138,8 +138,8 @@ Face facing(const Vec3& half, const Vec3& d, Real slack) {
   return {axis, d[axis] > 0};
 }
 
-/// The face that is least inclined to `d`, with the sine of the angle; the sine is 1, more than kMaxTilt, if
-/// this face cannot give the normal of the contact (see tilt() in manifold.cpp).
+/// The face that is least inclined to `d`, and the sine of the inclination. If this face cannot give the
+/// normal of the contact, the sine is 1, which is more than kMaxTilt (see tilt() in manifold.cpp).
 struct Tilted {
   Face face;
   Real sine;
@@ -188,7 +188,7 @@ class FaceContact {
   uint32_t count() const { return count_; }
   int other_axis() const { return other_.axis; }
   const Corner& corner(uint32_t k) const { return corners_[k]; }
-  /// Height of the lowest corner; infinite if there is none.
+  /// Returns the height of the lowest corner, or infinity without corners.
   Real lowest() const {
     Real least = kInfinity;
     for (uint32_t k = 0; k < count_; ++k) least = std::min(least, corners_[k].at[2]);
@@ -200,7 +200,7 @@ class FaceContact {
     for (uint32_t k = 0; k < count_; ++k) sum += corners_[k].at;
     return sum / std::max(1u, count_);
   }
-  /// Whether a corner whose height is at most `height` is over the face.
+  /// Whether any corner with at most this height is over the face.
   bool has_corner_over_face(Real height) const {
     for (uint32_t k = 0; k < count_; ++k) {
       const Vec3& p = corners_[k].at;
@@ -268,13 +268,13 @@ struct FacePair {
     return {reference.half, face, facing(incident.half, towards, slack), incident.half, at, body, slop};
   }
 
-  /// Whether separate boxes with a `gap` along the normal of the reference face have this gap as their
-  /// distance. They do if the lowest corner over the plane of the face is over the face.
+  /// Whether the distance of two separate boxes is the `gap` along the normal of the reference face. It is if
+  /// the lowest corner over the plane of the face is over the face.
   ///
   /// Faces at a small angle may also count. Let a point of the incident box be over the face, `depth` from
-  /// its border, and higher by `drop` than the lowest corner, whose height is h. Boxes are convex, so at x
-  /// beside the face the height is at least h - x drop / depth. The closest points are therefore about h
-  /// apart, along a normal that is inclined by at most drop / depth.
+  /// its border, and higher by `drop` than the lowest corner, whose height is h. Boxes are convex, so at a
+  /// distance x outside the face the height is at least h - x drop / depth. The closest points are therefore
+  /// about h apart, along a normal that is inclined by at most drop / depth.
   bool is_distance(Real gap, const FaceContact& contact, Real margin, Real slop, Real rounding) const {
     if (contact.has_corner_over_face(gap + rounding)) return true;
     const Real alike = at.rotation.row(face.axis).transpose().cross(Vec3::Unit(contact.other_axis())).norm();
@@ -287,7 +287,8 @@ struct FacePair {
   }
 };
 
-/// Writes the points of the contact and, if it is deeper, `closest`, the closest point on the incident box.
+/// Writes the points of the contact. Also writes `closest`, the closest point on the incident box, if that is
+/// deeper.
 void fill(Manifold& m, const FacePair& pair, const FaceContact& contact, const Pose& a_from_b, Real margin,
           Real slop, const Separation* closest, Manifold* more) {
   const bool on_a = pair.body == 0;
@@ -339,7 +340,8 @@ bool box_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, Real m
   const Vec3 along = by_a ? Vec3(Vec3::Unit(face_a)) : Vec3(at.rotation.col(face_b));
   const Vec3 n = edges ? edges->normal : Vec3((along.dot(at.translation) > 0 ? -1 : 1) * along);
 
-  // As in manifold(): if a face of each box can give the normal, the less inclined face is used.
+  // The choice is the same as in manifold(): if a face of each box can give the normal, the less inclined
+  // face does.
   const Real rounding = kSeparationRounding * size, tolerance = kTilt * margin + rounding,
              slop = kRim * margin + rounding;
   const Tilted of_a = tilted_face(-n, gaps.a, axis.gap, tolerance),

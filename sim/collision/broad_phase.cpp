@@ -66,8 +66,8 @@ void BroadPhase::count_diameter(uint32_t object, Real sign) {
   bounded_ += sign;
 }
 
-/// Adapts the cell width to the mean diameter, with hysteresis, because a change moves all objects to other
-/// cells.
+/// Adapts the cell width to the mean diameter of the objects. There is a hysteresis, because a change moves
+/// all objects to other cells.
 void BroadPhase::fit_uniform_width() {
   constexpr Real kTolerance = 1.25;
   if (sizes_.kind != GridKind::uniform || !(bounded_ > 0 && diameters_ > 0)) return;
@@ -123,7 +123,7 @@ void BroadPhase::find_among_moving() {
 }
 
 void BroadPhase::find_with_resting() {
-  // The grid of resting objects still contains those that have left since it was built.
+  // The grid of resting objects still contains objects that have moved since it was built.
   const auto has_left = [&](const IndexPair& p) { return !is_settled(p.a) && !is_settled(p.b); };
   for (std::size_t level = 0; level < moving_.tables().size(); ++level) {
     const CellTable &moving = moving_.tables()[level], &resting = resting_.tables()[level];
@@ -136,7 +136,7 @@ void BroadPhase::find_with_resting() {
   }
 }
 
-/// For objects that are too large for cells: finds each of their pairs that has an unsettled object.
+/// Finds the pairs of objects that are too large for cells. One object of each pair is unsettled.
 void BroadPhase::find_large() {
   const auto size = static_cast<uint32_t>(states_.size());
   const auto is_large = [&](uint32_t i) { return sizes_.level(boxes_[i]) == CellSizes::kNone; };
@@ -156,11 +156,11 @@ void BroadPhase::find_large() {
     });
 }
 
-/// Sorts the new pairs by counting and merges them with the remembered pairs of settled objects.
+/// Sorts the new pairs by counting, and merges them with the stored pairs of settled objects.
 void BroadPhase::collect() {
   const std::span<const CandidatePairs> blocks(blocks_.data(), block_count_);
-  // Counts are stored two places up. Placing the pairs of a then moves begin_[a + 1] from the beginning of
-  // its range to its end.
+  // The counts are stored two places further. Then begin_[a + 1] moves from the start of a's range to its end
+  // while the pairs of a are placed.
   begin_.assign(states_.size() + 2, 0);
   for (const CandidatePairs& block : blocks) {
     work_.compared += block.compared;
@@ -184,7 +184,7 @@ void BroadPhase::settle_if_due() {
   const auto rests = [&](uint32_t i) { return !(states_[i] & kMoved); };
   const auto resting = static_cast<std::size_t>(std::count_if(unsettled_.begin(), unsettled_.end(), rests));
   in_vain_ += resting;
-  // Settling an object costs about half as much as inserting and comparing it once.
+  // To settle an object costs about half as much as to insert and compare it once.
   const bool due = resting > 0 && 2 * in_vain_ >= count_;
   if (due) {
     std::erase_if(unsettled_, [&](uint32_t i) {

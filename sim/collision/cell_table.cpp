@@ -20,20 +20,21 @@ CellLanes lanes(const CellBox& box) {
   return CellLanes(box.bound.data(), stdx::vector_aligned);
 }
 
-/// Returns the limits that no lane of another box exceeds if the boxes overlap.
+/// Returns limits for the lanes of other boxes: boxes that overlap this one exceed none of them.
 CellLanes limits(const CellBox& box) {
   const Half low(box.bound.data(), stdx::vector_aligned),
       minus_high(box.bound.data() + 4, stdx::vector_aligned);
   return stdx::concat(-minus_high, -low);
 }
 
-/// Cells that are neighbours along x are neighbours in the table.
+/// Returns the hash of a cell. Cells that are neighbours along x are neighbours in the table.
 uint32_t hash(int32_t x, int32_t y, int32_t z) {
   return static_cast<uint32_t>(x) + static_cast<uint32_t>(y) * 0x9e3779b1u +
          static_cast<uint32_t>(z) * 0x85ebca6bu;
 }
 
-/// Lane that is equal for equal cells: 24 bits, exact in single precision.
+/// Returns a number that is equal for equal cells, for comparison in a lane: 24 bits, exact in single
+/// precision.
 float cell_lane(int32_t x, int32_t y, int32_t z) {
   return static_cast<float>((x & 255) << 16 | (y & 255) << 8 | (z & 255));
 }
@@ -46,8 +47,7 @@ CellBox in_cell(CellBox box, float cell) {
 
 /// Calls visit(hash, cell lane, axes along which this is the object's low cell) for the cells of a range, in
 /// blocks of 2 x 2 x 2. Nearly every object has one or two cells along each axis, and the processor cannot
-/// predict which. One loop over the cells of a block that are in the range is therefore faster than three
-/// nested loops.
+/// predict which. Therefore one loop over the cells of a block is faster than three nested loops.
 template <class Visit>
 void for_each_cell(const CellRange& range, Visit&& visit) {
   const auto& [x0, y0, z0] = range.low;

@@ -51,13 +51,13 @@ ClearanceGrid::Cell ClearanceGrid::cell_of(const Vec3& p) const {
 }
 
 bool ClearanceGrid::is_clear(const Vec3& centre, Real radius) const {
-  // A point outside of the grid is farther from everything in it than the nearest cell of the grid is.
+  // A point outside of the grid is farther from everything in the grid than the nearest cell of the grid.
   const int steps = steps_[index(cell_of(centre))];
   return (steps - 1) * cell_ > radius;
 }
 
-/// Marks the cells that a triangle may intersect. The triangle is halved until its pieces are as small as
-/// cells.
+/// Marks the cells that a triangle may intersect. The triangle is halved repeatedly, until its pieces are as
+/// small as cells.
 void ClearanceGrid::mark(const std::array<Vec3, 3>& triangle, std::vector<Cell>& surface) {
   std::vector<std::array<Vec3, 3>> pieces = {triangle};
   while (!pieces.empty()) {
@@ -96,7 +96,8 @@ void ClearanceGrid::for_each_neighbor(const Cell& c, F&& f) const {
       for (int x = std::max(c[0] - 1, 0); x <= std::min(c[0] + 1, count_[0] - 1); ++x) f(Cell{x, y, z});
 }
 
-/// Flood fill from a corner of the grid. The marked surface is closed, so the fill does not enter its inside.
+/// Marks the cells outside of the mesh by a flood fill from a corner of the grid. The marked surface is
+/// closed, so the fill does not enter the inside.
 void ClearanceGrid::flood_outside() {
   std::vector<Cell> open = {{0, 0, 0}};
   steps_[0] = kOutside;

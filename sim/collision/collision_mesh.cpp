@@ -10,9 +10,9 @@
 namespace offstage::sim {
 namespace {
 
-/// Keeps the clearance grids of the latest meshes for all worlds of the process. The tuning page builds a
-/// world after every change, and would spend most of that time on computing the same grids again. A grid
-/// depends only on its mesh, so keeping it does not change results. Uses at most 26 MB.
+/// Keeps the clearance grids of the latest meshes for all worlds of the process, in at most 26 MB. The tuning
+/// page builds a world after every change, and would spend most of that time on the same grids. A grid
+/// depends only on its mesh, so keeping it does not change results.
 class RecentGrids {
  public:
   ClearanceGrid of(const TriangleMesh& mesh, bool solid) {

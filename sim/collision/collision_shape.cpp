@@ -5,7 +5,7 @@
 namespace offstage::sim {
 namespace {
 
-/// The tree of a primitive in its box.
+/// Returns the tree of a primitive: one volume around its box.
 PieceTree tree_of(const Convex& hull, const Aabb& box, TreeVolume volume) {
   const Vec3 half = box.sizes() / 2;
   switch (volume) {

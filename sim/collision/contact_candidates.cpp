@@ -30,8 +30,8 @@ Real least_separation(std::span<const Candidate> c) {
   return least;
 }
 
-/// Signed distance of points to the left of the line from p to q, seen against the normal, times the length
-/// of pq: twice the area of their triangle.
+/// Signed distance of points from the line from p to q, times the length of pq: twice the area of the
+/// triangle. It is positive on the left, seen against the normal.
 struct LeftOf {
   Vec3 inward;
   Real offset;
@@ -56,7 +56,7 @@ void reduce(Manifold& m, std::span<const Candidate> c, Real slop) {
   const Real level = least_separation(c) + slop;
   const Vec3 p = keep(most(c, [&](const Candidate& x) { return x.separation <= level ? 1.0 : 0.0; }));
   const Vec3 q = keep(most(c, [&](const Candidate& x) { return (x.on_a - p).squaredNorm(); }));
-  // Among collinear points this term prefers the end away from q.
+  // This term decides between collinear points: it prefers the end that is farther from q.
   constexpr Real kRow = 1e-9;
   const LeftOf pq(m.normal, p, q);
   const Vec3 r = keep(

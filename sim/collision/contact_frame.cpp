@@ -8,7 +8,7 @@ namespace {
 /// Two points closer than this have no defined direction [m].
 constexpr Real kCoincident = 1e-12;
 
-/// Time derivative of n = +-(u x w) / |u x w|, where the direction u turns with A and w with B.
+/// Returns the time derivative of n = +-(u x w) / |u x w|, where the direction u turns with A and w with B.
 Vec3 crossing_rate(const Manifold& m, const Twist& a, const Twist& b) {
   const Vec3 &u = m.edge_a, &w = m.edge_b, cross = u.cross(w);
   const Vec3 rate =
@@ -16,9 +16,9 @@ Vec3 crossing_rate(const Manifold& m, const Twist& a, const Twist& b) {
   return cross.dot(m.normal) < 0 ? Vec3(-rate) : rate;
 }
 
-/// Time derivative of n = d / |d|, where d leads from a point or line of B to a point or line of A. The
-/// nearest point of a line slides along it, which does not change d across n and the line. For the direction
-/// e of a line, n.e = 0 gives n'.e = -n.e'.
+/// Returns the time derivative of n = d / |d|, where d leads from a point or line of B to a point or line of
+/// A. The nearest point of a line slides along the line, which does not change the part of d that is
+/// perpendicular to the line. For the direction e of a line, n.e = 0 gives n'.e = -n.e'.
 Vec3 pointing_rate(const Manifold& m, const ContactPoint& point, const Twist& a, const Twist& b) {
   const Vec3 &n = m.normal, p = point.on_a + m.radius_a * n, q = point.on_b - m.radius_b * n;
   const Real distance = (p - q).dot(n);
@@ -40,7 +40,7 @@ ContactFrame contact_frame(const Vec3& n) {
   return {n, t, n.cross(t)};
 }
 
-// With s = e x n, t = s / |s|: t' = (s' - t (t.s')) / |s|, and s' = e x n'.
+// Computed from s = e x n and t = s / |s|: t' = (s' - t (t.s')) / |s|, and s' = e x n'.
 ContactFrame contact_frame_rate(const ContactFrame& frame, const Vec3& n_rate) {
   Eigen::Index drop;
   frame.n.cwiseAbs().minCoeff(&drop);

@@ -8,10 +8,11 @@
 namespace offstage::sim {
 namespace {
 
-// With at most this many vertices, checking all of them is faster than climbing.
+// For at most this many vertices, a search of all of them is faster than climbing from neighbour to
+// neighbour.
 constexpr std::size_t kScanned = 24;
-// Fraction of the polyhedron's size by which it may fail to be convex, because hulls merge faces that are
-// this close to one plane.
+// Fraction of the polyhedron's size by which it may deviate from convexity, because hulls merge faces that
+// are this close to one plane.
 constexpr Real kLevel = 1e-9;
 
 uint32_t highest(const ConvexPolyhedron& p, const Vec3& d) {
@@ -26,21 +27,21 @@ uint32_t highest(const ConvexPolyhedron& p, const Vec3& d) {
   return best;
 }
 
-/// The box corner whose coordinates have the signs of the bits.
+/// Returns the corner of a box; bit i is set if coordinate i is positive.
 Vec3 corner(const Vec3& half, uint32_t bits) {
   return {bits & 1 ? half.x() : -half.x(), bits & 2 ? half.y() : -half.y(), bits & 4 ? half.z() : -half.z()};
 }
 
-/// Support point of a disc about the Y axis at y = `height`. If d is along Y, all points of the disc are
-/// equally far along d, and the centre is returned.
+/// Returns the support point of a disc about the Y axis at y = `height`. If d is along Y, all points of the
+/// disc are equally far along d, and the centre is returned.
 Vec3 rim(const Vec3& d, Real radius, Real height) {
   const Real rho = std::sqrt(d.x() * d.x() + d.z() * d.z());
   if (!(rho > 0)) return {0, height, 0};
   return {radius * (d.x() / rho), height, radius * (d.z() / rho)};
 }
 
-/// Support point of a cone or frustum: a point of the top if the top reaches farther along d than the base,
-/// otherwise a point of the base's rim.
+/// Returns the support point of a cone or frustum. It is a point of the top if that reaches farther along d
+/// than the base, otherwise a point of the base's rim.
 Vec3 cone_support(const Vec3& half, const Vec3& d) {
   if (half.z() > 0) {
     const Real rho = std::sqrt(d.x() * d.x() + d.z() * d.z());
@@ -52,8 +53,8 @@ Vec3 cone_support(const Vec3& half, const Vec3& d) {
   return rim(d, half.x(), -half.y());
 }
 
-/// Support point of an ellipsoid. The ellipsoid is the unit ball scaled by `half` along the axes, so its
-/// support point is the scaled support point of the ball.
+/// Returns the support point of an ellipsoid. The ellipsoid is the unit ball scaled by `half` along the axes,
+/// so its support point is the scaled support point of the ball.
 Vec3 ellipsoid_support(const Vec3& half, const Vec3& d) {
   const Vec3 scaled = half.cwiseProduct(d);
   const Real length = scaled.norm();
@@ -95,7 +96,7 @@ uint32_t support_vertex(const ConvexPolyhedron& p, const Vec3& d, uint32_t start
   if (vertices.size() <= kScanned) return highest(p, d);
   uint32_t top = start < vertices.size() ? start : 0;
   Real height = d.dot(vertices[top]);
-  for (;;) {  // ends, because the height grows
+  for (;;) {  // the loop ends because the height grows
     uint32_t next = top;
     Real best = -std::numeric_limits<Real>::infinity();
     for (uint32_t v : p.vertex_neighbours(top))

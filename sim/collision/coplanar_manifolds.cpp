@@ -17,7 +17,8 @@ namespace {
 constexpr Real kSameNormal = 1 - 5e-9;
 /// All points on coplanar triangles are within this distance of one plane [m].
 constexpr Real kSamePlane = 1e-6;
-/// Points that are nearer to each other are the same, such as one over the common edge of two triangles [m].
+/// Points that are nearer to each other than this are identical, such as two points over the common edge of
+/// two triangles [m].
 constexpr Real kSamePoint = 1e-6;
 
 /// The manifolds of one convex piece with coplanar triangles.
@@ -43,7 +44,7 @@ class CoplanarGroup {
     continues_b_ &= m.continues_b;
   }
 
-  /// The joined manifold, with at most four points.
+  /// Returns the joined manifold, with at most four points.
   Manifold joined() const {
     Manifold m = first_;
     if (points_.empty()) return m;
@@ -76,11 +77,11 @@ class CoplanarGroup {
     });
   }
 
-  /// The corners of the convex outline of the points, and the deepest point if it is inside. The separation
-  /// is linear over a flat part of the piece, so the others add nothing.
+  /// Returns the corners of the convex outline of the points, and also the deepest point if that is inside.
+  /// The separation is linear over a flat part of the piece, so other points add nothing.
   std::vector<Candidate> outline() const {
     if (points_.size() < 2) return points_;
-    // Orders points along the greatest extent, so that rounding does not decide the order of points on a
+    // Points are ordered along the greatest extent, so that rounding does not decide the order of points on a
     // line.
     const Vec3& end = farthest_from(points_.front().on_a).on_a;
     const Vec3 along = (farthest_from(end).on_a - end).normalized(), across = first_.normal.cross(along);
@@ -106,8 +107,8 @@ class CoplanarGroup {
     return corners;
   }
 
-  /// Adds one side of the outline of sorted points (Andrew's monotone chain), without its last corner, where
-  /// the other side begins.
+  /// Adds one side of the outline of sorted points by Andrew's monotone chain. Its last corner is omitted,
+  /// because the other side begins there.
   static void add_side(std::span<const Candidate> sorted, const auto& at, std::vector<Candidate>& corners) {
     const std::size_t first = corners.size();
     for (const Candidate& c : sorted) {

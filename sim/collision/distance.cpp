@@ -36,8 +36,8 @@ struct ProfileDistance {
   Vec2 normal;
 };
 
-/// Distance to two faces that bound a convex profile: inside by the line of the nearer face, outside by the
-/// nearer closest point.
+/// Returns the distance to two faces that bound a convex profile. Inside it is the distance from the line of
+/// the nearer face, outside from the nearer of the two closest points.
 ProfileDistance profile_distance(const Vec2& p, Real above_1, const Vec2& normal_1, const Vec2& closest_1,
                                  Real above_2, const Vec2& normal_2, const Vec2& closest_2) {
   if (above_1 <= 0 && above_2 <= 0)
@@ -143,10 +143,10 @@ SurfaceDistance signed_distance(const Frustum& c, const Vec3& p) {
 
 namespace {
 
-/// Returns the parameter t of the point y_i = r_i^2 p_i / (t + r_i^2) of an ellipsoid that is nearest to p:
-/// the root of F(t) = sum (r_i p_i / (t + r_i^2))^2 - 1 beyond the pole of the smallest radius (Eberly,
-/// "Distance from a point to an ellipse, an ellipsoid, or a hyperellipsoid", 2013). F falls and is convex
-/// there, so Newton's iteration from below the root never passes it.
+/// Returns the parameter t that determines the point of an ellipsoid nearest to p: y_i = r_i^2 p_i / (t +
+/// r_i^2). It is the root of F(t) = sum (r_i p_i / (t + r_i^2))^2 - 1 beyond the pole of the smallest radius
+/// (Eberly, "Distance from a point to an ellipse, an ellipsoid, or a hyperellipsoid", 2013). There F
+/// decreases and is convex, so Newton's iteration from below the root never passes it.
 Real nearest_parameter(const Vec3& r, const Vec3& p, Real least) {
   constexpr int kMostSteps = 100;
   Real t = least;
@@ -174,12 +174,12 @@ SurfaceDistance signed_distance(const Ellipsoid& e, const Vec3& point) {
   const Vec3 p = point.cwiseAbs();
   int thin = 0;
   const Real least_radius = r.minCoeff(&thin);
-  // Below the root: F >= 0 where the term of the thinnest axis alone is 1.
+  // This start is below the root: F >= 0 where the term of the thinnest axis alone is 1.
   const Real pole = -least_radius * least_radius;
   Vec3 nearest;
   bool on_axis_plane = false;
   if (!(p[thin] > 0)) {
-    // A point of the plane across the thinnest axis may have its nearest points off this plane.
+    // The nearest points of a point in the plane across the thinnest axis may be off this plane.
     Real others = 0;
     for (int i = 0; i < 3; ++i)
       if (i != thin && p[i] > 0) {
@@ -194,7 +194,7 @@ SurfaceDistance signed_distance(const Ellipsoid& e, const Vec3& point) {
     }
   }
   if (!on_axis_plane) {
-    // Each term alone gives a bound below the root; the greatest is the best start.
+    // Each single term gives a lower bound of the root; the greatest bound is the best start.
     Real start = pole;
     for (int i = 0; i < 3; ++i) start = std::max(start, r[i] * p[i] - r[i] * r[i]);
     const Real t = nearest_parameter(r, p, start);
@@ -246,8 +246,8 @@ SurfaceDistance mesh_distance(const CollisionMesh& m, const Vec3& p, Real limit2
 
 SurfaceDistance signed_distance(const CollisionMesh& m, const Vec3& p) {
   if (m.solids.empty()) return mesh_distance(m, p, kInfinity);
-  // The distance to a union is the smallest one. It is exact outside; inside, the surface is at least as
-  // deep.
+  // The distance to a union is the smallest distance to one of its solids. Outside it is exact; inside, the
+  // surface is at least this far away.
   SurfaceDistance nearest;
   for (const auto& solid : m.solids)
     if (const SurfaceDistance d = mesh_distance(*solid, p, kInfinity); d.distance < nearest.distance)
@@ -256,7 +256,7 @@ SurfaceDistance signed_distance(const CollisionMesh& m, const Vec3& p) {
 }
 
 SurfaceDistance signed_distance_below(const Solid& s, const Vec3& p, Real limit) {
-  // A point that is not known to be outside may be deep inside.
+  // A point that may be inside can be deep inside, so the limit does not apply to it.
   const bool outside = s.mesh && (!s.mesh->solid || s.mesh->clearance_grid().is_outside(p));
   return outside ? mesh_distance(*s.mesh, p, limit * limit) : signed_distance(s, p);
 }

@@ -11,7 +11,7 @@ constexpr std::size_t kMaxFaces = 2 * kMaxPoints;  // a closed surface of n poin
 // Tolerance of heights over a face, in units of the rounding of a point.
 constexpr Real kHeightTolerance = 64;
 constexpr Real kCurvedTolerance = 1e-10;  // the same for curved cores, as a fraction of the size
-// Fraction of the size: at greater depth the point gives the direction of the normal.
+// At a depth of more than this fraction of the size, the nearest point gives the direction of the normal.
 constexpr Real kDeep = 1e-6;
 // If the iteration ends early, its result is accepted if the gap between the bounds is less than this
 // fraction of the size.
@@ -20,11 +20,11 @@ constexpr Real kAcceptedGap = 1e-9;
 using Index = uint16_t;
 
 struct PolytopeFace {
-  std::array<Index, 3> corner;     ///< counter-clockwise from outside
-  std::array<Index, 3> neighbour;  ///< across the edge from corner k to the next
+  std::array<Index, 3> corner;     ///< counter-clockwise seen from outside
+  std::array<Index, 3> neighbour;  ///< by side k, from corner k to the next: the face beyond it
   Vec3 normal;                     ///< unit, outward
-  Real offset;                     ///< normal.w of its plane
-  Real slack;                      ///< a point that is lower than this over the plane may be in the plane
+  Real offset;                     ///< normal.w for all points w of its plane
+  Real slack;                      ///< points at a height of less than this over the plane may be in it
   Real key;                        ///< lower bound of the depth; infinite for a removed face
   bool is_key_exact, alive;
 };
@@ -59,7 +59,8 @@ class ExpandingPolytope {
     }
   }
 
-  /// On return `last` is the final face, or the best one if points run out or rounding breaks the polytope.
+  /// Expands the polytope and returns the deepest point. `last` becomes the final face, or the best face so
+  /// far if there is no memory for more points or rounding breaks the polytope.
   DeepestPoint expand(Simplex& last) {
     DeepestPoint best{.normal = Vec3::UnitY(), .distance = -kInfinity, .on_a = Vec3::Zero()};
     for (int iterations = 0;; ++iterations) {
@@ -76,9 +77,9 @@ class ExpandingPolytope {
   }
 
  private:
-  /// Returns the depth along the normal of a face. Rounding can leave faces nearly in one plane, none of
-  /// which is under the origin. The nearest edge to the origin is then used; if it is deep, its point gives
-  /// the direction.
+  /// Returns the depth along the normal of a face. Rounding can leave several faces nearly in one plane, none
+  /// of which is under the origin. The edge nearest to the origin is then used; if it is deep, its point
+  /// gives the direction.
   DeepestPoint answer(const PolytopeFace& face, Real height, Simplex& corners) const {
     corners.size = 3;
     for (std::size_t k = 0; k < 3; ++k) corners.points[k] = points_[face.corner[k]];
@@ -98,9 +99,9 @@ class ExpandingPolytope {
                        [&](const SupportPoint& q) { return q.w == p.w; });
   }
 
-  /// Compares faces by the distance of the plane or, if the origin is beside the triangle, of the triangle,
-  /// so that of triangles in one plane the one under the origin is chosen. The second distance is computed
-  /// only when needed.
+  /// Returns the face with the smallest distance from the origin. If the origin is not over the triangle, the
+  /// distance of the triangle counts instead of that of its plane. So the face under the origin is chosen
+  /// among several in one plane. The second distance is computed only when it is needed.
   Index nearest_face() {
     for (;;) {
       Index best = 0;
@@ -123,7 +124,7 @@ class ExpandingPolytope {
     const Real area = n.norm(), size2 = std::max(e.squaredNorm(), g.squaredNorm());
     const bool sliver = !(area > 4 * rounding_ * std::sqrt(size2));
     f.is_key_exact = sliver;
-    if (sliver) {  // it has no direction; its neighbours are as near
+    if (sliver) {  // a sliver has no direction; its neighbours are equally near
       f.normal = Vec3::Zero();
       f.offset = 0;
       f.slack = f.key = kInfinity;
@@ -151,7 +152,7 @@ class ExpandingPolytope {
     dead_[dead_size_++] = f;
   }
 
-  /// Returns the same edge as an edge of the neighbouring face.
+  /// Returns the edge as an edge of the neighbouring face.
   HorizonEdge across(Index f, std::size_t k) const {
     const Index other = faces_[f].neighbour[k];
     const auto& back = faces_[other].neighbour;

@@ -10,8 +10,7 @@ namespace {
 constexpr int kMaxGjkIterations = 100;
 // Accepted gap between the bounds of the distance, in units of the rounding of a point.
 constexpr Real kTolerance = 4;
-// Cores that are closer than this have no defined direction between them; in units of the rounding of a
-// point.
+// Cores that are closer than this many roundings of a point have no defined direction between them.
 constexpr Real kTouchingRoundings = 64;
 // If GJK makes no progress at a distance below this fraction of the size, the expanding polytope algorithm
 // computes the result.
@@ -64,8 +63,9 @@ Separation overlapping(const MinkowskiDifference& m, Simplex& s, GjkCache& cache
   return result;
 }
 
-/// Whether the nearest point of the simplex with a new corner is better: nearer to the origin, or equally
-/// near within rounding but in a face instead of on its edge, because a face gives a better normal.
+/// Whether the nearest point of the simplex with a new corner is better. It is if it is nearer to the origin,
+/// or if it is equally near within rounding and lies in a face instead of on an edge, because a face gives a
+/// better normal.
 bool is_progress(const SimplexPoint& nearer, const SimplexPoint& nearest) {
   return nearer.squared < nearest.squared ||
          (nearer.size > nearest.size && nearer.squared <= kGjkLevel * nearest.squared);

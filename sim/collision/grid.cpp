@@ -9,9 +9,9 @@
 namespace offstage::sim {
 namespace {
 
-// Cell coordinates are smaller than this. Therefore objects far from the origin get larger cells.
+// Cell coordinates must be smaller than this, so objects far from the origin get larger cells.
 constexpr Real kMaxCoordinate = 0x1p29;
-// Greatest number of cells of an object; in the multi-level grid no object comes near it.
+// Greatest number of cells of an object along an axis. In the multi-level grid no object has nearly as many.
 constexpr Real kMaxCells = CellTable::kMaxSpan;
 
 }  // namespace
@@ -84,7 +84,7 @@ std::size_t Grid::copies() const {
                                [](const CellTable& table) { return table.copies(); });
 }
 
-// A level matters if one grid has objects of that level, and the other contains any.
+// A level matters for the search if one grid has objects of this level and the other grid contains any.
 
 std::size_t Grid::enter_to_stay(const Grid& moving) {
   const std::size_t before = copies();

@@ -58,8 +58,9 @@ struct Polygon {
   }
 };
 
-/// Sutherland and Hodgman, "Reentrant polygon clipping" (1974), against the planes that stand on the sides of
-/// the reference face. Segments and points are clipped as polygons with two corners and one.
+/// Clips the incident feature against the planes that stand on the sides of the reference face (Sutherland
+/// and Hodgman, "Reentrant polygon clipping", 1974). Segments and points are clipped as polygons with two
+/// corners and one corner.
 class Clipping {
  public:
   Clipping(const Body& reference_body, const SupportingFeature& reference, const Body& incident_body,
@@ -166,10 +167,11 @@ bool is_over(const SupportingFeature& face, const Vec3& point, Real slop) {
   return true;
 }
 
-/// Contact with a face that gives the normal. `closest` is the closest point on the incident solid; for a rim
-/// it may be deeper than the corners of its polygon. The feature of a round solid is the one that faces the
-/// face; if this is not over the face, there are no points. The line nearest to an edge of the face is not
-/// used, because the face would push it along its normal although it rolls down to the face.
+/// Adds the contact with a face that gives the normal. `closest` is the closest point on the incident solid;
+/// for a rim it may be deeper than the corners of the rim's polygon. The feature of a round solid is the line
+/// or point that faces the face. If this is not over the face, there are no points: at the line nearest to an
+/// edge of the face, the face would push the solid along its normal although the solid rolls down to the
+/// face.
 void face_manifold(Manifold& m, const Body& reference, const SupportingFeature& face, Body incident,
                    SupportingFeature other, const Vec3& closest, Real margin, Real slack, Real slop,
                    Manifold* more) {
@@ -200,20 +202,20 @@ void face_manifold(Manifold& m, const Body& reference, const SupportingFeature& 
   reduce(m, candidates, slop, more);
 }
 
-/// Whether another part of the surface than the touching edge or vertex may come near a face.
+/// Whether a part of the surface other than the touching edge or vertex may come near a face.
 bool is_near(const Body& body, const SupportingFeature& f) {
   return f.is_face() && f.normal.dot(body.outward) > kNearFace;
 }
 
-/// If two parallel edges are the closest features, adds the ends of the segment along which they run side by
+/// Handles two parallel edges as closest features: adds the ends of the segment along which they run side by
 /// side.
 void parallel_edges(Manifold& m, const Body& a, const SupportingFeature& of_a, const Body& b,
                     const SupportingFeature& of_b, Real distance, Real margin, Real tolerance) {
   if (of_a.count < 2 || of_b.count < 2) return;
   const Vec3 &p = of_a.corners[0].point, &q = of_b.corners[0].point;
   const Vec3 u = of_a.corners[1].point - p, w = of_b.corners[1].point - q;
-  // In a projection along the normal, in units of B's edge: where A's edge begins and how far it extends.
-  // Then where it passes the ends of B's edge.
+  // These are values in a projection along the normal, in units of B's edge: where A's edge begins, how far
+  // it extends, and where it passes the ends of B's edge.
   const Vec3 across = m.normal.cross(w), on_plane = across.cross(m.normal);
   if (across.squaredNorm() < 0.5 * w.squaredNorm()) return;
   const Real start = (p - q).dot(on_plane) / across.squaredNorm(),
@@ -243,7 +245,7 @@ uint32_t feature_id(const Body& body, const SupportingFeature& f) {
                                 : vertex_id(body.name, f.corners[0].tag);
 }
 
-/// Contact of edges and vertices, if no face gives the normal.
+/// Adds the contact of edges and vertices, for the case that no face gives the normal.
 void edge_manifold(Manifold& m, const Body& a, const Body& b, const Separation& s, Real margin, Real slack,
                    Real tolerance) {
   const SupportingFeature of_a = a.edge(slack, s.on_a), of_b = b.edge(slack, s.on_b);
@@ -309,7 +311,7 @@ Manifold triangle_face_manifold(const Convex& a, const Convex& b, const Pose& a_
   const SupportingFeature face = reference.feature(0), other = incident.feature(margin + rounding);
   if (!face.is_face()) return m;
 
-  // Edges of the triangle that correspond to the sides, seen from this side of the triangle.
+  // The room beyond each side. From this side of the triangle, its sides may appear in the opposite order.
   std::array<Real, 3> room;
   for (uint32_t k = 0; k < 3; ++k) {
     const uint32_t from = face.corners[k].tag, to = face.corners[(k + 1) % 3].tag;

@@ -13,10 +13,9 @@ namespace {
 constexpr Real kSliver = 1e-5;
 /// Greatest number of consecutive slivers that are skipped.
 constexpr int kMostSlivers = 16;
-/// Sine: normals that are outside of a region by less than this are allowed, because normals are not more
-/// accurate.
+/// Normals may be outside of a region by up to this sine, because normals are not more accurate.
 constexpr Real kOff = 1e-5;
-/// Fraction of the longest edge: points this near to an edge or a vertex are on it.
+/// Points count as on an edge or a vertex if they are nearer to it than this fraction of the longest edge.
 constexpr Real kOnFeature = 1e-6;
 
 bool is_thin(const TriangleMesh& mesh, const Triangle& t) {
@@ -111,7 +110,7 @@ bool SurfaceTriangle::vertex_allows(uint32_t vertex, const Vec3& n, Real guard) 
     for (std::size_t k = 0; k < 3; ++k) {
       const bool begins = corners[k] == vertex, ends = corners[(k + 1) % 3] == vertex;
       if (!begins && !ends) {
-        // The edge is opposite to the vertex. In a sliver the vertex may lie on this edge.
+        // This is the edge opposite to the vertex. In a sliver the vertex may lie on this edge.
         if (mesh->surface.is_sliver(f) && !t.edge_allows(k, n, guard)) return false;
         continue;
       }

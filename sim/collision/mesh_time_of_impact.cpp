@@ -13,7 +13,7 @@ namespace offstage::sim {
 namespace {
 
 constexpr int kMaxMeshAdvances = 2000;
-/// Number of times within the step at which touching shapes are sampled.
+/// Number of times within the step at which shapes that touch at its start are sampled.
 constexpr int kLooks = 32;
 
 /// A lower bound of the distance of two volumes along a direction from B to A, in A's frame.
@@ -29,8 +29,9 @@ Mat3 axes_of(const Obb& box) {
   return box.axes;
 }
 
-/// Two boxes: along the axis of either on which they are farthest apart. A sphere: along the line of the
-/// centres or, with a box, along the box's axes.
+/// Returns a gap of two volumes along a direction that suits them. For two boxes this is the axis of either
+/// box along which they are farthest apart, for two spheres the line of the centres, and for a sphere and a
+/// box one of the box's axes.
 template <class A, class B>
 DirectedGap directed_gap(const A& a, const B& b, const Placement& p) {
   const Vec3 offset = p.point(centre(b)) - centre(a);
@@ -110,8 +111,8 @@ class Instant {
   /// The closest two pieces, if any are in contact at this time.
   const std::optional<Separation>& contact() const { return contact_; }
 
-  /// Returns a lower bound of the time until any two pieces come within half the tolerance; 0 if two are
-  /// within it now.
+  /// Returns a lower bound of the time until any two pieces come within half the tolerance, or 0 if two of
+  /// them are within it now.
   Real time_to_contact(Real limit) {
     time_ = limit;
     with_trees(a_.shape, b_.shape,
@@ -120,7 +121,8 @@ class Instant {
   }
 
  private:
-  /// The rotation of all pieces of a shape, in A's frame. Several pieces are not round about one axis.
+  /// Returns the rotation of all pieces of a shape, in A's frame. Shapes of several pieces are treated as
+  /// without an axis of revolution.
   CoreRotation turn_in_a(const MovingShape& s) const {
     CoreRotation turn = s.shape.piece_count() == 1
                             ? core_rotation({s.shape.hull(), s.path}, fraction_)
@@ -139,7 +141,8 @@ class Instant {
     stack.push(timed({&tree_a.nodes()[0], &tree_b.nodes()[0]}));
     while (!stack.empty()) {
       const NodePair<A, B> pair = stack.pop();
-      // Touching pairs have time 0. The nearest of them is wanted, so pairs with equal times are not skipped.
+      // Touching pairs have the time 0. The nearest of them is wanted, so pairs with equal times are not
+      // skipped.
       if (pair.gap > time_ || pair.gap >= limit) continue;
       if (pair.a->is_leaf() && pair.b->is_leaf()) {
         for (uint32_t i : tree_a.items(*pair.a))
@@ -155,7 +158,7 @@ class Instant {
     }
   }
 
-  /// Lower bound of the time for all pieces below two nodes.
+  /// Returns a lower bound of the time for all pieces below two nodes.
   template <class NodeA, class NodeB>
   Real node_time(const NodeA& a, const NodeB& b) const {
     const DirectedGap directed = directed_gap(a.volume, b.volume, placement_);
@@ -189,14 +192,15 @@ class Instant {
   Real fraction_, tolerance_;
   Pose pose_a_, pose_b_, a_from_b_;
   Placement placement_;
-  Vec3 closing_;  // A's frame
+  Vec3 closing_;  // in A's frame
   CoreRotation turn_a_, turn_b_;
   Real time_ = kInfinity;
   std::optional<Separation> contact_;
 };
 
-/// Bound of the deviation of a path's speed from that of a constant rotation, for all points of a shape [m
-/// per step]. The rate of a path deviates from a constant one by at most angle^2 / 24.
+/// Returns, for all points of a shape, an upper bound of the deviation of their speed from that of a constant
+/// rotation [m per step]. The rate of rotation deviates from a constant one by at most the fraction angle^2 /
+/// 24.
 Real unevenness(const MovingShape& s) {
   if (s.shape.is_plane()) return 0;
   return s.path.turn() * s.path.max_acceleration(s.shape.hull().reach()) / 24;
@@ -219,7 +223,7 @@ std::optional<Impact> bisected_time_of_impact(const MovingShape& a, const Moving
   TestCounts& counts = a.counts ? *a.counts : uncounted;
   const auto touch_at = [&](Real fraction) { return touching(a.shape, b.shape, a_from_b(fraction), counts); };
   if (!touch_at(1)) return std::nullopt;
-  // Bound of the relative speed of any two points [m per step].
+  // Upper bound of the relative speed of any two points [m per step].
   const auto fastest = [](const MovingShape& s) {
     return s.shape.is_plane() ? s.path.velocity().norm()
                               : s.path.velocity().norm() + s.path.turn() * s.shape.hull().reach();

@@ -98,12 +98,12 @@ int side_of_penetrating(const SurfaceTriangle& t, Real height, int before, SideO
   return height >= 0 ? 1 : -1;
 }
 
-/// Sets the side of a triangle, at first the front, on which the other piece is. `outward` is the direction
-/// from the triangle to the piece at the triangle's nearest point `point`, and `middle` the piece's centre,
-/// in the mesh's frame.
+/// Sets the side of a triangle on which the other piece is; initially it is the front. `outward` is the
+/// direction from the triangle's nearest point `point` to the piece, and `middle` the piece's centre, in the
+/// mesh's frame.
 ///
-/// The direction shows the side if the piece is apart from the triangle and the surface faces it there. A
-/// piece that is beside the triangle and penetrates the surface elsewhere is seen from behind.
+/// The direction shows the side if the piece is separate from the triangle and the surface faces the piece
+/// there. A piece next to the triangle that penetrates the surface elsewhere is seen from behind.
 template <class SideOfFace>
 void set_side(SurfaceTriangle& t, Real distance, const Vec3& outward, const Vec3& point, const Vec3& middle,
               int before, SideOfFace&& side_of_face) {
@@ -151,7 +151,8 @@ class PiecePair {
   }
 
  private:
-  /// Round surfaces have no internal edges. A triangle whose surroundings are all known has none either.
+  /// Whether a piece cannot be at an internal edge. Round surfaces have no internal edges, and neither has a
+  /// triangle whose surroundings are all known.
   static bool continues(const CollisionShape& shape, uint32_t piece) {
     if (const CollisionMesh* mesh = shape.surface()) return !mesh->surface.is_at_border(piece);
     return std::holds_alternative<Sphere>(*shape.solid().shape) ||
@@ -240,9 +241,9 @@ class PiecePair {
   Convex a_, b_;
 };
 
-/// Depth of a shape that is inside a hollow shape without touching its pieces, in the frame of the hollow
-/// shape. The inner shape is pushed out in the direction from its centre to the nearest point of the surface.
-/// There is no result if it is outside.
+/// A shape inside a hollow shape whose pieces it does not touch: its depth, in the frame of the hollow shape.
+/// It is pushed out in the direction from its centre to the nearest point of the surface. If it is outside,
+/// there is no result.
 struct Inside {
   Real depth;
   Vec3 outward, deepest;  // hollow's frame

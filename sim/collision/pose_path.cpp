@@ -4,11 +4,11 @@
 
 namespace offstage::sim {
 
-// Let f be half the angle and a(s) half the angle turned at fraction s. Then
+// Let f be half the angle, and a(s) half of the angle turned up to the fraction s. Then
 //   tan a = s sin f / ((1 - s) + s cos f),  da/ds = sin f / D,  D = 1 - 2 s (1 - s) (1 - cos f).
-// The angular speed 2 da/ds has its maximum 4 tan(f/2) at s = 1/2, and its rate is at most 16 tan^3(f/2). A
-// point at distance 1 from the axis has the centripetal acceleration (2 da/ds)^2 and the tangential
-// acceleration of that rate.
+// The angular speed 2 da/ds has its maximum 4 tan(f/2) at s = 1/2, and its derivative is at most 16
+// tan^3(f/2). A point at distance 1 from the axis has the centripetal acceleration (2 da/ds)^2, and this
+// derivative as its tangential acceleration.
 PosePath::PosePath(const Pose& start, const Pose& end)
     : start_(start), end_(end), velocity_(end.position - start.position) {
   if (start_.orientation.dot(end_.orientation) < 0) end_.orientation.coeffs() = -end_.orientation.coeffs();

@@ -28,7 +28,8 @@ SimplexPoint on_segment(const SimplexCorner& i, const SimplexCorner& j) {
   const Real t = along / length2;
   Vec3 v = p + t * e;
   v -= e.dot(v) / length2 *
-       // This is perpendicular to the edge even if tiny, because its direction matters as much as its length.
+       // This vector is perpendicular to the edge even if it is tiny, because its direction matters as much
+       // as its length.
        e;
   return {v, v.squaredNorm(), 2, {i.place, j.place}, {1 - t, t}};
 }
@@ -63,7 +64,7 @@ SimplexPoint on_triangle(const SimplexCorner& i, const SimplexCorner& j, const S
   return best;
 }
 
-// As for a triangle: the nearest point lies in a face with a negative coordinate. The coordinates of a
+// As for a triangle, the nearest point lies in a face with a negative coordinate. The coordinates of a
 // tetrahedron that is flat within rounding are meaningless, so all of its faces are tried.
 SimplexPoint in_tetrahedron(const SimplexCorner& i, const SimplexCorner& j, const SimplexCorner& k,
                             const SimplexCorner& l) {

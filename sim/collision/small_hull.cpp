@@ -8,7 +8,7 @@
 namespace offstage::sim {
 namespace {
 
-/// The hull as triangles, which grows point by point from a tetrahedron.
+/// A hull of triangles that grows from a tetrahedron, point by point.
 class SmallHull {
  public:
   struct Face {
@@ -22,7 +22,7 @@ class SmallHull {
   std::span<const Face> faces() const { return {faces_.data(), static_cast<std::size_t>(face_count_)}; }
   /// Point i relative to the first of the given points.
   const Vec3& point(uint32_t i) const { return points_[i]; }
-  /// Vector between two distant points; the whole result if there are no faces.
+  /// Returns the vector between two distant points. If there are no faces, it is the only result.
   const Vec3& diameter() const { return diameter_; }
 
  private:
@@ -33,7 +33,7 @@ class SmallHull {
   void add_face(uint32_t a, uint32_t b, uint32_t c);
   void add_point(uint32_t p);
 
-  static constexpr std::size_t kCapacity = kSmallHullPoints + 2;  // two more for the apexes of a flat set
+  static constexpr std::size_t kCapacity = kSmallHullPoints + 2;  // with the two apexes of a flat set
   static constexpr std::ptrdiff_t kMaxFaces = 2 * kCapacity;
 
   std::array<Vec3, kCapacity> points_;
@@ -66,7 +66,7 @@ std::pair<uint32_t, Real> SmallHull::farthest(F&& f) const {
   return best;
 }
 
-/// Starts with the triangle a, b, c and the point farthest from its plane.
+/// Starts with the triangle a, b, c and the point that is farthest from its plane.
 void SmallHull::grow_from(uint32_t a, uint32_t b, uint32_t c) {
   const Vec3 normal = diameter_.cross(points_[c] - points_[a]).normalized();
   const auto height = [&](const Vec3& p) { return normal.dot(p - points_[a]); };
@@ -114,7 +114,7 @@ void SmallHull::add_point(uint32_t p) {
     if (const auto [tail, head] = edges[e]; !(heads[head] >> tail & 1)) add_face(tail, head, p);
 }
 
-/// Covariance about the triangle's centre, per unit of area.
+/// Returns the covariance of a triangle about its centre, per unit of area.
 Mat3 triangle_covariance(const Vec3& p, const Vec3& q, const Vec3& r) {
   const Vec3 middle = (p + q + r) / 3, u = p - middle, v = q - middle, w = r - middle;
   return (u * u.transpose() + v * v.transpose() + w * w.transpose()) / 12;

@@ -19,7 +19,7 @@ struct Nearest {
   Kind kind = Kind::point;
   Real distance = 0;              ///< negative inside [m]
   Vec3 outward = Vec3::UnitY();   ///< unit, towards the query point
-  Vec3 edge = Vec3::Zero();       ///< unit direction, if it is on an edge
+  Vec3 edge = Vec3::Zero();       ///< unit direction of the edge, if the point is on one
   uint32_t tag = 0, end_tag = 0;  ///< tag of the vertex, or tags of both ends of the edge
 };
 
@@ -77,7 +77,7 @@ Nearest nearest(const Convex& c, const Vec3& p) {
   return c.core == Core::segment ? nearest_to_segment(c.half.y(), p) : nearest_to_point(p);
 }
 
-/// Id of the contact of the sphere's centre with the feature.
+/// Returns the id of a contact of the sphere's centre with this feature.
 uint32_t contact_id(const Nearest& n, uint32_t other) {
   const uint32_t sphere = vertex_id(1 - other, 0);
   if (n.kind == Nearest::Kind::face) return sphere;
@@ -122,7 +122,7 @@ void sphere_manifold(const Convex& a, const Pose& pose_a, const Convex& b, const
   m.radius_a = a.radius;
   m.radius_b = b.radius;
   set_source(m, n, other, pose.vector_to_world(n.edge));
-  // Seen from the sphere's centre.
+  // The points are computed from the sphere's centre.
   ContactPoint& p = m.points[m.count++];
   p.separation = separation;
   p.id = contact_id(n, other);

@@ -7,8 +7,8 @@ namespace {
 
 /// Gap that counts as touching [m]; well above the rounding of coordinates up to 1000 m.
 constexpr Real kTouching = 1e-12;
-/// A grazing sphere gains only a factor of four per iteration; this many iterations reach kTouching from any
-/// size.
+/// For a sphere that grazes a surface, each iteration reduces the gap only to a quarter. This many iterations
+/// reach kTouching from any size.
 constexpr int kMaxIterations = 32;
 
 template <class Distance>
@@ -44,7 +44,7 @@ std::optional<SweepHit> sweep_mesh(const CollisionMesh& m, const Vec3& a, const 
     const auto hit =
         sweep_convex([&](const Vec3& p) { return triangle_distance(m.mesh, face, p); }, a, b, radius);
     if (!hit) return;
-    // If several faces are touched from the start, the closest one is pressed.
+    // If several faces are touched from the start, the nearest one counts.
     const auto earlier = [](const SweepHit& x, const SweepHit& y) {
       return x.fraction != y.fraction ? x.fraction < y.fraction : x.distance < y.distance;
     };

@@ -10,21 +10,22 @@ namespace {
 
 constexpr uint32_t kMaxFeatureCorners = SupportingFeature::kMaxCorners;
 
-/// Fraction of the solid's size: vertices that are less than this below the plane of a face belong to the
+/// Vertices that are less than this fraction of the solid's size below the plane of a face belong to the
 /// face. Coordinates from files are seldom more accurate, and flat faces are often given as triangles that
 /// are not exactly coplanar.
 constexpr Real kFlat = 1e-5;
-/// Cosine: edges and directions closer to a right angle than this count as perpendicular. Normals of round
-/// solids are accurate to the square root of the accuracy of distances.
+/// An edge and a direction count as perpendicular if the cosine of their angle is below this. Normals of
+/// round solids are accurate to the square root of the accuracy of distances.
 constexpr Real kAcross = 1e-4;
 
 /// First tag for the ends of a line on a round side. The corners on rims have smaller tags.
 constexpr uint32_t kLineTag = 2 * kMaxFeatureCorners;
 
-/// Directions around the circle, by halving angles with square roots, for the same bits on every machine.
+/// Returns directions around the circle. Angles are halved with square roots, for the same bits on every
+/// machine.
 const std::array<Eigen::Vector2d, kMaxFeatureCorners>& circle() {
   static const std::array<Eigen::Vector2d, kMaxFeatureCorners> points = [] {
-    Real cosine = 0;  // of a quarter turn
+    Real cosine = 0;  // cosine of a quarter turn
     for (uint32_t parts = 4; parts < kMaxFeatureCorners; parts *= 2) cosine = std::sqrt((1 + cosine) / 2);
     const Eigen::Matrix2d turn{{cosine, -std::sqrt(1 - cosine * cosine)},
                                {std::sqrt(1 - cosine * cosine), cosine}};
@@ -147,8 +148,8 @@ SupportingFeature triangle_edge(const Convex& c, const Vec3& d, Real slack) {
 
 // Polyhedron
 
-/// Selects the corners of a planar set of points that are farthest in evenly spaced directions: their hull
-/// except for corners so blunt that they fall between two directions.
+/// Selects the corners of a planar set of points that are farthest in evenly spaced directions. They are the
+/// corners of the hull, except blunt corners between two of these directions.
 void spread_corners(SupportingFeature& f, const ConvexPolyhedron& p, std::span<const uint32_t> vertices,
                     const Vec3& u) {
   const Vec3 w = f.normal.cross(u);
@@ -219,14 +220,15 @@ SupportingFeature polyhedron_edge(const ConvexPolyhedron& p, const Vec3& d, Real
   return segment_feature(p.vertex(v), v, p.vertex(end), end, d);
 }
 
-/// Area, projected along d, of the part of a face that is within `slack` of its vertex v along d. The two
-/// sides at v alone would not do: in a polygon of many corners they are short and almost in line.
+/// Returns the area, projected along d, of the part of a face that is within `slack` of its vertex v along d.
+/// The two sides at v are not sufficient for it: in a polygon of many corners they are short and almost in
+/// line.
 Real patch_within(const ConvexPolyhedron& p, uint32_t face, uint32_t v, const Vec3& d, Real slack) {
   const std::span<const uint32_t> loop = p.face_vertices(face);
   const auto start = static_cast<std::size_t>(std::find(loop.begin(), loop.end(), v) - loop.begin());
   const Vec3& top = p.vertex(v);
   Vec3 corner = Vec3::Zero(), last = Vec3::Zero();  // relative to v; corners of the face and of its part
-  Real height = slack, doubled = 0;                 // of a corner above the lower end of the part
+  Real height = slack, doubled = 0;                 // height of a corner above the lower end of the part
   const auto add = [&](const Vec3& next) {
     doubled += d.dot(last.cross(next));
     last = next;
@@ -239,7 +241,7 @@ Real patch_within(const ConvexPolyhedron& p, uint32_t face, uint32_t v, const Ve
     corner = next;
     height = next_height;
   }
-  // The side from the last corner back to v.
+  // This is the side from the last corner back to v.
   if (height < 0) add(corner - height / (height - slack) * corner);
   return std::max(0.0, doubled / 2);
 }
@@ -260,7 +262,7 @@ SupportingFeature polyhedron_face(const ConvexPolyhedron& p, const Vec3& d, Real
 
 // Solids of revolution
 
-/// Radial direction of d, away from the axis.
+/// Returns the radial direction of d, away from the axis.
 Vec3 outward(const Vec3& d) {
   const Real rho = std::sqrt(d.x() * d.x() + d.z() * d.z());
   return rho > 0 ? Vec3(d.x() / rho, 0, d.z() / rho) : Vec3::UnitX();
@@ -278,8 +280,8 @@ SupportingFeature disc(Real radius, Real y, bool up) {
   return f;
 }
 
-/// The line of the round side that faces d, from the base to the top or from the end that is farther along d,
-/// and the outward normal there.
+/// The line of the round side that faces d, and the outward normal there. It runs from the base to the top,
+/// or from the end that is farther along d.
 struct RoundSide {
   Vec3 from, to, normal;
   uint32_t from_tag = kLineTag, to_tag = kLineTag + 1;
@@ -302,8 +304,8 @@ Real disc_radius(const Convex& c, bool up) {
   return up && c.core == Convex::Core::cone ? c.half.z() : c.half.x();
 }
 
-/// Whether more of the flat side than of the round one is within `slack`. Both patches are about equally wide
-/// across the plane through d and the axis, so their lengths in this plane decide.
+/// Whether a larger part of the flat side than of the round side is within `slack`. Both parts are about
+/// equally wide across the plane through d and the axis, so their lengths in this plane decide.
 bool rests_on_disc(const Convex& c, const RoundSide& side, const Vec3& d, Real slack) {
   const bool up = d.y() > 0;
   if (up && c.core == Convex::Core::cone && !(c.half.z() > 0)) return false;
@@ -320,8 +322,8 @@ SupportingFeature revolved(const Convex& c, const Vec3& d, Real slack) {
   return segment_feature(side.from, side.from_tag, side.to, side.to_tag, d);
 }
 
-/// Returns a line of the round side if it is perpendicular to d or, unless the solid rests on a disc, almost
-/// perpendicular; else the rim, whose tangent always is perpendicular; else the apex.
+/// Returns the line of the round side if it is perpendicular to d, or almost perpendicular while the solid
+/// does not rest on a disc. Otherwise returns the rim, whose tangent is always perpendicular, or the apex.
 SupportingFeature revolved_edge(const Convex& c, const Vec3& d, Real slack, const Vec3& on_surface) {
   const RoundSide side = round_side(c, d);
   SupportingFeature line = segment_feature(side.from, side.from_tag, side.to, side.to_tag, d);
@@ -336,8 +338,8 @@ SupportingFeature revolved_edge(const Convex& c, const Vec3& d, Real slack, cons
   return line;
 }
 
-/// The touching point, with the radius of the ball of the same Gaussian curvature there: r_1 r_2 r_3 / |h|^2
-/// with the support h, which is exact for a ball.
+/// Returns the touching point of an ellipsoid, with the radius of the ball of the same Gaussian curvature:
+/// r_1 r_2 r_3 / |h|^2 with the support h. For a ball this is exact.
 SupportingFeature ellipsoid_point(const Convex& c, const Vec3& d) {
   uint32_t none = 0;
   SupportingFeature f = point_feature(c.support(d, none), 0);

@@ -9,8 +9,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Greatest number of advances. It is sufficient for pairs whose bound of the rate is at most a hundred times
-/// the true rate.
+/// Greatest number of advances. It is enough for pairs whose bound of the closing speed is at most a hundred
+/// times the true speed.
 constexpr int kMaxAdvances = 2000;
 
 Pose relative(const Pose& a, const Pose& b) {
@@ -58,15 +58,15 @@ Real Gap::time_to(Real target) const {
   const Real room = distance - target;
   if (room <= 0) return 0;
   const Real root = std::sqrt(rate * rate + 2 * acceleration * room);
-  // Positive root of room = rate t + acceleration t^2 / 2, in the form without cancellation.
+  // This is the positive root of room = rate t + acceleration t^2 / 2, in a form without cancellation.
   if (rate > 0) return 2 * room / (rate + root);
   return acceleration > 0 ? (root - rate) / acceleration : kInfinity;
 }
 
-// The axis e of a round core turns with w' = w - (w.e) e, and w.e / |w| = c is constant, since the path turns
-// about a fixed axis. With s = |w'| / |w|, a point at distance 1 that turns with w' has at most the
-// centripetal acceleration s^2 w^2, the tangential one s |dw/dt| of the path and s |c| w^2 of the moving e.
-// Their sum is at most sqrt(2) s times the path's bound of |dw/dt| + w^2.
+// The axis e of a round core turns with w' = w - (w.e) e. Its inclination w.e / |w| = c is constant, since
+// the path turns about a fixed axis. Let s = |w'| / |w|. A point at distance 1 that turns with w' has at most
+// the centripetal acceleration s^2 w^2, and the tangential accelerations s |dw/dt| of the path and s |c| w^2
+// of the moving e. Their sum is at most sqrt(2) s times the path's bound of |dw/dt| + w^2.
 CoreRotation core_rotation(const MovingConvex& solid, Real fraction) {
   const PosePath& path = solid.path;
   if (!path.turns() || solid.shape.core == Convex::Core::point) return {};
@@ -82,8 +82,8 @@ Gap closing_gap(const MovingConvex& a, const MovingConvex& b, Real fraction, Rea
                 const Vec3& normal) {
   Gap gap{distance, normal.dot(b.path.velocity() - a.path.velocity()), 0};
   const CoreRotation turn_a = core_rotation(a, fraction), turn_b = core_rotation(b, fraction);
-  // -n.(w x r) = r.(w x n) for the points of A, and n.(w x r) = r.(n x w) for those of B. The radius around a
-  // core does not turn.
+  // For the points of A: -n.(w x r) = r.(w x n). For the points of B: n.(w x r) = r.(n x w). The radius
+  // around a core does not turn.
   if (turn_a.acceleration > 0) {
     gap.rate += extent(a.shape, a.path.at(fraction).orientation, turn_a.velocity.cross(normal));
     gap.acceleration += core_reach(a.shape) * turn_a.acceleration;

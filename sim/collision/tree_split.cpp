@@ -11,7 +11,7 @@
 namespace offstage::sim {
 namespace {
 
-/// With fewer items a separate task does not pay.
+/// With fewer items, a separate task costs more than it saves.
 constexpr uint32_t kTaskItems = 4096;
 
 Aabb midpoint_box(std::span<const TreeItem> items) {
@@ -66,8 +66,8 @@ class Bins {
     }
   }
 
-  /// Returns the axis and the first bin of the second half with the least cost of the heuristic; bin 0 if no
-  /// axis separates the items.
+  /// Returns the split with the least cost by the surface area heuristic: its axis, and the first bin of the
+  /// second half. The bin is 0 if no axis separates the items.
   std::pair<int, int> best_split() const {
     std::pair<int, int> best = {0, 0};
     Real least = kInfinity;
@@ -123,7 +123,7 @@ std::size_t surface_area_split(std::span<TreeItem> items, const Aabb& midpoints)
   });
 }
 
-/// Splits the items and returns where the second half starts; 0 if nothing separates them.
+/// Splits the items. Returns the start of the second half, or 0 if the items cannot be separated.
 std::size_t split_items(std::span<TreeItem> items, TreeSplit split, uint32_t depth) {
   if (items.size() < 2) return 0;
   const Aabb midpoints = midpoint_box(items);

@@ -13,11 +13,12 @@ namespace {
 /// The normal of a face that approaches a ridge may be outside of the ridge's region by up to this fraction
 /// of the ridge's slope, because the face may turn into the region within the step.
 constexpr Real kGuard = 0.5;
-/// Sine: the surface beyond an edge is a valley if it rises by more than this.
+/// The surface beyond an edge is a valley if it rises there by more than this sine.
 constexpr Real kValley = 1e-3;
 
-/// Distance by which the other solid may be outside of a triangle's sides and still count as in front of its
-/// face. Beyond a valley the plane of the face continues beneath the surface, and stops the solid next.
+/// Returns, by side, the distance by which the other solid may be beyond the triangle's side and still count
+/// as in front of its face. Beyond a valley the plane of the face continues below the surface, which stops
+/// the solid first.
 std::array<Real, 3> room_beyond(const SurfaceTriangle& t, Real margin) {
   std::array<Real, 3> room{};
   for (std::size_t k = 0; k < 3; ++k)
@@ -38,10 +39,10 @@ struct TriangleSide {
   bool takes_normal(const Manifold& m) const {
     return m.source == (of_b ? NormalSource::face_of_a : NormalSource::face_of_b);
   }
-  /// The normal away from the triangle, in the mesh's frame.
+  /// Returns the normal that points away from the triangle, in the mesh's frame.
   Vec3 outward(const Vec3& normal) const { return a_from_mesh.vector_to_body(of_b ? normal : Vec3(-normal)); }
 
-  /// Removes the points at which the surface does not allow the normal; returns whether there were any.
+  /// Removes the points at which the surface does not allow the normal. Returns whether there were any.
   bool restrict(Manifold& m) const {
     const Vec3 n = outward(m.normal);
     const uint32_t count = m.count;
@@ -71,8 +72,8 @@ void sphere_triangle_manifold(const Vec3& centre, Real radius, const SurfaceTria
   const Real distance = away.norm(), height = up.dot(p - triangle.corner(0));
   if (distance - radius > margin) return;
 
-  std::size_t excluded = 0, without = 0,
-              with = 0;  // number of vertices of weight 0; the last of them, and the last of the others
+  // The number of vertices of weight 0, the last of them, and the last of the other vertices.
+  std::size_t excluded = 0, without = 0, with = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     (nearest.weights[k] == 0 ? without : with) = k;
     excluded += nearest.weights[k] == 0;
@@ -96,7 +97,7 @@ void sphere_triangle_manifold(const Vec3& centre, Real radius, const SurfaceTria
                                : NormalSource::edge_of_a;
       (of_b ? m.radius_a : m.radius_b) = radius;
     } else {
-      // In front of the plane of a face, beyond a valley.
+      // The sphere is in front of the plane of a face, beyond a valley.
       const std::array<Real, 3> room = room_beyond(triangle, margin);
       const std::size_t k = excluded == 1 ? (without + 1) % 3 : room[with] > 0 ? with : (with + 2) % 3;
       if ((away - height * up).squaredNorm() > room[k] * room[k] || !(separation <= margin)) return;

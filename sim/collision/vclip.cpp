@@ -14,17 +14,17 @@ namespace {
 using Kind = Feature::Kind;
 constexpr uint32_t kNone = 0xffffffff;
 
-/// Fraction of the coordinates' size: rounding error of a computed height over a plane. A feature is left
-/// only for a neighbour that is better by more than this, so that rounding seldom makes the walk go in
+/// Rounding error of a computed height over a plane, as a fraction of the coordinates' size. The walk leaves
+/// a feature only for a neighbour that is better by more than this, so that rounding seldom makes it go in
 /// circles.
 constexpr Real kVClipRounding = 1e-14;
-/// Fraction of the coordinates' size: if two points are closer than this, their difference does not define a
+/// If two points are closer than this fraction of the coordinates' size, their difference does not define a
 /// normal.
 constexpr Real kVClipTouching = 1e-12;
 
 enum class Step : uint8_t { moved, closest, overlapping };
 
-/// One of the two polyhedra, with the transformation to the other's frame and the current feature.
+/// One of the two polyhedra, with its transformation to the other's frame and its current feature.
 struct Side {
   const ConvexPolyhedron& shape;
   Mat3 rotation;
@@ -43,14 +43,14 @@ struct Side {
   }
 };
 
-/// The part of a segment inside the clipping planes so far, as parameters from its tail (0) to its head (1),
-/// and the features beyond the planes that cut each end.
+/// The part of a segment that is inside all clipping planes so far, and the features beyond the planes that
+/// cut its ends. The part is given by parameters from the tail (0) to the head (1).
 struct Clip {
   Real low = 0, high = 1;
   uint32_t beyond_low = kNone, beyond_high = kNone;
 
-  /// Cuts at a plane, given the heights of both ends over it, positive inside. Returns false if nothing is
-  /// left.
+  /// Cuts the segment at a plane. `tail` and `head`: heights of both ends over it, positive inside. Returns
+  /// false if nothing is left.
   bool cut(Real tail, Real head, uint32_t beyond) {
     if (tail < 0 && head < 0) return false;
     if (tail >= 0 && head >= 0) return true;
@@ -67,7 +67,7 @@ struct Clip {
   bool empty() const { return low > high; }
 };
 
-/// Moves from the vertex to the edge whose vertex-edge plane is violated most by p, if there is one.
+/// Moves from a vertex to the edge whose vertex-edge plane p violates most. Returns false if p violates none.
 bool leave_vertex(Side& x, const Vec3& p) {
   const Vec3 d = p - x.vertex();
   Real worst = x.slop;
@@ -82,7 +82,7 @@ bool leave_vertex(Side& x, const Vec3& p) {
   return to != kNone && x.move(Kind::edge, to);
 }
 
-/// Moves from the edge to the end or the face in whose direction p lies.
+/// Moves from an edge to the end or the face in whose direction p lies.
 bool leave_edge(Side& x, const Vec3& p) {
   const ConvexPolyhedron::EdgeFrame& frame = x.shape.edge_frame(x.at.index);
   const Vec3 d = p - x.tail();
@@ -93,10 +93,10 @@ bool leave_edge(Side& x, const Vec3& p) {
   return x.move(Kind::face, left >= right ? x.edge().left : x.edge().right);
 }
 
-/// The same for an edge of the other polyhedron. It is clipped to the Voronoi region, first by the
-/// vertex-edge planes and then by the face-edge planes. If the distance increases inwards from a cut, the
-/// closest point lies beyond the cut. On a cut, the distances to the edge and to the neighbour beyond are
-/// equal, and so are their derivatives; the neighbour's is simpler to compute.
+/// Moves from an edge x towards an edge of the other polyhedron. That edge is clipped to the Voronoi region
+/// of x, first by the vertex-edge planes and then by the face-edge planes. If the distance increases inwards
+/// from a cut, the closest point lies beyond the cut. On a cut, the distances from x and from the neighbour
+/// beyond are equal, and so are their derivatives; the neighbour's is simpler to compute.
 bool leave_edge(Side& x, const Vec3& tail, const Vec3& head) {
   const ConvexPolyhedron::Edge& edge = x.edge();
   const ConvexPolyhedron::EdgeFrame& frame = x.shape.edge_frame(x.at.index);
@@ -152,8 +152,8 @@ Step edge_edge(Side& x, Side& y) {
              : Step::closest;
 }
 
-/// The vertex is under the face, and no edge leads out of that half-space. Either it is inside, or another
-/// face, the one over which it is highest, is closer.
+/// Handles a vertex under a face from which no edge leads out of the half-space below. Either the vertex is
+/// inside, or another face is closer: the face over which the vertex is highest.
 Step escape_local_minimum(Side& f, const Vec3& p) {
   Real best = 0;
   for (uint32_t k = 0; k < f.shape.face_count(); ++k) {
@@ -210,8 +210,8 @@ uint32_t closest_side(const Side& f, const Vec3& tail, const Vec3& head) {
   return closest;
 }
 
-/// An edge over a face is never the result: the lower end of its part over the face is closer, or equally
-/// close and the simpler feature.
+/// Moves on from an edge and a face, which are never the result: the lower end of the edge's part over the
+/// face is closer, or equally close and a simpler feature.
 Step edge_face(Side& e, Side& f) {
   const Vec3 tail = e.to_other(e.tail()), head = e.to_other(e.head());
   Clip clip;
@@ -248,10 +248,10 @@ Step step(Side& a, Side& b) {
   return Step::moved;
 }
 
-/// Walks until the features are the closest or overlap; returns nothing if the walk goes in circles. A pair
-/// of features determines the next one, so the walk is in a cycle if a pair occurs twice. The pair to compare
-/// with is renewed after 1, 2, 4 ... steps, so it lies on the cycle eventually (Brent, "An improved Monte
-/// Carlo factorization algorithm", 1980).
+/// Walks from feature to feature until the two are the closest or overlap. Returns nothing if the walk goes
+/// in circles. A pair of features determines the next pair, so the walk is in a cycle if a pair occurs twice.
+/// The pair for comparison is replaced after 1, 2, 4 ... steps, and so lies on the cycle eventually (Brent,
+/// "An improved Monte Carlo factorization algorithm", 1980).
 std::optional<Step> walk(Side& a, Side& b, int& steps) {
   Feature kept_a = a.at, kept_b = b.at;
   for (int renewal = 1;;) {
@@ -266,8 +266,8 @@ std::optional<Step> walk(Side& a, Side& b, int& steps) {
   }
 }
 
-/// Closest points of the features of x and y, where x's dimension is not higher, in y's frame and as if y
-/// were A.
+/// Returns the closest points of the features of x and y, in y's frame and with y as A. The dimension of x's
+/// feature must not be higher.
 Separation closest_points(const Side& x, const Side& y) {
   Separation s;
   if (x.at.kind == Kind::edge) {
@@ -294,7 +294,7 @@ Separation closest_points(const Side& x, const Side& y) {
   return s;
 }
 
-/// Transforms to the frame of `a`, which was x.
+/// Exchanges A and B in a separation, and transforms it to the frame of the new A.
 Separation exchanged(const Separation& s, const Side& b) {
   return {.distance = s.distance,
           .normal = b.rotation * -s.normal,

@@ -7,7 +7,7 @@
 namespace offstage::sim {
 namespace {
 
-/// A point on an edge of a triangle that may be the nearest point.
+/// The point on an edge of a triangle that is nearest to a given point.
 struct EdgePoint {
   TrianglePoint at;
   Real squared_distance;
@@ -34,7 +34,7 @@ void keep_nearer(ClosestPoints& best, const Vec3& on_a, const Vec3& on_b) {
   if (d2 < best.squared_distance) best = {on_a, on_b, d2};
 }
 
-/// For each edge of `edges` that crosses the plane of `t`, tests the crossing point together with the point
+/// Finds each point where an edge of `edges` crosses the plane of `t`, and calls keep() with it and the point
 /// of `t` nearest to it.
 template <class Keep>
 void for_each_crossing(const TriangleVertices& edges, const TriangleVertices& t, Keep&& keep) {
@@ -67,8 +67,8 @@ Real closest_on_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
   return along < length2 ? along / length2 : 1;
 }
 
-// Tests the Voronoi regions of the triangle, as Ericson, "Real-Time Collision Detection" (2005), 5.1.5, but
-// computes the areas from cross products.
+// The function tests the Voronoi regions of the triangle, as in Ericson, "Real-Time Collision Detection"
+// (2005), 5.1.5, but computes the areas from cross products.
 TrianglePoint closest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
   const Real d1 = ab.dot(ap), d2 = ac.dot(ap), d3 = ab.dot(bp), d4 = ac.dot(bp), d5 = ab.dot(cp),

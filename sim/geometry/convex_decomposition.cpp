@@ -22,8 +22,8 @@ namespace {
 /// Distances below this fraction of a mesh's diagonal count as zero. Files store coordinates in single
 /// precision, so faces that were modelled flat are flat within 1e-7.
 constexpr Real kSamePlace = 2e-7;
-/// Accepted difference between the total volume of the exact parts and the volume of the solid, as a
-/// fraction.
+/// Accepted difference between the total volume of the exact parts and the volume of the solid, as a fraction
+/// of the latter.
 constexpr Real kExact = 1e-6;
 
 /// Value of CutLimits::max_work if an approximate decomposition is accepted, too.
@@ -50,7 +50,7 @@ Real relative_error(const std::vector<ConvexPolyhedron>& parts, Real volume) {
   return std::abs(sum - volume) / volume;
 }
 
-/// The parts of the exact method, or the reason why there are none.
+/// The parts that the exact method found, or the reason why there are none.
 struct ExactResult {
   std::vector<ConvexPolyhedron> parts;
   std::string failure;
@@ -99,8 +99,8 @@ TriangleMesh triangles_of(const SolidPiece& solid) {
   return mesh;
 }
 
-/// Appends the convex parts of one connected surface. Returns the reason why there are none, or an empty
-/// string.
+/// Appends the convex parts of one connected surface. Returns an empty string, or the reason why there are no
+/// parts.
 std::string add_exact_parts(Polyhedron shell, const CutLimits& limits, Real tolerance,
                             std::vector<ConvexPolyhedron>& parts) {
   const WindingNumber winding(triangles_of(shell));
@@ -175,9 +175,9 @@ struct BoundedWinding {
   Aabb box;
 };
 
-/// Estimates the errors of a decomposition again for solids that overlap, because the existing errors count
-/// common volumes twice. The new errors compare the union of the solids with the union of the parts, at the
-/// points of a regular grid.
+/// Estimates the errors of a decomposition of solids that overlap. The errors computed before count common
+/// volumes twice. The new errors compare the union of the solids with the union of the parts, at the points
+/// of a regular grid.
 void estimate_errors(const std::vector<SolidPiece>& solids, ConvexDecomposition& result) {
   Aabb box;
   for (const ConvexPolyhedron& part : result.parts) box.extend(part.box());

@@ -17,8 +17,8 @@ extern "C" {
 namespace offstage::sim {
 namespace {
 
-constexpr Real kFlat = 1e-9;       // fraction of the extent: a thinner set counts as flat
-constexpr Real kCoplanar = 1e-10;  // fraction of the extent: a nearer point counts as on a face's plane
+constexpr Real kFlat = 1e-9;       // fraction of the extent: thinner sets count as flat
+constexpr Real kCoplanar = 1e-10;  // fraction of the extent: points nearer to a face's plane count as on it
 
 using Loops = std::vector<std::vector<uint32_t>>;
 
@@ -328,7 +328,7 @@ ConvexPolyhedron convex_hull(std::span<const Vec3> points) {
     if (ConvexPolyhedron hull = assemble(points, triangles, kCoplanar * frame.extent); hull.face_count() >= 4)
       return hull;
   }
-  return polygon_hull(points, frame);  // too thin for Qhull: use its projection along the thin direction
+  return polygon_hull(points, frame);  // too thin for Qhull: its projection is used
 }
 
 }  // namespace offstage::sim

@@ -22,11 +22,11 @@ constexpr Real kTrim = 0.02;
 /// Before merging, the solids are cut into more pieces than the wanted number of parts. kMorePieces is the
 /// factor for cuts of whole solids, kMoreCells for cuts of Voronoi cells.
 constexpr Real kMorePieces = 1.5, kMoreCells = 1.25;
-/// Excess of the hulls up to which pieces are cut, and up to which they are merged, in accepted errors.
-/// Trimming removes a part of it, which only the trial shows.
+/// Excess of the hulls' volume at which cutting ends, and at which merging ends, in multiples of the accepted
+/// error. Trimming removes a part of the excess; only a trial shows how much.
 constexpr Real kCutTo = 0.7;
 constexpr std::array<Real, 3> kMergeTo = {2, 1.4, 1};
-/// Trials between two of them where there are more than enough parts.
+/// Number of bisection steps between two values of kMergeTo while there are more parts than necessary.
 constexpr int kTrials = 3;
 
 class SolidCutter {

@@ -171,7 +171,7 @@ class CutSearch {
       height.push_back(std::abs(h) <= tolerance_ ? 0 : h);
       if (height.back() != 0) sides[height.back() > 0 ? 0 : 1].push_back(p);
     }
-    // Points on the plane belong to the sides to which an edge leads from them.
+    // A point on the plane is added to each side to which one of its edges leads.
     std::vector<std::array<bool, 2>> added(solid_.points.size());
     for (const auto& [a, b] : edges_) {
       const Real ha = height[a], hb = height[b];

@@ -90,9 +90,9 @@ bool any_edge_intersects(const TriangleVertices& edges, const TriangleVertices& 
   return false;
 }
 
-/// Returns the vertex that is alone on its side of a plane, with its side; the others are on the other side
-/// or in the plane. If two vertices are on one side and the third is in the plane, the third one is returned,
-/// as if it were on the other side.
+/// Returns the vertex that is alone on its side of a plane, and the sign of this side. The others are on the
+/// other side or in the plane. If two vertices are on one side and the third is in the plane, the third one
+/// is returned, as if it were on the other side.
 std::pair<std::size_t, int> lone_vertex(const Signs& s) {
   for (std::size_t i = 0; i < 3; ++i)
     if (s[i] != 0 && s[i] * s[(i + 1) % 3] <= 0 && s[i] * s[(i + 2) % 3] <= 0) return {i, s[i]};

@@ -15,7 +15,7 @@ namespace {
 
 /// Angles that differ by less than this are equal [rad].
 constexpr Real kFlatFace = 1e-6;
-/// Factors by which the limits are relaxed, one after the other.
+/// Factors by which the limits on a cut are relaxed, tried in this order.
 constexpr std::array<Real, 5> kRelaxed = {1, 0.5, 0.25, 0.1, 0};
 /// Fractions of the dihedral angle at which cuts are tried, after the planes of neighbouring faces and edges
 /// (F.2).

@@ -47,7 +47,7 @@ Real corner_angle(const TriangleMesh& mesh, const Triangle& t, std::size_t k) {
   return std::atan2(u.cross(v).norm(), u.dot(v));
 }
 
-/// One side of a face. It is stored with the side's vertex of lower index.
+/// One side of a face, stored at the side's vertex of lower index.
 struct HalfEdge {
   uint32_t other;  // the higher vertex
   uint32_t face;

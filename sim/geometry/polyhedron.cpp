@@ -146,8 +146,8 @@ std::vector<Polygon> polygons_of(const TriangleMesh& mesh, const MeshTopology& t
   return polygons;
 }
 
-/// Adds the polygons of one region to a polyhedron. `first_side`: the half-edge at each edge of the mesh that
-/// has no twin yet.
+/// Adds the polygons of one region to a polyhedron. `first_side`: by edge of the mesh, the half-edge that has
+/// no twin yet.
 void add_polygons(const std::vector<Polygon>& polygons, const FacePlane& plane,
                   std::vector<uint32_t>& first_side, Polyhedron& all) {
   std::map<std::pair<uint32_t, uint32_t>, uint32_t> diagonals;

@@ -53,8 +53,8 @@ uint32_t split_face(Polyhedron& p, uint32_t from, uint32_t to) {
   return there;
 }
 
-/// Closes one side of a cut. `outline[k]` leads from corner k to corner k + 1 if the cap is on its right, and
-/// back if `mirrored`.
+/// Closes one side of a cut with a cap. outline[k] leads from corner k to corner k + 1 on a cap that is on
+/// its right; on the other cap (`mirrored`) it leads back.
 void add_cap(Polyhedron& p, std::span<const std::vector<uint32_t>> pieces, std::span<const uint32_t> origins,
              std::span<const uint32_t> outline, const CutPlane& plane, bool mirrored) {
   const auto n = static_cast<uint32_t>(outline.size());
@@ -192,7 +192,7 @@ class Tracer {
     return std::isfinite(least);
   }
 
-  /// Returns the cut with its pieces, if no part of the surface is inside its outline.
+  /// Returns the cut with its pieces, or nothing if a part of the surface is inside its outline.
   std::optional<Cut> closed(Cut cut) const {
     std::vector<Vec2> outline;
     for (const Corner& c : cut.corners) outline.push_back(flat(c.point - origin_));
@@ -223,7 +223,7 @@ class Tracer {
   CutPlane plane_;
   Real tolerance_;
   Vec3 origin_, x_axis_, y_axis_;
-  std::vector<Real> height_;  // height of each point over the plane; 0 within the tolerance, decided once
+  std::vector<Real> height_;  // by point: height over the plane, 0 within the tolerance; decided once
   std::vector<bool> seen_point_, seen_edge_, seen_face_;
 };
 

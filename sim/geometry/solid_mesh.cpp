@@ -17,8 +17,8 @@ constexpr uint32_t kRoundSides = 48;  // flat sides around an axis of revolution
 constexpr uint32_t kTubeSides = 24;   // around the tube of a torus
 constexpr uint32_t kBallSides = 32;   // around a ball
 
-/// Points of the unit circle. Angles are halved with square roots, for the same bits on every machine;
-/// `count` is a quarter of a turn, or a sixth of a turn, halved some times.
+/// Returns `count` evenly spaced points of the unit circle. `count` must be a multiple of 4, and 4 or 6 times
+/// a power of two: angles are halved with square roots, which gives the same bits on every machine.
 std::vector<Vec2> unit_circle(uint32_t count) {
   const bool by_sixths = count % 3 == 0;
   Real cosine = by_sixths ? 0.5 : 0;
@@ -71,7 +71,7 @@ SolidMesh convex_solid(TriangleMesh mesh) {
   return solid;
 }
 
-/// Fills a ring by sectors between two of its sides, each the hull of its corners.
+/// Divides a ring into convex sectors; each is the hull of the profile at two neighbouring sides.
 SolidMesh ring(const std::vector<Vec2>& profile) {
   SolidMesh solid{revolved_mesh(profile, true, kRoundSides), {}};
   for (uint32_t k = 0; k < kRoundSides; ++k) {

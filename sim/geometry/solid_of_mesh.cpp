@@ -15,8 +15,8 @@ namespace {
 
 using Index3 = Eigen::Array3i;
 
-/// Lower bounds of the mean winding number of the inside. kHardlyInside is for a solid; kSurelyInside is for
-/// both sides of a surface together.
+/// Lower bounds of the mean winding number inside: kHardlyInside for a solid, kSurelyInside for a surface
+/// whose two sides together count as inside.
 constexpr Real kHardlyInside = 0.6, kSurelyInside = 0.9;
 /// Number of times that the surface of voxels is smoothed.
 constexpr int kSmoothings = 2;
@@ -57,7 +57,8 @@ class VoxelGrid {
     for (std::size_t i = 0; i < before.size(); ++i) piece.points[i] -= moved[i];
   }
 
-  /// Replaces the value of each point by the mean over the polygons around it of the means of their corners.
+  /// Replaces the value of each point by a mean over the polygons around it: each polygon contributes the
+  /// mean of its corners' values.
   static void spread(const SolidPiece& piece, std::vector<Vec3>& values) {
     std::vector<Vec3> sums(values.size(), Vec3::Zero());
     std::vector<int> counts(values.size(), 0);
@@ -116,8 +117,8 @@ class VoxelGrid {
     piece.first.push_back(static_cast<uint32_t>(piece.corners.size()));
   }
 
-  /// A solid has winding numbers near 1 inside, or -1 if its surface is inside out. Near an open sheet they
-  /// are just over 1/2 on hollow sides, possibly on both.
+  /// Finds the voxels inside. A solid has winding numbers near 1 inside, or near -1 if its surface is inside
+  /// out. Next to an open sheet they are slightly above 1/2 on the hollow sides, possibly on both.
   void find_inside() {
     struct Sum {
       Real positive = 0, negative = 0;
@@ -207,7 +208,7 @@ std::vector<TriangleMesh> connected_pieces(const TriangleMesh& mesh, std::size_t
   std::vector<TriangleMesh> pieces;
   for (auto& [shell, piece] : meshes) {
     piece.vertices = mesh.vertices;
-    pieces.push_back(weld(piece));  // without the vertices of the others
+    pieces.push_back(weld(piece));  // without the vertices of other pieces
   }
   return pieces;
 }

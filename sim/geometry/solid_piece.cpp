@@ -45,7 +45,7 @@ class HalfBuilder {
     for (uint32_t v : polygon)
       if (distinct.empty() || distinct.back() != v) distinct.push_back(v);
     while (distinct.size() > 1 && distinct.back() == distinct.front()) distinct.pop_back();
-    // Of two corners only an edge and its reverse remain, which cancel.
+    // A polygon with two corners left is an edge and its reverse, which cancel.
     if (distinct.size() < 3) return;
     for (std::size_t i = 0; i < distinct.size(); ++i) count(distinct[i], distinct[(i + 1) % distinct.size()]);
     half_.corners.insert(half_.corners.end(), distinct.begin(), distinct.end());
@@ -62,7 +62,7 @@ class HalfBuilder {
   /// Closes the surface on the cut plane, and removes unused points.
   SolidPiece finish(const CutBy& outward) {
     SolidPiece::Cap cap{outward, {}};
-    // Visited in the order of the keys, so that the result does not depend on the hash table.
+    // The edges are visited in the order of their keys, so that the result does not depend on the hash table.
     std::vector<std::pair<uint64_t, int>> open(net_.begin(), net_.end());
     std::sort(open.begin(), open.end());
     for (const auto& [key, net] : open) {
@@ -185,7 +185,7 @@ class PieceCutter {
   /// sides where the cap is.
   SolidPiece::Cap clipped(const SolidPiece::Cap& cap, Real sign) const {
     SolidPiece::Cap part{cap.plane, {}};
-    std::map<uint32_t, int> ends;  // number of sides that end at a point on the line, less those that begin
+    std::map<uint32_t, int> ends;  // by point: sides that end there minus sides that begin
     for (const auto& [a, b] : cap.sides) {
       const Real ha = sign * height_[a], hb = sign * height_[b];
       if (ha <= 0 && hb <= 0) continue;
@@ -214,8 +214,8 @@ class PieceCutter {
 
   const SolidPiece& piece_;
   CutBy plane_;
-  std::vector<Vec3> points_;  // of the piece, then the crossings
-  std::vector<Real> height_;  // over the plane; 0 within the tolerance
+  std::vector<Vec3> points_;  // points of the piece, then the crossings
+  std::vector<Real> height_;  // by point: height over the plane, 0 within the tolerance
   std::unordered_map<uint64_t, uint32_t> crossing_;
 };
 

@@ -48,7 +48,7 @@ std::vector<Vec3> surface_samples(const SolidPiece& solid, std::size_t count) {
   return samples;
 }
 
-/// Returns points of which each is farthest from the points before it.
+/// Returns points, each of which is the farthest from all points before it.
 std::vector<Vec3> far_points(const std::vector<Vec3>& samples, std::size_t count) {
   std::vector<Vec3> chosen = {samples.front()};
   std::vector<Real> distance(samples.size(), kInfinity);
