@@ -39,7 +39,7 @@ Real step_change(Real target, Real error, int error_order) {
 }
 
 /// Returns the greatest error of (x, p) = work.next at time t, in the unit of the coordinates. It is the
-/// greater one of the error of x itself and the error of the rates times `span` [s].
+/// error of x itself or, if that is greater, the error of the rates times `span` [s].
 Real error_of(const DynamicSystem& system, Real t, Real span, IntegratorWorkspace& work) {
   work.x.resize(work.next_x.size());
   work.p.resize(work.next_p.size());
@@ -80,7 +80,7 @@ void AdaptiveIntegrator::step(const DynamicSystem& system, Real t, Real h, std::
     ++work.report.steps;
     work.report.missed += !good;
     at = is_last ? h : at + now;
-    // A step that was shortened to end at h is no evidence against longer steps.
+    // The small error of a step that was shortened to end at h does not limit the next step.
     const Real proposed = std::max(shortest, change * now);
     length = now < length ? std::max(length, proposed) : proposed;
   }
@@ -134,7 +134,7 @@ void evaluate(const DynamicSystem& system, Real t, std::span<const Real> x, std:
   ++work.report.evaluations;
 }
 
-/// sum += h (weights . stages).
+/// Adds h (weights . stages) to `sum`.
 void add_stages(const std::vector<std::vector<Real>>& stages, const Real* weights, int count, Real h,
                 std::vector<Real>& sum) {
   for (int i = 0; i < count; ++i)

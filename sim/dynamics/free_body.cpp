@@ -12,14 +12,14 @@
 namespace offstage::sim {
 namespace {
 
-/// Greatest rotation of a body in one piece of a sub-step, at the fastest spin that its angular momentum
-/// allows [rad], and the greatest number of pieces. (A thin body that turns about a short axis may later spin
-/// about its long axis.)
+/// Greatest rotation of a body in a piece of a sub-step [rad], and greatest number of pieces. The speed is
+/// the fastest spin that the body's angular momentum allows: a thin body that turns about a short axis may
+/// later spin about its long axis.
 constexpr Real kTurn = 0.5, kMostPieces = 8;
-/// With more pieces SplitRotation is used. Its pieces are limited by the angle of a kick and by that of the
-/// nutation [rad], and their number by the last constant.
+/// If more pieces were needed, SplitRotation is used. Its pieces are limited by the angle of a kick and by
+/// the angle of the nutation [rad], and their number by kMostKicks.
 constexpr Real kKick = 0.05, kNutation = 0.2, kMostKicks = 1000;
-/// Accepted relative error of the energy of a free rotation, which is constant.
+/// Accepted relative error of the energy of a free rotation; the exact energy is constant.
 constexpr Real kRotationEnergy = 1e-3;
 
 /// Returns the quaternion that is stored in the coordinates of a body.
@@ -103,7 +103,8 @@ class SplitRotation {
   }
 
  private:
-  /// Rotates the body by the term of one axis: the difference of this axis from the middle one.
+  /// Rotates the body by the energy term of one axis. This term has the difference between the axis's inverse
+  /// inertia and that of the middle axis.
   void turn(Quat& q, int axis, Real h) const {
     const Real along = (q.conjugate() * H_)[axis];
     q = q * rotation(along * (inverse_[axis] - inverse_[1]) * Vec3::Unit(axis), h);
@@ -183,13 +184,13 @@ Real greatest_spin(const RigidBody& body) {
 }
 
 Quat rotation(const Vec3& w, Real h) {
-  // With a = h |w| / 2: (cos a, sin a / a * h w / 2), both even series in a. A large angle is halved until
-  // the series are short, and the result squared as often.
+  // With a = h |w| / 2, the quaternion is (cos a, sin a / a * h w / 2). Both functions are even series in a.
+  // A large angle is halved until the series are short, and the result is squared as often.
   Vec3 half = h / 2 * w;
   int squarings = 0;
   for (; half.squaredNorm() > 0.25 && squarings < 600; ++squarings) half /= 2;
   const Real s = half.squaredNorm();
-  // 1 - s/2! + s^2/4! - ... and 1 - s/3! + s^2/5! - ..., whose next terms are below 1e-17.
+  // The series are 1 - s/2! + s^2/4! - ... and 1 - s/3! + s^2/5! - ...; their next terms are below 1e-17.
   Real cosine = 1, sinc = 1;
   for (int k = 14; k > 0; k -= 2) {
     cosine = 1 - s / (k * (k - 1)) * cosine;

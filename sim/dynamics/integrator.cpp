@@ -54,7 +54,7 @@ class Leapfrog final : public Integrator {
     for (auto* v : {&work.p, &work.dp, &work.damping}) v->resize(p.size());
     system.velocity(t, x, p, work.dx);
     array(work.x) = array(x) + h / 2 * array(work.dx);
-    // work.p becomes the mean of p over the step.
+    // work.p is set to the mean of p over the step.
     if (system.force_and_damping(t + h / 2, work.x, p, work.dp, work.damping)) {
       for (std::size_t i = 0; i < p.size(); ++i) {
         const DampedKick kick(h, work.damping[i]);

@@ -15,9 +15,9 @@ Interpolation kind(const KeyframeTrack& track, std::size_t i) {
   return track.keys[i].interpolation.value_or(track.interpolation);
 }
 
-/// Returns the mean angular velocity between the keys i and i + 1, along the shortest arc [rad/s]. It is
-/// along the axis of the rotation, so it has the same components in the axes of both keys. For a jump it is
-/// zero.
+/// Returns the mean angular velocity between the keys i and i + 1, on the shortest rotation [rad/s]. It is
+/// parallel to the axis of this rotation, so it has the same components in the axes of both keys. For a jump
+/// it is zero.
 Vec3 turn_rate(const KeyframeTrack& track, std::size_t i) {
   const Keyframe &a = track.keys[i], &b = track.keys[i + 1];
   if (kind(track, i) == Interpolation::step) return Vec3::Zero();
@@ -27,8 +27,8 @@ Vec3 turn_rate(const KeyframeTrack& track, std::size_t i) {
   return rotation.angle() / (b.time - a.time) * rotation.axis();
 }
 
-/// The matrix J of w = J r' for the orientation exp(r), where w is the angular velocity in the axes of the
-/// body, and its inverse.
+/// The matrix J in w = J r', for the orientation exp(r) and the angular velocity w in the axes of the body;
+/// and its inverse.
 Mat3 turn_jacobian(const Vec3& r) {
   const Real angle = r.norm();
   if (angle < kSmallAngle) return Mat3::Identity() - cross_matrix(r) / 2;
@@ -46,7 +46,7 @@ Mat3 inverse_turn_jacobian(const Vec3& r) {
 
 struct TurnSample {
   Quat orientation;
-  Vec3 angular_velocity;  // world [rad/s]
+  Vec3 angular_velocity;  // in world axes [rad/s]
 };
 
 /// Returns the orientation at time t in segment i. It follows a curve of rotation vectors relative to the

@@ -13,7 +13,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Particles per task.
+/// Number of particles per task.
 constexpr std::size_t kPairChunk = 32;
 /// Below this squared distance, a force without a length scale does not increase any more [m^2].
 constexpr Real kLeastSquare = 1e-30;
@@ -31,8 +31,8 @@ Lanes greater(Lanes x, Real y) {
   return lane_max(x, lanes(y));
 }
 
-/// U = c / sqrt(r^2 + s^2) between particles of weight 1. The force on the first particle is factor(r^2) d,
-/// where d leads to it from the second.
+/// The law U = c / sqrt(r^2 + s^2) between particles of weight 1. The force on the first particle is
+/// factor(r^2) d, where d is the vector to it from the second.
 struct InverseDistance {
   Real constant, softening2;
 
@@ -45,12 +45,12 @@ struct InverseDistance {
     const T s = square(r2);
     return constant / (s * root_node(s));
   }
-  /// Derivative of factor by r^2.
+  /// Returns the derivative of factor by r^2.
   Real slope(Real r2) const { return -1.5 * factor(r2) / square(r2); }
   Real energy(Real r2) const { return constant / root_node(square(r2)); }
 };
 
-/// U = 4 e (q^2 - q), q = (sigma^2 / r^2)^3.
+/// The law U = 4 e (q^2 - q) with q = (sigma^2 / r^2)^3.
 struct TwelveSix {
   Real epsilon, sigma2;
 
@@ -119,7 +119,7 @@ struct Cloud {
 
   std::size_t size() const { return points.size(); }
 
-  /// Calls f(j, d) for every other particle that acts on i, where d leads from it to i.
+  /// Calls f(j, d) for every other particle j that acts on i. d is the vector from j to i.
   template <class F>
   void for_each_near(std::size_t i, F&& f) const {
     const auto visit = [&](std::size_t j) {
@@ -226,7 +226,7 @@ void PairForces::jacobian(Real t, std::span<const Real> x, int at_x, int at_v, S
       for (std::size_t i = 0; i < size; ++i) {
         Mat3 own = Mat3::Zero();
         std::fill(row.begin(), row.end(), Mat3::Zero());
-        // d(factor d) = factor 1 + 2 factor' d d^T.
+        // The derivative of factor d is factor 1 + 2 factor' d d^T.
         if (g.def->is_on(t))
           cloud.for_each_near(i, [&](std::size_t j, const Vec3& d) {
             const Real r2 = d.squaredNorm(), w = cloud.w[i] * cloud.w[j] / g.members[cloud.member[i]].mass;

@@ -5,7 +5,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Returns 1 in the middle of a region, 0 at its edge, linear values in between, and negative values outside.
+/// Returns the depth in a region: 1 in its middle, 0 at its border, linear values in between, and negative
+/// values outside.
 template <class Point>
 Real depth(const Everywhere&, const Point&) {
   return 1;

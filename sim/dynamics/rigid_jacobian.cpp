@@ -8,7 +8,7 @@ namespace {
 /// First index of each part of a body's state among its 13 numbers.
 constexpr int kTurnRow = 3, kMomentum = 7, kAngularMomentum = 10;
 
-/// The matrix of w -> (0, w) q, in the order x y z w.
+/// Returns the matrix of w -> (0, w) q, in the order x y z w.
 Eigen::Matrix<Real, 4, 3> left_product(const Eigen::Vector4d& q) {
   Eigen::Matrix<Real, 4, 3> m;
   m.topRows<3>() = q.w() * Mat3::Identity() - cross_matrix(q.head<3>());
@@ -16,7 +16,7 @@ Eigen::Matrix<Real, 4, 3> left_product(const Eigen::Vector4d& q) {
   return m;
 }
 
-/// The matrix of q -> (0, w) q.
+/// Returns the matrix of q -> (0, w) q.
 Eigen::Matrix4d turning(const Vec3& w) {
   Eigen::Matrix4d m;
   m.topLeftCorner<3, 3>() = cross_matrix(w);
@@ -32,7 +32,7 @@ RigidDerivative::RigidDerivative(const RigidStage& stage) : stage_(stage) {
   const Mat3 R = stage.motion.orientation.toRotationMatrix();
   inverse_inertia_ = R * stage.body.inverse_inertia * R.transpose();
   rotation_ = 2 / stage.turn.squaredNorm() * left_product(stage.turn).transpose();
-  // dw = I^-1 dH + d_theta x w - I^-1 (d_theta x H)
+  // This is dw = I^-1 dH + d_theta x w - I^-1 (d_theta x H).
   angular_velocity_.setZero();
   angular_velocity_.middleCols<4>(kTurnRow) = (inverse_inertia_ * cross_matrix(stage.angular_momentum) -
                                                cross_matrix(stage.motion.angular_velocity)) *
@@ -56,7 +56,7 @@ PointDerivative RigidDerivative::velocity(const Vec3& arm) const {
 }
 
 PointDerivative RigidDerivative::torque(const Vec3& arm, const Vec3& force) const {
-  // (d_theta x arm) x F
+  // This is (d_theta x arm) x F.
   PointDerivative d = PointDerivative::Zero();
   d.middleCols<4>(kTurnRow) = cross_matrix(force) * cross_matrix(arm) * rotation_;
   return d;
@@ -93,7 +93,7 @@ Eigen::Matrix<Real, 13, 13> RigidDerivative::own_rates(const BodyForces& forces,
 
 void add_block(const Eigen::Ref<const Eigen::MatrixXd>& block, const StateColumns& rows,
                const StateColumns& columns, SparseEntries& entries) {
-  // 7 of a body's numbers are coordinates, 3 of a particle's.
+  // The state of a body begins with 7 coordinates, that of a particle with 3.
   const auto place = [](const StateColumns& at, Eigen::Index i, Eigen::Index size) {
     const auto coordinates = size == 13 ? static_cast<Eigen::Index>(kBodyX) : 3;
     return static_cast<int>(i < coordinates ? at.x + i : at.p + (i - coordinates));

@@ -19,10 +19,10 @@ typedef int32_t Ints __attribute__((vector_size(kWidth * sizeof(int32_t))));
 constexpr Real kTile = 1024;
 /// The velocity of a corner consists of three integers from 0 to kLevels - 1. Each is 10 bits of a hash.
 constexpr uint32_t kLevels = 1024;
-/// Mean over a cell of sum |M|^2, M = (w + (grad w . d)/2) 1 - d grad w^T / 2. Random velocities of variance
-/// 1 in each axis give a field with this mean square.
+/// Mean over a cell of sum |M|^2 with M = (w + (grad w . d)/2) 1 - d grad w^T / 2. It is the mean square of
+/// the field for random velocities of variance 1 along each axis.
 constexpr Real kMeanSquare = 1.0974211408;
-/// 2^(-1/3): eddies of half the width have kCascade times the speed and kCascade^2 times the lifetime.
+/// 2^(-1/3). Eddies of half the width have kCascade times the speed and kCascade^2 times the lifetime.
 constexpr Real kCascade = 0.79370052598409973738;
 
 uint32_t mixed(uint32_t x) {
@@ -48,8 +48,8 @@ Floats product_sum(Floats a, Floats b, Floats c) {
   return _mm256_fmadd_ps(a, b, c);
 }
 
-/// One axis at eight points. For the low and the high corner of each point's cell: the distance of the point
-/// from the corner, the weight of the corner, and half the derivative of the weight.
+/// One axis at eight points. For the low and the high corner of each point's cell, it has the distance of the
+/// point from the corner, the weight of the corner, and half the derivative of the weight.
 struct Axis {
   Floats offset[2], weight[2], slope[2];
   Words index[2];
@@ -74,8 +74,8 @@ struct Axis {
   }
 };
 
-/// The current random velocities at eight corners. The hash is Wellons' lowbias32. The key is added in the
-/// middle of the hash, so both ticks share the first half of the computation.
+/// Returns the current random velocities at eight corners. The hash is Wellons' lowbias32. The key is added
+/// in the middle of the hash, so both ticks share the first half of the computation.
 std::array<Floats, 3> corner_velocity(const EddyLattice& o, Words x, Words y, Words z) {
   Words hash = x | (y << 10) | (z << 20);
   hash = (hash ^ (hash >> 16)) * 0x7feb352du;

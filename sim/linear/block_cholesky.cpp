@@ -84,8 +84,8 @@ void BlockCholesky<N>::order(uint32_t rows) {
   }
 }
 
-/// Moves each empty row right behind the last of its neighbours. Behind the first one its pivot might still
-/// be zero, if that neighbour is determined by other rows.
+/// Moves each empty row directly behind the last of its neighbours. After the first neighbour only, its pivot
+/// might still be zero.
 template <int N>
 void BlockCholesky<N>::put_empty_rows_after_neighbours() {
   std::vector<uint32_t> last = place_;
@@ -98,7 +98,7 @@ void BlockCholesky<N>::put_empty_rows_after_neighbours() {
   for (uint32_t k = 0; k < order_.size(); ++k) place_[order_[k]] = k;
 }
 
-/// Finds the columns of the factor: a column has the blocks of the matrix and the fill-in from earlier
+/// Finds the columns of the factor. A column has the blocks of the matrix and the fill-in from earlier
 /// columns.
 template <int N>
 void BlockCholesky<N>::find_columns(uint32_t rows) {
@@ -142,7 +142,7 @@ bool BlockCholesky<N>::factorize(std::span<const Block> diagonal, std::span<cons
     diagonal_[j] = inverse;
     const uint32_t first = begin_[j], last = begin_[j + 1];
     for (uint32_t p = first; p < last; ++p) below_[p] = (below_[p] * inverse.transpose()).eval();
-    // The stored blocks below the diagonal are L S, so the sign must be applied again to get the rows of L.
+    // The stored blocks below the diagonal are L S. Multiplying by the sign again gives the rows of L.
     for (uint32_t q = first; q < last; ++q) {
       const uint32_t column = row_[q];
       const Block row = sign_[j] * below_[q];

@@ -12,14 +12,15 @@ namespace {
 
 using Eigen::Index;
 
-constexpr Real kLcpSatisfied = 1e-11;  ///< fraction of the greatest |b|: smaller accelerations count as zero
-/// Fraction of the greatest |b|: with a larger residual the fall-back is used.
+constexpr Real kLcpSatisfied = 1e-11;  ///< accelerations below this times max |b| count as zero
+/// With a residual above this fraction of the greatest |b|, the fall-back is used.
 constexpr Real kAccurateLcp = 1e-9;
-constexpr Real kLcpNoise = 1e-12;  ///< relative: smaller rates count as zero
+constexpr Real kLcpNoise = 1e-12;  ///< smaller relative rates count as zero
 constexpr int kLcpAttempts = 4;
 constexpr int kLcpSweeps = 500;
 
-/// waiting: not yet added, its a is ignored. ZA: the contact holds, a = 0. ZF: the contact is broken, f = 0.
+/// State of a contact. waiting: not yet added, its acceleration is ignored. ZA: it holds, a = 0. ZF: it is
+/// broken, f = 0.
 enum class Zone : uint8_t { waiting, ZA, ZF };
 
 enum class Outcome { solved, postponed, unbounded };
@@ -54,7 +55,7 @@ class Dantzig {
   Eigen::VectorXd a_, da_, x_;
   std::vector<Zone> zones_;
   std::vector<Index> active_;   ///< the indices in ZA, in the order of the factor
-  std::vector<uint8_t> moves_;  ///< per index: changes of zone since the last step of positive length
+  std::vector<uint8_t> moves_;  ///< by index: changes of zone since the last step of positive length
   UpdatedCholesky factor_;
 };
 
@@ -81,8 +82,8 @@ void Dantzig::find_direction(Index m, Real sign) {
 }
 
 /// Finds the event that ends a step first: a_m becomes zero, or another index would leave its zone. If m is
-/// dependent (da_m = 0), it never ends the step itself: it unloads the other contacts until one of them can
-/// leave.
+/// dependent (da_m = 0), it never ends the step itself. It then unloads the other contacts until one of them
+/// can leave.
 Dantzig::Block Dantzig::first_block(Index m, Real sign) const {
   Block first;
   const auto consider = [&first](Real step, Index i) {
@@ -125,8 +126,8 @@ bool Dantzig::enter(Index i) {
   return true;
 }
 
-/// Moves a blocking index to the other zone. A dependent index may stay in ZF, because the others keep its a
-/// at 0.
+/// Moves an index that ended the step to the other zone. A dependent index may stay in ZF, because the other
+/// contacts keep its a at 0.
 void Dantzig::change_zone(Index i) {
   Zone& zone = zones_[static_cast<std::size_t>(i)];
   ++moves_[static_cast<std::size_t>(i)];
@@ -141,8 +142,8 @@ void Dantzig::change_zone(Index i) {
   }
 }
 
-/// Adds index m. If m is dependent and the others already make its a zero, it cannot enter the factor: its
-/// force is transferred back to the others, until it is zero or one of them leaves.
+/// Adds index m. If m is dependent and the other contacts already make its a zero, it cannot enter the
+/// factor. Its force is then transferred back to the others, until it is zero or one of them leaves.
 Outcome Dantzig::bring_in(Index m) {
   std::fill(moves_.begin(), moves_.end(), uint8_t{0});
   const Real zero = kLcpSatisfied * scale_;
@@ -164,7 +165,7 @@ Outcome Dantzig::bring_in(Index m) {
   return Outcome::postponed;
 }
 
-/// Removes the accumulated rounding of the steps by one more solve with the matrix itself.
+/// Removes the rounding errors of the steps by another solution with the matrix itself.
 void Dantzig::refine() {
   a_ = A_ * result_.f + b_;
   x_.resize(factor_.size());
@@ -187,7 +188,7 @@ Real Dantzig::residual() const {
   return worst;
 }
 
-/// Fall-back: projected Gauss-Seidel from the current forces.
+/// Improves the current forces by projected Gauss-Seidel, as a fall-back.
 void Dantzig::relax() {
   for (int sweep = 0; sweep < kLcpSweeps; ++sweep) {
     for (Index i = 0; i < a_.size(); ++i) {

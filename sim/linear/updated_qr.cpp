@@ -10,8 +10,8 @@ constexpr Real kSingular = 1e-13;
 
 }  // namespace
 
-/// Applies the rotation that takes (x, y) to (|xy|, 0) to two rows of R, from a column on, and to the columns
-/// of Q.
+/// Applies the rotation that takes (x, y) to (|xy|, 0) to two rows of R, from the column `from` on, and to
+/// the columns of Q.
 void UpdatedQr::rotate(Eigen::Index upper, Eigen::Index lower, Eigen::Index from, Real x, Real y) {
   if (y == 0) return;
   const Real length = std::sqrt(x * x + y * y), c = x / length, s = y / length;
@@ -57,7 +57,7 @@ void UpdatedQr::replace(Eigen::Index column, const Eigen::VectorXd& by) {
   r_.col(size_ - 1).head(size_).noalias() = q_.topLeftCorner(size_, size_).transpose() * by.head(size_);
 }
 
-// Rotations turn the row of Q into the last unit vector. The last column of Q is then a unit vector, too.
+// Rotations change this row of Q to the last unit vector. The last column of Q is then a unit vector, too.
 void UpdatedQr::remove(Eigen::Index row, Eigen::Index column) {
   drop_column(column);
   const Eigen::Index last = size_ - 1;

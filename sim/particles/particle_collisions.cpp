@@ -12,9 +12,9 @@ constexpr std::size_t kCollisionChunk = 1024;
 /// Thickness of the layers as a multiple of the greatest radius. Particles in contact are in neighbouring
 /// layers unless they are fast.
 constexpr Real kLayer = 3;
-/// Increase of the search distance of partners, as a multiple of the change of the paths. The middle and half
-/// the length of each path change by at most half of it, and by as much again if a particle was created
-/// within the sub-step.
+/// The search distance of partners increases by this multiple of the greatest change of a path. The middle of
+/// each path and half its length each change by at most half of it, and by as much again if a particle was
+/// created within the sub-step.
 constexpr Real kSlack = 3;
 
 template <class F>
@@ -37,8 +37,8 @@ void ParticleCollisions::step(std::span<ParticleSystem* const> systems, const Pa
   match();
 
   const ParticleStep step{stage.h, stage.fixed, stage.moving, law, collision_speed, stage.impulses};
-  // Resting contact uses the velocities at the end. The partners found with the mean velocities can be used
-  // for it, unless particles accelerate much in a sub-step.
+  // Resting contact uses the velocities at the end. The partners were found with the mean velocities; they
+  // can be used unless particles accelerate much in a sub-step.
   Real largest = 0, change = 0;
   for (const CollidingParticle& g : particles_) {
     largest = std::max(largest, g.radius);
@@ -90,7 +90,7 @@ CollidingParticle ParticleCollisions::make_particles(const ParticleSystem& syste
   return g;
 }
 
-/// Creates the colliding particles; those inside bodies are projected out.
+/// Creates the colliding particles. Particles inside bodies are projected out.
 void ParticleCollisions::gather(const ParticleStage& stage) {
   sources_.clear();
   for (uint32_t s = 0; s < systems_.size(); ++s) {
@@ -155,7 +155,7 @@ void ParticleCollisions::sort() {
   });
 }
 
-/// Finds the particle of the previous step that corresponds to each particle.
+/// Finds, for each particle, its entry of the previous step.
 void ParticleCollisions::match() {
   std::vector<uint32_t> place(sources_.size(), ParticleContacts::kNone);
   for (uint32_t i = 0; i < source_of_.size(); ++i) place[source_of_[i]] = i;

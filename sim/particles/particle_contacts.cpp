@@ -15,8 +15,8 @@ constexpr std::size_t kContactChunk = ParticleSearch::kChunk;
 /// Contacts belong to the same surface if the cosine of the angle between their normals is greater than this.
 constexpr Real kSameSurface = 0.95;
 
-/// Calls f(distance, normal) for points of a solid's surface within `reach` [m] of p, in the solid's frame.
-/// For a mesh these are the nearest points of all triangles; for other solids it is the nearest point only.
+/// Calls f(distance, normal) for points of a solid's surface within `reach` [m] of p, in the solid's frame. A
+/// mesh gives the nearest point of each triangle; other solids give only their nearest point.
 template <class F>
 void for_each_surface(const Solid& solid, const Vec3& p, Real reach, F&& f) {
   if (!solid.mesh) {
@@ -35,8 +35,8 @@ void for_each_surface(const Solid& solid, const Vec3& p, Real reach, F&& f) {
   });
 }
 
-/// Returns the part of an impulse that a contact can transmit with its current normal: no tension, and
-/// friction within its limit.
+/// Returns the part of an impulse that a contact can transmit with its current normal: without tension, and
+/// with friction within its limit.
 Vec3 admissible(const Vec3& impulse, const Vec3& normal, Real friction) {
   const Real pressing = impulse.dot(normal);
   if (!(pressing > 0)) return Vec3::Zero();
@@ -70,7 +70,7 @@ void ParticleContacts::find() {
     found.strikes.clear();
     NearObstacles near(step_->fixed, step_->moving);
     for (uint32_t i = begin; i < end; ++i) {
-      // Relative to the start of the chunk, until collect().
+      // These are relative to the start of the chunk until collect().
       pair_begin_[i] = static_cast<uint32_t>(found.pairs.size());
       surface_begin_[i] = static_cast<uint32_t>(found.surfaces.size());
       find_pairs(i, found);
@@ -92,15 +92,14 @@ void ParticleContacts::find_pairs(uint32_t i, Found& found) const {
     if (const auto met = meeting(a, b, h)) {
       const Real speed = -u.dot(met->normal);
       pair.is_impact = is_impact(speed, greater_acceleration(a, b), *step_);
-      // A contact that is not an impact acts during the whole sub-step, and its target closes the gap at the
-      // end.
+      // A contact that is not an impact acts during the whole sub-step. Its target closes the gap at the end.
       const Real from = std::max(a.from, b.from);
       target = pair.is_impact ? pair_restitution(a, b) * speed : -speed * (met->time - from) / h;
       normal = met->normal;
       time = pair.is_impact ? met->time : from;
     } else {
-      // The normal is that at half of the motion, which does not reverse if the particles press into each
-      // other. For fast particles that pass each other, it is that at the end.
+      // The normal is taken at half of the motion; there it does not reverse if the particles penetrate each
+      // other. For fast particles that pass each other, it is taken at the end.
       const Real from = std::max(a.from, b.from), reach = a.radius + b.radius;
       const Vec3 d = a.at(h) - b.at(h), displacement = (h - from) * u;
       const Vec3 middle = displacement.squaredNorm() < reach * reach / 64 ? Vec3(d - displacement / 2) : d;
@@ -151,8 +150,9 @@ void ParticleContacts::find_surfaces(uint32_t i, NearObstacles& near, Found& fou
   }
 }
 
-/// Adds the contact of particle i with a surface that it hits, or whose distance is `gap` [m] at the end.
-/// Each surface is added only once. `first`: index of the first contact that was found for this particle.
+/// Adds the contact of particle i with a surface that it hits (`meets`), or whose distance at the end is
+/// `gap` [m]. Each surface is added only once. `first`: index of the first contact that was found for this
+/// particle.
 void ParticleContacts::add_surface(uint32_t i, const Obstacle& o, const Vec3& normal, Real gap, Real time,
                                    bool meets, std::size_t first, Found& found) const {
   for (std::size_t k = first; k < found.surfaces.size(); ++k)
@@ -174,7 +174,7 @@ void ParticleContacts::add_surface(uint32_t i, const Obstacle& o, const Vec3& no
   Real target = meets ? -speed * (time - g.from) / step_->h : std::min(0.0, -speed - gap / step_->h);
   s.time = static_cast<float>(s.is_impact ? time : g.from);
   if (s.is_impact) {
-    // The body moves only in the next sub-step, so the particle keeps the velocity that the body will then
+    // The body moves only in the next sub-step. Until then the particle gets the velocity that the body will
     // have.
     const Vec3 arm = g.at(time) - g.radius * normal - o.centre_at(time / step_->h);
     const Real yielding =

@@ -61,7 +61,8 @@ void add(const PointField& f, const Run& run) {
   });
 }
 
-/// `flow(block, air)` writes the velocity of the air at each particle of a block.
+/// Adds the force of moving air. `flow(block, air)` writes the velocity of the air at each particle of a
+/// block.
 template <class Field, class Flow>
 void add_air(const Field& f, const Run& run, Flow&& flow) {
   for_each_block(f, run, [&](const Run& b, std::span<const Real> fraction) {
@@ -104,8 +105,8 @@ void add(const Other&, const Run&) {
                 "every other kind must be handled here");
 }
 
-/// Stiffness and damping of a force on a particle: its negative derivatives with respect to position [N/m]
-/// and velocity [N s/m].
+/// Stiffness and damping of a force on a particle: the negative derivatives of the force by position [N/m]
+/// and by velocity [N s/m].
 struct Stiffness {
   Real by_position = 0, by_velocity = 0;
 };

@@ -19,7 +19,7 @@ constexpr Real kNeighbourGap = 0.1;
 constexpr Real kTouching = 1e-6;
 /// Collisions of larger clusters are left to the solver of resting contacts.
 constexpr std::size_t kMaxCluster = 16;
-/// Number of changed particles that are searched one by one before they are sorted.
+/// Up to this number, changed particles are searched one by one; more of them are sorted first.
 constexpr std::size_t kMaxUnsorted = 128;
 
 }  // namespace
@@ -72,7 +72,7 @@ bool ParticleImpacts::is_left_to_resting_contact(uint32_t i, uint32_t j, Real sp
          speed * step_->h < particles_[i].radius + particles_[j].radius;
 }
 
-/// Finds the collisions on the initial paths.
+/// Finds the collisions of all particles on their initial paths.
 void ParticleImpacts::find_first() {
   const std::size_t n = particles_.size();
   found_.resize((n + kImpactChunk - 1) / kImpactChunk);
@@ -118,8 +118,8 @@ void ParticleImpacts::find_obstacle(uint32_t i, NearObstacles& near, Add&& add) 
   add(Impact{time, i, kNone, stamp_[i], 0, hit.normal, hit.obstacle});
 }
 
-/// Calls f for each particle that may come near the path of a particle, whether or not its own path has
-/// changed.
+/// Calls f for each particle that may come near the path of `particle`. The search includes particles whose
+/// paths have changed.
 template <class F>
 void ParticleImpacts::for_each_near(const CollidingParticle& particle, F&& f) const {
   search_->for_each_near(particle, [&](uint32_t k) {
@@ -169,7 +169,7 @@ void ParticleImpacts::collide_particles(const Impact& impact) {
   const Vec3 impulse = collision_impulse(m12, turn ? mass_across(a, b) : m12, u, impact.normal,
                                          pair_restitution(a, b), pair_friction(a.friction, b.friction));
   a.turn(impact.normal, impulse);
-  b.turn(impact.normal, impulse);  // both signs are opposite
+  b.turn(impact.normal, impulse);  // both signs are opposite, so the spin has the same sign
   strike(impact.a, impact.time, impulse / a.mass, impact.normal);
   strike(impact.b, impact.time, -impulse / b.mass, -impact.normal);
   find_again(impact.a);

@@ -13,17 +13,17 @@
 namespace offstage::sim {
 namespace {
 
-/// The Gauss-Seidel sweeps end when a sweep changes no velocity by more than this [m/s], or when a limit of
-/// work is reached. Few contacts are solved exactly; many contacts converge over several sub-steps.
+/// The Gauss-Seidel sweeps end when a sweep changes no velocity by more than kTolerance [m/s], or when the
+/// limit of work is reached. Few contacts are solved exactly; many contacts converge over several sub-steps.
 constexpr Real kTolerance = 1e-7;
 constexpr std::size_t kMaxContactVisits = 1'000'000;
 constexpr std::size_t kMinSweeps = 30, kMaxSweeps = 1000;
-/// An overlap of particles below kSlop times their radii is not removed. Of the rest, kPush is removed in a
-/// sub-step by moving the particles, without changing velocities.
+/// An overlap of particles below kSlop times their radii remains. In each sub-step, the fraction kPush of a
+/// larger excess is removed by moving the particles, without changing velocities.
 constexpr Real kSlop = 0.002, kPush = 0.2;
 constexpr int kMaxSlides = 4;
-/// Number of parts of a slab that are processed alternately, so that consecutive contacts do not wait for
-/// each other's velocities.
+/// Number of parts of a slab that are processed in turns, so that consecutive contacts do not wait for each
+/// other's velocities.
 constexpr uint32_t kStreams = 4;
 constexpr std::size_t kRelaxationChunk = ParticleSearch::kChunk;
 
@@ -32,19 +32,19 @@ struct Load {
   const Obstacle* obstacle;
   Vec3 impulse = Vec3::Zero(), angular_impulse = Vec3::Zero();
   Real arm = 0;                ///< greatest lever arm of its parts [m]
-  Real brought = 0, mass = 0;  ///< of the particles that load it, see Heap
+  Real brought = 0, mass = 0;  ///< those of the heaps that load it
   Real fraction = 1;
 };
 
 /// Particles that touch each other.
 struct Heap {
-  Real brought = 0;  ///< sum of the momenta that they had before the contacts acted [N s]
+  Real brought = 0;  ///< sum of the particles' momenta before the contacts acted [N s]
   Real mass = 0;     ///< [kg]
 };
 
 /// Limits the impulses of resting particles on each body. An impulse against the body's motion can at most
-/// stop the body. Any further momentum is limited to the momentum of these particles relative to the body.
-/// The angular momentum is limited to this momentum times the greatest lever arm.
+/// stop the body. Beyond that, the momentum is limited to the momentum of these particles relative to the
+/// body. The angular momentum is limited to the same momentum times the greatest lever arm.
 void limit_loads(std::span<Reaction> reactions, std::map<uint32_t, Load>& loads) {
   for (const Reaction& r : reactions)
     if (const auto load = loads.find(r.body); load != loads.end()) {
@@ -55,7 +55,7 @@ void limit_loads(std::span<Reaction> reactions, std::map<uint32_t, Load>& loads)
     }
   for (auto& [body, load] : loads) {
     const Obstacle& o = *load.obstacle;
-    // A fraction s of the load changes the energy by first s + second s^2.
+    // The fraction s of the load changes the energy by first s + second s^2.
     const Real first = o.end_velocity.dot(load.impulse) + o.end_spin.dot(load.angular_impulse);
     const Real second = (o.inverse_mass * load.impulse.squaredNorm() +
                          load.angular_impulse.dot(o.inverse_inertia * load.angular_impulse)) /
@@ -173,13 +173,15 @@ void ParticleContacts::start_motion() {
   return turns_.empty() ? u : u + lane_cross(normal, turns_[c.particle].surface_spin);
 }
 
-// The fourth lane of normals and impulses is 0, so the mass in the fourth lane of a particle does not change.
+// The fourth lanes of normals and impulses are 0, so the mass, which is in the fourth lane of a particle,
+// does not change.
 [[gnu::always_inline]] inline void ParticleContacts::apply(const Pair& c, Lanes normal, Lanes impulse) {
   Lanes &a = motion_[c.a].velocity, &b = motion_[c.b].velocity;
   a += fourth(a) * impulse;
   b -= fourth(b) * impulse;
   if (turns_.empty()) return;
-  // The arms and the impulses of the two are opposite, so that both turn in the same sense.
+  // The arms of both particles are opposite, and so are the impulses on them. Both therefore turn in the same
+  // sense.
   const Lanes turn = lane_cross(normal, impulse);
   Lanes &spin_a = turns_[c.a].surface_spin, &spin_b = turns_[c.b].surface_spin;
   spin_a -= fourth(spin_a) * turn;
@@ -224,7 +226,7 @@ void ParticleContacts::relax() {
   }
 }
 
-/// Moves the particles by their impulses, each from the start of its contact.
+/// Moves the particles by their impulses. Each impulse acts from the start of its contact.
 void ParticleContacts::displace(std::span<Vec3> end, std::span<uint8_t> touched) {
   const Real h = step_->h;
   const auto press = [&](const Contact& c, uint32_t i, Real sign) {
@@ -286,13 +288,13 @@ void ParticleContacts::keep_outside(std::span<Vec3> end, std::vector<Reaction>& 
     strikes.insert(strikes.end(), found.strikes.begin(), found.strikes.end());
   }
 
-  // A particle that is caught between a body and something else has no solution, and its impulses grow with
+  // For a particle caught between a body and another object there is no solution, and its impulses grow with
   // each sweep.
   std::map<uint32_t, Load> loads;
   for (const Surface& s : surfaces_)
     if (s.acts() && s.obstacle->is_dynamic()) loads.try_emplace(s.body, Load{s.obstacle});
   if (loads.empty()) return;
-  std::vector<Vec3> momentum(particles_.size());  // before the contacts acted
+  std::vector<Vec3> momentum(particles_.size());  // by particle, before the contacts acted
   std::vector<uint8_t> acts(particles_.size(), 0);
   for (std::size_t i = 0; i < particles_.size(); ++i)
     momentum[i] = particles_[i].mass * particles_[i].velocity;

@@ -58,7 +58,7 @@ void ParticleSearch::build(std::span<const CollidingParticle> particles, std::sp
 }
 
 /// Makes the lists of partners. for_each_partner(size class, place in the class, f) must call f with the
-/// index of each partner of the particle at this place.
+/// index of each partner of the particle at this place of the class.
 template <class ForEachPartner>
 void ParticleSearch::list(std::span<const CollidingParticle> particles, ForEachPartner&& for_each_partner) {
   struct Range {

@@ -11,8 +11,8 @@ namespace offstage::sim {
 namespace {
 
 /// Distance from surfaces at which particles are kept [m]: far above rounding (1e-13 at 1000 m) and invisibly
-/// small. A hit is detected at half of it, so sliding along a surface, which is exact up to rounding, is not
-/// a hit.
+/// small. A hit is detected at half of this distance. So a particle that slides along a surface, exactly up
+/// to rounding, does not hit it.
 constexpr Real kSkin = 1e-10;
 constexpr int kMaxHits = 8;
 /// Greatest number of projections out of bodies; each removes one layer of overlapping bodies.
@@ -20,7 +20,7 @@ constexpr int kMaxEjections = 4;
 /// Overlaps up to this fraction of the particle's radius can be caused by dividing paths around turning
 /// bodies into straight pieces.
 constexpr Real kDriftDepth = Obstacle::kChordError;
-/// Number of passes over simultaneous contacts. Two contacts at right angles need only one.
+/// Number of passes over simultaneous contacts. Two contacts at right angles need only one pass.
 constexpr int kContactPasses = 8;
 
 /// Whether a sphere, in the solid's frame, certainly does not touch the solid.
@@ -117,22 +117,22 @@ ObstacleHit NearObstacles::hit(const Obstacle& o, const Vec3& a, const Vec3& b, 
   return {};
 }
 
-/// Whether the particle already hit this obstacle in this sub-step. The obstacle reacts to the impulse, but
-/// only from the next sub-step on.
+/// Whether the particle already hit this obstacle in this sub-step. The obstacle moves by the impulse only
+/// from the next sub-step on.
 bool ParticleSweep::was_struck(const Obstacle& o) const {
   return std::any_of(contacts_.begin(), contacts_.begin() + static_cast<std::ptrdiff_t>(contact_count_),
                      [&](const Contact& c) { return c.gives_way && c.obstacle == &o; });
 }
 
-/// Returns the velocity after free flight. It is exact for constant forces, and accurate to second order in
-/// the drag.
+/// Returns the velocity after free flight. It is exact for constant forces without drag, and accurate to
+/// second order in the drag.
 Vec3 ParticleSweep::fly(const Vec3& v, Real mass, Real duration, const Vec3& extra) const {
   return v + DampedKick(duration, forces_.drag / mass).end * (forces_.acceleration(v, mass) + extra);
 }
 
-/// Moves the particle to the hit, applies the impulse (P5), and integrates the rest of its path. If the
-/// particle hits a dynamic body for whose impulses the caller is not prepared, returns false and moves
-/// nothing, because other particles may hit this body earlier.
+/// Moves the particle to the hit, applies the impulse (P5), and integrates the rest of its path. Returns
+/// false without moving the particle if it hits a dynamic body whose impulses the caller does not accept:
+/// other particles may hit this body earlier.
 bool ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real from, const Vec3& extra,
                             SweepOutcome& outcome) {
   const Obstacle& o = *hit.obstacle;
@@ -165,7 +165,8 @@ bool ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real fro
     approach = -u.dot(hit.normal);
     mobility = impulses_->mobility(o, arm, -hit.normal);
   }
-  // A bounce lasts 2 e u / a. One that ends within the sub-step is the tail of an infinite series (E6, Zeno).
+  // A bounce lasts 2 e u / a. A bounce that ends within the sub-step belongs to the tail of an infinite
+  // series (E6, Zeno).
   if (2 * restitution * approach < gain) restitution = 0;
   if (approach > 0 && !moved_it) {
     const Vec3 impulse =
@@ -189,7 +190,8 @@ bool ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real fro
   return true;
 }
 
-/// If there are too many contacts, the oldest is dropped, because it matters least at the current position.
+/// Adds a contact. If there are too many, the oldest one is dropped, because it is least important at the
+/// current position.
 void ParticleSweep::add_contact(const Contact& contact) {
   if (contact_count_ == contacts_.size()) {
     std::move(contacts_.begin() + 1, contacts_.end(), contacts_.begin());
@@ -198,9 +200,9 @@ void ParticleSweep::add_contact(const Contact& contact) {
   contacts_[contact_count_++] = contact;
 }
 
-/// Moves the particle for the remaining time. Forces that would press it into a surface on which it rests are
-/// compensated by an impulse without restitution. Divided by the time, this impulse is the normal force and
-/// Coulomb friction.
+/// Moves the particle for the remaining time. An impulse without restitution cancels forces that would push
+/// it into a surface on which it rests. Divided by the time, this impulse is the normal force and Coulomb
+/// friction.
 void ParticleSweep::finish(ParticlePath& path, Real duration, const Vec3& extra) {
   Vec3 v = fly(path.start_velocity, path.mass, duration, extra);
   const Vec3 predicted = path.start + duration * path.start_velocity;

@@ -15,7 +15,8 @@ namespace {
 /// Number of particles per task. The state of such a chunk stays in the second-level cache between
 /// integration and sweep.
 constexpr std::size_t kChunk = 1024;
-/// Steps per second for particles created before the sub-step, and greatest number of these steps.
+/// For a particle that was created before the sub-step: number of integration steps per second until the
+/// sub-step begins, and the greatest number of these steps.
 constexpr Real kStepsBefore = 120, kMostStepsBefore = 10000;
 /// Durations below this are rounding errors [s].
 constexpr Real kRounding = 1e-11;
@@ -37,7 +38,7 @@ struct ParticleSystem::Scratch {
   std::vector<Vec3> position, velocity;  // at the start of the sub-step
 };
 
-/// A particle that strikes a body, with its flight so far.
+/// A particle that hits a dynamic body, with its flight so far.
 struct ParticleSystem::Striker {
   Real time;  // as a fraction of the sub-step
   std::size_t particle;
@@ -82,8 +83,8 @@ void ParticleSystem::begin_coupled() {
   start_velocity_ = arrays.velocity;
 }
 
-/// Free flight of consecutive particles; their initial state is stored in `scratch`. Before time 0 the forces
-/// are those of time 0.
+/// Moves consecutive particles freely; `scratch` has their initial state. Before time 0 the forces of time 0
+/// act.
 void ParticleSystem::fly(const ParticleForces& forces, Real t, Real h, std::size_t begin, std::size_t end,
                          Scratch& scratch) {
   const auto x = part(arrays.position, begin, end), v = part(arrays.velocity, begin, end);
@@ -93,14 +94,14 @@ void ParticleSystem::fly(const ParticleForces& forces, Real t, Real h, std::size
   t = std::max(t, 0.0);
   if (def.integrator == IntegratorKind::leapfrog && forces.fields.empty())
     return forces.leapfrog_step(h, x, v, mass);
-  // Otherwise the result would depend on the previous particle of the thread, and thus on the number of
+  // The reset makes the result independent of the thread's previous particle, and so of the number of
   // threads.
   scratch.integrator.next_step = 0;
   integrator(def.integrator).step(FreeFlight(forces, mass), t, h, flat(x), flat(v), scratch.integrator);
 }
 
-/// Free flight of a particle that was created before time 0, or long before this sub-step, until the sub-step
-/// begins.
+/// Moves a particle freely until the sub-step begins, if it was created before time 0 or long before this
+/// sub-step.
 void ParticleSystem::fly_before(const ParticleForces& forces, Real t, std::size_t i, Real duration,
                                 Scratch& scratch) {
   duration = std::min(duration, arrays.lifespan[i]);
@@ -117,9 +118,9 @@ void ParticleSystem::admit_new_particles(const ParticleForces& forces) {
   since_birth.clear();
 }
 
-/// Integrates every particle, and then calls make_landing(chunk)(i, flight, integrated). `integrated` means
-/// that it was integrated before, in a CoupledGroup. Calls of one chunk are in order; those of different
-/// chunks are parallel.
+/// Integrates every particle, and then calls make_landing(chunk)(i, flight, integrated). `integrated`:
+/// whether a CoupledGroup integrated it before. Calls of one chunk are made in order; different chunks run in
+/// parallel.
 template <class MakeLanding>
 void ParticleSystem::fly_each(const ParticleStage& stage, const ParticleForces& forces, bool coupled,
                               MakeLanding&& make_landing) {

@@ -25,7 +25,7 @@ Vec3 velocity_after_shift(const Vec3& v, const Vec3& a, const Vec3& shift) {
 
 std::optional<Real> meeting_time(const Vec3& d, const Vec3& u, Real distance) {
   // Solves |d + u t| = distance. For accuracy the larger form of the quadratic's solution is used, and the
-  // discriminant is computed from the distance at which the centres would pass.
+  // discriminant is computed from the distance at which the centres would pass each other.
   const Real approach = -d.dot(u);
   if (!(approach > 0)) return std::nullopt;
   const Real gap = d.squaredNorm() - distance * distance;

@@ -1,8 +1,8 @@
-/// Prevents particles from passing through each other in the solution of ParticleContacts. That solution uses
-/// the particles that come near each other on their paths before contact, but contact may turn a fast
-/// particle towards others. The resulting paths are therefore swept once more, in the order of time, and two
-/// particles that would pass stop for the rest of the sub-step. A stopped particle keeps its distance from
-/// particles that arrive later, so no particle passes, and each particle stops at most once.
+/// Prevents particles from passing through each other in the solution of ParticleContacts. That solution
+/// considers the particles that come near each other on their paths before contact, but a contact may turn a
+/// fast particle towards others. Therefore the new paths are swept once more, in the order of time. Two
+/// particles that would pass each other stop for the rest of the sub-step. A stopped particle keeps its
+/// distance from particles that arrive later. So no particle passes, and each particle stops at most once.
 
 #include <algorithm>
 #include <queue>
@@ -42,8 +42,8 @@ bool ParticleContacts::predict_paths(std::span<const Vec3> end) {
   return std::find(is_long_.begin(), is_long_.end(), 1) != is_long_.end();
 }
 
-/// Finds the time after which two particles come too near each other. Stops that are already known are taken
-/// into account.
+/// Finds the time from which two particles come too near each other, with regard to the stops that are
+/// already known.
 template <class Add>
 void ParticleContacts::find_passing(uint32_t i, uint32_t j, Real after, Add&& add) const {
   const CollidingParticle &a = paths_[i], &b = paths_[j];
