@@ -127,8 +127,8 @@ struct StepFigures {
   void add(const StepFigures& more) { add_figures(*this, more); }
 };
 
-/// Two bodies whose contact forces are approximate: the pair with the greatest error in a group of contacts
-/// that fell back from its intended solver.
+/// Two bodies with approximate contact forces: the pair with the greatest error in a group of contacts for
+/// which the intended solver failed.
 struct RoughContact {
   BodyHandle a, b;
 };

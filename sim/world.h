@@ -38,7 +38,8 @@ namespace offstage::sim {
 
 class CollisionMesh;
 
-/// End of a spring: a point of the world, a point of a body (body frame), or a particle given by its id.
+/// The ends of a spring: a point of the world, a point of a body (in its frame), or a particle given by its
+/// id.
 struct WorldPoint {
   Vec3 position = Vec3::Zero();
 };
@@ -62,7 +63,8 @@ struct SpringDef {
   Real rest_length = -1;  ///< L [m]; negative: the distance at creation
 };
 
-/// Contact parameters of a pair of materials. They replace those combined from the two bodies (see BodyDef).
+/// Contact parameters for a pair of materials. They replace the values that are combined from the two bodies
+/// (see BodyDef).
 struct ContactRule {
   std::string a, b;  ///< materials, in any order
   std::optional<Real> restitution, friction, static_friction;
@@ -94,8 +96,8 @@ enum class ParticleContactMethod : uint8_t {
   lcp
 };
 
-/// Algorithms of collision detection. All give the same results within their tolerances, except that
-/// bisection misses bodies that pass through each other within a sub-step; they differ in their cost.
+/// Algorithms of collision detection. They differ in their cost, and give the same results within their
+/// tolerances, with one exception: bisection misses bodies that pass through each other within a sub-step.
 struct CollisionMethods {
   /// Kind of the bounding volumes in the trees over the parts and triangles of meshes (physics H1-H3).
   /// `mixed` uses spheres for dynamic bodies and axis-aligned boxes for the others; a sphere is then tested
@@ -223,8 +225,8 @@ class World {
   /// Adds a rule for a pair of materials. It replaces an earlier rule for the same pair.
   void add_contact_rule(const ContactRule& rule);
 
-  /// Removes an object. Returns false if the handle is stale. Removing a body also removes its springs and
-  /// joints.
+  /// Removes an object. Returns false if the handle is stale. The springs and joints of a removed body are
+  /// removed, too.
   bool remove(BodyHandle body);
   bool remove(ParticleSystemHandle system);
   bool remove(SpringHandle spring);

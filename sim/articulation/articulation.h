@@ -72,18 +72,18 @@ class Articulation final : public JointedBodies {
   Real kicks_needed(Real duration) const;
   /// With springs, before a motion: the number of times that kick() will be called in it.
   void set_kicks(Real count) { kicks_ = count; }
-  /// Fraction of a motion, from 0 to 1. Impulses applied at this time move the links as far as the same
+  /// Returns a fraction of a motion, from 0 to 1. Impulses at this time move the links as far as the same
   /// impulses distributed over the kicks.
   Real kicks_act_from() const { return (1 - 1 / kicks_) / 2; }
-  /// With springs: computes, by implicit Euler (physics A8), the mean force and torque on each link over the
-  /// part of the motion from t to t + h [s], springs and dampers of the joints included. `forces` holds all
-  /// other forces on entry, and the result [force, torque] on return.
+  /// With springs: computes the mean force and torque on each link over the part of the motion from t to t +
+  /// h [s], by implicit Euler (physics A8). Springs and dampers of the joints are included. `forces` holds
+  /// all other forces on entry, and the result [force, torque] on return.
   void kick(Real t, Real h, std::span<const LinkMotion> motion, std::span<const LinkMobility> mobility,
             std::span<Vec6> forces);
   /// Begins a motion from t to t + h.
   void begin_motion(Real t, Real h);
-  /// Adds the joint forces at time t within the motion to `forces`, which holds all other forces [force,
-  /// torque] on the links on entry. `motion`: state of the links at that time.
+  /// Adds the joint forces at time t within the motion to `forces`. On entry, `forces` holds all other forces
+  /// on the links [force, torque]. `motion`: state of the links at that time.
   void add_forces(Real t, std::span<const LinkMotion> motion, std::span<const LinkMobility> mobility,
                   std::span<Vec6> forces);
   /// Propagates impulses that acted on single bodies since the last settle() through the joints.
@@ -97,8 +97,8 @@ class Articulation final : public JointedBodies {
   void place(Real time, bool at_start = false);
   /// Evaluates the constraints for the contact solver, at the poses after a `fraction` of the interval. The
   /// interval lasts `duration` [s] and ends at `time` with the states Body::rigid. The fraction is the
-  /// average time at which the impulses act. With the poses at the end of the interval, the arms would have
-  /// turned, and the impulses would change the angular momentum.
+  /// average time at which the impulses act. At the end of the interval, the arms would have turned further,
+  /// and the impulses would change the angular momentum.
   void place_within(Real time, Real duration, Real fraction, Real substep);
   /// Projects velocities of the links at `time` onto the constraints of the last place_within().
   void project(Real time, std::span<Vec6> velocities);
@@ -120,7 +120,8 @@ class Articulation final : public JointedBodies {
   /// Returns the linear system after place_within(). It contains the constraints, and the springs and dampers
   /// as soft rows, which resist changes of the free motion.
   JointSystem& inert_system() { return has_springs() ? *sprung_ : system_; }
-  /// Multiplies the softness of the springs after place_within() by a factor. Returns whether it has changed.
+  /// Multiplies the softness of the springs after place_within() by a factor. Returns whether the softness
+  /// has changed.
   bool soften(Real factor);
   /// Adds constraint forces to the loads of the joints: the impulses of an interval divided by its duration
   /// [s]. The loads already contain the constraint forces of the free motion.
@@ -128,9 +129,9 @@ class Articulation final : public JointedBodies {
   /// Adds constraint impulses of a collision to the loads of the joints.
   void add_impact_impulses(std::span<const Vec6> impulses);
 
-  /// Prepares link_mobility() and respond() for impulses on links at the end of a sub-step. `time`: that end
-  /// [s]. The bodies must be in their poses at this time. The linear system is factored at the first call of
-  /// link_mobility() or respond().
+  /// Prepares link_mobility() and respond() for impulses on links at the end of a sub-step, `time` [s]. The
+  /// bodies must be in their poses at this time. The first call of link_mobility() or respond() factors the
+  /// linear system.
   void begin_impulses(Real time);
   Mat6 link_mobility(uint32_t link, const Vec6& push) override;
   void respond(uint32_t link, const Vec6& impulse, std::span<Vec6> velocities) override;
@@ -161,12 +162,12 @@ class Articulation final : public JointedBodies {
   std::vector<Joint*> joints_;
   std::vector<Body*> bodies_;
   std::vector<JointFrame> frames_a_, frames_b_;  // relative to the links' centres
-  std::vector<Driven> driven_a_, driven_b_;      // driven links in this motion
+  std::vector<Driven> driven_a_, driven_b_;      // accelerations of driven links in this motion
   bool has_bounded_rows_ = false, has_kinematic_ = false;
   std::vector<Momenta> settled_;  // momenta of the bodies after settle()
   JointSystem system_;
 
-  // With springs: the constraints and the springs as soft rows, and the loads by the kicks.
+  // These exist only with springs: the constraints and the springs as soft rows, and the loads by the kicks.
   std::optional<JointSystem> sprung_;
   std::vector<JointRows> sprung_rows_;
   std::vector<Wrench> kick_loads_;

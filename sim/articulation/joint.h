@@ -107,8 +107,8 @@ struct JointDef {
   /// in their poses at that time, and its anchors and axes have moved with the bodies.
   Real appear_at = 0, remove_at = kFree;
 
-  /// Returns c + h k, the derivative of the torque k theta + c u of spring and damper with respect to the
-  /// speed u, for implicit Euler over an interval of length h [s].
+  /// Returns c + h k: the derivative of the torque k theta + c u of spring and damper by the speed u, for
+  /// implicit Euler over an interval of length h [s].
   Real resistance(Real h) const { return damping + h * stiffness; }
   /// Whether a joint of this type only couples motions that other joints allow.
   bool is_coupling() const { return type == JointType::gear || type == JointType::rack; }

@@ -20,16 +20,16 @@ CommonMotion common_motion(std::span<Body* const> bodies);
 
 /// Returns the greatest constraint error of an articulation's joints at a time [m], [rad].
 Real joint_gap(const Articulation& articulation, Real time);
-/// Elastic energy of a joint at a time [J]: of its stiffness, and of a position motor with a stiffness, which
-/// acts as a spring with limited effort.
+/// Returns the elastic energy of a joint at a time [J]: that of its stiffness, and that of a position motor
+/// with a stiffness, which acts as a spring with limited effort.
 Real spring_energy(const Joint& joint, Real time);
 /// Whether a joint connects the articulation to the world or to a static or kinematic body.
 bool is_held(const Articulation& articulation);
 /// Whether a joint connects the articulation to a kinematic body, which may do work.
 bool has_kinematic_end(const Articulation& articulation);
 
-/// Kinetic energy of the links relative to their common motion [J]. If the articulation is_held(), the whole
-/// kinetic energy.
+/// Returns the kinetic energy of the links relative to their common motion [J]. If the articulation
+/// is_held(), returns the whole kinetic energy.
 Real internal_energy(const Articulation& articulation);
 /// Multiplies the velocities relative to the common motion by `fraction`, from 0 to 1. The velocities still
 /// satisfy the constraints. If the articulation is not held, momentum and angular momentum are conserved.

@@ -30,8 +30,8 @@ void collect_bounded_rows(const Articulation& articulation, Real duration, Real 
                           std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins);
 
 /// Appends rows for springs and dampers, which resist changes of the free motion (physics A8). `duration` is
-/// the length of the interval or, for a collision, of the sub-step [s]: springs that are stiff over a
-/// sub-step resist a collision equally.
+/// the length of the interval [s]. For a collision it is the length of the sub-step: springs that are stiff
+/// over a sub-step resist a collision equally.
 void collect_springs(const Articulation& articulation, Real duration, Real time,
                      std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins);
 

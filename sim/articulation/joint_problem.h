@@ -12,7 +12,7 @@ namespace offstage::sim {
 /// Index used for a body that impulses do not move.
 constexpr uint32_t kUnmoved = UINT32_MAX;
 
-/// J (v+ - v) = 0: the velocities on entry already satisfy the constraint.
+/// The condition J (v+ - v) = 0. The velocities on entry already satisfy the joint.
 struct JointConstraint {
   uint32_t a, b;
   const JointRows* rows;
@@ -29,8 +29,8 @@ struct BoundedRow {
   Real softness = 0;          ///< [1/kg] or [1/(kg m^2)], >= 0
   Real lower = 0, upper = 0;  ///< bounds of the impulse [N s] or [N m s]
   Real impulse = 0;           ///< in: a guess; out: the solution
-  // For the fast solver: the fraction of the interval after which the row acts, and how much greater `offset`
-  // is at the interval's start, decreasing linearly [m/s] or [rad/s].
+  // For the fast solver: the fraction of the interval after which the row acts, and the difference of
+  // `offset` between the interval's start and end. `offset` decreases linearly [m/s] or [rad/s].
   Real from = 0, turning = 0;
   bool resists_change =
       false;  ///< whether `target` is the speed u before the solution: the row resists its change

@@ -69,15 +69,14 @@ uint32_t constraint_count(const JointDef& def);
 /// Returns the axes of a joint's frame on body a (or b, if `of_b`) when the joint is created, in the world.
 /// For the columns see JointFrame::axes.
 Mat3 frame_axes(const JointDef& def, bool of_b);
-/// Returns the change of Joint::length of a gear, rack or screw due to whole turns of its rotations. To be
-/// called after each motion; a rotation must turn by at most half a turn in between.
+/// Returns the change of Joint::length of a gear, rack or screw due to whole turns of its rotations. Call it
+/// after each motion, and at least once per half turn.
 Real turns_offset(const JointDef& def, const JointPlace& place, Real length);
 /// Computes the constraint rows of a joint. `length`: Joint::length.
 void set_joint_rows(const JointDef& def, const JointPlace& place, Real length, JointRows& rows);
 
-/// Returns the row of the free coordinate: of a revolute, prismatic, distance, screw or pulley joint, the
-/// first angle of a universal joint, or the twist of a spherical joint. JointRow::error is the coordinate [m]
-/// or [rad]; angles are in [-pi, pi].
+/// Returns the row of the free coordinate. For a universal joint this is its first angle, for a spherical
+/// joint its twist. JointRow::error is the coordinate [m] or [rad]; angles are in [-pi, pi].
 JointRow free_row(const JointDef& def, const JointPlace& place, Real length);
 /// Row of the tilt of a spherical joint's axis, or of the second angle of a universal joint.
 JointRow swing_row(JointType type, const JointPlace& place);

@@ -1,10 +1,10 @@
 #pragma once
 /// The linear system of an articulation's joints (physics A1). The matrix is A = J M^-1 J^T + S, with the
 /// mass matrix M of the links, the Jacobian J of the constraints and their softness S. It has a block row for
-/// each joint and couples joints that share a link. A link with many joints would couple all of them. It gets
-/// its own block row instead, so that the cost for a tree of n joints is O(n). If joints form loops, rows may
-/// be linearly dependent. A small fraction of the diagonal is then added, and conjugate gradients remove the
-/// error that this causes.
+/// each joint, and couples joints that share a link. A link with many joints, which would couple all of them,
+/// gets its own block row instead, so that the cost for a tree of n joints is O(n). If joints form loops,
+/// rows may be linearly dependent. A small fraction of the diagonal is then added, and conjugate gradients
+/// remove the resulting error.
 
 #include <array>
 #include <cstdint>
@@ -28,7 +28,7 @@ class JointSystem {
   JointSystem(uint32_t links, std::vector<Topology> joints);
 
   /// Factors the system of these rows, to which the object keeps a reference. Returns false if the
-  /// constraints are too degenerate; correct() then has no effect.
+  /// constraints are too degenerate. correct() then does nothing.
   bool factorize(std::span<const JointRows> rows, std::span<const LinkMobility> links);
 
   /// Replaces the constraints by rows that differ little from those of the last factorize(). The factor is

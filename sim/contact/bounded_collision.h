@@ -8,8 +8,8 @@ namespace offstage::sim {
 /// Clusters without joints and with at most this many contacts are solved by pivoting.
 inline constexpr std::size_t kFewContacts = 8;
 
-/// Resolves collisions as collide() does, with at most about ten thousand operations. Some contacts of a
-/// large cluster may still approach afterwards. Like collide(), it never adds kinetic energy.
+/// Resolves collisions as collide() does, with at most about ten thousand operations. It never adds kinetic
+/// energy. Afterwards some contacts of a large cluster may still approach.
 ContactWork collide_bounded(std::span<ContactBody> bodies, std::span<Contact> contacts,
                             std::span<const Real> restitution, ImpactLaw law, const JointProblem& joints);
 

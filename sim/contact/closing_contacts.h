@@ -3,8 +3,8 @@
 ///
 /// If a whole interval is solved at once, a contact that closes within it pushes from the start, before the
 /// body has reached it. A ball that rolls over the concave seams of a bowl then loses a little energy at each
-/// seam: the work of its weight over the gap. Here the interval is divided at the times at which contacts
-/// close. The frames and arms of the contacts stay constant.
+/// seam: the work of its weight over the gap. To avoid this, the interval is divided at the times at which
+/// contacts close. The frames and arms of the contacts stay constant.
 
 #include <optional>
 #include <span>
@@ -19,7 +19,7 @@ namespace offstage::sim {
 struct ClosingPoint {
   Real gap = 0;                 ///< distance at the start [m]; 0: the point touches
   Vec3 surface = Vec3::Zero();  ///< velocity of conveyors [m/s]
-  /// Contact::bias as a polynomial of the elapsed fraction of the interval, from 0 to 1: its coefficients,
+  /// Coefficients of Contact::bias as a polynomial of the elapsed fraction of the interval, from 0 to 1;
   /// lowest degree first [m/s].
   Vec3 bias[3] = {Vec3::Zero(), Vec3::Zero(), Vec3::Zero()};
 
@@ -34,7 +34,7 @@ struct Displacement {
 
 struct ClosingSolution {
   std::vector<ContactBody> bodies;  ///< bodies with their velocities at the interval's end
-  // Contacts and bounded rows, with their impulses over the whole interval:
+  // Contacts and bounded rows, with their impulses over the whole interval.
   std::vector<Contact> contacts;
   std::vector<BoundedRow> bounded;
   std::vector<Vec6> constraints;            ///< impulses of the joint constraints over the interval
@@ -42,15 +42,15 @@ struct ClosingSolution {
   ContactWork work;
 };
 
-/// An interval of length `duration` [s].
+/// The contacts and joints of an interval of length `duration` [s].
 struct ClosingProblem {
   std::span<const ContactBody> start;  ///< bodies with their velocities at the start of the interval
   std::span<const ContactBody>
       free;  ///< bodies with the velocities that they would have at its end without contacts and bounded rows
-  /// Contacts, with the targets of the points that touch at the start, and with initial guesses of the
-  /// impulses over the interval.
+  /// Contacts with initial guesses of the impulses over the interval. Only points that touch at the start
+  /// have targets.
   std::span<const Contact> contacts;
-  std::span<const ClosingPoint> points;  ///< of the contacts
+  std::span<const ClosingPoint> points;  ///< motion of each contact
   /// Joints, with initial guesses of the impulses. Rows that act only in a part of the interval, such as
   /// limits, are not allowed.
   JointProblem joints;

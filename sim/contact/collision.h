@@ -19,10 +19,10 @@ enum class ImpactLaw : uint8_t {
   sequential
 };
 
-/// Returns the impulse on body a in the contact's frame (n, t, k) [N s] for a contact with mobility `K`
-/// [1/kg] whose points have the relative velocity `u` [m/s]; zero if they do not approach. Equal coefficients
-/// give the round friction cone, |P_tk| = mu P_n against the sliding; otherwise each axis sticks or slides
-/// separately.
+/// Returns the impulse on body a in the contact's frame (n, t, k) [N s]. `K` is the mobility [1/kg], and `u`
+/// the relative velocity of the points [m/s]. The impulse is zero if the points do not approach. Equal
+/// coefficients give the round friction cone, |P_tk| = mu P_n against the sliding; otherwise each axis sticks
+/// or slides separately.
 Vec3 collision_impulse(const Mat3& K, const Vec3& u, Real restitution, Real friction_t, Real friction_k);
 
 /// Resolves a cluster: changes the bodies' velocities, and sets the contacts' targets and total impulses.

@@ -20,8 +20,8 @@ struct Island {
   std::vector<Body*> bodies;
   std::vector<ContactPair*> pairs;
   std::vector<Articulation*> articulations;
-  /// System that has moved the island since the interval's start, and can restore the state at that time. May
-  /// be null.
+  /// The system that moved the island since the interval's start, and that can restore the state at that
+  /// time; may be null.
   CoupledSystem* motion = nullptr;
   Real from = 0;  ///< start of the island's interval, counted from the start of the sub-step [s]
 };
@@ -29,8 +29,8 @@ struct Island {
 class ContactGraph {
  public:
   /// Updates the list of pairs from the candidates of the broad phase. Candidates without a dynamic body are
-  /// ignored. Existing pairs are kept, and new pairs get their surface from `surface_of(a, b)`. Pairs that
-  /// are not among the candidates are removed if `adds` is false. `body_at(slot)` returns a body.
+  /// ignored. Existing pairs are kept; new pairs get their surface from surface_of(a, b). If `adds` is false,
+  /// pairs that are not among the candidates are removed. body_at(slot) returns a body.
   template <class BodyAt, class SurfaceOf>
   void update(std::span<const IndexPair> candidates, bool adds, BodyAt&& body_at, SurfaceOf&& surface_of);
 

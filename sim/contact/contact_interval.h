@@ -14,8 +14,8 @@ struct ContactInterval {
   /// Contacts that approach faster than this are impacts [m/s]; equals WorldDef::collision_speed.
   Real impact_speed;
   /// Whether the interval is a whole sub-step without impacts. Only the forces of whole sub-steps are stored
-  /// as the initial guess of the next one. The force that stops a body in a short part before or after an
-  /// impact would be far too large for a whole sub-step, and forces would accumulate if a part were solved
+  /// as the initial guess of the next one. A force that stops a body in a short part before or after an
+  /// impact would be far too large for a whole sub-step. Forces would also accumulate if a part were solved
   /// again after each of many impacts.
   bool is_whole = true;
 };

@@ -3,11 +3,11 @@
 ///
 /// A contact has two arms (vectors from the centres of mass) and a normal n. They change while the bodies
 /// move: a corner moves with its body, the lowest point of a rim moves along the rim, and the normal turns
-/// with its face or with the line between two centres. A contact solved with the arms and the normal of the
-/// interval's start is accurate only to first order in the interval; a rolling coin would then stand up or
-/// fall. Here the impulse acts at the interval's middle, and the contact conditions apply to the velocities
-/// at its end. Impulse and angular momentum are then accurate to second order, for bodies that move by the
-/// mean of old and new velocity.
+/// with its face or with the line between two centres. With the arms and the normal of the interval's start,
+/// a solution is accurate only to first order in the interval, and a rolling coin would stand up or fall.
+/// Therefore the impulse acts at the interval's middle, and the contact conditions apply to the velocities at
+/// its end. Impulse and angular momentum are then accurate to second order, for bodies that move by the mean
+/// of old and new velocity.
 
 #include "sim/collision/contact_frame.h"
 #include "sim/collision/manifold.h"
@@ -21,8 +21,8 @@ struct ContactPlace {
   /// Vectors to the contact from the centres of mass [m], world axes. For a kinematic body the vector starts
   /// at the body's origin.
   Vec3 arm_a, arm_b;
-  /// Rotation of the contact points about the centre of the body whose feature defines the contact, since the
-  /// interval's start. Points usually turn with the body. On the sides and rims of round bodies they turn
+  /// Rotation of the contact points since the interval's start, about the centre of the body whose feature
+  /// defines the contact. Points usually turn with the body. On the sides and rims of round bodies they turn
   /// with the meridian that faces the other body.
   Quat turn;
 };
@@ -30,9 +30,8 @@ struct ContactPlace {
 struct ContactMotion {
   ContactPlace middle;
   ContactFrame frame;  ///< frame of the contact at the middle of the interval
-  /// Change of the relative velocity at the contact due to the rotation of arms and normal alone, in `frame`
-  /// (n, t, k): gain s + bow s^2, where s increases from -1 at the start through 0 in the middle to 1 at the
-  /// end [m/s].
+  /// Change of the relative velocity at the contact due to the rotation of arms and normal, in `frame` (n, t,
+  /// k): gain s + bow s^2. Here s is -1 at the start, 0 in the middle and 1 at the end of the interval [m/s].
   Vec3 gain = Vec3::Zero(), bow = Vec3::Zero();
   /// Additional `gain` of the normal velocity at neighbouring points, per metre of distance along the
   /// tangents t and k [1/s].
@@ -43,17 +42,17 @@ struct ContactMotion {
 /// Whether the feature that defines a contact belongs to body b. The contact moves with this feature.
 bool moves_with_b(NormalSource source);
 
-/// World position of a body's centre of mass at the interval's start [m]. For a kinematic body, the position
-/// of its origin.
+/// Returns the world position of a body's centre of mass at the interval's start or, for a kinematic body,
+/// the position of its origin [m].
 Vec3 start_centre(const Body& body);
 
 /// Whether contacts may move along a body's surface while the body turns. This requires rims or round sides,
 /// and a noticeable rotation within `duration` [s].
 bool runs_along(const Body& body, Real duration);
 
-/// Angular speed at the interval's start at which the axis of a cylinder, cone or frustum turns about the
-/// normal of a contact [rad/s]. The lowest point of a tilted rim moves around the rim at this speed, for
-/// example on a wobbling coin. Returns 0 if a face or a side lies flat, and for other shapes.
+/// Returns the angular speed at which the axis of a cylinder, cone or frustum turns about the normal of a
+/// contact at the interval's start [rad/s]. The lowest point of a tilted rim moves around the rim at this
+/// speed, for example on a wobbling coin. Returns 0 if a face or a side lies flat, and for other shapes.
 Real rim_speed(const Body& body, const Vec3& normal);
 
 /// Predicts the motion of a contact of a manifold. `frame` is the manifold's frame. `place` is the contact's

@@ -103,8 +103,8 @@ class alignas(64) ContactPair {
   bool predicts(const PlacedManifold& m, const Vec3& normal, const ContactPoint& at_end, Real duration,
                 bool between_points) const;
 
-  /// Whether the island is moved back to the impact at this point, so that the point must not limit the
-  /// approach before. While other points of the pair touch, this requires an approach faster than
+  /// Whether the island will be moved back to the impact at this point. The point must then not limit the
+  /// approach before the impact. While other points of the pair touch, this requires an approach faster than
   /// `impact_speed` [m/s].
   bool awaits_impact(const PlacedManifold& m, const ContactPoint& point, Real impact_speed) const {
     if (!needs_toi || point.separation <= kTouching) return false;
@@ -112,14 +112,15 @@ class alignas(64) ContactPair {
            relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n) < -impact_speed;
   }
 
-  /// Prefetches memory for find(): first the pair itself, and a little later, with prefetch_manifold(), its
-  /// first manifold.
+  /// Prefetches the pair for find(). Call prefetch_manifold(), which prefetches its first manifold, a little
+  /// later.
   void prefetch() const { sim::prefetch(this, this + 1); }
   void prefetch_manifold() const {
     if (!placed_.empty()) sim::prefetch(placed_.data(), placed_.data() + 1);
   }
 
-  /// Whether some manifold is a line or a point (is_narrow()), which may lie on an internal edge.
+  /// Whether a manifold touches along a line or at a point (is_narrow()). It may then lie at an internal
+  /// edge.
   bool has_narrow() const { return has_narrow_; }
   /// The i-th manifold added by add_speculative_contacts(), with its points at their positions at the
   /// interval's end.
@@ -178,7 +179,7 @@ class alignas(64) ContactPair {
   bool is_on_plane_;
   bool has_sphere_;  // the pair has at most one point, and finding it is as fast as reusing it
   PairCache cache_;
-  // Manifolds in a's frame. Filled when they are first reused, to save memory for moving pairs.
+  // Manifolds in a's frame. They are stored when they are first reused, to save memory for moving pairs.
   std::vector<Manifold> found_;
   std::vector<Manifold> at_end_;  // manifolds of the speculative contacts
   Pose a_from_b_;                 // relative pose when the contacts were found

@@ -50,8 +50,8 @@ struct Contact {
   ContactFrame frame;     ///< n from b to a
   /// Vectors from the centres of mass to the point, world axes [m].
   Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();
-  /// Added to the relative velocity of the bodies, (n, t, k): effect of moving surfaces and of the rotation
-  /// of the contact's frame [m/s].
+  /// Velocity that is added to the relative velocity of the bodies, (n, t, k): the effect of moving surfaces
+  /// and of the rotation of the contact's frame [m/s].
   Vec3 offset = Vec3::Zero();
   /// The part of `offset` without moving surfaces: the velocity terms of physics R9 [m/s].
   Vec3 bias = Vec3::Zero();

@@ -10,8 +10,9 @@
 
 namespace offstage::sim {
 
-/// Returns the force-independent change of the relative velocity at a contact in an interval of length h [s]:
-/// the velocity terms of the relative acceleration (physics R9), times h. Contact's frame [m/s].
+/// Returns the change of the relative velocity at a contact in an interval of length h [s] that does not
+/// depend on forces: the velocity terms of the relative acceleration (physics R9), times h. Components in the
+/// contact's frame [m/s].
 Vec3 velocity_bias(const ContactPair& pair, const PlacedManifold& placed, const ContactPoint& point, Real h);
 
 /// Velocity that conveyors add to the velocity of a relative to b [m/s], world axes.
@@ -24,12 +25,12 @@ Vec3 in_frame(const ContactFrame& f, const Vec3& v);
 /// If the contact does not slide, they are the static coefficients.
 std::pair<Real, Real> friction(const PairSurface& surface, const Vec3& u);
 
-/// World position of the point to which a body's velocity refers [m]: the centre of mass, or, for a kinematic
-/// body, its origin at the interval's end.
+/// Returns the world position of the point to which a body's velocity refers [m]: the centre of mass or, for
+/// a kinematic body, its origin at the interval's end.
 Vec3 origin(const Body& body);
 
-/// Returns the ContactBody of a body that contacts do not move: asleep, static or kinematic. Used by the
-/// exact solver and the impact solver.
+/// Returns the ContactBody of a body that contacts do not move: asleep, static or kinematic. The exact solver
+/// and the impact solver use it.
 ContactBody unmoved_body(const Body& body);
 
 /// The inverse inertia in world axes at an orientation.

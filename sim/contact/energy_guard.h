@@ -14,11 +14,11 @@ bool can_do_work(const Island& island);
 /// Kinetic energy of an island's bodies [J].
 Real kinetic_energy(const Island& island);
 
-/// Returns the factor by which to multiply an island's contact and joint impulses so that they add no kinetic
-/// energy to the island's free motion (the states Body::rigid). It is 1 unless the impulses add more than a
-/// fiftieth of the energy of that motion. Contacts and joints dissipate energy, except for the error of their
-/// velocity terms over a step, which is unbounded for a thin body that turns far in a step. Scaling all
-/// impulses by one factor conserves the momenta. The factor is 1 for an island driven by a kinematic body, a
+/// Returns the factor for an island's contact and joint impulses with which they add no kinetic energy to the
+/// island's free motion (the states Body::rigid). It is 1 unless the impulses add more than a fiftieth of the
+/// energy of that motion. Contacts and joints dissipate energy, except for the error of their velocity terms
+/// over a step, which is unbounded for a thin body that turns far in a step. Since all impulses are scaled by
+/// one factor, the momenta are conserved. The factor is 1 for an island driven by a kinematic body, a
 /// conveyor or a motor.
 Real kept_fraction(const Island& island, std::span<const RelaxedBody> relaxed);
 

@@ -9,9 +9,9 @@
 
 namespace offstage::sim {
 
-/// Solves the contacts of one island to rounding. Before, the bodies must have moved freely through the
-/// interval, from Body::start to Body::rigid. The effect of the contacts is added to this motion. Keep one
-/// object per island.
+/// Solves the contacts of one island to rounding. The bodies must have moved freely through the interval,
+/// from Body::start to Body::rigid. The effect of the contacts is added to this motion. Keep one object per
+/// island.
 class ExactContacts {
  public:
   /// How the problem is solved.
@@ -20,8 +20,8 @@ class ExactContacts {
     lcp        ///< linear complementarity (contact_lcp.h); `proximal` if that fails
   };
   struct Outcome {
-    /// False: nothing was changed, because the cost exceeded the budget, or because the result of a fall-back
-    /// was unsafe.
+    /// Whether the result was applied. If false, nothing was changed, because the cost exceeded the budget or
+    /// the result of a fall-back was unsafe.
     bool is_applied = false;
     ContactWork work;
     ContactWork lcp;                     ///< work of Method::lcp; `work` is then only the fall-back's
@@ -53,13 +53,13 @@ class ExactContacts {
   std::vector<Contact> contacts_;
   std::vector<const ContactPair*> pairs_;  // pair of each contact
   std::vector<PointForce*> forces_;        // force of each contact, in its pair
-  // Speed of each contact at the start, as an absolute value, less the part due to rotation [m/s].
+  // By contact: absolute value of the speed at the start minus the part due to rotation [m/s].
   std::vector<Real> approach_;
   std::vector<uint8_t> closing_;  // by body: whether a contact of it closed in the interval
   std::vector<Real> rest_;        // by body: fraction of the interval in which it has its change of velocity
   bool may_divide_ = false;       // whether the interval of the island may be divided
-  std::vector<ClosingPoint> points_;         // of each contact
-  std::vector<Displacement> displacements_;  // of the bodies, if the interval was divided
+  std::vector<ClosingPoint> points_;         // by contact
+  std::vector<Displacement> displacements_;  // by body, if the interval was divided
   Real cost_ = 0;
   IslandJoints joints_;
   ProximalNewton newton_;

@@ -2,10 +2,10 @@
 /// Coulomb's law of one contact as convex sets for projections:
 /// - the friction cone of the impulses (p_n, p_t, p_k), for the exact solver, which computes p_n and friction
 /// together. It is round for isotropic friction, and a pyramid if each axis has its own limit;
-/// - the section of the cone at a given normal impulse, a disc or a rectangle, for solvers that first compute
-/// p_n and then friction;
-/// - the limits of spinning and rolling. The fast solver has its own version for eight patches in SIMD lanes
-/// (patch_friction.h).
+/// - the section of the cone at a given normal impulse, a disc or a rectangle, for solvers that compute p_n
+/// first and then friction;
+/// - the limits of spinning and rolling.
+/// The fast solver has its own version for eight patches in SIMD lanes (patch_friction.h).
 
 #include <algorithm>
 #include <cmath>
@@ -38,7 +38,7 @@ struct ConeProjection {
 
 /// Projects an impulse q = (n, t, k) [N s] onto Coulomb's friction cone of a contact. A point at the apex
 /// counts as inside the cone. Otherwise the contacts of a stack at rest would become active one after the
-/// other from the bottom up, not all at once.
+/// other from the bottom up, instead of all at once.
 ConeProjection project_on_cone(const Contact& c, const Vec3& q);
 
 /// Derivative of the projection at a point q. It is symmetric, with eigenvalues between 0 and 1.
@@ -65,7 +65,7 @@ inline Vec3 project_on_section(const Contact& c, const Vec3& p, Real normal) {
 
 using Tangential = Eigen::Matrix<Real, 2, 1>;  ///< components along t and k
 
-/// Returns a vector, scaled down to the length `limit` >= 0 if it is longer.
+/// Returns the vector, or the vector scaled down to the length `limit` >= 0 if it is longer.
 template <class Vector>
 Vector shortened(const Vector& v, Real limit) {
   const Real length = v.norm();
@@ -76,8 +76,8 @@ Vector shortened(const Vector& v, Real limit) {
 /// surfaces with very little sliding friction; sliding and spinning then have separate limits.
 inline constexpr Real kLongestSpinArm = 0.1;
 
-/// The arm s [m]: spinning at the angular velocity w counts as sliding at the velocity s w. Returns 0 if
-/// there is no spinning friction, or if sliding and spinning have separate limits.
+/// Returns the arm s [m]: spinning at the angular velocity w counts as sliding at the velocity s w. It is 0
+/// if there is no spinning friction, or if sliding and spinning have separate limits.
 inline Real spin_arm(const Contact& c) {
   const bool is_common = c.is_isotropic() && c.spinning <= kLongestSpinArm * c.friction_t;
   return is_common && c.spinning > 0 ? c.spinning / c.friction_t : 0;

@@ -8,7 +8,7 @@
 
 namespace offstage::sim {
 
-/// Solves the problem of contact_problem.h from zero impulses, ignoring the contacts' guesses. It sets the
+/// Solves the problem of contact_problem.h from zero impulses; the contacts' guesses are ignored. It sets the
 /// contacts' impulses and adds their effect to the bodies' velocities. Isotropic contacts have the round
 /// cone: between successive pivoting solutions their tangents are aligned with the direction of sliding, and
 /// Newton's method on the cone refines the result. If the residual exceeds rounding, projected Gauss-Seidel

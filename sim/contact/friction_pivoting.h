@@ -1,7 +1,7 @@
 #pragma once
 /// Baraff's pivoting on contacts with friction (physics N10; "Fast contact force computation for
-/// nonpenetrating rigid bodies", 1994), in matrix form. Normals and tangents are added one at a time, and
-/// their conditions stay satisfied afterwards. Success is not guaranteed: see PivotingResult.
+/// nonpenetrating rigid bodies", 1994), in matrix form. Normals and tangents are added one at a time, and the
+/// conditions of those added before stay satisfied. Success is not guaranteed: see PivotingResult.
 
 #include <cstdint>
 #include <vector>
@@ -20,8 +20,8 @@ struct DenseContacts {
   std::vector<Eigen::Vector2d> friction;  ///< coefficients of friction of each contact, along t and along k
   /// For each contact, whether it has dynamic friction: p_t = -mu p_n and p_k = 0 at any tangential velocity.
   std::vector<uint8_t> slides;
-  /// Optional: excluded rows. Their normal impulse is fixed at 1, so that the limits of their tangents are
-  /// constant. The rows and columns of these normals in A and b are zero.
+  /// Optional: rows excluded from pivoting. Their normal impulse is fixed at 1, so that the limits of their
+  /// tangents are constant. The rows and columns of these normals in A and b are zero.
   std::vector<uint8_t> held = {};
 
   std::size_t count() const { return friction.size(); }
@@ -29,8 +29,8 @@ struct DenseContacts {
 
 struct PivotingResult {
   uint32_t pivots = 0;
-  /// False after an unbounded step, cycling, a singular matrix or too many pivots. The
-  /// impulses then satisfy their limits but are not the solution.
+  /// Whether the impulses are the solution. It is false after an unbounded step, cycling, a singular matrix
+  /// or too many pivots. The impulses then only satisfy their limits.
   bool solved = true;
 };
 

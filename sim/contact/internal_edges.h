@@ -15,12 +15,12 @@ namespace offstage::sim {
 /// objects. For bodies smaller than 0.1 m the limit is kFlushFraction times their extent.
 constexpr Real kFlush = 1e-4, kFlushFraction = 1e-3;
 
-/// Removes the contacts at internal edges from pairs whose contacts were found at one time of a sub-step of
-/// length h [s]. A contact of a convex piece is at an internal edge if the piece already lies on a face and
-/// the other piece does not rise above that face. If another piece of the body lies on a face, and the plane
-/// of this face separates the two pieces throughout the sub-step, the contact gets the normal of that face. A
-/// contact at the foot of a slope gets the normal of the slope. Pairs that share a body must be given
-/// together. Returns the pairs that have changed, in the order given.
+/// Removes the contacts at internal edges. The contacts of the pairs must have been found at one time of a
+/// sub-step of length h [s], and pairs that share a body must be given together. A contact of a convex piece
+/// is at an internal edge if the piece already lies on a face and the other piece does not rise above that
+/// face. If another piece of the body lies on a face, and the plane of this face separates the two pieces
+/// throughout the sub-step, the contact gets the normal of that face. A contact at the foot of a slope gets
+/// the normal of the slope. Returns the pairs that have changed, in the order given.
 std::vector<ContactPair*> remove_internal_edge_contacts(std::span<ContactPair* const> pairs, Real time,
                                                         Real h);
 

@@ -22,8 +22,8 @@ struct CollisionOutcome {
   const ContactPair* rough = nullptr;  ///< after a fall-back: the pair with the greatest error
 };
 
-/// Resolves the collisions of an island's pairs. Reads poses and velocities from Body::start, and changes the
-/// velocities in it.
+/// Resolves the collisions of an island's pairs. It reads poses and velocities from Body::start, and changes
+/// these velocities.
 CollisionOutcome resolve_collisions(const Island& island, const CollisionSettings& settings);
 
 }  // namespace offstage::sim

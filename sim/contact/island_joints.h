@@ -28,8 +28,8 @@ class IslandJoints {
   /// Adds the impulses of a collision to the loads of the joints.
   void store_impact_impulses();
   JointProblem problem() { return {constraints_, bounded_, impulses_}; }
-  /// Stores the impulses of the solution in the joints, as loads over `duration` [s] and as the next initial
-  /// guess.
+  /// Stores the impulses of the solution in the joints: as loads, divided by `duration` [s], and as the next
+  /// initial guess.
   void store_impulses(Real duration);
 
   std::span<Articulation* const> articulations() const { return articulations_; }
@@ -41,9 +41,8 @@ class IslandJoints {
   /// Whether all impulses act with constant force and direction throughout the interval. This requires that
   /// no limit is near, and that there are no springs and no distance joints.
   bool act_throughout() const;
-  /// Corrects the velocities at the interval's end of articulations that reach a limit. The components that
-  /// violate the constraints at the time when the limit is reached are removed. Other articulations are not
-  /// changed.
+  /// Removes, from the velocities at the interval's end, the components that violate the constraints at the
+  /// time when a limit is reached. It changes only articulations that reach a limit.
   void project(std::span<ContactBody> bodies, Real end) const;
   /// For each articulation, the index in bounded() after its last row.
   std::span<const uint32_t> bounded_ends() const { return bounded_ends_; }

@@ -1,11 +1,11 @@
 #pragma once
 /// Eight contact patches in SIMD lanes, the unit of work of the fast solver (relaxation.h).
 ///
-/// A patch applies a wrench about its centre and reads the relative twist there, both in its frame. Both have
-/// two groups of three components: the normal group (linear along n, angular about t and k), which contains
-/// the normal forces of all points, and the friction group (linear along t and k, angular about n). A point
-/// at (x, y) along (t, k) has the normal velocity u_n + y w_t - x w_k, and its force f makes the wrench (f, y
-/// f, -x f) of the normal group.
+/// A patch applies a wrench about its centre and reads the relative twist there, both in its frame. Twist and
+/// wrench have two groups of three components. The normal group (linear along n, angular about t and k)
+/// contains the normal forces of all points. The friction group is linear along t and k, and angular about n.
+/// A point at (x, y) along (t, k) has the normal velocity u_n + y w_t - x w_k, and its force f has the wrench
+/// (f, y f, -x f) in the normal group.
 ///
 /// All computations are in single precision. They use only the changes of velocities and positions within the
 /// step. A body's velocity at the start may be large, so relative velocities at the start are computed in
@@ -60,12 +60,12 @@ struct PatchBatch {
   Vector n, t, k, arm_a, arm_b;
   Lanes inverse_mass_a, inverse_mass_b;
   Symmetric inverse_inertia_a, inverse_inertia_b;
-  /// Mobilities, the twist per unit wrench: within the normal group, within the friction group, and
-  /// (coupling) the twist of the friction group per wrench of the normal group.
+  /// Mobilities: twist per unit wrench within the normal group, and within the friction group. `coupling`:
+  /// twist of the friction group per unit wrench of the normal group.
   Symmetric normal_mobility, friction_mobility;
   LaneMatrix<Lanes> coupling;
-  /// The inverse of friction_mobility. For patches of one point, which have no torque, the inverse of the
-  /// part along t and k, and in zz the reciprocal of a bound on its eigenvalues.
+  /// Inverse of friction_mobility. Patches of one point have no torque; for them it is the inverse of the
+  /// part along t and k, and zz is the reciprocal of a bound of its eigenvalues.
   Symmetric friction_stiffness;
   PatchGroups approach;  ///< twist due to the velocities at the start, conveyors included
   Lanes conveyed;        ///< component of `approach` along n due to conveyors [m/s]
@@ -77,7 +77,7 @@ struct PatchBatch {
   Vector rolling_before, rolling_shift;  ///< rolling friction, as Point::before and Point::shift
   /// Friction along t and k, and about n; for the meanings see Point.
   Vector friction_impulse, friction_mean, friction_before, friction_shift;
-  /// Sum of the normal impulses with which the friction was computed, if the patch slides; else 0 [N s].
+  /// Sum of the normal impulses for which the friction was computed, if the patch slides; else 0 [N s].
   Lanes pressure;
   Lanes holds;     ///< mask: all bits set if friction was well below its limit in the last sweep
   Lanes renewal;   ///< weight of the new impulse in the moving averages, per sub-step
@@ -101,9 +101,9 @@ struct SubstepTime {
 };
 
 /// Fills a batch and applies the impulses of the patches' initial forces over `substep` [s] to the bodies.
-/// `motions` has one element more than `bodies`, for unused lanes. `alone`: no other patch corrects the
-/// errors that remain after solving this batch, because one of its bodies touches only bodies that contacts
-/// do not move.
+/// `motions` has one element more than `bodies`, for unused lanes. `alone`: whether one of the bodies touches
+/// only bodies that contacts do not move, so that no other patch corrects the errors that remain in this
+/// batch.
 void prepare(PatchBatch& batch, const PatchBatch::Index& patches, std::span<const ContactPatch> all,
              std::span<const RelaxedBody> bodies, std::span<BodyMotion> motions, Real substep, bool alone);
 
@@ -123,8 +123,8 @@ struct PushOut {
   Real fraction;     ///< fraction of the depth that one sweep removes
   Real limit;        ///< greatest displacement by push-out in a step [m]
 };
-/// Separates overlapping bodies by moving them without changing their velocities. If an earlier call opened a
-/// gap, its displacement is undone as far as necessary. Returns, for each lane, the greatest displacement
+/// Separates overlapping bodies by moving them, without a change of their velocities. If an earlier call
+/// opened a gap, its displacement is reduced as far as necessary. Returns, by lane, the greatest displacement
 /// that a point required, before limits [m].
 FloatLanes push_out(PatchBatch& batch, std::span<BodyMotion> motions, const PushOut& push);
 

@@ -15,15 +15,15 @@ using PatchSymmetric = PatchBatch::Symmetric;
 /// Smaller sliding speeds of points are replaced by this one, to avoid division by zero [m/s].
 inline constexpr float kSlowestSliding = 1e-6F;
 
-/// Sum of a patch's normal impulses.
+/// Returns the sum of a patch's normal impulses.
 inline FloatLanes pressure(const PatchBatch& p) {
   FloatLanes sum{};
   for (uint32_t i = 0; i < p.count; ++i) sum += p.points[i].impulse;
   return sum;
 }
 
-/// Coulomb's limits of the impulses along t and k [N s], and of the angular impulse about n [N m s]. The
-/// latter assumes that every point's friction is perpendicular to its arm from the centre.
+/// Returns Coulomb's limits of the impulses along t and k [N s], and of the angular impulse about n [N m s].
+/// The latter assumes that every point's friction is perpendicular to its arm from the centre.
 inline PatchVector friction_limits(const PatchBatch& p) {
   FloatLanes force{}, moment{};
   for (uint32_t i = 0; i < p.count; ++i) {
@@ -60,7 +60,7 @@ inline PatchVector coulomb_impulse(const PatchBatch& p, const PatchVector& u, co
   return {sticks ? stick_t : held_t, sticks ? stick_k : held_k, FloatLanes{}};
 }
 
-/// Solution x of A x = b for a positive definite A.
+/// Returns the solution x of A x = b for a positive definite A.
 inline PatchVector solution_of(const PatchSymmetric& A, const PatchVector& b) {
   const FloatLanes first = lane_inverse(A.xx), y_x = first * A.xy, z_x = first * A.xz;
   const FloatLanes yy = A.yy - y_x * A.xy, yz = A.yz - y_x * A.xz;
@@ -82,13 +82,13 @@ inline PatchVector separate_impulse(const PatchBatch& p, const PatchVector& u, c
   return {held_t, held_k, lane_clamp(old.z - lane_inverse(K.zz) * spin, limits.z)};
 }
 
-/// Friction of a patch that slides or spins with the relative `twist`. Each point has Coulomb friction
-/// against its own velocity, so sliding reduces the friction against spin and vice versa. The friction of a
-/// point is linearized as viscous friction with the coefficient limit / speed, which gives one linear system
-/// per patch. The speeds are the ones after separate_impulse(), which is exact without spin. `kIsotropic`:
-/// friction_t equals friction_k in all lanes, which takes fewer operations. `kSpins`: points have spinning
-/// friction, treated as sliding at the distance spin_arm. With a friction axis, spinning has a separate
-/// limit.
+/// Returns the friction of a patch that slides or spins with the relative `twist`. Each point has Coulomb
+/// friction against its own velocity, so sliding reduces the friction against spin and vice versa. The
+/// friction of a point is linearized as viscous friction with the coefficient limit / speed, which gives one
+/// linear system per patch. The speeds are those after separate_impulse(), which is exact without spin.
+/// `kIsotropic`: friction_t equals friction_k in all lanes, which takes fewer operations. `kSpins`: points
+/// have spinning friction, treated as sliding at the distance spin_arm. With a friction axis, spinning has a
+/// separate limit.
 template <bool kIsotropic, bool kSpins>
 PatchVector sliding_impulse(const PatchBatch& p, const PatchVector& twist, const PatchVector& limits) {
   std::array<FloatLanes, 4> viscous_t, viscous_k, viscous_n;
@@ -151,11 +151,11 @@ PatchVector sliding_impulse(const PatchBatch& p, const PatchVector& twist, const
   return impulse;
 }
 
-/// Rolling friction of a patch, about t and k in y and z, from the normal group's twist: the angular impulse
-/// that stops the rolling if it is within the disc, else a projected gradient step as in coulomb_impulse().
-/// Where the patch sticks, its friction follows a change of the rolling: a ball then rolls about the contact
-/// with the inertia I + m r^2, not with I, and the stopping impulse takes that into account. (With I alone,
-/// rolling and friction in turn leave 5/7 of the error.)
+/// Returns the rolling friction of a patch, about t and k in y and z. It is the angular impulse that stops
+/// the rolling if that is within the disc, else a projected gradient step as in coulomb_impulse(). Where the
+/// patch sticks, its friction follows a change of the rolling: a ball rolls about the contact with the
+/// inertia I + m r^2, and not with I. The stopping impulse takes that into account. (With I alone, solving
+/// rolling and friction in turn would leave 5/7 of the error.)
 inline PatchVector rolling_impulse(const PatchBatch& p, const PatchVector& u) {
   const FloatLanes zero{};
   const PatchSymmetric& K = p.normal_mobility;

@@ -84,7 +84,7 @@ class ProximalNewton {
   struct Mixed {
     Eigen::VectorXd lift, rise;
   };
-  /// Changes of an iteration, as velocities [m/s].
+  /// Changes of the multipliers and of g in an iteration, as velocities [m/s].
   struct Change {
     Real multipliers = 0, lifts = 0;
   };

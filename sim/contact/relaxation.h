@@ -7,10 +7,9 @@
 ///
 /// One sweep leaves an error, which acts on the next sub-step as a change of velocity. The forces of a tall
 /// stack therefore behave like the springs of a spurious oscillator: a mode whose error a sweep reduces by
-/// the fraction e oscillates at sqrt(e) per sub-step and is damped only by e / 2. After its solution a patch
-/// therefore moves its forces slightly towards their mean over the last tenth of a second, which adds
-/// damping. Forces at rest equal their mean, and errors that one sweep can remove are removed again, so
-/// neither is changed by this.
+/// the fraction e oscillates at sqrt(e) per sub-step, and is damped only by e / 2. To add damping, a patch
+/// moves its forces after its solution slightly towards their mean over the last tenth of a second. This
+/// changes neither forces at rest, which equal their mean, nor errors that one sweep can remove.
 ///
 /// The points of a manifold, at most four, are solved together as a patch. The bodies' relative twist has six
 /// components, the impulses form a wrench of six components, and a symmetric 6 x 6 matrix, computed once per

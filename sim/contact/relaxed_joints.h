@@ -15,8 +15,8 @@ namespace offstage::sim {
 
 struct RelaxedBody;
 
-/// A contact point of a link, solved with the joints. The sweeps over the contacts use only the mass of the
-/// link itself; a light link would then be pushed into an obstacle by heavy bodies that it supports. If the
+/// A contact point of a link that is solved with the joints. The sweeps over the contacts use only the mass
+/// of the link itself, so heavy bodies that a light link supports would push it into an obstacle. If the
 /// point still approaches after the joints were solved, an impulse on the whole articulation stops it.
 struct LinkContact {
   uint32_t part;          ///< index of the articulation
@@ -40,16 +40,16 @@ class RelaxedJoints {
   void start(uint32_t part, std::span<BodyMotion> motions);
   /// Solves a part at the end of a sub-step. `elapsed`: time since the start of the step [s].
   void solve(uint32_t part, std::span<BodyMotion> motions, Real elapsed, bool is_last);
-  /// Stores the displacements of the links. To be called before overlaps are removed by moving bodies.
+  /// Stores the displacements of the links. Call it before overlaps are removed by moving bodies.
   void begin_push(uint32_t part, std::span<const BodyMotion> motions);
-  /// Moves the links of a part so that the displacements since begin_push() satisfy the joints. Returns the
-  /// greatest displacement of this call [m]. Without this, joints would pull bodies back into the overlap at
-  /// the end of each step.
+  /// Moves the links of a part so that their displacements since begin_push() satisfy the joints. Otherwise
+  /// the joints would pull bodies back into the overlap at the end of each step. Returns the greatest
+  /// displacement of this call [m].
   Real push_out(uint32_t part, std::span<BodyMotion> motions);
   /// Indices of the bodies of a part.
   std::span<const uint32_t> bodies(uint32_t part) const { return parts_[part].bodies; }
-  /// Adds the effect of the joints in the step to the bodies, in double precision. `late`: for each body, the
-  /// excess displacement by the sub-steps per change of velocity [s], which is corrected.
+  /// Adds the effect of the joints in the step to the bodies, in double precision. `late`: by body, the
+  /// excess displacement by the sub-steps per change of velocity [s]; this function corrects it.
   void add_motion(std::span<RelaxedBody> bodies, std::span<const Real> late) const;
   /// Writes the impulses of the whole step to the problem and the contacts.
   void finish();
@@ -62,9 +62,10 @@ class RelaxedJoints {
     Real shift = 0;              // integral of the sum over the step
     bool acts = false;           // whether the time from which it acts has come
     bool is_ready = false;       // whether its responses are known
-    // Of the links to a unit impulse; empty: only of its own two links, in `response_a` and `response_b`.
+    // Responses of the links to a unit impulse; empty if only those of the row's own two links are known, in
+    // `response_a` and `response_b`.
     std::vector<Vec6> response;
-    std::vector<Vec6> reaction;  // of the joints to a unit impulse
+    std::vector<Vec6> reaction;  // impulses of the joints due to a unit impulse
     Vec6 response_a, response_b;
   };
   struct Part {

@@ -9,8 +9,8 @@
 
 namespace offstage::sim {
 
-/// Up to this number of bodies, every solver is cheap. Islands of this size always use the exact solver. In
-/// worlds of this size, each collision is resolved at its own time.
+/// Up to this number of bodies, every solver is cheap. Small islands always use the exact solver, and small
+/// worlds resolve each collision at its own time.
 inline constexpr std::size_t kFewBodies = 6;
 
 /// Budget of the exact solver beyond the cost of the fast one, for all islands of a world. A collapsing heap

@@ -1,8 +1,8 @@
 #pragma once
-/// Corrects the paths of bodies that are both moved by springs and held by contacts (physics R7). The free
-/// motion integrates the force of a spring along the path of a body without contacts. Where a contact holds
-/// the body, the spring force does not change in this way. But the position would still contain the deviation
-/// of the free path from uniform motion. A body that a stiff spring presses on the ground would sink.
+/// Corrects the paths of bodies that springs move while contacts hold them (physics R7). The free motion
+/// integrates the force of a spring along the path of a body without contacts. Where a contact holds the
+/// body, the spring force does not change in this way, but the position would still contain the deviation of
+/// the free path from uniform motion. A body that a stiff spring presses on the ground would sink.
 
 #include <array>
 #include <span>
@@ -14,8 +14,8 @@ namespace offstage::sim {
 
 class SprungPaths {
  public:
-  /// Stores the deviations of the free paths from uniform motion. Before, the bodies of the islands must have
-  /// moved freely through an interval of this duration [s].
+  /// Stores the deviations of the free paths from uniform motion. The bodies of the islands must have moved
+  /// freely through an interval of this duration [s].
   SprungPaths(std::span<Island* const> islands, Real duration);
 
   /// Removes the deviations along the normals of the contacts that pushed in the interval, and along the
@@ -27,7 +27,7 @@ class SprungPaths {
     Body* body;
     Vec3 shift, turn;  // deviation from the mean velocity times the duration [m], [rad]
     Vec3 shift_before, turn_before;
-    Mat3 inverse_inertia;  // world axes
+    Mat3 inverse_inertia;  // in world axes
   };
   struct Held {
     struct End {

@@ -15,8 +15,8 @@ class ActiveBodies {
  public:
   explicit ActiveBodies(const WorldState& world) : world_(world) {}
 
-  /// Awake dynamic bodies, and moving kinematic bodies, each in the order of rank. Valid until the next
-  /// update().
+  /// Awake dynamic bodies, and moving kinematic bodies, each in the order of rank. The lists are valid until
+  /// the next update().
   std::span<Body* const> awake() const { return awake_; }
   std::span<Body* const> kinematic() const { return kinematic_; }
   std::size_t asleep() const { return asleep_; }
@@ -27,10 +27,10 @@ class ActiveBodies {
       for (Body* body : group) f(*body);
   }
 
-  /// Marks the lists as outdated. To be called after a body has been added or removed, or has appeared or
+  /// Marks the lists as outdated. Call it after a body has been added or removed, or has appeared or
   /// disappeared.
   void note_new_set() { is_ranked_ = false, note_change(); }
-  /// Marks the lists as outdated. To be called after a body has become able or unable to move.
+  /// Marks the lists as outdated. Call it after a body has become able or unable to move.
   void note_change() { is_current_ = false, ++version_; }
   /// Number of changes of the set of moving bodies so far.
   uint64_t version() const { return version_; }
@@ -47,7 +47,7 @@ class ActiveBodies {
   /// is awake.
   std::vector<Body*> wake(Body& body);
   void wake_all();
-  /// Wakes the bodies on which the load by a force field or a spring has changed since they fell asleep.
+  /// Wakes the bodies on which the force of a field or a spring has changed since they fell asleep.
   void wake_pushed(Real time);
   /// Puts islands at rest to sleep at the end of a sub-step, which begins at time `start` and has length h
   /// [s].
@@ -71,8 +71,8 @@ class ActiveBodies {
   uint64_t woken_ = 0, put_to_sleep_ = 0;
 };
 
-/// Whether the wrench `push` differs so much from the wrench `at_rest`, when the body fell asleep, that it
-/// could move the body.
+/// Whether the wrench `push` could move a body that was at rest under the wrench `at_rest` when it fell
+/// asleep.
 bool is_pushed(const Body& body, const Wrench& push, const Wrench& at_rest);
 
 }  // namespace offstage::sim

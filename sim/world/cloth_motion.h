@@ -15,8 +15,7 @@ class ClothMotion {
  public:
   ClothMotion(const WorldState& world, ActiveBodies& active) : world_(world), active_(active) {}
 
-  /// Updates the list of cloths to step. To be called after a cloth has been added or removed, or has
-  /// appeared.
+  /// Updates the list of cloths to step. Call it after a cloth has been added or removed, or has appeared.
   void arrange();
   /// Releases all cloth vertices that are pinned to a body.
   void detach(BodyHandle body);

@@ -25,7 +25,7 @@ class ContactFinder {
   /// Removes the pairs of one body, or of all bodies.
   void forget(const Body& body);
   void forget_all();
-  /// Passes the groups of joints to the broad phase. To be called after they have changed.
+  /// Passes the groups of joints to the broad phase. Call it after they have changed.
   void update_joint_groups();
 
   /// Finds the pairs of a sub-step of length h and their contact points, after the bodies have moved freely.
@@ -43,7 +43,7 @@ class ContactFinder {
   /// Wakes the sleeping bodies near moving bodies, moves the woken bodies through the sub-step, and returns
   /// them.
   std::vector<Body*> wake_touched(FreeMotion& motion, Real start, Real h);
-  /// Adds the pairs that result from changed paths of bodies in the sub-step. Existing pairs are kept,
+  /// Adds the pairs that result from changed paths of these bodies in the sub-step. Existing pairs are kept,
   /// because impacts and islands refer to them. Returns whether pairs may have been added; see
   /// ContactPair::is_new().
   bool follow(std::span<Body* const> bodies);
@@ -76,7 +76,7 @@ class ContactFinder {
   const ContactMaterials& materials_;
   ActiveBodies& active_;
   const JointGroups& joints_;
-  GroupedBroadPhase broad_phase_;  // of the colliding bodies, by slot; articulations are groups
+  GroupedBroadPhase broad_phase_;  // the colliding bodies, by slot; articulations are groups
   ContactGraph graph_;
   std::vector<ContactPair*> pairs_;
   bool is_current_ = false, is_exact_ = false;

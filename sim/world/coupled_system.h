@@ -11,10 +11,10 @@ namespace offstage::sim {
 
 class CoupledSystem {
  public:
-  /// Uses all dynamic bodies, and all particle systems with springs or with forces between particles. No
+  /// Contains all dynamic bodies, and all particle systems with springs or with forces between particles. No
   /// object may be added to the world or removed from it during its lifetime.
   explicit CoupledSystem(WorldState& world, std::span<const ForceDef* const> forces = {});
-  /// Uses the given bodies, with their springs, joints and forces, for the rest of a sub-step that a
+  /// Contains the given bodies, with their springs, joints and forces, for the rest of a sub-step that a
   /// CoupledSystem of all objects has begun. `bodies` must include all bodies that are connected() to one of
   /// them.
   CoupledSystem(WorldState& world, std::span<Body* const> bodies,
@@ -32,8 +32,8 @@ class CoupledSystem {
 
   /// Stores the state of all members.
   void save();
-  /// Returns the given bodies, and the objects connected to them, to their state at the last save(); without
-  /// an argument, all members.
+  /// Returns the given bodies, and the objects connected to them, to their state at the last save(). Without
+  /// an argument, it restores all members.
   void restore(std::span<Body* const> bodies);
   void restore();
 

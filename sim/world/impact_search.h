@@ -12,8 +12,8 @@ namespace offstage::sim {
 inline constexpr Real kInstant = 1e-9;
 
 /// Returns the time at which the bodies of a pair will touch on their current paths, counted from the start
-/// of a sub-step of length h [s]; empty if they do not touch. If they touch already and approach, returns the
-/// current time.
+/// of a sub-step of length h [s]. Returns nothing if they do not touch. If they touch already and approach,
+/// returns the current time.
 std::optional<Real> impact_time(const ContactPair& pair, const WorldDef& def, Real h, TestCounts& tests);
 
 /// Whether a body of the pair turns so fast within the time h [s] that the search must divide its rotation

@@ -15,9 +15,8 @@
 
 namespace offstage::sim {
 
-/// Resolves the impacts of one sub-step, which begins at time `start` and has length h [s]. Before, the
-/// bodies must have moved to the end of the sub-step, and islands and pairs must have been found for this
-/// motion.
+/// Resolves the impacts of one sub-step, which begins at time `start` and has length h [s]. The bodies must
+/// have moved to the end of the sub-step, and islands and pairs must have been found for this motion.
 class ImpactStage {
  public:
   ImpactStage(const WorldState& world, const ActiveBodies& active, ContactFinder& contacts,
@@ -39,7 +38,7 @@ class ImpactStage {
   struct Event {
     Real time;  // since the sub-step's start
     ContactPair* pair;
-    bool is_impact;  // otherwise the contacts of the pair are updated, because they move around a rim
+    bool is_impact;  // if false, the contacts of the pair are updated, because they move around a rim
   };
 
   template <class IsWanted>

@@ -14,7 +14,7 @@ class JointGroups {
  public:
   explicit JointGroups(WorldState& world) : world_(world) {}
 
-  /// Marks the groups as outdated. To be called after a joint or one of its bodies has been added, removed or
+  /// Marks the groups as outdated. Call it after a joint or one of its bodies has been added, removed or
   /// broken, or has appeared.
   void note_change() { is_current_ = false; }
   /// Rebuilds the articulations if there were changes since the last call. Returns whether there were any.
@@ -47,7 +47,7 @@ class JointGroups {
 /// Initializes a joint for the current poses of its bodies, with the anchors of the definition.
 void fit(Joint& joint);
 /// Initializes a joint that appears after time 0, for the current poses of its bodies. Its anchors and axes
-/// have moved with body a, or with body b if there is no a.
+/// have moved with body a or, without a body a, with body b.
 void place_at_bodies(Joint& joint);
 /// Whether a joint prevents an island from falling asleep.
 bool is_driven(const Island& island, Real time);

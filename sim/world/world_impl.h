@@ -49,9 +49,9 @@ struct World::Impl : WorldState {
   Real now = 0;
 
   std::vector<MovedBody> moved;
-  uint64_t born = 0;            // since the last report
+  uint64_t born = 0;            // particles created since the last report
   bool has_lifetimes = false;   // whether any body, joint or cloth appears or is removed at a time
-  std::vector<Island> islands;  // of the last sub-step
+  std::vector<Island> islands;  // islands of the last sub-step
   tbb::task_arena serial{1};
 
   ActiveBodies active{*this};
