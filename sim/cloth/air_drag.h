@@ -1,8 +1,9 @@
 #pragma once
 /// Drag, lift and ram pressure of the air on a cloth (ClothAir, physics F8), and the linear drag of fields
 /// and hands. The force is linearised in the velocities of the points, and the integrators make this linear
-/// part implicit. Steady motion and loads at rest are exact for any step. Free decay is of second order; with
-/// one step of the springs per linearisation, the decay u0 / (1 + k u0 t) of a flat cloth is exact.
+/// part implicit. Steady motion and loads at rest are exact for any step. Decay without loads is accurate to
+/// second order. With one step of the springs per linearisation, the decay u0 / (1 + k u0 t) of a flat cloth
+/// is exact.
 
 #include <array>
 #include <cstdint>
@@ -22,13 +23,12 @@ class AirDrag {
   /// until the next call.
   void assign(const Cloth& cloth, std::size_t first);
 
-  /// Forces the next renew() to linearise again. To be called after changes of other forces, masses or
-  /// velocities.
+  /// Forces the next renew() to linearise again. Call it after changes of other forces, masses or velocities.
   void expire() { left_ = 0; }
   /// Updates the linearisation if it has expired: sets ClothPoints::acceleration to the effect of outer
-  /// forces and of the air at the current velocities. To be called before each sub-step of the cloth, of
-  /// length dt [s]. `substeps`: number of sub-steps of the cloth that are left in the world's sub-step;
-  /// `steps`: steps of the integrator in each of them.
+  /// forces and of the air at the current velocities. Call it before each sub-step of the cloth, of length dt
+  /// [s]. `substeps`: number of sub-steps of the cloth that are left in the world's sub-step; `steps`: steps
+  /// of the integrator in each of them.
   void renew(ClothPoints& points, Real dt, uint32_t substeps, uint32_t steps);
   /// Returns whether the force of the air does not depend on the velocities of the points.
   bool empty() const { return !is_active_; }
@@ -48,8 +48,8 @@ class AirDrag {
   const Vec4& from(std::size_t i) const { return from_[i]; }
 
  private:
-  /// A symmetric matrix in single precision. Every step of the springs reads two of each point, and it only
-  /// slows motion, so the rounding is never seen.
+  /// A symmetric matrix in single precision, which is fast: every step of the springs reads two for each
+  /// point. The matrix only slows motion, so its rounding is never visible.
   struct alignas(32) Symmetric {
     std::array<float, 8> at = {};  // xx yy zz 0 xy yz zx 0
 
@@ -92,8 +92,8 @@ class AirDrag {
   std::vector<Symmetric> resistance_;
   std::vector<Symmetric> loss_;  // 1 - (1 + h R)^-1
   std::vector<Vec4> from_, wind_, force_;
-  std::vector<Real> mobility_;  // of each triangle: kValence over the mass of its points [1/kg]
-  Real prepared_for_ = -1;      // step [s]; < 0: none
+  std::vector<Real> mobility_;  // by triangle: kValence over the mass of its points [1/kg]
+  Real prepared_for_ = -1;      // length of the steps that were prepared [s]; < 0: none
 };
 
 }  // namespace offstage::sim

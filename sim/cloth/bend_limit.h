@@ -43,9 +43,9 @@ class BendLimit {
   /// A place at its limit or near it.
   struct Row {
     std::size_t patch;
-    std::size_t first, end;  // in gradient_
-    Real excess;             // excess of the curvature times the radius, which is to be removed
-    Real compliance;         // of the curvature times the radius, for an impulse of this row alone [1/kg]
+    std::size_t first, end;  // range in gradient_
+    Real excess;             // excess of the curvature times the radius, to be removed
+    Real compliance;         // change of the curvature times the radius by a unit impulse of this row [1/kg]
     Real impulse = 0;        // [kg m], >= 0
   };
 
@@ -62,9 +62,9 @@ class BendLimit {
   const ClothBending* bending_;
   Real radius_;
   std::vector<Row> rows_;
-  std::vector<std::pair<uint32_t, Vec4>> gradient_;  // times the radius, by points of the cloth
-  std::vector<Vec4> move_;    // of each point by the impulses; of held ones the impulse
-  std::vector<Real> before_;  // impulses of the last sub-step, of each patch
+  std::vector<std::pair<uint32_t, Vec4>> gradient_;  // by point: derivative times the radius
+  std::vector<Vec4> move_;    // by point: move due to the impulses; for pinned points the impulse
+  std::vector<Real> before_;  // by patch: impulse of the last sub-step
 };
 
 }  // namespace offstage::sim

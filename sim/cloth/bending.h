@@ -37,8 +37,8 @@ class ClothBending {
   bool empty() const { return rigidity_ == 0 || patches_.empty(); }
   Real damping() const { return damping_; }
 
-  /// Sets the clamped triangles, which do not bend: those whose corners are all held by the same body.
-  /// `clamp`: for each point the number of the body that holds it; 0: none.
+  /// Sets the clamped triangles, which do not bend: the same body holds all of their corners. `clamp`: by
+  /// point, the number of the body that holds it; 0: none.
   void set_clamps(std::span<const uint32_t> clamp);
 
   /// Upper bound of the eigenvalues of M^-1 K [1/s^2].
@@ -49,7 +49,7 @@ class ClothBending {
   void add_forces(std::span<const Vec4> x, Real scale, std::span<Vec4> f) const;
   /// Adds the bending forces at x, and the damping forces at the velocities v, to f.
   void add_damped_forces(std::span<const Vec4> x, std::span<const Vec4> v, std::span<Vec4> f);
-  /// Adds scale K p to y: K is the Hessian of the energy without the curvature at rest.
+  /// Adds scale K p to y, where K is the Hessian of the energy without the curvature at rest.
   void multiply(std::span<const Vec4> p, Real scale, std::span<Vec4> y) const;
   /// Returns the factor d [N/m] of the diagonal block of K for a point, which is d times the 3 x 3 unit
   /// matrix.
@@ -66,10 +66,10 @@ class ClothBending {
   void add_gradient(std::size_t patch, std::span<const Vec4> x,
                     std::vector<std::pair<uint32_t, Vec4>>& gradient) const;
 
-  /// Replaces explicit displacements `moves` by the solution y of (M + stiff K) y = M moves, the
-  /// displacements of backward Euler. Points with the inverse mass 0 keep theirs. The system is solved by
-  /// conjugate gradients; if these would take many iterations, by a factorisation that is kept for the next
-  /// step. Returns false if the limit of iterations was reached.
+  /// Replaces explicit displacements `moves` by the displacements y of backward Euler: (M + stiff K) y = M
+  /// moves. Points with the inverse mass 0 keep theirs. The system is solved by conjugate gradients. If these
+  /// would take many iterations, it is solved by a factorisation, which is kept for the next step. Returns
+  /// false if the limit of iterations was reached.
   bool filter(std::span<const Real> masses, std::span<const Real> inverse_masses, Real stiff,
               std::span<Vec4> moves);
 
@@ -77,10 +77,10 @@ class ClothBending {
   /// Second derivatives xx, yy and sqrt(2) xy on a triangle, as weights of points.
   struct Patch {
     uint32_t triangle = 0;
-    uint32_t first = 0, count = 0;  // of points_ and weights_
+    uint32_t first = 0, count = 0;  // range in points_ and weights_
     Real area = 0;
     Vec3 rest = Vec3::Zero();  // unstressed curvature
-    bool rough = false;        // by jumps of gradients
+    bool rough = false;        // whether it is computed from jumps of gradients
   };
 
   std::vector<uint8_t> affected(std::span<const uint8_t> changed, std::vector<uint8_t> near) const;
@@ -97,17 +97,17 @@ class ClothBending {
   std::vector<Triangle> triangles_;
   std::vector<Real> masses_;
   std::vector<Vec3> rest_;
-  std::vector<uint8_t> clamped_;  // of each triangle
+  std::vector<uint8_t> clamped_;  // by triangle
   std::vector<Patch> patches_;
   std::vector<uint32_t> points_;
   std::vector<Vec3> weights_;
-  std::vector<std::size_t> row_;  // of the matrix, and the end
+  std::vector<std::size_t> row_;  // start of each row of the matrix, and the end
   std::vector<uint32_t> column_;
-  std::vector<Real> value_;               // off the diagonal; rows add up to zero with it
-  std::vector<Real> diagonal_, row_sum_;  // the latter of absolute values, with the diagonal
-  /// The entries above the diagonal. A pair of points gets opposite forces, so these suffice, and multiply()
-  /// takes as long as the memory needs to deliver them.
-  std::vector<std::size_t> upper_row_;  // and the end
+  std::vector<Real> value_;               // off the diagonal; each row adds up to 0 with the diagonal
+  std::vector<Real> diagonal_, row_sum_;  // row_sum_: sum of absolute values in each row
+  /// The entries above the diagonal. Each pair of points gets opposite forces, so these entries are
+  /// sufficient. multiply() takes as long as reading them from memory.
+  std::vector<std::size_t> upper_row_;  // start of each row, and the end
   std::vector<uint32_t> upper_column_;
   std::vector<Real> upper_value_;
   std::vector<Vec4> residual_, direction_, image_;
@@ -115,7 +115,7 @@ class ClothBending {
   using Factor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<Real>>;
   std::shared_ptr<Factor> factor_;
   float factor_stiff_ = 0;
-  std::vector<Real> factor_masses_;  // inverse
+  std::vector<Real> factor_masses_;  // inverse masses
 };
 
 }  // namespace offstage::sim

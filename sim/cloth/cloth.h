@@ -29,11 +29,12 @@ enum class SpringKind : uint8_t {
   cord,     ///< segment of a cord; it neither tears nor has a stretch limit
 };
 
-/// F = -(k e + c (d'.d)/|d|) d/|d| on vertex a, d from b to a, with the elongation e = |d| - L.
+/// A damped spring: F = -(k e + c (d'.d)/|d|) d/|d| on vertex a, with the vector d from b to a and the
+/// elongation e = |d| - L.
 ///
 /// The two diagonals of a woven cell can be each other's counterpart. Then e is half the difference of their
-/// elongations: the cell resists being sheared, but a load along its threads leaves the diagonals without
-/// force, so that `stretch` alone determines its length under a load.
+/// elongations. The cell resists shear, but a load along its threads causes no force in the diagonals. So
+/// `stretch` alone determines the length of the cloth under a load.
 struct ClothSpring {
   uint32_t a = 0, b = 0;  ///< vertices
   Real rest_length = 1;   ///< L [m], > 0
@@ -43,8 +44,7 @@ struct ClothSpring {
   std::array<uint32_t, 2> counterpart = {};  ///< vertices of the other diagonal (its counterpart)
   Real counterpart_rest = 0;                 ///< rest length of the counterpart [m]; 0: there is none
 
-  /// Returns the elongation e of the spring, whose present length is `length`; `at` has the positions of the
-  /// points.
+  /// Returns the elongation e of the spring. `length`: its current length; `at`: the positions of the points.
   template <class Points>
   Real elongation(Real length, const Points& at, std::size_t first = 0) const {
     if (counterpart_rest == 0) return length - rest_length;
@@ -80,10 +80,10 @@ enum class ClothIntegrator : uint8_t {
 };
 
 /// Aerodynamic force on each triangle. With the relative air velocity u, the unit normal n and the area A: F
-/// = rho A / 2 |u| ((C_D - C_L) u + C_L (u.n) n): C_D acts on air across the triangle, C_D - C_L on air along
-/// it. The default C_D - C_L of 0.02 is the friction of both sides of a plate in a turbulent boundary layer,
-/// 2 * 0.074 Re^(-1/5), 0.01 at 1 m and 10 m/s, doubled for rough cloth, as in the fabrics of
-/// effects/fabric.h.
+/// = rho A / 2 |u| ((C_D - C_L) u + C_L (u.n) n). C_D acts on air across the triangle, C_D - C_L on air along
+/// it. The default C_D - C_L is 0.02. It is the friction of both sides of a plate in a turbulent boundary
+/// layer, 2 * 0.074 Re^(-1/5) or 0.01 at 1 m and 10 m/s, doubled for rough cloth; the fabrics of
+/// effects/fabric.h use it too.
 struct ClothAir {
   Real drag = 1;       ///< C_D, >= 0
   Real lift = 0.98;    ///< C_L, >= 0, <= C_D, because a larger lift would add energy
@@ -141,8 +141,8 @@ struct ClothDef {
   /// Duration of the inflation at a constant rate [s], >= 0; 0: the gas is inside from the start.
   Real inflate_time = 0;
   /// Density of the gas inside [kg/m^3], >= 0; empty: air.density. Requires `pressure` > 0. The weight of the
-  /// gas, less that of the displaced air, acts on the cloth: the overpressure changes with the height at the
-  /// rate (air.density - gas_density) g. The inertia of the gas and of the surrounding air is neglected.
+  /// gas minus the weight of the displaced air acts on the cloth: the overpressure changes with the height at
+  /// the rate (air.density - gas_density) g. The inertia of the gas and of the surrounding air is neglected.
   std::optional<Real> gas_density;
   /// For an open cloth such as a parachute: pressure inside, as a fraction of the stagnation pressure rho
   /// (u.m)^2 / 2 of the air that enters at the mouth. It acts on the side opposite to the normals. 0: none.
@@ -164,8 +164,8 @@ inline constexpr Real kShortestSpringStep = 1e-5;
 /// definition is valid.
 std::string problem(const ClothDef& def);
 
-/// Stability limit of an explicit integrator, considering only springs and bending, and the spring that
-/// determines the limit: the one with the greatest ratio of stiffness to mass.
+/// Stability limit of an explicit integrator, considering only springs and bending. Also gives the spring
+/// that determines the limit, which has the greatest ratio of stiffness to mass.
 struct StableStep {
   Real step = std::numeric_limits<Real>::infinity();  ///< [s]
   uint32_t spring = 0;                                ///< index of the spring in the definition

@@ -44,8 +44,8 @@ class ClothContacts {
                                 std::span<const std::optional<Vec3>> whole_velocity,
                                 std::span<const BodyContact> triangles);
 
-  /// near_to(): a body that was so close to the point in the last solve() that they may soon touch; null if
-  /// there is none. is_near_several(): whether there was more than one such body.
+  /// near_to() returns a body that was so close to the point in the last solve() that they may soon touch, or
+  /// null if there is none. is_near_several() returns whether there was more than one such body.
   const ClothBody* near_to(std::size_t point) const {
     return point < near_to_.size() ? near_to_[point] : nullptr;
   }
@@ -63,15 +63,15 @@ class ClothContacts {
  private:
   struct Near {
     uint32_t point, body;
-    Vec3 place;        // in the body's frame at the last search
-    Real distance;     // from the surface there
-    Real pressed = 0;  // impulse along the normal in this sub-step of the world, of a pinched point [N s]
+    Vec3 place;        // position of the point in the body's frame at the last search
+    Real distance;     // distance of that position from the surface
+    Real pressed = 0;  // impulse along the normal on a pinched point in this sub-step of the world [N s]
   };
   struct Touch {
     Near* near;
     ClothBody* body;
     Vec3 normal, on_body;  // world
-    Real gap;              // to the cloth's thickness, negative in contact
+    Real gap;              // distance minus the cloth's thickness; negative in contact
   };
 
   void look(const ClothPoints& points, uint32_t point, std::vector<Near>& found) const;
@@ -85,15 +85,15 @@ class ClothContacts {
   std::span<const uint8_t> collides_;
   Real h_ = 0;
   std::vector<Near> near_;  // by point
-  // For each point, a body that it is near, and whether it is near several.
+  // By point: a body near it, and whether several bodies are near it.
   std::vector<const ClothBody*> near_to_;
   std::vector<uint8_t> near_several_;
   std::vector<Vec3> seen_at_;
-  std::vector<Real> seen_reach_;  // distance that each point may move before its search must be repeated
-  std::vector<Aabb> boxes_;       // of the bodies' paths
+  std::vector<Real> seen_reach_;  // by point: how far it may move before its search must be repeated
+  std::vector<Aabb> boxes_;       // boxes of the bodies' paths
   std::vector<uint64_t> active_;
-  std::vector<uint8_t> touched_;  // of each cloth
-  std::vector<Touch> touches_;    // of one point
+  std::vector<uint8_t> touched_;  // by cloth
+  std::vector<Touch> touches_;    // contacts of one point
 };
 
 }  // namespace offstage::sim

@@ -12,13 +12,13 @@ namespace offstage::sim {
 
 class ClothGas {
  public:
-  /// Finds the holes of a cloth: the borders of its triangles, whose normals must point outwards. To be
-  /// called after the cloth has torn.
+  /// Finds the holes of a cloth: the borders of its triangles, whose normals must point outwards. Call it
+  /// after the cloth has torn.
   void assign(std::span<const Triangle> triangles);
 
   /// Volume inside, with each hole closed by a fan around the centre of its border [m^3].
   Real volume(std::span<const Vec3> points, std::span<const Triangle> triangles) const;
-  /// Sum of the areas of the holes, each the length of its area vector [m^2].
+  /// Returns the sum of the areas of the holes [m^2]. The area of a hole is the length of its area vector.
   Real hole_area(std::span<const Vec3> points) const;
 
   /// Fraction of the gas that has not leaked out, 0 to 1. The overpressure at a given volume is proportional
@@ -35,7 +35,7 @@ class ClothGas {
 
  private:
   struct Edge {
-    uint32_t from, to;  // in the direction of its triangle
+    uint32_t from, to;  // in the direction of the edge's triangle
   };
   /// A hole: a range of the edges, which form one border.
   struct Hole {

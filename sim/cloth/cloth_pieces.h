@@ -34,8 +34,8 @@ class ClothPieces {
   std::size_t count() const { return sets_.size(); }
 
  private:
-  std::vector<uint32_t> number_;  // of the piece of each point, as kept
-  DisjointSets sets_;             // of pieces that later connections join
+  std::vector<uint32_t> number_;  // by point: the piece that contains it, as of the last keep()
+  DisjointSets sets_;             // pieces that later connections join
 };
 
 }  // namespace offstage::sim

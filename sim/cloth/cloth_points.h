@@ -11,7 +11,7 @@ namespace offstage::sim {
 
 class ClothBody;
 
-/// x y z 0: aligned, so that one instruction handles it.
+/// x, y, z and 0; aligned, so that one instruction can process it.
 using Vec4 = Eigen::Vector4d;
 
 inline Vec4 padded(const Vec3& p) {
@@ -22,12 +22,12 @@ struct ClothPoints {
   std::vector<Vec4> position;
   std::vector<Vec4> start;         ///< position at the start of the cloth's sub-step
   std::vector<Vec4> velocity;      ///< mean velocity over the last sub-step of the cloth
-  std::vector<Vec4> outer;         ///< acceleration by all forces except springs, contacts and drag
+  std::vector<Vec4> outer;         ///< by all forces except springs, contacts and drag
   std::vector<Vec4> acceleration;  ///< acceleration including the drag of the air at a velocity (air_drag.h)
   std::vector<Vec4> flow;          ///< velocity of the air
   std::vector<Vec4> rest;          ///< position in the unstrained cloth
   std::vector<Vec4> moves;         ///< displacements in a step of the springs [m]
-  std::vector<Vec4> step_start, step_velocity, step_gain;  ///< of an integrator, during its sub-step
+  std::vector<Vec4> step_start, step_velocity, step_gain;  ///< buffers of an integrator for its sub-step
   std::vector<Vec4> pin_impulse;   ///< impulse of the springs on pinned points, times the sub-step [kg m]
   std::vector<Real> field_drag;    ///< rate of linear drag by fields and hands [1/s]
   std::vector<Real> mass;          ///< [kg]

@@ -25,8 +25,8 @@ class ClothSprings {
   void assign(std::span<const ClothSpring> springs, const ClothPoints& points);
 
   /// Adapts longest_step() to the current positions. A spring under tension also has a transverse stiffness,
-  /// its force divided by its length, which the sweep does not make implicit. To be called when the stretch
-  /// may have changed much; the result depends only on the positions.
+  /// which is its force divided by its length. The sweep does not make this stiffness implicit. Call this
+  /// function when the stretch may have changed much; the result depends only on the positions.
   void adapt_to_stretch(const ClothPoints& points);
   /// The longest step at which no spring's stiffness is clamped [s].
   Real longest_step() const { return longest_step_; }
@@ -45,48 +45,49 @@ class ClothSprings {
 
  private:
   static constexpr std::size_t kLanes = 4;
-  static constexpr std::size_t kChains = 4;  // batches swept in turns
+  static constexpr std::size_t kChains = 4;  // number of batches that are swept in turns
   typedef float Floats __attribute__((vector_size(kLanes * sizeof(float))));
 
   struct Material {
     uint32_t a, b;
     Real stiffness, damping;
     Real fastest;             // k (1/m_a + 1/m_b)
-    Real most, most_at_rest;  // of h^2 `fastest`; at the present stretch, and without stretch
+    Real most, most_at_rest;  // limits of h^2 `fastest`: at the current stretch, and without stretch
   };
-  /// The springs between one point of each of four paths and the next, and the first of the two points. It is
-  /// small because every sweep reads all of them. A relative move d along the axis is resisted by the impulse
-  /// `along` d, less the fraction `forget` of the impulse of the sweep so far.
+  /// For each of four paths, a point and the spring to the next point. The structure is small because every
+  /// sweep reads all of them. A relative move d along the axis causes the impulse `along` d; the fraction
+  /// `forget` of the sweep's impulse so far is subtracted.
   struct Row {
-    Lanes weight;                // inverse masses
-    std::array<Floats, 3> axis;  // unit, from the next point to this one; by x, y and z
+    Lanes weight;                // inverse masses of the points
+    std::array<Floats, 3> axis;  // unit vector from the next point to this one, by x, y and z
     Floats along, forget, impulse;
     std::array<uint32_t, kLanes> point;
-    uint32_t count;  // of lanes that have this point
-    uint32_t held;   // bit mask of those whose point is held
+    uint32_t count;  // number of lanes that have this point
+    uint32_t held;   // bit mask of the lanes whose point is pinned
   };
   /// Values of a row that are needed only for the explicit step.
   struct Elastic {
-    Lanes rest, stiffness;  // the latter times h^2, clamped if necessary
+    Lanes rest, stiffness;  // stiffness: times h^2, clamped if necessary
     std::array<uint32_t, kLanes> spring;
   };
   /// The other diagonals of springs that have a counterpart.
   struct Counterparts {
     std::array<uint32_t, kLanes> a, b;
-    Lanes rest;  // 0: none
+    Lanes rest;  // 0: no counterpart
   };
-  /// Up to four paths: rows from the first on, of which the last has points alone.
+  /// Up to four paths as consecutive rows, one for each spring of the longest path and one for its last
+  /// point.
   struct Batch {
-    std::size_t first, length;  // number of springs of the longest
-    std::size_t counterparts;   // index of the counterparts of the first row; kNone: it has none
+    std::size_t first, length;  // index of the first row; number of springs of the longest path
+    std::size_t counterparts;   // index of the first row's counterparts; kNone: none
   };
   static constexpr std::size_t kNone = ~std::size_t{0};
   static constexpr uint32_t kNoSpring = ~0u;
   struct Stage {
     enum { apply, forward, backward } kind;
-    std::size_t begin, end;  // batches
-    std::size_t block;       // batches of a block
-    bool alone;              // one batch at a time
+    std::size_t begin, end;  // range of batches
+    std::size_t block;       // number of batches in a block
+    bool alone;              // whether only one batch at a time is swept
 
     uint32_t block_count() const { return static_cast<uint32_t>((end - begin + block - 1) / block); }
   };
@@ -113,15 +114,15 @@ class ClothSprings {
   void sweep_forward(ClothPoints& points, std::span<Vec4> moves, std::span<const Batch> batches);
   void sweep_backward(ClothPoints& points, std::span<Vec4> moves, std::span<const Batch> batches);
 
-  std::vector<Material> material_;  // of each spring
+  std::vector<Material> material_;  // by spring
   std::vector<Row> row_;
   std::vector<Elastic> elastic_;
   std::vector<Counterparts> counterparts_;
   std::vector<Batch> batch_;
-  std::vector<Stage> apply_, relax_;  // of any step
-  std::vector<Real> inverse_mass_;    // that springs were prepared for
-  bool is_stretched_ = false;         // whether some `most` is not that at rest
-  Real prepared_for_ = -1;            // step [s]; < 0: none
+  std::vector<Stage> apply_, relax_;  // stages of a step of any length
+  std::vector<Real> inverse_mass_;    // inverse masses for which the springs were prepared
+  bool is_stretched_ = false;         // whether some `most` differs from `most_at_rest`
+  Real prepared_for_ = -1;            // length of the steps that were prepared [s]; < 0: none
   Real longest_step_ = 0, least_stiffness_ = 1;
   uint64_t clamped_ = 0;
 };

@@ -33,7 +33,7 @@ struct Cloth {
   std::optional<ClothTear> first_tear;
   ClothReport report;
 
-  /// Adapts the bending to the triangles. To be called after these have changed.
+  /// Adapts the bending to the triangles. Call it after these have changed.
   void assign_bending();
 };
 

@@ -1,8 +1,8 @@
 #pragma once
 /// Steps all cloths of a world. A sub-step of the world computes the external forces and the possible
-/// contacts, then runs sub-steps of cloth. In each of these the integrator moves every cloth; the stretch
-/// limit, contacts with cloth and contacts with bodies are solved; and moves are shortened until no spring is
-/// too long and no cloth has passed through cloth.
+/// contacts, and then runs sub-steps of cloth. In each of these the integrator moves every cloth. Then the
+/// stretch limit, contacts with cloth and contacts with bodies are solved. Finally moves are shortened until
+/// no spring is too long and no cloth has passed through cloth.
 
 #include <optional>
 #include <span>
@@ -43,14 +43,14 @@ class ClothSystem {
     uint32_t point;
     ClothBody* body;  // null: the world
     Vec3 position;
-    Vec4 from = Vec4::Zero();  // where the sub-step began
+    Vec4 from = Vec4::Zero();  // position at the start of the sub-step
   };
-  /// Frame in which a point's move was shortened.
+  /// The frame in which a point's move was shortened.
   enum Shortened : uint8_t { kWhole, kInPiece, kInWorld };
   /// The frame in which the moves of a piece of cloth are shortened. The frame moves with the piece, all
   /// cloth that it may cross and the dynamic bodies that hold it.
   struct Frame {
-    bool rests = false;                 // in the world
+    bool rests = false;                 // the frame is that of the world
     bool anchored = false;              // a fixed object holds it
     bool carries = false;               // dynamic bodies are pinned to it
     const ClothBody* leader = nullptr;  // the only body that holds it, if that is not dynamic
@@ -59,11 +59,11 @@ class ClothSystem {
     Real mass = 0;                      // mass of the same points and bodies
     Vec4 momentum = Vec4::Zero();       // momentum lost by shortening
     Vec4 velocity = Vec4::Zero();       // mean velocity of points and bodies
-    Real total_mass = 0;                // of points and bodies
+    Real total_mass = 0;                // mass of points and bodies
   };
   struct Seam {
     uint32_t cloth;
-    Real open_length;  // at the start [m]
+    Real open_length;  // length at the start [m]
   };
 
   void adapt_springs();
@@ -130,34 +130,34 @@ class ClothSystem {
   void count_penetration();
 
   std::vector<Cloth*> cloths_;
-  std::vector<std::size_t> first_;         // point of each cloth
-  std::vector<ClothSpring> all_springs_;   // by cloth, between points of all
-  std::vector<std::size_t> first_spring_;  // of each cloth, and the end
+  std::vector<std::size_t> first_;         // by cloth: index of its first point
+  std::vector<ClothSpring> all_springs_;   // springs of all cloths; their ends are indices into all points
+  std::vector<std::size_t> first_spring_;  // by cloth: index of its first spring; and the end
   std::vector<Vec4> kick_;  // difference of the velocities at the end of a sub-step from those of the moves
   bool changed_ = false;
-  Real dt_ = 0;     // sub-step of cloth [s]
-  Real time_ = 0;   // at the end of the world's sub-step [s]
-  Real parts_ = 1;  // sub-steps of cloth in one of the world
+  Real dt_ = 0;     // length of a sub-step of cloth [s]
+  Real time_ = 0;   // end of the world's sub-step [s]
+  Real parts_ = 1;  // number of sub-steps of cloth in the world's sub-step
 
   ClothPoints points_;
-  std::vector<ClothSprings> springs_;   // of each `relaxed` cloth
-  std::vector<AirDrag> air_;            // on each cloth
-  std::vector<BendLimit> bend_limits_;  // of the cloths that have one
+  std::vector<ClothSprings> springs_;   // by `relaxed` cloth
+  std::vector<AirDrag> air_;            // by cloth
+  std::vector<BendLimit> bend_limits_;  // one for each cloth with such a limit
   StretchLimit limit_;
   ClothContacts contacts_;
   CornerContacts corner_contacts_;
   SelfContacts self_contacts_;
   std::vector<uint8_t> collides_;
   std::vector<Held> held_;
-  std::vector<Carrier> carriers_;  // of the sub-step of the world
+  std::vector<Carrier> carriers_;  // for the current sub-step of the world
   std::vector<Seam> seams_;
   std::vector<VelocityCut> cuts_;
   std::vector<BodyContact> body_contacts_;
   ClothPieces pieces_;
   std::vector<Vec4> drift_;  // the move of the frame in which each point's move is shortened
   MoveFractions fractions_;
-  std::vector<Frame> frames_;       // of the pieces
-  std::vector<uint8_t> shortened_;  // how each point's move was shortened in the sub-step
+  std::vector<Frame> frames_;       // by piece
+  std::vector<uint8_t> shortened_;  // by point: the frame in which its move was shortened in this sub-step
   std::vector<uint32_t> lowered_;   // points whose fractions were lowered in a round
   std::span<ClothBody> bodies_;
 };

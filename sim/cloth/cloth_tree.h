@@ -1,11 +1,12 @@
 #pragma once
 /// Bounding-box tree over the triangles of all cloths, which is refitted when they move. It finds the pairs
-/// of triangles that may touch. Consider a connected patch whose normals all lie in one half-space. If the
-/// outline of the patch, projected along the axis of this half-space, does not cross itself, the patch cannot
-/// cross itself either, and is skipped (Volino and Magnenat-Thalmann, "Efficient self-collision detection on
-/// smoothly discretized surface animations using geometrical shape regularity", 1994). The triangles around
-/// one point are skipped in the same case, unless their angles at the point could add up to more than a full
-/// turn as seen from that side. Two rings of triangles around one triangle are treated in the same way.
+/// of triangles that may touch, and skips patches that cannot cross themselves. Consider a connected patch
+/// whose normals all lie in one half-space. If the outline of the patch, projected along the axis of this
+/// half-space, does not cross itself, then the patch cannot cross itself either (Volino and
+/// Magnenat-Thalmann, "Efficient self-collision detection on smoothly discretized surface animations using
+/// geometrical shape regularity", 1994). The triangles around one point are skipped under the same condition,
+/// unless their angles at the point may add up to more than a full turn, seen from that side. Two rings of
+/// triangles around one triangle are treated in the same way.
 
 #include <array>
 #include <bit>
@@ -40,33 +41,33 @@ class ClothTree {
   void overlapping(const Aabb& bounds, Visit&& visit) const;
 
  private:
-  /// Bit mask of the directions (cloth_tree.cpp) towards which all of some normals lean.
+  /// Bit mask of directions (cloth_tree.cpp): those towards which all of some normals lean.
   using Views = uint64_t;
   struct Node {
     MovingBox box;
-    Views views;             // towards which its normals lean
-    uint32_t first, count;   // triangles, in order_
-    uint32_t second;         // node; the first child is the next one. 0: a leaf
-    uint32_t leaf = 0;       // of a leaf: its index in leaves_
-    uint32_t fresh = 0;      // lanes of a leaf that were fitted last; else whether any below
-    bool connected = false;  // all of it one piece
+    Views views;             // directions towards which its normals lean
+    uint32_t first, count;   // range of triangles in order_
+    uint32_t second;         // index of the second child; 0: a leaf. The first child is the next node
+    uint32_t leaf = 0;       // leaf: index in leaves_
+    uint32_t fresh = 0;      // leaf: lanes that were fitted last; branch: whether a leaf below was
+    bool connected = false;  // whether its triangles are one connected piece
 
-    bool leans() const { return connected && views != 0; }  // all normals lie in one half-space
+    bool leans() const { return connected && views != 0; }  // whether all normals lie in one half-space
   };
 
   /// All triangles around a point.
   struct Star {
-    uint32_t first, count;  // places in order_, in around_
-    bool simple;            // one fan, that does not overlap itself as long as its normals lean enough
-    bool leans = false;     // simple, and its normals lie in one half-space
-    Views views = 0;        // simple, and its normals lean steeply towards these
+    uint32_t first, count;  // range in around_, which has places in order_
+    bool simple;            // whether it is one fan that cannot overlap itself while its normals lean enough
+    bool leans = false;     // whether it is simple and its normals lie in one half-space
+    Views views = 0;        // directions towards which its normals lean steeply; 0 unless it is simple
   };
   /// The unit normals of a triangle at both ends of its path.
   struct Normals {
     std::array<Vec4, 2> at;
     Views views, steep_views;
   };
-  /// Triangles of a leaf that are within two rings of triangles around another one.
+  /// The triangles of a leaf that are within two rings around some triangle.
   struct RingPart {
     uint32_t leaf, lanes;
   };
@@ -97,19 +98,19 @@ class ClothTree {
 
   std::vector<Triangle> triangles_;
   std::vector<uint32_t> order_;
-  std::vector<uint32_t> place_;                  // of each triangle in order_
-  std::vector<uint32_t> piece_;                  // connected piece of each triangle
-  std::vector<std::array<uint32_t, 3>> beside_;  // triangle across each edge from a corner to the next
-  std::vector<MovingBox> boxes_;                 // in the order of order_, as the next
+  std::vector<uint32_t> place_;                  // by triangle: its place in order_
+  std::vector<uint32_t> piece_;                  // by triangle: its connected piece
+  std::vector<std::array<uint32_t, 3>> beside_;  // by triangle: the neighbour across each edge
+  std::vector<MovingBox> boxes_;                 // by place in order_, as normals_
   std::vector<Normals> normals_;
-  std::vector<uint8_t> ring_leans_;      // whether two rings around each triangle cannot cross themselves
-  std::vector<RingPart> ring_;           // of one triangle after another
-  std::vector<uint32_t> first_in_ring_;  // of each triangle, and the end
-  std::vector<Views> views_around_;      // of two rings around each point
-  std::vector<Star> stars_;              // of each point
+  std::vector<uint8_t> ring_leans_;      // by place: whether the two rings around it cannot cross themselves
+  std::vector<RingPart> ring_;           // rings of all triangles, one after the other
+  std::vector<uint32_t> first_in_ring_;  // by place: start of its ring in ring_; and the end
+  std::vector<Views> views_around_;      // by point: views of its two rings
+  std::vector<Star> stars_;              // by point
   std::vector<uint32_t> around_;
   std::vector<Node> nodes_;
-  std::vector<uint32_t> leaf_;  // node of each place in order_
+  std::vector<uint32_t> leaf_;  // by place in order_: the leaf's node
   std::vector<EightBoxes> leaves_;
 };
 
@@ -131,7 +132,7 @@ void ClothTree::within(std::span<const Vec4> points, uint32_t at, Visit& visit) 
   for (uint32_t i = 0; i < node.count; ++i) look(node, i, node, ~1u << i, visit);
 }
 
-/// Visits the pairs of one triangle with the triangles of a leaf that are in `lanes`.
+/// Visits the pairs of one triangle with those triangles of a leaf that are in `lanes`.
 template <class Visit>
 void ClothTree::look(const Node& own, uint32_t lane, const Node& other, uint32_t lanes, Visit& visit) const {
   if ((own.fresh >> lane & 1) == 0) lanes &= other.fresh;

@@ -46,8 +46,8 @@ class CornerContacts {
 
   std::vector<Triangle> triangles_;
   ClothTree tree_;
-  Real spacing_ = 0;                 // of samples: half a mean edge of the cloths [m]
-  Real longest_ = 0, thinnest_ = 0;  // edge and thickness of the cloths [m]
+  Real spacing_ = 0;                 // distance of samples: half a mean edge of the cloths [m]
+  Real longest_ = 0, thinnest_ = 0;  // longest edge and smallest thickness of the cloths [m]
   RoundContacts round_;
   std::span<ClothBody> bodies_;
   std::vector<Near> near_;

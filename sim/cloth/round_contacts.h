@@ -1,8 +1,8 @@
 #pragma once
 /// Contact of rounded bodies (spheres, capsules, cylinders, cones) with triangles of cloth. If the radius of
-/// a body is large compared with the triangles, contacts of points keep it out; but a thin rod or a small
-/// ball would pass between the points. Here the point of a triangle that is nearest to the body's axis is
-/// swept along the paths of both.
+/// a body is large compared with the triangles, the contacts of points are sufficient. A thin rod or a small
+/// ball, however, would pass between the points. For these bodies, the point of a triangle that is nearest to
+/// the body's axis is swept along the paths of both.
 
 #include <optional>
 #include <span>

@@ -45,39 +45,39 @@ class SelfContacts {
   /// Lowers the fractions of the moves of pairs that crossed, and adds their points to `lowered`. Returns
   /// whether there were any.
   bool shorten(const ClothPoints& points, MoveFractions& fractions, std::vector<uint32_t>& lowered);
-  /// Records the moves of points, for the next search. To be called at the end of a sub-step of length dt
-  /// [s].
+  /// Records the moves of points for the next search. Call it at the end of a sub-step of length dt [s].
   void end_substep(const ClothPoints& points, Real dt);
 
   std::span<const uint64_t> active() const {
     return active_;
   }  ///< contacts of the last push_apart(), by cloth
-  /// Points, since the last call: take_held_back(), those whose displacements shorten() has shortened;
-  /// take_crossed(), those of pairs whose crossing could not be prevented because pins hold them.
+  /// Both functions return points collected since their last call. take_held_back(): points whose
+  /// displacements shorten() has shortened. take_crossed(): points of pairs whose crossing could not be
+  /// prevented, because pins hold them.
   std::vector<uint32_t> take_held_back() { return std::exchange(held_back_, {}); }
   std::vector<uint32_t> take_crossed() { return std::exchange(crossed_, {}); }
 
  private:
-  /// A point (the first) and a triangle, or an edge (the first two) and an edge.
+  /// A point and a triangle, or two edges. The points of the first element come first.
   struct Pair {
     std::array<uint32_t, 4> points;
     bool edges;
     Real thickness;
     Real nearest;            // the pair is kept at least this far apart, unless it is already closer
     Real distance;           // distance at the last check
-    Real travel;             // motion of all four points together until then
-    Eigen::Vector3f normal;  // direction from the second to the first at that time
+    Real travel;             // motion of all four points together up to that check
+    Eigen::Vector3f normal;  // unit direction from the second element to the first at that check
   };
   struct Contact {
     uint32_t pair;
-    std::array<Real, 4> weights;  // of the difference of both closest points
-    Vec4 normal;                  // from the second to the first
+    std::array<Real, 4> weights;  // weights of the points in the vector between the closest points
+    Vec4 normal;                  // from the second element to the first
     Real distance;                // at the start of the sub-step
-    bool pushes;                  // false: its neighbours do so
+    bool pushes;                  // if false, contacts of its neighbours push in its place
   };
 
-  /// The two points of a pair that are closest to the other side or beyond it, and their heights above a
-  /// plane.
+  /// Two points of a pair and their heights above a plane. Each is the point of its element that is closest
+  /// to the other side, or farthest beyond it.
   struct Sides {
     uint32_t first, second;
     Real low, high;
@@ -107,21 +107,21 @@ class SelfContacts {
   Contact look(const ClothPoints& points, uint32_t pair);
 
   std::vector<Triangle> triangles_;
-  std::vector<std::array<bool, 3>> owns_point_, owns_edge_;  // of each triangle, so that each has one owner
+  std::vector<std::array<bool, 3>> owns_point_, owns_edge_;  // by triangle; each has one owner
   ClothTree tree_;
 
   std::vector<Pair> pairs_;
-  std::vector<Contact> contacts_;  // of the sub-step; then those in doubt
+  std::vector<Contact> contacts_;  // contacts of the sub-step; after find_doubtful(), the pairs in doubt
   std::vector<uint64_t> active_;
   std::vector<uint32_t> held_back_, crossed_;
 
-  // Since the last search: predicted paths, and the paths made.
+  // Since the last search: the predicted paths, and the actual paths.
   Real since_ = 0, horizon_ = -1;
   SearchHorizon length_;
   std::vector<Vec4> predicted_from_, predicted_to_, predicted_velocity_;
   std::vector<Real> travel_, margin_;
-  std::vector<Vec4> still_;  // no drifts
-  std::vector<Real> move_;   // of each point in the sub-step
+  std::vector<Vec4> still_;  // zero drifts
+  std::vector<Real> move_;   // by point: length of its move in the sub-step
 };
 
 }  // namespace offstage::sim

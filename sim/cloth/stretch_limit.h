@@ -1,8 +1,8 @@
 #pragma once
-/// The greatest length of springs (physics F7). A few sweeps first shorten springs that are too long. Where
+/// The greatest length of springs (physics F7). First, a few sweeps shorten springs that are too long. Where
 /// that is not enough, as under a body that hangs on the cloth, the impulses of all springs at their limit
-/// are solved for together. Both preserve the momentum. Then moves are shortened until every limit holds,
-/// which guarantees it.
+/// are solved for together. Both preserve the momentum. Finally, moves are shortened until every limit holds.
+/// This last step always succeeds.
 
 #include <cstdint>
 #include <span>
@@ -67,7 +67,7 @@ class StretchLimit {
 
   std::vector<Limit> limits_, ties_;
   std::vector<uint32_t> limits_at_,
-      first_at_;                     // of each point, one point's after another's; where they begin
+      first_at_;                     // by point: its limits, in one array; the index of its first
   std::vector<uint32_t> looked_in_;  // round in which each limit was last checked
   uint32_t round_ = 0;
 };

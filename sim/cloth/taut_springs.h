@@ -4,10 +4,10 @@
 /// bodies, to first order. In this way the whole taut cloth stops a heavy body, not only the points that
 /// touch it.
 ///
-/// With the rows of J the directions of springs and contacts, and W the inverse masses of points and bodies,
-/// the impulses are the lambda >= 0 of the linear complementarity problem J W J^T lambda >= excess. An
-/// active-set method solves it: conjugate gradients compute the impulses of the active rows. The active set
-/// changes until no active impulse is negative and no inactive row has an excess.
+/// Let the rows of J be the directions of springs and contacts, and W the inverse masses of points and
+/// bodies. The impulses lambda >= 0 solve the linear complementarity problem J W J^T lambda >= excess. An
+/// active-set method computes them: conjugate gradients solve for the impulses of the active rows, and the
+/// active set changes until no active impulse is negative and no inactive row has an excess.
 
 #include <array>
 #include <span>
@@ -18,8 +18,8 @@
 
 namespace offstage::sim {
 
-/// Target of corrections as a fraction of the allowed elongation. At the limit itself every outward move
-/// would be taken back, and the cloth would freeze there.
+/// Target of corrections, as a fraction of the allowed elongation. With the limit itself as target, every
+/// outward move would be reversed, and the cloth would freeze there.
 inline constexpr Real kStretchAim = 0.97;
 
 struct SpringLimit {
@@ -47,7 +47,7 @@ class TautSprings {
   /// Keeps references to the arguments.
   TautSprings(const ClothPoints& points, std::span<const Carrier> carriers);
 
-  /// Adds a spring if it is at its limit or near it.
+  /// Adds a spring if its elongation is near the limit or beyond it.
   void add(const SpringLimit& limit);
   void add(const BodyContact& contact);
   bool any_too_long() const { return any_too_long_; }
@@ -64,7 +64,7 @@ class TautSprings {
 
   struct MovedBody {
     ClothBody* body;
-    const Carrier* carrier;  // or null
+    const Carrier* carrier;  // null: the body carries no points
     Mat6 carried, mobility;
   };
   /// One end of a row: a point, which a body may carry, a point of a body, or a weighted mean of points.
@@ -80,11 +80,11 @@ class TautSprings {
   };
   /// A row acts on one place along its direction, and on the other against it.
   struct Row {
-    uint32_t first, second;  // places
+    uint32_t first, second;  // indices in places_
     Vec4 direction;
-    Real excess;      // displacement to be gained along the direction [m]
+    Real excess;      // displacement that is missing along the direction [m]
     Real compliance;  // J W J^T of the row alone [1/kg]
-    bool acts;        // in the set
+    bool acts;        // whether it is in the active set
   };
 
   uint32_t place_of(uint32_t point);
@@ -99,15 +99,15 @@ class TautSprings {
 
   const ClothPoints& points_;
   std::vector<MovedBody> bodies_;
-  std::vector<Vec6> impulses_;   // on the bodies
-  std::vector<uint32_t> place_;  // of each point; kNone: none yet
+  std::vector<Vec6> impulses_;   // by body
+  std::vector<uint32_t> place_;  // by point: its index in places_; kNone: none
   std::vector<Place> places_;    // number of a weighted mean, which is neither point nor body
   std::vector<MeanPlace> mean_places_;
-  std::vector<Vec4> moves_;  // impulses, then moves, of each place
+  std::vector<Vec4> moves_;  // by place: impulses, and then moves
   std::vector<Row> rows_;
-  std::vector<Real> lambda_;  // [kg m]
+  std::vector<Real> lambda_;  // by row [kg m]
   std::vector<Real> residual_, direction_, image_, scaled_;
-  Real greatest_ = 0;  // excess [m]
+  Real greatest_ = 0;  // greatest initial excess [m]
   bool any_too_long_ = false;
 };
 

@@ -33,9 +33,9 @@ class BroadPhase {
   void remove(uint32_t object);
   bool contains(uint32_t object) const { return object < states_.size() && (states_[object] & kLive); }
 
-  /// Returns all pairs of objects, not both static, whose boxes have a common point, each once and in
-  /// ascending order. The result depends on the boxes alone, not on threads or earlier calls. Valid until the
-  /// next call.
+  /// Returns all pairs of objects whose boxes have a common point, except pairs of two static objects. Each
+  /// pair occurs once, in ascending order. The result depends on the boxes alone, not on threads or earlier
+  /// calls, and is valid until the next call.
   std::span<const IndexPair> pairs();
 
   /// Work of the last call of pairs(), as counts.

@@ -23,7 +23,7 @@ namespace offstage::sim {
 
 class CollisionMesh {
  public:
-  /// `known` is the decomposition of the mesh, if the caller has it; otherwise it is computed when first
+  /// `known`: the decomposition of the mesh, if the caller has it. Otherwise it is computed when it is first
   /// needed.
   explicit CollisionMesh(TriangleMesh welded, std::optional<ConvexDecomposition> known = {});
 

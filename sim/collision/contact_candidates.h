@@ -12,10 +12,10 @@
 
 namespace offstage::sim {
 
-/// Fractions of the margin within which solids count as touching. kTilt: how much the gap along the normal of
-/// a face may be smaller than the separation, and how far parallel edges may pass each other. kRim: how far a
-/// point may lie outside of a face, and how much deeper the true deepest point of a rim may be than the
-/// deepest corner of its polygon.
+/// Fractions of the margin within which solids count as touching. kTilt limits by how much the gap along the
+/// normal of a face may be smaller than the separation, and how far parallel edges may pass each other. kRim
+/// limits how far a point may lie outside of a face, and how much deeper the true deepest point of a rim may
+/// be than the deepest corner of its polygon.
 inline constexpr Real kTilt = 0.05, kRim = 0.001;
 /// Accuracy of separations, as a fraction of the solids' size.
 inline constexpr Real kSeparationRounding = 1e-9;

@@ -22,11 +22,11 @@ struct GjkCache {
   Vec3 direction = Vec3::Zero();     ///< last normal, in A's frame; zero before the first query
 };
 
-/// Signed distance of A and B. For cores with vertices the result is exact up to rounding. If a core is
-/// round, such as a cylinder or a cone, the error is at most 1e-12 of the size for separate solids. In
-/// penetration it is at most 1e-10; about 0.5 % of these cases are slightly worse, and `converged` is then
-/// false. Cores that overlap or touch are passed to deepest_point(). It returns the normal of a face of A -
-/// B, so the normal is reliable even if the solids barely touch.
+/// Returns the signed distance of A and B. For cores with vertices the result is exact up to rounding. If a
+/// core is round, such as a cylinder or a cone, the error is at most 1e-12 of the size for separate solids.
+/// In penetration it is at most 1e-10; about 0.5 % of these cases are slightly worse, and `converged` is then
+/// false. Cores that overlap or touch are passed to deepest_point(), which returns the normal of a face of A
+/// - B. So the normal is reliable even if the solids barely touch.
 Separation gjk(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache& cache);
 
 /// Returns the depth and the direction of the smallest translation that separates two solids, which must

@@ -74,11 +74,11 @@ struct MoreManifolds {
 Manifold manifold(const Convex& a, const Convex& b, const Pose& a_from_b, const Separation& s, Real margin,
                   MoreManifolds* more = nullptr);
 
-/// Returns the manifold of a triangle and another solid. The triangle's face gives the normal. `up` is the
+/// Returns the manifold of a triangle and another solid, with the normal of the triangle's face. `up` is the
 /// unit normal away from the triangle, in A's frame. The points are the corners of the other solid's
-/// supporting feature that are in front of the face, and the deepest points of this feature. `of_b`: whether
-/// the triangle is B. `beyond`: greatest allowed distance of points outside of the edges (0,1), (1,2), (2,0)
-/// [m]. May have no points.
+/// supporting feature that are in front of the face, and the deepest points of this feature. There may be
+/// none. `of_b`: whether the triangle is B. `beyond`: greatest allowed distance of points outside of the
+/// edges (0,1), (1,2), (2,0) [m].
 Manifold triangle_face_manifold(const Convex& a, const Convex& b, const Pose& a_from_b, bool of_b,
                                 const Vec3& up, const std::array<Real, 3>& beyond, Real margin);
 

@@ -94,12 +94,12 @@ struct MovingShape {
       nullptr;  ///< if not null in the first shape, the tests of the query are added to these counts
 };
 
-/// Returns the time, as a fraction of the step, at which the shapes are within `tolerance` [m], > 0, of each
-/// other. Before it they are never within half of that distance. Empty if they stay more than half of that
-/// distance apart. The time is 0 for shapes that are within the tolerance at the start, or one inside the
-/// other. The method is conservative advancement over both trees at once, with a bound on the motion per
-/// node: Tang, Kim, Manocha, "C2A: controlled conservative advancement for continuous collision detection of
-/// polygonal models" (2009).
+/// Returns the time, as a fraction of the step, at which the distance of the shapes is at most `tolerance`
+/// [m], > 0. Before this time the distance is never less than half of the tolerance. Returns nothing if the
+/// distance stays more than half of the tolerance. The time is 0 for shapes that are within the tolerance at
+/// the start, or one inside the other. The method is conservative advancement over both trees at once, with a
+/// bound on the motion per node: Tang, Kim, Manocha, "C2A: controlled conservative advancement for continuous
+/// collision detection of polygonal models" (2009).
 std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance);
 
 /// Returns the same time as time_of_impact(), found by bisection of the step as in the book. An impact is
@@ -107,7 +107,7 @@ std::optional<Impact> time_of_impact(const MovingShape& a, const MovingShape& b,
 std::optional<Impact> bisected_time_of_impact(const MovingShape& a, const MovingShape& b, Real tolerance);
 
 /// Returns the time of the next impact, as a fraction of the step, for shapes that are within the tolerance
-/// at the start; empty if there is none. An impact occurs when their nearest or deepest points approach
+/// at the start; nothing if there is none. An impact occurs when their nearest or deepest points approach
 /// faster than `speed` [m per step], > 0, plus the deviation of the rotation from a constant rate. The motion
 /// is sampled until the shapes are separate, because conservative advancement makes no progress within the
 /// tolerance.

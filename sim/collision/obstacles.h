@@ -31,9 +31,9 @@ struct Obstacle {
   /// unit of impulse there, world axes [1/kg].
   Mat3 mobility(const Vec3& arm) const;
   bool is_dynamic() const { return inverse_mass > 0; }
-  /// Number of straight pieces into which a particle's path is divided in the solid's frame. There a straight
-  /// path is curved if the solid turns. The pieces deviate from the curve by at most kChordError of the
-  /// particle's radius, unless the upper limit of the number is reached.
+  /// Returns the number of straight pieces into which a particle's path is divided in the solid's frame. If
+  /// the solid turns, a straight path is curved in this frame. The pieces deviate from the curve by at most
+  /// kChordError of the particle's radius, unless the upper limit of the number is reached.
   int pieces(Real particle_radius) const;
   /// Box in the world around all positions of the solid during the sub-step.
   Aabb swept_bounds() const;

@@ -23,7 +23,7 @@ class PosePath {
   const Vec3& velocity() const { return velocity_; }
   /// Angular velocity, world [rad per step].
   Vec3 angular_velocity(Real fraction) const;
-  /// Whether the orientations differ, and the angle between them, 0 to pi [rad].
+  /// turns(): whether the orientations differ. turn(): the angle between them, 0 to pi [rad].
   bool turns() const { return sine_ > 0; }
   Real turn() const;
   /// Upper bound of the acceleration of all points within `reach` of the origin [m per step^2].

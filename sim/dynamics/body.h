@@ -20,9 +20,9 @@ namespace offstage::sim {
 /// [rad].
 inline constexpr Real kMostPredictedTurn = 1;
 
-/// The definition of a body, constant from World::add_body() on. `solid` has pointers into the body and to
-/// its mesh, so a body is never moved or copied. The members that contact pairs read are the last ones, next
-/// to the state in memory.
+/// The definition of a body, which is constant from World::add_body() on. `solid` has pointers into the body
+/// and to its mesh, so a body is never moved or copied. The members that contact pairs read are the last
+/// ones, next to the state in memory.
 struct BodyModel {
   BodyDef def;
   Solid solid;
@@ -47,8 +47,8 @@ struct BodyModel {
 struct SleepMemory {
   Real quiet_time = 0;  // how long the body has been almost at rest [s]
   // While it is asleep:
-  Wrench push;                 // of the variable forces when it fell asleep, about its centre of mass
-  std::optional<Wrench> pins;  // by pinned cloth when it fell asleep
+  Wrench push;                 // wrench of the variable forces when it fell asleep, about its centre of mass
+  std::optional<Wrench> pins;  // wrench of pinned cloth when it fell asleep
   std::vector<SpringHandle> moving_springs;  // springs whose other end can move independently
 };
 
@@ -64,7 +64,7 @@ struct Body : BodyModel {
   // Its place in the lists of the current sub-step.
   uint32_t island = 0;          // awake: number of its island; asleep: number of its sleeping island
   uint32_t row = 0;             // index among the bodies of its island
-  uint32_t rank = 0;            // position in the order of the world's bodies; see ActiveBodies
+  uint32_t rank = 0;            // position in the world's order of bodies; see ActiveBodies
   Real impact_speed_bound = 0;  // greatest speed of a nearby body that may hit it in the sub-step [m/s]
 
   // The current interval of motion: a whole sub-step, or the rest of it after an impact.
@@ -81,8 +81,8 @@ struct Body : BodyModel {
   // The current sub-step and sampling time.
   Pose before_substep, before_step;
   Aabb swept;              // box around its motion in the sub-step, as given to the broad phase
-  bool on_cloth = false;   // touched by cloth in the last sub-step
-  bool on_spring = false;  // a spring ends on it in this sub-step
+  bool on_cloth = false;   // whether cloth touched it in the last sub-step
+  bool on_spring = false;  // whether a spring ends on it in this sub-step
 
   SleepMemory sleep;
 

@@ -99,8 +99,8 @@ struct AppliedForce {
   bool body_axes = false;  ///< whether force and torque are in the body's axes, not in the world's
 };
 
-/// An impulse away from a point, at the time ForceDef::start. It acts at the point of a body that is nearest
-/// to the explosion, so that it may also make bodies spin.
+/// An impulse away from a point, at the time ForceDef::start. It acts on a body at the body's nearest point,
+/// so it may also make the body spin.
 struct Explosion {
   Vec3 point = Vec3::Zero();
   Real impulse = 1;  ///< impulse on a body or a particle at the point of the explosion [N s]

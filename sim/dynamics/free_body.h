@@ -1,6 +1,6 @@
 #pragma once
-/// Bodies as dynamic systems (physics R1, R2), and the motion of a body without springs and joints: exact
-/// where there is a closed form, otherwise by an integrator on 13 numbers.
+/// Bodies as dynamic systems (physics R1, R2), and the motion of a body without springs and joints. The
+/// motion is exact where it has a closed form; otherwise an integrator computes its 13 numbers.
 
 #include <span>
 
@@ -13,7 +13,7 @@ namespace offstage::sim {
 /// Size of a body in a flat state: x = [position 3, quaternion x y z w], p = [L 3, H 3].
 constexpr std::size_t kBodyX = 7, kBodyP = 6;
 
-/// The forces that act on each body independently of others.
+/// The forces that act on each body independently of other bodies.
 struct BodyForces {
   Vec3 gravity;
   std::span<const ActiveForce> forces;

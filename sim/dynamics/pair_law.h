@@ -14,7 +14,7 @@
 
 namespace offstage::sim {
 
-/// U = -G m1 m2 / sqrt(r^2 + s^2).
+/// The potential U = -G m1 m2 / sqrt(r^2 + s^2).
 struct MutualGravitation {
   Real constant = 6.672e-11;  ///< G [N m^2/kg^2], >= 0
   Real softening = 0;         ///< s, as if each mass were distributed over this radius [m], >= 0 (Plummer)
@@ -23,7 +23,7 @@ struct MutualGravitation {
   uint32_t drop_rate = 0;
 };
 
-/// U = K q1 q2 / sqrt(r^2 + s^2).
+/// The potential U = K q1 q2 / sqrt(r^2 + s^2).
 struct Coulomb {
   Real constant = 8.9875e9;  ///< K [N m^2/C^2], >= 0
   Real softening = 0;        ///< s [m], >= 0
@@ -32,8 +32,8 @@ struct Coulomb {
   uint32_t drop_rate = 0;
 };
 
-/// U = 4 epsilon [(sigma/r)^12 - (sigma/r)^6]; the equilibrium distance is 2^(1/6) sigma. Below sigma/1000
-/// the force is constant.
+/// The potential U = 4 epsilon [(sigma/r)^12 - (sigma/r)^6]. The equilibrium distance is 2^(1/6) sigma. Below
+/// sigma/1000 the force is constant.
 struct LennardJones {
   Real epsilon = 1;   ///< depth of the well [J], >= 0
   Real sigma = 0.01;  ///< distance of U = 0 [m], > 0

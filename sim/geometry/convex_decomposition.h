@@ -1,9 +1,9 @@
 #pragma once
-/// Decomposition of solids into convex parts (physics N8). Exact: reflex edges are resolved by cut planes
-/// after Joe, "Tetrahedral mesh generation in polyhedral regions based on convex polyhedron decompositions"
-/// (1994), in the simplified form of the book's appendix F. Where this is not possible (open or non-manifold
-/// scans, cavities, surfaces that intersect themselves, too many parts) the solid is approximated by convex
-/// hulls of its pieces between cut planes, and the result states the reason.
+/// Decomposition of solids into convex parts (physics N8). The exact method resolves reflex edges by cut
+/// planes after Joe, "Tetrahedral mesh generation in polyhedral regions based on convex polyhedron
+/// decompositions" (1994), in the simplified form of the book's appendix F. Where this is not possible (open
+/// or non-manifold scans, cavities, surfaces that intersect themselves, too many parts) the solid is
+/// approximated by convex hulls of its pieces between cut planes, and the result states the reason.
 
 #include <cstdint>
 #include <numbers>
@@ -37,8 +37,8 @@ struct DecompositionSettings {
   /// Greatest number of approximate parts if these reach `max_error`; >= 1.
   uint32_t max_parts = 64;
   /// Greatest number of approximate parts in any case, >= max_parts. If max_parts are not sufficient for
-  /// `max_error`, for example for thin bent shells, up to this number are created, even if the error remains
-  /// greater.
+  /// `max_error`, as for thin bent shells, up to this number of parts are created. The error may then still
+  /// be greater than `max_error`.
   uint32_t most_parts = 1024;
   uint32_t resolution = 64;  ///< voxels along the longest side of a mesh with holes
 

@@ -10,7 +10,7 @@
 
 namespace offstage::sim {
 
-/// Volume of a convex polyhedron; 0 if it is flat. [m^3]
+/// Returns the volume of a convex polyhedron, 0 if it is flat [m^3].
 Real hull_volume(const ConvexPolyhedron& p);
 
 /// The common hull of some of the given parts.

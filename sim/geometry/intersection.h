@@ -1,6 +1,6 @@
 #pragma once
-/// Intersection tests of points, segments and triangles (physics H7). All are closed sets, so touching
-/// counts. Triangles may be degenerate; they are then segments or points.
+/// Intersection tests of points, segments and triangles (physics H7). All are closed sets, so objects that
+/// touch count as intersecting. Triangles may be degenerate; they are then segments or points.
 ///
 /// Tests among points, segments and triangles are exact for the given coordinates (predicates.h). They are
 /// symmetric, do not depend on the order of vertices, and leave no gap between two triangles that share an

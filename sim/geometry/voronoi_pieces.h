@@ -9,8 +9,8 @@
 
 namespace offstage::sim {
 
-/// Centres of a centroidal Voronoi tessellation of the surface, by Lloyd's iteration. Du, Faber, Gunzburger,
-/// "Centroidal Voronoi tessellations" (1999). At most `count` [m].
+/// Returns at most `count` centres of a centroidal Voronoi tessellation of the surface, by Lloyd's iteration
+/// [m]. See Du, Faber, Gunzburger, "Centroidal Voronoi tessellations" (1999).
 std::vector<Vec3> spread_centres(const SolidPiece& solid, std::size_t count);
 
 /// Area of the polygons [m^2].

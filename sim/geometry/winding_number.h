@@ -1,9 +1,9 @@
 #pragma once
 /// Generalized winding numbers: how often a surface winds around a point. They distinguish inside from
-/// outside even where the surface has holes, doubled sheets or self-intersections. Jacobson, Kavan,
-/// Sorkine-Hornung, "Robust inside-outside segmentation using generalized winding numbers" (2013). Far
-/// clusters of triangles are approximated by dipoles after Barill et al., "Fast winding numbers for soups and
-/// clouds" (2018).
+/// outside even where the surface has holes, doubled sheets or self-intersections (Jacobson, Kavan,
+/// Sorkine-Hornung, "Robust inside-outside segmentation using generalized winding numbers", 2013). Far
+/// clusters of triangles are approximated by dipoles (Barill et al., "Fast winding numbers for soups and
+/// clouds", 2018).
 
 #include <cstdint>
 #include <span>

@@ -1,6 +1,7 @@
 #pragma once
-/// The Cholesky factorization of a symmetric matrix that gains and loses rows (Golub and Van Loan, Matrix
-/// Computations, 6.5), for pivoting methods, whose active set changes by one index at a time (N9).
+/// The Cholesky factorization of a symmetric matrix to which rows are added and from which they are removed
+/// (Golub and Van Loan, Matrix Computations, 6.5). Pivoting methods use it, because their active set changes
+/// by one index at a time (N9).
 
 #include <vector>
 

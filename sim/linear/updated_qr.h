@@ -1,7 +1,7 @@
 #pragma once
-/// The QR factorization of a square matrix that gains, loses and changes rows and columns (Golub and Van
-/// Loan, Matrix Computations, 6.5), for pivoting on matrices without symmetry, which sliding friction
-/// produces (N10).
+/// The QR factorization of a square matrix whose rows and columns are added, removed and replaced (Golub and
+/// Van Loan, Matrix Computations, 6.5). It is used for pivoting on matrices without symmetry, which sliding
+/// friction produces (N10).
 
 #include <Eigen/Core>
 

@@ -48,8 +48,8 @@ struct CollidingParticle {
   Vec3 angular_velocity() const { return surface_spin / radius; }
   Real inverse_inertia() const { return turning / (mass * radius * radius); }
   Vec3 velocity_at(Real t, Real h) const { return velocity - (h - t) * acceleration; }
-  /// Velocity at time t, scaled so that the energy is right at the position at(t), which is on the straight
-  /// path and not on the parabola.
+  /// Returns the velocity at time t, scaled so that the energy is right at the position at(t). This position
+  /// is on the straight path and not on the parabola.
   Vec3 arrival(Real t, Real h) const {
     const Vec3 v = velocity_at(t, h);
     const Vec3 shift = (t - from) * (path_velocity - (velocity_at(from, h) + v) / 2);

@@ -1,10 +1,10 @@
 #pragma once
 /// Resting contact of particles with each other and with bodies, including the collisions that
-/// ParticleImpacts leaves (physics P6, P7, P8, R10): a complementarity problem on the velocities at the end
-/// of the sub-step with Coulomb's round cone, as for bodies (contact_problem.h). Particles do not rotate, or
-/// are balls. Therefore a contact's mobility consists of two numbers, along the normal and perpendicular to
-/// it, and a single contact is solved in closed form. The problem is solved by projected Gauss-Seidel from
-/// the impulses of the previous sub-step; a heap at rest is its own solution. Particles are sorted into
+/// ParticleImpacts leaves (physics P6, P7, P8, R10). It is a complementarity problem on the velocities at the
+/// end of the sub-step with Coulomb's round cone, as for bodies (contact_problem.h). Particles do not rotate,
+/// or are balls. Therefore a contact's mobility consists of two numbers, along the normal and perpendicular
+/// to it, and a single contact is solved in closed form. The problem is solved by projected Gauss-Seidel from
+/// the impulses of the previous sub-step; a heap at rest starts with its solution. Particles are sorted into
 /// layers (NeighborGrid); two layers form a slab. Contacts of a slab extend at most to the adjacent layers.
 /// Therefore all even slabs can be solved in parallel, and then all odd ones.
 
@@ -99,12 +99,12 @@ class ParticleContacts {
              std::clamp(across.dot(along), -most, most) * across;
     }
   };
-  /// In one register: the velocity, and the inverse mass in the fourth lane.
+  /// A particle's velocity and, in the fourth lane of the same register, its inverse mass.
   struct Motion {
     Lanes velocity;
     Vec3 at() const { return vector_of(velocity); }
   };
-  /// Rotation of a ball (see CollidingParticle): the surface's spin, and turning / mass [1/kg].
+  /// Rotation of a ball (see CollidingParticle): the spin of its surface, and turning / mass [1/kg].
   struct Turn {
     Lanes surface_spin;
     Vec3 at() const { return vector_of(surface_spin); }
@@ -113,7 +113,7 @@ class ParticleContacts {
   struct Passing {
     Real time;
     uint32_t a, b;
-    bool a_stands, b_stands;  // whether they have stopped by then
+    bool a_stands, b_stands;  // whether each of them has stopped by then
 
     bool operator>(const Passing& o) const { return std::tie(time, a, b) > std::tie(o.time, o.a, o.b); }
   };
@@ -180,13 +180,13 @@ class ParticleContacts {
   std::vector<Found> found_;  // by chunk
   std::vector<Pair> pairs_, pairs_before_;
   std::vector<Surface> surfaces_, surfaces_before_;
-  // First contact of each particle; a pair belongs to its first particle.
+  // Index of the first contact of each particle; a pair belongs to its first particle.
   std::vector<uint32_t> pair_begin_, surface_begin_, pair_begin_before_, surface_begin_before_;
   std::vector<uint32_t> far_;
   std::vector<Motion> motion_;
   std::vector<Turn> turns_;  // by particle; empty if none turns
   std::vector<Real> slab_change2_;
-  // Paths after contact, whether they are long, and the time at which stopped particles stopped.
+  // Paths after contact, whether they are long, and the time at which a particle stopped.
   std::vector<CollidingParticle> paths_;
   std::vector<uint8_t> is_long_;
   std::vector<Real> stop_;

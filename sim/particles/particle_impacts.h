@@ -3,7 +3,7 @@
 /// of time (physics E6, P3, P5, P6). If a hit particle touches others, they form a cluster and are solved
 /// together. The work is bounded. A particle with too many collisions in a sub-step is left to the solver of
 /// resting contact (particle_contacts.h), which also prevents tunnelling. If there are too many collisions in
-/// total, all particles are. Slow collisions in dense crowds are also left to it, because they are very
+/// total, all particles are left to it. So are slow collisions in dense crowds, because they are very
 /// numerous and depend on each other.
 
 #include <functional>
@@ -21,9 +21,9 @@ class ParticleImpacts {
  public:
   static constexpr uint32_t kNone = ~0u;
 
-  /// Resolves the collisions of the particles. Before, ParticleSearch::build() and list_partners() must have
-  /// been called for them. Impulses on bodies are added to ParticleStep::impulses, and collisions are
-  /// appended to `strikes`.
+  /// Resolves the collisions of the particles. ParticleSearch::build() and list_partners() must have been
+  /// called for them. Impulses on bodies are added to ParticleStep::impulses, and collisions are appended to
+  /// `strikes`.
   void resolve(std::span<CollidingParticle> particles, const ParticleSearch& search, const ParticleStep& step,
                std::vector<ParticleStrike>& strikes);
 
@@ -73,7 +73,7 @@ class ParticleImpacts {
   std::vector<uint32_t> neighbours_;        // number of neighbours that nearly touch, for each particle
   std::vector<uint32_t> struck_body_;
   std::vector<uint32_t> changed_;
-  // The changed particles: those sorted last, and those changed since.
+  // The changed particles that are sorted, and the ones changed since they were sorted.
   ParticleSearch changed_search_;
   std::vector<uint32_t> sorted_stamp_;
   std::vector<uint32_t> unsorted_;

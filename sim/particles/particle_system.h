@@ -39,7 +39,7 @@ struct ParticleSystem {
   ParticleArrays arrays;
   uint64_t next_id = 0;
   /// For each particle added since the last sub-step (the last ones of the arrays): time from its birth to
-  /// the end of the coming sub-step [s]. Negative: it exists from the sub-step's start.
+  /// the end of the coming sub-step [s]. A negative value means that it exists from the sub-step's start.
   std::vector<Real> since_birth;
 
   uint64_t add(const Particle& p, Real elapsed);

@@ -94,9 +94,9 @@ struct ParticleArrays {
   std::size_t size() const { return position.size(); }
 };
 
-/// Returns the impulse on body 1 in a collision of two bodies [N s] (physics P5). m12: effective mass [kg]; u
-/// = v1 - v2: relative velocity, u.n < 0; n: unit normal. The contact sticks if the friction cone allows it;
-/// otherwise |P_t| = mu P_n against the sliding direction.
+/// Returns the impulse on body 1 in a collision of two bodies [N s] (physics P5). m12: effective mass [kg]. u
+/// = v1 - v2: relative velocity, u.n < 0 [m/s]. n: unit normal. The contact sticks if the friction cone
+/// allows it; otherwise |P_t| = mu P_n against the sliding direction.
 Vec3 collision_impulse(Real m12, const Vec3& u, const Vec3& n, Real restitution, Real friction);
 /// As above, for round bodies that rotate. `across`: effective mass for tangential impulses [kg].
 Vec3 collision_impulse(Real m12, Real across, const Vec3& u, const Vec3& n, Real restitution, Real friction);

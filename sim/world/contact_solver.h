@@ -29,7 +29,7 @@ class ContactSolver {
   FastContacts fast_;
 };
 
-/// Adds a pair whose contact forces are inaccurate to StepReport::rough_contacts. Does nothing for null.
+/// Adds a pair with inaccurate contact forces to StepReport::rough_contacts. Does nothing for null.
 void record_rough_contact(const ContactPair* pair, StepReport& report);
 
 }  // namespace offstage::sim
