@@ -67,7 +67,7 @@ const std::array<Entry, kEntries>& table() {
   return entries;
 }
 
-/// The table entry below a temperature, and the fraction of the way to the next entry.
+/// Position of a temperature in the table: the entry below it, and the fraction of the way to the next entry.
 struct Spot {
   std::size_t i;
   double part;

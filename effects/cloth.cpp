@@ -85,10 +85,10 @@ void add_spring(ClothDef& def, uint32_t a, uint32_t b, Real stiffness, const Fab
       {a, b, length, stiffness, damping, kind, counterpart, distance(counterpart[0], counterpart[1])});
 }
 
-/// A spring over two cells of length h that bends by an angle theta gets shorter by h theta^2 / 4, so it
-/// resists bending only by its compression. Its stiffness is chosen for a strip of width w that is bent to
-/// the angle of a fold between cells, theta = 1/2: its energy then is that of the bending moment, B w theta^2
-/// / (2 h).
+/// Returns the stiffness of a spring that resists bending over two cells of length h. If the cloth bends by
+/// an angle theta, the spring gets shorter by h theta^2 / 4, and resists bending only by its compression. The
+/// stiffness is chosen for a strip of width w and the angle theta = 1/2 of a fold between cells: the energy
+/// is then that of the bending moment, B w theta^2 / (2 h).
 Real bend_stiffness(Real bend, Real w, Real h) {
   constexpr Real kAngle = 0.5;
   return 16 * bend * w / (h * h * h * kAngle * kAngle);
@@ -183,9 +183,9 @@ ClothDef grid_cloth(const GridSize& size, const sim::Pose& pose, const Fabric& f
         add_spring(def, at(c, r), at(c, r + 2), bend_stiffness(fabric.bend, wx, dz), fabric,
                    SpringKind::bend);
     }
-  // A shear of gamma changes the diagonals of a cell by gamma dx dz / |d|. The energy of both springs equals
-  // that of the shear modulus over the cell's area.
-  // Each of the two is the other's counterpart.
+  // A shear of gamma changes the diagonals of a cell by gamma dx dz / |d|. The energy of both springs
+  // together equals the energy by the shear modulus over the cell's area. Each diagonal is the counterpart of
+  // the other.
   const Real shear = fabric.shear * (dx * dx + dz * dz) / (2 * dx * dz);
   for (uint32_t r = 0; r < nz; ++r)
     for (uint32_t c = 0; c < nx; ++c) {
@@ -255,7 +255,7 @@ uint32_t add_cord(ClothDef& def, const Cord& cord) {
   if (cord.vertex >= def.vertices.size()) refuse("a cord begins at a vertex that does not exist");
   const Vec3 start = def.vertices[cord.vertex], across = cord.end - start;
   const Real distance = across.norm(), length = cord.length > 0 ? cord.length : distance;
-  if (!(length > 0)) refuse("the ends of a cord are at one place, and it has no length");
+  if (!(length > 0)) refuse("the ends of a cord are at the same place; give it a length");
   const Real count = cord.segments, rest = length / count, segment_mass = cord.mass_per_length * rest;
   // Both parts of a slack cord meet at its middle, or beside it if the number of segments is odd.
   const Real first = std::floor(count / 2) * rest, second = length - first;

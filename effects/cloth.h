@@ -28,9 +28,9 @@ inline uint32_t grid_vertex(const GridSize& size, uint32_t column, uint32_t row)
 /// Throws std::invalid_argument for a size or a fabric out of range.
 sim::ClothDef grid_cloth(const GridSize& size, const sim::Pose& pose, const Fabric& fabric);
 
-/// Creates a cloth from any triangle mesh: stretch springs along its edges, bend springs between the vertices
-/// opposite an edge. Vertices at the same position are merged by weld(), unless `keep_vertices` is true,
-/// which keeps the vertex indices.
+/// Creates a cloth from any triangle mesh, with stretch springs along its edges and bend springs between the
+/// vertices opposite an edge. Vertices at the same position are merged by weld(), unless `keep_vertices` is
+/// true, which keeps the vertex indices.
 sim::ClothDef mesh_cloth(const sim::TriangleMesh& mesh, const sim::Pose& pose, const Fabric& fabric,
                          bool keep_vertices = false);
 

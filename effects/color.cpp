@@ -5,8 +5,8 @@
 namespace offstage::effects {
 
 Rgba StartColor::of(const RandomStream& random, uint64_t id) const {
-  // Numbers that select the random numbers for drawing. They differ from the numbers that the simulation
-  // uses.
+  // Property numbers for drawing. They differ from those of the simulation, so that the random numbers are
+  // independent.
   constexpr uint32_t kBrightness = 1u << 24, kChannel = kBrightness + 1;
   const auto varied = [&](float middle, float spread, uint32_t property) {
     if (spread == 0) return middle;

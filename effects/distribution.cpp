@@ -15,9 +15,9 @@ template <class... Fs>
 Overloaded(Fs...) -> Overloaded<Fs...>;  // Clang before 17 does not deduce it
 
 constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
-/// Limits of at least this size count as no limits.
+/// A limit of at least this size counts as none.
 constexpr Real kUnbounded = 1e300;
-/// The normal distribution function at -1.
+/// Value of the standard normal distribution function at -1.
 constexpr Real kBelowOneDeviation = 0.15865525393145705;
 
 Real value_at(const Curve& curve, Real t) {

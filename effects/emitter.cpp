@@ -135,7 +135,7 @@ void Emitter::release(sim::World& world, const Release& r, Real start, Real end)
   const uint64_t allowed =
       std::min(r.count, def_.particles.max_alive > alive ? def_.particles.max_alive - alive : 0);
   if (allowed > 0) {
-    // Particles that were due earlier without waiting belong to the prewarming.
+    // Without waiting, particles that were due earlier belong to the prewarm.
     const Real birth_time = r.waited ? std::max(r.time, start) : r.time;
     const Batch batch{allowed, birth_time, end, largest_diameter(allowed, birth_time),
                       def_.body ? world.body_motion(def_.body, std::max(birth_time, start)) : sim::Motion{}};
@@ -150,7 +150,7 @@ void Emitter::release(sim::World& world, const Release& r, Real start, Real end)
       wait({birth_time + clearing, allowed - placed, true}, end);
     }
   }
-  // Particles over the limit use up their numbers, too, so that the random numbers of the others do not
+  // Particles over the limit also use up their numbers, so that the random numbers of other particles do not
   // depend on the limit.
   report_.skipped += r.count - allowed;
   number_ += r.count - allowed;
@@ -185,7 +185,7 @@ uint64_t Emitter::place_in_cells(sim::World& world, const Batch& batch) {
   return placed;
 }
 
-/// The cells of a sphere and a disc are rotated for each round of them. A release that would not fit into the
+/// Rotates the cells of a sphere or a disc for each round through them. A release that does not fit into the
 /// current round begins with the next one, because the cells of two rounds may overlap.
 void Emitter::begin_cells(const Cells& cells, uint64_t count) {
   if (def_.surface.kind == SurfaceKind::plane) return;

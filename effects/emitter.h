@@ -34,8 +34,8 @@ class Emitter {
   /// Adds the particles created in (start, end] to the world, each with its remaining time in this sub-step.
   void emit(sim::World& world, Real start, Real end);
 
-  /// Releases nothing after this time of the world [s], not even postponed particles. Existing particles live
-  /// on.
+  /// Stops the emitter: after this time of the world [s] it releases nothing, not even postponed particles.
+  /// Existing particles remain.
   void stop(Real time);
 
   sim::ParticleSystemHandle target() const { return target_; }
@@ -71,10 +71,10 @@ class Emitter {
   Spacing spacing_;
   EmitterReport report_;
   uint64_t number_ = 0;        // number of the next particle, on which its random numbers depend
-  Real path_fraction_ = 0;     // particles of rate_per_metre due since the last one, below 1
+  Real path_fraction_ = 0;     // fraction of the next particle of rate_per_metre that is already due, below 1
   uint64_t cell_cursor_ = 0;   // position in the shuffled sequence of cells
   std::array<Real, 3> turn_;   // rotation of the cells for one round
-  uint64_t turned_round_ = 0;  // which round that is, from 1
+  uint64_t turned_round_ = 0;  // number of the round for which turn_ is valid, from 1
   std::vector<Release> due_, waiting_;
 };
 

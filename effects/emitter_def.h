@@ -33,8 +33,8 @@ struct EmitterRelease {
   Real inherit_velocity = 1;  ///< fraction of the velocity of the body's point that particles get, >= 0
   bool recoil =
       false;  ///< whether a dynamic body gets the opposite of the particles' momentum relative to it
-  /// Whether particles may overlap when they are released. They are placed anywhere on the surface and never
-  /// postponed. For particles that do not collide with each other.
+  /// Whether particles may overlap when they are released. They are then placed anywhere on the surface and
+  /// never postponed. Use it for particles that do not collide with each other.
   bool overlap = false;
   Varying rate = 100.0;  ///< particles per second, released one by one; 0: only `count` and bursts
   /// Particles per metre of the path of the emitter's origin [1/m], >= 0. They are distributed evenly along
@@ -44,7 +44,7 @@ struct EmitterRelease {
   Varying interval = 0.1;  ///< time between releases [s], > 0
   std::vector<Burst> bursts = {};
   Real start = 0;                        ///< start of `rate` and `count` [s]
-  Real end = 1e30;                       ///< end of all releases [s]; existing particles live on
+  Real end = 1e30;                       ///< end of all releases [s]; existing particles remain
   std::vector<TimeWindow> windows = {};  ///< times in which `rate` and `count` release; empty: always
   Real prewarm = 0;                      ///< time by which `rate` and `count` begin before `start` [s], >= 0
 };
@@ -53,8 +53,8 @@ struct EmitterDef {
   std::string name = {};  ///< name of the emitter, which also selects its random numbers
   uint64_t seed = 1;
   EmitterSurface surface = {};
-  /// Null: fixed in the world; otherwise it moves with the body, and releases nothing while the body does not
-  /// exist.
+  /// The body with which the emitter moves; null: it is fixed in the world. While the body does not exist,
+  /// nothing is released.
   sim::BodyHandle body = {};
   EmitterRelease release = {};
   NewParticles particles = {};

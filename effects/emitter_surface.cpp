@@ -13,9 +13,9 @@ constexpr Real kPi = std::numbers::pi;
 /// 1.
 constexpr uint64_t kGoldenTurn = 0x9e3779b97f4a7c15u;
 
-// Smallest distances between points of the golden spirals, times sqrt(n): on the unit sphere from 5 points
-// on, on the unit sphere for fewer, and on a disc of radius sqrt(n), where the first and the fourth point are
-// closest.
+// Smallest distances between points of the golden spirals, times sqrt(n). They are for the unit sphere from 5
+// points on, for the unit sphere with fewer points, and for a disc of radius sqrt(n), where the first and the
+// fourth point are closest.
 constexpr Real kSphereGap = 3.078, kSphereGapOfFew = 2.685, kDiscGap = 1.546;
 
 Real golden_angle(uint64_t i) {
@@ -114,7 +114,7 @@ Place ReleaseSurface::anywhere(const std::array<Real, 3>& u) const {
   }
 }
 
-/// Equal steps of height correspond to equal areas of the sphere (Archimedes).
+/// On a sphere, equal steps of height correspond to equal areas (Archimedes).
 Place ReleaseSurface::on_sphere(Real height, Real angle) const {
   const SinCos a = sincos(angle);
   const Real r = std::sqrt(std::max(0.0, 1 - height * height));

@@ -7,12 +7,12 @@
 namespace offstage::effects {
 namespace {
 
-// Areal densities and flexural rigidities are measured ones (docs/scene-guide.md names the sources). The
-// stiffness along the threads is a tenth to a hundredth of the true one. At these loads the strain is already
+// Areal densities and flexural rigidities are measured values (docs/scene-guide.md names the sources). The
+// stiffness along the threads is a tenth to a hundredth of the real one: at these loads the strain is already
 // far below a per cent, and a higher stiffness would only need more steps. The low shear stiffness makes
 // woven cloth drape in folds. drag - lift is the friction of both sides of a plate in a turbulent boundary
-// layer, 2 * 0.074 Re^(-1/5), 0.01 at 1 m and 10 m/s, doubled for rough cloth. More would stretch a flag so
-// much that it hardly flutters.
+// layer, 2 * 0.074 Re^(-1/5) or 0.01 at 1 m and 10 m/s, doubled for rough cloth. With a larger value, a flag
+// would be stretched so much that it hardly flutters.
 const std::array<FabricPreset, 6> kPresets = {{
     {"silk",
      "light and flowing, many small folds",
@@ -75,9 +75,10 @@ const std::array<FabricPreset, 6> kPresets = {{
       .drag = 1,
       .lift = 0.98,
       .max_stretch = 2}},
-    // A latex balloon of 30 cm weighs 3 g. Here its skin has no stress at a diameter of 20 cm. Stretched by
-    // lambda = 1.5 it has the tension 1.5 stretch (lambda - 1) / lambda = p R / 2 of a pressure of 2.5 kPa.
-    // Drag is that of a sphere, whose coefficient is 4 (drag - lift) + 4/3 lift = 0.47 (docs/scene-guide.md).
+    // A latex balloon of 30 cm weighs 3 g. The skin of this preset has no stress at a diameter of 20 cm.
+    // Stretched by lambda = 1.5, it has the tension 1.5 stretch (lambda - 1) / lambda, which equals p R / 2
+    // for a pressure p of 2.5 kPa. The drag is that of a sphere: its coefficient is 4 (drag - lift) + 4/3
+    // lift = 0.47 (docs/scene-guide.md).
     {"balloon",
      "the skin of a balloon of 20 cm that is blown up to 30 cm",
      {.areal_density = 0.024,

@@ -32,7 +32,7 @@ class NewParents {
   bool begun_ = false;
   uint64_t next_ = 0;                   // first id that was not seen yet
   std::vector<uint64_t> age_zero_ids_;  // ids seen at age 0, ascending
-  std::vector<uint64_t> waiting_;       // of the last call
+  std::vector<uint64_t> waiting_;       // ids that had age 0 in the last call
   std::vector<std::size_t> found_;
 };
 

@@ -42,7 +42,7 @@ Real logarithm(Real x) {
   const Real s = (m - 1) / (m + 1), s2 = s * s;
   constexpr Real kSeries[] = {1.0 / 3,  1.0 / 5,  1.0 / 7,  1.0 / 9,  1.0 / 11,
                               1.0 / 13, 1.0 / 15, 1.0 / 17, 1.0 / 19, 1.0 / 21};
-  // log 2 in two parts, the first with trailing zeros so that k times it is exact.
+  // log 2 in two parts. The first has trailing zeros, so that k times it is exact.
   constexpr Real kLog2High = 0x1.62e42fee00000p-1, kLog2Low = 0x1.a39ef35793c76p-33;
   const Real artanh_rest = s * s2 * polynomial(kSeries, s2);
   return k * kLog2High + (2 * s + (2 * artanh_rest + k * kLog2Low));
@@ -87,8 +87,8 @@ Permutation::Permutation(uint64_t n, uint64_t key) : n_(n), key_(key), half_bits
 
 uint64_t Permutation::operator()(uint64_t i) const {
   const uint64_t mask = (uint64_t{1} << half_bits_) - 1;
-  // The network permutes up to 4 n numbers. If it is applied repeatedly, starting at i, it eventually gives a
-  // number below n.
+  // The network permutes up to 4 n numbers. Starting at i, repeated application eventually gives a number
+  // below n.
   do {
     uint64_t left = i >> half_bits_, right = i & mask;
     for (uint64_t round = 0; round < 6; ++round) {
@@ -150,14 +150,14 @@ Real normal_quantile(Real p) {
 
 SinCos sincos(Real x) {
   constexpr Real kFar = 1e6;
-  if (std::abs(x) > kFar) x = std::fmod(x, 2 * std::numbers::pi);  // exact, so the same bits everywhere
-  // x - k pi/2 with pi/2 in three parts; k times each of the first two is exact for |x| < 1e6.
+  if (std::abs(x) > kFar) x = std::fmod(x, 2 * std::numbers::pi);  // exact, with the same bits everywhere
+  // Computes x - k pi/2 with pi/2 in three parts; k times each of the first two is exact for |x| < 1e6.
   constexpr Real kHalfPi1 = 0x1.921fb54400000p+0, kHalfPi2 = 0x1.0b4611a600000p-34,
                  kHalfPi3 = 0x1.3198a2e037073p-69;
   const Real k = std::floor(x * 0.63661977236758134 + 0.5);
   const Real r = ((x - k * kHalfPi1) - k * kHalfPi2) - k * kHalfPi3;
 
-  // Taylor series, whose remainders on [-pi/4, pi/4] are below 1e-18.
+  // The remainders of the Taylor series on [-pi/4, pi/4] are below 1e-18.
   constexpr Real kSin[] = {1.0,
                            -1.0 / 6,
                            1.0 / 120,

@@ -13,8 +13,8 @@ namespace {
 constexpr Real kNever = std::numeric_limits<Real>::infinity();
 /// Time for which a random rate keeps its value [s].
 constexpr Real kRateWindow = 0.1;
-/// If this many consecutive windows (almost three hours) have no particle, a random rate counts as zero for
-/// ever.
+/// If this many consecutive windows (almost three hours) have no particle, a random rate counts as zero from
+/// then on.
 constexpr int kMaxIdleWindows = 100'000;
 
 /// Returns the time at which the integral of a rate over time, starting at t, reaches 1 [s].

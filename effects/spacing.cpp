@@ -25,7 +25,7 @@ uint32_t& Spacing::bucket(const Cell& cell) {
   return buckets_[combined(combined(key(0), key(1)), key(2)) & (buckets_.size() - 1)];
 }
 
-/// The bucket may also contain balls of other cells, which do not change the result.
+/// The bucket may also contain balls of other cells; these do not change the result.
 bool Spacing::is_clear(const Cell& cell, const Vec3& centre, Real radius) {
   for (uint32_t i = bucket(cell); i != kNone; i = balls_[i].next) {
     const Real reach = radius + balls_[i].radius;

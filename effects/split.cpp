@@ -47,8 +47,8 @@ void Splitter::emit(sim::World& world, Real start, Real end) {
   }
 }
 
-/// Numbers the new particles that are not children, in the order of creation. Children that were created
-/// between them do not affect the numbers.
+/// Assigns numbers to the new particles that are not children, in the order of creation. Children that were
+/// created between them do not affect these numbers.
 void Splitter::enter_new_particles(const sim::World& world, Real now) {
   const sim::ParticleArrays& p = world.particles(parents_);
   for (std::size_t i : new_parents_.find(p)) {

@@ -45,7 +45,7 @@ class Splitter {
   /// Throws std::invalid_argument if a parameter is out of range.
   Splitter(const SplitDef& def, sim::ParticleSystemHandle parents, sim::ParticleSystemHandle children);
 
-  /// Adds the children created in (start, end]. Must be called before each sub-step.
+  /// Adds the children created in (start, end]. Call it before each sub-step.
   void emit(sim::World& world, Real start, Real end);
 
   const OffspringReport& report() const { return report_; }

@@ -75,8 +75,8 @@ void SubEmitter::answer_ages(sim::World& world, Real start, Real end) {
 
 void SubEmitter::answer(sim::World& world, const sim::ParticleEvent& event, Real start, Real end) {
   if (event.velocity.norm() < def_.release.min_speed) return;
-  // For an age the time of the event is not used: an age is reached only once, and the rounding of the time
-  // depends on the frame rate.
+  // For the trigger `age`, the time of the event is not used: an age is reached only once, and the rounding
+  // of the time depends on the frame rate.
   const uint64_t occasion = def_.trigger == Trigger::age ? 0 : std::bit_cast<uint64_t>(event.time);
   const uint64_t index = combined(event.id, occasion);
   const Draws draw(random_, index, event.time);

@@ -57,8 +57,8 @@ class SubEmitter {
   /// Throws std::invalid_argument if a parameter is out of range.
   SubEmitter(const SubEmitterDef& def, sim::ParticleSystemHandle parents, sim::ParticleSystemHandle target);
 
-  /// Adds the particles for the events of the last sub-step, and for the ages reached in (start, end]. Must
-  /// be called before each sub-step.
+  /// Adds the particles for the events of the last sub-step, and for the ages reached in (start, end]. Call
+  /// it before each sub-step.
   void emit(sim::World& world, Real start, Real end);
 
   const OffspringReport& report() const { return report_; }
@@ -75,7 +75,7 @@ class SubEmitter {
   RandomStream random_;
   NewParents new_parents_;
   OffspringReport report_;
-  uint64_t born_ = 0;  // number in this sub-step
+  uint64_t born_ = 0;  // number of particles released in this sub-step
 };
 
 }  // namespace offstage::effects

@@ -36,13 +36,13 @@ void Trail::emit(sim::World& world, Real start, Real end) {
   for (std::size_t i = 0; i < p.size(); ++i) {
     const bool is_new = next != fresh.end() && *next == i;
     next += is_new;
-    // The time of creation of a new particle is known only after it has been stepped; its trail then starts
-    // at that time.
+    // The creation time of a new particle is known only after it has been stepped. Its trail then starts at
+    // that time.
     if (p.age[i] > 0) leave(world, i, is_new, start, end);
   }
 }
 
-/// Adds the particles that particle i leaves behind in the sub-step; for a new particle, since its creation.
+/// Adds the particles that particle i leaves behind in the sub-step or, if it is new, since its creation.
 void Trail::leave(sim::World& world, std::size_t i, bool is_new, Real start, Real end) {
   const sim::ParticleArrays& p = world.particles(parents_);
   const Draws draw(random_, p.id[i], start);

@@ -17,7 +17,7 @@ class Draws;
 struct TrailRelease {
   Varying rate = 60.0;  ///< particles per second of each parent, drawn once for its life; must not be a curve
   Real start_age = 0;   ///< age of the parent at which its trail begins [s], >= 0
-  Real end_age = 1e30;  ///< age of the parent [s]
+  Real end_age = 1e30;  ///< age of the parent at which its trail ends [s]
   Varying velocity_percent = 0.0;  ///< percentage of the parent's velocity that new particles get
 };
 
@@ -38,7 +38,7 @@ class Trail {
   /// Throws std::invalid_argument if a parameter is out of range, or if both systems are the same.
   Trail(const TrailDef& def, sim::ParticleSystemHandle parents, sim::ParticleSystemHandle target);
 
-  /// Adds the particles left behind in (start, end]. Must be called before each sub-step.
+  /// Adds the particles left behind in (start, end]. Call it before each sub-step.
   void emit(sim::World& world, Real start, Real end);
 
   const OffspringReport& report() const { return report_; }

@@ -11,7 +11,7 @@
 namespace offstage::effects {
 namespace {
 
-/// Greatest number up to which all integers are exact. Larger bounds would be useless.
+/// All integers up to this number are exact. Larger bounds are clamped to it.
 constexpr Real kSaturated = 0x1p53;
 /// Used instead of infinity, because infinity times zero is not a number.
 constexpr Real kHuge = 1e300;
@@ -25,7 +25,7 @@ Real most(const Varying& count) {
   return static_cast<Real>(rounded(upper_bound(count)));
 }
 
-// Rounds up, except for quotients that are integers within rounding.
+// Rounds up. A quotient within rounding of an integer gives this integer.
 Real up(Real x) {
   return std::ceil(x * (1 - 1e-12));
 }
@@ -72,11 +72,11 @@ bool can_wait(const EmitterDef& def) {
          count > static_cast<Real>(surface.cells(2 * radius).count());
 }
 
-/// Returns the number of particles that come from one particle, itself included. The particle may still split
-/// `left` times; `own` of these splits fit into its lifespan, and `each` splits fit into the lifespan of each
+/// Returns the number of particles that descend from one particle, itself included. The particle may still
+/// split `left` times. `own` of these splits fit into its lifespan; `each` splits fit into the lifespan of a
 /// child.
 Real family(Real children, int left, int own, int each) {
-  // Number for a child at the start of its life, by splits left; smaller depths are computed first.
+  // By splits left: the number for a child at the start of its life. Smaller depths are computed first.
   std::vector<std::vector<Real>> size(static_cast<std::size_t>(left) + 1);
   const int most_own = std::min(left, std::max(own, each));
   for (int d = 0; d <= left; ++d) {
@@ -146,7 +146,7 @@ WorstCase worst_case(const TrailDef& def, const WorstCase& parents) {
   const Real rate = highest_rate(def.release.rate),
              time = std::min(parents.lifespan, def.release.end_age) - def.release.start_age;
   if (!(time > 0)) return {};
-  // Each parent releases at regular times, and each may release one particle at once.
+  // Each parent releases particles at regular times. The first one may come at once.
   const WorstCase begun = bounded_children(parents, 1, parents.lifespan, 0, def.particles.max_alive);
   return bounded(static_cast<Real>(parents.born) * up(rate * time), upper_bound(def.particles.lifespan),
                  begun.at_once, begun.rate + static_cast<Real>(parents.alive) * rate,

@@ -22,18 +22,18 @@ struct WorstCase {
   Real rate = 0;  ///< [1/s]
 };
 
-/// Bounds for an emitter, from its start to `duration` [s] on its clock.
+/// Returns bounds for an emitter, from its start to `duration` [s] on its clock.
 WorstCase worst_case(const EmitterDef& def, Real duration);
-/// Bounds for the number of children alone. `parents` are the bounds for their parents. `same_system`:
+/// Returns bounds for the children alone. `parents`: bounds for their parents. `same_system`: whether
 /// children are in the system of their parents.
 WorstCase worst_case(const SplitDef& def, const WorstCase& parents, bool same_system);
 WorstCase worst_case(const TrailDef& def, const WorstCase& parents);
-/// Bounds for a sub-emitter. Each parent has one death and reaches the age once; the caller estimates
-/// `hits_per_parent`, the number of collisions in its life.
+/// Returns bounds for a sub-emitter. Each parent has one death and reaches the age once. `hits_per_parent`:
+/// number of collisions in a parent's life, as estimated by the caller.
 WorstCase worst_case(const SubEmitterDef& def, const WorstCase& parents, Real hits_per_parent = 1);
 
-/// The highest rate [1/s] at which particles that are released one by one do not overlap, because each leaves
-/// its cell before the cell is used again. 0 on a mesh, which has no cells.
+/// Returns the highest rate [1/s] at which particles that are released one by one do not overlap, because
+/// each leaves its cell before the cell is used again. Returns 0 on a mesh, which has no cells.
 Real highest_clear_rate(const EmitterDef& def);
 
 }  // namespace offstage::effects

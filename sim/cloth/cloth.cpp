@@ -20,7 +20,7 @@ std::string element(const char* field, std::size_t i) {
 }
 
 std::string vertex_problem(const ClothDef& def) {
-  if (def.vertices.empty()) return "vertices: there are none";
+  if (def.vertices.empty()) return "it has no vertices";
   if (!def.rest_vertices.empty() && def.rest_vertices.size() != def.vertices.size())
     return "rest_vertices must be empty or have one position for each vertex";
   if (def.masses.size() != def.vertices.size()) return "masses must have one value for each vertex";
@@ -112,7 +112,7 @@ std::string problem(const ClothDef& def) {
     const auto& rest = def.rest_vertices.empty() ? def.vertices : def.rest_vertices;
     if (!MeshTopology({rest, def.triangles}).defects().closed()) return "pressure needs a closed surface";
     if (!(enclosed_volume(rest, def.triangles) > 0))
-      return "pressure needs triangles whose normals point out";
+      return "pressure needs triangles whose normals point outwards";
   }
   return {};
 }

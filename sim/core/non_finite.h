@@ -8,9 +8,9 @@
 
 namespace offstage::sim {
 
-/// An object whose state became infinite or NaN, with its state before and after that [m], [m/s]. For a body,
-/// `position_before` is the position of its origin, and `velocity_before` is not set. The other values belong
-/// to the centre of mass.
+/// An object whose state became infinite or NaN, with its last finite state and the state after it [m],
+/// [m/s]. For a body, `position_before` is the position of its origin, and `velocity_before` is not set. The
+/// other values belong to the centre of mass.
 struct NonFinite {
   std::string object;     ///< name of the body, the particle system or the cloth
   uint64_t particle = 0;  ///< id of the particle in its system, or index of the vertex of a cloth

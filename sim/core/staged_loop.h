@@ -1,6 +1,6 @@
 #pragma once
 /// A sequence of many short parallel loops. A parallel loop of oneTBB for each of them would cost more than
-/// its work. Here the threads are started once and go from stage to stage together.
+/// its work. Therefore the threads are started once, and go from stage to stage together.
 
 #include <algorithm>
 #include <atomic>

@@ -24,7 +24,7 @@ struct Wrench {
   }
 };
 
-/// The matrix M for which M u is the cross product v x u.
+/// Returns the matrix M for which M u is the cross product v x u.
 inline Mat3 cross_matrix(const Vec3& v) {
   Mat3 m;
   m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;

@@ -160,7 +160,7 @@ std::string problem(const Grab& f) {
   return f.reach > 0 ? "" : "reach must be > 0";
 }
 std::string problem(const AppliedForce& f) {
-  if (f.keys.empty()) return "keys: there is none, a force needs at least one";
+  if (f.keys.empty()) return "keys are missing, at least one is needed";
   if (f.point && !f.point->allFinite()) return "point must be finite";
   for (std::size_t i = 0; i < f.keys.size(); ++i) {
     const AppliedForce::Key& key = f.keys[i];

@@ -245,7 +245,7 @@ MeshHandle World::add_compound(const std::vector<SolidMesh>& solids) {
 }
 
 MeshHandle World::add_shared_mesh(std::shared_ptr<const CollisionMesh> mesh) {
-  if (!mesh) refuse("mesh", "there is none");
+  if (!mesh) refuse("mesh", "it is null");
   return impl_->meshes.insert(std::move(mesh));
 }
 

@@ -52,7 +52,7 @@ void check(const JointDef& def) {
     refuse(def, "restitution is " + std::to_string(def.restitution) + ", allowed is 0 to 1");
   if (!(def.lower <= def.upper) || def.lower > 0 || def.upper < 0)
     refuse(def, "limits are " + std::to_string(def.lower) + " to " + std::to_string(def.upper) +
-                    ", allowed is a range that contains 0, where the joint is made");
+                    ", allowed is a range that contains 0, the coordinate at creation");
   check_not_negative(def, "swing", def.swing);
   if (def.has_limits() && def.type == JointType::fixed)
     refuse(def, "limits have no effect on a fixed joint; remove them");

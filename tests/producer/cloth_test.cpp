@@ -161,7 +161,7 @@ TEST(Cloths, CordsAndGasesThatCannotBeAreRefused) {
   EXPECT_EQ(cloth_errors(R"({"pressure": 100})"), "/cloths/0: pressure needs a closed surface\n");
   EXPECT_EQ(
       cloth_errors(R"({"shape": {"type": "sphere"}, "cords": [{"from": [0.1, 0, 0], "to": [0.1, 0, 0]}]})")
-          .find("/cloths/0: cloth: the ends of a cord are at one place"),
+          .find("/cloths/0: cloth: the ends of a cord are at the same place"),
       0u);
 }
 
