@@ -217,7 +217,7 @@ void Articulation::add_forces(Real t, std::span<const LinkMotion> motion,
   read_rows(t, motion);
   if (!system_.factorize(rows_, mobility)) return;  // settle() detects and counts the same failure
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    // d/dt (I w) = torque: the angular acceleration includes the gyroscopic term.
+    // d/dt (I w) = torque. So the angular acceleration includes the gyroscopic term.
     const Mat3& R = motion[i].axes;
     const Vec3& w = motion[i].angular_velocity;
     const Vec3 H = R * (bodies_[i]->rigid.inertia * (R.transpose() * w));
@@ -289,7 +289,7 @@ void Articulation::kick(Real t, Real h, std::span<const LinkMotion> motion,
   std::vector<Vec6> by_forces(joints_.size());
   sprung_->relative(velocities_, by_forces);
   for (std::size_t j = 0; j < joints_.size(); ++j) {
-    // The velocities already satisfy the constraints, whose errors are those of the positions.
+    // The velocities already satisfy the constraints. The errors of the constraints belong to the positions.
     change_[j] = -by_forces[j];
     for (uint32_t i = rows_[j].count; i < sprung_rows_[j].count; ++i)
       change_[j][i] -= sprung_rows_[j].error[i];
@@ -311,7 +311,7 @@ Wrench Articulation::wrench(std::size_t j, const JointRows& rows, const Vec6& im
   const Vec6 on_a = rows.on_a * impulse;
   const uint32_t a = system_.joints()[j].a;
   const Mat3 axes = a != JointSystem::kDriven ? motion[a].axes : link_motion(joints_[j]->a, 0).axes;
-  // The torque of the angular constraints, without the moment of the force.
+  // This is the torque of the angular constraints, without the moment of the force.
   return {on_a.head<3>(), on_a.tail<3>() - (axes * frames_a_[j].point).cross(on_a.head<3>())};
 }
 
@@ -376,7 +376,7 @@ void Articulation::find_response(uint32_t link, const Vec6& impulse) {
   pass_on(response_);
 }
 
-/// Returns the impulses of the limits that prevent every joint of the response from moving beyond its limits.
+/// Returns the impulses of the limits that keep every joint of the response within its limits.
 Eigen::VectorXd Articulation::stop_impulses() const {
   const auto n = static_cast<Eigen::Index>(stops_.size());
   Eigen::MatrixXd mobility(n, n);
@@ -421,7 +421,7 @@ Mat6 Articulation::free_mobility(uint32_t link) {
     find_response(link, Vec6::Unit(k));
     mobility.col(k) = response_[link];
   }
-  // Rounding makes the matrix slightly asymmetric, with which an impulse could add energy.
+  // Rounding makes the matrix slightly asymmetric, and an impulse could then add energy.
   const Mat6 symmetric = (mobility + mobility.transpose()) / 2;
   link_mobility_[link] = symmetric;
   return symmetric;

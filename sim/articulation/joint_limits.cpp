@@ -134,7 +134,7 @@ class RowMaker {
     return row.on_a.head<3>().dot(at.a.velocity) + row.on_a.tail<3>().dot(at.a.angular_velocity) +
            row.on_b.head<3>().dot(at.b.velocity) + row.on_b.tail<3>().dot(at.b.angular_velocity);
   }
-  /// The speed of the coordinate at the interval's end, before the impulses of the rows are applied.
+  /// Returns the speed of the coordinate at the interval's end, before the impulses of the rows are applied.
   Real speed(const Direction& d) const { return speed(d.end, end_); }
 
   /// Returns the coordinate from which the mean of the speeds at both ends leads to the coordinate at the
@@ -229,7 +229,7 @@ class RowMaker {
     if (motor.stiffness == 0) {
       r.target = missing / h_;
     } else {
-      // effort = k (missing - h u) - c u, with the speed u at the end.
+      // With the speed u at the end, effort = k (missing - h u) - c u.
       const Real resistance = motor.stiffness * h_ + motor.damping;
       r.softness = 1 / (h_ * resistance);
       r.target = motor.stiffness * missing / resistance;

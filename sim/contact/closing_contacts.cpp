@@ -133,8 +133,8 @@ class Pieces {
     return c.frame.n.dot(bodies[c.a].velocity_at(c.arm_a) - bodies[c.b].velocity_at(c.arm_b)) +
            problem_.points[i].surface.x();
   }
-  /// Returns the time until the next contact closes [s]; a time beyond the end of the interval if no contact
-  /// closes.
+  /// Returns the time until the next contact closes [s]. If no contact closes, this time is beyond the end of
+  /// the interval.
   Real next_closing() {
     const Real rest = problem_.duration - time_;
     Real next = 2 * rest;

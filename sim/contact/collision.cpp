@@ -21,10 +21,10 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr Real kRounding = 1e-13;  ///< relative rounding error of products of impulses and velocities
-/// Number of arcs of the circle of directions; each is searched for a change of sign.
+/// The circle of directions is divided into this number of arcs; each is searched for a change of sign.
 constexpr int kArcs = 64;
 constexpr int kHalvings = 60;  ///< bisection steps: to the last bit
-/// Greatest number of solutions of a cluster in the search for the restitution that conserves energy.
+/// Greatest number of solutions of a cluster while the restitution that conserves energy is searched.
 constexpr int kSolves = 20;
 constexpr Real kKeptEnergy = 1e-9;  ///< fraction of the energy added by restitution that may be lost instead
 constexpr std::size_t kDense = 24;  ///< clusters of at most this many contacts are solved by pivoting
@@ -56,8 +56,8 @@ std::optional<Vec3> sliding_impulse(const Mat3& K, Real du_n, Real mu, const Vec
   return Vec3(normal, -mu * normal * d.x(), -mu * normal * d.y());
 }
 
-/// Returns a unit direction for each s in [0, 4): s runs along the boundary of a square, which needs no
-/// trigonometry.
+/// Returns a unit direction for each s in [0, 4). s runs along the boundary of a square, so that no
+/// trigonometric functions are needed.
 Vector2d direction_at(Real s) {
   const int side = std::min(static_cast<int>(s), 3);
   const Real x = 2 * (s - side) - 1;
@@ -123,8 +123,8 @@ class RoundSlide {
   Real nearness_ = 0;
 };
 
-/// The cases of section 4.8: each axis sticks, or slides with its sign (+1, -1) against friction at the
-/// limit.
+/// Solves one of the cases of section 4.8: each axis sticks (sign 0), or slides against friction at the limit
+/// (sign +1 or -1).
 std::optional<Vec3> axes_impulse(const Mat3& K, const Vec3& u, Real du_n, const Vec3& mu, const Vec3& signs) {
   Mat3 M = K;
   Vec3 du(du_n, -u.y(), -u.z());
@@ -172,11 +172,11 @@ Real approach(const Contact& c, std::span<const ContactBody> bodies) {
   return std::max(0.0, -c.relative_velocity(bodies).x());
 }
 
-/// Limit of the work for a solution: unlimited, or a bounded number of operations.
+/// Limit of the work for a solution.
 enum class Effort : uint8_t { full, bounded };
 
-/// Solves few contacts by pivoting and many by sweeps, whose impulses are improved by the proximal method if
-/// necessary. With joints only the proximal method is used.
+/// Solves few contacts by pivoting and many by sweeps. If necessary, the proximal method improves the
+/// impulses of the sweeps. With joints only the proximal method is used.
 void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, const JointProblem& joints,
                     Effort effort, ContactWork& work) {
   const bool is_bounded = effort == Effort::bounded;
@@ -205,8 +205,8 @@ void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, 
   --work.solves;
 }
 
-/// The collision of a cluster of contacts. If it would add energy, all restitutions are scaled down by the
-/// factor that conserves energy.
+/// Computes the collision of a cluster of contacts. If it would add energy, all restitutions are scaled down
+/// by the factor that conserves energy.
 class Cluster {
  public:
   Cluster(std::span<ContactBody> bodies, std::span<Contact> contacts, std::span<const Real> restitution,
@@ -243,8 +243,8 @@ class Cluster {
     return work;
   }
 
-  /// Whether the limit of work allows only a number of sweeps. Their residual does not count as a failure,
-  /// because contacts that still approach collide again.
+  /// Whether the limit of work allows only a number of sweeps. A residual then does not count as a failure,
+  /// because contacts that still approach will collide again.
   bool is_swept() const {
     return effort_ == Effort::bounded && joints_.empty() && contacts_.size() > kFewContacts;
   }
@@ -326,7 +326,7 @@ class Cluster {
     return work;
   }
 
-  /// Kinetic energy added by the impulses, beyond rounding [J].
+  /// Returns the kinetic energy that the impulses add, beyond rounding [J].
   Real added_energy() const {
     Real size = 0;
     for (std::size_t i = 0; i < contacts_.size(); ++i)
@@ -372,7 +372,7 @@ class Cluster {
   bool has_swept_ = false;
 };
 
-/// Sums the impulses of several solutions on the joints.
+/// Adds up the impulses of several solutions on the joints.
 class JointSums {
  public:
   explicit JointSums(const JointProblem& joints)

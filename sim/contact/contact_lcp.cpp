@@ -18,7 +18,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Fraction of the diagonal that is added to it, so that redundant contacts share their load in a unique way.
+/// This fraction of the diagonal is added to it, so that redundant contacts share their load in a unique way.
 constexpr Real kFraction = 1e-7;
 /// Greatest accepted residual, as a fraction of scale().
 constexpr Real kLcpAccepted = 1e-8;
@@ -29,7 +29,7 @@ constexpr int kRefinements = 3;
 /// If joints reduce the mobility of a row to less than this fraction, the remaining mobility is only a
 /// rounding error.
 constexpr Real kImmobile = 1e-10;
-/// A tangential impulse within this fraction of its limit slides.
+/// A tangential impulse within this fraction of its limit counts as sliding.
 constexpr Real kAtLimit = 1e-9;
 /// Number of orders in which the contacts are tried.
 constexpr std::size_t kOrders = 2;

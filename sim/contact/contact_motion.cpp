@@ -14,31 +14,31 @@ constexpr Real kStraight = 2e-4;
 constexpr Real kEven = 0.1;
 /// Cosine of the greatest predicted rotation of a normal within an interval.
 constexpr Real kPredictable = 0.8;
-/// Sine of the angle between an axis of revolution and the contact's direction: below it the direction around
-/// the axis is too inaccurate to follow.
+/// If the sine of the angle between an axis of revolution and the contact's direction is below this, the
+/// direction around the axis is too inaccurate to follow.
 constexpr Real kUpright = 0.02;
-/// Points of a surface of revolution are fixed in the body if the cosine of their angle from the meridian
-/// that faces the other body is less than this.
+/// A point of a surface of revolution turns with the body if it is far from the meridian that faces the other
+/// body: if the cosine of the angle between them is less than this.
 constexpr Real kFacing = 0.97;
 /// If the sine of the angle between two lines is less than this, their crossing is undefined.
 constexpr Real kParallel = 0.05;
 
 using Vec2 = Eigen::Vector2d;
 
-/// Whether a shape has sides and rims that are round about an axis: cylinders, cones and frustums.
+/// Whether a shape is round about an axis and has a rim: a cylinder, cone or frustum.
 bool is_revolved(const Shape& shape) {
   return std::holds_alternative<Cylinder>(shape) || std::holds_alternative<Cone>(shape) ||
          std::holds_alternative<Frustum>(shape);
 }
-/// Radius around the core of a sphere or capsule; 0 for other shapes.
+/// Returns the radius around the core of a sphere or capsule, and 0 for other shapes [m].
 Real round_radius(const Shape& shape) {
   if (const auto* sphere = std::get_if<Sphere>(&shape)) return sphere->radius;
   if (const auto* capsule = std::get_if<Capsule>(&shape)) return capsule->radius;
   return 0;
 }
 
-/// Vector from the axis of a surface of revolution to the body's centre of mass, in the body's frame [m]. It
-/// can differ from 0 if the scene sets the centre of mass.
+/// Returns the vector from the axis of a surface of revolution to the body's centre of mass, in the body's
+/// frame [m]. It is not 0 if the scene sets the centre of mass off the axis.
 Vec3 centre_off_axis(const Body& body) {
   return body.is_awake() ? Vec3(body.rigid.centre.x(), 0, body.rigid.centre.z()) : Vec3(Vec3::Zero());
 }
@@ -140,7 +140,7 @@ Vec3 turned_normal(const Start& s, const Carried& a, const Carried& b, const Lin
     default:
       break;
   }
-  // The vector from B's point or line behind the surface to A's point or line.
+  // This is the vector from B's point or line behind the surface to A's point or line.
   const Real depth_a = s.gap / 2 + s.m.radius_a, depth_b = s.gap / 2 + s.m.radius_b;
   const Vec3 core_a = s.arm_a + depth_a * n, core_b = s.arm_b - depth_b * n;
   const Real distance = depth_a + depth_b;
@@ -159,7 +159,7 @@ Vec3 crossing(const Vec3& on_a, const Vec3& from_b_to_a, const Lines& lines, con
   return on_a - from_b_to_a.cross(lines.of_b).dot(n) / area * lines.of_a;
 }
 
-/// Computes the contact after a time; returns false if its normal cannot be predicted.
+/// Computes the contact's place after a time. Returns false if its normal cannot be predicted.
 bool place_after(const Start& s, Real time, ContactPlace& place) {
   const Carried a = carried(s.a, time), b = carried(s.b, time);
   const Vec3& n = s.m.normal;
@@ -177,8 +177,8 @@ bool place_after(const Start& s, Real time, ContactPlace& place) {
   const auto arm_of_b = [&]() -> Vec3 {
     return turned_arm(s.b, s.arm_b - to_a, from_b, n, b.orientation, place.normal) + to_a_now;
   };
-  // The contact also moves with the material of the other body, apart from its motion along the first body's
-  // surface and the sliding.
+  // Besides its motion along the first body's surface and the sliding, the contact moves with the material of
+  // the other body.
   const Vec3 slide = time * s.sliding;
   const bool by_b = moves_with_b(s.m.source);
   const auto turn_of = [&](const Body& body, const Carried& now, const Vec3& arm, const Vec3& out,
@@ -206,7 +206,7 @@ bool place_after(const Start& s, Real time, ContactPlace& place) {
   return true;
 }
 
-/// Returns a contact frame after the smallest rotation that gives it another normal.
+/// Returns a contact frame with the normal n: the frame f after the smallest rotation.
 ContactFrame turned_frame(const ContactFrame& f, const Vec3& n) {
   if (n == f.n) return f;
   const auto turn = [&](const Vec3& tangent) {
@@ -336,12 +336,13 @@ Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3&
       const Vec3 scaled = ellipsoid->radii.cwiseProduct(orientation.conjugate() * out);
       return Vec3(ellipsoid->radii.cwiseProduct(scaled.normalized()));
     };
-    // The distance from the point that faces the other body is only the error of the manifold.
+    // The difference of the distances from the point that faces the other body is an error of the manifold,
+    // which is kept.
     return with_body(arm) + to * (facing(to, out_to) - facing(from, out_from));
   }
   if (!is_revolved(shape)) return with_body(arm);
-  // The angle of the point from the meridian that faces the other body does not change; it is only an error
-  // of the manifold.
+  // The angle of the point from the meridian that faces the other body is only an error of the manifold, and
+  // does not change.
   const Vec3 off_axis = centre_off_axis(body), from_axis = arm + from * off_axis;
   return meridian_turn(from_axis, from, out_from, to, out_to) * from_axis - to * off_axis;
 }
@@ -385,7 +386,7 @@ ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, co
   }
   const bool by_a = m.source == NormalSource::face_of_b;
   if (is_face && is_sphere(by_a ? a : b) && turn2(by_a ? b : a) < kStraight * kStraight) {
-    // A ball on a face that does not turn: only the motion of its centre moves the contact.
+    // This is a ball on a face that does not turn: only the motion of its centre moves the contact.
     const Vec3 displacement =
         duration / 2 *
         (start.sliding -

@@ -14,11 +14,12 @@ namespace {
 
 /// Points closer to each other than this are identical, even if their ids differ [m].
 constexpr Real kSame = 5e-3;
-/// For points with equal ids the squared distance is multiplied by this, so that they are preferred.
+/// The squared distance of points with equal ids is multiplied by this, so that they are preferred.
 constexpr Real kSameFeature = 1.0 / 16;
-/// If there are more points than this, candidates are looked up and not compared one by one.
+/// With more points than this, candidates are found by binary search and not compared one by one.
 constexpr std::size_t kManyPoints = 16;
-/// Cosine: a contact can continue another one only if their normals are at most this different.
+/// A contact can continue another one only if the cosine of the angle between their normals is greater than
+/// this.
 constexpr Real kAlong = 0.7;
 /// An overlap at the end of an interval is expected if it exceeds the prediction of an existing point by less
 /// than kExpected [m]. This point must be within kNear [m], and the cosine of the angle between the normals
@@ -152,7 +153,7 @@ class LeaningRim {
     if (towards(local) < kNearest * radius) return place;
     return core_.point_to_world({radius * facing_.x(), local.y(), radius * facing_.y()});
   }
-  /// Whether a point is beside the lowest point of the same rim.
+  /// Whether a point is next to the lowest point of the same rim.
   bool is_beside(const Vec3& place, const Vec3& lowest) const {
     const Vec3 local = core_.point_to_body(place), low = core_.point_to_body(lowest);
     const Real radius = std::hypot(low.x(), low.z());
@@ -171,7 +172,7 @@ class LeaningRim {
   Eigen::Vector2d facing_ = Eigen::Vector2d::Zero();
 };
 
-/// Corrects the points on leaning rims of a manifold in a's frame.
+/// Corrects the points of a manifold in a's frame that are on leaning rims.
 void follow_rims(Manifold& m, const Body& a, const Body& b, const Pose& a_from_b) {
   const bool on_a = m.source == NormalSource::face_of_b, on_b = m.source == NormalSource::face_of_a;
   if (!on_a && !on_b) return;

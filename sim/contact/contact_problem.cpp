@@ -21,7 +21,7 @@ Real tangential_bound(const Mat3& m) {
   return std::max(m(1, 1), m(2, 2)) + std::abs(m(1, 2));
 }
 
-/// Friction of one contact: the impulse along t and k [N s], and the angular impulse [N m s].
+/// Friction of one contact.
 struct Friction {
   Tangential force;
   Vec3 moment;
@@ -37,7 +37,7 @@ Friction friction_step(const Contact& c, const Vec3& u, const Vec3& w, Real norm
           .tail<2>(),
       Vec3::Zero()};
   if (arm > 0) {
-    // One step size for all three, so that friction opposes the velocity.
+    // All three components have the same step size, so that friction opposes the velocity.
     const Real step = 1 / std::max(k, arm * arm * W(0, 0));
     const Vec3 wanted =
         Vec3(c.impulse.y(), c.impulse.z(), c.moment.x() / arm) - step * Vec3(u.y(), u.z(), arm * w.x());
@@ -63,8 +63,8 @@ Real turning_violation(const Contact& c, std::span<const ContactBody> bodies) {
                   (next.moment - c.moment).norm() * W.trace() * radius);
 }
 
-/// Returns the natural residual [m/s]. The impulse p is the solution if a step against u and a projection
-/// lead back to p.
+/// Returns the natural residual [m/s]. It is 0 if a step from the impulse p against u, followed by the
+/// projection, leads back to p.
 Real violation(const Contact& c, std::span<const ContactBody> bodies) {
   if (c.resists_turning()) {
     const Real approach = c.relative_velocity(bodies).x() - c.target;

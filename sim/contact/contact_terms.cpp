@@ -8,7 +8,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Below this sliding speed, static friction applies [m/s].
+/// Static friction applies below this sliding speed [m/s].
 constexpr Real kSlip = 1e-3;
 /// A thin body may exceed its expected energy of rotation by this fraction after a sub-step.
 constexpr Real kSpinExcess = 1e-3;
@@ -36,7 +36,7 @@ PointRates rates(const Body& body, const Vec3& place) {
     const Vec3 &w = body.start_twist.angular_velocity, wr = w.cross(place - body.start.position);
     return {body.start_twist.velocity + wr, w.cross(wr)};
   }
-  // The velocities of kinematic bodies are those of the interval's end, so they need no correction.
+  // The velocities of kinematic bodies belong to the interval's end, so they need no correction.
   return {body.start_velocity(place), Vec3::Zero()};
 }
 
@@ -55,7 +55,7 @@ bool is_face(NormalSource s) {
   return s == NormalSource::face_of_a || s == NormalSource::face_of_b;
 }
 
-/// Square of the angular velocity [1/s^2]. Below this, faces do not turn in a step.
+/// Below this squared angular velocity, faces do not turn in a step [1/s^2].
 constexpr Real kNoSpin = 1e-14;
 Real spin(const Body& body) {
   if (body.is_awake()) return body.start_twist.angular_velocity.squaredNorm();
@@ -87,16 +87,16 @@ void agree_with_spin(RigidBody& r, const Vec3& expected, Real free_energy, Real 
 
 }  // namespace
 
-/// Terms of the relative acceleration of R9 besides the part that is linear in the accelerations of the
-/// bodies:
+/// Returns the change of the relative velocity in an interval of length h by the velocity terms of R9, in the
+/// contact's frame. These are the terms of the relative acceleration that are not linear in the accelerations
+/// of the bodies:
 ///   n . (c_a'' - c_b'') + 2 n' . (c_a' - c_b') - |n'|^2 D
 /// with material points c on both bodies at a distance D along n. (For two centres of spheres, this is n.c''
-/// + n'.c', not twice the latter.) The tangential terms are due to the rotation of the bodies. Returns the
-/// change of the relative velocity by these terms in an interval of length h, in the contact's frame.
+/// + n'.c', without the factor 2.) The tangential terms are due to the rotation of the bodies.
 ///
 /// The terms with n' are valid while n turns little. When sharp corners slide past each other, or edges that
-/// are almost parallel, n turns by any angle in a very short time; the velocity of separation then equals the
-/// sliding speed at most. For two points that pass each other with the velocity s, T = s^2 / D gives
+/// are almost parallel, n turns by any angle in a very short time. The velocity of separation is then at most
+/// the sliding speed. For two points that pass each other with the velocity s, T = s^2 / D gives
 ///   d/dt |(D, s t)| at h = T h / sqrt(1 + (T h / s)^2),
 /// which is used in all cases.
 Vec3 velocity_bias(const ContactPair& pair, const PlacedManifold& placed, const ContactPoint& point, Real h) {

@@ -41,7 +41,7 @@ Real kinetic_energy(const Island& island) {
 }
 
 Real kept_fraction(const Island& island, std::span<const RelaxedBody> relaxed) {
-  // Energy with s times the impulses: kinetic + first s + second s^2.
+  // The energy with s times the impulses is kinetic + first s + second s^2.
   Real kinetic = 0, first = 0, second = 0;
   for (std::size_t i = 0; i < island.bodies.size(); ++i) {
     const RigidBody& body = island.bodies[i]->rigid;

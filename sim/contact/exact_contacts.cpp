@@ -13,26 +13,27 @@
 namespace offstage::sim {
 namespace {
 
-/// Fraction of a penetration that a step removes, and the greatest speed of the removal [m/s].
+/// kPushOut: fraction of a penetration that a step removes. kFastestPush: greatest speed of this correction
+/// [m/s].
 constexpr Real kPushOut = 0.2, kFastestPush = 0.5;
 /// Points that approach faster than this closed within the interval, and not before it [m/s].
 constexpr Real kClosing = 1e-3;
 /// In an interval that may be divided, points with a gap close later if they approach faster than this, even
 /// if the gap is very small [m/s].
 constexpr Real kApproaching = 1e-4;
-/// The intervals of islands with more bodies are not divided: they are heaps, for which it would cost more
-/// than the solution.
+/// Islands with more bodies than this are heaps, whose intervals are not divided, because that would cost
+/// more than the solution.
 constexpr std::size_t kMostDivided = 6;
-/// Corners of bodies that turn farther than this in an interval do not move on straight lines [rad]. An
-/// island of several bodies with such a body is not divided, since bodies that have met would overlap.
+/// Corners of bodies that turn farther than this in an interval do not move on straight lines [rad]. Islands
+/// of several bodies with such a body are not divided, since bodies that have touched would overlap.
 constexpr Real kMostTurned = 0.1;
 /// Greatest cost of a solution and its division [ns, see ProximalNewton::cost()].
 constexpr Real kMostDivision = 2e6;
 /// Uncertainty of the speed of approach at a resting contact. It is this fraction of the change of the normal
 /// velocity due to rotation in half an interval.
 constexpr Real kTurningShare = 0.5;
-/// A stopped body also stops its neighbours where they would overlap by more than kOverlap [m]; this is
-/// repeated for their neighbours, in at most kBlockPasses passes.
+/// A stopped body also stops those neighbours that would otherwise overlap it by more than kOverlap [m]. This
+/// is repeated for their neighbours, in at most kBlockPasses passes.
 constexpr int kBlockPasses = 20;
 constexpr Real kOverlap = 1e-6;
 /// The result of a fall-back is rejected if its residual is larger than kRough [m/s], or if it adds more than
@@ -41,7 +42,8 @@ constexpr Real kRough = 1e-2, kEnergyRounding = 1e-9;
 /// Fraction of the kinetic energy that the velocity terms of a solution may add in a step.
 constexpr Real kTermsShare = 0.02;
 
-/// Angular speed of a body's corners [rad/s]. The rotation of round bodies about their axis does not count.
+/// Returns the angular speed of a body's corners [rad/s]. The rotation of round bodies about their axis does
+/// not count.
 Real turning_of_corners(const Body& body) {
   const Vec3& spin = body.start_twist.angular_velocity;
   const Shape& shape = body.def.shape;
@@ -99,7 +101,7 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
     if (outcome.work.fallbacks > 0)
       if (const auto worst = worst_contact(bodies_, contacts_)) outcome.rough = pairs_[*worst];
     if (!outcome.is_applied) return outcome;
-    // The fast solver, whose sub-steps are shorter, loses less than an undivided solution.
+    // The fast solver has shorter sub-steps, so it loses less energy than an undivided solution.
     const bool is_divided =
         !has_closing() ||
         divide_at_closings(island, interval, std::min(2 * budget, kMostDivision) - cost_, outcome.work);
@@ -140,7 +142,7 @@ bool ExactContacts::solve_lcp(ContactWork& work) {
 bool ExactContacts::is_safe(const ContactWork& work) const {
   if (work.fallbacks > 0 && work.residual > kRough) return false;
   Real energy = added_energy(free_, bodies_, contacts_);
-  // Limits have one finite bound; motors and friction have two, and motors of any strength none.
+  // A limit has one finite bound. A motor or friction has two, and a motor of unlimited strength has none.
   for (const BoundedRow& r : joints_.bounded())
     if (const Real gain = (r.impulse * row_speed(r, free_) + r.impulse * row_speed(r, bodies_)) / 2;
         std::isfinite(r.lower) != std::isfinite(r.upper) || gain < 0)

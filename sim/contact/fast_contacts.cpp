@@ -74,7 +74,7 @@ void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifol
                const ContactInterval& interval) {
   const Real duration = interval.duration;
   const Vec3 centre_a = start_centre(pair.a()), surface = surface_velocity(pair);
-  // Only the deepest point of a rim shows where on the rim the contact is.
+  // Only the deepest point of a rim shows the contact's position on the rim.
   const bool runs = runs_along(pair.a(), duration) || runs_along(pair.b(), duration);
   const Real gap = set_points(patch, m.manifold, m.frame, centre_a, start_centre(pair.b()), runs);
   const Vec3 place = centre_a + patch.arm_a;

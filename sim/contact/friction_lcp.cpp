@@ -178,7 +178,7 @@ void FrictionSolver::round_friction_row(Index row, const Vec3& p, const Vec3& y,
   auto rows = jacobian_.middleRows<2>(row + 1);
   rows = rho * problem_.A.middleRows<2>(row + 1);
   if (sticks) return;
-  // d (y / |y|) = (1 - d d^T) / |y| dy, dy = dp - rho A dp
+  // d (y / |y|) = (1 - d d^T) / |y| dy, where dy = dp - rho A dp.
   const Eigen::Matrix2d across =
       length > 0 ? Eigen::Matrix2d((Eigen::Matrix2d::Identity() - d * d.transpose()) * (limit / length))
                  : Eigen::Matrix2d::Zero();
@@ -277,7 +277,7 @@ void FrictionSolver::set_impulses(const VectorXd& p) {
 
 void FrictionSolver::solve_by_rounds(ContactWork& work) {
   p_.setZero(problem_.b.size());
-  // Direction of sliding without contact forces; for most contacts this guess is correct.
+  // The first guess is the direction of sliding without contact forces, which is correct for most contacts.
   for (std::size_t i = 0; i < problem_.count(); ++i)
     if (is_round(i)) turn(i, problem_.b.segment<2>(static_cast<Index>(3 * i + 1)));
   Real least = evaluate(p_, false);

@@ -22,14 +22,14 @@ constexpr Real kClipped = 2e-3;
 /// Cosines. A surface continues a face if the angle between both normals has a cosine of at least kGoesOn. A
 /// contact pushes along the surface's own normal if the cosine is at least kOwnNormal.
 constexpr Real kGoesOn = 0.999, kOwnNormal = 0.9;
-/// Height over a face at which the surface beside it is sampled, as a multiple of the greatest flush step.
+/// Height over a face at which the surface next to it is sampled, as a multiple of the greatest flush step.
 constexpr Real kLookOver = 3;
 /// If a body has more contacts than this, they are not compared with each other.
 constexpr std::size_t kMostContacts = 512;
 /// Lateral distance at which the surface is sampled, as a multiple of the greatest flush step. With
 /// kLookOver, the direction from an edge to the sample is at 18 degrees to the normal.
 constexpr Real kLookBeside = 1;
-/// Contacts of a slope are searched this far beyond the contact that they replace [m].
+/// Contacts with a slope are searched within this distance beyond the contact that they replace [m].
 constexpr Real kSlopeMargin = 2e-3;
 
 /// Distance of a point from a convex piece of a shape, with its gradient, in the shape's frame.
@@ -100,7 +100,7 @@ struct View {
   }
 };
 
-/// The decision on a contact: it is removed, or replaced by another manifold.
+/// The decision on a contact: it is removed, or another manifold replaces it.
 struct Verdict {
   ContactPair* pair;
   uint32_t index;
@@ -240,8 +240,8 @@ class BodyContacts {
     Real low = std::min(0.0, face.separation()) - flush_ - clipped;
     const Real moved = v.speculative ? std::abs(up.dot(x_.pose.position - x_.start_pose.position)) : 0;
     low -= moved;
-    // A surface that is flush with a face is not nearer to X than the face. A contact that is nearer is
-    // beside the face.
+    // A surface that is flush with a face is not nearer to X than the face. So a nearer contact is not with a
+    // flush surface.
     if (v.separation() < face.separation() - flush_ - clipped - moved) return std::nullopt;
     for (uint32_t k = 0; k < v.m->count; ++k)
       if (const Real height = up.dot(v.on_y(k) - on_face); height < low || height > flush_ + clipped)

@@ -12,8 +12,8 @@
 namespace offstage::sim {
 namespace {
 
-/// At most kSmallCluster contacts always collide together. Clusters of more than kCluster contacts, or with
-/// more than kGrowths extensions, are solved as a whole only on request.
+/// Clusters of at most kSmallCluster contacts are always solved as a whole. Clusters of more than kCluster
+/// contacts, or with more than kGrowths extensions, are solved as a whole only on request.
 constexpr std::size_t kSmallCluster = 40, kCluster = 100;
 constexpr int kGrowths = 2;
 /// Cost of an update of a contact, and of a product of a dense factorization [ns].
@@ -136,7 +136,7 @@ CollisionOutcome resolve_collisions(const Island& island, const CollisionSetting
         collide_bounded(cluster.bodies, cluster.contacts, cluster.restitution, settings.law, problem);
   else
     outcome.work = collide_reached(cluster, settings.collision_speed, settings.law, problem);
-  // Without joints, only small clusters are factorized with bounded effort.
+  // Without joints, the work is bounded and only small clusters are factorized.
   const std::size_t dense =
       std::min(cluster.contacts.size(), settings.whole || !problem.empty() ? kSmallCluster : kFewContacts);
   outcome.cost = static_cast<Real>(outcome.work.iterations * cluster.contacts.size()) * kContactUpdate +

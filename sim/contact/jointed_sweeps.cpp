@@ -29,7 +29,7 @@ void add_impulse(std::span<ContactBody> bodies, uint32_t body, const Vec6& impul
   bodies[body].angular_velocity += v.tail<3>();
 }
 
-/// A joint's constraints as one block: J (v - v0) = 0.
+/// The constraints J (v - v0) = 0 of a joint, solved as one block.
 class JointBlock {
  public:
   JointBlock(const JointConstraint& joint, std::span<const ContactBody> bodies)

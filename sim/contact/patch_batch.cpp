@@ -51,7 +51,7 @@ struct LaneTwist {
   Vector linear, angular;
 };
 
-/// Transposes a matrix of four rows in each half of the registers, and returns the first three columns.
+/// Transposes the matrix of four rows in each half of the registers. Returns its first three columns.
 Vector columns(FloatLanes a, FloatLanes b, FloatLanes c, FloatLanes d) {
   const FloatLanes low_ab = _mm256_unpacklo_ps(a, b), low_cd = _mm256_unpacklo_ps(c, d);
   const FloatLanes high_ab = _mm256_unpackhi_ps(a, b), high_cd = _mm256_unpackhi_ps(c, d);
@@ -66,8 +66,7 @@ std::array<FloatLanes, 4> rows(const Vector& v) {
   return {_mm256_shuffle_ps(low_xy, low_z, 0x44), _mm256_shuffle_ps(low_xy, low_z, 0xEE),
           _mm256_shuffle_ps(high_xy, high_z, 0x44), _mm256_shuffle_ps(high_xy, high_z, 0xEE)};
 }
-/// Returns a register with the first halves of both registers; second_halves() does the same with the second
-/// halves.
+/// Returns a register with the first halves of both registers. second_halves() returns the second halves.
 FloatLanes first_halves(FloatLanes a, FloatLanes b) {
   return _mm256_permute2f128_ps(a, b, 0x20);
 }
@@ -87,7 +86,7 @@ LaneTwist gather(std::span<const BodyMotion> motions, const PatchBatch::Index& i
           columns(angular(0), angular(1), angular(2), angular(3))};
 }
 
-/// Bodies that contacts do not move are not written, because other threads may be reading them.
+/// Bodies that contacts do not move are not written, because other threads may read them.
 template <FloatLanes BodyMotion::*kWhat>
 void scatter(const LaneTwist& v, std::span<BodyMotion> motions, const PatchBatch::Index& i,
              const std::array<bool, kLanes>& moves) {
@@ -248,7 +247,8 @@ void set_body(uint32_t index, std::span<const RelaxedBody> bodies, unsigned lane
   if (inverse_mass[lane] > 0) inverse_inertia.set(lane, bodies[index].inverse_inertia);
 }
 
-/// Velocities at the start may be large, so they are subtracted in double precision.
+/// Sets the approach at the step's start. These velocities may be large, so they are subtracted in double
+/// precision.
 void set_approach(PatchBatch& p, unsigned lane, const ContactPatch& c, const RelaxedBody& a,
                   const RelaxedBody& b) {
   const Vec3 linear =
@@ -303,7 +303,7 @@ void set_patch(PatchBatch& p, unsigned lane, const ContactPatch& c, Real substep
   }
   const bool fresh =
       std::none_of(c.points.begin(), c.points.begin() + c.count, [](const auto& q) { return q.force > 0; });
-  // There is no guess of rolling friction, and the friction depends on it.
+  // There is no initial guess of rolling friction, and the friction depends on it.
   if (fresh || c.rolling > 0) p.tolerance = kSolved;
   p.renewal[lane] = fresh ? 1 : kRenewal;
 }
@@ -323,7 +323,7 @@ Vector normal_wrench(const PatchBatch& p) {
 Vector solve_friction(PatchBatch& p, Groups& u) {
   Vector next = p.friction_impulse - p.friction_stiffness * u.friction;
   const Vector limits = friction_limits(p);
-  // A single point without spinning friction does not slide because it spins.
+  // Spin does not make a single point slide unless it has spinning friction.
   if (p.resists_turning) next.z = limits.z > FloatLanes{} ? next.z : FloatLanes{};
   const FloatLanes size2 = next.x * next.x + next.y * next.y;
   const auto within = p.friction_t == p.friction_k
@@ -377,11 +377,11 @@ Vector solve_normal(PatchBatch& p, Groups& u, const Gaps& gaps) {
   return change;
 }
 
-/// Moves the impulses a fixed fraction towards their running means, and updates the means. The change
-/// of an impulse is limited to the same fraction of the impulse, or of Coulomb's limit for friction. Without
-/// the limit, the mean impulse of an impact would lift the body that the impact has stopped. The friction of
-/// sliding points is set to the limit given by the present normal impulses, so the sums over the sub-steps
-/// obey Coulomb's law however the load shifts between points. Returns the change.
+/// Moves the impulses by a fixed fraction towards their running means, and updates the means. The change of
+/// an impulse is limited to the same fraction of the impulse or, for friction, of Coulomb's limit. Without
+/// this limit, the mean impulse of an impact would lift the body that the impact has stopped. The friction of
+/// sliding points is set to the limit by the current normal impulses. So the sums over the sub-steps obey
+/// Coulomb's law, even if the load shifts between points. Returns the change.
 Groups return_to_mean(PatchBatch& p) {
   Groups change{};
   const Vector limits = friction_limits(p);
@@ -414,7 +414,7 @@ FloatLanes greatest(const Vector& v) {
   return lane_max(lane_abs(v.x), lane_max(lane_abs(v.y), lane_abs(v.z)));
 }
 
-// Patches of one point, as round bodies have: no moments
+// The following functions are for patches of one point, as round bodies have. They have no moments.
 
 /// A velocity or impulse at the point, along n, t and k.
 using Single = Vector;

@@ -47,7 +47,8 @@ constexpr uint32_t kMaxOuter = 120, kMaxNewton = 40, kMaxHalvings = 25, kMaxSwee
 constexpr Real kStale = 0.2;
 constexpr Real kMeritRounding = 1e-11;
 constexpr std::size_t kMixed = 5;
-/// Fraction of the mobility of a joint's constraints; makes dependent constraints solvable.
+/// This fraction of the mobility of a joint's constraints is added, which makes dependent constraints
+/// solvable.
 constexpr Real kRegularization = 1e-11;
 constexpr uint32_t kMaxFactorizations = 300;
 /// Cost of operations, per contact or per block of the factorization [ns].
@@ -294,7 +295,7 @@ void ProximalNewton::set_points(std::span<const ContactBody> bodies, std::span<c
                                    relative_velocity(contacts[i], points_[i], velocity_) + fixed_[i]);
 }
 
-/// Called after set_points(): the impulses of rows with bounds also change the velocities.
+/// Adds the rows with bounds, whose impulses also change the velocities. Call it after set_points().
 void ProximalNewton::set_joints() {
   const auto row = [this](uint32_t body) { return body == kUnmoved ? kNone : row_of_body_[body]; };
   const auto rows = static_cast<uint32_t>(body_of_row_.size());
@@ -357,8 +358,8 @@ Vec6 ProximalNewton::violation(std::size_t j) const {
   return v;
 }
 
-/// Changes the velocities as little as possible so that they satisfy the joints' constraints. The change is
-/// measured by its kinetic energy.
+/// Corrects the velocities so that they satisfy the joints' constraints. The change has the least kinetic
+/// energy.
 void ProximalNewton::satisfy_constraints() {
   factor_.analyze(static_cast<uint32_t>(direction_.size()), pairs_, kinds_);
   add_constraint_blocks();
@@ -410,8 +411,8 @@ Vec3 ProximalNewton::relative_velocity(const Contact& c, const Point& p,
   return c.to_frame(u);
 }
 
-/// Evaluates the impulses at the velocities, and the function whose gradient is M (v - v0) - J^T p, with the
-/// constraints' impulses in p.
+/// Evaluates the impulses p at the velocities, with those of the constraints, and the function whose gradient
+/// is M (v - v0) - J^T p.
 void ProximalNewton::evaluate(std::span<const Contact> contacts) {
   merit_ = {};
   for (std::size_t row = 0; row < velocity_.size(); ++row) {
@@ -440,7 +441,8 @@ void ProximalNewton::evaluate(std::span<const Contact> contacts) {
     const Real wanted = (p.multiplier - p.rho * u) / (1 + p.rho * r.softness);
     p.impulse = std::clamp(wanted, r.lower, r.upper);
     p.is_free = p.impulse == wanted;
-    // The greatest value of -p u - s p^2 / 2 - (p - q)^2 / (2 rho): convex in u, with the derivative -p.
+    // This term is the greatest value of -p u - s p^2 / 2 - (p - q)^2 / (2 rho). It is convex in u and has
+    // the derivative -p.
     merit_.add(-p.impulse * u);
     merit_.add(-r.softness * p.impulse * p.impulse / 2);
     merit_.add(-std::pow(p.impulse - p.multiplier, 2) / (2 * p.rho));
@@ -543,7 +545,8 @@ bool ProximalNewton::assemble(std::span<const Contact> contacts, ContactWork& wo
   return is_factored_ = factor_.factorize(diagonal_, off_);
 }
 
-/// Minimizes by Newton's method for constant multipliers and limits, to a gradient of `tolerance` [m/s].
+/// Minimizes the function of evaluate() by Newton's method, for constant multipliers and limits, until the
+/// gradient is below `tolerance` [m/s]. Returns false if there were too many factorizations or steps.
 bool ProximalNewton::minimize(std::span<const Contact> contacts, Real tolerance, ContactWork& work) {
   Real before = std::numeric_limits<Real>::infinity();
   for (uint32_t step = 0; step < kMaxNewton; ++step) {
@@ -560,13 +563,13 @@ bool ProximalNewton::minimize(std::span<const Contact> contacts, Real tolerance,
   return false;
 }
 
-/// One step along -H^-1 g with back-tracking; returns false if rounding prevents a decrease.
+/// Makes one step along -H^-1 g with back-tracking. Returns false if rounding prevents a decrease.
 bool ProximalNewton::descend(std::span<const Contact> contacts) {
   solve_for_direction();
   cost_ +=
       kSolve * static_cast<Real>(factor_.factor_blocks()) + kEvaluation * static_cast<Real>(contacts.size());
-  // With the new impulses of the constraints the step decreases the function, even where it leads back to the
-  // constraints.
+  // The step includes new impulses of the constraints. With these, it decreases the function even where it
+  // restores violated constraints.
   const auto add_to_constraints = [this, &contacts](Real sign) {
     for (std::size_t j = 0; j < constraints_.size(); ++j)
       constraints_[j].impulse += sign * direction_[gradient_.size() + j];

@@ -8,7 +8,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Penalty of rolling and spinning friction times the angular mobility; the same value as for contacts.
+/// Penalty of rolling and spinning friction times the angular mobility; equal to that of contacts.
 constexpr Real kTurningStiffness = 1e5;
 
 using Vec4 = Eigen::Matrix<Real, 4, 1>;
@@ -103,7 +103,7 @@ void ProximalNewton::evaluate_turning(const Contact& c, Point& p, const Vec3& u)
   }
   const Tangential shifted = t.shifted.tail<2>(), roll = shortened(shifted, t.roll_limit);
   t.impulse.tail<2>() = roll;
-  // Half of |q|^2 - |q - p|^2, whose derivative is the projection p of q on a convex set.
+  // This is half of |q|^2 - |q - p|^2, whose derivative is the projection p of q on a convex set.
   merit_.add(roll.dot(2 * shifted - roll) / (2 * t.rho));
 }
 
@@ -115,7 +115,7 @@ Vec3 ProximalNewton::turning_impulse(const Contact& c, const Point& p) const {
 
 void ProximalNewton::assemble_turning(const Contact& c, const Point& p) {
   const Turning& t = turnings_[p.turning];
-  // Rows: n, t, k of the point, spinning, rolling about t and k.
+  // The rows are n, t and k of the point, spinning, and rolling about t and k.
   Mat6 W = Mat6::Zero();
   if (t.arm > 0) {
     W.topLeftCorner<4, 4>() = p.rho * round_cone_derivative(c.friction_t, joined(p.shifted, t.shifted.x()),
@@ -148,7 +148,7 @@ Real ProximalNewton::turning_lift(const Contact& c, const Point& p, const Vec3& 
   return c.friction_t * Vec3(u.y(), u.z(), turning_speed(c, p).x()).norm();
 }
 
-/// Whether an open contact has no impulse at the relative velocity u. The lift is included.
+/// Whether an open contact has no impulse at the relative velocity u, which includes the lift.
 bool ProximalNewton::stays_open(const Contact& c, const Point& p, const Vec3& u) const {
   if (p.turning == kNone || turnings_[p.turning].arm == 0)
     return project_on_cone(c, -p.rho * u).region == ConeRegion::apex;

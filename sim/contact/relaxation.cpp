@@ -11,10 +11,10 @@
 namespace offstage::sim {
 namespace {
 
-/// Fraction of the penetration that a step removes, and the greatest speed of the removal [m/s]. Moving one
-/// patch opens the gaps of others, whose forces are then missing until they close. With fractions of 0.65 and
-/// 0.8 a wall of 1000 bricks trembled (0.2 and 2 J after 4 s instead of 0.001), with 1 it fell. With 0.3 the
-/// greatest overlap in heaps was the same.
+/// kPushFraction: fraction of the penetration that a step removes. kMaxPush: greatest speed of this
+/// correction [m/s]. Moving one patch opens the gaps of others, whose forces are then missing until the gaps
+/// close. With fractions of 0.65 and 0.8 a wall of 1000 bricks trembled (0.2 and 2 J after 4 s instead of
+/// 0.001 J), and with 1 it fell. With 0.3 the greatest overlap in heaps was the same.
 constexpr Real kPushFraction = 0.5, kMaxPush = 3;
 
 /// With fewer batches than this, a second thread would not save time.
@@ -26,11 +26,11 @@ constexpr std::size_t kSerialBatches = 48;
 /// instead of 0.8 mm, in the same time; this is within the scatter.)
 constexpr Real kImpact = 0.1;
 constexpr uint32_t kRepeats = 12;
-/// Bodies under a load can only be separated together. A displacement by push-out of more than kPress is
-/// therefore passed on in the same way, and then on until it is less than kPassedOn [m]. Without this,
-/// columns in heaps of 3000 boxes overlapped by 1 mm for seconds at rest, with it by 0.6 mm; the sampled
-/// overlap was above 1 mm in 114 of 360 samples, with it in 5. Smaller values reduce it further, but make a
-/// wall of 1000 bricks sway. In a wall at rest the displacements are smaller than this.
+/// Bodies under a load can only be separated together. Therefore a displacement of more than kPress by
+/// push-out is propagated like an impact, until it is less than kPassedOn [m]. Without this, columns in heaps
+/// of 3000 boxes overlapped by 1 mm for seconds at rest, with it by 0.6 mm; the sampled overlap was above 1
+/// mm in 114 of 360 samples, with it in 5. Smaller values reduce it further, but make a wall of 1000 bricks
+/// sway. In a wall at rest the displacements are smaller than this.
 constexpr Real kPress = 3e-4, kPassedOn = 1e-4;
 
 /// A sub-step whose change of velocity is more than this many times the mean contains an impact.
@@ -52,10 +52,10 @@ FloatLanes joined(const Vec3& linear, const Vec3& angular) {
   return FloatLanes{v.x(), v.y(), v.z(), 0, w.x(), w.y(), w.z(), 0};
 }
 
-/// Whether a body was hit. Its velocity must change by more than steady forces would, which is twice the
-/// change of the free motion, measured as kinetic energy, and most of the change must be in few sub-steps.
-/// (Twice, because the torque of the load turns the spin of a rolling coin faster than gravity does.)
-/// `greatest`: by component, the greatest change of velocity in a sub-step.
+/// Whether a body was hit. Two conditions must hold. Its velocity changes by more than steady forces would
+/// change it: by twice the change of the free motion, measured as kinetic energy. (The factor is two because
+/// the torque of the load turns the spin of a rolling coin faster than gravity does.) And most of the change
+/// happens in few sub-steps. `greatest`: by component, the greatest change of velocity in a sub-step.
 bool jumps(const RelaxedBody& b, const BodyMotion& m, FloatLanes greatest, const RelaxationDef& def) {
   const Real inertia = b.inverse_inertia.trace() > 0 ? 3 * b.inverse_mass / b.inverse_inertia.trace() : 0;
   const auto size2 = [inertia](const Vec3& linear, const Vec3& angular) {
@@ -125,8 +125,8 @@ void RelaxationSolver::plan_colors(Stage stage, uint32_t substep, bool backward)
   if (backward) std::reverse(ranges_.begin() + static_cast<std::ptrdiff_t>(first), ranges_.end());
 }
 
-/// A sweep over all batches, and then over those that impacts reach, alternately backward and forward, so
-/// that impacts propagate in both directions.
+/// Plans a sweep over all batches, and then repeated sweeps over the batches that impacts reach. The latter
+/// go alternately backward and forward, so that impacts propagate in both directions.
 void RelaxationSolver::plan_sweeps(Stage first, Stage again, uint32_t substep) {
   ++sweeps_;
   plan_colors(first, substep);
@@ -136,7 +136,7 @@ void RelaxationSolver::plan_sweeps(Stage first, Stage again, uint32_t substep) {
   }
 }
 
-/// The same for the push-out, in which the joints move their links after each sweep.
+/// Plans the sweeps of the push-out in the same way. After each of them the joints move their links.
 void RelaxationSolver::plan_push(uint32_t substeps, uint32_t joints) {
   if (joints > 0) ranges_.push_back({Stage::begin_push, 0, joints, 1});
   for (uint32_t k = 0; k <= kRepeats; ++k) {
@@ -254,8 +254,8 @@ void RelaxationSolver::start(uint32_t i) {
                  FloatLanes{}};
 }
 
-// The change of velocity in the last sub-step, by contacts and free motion together, is the initial guess for
-// the next one.
+// Sets the initial guess for the next sub-step: the change of velocity in the last one, by contacts and free
+// motion together.
 void RelaxationSolver::extrapolate(uint32_t i) {
   FloatLanes& v = motions_[i].velocity;
   const FloatLanes now = v;
@@ -277,7 +277,8 @@ void RelaxationSolver::push(uint32_t i, const Range& range, Real threshold) {
   strike(p, range.sweep, push_out(p, motions_, how), threshold);
 }
 
-/// Contacts of links that the joints have moved far get another push-out sweep.
+/// Moves the links of an articulation. If the joints have moved them far, their contacts get another push-out
+/// sweep.
 void RelaxationSolver::push_joints(uint32_t part, const Range& range) {
   if (!(joints_->push_out(part, motions_) > kPassedOn)) return;
   for (const uint32_t body : joints_->bodies(part)) struck_[body] = range.sweep;
@@ -306,9 +307,9 @@ void RelaxationSolver::advance(uint32_t i) {
   m.shift += float_lanes(substep_) * m.velocity;
 }
 
-// The sub-steps moved the bodies with the velocities at their ends, which closes gaps exactly. For steady
-// forces the mean of the velocities at start and end is correct. Summed over the sub-steps, the difference is
-// the whole change of velocity times half a sub-step.
+// Corrects the motion of a body at the end of the step. The sub-steps moved the bodies with the velocities at
+// their ends, which closes gaps exactly. For steady forces the mean of the velocities at start and end is
+// correct. Summed over the sub-steps, the difference is the whole change of velocity times half a sub-step.
 void RelaxationSolver::finish(uint32_t i) {
   RelaxedBody& b = bodies_[i];
   if (b.inverse_mass == 0) return;
@@ -324,8 +325,8 @@ void RelaxationSolver::finish(uint32_t i) {
 
 namespace {
 
-/// Wrench about a patch's centre, in world axes, from the normal components of the points and the common
-/// components along t, k and about n.
+/// Returns the wrench about a patch's centre, in world axes. It is computed from the normal components of the
+/// points, and from the common components along t and k and about n.
 Wrench wrench(const ContactPatch& p, Real ContactPatch::Point::*normal, const Vec3& friction,
               const Tangential& rolling) {
   Vec3 sum = Vec3::Zero();  // along n, and moments about t and k
@@ -361,8 +362,8 @@ void RelaxationSolver::give(const ContactPatch& p) {
   to(p.b, p.arm_b, -1);
 }
 
-// The motion is computed again from the impulses in double precision. The impulses on both bodies are
-// opposite to the last bit, so momentum is conserved.
+// Reports the forces of a batch, and computes the motion again from the impulses in double precision. The
+// impulses on both bodies are opposite to the last bit, so momentum is conserved.
 void RelaxationSolver::report(uint32_t i) {
   sim::report(batches_[i], patches_, substep_);
   for (const uint32_t patch : coloring_.batches()[i])

@@ -9,9 +9,9 @@
 namespace offstage::sim {
 namespace {
 
-/// Rows times links above which the responses of all links are not stored.
+/// If the number of rows times the number of links is above this, the responses of all links are not stored.
 constexpr std::size_t kMostResponses = 20000;
-/// A row that acts from the interval's end on acts in its last sub-step; fraction of the interval.
+/// Fraction of the interval. A row that acts only from the interval's end on acts in its last sub-step.
 constexpr Real kInstant = 1e-9;
 /// The contacts of an articulation depend on each other. Passes over them end when none changes a velocity by
 /// more than kSettled [m/s].
@@ -107,9 +107,9 @@ void RelaxedJoints::prepare(Part& part, std::span<const RelaxedBody> bodies) {
     prepare_row(part, problem_.bounded[i], rows_[i], bodies, whole);
 }
 
-/// The rows of springs oppose the change of their speeds since the step's start. With steady forces it grows
-/// in proportion to the time, and the impulses of the sub-steps are equal: the softness times the sum of them
-/// is the change in each sub-step.
+/// Applies the softness of the rows of springs, which oppose the change of their speeds since the step's
+/// start. With steady forces this change grows in proportion to the time, and the impulses of the sub-steps
+/// are equal. So the softness times the sum of all impulses is the change in each sub-step.
 void RelaxedJoints::soften(Part& part, Real elapsed) {
   const Real substeps = std::max(1.0, std::round(elapsed / substep_));
   if (!part.articulation->soften(substeps)) return;
@@ -119,7 +119,8 @@ void RelaxedJoints::soften(Part& part, Real elapsed) {
   for (uint32_t i = part.first_contact; i < part.last_contact; ++i) contact_rows_[i].is_ready = false;
 }
 
-/// `whole`: whether the response of the whole articulation is found, not only that of the row's bodies.
+/// Prepares a row of a part. `whole`: whether the response of the whole articulation is computed, or only
+/// that of the row's bodies.
 void RelaxedJoints::prepare_row(Part& part, const BoundedRow& r, Row& row,
                                 std::span<const RelaxedBody> bodies, bool whole) {
   const auto response = [&](uint32_t body, const Vec6& on) -> Vec6 {
@@ -191,8 +192,8 @@ void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapse
   std::fill(correction.begin(), correction.end(), Vec6::Zero());
   system.correct(part.change, part.impulses, correction);
   for (std::size_t k = 0; k < part.bodies.size(); ++k) add_to(motions[part.bodies[k]], correction[k]);
-  // The velocities of a sub-step carry over to the next one, including the impulses; after the last there is
-  // none.
+  // The next sub-step starts with the velocities of this one, including the impulses. After the last sub-step
+  // there is no next one.
   if (is_last) std::fill(part.now.begin(), part.now.end(), Vec6::Zero());
   for (std::size_t j = 0; j < part.now.size(); ++j) part.now[j] += part.impulses[j];
 
@@ -305,7 +306,8 @@ void RelaxedJoints::add_motion(std::span<RelaxedBody> bodies, std::span<const Re
       to(r.a, contact_rows_[i].sum * r.on_a, contact_rows_[i].shift * r.on_a);
       to(r.b, contact_rows_[i].sum * r.on_b, contact_rows_[i].shift * r.on_b);
     }
-    // Links with springs move by the change of the velocity at the end: any other motion would strain them.
+    // Links with springs move by the change of the velocity at the end. Any other motion would strain the
+    // springs.
     if (!part.articulation->has_springs()) continue;
     const Real time = (1 - part.articulation->kicks_act_from()) * duration_;
     for (std::size_t k = 0; k < part.bodies.size(); ++k) {

@@ -1,4 +1,4 @@
-/// Choice of the exact or the fast solver for an island.
+/// Chooses the exact or the fast solver for an island.
 
 #include "sim/contact/solver_choice.h"
 
@@ -14,11 +14,12 @@ constexpr Real kSmall = 1e5;
 constexpr Real kFastPoint = 60;
 /// Cost of the fast solver per joint and sub-step [ns].
 constexpr Real kFastJoint = 200;
-/// kWorth: how many times more expensive than the fast solver the exact one may be on average. Cost beyond
-/// this is a debt, of at most kCredit steps of the fast solver. The exact solver is expensive for a new
-/// island, and cheap afterwards.
+/// kWorth: how many times the cost of the fast solver the exact solver may have on average. Any further cost
+/// is a debt, of at most kCredit steps of the fast solver. The exact solver is expensive for a new island,
+/// and cheap afterwards.
 constexpr Real kWorth = 2.5, kCredit = 120;
-/// After exceeding the credit, it pauses until the debt is this fraction of the fast solver's cost.
+/// After the credit is exceeded, the exact solver is not tried while the debt decreases: in each step by the
+/// fraction kFraction of the fast solver's cost, for at most kLongestWait steps.
 constexpr Real kFraction = 0.25, kLongestWait = 2400;
 /// With less than this fraction of the credit left, only islands whose last attempt was cheap are tried.
 constexpr Real kLittle = 0.05;

@@ -9,11 +9,11 @@
 namespace offstage::sim {
 namespace {
 
-/// kPasses: greatest number of passes over the contacts. They end earlier when the deviation at each contact
-/// is less than the second constant [m].
+/// kPasses: greatest number of passes over the contacts. They end earlier if the deviation at each contact is
+/// less than kEnough [m].
 constexpr int kPasses = 30;
 constexpr Real kEnough = 1e-9;
-/// Friction below this fraction of its limit holds the bodies together at the contact.
+/// If friction is below this fraction of its limit, it holds the bodies together at the contact.
 constexpr Real kHolds = 0.99;
 
 bool sticks(const PairSurface& surface, const Vec3& force) {
@@ -47,7 +47,8 @@ SprungPaths::Path* SprungPaths::path_of(const Body& body) {
   return at != paths_.end() && at->body == &body ? &*at : nullptr;
 }
 
-/// The point at `place` where a contact holds the bodies of two paths along a direction; either may be null.
+/// Returns the point at `place` where a contact holds the bodies of two paths along a direction. Either path
+/// may be null.
 SprungPaths::Held SprungPaths::hold(const std::array<Path*, 2>& paths, const Vec3& place,
                                     const Vec3& direction) {
   Held h;

@@ -1,6 +1,6 @@
 /// Collisions of particles with cloth in both directions (physics F6). After both have moved, a particle that
-/// is beyond a triangle, or nearer than its radius, is moved back and exchanges an impulse with the
-/// triangle's corners.
+/// has passed a triangle, or is nearer to it than its radius, is moved back. It exchanges an impulse with the
+/// corners of the triangle.
 
 #include <algorithm>
 #include <cmath>

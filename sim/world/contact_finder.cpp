@@ -20,7 +20,7 @@ constexpr Real kMargin = 2e-3, kMarginFraction = 0.05;
 /// at the start do not predict later contacts. The limit is larger for the fast solver without restitution,
 /// for which the points only limit the approach.
 constexpr Real kFar = 0.25, kFarWithoutBounce = 1;
-/// Margin of bodies in the broad phase: a fraction of their size, plus their motion in this many steps.
+/// Margin of the boxes in the broad phase: kRoom times the body's size, plus its motion in kSteps steps.
 constexpr Real kRoom = 0.03, kSteps = 2;
 /// Greatest deviation of a path from its chord, as a fraction of the extent. Only rotations of more than half
 /// a radian exceed it.
@@ -42,7 +42,7 @@ Real smaller_extent(const Body& a, const Body& b) {
   return std::min(a.extent, b.extent);
 }
 
-/// Box around all positions of a body in its interval.
+/// Returns a box around all positions of a body in its interval.
 Aabb swept_bounds(const Body& body) {
   Aabb box = bounds(body.solid, body.start_pose).merged(bounds(body.solid, body.pose));
   Real margin = std::min(kMargin, kMarginFraction * body.extent);

@@ -50,7 +50,8 @@ CoupledGroup::EndDerivative CoupledGroup::derivative(const End& end, const Vec3&
 void CoupledGroup::add_derivatives(const ActiveSpring& s, Real t, std::span<const Real> x,
                                    std::span<const Real> p, SparseEntries& entries) const {
   const Pull f = pull(s, t, x, p);
-  // F_a = -(k (l - L) + c u.n) n with n = d / l, dn = (1 - n n^T) / l dd, and u the relative velocity.
+  // The force is F_a = -(k (l - L) + c u.n) n with n = d / l and dn = (1 - n n^T) / l dd; u is the relative
+  // velocity.
   const Mat3 outer = f.along * f.along.transpose(), across = Mat3::Identity() - outer;
   const Real inverse_length = f.length > 0 ? 1 / f.length : 0;
   const Mat3 by_distance = -s.stiffness * outer - f.size * inverse_length * across -

@@ -25,7 +25,7 @@ Real spin(const Body& body) {
   return body.is_awake() ? body.start_twist.angular_velocity.norm() : 0;
 }
 
-/// Angular speed of the faster turning body of a pair [rad/s].
+/// Returns the angular speed of the body of a pair that turns faster [rad/s].
 Real turn_of(const ContactPair& pair) {
   return std::max(spin(pair.a()), spin(pair.b()));
 }

@@ -74,7 +74,7 @@ ContactWork ParticleMotion::collide(const ParticleStage& stage, const CoupledSys
   return collisions_.lcp_work();
 }
 
-/// Appends the events of a system, ordered by particle.
+/// Appends the events of a system to the events of the sub-step, ordered by particle.
 void ParticleMotion::add(std::vector<ParticleEvent>& events) {
   std::stable_sort(events.begin(), events.end(), [](const ParticleEvent& a, const ParticleEvent& b) {
     return a.id != b.id ? a.id < b.id : a.time < b.time;

@@ -1,5 +1,5 @@
-/// Removal of objects, and bodies, joints and cloths that appear or disappear at a given time. Their handles
-/// are valid before they appear and after they disappear, so that other objects can refer to them.
+/// Removes objects, and lets bodies, joints and cloths appear or disappear at given times. Their handles are
+/// valid before they appear and after they disappear, so that other objects can refer to them.
 
 #include "sim/world/world_impl.h"
 

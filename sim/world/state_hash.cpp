@@ -1,4 +1,5 @@
-/// Hash of the whole changing state, in slot order and little-endian bytes (the only supported byte order).
+/// Computes the hash of the whole changing state, in slot order and little-endian bytes (the only supported
+/// byte order).
 
 #include <algorithm>
 #include <bit>

@@ -15,7 +15,7 @@ namespace {
 constexpr Real kMaxSubsteps = 1e6;
 constexpr std::size_t kWorthThreads = 200;
 
-/// Whether the state and the velocities that follow from it are finite.
+/// Whether the state, and the velocities that are computed from it, are finite.
 bool is_finite(const RigidBody& b) {
   return b.position.allFinite() && b.orientation.coeffs().allFinite() && b.velocity().allFinite() &&
          b.angular_velocity().allFinite() && b.angular_momentum.allFinite();
@@ -200,7 +200,7 @@ void World::Impl::explode(Real start, Real end) {
     });
     cloths.for_each([&](ClothHandle handle, const std::unique_ptr<Cloth>& cloth) {
       if (!def_.acts_on(handle)) return;
-      // Each point gets its fraction of the impulse on the whole cloth, by mass.
+      // Each point gets a part of the impulse on the whole cloth, in proportion to its mass.
       const Real total = std::accumulate(cloth->masses.begin(), cloth->masses.end(), 0.0);
       for (std::size_t i = 0; i < cloth->points.size(); ++i)
         cloth->velocities[i] += impulse(explosion, cloth->points[i]) / total;

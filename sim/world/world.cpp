@@ -16,7 +16,7 @@
 namespace offstage::sim {
 namespace {
 
-// Limits within which the solvers can square and multiply without overflow.
+// Within these limits the solvers can square and multiply without overflow.
 constexpr Real kLeastMass = 1e-40, kMostMass = 1e40;  // [kg]
 constexpr Real kMostInertia = 1e100;                  // [kg m^2], and limit of the inverse
 constexpr Real kMostCoordinate = 1e12;                // greatest coordinate of a mesh [m]
@@ -503,8 +503,8 @@ std::vector<BodyOverlap> World::overlaps(Real least) const {
     const Pose a_from_b{a->pose.point_to_body(b->pose.position),
                         a->pose.orientation.conjugate() * b->pose.orientation};
     PairCache none;
-    // The tree search ignores pairs beyond a limit, and the bound for touching bodies is 0, so the limit must
-    // be above 0.
+    // The tree search ignores pairs beyond a limit. Touching bodies have the bound 0, so the limit must be
+    // above 0.
     const auto s =
         separation(a->collision_shape(), b->collision_shape(), a_from_b, none, DistanceMethod::gjk, least);
     if (!s || -s->distance <= least) continue;
