@@ -257,7 +257,8 @@ uint32_t add_cord(ClothDef& def, const Cord& cord) {
   const Real distance = across.norm(), length = cord.length > 0 ? cord.length : distance;
   if (!(length > 0)) refuse("the ends of a cord are at the same place; give it a length");
   const Real count = cord.segments, rest = length / count, segment_mass = cord.mass_per_length * rest;
-  // Both parts of a slack cord meet at its middle, or beside it if the number of segments is odd.
+  // The two parts of a slack cord meet at its middle, or half a segment from it if the number of segments is
+  // odd.
   const Real first = std::floor(count / 2) * rest, second = length - first;
   Real along = 0, down = 0;
   const Vec3 u = distance > 0 ? Vec3(across / distance) : Vec3(Vec3::UnitX());

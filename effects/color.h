@@ -110,7 +110,8 @@ class Ramp {
   static float span_of(const Keys& k, std::size_t i) { return static_cast<float>(k[i + 1].age - k[i].age); }
   static T slope_of(const Keys& k, std::size_t i) { return (k[i + 1].value - k[i].value) / span_of(k, i); }
 
-  /// Slope at key i for the cubic beside it. It is zero beyond the ends and beside a step.
+  /// Returns the slope at key i of the cubics on both sides. It is zero at the first and last key and next to
+  /// a step.
   static T slope_at(const Keys& k, std::size_t i) {
     const bool inside = i > 0 && i + 1 < k.size() && span_of(k, i - 1) > 0 && span_of(k, i) > 0;
     if (!inside) return T(k[i].value * 0.f);

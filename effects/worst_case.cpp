@@ -13,7 +13,7 @@ namespace {
 
 /// All integers up to this number are exact. Larger bounds are clamped to it.
 constexpr Real kSaturated = 0x1p53;
-/// Used instead of infinity, because infinity times zero is not a number.
+/// This replaces infinity, because infinity times zero is not a number.
 constexpr Real kHuge = 1e300;
 constexpr Real kEver = std::numeric_limits<Real>::infinity();
 

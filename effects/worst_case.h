@@ -1,7 +1,7 @@
 #pragma once
-/// Greatest number of particles that a definition can create, so that `validate` can refuse it before a run
-/// (physics F3). The bounds hold for every seed. Scenes with constant parameters reach them. Sums that would
-/// overflow are clamped to the largest number.
+/// Bounds of the number of particles that a definition can create. With them `validate` can refuse a
+/// definition before a run (physics F3). The bounds hold for every seed. Scenes with constant parameters
+/// reach them. Sums that would overflow are clamped to the largest number.
 
 #include <cstdint>
 

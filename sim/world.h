@@ -262,7 +262,7 @@ class World {
   /// Advances by `sampling_time` in the fewest equal sub-steps not longer than WorldDef::max_step.
   StepReport step(Real sampling_time, const BeforeSubStep& before = {});
 
-  /// Time since the start of the simulation [s]. Negative until prewarm() has reached time 0.
+  /// Time since the start of the simulation [s]. It is negative until prewarm() has reached time 0.
   Real time() const;
   const WorldDef& def() const;
 
@@ -298,8 +298,8 @@ class World {
   /// order of the bodies' slots. Body `a` of a pair is dynamic. The contact solvers push such bodies apart
   /// during the next steps.
   std::vector<BodyOverlap> overlaps(Real least) const;
-  /// Index of the island that contains a body. Islands are numbered in the order of their first bodies. Empty
-  /// for static and kinematic bodies.
+  /// Index of the island that contains a body. Islands are numbered in the order of their first bodies. The
+  /// result is empty for static and kinematic bodies.
   std::optional<uint32_t> island(BodyHandle body) const;
   bool is_asleep(BodyHandle body) const;
   std::size_t body_count() const;

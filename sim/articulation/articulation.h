@@ -197,7 +197,7 @@ class Articulation final : public JointedBodies {
   Eigen::VectorXd stop_impulses() const;
   std::vector<Stop> stops_;  // computed since begin_impulses()
   std::mutex responding_;
-  // Computed since begin_impulses(), for the links that were used.
+  // Results since begin_impulses(), for the links that were used.
   std::vector<std::optional<Mat6>> link_mobility_;
   Real response_time_ = 0;
   bool is_placed_ = false;  // whether place() was called since begin_impulses()

@@ -40,7 +40,7 @@ class BendLimit {
   Real greatest(const ClothPoints& points) const;
 
  private:
-  /// A place at its limit or near it.
+  /// A patch at its limit or near it.
   struct Row {
     std::size_t patch;
     std::size_t first, end;  // range in gradient_

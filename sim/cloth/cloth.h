@@ -160,12 +160,12 @@ struct ClothDef {
 /// it is clamped.
 inline constexpr Real kShortestSpringStep = 1e-5;
 
-/// Returns a description of the first error of a definition: field, place and allowed values. Empty if the
-/// definition is valid.
+/// Returns a description of the first error of a definition: field, place and allowed values. The text is
+/// empty if the definition is valid.
 std::string problem(const ClothDef& def);
 
-/// Stability limit of an explicit integrator, considering only springs and bending. Also gives the spring
-/// that determines the limit, which has the greatest ratio of stiffness to mass.
+/// Stability limit of an explicit integrator, considering only springs and bending. It also returns the
+/// spring that determines the limit, which has the greatest ratio of stiffness to mass.
 struct StableStep {
   Real step = std::numeric_limits<Real>::infinity();  ///< [s]
   uint32_t spring = 0;                                ///< index of the spring in the definition

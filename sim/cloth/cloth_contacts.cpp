@@ -288,9 +288,9 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
     s.moves = !on_bodies[s.body].holds_cloth;
   }
   std::vector<Vec3> taken(recoil.size(), Vec3::Zero());
-  // Projected Jacobi iteration: all contacts stop a body together. One after the other, the first would turn
-  // it aside. The body moves by the change of its velocity already in this sub-step: otherwise a fast body
-  // would be behind the cloth at its end.
+  // Projected Jacobi iteration: all contacts stop a body together. If they acted one after the other, the
+  // first one would deflect the body. The change of the body's velocity moves the body already in this
+  // sub-step. Otherwise a fast body would be behind the cloth at the end of the sub-step.
   for (int sweep = 0; sweep < kStopSweeps && !stops.empty(); ++sweep) {
     for (Stop& s : stops) {
       const Real speed = s.speed + recoil[s.cloth] * s.normal.dot(taken[s.cloth]);

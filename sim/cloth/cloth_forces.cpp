@@ -16,7 +16,7 @@ Real gas_volume(const Cloth& cloth) {
   return std::max(cloth.gas.volume(cloth.points, cloth.triangles), 0.1 * cloth.rest_volume);
 }
 
-/// Returns the overpressure without leaks: that of the gas filled in so far at the current volume [Pa].
+/// Returns the overpressure of the gas filled in so far at the current volume, without leaks [Pa].
 Real overpressure(const Cloth& cloth) {
   const Real let_in = cloth.age < cloth.def.inflate_time ? cloth.age / cloth.def.inflate_time : 1;
   return let_in * cloth.def.pressure * cloth.rest_volume / gas_volume(cloth);

@@ -29,7 +29,7 @@ constexpr Real kShortEnough = 1.14;
 constexpr Real kSoftRatio = 0.5;
 /// Points whose squared distance is below this have no direction between them [m^2].
 constexpr Real kNoLength2 = 1e-24;
-/// Mobility of a spring between two pinned points, which avoids a division by zero [1/kg].
+/// Mobility used for a spring between two pinned points; it avoids a division by zero [1/kg].
 constexpr Real kNoMobility = 1e-100;
 
 /// A stiffness counts as equal to the limit of the step within this fraction.

@@ -10,7 +10,7 @@ namespace {
 
 /// Greatest number of rounds that solve contacts with bodies and the stretch limit together.
 constexpr int kMaxTurns = 16;
-/// Greatest number of sub-steps of cloth in one of the world.
+/// Greatest number of parts into which a sub-step of the world is divided for cloth.
 constexpr Real kMaxParts = 1000;
 /// Greatest distance by which a body may approach cloth in a sub-step, as a fraction of the mean edge of the
 /// triangles.
@@ -195,7 +195,7 @@ void ClothSystem::limit_bending(Real dt) {
 }
 
 /// Shortens seams at a constant rate within their time, and then keeps them closed. A delayed seam does not
-/// close faster, because the stretch limit would remove any motion that the cloth beside it cannot follow.
+/// close faster, because the stretch limit would remove any motion that the neighbouring cloth cannot follow.
 void ClothSystem::close_seams(Real dt) {
   for (std::size_t k = 0; k < seams_.size(); ++k) {
     const Cloth& cloth = *cloths_[seams_[k].cloth];

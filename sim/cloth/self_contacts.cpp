@@ -69,8 +69,8 @@ Closest closest(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool 
   return {{1 - s, s, t - 1, -t}, padded(q.on_a - q.on_b), inner};
 }
 
-/// Whether the boxes of both are more than `reach` apart along the same axis at the start and at the end. The
-/// test is fast and succeeds for most pairs.
+/// Whether the bounding boxes of a pair's elements are more than `reach` apart along the same axis, both at
+/// the start and at the end. The test is fast and true for most pairs.
 bool boxes_apart(std::span<const Vec4> start, std::span<const Vec4> end, const std::array<uint32_t, 4>& p,
                  bool edges, Real reach) {
   Vec4 over = Vec4::Constant(1e300), under = over;
@@ -105,8 +105,8 @@ bool plane_separates(std::span<const Vec4> start, std::span<const Vec4> end, con
   return least > 0 && least * least > reach * reach * n.squaredNorm();
 }
 
-/// Vector from the middle of the pair's second element to the middle of the first one [m]; for two edges
-/// twice that vector, because only the direction is used.
+/// Returns the vector from the middle of the pair's second element to the middle of the first one [m]. For
+/// two edges it is twice as long, because only its direction is used.
 Vec4 middle_to_middle(std::span<const Vec4> x, const std::array<uint32_t, 4>& p, bool edges) {
   if (edges) return x[p[0]] + x[p[1]] - x[p[2]] - x[p[3]];
   return x[p[0]] - (x[p[1]] + x[p[2]] + x[p[3]]) / 3;
@@ -381,10 +381,10 @@ void SelfContacts::keep_thickness(ClothPoints& points) {
   }
 }
 
-/// Keeps pairs from crossing by impulses along the normal of the plane between them. The impulse acts on that
-/// point of each element that would go farthest beyond the plane. Pairs that remain are left to shorten(),
-/// which stops points in all directions. Springs to points that still move then gain energy, and many pressed
-/// layers jam.
+/// Prevents pairs from crossing by impulses along the normal of the plane between them. The impulse acts on
+/// that point of each element that would go farthest beyond the plane. Pairs that remain are left to
+/// shorten(), which stops points in all directions. Springs to points that still move then gain energy, and
+/// many pressed layers jam.
 void SelfContacts::keep_sides(ClothPoints& points) const {
   bool again = true;
   for (int sweep = 0; again && sweep < kSideSweeps; ++sweep) {

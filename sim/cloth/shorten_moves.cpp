@@ -269,7 +269,7 @@ void ClothSystem::restore_momenta() {
 /// points. Returns whether any move was shortened.
 bool ClothSystem::shorten_until_valid(Shortened how) {
   bool any = false, turned = false;
-  // The points of a body that turns do not move straight, so they are checked again.
+  // The points of a rotating body do not move on straight lines, so they are checked again.
   for (int pass = 0; pass < kMaxPasses; ++pass) {
     turned = false;
     if (!shorten_straight(how, turned)) break;

@@ -44,7 +44,7 @@ inline constexpr Real kTautRecovery = 0.1;
 
 class TautSprings {
  public:
-  /// Keeps references to the arguments.
+  /// The object keeps references to the arguments.
   TautSprings(const ClothPoints& points, std::span<const Carrier> carriers);
 
   /// Adds a spring if its elongation is near the limit or beyond it.

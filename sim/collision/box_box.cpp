@@ -119,7 +119,7 @@ struct Face {
 
   int axis_of(int k) const { return (axis + 1 + k) % 3; }
   Real sign() const { return positive ? 1 : -1; }
-  /// Number of a corner; corners are counter-clockwise seen from outside.
+  /// Number of the box's vertex at a corner of the face. Corners are counter-clockwise seen from outside.
   uint32_t tag(uint32_t corner) const {
     const uint32_t at = (positive ? corner : 3 - corner) % 4, right = at == 1 || at == 2, up = at >= 2;
     return uint32_t{positive} << axis | right << axis_of(0) | up << axis_of(1);
@@ -182,13 +182,14 @@ class FaceContact {
   struct Corner {
     Vec3 at;  ///< position along the axes of the reference face, and height over it
     uint32_t id;
-    /// The side that leaves the corner: of the incident face, or kReference + k for the reference face.
+    /// The side that starts at the corner: a side of the incident face, or kReference + side of the reference
+    /// face.
     uint32_t side;
   };
   uint32_t count() const { return count_; }
   int other_axis() const { return other_.axis; }
   const Corner& corner(uint32_t k) const { return corners_[k]; }
-  /// Returns the height of the lowest corner, or infinity without corners.
+  /// Returns the height of the lowest corner, or infinity if there are no corners.
   Real lowest() const {
     Real least = kInfinity;
     for (uint32_t k = 0; k < count_; ++k) least = std::min(least, corners_[k].at[2]);
@@ -214,8 +215,8 @@ class FaceContact {
 
   static uint32_t side_id(const Face& f, uint32_t k) { return edge_id(f.tag(k), f.tag(k + 1)); }
 
-  /// Id of a crossing. If both sides are neighbouring sides of the reference face, the crossing is a vertex
-  /// of this face.
+  /// Returns the id of a crossing. If both sides are neighbouring sides of the reference face, the crossing
+  /// is a vertex of this face.
   uint32_t crossing(uint32_t side, uint32_t cut, uint32_t cut_id) const {
     if (side < kReference) return crossing_id(1 - body_, side_id(other_, side), cut_id);
     return vertex_id(body_, face_.tag((side - kReference + 1) % 4 == cut ? cut : side - kReference));

@@ -36,7 +36,7 @@ class CollisionShape {
   uint32_t piece_count() const { return pieces_; }
   Convex piece(uint32_t index) const;
   /// Calls f(tree) with the tree of the pieces and returns the result. The tree's items are the indices of
-  /// the pieces. Not available for a plane.
+  /// the pieces. The shape must not be a plane, because a plane has no pieces.
   template <class F>
   decltype(auto) with_tree(F&& f) const {
     switch (tree_.index()) {
@@ -62,7 +62,7 @@ class CollisionShape {
   const CollisionMesh* surface() const { return triangles_ ? solid_.mesh : nullptr; }
   /// Whether Options::by_triangles was chosen for a mesh.
   bool is_by_triangles() const { return by_triangles_; }
-  /// The convex hull of all pieces. Not available for a plane.
+  /// Returns the convex hull of all pieces. A plane has none.
   const Convex& hull() const { return hull_; }
 
  private:

@@ -40,7 +40,7 @@ ContactFrame contact_frame(const Vec3& n) {
   return {n, t, n.cross(t)};
 }
 
-// Computed from s = e x n and t = s / |s|: t' = (s' - t (t.s')) / |s|, and s' = e x n'.
+// The result is computed from s = e x n and t = s / |s|: t' = (s' - t (t.s')) / |s|, and s' = e x n'.
 ContactFrame contact_frame_rate(const ContactFrame& frame, const Vec3& n_rate) {
   Eigen::Index drop;
   frame.n.cwiseAbs().minCoeff(&drop);

@@ -13,7 +13,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Cosine: normals of coplanar triangles differ by less than 1e-4 rad.
+/// Least cosine of the angle between the normals of coplanar triangles; the angle is about 1e-4 rad.
 constexpr Real kSameNormal = 1 - 5e-9;
 /// All points on coplanar triangles are within this distance of one plane [m].
 constexpr Real kSamePlane = 1e-6;

@@ -17,7 +17,8 @@ Vec3 direction(const Vec3& v, const Vec3& fallback) {
   return norm > 0 ? Vec3(v / norm) : fallback;
 }
 
-/// Converts a point to the half plane of a solid of revolution about Y: (distance from the axis, height).
+/// Returns a point's distance from the Y axis and its height, as coordinates in the half plane of a solid of
+/// revolution about Y.
 Vec2 to_profile(const Vec3& p) {
   return {std::sqrt(p.x() * p.x() + p.z() * p.z()), p.y()};
 }

@@ -35,7 +35,7 @@ SurfaceDistance signed_distance(const Plane&, const Vec3& p);
 SurfaceDistance signed_distance(const CollisionMesh& m, const Vec3& p);
 SurfaceDistance signed_distance(const Solid& s, const Vec3& p);
 /// Returns the signed distance if it is less than `limit` [m], >= 0; otherwise some value that is at least
-/// `limit`. Much faster than signed_distance() at points away from a mesh.
+/// `limit`. It is much faster than signed_distance() at points away from a mesh.
 SurfaceDistance signed_distance_below(const Solid& s, const Vec3& p, Real limit);
 
 /// Returns the support function: the largest n.x of all points x of a solid [m]. For a plane it is infinite

@@ -33,7 +33,7 @@ Separation gjk(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache&
 /// overlap.
 Separation penetration(const Convex& a, const Convex& b, const Pose& a_from_b);
 
-/// Whether A and B have a point in common. Faster than gjk(), because it ends at the first separating
+/// Whether A and B have a point in common. It is faster than gjk(), because it ends at the first separating
 /// direction.
 bool overlap(const Convex& a, const Convex& b, const Pose& a_from_b, GjkCache& cache);
 

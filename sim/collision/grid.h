@@ -37,7 +37,7 @@ struct CellSizes {
   static constexpr int32_t kFinest = -18, kLevels = 64;
   /// Objects that reach farther than this from the origin are not inserted in cells [m].
   static constexpr Real kMaxReach = 0x1p40;
-  /// Used instead of a level for objects that are too large or too far away for cells.
+  /// This value replaces the level of objects that are too large or too far away for cells.
   static constexpr int32_t kNone = -1;
 
   GridKind kind = GridKind::multilevel;

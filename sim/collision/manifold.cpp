@@ -114,8 +114,8 @@ class Clipping {
     return edge_id(tag_of(f, k), tag_of(f, k + 1));
   }
 
-  /// Id of a crossing. If both sides are neighbouring sides of the reference face, the crossing is a vertex
-  /// of this face.
+  /// Returns the id of a crossing. If both sides are neighbouring sides of the reference face, the crossing
+  /// is a vertex of this face.
   uint32_t id_of_crossing(uint32_t side, uint32_t reference_side) const {
     const uint32_t cut = side_id(reference_, reference_side);
     if (side < kMaxCorners) return crossing_id(incident_body_.name, side_id(incident_, side), cut);
@@ -311,7 +311,8 @@ Manifold triangle_face_manifold(const Convex& a, const Convex& b, const Pose& a_
   const SupportingFeature face = reference.feature(0), other = incident.feature(margin + rounding);
   if (!face.is_face()) return m;
 
-  // The room beyond each side. From this side of the triangle, its sides may appear in the opposite order.
+  // The room beyond each side. If the other body is behind the triangle, the face has the triangle's sides in
+  // the opposite order.
   std::array<Real, 3> room;
   for (uint32_t k = 0; k < 3; ++k) {
     const uint32_t from = face.corners[k].tag, to = face.corners[(k + 1) % 3].tag;

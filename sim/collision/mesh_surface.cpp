@@ -13,7 +13,8 @@ namespace {
 constexpr Real kSliver = 1e-5;
 /// Greatest number of consecutive slivers that are skipped.
 constexpr int kMostSlivers = 16;
-/// Normals may be outside of a region by up to this sine, because normals are not more accurate.
+/// A normal outside of a region by less than this sine counts as inside, because normals are not more
+/// accurate.
 constexpr Real kOff = 1e-5;
 /// Points count as on an edge or a vertex if they are nearer to it than this fraction of the longest edge.
 constexpr Real kOnFeature = 1e-6;

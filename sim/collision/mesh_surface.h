@@ -12,7 +12,7 @@
 
 namespace offstage::sim {
 
-/// The neighbours of each triangle of a mesh. Computed once for each mesh.
+/// The neighbours of each triangle of a mesh. They are computed once for each mesh.
 class MeshSurface {
  public:
   MeshSurface(const TriangleMesh& mesh, const MeshTopology& topology);

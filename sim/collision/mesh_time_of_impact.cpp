@@ -108,7 +108,7 @@ class Instant {
         turn_b_(turn_in_a(b)) {}
 
   const Pose& a_from_b() const { return a_from_b_; }
-  /// The closest two pieces, if any are in contact at this time.
+  /// Returns the two closest pieces, if any pieces are in contact at this time.
   const std::optional<Separation>& contact() const { return contact_; }
 
   /// Returns a lower bound of the time until any two pieces come within half the tolerance, or 0 if two of

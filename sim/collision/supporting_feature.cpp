@@ -84,7 +84,7 @@ SupportingFeature box_face(const Convex& c, const Vec3& d, Real slack) {
   SupportingFeature f;
   f.normal[axis] = side ? 1 : -1;
   for (uint32_t corner = 0; corner < 4; ++corner) {
-    // Counter-clockwise about +axis: (-,-) (+,-) (+,+) (-,+).
+    // The order is counter-clockwise about +axis: (-,-) (+,-) (+,+) (-,+).
     const uint32_t at = side ? corner : 3 - corner, right = at == 1 || at == 2, up = at >= 2;
     const uint32_t tag = side << i | right << j | up << k;
     f.add(c.vertex(tag), tag);
@@ -328,7 +328,7 @@ SupportingFeature revolved_edge(const Convex& c, const Vec3& d, Real slack, cons
   const RoundSide side = round_side(c, d);
   SupportingFeature line = segment_feature(side.from, side.from_tag, side.to, side.to_tag, d);
   if (line.edge != Vec3::Zero()) {
-    // The centre of curvature of a cone is where the normal meets the axis.
+    // The centre of curvature of a cone is the intersection of the normal with the axis.
     line.rod = std::max(0.0, outward(d).dot(on_surface)) / side.normal.dot(outward(d));
     return line;
   }

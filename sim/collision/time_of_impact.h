@@ -32,9 +32,9 @@ struct MovingConvex {
 };
 
 /// Returns a time, as a fraction of the step, at which the distance of A and B is at most `tolerance` [m], >
-/// 0. Before this time the distance is never less than half of the tolerance. Empty if the distance stays
-/// greater than half of the tolerance until the end. If the distance is within the tolerance at the start,
-/// the time is 0.
+/// 0. Before this time the distance is never less than half of the tolerance. The result is empty if the
+/// distance stays greater than half of the tolerance until the end. If the distance is within the tolerance
+/// at the start, the time is 0.
 std::optional<Impact> time_of_impact(const MovingConvex& a, const MovingConvex& b, Real tolerance);
 
 /// Returns the time of impact, as time_of_impact() does, of a solid and the half-space below a plane, which

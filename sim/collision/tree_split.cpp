@@ -43,14 +43,14 @@ std::size_t mean_split(std::span<TreeItem> items, int axis) {
   return balanced && split > 0 ? split : median_split(items, axis);
 }
 
-/// The midpoints of a node's items in slices of equal width along each axis.
+/// Distributes the midpoints of a node's items among slices of equal width along each axis.
 class Bins {
  public:
   static constexpr int kCount = 16;
 
   explicit Bins(const Aabb& midpoints) : low_(midpoints.min()) {
     const Vec3 extent = midpoints.sizes();
-    // For an extent near the smallest number the slices have no width.
+    // If the extent is almost zero, all items are in the first slice.
     for (int k = 0; k < 3; ++k) scale_[k] = extent[k] > 1e-300 ? kCount / extent[k] : 0;
   }
 

@@ -26,7 +26,7 @@ std::array<Real, 3> room_beyond(const SurfaceTriangle& t, Real margin) {
   return room;
 }
 
-/// A triangle that is one of the two pieces.
+/// One of the two pieces, if it is a triangle.
 struct TriangleSide {
   SurfaceTriangle triangle;
   Pose a_from_mesh;

@@ -234,7 +234,7 @@ Gain gain(const Start& s, const ContactMotion& motion, const ContactPlace& place
   Vec3 by_turning =
       components(motion.frame, wa.cross(place.arm_a - middle.arm_a) - wb.cross(place.arm_b - middle.arm_b));
   by_turning.x() += (place.normal - middle.normal).dot(velocity);
-  if (s.m.count == 1) return {by_turning, 0, 0};  // there are no points beside it
+  if (s.m.count == 1) return {by_turning, 0, 0};  // a single point has no lever arms
   const Vec3 spin = wa - wb;
   const Quat turn = place.turn * middle.turn.conjugate();
   const auto along = [&](const Vec3& tangent) {

@@ -71,7 +71,7 @@ class alignas(64) ContactPair {
   /// points limit the approach.
   bool needs_toi = false;
 
-  /// Only `b` may be a plane.
+  /// Only body `b` may be a plane.
   ContactPair(Body& a, Body& b, const PairSurface& surface);
 
   Body& a() const { return *a_; }

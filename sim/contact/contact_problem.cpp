@@ -79,7 +79,7 @@ Real violation(const Contact& c, std::span<const ContactBody> bodies) {
 }
 
 /// Solves the friction of a contact with rolling or spinning friction, after the change of its normal
-/// impulse. Also applies this change, which the bodies do not contain yet. Returns the greatest change of
+/// impulse. It also applies this change, which the bodies do not contain yet. Returns the greatest change of
 /// velocity [m/s].
 Real turn_step(Contact& c, const Vec3& before, const Vec3& u, const Mat3& K, std::span<ContactBody> bodies) {
   const Mat3 W = angular_mobility(c, bodies);

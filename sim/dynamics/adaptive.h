@@ -27,7 +27,7 @@ class AdaptiveIntegrator : public Integrator {
   /// work.error_p.
   virtual void attempt(const DynamicSystem& system, Real t, Real h, std::span<const Real> x,
                        std::span<const Real> p, IntegratorWorkspace& work) const = 0;
-  /// Called after an attempt whose error is accepted; it may still correct the result.
+  /// It is called after an attempt whose error is accepted; it may still correct the result.
   virtual void accept(IntegratorWorkspace&) const {}
 
  private:

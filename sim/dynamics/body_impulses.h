@@ -21,8 +21,8 @@ class JointedBodies {
   virtual ~JointedBodies() = default;
   /// Returns the 6 x 6 mobility of a link, joints included: its change of velocity and angular velocity per
   /// unit of impulse and angular impulse on it. It is valid for impulses roughly in the direction of `push`,
-  /// because a joint at a limit resists only impulses towards the limit. May be called from several threads
-  /// at the same time.
+  /// because a joint at a limit resists only impulses towards the limit. It may be called from several
+  /// threads at the same time.
   virtual Mat6 link_mobility(uint32_t link, const Vec6& push) = 0;
   /// Adds the changes of velocity of all links due to an impulse on one link to `velocities`. Joint limits
   /// are taken into account.
@@ -44,7 +44,7 @@ class BodyImpulses {
 
   /// Mobility K of physics P8 at the point `arm` from the centre of mass: change of the point's velocity per
   /// unit of impulse there, world axes [1/kg]; zero for a body that is not dynamic. `push`: unit direction of
-  /// the impulse, because a joint at its limit yields to one side only. May be called from several threads
+  /// the impulse, because a joint at its limit yields to one side only. It may be called from several threads
   /// while no impulse is added.
   Mat3 mobility(const Obstacle& o, const Vec3& arm, const Vec3& push) const;
   /// Velocity of the point at `arm` from the centre of mass, after the impulses so far [m/s].

@@ -236,8 +236,7 @@ Wrench impulse(const Explosion& explosion, const Solid& solid, const Pose& pose,
   const Real size =
       explosion.impulse * strength_at_depth(1 - distance / explosion.radius, explosion.drop_rate);
   if (!(size != 0)) return {};
-  // If the explosion is inside the body, the body is pushed as a whole, without rotation, whichever side is
-  // nearest.
+  // An explosion inside the body pushes it from the explosion towards its centre of mass, without rotation.
   if (surface.distance <= 0) return {size * direction(centre - explosion.point), Vec3::Zero()};
   // The gradient of the distance points from the body to the source.
   const Vec3 push = -size * pose.vector_to_world(surface.normal);

@@ -63,10 +63,11 @@ void integrate(RigidBody& body, const BodyForces& forces, const Integrator& inte
 
 namespace {
 
-/// The free rotation of a body that may turn by many radians in a sub-step. Its kinetic energy is split into
-/// the energy of a symmetric top and a term of one axis. The motion of each part has a closed form, and the
-/// two motions are applied alternately (Touma and Wisdom, "Lie-Poisson integrators for rigid body dynamics in
-/// the solar system", 1994). The angular momentum is conserved exactly, and the energy does not drift.
+/// Computes the free rotation of a body that may turn by many radians in a sub-step. Its kinetic energy is
+/// split into the energy of a symmetric top and a term of one axis. The motion of each part has a closed
+/// form, and the two motions are applied alternately (Touma and Wisdom, "Lie-Poisson integrators for rigid
+/// body dynamics in the solar system", 1994). The angular momentum is conserved exactly, and the energy does
+/// not drift.
 class SplitRotation {
  public:
   explicit SplitRotation(const RigidBody& body) : H_(body.angular_momentum) {

@@ -15,7 +15,7 @@ constexpr int kIterations = 16;
 constexpr Real kConverged = 1e-9, kLeastScale = 1e-3;
 constexpr Real kShortest = 1.0 / 64;
 
-/// One implicit step of a system, from the state at `t` to the one at `t + h`.
+/// One implicit step of a system, from the state at time `t` to the state at time `t + h`.
 class ImplicitStep {
  public:
   ImplicitStep(const DynamicSystem& system, std::size_t x_size, std::size_t p_size, IntegratorReport& report)

@@ -10,9 +10,11 @@ namespace offstage::sim {
 namespace {
 
 constexpr std::size_t kGridChunk = 4096;
-/// Points are first distributed by the leading bits of their cells; each part is then sorted separately.
+/// Number of leading bits of a cell's index by which points are first distributed into parts. Each part is
+/// then sorted separately.
 constexpr uint32_t kPartBits = 8;
-/// With fewer cells along an axis the same neighbour would be visited twice.
+/// Base-2 logarithm of the least number of cells along an axis. With fewer cells a search would visit the
+/// same neighbour twice.
 constexpr uint32_t kMinBits = 2;
 
 Aabb bounding_box(std::span<const Vec3> points) {

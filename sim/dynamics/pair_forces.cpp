@@ -157,7 +157,7 @@ Vec3 force_by_all(const Kernel& kernel, const Cloud& c, std::size_t i) {
   for (std::size_t j = 0; j < c.x.size(); j += 4) {
     const auto four = [&](const std::vector<Real>& v) { return Lanes(_mm256_loadu_pd(&v[j])); };
     const LaneVector<Lanes> d{x - four(c.x), y - four(c.y), z - four(c.z)};
-    // At distance 0, as for the particle itself, this is a finite factor times zero.
+    // The particle itself is at distance 0 and adds a finite factor times zero.
     sum = sum + (w * four(c.w) * kernel.factor(dot(d, d))) * d;
   }
   const auto total = [](Lanes v) { return (v[0] + v[1]) + (v[2] + v[3]); };

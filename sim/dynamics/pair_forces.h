@@ -28,9 +28,9 @@ class PairForces {
 
   /// Adds to the accelerations `dv` at positions `x`.
   void accelerate(Real t, std::span<const Real> x, std::span<Real> dv) const;
-  /// Appends the derivatives of dv/dt by x, which begin at row `at_v` and column `at_x`. Exact for up to
-  /// kExactJacobian particles. For more particles the derivatives between different particles are omitted,
-  /// because their pattern would change with the state.
+  /// Appends the derivatives of dv/dt by x, which begin at row `at_v` and column `at_x`. They are exact for
+  /// up to kExactJacobian particles. For more particles the derivatives between different particles are
+  /// omitted, because their pattern would change with the state.
   void jacobian(Real t, std::span<const Real> x, int at_x, int at_v, SparseEntries& entries) const;
   /// Potential energy [J]; 0 at infinity, or at the cut-off distance. Strengths in a region count as constant
   /// factors.

@@ -33,8 +33,8 @@ struct RigidBody : RigidState {
   }
   /// Returns the angular momentum H for the orientation q and the angular velocity w.
   Vec3 spin_momentum(const Quat& q, const Vec3& w) const { return q * (inertia * (q.conjugate() * w)); }
-  /// Whether the greatest moment of inertia is more than about ten times the smallest one. Measured by tr I
-  /// tr I^-1, which is 9 for a ball and 10 for a coin.
+  /// Whether the greatest moment of inertia is more than about ten times the smallest one. The measure is tr
+  /// I tr I^-1, which is 9 for a ball and 10 for a coin.
   bool is_thin() const { return inertia.trace() * inverse_inertia.trace() > 26; }
   Pose pose() const { return {position - orientation * centre, orientation}; }
 

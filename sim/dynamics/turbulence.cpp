@@ -15,7 +15,7 @@ typedef float Floats __attribute__((vector_size(kWidth * sizeof(float))));
 typedef uint32_t Words __attribute__((vector_size(kWidth * sizeof(uint32_t))));
 typedef int32_t Ints __attribute__((vector_size(kWidth * sizeof(int32_t))));
 
-/// Period of the lattice in cells along each axis: 10 bits.
+/// Period of the lattice along each axis, in cells; a corner's index has 10 bits.
 constexpr Real kTile = 1024;
 /// The velocity of a corner consists of three integers from 0 to kLevels - 1. Each is 10 bits of a hash.
 constexpr uint32_t kLevels = 1024;
@@ -109,7 +109,7 @@ TurbulentFlow::TurbulentFlow(const Turbulence& f, Real time) : octave_count_(f.o
     const auto tick = static_cast<uint32_t>(static_cast<int64_t>(std::clamp(whole, -0x1p62, 0x1p62)));
     EddyLattice& o = octaves_[k];
     o.cells = cells;
-    // Random offsets: lattices of different octaves have no corner in common.
+    // Random offsets move the lattices of the octaves, so that they have no corner in common.
     o.origin = time * cells * f.drift;
     for (int i = 0; i < 3; ++i)
       o.origin[i] += mixed(stream + 1 + static_cast<uint32_t>(i)) * (kTile / 0x1p32);

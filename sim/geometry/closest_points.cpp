@@ -87,7 +87,7 @@ TrianglePoint closest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, c
 
 // The common perpendicular of the two lines gives the fraction s along p. This s is clamped to the segment.
 // Then the nearest t along q is computed and clamped, and then the nearest s again. The squared distance is
-// convex, so each step is the minimum over the remaining freedom.
+// convex, so each step minimises it over one fraction while the other is fixed.
 ClosestPoints closest_on_segments(const Vec3& p0, const Vec3& p1, const Vec3& q0, const Vec3& q1) {
   const Vec3 dp = p1 - p0, dq = q1 - q0, n = dp.cross(dq);
   const Real n2 = n.squaredNorm();

@@ -28,8 +28,8 @@ struct DecompositionSettings {
   /// Smallest angle between an exact cut and the faces that it meets [rad], 20 degrees; relaxed if no cut
   /// satisfies it.
   Real min_dihedral = 20 * std::numbers::pi / 180;
-  /// Smallest distance of an exact cut from vertices off it, as a fraction of the mean edge. Relaxed if no
-  /// cut satisfies it.
+  /// Smallest distance of an exact cut from vertices off it, as a fraction of the mean edge. The distance is
+  /// reduced if no cut satisfies it.
   Real min_distance = 0.1;
   /// Greatest number of reflex edges for the exact method; a solid with more is approximated at once.
   uint32_t max_reflex_edges = 2000;

@@ -58,10 +58,10 @@ class Qhull {
   std::FILE* log_;
 };
 
-/// A line or plane through extreme points of a set. No sums are used, so distant and repeated points do not
-/// reduce the accuracy.
+/// A line or plane through extreme points of a set. It is computed without sums over the points, so distant
+/// and repeated points do not reduce the accuracy.
 struct Frame {
-  int dimension;  // dimension of the set: 0-3
+  int dimension;  // dimension of the set: 0 to 3
   Vec3 origin, along, normal;
   Real extent;
 };
@@ -270,7 +270,7 @@ ConvexPolyhedron assemble(std::span<const Vec3> points, const std::vector<Triang
     if (Loops faces = FaceMerger(points, triangles, tolerance).faces(); faces.size() >= 4)
       return compact(points, std::move(faces));
   } catch (const std::invalid_argument&) {
-    // A merged outline touches itself; the triangles below have no such outlines.
+    // A merged outline touches itself. The triangles are used instead; their outlines never touch themselves.
   }
   Loops faces;
   for (const Triangle& t : triangles) faces.push_back({t[0], t[1], t[2]});
@@ -319,8 +319,8 @@ ConvexPolyhedron convex_hull(std::span<const Vec3> points) {
   coordinates.reserve(3 * points.size());
   for (const Vec3& p : points)
     for (int k = 0; k < 3; ++k) coordinates.push_back((p[k] - frame.origin[k]) / frame.extent);
-  // Qt: triangles only. QJ, as the last resort, perturbs the input, so that no two faces are exactly
-  // coplanar.
+  // The option Qt gives triangles only. The option QJ is the last resort: it perturbs the input, so that no
+  // two faces are exactly coplanar.
   for (const char* command : {"qhull Qt Pp", "qhull QJ Pp"}) {
     std::vector<Real> copy = coordinates;
     const std::vector<Triangle> triangles = Qhull().triangles(copy, command);

@@ -21,8 +21,8 @@ class ConvexPolyhedron {
     uint32_t left, right;
   };
   /// The unit vectors that bound the Voronoi regions at an edge (Mirtich, "V-Clip", 1998): along the edge
-  /// from tail to head, and perpendicular to it in the planes of its faces, pointing into the faces. Zero
-  /// where there is no face.
+  /// from tail to head, and perpendicular to it in the planes of its faces, pointing into the faces. The
+  /// vector is zero where there is no face.
   struct EdgeFrame {
     Vec3 along, into_left, into_right;
   };

@@ -28,8 +28,8 @@ struct ReflexEdge {
 std::vector<ReflexEdge> sharp_reflex_edges(const SolidPiece& solid);
 
 /// Returns the plane that minimizes the total volume of the hulls of both sides; of similar planes, the one
-/// with the most compact sides. `reflex`: sharp_reflex_edges() of the whole solid. Empty if no plane divides
-/// the piece. Distances below `tolerance` count as zero [m].
+/// with the most compact sides. `reflex`: sharp_reflex_edges() of the whole solid. The result is empty if no
+/// plane divides the piece. Distances below `tolerance` count as zero [m].
 std::optional<SolidPiece::Plane> best_cut(const HulledPiece& piece, const std::vector<ReflexEdge>& reflex,
                                           Real tolerance);
 

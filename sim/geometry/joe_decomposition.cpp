@@ -33,8 +33,8 @@ Real mean_edge(const Polyhedron& p) {
   return sum / static_cast<Real>(p.half_edges.size());
 }
 
-/// Angles of the planes that split the wedge of a reflex edge into two convex wedges, as F.2 lists them:
-/// along the two faces, through neighbouring edges, and at fractions of the angle.
+/// Angles of the planes that split the wedge of a reflex edge into two convex wedges (physics F.2). The
+/// planes are along the two faces, through neighbouring edges, and at fractions of the angle.
 class Candidates {
  public:
   Candidates(const Polyhedron& p, uint32_t h, Real tolerance) : wedge_(wedge(p, h)) {
@@ -152,8 +152,8 @@ class Decomposer {
     return edges;
   }
 
-  /// Returns the best acceptable cut of the first kCompared edges that have one. The limits are relaxed until
-  /// there is an acceptable cut; nothing if there is none.
+  /// Returns the best cut of the first kCompared edges that have an acceptable cut. The limits are relaxed
+  /// until an edge has one. The result is empty if there is no acceptable cut even then.
   std::optional<RatedCut> best_cut(const Polyhedron& p, const std::vector<uint32_t>& reflex) {
     const Real edge = mean_edge(p);
     std::optional<RatedCut> best;

@@ -1,5 +1,5 @@
 #pragma once
-/// Exact convex decomposition: reflex edges are resolved by cut planes, after Joe, "Tetrahedral mesh
+/// Exact convex decomposition that removes reflex edges by cut planes, after Joe, "Tetrahedral mesh
 /// generation in polyhedral regions based on convex polyhedron decompositions" (1994), as described in the
 /// book's appendix F.
 

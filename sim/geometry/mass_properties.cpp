@@ -70,7 +70,7 @@ MassProperties closed_form(const Cylinder& c) {
   return {volume, Vec3::Zero(), diagonal(across, volume * r2 / 2, across)};
 }
 
-/// A cylinder and two hemispheres, whose centroids are 3r/8 beyond the cap centres.
+/// Adds a cylinder and two hemispheres, whose centroids are 3r/8 beyond the centres of the caps.
 MassProperties closed_form(const Capsule& c) {
   const Real r = c.radius, h = c.height;
   const MassProperties side = closed_form(Cylinder{r, h}), ball = closed_form(Sphere{r});
@@ -79,15 +79,15 @@ MassProperties closed_form(const Capsule& c) {
   return {side.volume + ball.volume, Vec3::Zero(), diagonal(across, along, across)};
 }
 
-/// The centroid is a quarter of the height above the base.
+/// Uses the centroid of a cone, which is a quarter of the height above the base.
 MassProperties closed_form(const Cone& c) {
   const Real r2 = c.radius * c.radius, volume = std::numbers::pi * r2 * c.height / 3;
   const Real across = volume * 3 * (4 * r2 + c.height * c.height) / 80;
   return {volume, Vec3(0, -c.height / 4, 0), diagonal(across, volume * 3 * r2 / 10, across)};
 }
 
-/// With the radius R + (r - R) s at the height s h above the base, the integrals over the discs are
-/// polynomials of both radii.
+/// Integrates over the discs of a frustum. The disc at the height s h above the base has the radius R + (r -
+/// R) s, so the integrals are polynomials of both radii.
 MassProperties closed_form(const Frustum& c) {
   const Real R = c.radius, r = c.top_radius, h = c.height, pi = std::numbers::pi;
   const Real area = (R * R + R * r + r * r) / 3, volume = pi * h * area;

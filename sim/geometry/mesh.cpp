@@ -55,13 +55,13 @@ struct HalfEdge {
   bool ascending;  // the face runs from the lower vertex to the higher
 };
 
-/// Turns counts per bucket into start offsets; the last entry is the total.
+/// Replaces the count of each bucket by the offset of its first entry. The last entry becomes the total.
 void counts_to_starts(std::vector<uint32_t>& start) {
   uint32_t total = 0;
   for (uint32_t& s : start) total += std::exchange(s, total);
 }
 
-/// The half-edges of a mesh grouped by lower vertex, then sorted by higher vertex, then face.
+/// The half-edges of a mesh, sorted by the lower vertex, then by the higher vertex, then by the face.
 class HalfEdges {
  public:
   explicit HalfEdges(const TriangleMesh& mesh) : start_(mesh.vertices.size() + 1, 0) {
@@ -106,7 +106,8 @@ class HalfEdges {
   std::vector<HalfEdge> edges_;
 };
 
-/// Six times the signed volume, relative to a point near the mesh to limit cancellation.
+/// Returns six times the signed volume. Coordinates are relative to a point near the mesh, which limits
+/// cancellation.
 Real signed_volume6(const TriangleMesh& mesh) {
   if (mesh.vertices.empty()) return 0;
   const Vec3 origin = mesh.vertices.front();
@@ -230,7 +231,8 @@ MeshTopology::MeshTopology(const TriangleMesh& mesh) {
       face_neighbours_[sides[k].face][sides[k].side] = sides[0].face;
   });
 
-  // Faces around each vertex, ascending because faces are visited in order.
+  // Stores the faces around each vertex. They are in ascending order, because faces are visited in this
+  // order.
   vertex_face_start_.assign(vertices + 1, 0);
   for (const Triangle& t : mesh.triangles)
     for (uint32_t v : t) ++vertex_face_start_[v];
@@ -240,8 +242,8 @@ MeshTopology::MeshTopology(const TriangleMesh& mesh) {
   for (uint32_t face = 0; face < faces; ++face)
     for (uint32_t v : mesh.triangles[face]) vertex_faces_[next[v]++] = face;
 
-  // Neighbours of each vertex. Edges are in ascending (low, high) order, so each vertex gets first its lower
-  // neighbours, ascending, and then its higher ones.
+  // Stores the neighbours of each vertex in ascending order: edges are sorted by (low, high), so each vertex
+  // gets first its lower neighbours and then its higher ones.
   vertex_neighbour_start_.assign(vertices + 1, 0);
   for (const Edge& e : edges_)
     for (uint32_t v : e.vertices) ++vertex_neighbour_start_[v];
@@ -253,9 +255,9 @@ MeshTopology::MeshTopology(const TriangleMesh& mesh) {
     vertex_neighbours_[next[e.vertices[1]]++] = e.vertices[0];
   }
 
-  // Normals of faces, edges and vertices. The normals of edges and vertices are also the pseudonormals that
-  // determine inside and outside (Baerentzen and Aanaes, "Signed distance computation using the angle
-  // weighted pseudonormal", 2005).
+  // Computes the normals of faces, edges and vertices. The normals of edges and vertices are also the
+  // pseudonormals that determine inside and outside (Baerentzen and Aanaes, "Signed distance computation
+  // using the angle weighted pseudonormal", 2005).
   face_normals_.resize(faces);
   vertex_normals_.assign(vertices, Vec3::Zero());
   for (std::size_t face = 0; face < faces; ++face) {

@@ -16,7 +16,7 @@ namespace {
 using CutPlane = Polyhedron::Plane;
 
 constexpr uint32_t kNoVertex = 0xffffffff;
-/// Angles below this are a full turn, and angles that differ by less than this are equal [rad].
+/// Angles below this count as a full turn, and angles that differ by less count as equal [rad].
 constexpr Real kNoTurn = 1e-7;
 
 /// Inserts a point in an edge. The half-edge keeps its origin; the half-edge after it starts at the point.

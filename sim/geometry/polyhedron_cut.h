@@ -26,9 +26,9 @@ struct Cut {
 };
 
 /// Traces the cut face that begins along an edge. The inside of the cut is on the left of the half-edge, seen
-/// from the tip of the plane's normal. Points within `tolerance` of the plane count as on it. Empty if the
-/// cut face has holes or slits, or if its inside touches the surface. The outline may touch itself at
-/// vertices.
+/// from the tip of the plane's normal. Points within `tolerance` of the plane count as on it. The result is
+/// empty if the cut face has holes or slits, or if its inside touches the surface. The outline may touch
+/// itself at vertices.
 std::optional<Cut> trace_cut(const Polyhedron& p, uint32_t half_edge, const Polyhedron::Plane& plane,
                              Real tolerance);
 

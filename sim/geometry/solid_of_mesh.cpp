@@ -102,7 +102,8 @@ class VoxelGrid {
                   SolidPiece& piece) const {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     for (int k = 0; k < 4; ++k) {
-      // Counter-clockwise about the axis for the upper side.
+      // The corners of the upper side are counter-clockwise about the axis, the corners of the lower side
+      // clockwise.
       const int turn = side == 1 ? k : 3 - k;
       Index3 corner = i;
       corner[axis] += side;

@@ -219,7 +219,7 @@ class PieceCutter {
   std::unordered_map<uint64_t, uint32_t> crossing_;
 };
 
-/// Sums the signed tetrahedra between an apex and triangles, relative to the apex.
+/// Sums the signed tetrahedra between an apex and triangles. Coordinates are relative to the apex.
 struct PyramidSum {
   Real volume6 = 0;
   Vec3 first24 = Vec3::Zero();
@@ -260,8 +260,9 @@ void add_cap_above(const SolidPiece& piece, const SolidPiece::Cap& cap, const Cu
                    const std::vector<Real>& height, const Vec3& apex, PyramidSum& sum) {
   if (cap.sides.empty()) return;
   const Vec3 across = plane.normal - plane.normal.dot(cap.plane.normal) * cap.plane.normal;
-  // The apex is on the line where the planes meet, so that the closing sides along this line contribute
-  // nothing. Parallel planes do not meet; the cap is then on one side.
+  // The triangles of the cap start at a corner on the line where the two planes meet, so that the closing
+  // sides along this line contribute nothing. Parallel planes do not meet; the cap is then on one side of the
+  // plane.
   const uint32_t any = cap.sides.front()[0];
   Vec3 corner = piece.points[any] - apex;
   if (const Real square = across.squaredNorm(); square > 1e-20) corner -= height[any] / square * across;

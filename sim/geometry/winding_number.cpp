@@ -11,8 +11,8 @@ constexpr uint32_t kLeaf = 8;
 /// Clusters at a distance of more than this many of their radii are approximated by dipoles.
 constexpr Real kFar = 2.3;
 
-/// Solid angle of a triangle as seen from the origin: van Oosterom and Strackee, "The solid angle of a plane
-/// triangle" (1983).
+/// Returns the solid angle of a triangle seen from the origin [sr] (van Oosterom and Strackee, "The solid
+/// angle of a plane triangle", 1983).
 Real solid_angle(const Vec3& a, const Vec3& b, const Vec3& c) {
   const Real la = a.norm(), lb = b.norm(), lc = c.norm();
   const Real y = a.dot(b.cross(c)), x = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;

@@ -186,7 +186,7 @@ void ParticleContacts::add_surface(uint32_t i, const Obstacle& o, const Vec3& no
   found.surfaces.push_back(s);
 }
 
-/// Uses the impulse of the previous sub-step as the initial guess.
+/// Sets the initial guess of a pair's impulse to its impulse of the previous sub-step.
 void ParticleContacts::recall(Pair& pair) const {
   pair.impulse_single.setZero();
   const uint32_t a = order_.before[pair.a], b = order_.before[pair.b];

@@ -1,5 +1,5 @@
-/// The contact forces of small clusters of particles by linear complementarity, as in the book (physics P7,
-/// N9, N10).
+/// Computes the contact forces of small clusters of particles as a linear complementarity problem, as in the
+/// book (physics P7, N9, N10).
 
 #include <algorithm>
 

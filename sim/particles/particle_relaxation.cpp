@@ -1,4 +1,4 @@
-/// Solution of ParticleContacts, and the resulting motion.
+/// Solves the contacts of ParticleContacts and moves the particles.
 
 #include <algorithm>
 #include <array>
@@ -32,7 +32,7 @@ struct Load {
   const Obstacle* obstacle;
   Vec3 impulse = Vec3::Zero(), angular_impulse = Vec3::Zero();
   Real arm = 0;                ///< greatest lever arm of its parts [m]
-  Real brought = 0, mass = 0;  ///< those of the heaps that load it
+  Real brought = 0, mass = 0;  ///< sums over the heaps that rest on it
   Real fraction = 1;
 };
 

@@ -111,8 +111,8 @@ inline constexpr Real kBallTurning = 2.5;
 Vec3 velocity_after_shift(const Vec3& v, const Vec3& a, const Vec3& shift);
 
 /// Returns the time until the distance of two centres is `distance` [s], when the two spheres touch (physics
-/// P3). d: difference of the centres [m]; u: difference of the velocities [m/s]. Zero if they overlap and
-/// approach; empty if they never touch.
+/// P3). d: difference of the centres [m]; u: difference of the velocities [m/s]. The result is zero if they
+/// overlap and approach, and empty if they never touch.
 std::optional<Real> meeting_time(const Vec3& d, const Vec3& u, Real distance);
 
 }  // namespace offstage::sim

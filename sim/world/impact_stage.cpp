@@ -322,9 +322,9 @@ bool ImpactStage::join_next(uint32_t number, Real time) {
   return joined;
 }
 
-/// Merges the islands that an island overlaps now because its contact forces have moved it since `time`. Also
-/// finds contacts that were too far away for the first search. Returns whether any were found; all bodies
-/// must then be moved again.
+/// Merges the islands that an island overlaps now because its contact forces have moved it since `time`. It
+/// also finds contacts that were too far away for the first search. Returns whether any were found; all
+/// bodies must then be moved again.
 bool ImpactStage::join_overtaken(uint32_t number, Real time) {
   const std::span<ContactPair* const> pairs = contacts_.pairs();
   for (Body* body : islands_[number].bodies)

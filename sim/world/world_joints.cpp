@@ -16,7 +16,7 @@ void check_not_negative(const JointDef& def, const char* field, Real value) {
   if (!(value >= 0)) refuse(def, std::string(field) + " is " + std::to_string(value) + ", allowed is >= 0");
 }
 
-/// Checks what gears, racks, screws and pulleys need.
+/// Checks the fields that gears, racks, screws and pulleys need.
 void check_kind(const JointDef& def) {
   using enum JointType;
   const bool has_ratio = def.is_coupling() || def.type == screw || def.type == pulley;
