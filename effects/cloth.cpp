@@ -88,7 +88,7 @@ void add_spring(ClothDef& def, uint32_t a, uint32_t b, Real stiffness, const Fab
 /// Returns the stiffness of a spring that resists bending over two cells of length h. If the cloth bends by
 /// an angle theta, the spring gets shorter by h theta^2 / 4, and resists bending only by its compression. The
 /// stiffness is chosen for a strip of width w and the angle theta = 1/2 of a fold between cells: the energy
-/// is then that of the bending moment, B w theta^2 / (2 h).
+/// then equals the energy of the bending moment, B w theta^2 / (2 h).
 Real bend_stiffness(Real bend, Real w, Real h) {
   constexpr Real kAngle = 0.5;
   return 16 * bend * w / (h * h * h * kAngle * kAngle);

@@ -5,7 +5,7 @@
 namespace offstage::effects {
 
 Rgba StartColor::of(const RandomStream& random, uint64_t id) const {
-  // Property numbers for drawing. They differ from those of the simulation, so that the random numbers are
+  // Property numbers for drawing. They differ from the simulation's numbers, so that the random numbers are
   // independent.
   constexpr uint32_t kBrightness = 1u << 24, kChannel = kBrightness + 1;
   const auto varied = [&](float middle, float spread, uint32_t property) {

@@ -35,7 +35,7 @@ class Schedule {
   Real draw(const Varying& v, uint64_t number, uint32_t property, Real time) const;
   bool open(Real time) const;
 
-  // Times in this class are on the world's clock, those of the definitions on the emitter's clock.
+  // Times in this class are on the world's clock. Times in the definitions are on the emitter's clock.
   Varying rate_, count_, interval_;
   std::vector<Burst> bursts_;
   std::vector<TimeWindow> windows_;

@@ -70,7 +70,8 @@ struct ImpactFigures {
   }
 };
 
-/// Statistics of all cloths together. ClothReport has those of a single cloth and describes each figure.
+/// Statistics of all cloths together. ClothReport has the statistics of a single cloth and describes each
+/// figure.
 struct ClothFigures {
   Real strain = 0;  ///< greatest strain of a thread
   /// Greatest depth of a vertex inside a body [m].

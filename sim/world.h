@@ -254,7 +254,7 @@ class World {
   /// satisfy from <= to <= 0. A further call must start where the last one ended. The sub-steps are as long
   /// as in step(). Afterwards time() is `to`. Particles collide with each other and with bodies. Dynamic
   /// bodies, cloths, springs and previously existing particles do not move. Kinematic bodies follow their
-  /// tracks. Forces are those of time 0, and forces between particles do not act. With from = to = 0,
+  /// tracks. Forces have their values at time 0, and forces between particles do not act. With from = to = 0,
   /// `before` is called once, and particles created at that time exist from then on. Throws
   /// std::invalid_argument for other times.
   StepReport prewarm(Real from, Real to, const BeforeSubStep& before = {});

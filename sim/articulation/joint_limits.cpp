@@ -16,7 +16,7 @@ constexpr Real kPushOut = 0.2, kFastestPush = 2;
 constexpr Real kNear = 0.02, kReached = 1e-4;
 /// Links that turn by more than this in an interval are not predicted [rad].
 constexpr Real kMostTurn = 1;
-/// A joint that approaches its limit faster than this reaches it in the interval [m/s], [rad/s].
+/// A joint that approaches its limit faster than this speed reaches the limit in the interval [m/s], [rad/s].
 constexpr Real kClosing = 1e-3;
 
 /// Slots of Joint::efforts.

@@ -268,7 +268,7 @@ JointRow free_row(const JointDef& def, const JointPlace& p, Real length) {
     row = turning_row(za);
     row.error = angle_of(-ya.dot(xb), xa.dot(xb));
   } else {
-    // The angle is that of the smallest rotation from one axis to the other. It is undefined if they are
+    // The angle is the smallest angle of a rotation from one axis to the other. It is undefined if they are
     // opposite.
     const Real both = std::max(1 + za.dot(zb), 0.05);
     row = turning_row((za + zb) / both);

@@ -31,7 +31,7 @@ class JointSystem {
   /// constraints are too degenerate. correct() then does nothing.
   bool factorize(std::span<const JointRows> rows, std::span<const LinkMobility> links);
 
-  /// Replaces the constraints by rows that differ little from those of the last factorize(). The factor is
+  /// Replaces the constraints by rows that differ little from the rows of the last factorize(). The factor is
   /// kept, so correct() must be iterated.
   void update(std::span<const JointRows> rows) { rows_ = rows; }
 

@@ -221,8 +221,8 @@ struct ClothView {
   std::span<const Triangle> triangles;
   /// For each point, the vertex of the definition that it comes from. Points are added where cloth tears.
   std::span<const uint32_t> sources;
-  /// The springs that are not broken. Springs of the kind `cord` never break; their number and order are
-  /// those of the definition.
+  /// The springs that are not broken. Springs of the kind `cord` never break; their number and order are the
+  /// same as in the definition.
   std::span<const ClothSpring> springs;
   uint32_t version = 0;  ///< increases whenever the triangles or the number of points change
 };

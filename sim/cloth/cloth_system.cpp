@@ -17,7 +17,7 @@ constexpr Real kMaxParts = 1000;
 constexpr Real kMostApproach = 0.1;
 /// Greatest relative displacement of a spring's ends in a sub-step, as a fraction of the spring's length.
 constexpr Real kMostStrain = 1;
-/// Greatest number of parts into which a sub-step is divided for these two limits.
+/// Greatest number of parts into which a sub-step is divided because of kMostApproach and kMostStrain.
 constexpr Real kMostDivision = 16;
 
 }  // namespace

@@ -50,7 +50,7 @@ class ClothSystem {
   /// The frame in which the moves of a piece of cloth are shortened. The frame moves with the piece, all
   /// cloth that it may cross and the dynamic bodies that hold it.
   struct Frame {
-    bool rests = false;                 // the frame is that of the world
+    bool rests = false;                 // in the world's frame
     bool anchored = false;              // a fixed object holds it
     bool carries = false;               // dynamic bodies are pinned to it
     const ClothBody* leader = nullptr;  // the only body that holds it, if that is not dynamic
@@ -133,7 +133,7 @@ class ClothSystem {
   std::vector<std::size_t> first_;         // by cloth: index of its first point
   std::vector<ClothSpring> all_springs_;   // springs of all cloths; their ends are indices into all points
   std::vector<std::size_t> first_spring_;  // by cloth: index of its first spring; and the end
-  std::vector<Vec4> kick_;  // difference of the velocities at the end of a sub-step from those of the moves
+  std::vector<Vec4> kick_;  // velocities at the end of a sub-step minus the velocities of the moves
   bool changed_ = false;
   Real dt_ = 0;     // length of a sub-step of cloth [s]
   Real time_ = 0;   // end of the world's sub-step [s]

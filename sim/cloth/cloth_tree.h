@@ -27,7 +27,7 @@ class ClothTree {
   /// Fits the boxes to the paths of the triangles from the positions `from` to the positions `to`, enlarged
   /// by the `margin` of each point [m].
   void fit(std::span<const Vec4> from, std::span<const Vec4> to, std::span<const Real> margin);
-  /// Does what fit() does, for some of the triangles.
+  /// Updates the boxes like fit(), but only for some of the triangles.
   void refit(std::span<const uint32_t> triangles, std::span<const Vec4> from, std::span<const Vec4> to,
              std::span<const Real> margin);
 

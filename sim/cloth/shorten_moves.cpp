@@ -140,7 +140,7 @@ void ClothSystem::shorten_moves(Real dt) {
   for (std::size_t i = 0; any && i < points_.size(); ++i) {
     if (shortened_[i] == kWhole) continue;
     ++cloths_[points_.cloth[i]]->report.limited;
-    if (self) kick_[i].setZero();  // its velocity is that of the shortened move
+    if (self) kick_[i].setZero();  // its velocity follows from the shortened move
   }
   if (self) std::erase_if(cuts_, [&](const VelocityCut& cut) { return shortened_[cut.point] != kWhole; });
   if (any) {

@@ -79,7 +79,8 @@ class CellTable {
 
   /// Adds the pairs of the buckets [first, end).
   void find_pairs(uint32_t first, uint32_t end, CandidatePairs& out) const;
-  /// Adds the pairs between objects in the buckets [first, end) and those of another table of the same level.
+  /// Adds the pairs of an object in the buckets [first, end) and an object of another table of the same
+  /// level.
   void find_pairs_with(const CellTable& other, uint32_t first, uint32_t end, CandidatePairs& out) const;
 
  private:

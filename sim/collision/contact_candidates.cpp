@@ -7,8 +7,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Returns the point with the largest measure. Among equal points (within a thousandth) the one with the
-/// lowest id is chosen, so that neither rounding nor the order decides.
+/// Returns the point with the largest measure. If several measures are equal within a thousandth, the point
+/// with the lowest id is chosen, so that neither rounding nor the order decides.
 template <class Measure>
 const Candidate& most(std::span<const Candidate> c, Measure&& measure) {
   // Most manifolds have few candidates.

@@ -38,7 +38,7 @@ struct MovingConvex {
 std::optional<Impact> time_of_impact(const MovingConvex& a, const MovingConvex& b, Real tolerance);
 
 /// Returns the time of impact, as time_of_impact() does, of a solid and the half-space below a plane, which
-/// is the xz plane of its path's frame. The normal is that of the plane, in the solid's frame.
+/// is the xz plane of its path's frame. The normal is the plane's normal, in the solid's frame.
 std::optional<Impact> time_of_plane_impact(const MovingConvex& a, const PosePath& plane, Real tolerance);
 
 /// The part of a solid's rotation that changes the place of its core.

@@ -1,6 +1,6 @@
 #pragma once
-/// Contact with triangles that are parts of a mesh: manifolds like those of manifold(), but restricted to the
-/// normals that the surrounding surface allows (mesh_surface.h), on the side on which the other solid is.
+/// Contact with triangles that are parts of a mesh: manifolds as manifold() returns them, but restricted to
+/// the normals that the surrounding surface allows (mesh_surface.h), on the side on which the other solid is.
 
 #include <optional>
 #include <vector>

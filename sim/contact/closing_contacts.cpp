@@ -30,8 +30,8 @@ Real closing_time(Real gap, Real first, Real last, Real rest) {
   return 2 * gap / sum;
 }
 
-/// Solves an interval in pieces, from one closing of contacts to the next. The state is that of the current
-/// time.
+/// Solves an interval in pieces, from one closing of contacts to the next. The state is always the state at
+/// the current time.
 class Pieces {
  public:
   Pieces(const ClosingProblem& problem, ProximalNewton& newton)

@@ -206,8 +206,8 @@ Vec3 free_velocity(const Body& body, const Vec3& arm) {
   return mean.at(arm);
 }
 
-/// Poses of a body at the start of the interval and, if it moves freely, at its end. Their position is the
-/// one of start_centre().
+/// Poses of a body at the start of the interval and, if it moves freely, at its end. Their position is
+/// start_centre().
 struct Ends {
   explicit Ends(const Body& body)
       : start{start_centre(body), body.is_awake() ? body.start.orientation : body.start_pose.orientation},
@@ -395,7 +395,8 @@ PlacedManifold ContactPair::moved_back(const Manifold& at_end, Real duration) co
                       ends.start.orientation, side * m.normal);
   };
   // The bodies slide along each other in the interval. The contact moves with the feature that defines it, as
-  // in contact_motion(). Otherwise it would lie beside the axis of a thin body and set the body spinning.
+  // in contact_motion(). Otherwise it would be next to the axis of a thin body, and its force would make the
+  // body spin.
   const bool by_b = moves_with_b(m.source);
   for (uint32_t k = 0; k < m.count; ++k) {
     ContactPoint& p = m.points[k];

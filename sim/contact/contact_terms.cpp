@@ -27,7 +27,7 @@ Vec3 core_point(const Body& body, const Vec3& place) {
 }
 
 struct PointRates {
-  /// Motion of a material point at the start. The acceleration is the one without forces, w x (w x r).
+  /// Motion of a material point at the start. The acceleration is the part without forces, w x (w x r).
   Vec3 velocity, acceleration;
 };
 

@@ -312,8 +312,8 @@ void FrictionSolver::solve_by_newton(ContactWork& work) {
   if (residual(bodies_, contacts_) > least) set_impulses(before);
 }
 
-/// Solves by Gauss-Seidel and Newton's method in turn. Gauss-Seidel approaches the solution from any start,
-/// but slowly. Newton's method is fast near the solution.
+/// Solves by Gauss-Seidel and Newton's method alternately. Gauss-Seidel approaches the solution from any
+/// start, but slowly. Newton's method is fast near the solution.
 void FrictionSolver::fall_back(ContactWork& work) {
   ++work.fallbacks;
   for (int k = 0; k < kFallbacks && residual(bodies_, contacts_) > kAccepted * scale_; ++k) {

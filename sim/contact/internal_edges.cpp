@@ -214,9 +214,9 @@ class BodyContacts {
     return at.point_to_world(convex.support(local, vertex) + convex.radius * local);
   }
 
-  /// Whether X turns into a contact beside a face on which it lies, as a box does that tips over an edge of
-  /// the face. Then both the contact and the lowest point of X approach faster than the point on the face. If
-  /// X slides, rolls or lands, its lowest point does not.
+  /// Whether X turns into a contact next to a face on which it lies, for example a box that tips over an edge
+  /// of the face. Then both the contact and the lowest point of X approach faster than the point on the face.
+  /// If X slides, rolls or lands, its lowest point does not.
   bool tips_into(const View& v, const View& face) const {
     const Vec3 up = face.normal;
     const auto speed = [&](const View& to, const Vec3& place) {

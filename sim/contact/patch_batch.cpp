@@ -478,8 +478,8 @@ bool is_coupled(const PatchBatch& p) {
 }
 
 /// Solves the normal impulse and the friction of a point as one system, if the point neither separates nor
-/// slides. For rolling bodies they depend on each other so strongly that solving them in turn converges
-/// slowly. Returns the change, and sets `all` if this was possible in all lanes.
+/// slides. For rolling bodies they depend on each other so strongly that solving them one after the other
+/// converges slowly. Returns the change, and sets `all` if this was possible in all lanes.
 Single solve_single_rolling(PatchBatch& p, Single& u, FloatLanes gap, bool& all) {
   const Symmetric& F = p.friction_mobility;
   const Symmetric K{p.normal_mobility.xx, p.coupling.x.x, p.coupling.y.x, F.xx, F.xy, F.yy};

@@ -411,8 +411,8 @@ Vec3 ProximalNewton::relative_velocity(const Contact& c, const Point& p,
   return c.to_frame(u);
 }
 
-/// Evaluates the impulses p at the velocities, with those of the constraints, and the function whose gradient
-/// is M (v - v0) - J^T p.
+/// Evaluates the impulses p of contacts and constraints at the velocities, and the function whose gradient is
+/// M (v - v0) - J^T p.
 void ProximalNewton::evaluate(std::span<const Contact> contacts) {
   merit_ = {};
   for (std::size_t row = 0; row < velocity_.size(); ++row) {

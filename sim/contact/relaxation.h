@@ -190,7 +190,7 @@ class RelaxationSolver {
   std::vector<SubstepTime> times_;    // time of each sub-step, and of one more after the last
   std::vector<Range> ranges_;
   // Sweeps are numbered from 1; a body stores the number of the last sweep in which it was hit.
-  uint32_t sweeps_ = 0, push_sweep_ = 0;  // the latter: the first sweep of the push-out
+  uint32_t sweeps_ = 0, push_sweep_ = 0;  // push_sweep_: first sweep of the push-out
   std::vector<uint32_t> struck_;          // by body
   std::vector<uint8_t> strikes_;          // by sweep: whether any body was hit
 };

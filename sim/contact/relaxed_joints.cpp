@@ -119,8 +119,8 @@ void RelaxedJoints::soften(Part& part, Real elapsed) {
   for (uint32_t i = part.first_contact; i < part.last_contact; ++i) contact_rows_[i].is_ready = false;
 }
 
-/// Prepares a row of a part. `whole`: whether the response of the whole articulation is computed, or only
-/// that of the row's bodies.
+/// Prepares a row of a part. `whole`: whether the response of the whole articulation is computed, or only the
+/// response of the row's bodies.
 void RelaxedJoints::prepare_row(Part& part, const BoundedRow& r, Row& row,
                                 std::span<const RelaxedBody> bodies, bool whole) {
   const auto response = [&](uint32_t body, const Vec6& on) -> Vec6 {

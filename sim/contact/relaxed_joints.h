@@ -62,8 +62,8 @@ class RelaxedJoints {
     Real shift = 0;              // integral of the sum over the step
     bool acts = false;           // whether the time from which it acts has come
     bool is_ready = false;       // whether its responses are known
-    // Responses of the links to a unit impulse; empty if only those of the row's own two links are known, in
-    // `response_a` and `response_b`.
+    // Responses of the links to a unit impulse; empty if only the responses of the row's own two links are
+    // known, in `response_a` and `response_b`.
     std::vector<Vec6> response;
     std::vector<Vec6> reaction;  // impulses of the joints due to a unit impulse
     Vec6 response_a, response_b;

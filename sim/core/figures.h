@@ -11,8 +11,8 @@
 ///     }
 ///   };
 ///
-/// A figure may be such a struct itself. If its name is empty, its figures are listed directly among those of
-/// the outer struct.
+/// A figure may be such a struct itself. If its name is empty, its figures are listed directly among the
+/// figures of the outer struct.
 
 #include <algorithm>
 #include <cstdint>

@@ -14,8 +14,8 @@
 
 namespace offstage::sim {
 
-/// Bodies of an articulation, and their response to impulses at the end of a sub-step. Velocities are those
-/// of the centre of mass, and impulses act at it; both are in world axes.
+/// Bodies of an articulation, and their response to impulses at the end of a sub-step. Velocities refer to
+/// the centre of mass, and impulses act at it. Both are in world axes.
 class JointedBodies {
  public:
   virtual ~JointedBodies() = default;

@@ -104,8 +104,8 @@ class SplitRotation {
   }
 
  private:
-  /// Rotates the body by the energy term of one axis. This term has the difference between the axis's inverse
-  /// inertia and that of the middle axis.
+  /// Rotates the body by the energy term of one axis. The factor of this term is the axis's inverse inertia
+  /// minus the inverse inertia of the middle axis.
   void turn(Quat& q, int axis, Real h) const {
     const Real along = (q.conjugate() * H_)[axis];
     q = q * rotation(along * (inverse_[axis] - inverse_[1]) * Vec3::Unit(axis), h);

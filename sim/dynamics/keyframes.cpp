@@ -141,7 +141,7 @@ bool KeyframeTrack::jumps(Real from, Real to) const {
   if (keys.size() < 2) return false;
   const auto jumps_at = [&](Real time) { return from < time && time <= to; };
   const Real round = loop ? round_start(*this, to) - keys.front().time : 0;
-  // A jump is in the period that contains `to`, or in the one before.
+  // A jump is in the period that contains `to`, or in the previous period.
   for (std::size_t i = 0; i + 1 < keys.size(); ++i) {
     if (kind(*this, i) != Interpolation::step) continue;
     const Real time = keys[i + 1].time, period = keys.back().time - keys.front().time;

@@ -10,9 +10,9 @@
 
 namespace offstage::sim {
 
-/// Air with eddies of several sizes. Each octave has eddies of half the width of the one before; their speed
-/// decreases with the cube root of the width and their lifetime with its power 2/3, as in Kolmogorov's
-/// cascade.
+/// Air with eddies of several sizes. The eddies of each octave are half as wide as in the previous octave;
+/// their speed decreases with the cube root of the width and their lifetime with its power 2/3, as in
+/// Kolmogorov's cascade.
 struct Turbulence {
   static constexpr uint32_t kMaxOctaves = 8;
 

@@ -23,7 +23,7 @@ namespace {
 /// precision, so faces that were modelled flat are flat within 1e-7.
 constexpr Real kSamePlace = 2e-7;
 /// Accepted difference between the total volume of the exact parts and the volume of the solid, as a fraction
-/// of the latter.
+/// of the solid's volume.
 constexpr Real kExact = 1e-6;
 
 /// Value of CutLimits::max_work if an approximate decomposition is accepted, too.

@@ -27,9 +27,9 @@ struct ReflexEdge {
 /// Edges of the polygons of a solid at which the solid is concave by more than about 5 degrees.
 std::vector<ReflexEdge> sharp_reflex_edges(const SolidPiece& solid);
 
-/// Returns the plane that minimizes the total volume of the hulls of both sides; of similar planes, the one
-/// with the most compact sides. `reflex`: sharp_reflex_edges() of the whole solid. The result is empty if no
-/// plane divides the piece. Distances below `tolerance` count as zero [m].
+/// Returns the plane that minimizes the total volume of the hulls of both sides; among similar planes it
+/// chooses the plane with the most compact sides. `reflex`: sharp_reflex_edges() of the whole solid. The
+/// result is empty if no plane divides the piece. Distances below `tolerance` count as zero [m].
 std::optional<SolidPiece::Plane> best_cut(const HulledPiece& piece, const std::vector<ReflexEdge>& reflex,
                                           Real tolerance);
 

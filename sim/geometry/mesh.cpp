@@ -120,7 +120,7 @@ Real signed_volume6(const TriangleMesh& mesh) {
 
 /// Reverses faces until two faces with a common edge run along it in opposite directions, so that the surface
 /// has a consistent front side. In each connected part of the surface, the orientation with the smaller total
-/// area is reversed. A part with only one side, such as a Moebius strip, stays as it is.
+/// area is reversed. A part with only one side, such as a Moebius strip, is not changed.
 void unify_winding(TriangleMesh& mesh) {
   struct Neighbour {
     uint32_t face;

@@ -165,7 +165,7 @@ class Tracer {
     return {p_.head_point(k), p_.half_edges[k].next, false, false};
   }
 
-  /// Chooses the next side from a vertex: the one with the smallest angle inside the cut face (F.2). If a
+  /// Chooses the next side from a vertex: the side with the smallest angle inside the cut face (F.2). If a
   /// solid touches itself at a point, its surface has several corners at this point, so the other corners are
   /// considered, too. They must be better by a margin; this excludes the other side of an earlier cut.
   /// Returns false if there is no next side.

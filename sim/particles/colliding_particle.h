@@ -116,7 +116,7 @@ inline Real greater_acceleration(const CollidingParticle& a, const CollidingPart
   return std::sqrt(std::max(a.acceleration.squaredNorm(), b.acceleration.squaredNorm()));
 }
 
-/// A collision of a particle, as reported to the caller. The velocity is the one after the collision.
+/// A collision of a particle, as reported to the caller. The velocity is the velocity after the collision.
 struct ParticleStrike {
   uint32_t particle;
   Real time;  ///< time of the collision, since the sub-step's start [s]

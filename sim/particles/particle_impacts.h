@@ -73,7 +73,7 @@ class ParticleImpacts {
   std::vector<uint32_t> neighbours_;        // number of neighbours that nearly touch, for each particle
   std::vector<uint32_t> struck_body_;
   std::vector<uint32_t> changed_;
-  // The changed particles that are sorted, and the ones changed since they were sorted.
+  // The changed particles that are sorted, and the particles changed since then.
   ParticleSearch changed_search_;
   std::vector<uint32_t> sorted_stamp_;
   std::vector<uint32_t> unsorted_;

@@ -59,7 +59,7 @@ class ParticleSearch {
     std::vector<Vec3> centres;
   };
 
-  /// The partners of a particle, as a range of those of its chunk.
+  /// The partners of a particle, as a range of the partners of its chunk.
   struct List {
     uint32_t chunk = 0, first = 0, count = 0;
   };

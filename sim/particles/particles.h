@@ -17,7 +17,7 @@ namespace offstage::sim {
 struct ParticleSystemTag {};
 using ParticleSystemHandle = Handle<ParticleSystemTag>;
 
-/// One particle as it is created.
+/// The state in which a particle is created.
 struct Particle {
   Vec3 position = Vec3::Zero();
   Vec3 velocity = Vec3::Zero();
@@ -37,7 +37,7 @@ struct ParticleSystemDef {
   Vec3 force = Vec3::Zero();  ///< constant extra force per particle [N]
   bool collides = true;       ///< whether its particles collide with bodies (the book's "complex" flag)
   bool internal = false;      ///< whether its particles collide with each other
-  /// Whether its particles collide with those of other systems that also have this flag.
+  /// Whether its particles collide with particles of other systems that also have this flag.
   bool external = false;
   /// Whether contacts make particles rotate, as solid spheres: friction acts at their surface, so they roll.
   /// Otherwise they slide without rotating.
@@ -107,7 +107,7 @@ inline constexpr Real kBallTurning = 2.5;
 
 /// Returns v scaled so that its square is |v|^2 + 2 a.shift. This conserves the energy of a particle that is
 /// displaced by `shift` [m] under an acceleration a [m/s^2], for example when a hit on a straight path puts
-/// it beside its parabola. A particle at rest stays at rest.
+/// it at a point next to its parabola. A particle at rest stays at rest.
 Vec3 velocity_after_shift(const Vec3& v, const Vec3& a, const Vec3& shift);
 
 /// Returns the time until the distance of two centres is `distance` [s], when the two spheres touch (physics

@@ -165,7 +165,7 @@ void CoupledGroup::force(Real t, std::span<const Real> x, std::span<const Real> 
   for (const Jointed& j : articulations_) add_joint_forces(j, t, x, p, dp);
 }
 
-/// Computes in `dp` the forces that act between two kicks, except those of joints.
+/// Computes in `dp` the forces that act between two kicks, except joint forces.
 void CoupledGroup::set_free_forces(Real t, std::span<const Real> x, std::span<const Real> p,
                                    std::span<Real> dp) const {
   set_all_forces(t, x, p, dp);
@@ -174,7 +174,7 @@ void CoupledGroup::set_free_forces(Real t, std::span<const Real> x, std::span<co
       for (const std::size_t link : j.links) std::ranges::fill(dp.subspan(kBodyP * link, kBodyP), 0);
 }
 
-/// Computes in `dp` all forces except those of joints.
+/// Computes in `dp` all forces except joint forces.
 void CoupledGroup::set_all_forces(Real t, std::span<const Real> x, std::span<const Real> p,
                                   std::span<Real> dp) const {
   for (std::size_t i = 0; i < bodies_.size(); ++i)

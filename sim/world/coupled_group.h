@@ -113,7 +113,7 @@ class CoupledGroup final : public DynamicSystem {
   Real pieces(Real h) const;
   Real kicks(Real h) const;
   void kick(Real t, Real h, IntegratorWorkspace& work);
-  /// Kinetic energy [J], power of all forces except those of joints [W], and a measure of these forces: the
+  /// Kinetic energy [J], power of all forces except joint forces [W], and a measure of these forces: the
   /// kinetic energy that they would give to free bodies from rest in a time t, divided by t^2 [J/s^2].
   struct EnergyRate {
     Real kinetic = 0, power = 0, from_rest = 0;

@@ -55,7 +55,7 @@ StepReport World::Impl::step(Real sampling, const BeforeSubStep& before) {
     substep(start, end, report);
     now = end;
   }
-  update_presence(now);  // the state after the step shows what exists at its time
+  update_presence(now);  // afterwards the state contains exactly the objects that exist at its time
   ++samplings;
   report.particles.born = std::exchange(born, 0);
   active.count(report);
