@@ -156,7 +156,7 @@ class RowMaker {
 
   /// An impact at a limit that the free motion reaches in this interval.
   struct Stop {
-    Real fraction;  ///< fraction of the interval before it
+    Real fraction;  ///< fraction of the interval before the impact
     Real target;    ///< speed away from the limit at the interval's end
   };
   /// Returns the impact at a limit, or nothing if there is none in the interval. The impact reverses the

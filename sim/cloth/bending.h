@@ -103,7 +103,7 @@ class ClothBending {
   std::vector<Vec3> weights_;
   std::vector<std::size_t> row_;  // start of each row of the matrix, and the end
   std::vector<uint32_t> column_;
-  std::vector<Real> value_;               // off the diagonal; each row adds up to 0 with the diagonal
+  std::vector<Real> value_;               // elements off the diagonal; with the diagonal, each row sums to 0
   std::vector<Real> diagonal_, row_sum_;  // row_sum_: sum of absolute values in each row
   /// The entries above the diagonal. Each pair of points gets opposite forces, so these entries are
   /// sufficient. multiply() takes as long as reading them from memory.

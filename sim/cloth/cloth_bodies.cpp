@@ -66,7 +66,7 @@ void ClothBody::begin(Real from, Real to, Real dt) {
 Vec3 ClothBody::surface_motion(const Vec3& p) const {
   Vec3 motion = p - start_.point_to_world(end_.point_to_body(p));
   if (obstacle_.turn == 0 &&
-      obstacle_.angular_velocity != Vec3::Zero())  // a sphere, whose path leaves out its turning
+      obstacle_.angular_velocity != Vec3::Zero())  // the path of a sphere does not contain its rotation
     motion += dt_ * obstacle_.angular_velocity.cross(p - end_.position);
   if (surface_velocity_ != Vec3::Zero()) motion += dt_ * end_.vector_to_world(surface_velocity_);
   return motion;
@@ -133,7 +133,7 @@ void ClothBody::accelerate(const Vec3& dv, const Vec3& dw) {
 Vec3 ClothBody::shorten(Real fraction, const Vec3& drift) {
   const Vec3 displacement = move() - drift;
   const Quat turned = end_.orientation * start_.orientation.conjugate();
-  const Vec3 turn = 2 * (turned.w() < 0 ? -1 : 1) * turned.vec();  // small
+  const Vec3 turn = 2 * (turned.w() < 0 ? -1 : 1) * turned.vec();  // for a small rotation
   const Vec3 lost = (1 - fraction) * displacement, lost_turn = (1 - fraction) * turn;
   shift_ -= lost;
   turn_ -= lost_turn;

@@ -232,15 +232,16 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
   struct Stop {
     ClothBody* body;
     Vec3 normal, on_body;
-    Real speed;  // of the cloth there along the normal [m/s]
-    Real depth;  // of the overlap, at most the thickness [m]
+    Real speed;  // velocity of the cloth at the contact, along the normal [m/s]
+    Real depth;  // depth of the overlap, at most the thickness [m]
     uint32_t cloth;
-    bool moves = true;  // whether it moves in this sub-step; a body that holds cloth would move that cloth
-                        // beyond its limits
+    bool moves = true;  // whether the body moves in this sub-step; a body that holds cloth would move this
+                        // cloth beyond its limits
     Real fraction = 1;  // part of each of the body's contacts, whose impulses are found at the same time
-    Real recoil = 0;    // of the cloth by one impulse at all of its contacts, times the fraction [1/kg]
-    Real impulse = 0;   // so far [N s]
-    Real change = 0;    // in this sweep
+    // Recoil of the cloth due to a unit impulse at each of its contacts, times the fraction [1/kg].
+    Real recoil = 0;
+    Real impulse = 0;  // impulse so far [N s]
+    Real change = 0;   // change of the impulse in this sweep [N s]
   };
   std::vector<Stop> stops;
   struct OnBody {
@@ -248,7 +249,7 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
     bool holds_cloth = false;
   };
   std::map<const ClothBody*, OnBody> on_bodies;
-  std::vector<Real> on_cloths(recoil.size(), 0);  // contacts
+  std::vector<Real> on_cloths(recoil.size(), 0);  // by cloth: number of contacts
   const auto add = [&](ClothBody& body, const Vec3& normal, const Vec3& on_body, const Vec3& velocity,
                        Real depth, uint32_t point) {
     const uint32_t cloth = points.cloth[point];

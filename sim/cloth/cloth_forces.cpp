@@ -8,7 +8,7 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kAirDensity = 1.2;  // of leaking gas without a density of its own [kg/m^3]
+constexpr Real kAirDensity = 1.2;  // density of leaking gas if none is given [kg/m^3]
 
 /// Returns the volume inside a cloth [m^3], at least a tenth of the volume at rest. This minimum keeps cloth
 /// that is crushed flat from bursting. It also lets torn cloth, which encloses nothing, lose its gas.

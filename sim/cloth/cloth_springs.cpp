@@ -211,7 +211,7 @@ void ClothSprings::adapt_to_stretch(const ClothPoints& points) {
   }
   is_stretched_ = is_stretched;
   set_longest_step();
-  if (clamped_ > 0 || prepared_for_ > longest_step_) prepared_for_ = -1;  // else no stiffness changes
+  if (clamped_ > 0 || prepared_for_ > longest_step_) prepared_for_ = -1;  // otherwise no stiffness changes
 }
 
 void ClothSprings::apply(ClothPoints& points, std::span<Vec4> moves) {

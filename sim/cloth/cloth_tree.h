@@ -49,7 +49,7 @@ class ClothTree {
     uint32_t first, count;   // range of triangles in order_
     uint32_t second;         // index of the second child; 0: a leaf. The first child is the next node
     uint32_t leaf = 0;       // leaf: index in leaves_
-    uint32_t fresh = 0;      // leaf: lanes that were fitted last; branch: whether a leaf below was
+    uint32_t fresh = 0;      // leaf: lanes that were fitted last; branch: whether a leaf below was fitted
     bool connected = false;  // whether its triangles are one connected piece
 
     bool leans() const { return connected && views != 0; }  // whether all normals lie in one half-space

@@ -47,9 +47,9 @@ Vec3 place(std::span<const Vec4> points, uint32_t i) {
 }
 
 struct Closest {
-  std::array<Real, 4> weights;  // of the points: 1, -b or 1 - s, s, -(1 - t), -t
-  Vec4 apart;                   // from the second element's nearest point to the first element's
-  bool inner;                   // of two edges: neither nearest point is an end
+  std::array<Real, 4> weights;  // weights of the points: (1, -b), or (1 - s, s, t - 1, -t)
+  Vec4 apart;                   // vector from the second element's nearest point to the first element's
+  bool inner;                   // for two edges: neither nearest point is an end of its edge
 };
 
 Real fraction_along(const Vec3& p, const Vec3& a, const Vec3& b) {

@@ -65,14 +65,14 @@ class SelfContacts {
     Real thickness;
     Real nearest;            // the pair is kept at least this far apart, unless it is already closer
     Real distance;           // distance at the last check
-    Real travel;             // motion of all four points together up to that check
+    Real travel;             // travelled() of the pair at that check
     Eigen::Vector3f normal;  // unit direction from the second element to the first at that check
   };
   struct Contact {
     uint32_t pair;
     std::array<Real, 4> weights;  // weights of the points in the vector between the closest points
     Vec4 normal;                  // from the second element to the first
-    Real distance;                // at the start of the sub-step
+    Real distance;                // distance at the start of the sub-step
     bool pushes;                  // if false, contacts of its neighbours push in its place
   };
 

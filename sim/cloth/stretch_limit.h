@@ -66,8 +66,8 @@ class StretchLimit {
   bool sweep(ClothPoints& points, bool& all_hold) const;
 
   std::vector<Limit> limits_, ties_;
-  std::vector<uint32_t> limits_at_,
-      first_at_;                     // by point: its limits, in one array; the index of its first
+  // Limits of all points, one point after the other; and by point, the index of its first limit.
+  std::vector<uint32_t> limits_at_, first_at_;
   std::vector<uint32_t> looked_in_;  // round in which each limit was last checked
   uint32_t round_ = 0;
 };

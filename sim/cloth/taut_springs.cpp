@@ -9,8 +9,8 @@ namespace {
 /// If a spring was beyond its target length at the start of the sub-step, it keeps this fraction of its
 /// excess. A body that hangs on it is stopped, but not thrown back.
 constexpr Real kKeepsBeyondAim = 0.9;
-/// A spring takes part if its elongation is above this fraction of the allowed one: the impulses of other
-/// springs may make it too long.
+/// A spring takes part if its elongation is above this fraction of the allowed elongation, because the
+/// impulses of other springs may make it too long.
 constexpr Real kNearLimit = 0.3;
 /// Accepted excess of a spring, as a fraction of the greatest initial excess.
 constexpr Real kLeftOfExcess = 3e-3;

@@ -101,7 +101,7 @@ class TautSprings {
   std::vector<MovedBody> bodies_;
   std::vector<Vec6> impulses_;   // by body
   std::vector<uint32_t> place_;  // by point: its index in places_; kNone: none
-  std::vector<Place> places_;    // number of a weighted mean, which is neither point nor body
+  std::vector<Place> places_;    // an entry for a weighted mean has neither point nor body
   std::vector<MeanPlace> mean_places_;
   std::vector<Vec4> moves_;  // by place: impulses, and then moves
   std::vector<Row> rows_;

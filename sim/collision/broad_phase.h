@@ -66,7 +66,7 @@ class BroadPhase {
   Real means_in_cell_;
   std::size_t count_ = 0;  // number of objects
   Real diameters_ = 0;     // sum of the diameters of bounded objects [m]
-  Real bounded_ = 0;       // number of these
+  Real bounded_ = 0;       // number of bounded objects
 
   std::vector<Aabb> boxes_;          // by object
   std::vector<uint8_t> states_;      // by object, bits of State

@@ -10,7 +10,7 @@ constexpr std::size_t kMaxPoints = 128;
 constexpr std::size_t kMaxFaces = 2 * kMaxPoints;  // a closed surface of n points has 2 n - 4 triangles
 // Tolerance of heights over a face, in units of the rounding of a point.
 constexpr Real kHeightTolerance = 64;
-constexpr Real kCurvedTolerance = 1e-10;  // the same for curved cores, as a fraction of the size
+constexpr Real kCurvedTolerance = 1e-10;  // tolerance for curved cores, as a fraction of the size
 // At a depth of more than this fraction of the size, the nearest point gives the direction of the normal.
 constexpr Real kDeep = 1e-6;
 // If the iteration ends early, its result is accepted if the gap between the bounds is less than this

@@ -280,8 +280,8 @@ SupportingFeature disc(Real radius, Real y, bool up) {
   return f;
 }
 
-/// The line of the round side that faces d, and the outward normal there. It runs from the base to the top,
-/// or from the end that is farther along d.
+/// The line of the round side that faces d, and the outward normal there. `from` is the end of the line that
+/// is farther along d; if both ends are equally far, it is the end at the base.
 struct RoundSide {
   Vec3 from, to, normal;
   uint32_t from_tag = kLineTag, to_tag = kLineTag + 1;

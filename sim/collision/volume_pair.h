@@ -66,8 +66,9 @@ struct Placement {
 /// Two boxes, the second one in the axes of the first. A gap is the distance along a direction, negative
 /// where they overlap.
 struct BoxPair {
-  LaneColumns rotation, spread;  ///< a's axes from b's, and its absolute values
-  Lanes offset;                  ///< difference of the centres
+  /// Rotation matrix from b's axes to a's axes, and the absolute values of its elements.
+  LaneColumns rotation, spread;
+  Lanes offset;  ///< difference of the centres
   Vec3 half_a, half_b;
 
   Lanes gaps_a() const { return lane_abs(offset) - lanes(half_a) - product(spread, half_b); }

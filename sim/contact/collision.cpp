@@ -23,7 +23,7 @@ using Eigen::Vector2d;
 constexpr Real kRounding = 1e-13;  ///< relative rounding error of products of impulses and velocities
 /// The circle of directions is divided into this number of arcs; each is searched for a change of sign.
 constexpr int kArcs = 64;
-constexpr int kHalvings = 60;  ///< bisection steps: to the last bit
+constexpr int kHalvings = 60;  ///< number of bisection steps; they reach the last bit
 /// Greatest number of solutions of a cluster while the restitution that conserves energy is searched.
 constexpr int kSolves = 20;
 constexpr Real kKeptEnergy = 1e-9;  ///< fraction of the energy added by restitution that may be lost instead

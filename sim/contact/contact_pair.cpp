@@ -539,7 +539,7 @@ void ContactPair::restore_forces(std::vector<StoredPoint>& points, const Pose& p
   // Points of different pairs of parts may have the same id.
   const Real same_feature = kSame / std::sqrt(kSameFeature);
   static thread_local std::vector<std::pair<Real, uint32_t>> by_x;
-  static thread_local std::vector<std::tuple<uint32_t, Real, uint32_t>> by_id;  // and by x
+  static thread_local std::vector<std::tuple<uint32_t, Real, uint32_t>> by_id;  // sorted by id, and then by x
   if (are_many) {
     by_x.clear();
     by_id.clear();

@@ -57,7 +57,7 @@ Real turning_of_corners(const Body& body) {
 /// if the contact does not turn.
 ClosingPoint closing_point(Real gap, const Vec3& surface, const ContactMotion& motion, const Vec3& linear) {
   if (!motion.turns) return {.gap = gap, .surface = surface, .bias = {Vec3::Zero(), linear, Vec3::Zero()}};
-  const Vec3 &gain = motion.gain, &bow = motion.bow;  // of s = 2 part - 1
+  const Vec3 &gain = motion.gain, &bow = motion.bow;  // coefficients of the polynomial in s = 2 part - 1
   return {.gap = gap, .surface = surface, .bias = {bow - gain, 2 * gain - 4 * bow, 4 * bow}};
 }
 

@@ -20,7 +20,7 @@ enum class ConeRegion : uint8_t {
   apex,     ///< the projection is zero
   inside,   ///< the projection is the point itself
   surface,  ///< the projection is on the round cone
-  // Pyramid: on a face or an edge, by the signs of the active limits.
+  // The projection is on a face or an edge of the pyramid; the names give the active limits.
   low_t,
   high_t,
   low_k,

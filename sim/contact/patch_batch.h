@@ -48,7 +48,7 @@ struct PatchBatch {
     Lanes start;          ///< separation at the start of the step [m]
     Lanes impulse, mean;  ///< impulse of a sub-step, and its moving average over previous sub-steps [N s]
     Lanes before;         ///< sum of the impulses of previous sub-steps [N s]
-    Lanes shift;  ///< mass times the displacement due to these: during sub-steps [N s], at the end [kg m]
+    Lanes shift;  ///< mass times the displacement due to `before`: during sub-steps [N s], at the end [kg m]
     Lanes push;   ///< part of `shift` that removed penetration [kg m]
   };
 

@@ -85,10 +85,10 @@ inline PatchVector separate_impulse(const PatchBatch& p, const PatchVector& u, c
 /// Returns the friction of a patch that slides or spins with the relative `twist`. Each point has Coulomb
 /// friction against its own velocity, so sliding reduces the friction against spin and vice versa. The
 /// friction of a point is linearized as viscous friction with the coefficient limit / speed, which gives one
-/// linear system per patch. The speeds are those after separate_impulse(), which is exact without spin.
-/// `kIsotropic`: friction_t equals friction_k in all lanes, which takes fewer operations. `kSpins`: points
-/// have spinning friction, treated as sliding at the distance spin_arm. With a friction axis, spinning has a
-/// separate limit.
+/// linear system per patch. The speeds of the points are evaluated after separate_impulse(), which is exact
+/// without spin. `kIsotropic`: friction_t equals friction_k in all lanes, which takes fewer operations.
+/// `kSpins`: points have spinning friction, treated as sliding at the distance spin_arm. With a friction
+/// axis, spinning has a separate limit.
 template <bool kIsotropic, bool kSpins>
 PatchVector sliding_impulse(const PatchBatch& p, const PatchVector& twist, const PatchVector& limits) {
   std::array<FloatLanes, 4> viscous_t, viscous_k, viscous_n;

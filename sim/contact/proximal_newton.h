@@ -140,7 +140,7 @@ class ProximalNewton {
   std::vector<Turning> turnings_;
   std::vector<Vec6> free_, velocity_, trial_, gradient_, direction_;
   std::vector<Vec3> fixed_;  // relative velocity due to immovable bodies and offsets, less the target
-  std::vector<Mat6> mass_;   // of each row
+  std::vector<Mat6> mass_;   // mass matrix of each row
   std::vector<LinkMobility> mobility_;
   std::vector<Mat6> diagonal_, off_;  // H
   std::vector<BlockRowKind> kinds_;

@@ -29,7 +29,7 @@ RoundProjection project_on_round_cone(Real mu, const Vec4& q) {
   return {p, ConeRegion::surface};
 }
 
-/// Its derivative at q.
+/// Returns the derivative of the projection on the round cone at q.
 Mat4 round_cone_derivative(Real mu, const Vec4& q, ConeRegion region, Real normal) {
   if (region == ConeRegion::apex) return Mat4::Zero();
   if (region == ConeRegion::inside) return Mat4::Identity();

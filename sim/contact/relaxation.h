@@ -131,7 +131,7 @@ class RelaxationSolver {
     prepare,
     solve,
     solve_next,   // the first sweep of another sub-step
-    solve_again,  // repeated sweep over the bodies hit in the previous one
+    solve_again,  // another sweep over the bodies hit in the previous sweep
     start_joints,
     join,
     join_last,
@@ -139,7 +139,7 @@ class RelaxationSolver {
     advance_last,
     begin_push,
     push,
-    push_again,   // repeated push-out of the bodies moved in the previous one
+    push_again,   // another push-out of the bodies moved by the previous push-out
     push_joints,  // the joints move their links after the push-out of the same sweep
     finish,
     report

@@ -32,7 +32,7 @@ class SprungPaths {
   struct Held {
     struct End {
       Path* path = nullptr;
-      Vec3 direction, turning;  // of the first body: the direction; arm x direction
+      Vec3 direction, turning;  // direction of the row at this end, and arm x direction
     };
     std::array<End, 2> ends;
     Real mobility = 0;

@@ -18,7 +18,7 @@ namespace offstage::sim {
 struct MutualGravitation {
   Real constant = 6.672e-11;  ///< G [N m^2/kg^2], >= 0
   Real softening = 0;         ///< s, as if each mass were distributed over this radius [m], >= 0 (Plummer)
-  Real cut_off = 0;           ///< distance of no force [m]; 0: unlimited
+  Real cut_off = 0;           ///< distance from which on there is no force [m]; 0: unlimited
   Region region;
   uint32_t drop_rate = 0;
 };
@@ -27,7 +27,7 @@ struct MutualGravitation {
 struct Coulomb {
   Real constant = 8.9875e9;  ///< K [N m^2/C^2], >= 0
   Real softening = 0;        ///< s [m], >= 0
-  Real cut_off = 0;          ///< distance of no force [m]; 0: unlimited
+  Real cut_off = 0;          ///< distance from which on there is no force [m]; 0: unlimited
   Region region;
   uint32_t drop_rate = 0;
 };
@@ -37,7 +37,8 @@ struct Coulomb {
 struct LennardJones {
   Real epsilon = 1;   ///< depth of the well [J], >= 0
   Real sigma = 0.01;  ///< distance of U = 0 [m], > 0
-  Real cut_off = 0;   ///< distance of no force [m]; 0: unlimited. A common value is 2.5 sigma
+  /// Distance from which on there is no force [m]; 0: unlimited. A common value is 2.5 sigma.
+  Real cut_off = 0;
   Region region;
   uint32_t drop_rate = 0;
 };

@@ -10,9 +10,10 @@ namespace offstage::sim {
 struct RigidState {
   Vec3 position = Vec3::Zero();  ///< position of the centre of mass, world
   Quat orientation = Quat::Identity();
-  Vec3 momentum = Vec3::Zero();          ///< L
-  Vec3 angular_momentum = Vec3::Zero();  ///< H, about the centre of mass, world
-  Real next_step = 0;                    ///< adaptive integrators: length of the next step [s]; 0: unknown
+  Vec3 momentum = Vec3::Zero();  ///< linear momentum L [kg m/s]
+  /// Angular momentum H about the centre of mass, world axes [kg m^2/s].
+  Vec3 angular_momentum = Vec3::Zero();
+  Real next_step = 0;  ///< adaptive integrators: length of the next step [s]; 0: unknown
 };
 
 struct RigidBody : RigidState {

@@ -114,7 +114,7 @@ class SolidCutter {
     };
     CutDecomposition result;
     std::size_t count = 0;
-    Real missed = 0, reached = 0;  // in accepted errors
+    Real missed = 0, reached = 0;  // as multiples of the accepted error
     for (Real merge_to : kMergeTo) {
       std::vector<MergedHull> parts = merge(merge_to);
       // A smaller budget ends the same mergers earlier.

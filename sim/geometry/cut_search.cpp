@@ -204,7 +204,7 @@ class CutSearch {
   const SolidPiece& solid_;
   Real tolerance_;
   std::vector<SolidPiece::Side> edges_;
-  Mat3 spread_ = Mat3::Zero();  // of the points, about their mean
+  Mat3 spread_ = Mat3::Zero();  // second moments of the points about their mean
 };
 
 }  // namespace

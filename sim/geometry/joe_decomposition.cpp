@@ -70,7 +70,7 @@ class Candidates {
 
 /// Quality of a cut.
 struct Merit {
-  int resolved = 0;                                       ///< reflex edges removed, less those cut in two
+  int resolved = 0;  ///< number of reflex edges removed minus number of reflex edges cut in two
   Real dihedral = std::numeric_limits<Real>::infinity();  ///< smallest angle between the cut and a face [rad]
   Real distance = std::numeric_limits<Real>::infinity();  ///< distance of the nearest vertex off the cut [m]
 };

@@ -66,7 +66,7 @@ class BlockCholesky {
   std::vector<uint32_t> begin_, row_;  // columns of L under the diagonal, in order of elimination, ascending
   std::vector<uint32_t> pair_at_;      // index in row_ of the block of each pair
   std::size_t products_ = 0;
-  std::vector<Block> diagonal_, below_;  // L; the diagonal holds the inverses of its triangles
+  std::vector<Block> diagonal_, below_;  // blocks of L; diagonal_ holds the inverses of the triangular blocks
 };
 
 extern template class BlockCholesky<3>;

@@ -69,11 +69,11 @@ class CoupledGroup final : public DynamicSystem {
   /// An end of a spring, as a position in the state.
   struct End {
     enum class Kind { still, kinematic, dynamic, particle } kind = Kind::still;
-    Vec3 point =
-        Vec3::Zero();  // still: world; bodies: from the centre of mass (dynamic) or the origin, body axes
+    Vec3 point = Vec3::Zero();  // still: position in the world; dynamic: relative to the centre of mass, body
+                                // axes; kinematic: in the frame of the body
     const Body* body = nullptr;
-    std::size_t index = 0;  // of the body or the particle in the state
-    Real mass = 1;          // of the particle
+    std::size_t index = 0;  // index of the body or the particle in the state
+    Real mass = 1;          // mass of the particle
 
     bool is_moved() const { return kind == Kind::dynamic || kind == Kind::particle; }
   };
