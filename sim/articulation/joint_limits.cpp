@@ -137,9 +137,10 @@ class RowMaker {
   /// Returns the speed of the coordinate at the interval's end, before the impulses of the rows are applied.
   Real speed(const Direction& d) const { return speed(d.end, end_); }
 
-  /// Returns the coordinate from which the mean of the speeds at both ends leads to the coordinate at the
-  /// interval's end, both without the impulses of the rows. If the row's target starts here, it leads exactly
-  /// to the wanted coordinate. Links with springs move with the speed at the end.
+  /// Returns the coordinate at the interval's end minus the mean of the speeds at both ends times the
+  /// duration, all without the impulses of the rows. A row whose target speed is computed from this
+  /// coordinate reaches the wanted coordinate exactly. For links with springs the speed at the end replaces
+  /// the mean.
   Real at_start(const Direction& d) const {
     return d.end.error - h_ / 2 * ((is_kicked_ ? speed(d) : speed_at_start(d)) + speed(d));
   }

@@ -99,7 +99,7 @@ void BendLimit::solve(const ClothPoints& points) {
 }
 
 /// Moves the points by the impulses. The velocities change by the greatest fraction of the moves that adds no
-/// kinetic energy. So the correction of a place that was bent too far before gives it no velocity.
+/// kinetic energy. So the correction of a patch that was bent too far before gives the cloth no velocity.
 void BendLimit::apply(ClothPoints& points, Real dt, std::span<const Vec4> kick,
                       std::vector<VelocityCut>& cuts) {
   std::vector<Vec4> cut(count_, Vec4::Zero());

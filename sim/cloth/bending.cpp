@@ -16,10 +16,11 @@ namespace {
 /// so near to a conic that they do not determine a quadratic polynomial.
 constexpr Real kLargestWeight = 4;
 /// Weight of the energy of the jump patches, relative to that of the recovered patches. The second
-/// derivatives by jumps resist shapes that alternate from point to point; those by recovered gradients miss
-/// such shapes.
+/// derivatives by jumps resist shapes that alternate from point to point. Second derivatives by recovered
+/// gradients are zero for such shapes.
 constexpr Real kJumpFraction = 0.05;
-/// Divisor of a jump patch's curvature, whose weights contain sqrt(kJumpFraction): it counts half. Next to a
+/// Divisor of the curvature that is computed from the weights of a jump patch. The weights contain the factor
+/// sqrt(kJumpFraction), and the other factor 2 makes the curvature of such patches count half. Next to a
 /// border or a crease of a smooth surface, the curvature by jumps can be too large by as much as the
 /// curvature itself.
 const Real kRoughCounts = 2 * std::sqrt(kJumpFraction);
@@ -358,7 +359,8 @@ std::vector<uint8_t> ClothBending::affected(std::span<const uint8_t> changed,
 }
 
 /// Builds the patches of changed triangles and of those that depend on them, and keeps the others. The result
-/// equals that of building all patches to the last bit. `moved_corners` is the argument `near` of affected().
+/// is the same to the last bit as after building all patches. `moved_corners` is the argument `near` of
+/// affected().
 void ClothBending::build(std::span<const uint8_t> changed, std::vector<uint8_t> moved_corners) {
   const std::vector<uint8_t> builds = affected(changed, std::move(moved_corners));
   const auto old_patches = std::exchange(patches_, {});

@@ -118,7 +118,7 @@ void push_out(Run& run, Real pressure) {
 
 /// Adds the effect of the weight of gas and air. The pressure of a gas at rest grows downwards by its weight.
 /// The corners of a triangle get the forces of a pressure that is linear over it. So the force on a closed
-/// cloth is exactly that of Archimedes, and acts at the centre of the volume.
+/// cloth is exactly the buoyancy of Archimedes' principle, and acts at the centre of the volume.
 void lift(Run& run, const Vec3& gravity) {
   const Cloth& cloth = run.cloth;
   if (!cloth.def.gas_density) return;

@@ -12,11 +12,12 @@ namespace {
 
 /// Number of springs in a block, and the least number for which several threads are faster.
 constexpr std::size_t kBlock = 2048, kWorthThreads = 60000;
-/// Springs that are too stiff for the step are clamped. Otherwise the error that one symmetric sweep leaves
-/// of the explicit step would grow. The limit of h^2 k (1/m_a + 1/m_b) depends on all springs at both points.
-/// Without damping, a flat weave is stable up to 10, a weave sheared by 30 degrees up to 2 to 3, and a mesh
-/// of triangles, where six springs meet, up to 2 to 3 (measured; an exact solution has no such limit).
-/// kMaxRatioOfAll limits the sheared weave to 3.5 and the mesh to 2.3.
+/// Limits of the stiffness of springs; stiffer springs are clamped. Otherwise the error of the explicit step
+/// that remains after one symmetric sweep would grow. kMaxRatio limits h^2 k (1/m_a + 1/m_b). The stable
+/// limit depends on all springs at both points. Without damping, a flat weave is stable up to 10, a weave
+/// sheared by 30 degrees up to 2 to 3, and a mesh of triangles, where six springs meet, up to 2 to 3
+/// (measured; an exact solution has no such limit). kMaxRatioOfAll limits the sum over all springs at both
+/// points, which limits the ratio of the sheared weave to 3.5 and of the mesh to 2.3.
 constexpr Real kMaxRatio = 6, kMaxRatioOfAll = 14;
 /// Limit of h^2 times the sum of k e / (l m) over the springs at both points, with the elongation e and the
 /// length l. The explicit step is stable up to 4 (Anderson and Morley, 1985). The rest is a reserve for the

@@ -30,8 +30,8 @@ class RelaxedBending {
   Vec4 steady_gain(const ClothPoints& points, std::size_t i) const {
     return h_ * h_ * points.inverse_mass[cloth_.begin + i] * force_[i];
   }
-  /// Adds the effect of a step: on pinned points to their `pin_impulse`, and that of stiff bending on other
-  /// points to the moves.
+  /// Adds the impulses of bending in a step to `pin_impulse` for pinned points. For other points it adds the
+  /// effect of stiff bending to the moves.
   void apply(ClothPoints& points, std::span<Vec4> moves) {
     if (is_stiff_) {
       std::fill(force_.begin(), force_.end(), Vec4::Zero());

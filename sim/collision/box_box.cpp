@@ -288,8 +288,8 @@ struct FacePair {
   }
 };
 
-/// Writes the points of the contact. Also writes `closest`, the closest point on the incident box, if that is
-/// deeper.
+/// Writes the points of the contact. It also writes `closest`, the closest point on the incident box, if that
+/// is deeper.
 void fill(Manifold& m, const FacePair& pair, const FaceContact& contact, const Pose& a_from_b, Real margin,
           Real slop, const Separation* closest, Manifold* more) {
   const bool on_a = pair.body == 0;

@@ -9,7 +9,7 @@ namespace {
 constexpr Real kCells = 96;  // number of cells along the longest side
 constexpr int kPadding = 3;  // cells around the mesh; rounding may use up one of them
 constexpr uint8_t kUnknown = 255, kOutside = 254;
-constexpr Real kClearRounding = 1e-9;  // fraction of a cell
+constexpr Real kClearRounding = 1e-9;  // bound of rounding errors, as a fraction of a cell
 
 Aabb bounds(const TriangleMesh& mesh) {
   Aabb box;

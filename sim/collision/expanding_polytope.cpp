@@ -100,8 +100,8 @@ class ExpandingPolytope {
   }
 
   /// Returns the face with the smallest distance from the origin. If the origin is not over the triangle, the
-  /// distance of the triangle counts instead of that of its plane. So the face under the origin is chosen
-  /// among several in one plane. The second distance is computed only when it is needed.
+  /// distance of the triangle counts instead of the distance of its plane. So the face under the origin is
+  /// chosen among several in one plane. The second distance is computed only when it is needed.
   Index nearest_face() {
     for (;;) {
       Index best = 0;

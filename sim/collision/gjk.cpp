@@ -15,7 +15,7 @@ constexpr Real kTouchingRoundings = 64;
 // If GJK makes no progress at a distance below this fraction of the size, the expanding polytope algorithm
 // computes the result.
 constexpr Real kNear = 1e-9;
-constexpr Real kGjkLevel = 1 + 1e-14;  // ratio of squares that differ by rounding
+constexpr Real kGjkLevel = 1 + 1e-14;  // squares with a ratio of at most this differ only by rounding
 constexpr Real kAccepted = 1e-12;      // fraction of the size: with a smaller gap a stalled query is accepted
 
 /// Returns the start direction: the normal of the last query, or else the direction from B's centre to A's

@@ -239,7 +239,7 @@ void parallel_edges(Manifold& m, const Body& a, const SupportingFeature& of_a, c
   if (ends.least_separation() <= distance + tolerance) reduce(m, ends, 0);
 }
 
-/// Tag of an edge or a vertex.
+/// Returns the id of an edge or a vertex.
 uint32_t feature_id(const Body& body, const SupportingFeature& f) {
   return f.edge != Vec3::Zero() ? edge_id(f.corners[0].tag, f.corners[f.count - 1].tag)
                                 : vertex_id(body.name, f.corners[0].tag);

@@ -198,9 +198,9 @@ class Instant {
   std::optional<Separation> contact_;
 };
 
-/// Returns, for all points of a shape, an upper bound of the deviation of their speed from that of a constant
-/// rotation [m per step]. The rate of rotation deviates from a constant one by at most the fraction angle^2 /
-/// 24.
+/// Returns, for all points of a shape, an upper bound of the deviation of their speed from the speed in a
+/// constant rotation [m per step]. The rate of rotation deviates from a constant one by at most the fraction
+/// angle^2 / 24.
 Real unevenness(const MovingShape& s) {
   if (s.shape.is_plane()) return 0;
   return s.path.turn() * s.path.max_acceleration(s.shape.hull().reach()) / 24;

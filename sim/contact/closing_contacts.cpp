@@ -62,8 +62,8 @@ class Pieces {
 
  private:
   /// Solves the closed contacts and the joints: for the rest of the interval, or for an impact at the current
-  /// time if `now`. bodies_ must hold the velocities without the impulses of this solution, and gets those
-  /// with them. Returns false if the solver failed or the impact would add energy.
+  /// time if `now`. bodies_ must hold the velocities without the impulses of this solution; it then holds the
+  /// velocities with them. Returns false if the solver failed or the impact would add energy.
   bool solve_closed(bool now) {
     const Real elapsed = time_ / problem_.duration;
     closed_.clear();

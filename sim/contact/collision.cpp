@@ -33,8 +33,8 @@ constexpr Real kAcceptedResidual = 1e-6;  ///< fraction of the velocities: accep
 constexpr Real kRoughResidual = 1e-3;
 constexpr uint32_t kCollisionSweeps = 200, kPlasticSweeps = 400, kJointedSweeps = 60;
 /// Limits under Effort::bounded. kUpdates: updates of single contacts in a sweep or a sequence (60 ns each);
-/// kMoreUpdates: those in later solutions of the same cluster. kBoundedSolves: solutions in the search for
-/// the restitution. kJointBudget: cost of a solution with joints [ns].
+/// kMoreUpdates: the same for later solutions of the same cluster. kBoundedSolves: solutions in the search
+/// for the restitution. kJointBudget: cost of a solution with joints [ns].
 constexpr std::size_t kUpdates = 4'000, kMoreUpdates = 1'000;
 constexpr int kBoundedSolves = 3;
 constexpr Real kJointBudget = 1e6;
@@ -167,7 +167,7 @@ bool adds_energy(const Mat3& K, const Vec3& u, const Vec3& p) {
   return p.dot(u + K * p / 2) > kRounding * p.norm() * u.norm();
 }
 
-/// Speed of approach; 0 if the points separate.
+/// Returns the speed of approach [m/s]; 0 if the points separate.
 Real approach(const Contact& c, std::span<const ContactBody> bodies) {
   return std::max(0.0, -c.relative_velocity(bodies).x());
 }

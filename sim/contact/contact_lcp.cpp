@@ -22,8 +22,8 @@ using Eigen::VectorXd;
 constexpr Real kFraction = 1e-7;
 /// Greatest accepted residual, as a fraction of scale().
 constexpr Real kLcpAccepted = 1e-8;
-/// kConstraintAccepted: the same for the constraints of joints. kConstraintSoftness: fraction of the diagonal
-/// that is added, so that redundant constraints can be solved.
+/// kConstraintAccepted: greatest accepted residual of the constraints of joints, as a fraction of scale().
+/// kConstraintSoftness: fraction of the diagonal that is added, so that redundant constraints can be solved.
 constexpr Real kConstraintAccepted = 1e-9, kConstraintSoftness = 1e-11;
 constexpr int kRefinements = 3;
 /// If joints reduce the mobility of a row to less than this fraction, the remaining mobility is only a

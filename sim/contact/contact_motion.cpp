@@ -58,7 +58,7 @@ Quat meridian_turn(const Vec3& arm, const Quat& from, const Vec3& out_from, cons
   if (facing.norm() < kUpright || next.norm() < kUpright ||
       spoke.dot(facing) < kFacing * spoke.norm() * facing.norm())
     return to * from.conjugate();
-  // Half of the angle about the axis.
+  // Cosine and sine of half the angle about the axis.
   const Real cosine = std::sqrt(std::max(Real(0), (1 + facing.dot(next) / lengths) / 2));
   const Real sine = (facing.y() * next.x() - facing.x() * next.y()) / lengths / (2 * cosine);
   return cosine > 0.1 ? to * Quat(cosine, 0, sine, 0) * from.conjugate() : to * from.conjugate();

@@ -25,7 +25,7 @@ constexpr Real kAlong = 0.7;
 /// than kExpected [m]. This point must be within kNear [m], and the cosine of the angle between the normals
 /// must exceed kSameNormal.
 constexpr Real kSameNormal = 0.999, kNear = 0.02, kExpected = 2e-4;
-/// This fraction of their spread is added to the spread of points, so that its matrix can be inverted.
+/// Fraction of the spread of points that is added to the spread, so that its matrix can be inverted.
 constexpr Real kFlat = 1e-6;
 
 Pose between(const Pose& a, const Pose& b) {
@@ -134,7 +134,8 @@ Weights weights(const Manifold& m, const ContactFrame& frame, const Pose& a, con
 /// which their velocity at the start does not show.
 class LeaningRim {
  public:
-  /// `core`: pose of the shape in the frame of the manifold. `out`: direction towards the face.
+  /// Prepares the corrections if the shape has a rim. `core`: pose of the shape in the frame of the manifold.
+  /// `out`: direction towards the face.
   LeaningRim(const Shape& shape, const Pose& core, const Vec3& out) : core_(core) {
     if (!std::holds_alternative<Cylinder>(shape) && !std::holds_alternative<Cone>(shape) &&
         !std::holds_alternative<Frustum>(shape))

@@ -16,7 +16,7 @@ Mat3 angular_mobility(const Contact& c, std::span<const ContactBody> bodies) {
   return axes.transpose() * (bodies[c.a].inverse_inertia + bodies[c.b].inverse_inertia) * axes;
 }
 
-/// Upper bound of the eigenvalues of the block along t and k.
+/// Returns an upper bound of the eigenvalues of the block along t and k.
 Real tangential_bound(const Mat3& m) {
   return std::max(m(1, 1), m(2, 2)) + std::abs(m(1, 2));
 }

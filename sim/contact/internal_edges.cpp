@@ -32,7 +32,7 @@ constexpr Real kLookBeside = 1;
 /// Contacts with a slope are searched within this distance beyond the contact that they replace [m].
 constexpr Real kSlopeMargin = 2e-3;
 
-/// Distance of a point from a convex piece of a shape, with its gradient, in the shape's frame.
+/// Returns the distance of a point from a convex piece of a shape, with its gradient, in the shape's frame.
 SurfaceDistance piece_distance(const CollisionShape& shape, uint32_t piece, const Vec3& p) {
   if (shape.is_plane()) return {p.y(), Vec3::UnitY()};
   if (!shape.solid().mesh) return signed_distance(shape.solid(), p);

@@ -72,11 +72,11 @@ struct CollisionCluster {
   }
 };
 
-/// Collides the part of a large cluster that the impact reaches: the bouncing contacts and those around them.
-/// Contacts that the impulses make approach faster than `speed` follow with those around them, until there
-/// are no more. The other contacts get no impulse, which is then their solution. A cluster with more than
-/// kCluster contacts or too many extensions is truncated; afterwards the omitted contacts block as resting
-/// contacts.
+/// Collides the part of a large cluster that the impact reaches: the bouncing contacts and the contacts
+/// around them. If the impulses make other contacts approach faster than `speed`, these contacts and the
+/// contacts around them are added. This is repeated until there are no more. The other contacts need no
+/// impulse. A cluster with more than kCluster contacts or too many extensions is truncated; afterwards the
+/// omitted contacts block as resting contacts.
 ContactWork collide_reached(CollisionCluster& cluster, Real speed, ImpactLaw law,
                             const JointProblem& joints) {
   std::vector<uint8_t> taken(cluster.contacts.size(), 0);

@@ -58,7 +58,7 @@ Vector columns(FloatLanes a, FloatLanes b, FloatLanes c, FloatLanes d) {
   return {_mm256_shuffle_ps(low_ab, low_cd, 0x44), _mm256_shuffle_ps(low_ab, low_cd, 0xEE),
           _mm256_shuffle_ps(high_ab, high_cd, 0x44)};
 }
-/// The inverse of columns(). The last column is 0.
+/// Inverts columns(). The last column is 0.
 std::array<FloatLanes, 4> rows(const Vector& v) {
   const FloatLanes zero{};
   const FloatLanes low_xy = _mm256_unpacklo_ps(v.x, v.y), low_z = _mm256_unpacklo_ps(v.z, zero);
@@ -460,7 +460,7 @@ Vector turning_displacement(const PatchBatch& p, const SubstepTime& time) {
          Vector{_mm256_set1_ps(time.s2_sum) * p.bow.x, FloatLanes{}, FloatLanes{}};
 }
 
-/// The relative twist at the end of a sub-step.
+/// Returns the relative twist at the end of a sub-step.
 Groups relative_now(const PatchBatch& p, const LaneTwist& a, const LaneTwist& b, const SubstepTime& time) {
   Groups u = relative(p, a, b);
   u.normal = u.normal + p.approach.normal;
@@ -555,7 +555,7 @@ void sweep_single(PatchBatch& p, std::span<BodyMotion> motions, const SubstepTim
 
 }  // namespace
 
-// s = 2 t / h - 1 at the sub-steps' ends t.
+// Here s = 2 t / h - 1, where t are the ends of the sub-steps and h is the length of the step.
 SubstepTime::SubstepTime(Real substep_, uint32_t index, Real duration_)
     : substep(substep_), elapsed(index * substep_), duration(duration_) {
   const Real e = elapsed, first = e * (e + substep) / duration,

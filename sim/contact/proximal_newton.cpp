@@ -47,8 +47,8 @@ constexpr uint32_t kMaxOuter = 120, kMaxNewton = 40, kMaxHalvings = 25, kMaxSwee
 constexpr Real kStale = 0.2;
 constexpr Real kMeritRounding = 1e-11;
 constexpr std::size_t kMixed = 5;
-/// This fraction of the mobility of a joint's constraints is added, which makes dependent constraints
-/// solvable.
+/// Fraction of the mobility of a joint's constraints that is added to it, so that dependent constraints can
+/// be solved.
 constexpr Real kRegularization = 1e-11;
 constexpr uint32_t kMaxFactorizations = 300;
 /// Cost of operations, per contact or per block of the factorization [ns].

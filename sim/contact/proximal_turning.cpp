@@ -43,7 +43,7 @@ Mat4 round_cone_derivative(Real mu, const Vec4& q, ConeRegion region, Real norma
   return D + mu * normal / length * across;
 }
 
-/// Derivative of shortened(q, limit).
+/// Returns the derivative of shortened(q, limit) by q.
 Eigen::Matrix<Real, 2, 2> shortened_derivative(const Tangential& q, Real limit) {
   const Real length = q.norm();
   if (length <= limit) return Eigen::Matrix<Real, 2, 2>::Identity();
@@ -107,7 +107,7 @@ void ProximalNewton::evaluate_turning(const Contact& c, Point& p, const Vec3& u)
   merit_.add(roll.dot(2 * shifted - roll) / (2 * t.rho));
 }
 
-/// Angular impulse on body a, world axes.
+/// Returns the angular impulse on body a, in world axes [N m s].
 Vec3 ProximalNewton::turning_impulse(const Contact& c, const Point& p) const {
   const Turning& t = turnings_[p.turning];
   return c.to_world({t.spin_scale() * t.impulse.x(), t.impulse.y(), t.impulse.z()});

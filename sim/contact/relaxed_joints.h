@@ -77,7 +77,8 @@ class RelaxedJoints {
     std::vector<Vec6> velocities, change, impulses;
     std::vector<FloatLanes> before_push;  // by link: its displacement
     std::vector<Vec6> pushed;             // by link: its displacement since then
-    // Impulses of the joints in this sub-step, in the whole step, and the integral of these over the step.
+    // Impulses of the joints: `now` in this sub-step, `sum` in the step so far. `shift`: integral of `sum`
+    // over the step.
     std::vector<Vec6> now, sum, shift;
   };
 

@@ -26,7 +26,7 @@ Real root(Real r, int n) {
   return y;
 }
 
-/// h_new / h = 0.8 |target / error|^(1/p).
+/// Returns h_new / h = 0.8 |target / error|^(1/p), where p is `error_order`.
 Real step_change(Real target, Real error, int error_order) {
   Real least = 1, greatest_ratio = 1;
   for (int i = 0; i < error_order; ++i) {

@@ -27,8 +27,8 @@ Vec3 turn_rate(const KeyframeTrack& track, std::size_t i) {
   return rotation.angle() / (b.time - a.time) * rotation.axis();
 }
 
-/// The matrix J in w = J r', for the orientation exp(r) and the angular velocity w in the axes of the body;
-/// and its inverse.
+/// turn_jacobian() returns the matrix J in w = J r', for the orientation exp(r) and the angular velocity w in
+/// the axes of the body. The second function returns its inverse.
 Mat3 turn_jacobian(const Vec3& r) {
   const Real angle = r.norm();
   if (angle < kSmallAngle) return Mat3::Identity() - cross_matrix(r) / 2;

@@ -263,7 +263,8 @@ ConvexPolyhedron compact(std::span<const Vec3> points, Loops faces) {
 }
 
 /// Builds the polyhedron of a triangulated hull with merged faces or, if merging does not give a closed
-/// surface, with the triangles as they are. Returns an empty one if even these do not close.
+/// surface, with the triangles as they are. Returns an empty polyhedron if the triangles do not give a closed
+/// surface either.
 ConvexPolyhedron assemble(std::span<const Vec3> points, const std::vector<Triangle>& triangles,
                           Real tolerance) {
   try {

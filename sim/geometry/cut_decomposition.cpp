@@ -75,8 +75,8 @@ class SolidCutter {
     return cells;
   }
 
-  /// Repeatedly cuts the piece with the largest excess. Ends when the excess of all pieces is small, or there
-  /// are `factor` times as many pieces as wanted parts.
+  /// Repeatedly cuts the piece with the largest excess. It ends when the excess of all pieces is small, or
+  /// there are `factor` times as many pieces as wanted parts.
   void cut_worst(std::vector<HulledPiece>& pieces, Real factor) const {
     const Real wanted = static_cast<Real>(goal_.max_parts), accepted = goal_.max_error * whole_;
     while (static_cast<Real>(pieces.size()) < factor * wanted) {

@@ -32,7 +32,7 @@ ConvexPolyhedron common_hull(const ConvexPolyhedron& a, const ConvexPolyhedron& 
   return convex_hull(points);
 }
 
-/// The planes of the largest faces.
+/// Returns the planes of the largest faces.
 std::vector<SolidPiece::Plane> main_planes(const ConvexPolyhedron& p) {
   std::vector<std::pair<Real, uint32_t>> faces;
   for (uint32_t f = 0; f < p.face_count(); ++f) {

@@ -76,7 +76,8 @@ class HullTrimmer {
     Real depth = 0;    // [m]
     Real removed = 0;  // volume of the hull [m^3]
     Real lost = 0;     // volume of the solid in it [m^3]
-    /// Volume by which the difference shrinks: empty space is gained, the solid is lost.
+    /// Returns the volume by which the difference of hull and solid decreases: the removed empty space minus
+    /// the lost part of the solid [m^3].
     Real gain() const { return removed - 2 * lost; }
   };
 

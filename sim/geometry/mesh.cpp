@@ -40,7 +40,7 @@ Vec3 doubled_area(const TriangleMesh& mesh, const Triangle& t) {
   return (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a);
 }
 
-/// Angle of a triangle at its corner `k`.
+/// Returns the angle of a triangle at its corner `k` [rad].
 Real corner_angle(const TriangleMesh& mesh, const Triangle& t, std::size_t k) {
   const Vec3& p = mesh.vertices[t[k]];
   const Vec3 u = mesh.vertices[t[(k + 1) % 3]] - p, v = mesh.vertices[t[(k + 2) % 3]] - p;

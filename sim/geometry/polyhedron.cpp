@@ -22,7 +22,7 @@ Vec3 doubled_area_of(const TriangleMesh& mesh, uint32_t face) {
   return (mesh.vertices[t[1]] - a).cross(mesh.vertices[t[2]] - a);
 }
 
-/// Smallest height of a triangle.
+/// Returns the smallest height of a triangle [m].
 Real thickness(const TriangleMesh& mesh, uint32_t face, Real area2) {
   const Triangle& t = mesh.triangles[face];
   Real longest = 0;

@@ -84,8 +84,8 @@ void BlockCholesky<N>::order(uint32_t rows) {
   }
 }
 
-/// Moves each empty row directly behind the last of its neighbours. After the first neighbour only, its pivot
-/// might still be zero.
+/// Moves each empty row directly behind the last of its neighbours. If it followed only some of its
+/// neighbours, its pivot could be zero.
 template <int N>
 void BlockCholesky<N>::put_empty_rows_after_neighbours() {
   std::vector<uint32_t> last = place_;

@@ -70,7 +70,7 @@ void ParticleContacts::find() {
     found.strikes.clear();
     NearObstacles near(step_->fixed, step_->moving);
     for (uint32_t i = begin; i < end; ++i) {
-      // These are relative to the start of the chunk until collect().
+      // These indices are relative to the start of the chunk until collect().
       pair_begin_[i] = static_cast<uint32_t>(found.pairs.size());
       surface_begin_[i] = static_cast<uint32_t>(found.surfaces.size());
       find_pairs(i, found);

@@ -136,7 +136,8 @@ void ContactFinder::move(Body& body, Aabb swept_box, bool again) {
   is_current_ = false;
 }
 
-/// Does the same only if the path is not within the previous box. Returns whether the box was changed.
+/// Gives a new box to the broad phase only if the body's path is not within the previous box. Returns whether
+/// the box was changed.
 bool ContactFinder::move(Body& body, bool again) {
   const Aabb swept_box = swept_bounds(body);
   if (!leaves(body, swept_box)) return false;

@@ -37,7 +37,7 @@ bool turns_other_points(const Body& body, Real duration) {
          (std::holds_alternative<Ellipsoid>(body.def.shape) && body.turning_speed() * duration > kTouching);
 }
 
-/// Number of pieces into which a rotation is divided.
+/// Returns the number of pieces into which a rotation is divided.
 uint32_t pieces_of(Real turn) {
   return static_cast<uint32_t>(std::clamp(std::ceil(turn / kImpactTurn), 1.0, kMostTurns));
 }

@@ -184,7 +184,7 @@ RigidBody make_rigid_body(const std::string& object, const BodyDef& def, const S
   return rigid;
 }
 
-/// Energy of the forces between particles.
+/// Returns the potential energy of the forces between particles [J].
 Real pair_energy(const WorldState& world, Real time) {
   Real energy = 0;
   world.force_defs.for_each([&](ForceHandle, const ForceDef& def) {
