@@ -142,8 +142,8 @@ struct WorldDef {
                      Vec3::Constant(1000));  ///< objects that leave are retired and reported (E3)
 };
 
-/// Mechanical energy [J]: kinetic, potential and elastic. The potential energy is that of gravity (zero at y
-/// = 0) and of the forces between particles (zero at infinity).
+/// Mechanical energy [J]: kinetic, potential and elastic. The potential energy is the sum of the energies of
+/// gravity (zero at y = 0) and of the forces between particles (zero at infinity).
 struct Energy {
   Real kinetic = 0, potential = 0, elastic = 0;
   Real total() const { return kinetic + potential + elastic; }
@@ -247,7 +247,8 @@ class World {
   /// now and is advanced through the whole sub-step.
   uint64_t add_particle(ParticleSystemHandle system, const Particle& particle, Real elapsed = -1);
 
-  /// Called before each sub-step with its start and end time; emitters add their particles here.
+  /// A function that is called before each sub-step with its start and end time. Emitters add their particles
+  /// in this function.
   using BeforeSubStep = std::function<void(Real start, Real end)>;
 
   /// Advances only the particles, from time `from` to time `to` [s], before the first step(). The times must

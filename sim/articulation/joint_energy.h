@@ -20,7 +20,7 @@ CommonMotion common_motion(std::span<Body* const> bodies);
 
 /// Returns the greatest constraint error of an articulation's joints at a time [m], [rad].
 Real joint_gap(const Articulation& articulation, Real time);
-/// Returns the elastic energy of a joint at a time [J]: that of its stiffness, and that of a position motor
+/// Returns the elastic energy of a joint at a time [J]: the energy of its stiffness, and of a position motor
 /// with a stiffness, which acts as a spring with limited effort.
 Real spring_energy(const Joint& joint, Real time);
 /// Whether a joint connects the articulation to the world or to a static or kinematic body.

@@ -26,11 +26,11 @@ namespace offstage::sim {
 
 class ClothBending {
  public:
-  /// `rigidity` B [N m]; 0: no bending. `damping`: time tau [s]; the moment is B (kappa + tau d kappa/dt).
-  /// `rest_fraction`: fraction of the curvature of `rest` that is free of stress, 0 to 1; with 0 the cloth
-  /// tends to be flat. After a cloth has torn, only the surroundings of the tears are computed again.
-  /// Triangles stay clamped until set_clamps(). `measures`: whether curvature() is needed even if the
-  /// rigidity is 0.
+  /// Sets the triangles of a cloth and computes its bending. `rigidity` B [N m]; 0: no bending. `damping`:
+  /// time tau [s]; the moment is B (kappa + tau d kappa/dt). `rest_fraction`: fraction of the curvature of
+  /// `rest` that is free of stress, 0 to 1; with 0 the cloth tends to be flat. After a cloth has torn, only
+  /// the surroundings of the tears are computed again. Triangles stay clamped until set_clamps(). `measures`:
+  /// whether curvature() is needed even if the rigidity is 0.
   void assign(std::span<const Vec3> rest, std::span<const Triangle> triangles, std::span<const Real> masses,
               Real rigidity, Real damping, Real rest_fraction, bool measures = false);
   /// Whether nothing resists bending, because the rigidity is 0.
@@ -59,7 +59,7 @@ class ClothBending {
   /// as a smooth surface. The other has half the weight and measures shapes that alternate from point to
   /// point, which the first cannot see.
   std::size_t patch_count() const { return patches_.size(); }
-  /// Curvature of a patch beyond that at rest, |H x - n b0| [1/m].
+  /// Curvature of a patch in excess of its curvature at rest, |H x - n b0| [1/m].
   Real curvature(std::size_t patch, std::span<const Vec4> x) const;
   /// Appends the derivatives of curvature() with respect to the points, as pairs of point and derivative
   /// [1/m^2]. Their sum, and their moment about any point, are zero.

@@ -16,8 +16,9 @@ namespace offstage::sim {
 
 class ClothBody {
  public:
-  /// `velocity` and `angular_velocity` of the body are those at the end of the world's sub-step of length h
-  /// [s]. `surface_velocity`: velocity of the surface (conveyor) relative to the body, body frame [m/s].
+  /// `velocity` and `angular_velocity`: velocities of the body at the end of the world's sub-step, which has
+  /// length h [s]. `surface_velocity`: velocity of the surface (conveyor) relative to the body, body frame
+  /// [m/s].
   ClothBody(const Obstacle& obstacle, Real h, const Vec3& velocity, const Vec3& angular_velocity,
             const Vec3& surface_velocity);
 

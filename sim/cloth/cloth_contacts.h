@@ -35,10 +35,10 @@ class ClothContacts {
   /// Stops bodies that move towards cloth at points whose moves were shortened (non-zero `shortened`), and
   /// removes the component of the bodies' displacements towards the cloth. The result does not depend on the
   /// order of the contacts. `triangles`: contacts of the bodies with triangles. `kick`: velocity of each
-  /// point in addition to that of its move. `recoil`: for each cloth, the inverse of its mass including the
-  /// bodies that hold it [1/kg]; 0 if it is pinned to the world. `whole_velocity`: for each cloth, its mean
-  /// velocity including these bodies, or the velocity of the single object to which it is pinned. Returns for
-  /// each cloth the impulse that it absorbs [N s].
+  /// point in addition to the velocity of its move. `recoil`: for each cloth, the inverse of its mass
+  /// including the bodies that hold it [1/kg]; 0 if it is pinned to the world. `whole_velocity`: for each
+  /// cloth, its mean velocity including these bodies, or the velocity of the single object to which it is
+  /// pinned. Returns for each cloth the impulse that it absorbs [N s].
   std::vector<Vec3> stop_bodies(const ClothPoints& points, std::span<const uint8_t> shortened,
                                 std::span<const Vec4> kick, std::span<const Real> recoil,
                                 std::span<const std::optional<Vec3>> whole_velocity,

@@ -28,7 +28,7 @@ class ClothSystem {
   /// Sets the cloths to step. Their addresses must stay valid until the next call.
   void assign(std::vector<Cloth*> cloths);
 
-  /// Advances the cloths through a sub-step of the world. `bodies` are those that may touch cloth or hold
+  /// Advances the cloths through a sub-step of the world. `bodies`: all bodies that may touch cloth or hold
   /// pins.
   void step(const ClothWeather& weather, std::span<ClothBody> bodies);
 

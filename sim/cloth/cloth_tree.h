@@ -41,7 +41,8 @@ class ClothTree {
   void overlapping(const Aabb& bounds, Visit&& visit) const;
 
  private:
-  /// Bit mask of directions (cloth_tree.cpp): those towards which all of some normals lean.
+  /// Bit mask of directions (see cloth_tree.cpp). The bit of a direction is set if all normals of a set of
+  /// triangles lean towards this direction.
   using Views = uint64_t;
   struct Node {
     MovingBox box;

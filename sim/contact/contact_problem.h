@@ -108,8 +108,9 @@ std::optional<std::size_t> worst_contact(std::span<const ContactBody> bodies,
 Real kinetic_energy(std::span<const ContactBody> bodies);
 
 /// Kinetic energy that the impulses of the contacts add to the bodies [J]. `before` has the velocities
-/// without the impulses, `after` those with them. The work of conveyors is not included. If all targets and
-/// biases are zero, an exact solution adds no energy, because friction and plastic impacts dissipate.
+/// without the impulses, `after` the velocities with them. The work of conveyors is not included. If all
+/// targets and biases are zero, an exact solution adds no energy, because friction and plastic impacts
+/// dissipate.
 Real added_energy(std::span<const ContactBody> before, std::span<const ContactBody> after,
                   std::span<const Contact> contacts);
 

@@ -1,8 +1,8 @@
 #pragma once
 /// Internal edges: edges and side faces that are covered by flush neighbouring pieces or bodies, so that no
-/// object can collide with them. The narrow phase handles those between triangles of one mesh
-/// (mesh_surface.h). This file handles those between adjacent bodies, between the convex parts of one body,
-/// and between triangles that do not share vertices.
+/// object can collide with them. The narrow phase handles internal edges between triangles of one mesh
+/// (mesh_surface.h). This file handles internal edges between adjacent bodies, between the convex parts of
+/// one body, and between triangles that do not share vertices.
 
 #include <span>
 #include <vector>

@@ -1,7 +1,7 @@
 #pragma once
 /// Forces on bodies and particles besides gravity, drag and springs (physics P2, R2, E8): fields in a region,
 /// moving air, a scripted grab, an explosion, forces between particles. This file has the definitions and the
-/// forces on a body; those on particles are in particle_forces.h and pair_forces.h.
+/// forces on a body; the forces on particles are in particle_forces.h and pair_forces.h.
 
 #include <cstdint>
 #include <limits>

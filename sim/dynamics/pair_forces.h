@@ -20,13 +20,13 @@ struct PairMember {
 /// of a pair are opposite to the last bit.
 class PairForces {
  public:
-  /// `def` must be pairwise and outlive this object.
+  /// Adds a force between the particles `members`. `def` must be pairwise and outlive this object.
   void add(const ForceDef& def, std::vector<PairMember> members) {
     groups_.push_back({&def, std::move(members)});
   }
   bool empty() const { return groups_.empty(); }
 
-  /// Adds to the accelerations `dv` at positions `x`.
+  /// Adds the accelerations by the forces at the positions `x` to `dv`.
   void accelerate(Real t, std::span<const Real> x, std::span<Real> dv) const;
   /// Appends the derivatives of dv/dt by x, which begin at row `at_v` and column `at_x`. They are exact for
   /// up to kExactJacobian particles. For more particles the derivatives between different particles are

@@ -31,8 +31,8 @@ struct CutDecomposition {
 };
 
 /// Decomposes several solids together. Each must have a positive volume; they may touch or overlap each
-/// other. First tries to reach the error with few parts, then with as many as allowed. The result does not
-/// depend on the number of threads.
+/// other. It first tries to reach the error with few parts, and then with as many parts as allowed. The
+/// result does not depend on the number of threads.
 CutDecomposition decompose_by_cuts(std::span<const SolidPiece> solids, const CutGoal& goal);
 
 }  // namespace offstage::sim

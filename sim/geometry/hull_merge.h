@@ -33,9 +33,9 @@ class HullMerger {
   explicit HullMerger(std::span<const HullToMerge> parts);
   ~HullMerger();
 
-  /// Repeatedly replaces two parts by their common hull, those with the least additional volume first. It
-  /// continues while there are more than `max_parts` parts, and then as long as the sum of the additional
-  /// volumes is at most `budget` [m^3]. Parts with separate bounding boxes are merged last.
+  /// Repeatedly replaces two parts by their common hull. It chooses the two parts whose common hull adds the
+  /// least volume. It continues while there are more than `max_parts` parts, and then as long as the sum of
+  /// the additional volumes is at most `budget` [m^3]. Parts with separate bounding boxes are merged last.
   std::vector<MergedHull> run(std::size_t max_parts, Real budget) const;
 
  private:

@@ -90,7 +90,8 @@ class ParticleContacts {
     Vec3 velocity;       // velocity of the surface
     Vec3 friction_axis;  // Obstacle::friction_axis_on() of the surface
 
-    /// As Contact::held(); with a friction axis, the limits along and across the axis are separate.
+    /// Does the same as Contact::held(). With a friction axis, the limits along and across the axis are
+    /// separate.
     Vec3 held(const Vec3& along, Real limit) const {
       if (friction_axis.isZero()) return Contact::held(along, limit);
       const Vec3 across = normal().cross(friction_axis);

@@ -33,9 +33,9 @@ struct ParticleForces {
   /// Takes one step of IntegratorKind::leapfrog of length h [s] with consecutive particles. `fields` must be
   /// empty.
   void leapfrog_step(Real h, std::span<Vec3> x, std::span<Vec3> v, std::span<const Real> mass) const;
-  /// Appends the derivatives of (dx/dt, dv/dt) of consecutive particles with respect to (x, v). The first row
-  /// and column of x is `at_x`, that of v is `at_v`. The derivatives of fields with respect to position are
-  /// omitted, because they do not make a system stiff.
+  /// Appends the derivatives of (dx/dt, dv/dt) of consecutive particles with respect to (x, v). The rows and
+  /// columns of x begin at `at_x`, and the rows and columns of v begin at `at_v`. The derivatives of fields
+  /// with respect to position are omitted, because they do not make a system stiff.
   void jacobian(Real t, std::span<const Real> x, std::span<const Real> mass, int at_x, int at_v,
                 SparseEntries& entries) const;
 

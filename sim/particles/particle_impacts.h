@@ -3,8 +3,8 @@
 /// of time (physics E6, P3, P5, P6). If a hit particle touches others, they form a cluster and are solved
 /// together. The work is bounded. A particle with too many collisions in a sub-step is left to the solver of
 /// resting contact (particle_contacts.h), which also prevents tunnelling. If there are too many collisions in
-/// total, all particles are left to it. So are slow collisions in dense crowds, because they are very
-/// numerous and depend on each other.
+/// total, all particles are left to it. Slow collisions in dense crowds are also left to it, because they are
+/// very numerous and depend on each other.
 
 #include <functional>
 #include <queue>

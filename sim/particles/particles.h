@@ -98,7 +98,8 @@ struct ParticleArrays {
 /// = v1 - v2: relative velocity, u.n < 0 [m/s]. n: unit normal. The contact sticks if the friction cone
 /// allows it; otherwise |P_t| = mu P_n against the sliding direction.
 Vec3 collision_impulse(Real m12, const Vec3& u, const Vec3& n, Real restitution, Real friction);
-/// As above, for round bodies that rotate. `across`: effective mass for tangential impulses [kg].
+/// Returns the same impulse for round bodies that rotate. `across`: effective mass for tangential impulses
+/// [kg].
 Vec3 collision_impulse(Real m12, Real across, const Vec3& u, const Vec3& n, Real restitution, Real friction);
 
 /// m r^2 / I of a solid ball. A tangential impulse changes the velocity of the surface 1 + kBallTurning times
