@@ -73,7 +73,8 @@ enum class ClothIntegrator : uint8_t {
   /// loads and fast. Each sub-step is divided into as many steps of the springs as the stiffest of them needs
   /// for stability, but none is shorter than kShortestSpringStep.
   relaxed,
-  /// Backward Euler, linearised once (Baraff and Witkin, "Large Steps in Cloth Simulation", 1998) and solved.
+  /// Backward Euler, linearised once (Baraff and Witkin, "Large Steps in Cloth Simulation", 1998). The linear
+  /// system is solved by conjugate gradients.
   implicit,
   symplectic,  ///< explicit: unstable beyond largest_stable_step()
   rk4,         ///< explicit, of fourth order between collisions: unstable beyond largest_stable_step()

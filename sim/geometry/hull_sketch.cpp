@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kFewPoints = 160;
 constexpr int kSpread = 96;
-constexpr Real kSketchFlat = 1e-9;  // fraction of the extent
+constexpr Real kSketchFlat = 1e-9;  // thinner sets count as flat; fraction of the extent
 
 /// Returns directions that are spread evenly over the sphere, along a spiral.
 std::vector<Vec3> spread_directions(int count) {
