@@ -13,7 +13,7 @@ Eigen::Vector3f blackbody_color(float kelvin);
 
 /// Returns the luminance of a black body at the temperature `kelvin`, divided by its luminance at the
 /// temperature `reference` [K]. The luminance increases steeply with the temperature: at 1000 K it is 1/40
-/// 000 of that at 1800 K.
+/// 000 of its value at 1800 K.
 float blackbody_brightness(float kelvin, float reference);
 
 }  // namespace offstage::effects

@@ -66,7 +66,7 @@ inline Rgba monotone_slope(float h0, float h1, const Rgba& s0, const Rgba& s1) {
 template <class T>
 class Ramp {
  public:
-  /// The keys must not be empty.
+  /// Prepares a ramp, whose keys must not be empty.
   explicit Ramp(const AgeRamp<T>& ramp, RampKind kind = RampKind::linear) {
     const auto& keys = ramp.keys;
     const T zero = T(keys.front().value * 0.f);

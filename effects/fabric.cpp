@@ -77,8 +77,8 @@ const std::array<FabricPreset, 6> kPresets = {{
       .max_stretch = 2}},
     // A latex balloon of 30 cm weighs 3 g. The skin of this preset has no stress at a diameter of 20 cm.
     // Stretched by lambda = 1.5, it has the tension 1.5 stretch (lambda - 1) / lambda, which equals p R / 2
-    // for a pressure p of 2.5 kPa. The drag is that of a sphere: its coefficient is 4 (drag - lift) + 4/3
-    // lift = 0.47 (docs/scene-guide.md).
+    // for a pressure p of 2.5 kPa. The drag equals the drag of a sphere: its coefficient is 4 (drag - lift) +
+    // 4/3 lift = 0.47 (docs/scene-guide.md).
     {"balloon",
      "the skin of a balloon of 20 cm that is blown up to 30 cm",
      {.areal_density = 0.024,

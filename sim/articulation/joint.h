@@ -26,7 +26,7 @@ enum class JointType : uint8_t {
   prismatic,  ///< allows displacement along the axis, without rotation
   universal,  ///< allows rotation about the axis, fixed in a, and about the second axis, fixed in b
   /// Keeps the distance between the anchors constant, like a massless rod. With limits or a motor the length
-  /// may change, like that of a rope or a winch.
+  /// may change, like the length of a rope or a winch.
   distance,
   /// Couples the rotation of a about `axis` with the rotation of b about `second_axis`: angle of a + ratio *
   /// angle of b = 0. The axes are fixed in the bodies. Other joints must hold the wheels on a carrier, and

@@ -15,9 +15,9 @@ namespace {
 /// Limit of the gradient's greatest weight times the size of the fan. With a greater weight, the points lie
 /// so near to a conic that they do not determine a quadratic polynomial.
 constexpr Real kLargestWeight = 4;
-/// Weight of the energy of the jump patches, relative to that of the recovered patches. The second
-/// derivatives by jumps resist shapes that alternate from point to point. Second derivatives by recovered
-/// gradients are zero for such shapes.
+/// Weight of the energy of the jump patches, relative to the weight of the energy of the recovered patches.
+/// The second derivatives by jumps resist shapes that alternate from point to point. Second derivatives by
+/// recovered gradients are zero for such shapes.
 constexpr Real kJumpFraction = 0.05;
 /// Divisor of the curvature that is computed from the weights of a jump patch. The weights contain the factor
 /// sqrt(kJumpFraction), and the other factor 2 makes the curvature of such patches count half. Next to a

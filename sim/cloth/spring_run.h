@@ -18,7 +18,7 @@ inline Vec4 held_velocity(const ClothPoints& points, std::size_t i, Real h) {
   return (points.position[i] - points.start[i]) / h;
 }
 
-/// State at the start of a run, with the velocities of pinned points.
+/// Sets x and v to the state at the start of a run, with the velocities of pinned points.
 inline void begin_run(const ClothPoints& points, const ClothRange& cloth, Real h, SpringRun& x,
                       SpringRun& v) {
   x.assign(points.start.begin() + static_cast<std::ptrdiff_t>(cloth.begin),

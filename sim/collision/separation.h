@@ -6,9 +6,9 @@
 namespace offstage::sim {
 
 /// Closest points of two solids A and B, or the witness points of the penetration depth if they overlap, in
-/// A's frame. Moving A by
-/// `-distance * normal`, or B by `distance * normal`, brings separate solids into contact, and separates
-/// overlapping ones with the smallest translation (up to the tolerance of the algorithm).
+/// A's frame. Moving A by `-distance * normal`, or B by `distance * normal`, brings separate solids into
+/// contact, and separates overlapping ones with the smallest translation (up to the tolerance of the
+/// algorithm).
 struct Separation {
   Real distance = 0;            ///< [m]; negative: penetration depth
   Vec3 normal = Vec3::UnitY();  ///< unit vector from B to A: an approaching pair has (v_A - v_B).n < 0

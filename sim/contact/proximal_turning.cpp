@@ -8,7 +8,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Penalty of rolling and spinning friction times the angular mobility; equal to that of contacts.
+/// Penalty of rolling and spinning friction times the angular mobility; it equals this product for contacts.
 constexpr Real kTurningStiffness = 1e5;
 
 using Vec4 = Eigen::Matrix<Real, 4, 1>;

@@ -100,7 +100,7 @@ std::string problem(const SphereRegion& s) {
 }
 std::string problem(const BoxRegion& b) {
   if (!b.centre.allFinite()) return "region.centre must be finite";
-  return b.size.allFinite() && b.size.minCoeff() > 0 ? "" : "region.size must be finite numbers > 0";
+  return b.size.allFinite() && b.size.minCoeff() > 0 ? "" : "region.size must have finite numbers > 0";
 }
 std::string problem(const Region& region) {
   return std::visit([](const auto& r) { return problem(r); }, region);

@@ -32,7 +32,7 @@ struct ForceTag {};
 using ForceHandle = Handle<ForceTag>;
 struct Solid;
 
-/// The same force on every body and particle.
+/// A force that is the same on every body and particle.
 struct ConstantField {
   Vec3 force = Vec3::Zero();  ///< [N]
   Region region;

@@ -93,7 +93,7 @@ Eigen::Matrix<Real, 13, 13> RigidDerivative::own_rates(const BodyForces& forces,
 
 void add_block(const Eigen::Ref<const Eigen::MatrixXd>& block, const StateColumns& rows,
                const StateColumns& columns, SparseEntries& entries) {
-  // The state of a body begins with 7 coordinates, that of a particle with 3.
+  // The state of a body begins with 7 coordinates, the state of a particle with 3.
   const auto place = [](const StateColumns& at, Eigen::Index i, Eigen::Index size) {
     const auto coordinates = size == 13 ? static_cast<Eigen::Index>(kBodyX) : 3;
     return static_cast<int>(i < coordinates ? at.x + i : at.p + (i - coordinates));

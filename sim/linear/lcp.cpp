@@ -15,7 +15,7 @@ using Eigen::Index;
 constexpr Real kLcpSatisfied = 1e-11;  ///< accelerations below this times max |b| count as zero
 /// With a residual above this fraction of the greatest |b|, the fall-back is used.
 constexpr Real kAccurateLcp = 1e-9;
-constexpr Real kLcpNoise = 1e-12;  ///< smaller relative rates count as zero
+constexpr Real kLcpNoise = 1e-12;  ///< scaled rates smaller than this count as zero
 constexpr int kLcpAttempts = 4;
 constexpr int kLcpSweeps = 500;
 
