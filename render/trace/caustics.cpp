@@ -16,7 +16,7 @@ namespace offstage::render {
 namespace {
 
 constexpr float kRaysPerPixel = 1;  // photons per pixel that a piece of glass covers, in a sub-frame
-constexpr float kMostRays = 4e5f;   // approximate limit of the photons of a sub-frame
+constexpr float kMostRays = 4e5f;   // approximate limit of the photons of a sub-frame, at most one per pixel
 constexpr float kRaysPerMean = 64;  // photons over which a pixel of a frame is averaged
 constexpr int kWidestMean_px = 8;   // largest half-width of the averaged square of pixels
 constexpr int kMostSurfaces = 16;   // largest number of glass surfaces on the path of a photon
@@ -159,7 +159,8 @@ std::vector<LightTracer::Beam> LightTracer::beams_to(const GlassPiece& piece) co
 void LightTracer::add_caustics(const LightView& view, LightBuffer& light) const {
   float pixels = 0;
   for (const GlassPiece& piece : sources_.glass) pixels += pixels_of(piece, view);
-  const float per_pixel = std::min(kRaysPerPixel, kMostRays / std::max(pixels, 1.0f));
+  const float most = std::min(kMostRays, static_cast<float>(light.pixels.width_px * light.pixels.height_px));
+  const float per_pixel = std::min(kRaysPerPixel, most / std::max(pixels, 1.0f));
   const VisibleLight visible(light, view);
   std::vector<Photon> photons;
   for (const GlassPiece& piece : sources_.glass) {
