@@ -12,7 +12,7 @@
 #include "producer/cli/commands.h"
 #include "producer/format/presets.h"
 #include "producer/format/scene_table.h"
-#include "producer/format/table_joint.h"
+#include "producer/format/table_articulation.h"
 
 namespace offstage::producer {
 namespace {
