@@ -5,6 +5,7 @@
 
 #include "producer/format/table_joint.h"
 #include "producer/format/table_placement.h"
+#include "producer/format/table_shape.h"
 #include "producer/format/values.h"
 
 namespace offstage::producer {
@@ -19,15 +20,16 @@ struct Table<Chain> {
     using T = Chain;
     return {
         {"name", &T::name, "unique name; default: articulation_N, where N is the index in the list"},
-        {"from", &T::from, "start of the chain", "m"},
-        {"to", &T::to, "end of the chain", "m"},
+        {"from", &T::from, "start of the chain, in the world at time 0", "m"},
+        {"to", &T::to, "end of the chain, in the world at time 0", "m"},
         {"path", &T::path,
-         "instead of `from` and `to`: at least two points in the world, along which the links are laid in "
-         "equal steps",
+         "instead of `from` and `to`: at least two points in the world; the links lie along the line through "
+         "them, in equal steps",
          "m"},
         {"links", &T::links, "number of links", "", between(1, 10000)},
         {"sag", &T::sag,
-         "length of the chain relative to the distance of its ends; above 1.0005 if both ends are held still",
+         "length of the chain, as a multiple of the distance of its ends; must be above 1.0005 if both ends "
+         "are held still",
          "", between(1, 3)},
         {"radius", &T::radius, "radius of a link", "m", kPositive},
         {"density", &T::density, "density of a link", "kg/m^3", kPositive},
@@ -39,12 +41,13 @@ struct Table<Chain> {
         {"bend_stiffness", &T::bend_stiffness,
          "flexural rigidity (Young's modulus times second moment of area) of an elastic rod that is "
          "unstressed as it is laid out; twisting has the same stiffness. A joint between links of the length "
-         "l has the stiffness `bend_stiffness` / l per radian, so the rod bends alike for any number of "
-         "links, at most 32. The bodies that hold the ends of the chain clamp them",
+         "l has the stiffness `bend_stiffness` / l per radian, so the rod bends in the same way for any "
+         "number of links (at most 32). The bodies that hold the ends of the chain clamp them",
          "N m^2", kNotNegative},
         {"friction", &T::friction, "dry friction of each joint", "N m", kNotNegative},
         {"damping", &T::damping, "viscous damping of each joint", "N m s", kNotNegative},
-        {"max_force", &T::max_force, "force at which a joint breaks; default: never", "N", kPositive}};
+        {"max_force", &T::max_force, "force above which a joint breaks; default: it never breaks", "N",
+         kPositive}};
   }
 };
 template <>
@@ -52,7 +55,7 @@ struct Table<Ragdoll> {
   static constexpr const char* kName = "ragdoll";
   static constexpr const char* kHelp =
       "A standing person who faces +Z and collapses when the film starts: bodies NAME/pelvis, chest, head, "
-      "upper_arm_left and so on, with joints that bend as human joints do.";
+      "upper_arm_left and so on, with joints that have the limits of human joints.";
   static Fields<Ragdoll> fields() {
     using T = Ragdoll;
     return Fields<T>{
@@ -79,18 +82,20 @@ struct Table<Bridge> {
       "Planks hinged to each other between two banks: bodies NAME/plank_0, NAME/plank_1 and so on.";
   static Fields<Bridge> fields() {
     using T = Bridge;
-    return {
-        {"name", &T::name, "unique name; default: articulation_N, where N is the index in the list"},
-        {"from", &T::from, "start of the bridge", "m"},
-        {"to", &T::to, "end of the bridge", "m"},
-        {"planks", &T::planks, "number of planks", "", between(1, 1000)},
-        {"width", &T::width, "width of the deck", "m", kPositive},
-        {"thickness", &T::thickness, "thickness of a plank", "m", kPositive},
-        {"density", &T::density, "density of a plank", "kg/m^3", kPositive},
-        {"material", &T::material, "name of a material; empty: grey"},
-        {"sag", &T::sag, "length of the deck relative to the distance of the banks", "", between(1.0005, 2)},
-        {"damping", &T::damping, "viscous damping of each hinge", "N m s", kNotNegative},
-        {"max_force", &T::max_force, "force at which a hinge breaks; default: never", "N", kPositive}};
+    return {{"name", &T::name, "unique name; default: articulation_N, where N is the index in the list"},
+            {"from", &T::from, "start of the bridge, in the world at time 0", "m"},
+            {"to", &T::to, "end of the bridge, in the world at time 0", "m"},
+            {"planks", &T::planks, "number of planks", "", between(1, 1000)},
+            {"width", &T::width, "width of the deck", "m", kPositive},
+            {"thickness", &T::thickness, "thickness of a plank", "m", kPositive},
+            {"density", &T::density, "density of a plank", "kg/m^3", kPositive},
+            {"material", &T::material, "name of a material; empty: grey"},
+            {"sag", &T::sag,
+             "length of the deck, as a multiple of the distance of the banks; larger: the bridge sags more",
+             "", between(1.0005, 2)},
+            {"damping", &T::damping, "viscous damping of each hinge", "N m s", kNotNegative},
+            {"max_force", &T::max_force, "force above which a hinge breaks; default: it never breaks", "N",
+             kPositive}};
   }
 };
 template <>
@@ -110,7 +115,8 @@ struct Table<Vehicle> {
         {"width", &T::width, "width over the wheels", "m", kPositive},
         {"wheel_radius", &T::wheel_radius, "radius of each wheel", "m", kPositive},
         {"mass", &T::mass, "mass of the whole car", "kg", kPositive},
-        {"suspension_hz", &T::suspension_hz, "frequency of the car's vibration on its springs", "Hz",
+        {"suspension_hz", &T::suspension_hz,
+         "frequency at which the car oscillates on its springs; larger: stiffer springs", "Hz",
          between(0.2, 10)},
         {"speed", &T::speed,
          "target speed of the rear wheels over time, in m/s; empty: the car rolls freely"},
@@ -132,12 +138,12 @@ struct Table<Crane> {
     using T = Crane;
     return Fields<T>{
         {"name", &T::name, "unique name; default: articulation_N, where N is the index in the list"},
-        {"position", &T::position, "foot of the mast", "m"},
+        {"position", &T::position, "position of the foot of the mast", "m"},
         {"orientation", &T::orientation, "orientation of the crane, about `position`"},
         {"height", &T::height, "height of the mast", "m", kPositive},
         {"reach", &T::reach, "length of the jib", "m", kPositive},
         {"load_mass", &T::load_mass, "mass of the load", "kg", kPositive},
-        {"load_size", &T::load_size, "edge of the load, a cube", "m", kPositive},
+        {"load_size", &T::load_size, "length of an edge of the load, a cube", "m", kPositive},
         {"slew", &T::slew, "rotation of the jib over time, in degrees"},
         {"trolley", &T::trolley,
          "outward displacement of the trolley over time, in metres, from its place at 0.6 of the reach"},
@@ -169,23 +175,22 @@ struct Table<ModelTree> {
     using T = ModelTree;
     return Fields<T>{
         {"name", &T::name, "unique name; default: articulation_N, where N is the index in the list"},
-        {"file", &T::file, "model file", kRequired},
+        {"file", &T::file, kModelFileHelp, kRequired},
         {"position", &T::position, "position of the model's origin", "m"},
         {"orientation", &T::orientation, "orientation of the model, about `position`"},
         {"velocity", &T::velocity, "velocity of all links at time 0", "m/s"},
-        {"scale", &T::scale,
-         "scale factor of the model; `auto` converts the likely unit of the file to metres (docs/models.md). "
-         "`offstage info FILE` shows the factor",
-         "", kPositive},
+        {"scale", &T::scale, kModelScaleHelp, "", kPositive},
         {"density", &T::density, "density of the links", "kg/m^3", kPositive},
         {"base", &T::base,
          "name of the body that holds the uppermost nodes, or `world`; empty: these nodes are free"},
         {"material", &T::material, "name of a material; empty: the materials of the file"},
         {"collides", &T::collides, "whether links collide with all objects that they are not joined to"},
         {"joints", &T::joints,
-         "the joints that are not plain spherical joints, such as joints with a motor or limits"},
-        {"friction", &T::friction, "dry friction of the other joints", "N m", kNotNegative},
-        {"damping", &T::damping, "viscous damping of the other joints", "N m s", kNotNegative}}
+         "joints with keys of their own, such as a type, a motor or limits; all other joints are spherical"},
+        {"friction", &T::friction, "dry friction of the joints that `joints` does not list", "N m",
+         kNotNegative},
+        {"damping", &T::damping, "viscous damping of the joints that `joints` does not list", "N m s",
+         kNotNegative}}
         .with(&T::placement);
   }
 };

@@ -23,7 +23,8 @@ struct Table<MotorKey> {
   static constexpr const char* kHelp = "A motor's target at a time.";
   static Fields<MotorKey> fields() {
     return {{"time", &MotorKey::time, "time of the key; times must increase", "s"},
-            {"target", &MotorKey::target, "target, in the unit of the motor's `target`"},
+            {"target", &MotorKey::target,
+             "target position or speed of the motor at this time, in the unit of `target` of the motor"},
             {"interpolation", &MotorKey::interpolation,
              "interpolation from this key to the next; default: the interpolation of the motor"}};
   }
@@ -31,24 +32,28 @@ struct Table<MotorKey> {
 template <>
 struct Table<JointMotor> {
   static constexpr const char* kName = "motor";
-  static constexpr const char* kHelp = "Motor of a revolute, prismatic or distance joint.";
+  static constexpr const char* kHelp = "Motor of a revolute, prismatic, screw or distance joint.";
   static Fields<JointMotor> fields() {
     using T = JointMotor;
-    return {{"mode", &T::mode,
-             "quantity that the motor controls: a speed, or a position relative to the position at time 0"},
-            {"target", &T::target,
-             "target position in degrees or metres, or target speed in degrees per second or metres per "
-             "second; `keys` "
-             "replace it"},
-            {"keys", &T::keys, "targets over time"},
-            {"interpolation", &T::interpolation, kInterpolationHelp},
-            {"smooth", &T::smooth, "whether a `monotone` curve has zero speed at every key"},
-            {"max_effort", &T::max_effort, "greatest torque or force; default: unlimited", "N m or N",
-             kNotNegative},
-            {"stiffness", &T::stiffness, "stiffness of position control, per radian or metre; 0: rigid",
-             "N m or N/m", kNotNegative},
-            {"damping", &T::damping, "damping of position control with a stiffness, per speed",
-             "N m s or N s/m", kNotNegative}};
+    return {
+        {"mode", &T::mode,
+         "quantity that the motor controls: a speed, or a position relative to the position at time 0"},
+        {"target", &T::target,
+         "constant target: a position in degrees or metres, or a speed in degrees per second or metres per "
+         "second; not with `keys`"},
+        {"keys", &T::keys, "targets over time, instead of `target`"},
+        {"interpolation", &T::interpolation, kInterpolationHelp},
+        {"smooth", &T::smooth,
+         "whether a `monotone` curve through the keys has zero slope at every key, so that a position motor "
+         "stops there"},
+        {"max_effort", &T::max_effort, "greatest torque or force of the motor; default: unlimited",
+         "N m or N", kNotNegative},
+        {"stiffness", &T::stiffness,
+         "torque or force of the motor per radian or metre from the target position; 0: the position is "
+         "controlled rigidly",
+         "N m or N/m", kNotNegative},
+        {"damping", &T::damping, "torque or force per speed that damps position control; needs a `stiffness`",
+         "N m s or N s/m", kNotNegative}};
   }
 };
 
@@ -67,19 +72,17 @@ struct Table<JointBehaviour> {
          "`ratio` metres along it per turn; `pulley` is a rope from `anchor` over `pulley_a` and `pulley_b` "
          "to `anchor_b`. Gears and racks only couple motions: their bodies need other joints, which hold "
          "them on a carrier that does not turn"},
-        {"axis", &T::axis, "axis of rotation or sliding; for a spherical joint, axis of the twist", "",
+        {"axis", &T::axis,
+         "axis of rotation or sliding, in the world at time 0; for a spherical joint, axis of the twist", "",
          kDirection},
         {"second_axis", &T::second_axis,
          "second axis of a universal joint, axis of `b` of a gear, or direction of a rack; default: +X, or "
-         "`axis` for "
-         "a gear",
+         "`axis` for a gear",
          "", kDirection},
         {"ratio", &T::ratio,
          "gear: teeth of `b` / teeth of `a`, negative for an internal gear or a belt; rack: radius of the "
-         "pinion in m, "
-         "negative for the other direction; screw: lead in m per turn, positive for a right-handed thread; "
-         "pulley: "
-         "number of strands at `b`. Not 0"},
+         "pinion in m, negative for the other direction; screw: lead in m per turn, positive for a "
+         "right-handed thread; pulley: number of strands at `b`. Not 0"},
         {"limits", &T::limits,
          "least and greatest displacement of a prismatic joint, or change of the distance of a distance "
          "joint: a rope has [-its length, 0]",
@@ -90,7 +93,9 @@ struct Table<JointBehaviour> {
          "distance from `anchor_b` to `pulley_b`. Without limits, the rope of a pulley cannot get longer "
          "than at the start",
          "m", kNotNegative},
-        {"limits_deg", &T::limits_deg, "least and greatest angle; for a spherical joint, of the twist",
+        {"limits_deg", &T::limits_deg,
+         "least and greatest angle of rotation about `axis`; 0 is the angle at time 0. For a spherical joint "
+         "these are limits of the twist",
          "degrees"},
         {"swing_deg", &T::swing_deg,
          "spherical joint: largest angle between the axes of the two bodies; universal joint: largest angle "
@@ -102,16 +107,17 @@ struct Table<JointBehaviour> {
          "", kFraction},
         {"stiffness", &T::stiffness,
          "spherical joint: torque per angle of rotation from the pose of time 0, about any axis; for the "
-         "other types use a "
-         "motor with a stiffness",
+         "other types use a motor with a stiffness",
          "N m/rad", kNotNegative},
-        {"friction", &T::friction, "dry friction: greatest torque or force against the motion", "N m or N",
-         kNotNegative},
-        {"damping", &T::damping, "viscous damping: torque or force per speed", "N m s or N s/m",
+        {"friction", &T::friction, "dry friction of the joint: greatest torque or force against its motion",
+         "N m or N", kNotNegative},
+        {"damping", &T::damping, "viscous damping of the joint: torque or force per speed", "N m s or N s/m",
          kNotNegative},
         {"motor", &T::motor, "motor that drives the joint"},
-        {"max_force", &T::max_force, "force at which the joint breaks; default: never", "N", kPositive},
-        {"max_torque", &T::max_torque, "torque at which the joint breaks; default: never", "N m", kPositive},
+        {"max_force", &T::max_force, "force above which the joint breaks; default: it never breaks", "N",
+         kPositive},
+        {"max_torque", &T::max_torque, "torque above which the joint breaks; default: it never breaks", "N m",
+         kPositive},
     };
   }
 };
@@ -127,10 +133,15 @@ struct Table<Joint> {
         {"name", &T::name, "unique name; default: joint_N, where N is the index in the list"},
         {"a", &T::a, "name of a body", kRequired},
         {"b", &T::b, "name of a body; empty: the world"},
-        {"anchor", &T::anchor, "point at which the bodies are joined", "m"},
-        {"anchor_b", &T::anchor_b, "distance joint or pulley: the end on `b`; rack: a point of `b`", "m"},
-        {"pulley_a", &T::pulley_a, "fixed point over which the rope of `a` runs", "m"},
-        {"pulley_b", &T::pulley_b, "fixed point over which the rope of `b` runs", "m"}}
+        {"anchor", &T::anchor, "point at which the bodies are joined, in the world at time 0", "m"},
+        {"anchor_b", &T::anchor_b,
+         "distance joint or pulley: point of `b` at which the rod or the rope ends, in the world at time 0; "
+         "rack: a point of `b`",
+         "m"},
+        {"pulley_a", &T::pulley_a, "for a pulley: fixed point in the world over which the rope from `a` runs",
+         "m"},
+        {"pulley_b", &T::pulley_b, "for a pulley: fixed point in the world over which the rope from `b` runs",
+         "m"}}
         .with(&T::behaviour)
         .then({{"collide", &T::collide, "whether the two bodies also collide with each other"},
                {"appear_at", &T::appear_at,
@@ -139,8 +150,8 @@ struct Table<Joint> {
                 "s", kNotNegative},
                {"remove_at", &T::remove_at,
                 "time at which the joint is removed; must be later than `appear_at`", "s", kPositive},
-               {"visible", &T::visible, "whether a distance joint is drawn, as a straight rod"},
-               {"radius", &T::radius, "radius of the rod", "m", kPositive},
+               {"visible", &T::visible, "whether a distance joint is drawn as a straight rod"},
+               {"radius", &T::radius, "radius of the drawn rod", "m", kPositive},
                {"material", &T::material, "name of the rod's material; empty: grey"}});
   }
 };
