@@ -16,8 +16,8 @@
 namespace offstage::render {
 namespace {
 
-/// In the child: sets its streams, group and signals, then starts the program. Uses only calls that are safe
-/// after fork() in a process with threads.
+/// Runs in the child process. Sets its streams, process group and signals, then starts the program. Uses only
+/// calls that are safe after fork() in a process with threads.
 [[noreturn]] void become(char** argv, const std::array<int, 3>& streams, pid_t parent, int report) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(127);

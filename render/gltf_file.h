@@ -81,7 +81,7 @@ class GltfFile {
   std::set<std::string> warned_;
 };
 
-/// Whether a file is glTF by its name.
+/// Returns whether a file is glTF by its name.
 bool is_gltf(const std::filesystem::path& path);
 
 }  // namespace offstage::render

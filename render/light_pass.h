@@ -17,7 +17,7 @@ class LightPass {
  public:
   /// `depth`: depth buffer of the picture, into which the visible surfaces are drawn. `quick`: see StageDef.
   LightPass(int width_px, int height_px, const gl::Texture& depth, bool quick);
-  /// The scene for ray tracing. It must be filled and built before trace().
+  /// Returns the scene for ray tracing. It must be filled and built before trace().
   RayScene& scene() { return scene_; }
   const RayScene& scene() const { return scene_; }
   /// Sums over all traced light.

@@ -82,7 +82,8 @@ Vector4f linear_color(const aiColor4D& c) {
           std::clamp(static_cast<float>(c.a), 0.0f, 1.0f)};
 }
 
-/// assimp gives the bytes of Blender's files as signed numbers: 255 is -1.
+/// Converts a colour that was stored as bytes. assimp reads the bytes of Blender's files as signed numbers,
+/// so 255 arrives as -1.
 aiColor4D from_bytes(const aiColor4D& c) {
   const auto fraction = [](ai_real value) { return (value < 0 ? value + 256 : value) / 255; };
   return {fraction(c.r), fraction(c.g), fraction(c.b), fraction(c.a)};

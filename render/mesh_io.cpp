@@ -255,8 +255,8 @@ bool is_whole(const Model::Light& light, const ModelRig& rig) {
          (light.kind != Model::Light::Kind::spot || cone > 0) && cone <= 90 && std::isfinite(light.range_m);
 }
 
-/// Whether a model is consistent: all indices are valid and all sizes agree. Such a model can be drawn and
-/// simulated safely.
+/// Returns whether a model is consistent: all indices are valid and all sizes agree. Such a model can be
+/// drawn and simulated safely.
 bool is_whole(const Model& model) {
   const auto refers = [](int index, std::size_t size) {
     return index >= 0 && static_cast<std::size_t>(index) < size;

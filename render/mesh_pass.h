@@ -71,7 +71,7 @@ struct GpuMaterial {
   bool plain = false;
   std::unique_ptr<const RayMaterial> rays;  ///< the material for ray tracing
 
-  /// Whether objects behind the surface are visible through it.
+  /// Returns whether objects behind the surface are visible through it.
   bool lets_through() const { return blended || glass; }
 };
 
@@ -91,10 +91,10 @@ struct Instance {
   std::optional<Eigen::Affine3f> before;  ///< pose at Stage::store_previous_transforms
 
   float scale() const;
-  /// Centre and radius of the bounding sphere in the world [m].
+  /// Return the centre and the radius of the bounding sphere in the world [m].
   Vector3f center() const { return world_from_mesh * mesh->center; }
   float radius() const { return mesh->radius * scale(); }
-  /// Whether the instance fills the ball of center() and radius().
+  /// Returns whether the instance fills the ball of center() and radius().
   bool is_ball() const;
 };
 
@@ -113,7 +113,7 @@ class MeshPass {
   /// Draws the opaque instances, and the opaque parts of blended ones.
   void draw_opaque(Shading shading);
   GLuint white() const { return white_; }
-  /// Translucent instances, in the order of the instances.
+  /// Returns the translucent instances, in the order of all instances.
   std::span<const Instance* const> translucent() const { return see_through_; }
   /// Draws element k of translucent(). With Shading::traced_with_particles, the pictures with and without the
   /// particles behind it must be bound.
@@ -133,7 +133,7 @@ class MeshPass {
     float thickness;  ///< thickness of its first instance, in the world
   };
   void draw(const Batch& batch);
-  /// Whether the surface pass writes everything on which the colour of a batch depends.
+  /// Returns whether the surface pass writes everything on which the colour of a batch depends.
   bool is_plain(const Batch& batch) const { return quick_ && batch.material->plain && !batch.mesh->endless; }
   gl::LazyProgram& surface_program(const Batch& batch, Shading shading);
   static void set_facing(const Batch& batch);

@@ -106,7 +106,8 @@ struct Material {
   float clearcoat_roughness = 0;
   Vector3f sheen_color = Vector3f::Zero();  ///< colour of light scattered at grazing angles, as by velvet
 
-  /// Whether the material needs more than its first three textures, or a transform of texture coordinates.
+  /// Returns whether the material needs more than its first three textures, or a transform of texture
+  /// coordinates.
   bool is_detailed() const;
 };
 

@@ -90,8 +90,8 @@ RigPose pose_at(const ModelRig& rig, int clip, float time);
 /// skin it is in the model's frame, otherwise in the frame of its node.
 Mesh deformed(const ModelRig& rig, const RigSurface& surface, const RigPose& pose);
 
-/// Whether all indices are in range, all sizes agree and all numbers are finite. `materials`: number of
-/// materials.
+/// Returns whether all indices are in range, all sizes agree and all numbers are finite. `materials`: number
+/// of materials.
 bool is_whole(const ModelRig& rig, std::size_t materials);
 
 }  // namespace offstage::render

@@ -18,7 +18,8 @@ namespace {
 constexpr std::string_view kPrefix = ".offstage-", kEnding = ".part";
 constexpr std::size_t kRandomLetters = 8;
 
-/// The name is random and does not contain the target's name, which may be as long as the system allows.
+/// Returns a random name for a temporary file. It does not contain the name of the output, which may already
+/// be as long as the system allows.
 std::string temporary_name() {
   static constexpr std::string_view kLetters = "0123456789abcdefghijklmnopqrstuvwxyz";
   std::random_device random;

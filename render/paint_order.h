@@ -87,7 +87,7 @@ class PaintOrder {
   /// Keys of the visible particles of a kind, nearest first; equal depths are ordered by set and id.
   std::span<const uint64_t> keys(Kind kind) const { return keys_[index(kind)]; }
   std::span<const Source> sources(Kind kind) const { return sources_[index(kind)]; }
-  /// Number of all points of a kind, whether visible or not.
+  /// Returns the number of all points of a kind, whether visible or not.
   uint32_t count(Kind kind) const { return counts_[index(kind)]; }
   uint32_t number(Kind kind, uint64_t key) const;
   Place place(Kind kind, uint64_t key) const;
@@ -96,7 +96,7 @@ class PaintOrder {
   /// `body` is the number of bodies, these are the runs in front of all bodies.
   std::span<const Run> runs_before(std::size_t body) const;
   std::size_t run_count() const { return runs_.size(); }
-  /// The pixels that the sprites or flakes of a run can change.
+  /// Returns the pixels that the sprites or flakes of a run can change.
   Eigen::AlignedBox2i area_px(const Run& run, const View& view, int width_px, int height_px) const;
 
  private:

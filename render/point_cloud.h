@@ -26,7 +26,8 @@ struct PointCloud {
 PointCloud read_points(const std::filesystem::path& path, const InputFolders& folders = {},
                        const StopTest& stop = {});
 
-/// The part that handles untrusted bytes. Private to render and its tests. Throws FileError.
+/// Parses the bytes of a PLY file, which are not trusted. Only the render library and its tests use this
+/// function. Throws FileError.
 PointCloud parse_ply_points(std::span<const uint8_t> bytes);
 PointCloud parse_obj_points(std::span<const uint8_t> bytes);
 

@@ -49,11 +49,11 @@ struct PointSet {
   std::unique_ptr<const RayMaterial> rays;         ///< material of spheres, for light rays
 
   void assign(std::span<const Point> values);
-  /// Whether the points are smoke or fire, which PuffsPass draws.
+  /// Returns whether the points are smoke or fire, which PuffsPass draws.
   bool is_puffs() const { return def.style == PointStyle::smoke || def.style == PointStyle::fire; }
-  /// Whether another pass draws the points: PuffsPass, or StreaksPass for streaks.
+  /// Returns whether another pass draws the points: PuffsPass, or StreaksPass for streaks.
   bool is_splatted() const { return is_puffs() || def.style == PointStyle::streak; }
-  /// Whether points are stretched along their motion.
+  /// Returns whether points are stretched along their motion.
   bool is_stretched() const { return def.style != PointStyle::sphere; }
   bool is_turned() const { return def.style == PointStyle::sprite || def.style == PointStyle::flake; }
   /// Returns the radius of the bounding sphere of the drawn particle i [m].

@@ -28,7 +28,7 @@ struct PuffLight {
   /// see AirLight::sun.
   AirRadiance radiance(const Vector3f& place, float radius, const Vector3f& albedo, float number,
                        const Vector3f& to_eye) const;
-  /// Sky light on a white surface with this normal, as in shaders/sky.glsl.
+  /// Returns the sky light on a white surface with this normal, as in shaders/sky.glsl.
   Vector3f ambient(const Vector3f& normal) const;
   /// Returns the sky light that a surface with this roughness reflects. `direction`: the mirrored direction.
   Vector3f sky_reflection(const Vector3f& direction, float roughness) const;

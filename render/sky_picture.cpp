@@ -36,7 +36,7 @@ Vector3f sky_direction(const SkyGrid& grid, int column, int row) {
                           std::cos(kSkyPi * v));
 }
 
-/// Index of the cell that contains a direction.
+/// Returns the index of the cell that contains a direction.
 std::size_t sky_cell_at(const SkyGrid& grid, const Vector3f& direction) {
   const Vector2f at = sky_coordinates(direction);
   const int column = std::min(static_cast<int>(at.x() * static_cast<float>(grid.columns)), grid.columns - 1);
@@ -104,7 +104,7 @@ SkyGrid sky_grid_of(const HdrImage& image) {
   return grid;
 }
 
-/// Convolution with a Gaussian of the angle between directions, up to three standard deviations.
+/// Returns the convolution with a Gaussian of the angle between directions, up to three standard deviations.
 SkyGrid blurred_sky(const SkyGrid& source, float sigma) {
   const int columns = std::clamp(2 * static_cast<int>(2 * kSkyPi / sigma), 32, std::max(source.columns, 32));
   const SkyGrid grid = resampled(source, columns, columns / 2);

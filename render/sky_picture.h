@@ -29,7 +29,7 @@ struct SkyGrid {
   Vector3f at(const Vector3f& direction) const;
   Vector3f& cell(int column, int row);
   const Vector3f& cell(int column, int row) const;
-  /// Solid angle of the cells of a row [sr].
+  /// Returns the solid angle of the cells of a row [sr].
   float solid_angle(int row) const;
 };
 
@@ -55,9 +55,9 @@ class SkyPicture {
   /// `blur_deg`: standard deviation of a Gaussian that blurs the background, but not the light; 0: none.
   explicit SkyPicture(const HdrImage& image, float blur_deg = 0);
 
-  /// Radiance from a unit direction, the sum of both parts.
+  /// Returns the radiance from a unit direction, the sum of both parts.
   Vector3f seen(const Vector3f& direction) const { return unpacked_at(direction); }
-  /// Radiance of the dim part from a unit direction.
+  /// Returns the radiance of the dim part from a unit direction.
   Vector3f dim(const Vector3f& direction) const;
   /// Returns the radiance of the dim part that a surface with this roughness reflects. `direction`: the
   /// mirrored direction.
@@ -72,9 +72,9 @@ class SkyPicture {
   const Irradiance& irradiance() const { return irradiance_; }
 
   bool has_bright_part() const { return bright_total_ > 0; }
-  /// Fraction of the luminance from a direction that belongs to the bright part.
+  /// Returns the fraction of the luminance from a direction that belongs to the bright part.
   float bright_fraction(const Vector3f& direction) const;
-  /// Probability density of sample() [1/sr].
+  /// Returns the probability density of sample() [1/sr].
   float density(const Vector3f& direction) const;
   struct Sample {
     Vector3f direction;
@@ -123,7 +123,7 @@ struct TurnedSky {
 
   Vector3f to_picture(const Vector3f& direction) const;
   Vector3f from_picture(const Vector3f& direction) const;
-  /// Light of the dim part as the weights of the nine functions of sky_irradiance().
+  /// Returns the light of the dim part as the weights of the nine functions of sky_irradiance().
   std::array<Vector3f, 9> irradiance() const;
   SkyBeam beam() const;
 };

@@ -90,8 +90,8 @@ class StreakBands {
   void sort(std::span<const StreakSplat> front_to_back, int width_px, int height_px);
   /// Returns the range of tile columns between `left` and `right` that contain streaks.
   std::pair<int, int> columns_px(int left, int right) const;
-  /// Whether the tiles of a band from `left` to `right` contain streaks, from number `first` on, that were
-  /// not drawn yet.
+  /// Returns whether the tiles of a band from `left` to `right` contain streaks, from number `first` on, that
+  /// were not drawn yet.
   bool any(int bottom, int left, int right, uint32_t first) const;
   /// Draws those streaks from `first` on that were not drawn yet over a strip. `distance` converts values of
   /// the depth buffer: the distance along the view axis is distance.x / (depth + distance.y) [m].

@@ -225,7 +225,7 @@ inline BoxScene brick_wall(int count) {
   return s;
 }
 
-/// A box on an inclined plane that descends towards +x.
+/// Returns a box on an inclined plane that descends towards +x.
 inline BoxScene box_on_incline(Real degrees) {
   BoxScene s;
   const Quat q(Eigen::AngleAxisd(-degrees * std::numbers::pi / 180, Vec3::UnitZ()));
@@ -234,7 +234,7 @@ inline BoxScene box_on_incline(Real degrees) {
   return s;
 }
 
-/// A box that slides over the ground at 5 m/s.
+/// Returns a box that slides over the ground at 5 m/s.
 inline BoxScene sliding_box(Real heading_degrees) {
   BoxScene s;
   s.add_ground();

@@ -69,8 +69,8 @@ Placement mesh_placement(const MeshTree<A>& a, const MeshTree<B>& b, const Pose&
   return Placement(a_from_b, std::max(a.tree.reach(), b.tree.reach()), margin);
 }
 
-/// Whether any triangle of A intersects a triangle of B. The result is false if one mesh is completely inside
-/// the other.
+/// Returns whether any triangle of A intersects a triangle of B. The result is false if one mesh is
+/// completely inside the other.
 template <class A, class B>
 bool surfaces_intersect(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& a_from_b) {
   const Placement place = mesh_placement(a, b, a_from_b);

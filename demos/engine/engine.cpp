@@ -19,8 +19,9 @@ constexpr milliseconds kVeryQuiet{2500};  // before it is refined to the highest
 constexpr int kBusy = 4;                  // factor of these times until the film is complete
 constexpr milliseconds kGlimpse{60};      // between two pictures of the time before frame 1
 
-/// The part of a scene that determines which model files are read and how they are processed: everything
-/// except numbers and colours, which matter only for decompositions, the sky's picture and flip-books.
+/// Returns the part of a scene that determines which model files are read and how they are processed:
+/// everything except numbers and colours, which matter only for decompositions, the sky's picture and
+/// flip-books.
 std::string used_by_models(const std::string& canonical) {
   auto json = nlohmann::json::parse(canonical);
   for (const char* key : {"name", "description", "render", "output", "world"}) json.erase(key);

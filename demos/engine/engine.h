@@ -154,10 +154,10 @@ class Engine {
   void report_frame(int frame, Detail detail);
   void report_film(FilmEvent::Phase phase, const std::string& message = "");
   void fail(const std::string& what);
-  /// Whether there is an unprocessed request of any kind.
+  /// Returns whether there is an unprocessed request of any kind.
   bool is_stale() const { return ending_ || holds_ > 0 || requested_ != taken_; }
-  /// Whether another version or camera was requested, or is about to be (see Hold). Other requests, such as
-  /// the next frame of a playing film, do not abort a draft.
+  /// Returns whether another version or camera was requested, or is about to be (see Hold). Other requests,
+  /// such as the next frame of a playing film, do not abort a draft.
   bool is_outdated() const { return ending_ || holds_ > 0 || runs_ != run_; }
 
   const EngineSettings settings_;

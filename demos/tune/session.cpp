@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 using producer::Node;
 using std::chrono::milliseconds;
 
-/// The index of the list item that a step of a path refers to, by index or by name.
+/// Returns the index of the list item that a step of a path refers to, by index or by name.
 std::optional<std::size_t> item_of(const producer::List& list, const std::string& step) {
   for (std::size_t i = 0; i < list.size(); ++i) {
     const Node* name = list[i].find("name");
@@ -33,7 +33,7 @@ std::optional<std::size_t> item_of(const producer::List& list, const std::string
   return {};
 }
 
-/// The overlays of the text and `more`, as an override.
+/// Returns an override of the scene with the overlays of its text and those in `more`.
 std::string overlays_override(const std::string& text, const Session::Json& more) {
   Session::Json all = Session::Json::array();
   const Node root = producer::parse_json(text, "");

@@ -28,7 +28,7 @@ class RayMaterial {
   Vector3f emission_at(const Vector2f& uv) const;
   /// Returns the mean of the emitted radiance over the texture.
   const Vector3f& mean_emission() const { return mean_emission_; }
-  /// Whether the whole surface blocks light.
+  /// Returns whether the whole surface blocks light.
   bool is_opaque() const { return opaque_; }
   /// Returns the fraction of the light that passes the surface along a shadow ray, per channel.
   Vector3f transmittance(const Hit& hit, const Vector3f& direction) const;

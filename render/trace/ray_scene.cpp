@@ -28,7 +28,8 @@ constexpr unsigned blocking(RayScene::Focus focus) {
 // others freely.
 constexpr int kMostPassed = 64;
 
-/// The device of the process. The instruction set is fixed, because others round hit distances differently.
+/// Returns the device of the process. The instruction set is fixed, because others round hit distances
+/// differently.
 RTCDevice device() {
   static const RTCDevice made = [] {
     RTCDevice result = rtcNewDevice("isa=avx2");

@@ -44,7 +44,7 @@ class Crowd {
     const Vec3 p = centre(i, step), r = Vec3::Constant(diameter(i) / 2);
     return {p - r, p + r};
   }
-  /// Those that move in a step, one in `every`.
+  /// Returns the spheres that move in a step: one in `every`.
   static std::vector<uint32_t> movers(int step, uint32_t every) {
     std::vector<uint32_t> movers;
     for (uint32_t i = static_cast<uint32_t>(step) % every; i < kSpheres; i += every) movers.push_back(i);

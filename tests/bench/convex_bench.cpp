@@ -21,7 +21,7 @@
 namespace offstage::sim {
 namespace {
 
-/// All its points are vertices, for they lie on a sphere, or an ellipsoid if its axes differ.
+/// Returns all its points are vertices, for they lie on a sphere, or an ellipsoid if its axes differ.
 ConvexPolyhedron round_hull(uint64_t seed, int points) {
   const Scatter scatter{seed};
   std::vector<Vec3> cloud;

@@ -16,7 +16,7 @@
 namespace offstage::render {
 namespace {
 
-/// An OBJ of a wavy grid of n x n cells, with normals: 2 n^2 triangles.
+/// Returns an OBJ of a wavy grid of n x n cells, with normals: 2 n^2 triangles.
 std::filesystem::path grid_file(int n) {
   const auto path =
       std::filesystem::temp_directory_path() / ("offstage-grid-" + std::to_string(getpid()) + ".obj");

@@ -17,7 +17,8 @@
 namespace offstage::sim {
 namespace {
 
-/// B under A, its middle `depth` below A's, turned about Y and rocked by 1e-4 rad.
+/// Returns poses of body B below body A. Their centres are `depth` apart along Y; B is turned about Y and
+/// tilted by 1e-4 rad.
 std::vector<Pose> poses(Real depth = 0.9999) {
   std::vector<Pose> result;
   for (int k = 0; k < 1000; ++k)
@@ -75,7 +76,7 @@ struct Body {
   CollisionShape collision;
 };
 
-/// Of radius 0.5, resting on a face.
+/// Returns an icosahedron of radius 0.5 m that rests on a face.
 ConvexPolyhedron icosahedron() {
   std::vector<Vec3> points;
   for (int k = 0; k < 3; ++k)
@@ -146,7 +147,7 @@ void query_balls(benchmark::State& state) {
 void query_ball_on_box(benchmark::State& state) {
   query(state, small_ball(), unit_box(), poses());
 }
-/// B under A, turned about Y, so that they overlap by `depth`.
+/// Returns poses of body B below body A in which the bodies overlap by `depth`. B is turned about Y.
 std::vector<Pose> touching(const Body& a, const Body& b, Real depth) {
   std::vector<Pose> at = poses(1);
   for (Pose& p : at) {
@@ -156,7 +157,7 @@ std::vector<Pose> touching(const Body& a, const Body& b, Real depth) {
   }
   return at;
 }
-/// The same while A tumbles.
+/// Returns the same while A tumbles.
 std::vector<Pose> tumbling(const Body& a, const Body& b, Real depth) {
   std::vector<Pose> at = poses(1);
   for (std::size_t k = 0; k < at.size(); ++k) {

@@ -12,7 +12,7 @@ namespace {
 
 constexpr Real kParticlesStep = 1.0 / 240;
 
-/// `count` particles above a plane; the drop height says how soon they come to lie on it.
+/// Returns a world with `count` particles above a plane. `height`: height from which they fall.
 World rain(std::size_t count, Real height, ParticleSystemHandle& system) {
   World world({.max_step = kParticlesStep});
   world.add_body({.name = "ground", .shape = Plane{}, .motion = MotionType::static_body});

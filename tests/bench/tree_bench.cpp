@@ -14,7 +14,7 @@
 namespace offstage::sim {
 namespace {
 
-/// 2 around (rings - 1) triangles.
+/// Returns a bumpy sphere with 2 `around` (`rings` - 1) triangles.
 TriangleMesh bumpy_sphere(uint32_t around, uint32_t rings) {
   TriangleMesh mesh = sphere_mesh(1, around, rings);
   for (Vec3& v : mesh.vertices)
@@ -43,7 +43,7 @@ const AabbTree& any_tree() {
   return contact_tree<Aabb>(TreeSplit::surface_area);
 }
 
-/// Where the second sphere is when the surfaces are `gap` apart (to 1e-9).
+/// Returns the pose of the second sphere at which the surfaces are `gap` apart, to 1e-9 m.
 Pose placed(Real gap) {
   static const Pose touching = [] {
     Pose pose{Vec3(3, 0.3, 0.2), Quat(0.8, 0.1, 0.5, -0.2).normalized()};

@@ -82,7 +82,7 @@ TEST_F(Golden, PicturesCompareByPixels) {
   EXPECT_EQ(offstage("compare a.png c.png", folder_.path()).code, 6);
 }
 
-/// A scene with a ball whose initial vertical speed is `speed`, 64 x 36 pixels.
+/// Returns a scene with a ball whose initial vertical speed is `speed`, 64 x 36 pixels.
 std::string falling_ball(double speed) {
   return R"({"version": 1, "bodies": [{"shape": {"type": "sphere"}, "velocity": [0, )" +
          std::to_string(speed) +

@@ -38,7 +38,7 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-/// Path of the scene that most tests use, tests/data/tiny.json.
+/// Returns the path of the scene that most tests use, tests/data/tiny.json.
 std::string tiny_scene();
 
 }  // namespace offstage::test

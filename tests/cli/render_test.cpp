@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The frames of a render, without the manifest.
+/// Returns the frames of a render, without the manifest.
 std::map<std::string, std::string> frames(const fs::path& folder) {
   auto files = contents(folder);
   files.erase("manifest.json");
@@ -242,7 +242,7 @@ class WatchedRender {
   pid_t child_ = -1;
 };
 
-/// A falling ball and a jet of particles.
+/// Returns a falling ball and a jet of particles.
 std::string watched_scene(const std::string& color, double height, double duration = 0.3) {
   return R"({"version": 1, "materials": [{"name": "paint", "color": ")" + color +
          R"("}], "bodies": [{"shape": {"type": "sphere"}, "material": "paint", "position": [0, )" +
@@ -252,7 +252,7 @@ std::string watched_scene(const std::string& color, double height, double durati
          std::to_string(duration) + "}}";
 }
 
-/// The statistics of a run without its times and its memory.
+/// Returns the statistics of a run without its times and its memory.
 nlohmann::json lasting_statistics(const fs::path& file) {
   auto stats = nlohmann::json::parse(read_file(file));
   for (const char* key : {"wall_s", "startup_s", "sim_ms", "render_ms", "encode_ms", "peak_rss_mb"})
@@ -490,7 +490,8 @@ TEST(Render, QualityNeverChangesThePhysics) {
   EXPECT_EQ(hashes.size(), 1u);
 }
 
-/// The compressed pixels of a PNG file, without the settings in front of them, which depend on the channels.
+/// Returns the compressed pixels of a PNG file, without the settings in front of them, which depend on the
+/// channels.
 std::string pixel_data(const std::string& png) {
   return png.substr(png.find("IDAT"));
 }

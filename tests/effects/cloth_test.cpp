@@ -14,7 +14,7 @@
 namespace offstage::sim {
 namespace {
 
-/// A vertical thread of n springs of stiffness k, pinned at the top.
+/// Returns a vertical thread of n springs of stiffness k, pinned at the top.
 ClothDef thread(uint32_t n, Real length, Real mass, Real stiffness, Real damping) {
   ClothDef def;
   const Real rest = length / n;
@@ -30,7 +30,8 @@ ClothDef thread(uint32_t n, Real length, Real mass, Real stiffness, Real damping
   return def;
 }
 
-/// Elongation of a hanging thread of n springs: spring i (from the top) carries the n - i masses below it.
+/// Returns the elongation of a hanging thread of n springs. Spring i (from the top) carries the n - i masses
+/// below it.
 Real hanging_elongation(uint32_t n, Real length, Real mass, Real stiffness) {
   Real sum = 0;
   for (uint32_t i = 0; i < n; ++i) sum += (n - i) * (mass / n) * 9.81 / (stiffness * n / length);
@@ -44,7 +45,7 @@ Real settled_elongation(ClothDef def, uint32_t n, Real length) {
   return -world.cloth(cloth).points[n].y() - length;
 }
 
-/// How many pieces the triangles at a point would fall into without it.
+/// Returns the number of connected pieces that the triangles at a point would form if the point were removed.
 int fan_count(std::span<const Triangle> triangles, uint32_t point) {
   std::vector<Triangle> left;
   for (const Triangle& t : triangles)

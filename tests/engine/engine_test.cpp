@@ -16,7 +16,7 @@ namespace {
 
 using producer::LoadedScene;
 
-/// A scene with a few particles and a falling ball; different rates make different versions of it.
+/// Returns a scene with a few particles and a falling ball; different rates make different versions of it.
 Engine::Loaded fountain(int rate, double duration = 0.5) {
   const std::string text =
       R"({"bodies": [{"name": "ball", "position": [0, 2, 0], "shape": {"type": "sphere", "radius": 0.3}}],

@@ -28,7 +28,7 @@ struct Drafts {
   static float brightness(const render::HdrImage& image, std::size_t pixel) {
     return image.rgba[4 * pixel] + image.rgba[4 * pixel + 1] + image.rgba[4 * pixel + 2];
   }
-  /// Mean over the picture of the difference, as a fraction of the mean brightness.
+  /// Returns the mean difference of all pixels, as a fraction of the mean brightness.
   double mean_difference() const {
     double difference = 0, total = 0;
     for (std::size_t i = 0; i < exact.pixel_count(); ++i) {
@@ -37,7 +37,7 @@ struct Drafts {
     }
     return difference / total;
   }
-  /// Fraction of the pixels that differ by more than a factor of two.
+  /// Returns the fraction of the pixels that differ by more than a factor of two.
   double fraction_of_wrong() const {
     std::size_t wrong = 0;
     for (std::size_t i = 0; i < exact.pixel_count(); ++i) {

@@ -25,7 +25,7 @@ std::vector<std::string> with_options(std::vector<std::string> arguments) {
   return arguments;
 }
 
-/// The PNG files of a folder by name.
+/// Returns the PNG files of a folder by name.
 std::map<std::string, std::string> frames_of(const fs::path& folder) {
   std::map<std::string, std::string> frames = contents(folder);
   std::erase_if(frames, [](const auto& file) { return !file.first.ends_with(".png"); });

@@ -21,8 +21,8 @@
 namespace offstage::producer {
 namespace {
 
-/// The scenes with the key `cloths`. Their text is searched, because every start of this program lists them,
-/// and loading all scenes takes 0.2 s.
+/// Returns the scenes with the key `cloths`. Their text is searched, because every start of this program
+/// lists them, and loading all scenes takes 0.2 s.
 std::vector<std::string> scenes_with_cloths() {
   std::vector<std::string> names;
   for (const auto& entry : std::filesystem::directory_iterator(OFFSTAGE_SOURCE_DIR "/demos/scenes")) {
@@ -49,7 +49,8 @@ std::size_t points_inside(const sim::World& world, const sim::ClothView& cloth) 
   return count;
 }
 
-/// All cloths that collide with cloth, as one.
+/// Returns the number of pairs of triangles that cross. All cloths with `self_collision` are treated as one
+/// mesh.
 std::size_t crossed_pairs(const Simulation& simulation) {
   std::vector<sim::Vec3> points;
   std::vector<sim::Triangle> triangles;

@@ -33,7 +33,7 @@ class Film {
   Snapshot snapshot_;
 };
 
-/// A scene with one emitter; the arguments add keys to the emitter, the output section and the scene.
+/// Returns a scene with one emitter; the arguments add keys to the emitter, the output section and the scene.
 std::string scene(const std::string& emitter, const std::string& output = "", const std::string& more = "") {
   return R"({"emitters": [{"overlap": true, "radius": 0.02, "surface": {"position": [0, 6, 0], "size": [2, 2]},)" +
          emitter + R"(}], "output": {"fps": 10, "duration": 1)" + output + "}" + more + "}";

@@ -72,7 +72,8 @@ class GalleryKeys {
                ? resolve(schema_["definitions"][rule["$ref"].get<std::string>().substr(kAt.size())])
                : rule;
   }
-  /// Whether a choice of the schema is meant: one of the same `type`, if it has types.
+  /// Returns whether a value belongs to one of the alternatives of the schema: if the alternatives have
+  /// types, the `type` must be equal.
   static bool fits(const json& value, const json& option) {
     if (!value.is_object() || !option.contains("properties")) return value.is_object() || value.is_array();
     const auto type = option["properties"].find("type");

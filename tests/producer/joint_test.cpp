@@ -81,7 +81,8 @@ TEST(Articulations, AChainHasEitherAPathOrTwoEnds) {
             "/articulations/0/path: needs at least two points\n");
 }
 
-/// Distance by which the tip of a rod along x, of 1 m length, is below its clamp at x = 0, after each frame.
+/// Returns the distance by which the tip of a rod along x, of 1 m length, is below its clamp at x = 0, after
+/// each frame.
 std::vector<Real> sags_of_rod(int links, const char* solver, Real step, const std::string& rest) {
   const LoadedScene loaded =
       parse(R"("output": {"fps": 60, "duration": 2.5}, "world": {"solver": ")" + std::string(solver) +
@@ -99,7 +100,7 @@ std::vector<Real> sags_of_rod(int links, const char* solver, Real step, const st
   }
   return sags;
 }
-/// Weight of the rod per length [N/m]. Its links are capsules.
+/// Returns the weight of the rod per length [N/m]. Its links are capsules.
 Real weight_of_rod(int links, Real radius = 0.01, Real density = 2000) {
   return density * 9.81 * std::numbers::pi * radius * radius * (1 - 2 * radius / 3 * links);
 }

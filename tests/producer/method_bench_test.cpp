@@ -13,7 +13,7 @@
 namespace offstage::producer {
 namespace {
 
-/// Two compounds of frusta, convex polyhedra, fall on a floor and bounce.
+/// Returns a scene in which two compounds of frusta fall on a floor and bounce.
 LoadedScene falling_cups(const std::vector<std::string>& overrides = {}) {
   return parse_scene(R"({"world": {"solver": "exact"}, "output": {"fps": 30, "duration": 1},
     "materials": [{"name": "rubber", "restitution": 0.4}],

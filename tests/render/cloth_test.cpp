@@ -157,7 +157,8 @@ TEST(StageCloth, ThrowsItsShadowOnObjectsBehind) {
   EXPECT_LT(shadowed, 0.3f * below());
 }
 
-/// Mean of the red of a few pixels in the middle, or below it, of a frame of `count` sub-frames.
+/// Returns the mean red of a few pixels in the middle of a frame of `count` sub-frames, or `below_px` pixels
+/// below the middle.
 float mean_red(ClothStage& s, int count, int below_px = 0) {
   HdrImage sum;
   for (int i = 0; i < count; ++i) s.stage.draw(sample_offsets(i, count), sum);
@@ -167,7 +168,7 @@ float mean_red(ClothStage& s, int count, int below_px = 0) {
   return result;
 }
 
-/// Black cloth of an alpha.
+/// Returns the material of black cloth with this alpha.
 Material sheer(float alpha) {
   Material m = plain();
   m.color = {0, 0, 0, alpha};

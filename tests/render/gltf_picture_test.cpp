@@ -242,7 +242,7 @@ TEST(GltfPicture, DoubleSidedSurfacesAreSeenFromBehind) {
   expect_color(both.color_at(0, 0), kPureWhite);
 }
 
-/// Light from the sun on a rough square, by its normals or by its normal map.
+/// Returns the light from the sun on a rough square, by its normals or by its normal map.
 Vector3f sunlit(GltfSample& sample, const Vector3f& sun) {
   sample.pbr()["metallicFactor"] = 0;
   sample.pbr()["roughnessFactor"] = 1;

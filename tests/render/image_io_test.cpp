@@ -10,7 +10,7 @@
 namespace offstage::render {
 namespace {
 
-/// A gradient with some structure; `alpha` is that of the first pixel.
+/// Returns a gradient with some structure; `alpha` is that of the first pixel.
 Image test_image(int width, int height, uint8_t alpha = 255) {
   Image image{width, height, {}};
   for (int y = 0; y < height; ++y) {

@@ -67,7 +67,7 @@ struct Veil {
   Vector3f color;
   float alpha;
 };
-/// The colour of translucent layers, the nearest first.
+/// Returns the colour of translucent layers, the nearest first.
 Vector3f over(std::initializer_list<Veil> layers) {
   Vector3f sum(0, 0, 0);
   float through = 1;

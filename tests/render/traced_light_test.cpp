@@ -19,7 +19,7 @@ Environment even_sky(float radiance) {
   return {.zenith = all, .horizon = all, .ground = all};
 }
 
-/// The mean of n sub-frames.
+/// Returns the mean of n sub-frames.
 HdrImage mean_of(SmallStage& s, int n) {
   HdrImage sum;
   for (int i = 0; i < n; ++i) s.stage.draw(sample_offsets(i, n), sum);
@@ -27,7 +27,7 @@ HdrImage mean_of(SmallStage& s, int n) {
   return sum;
 }
 
-/// Mean of a square of pixels around a point.
+/// Returns the mean of a square of pixels around a point.
 float mean_around(const HdrImage& picture, const Vector2f& place, int half) {
   float sum = 0;
   for (int dy = -half; dy <= half; ++dy)

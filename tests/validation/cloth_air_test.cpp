@@ -221,7 +221,7 @@ class Flag {
     Real amplitude;  ///< of the free end, from peak to peak [m]
     Real frequency;  ///< [Hz]
   };
-  /// Of some seconds, after others.
+  /// Returns the swing during `seconds`, which follow the first `after` seconds.
   Swing swing(int seconds, int after) {
     std::vector<Real> place;
     for (int i = 0; i < 60 * (after + seconds); ++i) {

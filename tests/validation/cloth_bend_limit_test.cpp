@@ -37,7 +37,7 @@ void make_stable(ClothDef& def, ClothIntegrator integrator) {
   ASSERT_GT(largest_stable_step(def).step, def.substep);
 }
 
-/// A strip along x of cells of the given size, four wide.
+/// Returns a strip along x of cells of the given size, four wide.
 ClothDef bend_strip(BendModel model, Real radius, Real length, Real cell) {
   const auto cells = static_cast<uint32_t>(std::lround(length / cell));
   ClothDef def = effects::grid_cloth({length, 4 * cell, cells, 4}, {}, limp(model, radius));

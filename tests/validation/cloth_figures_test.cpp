@@ -47,7 +47,7 @@ struct HangingStrip {
     }
     cloth = world.add_cloth(def);
   }
-  /// How much longer the strip is than at rest on the mean of some seconds [m].
+  /// Returns the mean elongation of the strip over some seconds, relative to its rest length [m].
   Real mean_elongation(int seconds) {
     Real sum = 0;
     for (int i = 0; i < 60 * seconds; ++i) {

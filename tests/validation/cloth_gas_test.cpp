@@ -68,7 +68,7 @@ TEST(ClothGas, ABalloonHitByADartTearsAndShrinks) {
   EXPECT_LT(volume() - rest, 0.5 * (blown_up - rest));
 }
 
-/// A sphere of the balloon's skin that helium fills.
+/// Returns a sphere with the skin of a balloon that is filled with helium.
 ClothDef helium_balloon() {
   ClothDef def = effects::sphere_cloth(0.1, 2, {}, effects::find_fabric("balloon")->fabric);
   def.pressure = 8440;

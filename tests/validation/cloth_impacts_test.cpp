@@ -14,7 +14,7 @@
 namespace offstage::sim {
 namespace {
 
-/// A square cloth in the plane y = 0, pinned along its border.
+/// Returns a square cloth in the plane y = 0, pinned along its border.
 ClothDef framed_cloth(const effects::Fabric& fabric, Real side, uint32_t cells) {
   ClothDef def = effects::grid_cloth({side, side, cells, cells}, {}, fabric);
   for (uint32_t i = 0; i < def.vertices.size(); ++i)

@@ -16,7 +16,7 @@ namespace {
 
 constexpr uint32_t kMovingCells = 24;
 
-/// A square metre of cloth in a vacuum, horizontal at first and pinned along one edge.
+/// Returns a square metre of cloth in a vacuum, horizontal at first and pinned along one edge.
 ClothDef hanging_cloth(const std::string& fabric) {
   ClothDef def =
       effects::grid_cloth({1, 1, kMovingCells, kMovingCells}, {}, effects::find_fabric(fabric)->fabric);
@@ -25,7 +25,8 @@ ClothDef hanging_cloth(const std::string& fabric) {
   return def;
 }
 
-/// The same, pinned at two corners alone, between which it swings and folds on itself.
+/// Returns a square metre of cloth that is pinned only at two corners, between which it swings and folds onto
+/// itself.
 ClothDef folding_cloth(const std::string& fabric) {
   ClothDef def = hanging_cloth(fabric);
   def.pins = {def.pins.front(), def.pins.back()};

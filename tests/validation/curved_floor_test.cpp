@@ -19,8 +19,8 @@ using std::numbers::pi;
 constexpr Real kTroughGravity = 9.81, kTroughRadius = 1, kTroughBall = 0.1, kStartSlope = 0.2,
                kTroughSeconds = 8;
 
-/// Half a cylinder of radius kTroughRadius about the z axis at height kTroughRadius, open at the top, of flat
-/// strips whose edges are on the cylinder.
+/// Returns half a cylinder of radius kTroughRadius about the z axis at height kTroughRadius, open at the top,
+/// of flat strips whose edges are on the cylinder.
 TriangleMesh strip_trough(int strips) {
   TriangleMesh m;
   for (int i = 0; i <= strips; ++i) {
@@ -48,9 +48,9 @@ struct TroughPath {
   }
 };
 
-/// Energy of a ball that slides without friction, in closed form: constant acceleration on each line, and at
-/// each seam the speed falls by the cosine of its angle. It starts at rest in the middle of a line. The
-/// energy is per mass, above that at rest at the bottom of a round trough [J/kg].
+/// Returns the energy of a ball that slides without friction, in closed form: constant acceleration on each
+/// line, and at each seam the speed falls by the cosine of its angle. It starts at rest in the middle of a
+/// line. The energy is per mass, above that at rest at the bottom of a round trough [J/kg].
 Real sliding_energy(const TroughPath& path, Real seconds) {
   const Real half = path.distance * std::tan(path.turn / 2);
   Real slope = path.start, s = 0, v = 0, left = seconds;
@@ -94,7 +94,8 @@ class CurvedFloor : public testing::TestWithParam<std::tuple<SolverKind, int>> {
                 .friction = friction});
     return w;
   }
-  /// Energy per mass after kTroughSeconds, as sliding_energy(), and at the start.
+  /// Returns the energy per mass after kTroughSeconds and at the start, relative to the same level as
+  /// sliding_energy().
   static std::pair<Real, Real> energy(int strips, const Shape& shape, const Quat& pose, Real friction) {
     World w = world_with_trough(strips, friction);
     w.add_body({.shape = shape,

@@ -33,7 +33,8 @@ struct Discharge {
   Real bulk_density = 0;
   Real fill = 0;  ///< height of the grains at rest [m]
 
-  /// Beverloo, Leniger and van de Velde 1961, with C = 0.58 and k = 1.4 for spheres.
+  /// Returns the discharge rate by Beverloo, Leniger and van de Velde (1961) [kg/s], with C = 0.58 and k =
+  /// 1.4 for spheres.
   Real expected(Real orifice) const {
     return 0.58 * bulk_density * std::sqrt(9.81) * std::pow(orifice - 1.4 * kGrain, 2.5);
   }

@@ -19,7 +19,7 @@ BodyDef smooth_ground() {
           .friction = 0};
 }
 
-/// The deepest overlap at the end of a frame [m].
+/// Returns the deepest overlap at the end of a frame [m].
 Real deepest_in_a_second(World& w) {
   Real deepest = 0;
   for (int k = 0; k < 60; ++k) {

@@ -144,12 +144,13 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
   }
 
  private:
-  /// "; expected ',' or '}'", if nlohmann's message says so.
+  /// Returns a text such as "; expected ',' or '}'" if nlohmann's message contains it; otherwise an empty
+  /// text.
   static std::string expected(const std::string& what) {
     const std::size_t at = what.rfind("; expected ");
     return at == std::string::npos ? "" : what.substr(at);
   }
-  /// The reason in nlohmann's message, without exception number, position and last token.
+  /// Returns the reason in nlohmann's message, without exception number, position and last token.
   static std::string reason(const std::string& what) {
     const std::size_t dash = what.find(" - "), bracket = what.find("] ");
     const std::size_t begin = dash != std::string::npos      ? dash + 3

@@ -19,7 +19,7 @@
 
 namespace offstage::producer {
 
-/// Computes colour, size and rotation of particles from their look.
+/// Computes the colour, size and rotation of particles from their look and age.
 class LookRamps {
  public:
   LookRamps(const ParticleLook& look, uint64_t seed, const std::string& name);
@@ -66,7 +66,7 @@ class ParticleSources {
   void for_each_system(Visit&& visit) const {
     for (const System& system : systems_) visit(system.name, system.handle, system.look);
   }
-  /// The system of a source, by its full name; null if there is none.
+  /// Returns the system of a source, by its full name; null if there is none.
   sim::ParticleSystemHandle system(const std::string& name) const;
 
  private:

@@ -30,10 +30,10 @@ struct Copies {
   int left_out = 0;  ///< number of scattered copies without room at min_distance from the others
 };
 
-/// Whether a fill lacks the spacing that copies need.
+/// Returns whether a fill lacks the spacing that copies need.
 bool needs_spacing(const Placement& placement);
 
-/// Number of copies of a placement; kMaxCopies + 1 if there are more than kMaxCopies.
+/// Returns the number of copies of a placement; kMaxCopies + 1 if there are more than kMaxCopies.
 int copy_count(const Placement& placement);
 
 /// Returns the copies of an object at `position`; one without suffix if there is no placement. The random

@@ -231,7 +231,7 @@ const T& initial_object() {
   static const T object{};
   return object;
 }
-/// Offset of a part in the initial object [bytes].
+/// Returns the offset of a part in the initial object [bytes].
 template <class T, class Part>
 std::ptrdiff_t offset_in(const Part& part) {
   return reinterpret_cast<const std::byte*>(&part) - reinterpret_cast<const std::byte*>(&initial_object<T>());

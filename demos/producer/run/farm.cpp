@@ -24,7 +24,7 @@ std::string command_text(const FarmPlan& plan, const std::vector<std::string>& w
   return text;
 }
 
-/// The common beginning of all scripts.
+/// Returns the common beginning of all scripts.
 std::string head(const FarmPlan& plan, const std::string& title) {
   return fmt::format(
       "#!/bin/sh\n# {}: {}\nset -eu\ncd {}\nmkdir -p done\n"

@@ -39,7 +39,7 @@ double ms_since(Clock::time_point start) {
 /// thread that writes share one object.
 class ProgressMeter {
  public:
-  /// `drawing_ms`: initial estimate of the drawing time of a frame.
+  /// `drawing_ms`: initial estimate of the time to draw a frame [ms].
   ProgressMeter(const ProgressCallback& callback, int frames, int frames_to_simulate, double drawing_ms)
       : callback_(callback), guess_ms_(drawing_ms) {
     latest_.total = frames;

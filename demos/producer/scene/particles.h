@@ -53,7 +53,7 @@ struct ParticleLook {
   Varying angle_deg = 0.0;       ///< angle of a particle at its birth time [degrees]
   Varying spin_deg_per_s = 0.0;
 
-  /// Whether a rotation of a particle changes its appearance.
+  /// Returns whether a rotation of a particle changes its appearance.
   bool turns() const;
 };
 

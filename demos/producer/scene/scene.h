@@ -147,7 +147,7 @@ struct Body {
   Real remove_at = 1e30;
   Placement placement;  ///< in the file, the keys of the placement are keys of the body
 
-  /// Whether an animation moves the parts of the body's collision shape.
+  /// Returns whether an animation moves the parts of the body's collision shape.
   bool has_animated_shape() const { return animation && !model && std::holds_alternative<MeshFile>(shape); }
 };
 
@@ -405,7 +405,7 @@ struct OutputSettings {
   std::vector<render::Channel> channels;  ///< numeric channels, in files beside the frames or the video
   render::ChannelFormat channel_format = render::ChannelFormat::exr;
 
-  /// Time of frame k [s], k from 1.
+  /// Returns the time of frame k [s], k from 1.
   Real time_of(int frame) const { return start + fps.seconds(frame - 1); }
 };
 

@@ -25,8 +25,8 @@ using sim::Vec3;
 /// A time from this value on means "never" [s]. The default of `remove_at` is greater.
 inline constexpr Real kForever = 1e29;
 
-/// Whether an object exists at `time` [s]: from `appear_at` until just before `remove_at`. A tolerance of
-/// 1e-9 s absorbs rounding errors.
+/// Returns whether an object exists at `time` [s]: from `appear_at` until just before `remove_at`. A
+/// tolerance of 1e-9 s absorbs rounding errors.
 inline bool exists(Real appear_at, Real remove_at, Real time) {
   constexpr Real kRounding = 1e-9;
   return time >= appear_at - kRounding && time < remove_at - kRounding;

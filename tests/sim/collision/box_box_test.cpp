@@ -29,7 +29,8 @@ struct PlacedBoxes {
   Real size, margin;
 };
 
-/// A random rotation, quarter turns, a turn about an axis of A, or a tiny perturbation of one of these.
+/// Returns a random rotation, quarter turns, a turn about an axis of A, or a tiny perturbation of one of
+/// these.
 Quat turn(Dice& dice) {
   Quat q = dice.chance(0.3) ? dice.rotation() : Quat::Identity();
   if (dice.chance(0.5))

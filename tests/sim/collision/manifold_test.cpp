@@ -34,8 +34,8 @@ std::set<uint32_t> ids(const Manifold& m) {
   return result;
 }
 
-/// Area of the largest quadrilateral whose corners are among the given points of a plane with normal n. All
-/// orders of the corners are tried.
+/// Returns the area of the largest quadrilateral whose corners are among the given points of a plane with
+/// normal n. All orders of the corners are tried.
 Real area(const Vec3& n, std::vector<Vec3> p) {
   if (p.size() < 3) return 0;
   const auto triangle = [&](const Vec3& a, const Vec3& b, const Vec3& c) {

@@ -10,7 +10,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Largest difference between two solutions, as velocities of the bodies.
+/// Returns the largest difference between two solutions, as velocities of the bodies.
 Real largest_difference(const ContactSample& x, const ContactSample& y) {
   Real d = 0;
   for (std::size_t i = 0; i < x.bodies.size(); ++i)
