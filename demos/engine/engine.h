@@ -103,7 +103,7 @@ class Engine {
   /// Sets the frame that the user sees. This frame is drawn first. It is refined when there are no changes
   /// for a while and the film is not playing.
   void look_at(int frame, bool playing);
-  /// Call this when model files have changed: versions shown from now on read them again.
+  /// Must be called when model files have changed. Versions that are shown later read them again.
   void forget_models();
   /// Returns the name of the object that is visible at a position of a frame; see FilmRun::pick(). The name
   /// is empty if there is no object or the frame has no state yet.

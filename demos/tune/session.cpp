@@ -96,8 +96,8 @@ std::vector<std::string> Session::muted_paths(const std::string& text) const {
   return paths;
 }
 
-/// Parses the scene's text; errors are returned. `with_view`: leave out the muted objects, and add the
-/// overlays of the page.
+/// Parses the scene's text. Errors are a part of the result. `with_view`: omits the muted objects, and adds
+/// the overlays of the page.
 Session::Parsed Session::parse(const std::string& text, bool with_view) const {
   Parsed parsed;
   std::vector<std::string> muted;
@@ -272,7 +272,8 @@ Reply Session::restore(const nlohmann::json& request) {
   return shown();
 }
 
-/// Changes that are never an undo step: frame, camera, overlays, and muted objects.
+/// Handles changes that are never an undo step: of the frame, the camera, the overlays, and the muted
+/// objects.
 Reply Session::view(const nlohmann::json& request) {
   const std::lock_guard lock(mutex_);
   bool changed = false;
@@ -398,7 +399,7 @@ void Session::watch_files() {
   std::string hash = others(files());
   while (!closing_) {
     producer::FileWatch watch(files());
-    // Also detects a change between the reading of the file and the start of the watch.
+    // This also detects a change after the file was read and before the watch began.
     files_changed(hash, hash);
     while (!closing_ && !watch.changed()) watch.wait(milliseconds(250));
     if (closing_) return;

@@ -270,8 +270,8 @@ std::string set_value(std::string_view text, std::string_view path, std::string_
     return result.replace(followed.end->value.begin, followed.end->value.end - followed.end->value.begin,
                           value);
   }
-  // Content of the missing objects and lists, from the inside. A list in an object whose keys are on separate
-  // lines has its first item on a separate line, too.
+  // Text of the missing objects and lists, built from the innermost outwards. If an object has its keys on
+  // separate lines, a new list in it has its first item on a separate line, too.
   const auto indent = followed.end->object && !followed.end->parts.empty()
                           ? own_line_indent(text, followed.end->parts.back().begin())
                           : std::nullopt;
@@ -330,7 +330,7 @@ std::string blank_out(std::string_view text, const std::vector<std::string>& pat
       items.emplace_back(followed.parent, followed.index);
   }
   for (const auto& [list, index] : items) blank(list->parts[index].value);
-  // Of the commas of a list, those between two remaining items stay.
+  // The commas between two remaining items of a list stay.
   std::vector<const Part*> lists;
   for (const auto& item : items)
     if (std::ranges::find(lists, item.first) == lists.end()) lists.push_back(item.first);

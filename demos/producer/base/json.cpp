@@ -219,7 +219,7 @@ void append_number(double v, std::string& out) {
     return;
   }
   char buffer[32];
-  // With an exponent, so that it is not read back as an integer that is too long.
+  // The number gets an exponent. Otherwise it would be read back as an integer that does not fit in 64 bits.
   const bool large = std::abs(v) >= kManyDigits;
   const auto format = large ? std::chars_format::scientific : std::chars_format::general;
   out.append(buffer, std::to_chars(buffer, buffer + sizeof buffer, v, format).ptr);

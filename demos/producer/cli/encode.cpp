@@ -1,4 +1,4 @@
-// encode: a video of existing frames.
+// The command encode: makes a video of existing frames.
 
 #include <algorithm>
 #include <array>

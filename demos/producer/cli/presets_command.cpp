@@ -1,4 +1,4 @@
-// presets: the presets that a scene can name.
+// The command presets: lists the presets that a scene can name.
 
 #include <algorithm>
 #include <memory>

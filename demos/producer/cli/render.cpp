@@ -1,4 +1,4 @@
-// render.
+// The command render: makes a film.
 
 #include <algorithm>
 #include <array>
@@ -47,7 +47,7 @@ struct Plan {
   std::vector<int> frames;
   std::string settings;
   int threads = 1, jobs = 1;
-  // Whether frames are drawn first and a video is then made of them, which can be resumed.
+  // Whether the frames are drawn to files first, and then encoded to a video. Such a run can be resumed.
   bool through_frames = false;
   fs::path frames_pattern;  // pattern of these frames
   ChannelFiles channels;
@@ -192,7 +192,7 @@ int render_to_frames(const Plan& plan, const ModelLibrary& models, const RenderO
     if (!assemble_video(plan)) stats.interrupted_by = interrupt_signal();
   }
   if (plan.through_frames && !stats.interrupted_by) {
-    folder.lock = {};  // releases the lock, whose file would prevent the removal of the folder
+    folder.lock = {};  // releases the lock, because its file would prevent the removal of the folder
     remove_frames(plan.frames_pattern.parent_path());
   }
   report_run(stats, options.log, options.stats);

@@ -1,4 +1,4 @@
-// sweep.
+// The command sweep: renders a scene with different values.
 
 #include <algorithm>
 #include <atomic>
@@ -37,7 +37,7 @@ struct SweepOptions {
   SceneOptions scene;
   std::vector<std::string> vary;
   std::vector<double> at;  ///< times [s]; empty: the middle of the film
-  std::string out, csv;    ///< csv empty: beside the sheet
+  std::string out, csv;    ///< an empty `csv` means a file beside the sheet
   int columns = 0;         ///< 0: chosen according to the variations
   int threads = 0, jobs = 0;
   bool resume = false, force = false, quiet = false;

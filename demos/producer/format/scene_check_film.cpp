@@ -21,7 +21,7 @@ class FilmChecker : SceneChecker {
     for (const Overlay& overlay : scene_.overlays)
       std::visit(
           [&](const auto& o) {
-            // An empty path: its type was invalid, so it was not read.
+            // An empty path means that the type of the overlay was invalid, so that it was not read.
             if (!o.where.path.empty()) check_overlay(o);
           },
           overlay);

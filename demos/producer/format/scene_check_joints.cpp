@@ -29,7 +29,8 @@ class JointChecker : CheckBase {
     for (const ArticulationTemplate& articulation : scene_.articulations)
       std::visit(
           [this](const auto& a) {
-            if (!a.where.path.empty()) check(a);  // an empty path: its type was invalid, so it was not read
+            if (!a.where.path.empty())
+              check(a);  // an empty path: the type was invalid, so the articulation was not read
           },
           articulation);
   }
