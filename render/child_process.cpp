@@ -75,7 +75,7 @@ ChildProcess::ChildProcess(const std::vector<std::string>& arguments, int in, in
   writing.close();
   ssize_t got = 0;
   do {
-    // Nothing is read if the program started, because the other end was closed.
+    // If the program has started, the other end is closed and nothing can be read.
     got = ::read(reading.fd(), &error_, sizeof error_);
   } while (got < 0 && errno == EINTR);
   if (got != sizeof error_) {

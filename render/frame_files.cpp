@@ -48,7 +48,7 @@ int big_endian(const uint8_t* bytes, int count) {
 std::optional<FrameFile> inspect_png(const std::filesystem::path& path) {
   const FileParts file(path);
   const std::vector<uint8_t> head = file.read(0, 26), tail = file.read(file.size() - 12, 12);
-  constexpr int kPalette = 3;  // may have a table of alpha values
+  constexpr int kPalette = 3;  // an image with a palette, which may have a table of alpha values
   if (head.size() < 26 || tail.size() < 12 || std::memcmp(head.data(), "\x89PNG\r\n\x1a\n", 8) != 0 ||
       std::memcmp(tail.data() + 4, "IEND", 4) != 0)
     return {};

@@ -13,7 +13,8 @@
 
 namespace offstage::render {
 
-/// An object of the document with its place. A missing object is empty: all its members have their defaults.
+/// An object of the document with its place. A missing object is empty, so all its members have their
+/// defaults.
 class GltfValue {
  public:
   using Json = nlohmann::json;

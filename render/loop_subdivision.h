@@ -26,7 +26,7 @@ class LoopSubdivision {
   /// flat sheet. An edge of more than two triangles counts as boundary.
   LoopSubdivision(std::span<const uint32_t> triangles, std::span<const Eigen::Vector2f> places);
 
-  /// Triangles of the finer mesh: the coarse vertices come first, then one vertex per edge.
+  /// Returns the triangles of the finer mesh. Its vertices are the coarse vertices, then one vertex per edge.
   const std::vector<uint32_t>& triangles() const { return triangles_; }
   std::size_t vertex_count() const { return first_term_.size() - 1; }
 

@@ -203,7 +203,7 @@ class Reader {
   }
   template <class T, class Each>
   void list(std::vector<T>& values, Each each) {
-    // Without reserve(): a wrong count ends with the bytes, before it has taken much memory.
+    // reserve() is not called: with a wrong count, the bytes end before much memory is allocated.
     for (std::size_t left = count(1); left > 0; --left) each(values.emplace_back());
   }
 

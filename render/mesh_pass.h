@@ -34,7 +34,7 @@ struct GpuMesh {
   std::unique_ptr<const RayMesh> rays;  ///< the mesh for ray tracing
 
   bool stored = false;         ///< whether the mesh existed at the last Stage::store_previous_transforms()
-  gl::Buffer vertices_before;  ///< previous vertices, if they have been replaced; otherwise 0
+  gl::Buffer vertices_before;  ///< the vertices before the last replacement; 0: they were not replaced
 
   /// Stores the current vertices as the previous positions for Channels::motion.
   void store();

@@ -164,13 +164,13 @@ struct Model {
     enum class Kind { directional, point, spot };
     Kind kind = Kind::point;
     Vector3f color = Vector3f::Ones();
-    float intensity = 1;                  ///< [lx] of directional lights, else [cd]
+    float intensity = 1;  ///< illuminance of a directional light [lx], or intensity of another light [cd]
     float inner_deg = 0, outer_deg = 45;  ///< half angles of a spot's cone: full light, no light
     float range_m = 0;                    ///< distance beyond which the light has no effect; 0: no limit
   };
   std::vector<Camera> cameras;
   std::vector<Light> lights;
-  std::string unit;  ///< unit of length in the file and how it was found, in words
+  std::string unit;  ///< unit of length in the file, and how it was found, as text
   enum class UnitSource { stated, none, millimetres };
   UnitSource unit_source = UnitSource::none;  ///< `millimetres`: not stated, but usual (STL); read as metres
   /// Longest side of the box around the content of the whole file [m]; empty if only a node was read (see

@@ -59,7 +59,7 @@ struct RigSurface {
   Mesh mesh;                     ///< the mesh without morph targets and skin
   bool flat = false;             ///< whether the file has no normals, so that each face has its own
   std::size_t influences = 0;    ///< joints per vertex
-  std::vector<uint32_t> joints;  ///< indices into RigSkin::joints; others are ignored
+  std::vector<uint32_t> joints;  ///< indices into RigSkin::joints; indices out of range are ignored
   std::vector<float> weights;    ///< weight of each entry of `joints`
   std::vector<RigTarget> targets;
 

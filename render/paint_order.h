@@ -112,8 +112,8 @@ class PaintOrder {
       1;  ///< number of bodies per group; particles are not inserted between the bodies of a group
   std::vector<Run> runs_;  ///< back to front
   std::vector<uint32_t>
-      /// Index of the first run before each body, then that of the particles in front of all bodies, then the
-      /// end.
+      /// For each body, the index of the first run that is drawn before it. Then the index of the first run
+      /// in front of all bodies, and the number of runs.
       run_begins_;
 };
 

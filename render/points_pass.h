@@ -36,8 +36,8 @@ struct BlendedPoint {
 
 struct PointSet {
   PointsDef def;
-  std::vector<GpuPoint>
-      points;  ///< w of position: radius; w of velocity: a pseudo-random number per particle in [0, 1)
+  std::vector<GpuPoint> points;  ///< the particles; w of the position is the radius, w of the velocity a
+                                 ///< pseudo-random number in [0, 1)
   std::vector<uint64_t> ids;
   std::vector<float> ages;
   std::vector<GpuPicture> turns;                   ///< for each point of sprites and flakes
@@ -100,7 +100,7 @@ class PointsPass {
   gl::VertexArray vertex_array_, blended_array_;
   std::vector<GpuPoint> ordered_;
   gl::StreamBuffer blended_buffer_;
-  std::vector<BlendedPoint> blended_;  ///< all sprites, then all flakes, each back to front
+  std::vector<BlendedPoint> blended_;  ///< all sprites from back to front, then all flakes from back to front
   /// A run of blended points that share a texture of pictures.
   struct PictureRun {
     std::size_t first;

@@ -154,7 +154,7 @@ Vector3f SkyGrid::at(const Vector3f& direction) const {
 }
 
 SkyGrid resampled(const SkyGrid& grid, int columns, int rows) {
-  // Sums within each row, then over rows with the solid angle of each row's contribution.
+  // Sums the cells within each row, and then the rows, weighted by the solid angle of their contribution.
   const auto fraction_of = [](int from, int to, int k, int j) {  // of cell k of `from` in cell j of `to`
     const double a = static_cast<double>(j) * from / to, b = static_cast<double>(j + 1) * from / to;
     return std::max(std::min<double>(k + 1, b) - std::max<double>(k, a), 0.0);
@@ -220,7 +220,7 @@ SkyPicture::SkyPicture(const HdrImage& image, float blur_deg) {
 }
 
 // The bright part is the radiance above four times the mean luminance of the dim part. The mean decreases
-// from round to round, because less and less is left in the dim part; any limit gives the same sum of both.
+// with every iteration, because the dim part gets darker. The sum of both parts does not depend on the limit.
 void SkyPicture::split() {
   constexpr float kTimesMean = 4;
   constexpr int kRounds = 8;
@@ -302,7 +302,7 @@ float SkyPicture::density(const Vector3f& direction) const {
 
 SkyPicture::Sample SkyPicture::sample(const Vector2f& uv) const {
   if (!has_bright_part()) return {Vector3f::UnitY(), Vector3f::Zero()};
-  // `at` becomes the place within the cell that is found.
+  // Returns a cell, and sets `at` to the position within this cell.
   const auto find = [](const float* sums, int count, float& at) {
     const float wanted = at * sums[count - 1];
     const float* found = std::upper_bound(sums, sums + count - 1, wanted);

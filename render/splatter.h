@@ -49,7 +49,7 @@ struct StreakSplat {
   const StreakLight* light;
 };
 
-/// Target picture of splats: premultiplied colour, and the remaining fraction of the background.
+/// Target picture of splats: premultiplied colour, and the visible fraction of the background.
 struct SplatPicture {
   int width_px = 0, height_px = 0;
   std::vector<float> depth;  ///< depth of the scene along the view axis [m], one value per pixel

@@ -27,7 +27,7 @@ struct Camera {
   Vector3f eye = {0, 1.5f, 5};
   Vector3f target = Vector3f::Zero();
   Vector3f up = Vector3f::UnitY();
-  float fov_deg = 40;  ///< vertical, in (0, 180)
+  float fov_deg = 40;  ///< vertical field of view, in (0, 180)
   float near_m = 0.05f, far_m = 1e6f;
   float aperture = 0;  ///< lens diameter [m]; 0: everything is sharp
   float focus = 0;     ///< distance in focus [m]; 0: the distance of the target
@@ -67,11 +67,13 @@ struct Environment {
   float clouds = 0;  ///< fraction of the sky covered by clouds
   /// Density [1/m]; transmittance exp(-fog * distance). 0: nothing fades with distance.
   float fog = 0;
-  bool visible = true;  ///< false: transparent background; it still lights the scene
+  bool visible = true;  ///< whether the sky is drawn; false: the background is transparent, and the sky only
+                        ///< lights the scene
   /// A picture of the sky that lights the scene in place of the colours, scaled by `intensity`; null: none.
   /// Clouds are then not drawn.
   std::shared_ptr<const SkyPicture> picture = {};
-  float picture_turn_deg = 0;   ///< counter-clockwise as seen from above
+  float picture_turn_deg =
+      0;  ///< rotation of the picture about +Y [degrees], counter-clockwise as seen from above
   bool picture_visible = true;  ///< false: the colours are the background and the colour of fog
 };
 
@@ -145,7 +147,8 @@ struct ClothDef {
   bool casts_shadow = true;
 };
 
-/// Offsets of one sub-frame, each in [-0.5, 0.5] (pixel, lens and light squares; mapped to discs inside).
+/// Offsets of one sub-frame, each in the square [-0.5, 0.5]^2. The stage maps the offsets of lens and light
+/// to discs.
 struct SampleOffsets {
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
   Eigen::Vector2f lens = Eigen::Vector2f::Zero();

@@ -160,7 +160,7 @@ Contents read_gif(FileView& file) {
       at += 2;
     } else if (kind == 0x2C) {
       ++found.frames;
-      at += 11 + table(file.byte(at + 9));  // including the code size of the pixels
+      at += 11 + table(file.byte(at + 9));  // the length includes the byte with the code size of the pixels
     } else {
       return found;
     }
