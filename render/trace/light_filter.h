@@ -141,7 +141,7 @@ class LightValues {
  private:
   class Averaging;
   std::vector<LightPlane> values_, next_;
-  /// For each run of pixels and each channel: the value if all pixels of the run have the same one, else NaN.
+  /// For each run of pixels and each channel: the common value of all pixels of the run; NaN if they differ.
   std::vector<float> even_;
 };
 

@@ -13,7 +13,7 @@
 namespace offstage::render {
 namespace {
 
-// Groups of objects that a ray may leave out.
+// Groups of objects that a ray can ignore.
 constexpr unsigned kOpaqueCaster = 1, kTranslucentCaster = 2, kFocusingCaster = 4, kNoCaster = 8, kAll = 15,
                    kSprite = 16;
 // The groups of objects that reduce the light along a shadow ray.
@@ -367,7 +367,7 @@ void RayScene::Object::describe_ball(unsigned ball, const Vector3f& from, const 
   hit.color.w() = 1;
 }
 
-// As in shaders/points_shape.glsl.
+// Equal to coverage() in shaders/points_shape.glsl.
 float RayScene::Object::transmittance(unsigned sprite, const Vector3f& from, const Vector3f& direction,
                                       float& behind) const {
   const Vector4f& place = *reinterpret_cast<const Vector4f*>(balls + sprite * stride);
