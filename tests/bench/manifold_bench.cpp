@@ -1,5 +1,6 @@
-/// Manifolds of solids in contact, each turned a little from query to query: from the separation to the
-/// points, and the whole query of two shapes, next to Bullet's test of two boxes. Counters: points per query.
+/// Measures manifolds of solids in contact, which turn a little between two queries: the computation of the
+/// points from the separation, and the whole query of two shapes. Bullet's test of two boxes is measured for
+/// comparison. Counters: points per query.
 
 #include <memory>
 #include <numbers>
@@ -59,7 +60,7 @@ void cylinders(benchmark::State& state) {
   points_of(state, Cylinder{0.5, 1}, Cylinder{0.5, 1});
 }
 
-/// A shape for the narrow phase.
+/// A shape with the data that the narrow phase needs.
 struct Body {
   explicit Body(const Shape& s) : shape(s), collision({&shape, nullptr}, true) {}
   explicit Body(const SolidMesh& solid)
@@ -90,7 +91,8 @@ ConvexPolyhedron icosahedron() {
   return convex_hull(points);
 }
 
-/// `keep`: the PairCache is kept from query to query, as the world does; otherwise each query begins without.
+/// `keep`: whether the PairCache is kept between queries, as in a world; otherwise each query begins with an
+/// empty one.
 void query(benchmark::State& state, const Body& a, const Body& b, const std::vector<Pose>& at,
            bool keep = true, DistanceMethod method = DistanceMethod::gjk) {
   PairCache cache;
@@ -157,7 +159,7 @@ std::vector<Pose> touching(const Body& a, const Body& b, Real depth) {
   }
   return at;
 }
-/// Returns the same while A tumbles.
+/// Returns the poses of touching(), rotated together with a tumbling body A.
 std::vector<Pose> tumbling(const Body& a, const Body& b, Real depth) {
   std::vector<Pose> at = poses(1);
   for (std::size_t k = 0; k < at.size(); ++k) {

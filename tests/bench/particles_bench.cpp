@@ -1,5 +1,5 @@
-/// Particles under gravity and drag that bounce on a plane, and on a mesh in turbulent air: sub-steps per
-/// second, with how many of them touch something.
+/// Measures particles with gravity and drag that bounce on a plane, and on a mesh in turbulent air: sub-steps
+/// per second, and the number of particles in contact.
 
 #include <benchmark/benchmark.h>
 
@@ -53,7 +53,7 @@ void at_rest(benchmark::State& state) {
   run_particles(state, 0, 480);
 }
 
-/// Into eddies of two sizes, past a torus of 18 432 triangles that stands in their midst.
+/// Particles move in turbulence with eddies of two sizes, past a torus of 18 432 triangles.
 void on_mesh_in_eddies(benchmark::State& state) {
   ParticleSystemHandle system;
   World world = rain(static_cast<std::size_t>(state.range(0)), 5, system);

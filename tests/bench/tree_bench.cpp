@@ -1,6 +1,6 @@
 /// Bounding trees: building them for 871 000 triangles, and the queries of two bumpy spheres of 69 000
-/// triangles each, against FCL's OBBRSS trees on the same data. The spheres are pressed into each other, just
-/// touch, or are 1 % of their radius apart; arguments choose which.
+/// triangles each, against FCL's OBBRSS trees on the same data. The spheres overlap, just touch, or are 1 %
+/// of their radius apart, as the arguments say.
 
 #include <cmath>
 #include <memory>
@@ -146,7 +146,7 @@ void fcl_build(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(fcl_tree(big_mesh()));
 }
 
-/// With `contacts` each pair's points and normals are computed too, which ours does not do.
+/// With `contacts`, FCL also computes points and normals for each pair, which this engine does not do here.
 void fcl_collide(benchmark::State& state, std::size_t most, bool contacts) {
   const FclPair pair(situation(state.range(0)));
   std::size_t count = 0;

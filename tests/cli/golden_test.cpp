@@ -1,5 +1,4 @@
-// Tests of the image tests: a golden must detect a parameter changed by one percent, and a single changed
-// pixel.
+// Goldens must detect a parameter that changed by one per cent, and a single changed pixel.
 
 #include <cstdlib>
 
@@ -101,7 +100,8 @@ TEST(GoldenNames, ScenesOfOneNameInDifferentFoldersHaveGoldensOfTheirOwn) {
   for (const char* scene : {"rain.json", "sub/rain.json", "./sub/../rain.json"})
     EXPECT_EQ(offstage(std::string("compare ") + scene + " --golden g", folder.path()).code, 0) << scene;
 
-  // If only one of them has a golden, it must not be used for the other.
+  // If only one of two scenes with the same name has a golden, the golden must not be used for the other
+  // scene.
   EXPECT_EQ(offstage("bless sub/rain.json --golden h --reason new", folder.path(), in).code, 0);
   const Outcome other = offstage("compare rain.json --golden h", folder.path());
   EXPECT_EQ(other.code, 1);

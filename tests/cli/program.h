@@ -13,7 +13,7 @@ struct Outcome {
   std::string out, err;
 };
 
-/// Runs `build/offstage ARGS` in `folder`; `before` is shell text in front of the command, such as "ulimit -f
+/// Runs `build/offstage ARGS` in `folder`; `before`: shell text in front of the command, such as "ulimit -f
 /// 1;" or "VAR=value".
 Outcome offstage(const std::string& args, const std::filesystem::path& folder,
                  const std::string& before = {});

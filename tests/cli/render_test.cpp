@@ -228,7 +228,7 @@ class WatchedRender {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     return count() >= times;
   }
-  /// Ends it as Ctrl-C does; returns its exit code.
+  /// Ends the process as Ctrl-C does, and returns its exit code.
   int end() {
     if (child_ <= 0) return -1;
     int status = 0;

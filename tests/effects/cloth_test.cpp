@@ -1,4 +1,4 @@
-/// Facts about cloths made of fabrics, each alone in a world.
+/// Properties of cloths of the preset fabrics. Each world contains only one cloth.
 
 #include "effects/cloth.h"
 
@@ -91,11 +91,11 @@ TEST(Cloth, AStiffOneIsStableAtOneStepPerFrame) {
     const ClothHandle cloth = world.add_cloth(def);
     for (int i = 0; i < 120; ++i) {
       world.step(1.0 / 24);
-      // All motion is due to its fall.
+      // All of the energy comes from the fall of the cloth.
       ASSERT_LE(world.energy().kinetic + world.energy().potential, 1e-9);
     }
     EXPECT_TRUE(world.cloth_report(cloth).finite);
-    // Of the 4 J that its fall gave, it keeps a slow swing, which only the air damps.
+    // Of the 4 J from its fall, the cloth keeps only a slow swing, which the air damps.
     EXPECT_LT(world.energy().kinetic, 0.1);
   }
 }
@@ -162,7 +162,7 @@ TEST(Cloth, TearsUnderALoadAndStaysAMesh) {
   for (uint32_t i = 0; i < view.points.size(); ++i) EXPECT_EQ(fan_count(view.triangles, i), 1) << i;
 }
 
-// Nothing hangs on the cloth that a ball tore out of it, and that is one hole: not a shower of threads.
+// A ball tears one hole. No torn pieces hang on the cloth, and single threads do not fall out of it.
 TEST(Cloth, ABallTearsAHole) {
   ClothDef def = effects::grid_cloth({2, 2, 40, 40}, {Vec3(0, 1, 0)}, effects::find_fabric("cotton")->fabric);
   def.tear = 1.2;

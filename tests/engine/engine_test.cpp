@@ -115,7 +115,7 @@ TEST_F(Engines, StartNoWorkWhileAChangeIsPending) {
   std::size_t before = 0;
   {
     const Engine::Hold hold(engine_);
-    bool still = false;  // the current piece of work has ended, out of 1200 frames
+    bool still = false;  // the current work has ended before all 1200 frames
     for (int i = 0; i < 10 && !still; ++i) {
       before = events_.all().size();
       std::this_thread::sleep_for(std::chrono::milliseconds(500));

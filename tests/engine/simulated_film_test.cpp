@@ -1,4 +1,4 @@
-// Films from the store of states, whose states and pictures are those of the simulation.
+// Films from the store of states have the same states and pictures as films from the simulation.
 
 #include "engine/simulated_film.h"
 

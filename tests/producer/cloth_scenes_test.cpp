@@ -35,8 +35,8 @@ std::vector<std::string> scenes_with_cloths() {
   return names;
 }
 
-/// Points behind the surface of a body by more than rounding: cords end on surfaces. Of meshes the
-/// simulation's own figure says it.
+/// Returns the number of cloth points that are behind the surface of a body. Rounding errors are tolerated,
+/// because cords end on surfaces. For meshes the statistics of the simulation are used.
 std::size_t points_inside(const sim::World& world, const sim::ClothView& cloth) {
   std::size_t count = 0;
   world.for_each_body([&](sim::BodyHandle handle) {

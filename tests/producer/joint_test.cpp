@@ -120,8 +120,8 @@ TEST(Articulations, AChainWithBendStiffnessSagsAsACantilever) {
       }
 }
 
-// The place of rest does not depend on the damping, also of a rod of light links that turn far within a
-// sub-step without their springs.
+// The position of rest does not depend on the damping. This includes a rod of light links, which would turn
+// far within a sub-step without their springs.
 TEST(Articulations, DampingDoesNotHoldAnElasticChainUp) {
   const Real expected = weight_of_rod(32, 0.005, 658) / (8 * 2) * (1 + 1.0 / (32 * 32));
   for (const char* solver : {"exact", "fast"})
@@ -185,8 +185,7 @@ TEST(Articulations, AChainWithBendStiffnessSwingsAsACantilever) {
   }
 }
 
-// A light rod that is stiffer than anything else stays straight, also where its own vibrations are far faster
-// than the sub-step.
+// A light and very stiff rod stays straight, even if its vibrations are much faster than the sub-step.
 TEST(Articulations, AStiffLightChainStaysStraight) {
   for (const char* solver : {"auto", "exact", "fast"})
     for (const Real step : {1.0 / 240, 1.0 / 60})

@@ -1,4 +1,4 @@
-// Looks of particles with pictures and meshes: what reaches the drawing, and which scenes are refused.
+// Looks of particles with pictures and meshes: the data that the renderer gets, and the refused scenes.
 
 #include <cmath>
 #include <map>

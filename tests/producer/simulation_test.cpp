@@ -1,5 +1,5 @@
-// Bodies, contacts and forces of a scene reach the simulation: compared with closed forms that depend on each
-// of the keys.
+// Bodies, contacts and forces of a scene have their effect in the simulation. The results are compared with
+// closed forms that depend on each of the keys.
 
 #include "producer/build/simulation.h"
 

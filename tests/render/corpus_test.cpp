@@ -52,7 +52,7 @@ bool moves_soundly(const ModelRig& rig) {
   return true;
 }
 
-/// What the files come to; a file's fault is an empty string if there is none.
+/// The results of reading many files. The fault of a file is an empty string if there is none.
 struct Tally {
   int loaded = 0, refused = 0;
   double slowest_s = 0;

@@ -86,7 +86,7 @@ TEST(ReadModel, GivesFlatFacesToACubeWithoutNormals) {
 }
 
 TEST(ReadModel, CutsPolygonsWithoutSliversAndGaps) {
-  // Prisms of combs with corners in a line; assimp's ears have no area there.
+  // Prisms of combs with collinear corners, where the ears of assimp have no area.
   const ScratchFolder folder;
   for (const int teeth : {1, 2, 5, 100}) {
     std::vector<std::pair<int, int>> outline = {{0, 0}, {2 * teeth, 0}, {2 * teeth, 1}};

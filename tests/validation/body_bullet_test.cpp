@@ -1,5 +1,5 @@
-/// R12 with the full simulation: bullets of 300 m/s do not pass through a plate of 1 cm, for all combinations
-/// of shapes.
+/// Bullets of 300 m/s do not pass through a plate of 1 cm, for all combinations of shapes, with the full
+/// simulation (physics R12).
 
 #include <algorithm>
 #include <cmath>

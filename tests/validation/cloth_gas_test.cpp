@@ -107,7 +107,7 @@ TEST(ClothGas, LiftsAWeightOnACordByArchimedes) {
     ASSERT_TRUE(world.cloth_report(cloth).finite);
   }
   EXPECT_GT(expected, 0.01 * total);
-  // A pinned point takes part in its body's last change of velocity only in the next sub-step.
+  // A pinned point gets the last change of its body's velocity only in the next sub-step.
   EXPECT_NEAR(momentum(), expected, 2e-3 * expected);
   EXPECT_GT(world.body(weight).pose.position.y(), -0.5);
 }

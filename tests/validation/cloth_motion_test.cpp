@@ -35,8 +35,8 @@ ClothDef folding_cloth(const std::string& fabric) {
 
 struct SwingRecord {
   Real fall = 0;     // energy of the fall of all points to where they hang straight down [J]
-  Real rise = 0;     // greatest, of the energy over its least value before [J]
-  Real kinetic = 0;  // greatest in the last second [J]
+  Real rise = 0;     // greatest increase of the energy over its smallest earlier value [J]
+  Real kinetic = 0;  // greatest kinetic energy in the last second [J]
   uint64_t limited = 0, touches = 0, crossings = 0;
 };
 

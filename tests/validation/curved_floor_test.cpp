@@ -55,7 +55,7 @@ Real sliding_energy(const TroughPath& path, Real seconds) {
   const Real half = path.distance * std::tan(path.turn / 2);
   Real slope = path.start, s = 0, v = 0, left = seconds;
   for (int seams = 0; seams < 100000; ++seams) {
-    // The next end of the line: below first, or above if the ball turns back before that.
+    // The next end of the line: the lower end first, or the upper one if the ball turns back before.
     const Real a = -kTroughGravity * std::sin(slope);
     Real time = left;
     Real side = 0;
@@ -166,8 +166,8 @@ TEST_P(CurvedFloor, LetsACartRollAsARoundTrough) {
   }
 }
 
-// At a step of one frame these seams close at up to 0.5 m/s, so that impacts are looked for; contacts that
-// close more slowly were then left out, and pushed the body out of the overlap later.
+// At a step of one frame these seams close at up to 0.5 m/s, so that times of impact are searched. An earlier
+// version then ignored contacts that close more slowly, and pushed the body out of the overlap later.
 TEST_P(CurvedFloor, NeverGivesEnergyAtCoarseSeams) {
   const Quat lying(Eigen::AngleAxisd(pi / 2, Vec3::UnitX()));
   for (const int strips : {45, 90})

@@ -28,8 +28,8 @@ struct Silo {
 
 struct Discharge {
   Real rate = 0;  ///< [kg/s]
-  /// As weighed: the mass of the grains over the volume that they fill in the silo, with the voids at its
-  /// walls [kg/m^3].
+  /// Mass of the grains divided by the volume that they fill in the silo, including the voids at its walls
+  /// [kg/m^3].
   Real bulk_density = 0;
   Real fill = 0;  ///< height of the grains at rest [m]
 

@@ -261,8 +261,8 @@ TEST_P(InternalEdges, DoNotStopBodiesInAnyDirection) {
     for (const Case& c : cases)
       for (const Real speed : {1.0, 4.0, 10.0})
         for (const bool rolls : {true, false}) {
-          // A face gets the nearest point of a body that is beside it, so that by the fast solver the flat
-          // end of a fast cylinder may hit a tile that it passes.
+          // A face gets the nearest point of a body that is beside it. With the fast solver, the flat end of
+          // a fast cylinder may therefore hit a tile that it passes.
           ++number;
           if (!is_exact() && !rolls && speed > 5 && std::holds_alternative<Cylinder>(c.shape)) continue;
           const Real heading = 2 * std::numbers::pi * random.uniform(number, 0);

@@ -80,7 +80,7 @@ TEST(Gjk, CrossesTouchingSmoothly) {
   struct Rest {
     Convex a, b;
     Quat rotation;
-    Real height;  // of B's centre when the solids touch
+    Real height;  // height of B's centre when the solids touch
     bool curved;
   };
   const std::vector<Rest> rests = {

@@ -190,7 +190,7 @@ TEST(Manifold, AnEdgeOnAFaceHasTwoPointsAndAVertexOne) {
   EXPECT_NEAR(vertex.points[0].separation, 0, 1e-12);
 }
 
-// Two beams of 3 m, each standing on one of its edges, one on the other.
+// Two beams of 3 m, one on the other. Each stands on one of its edges.
 TEST(Manifold, EdgesMeetInTwoPointsAlongEachOtherAndInOneAcross) {
   const ConvexPolyhedron upright = box_polyhedron({3, 1, 1});
   std::vector<Vec3> corners;

@@ -98,7 +98,7 @@ TEST(ActiveForce, ActsOnTheNamedBodiesOnly) {
   EXPECT_FALSE((ActiveForce{&named, {}}.acts_on(a)));  // the named body has been removed
 }
 
-// Below the middle of a face, the impulse has no torque. Beside the middle it turns the box. It never turns a
+// An explosion below the middle of a face does not turn the box. Beside the middle it does. It never turns a
 // ball.
 TEST(Explosion, BlowsAwayFromItsPointAndSpinsTheExposedSide) {
   const Shape box = Box{{2, 1, 1}}, ball = Sphere{0.5};
