@@ -309,7 +309,7 @@ void check_file(const std::string& file, bool force) {
 
 void check_distinct(const std::string& a, const std::string& b) {
   if (!a.empty() && fs::path(a).lexically_normal() == fs::path(b).lexically_normal())
-    throw OutputError(a + ": is used for two outputs");
+    throw OutputError(a + ": is used for two outputs; give them different names");
 }
 
 void check_png(const std::string& file) {

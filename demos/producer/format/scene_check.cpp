@@ -215,7 +215,8 @@ class Checker : SceneChecker {
           fail(path + "/materials" + step(i),
                "there is no material '" + name + "'" + suggestion(name, names_of(scene_.materials)));
       const auto [it, fresh] = owners.emplace(std::minmax(a, b), path);
-      if (!fresh) fail(path + "/materials", "are the same pair as in " + it->second);
+      if (!fresh)
+        fail(path + "/materials", "are the same pair as in " + it->second + "; remove one of the two rules");
       if (!rule.restitution && !rule.friction && !rule.static_friction && !rule.rolling_friction &&
           !rule.spinning_friction)
         warn(path, "has no effect: it has neither restitution nor friction");

@@ -189,7 +189,8 @@ class FilmChecker : SceneChecker {
     check_not_random("/render/exposure", scene_.render.exposure);
     const auto& size = scene_.render.size;
     if (size.x() % 2 != 0 || size.y() % 2 != 0)
-      warn("/render/size", "is odd; most video formats need an even width and height");
+      warn("/render/size",
+           "has an odd width or height; most video formats need even numbers, such as 1280 x 720");
     if (scene_.frame_count() < 1)
       fail("/output/duration",
            fmt::format("is shorter than one frame at {} frames per second", scene_.output.fps.text()));

@@ -42,7 +42,10 @@ fs::path snapshot_file(const CacheInfo& info, int frame) {
 }  // namespace
 
 CacheInfo read_cache_info(const fs::path& folder) {
-  if (!is_cache(folder)) throw render::FileError(folder.string() + ": is not a cache of snapshots");
+  if (!is_cache(folder))
+    throw render::FileError(
+        folder.string() +
+        ": is not a cache of snapshots; `offstage simulate SCENE --cache FOLDER` writes one");
   CacheInfo info{.folder = folder, .bytes = bytes_in(folder)};
   const std::optional<JsonObject> published = read_json_file(folder / SnapshotCache::kFile);
   if (!published) {
@@ -107,7 +110,10 @@ std::vector<std::string> verify_cache(const CacheInfo& info, std::size_t most) {
 }
 
 uint64_t clear_cache(const fs::path& folder, std::string& problem) {
-  if (!is_cache(folder)) throw render::FileError(folder.string() + ": is not a cache of snapshots");
+  if (!is_cache(folder))
+    throw render::FileError(
+        folder.string() +
+        ": is not a cache of snapshots; `offstage simulate SCENE --cache FOLDER` writes one");
   const uint64_t before = bytes_in(folder);
   std::error_code error;
   // removed first, so that no further process opens the cache

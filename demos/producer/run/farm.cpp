@@ -145,7 +145,9 @@ void write_farm(const FarmPlan& plan) {
 FarmPlan read_farm(const fs::path& work) {
   const std::optional<JsonObject> json = read_json_file(work / "farm.json");
   if (!json || json->count("offstage_farm", 0, kMostFrames) != kFarmFormat)
-    throw render::FileError(work.string() + ": is not the folder of a farm");
+    throw render::FileError(
+        work.string() +
+        ": is not the folder of a farm; give the folder that `offstage farm` wrote, such as FILM.mp4.farm");
   FarmPlan plan;
   plan.work = fs::absolute(work);
   plan.program = json->text("program");
