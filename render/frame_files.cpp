@@ -57,7 +57,8 @@ std::optional<FrameFile> inspect_png(const std::filesystem::path& path) {
                    (kind & 4) != 0 || kind == kPalette, png_settings(path)};
 }
 
-/// Reads the segments of a JPEG file up to its pixels.
+/// Reads size and settings of a JPEG file from the segments before its pixels. Returns nothing if the file is
+/// truncated or is not a JPEG.
 std::optional<FrameFile> inspect_jpeg(const std::filesystem::path& path) {
   constexpr int kStartOfImage = 0xD8, kEndOfImage = 0xD9, kStartOfScan = 0xDA, kComment = 0xFE;
   constexpr int kMostSegments = 1000;

@@ -72,7 +72,7 @@ class GltfNodes {
   const std::vector<std::size_t>& children(std::size_t node) const { return children_[node]; }
   const Affine3d& world(std::size_t node) const { return world_[node]; }
   const std::vector<int>& parents() const { return parents_; }
-  /// All nodes, parents first.
+  /// Returns all nodes in an order in which parents precede their children.
   const std::vector<std::size_t>& order() const { return order_; }
 
  private:

@@ -15,7 +15,8 @@ struct View;
 
 class LightPass {
  public:
-  /// `depth`: depth buffer of the picture, into which the visible surfaces are drawn. `quick`: see StageDef.
+  /// Creates the textures. `depth`: depth buffer of the picture, into which the visible surfaces are drawn.
+  /// `quick`: see StageDef.
   LightPass(int width_px, int height_px, const gl::Texture& depth, bool quick);
   /// Returns the scene for ray tracing. It must be filled and built before trace().
   RayScene& scene() { return scene_; }

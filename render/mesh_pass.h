@@ -128,9 +128,9 @@ class MeshPass {
     const GpuMaterial* material;
     bool mirrored;
     float depth;
-    GLuint first;  ///< first row of its instances
+    GLuint first;  ///< first row of the batch's instances
     GLsizei count;
-    float thickness;  ///< thickness of its first instance, in the world
+    float thickness;  ///< thickness of the batch's first instance in the world [m]
   };
   void draw(const Batch& batch);
   /// Returns whether the surface pass writes everything on which the colour of a batch depends.

@@ -15,7 +15,8 @@ namespace offstage::render {
 /// The space that a translucent body occupies: an oriented box, or the ball inscribed in it.
 class Region {
  public:
-  /// `round`: the body is the ball inscribed in the box, which is then a cube.
+  /// Creates the region of a body. `round`: whether the body is the ball inscribed in the box, which is then
+  /// a cube.
   Region(const Eigen::AlignedBox3f& box, const Eigen::Affine3f& world_from_box, bool round, const View& view);
 
   /// Returns whether a point in the world counts as behind the body. `depth`: depth of the point along the
@@ -74,7 +75,7 @@ class PaintOrder {
   };
   struct Source {
     const PointSet* set;
-    uint32_t first;  ///< index of its first point among all points of its kind
+    uint32_t first;  ///< index of the set's first point among all points of its kind
   };
   struct Place {
     const PointSet* set;

@@ -26,7 +26,8 @@ using GpuPicture = Vector4f;
 /// A sprite or flake of any set.
 struct BlendedPoint {
   GpuPoint point;
-  Vector4f style;  ///< softness, stretch [s]; fraction of the sun that is visible, or -1: not lit; additive
+  Vector4f style;  ///< x: softness; y: stretch [s]; z: visible fraction of the sun, or -1 for a particle that
+                   ///< is not lit; w: additive
   GpuPicture picture;
   /// Light of lamps and from around, a column for each of red, green and blue: the constant and the slope of
   /// an AirRadiance.

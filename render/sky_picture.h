@@ -106,7 +106,7 @@ class SkyPicture {
   Packed sharp_;
   std::vector<Packed> background_;
   SkyGrid light_;                ///< radiance of both parts together
-  std::vector<float> fraction_;  ///< fraction of the bright part in the same cells
+  std::vector<float> fraction_;  ///< fraction of the bright part in each cell of light_
   std::vector<float> row_sum_;   ///< sum of luminance * solid angle of the bright part, up to each row
   /// Sums of luminance * solid angle of the bright part within each row, up to each cell.
   std::vector<float> sums_;

@@ -23,7 +23,8 @@ struct Splat {
       vy;  ///< Position in the atlas's cell, in [-1, 1]: u = ux * dx + uy * dy, v = vx * dx + vy * dy.
   float depth, inverse_reach;  ///< distance along the view axis [m]; 1 / (2 * radius) [1/m]
   float opacity;               ///< opacity where the cell's cover is 1
-  float cover;  ///< fraction of its opacity that hides the background: 1 for smoke, 0 only adds light
+  float cover;  ///< fraction of the opacity that hides the background: 1 for smoke; with 0, the splat only
+                ///< adds light
   /// Radiance of red, green and blue where the normal is n: r[0] + r[1] n.x + r[2] n.y + r[3] n.z.
   float radiance[3][4];
   PuffAtlas::Level cell;
@@ -39,7 +40,7 @@ struct StreakLight {
 struct StreakSplat {
   float x, y;
   float half_x, half_y;
-  float along_x, along_y;             ///< unit vector to its head
+  float along_x, along_y;             ///< unit vector towards the head of the streak
   float half_length, inverse_radius;  ///< half-length of the straight part; 1 / radius
   /// Distance of the centre along the view axis [m], and its change per pixel towards the head.
   float depth, depth_slope;

@@ -49,7 +49,7 @@ struct Lamp {
   Vector2f size = {0, 0};             ///< size of a rectangle [m]; otherwise zero
   Vector3f direction = {0, -1, 0};    ///< unit direction of cones and rectangles
   float cone_deg = 0;                 ///< full angle of a cone; otherwise zero
-  float softness = 0.3f;              ///< fraction of the cone over which its edge fades
+  float softness = 0.3f;              ///< fraction of the cone over which the light fades to zero at the edge
   /// Whether the edge of the cone fades with the square of a linear ramp (KHR_lights_punctual), instead of in
   /// proportion to the cosine.
   bool squared_edge = false;
@@ -183,7 +183,7 @@ struct StageDef {
 
 class Stage {
  public:
-  /// The context must be current, and outlive the stage.
+  /// Creates an empty stage. The context must be current, and must outlive the stage.
   Stage(Context& context, const StageDef& def);
   ~Stage();
   Stage(Stage&&) noexcept;
@@ -191,13 +191,12 @@ class Stage {
   MeshHandle add_mesh(const Mesh& mesh);
   /// Replaces a mesh, for instance by its next pose; all instances of it change.
   void set_mesh(MeshHandle handle, const Mesh& mesh);
-  /// `textures` are the textures to which the material's indices refer; each is uploaded once per call, with
-  /// mip maps.
+  /// Adds a material. Its indices refer to `textures`; each call uploads each texture once, with mip maps.
   MaterialHandle add_material(const Material& material, std::span<const Image> textures = {});
   InstanceHandle add_instance(MeshHandle mesh, MaterialHandle material, bool casts_shadow = true);
-  /// `picture`: drawn for each sprite instead of a soft disc; it covers the square around the particle, or a
-  /// part of it if it is not square. Empty: none. Throws std::invalid_argument if the sheet has more than
-  /// kMostSheetPictures pictures, or none.
+  /// Adds a set of particles. `picture`: image that is drawn for each sprite instead of a soft disc; empty:
+  /// none. The longer side of the image is the diameter of the particle. Throws std::invalid_argument if the
+  /// sheet has more than kMostSheetPictures pictures, or none.
   PointsHandle add_points(const PointsDef& def, const Image& picture = {});
   LinesHandle add_lines(const LinesDef& def);
   /// Adds a cloth, which is not visible before set_cloth(). Throws std::invalid_argument for an index out of

@@ -21,7 +21,7 @@ class SimulatedFilm : public producer::StateSource {
 
   const Physics& physics() const { return *physics_; }
   bool has_state(int frame) const { return find(frame) != nullptr; }
-  /// The state must be available.
+  /// Returns the state of a frame, which must be available.
   const producer::Snapshot& state(int frame) const { return *find(frame); }
   bool is_complete() const { return physics_->totals.has_value(); }
 

@@ -209,7 +209,7 @@ bool LightTracer::follow_smooth(const Hit& hit, const Vector3f& albedo, PixelSam
     path.fraction = path.fraction.cwiseProduct(albedo + (Vector3f::Ones() - albedo) * grazing);
     return true;
   }
-  if (sharp) {  // in a mirror image, a varnished surface mirrors the sky alone
+  if (sharp) {  // in a mirror image, a varnished surface mirrors only the sky
     const float fresnel = 0.04f + 0.96f * grazing;
     Path sky = path;
     sky.turn(reflected(path.direction, hit.normal), hit);

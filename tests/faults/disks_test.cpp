@@ -33,7 +33,7 @@ class SmallDisk {
   }
   SmallDisk(const SmallDisk&) = delete;
   SmallDisk& operator=(const SmallDisk&) = delete;
-  /// Shell text to put in front of a command that writes there.
+  /// Returns shell text for the front of a command that writes to this disk.
   const std::string& limit() const { return limit_; }
 
  private:

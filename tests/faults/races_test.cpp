@@ -32,7 +32,7 @@ std::map<std::string, std::string> frames_of(const fs::path& folder) {
   return frames;
 }
 
-/// The complete film for a seed, drawn once.
+/// Returns the frames of the complete film for a seed. Each film is drawn only once.
 const std::map<std::string, std::string>& film_of_seed(int seed) {
   static std::map<int, std::map<std::string, std::string>> known;
   if (const auto film = known.find(seed); film != known.end()) return film->second;

@@ -451,7 +451,7 @@ class Overlap {
  private:
   static constexpr Real kSolved = 5e-4, kPiece = 0.25, kPushedOut = 0.2;
 
-  /// The two greatest values among the bodies.
+  /// The greatest and the second greatest value of all bodies.
   struct GreatestTwo {
     Real first = 0, second = 0;
     void add(Real x) {

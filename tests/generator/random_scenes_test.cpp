@@ -1,7 +1,6 @@
 /// In random scenes, no object explodes, leaves the room or sinks into another one, and the work of each step
-/// is bounded. To run one scene again:
-/// OFFSTAGE_SEED=1234 build/test_generator --gtest_filter='*Replays*'
-/// and with OFFSTAGE_BODIES=1 if it is a scene of bodies alone.
+/// is bounded. To run one scene again: OFFSTAGE_SEED=1234 build/test_generator --gtest_filter='*Replays*' For
+/// a scene of bodies only, set OFFSTAGE_BODIES=1, too.
 
 #include <cstdlib>
 #include <iostream>

@@ -18,7 +18,7 @@ class Film {
   explicit Film(const std::string& text)
       : loaded_(parse_scene(text, "scene", OFFSTAGE_SOURCE_DIR)),
         simulation_(loaded_.scene, ModelLibrary()) {}
-  /// The particles of the first source in a frame; frames must be requested in ascending order.
+  /// Returns the particles of the first source in a frame. Frames must be requested in ascending order.
   const std::vector<render::Point>& at(int frame) {
     while (simulation_.frame() < frame) simulation_.advance();
     snapshot_ = simulation_.snapshot();

@@ -1,5 +1,5 @@
 #pragma once
-/// Draws a model file alone, to compare its pixels with what the file format requires.
+/// Draws a model file without other objects, to compare its pixels with the requirements of the file format.
 
 #include <algorithm>
 #include <cmath>

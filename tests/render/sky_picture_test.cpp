@@ -115,7 +115,7 @@ TEST(SkyPicture, HasTwiceTheWidthAndLight) {
                std::invalid_argument);
 }
 
-/// A stage that is lit by a picture alone.
+/// A stage that is lit only by a picture of the sky.
 struct LitStage : SmallStage {
   explicit LitStage(const HdrImage& sky, float turn_deg = 0, bool visible = false, float intensity = 1)
       : SmallStage(160, 120) {
@@ -293,7 +293,7 @@ float reflectance_of_glass(float roughness, float nv) {
   return 0.04f * (-1.04f * t + r.z()) + (1.04f * t + r.w());
 }
 
-// Black glass shows its mirror image alone: the mean of the sky over the lobe times the reflectance. The
+// Black glass shows only its mirror image: the mean of the sky over the lobe times the reflectance. The
 // bright part is so large that both strategies to find it have a weight.
 TEST(StageSkyPicture, RoughGlassMirrorsTheBrightPartOnce) {
   const Vector3f middle = Vector3f(0, 1, -1).normalized(), view = Vector3f(0, 1, 1).normalized();

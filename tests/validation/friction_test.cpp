@@ -347,7 +347,7 @@ OFFSTAGE_BOTH_SOLVERS(Solvers, Rod);
 class Dome : public BothSolvers {
  protected:
   struct Flight {
-    Real cosine;   ///< cosine of the polar angle where it left, by its horizontal velocity
+    Real cosine;   ///< cosine of the polar angle where the ball left the sphere, from its horizontal velocity
     Real touched;  ///< cosine of the polar angle where a force last acted
     Real energy;   ///< energy lost, in units of m g (R + r)
   };

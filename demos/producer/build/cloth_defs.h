@@ -17,7 +17,7 @@ namespace offstage::producer {
 /// Greatest number of vertices of a cloth.
 inline constexpr std::size_t kMaxClothVertices = 250'000;
 
-/// A cloth in its own frame, and placed in the world.
+/// A cloth that is not deformed: its vertices in its own frame, and its definition in the world.
 struct FlatCloth {
   sim::ClothDef def;  ///< definition of the cloth without its pins, because pins refer to bodies
   std::vector<Vec3>

@@ -22,7 +22,7 @@ inline constexpr int kMaxCopies = 100'000;  ///< limit for one object
 struct PlacedCopy {
   sim::Pose motion;    ///< maps the original to the copy, in world coordinates
   Real scale = 1;      ///< factor of the object's size
-  std::string suffix;  ///< suffix of its name: "_0", "_1" ...
+  std::string suffix;  ///< suffix of the copy's name: "_0", "_1" ...
 };
 
 struct Copies {

@@ -97,7 +97,7 @@ void check_format(const Plan& plan) {
   const bool texts = std::ranges::any_of(
       scene.overlays, [](const Overlay& overlay) { return std::holds_alternative<TextOverlay>(overlay); });
   if (format == render::FrameFormat::exr && texts)
-    log("warning: the text overlays are not in the EXR frames, which hold the light of the scene alone\n");
+    log("warning: the text overlays are not in the EXR frames, which contain only the light of the scene\n");
 }
 
 Plan make_plan(const RenderOptions& options, const ModelLibrary& models, LoadedScene loaded) {

@@ -265,8 +265,8 @@ double available_memory_mb() {
   return INFINITY;
 }
 
-/// Processes the runs on several threads. The first run is done alone, to measure how much memory a run
-/// needs.
+/// Processes the runs on several threads. Only the first run is done at first, to measure how much memory a
+/// run needs.
 class Crew {
  public:
   Crew(Sweep& sweep, const SweepOptions& options) : sweep_(sweep), options_(options) {}

@@ -167,7 +167,7 @@ struct Table<PlaneSurface> {
             {"direction", &PlaneSurface::direction, "normal of the rectangle, in the emitter's frame", "",
              kDirection},
             {"turn_deg", &PlaneSurface::turn_deg, "rotation of the rectangle about its normal", "degrees"},
-            {"size", &PlaneSurface::size, "lengths of the two edges", "m", kPositive}};
+            {"size", &PlaneSurface::size, "lengths of the two edges of the rectangle", "m", kPositive}};
   }
 };
 template <>

@@ -73,11 +73,12 @@ struct Table<JointBehaviour> {
          "to `anchor_b`. Gears and racks only couple motions: their bodies need other joints, which hold "
          "them on a carrier that does not turn"},
         {"axis", &T::axis,
-         "axis of rotation or sliding, in the world at time 0; for a spherical joint, axis of the twist", "",
-         kDirection},
+         "axis of rotation or sliding; for a spherical joint, axis of the twist. It is a direction in the "
+         "world at time 0 or, for a joint of a model, in the frame of `node`",
+         "", kDirection},
         {"second_axis", &T::second_axis,
-         "second axis of a universal joint, axis of `b` of a gear, or direction of a rack; default: +X, or "
-         "`axis` for a gear",
+         "second axis of a universal joint, axis of `b` of a gear, or direction of a rack, in the same frame "
+         "as `axis`; default: +X, or `axis` for a gear",
          "", kDirection},
         {"ratio", &T::ratio,
          "gear: teeth of `b` / teeth of `a`, negative for an internal gear or a belt; rack: radius of the "

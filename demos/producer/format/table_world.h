@@ -120,8 +120,7 @@ struct Table<WorldSettings> {
         {"particle_cluster", &T::particle_cluster,
          "for `particle_contacts: lcp`: greatest number of contacts that are solved together", "",
          between(1, 64)},
-        {"sleep", &T::sleep,
-         "whether bodies at rest are left out of the simulation until something reaches them"},
+        {"sleep", &T::sleep, "whether the simulation skips bodies at rest until something reaches them"},
         {"bounds", &T::bounds,
          "half the length of an edge of the cube around the origin that contains the scene. A body that "
          "leaves the cube stops for the rest of the film; a particle that leaves it is removed",

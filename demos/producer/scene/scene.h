@@ -122,7 +122,8 @@ struct Body {
   Shape shape = sim::Box{};
   std::optional<ModelLook> model;
   std::optional<ModelAnimation> animation;
-  std::string material;  ///< name; empty: the default material, or that of the model file
+  std::string
+      material;  ///< name of the material; empty: the default material, or the material of the model file
   Vec3 position = Vec3::Zero();
   Quat orientation = Quat::Identity();
   Vec3 velocity = Vec3::Zero();
@@ -134,8 +135,9 @@ struct Body {
   Vec3 inertia_products = Vec3::Zero();  ///< Ixy, Iyz, Izx of the inertia matrix, with `inertia`
   Real linear_drag = 0;
   Real angular_drag = 0;
-  Vec3 friction_axis = Vec3::Zero();     ///< friction axis of the surface, in the body's frame
-  Vec3 surface_velocity = Vec3::Zero();  ///< velocity of the surface relative to the body, in its frame
+  Vec3 friction_axis = Vec3::Zero();  ///< friction axis of the surface, in the body's frame
+  Vec3 surface_velocity =
+      Vec3::Zero();  ///< velocity of the surface relative to the body, in the body's frame
   bool collides = true;
   bool visible = true;
   bool casts_shadow = true;
@@ -190,7 +192,7 @@ struct TreeOverlay : LineLook {
 struct PartsOverlay {
   Where where;
   std::string body;
-  Varying explode = 0.0;  ///< moves the parts away from the centre, by this fraction of their distance
+  Varying explode = 0.0;  ///< displacement of each part from the centre, as a fraction of its distance
 };
 /// Draws the closest points of two bodies, or their penetration if they overlap.
 struct ClosestOverlay : LineLook {
@@ -349,7 +351,7 @@ struct ModelLights {
   Where where;
   std::string body;
   std::string name;     ///< name of the light's node; empty: all lights of the file
-  Real intensity = 1;   ///< factor of their intensities
+  Real intensity = 1;   ///< factor of the intensities of the lights
   Real radius = 0.01;   ///< radius of point and spot lights
   Real size_deg = 0.5;  ///< angular diameter of directional lights
   bool shadows = true;

@@ -82,7 +82,7 @@ Separation separation(const Pair& pair, const Pose& a, const Pose& b) {
   return gjk(pair.a, pair.b, relative(a, b), fresh);
 }
 
-/// Returns the central difference of the normal over a time step, from the geometry alone.
+/// Returns the central difference of the normal over a time step. It is computed only from the geometry.
 Vec3 difference(const Pair& pair, const Twist& a, const Twist& b, Real h) {
   const auto normal = [&](Real t) {
     const Pose at = moved(pair.world_from_a, a, t);
