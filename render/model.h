@@ -54,7 +54,7 @@ enum class Wrap { repeat, mirror, clamp };
 /// A texture of a material and its mapping.
 struct TextureMap {
   int image = -1;  ///< index into Model::textures, -1: none
-  int uv_set = 0;  ///< 0: Mesh::uvs, 1: Mesh::second_uvs
+  int uv_set = 0;  ///< set of texture coordinates: 0 is Mesh::uvs, 1 is Mesh::second_uvs
   Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
   bool nearest = false;  ///< whether enlarged texels are squares instead of being interpolated
   bool mip_maps = true;  ///< whether minified texels are averaged
@@ -157,7 +157,7 @@ struct Model {
     Eigen::Matrix4f model_from_place = Eigen::Matrix4f::Identity();
   };
   struct Camera : Place {
-    bool perspective = true;  ///< false: orthographic
+    bool perspective = true;  ///< whether the projection is perspective; false: orthographic
     float fov_deg = 0;        ///< vertical
   };
   struct Light : Place {

@@ -54,7 +54,7 @@ struct RigTarget {
 /// A mesh with one material that moves with a node or a skin.
 struct RigSurface {
   int node = 0;
-  int skin = -1;               ///< -1: none; then the triangles are in the node's frame
+  int skin = -1;               ///< index of the skin; -1: none, the triangles are in the node's frame
   int material = 0;            ///< index into Model::materials
   Mesh mesh;                   ///< the mesh without morph targets and skin
   bool flat = false;           ///< whether the file has no normals, so that each face has a normal of its own

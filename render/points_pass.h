@@ -42,7 +42,7 @@ struct PointSet {
   std::vector<uint64_t> ids;
   std::vector<float> ages;
   std::vector<GpuPicture> turns;                   ///< for each point of sprites and flakes
-  std::shared_ptr<const SpritePictures> pictures;  ///< null: soft discs
+  std::shared_ptr<const SpritePictures> pictures;  ///< pictures of the sprites; null: soft discs
   Eigen::AlignedBox3f box;                         ///< bounds of the drawn particles, streaks at full length
   gl::StreamBuffer buffer;                         ///< visible balls by depth
   std::size_t seen = 0;                            ///< number of visible balls in the buffer

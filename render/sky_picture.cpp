@@ -91,14 +91,16 @@ SkyPicture::Packed packed_grid(const SkyGrid& grid) {
 
 SkyGrid sky_grid_of(const HdrImage& image) {
   if (image.width_px < 2 || image.width_px != 2 * image.height_px)
-    throw std::invalid_argument("a picture of the sky is twice as wide as high, not " +
+    throw std::invalid_argument("a picture of the sky must be twice as wide as high, got " +
                                 std::to_string(image.width_px) + "x" + std::to_string(image.height_px));
   SkyGrid grid{image.width_px, image.height_px, {}};
   grid.values.reserve(image.pixel_count());
   for (std::size_t i = 0; i < image.pixel_count(); ++i) {
     const Vector3f value(image.rgba[4 * i], image.rgba[4 * i + 1], image.rgba[4 * i + 2]);
     if (!value.allFinite() || value.minCoeff() < 0)
-      throw std::invalid_argument("a picture of the sky has only finite values that are not negative");
+      throw std::invalid_argument(
+          "the picture of the sky has a negative, infinite or undefined value; all values must be finite and "
+          "at least 0");
     grid.values.push_back(value);
   }
   return grid;

@@ -118,7 +118,7 @@ class SkyPicture {
 
 /// A sky picture as a scene uses it.
 struct TurnedSky {
-  std::shared_ptr<const SkyPicture> picture;  ///< null: none
+  std::shared_ptr<const SkyPicture> picture;  ///< the picture; null: there is none
   float turn = 0;                             ///< counter-clockwise as seen from above [rad]
   float intensity = 1;
 

@@ -74,7 +74,8 @@ struct Environment {
   std::shared_ptr<const SkyPicture> picture = {};
   float picture_turn_deg =
       0;  ///< rotation of the picture about +Y [degrees], counter-clockwise as seen from above
-  bool picture_visible = true;  ///< false: the colours are the background and the colour of fog
+  bool picture_visible =
+      true;  ///< whether the background shows the picture; false: the background and the fog have the colours
 };
 
 /// One drawn particle.

@@ -62,7 +62,7 @@ struct Stage::Impl {
   };
   /// A body through which other objects are visible.
   struct TranslucentBody {
-    const Cloth* cloth = nullptr;  ///< null: an instance
+    const Cloth* cloth = nullptr;  ///< the cloth; null: the body is an instance of a mesh
     std::size_t instance = 0;      ///< index in MeshPass::translucent
     bool glass = false;
     bool fills_region = false;

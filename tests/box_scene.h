@@ -22,7 +22,7 @@ namespace offstage::sim {
 
 struct BoxBody {
   Vec3 size = Vec3::Ones();
-  Real mass = 0;  ///< 0: static
+  Real mass = 0;  ///< mass [kg]; 0: the box is static
   Pose pose;
   Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
 
@@ -48,7 +48,7 @@ class BoxScene {
   std::vector<BoxBody> bodies;
   Real friction = 0.5;
   Vec3 gravity = Vec3(0, -9.81, 0);
-  uint32_t substeps = 0;  ///< 0: the number that the solver recommends
+  uint32_t substeps = 0;  ///< number of sub-steps; 0: the number that the solver recommends
 
   void add(const Vec3& size, Real mass, const Vec3& position, const Quat& q = Quat::Identity()) {
     bodies.push_back({size, mass, {position, q}});

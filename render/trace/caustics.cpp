@@ -44,7 +44,7 @@ float area_of_pixel(const Vector3f& place, const Vector3f& normal, const LightVi
 /// The light of the sun or of a lamp that falls on the box around a piece of glass.
 struct LightTracer::Beam {
   const GlassPiece* piece;
-  const Sun* sun;  ///< null: a lamp
+  const Sun* sun;  ///< the sun; null: the source is a lamp
   const SunDisc* disc;
   const RayLamp* lamp;
   std::array<float, 6> powers = {};  ///< estimated power at each face of the box, sum of the three colours

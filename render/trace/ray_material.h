@@ -36,7 +36,7 @@ class RayMaterial {
  private:
   /// A reduced copy of a texture.
   struct Texels {
-    std::shared_ptr<const Image> image;  ///< null: white
+    std::shared_ptr<const Image> image;  ///< pixels of the texture; null: white
     TextureMap map;
     Vector4f mean = {1, 1, 1, 1};
 

@@ -172,7 +172,7 @@ float RayMesh::chance_of(unsigned triangle) const {
 
 struct RayScene::Object {
   const RayMaterial* material = nullptr;
-  const RayMesh* mesh = nullptr;  ///< null: a cloth or balls
+  const RayMesh* mesh = nullptr;  ///< the mesh; null: the object is a cloth or balls
   Eigen::Affine3f world_from_mesh = Eigen::Affine3f::Identity();
   Eigen::Matrix3f normal_from_mesh = Eigen::Matrix3f::Identity();
   bool mirrored = false;

@@ -22,12 +22,13 @@ struct RandomScene {
   struct Joint {
     JointDef def;
     std::size_t a = 0;
-    std::optional<std::size_t> b;  ///< none: connected to the world
+    std::optional<std::size_t> b;  ///< second body; none: connected to the world
   };
   struct Spring {
     SpringDef def;
     std::size_t a = 0;
-    std::optional<std::size_t> b;  ///< none: connected to the point of the world in `def`
+    std::optional<std::size_t>
+        b;  ///< body at the second end; none: the end is the point of the world in `def`
   };
 
   uint64_t seed = 0;

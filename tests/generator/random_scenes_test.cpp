@@ -33,7 +33,7 @@ void check(uint64_t seed, Parts parts) {
         << "seed " << seed << ", " << threads << " threads";
 }
 
-/// Blocks of a hundred scenes.
+/// Parameter: number of a block of a hundred scenes.
 class RandomScenes : public testing::TestWithParam<uint64_t> {
  protected:
   static void check_block(Parts parts) {

@@ -63,7 +63,7 @@ struct HangingStrip {
   ClothHandle cloth;
 };
 
-/// Fabric, fraction of the load at its limit, and step of the world.
+/// Parameters: fabric, load as a fraction of the load at the stretch limit, step of the world [s].
 class ClothUnderALoad : public testing::TestWithParam<std::tuple<std::string, Real, Real>> {};
 
 TEST_P(ClothUnderALoad, StretchesByItsStiffness) {
@@ -82,7 +82,7 @@ INSTANTIATE_TEST_SUITE_P(Fabrics, ClothUnderALoad,
                          testing::Combine(testing::Values("silk", "cotton", "denim", "leather", "rubber"),
                                           testing::Values(0.3, 0.9), testing::Values(1.0 / 240, 1.0 / 60)));
 
-/// Integrator and step of the world.
+/// Parameters: integrator, step of the world [s].
 class StiffClothUnderALoad : public testing::TestWithParam<std::tuple<ClothIntegrator, Real>> {};
 
 TEST_P(StiffClothUnderALoad, StretchesByItsStiffnessAtTheDefaultSubstep) {
@@ -223,7 +223,7 @@ INSTANTIATE_TEST_SUITE_P(Shapes, ClothHangs,
                          testing::Values(Shape(Cylinder{0.02, 2}), Shape(Sphere{0.02}),
                                          Shape(Capsule{0.01, 2})));
 
-/// Whether a sheet is sheared, or stretched along its threads.
+/// Parameter: whether the sheet is sheared; false: it is stretched along its threads.
 class ClothDamping : public testing::TestWithParam<bool> {};
 
 TEST_P(ClothDamping, OfEachKindOfSpringIsItsFractionOfTheCriticalOne) {

@@ -140,7 +140,7 @@ TEST(ClothGas, FillsABalloonInItsTime) {
   EXPECT_NEAR(filled / 3 / volume, 2500, 150);
 }
 
-/// Self-collision.
+/// Parameter: whether the cloth has self-collision.
 class PoppedBalloon : public testing::TestWithParam<bool> {};
 
 TEST_P(PoppedBalloon, FliesFreelyAndNoFasterThanItsGas) {
@@ -182,7 +182,7 @@ TEST_P(PoppedBalloon, FliesFreelyAndNoFasterThanItsGas) {
 
 INSTANTIATE_TEST_SUITE_P(SelfCollision, PoppedBalloon, testing::Bool());
 
-/// Divisions of the sphere.
+/// Parameter: number of divisions of the sphere.
 class StretchedBalloon : public testing::TestWithParam<uint32_t> {};
 
 TEST_P(StretchedBalloon, StaysRoundAndComesToRest) {
@@ -209,7 +209,7 @@ TEST_P(StretchedBalloon, StaysRoundAndComesToRest) {
 
 INSTANTIATE_TEST_SUITE_P(Balloons, StretchedBalloon, testing::Values(2, 3));
 
-/// Number of segments of a cord.
+/// Parameter: number of segments of the cord.
 class ClothCord : public testing::TestWithParam<uint32_t> {};
 
 TEST_P(ClothCord, StretchesByItsStiffness) {

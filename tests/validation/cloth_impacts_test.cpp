@@ -23,7 +23,7 @@ ClothDef framed_cloth(const effects::Fabric& fabric, Real side, uint32_t cells) 
   return def;
 }
 
-/// Fabric, cells and speed.
+/// Parameters: fabric, number of cells, speed of the ball [m/s].
 class ClothRebound : public testing::TestWithParam<std::tuple<std::string, uint32_t, Real>> {};
 
 TEST_P(ClothRebound, LeavesAlongTheAxisOnWhichTheBallCame) {
@@ -61,7 +61,7 @@ INSTANTIATE_TEST_SUITE_P(Balls, ClothRebound,
                          testing::Combine(testing::Values("cotton", "denim"), testing::Values(24, 40),
                                           testing::Values(5.5, 12.0)));
 
-/// Fabric, length over rest length at which it tears, and where the ball comes [m].
+/// Parameters: fabric, length over rest length at which it tears, position of the impact [m].
 class ClothBullet : public testing::TestWithParam<std::tuple<std::string, Real, Real>> {};
 
 TEST_P(ClothBullet, GoesThroughOnlyWhereTheClothTears) {
@@ -109,7 +109,7 @@ TEST(ClothImpacts, GiveAFreeClothNoEnergyOfTheirOwn) {
   EXPECT_GT(contacts, 0);
 }
 
-/// Integrator, longest step of the world and mass of the ball.
+/// Parameters: integrator, steps of the world per second, mass of the ball [kg].
 class ClothHit : public testing::TestWithParam<std::tuple<ClothIntegrator, Real, Real>> {};
 
 TEST_P(ClothHit, GivesBallAndFreeClothNoEnergyAndKeepsTheirMomentum) {

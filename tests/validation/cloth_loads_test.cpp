@@ -107,7 +107,7 @@ TEST(ClothPressure, HoldsASkinByBoylesLaw) {
   EXPECT_GT(enclosed_volume(view.points, view.triangles), 1.05 * rest);
 }
 
-/// The stretch limit, and how far the seam is open at first [m].
+/// Parameters: stretch limit, width of the open seam at first [m].
 class ClothSeams : public testing::TestWithParam<std::pair<Real, Real>> {};
 
 TEST_P(ClothSeams, HoldAWeightClosed) {

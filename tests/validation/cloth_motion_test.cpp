@@ -61,7 +61,7 @@ SwingRecord swing_of(const ClothDef& def, Real step) {
   return motion;
 }
 
-/// Fabric and step of the world [s].
+/// Parameters: fabric, step of the world [s].
 class MovingCloth : public testing::TestWithParam<std::tuple<std::string, Real>> {};
 
 TEST_P(MovingCloth, SwingsOnAtItsStretchLimitAndGainsNothing) {
@@ -88,7 +88,7 @@ INSTANTIATE_TEST_SUITE_P(Fabrics, MovingCloth,
                          testing::Combine(testing::Values("silk", "cotton"),
                                           testing::Values(1.0 / 60, 1.0 / 240)));
 
-/// Self-collision.
+/// Parameter: whether the cloth has self-collision.
 class TurningBall : public testing::TestWithParam<bool> {};
 
 TEST_P(TurningBall, TakesItsClothAlong) {

@@ -73,7 +73,7 @@ TEST(HeavyLoop, AgreesWithPeircesWeightlessLoops) {
   EXPECT_NEAR(HeavyLoop(std::numbers::pi / 2, 0.5, 1, 0).height(), 0.1337, 1e-3);
 }
 
-/// Angle at the clamp: 0 for a ring loop, pi/2 for a heart loop.
+/// Parameter: angle at the clamp, 0 for a ring loop, pi/2 for a heart loop.
 class ClothLoop : public testing::TestWithParam<Real> {};
 
 TEST_P(ClothLoop, HangsAsAHeavyElasticStrip) {

@@ -321,7 +321,7 @@ void ModelLibrary::read_animations(const Scene& scene, const DecompositionCache&
     where.path += "/animation";
     if (rig.clips.empty()) {
       problems.push_back(
-          {where, file + ": has no animation that can be played; glTF 2.0 files can have some"});
+          {where, file + ": has no animation that can be played; use a glTF 2.0 file with an animation"});
     } else if (clip < 0) {
       std::vector<std::string> names;
       for (const render::RigClip& known : rig.clips) names.push_back(known.name);

@@ -38,7 +38,7 @@ struct SweepOptions {
   std::vector<std::string> vary;
   std::vector<double> at;  ///< times [s]; empty: the middle of the film
   std::string out, csv;    ///< an empty `csv` means a file beside the sheet
-  int columns = 0;         ///< 0: chosen according to the variations
+  int columns = 0;         ///< number of columns of the sheet; 0: chosen according to the variations
   int threads = 0, jobs = 0;
   bool resume = false, force = false, quiet = false;
   render::GlPlatform gl = render::GlPlatform::automatic;

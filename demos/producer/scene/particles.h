@@ -65,7 +65,7 @@ render::PointsDef points_def(const ParticleLook& look);
 struct ParticlePlace {
   Vec3 position = Vec3::Zero();
   Vec3 velocity = Vec3::Zero();
-  std::optional<Color> color;  ///< default: the colour of the look
+  std::optional<Color> color;  ///< colour of the particle; default: the colour of the look
 };
 
 /// Particles placed one by one, or as the points of a file.

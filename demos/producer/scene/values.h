@@ -57,7 +57,7 @@ struct ModelScale {
 struct MeshDecomposition {
   sim::DecompositionMethod method = sim::DecompositionMethod::automatic;
   Real max_error = sim::DecompositionSettings().max_error;
-  std::optional<int> max_parts;  ///< default: see sim::DecompositionSettings
+  std::optional<int> max_parts;  ///< greatest number of parts; default: see sim::DecompositionSettings
   Real min_angle_deg = 20;
   Real min_distance = sim::DecompositionSettings().min_distance;
 };
@@ -82,7 +82,7 @@ struct CompoundPart {
   PartShape shape = sim::Box{};
   Vec3 position = Vec3::Zero();  ///< position of the part, in the body's frame
   Quat orientation = Quat::Identity();
-  std::optional<Real> density;  ///< default: density of the body
+  std::optional<Real> density;  ///< density of the part; default: the density of the body
   std::string material;         ///< name of the material; empty: material of the body
 };
 /// A shape that consists of several solids, which form one rigid body.
