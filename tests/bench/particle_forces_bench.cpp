@@ -25,7 +25,7 @@ void rates(benchmark::State& state, const char* name) {
       benchmark::Counter(static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
 }
 
-/// One thread; arguments: points, octaves.
+/// Measures turbulence in one thread. Arguments: number of points, number of octaves.
 void turbulence(benchmark::State& state) {
   std::vector<Real> x, v;
   for (std::size_t i = 0; i < static_cast<std::size_t>(state.range(0)); ++i) {
@@ -41,7 +41,7 @@ void turbulence(benchmark::State& state) {
   rates(state, "fields/s");
 }
 
-/// Particles that fall far above the ground.
+/// Measures sub-steps of particles that fall far above the ground.
 void step(benchmark::State& state, const std::vector<ForceDef>& forces) {
   World world({.max_step = kForcesStep});
   world.add_body({.name = "ground", .shape = Plane{}, .motion = MotionType::static_body});

@@ -1,5 +1,5 @@
-/// Every scene of the gallery with cloth, ten seconds long: nothing is inside of anything, and no cloth
-/// crosses itself.
+/// Simulates ten seconds of every scene of the gallery with cloth: no object is inside of another one, and no
+/// cloth crosses itself.
 
 #include <algorithm>
 #include <array>

@@ -131,8 +131,9 @@ struct Body {
   Real density = 1000;
   Real mass = 0;
   std::optional<Vec3> centre;   ///< centre of mass, in the body's frame; default: computed from the shape
-  std::optional<Vec3> inertia;  ///< Ixx, Iyy, Izz about the centre of mass; default: from the shape
-  Vec3 inertia_products = Vec3::Zero();  ///< Ixy, Iyz, Izx of the inertia matrix, with `inertia`
+  std::optional<Vec3> inertia;  ///< moments of inertia Ixx, Iyy, Izz about the centre of mass; default:
+                                ///< computed from the shape
+  Vec3 inertia_products = Vec3::Zero();  ///< products of inertia Ixy, Iyz, Izx; they need `inertia`
   Real linear_drag = 0;
   Real angular_drag = 0;
   Vec3 friction_axis = Vec3::Zero();  ///< friction axis of the surface, in the body's frame
