@@ -234,7 +234,7 @@ struct Table<ClothCord> {
         {"damping", &T::damping,
          "damping of the cord along its length, as a fraction of the critical damping of a segment", "",
          between(0, 10)},
-        {"visible", &T::visible, "whether the cord is drawn"},
+        {"visible", &T::visible, "whether the object is drawn"},
         {"radius", &T::radius, "radius of the drawn cord", "m", kPositive},
         {"material", &T::material, "name of a material; empty: the default material"}};
   }
@@ -262,7 +262,7 @@ struct Table<Cloth> {
             {"material", &T::material, "name of a material; empty: the appearance of the fabric"},
             {"position", &T::position, "position of the cloth's origin at time 0", "m"},
             {"orientation", &T::orientation, "orientation of the cloth at time 0"},
-            {"velocity", &T::velocity, "velocity of the cloth at time 0", "m/s"},
+            {"velocity", &T::velocity, "velocity at time 0, in world axes", "m/s"},
             {"pins", &T::pins, "vertices that are held"},
             {"seams", &T::seams, "vertices that are sewn together"},
             {"cords", &T::cords, "strings and springs that hang on vertices"},
@@ -307,8 +307,8 @@ struct Table<Cloth> {
              kNotNegative},
             {"remove_at", &T::remove_at, "time at which the cloth is removed; must be later than `appear_at`",
              "s", kPositive},
-            {"visible", &T::visible, "whether the cloth is drawn"},
-            {"casts_shadow", &T::casts_shadow, "whether the cloth casts a shadow"},
+            {"visible", &T::visible, "whether the object is drawn"},
+            {"casts_shadow", &T::casts_shadow, "whether the object casts a shadow"},
         })
         .with(&T::placement);
   }

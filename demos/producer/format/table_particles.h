@@ -40,7 +40,7 @@ struct Table<ParticlePlace> {
   static constexpr const char* kHelp = "One particle of a group.";
   static Fields<ParticlePlace> fields() {
     return {{"position", &ParticlePlace::position, "position of the particle at time 0", "m"},
-            {"velocity", &ParticlePlace::velocity, "velocity of the particle at time 0", "m/s"},
+            {"velocity", &ParticlePlace::velocity, "velocity at time 0, in world axes", "m/s"},
             {"color", &ParticlePlace::color, "colour of the particle, instead of the colour of the `look`"}};
   }
 };
