@@ -14,7 +14,8 @@ namespace offstage::render {
 
 class GltfRig {
  public:
-  /// `parents`: parent of each node of the file, or -1; `order`: all nodes, parents first.
+  /// Prepares the rig of a file. `parents`: parent of each node of the file, or -1; `order`: all nodes,
+  /// parents first.
   GltfRig(GltfFile& file, GltfGeometry& geometry, std::span<const int> parents,
           std::span<const std::size_t> order);
 

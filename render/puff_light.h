@@ -21,7 +21,7 @@ struct PuffLight {
   SkyModel sky;
   Vector3f to_sun;
 
-  /// `sky_model` must have the direction of the sun in this sub-frame.
+  /// Prepares the lighting of a sub-frame. `sky_model` must have the direction of the sun in this sub-frame.
   PuffLight(const OpacityGrid& opacity, const FrameUniforms& frame_uniforms, const SkyModel& sky_model,
             const Vector3f& sun_direction, const AirLight& air_light, const AirField& light_around);
   /// Returns the radiance of a white puff at a place, as a function of the normal of its surface. `number`:

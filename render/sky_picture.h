@@ -51,8 +51,9 @@ class SkyPicture {
   static constexpr int kMostLightColumns = 1024;  ///< greatest width of the picture that gives light
   static constexpr int kLevels = 5;               ///< prefiltered for the roughness 0, 1/4 ... 1
 
-  /// `image`: twice as wide as high; finite values, at least 0. Throws std::invalid_argument otherwise.
-  /// `blur_deg`: standard deviation of a Gaussian that blurs the background, but not the light; 0: none.
+  /// Prepares a picture. `image` must be twice as wide as high, with finite values of at least 0; otherwise
+  /// throws std::invalid_argument. `blur_deg`: standard deviation of a Gaussian that blurs the background,
+  /// but not the light; 0: none.
   explicit SkyPicture(const HdrImage& image, float blur_deg = 0);
 
   /// Returns the radiance from a unit direction, the sum of both parts.

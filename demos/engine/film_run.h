@@ -46,7 +46,7 @@ class FilmRun {
  public:
   using Stop = std::function<bool()>;
 
-  /// Throws the exceptions of producer::Simulation's constructor.
+  /// Builds the film and its simulation. Throws the exceptions of the constructor of producer::Simulation.
   FilmRun(FilmDef def, std::shared_ptr<const producer::ModelLibrary> models, const FilmResources& resources);
 
   const FilmDef& def() const { return def_; }

@@ -78,7 +78,7 @@ class PixelBlocks {
 /// The noise of light in each block of a picture.
 class LightNoise {
  public:
-  /// `brightness`: light that one ray found, for each pixel with a surface.
+  /// Measures the noise. `brightness`: light that one ray found, for each pixel with a surface.
   LightNoise(const LightGuide& guide, const LightPlane& brightness);
   /// Returns variance / mean^2 over the block that contains pixel (x, y) and its neighbours.
   float relative_variance(int x, int y) const;

@@ -22,7 +22,7 @@ class Overlays {
   using BodiesByName = std::map<std::string, sim::BodyHandle>;
   using ClothsByName = std::map<std::string, sim::ClothHandle>;
 
-  /// The scene must outlive the overlays.
+  /// Prepares the overlays of a scene, which must outlive this object.
   Overlays(const Scene& scene, const sim::World& world, const BodiesByName& bodies,
            const ClothsByName& cloths);
 

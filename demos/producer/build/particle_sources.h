@@ -44,7 +44,7 @@ class ParticleSources {
   /// Returns the body with this name; null for an empty name.
   using FindBody = std::function<sim::BodyHandle(const std::string&)>;
 
-  /// Throws SceneError for an emitter with invalid parameters.
+  /// Builds the particle systems of all emitters. Throws SceneError for an emitter with invalid parameters.
   ParticleSources(const Scene& scene, const ModelLibrary& models, sim::World& world, const FindBody& body);
 
   /// Returns how long before time 0 the first particles are created [s]; 0 if no emitter prewarms.

@@ -25,7 +25,7 @@ namespace offstage::producer {
 
 class Picture {
  public:
-  /// The context must be current on this thread and outlive the picture.
+  /// Builds the stage of a scene. The context must be current on this thread and outlive the picture.
   /// `quick`: see render::StageDef.
   Picture(const Scene& scene, const ModelLibrary& models, render::Context& context, bool quick = false);
 

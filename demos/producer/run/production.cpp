@@ -96,7 +96,8 @@ class ProgressMeter {
 
 class LiveSource : public StateSource {
  public:
-  /// The requested states are written to `kept`, unless it is empty. `keep_at_most`: see RenderJob.
+  /// Prepares a simulation. The requested states are written to `kept`, unless it is empty. `keep_at_most`:
+  /// see RenderJob.
   LiveSource(const Scene& scene, const ModelLibrary& models, std::optional<SnapshotCache>& kept,
              std::optional<uint64_t> keep_at_most)
       : simulation_(scene, models),
