@@ -418,7 +418,7 @@ TEST(Render, VideoOnAFullDiskIsAnErrorAndLeavesNoFilm) {
   EXPECT_FALSE(fs::exists(folder / "film.mp4"));
 }
 
-TEST(Render, InterruptedVideoLeavesAnEarlierFilmAlone) {
+TEST(Render, InterruptedVideoKeepsAnEarlierFilm) {
   const TemporaryFolder folder;
   write_file(folder / "film.mp4", "an earlier film");
   const Outcome run = offstage("render " + tiny_scene() +

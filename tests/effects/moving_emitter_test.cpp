@@ -50,7 +50,7 @@ TEST(MovingEmitter, InheritsAFractionOfTheBodysVelocity) {
 }
 
 // The number is the length of the path times the rate at any speed, and the places are evenly spaced.
-TEST(MovingEmitter, ReleasesParticlesPerMetreOfItsWay) {
+TEST(MovingEmitter, ReleasesParticlesPerMetreOfItsPath) {
   for (const Real speed : {0.5, 7.0}) {
     Ride ride({speed, 0, 0});
     EmitterDef def = up(0);

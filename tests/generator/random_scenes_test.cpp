@@ -105,7 +105,7 @@ TEST(RandomScene, SeedsWithJointsStopAllLinks) {
 }
 
 // The same seed gives the same scene, so that failures can be reproduced.
-TEST(RandomScene, DependsOnItsSeedAlone) {
+TEST(RandomScene, DependsOnlyOnItsSeed) {
   EXPECT_EQ(text(random_scene(42, Parts::all)), text(random_scene(42, Parts::all)));
   EXPECT_NE(text(random_scene(42, Parts::all)), text(random_scene(43, Parts::all)));
 }

@@ -123,7 +123,7 @@ TEST(FirstFrame, PrewarmingDoesNotMoveOtherObjects) {
 }
 
 // Keys of the form "hold, then move" do not overshoot in grabs and motors either, as in cameras and bodies.
-TEST(Keys, OfAGrabAndOfAMotorDoNotSwingBeyondTheirValues) {
+TEST(Keys, OfAGrabAndOfAMotorDoNotOvershootTheirValues) {
   const LoadedScene loaded = parse_scene(R"({"world": {"gravity": [0, 0, 0]},
     "bodies": [{"name": "held", "shape": {"type": "sphere", "radius": 0.1}, "mass": 1},
                {"name": "arm", "shape": {"type": "box"}, "position": [5, 0, 0], "collides": false}],

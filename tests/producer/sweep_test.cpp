@@ -81,7 +81,7 @@ bool is_drawn(const render::Image& image, int left, int top, int right, int bott
   return false;
 }
 
-TEST(ContactSheet, LabelsStayUnderTheirPictureHoweverLongTheyAre) {
+TEST(ContactSheet, LongLabelsStayUnderTheirPicture) {
   render::Image picture{160, 90, {}};
   picture.rgba.assign(4 * picture.pixel_count(), 255);
   const std::string longest(300, 'W');

@@ -389,7 +389,7 @@ TEST(GltfPacked, DracoMeshoptAndWebpAreUnpackedOrRefusedByName) {
 
 // Each of these files has a wrong size, index or type. The reader must detect it: after a crash of its
 // process, the message would be another one.
-TEST(GltfHostile, LiesAboutSizesAndIndicesAreFound) {
+TEST(GltfHostile, WrongSizesAndIndicesAreFound) {
   const std::vector<std::pair<const char*, std::function<void(GltfSample&)>>> lies = {
       {"count", [](GltfSample& s) { s.document["accessors"][0]["count"] = 4000000000u; }},
       {"view length", [](GltfSample& s) { s.document["bufferViews"][0]["byteLength"] = 1e15; }},

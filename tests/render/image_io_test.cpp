@@ -126,7 +126,7 @@ TEST(WriteFileAtomically, SaysWhyAFolderIsRefused) {
   EXPECT_EQ(folder.names(), std::set<std::string>{"file"});
 }
 
-TEST(WriteFileAtomically, LeavesTheOldFileAloneWhenTheDiskIsFull) {
+TEST(WriteFileAtomically, KeepsTheOldFileWhenTheDiskIsFull) {
   const ScratchFolder folder;
   folder.put("a.bin", "old");
   const int status = status_of_child([&] {

@@ -268,7 +268,7 @@ View view_from(const Vector3f& eye) {
   return make_view({.eye = eye, .target = {0, 0, 0}}, {}, 96, 64);
 }
 
-TEST(PaintOrder, RunsAreBoundedHoweverKindsAlternateAndKeepTheOrderOfEachKind) {
+TEST(PaintOrder, RunsAreBoundedForAnyOrderOfKindsAndKeepTheOrderOfEachKind) {
   const auto points = [](float first, int n) {
     std::vector<Point> result;
     for (int i = 0; i < n; ++i)

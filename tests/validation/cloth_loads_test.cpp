@@ -278,7 +278,7 @@ TEST(ClothHanging, AStripHangsInACatenary) {
   }
 }
 
-TEST(ClothPins, AClothCarriedByABodyHandsBlowsOnToIt) {
+TEST(ClothPins, AClothOnABodyTransmitsImpactsToIt) {
   // A frame in free space carries a taut cloth; a ball flies into it. Nothing else can take up momentum.
   World world({.gravity = Vec3::Zero()});
   const BodyHandle frame = world.add_body({.shape = Box{{1, 0.02, 1}}, .mass = 2, .collides = false});

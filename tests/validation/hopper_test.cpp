@@ -137,7 +137,7 @@ struct HopperCase {
 class Hopper : public testing::TestWithParam<HopperCase> {};
 
 // Grains that jam above the hole, and those that the walls carry, make the rate independent of the fill.
-TEST_P(Hopper, DischargesAsBeverlooSaysWhateverItsFill) {
+TEST_P(Hopper, DischargesByBeverloosLawForAnyFill) {
   std::vector<Real> rates;
   for (const int layers : GetParam().layers) {
     const Discharge d = SiloRun({GetParam().orifice, GetParam().width, layers}).run();

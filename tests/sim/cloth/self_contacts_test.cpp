@@ -54,7 +54,7 @@ struct Layers {
 };
 
 // If each move left a seventh of the distance, rounding would soon decide on which side a layer is.
-TEST(SelfContacts, KeepADistanceHoweverOftenTheyArePressed) {
+TEST(SelfContacts, KeepADistanceAfterAnyNumberOfMoves) {
   Layers layers(0.02);
   for (int i = 0; i < 60; ++i) {
     layers.move(Vec4::Zero(), Vec4(0, -0.85 * layers.least_height(), 0, 0));

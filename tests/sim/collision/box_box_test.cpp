@@ -148,7 +148,7 @@ TEST(BoxBox, BricksRestOnTheHalfThatTheyShare) {
 
 // The configurations of a stack at rest: small gaps and overlaps, tilted and moved by tiny amounts. The
 // fallback to GJK costs three times as much, so it must be rare.
-TEST(BoxBox, AStackAtRestKeepsItsPointsWithoutOtherHelp) {
+TEST(BoxBox, AStackAtRestKeepsItsPointsAndSeldomNeedsGjk) {
   Dice dice(5);
   constexpr Real kMargin = 0.01;
   Manifold first;

@@ -164,7 +164,7 @@ TEST(Manifold, AStackOfEqualBoxesKeepsItsIdsWhileItCreeps) {
 
 // Here a pair of crossing edges often has slightly less penetration than the faces, and would be selected in
 // some steps only.
-TEST(Manifold, BoxesTwistedUponEachOtherKeepTheFacesNormalWhileTheyRock) {
+TEST(Manifold, TwistedBoxesOnEachOtherKeepTheFaceNormalWhileTheyRock) {
   const Convex box = convex(Box{Vec3::Ones()});
   const Quat twist(Eigen::AngleAxisd(kPi / 4, Vec3::UnitY()));
   Dice dice(19);

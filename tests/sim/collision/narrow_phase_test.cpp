@@ -294,7 +294,7 @@ TEST(NarrowPhase, ATriangleGivesItsNormalAtAnyHeightInItsMesh) {
   }
 }
 
-TEST(NarrowPhase, AnEdgeOfASheetHasTheNormalsBetweenItsFacesAlone) {
+TEST(NarrowPhase, AnEdgeOfASheetHasOnlyTheNormalsBetweenItsFaces) {
   const Piece box(Box{Vec3::Constant(0.5)}), ball(Sphere{0.25}), drum(Cylinder{0.25, 0.5});
   for (const Piece* piece : {&box, &ball, &drum}) {
     // Short of the edge by less than the margin: the triangles beyond the edge are near, but in the same

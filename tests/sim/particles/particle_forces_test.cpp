@@ -144,7 +144,7 @@ TEST(ParticleForces, StiffForcesAreStableWithImplicitEuler) {
 
 // The same particle in a system coupled by springs, in a system whose particles attract each other, and
 // alone.
-TEST(ParticleForces, AreTheSameHoweverASystemIsIntegrated) {
+TEST(ParticleForces, AreTheSameForEveryKindOfSystem) {
   std::array<Vec3, 3> ends;
   for (std::size_t kind = 0; kind < ends.size(); ++kind) {
     World world;
