@@ -11,7 +11,7 @@ install(DIRECTORY assets/models assets/pictures DESTINATION ${DATA}/assets COMPO
 install(DIRECTORY demos/scenes DESTINATION ${DATA}/demos COMPONENT program)  # they name models as ../../assets/models/...
 install(FILES LICENSE assets/CREDITS.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program)
 
-# The manual page and the completions, which the program prints itself.
+# The program itself prints the manual page and the completions.
 install(CODE "
   function(written command file)
     execute_process(COMMAND \"$<TARGET_FILE:offstage>\" \${command} OUTPUT_VARIABLE text COMMAND_ERROR_IS_FATAL ANY)

@@ -1,5 +1,5 @@
 # Sourced by demos/run.sh and tests/run.sh: installs missing packages, on Debian 12, Debian 13 and Ubuntu 24.04.
-# "a|b" stands for the first of them that the release has; "a?" is optional and is installed if the release has it.
+# "a|b": the first of both packages that the release has. "a?": an optional package, installed if the release has it.
 
 build_packages="g++ cmake ninja-build pkg-config python3-glad libeigen3-dev libtbb-dev libegl1 libgl1-mesa-dri libassimp-dev libstb-dev
 libembree-dev libglm-dev libdeflate-dev libopenexr-dev libqhull-dev libxxhash-dev libzstd-dev nlohmann-json3-dev libcli11-dev libfmt-dev libcpp-httplib-dev

@@ -2,7 +2,7 @@
 # (OFFSTAGE_SANITIZED_TESTS). The tests themselves are compiled once: both programs use the same object files.
 
 # Checks memory errors and integer arithmetic. The checks of -fsanitize=undefined for null, misaligned and wrongly typed pointers are
-# left out: they take twice the compile time of all the others, and AddressSanitizer or the processor finds most of these errors.
+# omitted: they take twice the compile time of all other checks, and AddressSanitizer or the processor finds most of these errors.
 set(OFFSTAGE_SANITIZERS
   -fsanitize=address,signed-integer-overflow,shift,bounds,integer-divide-by-zero,float-cast-overflow,return,unreachable,bool,enum
   -fno-sanitize-recover=all -fno-omit-frame-pointer)

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # Draws a picture of every scene and writes demos/README.md around them, and docs/gallery.jpg, the strip of the README:
 #   demos/gallery.sh [NAME...]     draws only these scenes again
-# Needs build/offstage and ffmpeg. The words are those at the head of each scene file.
+# Needs build/offstage and ffmpeg. The descriptions are the comments at the start of the scene files.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-# Chapters, and of each scene the moment that shows it best.
+# Chapters with their scenes, and for each scene the time of its picture [s].
 chapters=(
   "Rigid bodies|wall:1.6 dominoes:2 arch:4.7 marbles:1.5 pile:0.9 explosion:1.5 coins:2 cradle:0.4 cradle_simultaneous:0.4 t_handle:3 collision:4 forces:2.25 machine:4.35 pushers:4.1 boules:2.2 book:1.1 toybox:2 workbench:1.4 glass:2.2 studio:0.7 evening:2.5"
   "Articulated bodies|wrecking_chain:1.45 ragdolls:1.4 bridge:1.6 double_pendulums:12 linkage:5 gyroscope:2.6 robot_arm:5 crane:4.7 vehicle:7 multi_pendulum:1.2 tentacle:3 gears:1.4 playground:1.5"

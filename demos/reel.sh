@@ -40,7 +40,7 @@ fi
 mkdir -p out/reel
 options=("$@")
 [[ " $* " == *" --size "* ]] || options+=(--size 1280x720)
-# Shots of other options do not fit together with new ones.
+# Removes shots that were rendered with other options.
 [ "$(cat out/reel/options 2>/dev/null)" = "${options[*]}" ] || rm -f out/reel/*.mp4
 echo "${options[*]}" >out/reel/options
 

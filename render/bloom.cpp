@@ -34,8 +34,8 @@ bool has_glow(const HdrImage& sum, float threshold) {
   return false;
 }
 
-// Writes the light above the threshold, at half the size. A pixel that is a hundred times too bright, such as
-// a glint of the sun, is limited to ten times, because it would flicker.
+// Writes the light above the threshold to a layer of half the size. A pixel that is a hundred times too
+// bright, such as a glint of the sun, is limited to ten times, because it would flicker.
 void extract(const HdrImage& sum, float threshold, Layer& out) {
   const float most = 10 * threshold;
   tbb::parallel_for(0, out.height, [&](int y) {
@@ -95,7 +95,8 @@ void add_bloom(HdrImage& sum, const Bloom& options) {
   for (int k = 0; k < widest && std::min(layers.back().width, layers.back().height) > 2; ++k)
     layers.push_back(half_of(layers.back()));
 
-  // All layers have the same total weight, so narrow ones have more per pixel: a sharp core with a long tail.
+  // All layers have the same total weight. A narrow layer therefore has more weight per pixel, so the glow
+  // has a sharp core and a long tail.
   const float weight = options.strength / static_cast<float>(layers.size());
   for (std::size_t k = layers.size() - 1; k > 0; --k) {
     Layer& finer = layers[k - 1];

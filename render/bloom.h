@@ -8,10 +8,11 @@
 namespace offstage::render {
 
 struct Bloom {
-  float threshold = 4;      ///< applies to the brightest channel after exposure; a sunlit white is about 4
-  float strength = 0.12f;   ///< fraction of the light above the threshold that is spread
-  float radius = 0.04f;     ///< radius of the widest blur, as a fraction of the picture's height
-  float exposure = 1;       ///< see ToneMap::exposure
+  float threshold = 4;     ///< value of the brightest channel, after exposure, from which on light spreads; a
+                           ///< sunlit white is about 4
+  float strength = 0.12f;  ///< fraction of the light above the threshold that is spread
+  float radius = 0.04f;    ///< radius of the widest blur, as a fraction of the picture's height
+  float exposure = 1;      ///< linear factor of the light; see ToneMap::exposure
   float sample_weight = 1;  ///< 1 / number of sub-frames summed in the image
 };
 

@@ -30,7 +30,7 @@ void ChannelsPass::begin(const Matrix4f& clip_from_world, const Matrix4f& clip_b
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
   glViewport(0, 0, width_px_, height_px_);
   glEnable(GL_DEPTH_TEST);
-  glDepthMask(GL_TRUE);  // clearing needs it, and the drawing passes have disabled it
+  glDepthMask(GL_TRUE);  // the drawing passes have disabled writing of depth, and clearing needs it
   glDepthFunc(GL_GREATER);
   glDisable(GL_BLEND);
   const std::array<float, 4> nothing = {0, 0, 0, 0};

@@ -16,8 +16,8 @@
 namespace offstage::render {
 namespace {
 
-/// In the child: sets its streams, group and signals, then starts the program. Uses only calls that are safe
-/// after fork() in a process with threads.
+/// Runs in the child process. Sets its streams, process group and signals, then starts the program. Uses only
+/// calls that are safe after fork() in a process with threads.
 [[noreturn]] void become(char** argv, const std::array<int, 3>& streams, pid_t parent, int report) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(127);
@@ -75,7 +75,7 @@ ChildProcess::ChildProcess(const std::vector<std::string>& arguments, int in, in
   writing.close();
   ssize_t got = 0;
   do {
-    // Nothing is read if the program started, because the other end was closed.
+    // If the program has started, the other end is closed and nothing can be read.
     got = ::read(reading.fd(), &error_, sizeof error_);
   } while (got < 0 && errno == EINTR);
   if (got != sizeof error_) {

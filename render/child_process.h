@@ -36,7 +36,7 @@ class ChildProcess {
   ChildProcess(const ChildProcess&) = delete;
   ChildProcess& operator=(const ChildProcess&) = delete;
 
-  /// The errno value if the child could not be started; otherwise 0.
+  /// Returns the errno value if the child could not be started; otherwise 0.
   int error() const { return error_; }
   void kill();
   /// Waits for the end of the child. Returns nothing if it succeeded, otherwise "exit code 1" or "signal 9".

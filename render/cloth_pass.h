@@ -27,7 +27,7 @@ struct Cloth {
   uint32_t uploaded = 0;  ///< version of the uploaded indices
   gl::VertexArray vertex_array;
 
-  /// Whether objects behind the cloth are visible through it.
+  /// Returns whether objects behind the cloth are visible through it.
   bool is_translucent() const { return material->lets_through(); }
   bool is_seen() const { return !surface.vertices().empty() && !surface.indices().empty(); }
 };

@@ -30,7 +30,7 @@ class ClothSurface {
 
   std::span<const ClothVertex> vertices() const { return vertices_; }
   const std::vector<uint32_t>& indices() const { return indices_; }
-  /// Number of calls of set_mesh(), to check whether uploaded `indices` are current.
+  /// Returns the number of calls of set_mesh(), to check whether uploaded `indices` are current.
   uint32_t version() const { return version_; }
   const Eigen::AlignedBox3f& box() const { return box_; }
   int levels() const { return static_cast<int>(subdivisions_.size()); }

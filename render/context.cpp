@@ -26,8 +26,8 @@ constexpr std::array<std::pair<std::string_view, GlPlatform>, 4> kPlatforms = {
      {"egl", GlPlatform::egl},
      {"egl:gpu", GlPlatform::egl_gpu}}};
 
-// The mutex of the process, because Mesa's environment variables and glad's function pointers are global,
-// too. The first context replaces `automatic` by an available platform.
+// Protects the platform, the environment variables of Mesa and the function pointers of glad, which are
+// global in the process. The first context replaces `automatic` by an available platform.
 std::mutex platform_mutex;
 GlPlatform chosen_platform = GlPlatform::automatic;
 
@@ -137,7 +137,7 @@ void pin_environment(int raster_threads, GlPlatform platform) {
   };
   clear_driver_variables();
   set_if(software, "GALLIUM_DRIVER", "llvmpipe");
-  set_if(software, "LIBGL_ALWAYS_SOFTWARE", "true");  // EGL would prefer a GPU
+  set_if(software, "LIBGL_ALWAYS_SOFTWARE", "true");  // without this variable, EGL prefers a GPU
   setenv("EGL_LOG_LEVEL", "fatal", 0);                // errors are reported as exceptions
   setenv("LP_NATIVE_VECTOR_WIDTH", "256", 1);
   setenv("LP_NUM_THREADS", std::to_string(raster_threads).c_str(), 1);

@@ -15,7 +15,7 @@ namespace {
 constexpr int kSearch_px = 12;
 constexpr int kMinContrast = 12;
 
-// Brightness with a repeated border of one pixel, so that neighbours need no checks.
+// Brightness of a picture. The border pixels are repeated once outside, so that every pixel has neighbours.
 struct Luma {
   int stride = 0;
   std::vector<uint8_t> values;
@@ -49,7 +49,7 @@ void mark_edges(const Luma& luma, int y, int width, std::vector<uint8_t>& mark) 
   }
 }
 
-// How a pixel is mixed with its neighbour at (dx, dy): `weight` is the neighbour's fraction in 1/256.
+// The mixture of a pixel with its neighbour at (dx, dy). `weight`: fraction of the neighbour in 1/256.
 struct Mix {
   int dx = 0, dy = 0, weight = 0;
 };
@@ -84,7 +84,7 @@ Mix mix_of(const Luma& luma, const Image& image, int x, int y) {
   const int ahead = search(along, std::min(kSearch_px, room_ahead));
   const int near = std::min(back, ahead);
   const int end = near == back ? -along * back : along * ahead;
-  // Only pixels on the side of the edge that steps over at its nearer end are mixed.
+  // At its nearer end, the edge steps to one side. Only the pixels on this side are mixed.
   const int end_value = m[end] + m[end + across] - edge;
   const bool steps_here = (end_value < 0) != (2 * m[0] - edge < 0);
   int weight = steps_here ? 128 - 256 * near / (back + ahead) : 0;

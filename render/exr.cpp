@@ -87,7 +87,7 @@ HdrImage decode_rgb(std::span<const uint8_t> bytes, uint64_t max_pixels) {
     const Imf::Channel* channel = channels.findChannel(names[c]);
     if (channel == nullptr || channel->xSampling != 1 || channel->ySampling != 1)
       throw std::runtime_error("it has no channels R, G and B of full resolution, and no Y");
-    // The library's origin is that of the display window.
+    // The library counts pixels from the origin of the display window.
     auto* base = reinterpret_cast<char*>(image.rgba.data() + c);
     base -=
         static_cast<std::ptrdiff_t>(stride) * window.min.x + static_cast<std::ptrdiff_t>(row) * window.min.y;
@@ -115,7 +115,7 @@ HdrImage decode_exr(std::span<const uint8_t> bytes, const std::string& name, uin
 }
 
 void write_exr(const std::filesystem::path& path, const HdrImage& image, const std::string& settings) {
-  constexpr float kLargest = 65504;  // of a half float
+  constexpr float kLargest = 65504;  // the largest half float
   const std::size_t channels = image.transparent ? 4 : 3;
   std::vector<half> values(image.pixel_count() * channels);
   for (std::size_t i = 0; i < image.pixel_count(); ++i)
@@ -152,7 +152,7 @@ std::optional<FrameFile> inspect_exr(const std::filesystem::path& path) {
     return FrameFile{window.max.x - window.min.x + 1, window.max.y - window.min.y + 1,
                      file.header().channels().findChannel("A") != nullptr, settings ? settings->value() : ""};
   } catch (const std::exception&) {
-    return {};  // it is no EXR file
+    return {};  // the file is not an EXR file
   }
 }
 

@@ -53,7 +53,7 @@ int write_all(int fd, std::span<const uint8_t> bytes, const StopTest& stop) {
 }
 
 std::vector<uint8_t> read_file(const std::filesystem::path& path, uint64_t max_bytes) {
-  // Non-blocking, because opening a named pipe would wait for its writer.
+  // O_NONBLOCK is needed, because opening a named pipe would otherwise wait for its writer.
   Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   struct stat info {};
   if (!file || ::fstat(file.fd(), &info) != 0) throw_file_error(path, "cannot be opened");

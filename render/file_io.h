@@ -55,7 +55,7 @@ class StopDeadline {
   static constexpr int kInterval_ms = 100;  ///< time between two polls
 
   explicit StopDeadline(const StopTest& stop) : stop_(stop) {}
-  /// Call when the other program has read or written something.
+  /// Must be called when the other program has read or written something.
   void progressed() { asked_ = false; }
   /// Polls the StopTest. Returns true if the three seconds are over.
   bool exhausted();

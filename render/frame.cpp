@@ -91,7 +91,7 @@ View make_view(const Camera& camera, const SampleOffsets& offsets, int width_px,
   view.forward = distance > 0 ? Vector3f(sight / distance) : Vector3f(-Vector3f::UnitZ());
   Vector3f side = view.forward.cross(camera.up);
   if (side.norm() < 1e-6f)
-    side = view.forward.cross(-Vector3f::UnitZ());  // looking straight down: as on a map, -Z is up
+    side = view.forward.cross(-Vector3f::UnitZ());  // the camera looks straight down: as on a map, -Z is up
   view.right = side.norm() > 1e-6f ? Vector3f(side.normalized()) : perpendicular(view.forward);
   view.up = view.right.cross(view.forward);
 
@@ -145,7 +145,7 @@ FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& en
   frame.ray_x = vec4(x);
   frame.ray_y = vec4(y);
   frame.depth = {n * f / (f - n), n / (f - n), n, f};
-  // Over the sub-frames, the dither value of every pixel is evenly distributed over [0, 1).
+  // The dither values of a pixel in all sub-frames are evenly distributed over [0, 1).
   frame.sun_direction = vec4(jittered_sun(sun, offsets.light),
                              static_cast<float>(offsets.index) / static_cast<float>(offsets.count));
   frame.sun_radiance = vec4(sun.color * sun.intensity, 0.5f * sun.size_deg * kRadians);
@@ -162,8 +162,8 @@ FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& en
 
 SampleOffsets sample_offsets(int i, int n) {
   if (n <= 1) return {};
-  // The Hammersley set in three different orders, so that pixel, lens and light are independent of each other
-  // and of time, which is proportional to i.
+  // Pixel, lens and light use the Hammersley set in three different orders. They are therefore independent of
+  // each other and of time, which is proportional to i.
   const auto hammersley = [n](int k) {
     float inverse = 0, digit = 0.5f;
     for (int bits = k; bits > 0; bits >>= 1, digit *= 0.5f) inverse += static_cast<float>(bits & 1) * digit;

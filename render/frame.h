@@ -45,7 +45,7 @@ struct View {
   Vector2f shear;     ///< shift of the image due to lens and pixel offsets, as a fraction of tan_half
   float near_m = 0, far_m = 0;
 
-  /// Whether a ball may be visible: false only if it is outside of one plane of the frustum.
+  /// Returns whether a ball may be visible: false only if it is outside of one plane of the frustum.
   bool sees(const Vector3f& center, float radius) const;
   float depth_of(const Vector3f& point) const { return forward.dot(point - eye); }
 };

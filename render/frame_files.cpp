@@ -48,7 +48,7 @@ int big_endian(const uint8_t* bytes, int count) {
 std::optional<FrameFile> inspect_png(const std::filesystem::path& path) {
   const FileParts file(path);
   const std::vector<uint8_t> head = file.read(0, 26), tail = file.read(file.size() - 12, 12);
-  constexpr int kPalette = 3;  // may have a table of alpha values
+  constexpr int kPalette = 3;  // an image with a palette, which may have a table of alpha values
   if (head.size() < 26 || tail.size() < 12 || std::memcmp(head.data(), "\x89PNG\r\n\x1a\n", 8) != 0 ||
       std::memcmp(tail.data() + 4, "IEND", 4) != 0)
     return {};
@@ -57,7 +57,8 @@ std::optional<FrameFile> inspect_png(const std::filesystem::path& path) {
                    (kind & 4) != 0 || kind == kPalette, png_settings(path)};
 }
 
-/// Reads the segments of a JPEG file up to its pixels.
+/// Reads size and settings of a JPEG file from the segments before its pixels. Returns nothing if the file is
+/// truncated or is not a JPEG.
 std::optional<FrameFile> inspect_jpeg(const std::filesystem::path& path) {
   constexpr int kStartOfImage = 0xD8, kEndOfImage = 0xD9, kStartOfScan = 0xDA, kComment = 0xFE;
   constexpr int kMostSegments = 1000;

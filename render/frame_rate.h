@@ -15,11 +15,12 @@ struct FrameRate {
   bool operator==(const FrameRate&) const = default;
 
   double per_second() const { return static_cast<double>(numerator) / denominator; }
-  /// Duration of a number of frames [s], rounded once. The product is exact, so a long film does not drift.
+  /// Returns the duration of a number of frames [s], rounded once. The product is exact, so a long film does
+  /// not drift.
   double seconds(int64_t frames) const {
     return static_cast<double>(frames * denominator) / static_cast<double>(numerator);
   }
-  /// "30" or "30000/1001".
+  /// Returns the rate as text, such as "30" or "30000/1001".
   std::string text() const;
 };
 

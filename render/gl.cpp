@@ -32,7 +32,7 @@ void attach_shader(GLuint program, GLenum stage, std::span<const std::string_vie
   glGetShaderiv(shader, GL_COMPILE_STATUS, &ok);
   const std::string log = ok ? std::string() : info_log(shader, glGetShaderiv, glGetShaderInfoLog);
   glAttachShader(program, shader);
-  glDeleteShader(shader);  // it is deleted with the program
+  glDeleteShader(shader);  // OpenGL deletes the shader together with the program
   if (!ok) throw UnavailableError("shader " + std::string(files.back()) + " does not compile: " + log);
 }
 

@@ -69,7 +69,7 @@ Buffer make_buffer(std::span<const T> values) {
   glNamedBufferStorage(buffer, static_cast<GLsizeiptr>(values.size_bytes()), values.data(), 0);
   return buffer;
 }
-/// A 2D texture of one level, clamped to its edges.
+/// Returns a 2D texture of one level, clamped to its edges.
 Texture make_target(GLenum format, int width_px, int height_px, GLenum filter);
 /// Creates a framebuffer. Throws UnavailableError if it is not complete. A texture of 0 leaves that
 /// attachment empty.

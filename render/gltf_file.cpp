@@ -39,7 +39,7 @@ constexpr std::array kGltfExtensions = {"KHR_mesh_quantization",
                                         "KHR_xmp_json_ld",
                                         "KHR_xmp"};
 
-/// Extensions that need a library; `built` says whether this program has it.
+/// Extensions that need a library. `built`: whether the program was built with the library.
 struct GltfLibrary {
   const char* extension;
   bool built;
@@ -124,7 +124,8 @@ bool is_known_extension(const std::string& name) {
 /// Returns the names of all extensions in a document. Application data (`extras`) are not searched.
 std::set<std::string> extensions_within(const GltfValue::Json& document) {
   std::set<std::string> names;
-  std::vector<const GltfValue::Json*> stack = {&document};  // explicit, because the depth depends on the file
+  std::vector<const GltfValue::Json*> stack = {
+      &document};  // a recursion would be unsafe, because the depth depends on the file
   while (!stack.empty()) {
     const GltfValue::Json& json = *stack.back();
     stack.pop_back();
@@ -253,7 +254,7 @@ void GltfFile::check_extensions() {
   }
   const std::vector<std::string> listed = names("extensionsUsed");
   std::set<std::string> used(listed.begin(), listed.end());
-  used.merge(extensions_within(document_));  // not all writers list them
+  used.merge(extensions_within(document_));  // not all programs list the extensions that they use
   for (const std::string& name : used) {
     const auto library = std::ranges::find(gltf_libraries(), name, &GltfLibrary::extension);
     if (library != gltf_libraries().end() && !library->built)
@@ -390,7 +391,7 @@ std::vector<T> GltfFile::read(const GltfValue& accessor, const Layout& form,
                               T (*convert)(const uint8_t*, std::size_t, bool)) {
   if (!accessor.has("bufferView") && form.count * form.width > kMaxGltfZeros)
     throw accessor.wrong("count", "is too large for an accessor without data");
-  if (accessor.has("bufferView") && form.count > 0) {  // before memory is taken for it
+  if (accessor.has("bufferView") && form.count > 0) {  // checked before memory is allocated
     const std::size_t source = *accessor.index("bufferView", count("bufferViews"));
     if (form.count > view(source).size()) throw FileError(accessor.place() + ": goes beyond its buffer view");
   }

@@ -45,7 +45,7 @@ class GltfFile {
   /// messages.
   std::vector<uint8_t> resource(const std::string& uri, const std::string& what) const;
 
-  /// Reads an accessor of any component type, with sparse values (sections 3.6.2). `width`: the number of
+  /// Reads an accessor of any component type, with sparse values (section 3.6.2). `width`: the number of
   /// components that its use allows, 0: any.
   GltfNumbers numbers(std::size_t accessor, int width = 0);
   /// Reads an accessor of unsigned integers with one component (indices).
@@ -81,7 +81,7 @@ class GltfFile {
   std::set<std::string> warned_;
 };
 
-/// Whether a file is glTF by its name.
+/// Returns whether a file is glTF by its name.
 bool is_gltf(const std::filesystem::path& path);
 
 }  // namespace offstage::render

@@ -46,7 +46,7 @@ void normalize(const GltfValue& accessor, std::vector<float>& values) {
 
 }  // namespace
 
-/// The source of a primitive's attributes: accessors, or Draco data for some of them.
+/// The source of a primitive's attributes: accessors, and Draco data for some attributes.
 struct GltfGeometry::Source {
   const GltfValue& primitive;
   std::optional<DracoMesh> draco;
@@ -63,7 +63,8 @@ struct GltfGeometry::Source {
         throw attributes.wrong(name, "has " + std::to_string(packed.width) + " components in its Draco data");
       result = {packed.values.size() / static_cast<std::size_t>(packed.width), packed.width, packed.values};
       const auto accessor = attributes.index(name.c_str(), file.count("accessors"));
-      // The accessor decides (section 3.6.2.2); encoders do not always set the flag in the data.
+      // The flag of the accessor is valid (section 3.6.2.2), because encoders do not always set the flag in
+      // the data.
       if (accessor && !packed.normalized) normalize(file.item("accessors", *accessor), result.values);
     } else if (const auto accessor = attributes.index(name.c_str(), file.count("accessors"))) {
       result = file.numbers(*accessor, width);
@@ -78,7 +79,8 @@ struct GltfGeometry::Source {
 const GltfPrimitive& GltfGeometry::primitive(std::size_t mesh, std::size_t index) {
   const auto found = primitives_.find({mesh, index});
   if (found != primitives_.end()) return found->second;
-  primitives_.clear();  // primitives often share one large vertex buffer, of which each has a copy
+  primitives_.clear();  // frees memory: primitives often share one large vertex buffer, and each primitive
+                        // has a copy of it
   return primitives_
       .emplace(std::pair(mesh, index), read(file_.item("meshes", mesh).item("primitives", index)))
       .first->second;

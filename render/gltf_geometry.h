@@ -30,7 +30,7 @@ class GltfGeometry {
   std::size_t primitive_count(std::size_t mesh) const {
     return file_.item("meshes", mesh).count("primitives");
   }
-  /// Returns a primitive without its morph targets. Each is read only once.
+  /// Returns a primitive without its morph targets. Each primitive is read only once.
   const GltfPrimitive& primitive(std::size_t mesh, std::size_t index);
   /// Returns a primitive with its morph targets applied, or nothing if the weights of all targets are 0. The
   /// `weights` of a node replace the weights of the mesh.

@@ -72,7 +72,7 @@ class GltfNodes {
   const std::vector<std::size_t>& children(std::size_t node) const { return children_[node]; }
   const Affine3d& world(std::size_t node) const { return world_[node]; }
   const std::vector<int>& parents() const { return parents_; }
-  /// All nodes, parents first.
+  /// Returns all nodes in an order in which parents precede their children.
   const std::vector<std::size_t>& order() const { return order_; }
 
  private:
@@ -119,7 +119,8 @@ class GltfImporter {
  private:
   std::vector<std::size_t> roots() const {
     std::vector<std::size_t> result;
-    if (file_.count("scenes") == 0) {  // a library of meshes: all nodes without a parent
+    if (file_.count("scenes") ==
+        0) {  // without a scene, the file is a library of meshes: all nodes without a parent are used
       std::vector<bool> is_child(nodes_->size(), false);
       for (std::size_t i = 0; i < nodes_->size(); ++i)
         for (const std::size_t child : nodes_->children(i)) is_child[child] = true;

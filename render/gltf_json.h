@@ -13,7 +13,8 @@
 
 namespace offstage::render {
 
-/// An object of the document with its place. A missing object is empty: all its members have their defaults.
+/// An object of the document with its place. A missing object is empty, so all its members have their
+/// defaults.
 class GltfValue {
  public:
   using Json = nlohmann::json;
@@ -25,11 +26,11 @@ class GltfValue {
   bool exists() const { return json_ != nullptr; }
   const Json* json() const { return json_; }
   bool has(const char* key) const { return find(key) != nullptr; }
-  /// A member that is an object; empty if missing.
+  /// Returns a member that is an object; an empty object if the member is missing.
   GltfValue child(const char* key) const { return {find(key), place_ + "." + key}; }
   GltfValue extension(const char* name) const { return child("extensions").child(name); }
 
-  /// Length of a list; 0 if missing.
+  /// Returns the length of a list; 0 if the list is missing.
   std::size_t count(const char* key) const {
     const Json* list = find(key);
     if (list != nullptr && !list->is_array()) throw wrong(key, "must be a list");
@@ -44,7 +45,7 @@ class GltfValue {
     const Json* value = find(key);
     return value == nullptr ? missing : to_number(*value, key);
   }
-  /// A whole number in [0, 2^53].
+  /// Returns a whole number in [0, 2^53].
   std::size_t size(const char* key, std::size_t missing) const {
     const Json* value = find(key);
     return value == nullptr ? missing : to_size(*value, key);
@@ -59,7 +60,7 @@ class GltfValue {
     if (value != nullptr && !value->is_string()) throw wrong(key, "must be a string");
     return value == nullptr ? missing : value->get<std::string>();
   }
-  /// An index into a list of `limit` entries.
+  /// Returns an index into a list of `limit` entries.
   std::optional<std::size_t> index(const char* key, std::size_t limit) const {
     const Json* value = find(key);
     if (value == nullptr) return std::nullopt;
@@ -73,7 +74,7 @@ class GltfValue {
     if (i >= count(key)) throw wrong(key, "has no entry " + std::to_string(i));
     return to_number((*find(key))[i], key);
   }
-  /// A list of exactly N finite numbers.
+  /// Returns a list of exactly N finite numbers.
   template <int N>
   Eigen::Matrix<double, N, 1> numbers(const char* key, const Eigen::Matrix<double, N, 1>& missing) const {
     if (!has(key)) return missing;

@@ -25,8 +25,8 @@ Vector3f color_of(const GltfValue& source, const char* key, double missing, doub
   return color.cwiseMax(0).cwiseMin(most).cast<float>();
 }
 
-/// A file without a look of its own gets the usual one: an unnamed white material is, by the defaults of the
-/// format, rough metal.
+/// Gives the default look of offstage to a material without properties. By the defaults of the format, an
+/// unnamed white material would be rough metal.
 void give_usual_look(Material& look) {
   look.color = Material{}.color;
   if (look.metallic != 1 || look.roughness != 1) return;
@@ -36,7 +36,7 @@ void give_usual_look(Material& look) {
 
 /// KHR_texture_transform: scale, then rotation (positive turns the image clockwise), then offset.
 void transform_uvs(const GltfValue& transform, TextureMap& map) {
-  constexpr double kMost = 1e6;  // so that the sums of the shader stay finite
+  constexpr double kMost = 1e6;  // greatest value with which the sums in the shader stay finite
   const auto pair = [&](const char* key, double missing) {
     return transform.numbers<2>(key, Eigen::Vector2d::Constant(missing))
         .cwiseMax(-kMost)
@@ -130,7 +130,7 @@ void GltfMaterials::read_transmission(const GltfValue& source, Material& look, G
   const GltfValue transmission = source.extension("KHR_materials_transmission");
   if (index.exists() && look.glossiness < 0) {
     const double n = index.number("ior", 1.5);
-    const double f0 = n == 0 ? 1 : std::pow((n - 1) / (n + 1), 2);  // 0 stands for infinity
+    const double f0 = n == 0 ? 1 : std::pow((n - 1) / (n + 1), 2);  // an index of 0 stands for infinity
     look.specular = Vector3f::Constant(fraction(f0));
     look.refraction = static_cast<float>(n == 0 ? 3 : std::clamp(n, 1.0, 3.0));
   }

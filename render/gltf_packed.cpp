@@ -61,7 +61,9 @@ bool has_meshopt() {
   return false;
 }
 std::vector<uint8_t> unpack_meshopt(const MeshoptView& view, std::span<const uint8_t>) {
-  throw FileError(view.place + ": cannot be unpacked; this program was built without libmeshoptimizer-dev");
+  throw FileError(view.place +
+                  ": cannot be unpacked: this program was built without meshoptimizer; install "
+                  "libmeshoptimizer-dev and build it again");
 }
 #endif
 
@@ -111,7 +113,9 @@ bool has_draco() {
 }
 DracoMesh unpack_draco(std::span<const uint8_t>, const std::map<std::string, uint32_t>&,
                        const std::string& place) {
-  throw FileError(place + ": cannot be unpacked; this program was built without libdraco-dev");
+  throw FileError(
+      place +
+      ": cannot be unpacked: this program was built without Draco; install libdraco-dev and build it again");
 }
 #endif
 
@@ -148,7 +152,9 @@ bool has_webp() {
   return false;
 }
 Image decode_webp(std::span<const uint8_t>, const std::string& name, uint64_t) {
-  throw FileError(name + ": is a WebP image; this program was built without libwebp-dev");
+  throw FileError(name +
+                  ": is a WebP image, and this program was built without libwebp; install libwebp-dev and "
+                  "build it again");
 }
 #endif
 

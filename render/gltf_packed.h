@@ -40,7 +40,7 @@ struct DracoMesh {
 DracoMesh unpack_draco(std::span<const uint8_t> packed, const std::map<std::string, uint32_t>& ids,
                        const std::string& place);
 
-/// Whether the bytes are a WebP image.
+/// Returns whether the bytes are a WebP image.
 bool is_webp(std::span<const uint8_t> bytes);
 /// Decodes a WebP image of up to `max_pixels`. Throws FileError.
 Image decode_webp(std::span<const uint8_t> bytes, const std::string& name, uint64_t max_pixels);

@@ -20,13 +20,13 @@ std::optional<Model::Camera> gltf_camera(GltfFile& file, const GltfValue& node) 
   const std::string type = source.text("type");
   camera.perspective = type == "perspective";
   if (!camera.perspective && type != "orthographic") {
-    file.warn(source.place() + ": its type '" + type + "' is unknown; it is left out");
+    file.warn(source.place() + ": its type '" + type + "' is unknown; the camera is ignored");
     return std::nullopt;
   }
   if (!camera.perspective) return camera;
   const double fov = source.child("perspective").number("yfov", 0);
   if (!(fov > 1e-4 && fov < std::numbers::pi - 1e-4)) {
-    file.warn(source.place() + ": its yfov is not between 0 and pi; it is left out");
+    file.warn(source.place() + ": its yfov is not between 0 and pi; the camera is ignored");
     return std::nullopt;
   }
   camera.fov_deg = in_degrees(fov);
@@ -39,7 +39,7 @@ std::optional<Model::Light> gltf_light(GltfFile& file, const GltfValue& node) {
   if (!index) return std::nullopt;
   const GltfValue source = lights.item("lights", *index);
   const auto left_out = [&](const std::string& why) {
-    file.warn(source.place() + ": " + why + "; the light is left out");
+    file.warn(source.place() + ": " + why + "; the light is ignored");
     return std::nullopt;
   };
   using Kind = Model::Light::Kind;

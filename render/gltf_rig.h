@@ -14,14 +14,15 @@ namespace offstage::render {
 
 class GltfRig {
  public:
-  /// `parents`: parent of each node of the file, or -1; `order`: all nodes, parents first.
+  /// Prepares the rig of a file. `parents`: parent of each node of the file, or -1; `order`: all nodes,
+  /// parents first.
   GltfRig(GltfFile& file, GltfGeometry& geometry, std::span<const int> parents,
           std::span<const std::size_t> order);
 
   /// Adds the primitives of a node's mesh. `instances`: transforms of the instances of the mesh in the node's
   /// frame. A mesh that deforms is drawn once, with a warning.
   void add_mesh(std::size_t node, std::size_t mesh, std::span<const Eigen::Affine3d> instances);
-  /// Index of a node of the file in the rig.
+  /// Returns the index of a node of the file in the rig.
   int index_of(std::size_t node) const { return rig_index_[node]; }
   /// Reads the animations and returns the rig. Must be called after all meshes were added.
   ModelRig finish();

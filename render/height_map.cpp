@@ -38,7 +38,7 @@ bool is_normal_map(const Image& image) {
 }
 
 Image normals_of_heights(const Image& heights, float bump) {
-  constexpr float kHeight = 0.01f;  // of white, in widths of the picture
+  constexpr float kHeight = 0.01f;  // height of white, as a fraction of the width of the picture
   const int w = heights.width_px, h = heights.height_px;
   Image normals{w, h, std::vector<uint8_t>(heights.rgba.size(), 255)};
   const float slope = 0.5f * kHeight * bump * static_cast<float>(w);

@@ -43,8 +43,8 @@ struct ImageDifference {
   double fraction_over = 0;     ///< `pixels_over` as a fraction of all pixels
   double total_delta = 0;       ///< sum of all absolute channel differences
 
-  /// Tolerance for goldens of another fingerprint class: at most 0.05 % of the pixels differ by more than 2
-  /// steps, and the mean difference is at most 0.05 steps.
+  /// Returns whether the difference is acceptable for a golden of another fingerprint class: at most 0.05 %
+  /// of the pixels differ by more than 2 steps, and the mean difference is at most 0.05 steps.
   bool within_tolerance() const;
 };
 /// Compares two images. Throws std::invalid_argument if their sizes differ.

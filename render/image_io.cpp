@@ -39,7 +39,7 @@
 namespace offstage::render {
 namespace {
 
-constexpr int kMaxSide = 16384;  // also OpenGL's limit here
+constexpr int kMaxSide = 16384;  // also the limit of OpenGL with llvmpipe
 constexpr uint64_t kMaxImageBytes = uint64_t{1} << 30;
 
 FileError unreadable_image(const std::string& name, const std::string& why) {
@@ -152,7 +152,8 @@ Image decode_image(std::span<const uint8_t> bytes, const std::string& name, uint
   int width = 0, height = 0, channels = 0;
   check_declared_size(bytes, name, max_pixels);
   if (bytes[0] == 'P' && stbi_is_16_bit_from_memory(bytes.data(), size)) {
-    throw fail("PNM of 16 bits is not supported; convert it to PNG");  // stb_image swaps their bytes
+    throw fail(
+        "PNM of 16 bits is not supported; convert it to PNG");  // stb_image swaps the bytes of their samples
   }
   const auto pixels = decode_whole<stbi_uc>(bytes, name, [&](stbi__context* file) {
     return stbi__load_and_postprocess_8bit(file, &width, &height, &channels, STBI_rgb_alpha);
@@ -166,7 +167,7 @@ Image decode_image(std::span<const uint8_t> bytes, const std::string& name, uint
 LightImage decode_light_image(std::span<const uint8_t> bytes, const std::string& name, uint64_t max_pixels) {
   if (bytes.empty()) throw unreadable_image(name, "it is empty");
   if (bytes.size() > kMaxImageBytes) throw unreadable_image(name, "it is larger than 1 GiB");
-  constexpr float kLargest = 65504;  // of a half float
+  constexpr float kLargest = 65504;  // the largest half float
   LightImage result{decode_light(bytes, name, max_pixels), {}};
   std::size_t raised = 0, limited = 0;
   for (float& value : result.image.rgba) {

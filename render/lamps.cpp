@@ -16,7 +16,8 @@ Lamp lamp_of_fire(const PointSet& flames) {
     light += seen * p.color.head<3>();
   }
   if (area <= 0) return {.intensity = Vector3f::Zero()};
-  // Flames hide each other: their total visible area is at most one side of the box around them.
+  // Flames hide each other, so their total visible area is at most the area of one side of the box around
+  // them.
   constexpr float kCover = 0.6f;  // fraction of a flame's disc that is covered
   constexpr float kDimmed = 4;  // flames are drawn darker than they are, because otherwise all would be white
   const Vector3f sizes = flames.box.sizes();

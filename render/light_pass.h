@@ -15,23 +15,24 @@ struct View;
 
 class LightPass {
  public:
-  /// `depth`: depth buffer of the picture, into which the visible surfaces are drawn. `quick`: see StageDef.
+  /// Creates the textures. `depth`: depth buffer of the picture, into which the visible surfaces are drawn.
+  /// `quick`: see StageDef.
   LightPass(int width_px, int height_px, const gl::Texture& depth, bool quick);
-  /// The scene for ray tracing. It must be filled and built before trace().
+  /// Returns the scene for ray tracing. It must be filled and built before trace().
   RayScene& scene() { return scene_; }
   const RayScene& scene() const { return scene_; }
-  /// Sums over all traced light.
+  /// Returns the sums over all traced light.
   const LightSums& sums() const { return sums_; }
   /// Binds and clears the targets for drawing surfaces.
   void begin() const;
   /// Reads the surfaces, traces their light, and binds it for the shaders. `stop`: see Stage::draw.
   void trace(const LightSources& sources, const View& view, const SampleOffsets& offsets,
              const StopTest& stop);
-  /// Binds the surfaces for shaders/plain.frag. Call it after trace() of a quick picture.
+  /// Binds the surfaces for shaders/plain.frag. Must be called after trace() of a quick picture.
   void bind_surfaces() const;
   /// Binds the targets for drawing the surfaces of glass, or of a translucent body, in a part of the picture.
-  /// Call it after trace(). `depth`: depth buffer of the picture, whose nearer surfaces hide the new ones.
-  /// Returns false if the area is outside of the picture.
+  /// Must be called after trace(). `depth`: depth buffer of the picture, whose nearer surfaces hide the new
+  /// ones. Returns false if the area is outside of the picture.
   bool begin_part(GLuint depth, const Eigen::AlignedBox2i& area_px);
   /// Traces the light of glass. `picture_framebuffer` must contain the opaque objects.
   void trace_glass(const LightSources& sources, const View& view, const SampleOffsets& offsets,
@@ -50,7 +51,8 @@ class LightPass {
   RayScene scene_;
   Eigen::AlignedBox2i all_px_;
   LightSums sums_;
-  SurfaceBuffer surfaces_;  ///< the surfaces whose light is traced last: opaque ones, or a part
+  SurfaceBuffer
+      surfaces_;  ///< the surfaces whose light was traced last: all opaque surfaces, or a translucent part
   LightBuffer light_;
   bool quick_;
   gl::Texture places_, normals_;

@@ -44,8 +44,8 @@ void for_each_edge(const std::vector<Side>& sides, Visit&& visit) {
   }
 }
 
-/// Whether a boundary with these directions before and after a vertex has a corner there. A zero direction
-/// counts as a corner.
+/// Returns whether a boundary with these directions before and after a vertex has a corner there. A zero
+/// direction counts as a corner.
 bool turns(const Eigen::Vector2f& before, const Eigen::Vector2f& after) {
   return !(before.dot(after) > 0.5f * before.norm() * after.norm());
 }

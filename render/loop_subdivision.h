@@ -22,11 +22,11 @@ std::vector<BoundaryEdge> boundary_edges(std::span<const uint32_t> triangles);
 /// boundary turns by more than 60 degrees, or where more than two boundary edges meet.
 class LoopSubdivision {
  public:
-  /// `triangles`: three indices each, below the size of `places`. `places`: positions of the vertices on the
-  /// flat sheet. An edge of more than two triangles counts as boundary.
+  /// Prepares one step of subdivision. `triangles`: three indices each, below the size of `places`. `places`:
+  /// positions of the vertices on the flat sheet. An edge of more than two triangles counts as boundary.
   LoopSubdivision(std::span<const uint32_t> triangles, std::span<const Eigen::Vector2f> places);
 
-  /// Triangles of the finer mesh: the coarse vertices come first, then one vertex per edge.
+  /// Returns the triangles of the finer mesh. Its vertices are the coarse vertices, then one vertex per edge.
   const std::vector<uint32_t>& triangles() const { return triangles_; }
   std::size_t vertex_count() const { return first_term_.size() - 1; }
 

@@ -82,7 +82,8 @@ Vector4f linear_color(const aiColor4D& c) {
           std::clamp(static_cast<float>(c.a), 0.0f, 1.0f)};
 }
 
-/// assimp gives the bytes of Blender's files as signed numbers: 255 is -1.
+/// Converts a colour that was stored as bytes. assimp reads the bytes of Blender's files as signed numbers,
+/// so 255 arrives as -1.
 aiColor4D from_bytes(const aiColor4D& c) {
   const auto fraction = [](ai_real value) { return (value < 0 ? value + 256 : value) / 255; };
   return {fraction(c.r), fraction(c.g), fraction(c.b), fraction(c.a)};
@@ -150,7 +151,7 @@ class AssimpSurfaces {
     }
     Material& look = model_.materials[material];
     look.vertex_colors = true;
-    // The grey of files without materials, such as scans, would darken the colours.
+    // Files without materials, such as scans, get a grey material. Its grey would darken the vertex colours.
     if (look.name.empty() || look.name == AI_DEFAULT_MATERIAL_NAME) look.color = Vector4f::Ones();
     look.vertex_alpha |= std::ranges::any_of(out.colors, [](const Vector4f& c) { return c.w() < 1; });
   }
@@ -163,8 +164,8 @@ class AssimpSurfaces {
   std::map<unsigned, FileSurface> surfaces_;
 };
 
-/// Lists the nodes that have meshes, and adds the meshes of all of them, or of the node `wanted`. Depth first
-/// with an explicit stack, because the depth depends on the file.
+/// Lists the nodes that have meshes, and adds the meshes of all of them, or of the node `wanted`. The search
+/// is depth-first with an explicit stack, because the depth depends on the file.
 void place_nodes(const aiScene& scene, const std::string& wanted, AssimpSurfaces& surfaces, Model& model) {
   struct Item {
     const aiNode* node;
@@ -203,7 +204,7 @@ std::string reason(const Assimp::Importer& importer) {
   return error.empty() ? "no reason given" : error;
 }
 
-/// Returns the names of things that the file contains but that are not read. Files of FBX are searched,
+/// Returns one message for each kind of content of the file that is not read. Files of FBX are searched,
 /// because their animations are not read.
 std::vector<std::string> ignored_by_assimp(const aiScene& scene) {
   std::vector<std::string> lines;

@@ -203,7 +203,7 @@ class Reader {
   }
   template <class T, class Each>
   void list(std::vector<T>& values, Each each) {
-    // Without reserve(): a wrong count ends with the bytes, before it has taken much memory.
+    // reserve() is not called: with a wrong count, the bytes end before much memory is allocated.
     for (std::size_t left = count(1); left > 0; --left) each(values.emplace_back());
   }
 
@@ -255,8 +255,8 @@ bool is_whole(const Model::Light& light, const ModelRig& rig) {
          (light.kind != Model::Light::Kind::spot || cone > 0) && cone <= 90 && std::isfinite(light.range_m);
 }
 
-/// Whether a model is consistent: all indices are valid and all sizes agree. Such a model can be drawn and
-/// simulated safely.
+/// Returns whether a model is consistent: all indices are valid and all sizes agree. Such a model can be
+/// drawn and simulated safely.
 bool is_whole(const Model& model) {
   const auto refers = [](int index, std::size_t size) {
     return index >= 0 && static_cast<std::size_t>(index) < size;

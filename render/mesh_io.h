@@ -17,7 +17,7 @@ namespace offstage::render {
 
 struct ModelPath {
   std::filesystem::path file;
-  std::string node;  ///< empty: the whole file
+  std::string node;  ///< name of the node; empty: the whole file
 };
 /// Splits FILE#NODE, unless a file with the whole name exists.
 ModelPath split_node(const std::filesystem::path& path);

@@ -76,13 +76,14 @@ class MaterialImporter {
         texture(source, {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}, opaque, &uv_set);
     material.emission_texture.image =
         texture(source, {aiTextureType_EMISSION_COLOR, aiTextureType_EMISSIVE}, true);
-    // glTF's combined image; formats with two separate images are not supported.
+    // glTF has one image for metal and roughness. Formats with two separate images are not supported.
     if (gltf) material.metallic_roughness_texture.image = texture(source, {aiTextureType_UNKNOWN}, true);
     if (material.name.empty() && material.base_color_texture.image < 0 &&
         material.color == Vector4f::Ones()) {
       give_default_look(material);
     }
-    if (!gltf && material.color.w() < 1e-3f) {  // many programs write the transparency here instead
+    if (!gltf &&
+        material.color.w() < 1e-3f) {  // many programs write the transparency in place of the opacity
       material.color.w() = 1;
       model_.warnings.push_back("material '" + material.name + "': opacity 0 is read as opaque");
     }
@@ -106,7 +107,8 @@ class MaterialImporter {
         model_.warnings.push_back("material '" + name + "': its " + what + " is ignored");
   }
 
-  /// A file without materials gets an unnamed white one, which for glTF is rough metal.
+  /// Gives the default look of offstage to the material of a file without materials. assimp gives such a file
+  /// an unnamed white material, which for glTF is rough metal.
   static void give_default_look(Material& material) {
     material.color = Material{}.color;
     if (material.metallic == 1 && material.roughness == 1) {
@@ -253,8 +255,8 @@ class MaterialImporter {
   const InputFolders& folders_;
   Model& model_;
   std::map<std::pair<std::string, bool>, int> loaded_;
-  std::map<std::pair<int, int>, int> masked_;   ///< by base colour and mask
-  std::map<std::pair<int, float>, int> bumps_;  ///< normal maps by height map and strength
+  std::map<std::pair<int, int>, int> masked_;   ///< keys: indices of the base colour and the mask
+  std::map<std::pair<int, float>, int> bumps_;  ///< normal maps; keys: index of the height map, and strength
 };
 
 }  // namespace

@@ -25,7 +25,7 @@ constexpr GLuint kVertexBinding = 0, kInstanceBinding = 1, kDetailBinding = 2;
 constexpr GLuint kSecondUv = 6, kColor = 7, kTangent = 8, kBefore = 9;  // attributes
 constexpr GLuint kMaterialBlock = 1;
 constexpr std::array<GLuint, kTextureMaps> kTextureUnits = {1, 2, 3, 14, 15, 16, 17};
-constexpr float kSmooth = 0.3f;  // with less roughness, a surface shows a mirror image of the scene
+constexpr float kSmooth = 0.3f;  // a surface with a smaller roughness shows a mirror image of the scene
 // The first three rows of a transform.
 using Rows = std::array<Vector4f, 3>;
 
@@ -216,7 +216,7 @@ void MeshPass::prepare(std::span<const Instance* const> instances, const View& v
       seen.begin(), seen.end(), [](const Item& item) { return !item.instance->material->lets_through(); });
   const std::vector<Item> see_through(transparent, seen.end());
   seen.erase(transparent, seen.end());
-  // Surfaces cut out by their texture are opaque where the texture is, so they are drawn in both passes.
+  // A surface that is cut out by its texture is opaque in some places, so it is drawn in both passes.
   const auto by_batch = [](const Item& a, const Item& b) {
     return std::tie(a.instance->batch_key, a.mirrored, a.depth, a.order) <
            std::tie(b.instance->batch_key, b.mirrored, b.depth, b.order);
@@ -257,7 +257,8 @@ void MeshPass::draw(const Batch& batch) {
 
 gl::LazyProgram& MeshPass::surface_program(const Batch& batch, Shading shading) {
   const GpuMaterial& material = *batch.material;
-  // The relief of a pattern is visible only in mirror images; without them its surface is quick to draw.
+  // The relief of a pattern is visible only in mirror images. A surface without mirror images is drawn
+  // without the relief, which is faster.
   const bool surface = shading == Shading::surface;
   const Pattern pattern = surface && !material.smooth ? Pattern::none : material.pattern;
   const bool plain = surface && is_plain(batch);

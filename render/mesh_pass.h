@@ -34,7 +34,7 @@ struct GpuMesh {
   std::unique_ptr<const RayMesh> rays;  ///< the mesh for ray tracing
 
   bool stored = false;         ///< whether the mesh existed at the last Stage::store_previous_transforms()
-  gl::Buffer vertices_before;  ///< previous vertices, if they have been replaced; otherwise 0
+  gl::Buffer vertices_before;  ///< the vertices before the last replacement; 0: they were not replaced
 
   /// Stores the current vertices as the previous positions for Channels::motion.
   void store();
@@ -71,7 +71,7 @@ struct GpuMaterial {
   bool plain = false;
   std::unique_ptr<const RayMaterial> rays;  ///< the material for ray tracing
 
-  /// Whether objects behind the surface are visible through it.
+  /// Returns whether objects behind the surface are visible through it.
   bool lets_through() const { return blended || glass; }
 };
 
@@ -91,10 +91,10 @@ struct Instance {
   std::optional<Eigen::Affine3f> before;  ///< pose at Stage::store_previous_transforms
 
   float scale() const;
-  /// Centre and radius of the bounding sphere in the world [m].
+  /// Return the centre and the radius of the bounding sphere in the world [m].
   Vector3f center() const { return world_from_mesh * mesh->center; }
   float radius() const { return mesh->radius * scale(); }
-  /// Whether the instance fills the ball of center() and radius().
+  /// Returns whether the instance fills the ball of center() and radius().
   bool is_ball() const;
 };
 
@@ -113,7 +113,7 @@ class MeshPass {
   /// Draws the opaque instances, and the opaque parts of blended ones.
   void draw_opaque(Shading shading);
   GLuint white() const { return white_; }
-  /// Translucent instances, in the order of the instances.
+  /// Returns the translucent instances, in the order of all instances.
   std::span<const Instance* const> translucent() const { return see_through_; }
   /// Draws element k of translucent(). With Shading::traced_with_particles, the pictures with and without the
   /// particles behind it must be bound.
@@ -128,12 +128,12 @@ class MeshPass {
     const GpuMaterial* material;
     bool mirrored;
     float depth;
-    GLuint first;  ///< first row of its instances
+    GLuint first;  ///< first row of the batch's instances
     GLsizei count;
-    float thickness;  ///< thickness of its first instance, in the world
+    float thickness;  ///< thickness of the batch's first instance in the world [m]
   };
   void draw(const Batch& batch);
-  /// Whether the surface pass writes everything on which the colour of a batch depends.
+  /// Returns whether the surface pass writes everything on which the colour of a batch depends.
   bool is_plain(const Batch& batch) const { return quick_ && batch.material->plain && !batch.mesh->endless; }
   gl::LazyProgram& surface_program(const Batch& batch, Shading shading);
   static void set_facing(const Batch& batch);

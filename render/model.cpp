@@ -23,7 +23,8 @@ struct PositionHash {
   }
 };
 
-// For each position, the corners (indices into `indices`) of all triangles that touch it, as one flat list.
+// For each position, the corners of all triangles at this position, as one flat list. A corner is an index
+// into `indices`.
 struct Fans {
   std::vector<uint32_t> position;  // number of the welded position of each vertex
   std::vector<uint32_t> begin;     // first element in `corner` of each position
@@ -93,7 +94,7 @@ bool TextureMap::is_plain() const {
 
 bool Material::is_detailed() const {
   const bool laid = triplanar || !base_color_texture.is_plain();
-  if (pattern != Pattern::none) return laid;  // patterns replace the others
+  if (pattern != Pattern::none) return laid;  // a pattern replaces all other textures
   const bool more = normal_texture.image >= 0 || occlusion_texture.image >= 0 ||
                     transmission_texture.image >= 0 || specular_texture.image >= 0;
   const bool moved = !metallic_roughness_texture.is_plain() || !emission_texture.is_plain();

@@ -54,7 +54,7 @@ enum class Wrap { repeat, mirror, clamp };
 /// A texture of a material and its mapping.
 struct TextureMap {
   int image = -1;  ///< index into Model::textures, -1: none
-  int uv_set = 0;  ///< 0: Mesh::uvs, 1: Mesh::second_uvs
+  int uv_set = 0;  ///< set of texture coordinates: 0 is Mesh::uvs, 1 is Mesh::second_uvs
   Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
   bool nearest = false;  ///< whether enlarged texels are squares instead of being interpolated
   bool mip_maps = true;  ///< whether minified texels are averaged
@@ -106,7 +106,8 @@ struct Material {
   float clearcoat_roughness = 0;
   Vector3f sheen_color = Vector3f::Zero();  ///< colour of light scattered at grazing angles, as by velvet
 
-  /// Whether the material needs more than its first three textures, or a transform of texture coordinates.
+  /// Returns whether the material needs more than its first three textures, or a transform of texture
+  /// coordinates.
   bool is_detailed() const;
 };
 
@@ -156,20 +157,20 @@ struct Model {
     Eigen::Matrix4f model_from_place = Eigen::Matrix4f::Identity();
   };
   struct Camera : Place {
-    bool perspective = true;  ///< false: orthographic
+    bool perspective = true;  ///< whether the projection is perspective; false: orthographic
     float fov_deg = 0;        ///< vertical
   };
   struct Light : Place {
     enum class Kind { directional, point, spot };
     Kind kind = Kind::point;
     Vector3f color = Vector3f::Ones();
-    float intensity = 1;                  ///< [lx] of directional lights, else [cd]
+    float intensity = 1;  ///< illuminance of a directional light [lx], or intensity of another light [cd]
     float inner_deg = 0, outer_deg = 45;  ///< half angles of a spot's cone: full light, no light
     float range_m = 0;                    ///< distance beyond which the light has no effect; 0: no limit
   };
   std::vector<Camera> cameras;
   std::vector<Light> lights;
-  std::string unit;  ///< unit of length in the file and how it was found, in words
+  std::string unit;  ///< unit of length in the file, and how it was found, as text
   enum class UnitSource { stated, none, millimetres };
   UnitSource unit_source = UnitSource::none;  ///< `millimetres`: not stated, but usual (STL); read as metres
   /// Longest side of the box around the content of the whole file [m]; empty if only a node was read (see

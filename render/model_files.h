@@ -16,7 +16,7 @@ namespace offstage::render {
 /// treated as missing. `folders` must outlive the result.
 std::unique_ptr<Assimp::IOSystem> make_model_files(const InputFolders& folders);
 
-/// Whether a file name ends in `ending`, in any letter case.
+/// Returns whether a file name ends in `ending`, in any letter case.
 bool has_ending(const std::filesystem::path& path, const std::string& ending);
 
 /// Finds a file that a model refers to. Tries the given path, then its file name in the model's folder, then

@@ -22,7 +22,7 @@ struct RigNode {
   Vector3f scale = Vector3f::Ones();
   bool has_matrix = false;
   Eigen::Matrix4f matrix = Eigen::Matrix4f::Identity();
-  std::vector<float> weights;  ///< weights of the morph targets of its mesh
+  std::vector<float> weights;  ///< weights of the morph targets of the node's mesh
 };
 
 /// One property of one node over time (section 3.11).
@@ -54,12 +54,12 @@ struct RigTarget {
 /// A mesh with one material that moves with a node or a skin.
 struct RigSurface {
   int node = 0;
-  int skin = -1;                 ///< -1: none; then the triangles are in the node's frame
-  int material = 0;              ///< index into Model::materials
-  Mesh mesh;                     ///< the mesh without morph targets and skin
-  bool flat = false;             ///< whether the file has no normals, so that each face has its own
-  std::size_t influences = 0;    ///< joints per vertex
-  std::vector<uint32_t> joints;  ///< indices into RigSkin::joints; others are ignored
+  int skin = -1;               ///< index of the skin; -1: none, the triangles are in the node's frame
+  int material = 0;            ///< index into Model::materials
+  Mesh mesh;                   ///< the mesh without morph targets and skin
+  bool flat = false;           ///< whether the file has no normals, so that each face has a normal of its own
+  std::size_t influences = 0;  ///< joints per vertex
+  std::vector<uint32_t> joints;  ///< indices into RigSkin::joints; indices out of range are ignored
   std::vector<float> weights;    ///< weight of each entry of `joints`
   std::vector<RigTarget> targets;
 
@@ -90,8 +90,8 @@ RigPose pose_at(const ModelRig& rig, int clip, float time);
 /// skin it is in the model's frame, otherwise in the frame of its node.
 Mesh deformed(const ModelRig& rig, const RigSurface& surface, const RigPose& pose);
 
-/// Whether all indices are in range, all sizes agree and all numbers are finite. `materials`: number of
-/// materials.
+/// Returns whether all indices are in range, all sizes agree and all numbers are finite. `materials`: number
+/// of materials.
 bool is_whole(const ModelRig& rig, std::size_t materials);
 
 }  // namespace offstage::render

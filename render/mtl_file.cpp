@@ -61,7 +61,7 @@ Eigen::Vector2f next_pair(std::string_view& line, float missing) {
   for (int k = 0; k < 3; ++k) {
     std::string_view rest = line;
     const std::optional<float> value = mtl_number(next_word(rest));
-    if (!value || rest.empty()) break;  // the last word is the file
+    if (!value || rest.empty()) break;  // the last word is the name of the file
     if (k < 2) result[k] = *value;
     line = rest;
   }
@@ -164,7 +164,7 @@ std::map<std::string, MtlMaterial> read_mtl_of(const std::filesystem::path& obj,
       const std::vector<uint8_t> text = read_file(file, kMaxMtlBytes);
       read_mtl({text.begin(), text.end()}, materials);
     } catch (const FileError&) {
-      continue;  // assimp reads the same file and has the message
+      continue;  // no message here: assimp reads the same file and reports the error
     }
   }
   return materials;

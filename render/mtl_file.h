@@ -30,7 +30,7 @@ struct MtlMaterial {
   std::set<std::string> ignored;             ///< names of the statements without effect, in lower case
 };
 
-/// Parses the text of one library.
+/// Parses the text of a material library and adds its materials.
 void read_mtl(const std::string& text, std::map<std::string, MtlMaterial>& materials);
 
 /// Returns only the statements that assimp reads correctly: names, colours, numbers, and textures without

@@ -10,7 +10,7 @@ constexpr int kOpacityCells = 72;  // number of cells along the longest side
 // Greatest number of cells per radius of a typical puff. Finer cells would show single puffs.
 constexpr float kCellsPerRadius = 2;
 
-// Corners of a tetrahedron: four points within a puff that represent it.
+// Corners of a tetrahedron: four points that represent the volume of a puff.
 const std::array<Vector3f, 4> kCorners = {Vector3f(1, 1, 1), Vector3f(1, -1, -1), Vector3f(-1, 1, -1),
                                           Vector3f(-1, -1, 1)};
 
@@ -37,8 +37,8 @@ void OpacityGrid::fit(std::span<const Absorber> absorbers, const Vector3f& away)
   }
   const float typical = static_cast<float>(volume / area);
   const float needed = std::max(box.sizes().maxCoeff() / (kOpacityCells - 4), typical / kCellsPerRadius);
-  // The cell size changes in steps and the corner is on whole cells, so that the shadow does not swim while
-  // the smoke grows.
+  // The cell size changes in steps, and the corner is at a multiple of the cell size. Otherwise the shadow
+  // would flicker while the smoke grows.
   cell_ = std::exp2(std::ceil(4 * std::log2(needed)) / 4);
   const Vector3f low = ((box.min() / cell_).array().floor() - 1).matrix();
   const Vector3f high = ((box.max() / cell_).array().ceil() + 1).matrix();

@@ -27,7 +27,7 @@ class OpacityGrid {
   bool empty() const { return sums_.empty(); }
   /// Returns the optical depth between the sun and a point, at least 0.
   float depth(const Vector3f& place) const;
-  /// Optical depth per metre.
+  /// Returns the optical depth per metre.
   float density(const Vector3f& place) const;
   float cell_m() const { return cell_; }
 

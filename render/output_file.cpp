@@ -18,7 +18,8 @@ namespace {
 constexpr std::string_view kPrefix = ".offstage-", kEnding = ".part";
 constexpr std::size_t kRandomLetters = 8;
 
-/// The name is random and does not contain the target's name, which may be as long as the system allows.
+/// Returns a random name for a temporary file. It does not contain the name of the output, which may already
+/// be as long as the system allows.
 std::string temporary_name() {
   static constexpr std::string_view kLetters = "0123456789abcdefghijklmnopqrstuvwxyz";
   std::random_device random;
@@ -51,8 +52,8 @@ OutputFile::OutputFile(const std::filesystem::path& target) : target_(target) {
     file_ = Descriptor(::open(path_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
     if (!file_ && errno == EEXIST) continue;
     if (!file_) throw_file_error(target_, "cannot be created");
-    // Between these two calls another process may remove the file as a leftover; another name is then tried.
-    // On a file system without locks leftovers are kept.
+    // Another process may remove the file as a leftover between these two calls. In this case another name is
+    // tried. Leftovers on a file system without locks are not removed.
     struct stat info {};
     if (::flock(file_.fd(), LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK)
       if (::fstat(file_.fd(), &info) == 0 && info.st_nlink > 0) return;

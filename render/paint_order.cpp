@@ -76,8 +76,8 @@ Region::Region(const Eigen::AlignedBox3f& box, const Eigen::Affine3f& world_from
   }
 }
 
-// A plane between a place and a body determines which of them can hide the other, wherever they are in the
-// picture, because the eye is on one side of it.
+// If a plane separates a place from a body, the one on the eye's side of the plane can hide the other one,
+// wherever they are in the picture.
 bool Region::hides(const Vector3f& place, float depth) const {
   if (depth <= nearest_) return false;
   if (depth > farthest_) return true;

@@ -15,7 +15,8 @@ namespace offstage::render {
 /// The space that a translucent body occupies: an oriented box, or the ball inscribed in it.
 class Region {
  public:
-  /// `round`: the body is the ball inscribed in the box, which is then a cube.
+  /// Creates the region of a body. `round`: whether the body is the ball inscribed in the box, which is then
+  /// a cube.
   Region(const Eigen::AlignedBox3f& box, const Eigen::Affine3f& world_from_box, bool round, const View& view);
 
   /// Returns whether a point in the world counts as behind the body. `depth`: depth of the point along the
@@ -74,7 +75,7 @@ class PaintOrder {
   };
   struct Source {
     const PointSet* set;
-    uint32_t first;  ///< index of its first point among all points of its kind
+    uint32_t first;  ///< index of the set's first point among all points of its kind
   };
   struct Place {
     const PointSet* set;
@@ -87,7 +88,7 @@ class PaintOrder {
   /// Keys of the visible particles of a kind, nearest first; equal depths are ordered by set and id.
   std::span<const uint64_t> keys(Kind kind) const { return keys_[index(kind)]; }
   std::span<const Source> sources(Kind kind) const { return sources_[index(kind)]; }
-  /// Number of all points of a kind, whether visible or not.
+  /// Returns the number of all points of a kind, whether visible or not.
   uint32_t count(Kind kind) const { return counts_[index(kind)]; }
   uint32_t number(Kind kind, uint64_t key) const;
   Place place(Kind kind, uint64_t key) const;
@@ -96,7 +97,7 @@ class PaintOrder {
   /// `body` is the number of bodies, these are the runs in front of all bodies.
   std::span<const Run> runs_before(std::size_t body) const;
   std::size_t run_count() const { return runs_.size(); }
-  /// The pixels that the sprites or flakes of a run can change.
+  /// Returns the pixels that the sprites or flakes of a run can change.
   Eigen::AlignedBox2i area_px(const Run& run, const View& view, int width_px, int height_px) const;
 
  private:
@@ -112,8 +113,8 @@ class PaintOrder {
       1;  ///< number of bodies per group; particles are not inserted between the bodies of a group
   std::vector<Run> runs_;  ///< back to front
   std::vector<uint32_t>
-      /// Index of the first run before each body, then that of the particles in front of all bodies, then the
-      /// end.
+      /// For each body, the index of the first run that is drawn before it. Then the index of the first run
+      /// in front of all bodies, and the number of runs.
       run_begins_;
 };
 

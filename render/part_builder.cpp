@@ -64,7 +64,7 @@ std::vector<Vector3f> moved_normals(const Mesh& mesh, const Eigen::Affine3d& wor
 Vector4f moved_tangent(const Vector4f& tangent, const Eigen::Affine3d& world_from_mesh, bool mirrored) {
   const Eigen::Vector3d t = world_from_mesh.linear() * tangent.head<3>().cast<double>();
   const double length = t.norm();
-  if (!(length > 0) || !std::isfinite(length)) return {0, 0, 0, 1};  // derived while drawing
+  if (!(length > 0) || !std::isfinite(length)) return {0, 0, 0, 1};  // the shader derives the tangent
   Vector4f result;
   result << (t / length).cast<float>(), (tangent.w() < 0) != mirrored ? -1.0f : 1.0f;
   return result;
@@ -79,7 +79,7 @@ Vector2f finite_uv(const Vector2f& uv) {
   return uv.allFinite() ? uv : Vector2f(0, 0);
 }
 
-/// Colours beyond 1 are kept, because they brighten.
+/// Colours above 1 are kept, because they make a surface brighter.
 Vector4f finite_color(const Vector4f& color) {
   constexpr float kBrightest = 1e4f;
   return color.allFinite() ? Vector4f(color.cwiseMax(0).cwiseMin(kBrightest)) : Vector4f(1, 1, 1, 1);

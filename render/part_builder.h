@@ -23,12 +23,12 @@ class PartBuilder {
   explicit PartBuilder(Model& model) : model_(model) {}
 
   void add(const FileSurface& surface, const Eigen::Affine3d& world_from_mesh);
-  /// Records elements that are left out, because only triangles are drawn.
+  /// Records elements that are omitted, because only triangles are drawn.
   void count_skipped(std::size_t points, std::size_t lines) {
     points_ += points;
     lines_ += lines;
   }
-  /// Returns one line for each kind of element that was left out.
+  /// Returns one line for each kind of element that was omitted.
   std::vector<std::string> left_out() const;
 
  private:

@@ -11,7 +11,7 @@ namespace offstage::render {
 
 class PictureCopy {
  public:
-  /// `unit`: texture unit that the copy is bound to. The texture is created on first use.
+  /// Describes a copy whose texture is created on first use. `unit`: texture unit to which the copy is bound.
   PictureCopy(GLenum format, GLenum filter, GLuint unit, int width_px, int height_px);
   /// Marks an area of the picture as changed.
   void change(const Eigen::AlignedBox2i& area_px);

@@ -40,8 +40,8 @@ class SigpipeBlock {
   bool was_pending_ = false;
 };
 
-/// Standard output. If it is a pipe, it is opened a second time. It can then be non-blocking for this process
-/// and stay blocking for other processes that share it.
+/// Standard output. A pipe is opened a second time. The new descriptor is non-blocking for this process,
+/// while the pipe stays blocking for other processes that share it.
 class StandardOutput {
  public:
   explicit StandardOutput(StopTest stop) : stop_(std::move(stop)) {

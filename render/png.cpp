@@ -66,7 +66,7 @@ std::vector<uint8_t> encode_png(const PngPixels& pixels) {
   append_number(header, static_cast<uint32_t>(pixels.width_px));
   append_number(header, static_cast<uint32_t>(pixels.height_px));
   const auto kind = static_cast<uint8_t>(pixels.channels == 1 ? 0 : pixels.channels == 3 ? 2 : 6);
-  // Deflate, the standard filters, not interlaced.
+  // The last three values mean: deflate, the standard filters, not interlaced.
   header.insert(header.end(), {static_cast<uint8_t>(pixels.bits), kind, 0, 0, 0});
   append_chunk(png, "IHDR", header);
 
@@ -76,7 +76,7 @@ std::vector<uint8_t> encode_png(const PngPixels& pixels) {
     append_chunk(png, "tEXt", text);
   }
   if (!pixels.comment.empty()) {
-    // Keyword, not compressed, no language, no translation of the keyword.
+    // The keyword is followed by zeros that mean: not compressed, no language, no translated keyword.
     constexpr std::string_view kStart("Comment\0\0\0\0\0", 12);
     std::vector<uint8_t> text(kStart.begin(), kStart.end());
     text.insert(text.end(), pixels.comment.begin(), pixels.comment.end());

@@ -20,13 +20,14 @@ struct PointCloud {
 };
 
 /// Reads all vertices of a PLY file (text or binary) or of an OBJ file, whether faces use them or not.
-/// Colours of vertices are taken as sRGB. Points that are not finite are left out. Throws FileError for a
-/// file that is missing, broken, outside of `folders`, of another format, or without points; StoppedError
-/// after a request by `stop`.
+/// Colours of vertices are taken as sRGB. Points that are not finite are omitted. Throws FileError for a file
+/// that is missing, broken, outside of `folders`, of another format, or without points; StoppedError after a
+/// request by `stop`.
 PointCloud read_points(const std::filesystem::path& path, const InputFolders& folders = {},
                        const StopTest& stop = {});
 
-/// The part that handles untrusted bytes. Private to render and its tests. Throws FileError.
+/// Parses the bytes of a PLY file, which are not trusted. Only the render library and its tests use this
+/// function. Throws FileError.
 PointCloud parse_ply_points(std::span<const uint8_t> bytes);
 PointCloud parse_obj_points(std::span<const uint8_t> bytes);
 

@@ -203,8 +203,8 @@ void PointsPass::draw_blended(PointStyle style, uint32_t first, uint32_t last) {
   const uint32_t end = begin + (last - first);
   glVertexArrayVertexBuffer(blended_array_, 0, blended_buffer_, 0, sizeof(BlendedPoint));
   glBindVertexArray(blended_array_);
-  // Consecutive particles with other pictures need a separate draw call. As little state as possible changes
-  // between two calls.
+  // Consecutive particles share a draw call only if they have the same texture. As little state as possible
+  // changes between two calls.
   auto run = std::upper_bound(picture_runs_.begin(), picture_runs_.end(), std::size_t{begin},
                               [](std::size_t place, const PictureRun& r) { return place < r.first; });
   std::optional<bool> with_pictures;

@@ -26,7 +26,8 @@ using GpuPicture = Vector4f;
 /// A sprite or flake of any set.
 struct BlendedPoint {
   GpuPoint point;
-  Vector4f style;  ///< softness, stretch [s]; fraction of the sun that is visible, or -1: not lit; additive
+  Vector4f style;  ///< x: softness; y: stretch [s]; z: visible fraction of the sun, or -1 for a particle that
+                   ///< is not lit; w: additive
   GpuPicture picture;
   /// Light of lamps and from around, a column for each of red, green and blue: the constant and the slope of
   /// an AirRadiance.
@@ -36,12 +37,12 @@ struct BlendedPoint {
 
 struct PointSet {
   PointsDef def;
-  std::vector<GpuPoint>
-      points;  ///< w of position: radius; w of velocity: a pseudo-random number per particle in [0, 1)
+  std::vector<GpuPoint> points;  ///< the particles; w of the position is the radius, w of the velocity a
+                                 ///< pseudo-random number in [0, 1)
   std::vector<uint64_t> ids;
   std::vector<float> ages;
   std::vector<GpuPicture> turns;                   ///< for each point of sprites and flakes
-  std::shared_ptr<const SpritePictures> pictures;  ///< null: soft discs
+  std::shared_ptr<const SpritePictures> pictures;  ///< pictures of the sprites; null: soft discs
   Eigen::AlignedBox3f box;                         ///< bounds of the drawn particles, streaks at full length
   gl::StreamBuffer buffer;                         ///< visible balls by depth
   std::size_t seen = 0;                            ///< number of visible balls in the buffer
@@ -49,11 +50,11 @@ struct PointSet {
   std::unique_ptr<const RayMaterial> rays;         ///< material of spheres, for light rays
 
   void assign(std::span<const Point> values);
-  /// Whether the points are smoke or fire, which PuffsPass draws.
+  /// Returns whether the points are smoke or fire, which PuffsPass draws.
   bool is_puffs() const { return def.style == PointStyle::smoke || def.style == PointStyle::fire; }
-  /// Whether another pass draws the points: PuffsPass, or StreaksPass for streaks.
+  /// Returns whether another pass draws the points: PuffsPass, or StreaksPass for streaks.
   bool is_splatted() const { return is_puffs() || def.style == PointStyle::streak; }
-  /// Whether points are stretched along their motion.
+  /// Returns whether points are stretched along their motion.
   bool is_stretched() const { return def.style != PointStyle::sphere; }
   bool is_turned() const { return def.style == PointStyle::sprite || def.style == PointStyle::flake; }
   /// Returns the radius of the bounding sphere of the drawn particle i [m].
@@ -100,7 +101,7 @@ class PointsPass {
   gl::VertexArray vertex_array_, blended_array_;
   std::vector<GpuPoint> ordered_;
   gl::StreamBuffer blended_buffer_;
-  std::vector<BlendedPoint> blended_;  ///< all sprites, then all flakes, each back to front
+  std::vector<BlendedPoint> blended_;  ///< all sprites from back to front, then all flakes from back to front
   /// A run of blended points that share a texture of pictures.
   struct PictureRun {
     std::size_t first;

@@ -11,7 +11,8 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr std::size_t kMostCorners = 1024;  // the time grows with the square, in the worst case with the cube
+constexpr std::size_t kMostCorners =
+    1024;  // greatest number of corners; the time grows with its square, in the worst case with its cube
 /// Areas below this fraction of the square of the polygon's extent count as zero.
 constexpr double kNoArea = 1e-12;
 
@@ -42,7 +43,7 @@ class EarCutter {
     rate_all(any);
     for (; left_ > 2; --left_) {
       uint32_t best = fittest(any);
-      if (!(fitness_[best] > 0)) {  // some may have become ears when others were cut off
+      if (!(fitness_[best] > 0)) {  // a corner may have become an ear when others were cut off
         rate_all(any);
         best = fittest(any);
         if (!(fitness_[best] > 0)) return {};

@@ -50,7 +50,8 @@ Mesh revolve(const std::vector<ProfilePoint>& profile, int segments) {
   return mesh;
 }
 
-// A quarter circle: from the equator to the top (sign 1), or from the bottom to the equator (sign -1).
+// Appends a quarter circle: from the equator to the top (sign 1), or from the bottom to the equator (sign
+// -1).
 void append_cap(std::vector<ProfilePoint>& profile, float radius, float center_y, int rings, int sign) {
   for (int k = 0; k <= rings; ++k) {
     const int step = sign > 0 ? k : rings - k;
@@ -61,8 +62,8 @@ void append_cap(std::vector<ProfilePoint>& profile, float radius, float center_y
   }
 }
 
-// Grid lines along one axis of a box: the flat part between two bevels of one facet each. Their normals make
-// the bevels look round. Finer bevels would dominate the cost of a scene of boxes.
+// Returns the grid lines along one axis of a box. They bound the flat part and two bevels of one facet each.
+// Their normals make the bevels look round. Finer bevels would dominate the cost of a scene of boxes.
 std::vector<float> box_lines(float half, float bevel) {
   if (bevel <= 0) return {-half, half};
   return {-half, bevel - half, half - bevel, half};
@@ -222,7 +223,7 @@ Mesh make_open_box(const Vector3f& size, float thickness) {
   add(-o, size.x() * x, size.z() * z);
   add({-i.x(), -i.y(), -i.z()}, 2 * i.z() * z, 2 * i.x() * x);
   for (const float side : {-1.f, 1.f}) {
-    // Outside, then inside, of the walls across x and across z.
+    // Adds the outside and then the inside of the walls across x and across z.
     const auto facing = [&](const Vector3f& corner, const Vector3f& u, const Vector3f& v, bool swap) {
       swap ? add(corner, v, u) : add(corner, u, v);
     };
@@ -230,7 +231,7 @@ Mesh make_open_box(const Vector3f& size, float thickness) {
     facing({side * i.x(), -i.y(), -i.z()}, depth * y, 2 * i.z() * z, side > 0);
     facing({-o.x(), -o.y(), side * o.z()}, size.x() * x, size.y() * y, side < 0);
     facing({-i.x(), -i.y(), side * i.z()}, 2 * i.x() * x, depth * y, side > 0);
-    // The rim.
+    // Adds the rim.
     const float low_x = side < 0 ? -o.x() : i.x(), low_z = side < 0 ? -o.z() : i.z();
     add({low_x, o.y(), -o.z()}, size.z() * z, thickness * x);
     add({-i.x(), o.y(), low_z}, thickness * z, 2 * i.x() * x);

@@ -107,7 +107,7 @@ PuffAtlas::Picture PuffAtlas::make_picture(Kind kind, uint32_t seed) {
   constexpr int d = 3;  // distance over which slopes are computed
   for (int y = d; y < n - d; ++y) {
     for (int x = d; x < n - d; ++x) {
-      // The front hides the back, both in light and in shape.
+      // The front of a puff hides its back, for the opacity and for the normal.
       float through = 1;
       Vector3f slope = Vector3f::Zero();
       for (int z = kSlices - 2; z > 0; --z) {

@@ -28,7 +28,7 @@ PuffLight::PuffLight(const OpacityGrid& opacity, const FrameUniforms& frame_unif
 
 AirRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vector3f& albedo, float number,
                                 const Vector3f& to_eye) const {
-  // Optical depth and its gradient, from the corners of a tetrahedron in the puff.
+  // The optical depth and its gradient are computed from the corners of a tetrahedron in the puff.
   static const std::array<Vector3f, 4> kCorners = {Vector3f(1, 1, 1), Vector3f(1, -1, -1),
                                                    Vector3f(-1, 1, -1), Vector3f(-1, -1, 1)};
   const float reach = std::max(0.5f * radius, 0.5f * grid.cell_m());

@@ -21,14 +21,14 @@ struct PuffLight {
   SkyModel sky;
   Vector3f to_sun;
 
-  /// `sky_model` must have the direction of the sun in this sub-frame.
+  /// Prepares the lighting of a sub-frame. `sky_model` must have the direction of the sun in this sub-frame.
   PuffLight(const OpacityGrid& opacity, const FrameUniforms& frame_uniforms, const SkyModel& sky_model,
             const Vector3f& sun_direction, const AirLight& air_light, const AirField& light_around);
   /// Returns the radiance of a white puff at a place, as a function of the normal of its surface. `number`:
   /// see AirLight::sun.
   AirRadiance radiance(const Vector3f& place, float radius, const Vector3f& albedo, float number,
                        const Vector3f& to_eye) const;
-  /// Sky light on a white surface with this normal, as in shaders/sky.glsl.
+  /// Returns the sky light on a white surface with this normal, as in shaders/sky.glsl.
   Vector3f ambient(const Vector3f& normal) const;
   /// Returns the sky light that a surface with this roughness reflects. `direction`: the mirrored direction.
   Vector3f sky_reflection(const Vector3f& direction, float roughness) const;

@@ -12,10 +12,13 @@ namespace {
 
 constexpr GLuint kColorUnit = 6, kLowDepthUnit = 7;
 constexpr float kMostOpaque = 0.98f;  // greatest opacity of one puff, so that its optical depth is finite
-constexpr double kHalf_px = 8, kQuarter_px = 64;  // radii from which the picture is reduced
-constexpr float kNearestPuff = 1.2f;  // radius from which a puff fades out, as a fraction of half the height
-constexpr float kTolerance = 0.25f;   // depth in typical radii over which puffs change little
-constexpr float kFlameCover = 0.6f;   // soot: deep flames glow, but do not add up without limit
+constexpr double kHalf_px = 8,
+                 kQuarter_px =
+                     64;  // radii from which on the picture is drawn at half and at a quarter of its size
+constexpr float kNearestPuff =
+    1.2f;  // radius from which on a puff fades out, as a fraction of half the picture's height
+constexpr float kTolerance = 0.25f;  // depth in typical radii over which puffs change little
+constexpr float kFlameCover = 0.6f;  // flames contain soot, so that the brightness of deep flames has a limit
 constexpr float kFlameWobble = 0.5f;  // [rad]
 constexpr float kSpin = 0.35f;        // [rad/s]
 
@@ -37,8 +40,8 @@ struct Shape {
   }
 };
 
-// The sun's disc blurs the shadow of a drop to nothing within a few tens of its widths, so drops are treated
-// as mist.
+// Because of the size of the sun's disc, the shadow of a drop disappears within a few tens of its widths.
+// Drops are therefore treated as mist.
 void add_drops(const PointSet& set, std::vector<OpacityGrid::Absorber>& absorbers) {
   constexpr float kLost = 0.6f;  // fraction of the light on a drop that is removed
   for (const GpuPoint& point : set.points) {
@@ -49,7 +52,7 @@ void add_drops(const PointSet& set, std::vector<OpacityGrid::Absorber>& absorber
   }
 }
 
-// Flames are redder where they are thin.
+// Thin parts of flames are redder.
 constexpr float kFlameThin[3] = {0.85f, 0.45f, 0.2f}, kFlameThick[3] = {0.3f, 0.75f, 1.0f};
 
 }  // namespace

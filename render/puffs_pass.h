@@ -26,7 +26,7 @@ class PuffsPass {
   const OpacityGrid& grid() const { return grid_; }
   /// Lights the puffs of a sub-frame. The order must stay in memory until they are drawn.
   void prepare_splats(const PaintOrder& order, const View& view, const PuffLight& light);
-  /// The pixels that puffs `first` to `last` (keys in the PaintOrder) can change.
+  /// Returns the pixels that puffs `first` to `last` (keys in the PaintOrder) can change.
   Eigen::AlignedBox2i area_px(uint32_t first, uint32_t last) const;
   /// Draws these puffs over the picture in `framebuffer`. The depth of the picture must also be bound to the
   /// texture unit `kSceneDepthUnit`.

@@ -50,7 +50,7 @@ constexpr std::array kAllowedCalls = {
     SYS_read,         SYS_readv,          SYS_pread64,      SYS_write,           SYS_writev,
     SYS_pwrite64,     SYS_close,          SYS_fstat,        SYS_newfstatat,      SYS_stat,
     SYS_lstat,        SYS_statx,          SYS_lseek,
-    SYS_ftruncate,  // for the answer; no other file is open for writing
+    SYS_ftruncate,  // for the file of the answer, the only file that is open for writing
     SYS_access,       SYS_faccessat,      SYS_faccessat2,   SYS_readlink,        SYS_readlinkat,
     SYS_getcwd,       SYS_getdents64,     SYS_mmap,         SYS_munmap,          SYS_mprotect,
     SYS_mremap,       SYS_madvise,        SYS_brk,          SYS_futex,           SYS_sched_yield,

@@ -18,7 +18,7 @@ class FrameSink {
   /// Writes a frame. Throws FileError if this fails or the encoder ended early; the message then contains the
   /// last output of the encoder.
   virtual void write(int frame, const Image& image) = 0;
-  /// Whether the sink stores linear light. If so, write_linear() must be called after each write().
+  /// Returns whether the sink stores linear light. If so, write_linear() must be called after each write().
   virtual bool needs_linear() const { return false; }
   /// Writes the linear light of a frame, times the exposure, with premultiplied alpha.
   virtual void write_linear(int, const HdrImage&) {}
@@ -63,7 +63,7 @@ std::unique_ptr<FrameSink> make_pipe_sink(bool y4m, int width_px, int height_px,
 
 /// Returns the endings of video files, with their dots.
 std::vector<std::string> video_endings();
-/// Whether a video with this ending keeps transparency; false if it is not an ending of a video.
+/// Returns whether a video with this ending keeps transparency; false if it is not an ending of a video.
 bool keeps_alpha(const std::string& ending);
 
 /// Returns the supported encoders that the installed ffmpeg has, for `doctor`; empty if there is no ffmpeg.

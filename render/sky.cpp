@@ -16,7 +16,8 @@ SkyModel make_sky(const Sun& sun, const Environment& environment) {
                .ground = environment.intensity * environment.ground,
                .glow = environment.intensity * kGlow * risen * sun.intensity * sun.color};
   if (environment.ground_albedo) {
-    // Horizontal ground sees the whole sky: its mean of the gradient, weighted by the cosine.
+    // Horizontal ground gets light from the whole sky. kLow is the mean of the gradient, weighted by the
+    // cosine.
     constexpr float kLow = 0.066f;
     const Vector3f light = sky.zenith + kLow * (sky.horizon - sky.zenith) +
                            std::max(direction.y(), 0.0f) * sun.intensity * sun.color;
@@ -78,8 +79,8 @@ std::array<float, 9> sky_basis(const Vector3f& n) {
 
 std::array<Vector3f, 9> sky_irradiance(const SkyModel& sky) {
   if (sky.turned.picture) return sky.turned.irradiance();
-  // The squares of the constants of the real spherical harmonics, times the factors of the cosine lobe
-  // divided by pi (1, 2/3, 1/4).
+  // Factors of the nine functions: the squares of the constants of the real spherical harmonics, times the
+  // factors of the cosine lobe divided by pi (1, 2/3, 1/4).
   constexpr float pi = std::numbers::pi_v<float>;
   constexpr std::array<float, 9> kWeights = {1 / (4 * pi),     0.5f / pi,      0.5f / pi,
                                              0.5f / pi,        3.75f / pi / 4, 3.75f / pi / 4,

@@ -34,15 +34,16 @@ Vector3f gradient_radiance(const SkyModel& sky, const Vector3f& direction);
 Vector3f sky_mirrored(const SkyModel& sky, const Vector3f& direction, float roughness,
                       const Vector3f& ambient);
 
-/// Colour of fog in a direction, as horizon_color() in shaders/sky.glsl.
+/// Returns the colour of fog in a direction, as horizon_color() in shaders/sky.glsl.
 Vector3f horizon_color(const SkyModel& sky, const Vector3f& direction);
 
-/// The functions of a direction that sky_irradiance() weights, as in shaders/sky.glsl: real spherical
-/// harmonics up to order 2 without their constants.
+/// Returns the values of nine functions at the unit direction n: the real spherical harmonics up to order 2,
+/// without their constants. sky_irradiance() gives the weights of these functions. shaders/sky.glsl computes
+/// the same values.
 std::array<float, 9> sky_basis(const Vector3f& n);
 
-/// Spherical-harmonics coefficients of the sky's irradiance. The radiance of a white diffuse surface with
-/// normal (x, y, z) is their sum weighted by 1, y, z, x, xy, yz, 3zz - 1, xz, xx - yy.
+/// Returns the spherical-harmonics coefficients of the sky's irradiance. The radiance of a white diffuse
+/// surface with normal (x, y, z) is their sum weighted by 1, y, z, x, xy, yz, 3zz - 1, xz, xx - yy.
 std::array<Vector3f, 9> sky_irradiance(const SkyModel& sky);
 
 }  // namespace offstage::render

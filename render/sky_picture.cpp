@@ -36,7 +36,7 @@ Vector3f sky_direction(const SkyGrid& grid, int column, int row) {
                           std::cos(kSkyPi * v));
 }
 
-/// Index of the cell that contains a direction.
+/// Returns the index of the cell that contains a direction.
 std::size_t sky_cell_at(const SkyGrid& grid, const Vector3f& direction) {
   const Vector2f at = sky_coordinates(direction);
   const int column = std::min(static_cast<int>(at.x() * static_cast<float>(grid.columns)), grid.columns - 1);
@@ -91,20 +91,22 @@ SkyPicture::Packed packed_grid(const SkyGrid& grid) {
 
 SkyGrid sky_grid_of(const HdrImage& image) {
   if (image.width_px < 2 || image.width_px != 2 * image.height_px)
-    throw std::invalid_argument("a picture of the sky is twice as wide as high, not " +
+    throw std::invalid_argument("a picture of the sky must be twice as wide as high, got " +
                                 std::to_string(image.width_px) + "x" + std::to_string(image.height_px));
   SkyGrid grid{image.width_px, image.height_px, {}};
   grid.values.reserve(image.pixel_count());
   for (std::size_t i = 0; i < image.pixel_count(); ++i) {
     const Vector3f value(image.rgba[4 * i], image.rgba[4 * i + 1], image.rgba[4 * i + 2]);
     if (!value.allFinite() || value.minCoeff() < 0)
-      throw std::invalid_argument("a picture of the sky has only finite values that are not negative");
+      throw std::invalid_argument(
+          "the picture of the sky has a negative, infinite or undefined value; all values must be finite and "
+          "at least 0");
     grid.values.push_back(value);
   }
   return grid;
 }
 
-/// Convolution with a Gaussian of the angle between directions, up to three standard deviations.
+/// Returns the convolution with a Gaussian of the angle between directions, up to three standard deviations.
 SkyGrid blurred_sky(const SkyGrid& source, float sigma) {
   const int columns = std::clamp(2 * static_cast<int>(2 * kSkyPi / sigma), 32, std::max(source.columns, 32));
   const SkyGrid grid = resampled(source, columns, columns / 2);
@@ -154,7 +156,7 @@ Vector3f SkyGrid::at(const Vector3f& direction) const {
 }
 
 SkyGrid resampled(const SkyGrid& grid, int columns, int rows) {
-  // Sums within each row, then over rows with the solid angle of each row's contribution.
+  // Sums the cells within each row, and then the rows, weighted by the solid angle of their contribution.
   const auto fraction_of = [](int from, int to, int k, int j) {  // of cell k of `from` in cell j of `to`
     const double a = static_cast<double>(j) * from / to, b = static_cast<double>(j + 1) * from / to;
     return std::max(std::min<double>(k + 1, b) - std::max<double>(k, a), 0.0);
@@ -220,7 +222,7 @@ SkyPicture::SkyPicture(const HdrImage& image, float blur_deg) {
 }
 
 // The bright part is the radiance above four times the mean luminance of the dim part. The mean decreases
-// from round to round, because less and less is left in the dim part; any limit gives the same sum of both.
+// with every iteration, because the dim part gets darker. The sum of both parts does not depend on the limit.
 void SkyPicture::split() {
   constexpr float kTimesMean = 4;
   constexpr int kRounds = 8;
@@ -302,7 +304,7 @@ float SkyPicture::density(const Vector3f& direction) const {
 
 SkyPicture::Sample SkyPicture::sample(const Vector2f& uv) const {
   if (!has_bright_part()) return {Vector3f::UnitY(), Vector3f::Zero()};
-  // `at` becomes the place within the cell that is found.
+  // Returns a cell, and sets `at` to the position within this cell.
   const auto find = [](const float* sums, int count, float& at) {
     const float wanted = at * sums[count - 1];
     const float* found = std::upper_bound(sums, sums + count - 1, wanted);

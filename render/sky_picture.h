@@ -29,7 +29,7 @@ struct SkyGrid {
   Vector3f at(const Vector3f& direction) const;
   Vector3f& cell(int column, int row);
   const Vector3f& cell(int column, int row) const;
-  /// Solid angle of the cells of a row [sr].
+  /// Returns the solid angle of the cells of a row [sr].
   float solid_angle(int row) const;
 };
 
@@ -51,13 +51,14 @@ class SkyPicture {
   static constexpr int kMostLightColumns = 1024;  ///< greatest width of the picture that gives light
   static constexpr int kLevels = 5;               ///< prefiltered for the roughness 0, 1/4 ... 1
 
-  /// `image`: twice as wide as high; finite values, at least 0. Throws std::invalid_argument otherwise.
-  /// `blur_deg`: standard deviation of a Gaussian that blurs the background, but not the light; 0: none.
+  /// Prepares a picture. `image` must be twice as wide as high, with finite values of at least 0; otherwise
+  /// throws std::invalid_argument. `blur_deg`: standard deviation of a Gaussian that blurs the background,
+  /// but not the light; 0: none.
   explicit SkyPicture(const HdrImage& image, float blur_deg = 0);
 
-  /// Radiance from a unit direction, the sum of both parts.
+  /// Returns the radiance from a unit direction, the sum of both parts.
   Vector3f seen(const Vector3f& direction) const { return unpacked_at(direction); }
-  /// Radiance of the dim part from a unit direction.
+  /// Returns the radiance of the dim part from a unit direction.
   Vector3f dim(const Vector3f& direction) const;
   /// Returns the radiance of the dim part that a surface with this roughness reflects. `direction`: the
   /// mirrored direction.
@@ -66,15 +67,16 @@ class SkyPicture {
   struct Irradiance {
     Vector3f constant = Vector3f::Zero();
     Eigen::Matrix3f slope = Eigen::Matrix3f::Zero();  ///< rows: red, green, blue
-    std::array<Eigen::Matrix3f, 3> curvature = {Eigen::Matrix3f::Zero(), Eigen::Matrix3f::Zero(),
-                                                Eigen::Matrix3f::Zero()};  ///< symmetric, without trace
+    std::array<Eigen::Matrix3f, 3> curvature = {
+        Eigen::Matrix3f::Zero(), Eigen::Matrix3f::Zero(),
+        Eigen::Matrix3f::Zero()};  ///< symmetric matrices with the trace 0
   };
   const Irradiance& irradiance() const { return irradiance_; }
 
   bool has_bright_part() const { return bright_total_ > 0; }
-  /// Fraction of the luminance from a direction that belongs to the bright part.
+  /// Returns the fraction of the luminance from a direction that belongs to the bright part.
   float bright_fraction(const Vector3f& direction) const;
-  /// Probability density of sample() [1/sr].
+  /// Returns the probability density of sample() [1/sr].
   float density(const Vector3f& direction) const;
   struct Sample {
     Vector3f direction;
@@ -105,7 +107,7 @@ class SkyPicture {
   Packed sharp_;
   std::vector<Packed> background_;
   SkyGrid light_;                ///< radiance of both parts together
-  std::vector<float> fraction_;  ///< fraction of the bright part in the same cells
+  std::vector<float> fraction_;  ///< fraction of the bright part in each cell of light_
   std::vector<float> row_sum_;   ///< sum of luminance * solid angle of the bright part, up to each row
   /// Sums of luminance * solid angle of the bright part within each row, up to each cell.
   std::vector<float> sums_;
@@ -117,13 +119,13 @@ class SkyPicture {
 
 /// A sky picture as a scene uses it.
 struct TurnedSky {
-  std::shared_ptr<const SkyPicture> picture;  ///< null: none
+  std::shared_ptr<const SkyPicture> picture;  ///< the picture; null: there is none
   float turn = 0;                             ///< counter-clockwise as seen from above [rad]
   float intensity = 1;
 
   Vector3f to_picture(const Vector3f& direction) const;
   Vector3f from_picture(const Vector3f& direction) const;
-  /// Light of the dim part as the weights of the nine functions of sky_irradiance().
+  /// Returns the light of the dim part as the weights of the nine functions of sky_irradiance().
   std::array<Vector3f, 9> irradiance() const;
   SkyBeam beam() const;
 };

@@ -14,7 +14,8 @@ namespace {
 
 constexpr int kTileWidth_px = 64, kTileHeight_px = 16;
 constexpr int kTilePixels = kTileWidth_px * kTileHeight_px;
-constexpr float kHidden = 1.0f / 512;  // below this fraction the background counts as hidden
+constexpr float kHidden =
+    1.0f / 512;  // if less than this fraction of the background is visible, it counts as hidden
 constexpr int kCheckEvery = 24;
 
 struct Tile {
@@ -22,7 +23,7 @@ struct Tile {
 };
 
 struct TileRange {
-  int x0, y0, x1, y1;  // in tiles, the end excluded
+  int x0, y0, x1, y1;  // range of tiles; x1 and y1 are excluded
 };
 
 template <class S>

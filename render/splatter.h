@@ -23,7 +23,8 @@ struct Splat {
       vy;  ///< Position in the atlas's cell, in [-1, 1]: u = ux * dx + uy * dy, v = vx * dx + vy * dy.
   float depth, inverse_reach;  ///< distance along the view axis [m]; 1 / (2 * radius) [1/m]
   float opacity;               ///< opacity where the cell's cover is 1
-  float cover;  ///< fraction of its opacity that hides the background: 1 for smoke, 0 only adds light
+  float cover;  ///< fraction of the opacity that hides the background: 1 for smoke; with 0, the splat only
+                ///< adds light
   /// Radiance of red, green and blue where the normal is n: r[0] + r[1] n.x + r[2] n.y + r[3] n.z.
   float radiance[3][4];
   PuffAtlas::Level cell;
@@ -39,7 +40,7 @@ struct StreakLight {
 struct StreakSplat {
   float x, y;
   float half_x, half_y;
-  float along_x, along_y;             ///< unit vector to its head
+  float along_x, along_y;             ///< unit vector towards the head of the streak
   float half_length, inverse_radius;  ///< half-length of the straight part; 1 / radius
   /// Distance of the centre along the view axis [m], and its change per pixel towards the head.
   float depth, depth_slope;
@@ -49,7 +50,7 @@ struct StreakSplat {
   const StreakLight* light;
 };
 
-/// Target picture of splats: premultiplied colour, and the remaining fraction of the background.
+/// Target picture of splats: premultiplied colour, and the visible fraction of the background.
 struct SplatPicture {
   int width_px = 0, height_px = 0;
   std::vector<float> depth;  ///< depth of the scene along the view axis [m], one value per pixel
@@ -90,8 +91,8 @@ class StreakBands {
   void sort(std::span<const StreakSplat> front_to_back, int width_px, int height_px);
   /// Returns the range of tile columns between `left` and `right` that contain streaks.
   std::pair<int, int> columns_px(int left, int right) const;
-  /// Whether the tiles of a band from `left` to `right` contain streaks, from number `first` on, that were
-  /// not drawn yet.
+  /// Returns whether the tiles of a band from `left` to `right` contain streaks, from number `first` on, that
+  /// were not drawn yet.
   bool any(int bottom, int left, int right, uint32_t first) const;
   /// Draws those streaks from `first` on that were not drawn yet over a strip. `distance` converts values of
   /// the depth buffer: the distance along the view axis is distance.x / (depth + distance.y) [m].

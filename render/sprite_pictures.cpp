@@ -170,7 +170,7 @@ void SpriteTextures::update() {
   std::vector<std::shared_ptr<const SpritePictures>> sheets;
   for (const auto& sheet : sheets_) sheets.push_back(sheet.lock());
   std::ranges::stable_sort(sheets, std::ranges::greater(), [](const auto& sheet) {
-    return int64_t{sheet->width_px} * sheet->height_px;  // so that those of similar sizes are together
+    return int64_t{sheet->width_px} * sheet->height_px;  // so that sheets of similar sizes are neighbours
   });
   std::vector<TextureGroup> groups;
   for (const auto& sheet : sheets) {

@@ -21,9 +21,9 @@ struct SpritePictures {
 };
 
 /// Cuts a sheet into pictures, in rows from the upper left corner. Each has mip levels of its own, so that
-/// neighbours on the sheet never mix. Pixels beyond a whole number of pictures are left out. Throws
-/// std::invalid_argument if there are no pictures, or more than kMostSheetPictures, or if a picture would
-/// have no pixel.
+/// neighbours on the sheet never mix. Pixels at the right and lower border that do not fill a picture are
+/// omitted. Throws std::invalid_argument if there are no pictures, or more than kMostSheetPictures, or if a
+/// picture would have no pixel.
 SpritePictures sprite_pictures(const Image& sheet, int columns, int rows);
 
 class SpriteTextures {
@@ -33,10 +33,12 @@ class SpriteTextures {
     GLuint texture = 0;
     int first_layer = 0;
   };
-  /// Adds a sheet, or returns the one with the same pictures. Its layers exist while the pointer does.
+  /// Adds a sheet, or returns the existing sheet with the same pictures. Its layers exist as long as the
+  /// returned pointer.
   std::shared_ptr<const SpritePictures> add(SpritePictures pictures);
-  /// Uploads all sheets again if some were added or removed. Sheets of pictures with the same size share a
-  /// texture; those of different sizes do if the layers that fit all of them take at most 64 MiB.
+  /// Uploads all sheets again if some were added or removed. Sheets with pictures of the same size share a
+  /// texture. Sheets with pictures of different sizes share a texture if its layers, which fit all pictures,
+  /// take at most 64 MiB.
   void update();
   Place place(const SpritePictures& pictures) const { return places_.at(&pictures); }
 

@@ -27,7 +27,7 @@ struct Camera {
   Vector3f eye = {0, 1.5f, 5};
   Vector3f target = Vector3f::Zero();
   Vector3f up = Vector3f::UnitY();
-  float fov_deg = 40;  ///< vertical, in (0, 180)
+  float fov_deg = 40;  ///< vertical field of view, in (0, 180)
   float near_m = 0.05f, far_m = 1e6f;
   float aperture = 0;  ///< lens diameter [m]; 0: everything is sharp
   float focus = 0;     ///< distance in focus [m]; 0: the distance of the target
@@ -49,7 +49,7 @@ struct Lamp {
   Vector2f size = {0, 0};             ///< size of a rectangle [m]; otherwise zero
   Vector3f direction = {0, -1, 0};    ///< unit direction of cones and rectangles
   float cone_deg = 0;                 ///< full angle of a cone; otherwise zero
-  float softness = 0.3f;              ///< fraction of the cone over which its edge fades
+  float softness = 0.3f;              ///< fraction of the cone over which the light fades to zero at the edge
   /// Whether the edge of the cone fades with the square of a linear ramp (KHR_lights_punctual), instead of in
   /// proportion to the cosine.
   bool squared_edge = false;
@@ -67,12 +67,15 @@ struct Environment {
   float clouds = 0;  ///< fraction of the sky covered by clouds
   /// Density [1/m]; transmittance exp(-fog * distance). 0: nothing fades with distance.
   float fog = 0;
-  bool visible = true;  ///< false: transparent background; it still lights the scene
+  bool visible = true;  ///< whether the sky is drawn; false: the background is transparent, and the sky only
+                        ///< lights the scene
   /// A picture of the sky that lights the scene in place of the colours, scaled by `intensity`; null: none.
   /// Clouds are then not drawn.
   std::shared_ptr<const SkyPicture> picture = {};
-  float picture_turn_deg = 0;   ///< counter-clockwise as seen from above
-  bool picture_visible = true;  ///< false: the colours are the background and the colour of fog
+  float picture_turn_deg =
+      0;  ///< rotation of the picture about +Y [degrees], counter-clockwise as seen from above
+  bool picture_visible =
+      true;  ///< whether the background shows the picture; false: the background and the fog have the colours
 };
 
 /// One drawn particle.
@@ -145,7 +148,8 @@ struct ClothDef {
   bool casts_shadow = true;
 };
 
-/// Offsets of one sub-frame, each in [-0.5, 0.5] (pixel, lens and light squares; mapped to discs inside).
+/// Offsets of one sub-frame, each in the square [-0.5, 0.5]^2. The stage maps the offsets of lens and light
+/// to discs.
 struct SampleOffsets {
   Eigen::Vector2f pixel = Eigen::Vector2f::Zero();
   Eigen::Vector2f lens = Eigen::Vector2f::Zero();
@@ -180,7 +184,7 @@ struct StageDef {
 
 class Stage {
  public:
-  /// The context must be current, and outlive the stage.
+  /// Creates an empty stage. The context must be current, and must outlive the stage.
   Stage(Context& context, const StageDef& def);
   ~Stage();
   Stage(Stage&&) noexcept;
@@ -188,13 +192,12 @@ class Stage {
   MeshHandle add_mesh(const Mesh& mesh);
   /// Replaces a mesh, for instance by its next pose; all instances of it change.
   void set_mesh(MeshHandle handle, const Mesh& mesh);
-  /// `textures` are the textures to which the material's indices refer; each is uploaded once per call, with
-  /// mip maps.
+  /// Adds a material. Its indices refer to `textures`; each call uploads each texture once, with mip maps.
   MaterialHandle add_material(const Material& material, std::span<const Image> textures = {});
   InstanceHandle add_instance(MeshHandle mesh, MaterialHandle material, bool casts_shadow = true);
-  /// `picture`: drawn for each sprite instead of a soft disc; it covers the square around the particle, or a
-  /// part of it if it is not square. Empty: none. Throws std::invalid_argument if the sheet has more than
-  /// kMostSheetPictures pictures, or none.
+  /// Adds a set of particles. `picture`: image that is drawn for each sprite instead of a soft disc; empty:
+  /// none. The longer side of the image is the diameter of the particle. Throws std::invalid_argument if the
+  /// sheet has more than kMostSheetPictures pictures, or none.
   PointsHandle add_points(const PointsDef& def, const Image& picture = {});
   LinesHandle add_lines(const LinesDef& def);
   /// Adds a cloth, which is not visible before set_cloth(). Throws std::invalid_argument for an index out of

@@ -42,7 +42,7 @@ void Stage::Impl::prepare_sky() {
   glBindTextureUnit(kSkyBackgroundUnit, sky_background);
 }
 
-// The depth of pixels without a surface.
+// This is the depth of pixels without a surface.
 void Stage::Impl::draw_sky() {
   Features defines = {"FLAT 1"};
   for (const std::string& feature : features)
@@ -363,7 +363,8 @@ void Stage::Impl::draw_translucent(std::span<const Cloth* const> sheets, std::sp
   puffs_pass.prepare_splats(paint_order, view, light);
   streaks_pass.prepare(paint_order, view, light, offsets.index == 0);
 
-  // Premultiplied: additive light has no alpha, so one blend function serves both.
+  // Colours are premultiplied. Additive light then has the alpha 0, so one blend function draws both kinds of
+  // particles.
   glEnable(GL_BLEND);
   glBlendFunc(GL_ONE, GL_ONE_MINUS_SRC_ALPHA);
   glDepthMask(GL_FALSE);

@@ -49,7 +49,7 @@ struct Stage::Impl {
           depth_copy(GL_DEPTH_COMPONENT32F, GL_NEAREST, kSceneDepthUnit, width_px, height_px),
           behind(GL_RGBA32F, GL_LINEAR, kBehindUnit, width_px, height_px) {}
 
-    /// Starts the picture without particles with the opaque objects.
+    /// Begins the picture without particles: copies the opaque objects to it.
     void begin_bodies(int width_px, int height_px) {
       if (bodies == 0) {
         bodies = gl::make_target(GL_RGBA32F, width_px, height_px, GL_LINEAR);
@@ -62,7 +62,7 @@ struct Stage::Impl {
   };
   /// A body through which other objects are visible.
   struct TranslucentBody {
-    const Cloth* cloth = nullptr;  ///< null: an instance
+    const Cloth* cloth = nullptr;  ///< the cloth; null: the body is an instance of a mesh
     std::size_t instance = 0;      ///< index in MeshPass::translucent
     bool glass = false;
     bool fills_region = false;

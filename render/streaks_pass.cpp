@@ -11,7 +11,8 @@ namespace {
 constexpr float kNearestStreak = 0.016f;
 constexpr float kThinnest_px = 0.6f;  // radius; thinner streaks are drawn with this radius and fainter
 
-// A drop stretched by its motion: it refracts the sky behind it, and is bright when the sun is behind it.
+// Returns the light of a drop that is stretched by its motion. The drop refracts the sky behind it, and is
+// bright if the sun is behind it.
 Vector3f drop_light(const PuffLight& light, const GpuPoint& point, const Vector3f& to_eye,
                     const AirLightAround& around) {
   const Vector3f place = point.position.head<3>();
@@ -31,7 +32,7 @@ Vector3f project(const View& view, const Vector3f& place, const Vector2f& half_s
   return {(clip.x() / clip.w() + 1) * half_size.x(), (clip.y() / clip.w() + 1) * half_size.y(), clip.w()};
 }
 
-/// `along`: direction of the streak on the screen.
+/// Returns the light of a streak. `along`: direction of the streak on the screen.
 StreakLight light_of(const GpuPoint& point, const PointsDef& def, const View& view, const PuffLight& light,
                      const Vector2f& along) {
   const Vector3f center = point.position.head<3>(), to_eye = (view.eye - center).normalized();
@@ -62,7 +63,8 @@ StreakSplat splat_of(const GpuPoint& point, const PointsDef& def, const View& vi
   const float distance = view.depth_of(center), pixel = pixel_m * distance;
   const float radius = point.position.w(), drawn = std::max(radius, kThinnest_px * pixel);
 
-  // With its rounded ends a streak is as long as its motion; its ends must not be behind the eye.
+  // The length of a streak, with its rounded ends, is the length of its motion. Its ends must not be behind
+  // the eye.
   Vector3f half_axis = 0.5f * def.stretch_s * point.velocity.head<3>();
   const float half_length = half_axis.norm();
   half_axis *= half_length > drawn ? 1 - drawn / half_length : 0;
@@ -88,7 +90,7 @@ StreakSplat splat_of(const GpuPoint& point, const PointsDef& def, const View& vi
   s.inverse_reach = 0.5f / drawn;
   s.opacity =
       std::min(point.color.w(), 1.0f) * (radius / drawn) * std::clamp(0.5f * room / drawn, 0.0f, 1.0f);
-  // A drop near the lens fades out, because it would be a bar across the picture.
+  // A drop near the lens fades out. Otherwise it would be a bar across the picture.
   const float apart = std::clamp(0.1f * distance / view.near_m - 1, 0.0f, 1.0f);
   s.opacity *= std::max(apart, std::clamp(2 - radius_px / (kNearestStreak * half_size.y()), 0.0f, 1.0f));
   s.cover = def.additive ? 0.0f : 1.0f;

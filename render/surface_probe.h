@@ -12,8 +12,8 @@ namespace offstage::render {
 class SurfaceProbe {
  public:
   SurfaceProbe(int width_px, int height_px) : width_px_(width_px), height_px_(height_px) {}
-  /// Distances along the view axis [m] in an area of the picture, by rows; infinite where `draw` draws
-  /// nothing. `draw` must write depth. The framebuffer binding is changed.
+  /// Returns the distances along the view axis [m] in an area of the picture, by rows. They are infinite
+  /// where `draw` draws nothing. `draw` must write depth. The framebuffer binding is changed.
   std::vector<float> distances(const Eigen::AlignedBox2i& area_px, const FrameUniforms& frame,
                                const std::function<void()>& draw);
 

@@ -14,7 +14,7 @@ namespace offstage::render {
 /// Height of a line from the top of a capital to the bottom of a "g", at scale 1.
 inline constexpr int kTextHeight_px = 10;
 
-/// Width of one line at scale 1 [px].
+/// Returns the width of one line at scale 1 [px].
 int text_width_px(std::string_view text);
 
 /// Draws one line with its upper left corner at (x, y), each pixel of the font as scale x scale pixels. Parts

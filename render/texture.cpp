@@ -69,12 +69,13 @@ double coverage_of(const Image& image, float cutoff, float factor) {
 
 /// Scales alpha so that about the fraction `coverage` of the pixels reaches the cutoff.
 Image with_coverage(const Image& image, float cutoff, double coverage) {
-  float low = 0.1f, high = 16;  // at the lower factor too little is covered, at the higher one too much
+  float low = 0.1f, high = 16;  // with the factor `low` too little is covered, with `high` too much
   for (int k = 0; k < 16; ++k) {
     const float middle = std::sqrt(low * high);
     (coverage_of(image, cutoff, middle) < coverage ? low : high) = middle;
   }
-  // A level with few pixels cannot have every fraction, so the nearer one of two possible fractions is used.
+  // A level with few pixels has only a few possible fractions. The nearer one of the two neighbouring
+  // fractions is used.
   const double below = coverage - coverage_of(image, cutoff, low),
                above = coverage_of(image, cutoff, high) - coverage;
   const float factor = below < above ? low : high;

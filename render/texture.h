@@ -19,7 +19,7 @@ gl::Texture make_texture(const Image& image, TextureContent content, const Textu
 /// Creates a texture of a sky from pictures of decreasing size, which become its mip levels.
 gl::Texture make_texture(std::span<const SkyPicture::Packed> levels);
 gl::Texture make_white_texture();
-/// True if any pixel is not opaque.
+/// Returns whether any pixel is not opaque.
 bool has_alpha(const Image& image);
 
 }  // namespace offstage::render

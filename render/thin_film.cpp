@@ -33,11 +33,11 @@ Array3d film_sensitivity(double path_m, const Array3d& shift) {
   Array3d xyz =
       value * (2 * pi * variance).sqrt() * (place * phase + shift).cos() * (-phase * phase * variance).exp();
   xyz[0] += 9.7470e-14 * std::sqrt(2 * pi * 4.5282e9) * std::cos(2.2399e6 * phase + shift[0]) *
-            std::exp(-4.5282e9 * phase * phase);  // the second bump of X
+            std::exp(-4.5282e9 * phase * phase);  // the second maximum of the curve X
   Eigen::Matrix3d rgb_from_xyz;
   rgb_from_xyz << 3.2404542, -1.5371385, -0.4985314, -0.9692660, 1.8760108, 0.0415560, 0.0556434, -0.2040259,
       1.0572252;
-  // The fit takes light of equal energy as white; in RGB, white is (1, 1, 1).
+  // For the fit, light of equal energy is white. The factors convert this white to the RGB colour (1, 1, 1).
   return rgb_from_xyz.array().rowwise().sum().inverse() * (rgb_from_xyz * (xyz / 1.0685e-7).matrix()).array();
 }
 
@@ -49,7 +49,8 @@ Vector3f film_reflectance(double n, double thickness_nm, const Vector3f& base) {
   for (int k = 0; k < 3; ++k) {
     const double below = index_of_refraction(double{base[k]});
     bottom[k] = reflectance_between(n, below);
-    shift[k] = pi + (below < n ? pi : 0);  // at the inside of the top, which is less dense, and at the base
+    shift[k] = pi + (below < n ? pi : 0);  // the first term belongs to the upper surface, seen from the
+                                           // inside; the second one to the base
   }
   const Array3d both = (top * bottom).max(1e-5).min(0.9999), r = both.sqrt();
   const Array3d once = entering * entering * bottom / (1 - both);

@@ -49,7 +49,7 @@ const Table& table_of(ToneCurve curve) {
   return curve == ToneCurve::filmic ? filmic_table : linear_table;
 }
 
-// Negative numbers have the sign bit, so they map to the table's first entry, which is black.
+// Negative numbers have the sign bit set. They map to the first entry of the table, which is black.
 inline uint32_t look_up(const uint16_t* table, float value) {
   const int cell = (std::bit_cast<int32_t>(value) >> kShift) - kFirstCell + 1;
   return table[std::clamp(cell, 0, kCellCount)];
@@ -98,7 +98,7 @@ float metered_exposure(const HdrImage& sum, float sample_weight) {
 }
 
 Image tone_map(const HdrImage& sum, const ToneMap& options) {
-  constexpr float kOpaque = 0.9999f;  // for a sum of N values times 1/N
+  constexpr float kOpaque = 0.9999f;  // not exactly 1, because of rounding errors in the mean of N values
   Image image{sum.width_px, sum.height_px, std::vector<uint8_t>(sum.rgba.size()), sum.transparent};
   const uint16_t* table = table_of(options.curve).data();
   const float weight = options.sample_weight;

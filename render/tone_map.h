@@ -18,7 +18,7 @@ struct ToneMap {
   bool dither = true;
 };
 
-/// Linear [0, 1] to sRGB [0, 1] and back (IEC 61966-2-1).
+/// Convert a component from linear light to sRGB, and back (IEC 61966-2-1). Both values are in [0, 1].
 float srgb_encode(float linear);
 float srgb_decode(float encoded);
 

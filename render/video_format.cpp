@@ -40,7 +40,7 @@ std::vector<VideoFormat> make_formats() {
   Options vp9_alpha = vp9;  // alternate reference frames cannot have alpha
   vp9_alpha.insert(vp9_alpha.end(), {"-auto-alt-ref", "0"});
   const Options prores = {"-profile:v", "4444", "-vendor", "apl0"};
-  // A palette per frame, because a palette for the whole film would need all its frames in memory.
+  // Each frame has its own palette, because a palette for the whole film would need all frames in memory.
   const Options gif = {"-filter_complex",
                        "split[a][b];[a]palettegen=stats_mode=single[p];"
                        "[b][p]paletteuse=new=1:dither=bayer:bayer_scale=3:diff_mode=rectangle",
@@ -142,8 +142,8 @@ std::vector<std::string> encoder_command(const std::string& ffmpeg, const VideoD
                      format.encoder};
   const Options& options = def.alpha ? format.transparent : format.opaque;
   command.insert(command.end(), options.begin(), options.end());
-  // A fixed number of threads and no dates or versions, so that the same frames give the same file on any
-  // machine.
+  // The number of threads is fixed, and the file has no dates or versions, so that the same frames give the
+  // same file on any machine.
   command.insert(command.end(), {"-threads", "4", "-map_metadata", "-1", "-fflags", "+bitexact", "-flags:v",
                                  "+bitexact", "-f", format.container, "-y", "file:" + output.string()});
   return command;

@@ -138,7 +138,8 @@ class Matroska {
   Contents found_;
 };
 
-/// GIF89a: delays of the graphic control extensions in hundredths of a second, up to the trailer.
+/// Reads a GIF89a file up to its trailer. The graphic control extensions contain the duration of each frame,
+/// in hundredths of a second.
 Contents read_gif(FileView& file) {
   Contents found{.seconds = 0};
   if (!file.is(0, "GIF8")) return found;
@@ -159,7 +160,7 @@ Contents read_gif(FileView& file) {
       at += 2;
     } else if (kind == 0x2C) {
       ++found.frames;
-      at += 11 + table(file.byte(at + 9));  // including the code size of the pixels
+      at += 11 + table(file.byte(at + 9));  // the length includes the byte with the code size of the pixels
     } else {
       return found;
     }
@@ -168,8 +169,8 @@ Contents read_gif(FileView& file) {
   return found;
 }
 
-/// WebP (RFC 9649): chunks of a RIFF file that must fill the file; ANMF chunks are frames, with their
-/// duration in milliseconds.
+/// Reads a WebP file (RFC 9649), a RIFF file whose chunks must fill it completely. Each ANMF chunk is a
+/// frame, with its duration in milliseconds.
 Contents read_webp(FileView& file) {
   Contents found{.seconds = 0};
   if (!file.is(0, "RIFF") || !file.is(8, "WEBP") || file.little(4, 4) + 8 != file.size()) return found;
@@ -189,8 +190,8 @@ Contents read_webp(FileView& file) {
   return found;
 }
 
-/// Animated PNG: a frame control chunk for every frame, up to IEND at the end. A film of one frame is a plain
-/// PNG.
+/// Reads an animated PNG up to its IEND chunk. It has a frame control chunk for every frame. A film of one
+/// frame is a plain PNG.
 Contents read_apng(FileView& file) {
   Contents found;
   if (!file.is(0, "\x89PNG\r\n\x1a\n")) return found;

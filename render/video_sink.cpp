@@ -68,8 +68,8 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-/// ffmpeg's end of a socket pair, and ours. It is a socket instead of a pipe, because send() can be told not
-/// to raise SIGPIPE.
+/// The two ends of a socket pair: one for ffmpeg, one for this process. It is a socket instead of a pipe,
+/// because send() can be told not to raise SIGPIPE.
 struct FrameChannel {
   Descriptor ours, theirs;
 

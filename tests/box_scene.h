@@ -22,7 +22,7 @@ namespace offstage::sim {
 
 struct BoxBody {
   Vec3 size = Vec3::Ones();
-  Real mass = 0;  ///< 0: static
+  Real mass = 0;  ///< mass [kg]; 0: the box is static
   Pose pose;
   Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
 
@@ -48,7 +48,7 @@ class BoxScene {
   std::vector<BoxBody> bodies;
   Real friction = 0.5;
   Vec3 gravity = Vec3(0, -9.81, 0);
-  uint32_t substeps = 0;  ///< 0: the number that the solver recommends
+  uint32_t substeps = 0;  ///< number of sub-steps; 0: the number that the solver recommends
 
   void add(const Vec3& size, Real mass, const Vec3& position, const Quat& q = Quat::Identity()) {
     bodies.push_back({size, mass, {position, q}});
@@ -225,7 +225,7 @@ inline BoxScene brick_wall(int count) {
   return s;
 }
 
-/// A box on an inclined plane that descends towards +x.
+/// Returns a box on an inclined plane that descends towards +x.
 inline BoxScene box_on_incline(Real degrees) {
   BoxScene s;
   const Quat q(Eigen::AngleAxisd(-degrees * std::numbers::pi / 180, Vec3::UnitZ()));
@@ -234,7 +234,7 @@ inline BoxScene box_on_incline(Real degrees) {
   return s;
 }
 
-/// A box that slides over the ground at 5 m/s.
+/// Returns a box that slides over the ground at 5 m/s.
 inline BoxScene sliding_box(Real heading_degrees) {
   BoxScene s;
   s.add_ground();

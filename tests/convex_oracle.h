@@ -134,7 +134,7 @@ class ConvexOracle {
   Separation closest_{.distance = std::numeric_limits<Real>::infinity()};
 };
 
-/// Exact signed distance of two convex polyhedra.
+/// Returns the exact signed distance of two convex polyhedra.
 inline Separation brute_force_separation(const ConvexPolyhedron& a, const ConvexPolyhedron& b,
                                          const Pose& a_from_b) {
   return ConvexOracle(a, b, a_from_b).signed_distance();

@@ -21,7 +21,7 @@ class Dice {
   explicit Dice(uint64_t seed) : scatter_{seed} {}
 
   Real uniform(Real low = 0, Real high = 1) { return low + (high - low) * scatter_.uniform(next_++, 0); }
-  /// A number from 0 to count - 1.
+  /// Returns a number from 0 to count - 1.
   uint32_t index(std::size_t count) { return static_cast<uint32_t>(uniform() * static_cast<Real>(count)); }
   bool chance(Real probability) { return uniform() < probability; }
   Vec3 in_cube() { return {uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)}; }

@@ -25,7 +25,7 @@ struct MeshTree {
   const BoundingTree<Volume>& tree;
 };
 
-/// Indices of a triangle of A and of one of B.
+/// Indices of a triangle of A and a triangle of B.
 struct TrianglePair {
   uint32_t a, b;
   friend auto operator<=>(const TrianglePair&, const TrianglePair&) = default;
@@ -38,7 +38,7 @@ struct CloseTriangles {
 };
 
 /// The vertices of the triangles of both meshes in A's frame. The traversal visits a triangle of B with many
-/// of A in a row, so the last one is kept.
+/// triangles of A in succession, so the last triangle of B is kept.
 class PlacedTriangles {
  public:
   PlacedTriangles(const TriangleMesh& a, const TriangleMesh& b, const Placement& placement)
@@ -69,8 +69,8 @@ Placement mesh_placement(const MeshTree<A>& a, const MeshTree<B>& b, const Pose&
   return Placement(a_from_b, std::max(a.tree.reach(), b.tree.reach()), margin);
 }
 
-/// Whether any triangle of A intersects a triangle of B. The result is false if one mesh is completely inside
-/// the other.
+/// Returns whether any triangle of A intersects a triangle of B. The result is false if one mesh is
+/// completely inside the other.
 template <class A, class B>
 bool surfaces_intersect(const MeshTree<A>& a, const MeshTree<B>& b, const Pose& a_from_b) {
   const Placement place = mesh_placement(a, b, a_from_b);

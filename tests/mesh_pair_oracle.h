@@ -11,7 +11,7 @@
 
 namespace offstage::sim {
 
-/// A sphere with random radii, without symmetry: 2 around (rings - 1) triangles.
+/// Returns a sphere with random radii, without symmetry: 2 around (rings - 1) triangles.
 inline TriangleMesh bumpy_sphere(uint32_t around, uint32_t rings, uint64_t seed) {
   TriangleMesh mesh = sphere_mesh(1, around, rings);
   for (uint64_t i = 0; i < mesh.vertices.size(); ++i)

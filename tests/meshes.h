@@ -18,7 +18,7 @@ inline TriangleMesh box_mesh(const Vec3& size) {
   return mesh;
 }
 
-/// A torus about Y with major radius R and tube radius r.
+/// Returns a torus about Y with major radius R and tube radius r.
 inline TriangleMesh torus_mesh(Real R, Real r, uint32_t around, uint32_t across) {
   constexpr Real kTurn = 2 * std::numbers::pi;
   TriangleMesh mesh;

@@ -26,11 +26,11 @@ install_packages $build_packages $test_packages
 cores=$(nproc)
 failed=0
 
-# Beside other engines, if their harness is there (tests/bench/RESULTS.md).
+# Builds the benchmarks against other engines, if their program is there (tests/bench/RESULTS.md).
 peers=()
 [ -d ../shared/peers ] && peers=("-DOFFSTAGE_PEERS=$(realpath ../shared/peers)")
 
-# One build and one run of all tests: no core waits for the end of one before the next begins.
+# All tests are built together and run together, so that all cores are busy until the end.
 cmake --preset release -DOFFSTAGE_WERROR=ON -DOFFSTAGE_TESTS=ON -DOFFSTAGE_SANITIZED_TESTS=ON -DOFFSTAGE_PYTHON=ON \
   -DOFFSTAGE_BENCH=$bench "${peers[@]}"
 cmake --build build

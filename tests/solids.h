@@ -53,8 +53,8 @@ TriangleMesh cubes(int nx, int ny, int nz, Filled&& filled) {
   return mesh;
 }
 
-/// A prism along z over a polygon that is star-shaped about its centre, given as (angle, radius) pairs,
-/// counter-clockwise.
+/// Returns a prism along z over a polygon that is star-shaped about its centre, given as (angle, radius)
+/// pairs, counter-clockwise.
 inline TriangleMesh star_shaped_prism(const std::vector<Eigen::Vector2d>& outline, Real height) {
   TriangleMesh mesh;
   const auto n = static_cast<uint32_t>(outline.size());
@@ -72,7 +72,7 @@ inline TriangleMesh star_shaped_prism(const std::vector<Eigen::Vector2d>& outlin
   return mesh;
 }
 
-/// A star with `points` tips at radius `outer` and inner corners at radius `inner`.
+/// Returns a star with `points` tips at radius `outer` and inner corners at radius `inner`.
 inline TriangleMesh star_prism(uint32_t points, Real outer, Real inner, Real height) {
   std::vector<Eigen::Vector2d> outline;
   for (uint32_t i = 0; i < 2 * points; ++i) {
@@ -111,34 +111,34 @@ inline TriangleMesh u_solid() {
 inline TriangleMesh cross_solid() {
   return cubes(3, 3, 1, [](int i, int j, int) { return i == 1 || j == 1; });
 }
-/// Three bars that cross in the middle.
+/// Returns three bars that cross in the middle.
 inline TriangleMesh jack_solid() {
   return cubes(3, 3, 3, [](int i, int j, int k) { return (i == 1) + (j == 1) + (k == 1) >= 2; });
 }
 inline TriangleMesh stairs() {
   return cubes(5, 5, 2, [](int i, int j, int) { return j <= i; });
 }
-/// A plate with two holes.
+/// Returns a plate with two holes.
 inline TriangleMesh frame() {
   return cubes(5, 4, 2, [](int i, int j, int) { return i % 2 == 0 || j % 3 == 0; });
 }
 inline TriangleMesh notched_box() {
   return cubes(3, 1, 2, [](int i, int, int k) { return i != 1 || k == 0; });
 }
-/// A block with a pocket in one face.
+/// Returns a block with a pocket in one face.
 inline TriangleMesh pocketed_box() {
   return cubes(3, 3, 2, [](int i, int j, int k) { return i != 1 || j != 1 || k == 0; });
 }
-/// A cube with a tunnel along every axis: a surface of genus five.
+/// Returns a cube with a tunnel along every axis: a surface of genus five.
 inline TriangleMesh sponge() {
   return cubes(3, 3, 3, [](int i, int j, int k) { return (i == 1) + (j == 1) + (k == 1) < 2; });
 }
-/// A cube with a void inside.
+/// Returns a cube with a void inside.
 inline TriangleMesh hollow_box() {
   return cubes(3, 3, 3, [](int i, int j, int k) { return i != 1 || j != 1 || k != 1; });
 }
 
-/// A thick half shell, open at the top.
+/// Returns a thick half shell, open at the top.
 inline TriangleMesh bowl(Real outer, Real inner, uint32_t around, uint32_t rings) {
   std::vector<Eigen::Vector2d> profile;
   for (uint32_t k = 0; k <= rings; ++k) {

@@ -14,13 +14,14 @@ using producer::LoadedScene;
 using producer::ModelLibrary;
 using std::chrono::milliseconds;
 
-constexpr milliseconds kQuiet{500};       // before a frame is refined
-constexpr milliseconds kVeryQuiet{2500};  // before it is refined to the highest quality
-constexpr int kBusy = 4;                  // factor of these times until the film is complete
-constexpr milliseconds kGlimpse{60};      // between two pictures of the time before frame 1
+constexpr milliseconds kQuiet{500};       // time without requests before a frame is refined
+constexpr milliseconds kVeryQuiet{2500};  // time without requests before it is refined to the highest quality
+constexpr int kBusy = 4;                  // factor of both times while the film is not complete
+constexpr milliseconds kGlimpse{60};      // time between two pictures of the time before frame 1
 
-/// The part of a scene that determines which model files are read and how they are processed: everything
-/// except numbers and colours, which matter only for decompositions, the sky's picture and flip-books.
+/// Returns the part of a scene that determines which model files are read and how they are processed:
+/// everything except numbers and colours, which matter only for decompositions, the sky's picture and
+/// flip-books.
 std::string used_by_models(const std::string& canonical) {
   auto json = nlohmann::json::parse(canonical);
   for (const char* key : {"name", "description", "render", "output", "world"}) json.erase(key);

@@ -103,7 +103,7 @@ class Engine {
   /// Sets the frame that the user sees. This frame is drawn first. It is refined when there are no changes
   /// for a while and the film is not playing.
   void look_at(int frame, bool playing);
-  /// Call this when model files have changed: versions shown from now on read them again.
+  /// Must be called when model files have changed. Versions that are shown later read them again.
   void forget_models();
   /// Returns the name of the object that is visible at a position of a frame; see FilmRun::pick(). The name
   /// is empty if there is no object or the frame has no state yet.
@@ -154,10 +154,10 @@ class Engine {
   void report_frame(int frame, Detail detail);
   void report_film(FilmEvent::Phase phase, const std::string& message = "");
   void fail(const std::string& what);
-  /// Whether there is an unprocessed request of any kind.
+  /// Returns whether there is an unprocessed request of any kind.
   bool is_stale() const { return ending_ || holds_ > 0 || requested_ != taken_; }
-  /// Whether another version or camera was requested, or is about to be (see Hold). Other requests, such as
-  /// the next frame of a playing film, do not abort a draft.
+  /// Returns whether another version or camera was requested, or is about to be (see Hold). Other requests,
+  /// such as the next frame of a playing film, do not abort a draft.
   bool is_outdated() const { return ending_ || holds_ > 0 || runs_ != run_; }
 
   const EngineSettings settings_;

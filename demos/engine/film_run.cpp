@@ -18,7 +18,7 @@ double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-/// The largest size with a picture's aspect ratio within a box, and no larger than the picture.
+/// Returns the largest size with a picture's aspect ratio within a box, and no larger than the picture.
 Eigen::Vector2i fitted(const Eigen::Vector2i& size, const Eigen::Vector2i& box) {
   const double scale = std::min({1.0, double(box.x()) / size.x(), double(box.y()) / size.y()});
   return {std::max(2, int(size.x() * scale + 0.5)), std::max(2, int(size.y() * scale + 0.5))};

@@ -29,8 +29,8 @@ struct ViewCamera {
 struct FilmDef {
   std::shared_ptr<const producer::LoadedScene> loaded;
   std::optional<ViewCamera> camera;
-  std::string film;     ///< key of its pictures in the FrameStore
-  std::string physics;  ///< key of its states in the PhysicsStore
+  std::string film;     ///< key of the pictures in the FrameStore
+  std::string physics;  ///< key of the states in the PhysicsStore
 };
 
 /// The resources that all films of a session share.
@@ -46,7 +46,7 @@ class FilmRun {
  public:
   using Stop = std::function<bool()>;
 
-  /// Throws the exceptions of producer::Simulation's constructor.
+  /// Builds the film and its simulation. Throws the exceptions of the constructor of producer::Simulation.
   FilmRun(FilmDef def, std::shared_ptr<const producer::ModelLibrary> models, const FilmResources& resources);
 
   const FilmDef& def() const { return def_; }

@@ -67,7 +67,7 @@ void SimulatedFilm::add_figures(double sim_ms) {
                                .contacts = world.contacts().size(),
                                .energy = world.energy(),
                                .state_hash = state(frame).state_hash.hex()});
-  constexpr int kEvery = 15;  // number of frames
+  constexpr int kEvery = 15;  // notes are updated every 15 frames
   if (frame % kEvery == 0 || frame == last_) physics_->notes = producer::notes_of(simulation_->totals());
 }
 

@@ -21,7 +21,7 @@ class SimulatedFilm : public producer::StateSource {
 
   const Physics& physics() const { return *physics_; }
   bool has_state(int frame) const { return find(frame) != nullptr; }
-  /// The state must be available.
+  /// Returns the state of a frame, which must be available.
   const producer::Snapshot& state(int frame) const { return *find(frame); }
   bool is_complete() const { return physics_->totals.has_value(); }
 
@@ -29,14 +29,14 @@ class SimulatedFilm : public producer::StateSource {
   void restart();
   /// Simulates one frame, or a part of the time before frame 1. Throws DivergedError.
   void simulate();
-  /// Time of the simulation [s].
+  /// Returns the time of the simulation [s].
   double time() const { return simulation_ ? simulation_->world().time() : 0; }
   /// Returns the current state of the simulation, also before frame 1. simulate() must have been called
   /// before.
   producer::Snapshot current() const { return simulation_->snapshot(); }
-  /// Number of the latest simulated frame; 0 before frame 1.
+  /// Returns the number of the latest simulated frame; 0 before frame 1.
   int simulated_to() const { return simulation_ ? simulation_->frame() : 0; }
-  /// Finished fraction of the simulation before frame 1, 0 to 1.
+  /// Returns the finished fraction of the simulation before frame 1, 0 to 1.
   double lead_in() const;
 
   int advances_to(int frame) override;

@@ -33,7 +33,7 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kStill{120};  // time without changes before files are read
 
-/// The existing files that the manifest of a folder lists.
+/// Returns the existing files that the manifest of a folder lists.
 std::set<fs::path> frames_in(const fs::path& pattern) {
   const std::vector<fs::path> files = producer::files_of_frames(pattern.parent_path());
   return {files.begin(), files.end()};
@@ -132,7 +132,7 @@ class Watcher {
     return stopped ? std::nullopt : std::optional(code);
   }
 
-  /// The output beside which hidden folders are placed.
+  /// Returns the output beside which hidden folders are placed.
   fs::path beside() const { return target_.kind == OutputKind::frames ? folder() : target_.path; }
   fs::path folder() const { return target_.path.has_parent_path() ? target_.path.parent_path() : "."; }
 

@@ -23,7 +23,8 @@ constexpr std::size_t kMostVersions = 400;
   throw render::FileError(file.string() + ": " + what + ": " + std::generic_category().message(error));
 }
 
-/// Writes, flushes to the disk and closes; returns the error number, or 0.
+/// Writes the text to a file descriptor, flushes it to the disk and closes the descriptor. Returns the error
+/// number, or 0.
 int write_through(int fd, const std::string& text) {
   std::size_t written = 0;
   while (written < text.size()) {

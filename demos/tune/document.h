@@ -36,7 +36,7 @@ class Document {
   const std::string& text() const { return history_[now_].text; }
   const Version& version() const { return history_[now_]; }
   bool is_saved() const { return text() == saved_; }
-  /// Content of the file when it was last read or written.
+  /// Returns the content of the file when it was last read or written.
   const std::string& saved() const { return saved_; }
 
   /// Makes `text` the current version; `label` and `paths` describe the change. Consecutive changes with the

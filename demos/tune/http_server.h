@@ -24,7 +24,7 @@ class HttpServer {
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;
 
-  /// The address to open in a browser, including the token.
+  /// Returns the address to open in a browser, including the token.
   std::string address() const;
 
  private:

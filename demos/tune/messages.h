@@ -25,7 +25,8 @@ Json vector_json(const Eigen::Vector3d& v);
 Eigen::Vector3d vector_of(const nlohmann::json& json);
 
 Json version_json(const Version& version, const std::map<uint64_t, std::string>& films);
-/// `file` is the scene's own file; only problems in other files get the name of their file.
+/// Returns the problems as JSON. `file` is the scene's own file; only problems in other files contain the
+/// name of their file.
 Json problems_json(const std::vector<Problem>& problems, const std::string& file);
 /// Returns the ranges as a list of pairs [first, last].
 Json ranges_json(const std::vector<std::pair<int, int>>& ranges);

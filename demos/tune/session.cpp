@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 using producer::Node;
 using std::chrono::milliseconds;
 
-/// The index of the list item that a step of a path refers to, by index or by name.
+/// Returns the index of the list item that a step of a path refers to, by index or by name.
 std::optional<std::size_t> item_of(const producer::List& list, const std::string& step) {
   for (std::size_t i = 0; i < list.size(); ++i) {
     const Node* name = list[i].find("name");
@@ -33,7 +33,7 @@ std::optional<std::size_t> item_of(const producer::List& list, const std::string
   return {};
 }
 
-/// The overlays of the text and `more`, as an override.
+/// Returns an override of the scene with the overlays of its text and those in `more`.
 std::string overlays_override(const std::string& text, const Session::Json& more) {
   Session::Json all = Session::Json::array();
   const Node root = producer::parse_json(text, "");
@@ -96,8 +96,8 @@ std::vector<std::string> Session::muted_paths(const std::string& text) const {
   return paths;
 }
 
-/// Parses the scene's text; errors are returned. `with_view`: leave out the muted objects, and add the
-/// overlays of the page.
+/// Parses the scene's text. Errors are a part of the result. `with_view`: omits the muted objects, and adds
+/// the overlays of the page.
 Session::Parsed Session::parse(const std::string& text, bool with_view) const {
   Parsed parsed;
   std::vector<std::string> muted;
@@ -272,7 +272,8 @@ Reply Session::restore(const nlohmann::json& request) {
   return shown();
 }
 
-/// Changes that are never an undo step: frame, camera, overlays, and muted objects.
+/// Handles changes that are never an undo step: of the frame, the camera, the overlays, and the muted
+/// objects.
 Reply Session::view(const nlohmann::json& request) {
   const std::lock_guard lock(mutex_);
   bool changed = false;
@@ -398,7 +399,7 @@ void Session::watch_files() {
   std::string hash = others(files());
   while (!closing_) {
     producer::FileWatch watch(files());
-    // Also detects a change between the reading of the file and the start of the watch.
+    // This also detects a change after the file was read and before the watch began.
     files_changed(hash, hash);
     while (!closing_ && !watch.changed()) watch.wait(milliseconds(250));
     if (closing_) return;

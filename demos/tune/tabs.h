@@ -43,7 +43,7 @@ class Tabs {
   };
   Next wait(const std::string& tab, uint64_t ticket, std::chrono::milliseconds limit);
 
-  /// The tab that may change the scene; empty if none is open.
+  /// Returns the tab that may change the scene; empty if none is open.
   std::string writer() const;
   /// Makes a tab the writer; returns false if the tab is not open.
   bool take_over(const std::string& tab);

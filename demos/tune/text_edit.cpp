@@ -33,7 +33,7 @@ class PartFinder {
     skip();
     return value();
   }
-  /// The first byte from `i` on that is neither white space nor in a comment.
+  /// Returns the first byte from `i` on that is neither white space nor in a comment.
   static std::size_t skip_from(std::string_view text, std::size_t i) {
     while (i < text.size()) {
       i = std::min(text.find_first_not_of(kBlanks, i), text.size());
@@ -157,7 +157,7 @@ FollowedPath follow(const Part& root, const std::vector<std::string>& steps) {
   throw std::invalid_argument("the scene has no " + std::string(path));
 }
 
-/// The text between the beginning of the line and `at`, if it is only white space.
+/// Returns the text between the beginning of the line and `at`, if it is only white space.
 std::optional<std::string> own_line_indent(std::string_view text, std::size_t at) {
   const std::size_t line = text.substr(0, at).find_last_of('\n');
   const std::size_t begin = line == std::string_view::npos ? 0 : line + 1;
@@ -166,8 +166,8 @@ std::optional<std::string> own_line_indent(std::string_view text, std::size_t at
   return std::string(before);
 }
 
-/// The end of the line of `at`, before its line break, if there are only white space and complete comments in
-/// between.
+/// Returns the end of the line of `at`, before its line break, if there are only white space and complete
+/// comments in between.
 std::optional<std::size_t> rest_of_line(std::string_view text, std::size_t at) {
   while (at < text.size()) {
     at = std::min(text.find_first_not_of(" \t", at), text.size());
@@ -189,7 +189,7 @@ std::string_view line_end(std::string_view text) {
   return text.find("\r\n") != std::string_view::npos ? "\r\n" : "\n";
 }
 
-/// The text between keys and values in this object, or else in the whole text.
+/// Returns the text between keys and values in this object, or else in the whole text.
 std::string colon_of(std::string_view text, const Part& object) {
   if (object.parts.empty()) return ": ";
   const Part& last = object.parts.back();
@@ -220,7 +220,7 @@ std::string append_to(std::string_view text, const Part& container, const std::s
   return result.insert(last.value.end, "," + gap + member);
 }
 
-/// The bytes that are removed with a part.
+/// Returns the bytes that are removed with a part.
 std::vector<ByteRange> bytes_to_remove(std::string_view text, const Part& container, std::size_t index) {
   const Part& part = container.parts[index];
   const bool is_last = index + 1 == container.parts.size();
@@ -270,8 +270,8 @@ std::string set_value(std::string_view text, std::string_view path, std::string_
     return result.replace(followed.end->value.begin, followed.end->value.end - followed.end->value.begin,
                           value);
   }
-  // Content of the missing objects and lists, from the inside. A list in an object whose keys are on separate
-  // lines has its first item on a separate line, too.
+  // Text of the missing objects and lists, built from the innermost outwards. If an object has its keys on
+  // separate lines, a new list in it has its first item on a separate line, too.
   const auto indent = followed.end->object && !followed.end->parts.empty()
                           ? own_line_indent(text, followed.end->parts.back().begin())
                           : std::nullopt;
@@ -330,7 +330,7 @@ std::string blank_out(std::string_view text, const std::vector<std::string>& pat
       items.emplace_back(followed.parent, followed.index);
   }
   for (const auto& [list, index] : items) blank(list->parts[index].value);
-  // Of the commas of a list, those between two remaining items stay.
+  // The commas between two remaining items of a list stay.
   std::vector<const Part*> lists;
   for (const auto& item : items)
     if (std::ranges::find(lists, item.first) == lists.end()) lists.push_back(item.first);

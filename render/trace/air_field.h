@@ -15,7 +15,8 @@ class AirField {
   /// A particle.
   struct Ball {
     Vector3f center;
-    float number;  ///< pseudo-random, in [0, 1), constant; selects the traced particles and their rays
+    float
+        number;  ///< constant pseudo-random number in [0, 1), which selects the traced particles and the rays
   };
   /// Traces the light of a sub-frame at some of the `balls`. `open`: see LightTracer::trace_air.
   AirField(const LightTracer& tracer, const SampleOffsets& offsets, std::span<const Ball> balls,

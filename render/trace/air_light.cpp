@@ -3,7 +3,7 @@
 namespace offstage::render {
 namespace {
 
-/// The 24 bits of a number in [0, 1).
+/// Returns the 24 bits of a number in [0, 1).
 uint32_t bits_of(float number) {
   return static_cast<uint32_t>(number * 0x1p24f);
 }

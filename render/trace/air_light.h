@@ -8,7 +8,7 @@ namespace offstage::render {
 
 class AirLight {
  public:
-  /// The arguments must outlive this object.
+  /// Prepares the tracing of a sub-frame. All arguments must outlive this object.
   AirLight(const RayScene& scene, const LightSources& sources, const SampleOffsets& offsets)
       : scene_(scene), sources_(sources), disc_(sources.sun, sources.sky.sun_direction), offsets_(offsets) {}
 

@@ -44,7 +44,7 @@ float area_of_pixel(const Vector3f& place, const Vector3f& normal, const LightVi
 /// The light of the sun or of a lamp that falls on the box around a piece of glass.
 struct LightTracer::Beam {
   const GlassPiece* piece;
-  const Sun* sun;  ///< null: a lamp
+  const Sun* sun;  ///< the sun; null: the source is a lamp
   const SunDisc* disc;
   const RayLamp* lamp;
   std::array<float, 6> powers = {};  ///< estimated power at each face of the box, sum of the three colours
@@ -104,7 +104,8 @@ LightTracer::Photon LightTracer::trace_photon(const Beam& beam, uint32_t number,
       return photon;
     const RayMaterial& material = *hit.material;
     const Vector4f color = material.color(hit, 0);
-    if (color.w() < 1 && sampler.next().x >= color.w()) {  // through a hole, or a translucent surface
+    if (color.w() < 1 &&
+        sampler.next().x >= color.w()) {  // the photon passes through a hole or a translucent surface
       path.from = off_surface(hit.position, -hit.face);
     } else if (material.transmission <= 0) {
       photon.pixel = visible.find(hit);

@@ -31,7 +31,8 @@ void Glow::limit() {
   sources_.resize(kMost);
 }
 
-// In proportion to power over distance squared; nothing if all of the source is below the surface's horizon.
+// The estimate is in proportion to the power divided by the square of the distance. It is 0 if the whole
+// source is below the horizon of the surface.
 float Glow::estimate(const Source& source, const Vector3f& place, const Vector3f& normal) {
   const Vector3f offset = source.center - place;
   if (offset.dot(normal) < -source.radius) return 0;
@@ -48,7 +49,7 @@ float Glow::Source::cap(const Vector3f& place) const {
   return sine2 < 1 ? sine2 / (1 + std::sqrt(1 - sine2)) : 0;
 }
 
-// A direction in the cone that contains the ball.
+// Samples a direction in the cone that contains the ball.
 GlowSample Glow::Source::sample_ball(const Vector3f& place, const SquarePoint<float>& uv) const {
   const Vector3f offset = center - place;
   const float wide = cap(place), distance = offset.norm();
@@ -73,7 +74,8 @@ GlowSample Glow::Source::sample_area(const Vector3f& place, float choice,
   const unsigned triangle = mesh->triangle_at(choice);
   const std::array<Vector3f, 3> p = mesh->corners(triangle, world_from_mesh);
   const float root = std::sqrt(uv.x);
-  const Vector2f b(root * (1 - uv.y), root * uv.y);  // even over the triangle
+  const Vector2f b(root * (1 - uv.y),
+                   root * uv.y);  // barycentric coordinates, uniformly distributed over the triangle
   const Vector3f offset = p[0] + b.x() * (p[1] - p[0]) + b.y() * (p[2] - p[0]) - place;
   const Vector3f normal = (p[1] - p[0]).cross(p[2] - p[0]);
   GlowSample result;

@@ -157,7 +157,7 @@ bool LightValues::Averaging::is_even(int run, int y) {
   for (int row = std::max(y - step_, y % step_); row <= std::min(y + step_, guide_.height_px - 1);
        row += step_)
     for (int r = std::max(run - 1, 0); r <= std::min(run + 1, runs_ - 1); ++r)
-      if (!std::equal(here, here + channels_, even(r, row))) return false;  // NaN differs from everything
+      if (!std::equal(here, here + channels_, even(r, row))) return false;  // a NaN is not equal to any value
   return true;
 }
 

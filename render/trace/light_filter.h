@@ -27,7 +27,7 @@ class LightPlane {
         values_(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(height_px)) {}
   float* at(int x, int y) { return &values_[index(x, y)]; }
   const float* at(int x, int y) const { return &values_[index(x, y)]; }
-  /// The values of the eight pixels x ... x + 7.
+  /// Returns the values of the eight pixels x ... x + 7.
   Lanes lanes(int x, int y) const {
     Lanes result;
     __builtin_memcpy(&result, at(x, y), sizeof(result));
@@ -56,7 +56,7 @@ class PixelBlocks {
         rows_((height_px + kSide - 1) / kSide),
         values_(static_cast<std::size_t>(columns_ * rows_)) {}
   int rows() const { return rows_; }
-  /// The value of the block that contains pixel (x, y).
+  /// Returns the value of the block that contains pixel (x, y).
   T& at(int x, int y) { return values_[index(x / kSide, y / kSide)]; }
   /// Returns the sum over the block that contains pixel (x, y) and its neighbours.
   T sum_around(int x, int y) const {
@@ -78,7 +78,7 @@ class PixelBlocks {
 /// The noise of light in each block of a picture.
 class LightNoise {
  public:
-  /// `brightness`: light that one ray found, for each pixel with a surface.
+  /// Measures the noise. `brightness`: light that one ray found, for each pixel with a surface.
   LightNoise(const LightGuide& guide, const LightPlane& brightness);
   /// Returns variance / mean^2 over the block that contains pixel (x, y) and its neighbours.
   float relative_variance(int x, int y) const;
@@ -110,9 +110,9 @@ struct LightGuide {
   /// For each of the pixels x ... x + 7, returns the fraction of the 5x5 pixels around it that have a similar
   /// position and normal, in [0, 1].
   Lanes similar_around(int x, int y) const;
-  /// Whether pixel (x, y) shows the surface at a point with this unit normal.
+  /// Returns whether pixel (x, y) shows the surface at a point with this unit normal.
   bool shows(int x, int y, const Eigen::Vector3f& position, const Eigen::Vector3f& unit_normal) const;
-  /// Position [m] or normal of a pixel; `planes`: place or normal.
+  /// Returns the position [m] or normal of a pixel; `planes`: place or normal.
   static Eigen::Vector3f at(const std::array<LightPlane, 3>& planes, int x, int y) {
     return {*planes[0].at(x, y), *planes[1].at(x, y), *planes[2].at(x, y)};
   }
@@ -141,7 +141,7 @@ class LightValues {
  private:
   class Averaging;
   std::vector<LightPlane> values_, next_;
-  /// For each run of pixels and each channel: the value if all pixels of the run have the same one, else NaN.
+  /// For each run of pixels and each channel: the common value of all pixels of the run; NaN if they differ.
   std::vector<float> even_;
 };
 

@@ -42,8 +42,8 @@ Vector3f enter(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Ve
   const bool smooth = a < 1e-3f;
   if (hit.material->thin && smooth) return color;
   const Vector3f n = smooth ? hit.normal : visible_facet(hit.normal, -direction, a, sampler.next());
-  if (hit.material
-          ->thin) {  // spreads light as its mirror image, to the other side (KHR_materials_transmission)
+  if (hit.material->thin) {  // a thin sheet spreads the transmitted light like its mirror image, but to the
+                             // other side (KHR_materials_transmission)
     direction = reflected(reflected(direction, n), hit.normal);
     if (direction.dot(hit.face) >= 0) direction = reflected(direction, hit.face);
     return color;
@@ -209,7 +209,7 @@ bool LightTracer::follow_smooth(const Hit& hit, const Vector3f& albedo, PixelSam
     path.fraction = path.fraction.cwiseProduct(albedo + (Vector3f::Ones() - albedo) * grazing);
     return true;
   }
-  if (sharp) {  // in a mirror image, a varnished surface mirrors the sky alone
+  if (sharp) {  // in a mirror image, a varnished surface mirrors only the sky
     const float fresnel = 0.04f + 0.96f * grazing;
     Path sky = path;
     sky.turn(reflected(path.direction, hit.normal), hit);
@@ -259,7 +259,8 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
     const RayMaterial& material = *hit.material;
     const Vector4f color = material.color(hit, travelled * path.cone);
     path.by_chance |= color.w() > 0 && color.w() < 1;
-    if (color.w() < 1 && sampler.next().x >= color.w()) {  // through a hole, or a translucent surface
+    if (color.w() < 1 &&
+        sampler.next().x >= color.w()) {  // the path passes through a hole or a translucent surface
       path.from = off_surface(hit.position, -hit.face);
       continue;
     }

@@ -19,7 +19,7 @@ inline std::size_t index_of(int x, int y, int width) {
 /// Returns the fraction of the light along a ray that a glass surface reflects (Fresnel), in [0, 1].
 float mirrored_fraction(const Hit& hit, const Vector3f& direction);
 
-/// Whether the glass is so rough that refracted rays get a random direction.
+/// Returns whether the glass is so rough that refracted rays get a random direction.
 bool is_rough_glass(const RayMaterial& material);
 
 /// Moves a ray to the other side of a glass surface and refracts its direction. Returns the transmitted

@@ -38,7 +38,7 @@ struct LightSources {
   std::vector<RayLamp> lamps;
   Glow glow;
   std::vector<GlassPiece> glass;
-  const OpacityGrid* smoke = nullptr;  ///< null: none
+  const OpacityGrid* smoke = nullptr;  ///< opacity of the smoke; null: there is no smoke
 };
 
 /// Light at a point in the air. A white surface there with the unit normal n has the radiance

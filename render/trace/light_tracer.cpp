@@ -379,7 +379,7 @@ void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, int r
   const Points points(surfaces, pixels_of_cells(surfaces, x, y, view));
   if (!view.sparse && round == 0) set_guide(points, x, y, view, 2, light.cells);
   const Lanes none{};
-  const int shift = view.sparse ? 1 : 0;  // numbers the cells that are no gaps without holes
+  const int shift = view.sparse ? 1 : 0;  // gives consecutive numbers to the cells that are not gaps
   const uint32_t row = (static_cast<uint32_t>(y) >> shift) + static_cast<uint32_t>(round) * kRowsPerRound;
   Sampler<UintLanes> samplers((UintLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<uint32_t>(x)) >> shift,
                               UintLanes{} + row, k, view.offsets.count);
@@ -595,7 +595,7 @@ void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, con
   glass.sums = sum_over_rows(surfaces.height_px, [&](int y, LightSums& sums) {
     for (int x = 0; x < width; x += kLanes) {
       Points points(surfaces, pixels_of_row(surfaces, x, y));
-      points.mirrors = points.visible;  // glass of any roughness
+      points.mirrors = points.visible;  // mirror images of glass are traced for any roughness
       if (with_lamps > 0) {
         Sampler<UintLanes> sampler(UintLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<uint32_t>(x0 + x),
                                    UintLanes{} + static_cast<uint32_t>(y0 + y), view.offsets.index,

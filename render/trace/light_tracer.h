@@ -92,8 +92,8 @@ class VisibleLight {
 
 class LightTracer {
  public:
-  /// `scene` and `sources` must outlive this object. Several threads call `stop`; once it returns true, the
-  /// functions for surfaces throw StoppedError.
+  /// Prepares the tracing of a sub-frame. `scene` and `sources` must outlive this object. Several threads
+  /// call `stop`; once it returns true, the functions for surfaces throw StoppedError.
   LightTracer(const RayScene& scene, const LightSources& sources, StopTest stop = {});
 
   /// Computes the light at all opaque surfaces of the picture.

@@ -39,7 +39,7 @@ LampPoint<T> RayLamp::point_of(const Three<T>& place, const SquarePoint<T>& uv) 
   Three<T> a = everywhere(right_), b = everywhere(up_);
   T softening{};
   SquarePoint<T> along = {(uv.x - 0.5f) * def_.size.x(), (uv.y - 0.5f) * def_.size.y()};
-  if (!rectangle) {  // the disc that the ball shows to the place
+  if (!rectangle) {  // the disc of the ball that is visible from the place
     const Three<T> to_place = place - middle;
     make_basis(to_place * (1.0f / square_root(larger(dot(to_place, to_place), T{} + 1e-24f))), a, b);
     const SquarePoint<T> d = on_disc(uv);

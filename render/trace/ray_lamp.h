@@ -27,9 +27,10 @@ class RayLamp {
   LampPoint<float> point(const Three<float>& place, const SquarePoint<float>& uv) const;
   LampPoint<Lanes> point(const LaneVectors& place, const SquarePoint<Lanes>& uv) const;
   const Lamp& def() const { return def_; }
-  /// Whether this is the bright part of the sky's picture.
+  /// Returns whether this is the bright part of the sky's picture.
   bool is_sky() const { return sky_.picture != nullptr; }
-  /// Whether the light that glass focuses is traced: the lamp casts shadows and is not inside of glass.
+  /// Returns whether the light that glass focuses is traced: the lamp casts shadows and is not inside of
+  /// glass.
   bool is_focused() const { return is_focused_; }
 
  private:

@@ -94,7 +94,7 @@ Vector3f RayMaterial::emission_at(const Vector2f& uv) const {
   return emission_.cwiseProduct(glowing_texels_.at(uv).head<3>());
 }
 
-// As triplanar_color() in shaders/mesh.frag.
+// Equal to triplanar_color() in shaders/mesh.frag.
 Vector4f RayMaterial::triplanar_texel(const Vector3f& p, const Vector3f& n) const {
   const Vector3f weight = n.array().square().square();
   const Vector2f x(n.x() < 0 ? p.z() : -p.z(), -p.y()), y(n.y() < 0 ? -p.x() : p.x(), p.z()),

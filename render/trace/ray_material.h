@@ -28,7 +28,7 @@ class RayMaterial {
   Vector3f emission_at(const Vector2f& uv) const;
   /// Returns the mean of the emitted radiance over the texture.
   const Vector3f& mean_emission() const { return mean_emission_; }
-  /// Whether the whole surface blocks light.
+  /// Returns whether the whole surface blocks light.
   bool is_opaque() const { return opaque_; }
   /// Returns the fraction of the light that passes the surface along a shadow ray, per channel.
   Vector3f transmittance(const Hit& hit, const Vector3f& direction) const;
@@ -36,7 +36,7 @@ class RayMaterial {
  private:
   /// A reduced copy of a texture.
   struct Texels {
-    std::shared_ptr<const Image> image;  ///< null: white
+    std::shared_ptr<const Image> image;  ///< pixels of the texture; null: white
     TextureMap map;
     Vector4f mean = {1, 1, 1, 1};
 

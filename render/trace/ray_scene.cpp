@@ -13,7 +13,7 @@
 namespace offstage::render {
 namespace {
 
-// Groups of objects that a ray may leave out.
+// Groups of objects that a ray can ignore.
 constexpr unsigned kOpaqueCaster = 1, kTranslucentCaster = 2, kFocusingCaster = 4, kNoCaster = 8, kAll = 15,
                    kSprite = 16;
 // The groups of objects that reduce the light along a shadow ray.
@@ -28,7 +28,8 @@ constexpr unsigned blocking(RayScene::Focus focus) {
 // others freely.
 constexpr int kMostPassed = 64;
 
-/// The device of the process. The instruction set is fixed, because others round hit distances differently.
+/// Returns the device of the process. The instruction set is fixed, because others round hit distances
+/// differently.
 RTCDevice device() {
   static const RTCDevice made = [] {
     RTCDevice result = rtcNewDevice("isa=avx2");
@@ -171,7 +172,7 @@ float RayMesh::chance_of(unsigned triangle) const {
 
 struct RayScene::Object {
   const RayMaterial* material = nullptr;
-  const RayMesh* mesh = nullptr;  ///< null: a cloth or balls
+  const RayMesh* mesh = nullptr;  ///< the mesh; null: the object is a cloth or balls
   Eigen::Affine3f world_from_mesh = Eigen::Affine3f::Identity();
   Eigen::Matrix3f normal_from_mesh = Eigen::Matrix3f::Identity();
   bool mirrored = false;
@@ -366,7 +367,7 @@ void RayScene::Object::describe_ball(unsigned ball, const Vector3f& from, const 
   hit.color.w() = 1;
 }
 
-// As in shaders/points_shape.glsl.
+// Equal to coverage() in shaders/points_shape.glsl.
 float RayScene::Object::transmittance(unsigned sprite, const Vector3f& from, const Vector3f& direction,
                                       float& behind) const {
   const Vector4f& place = *reinterpret_cast<const Vector4f*>(balls + sprite * stride);

@@ -50,8 +50,8 @@ class RayMesh {
 
   std::vector<Vector4f> positions;  ///< w is not used; Embree reads 16 bytes
   std::vector<Vector3f> normals;
-  std::vector<Vector2f> uvs;     ///< empty: none
-  std::vector<Vector4f> colors;  ///< empty: none
+  std::vector<Vector2f> uvs;     ///< texture coordinates of the vertices; empty: none
+  std::vector<Vector4f> colors;  ///< colours of the vertices; empty: none
   std::vector<uint32_t> indices;
 
  private:

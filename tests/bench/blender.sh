@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# CPU time of effects beside Blender 3.4.1, on its scenes in tests/bench/blender: tests/bench/blender.sh [PROGRAM [RUNS]].
-# Simulation: all frames less the start-up, per frame. Drawing: preview quality, PNG included, eight frames less one, per frame, from a cache.
-# Medians of RUNS. Blender's figures are those of EEVEE with 4 samples on the same machine (RESULTS.md says how they were taken).
+# Compares the CPU time of effects with Blender 3.4.1, on the scenes of tests/bench/blender: tests/bench/blender.sh [PROGRAM [RUNS]].
+# Simulation: time of all frames minus the start-up, per frame. Drawing, from a cache: preview quality, including PNG; time of eight
+# frames minus the time of one, per frame.
+# Prints medians of RUNS. RESULTS.md says how Blender was measured: EEVEE with 4 samples on the same machine.
 set -euo pipefail
 cd "$(dirname "$0")"
 program=$(realpath "${1:-../../build/offstage}")
@@ -10,7 +11,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 
 TIMEFORMAT='%U %S'
-# cpu COMMAND...: its user and system time [s].
+# cpu COMMAND...: prints the sum of user and system time of the command [s].
 cpu() { { time "$@" >/dev/null 2>"$folder/log"; } 2>&1 | awk '{print $1 + $2}'; }
 median() { sort -n | awk '{v[NR] = $1} END {print v[int((NR + 1) / 2)]}'; }
 simulate() { "$program" simulate "blender/$1.json" -q "${@:2}"; }

@@ -1,6 +1,6 @@
-/// Broad phase of spheres whose diameters are spread over 100:1 (1 cm to 1 m, as many in every octave): from
-/// the new boxes to all pairs that meet. Boxes are made outside the measured time, for the grids and for FCL
-/// alike.
+/// Measures the broad phase of spheres with diameters from 1 cm to 1 m, equally many in each octave: from the
+/// new boxes to all overlapping pairs. The time to compute the boxes is excluded, both for the grids and for
+/// FCL.
 
 #include <cmath>
 #include <memory>
@@ -24,9 +24,10 @@ constexpr uint32_t kSpheres = 100'000;
 /// The spheres and their motion: back and forth by up to 1.5 cm per step.
 class Crowd {
  public:
-  /// `partners` is the mean number of spheres whose boxes one sphere's box meets.
+  /// `partners`: mean number of boxes that a box overlaps.
   explicit Crowd(Real partners) {
-    // Cubes of sides s and t meet in a volume (s + t)^3 of places; this is its mean over the sizes.
+    // Cubes with the sides s and t overlap if their distance vector is in a cube of the volume (s + t)^3.
+    // This is the mean of the volume over all sizes.
     constexpr Real kMeanVolume = 0.285;
     side_ = std::cbrt(kSpheres * kMeanVolume / partners);
   }
@@ -44,7 +45,7 @@ class Crowd {
     const Vec3 p = centre(i, step), r = Vec3::Constant(diameter(i) / 2);
     return {p - r, p + r};
   }
-  /// Those that move in a step, one in `every`.
+  /// Returns the spheres that move in a step: one in `every`.
   static std::vector<uint32_t> movers(int step, uint32_t every) {
     std::vector<uint32_t> movers;
     for (uint32_t i = static_cast<uint32_t>(step) % every; i < kSpheres; i += every) movers.push_back(i);
@@ -61,7 +62,7 @@ void count_pairs(benchmark::State& state, std::size_t pairs) {
       benchmark::Counter(static_cast<double>(pairs), benchmark::Counter::kAvgIterations);
 }
 
-/// Arguments: mean partners in hundredths, one in how many moves.
+/// Arguments: mean number of partners, in hundredths; n, if one in n spheres moves.
 void grid(benchmark::State& state, GridKind kind) {
   const Crowd crowd(static_cast<Real>(state.range(0)) / 100);
   BroadPhase broad_phase(kind);

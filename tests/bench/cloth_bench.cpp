@@ -1,7 +1,7 @@
-/// A square of cotton of 4 m dropped on a sphere of radius 1 on the ground, 72 frames at 24 per second: CPU
-/// time per frame, and how well it did: strain, depth in bodies, crossings of cloth. bench_cloth [CELLS
-/// SELF_COLLISION [SUBSTEPS_PER_SECOND]] or peer NODES
-/// [SUBSTEPS_PER_SECOND]; without arguments the usual cases.
+/// Measures a square of cotton with edges of 4 m that falls on a sphere of radius 1 m on the ground, for 72
+/// frames at 24 per second: CPU time per frame, and the errors: strain, depth in bodies, crossings of cloth.
+/// bench_cloth [CELLS SELF_COLLISION [SUBSTEPS_PER_SECOND]] or peer NODES [SUBSTEPS_PER_SECOND]; without
+/// arguments, runs the default cases.
 
 #include <algorithm>
 #include <cstdio>
@@ -56,8 +56,9 @@ void run(uint32_t cells, bool self_collision, Real rate) {
       cells, cells, self_collision, 1e3 * total / kFrames, 1e3 * worst, mean, strain, depth, crossed);
 }
 
-/// The peers' scene `cloth N` (PEERS.md): N x N nodes of 1 kg in all, hung by two corners over a sphere, 4 s
-/// in steps of 1/240 s, without air and self-collision.
+/// Runs the scene `cloth N` of the benchmarks against other engines (PEERS.md): N x N nodes with a total mass
+/// of 1 kg hang by two corners over a sphere. It takes 4 s in steps of 1/240 s, without air and
+/// self-collision.
 void run_peer(uint32_t nodes, Real rate) {
   effects::Fabric fabric = effects::find_fabric("cotton")->fabric;
   fabric.areal_density = 0.25;

@@ -1,8 +1,9 @@
-/// Queries of two hulls of 100 vertices along a smooth motion, as a simulation asks them: B turns by about
-/// 0.01 rad and drifts by 0.001 from query to query. The hulls are of the size 1 and stay apart by a tenth,
-/// or within a thousandth, or overlap by that. libccd has no distance query of its own: its intersection test
-/// (apart) and its penetration (overlapping) are timed with the same hill-climbing support mapping that GJK
-/// uses here, and FCL's distance, which is built on libccd, with FCL's own. Counters: iterations per query.
+/// Measures queries of two hulls of 100 vertices along a smooth motion, as in a simulation: between two
+/// queries, B turns by about 0.01 rad and moves by 0.001. The hulls have the size 1. Their distance stays at
+/// 0.1 or below 0.001, or they overlap by 0.001. libccd has no distance query. Its intersection test and its
+/// penetration depth are therefore measured, with the same hill-climbing support mapping as for GJK. The
+/// distance of FCL, which is based on libccd, is measured with the support mapping of FCL. Counters:
+/// iterations per query.
 
 #include <cmath>
 #include <memory>
@@ -21,7 +22,7 @@
 namespace offstage::sim {
 namespace {
 
-/// All its points are vertices, for they lie on a sphere, or an ellipsoid if its axes differ.
+/// Returns the hull of points on a sphere or on an ellipsoid, so that every point is a vertex.
 ConvexPolyhedron round_hull(uint64_t seed, int points) {
   const Scatter scatter{seed};
   std::vector<Vec3> cloud;
@@ -43,7 +44,8 @@ struct HullMotion {
       const Real s = 0.01 * k;
       Pose pose{2 * Vec3(std::cos(0.1 * s), 0.3 * std::sin(0.07 * s), std::sin(0.1 * s)),
                 Quat(Eigen::AngleAxisd(s, Vec3(std::cos(0.01 * s), std::sin(0.01 * s), 0.5).normalized()))};
-      for (int i = 0; i < 3; ++i) {  // to the gap along the normal, which turns a little on the way
+      for (int i = 0; i < 3; ++i) {  // moves B to the given gap along the normal; this turns the normal a
+                                     // little, so it is repeated
         const Separation separation = gjk(convex(a), convex(b), pose, cache);
         pose.position += (separation.distance - gap) * separation.normal;
       }
@@ -57,7 +59,7 @@ const HullMotion& motion(int64_t which) {
   return which == 0 ? apart : which == 1 ? near : overlapping;
 }
 
-/// Calls a query, which returns its iterations, with one pose after the other.
+/// Calls a query with each pose in turn. The query returns its number of iterations.
 template <class Query>
 void run_queries(benchmark::State& state, Query&& query) {
   const std::vector<Pose>& poses = motion(state.range(0)).poses;
@@ -104,7 +106,7 @@ void overlap_warm(benchmark::State& state) {
   run_queries(state, [&](const Pose& pose) { return int{overlap(convex(m.a), convex(m.b), pose, cache)}; });
 }
 
-/// What libccd passes to its support mapping: a placed hull and where it climbed to last.
+/// Argument of libccd's support mapping: a hull with its pose, and the last vertex of the hill climbing.
 struct CcdHull {
   const ConvexPolyhedron* hull;
   Pose pose;

@@ -1,5 +1,5 @@
-/// Convex decomposition: exact of tori with ever more reflex edges, approximate of one with a hole in its
-/// surface.
+/// Measures convex decompositions: exact ones of tori with more and more reflex edges, and an approximate one
+/// of a torus with a hole in its surface.
 
 #include <benchmark/benchmark.h>
 
@@ -31,7 +31,7 @@ void approximate(benchmark::State& state) {
   decompose_mesh(state, torus);
 }
 
-/// A point inside, where no triangle is near.
+/// The point is inside, far from all triangles.
 void winding_number(benchmark::State& state) {
   const WindingNumber winding(torus_mesh(1, 0.3, 322, 107));
   for (auto _ : state) benchmark::DoNotOptimize(winding.at({0.95, 0.05, 0.1}));

@@ -11,8 +11,8 @@ namespace {
 
 constexpr Real kEmitterStep = 1.0 / 240;
 
-/// A million particles a second, one by one (range 1: 0) or in a burst each sub-step (1), from a kind of
-/// surface (range 0).
+/// Emits a million particles per second from a surface. Arguments: kind of the surface; 0 for single
+/// particles, 1 for a burst in each sub-step.
 void emission(benchmark::State& state) {
   const auto kind = static_cast<SurfaceKind>(state.range(0));
   const sim::TriangleMesh tetrahedron{{{0, 0, 0}, {9, 0, 0}, {0, 9, 0}, {0, 0, 9}},
@@ -43,7 +43,7 @@ void emission(benchmark::State& state) {
       benchmark::Counter(static_cast<double>(created), benchmark::Counter::kIsRate);
 }
 
-/// Ten thousand stars that leave a hundred particles a second each.
+/// Simulates ten thousand particles, each of which leaves a trail of a hundred particles per second.
 void trails(benchmark::State& state) {
   uint64_t created = 0;
   for (auto _ : state) {

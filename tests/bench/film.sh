@@ -6,9 +6,9 @@ runs=${1:-5}
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 
-# median NAME: of the numbers on standard input.
+# median NAME: prints the median of the numbers on standard input.
 median() { sort -n | awk -v name="$1" '{v[NR] = $1} END {printf "%s: median %.3f  (min %.3f, max %.3f, %d runs)\n", name, v[int((NR + 1) / 2)], v[1], v[NR], NR}'; }
-# field KEY: a top-level number of the stats object.
+# field KEY: prints a top-level number of the statistics.
 field() { sed -n "s/^  \"$1\": \([0-9.]*\).*/\1/p" "$folder/stats.json"; }
 render() { build/offstage render "$1" -o "$folder/out/" --force -q --stats "$folder/stats.json" "${@:2}"; }
 

@@ -1,4 +1,5 @@
-/// Free flight of lone bodies: the closed form, and the integrators where there is none.
+/// Measures the free motion of single bodies: by the closed form, and by the integrators where there is no
+/// closed form.
 
 #include <benchmark/benchmark.h>
 #include <oneapi/tbb/global_control.h>

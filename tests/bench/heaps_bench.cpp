@@ -1,5 +1,5 @@
-/// Steps of heaps that come down, by the solver `auto`: CPU time of a step over the first four seconds, its
-/// mean and the worst.
+/// Measures the steps of falling heaps with the solver `auto`: mean and greatest CPU time of a step in the
+/// first four seconds.
 
 #include <algorithm>
 #include <ctime>

@@ -1,5 +1,5 @@
-/// Reading a model against assimp alone with the same post-processing: what the child process, the checks and
-/// the hand-over cost.
+/// Compares the time to read a model with the time of assimp alone with the same post-processing. The
+/// difference is the cost of the child process, the checks and the transfer.
 
 #include <cmath>
 #include <cstdio>
@@ -16,7 +16,7 @@
 namespace offstage::render {
 namespace {
 
-/// An OBJ of a wavy grid of n x n cells, with normals: 2 n^2 triangles.
+/// Returns an OBJ of a wavy grid of n x n cells, with normals: 2 n^2 triangles.
 std::filesystem::path grid_file(int n) {
   const auto path =
       std::filesystem::temp_directory_path() / ("offstage-grid-" + std::to_string(getpid()) + ".obj");

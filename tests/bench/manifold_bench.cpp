@@ -1,5 +1,6 @@
-/// Manifolds of solids in contact, each turned a little from query to query: from the separation to the
-/// points, and the whole query of two shapes, next to Bullet's test of two boxes. Counters: points per query.
+/// Measures manifolds of solids in contact, which turn a little between two queries: the computation of the
+/// points from the separation, and the whole query of two shapes. Bullet's test of two boxes is measured for
+/// comparison. Counters: points per query.
 
 #include <memory>
 #include <numbers>
@@ -17,7 +18,8 @@
 namespace offstage::sim {
 namespace {
 
-/// B under A, its middle `depth` below A's, turned about Y and rocked by 1e-4 rad.
+/// Returns poses of body B below body A. Their centres are `depth` apart along Y; B is turned about Y and
+/// tilted by 1e-4 rad.
 std::vector<Pose> poses(Real depth = 0.9999) {
   std::vector<Pose> result;
   for (int k = 0; k < 1000; ++k)
@@ -58,7 +60,7 @@ void cylinders(benchmark::State& state) {
   points_of(state, Cylinder{0.5, 1}, Cylinder{0.5, 1});
 }
 
-/// A shape for the narrow phase.
+/// A shape with the data that the narrow phase needs.
 struct Body {
   explicit Body(const Shape& s) : shape(s), collision({&shape, nullptr}, true) {}
   explicit Body(const SolidMesh& solid)
@@ -75,7 +77,7 @@ struct Body {
   CollisionShape collision;
 };
 
-/// Of radius 0.5, resting on a face.
+/// Returns an icosahedron of radius 0.5 m that rests on a face.
 ConvexPolyhedron icosahedron() {
   std::vector<Vec3> points;
   for (int k = 0; k < 3; ++k)
@@ -89,7 +91,8 @@ ConvexPolyhedron icosahedron() {
   return convex_hull(points);
 }
 
-/// `keep`: the PairCache is kept from query to query, as the world does; otherwise each query begins without.
+/// `keep`: whether the PairCache is kept between queries, as in a world; otherwise each query begins with an
+/// empty one.
 void query(benchmark::State& state, const Body& a, const Body& b, const std::vector<Pose>& at,
            bool keep = true, DistanceMethod method = DistanceMethod::gjk) {
   PairCache cache;
@@ -146,7 +149,7 @@ void query_balls(benchmark::State& state) {
 void query_ball_on_box(benchmark::State& state) {
   query(state, small_ball(), unit_box(), poses());
 }
-/// B under A, turned about Y, so that they overlap by `depth`.
+/// Returns poses of body B below body A in which the bodies overlap by `depth`. B is turned about Y.
 std::vector<Pose> touching(const Body& a, const Body& b, Real depth) {
   std::vector<Pose> at = poses(1);
   for (Pose& p : at) {
@@ -156,7 +159,7 @@ std::vector<Pose> touching(const Body& a, const Body& b, Real depth) {
   }
   return at;
 }
-/// The same while A tumbles.
+/// Returns the poses of touching(), rotated together with a tumbling body A.
 std::vector<Pose> tumbling(const Body& a, const Body& b, Real depth) {
   std::vector<Pose> at = poses(1);
   for (std::size_t k = 0; k < at.size(); ++k) {

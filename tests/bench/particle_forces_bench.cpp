@@ -1,5 +1,5 @@
-/// What forces on particles cost: turbulence by itself, sub-steps of particles that drift in it, and
-/// particles that act on each other with and without a cut-off distance.
+/// Measures forces on particles: turbulence by itself, sub-steps of particles in turbulent air, and forces
+/// between particles with and without a cut-off distance.
 
 #include <cmath>
 
@@ -25,7 +25,7 @@ void rates(benchmark::State& state, const char* name) {
       benchmark::Counter(static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
 }
 
-/// One thread; arguments: points, octaves.
+/// Measures turbulence in one thread. Arguments: number of points, number of octaves.
 void turbulence(benchmark::State& state) {
   std::vector<Real> x, v;
   for (std::size_t i = 0; i < static_cast<std::size_t>(state.range(0)); ++i) {
@@ -41,7 +41,7 @@ void turbulence(benchmark::State& state) {
   rates(state, "fields/s");
 }
 
-/// Particles that fall far above the ground.
+/// Measures sub-steps of particles that fall far above the ground.
 void step(benchmark::State& state, const std::vector<ForceDef>& forces) {
   World world({.max_step = kForcesStep});
   world.add_body({.name = "ground", .shape = Plane{}, .motion = MotionType::static_body});
@@ -67,7 +67,8 @@ void with_three_fields(benchmark::State& state) {
                {.effect = WindField{.wind = {1, 0, 0}, .region = BoxRegion{{25, 525, 25}, {20, 20, 20}}}}});
 }
 
-/// One evaluation for particles as dense as a liquid, about 70 of them within the cut-off distance of each.
+/// Evaluates the forces once for particles as dense as a liquid. About 70 particles are within the cut-off
+/// distance of each.
 void pairs(benchmark::State& state, const ForceDef& def) {
   const auto count = static_cast<std::size_t>(state.range(0));
   std::vector<PairMember> members;

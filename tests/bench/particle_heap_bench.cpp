@@ -1,5 +1,5 @@
-/// Particles that collide with each other: sub-steps per second of a column of particles that comes down to a
-/// heap, of one that stands, and of a thin cloud in free flight, by their number.
+/// Measures particles that collide with each other: sub-steps per second of a column that collapses to a
+/// heap, of a column at rest, and of a thin cloud in free flight, for several numbers of particles.
 
 #include <cmath>
 
@@ -24,7 +24,8 @@ void run_heap(benchmark::State& state, World& world, int warm_up) {
       benchmark::Counter(static_cast<double>(collisions), benchmark::Counter::kAvgIterations);
 }
 
-/// Particles in a lattice with some disorder, twice as high as it is wide, on rough ground.
+/// Returns a world with particles on rough ground, in a slightly irregular lattice that is twice as high as
+/// wide.
 World column(std::size_t count) {
   World world({.max_step = kHeapStep});
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0});
@@ -52,7 +53,7 @@ void heap_at_rest(benchmark::State& state) {
   run_heap(state, world, 720);
 }
 
-/// A thousandth of the space is filled.
+/// The particles fill a thousandth of the space.
 void ballistic(benchmark::State& state) {
   World world({.max_step = kHeapStep});
   const auto system = world.add_particle_system({.internal = true});

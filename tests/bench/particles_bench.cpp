@@ -1,5 +1,5 @@
-/// Particles under gravity and drag that bounce on a plane, and on a mesh in turbulent air: sub-steps per
-/// second, with how many of them touch something.
+/// Measures particles with gravity and drag that bounce on a plane, and on a mesh in turbulent air: sub-steps
+/// per second, and the number of particles in contact.
 
 #include <benchmark/benchmark.h>
 
@@ -12,7 +12,7 @@ namespace {
 
 constexpr Real kParticlesStep = 1.0 / 240;
 
-/// `count` particles above a plane; the drop height says how soon they come to lie on it.
+/// Returns a world with `count` particles above a plane. `height`: height from which they fall.
 World rain(std::size_t count, Real height, ParticleSystemHandle& system) {
   World world({.max_step = kParticlesStep});
   world.add_body({.name = "ground", .shape = Plane{}, .motion = MotionType::static_body});
@@ -53,7 +53,7 @@ void at_rest(benchmark::State& state) {
   run_particles(state, 0, 480);
 }
 
-/// Into eddies of two sizes, past a torus of 18 432 triangles that stands in their midst.
+/// Particles move in turbulence with eddies of two sizes, past a torus of 18 432 triangles.
 void on_mesh_in_eddies(benchmark::State& state) {
   ParticleSystemHandle system;
   World world = rain(static_cast<std::size_t>(state.range(0)), 5, system);

@@ -1,6 +1,6 @@
-/// The scenes of the peer benchmarks in this engine: the measurements, and the scenes themselves, are those
-/// of peer_common.hpp, the same code for every engine. Usage: peer_scenes SCENE N STEPS DT [VARIANT], with
-/// the variants exact, fast, auto (the default), each with +sleep, and +2 for two threads.
+/// Runs the scenes of the benchmarks against other engines. peer_common.hpp defines the scenes and the
+/// measurements, and is the same for every engine. Usage: peer_scenes SCENE N STEPS DT [VARIANT], with the
+/// variants exact, fast, auto (the default), each with +sleep, and +2 for two threads.
 
 #include <cinttypes>
 #include <cstdio>
@@ -76,7 +76,7 @@ class Engine {
       world_.add_joint(def);
     }
   }
-  /// What the solvers did goes to the error output.
+  /// Prints the statistics of the solvers to standard error.
   ~Engine() {
     const SolverFigures& s = figures_.solvers;
     std::fprintf(stderr,

@@ -10,8 +10,8 @@ namespace {
 
 using offstage::render::Image;
 
-/// A smooth sky with soft discs, as a frame with particles has, and one step of noise, as dither and textures
-/// leave.
+/// Returns a picture that resembles a frame with particles: a smooth sky with soft discs, and noise of one
+/// step as from dither and textures.
 Image frame(uint8_t alpha) {
   Image image{1920, 1080, {}};
   image.rgba.reserve(image.pixel_count() * 4);

@@ -1,6 +1,6 @@
-/// The fast contact solver alone, without collision detection: colouring, set-up, all sub-steps and the
-/// report, on scenes that have settled. The second argument is the number of threads. Counters: patches,
-/// points and the time per patch and sweep.
+/// Measures only the fast contact solver, without collision detection: colouring, set-up, all sub-steps and
+/// the report. The bodies of the scenes are at rest. The second argument is the number of threads. Counters:
+/// patches, points and the time per patch and sweep.
 
 #include <benchmark/benchmark.h>
 #include <oneapi/tbb/global_control.h>

@@ -138,7 +138,7 @@ struct Drape {
   std::vector<Vector3f> points;
 };
 
-// Sub-frames of a moving cloth, whose surface is computed again for each.
+// Draws sub-frames of a moving cloth. Its surface is computed again for each sub-frame.
 void BM_DrawCloth(benchmark::State& state) {
   Context context;
   Stage stage(context, kStage);

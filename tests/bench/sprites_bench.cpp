@@ -18,7 +18,7 @@ float spread_sprites(uint64_t i, double step) {
   return static_cast<float>(x - std::floor(x));
 }
 
-// One sub-frame of `count` particles over a ground; as many in a column or a box of `size`.
+// Draws one sub-frame of `count` particles in a box of `size` above the ground.
 void time_points(benchmark::State& state, const PointsDef& def, const Vector3f& size, float radius,
                  float alpha) {
   Context context;

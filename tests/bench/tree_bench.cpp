@@ -1,6 +1,6 @@
 /// Bounding trees: building them for 871 000 triangles, and the queries of two bumpy spheres of 69 000
-/// triangles each, against FCL's OBBRSS trees on the same data. The spheres are pressed into each other, just
-/// touch, or are 1 % of their radius apart; arguments choose which.
+/// triangles each, against FCL's OBBRSS trees on the same data. The spheres overlap, just touch, or are 1 %
+/// of their radius apart, as the arguments say.
 
 #include <cmath>
 #include <memory>
@@ -14,7 +14,7 @@
 namespace offstage::sim {
 namespace {
 
-/// 2 around (rings - 1) triangles.
+/// Returns a bumpy sphere with 2 `around` (`rings` - 1) triangles.
 TriangleMesh bumpy_sphere(uint32_t around, uint32_t rings) {
   TriangleMesh mesh = sphere_mesh(1, around, rings);
   for (Vec3& v : mesh.vertices)
@@ -43,7 +43,7 @@ const AabbTree& any_tree() {
   return contact_tree<Aabb>(TreeSplit::surface_area);
 }
 
-/// Where the second sphere is when the surfaces are `gap` apart (to 1e-9).
+/// Returns the pose of the second sphere at which the surfaces are `gap` apart, to 1e-9 m.
 Pose placed(Real gap) {
   static const Pose touching = [] {
     Pose pose{Vec3(3, 0.3, 0.2), Quat(0.8, 0.1, 0.5, -0.2).normalized()};
@@ -146,7 +146,7 @@ void fcl_build(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(fcl_tree(big_mesh()));
 }
 
-/// With `contacts` each pair's points and normals are computed too, which ours does not do.
+/// With `contacts`, FCL also computes points and normals for each pair, which this engine does not do here.
 void fcl_collide(benchmark::State& state, std::size_t most, bool contacts) {
   const FclPair pair(situation(state.range(0)));
   std::size_t count = 0;

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The jobs of demos/ci are YAML, and their command does what docs/ci.md says:  ci_jobs.sh OFFSTAGE SOURCE_DIR
+# The jobs of demos/ci are valid YAML, and their command has the effect that docs/ci.md describes:  ci_jobs.sh OFFSTAGE SOURCE_DIR
 set -euo pipefail
 offstage=$(realpath "$1")
 source=$(realpath "$2")
@@ -14,7 +14,7 @@ scene='{"version": 1, "bodies": [{"shape": {"type": "sphere"}, "velocity": [0, S
 for speed in 1 2; do echo "${scene/SPEED/$speed}" >scenes/ball_$speed.json; done
 env -u CI offstage bless scenes/*.json --golden goldens --reason new >/dev/null
 
-# command FILE: the line of the job that compares.
+# command FILE: prints the command of the job that compares goldens.
 command() { grep -oE 'offstage compare .*' "$1"; }
 for job in github gitlab; do
   echo "${scene/SPEED/2}" >scenes/ball_2.json

@@ -132,7 +132,7 @@ TEST(Commands, DivergedSimulationIsExit5AndSavesTheState) {
   EXPECT_NE(state["not_finite"]["velocity"].get<std::string>().find("inf"), std::string::npos);
 }
 
-/// A scene with a crate of 8 kg that falls on the floor; `more` adds keys to the scene.
+/// Returns a scene with a crate of 8 kg that falls on the floor; `more` adds keys to the scene.
 std::string falling_crate(const std::string& more) {
   return R"({"version": 1, "materials": [{"name": "wood", "restitution": 0}],
     "bodies": [{"name": "floor", "motion": "static", "shape": {"type": "plane"}, "material": "wood"},

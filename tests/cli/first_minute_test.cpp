@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-/// Frame rate and frame count of a video's first stream as ffprobe prints them: "30000/1001,12".
+/// Returns the frame rate and frame count of a video's first stream as ffprobe prints them: "30000/1001,12".
 std::string probe(const fs::path& video) {
   const TemporaryFolder folder;
   const std::string out = (folder / "out").string();

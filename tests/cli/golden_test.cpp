@@ -1,5 +1,4 @@
-// Tests of the image tests: a golden must detect a parameter changed by one percent, and a single changed
-// pixel.
+// Goldens must detect a parameter that changed by one per cent, and a single changed pixel.
 
 #include <cstdlib>
 
@@ -82,7 +81,7 @@ TEST_F(Golden, PicturesCompareByPixels) {
   EXPECT_EQ(offstage("compare a.png c.png", folder_.path()).code, 6);
 }
 
-/// A scene with a ball whose initial vertical speed is `speed`, 64 x 36 pixels.
+/// Returns a scene with a ball whose initial vertical speed is `speed`, 64 x 36 pixels.
 std::string falling_ball(double speed) {
   return R"({"version": 1, "bodies": [{"shape": {"type": "sphere"}, "velocity": [0, )" +
          std::to_string(speed) +
@@ -101,7 +100,8 @@ TEST(GoldenNames, ScenesOfOneNameInDifferentFoldersHaveGoldensOfTheirOwn) {
   for (const char* scene : {"rain.json", "sub/rain.json", "./sub/../rain.json"})
     EXPECT_EQ(offstage(std::string("compare ") + scene + " --golden g", folder.path()).code, 0) << scene;
 
-  // If only one of them has a golden, it must not be used for the other.
+  // If only one of two scenes with the same name has a golden, the golden must not be used for the other
+  // scene.
   EXPECT_EQ(offstage("bless sub/rain.json --golden h --reason new", folder.path(), in).code, 0);
   const Outcome other = offstage("compare rain.json --golden h", folder.path());
   EXPECT_EQ(other.code, 1);

@@ -13,7 +13,7 @@ struct Outcome {
   std::string out, err;
 };
 
-/// Runs `build/offstage ARGS` in `folder`; `before` is shell text in front of the command, such as "ulimit -f
+/// Runs `build/offstage ARGS` in `folder`; `before`: shell text in front of the command, such as "ulimit -f
 /// 1;" or "VAR=value".
 Outcome offstage(const std::string& args, const std::filesystem::path& folder,
                  const std::string& before = {});
@@ -38,7 +38,7 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-/// Path of the scene that most tests use, tests/data/tiny.json.
+/// Returns the path of the scene that most tests use, tests/data/tiny.json.
 std::string tiny_scene();
 
 }  // namespace offstage::test

@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The frames of a render, without the manifest.
+/// Returns the frames of a render, without the manifest.
 std::map<std::string, std::string> frames(const fs::path& folder) {
   auto files = contents(folder);
   files.erase("manifest.json");
@@ -228,7 +228,7 @@ class WatchedRender {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     return count() >= times;
   }
-  /// Ends it as Ctrl-C does; returns its exit code.
+  /// Ends the process as Ctrl-C does, and returns its exit code.
   int end() {
     if (child_ <= 0) return -1;
     int status = 0;
@@ -242,7 +242,7 @@ class WatchedRender {
   pid_t child_ = -1;
 };
 
-/// A falling ball and a jet of particles.
+/// Returns a falling ball and a jet of particles.
 std::string watched_scene(const std::string& color, double height, double duration = 0.3) {
   return R"({"version": 1, "materials": [{"name": "paint", "color": ")" + color +
          R"("}], "bodies": [{"shape": {"type": "sphere"}, "material": "paint", "position": [0, )" +
@@ -252,7 +252,7 @@ std::string watched_scene(const std::string& color, double height, double durati
          std::to_string(duration) + "}}";
 }
 
-/// The statistics of a run without its times and its memory.
+/// Returns the statistics of a run without its times and its memory.
 nlohmann::json lasting_statistics(const fs::path& file) {
   auto stats = nlohmann::json::parse(read_file(file));
   for (const char* key : {"wall_s", "startup_s", "sim_ms", "render_ms", "encode_ms", "peak_rss_mb"})
@@ -418,7 +418,7 @@ TEST(Render, VideoOnAFullDiskIsAnErrorAndLeavesNoFilm) {
   EXPECT_FALSE(fs::exists(folder / "film.mp4"));
 }
 
-TEST(Render, InterruptedVideoLeavesAnEarlierFilmAlone) {
+TEST(Render, InterruptedVideoKeepsAnEarlierFilm) {
   const TemporaryFolder folder;
   write_file(folder / "film.mp4", "an earlier film");
   const Outcome run = offstage("render " + tiny_scene() +
@@ -490,7 +490,8 @@ TEST(Render, QualityNeverChangesThePhysics) {
   EXPECT_EQ(hashes.size(), 1u);
 }
 
-/// The compressed pixels of a PNG file, without the settings in front of them, which depend on the channels.
+/// Returns the compressed pixels of a PNG file, without the settings in front of them, which depend on the
+/// channels.
 std::string pixel_data(const std::string& png) {
   return png.substr(png.find("IDAT"));
 }

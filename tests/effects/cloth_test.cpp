@@ -1,4 +1,4 @@
-/// Facts about cloths made of fabrics, each alone in a world.
+/// Properties of cloths of the preset fabrics. Each world contains only one cloth.
 
 #include "effects/cloth.h"
 
@@ -14,7 +14,7 @@
 namespace offstage::sim {
 namespace {
 
-/// A vertical thread of n springs of stiffness k, pinned at the top.
+/// Returns a vertical thread of n springs of stiffness k, pinned at the top.
 ClothDef thread(uint32_t n, Real length, Real mass, Real stiffness, Real damping) {
   ClothDef def;
   const Real rest = length / n;
@@ -30,7 +30,8 @@ ClothDef thread(uint32_t n, Real length, Real mass, Real stiffness, Real damping
   return def;
 }
 
-/// Elongation of a hanging thread of n springs: spring i (from the top) carries the n - i masses below it.
+/// Returns the elongation of a hanging thread of n springs. Spring i (from the top) carries the n - i masses
+/// below it.
 Real hanging_elongation(uint32_t n, Real length, Real mass, Real stiffness) {
   Real sum = 0;
   for (uint32_t i = 0; i < n; ++i) sum += (n - i) * (mass / n) * 9.81 / (stiffness * n / length);
@@ -44,7 +45,7 @@ Real settled_elongation(ClothDef def, uint32_t n, Real length) {
   return -world.cloth(cloth).points[n].y() - length;
 }
 
-/// How many pieces the triangles at a point would fall into without it.
+/// Returns the number of connected pieces that the triangles at a point would form if the point were removed.
 int fan_count(std::span<const Triangle> triangles, uint32_t point) {
   std::vector<Triangle> left;
   for (const Triangle& t : triangles)
@@ -90,11 +91,11 @@ TEST(Cloth, AStiffOneIsStableAtOneStepPerFrame) {
     const ClothHandle cloth = world.add_cloth(def);
     for (int i = 0; i < 120; ++i) {
       world.step(1.0 / 24);
-      // All motion is due to its fall.
+      // All of the energy comes from the fall of the cloth.
       ASSERT_LE(world.energy().kinetic + world.energy().potential, 1e-9);
     }
     EXPECT_TRUE(world.cloth_report(cloth).finite);
-    // Of the 4 J that its fall gave, it keeps a slow swing, which only the air damps.
+    // Of the 4 J from its fall, the cloth keeps only a slow swing, which the air damps.
     EXPECT_LT(world.energy().kinetic, 0.1);
   }
 }
@@ -161,7 +162,7 @@ TEST(Cloth, TearsUnderALoadAndStaysAMesh) {
   for (uint32_t i = 0; i < view.points.size(); ++i) EXPECT_EQ(fan_count(view.triangles, i), 1) << i;
 }
 
-// Nothing hangs on the cloth that a ball tore out of it, and that is one hole: not a shower of threads.
+// A ball tears one hole. No torn pieces hang on the cloth, and single threads do not fall out of it.
 TEST(Cloth, ABallTearsAHole) {
   ClothDef def = effects::grid_cloth({2, 2, 40, 40}, {Vec3(0, 1, 0)}, effects::find_fabric("cotton")->fabric);
   def.tear = 1.2;

@@ -62,7 +62,7 @@ TEST(Ramp, EvaluatesOverNormalizedAges) {
   EXPECT_EQ(size, (std::vector<float>{1, 1.5f, 2, 3}));
 }
 
-TEST(StartColor, VariesByIdAlone) {
+TEST(StartColor, DependsOnlyOnTheId) {
   const StartColor start{.mean = Rgba(1, 0.5f, 0.25f, 1), .deviation = Rgba(0.1f, 0, 0.2f, 0)};
   const RandomStream random(3, 4);
   Rgba sum = Rgba::Zero();

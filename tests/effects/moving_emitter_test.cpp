@@ -50,7 +50,7 @@ TEST(MovingEmitter, InheritsAFractionOfTheBodysVelocity) {
 }
 
 // The number is the length of the path times the rate at any speed, and the places are evenly spaced.
-TEST(MovingEmitter, ReleasesParticlesPerMetreOfItsWay) {
+TEST(MovingEmitter, ReleasesParticlesPerMetreOfItsPath) {
   for (const Real speed : {0.5, 7.0}) {
     Ride ride({speed, 0, 0});
     EmitterDef def = up(0);
@@ -60,7 +60,7 @@ TEST(MovingEmitter, ReleasesParticlesPerMetreOfItsWay) {
     ride.run(def, 2);
     const ParticleArrays& p = ride.world.particles(ride.system);
     EXPECT_NEAR(static_cast<Real>(p.size()), 20 * 2 * speed, 1);
-    // Within the emitter's surface of 0.1 m.
+    // All particles are within the emitter's surface, which is 0.1 m wide.
     for (std::size_t i = 0; i < p.size(); ++i)
       EXPECT_NEAR(p.position[i].x(), (static_cast<Real>(i) + 1) / 20, 0.0501) << i;
   }

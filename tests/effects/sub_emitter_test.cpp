@@ -67,7 +67,7 @@ struct Rain {
   uint64_t hits;
 };
 
-/// Drops that create splash particles where they hit the ground.
+/// Simulates drops that create splash particles where they hit the ground.
 Rain rain(int threads, const SubEmitterDef& def) {
   tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
   World world;

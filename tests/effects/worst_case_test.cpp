@@ -15,7 +15,7 @@ struct Count {
   uint64_t born, alive;
 };
 
-/// The number of particles that an emitter really creates.
+/// Returns the number of particles that an emitter creates in a simulation.
 Count count(const EmitterDef& def, Real duration) {
   World world = empty_world();
   const auto system = world.add_particle_system({});

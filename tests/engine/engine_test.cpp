@@ -16,7 +16,7 @@ namespace {
 
 using producer::LoadedScene;
 
-/// A scene with a few particles and a falling ball; different rates make different versions of it.
+/// Returns a scene with a few particles and a falling ball; different rates make different versions of it.
 Engine::Loaded fountain(int rate, double duration = 0.5) {
   const std::string text =
       R"({"bodies": [{"name": "ball", "position": [0, 2, 0], "shape": {"type": "sphere", "radius": 0.3}}],
@@ -115,7 +115,7 @@ TEST_F(Engines, StartNoWorkWhileAChangeIsPending) {
   std::size_t before = 0;
   {
     const Engine::Hold hold(engine_);
-    bool still = false;  // the current piece of work has ended, out of 1200 frames
+    bool still = false;  // the current work has ended before all 1200 frames
     for (int i = 0; i < 10 && !still; ++i) {
       before = events_.all().size();
       std::this_thread::sleep_for(std::chrono::milliseconds(500));

@@ -8,7 +8,8 @@
 namespace offstage::engine {
 namespace {
 
-/// The first frame of a scene as the page draws it while it changes, and as `render --quality draft` does.
+/// The first frame of a scene, drawn in two ways: quickly, as the tuning page does, and as `render --quality
+/// draft` does.
 struct Drafts {
   explicit Drafts(const std::string& objects) {
     const std::string text = "{" + objects + R"(, "render": {"size": [160, 90], "quality": "draft"},
@@ -28,7 +29,7 @@ struct Drafts {
   static float brightness(const render::HdrImage& image, std::size_t pixel) {
     return image.rgba[4 * pixel] + image.rgba[4 * pixel + 1] + image.rgba[4 * pixel + 2];
   }
-  /// Mean over the picture of the difference, as a fraction of the mean brightness.
+  /// Returns the mean difference of all pixels, as a fraction of the mean brightness.
   double mean_difference() const {
     double difference = 0, total = 0;
     for (std::size_t i = 0; i < exact.pixel_count(); ++i) {
@@ -37,7 +38,7 @@ struct Drafts {
     }
     return difference / total;
   }
-  /// Fraction of the pixels that differ by more than a factor of two.
+  /// Returns the fraction of the pixels that differ by more than a factor of two.
   double fraction_of_wrong() const {
     std::size_t wrong = 0;
     for (std::size_t i = 0; i < exact.pixel_count(); ++i) {
@@ -49,8 +50,8 @@ struct Drafts {
   render::HdrImage exact, quick;
 };
 
-// The light from around is traced for a sixteenth of the pixels, that of the sun for a half of them, so edges
-// of shadows may be wrong by a pixel, and noise differs.
+// A quick draft traces indirect light for a sixteenth of the pixels, and the light of the sun for half of
+// them. Edges of shadows may therefore be wrong by a pixel, and the noise differs.
 TEST(EnginesQuickDrafts, LookLikeDraftsOfRender) {
   const Drafts drafts(
       R"("materials": [{"name": "tiles", "pattern": "checker"}, {"name": "lamp", "emission": [3, 2, 1]},
@@ -66,7 +67,7 @@ TEST(EnginesQuickDrafts, LookLikeDraftsOfRender) {
   EXPECT_LT(drafts.fraction_of_wrong(), 0.005);
 }
 
-// A line across the pixels' diagonals meets either only pixels with traced light, or only others.
+// A diagonal line crosses either only pixels with traced light, or only pixels with interpolated light.
 TEST(EnginesQuickDrafts, LightThinLinesInAnyDirection) {
   for (const double x : {0.0, 0.0125, 0.025, 0.0375, 0.05}) {
     const Drafts drafts(

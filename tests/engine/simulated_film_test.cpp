@@ -1,4 +1,4 @@
-// Films from the store of states, whose states and pictures are those of the simulation.
+// Films from the store of states have the same states and pictures as films from the simulation.
 
 #include "engine/simulated_film.h"
 
@@ -39,7 +39,7 @@ struct Film {
   explicit Film(PhysicsStore& store)
       : simulated(jet().scene, models, store, "jet", kFrames),
         advances_before(simulated.advances_to(kFrames)) {}
-  /// The state of the last frame, after those of all others.
+  /// Requests the states of all frames in order, and returns the state hash of the last frame.
   std::string state_hash() {
     for (int frame = 1; frame < kFrames; ++frame) EXPECT_TRUE(simulated.at(frame, count));
     return simulated.at(kFrames, count)->state_hash.hex();

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Blender reads what `offstage export` writes: positions agree with the trace, and Cycles draws it.
 # usage: blender.sh OFFSTAGE SOURCE_DIR PICTURES
-# Of the Debian package, which is built without USD and Alembic: glTF for a wall and a cloth, PLY for a fountain.
+# Tests the formats that Debian's Blender supports, which is built without USD and Alembic: glTF for a wall and a cloth, PLY for a
+# fountain.
 set -euo pipefail
 offstage=$(realpath "$1")
 source=$(realpath "$2")
@@ -12,7 +13,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work"
 
-# film NAME FORMAT: export, trace and our own picture of the fifth of the five frames.
+# film NAME FORMAT: writes the export, the trace, and the picture that offstage draws of the last of five frames.
 film() {
   "$offstage" simulate "$source/demos/scenes/$1.json" --duration 1 --trace "$1.csv" -q
   "$offstage" export "$source/demos/scenes/$1.json" --duration 1 -o "$2" -q

@@ -48,7 +48,8 @@ def check_gltf(film, trace_file):
             if thing.data is not None and getattr(thing.data, "shape_keys", None):
                 evaluated = thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
                 places = np.array([thing.matrix_world @ v.co for v in evaluated.vertices])
-                # The trace has the centre of mass; of an even grid this is near the mean of the vertices.
+                # The trace contains the centre of mass, which is close to the mean of the vertices for an
+                # even grid.
                 error = np.abs(y_up(places.mean(axis=0)) - trace[frame - 1, thing.name]).max()
                 assert error < 0.02, f"{thing.name} at frame {frame}: {error}"
             else:

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A film by the real Slurm on the loopback interface, with a node that dies in the middle:  slurm.sh OFFSTAGE SOURCE_DIR
+# Renders a film with a real Slurm on the loopback interface, with a node that fails during the film:  slurm.sh OFFSTAGE SOURCE_DIR
 # Starts munged, slurmctld and two slurmd as the present user, which must be root, with files in a folder of their own.
 set -euo pipefail
 offstage=$(realpath "$1")
@@ -83,7 +83,7 @@ chmod +x slow.sh
 "$offstage" farm "$scene" -o film.mp4 --slurm --partition render --chunks 6 --threads 1 --program "$work/slow.sh" \
   --sbatch=--export=ALL
 
-# The node dies with its job when both draw.
+# Kills a node with its job while both nodes draw.
 for _ in $(seq 240); do
   [ "$(squeue -h -t R -n film-chunk -o %N 2>/dev/null | sort -u | wc -l)" = 2 ] && break
   sleep 0.25

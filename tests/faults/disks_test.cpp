@@ -33,7 +33,7 @@ class SmallDisk {
   }
   SmallDisk(const SmallDisk&) = delete;
   SmallDisk& operator=(const SmallDisk&) = delete;
-  /// Shell text to put in front of a command that writes there.
+  /// Returns shell text for the front of a command that writes to this disk.
   const std::string& limit() const { return limit_; }
 
  private:
@@ -71,8 +71,8 @@ TEST_P(FilmOnAFullDisk, IsWholeOrAnErrorThatLeavesNothing) {
   const int tries = tries_of(4);
   int failed = 0;
   for (int i = 0; i <= tries; ++i) {
-    // Sizes from half of the film to all of it. Most of them lack only the last part, whose loss ffmpeg does
-    // not report.
+    // The disks have from half of the film's size to all of it. Most of them have no room only for the last
+    // part, and ffmpeg does not report its loss.
     const double fraction = i == 0 ? 0.5 : 0.9 + 0.2 * (i - 1) / std::max(tries - 1, 1);
     const SmallDisk disk(folder / "disk",
                          static_cast<std::uintmax_t>(fraction * static_cast<double>(whole.size())));

@@ -25,14 +25,14 @@ std::vector<std::string> with_options(std::vector<std::string> arguments) {
   return arguments;
 }
 
-/// The PNG files of a folder by name.
+/// Returns the PNG files of a folder by name.
 std::map<std::string, std::string> frames_of(const fs::path& folder) {
   std::map<std::string, std::string> frames = contents(folder);
   std::erase_if(frames, [](const auto& file) { return !file.first.ends_with(".png"); });
   return frames;
 }
 
-/// The complete film for a seed, drawn once.
+/// Returns the frames of the complete film for a seed. Each film is drawn only once.
 const std::map<std::string, std::string>& film_of_seed(int seed) {
   static std::map<int, std::map<std::string, std::string>> known;
   if (const auto film = known.find(seed); film != known.end()) return film->second;

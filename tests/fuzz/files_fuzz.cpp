@@ -42,7 +42,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   ++data;
   --size;
   if (kind == 0) refused_or_read([&] { deserialize({data, size}, "fuzz"); });
-  // The bytes as the payload behind a valid header and checksum, which a fuzzer would not find by itself.
+  // Puts the bytes behind a valid header and checksum, which a fuzzer would not find by itself.
   if (kind == 1)
     refused_or_read([&] { deserialize(pack({"offsnap", 4, "snapshot"}, {data, size}), "fuzz"); });
   if (kind == 2) {

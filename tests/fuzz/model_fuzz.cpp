@@ -1,6 +1,6 @@
-// A model as the confined reader answers it, with any bytes changed: refused with a FileError, or a model
-// that is consistent. A hostile file may have taken over the reader, so this is where it would reach the
-// program. The reader itself is run by reader_fuzz.cpp.
+// Decodes the answer of the confined reader with any bytes changed: it must be refused with a FileError, or
+// give a consistent model. A hostile file may have taken over the reader, so its answer is not trusted. The
+// reader itself is run by reader_fuzz.cpp.
 
 #include <algorithm>
 #include <cstdlib>

@@ -1,5 +1,5 @@
-// Any bytes as a model file of each ending, through the confined reader: a model or a FileError, never a
-// crash of the caller. The reader runs in a child, so that no fuzzer sees its coverage.
+// Reads any bytes as a model file of each ending by the confined reader. The result must be a model or a
+// FileError, never a crash of the caller. The reader runs in a child, so that no fuzzer sees its coverage.
 
 #include <cstdlib>
 #include <filesystem>

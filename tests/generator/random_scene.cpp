@@ -78,7 +78,8 @@ class Generator {
       }
   }
 
-  /// A place where a ball of radius `reach` overlaps no other body. If none is found, the body is left out.
+  /// Returns a place where a ball of radius `reach` overlaps no other body. Returns nothing if no such place
+  /// is found; the scene then omits the body.
   std::optional<Vec3> free_place(Real reach) {
     const Real half = (scene_.room > 0 ? scene_.room : 1.2) - reach - kGap;
     if (half <= 0) return std::nullopt;
@@ -450,7 +451,7 @@ class Overlap {
  private:
   static constexpr Real kSolved = 5e-4, kPiece = 0.25, kPushedOut = 0.2;
 
-  /// The two greatest values among the bodies.
+  /// The greatest and the second greatest value of all bodies.
   struct GreatestTwo {
     Real first = 0, second = 0;
     void add(Real x) {
@@ -475,7 +476,7 @@ class Overlap {
   Real left_ = 0;
 };
 
-/// The counted work of a step, in solver operations on the contacts of the scene.
+/// Returns the counted work of a step, in solver operations on the contacts of the scene.
 uint64_t counted_work(const StepReport& r) {
   return r.solvers.exact.iterations + r.solvers.exact.factorizations + r.solvers.impacts.iterations +
          r.solvers.impacts.factorizations + 50 * r.impacts.tracebacks;

@@ -22,12 +22,13 @@ struct RandomScene {
   struct Joint {
     JointDef def;
     std::size_t a = 0;
-    std::optional<std::size_t> b;  ///< none: connected to the world
+    std::optional<std::size_t> b;  ///< second body; none: connected to the world
   };
   struct Spring {
     SpringDef def;
     std::size_t a = 0;
-    std::optional<std::size_t> b;  ///< none: connected to the point of the world in `def`
+    std::optional<std::size_t>
+        b;  ///< body at the second end; none: the end is the point of the world in `def`
   };
 
   uint64_t seed = 0;
@@ -44,7 +45,7 @@ struct RandomScene {
   std::optional<ClothDef> cloth;
 };
 
-/// The objects that a scene may contain: bodies and walls alone, or also joints, springs, drives, particles
+/// The objects that a scene may contain: only bodies and walls, or also joints, springs, drives, particles
 /// and cloth.
 enum class Parts { bodies, all };
 
@@ -59,7 +60,7 @@ World make_world(const RandomScene& scene);
 struct Findings {
   bool finite = true;
   std::vector<std::string> lost;  ///< bodies that left the world or the room
-  Real energy_gain = 0;           ///< greatest increase of the energy over its minimum so far [J]
+  Real energy_gain = 0;           ///< greatest increase of the energy over its earlier minimum [J]
   Real energy_scale = 1;          ///< scale of the scene's energies [J]
   Real gained_at = 0;             ///< time of the greatest increase [s]
   Real penetration = 0;           ///< penetration at the time of its greatest excess over the allowed one [m]

@@ -1,7 +1,6 @@
 /// In random scenes, no object explodes, leaves the room or sinks into another one, and the work of each step
-/// is bounded. To run one scene again:
-/// OFFSTAGE_SEED=1234 build/test_generator --gtest_filter='*Replays*'
-/// and with OFFSTAGE_BODIES=1 if it is a scene of bodies alone.
+/// is bounded. To run one scene again: OFFSTAGE_SEED=1234 build/test_generator --gtest_filter='*Replays*' For
+/// a scene of bodies only, set OFFSTAGE_BODIES=1, too.
 
 #include <cstdlib>
 #include <iostream>
@@ -34,7 +33,7 @@ void check(uint64_t seed, Parts parts) {
         << "seed " << seed << ", " << threads << " threads";
 }
 
-/// Blocks of a hundred scenes.
+/// Parameter: number of a block of a hundred scenes.
 class RandomScenes : public testing::TestWithParam<uint64_t> {
  protected:
   static void check_block(Parts parts) {
@@ -47,9 +46,9 @@ class RandomBodies : public RandomScenes {};
 TEST_P(RandomBodies, KeepEnergyMomentumBoundsAndTime) {
   check_block(Parts::bodies);
 }
-// Not repaired yet: of the seeds 0 to 4999, 522 misses its angular momentum by 0.2 %, 2521 gains 0.7 % of its
-// energy, and 993, 3906 and 4759 overlap by up to 1.5 times what is allowed. Their blocks are among the long
-// tests, which fail there.
+// Known failures among the seeds 0 to 4999: the angular momentum of seed 522 changes by 0.2 %, seed 2521
+// gains 0.7 % of its energy, and the overlaps of the seeds 993, 3906 and 4759 are up to 1.5 times the allowed
+// depth. The long tests contain these seeds and fail there.
 INSTANTIATE_TEST_SUITE_P(Some, RandomBodies, testing::Values<uint64_t>(2, 3, 4, 6));
 INSTANTIATE_TEST_SUITE_P(LongFirst, RandomBodies, testing::Values<uint64_t>(0, 1, 5));
 INSTANTIATE_TEST_SUITE_P(Long, RandomBodies, testing::Range<uint64_t>(7, 50));
@@ -91,14 +90,14 @@ TEST(RandomScene, SeedsWithJointsKeepMomentumAndDoNotOverlap) {
   for (const uint64_t seed : {8, 64, 73, 261, 346, 428, 699}) check(seed, Parts::all);
 }
 
-// Bodies overlapped in these: contacts near a second piece of a body (87, 2004, 3392) or with the side of a
-// cone (1189) were taken for seams; other points of a rim hit after the first one (1133, 2281); and a thin
-// rod spun up (3876).
+// Bodies overlapped with these seeds: contacts near a second piece of a body (87, 2004, 3392) or with the
+// side of a cone (1189) were taken for seams; other points of a rim hit after the first one (1133, 2281); and
+// a thin rod spun up (3876).
 TEST(RandomScene, SeedsOfBodiesThatOverlappedDoNot) {
   for (const uint64_t seed : {87, 1133, 1189, 2004, 2281, 3392, 3876}) check(seed, Parts::bodies);
 }
 
-// In these, only some of the links of an articulation were stopped in a step (197, 894, 2457, 2865, 3239,
+// With these seeds, a step stopped only some of the links of an articulation (197, 894, 2457, 2865, 3239,
 // 3810, 3893, 3932, 3974, 4062), or light links turned far in a step (256, 1569, 4400).
 TEST(RandomScene, SeedsWithJointsStopAllLinks) {
   for (const uint64_t seed : {197, 256, 894, 1569, 2457, 2865, 3239, 3810, 3893, 3932, 3974, 4062, 4400})
@@ -106,7 +105,7 @@ TEST(RandomScene, SeedsWithJointsStopAllLinks) {
 }
 
 // The same seed gives the same scene, so that failures can be reproduced.
-TEST(RandomScene, DependsOnItsSeedAlone) {
+TEST(RandomScene, DependsOnlyOnItsSeed) {
   EXPECT_EQ(text(random_scene(42, Parts::all)), text(random_scene(42, Parts::all)));
   EXPECT_NE(text(random_scene(42, Parts::all)), text(random_scene(43, Parts::all)));
 }

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Builds and tests offstage in a fresh system, and installs its packages in another:  fresh_root.sh BUILD_DIR [SUITE]
 # SUITE is a release of Debian that debootstrap knows (default: trixie). The mirror is the one that apt uses here. Needs root and
-# the network; exits with 77 (skipped) without. What was fetched and compiled is kept in BUILD_DIR/roots for the next time.
+# the network; exits with 77 (skipped) without. Fetched packages and compiled files are kept in BUILD_DIR/roots for the next run.
 set -euo pipefail
 source=$(realpath "$(dirname "$0")/../..")
 suite=${2:-trixie}
@@ -13,7 +13,7 @@ if [ "$(id -u)" != 0 ] || [ -z "$mirror" ] || ! command -v debootstrap >/dev/nul
 fi
 mkdir -p "$roots/ccache"
 
-# enter ROOT COMMAND...: runs bash there, with the system's folders, that go away with it.
+# enter ROOT COMMAND...: runs bash in the system ROOT. The folders of the kernel are mounted until it ends.
 enter() {
   local root=$1
   shift
@@ -26,7 +26,7 @@ enter() {
     exec chroot "$0" env -i PATH=/usr/sbin:/usr/bin HOME=/root CCACHE_DIR=/ccache bash -euo pipefail -c "$@"' \
     "$root" "$roots/ccache" "$@"
 }
-# fresh NAME: a copy of the bare system.
+# fresh NAME: makes a copy of the new system.
 fresh() {
   rm -rf --one-file-system "${roots:?}/$1"
   cp -a "$roots/bare" "$roots/$1"

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# cmake --install into a folder of its own: the program finds its presets and models there, and another project the libraries.
+# Installs into a new folder: the program must find its presets and models there, and another project the libraries.
 # usage: install.sh BUILD_DIR
 set -euo pipefail
 tests=$(realpath "$(dirname "$0")")
@@ -27,7 +27,7 @@ for words in "ren render" "render --qual --quality" "render --quality fi final";
   [ "$got" = "${!#}" ] || { echo "offstage ${*:1:$#-1} was completed by '$got'"; exit 1; }
 done
 
-# Names that are nowhere but in the installation.
+# These names exist only in the installation.
 mv "$prefix/share/offstage/presets/rain.json" "$prefix/share/offstage/presets/only_installed.json"
 mv "$prefix/share/offstage/assets/models/duck.glb" "$prefix/share/offstage/assets/models/only_installed.glb"
 cat >"$work/scene.json" <<'JSON'

@@ -1,5 +1,5 @@
-/// Every scene of the gallery with cloth, ten seconds long: nothing is inside of anything, and no cloth
-/// crosses itself.
+/// Simulates ten seconds of every scene of the gallery with cloth: no object is inside of another one, and no
+/// cloth crosses itself.
 
 #include <algorithm>
 #include <array>
@@ -21,8 +21,8 @@
 namespace offstage::producer {
 namespace {
 
-/// The scenes with the key `cloths`. Their text is searched, because every start of this program lists them,
-/// and loading all scenes takes 0.2 s.
+/// Returns the scenes with the key `cloths`. Their text is searched, because every start of this program
+/// lists them, and loading all scenes takes 0.2 s.
 std::vector<std::string> scenes_with_cloths() {
   std::vector<std::string> names;
   for (const auto& entry : std::filesystem::directory_iterator(OFFSTAGE_SOURCE_DIR "/demos/scenes")) {
@@ -35,8 +35,8 @@ std::vector<std::string> scenes_with_cloths() {
   return names;
 }
 
-/// Points behind the surface of a body by more than rounding: cords end on surfaces. Of meshes the
-/// simulation's own figure says it.
+/// Returns the number of cloth points that are behind the surface of a body. Rounding errors are tolerated,
+/// because cords end on surfaces. For meshes the statistics of the simulation are used.
 std::size_t points_inside(const sim::World& world, const sim::ClothView& cloth) {
   std::size_t count = 0;
   world.for_each_body([&](sim::BodyHandle handle) {
@@ -49,7 +49,8 @@ std::size_t points_inside(const sim::World& world, const sim::ClothView& cloth) 
   return count;
 }
 
-/// All cloths that collide with cloth, as one.
+/// Returns the number of pairs of triangles that cross. All cloths with `self_collision` are treated as one
+/// mesh.
 std::size_t crossed_pairs(const Simulation& simulation) {
   std::vector<sim::Vec3> points;
   std::vector<sim::Triangle> triangles;

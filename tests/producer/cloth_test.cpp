@@ -22,7 +22,7 @@ std::string cloth_errors(const std::string& cloth, const std::string& rest = "")
   return "";
 }
 
-/// A grid of 4 by 2 cells, 2 m by 1 m, with pins.
+/// Returns a grid of 4 by 2 cells, 2 m by 1 m, with pins.
 std::vector<uint32_t> held_by(const std::string& pin) {
   const LoadedScene loaded = parse_scene(
       R"({"cloths": [{"shape": {"type": "grid", "size": [2, 1], "cells": [4, 2]}, "pins": [)" + pin + "]}]}",

@@ -18,7 +18,7 @@ class Film {
   explicit Film(const std::string& text)
       : loaded_(parse_scene(text, "scene", OFFSTAGE_SOURCE_DIR)),
         simulation_(loaded_.scene, ModelLibrary()) {}
-  /// The particles of the first source in a frame; frames must be requested in ascending order.
+  /// Returns the particles of the first source in a frame. Frames must be requested in ascending order.
   const std::vector<render::Point>& at(int frame) {
     while (simulation_.frame() < frame) simulation_.advance();
     snapshot_ = simulation_.snapshot();
@@ -33,7 +33,7 @@ class Film {
   Snapshot snapshot_;
 };
 
-/// A scene with one emitter; the arguments add keys to the emitter, the output section and the scene.
+/// Returns a scene with one emitter; the arguments add keys to the emitter, the output section and the scene.
 std::string scene(const std::string& emitter, const std::string& output = "", const std::string& more = "") {
   return R"({"emitters": [{"overlap": true, "radius": 0.02, "surface": {"position": [0, 6, 0], "size": [2, 2]},)" +
          emitter + R"(}], "output": {"fps": 10, "duration": 1)" + output + "}" + more + "}";
@@ -123,7 +123,7 @@ TEST(FirstFrame, PrewarmingDoesNotMoveOtherObjects) {
 }
 
 // Keys of the form "hold, then move" do not overshoot in grabs and motors either, as in cameras and bodies.
-TEST(Keys, OfAGrabAndOfAMotorDoNotSwingBeyondTheirValues) {
+TEST(Keys, OfAGrabAndOfAMotorDoNotOvershootTheirValues) {
   const LoadedScene loaded = parse_scene(R"({"world": {"gravity": [0, 0, 0]},
     "bodies": [{"name": "held", "shape": {"type": "sphere", "radius": 0.1}, "mass": 1},
                {"name": "arm", "shape": {"type": "box"}, "position": [5, 0, 0], "collides": false}],

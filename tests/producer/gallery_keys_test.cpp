@@ -1,4 +1,4 @@
-/// Every key of a scene is used by a scene of the gallery, so that each is seen at work and has a golden.
+/// Every key of the scene format occurs in a scene of the gallery, so that a golden tests its effect.
 
 #include <algorithm>
 #include <filesystem>
@@ -32,7 +32,7 @@ class GalleryKeys {
     for (const auto& [name, rule] : schema["definitions"].items()) all_of(rule);
   }
 
-  /// Notes the keys of a value, by the rule of the schema for it.
+  /// Records the keys of a value. The schema says which object of the format the value is.
   void see(const json& value, const json& given) {
     const json& rule = resolve(given);
     for (const char* choice : {"oneOf", "anyOf"})
@@ -72,7 +72,8 @@ class GalleryKeys {
                ? resolve(schema_["definitions"][rule["$ref"].get<std::string>().substr(kAt.size())])
                : rule;
   }
-  /// Whether a choice of the schema is meant: one of the same `type`, if it has types.
+  /// Returns whether a value belongs to one of the alternatives of the schema: if the alternatives have
+  /// types, the `type` must be equal.
   static bool fits(const json& value, const json& option) {
     if (!value.is_object() || !option.contains("properties")) return value.is_object() || value.is_array();
     const auto type = option["properties"].find("type");

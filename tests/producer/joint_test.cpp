@@ -81,7 +81,8 @@ TEST(Articulations, AChainHasEitherAPathOrTwoEnds) {
             "/articulations/0/path: needs at least two points\n");
 }
 
-/// Distance by which the tip of a rod along x, of 1 m length, is below its clamp at x = 0, after each frame.
+/// Returns the distance by which the tip of a rod along x, of 1 m length, is below its clamp at x = 0, after
+/// each frame.
 std::vector<Real> sags_of_rod(int links, const char* solver, Real step, const std::string& rest) {
   const LoadedScene loaded =
       parse(R"("output": {"fps": 60, "duration": 2.5}, "world": {"solver": ")" + std::string(solver) +
@@ -99,7 +100,7 @@ std::vector<Real> sags_of_rod(int links, const char* solver, Real step, const st
   }
   return sags;
 }
-/// Weight of the rod per length [N/m]. Its links are capsules.
+/// Returns the weight of the rod per length [N/m]. Its links are capsules.
 Real weight_of_rod(int links, Real radius = 0.01, Real density = 2000) {
   return density * 9.81 * std::numbers::pi * radius * radius * (1 - 2 * radius / 3 * links);
 }
@@ -119,8 +120,8 @@ TEST(Articulations, AChainWithBendStiffnessSagsAsACantilever) {
       }
 }
 
-// The place of rest does not depend on the damping, also of a rod of light links that turn far within a
-// sub-step without their springs.
+// The position of rest does not depend on the damping. This includes a rod of light links, which would turn
+// far within a sub-step without their springs.
 TEST(Articulations, DampingDoesNotHoldAnElasticChainUp) {
   const Real expected = weight_of_rod(32, 0.005, 658) / (8 * 2) * (1 + 1.0 / (32 * 32));
   for (const char* solver : {"exact", "fast"})
@@ -184,8 +185,7 @@ TEST(Articulations, AChainWithBendStiffnessSwingsAsACantilever) {
   }
 }
 
-// A light rod that is stiffer than anything else stays straight, also where its own vibrations are far faster
-// than the sub-step.
+// A light and very stiff rod stays straight, even if its vibrations are much faster than the sub-step.
 TEST(Articulations, AStiffLightChainStaysStraight) {
   for (const char* solver : {"auto", "exact", "fast"})
     for (const Real step : {1.0 / 240, 1.0 / 60})

@@ -16,7 +16,7 @@ std::string at(const Position& p) {
   return std::to_string(p.line) + ":" + std::to_string(p.column);
 }
 
-/// The error message for a text that must be refused.
+/// Returns the error message for a text that must be refused.
 std::string error_of(const std::string& text) {
   try {
     parse_json(text, "f");

@@ -13,7 +13,7 @@
 namespace offstage::producer {
 namespace {
 
-/// Two compounds of frusta, convex polyhedra, fall on a floor and bounce.
+/// Returns a scene in which two compounds of frusta fall on a floor and bounce.
 LoadedScene falling_cups(const std::vector<std::string>& overrides = {}) {
   return parse_scene(R"({"world": {"solver": "exact"}, "output": {"fps": 30, "duration": 1},
     "materials": [{"name": "rubber", "restitution": 0.4}],
@@ -69,13 +69,13 @@ TEST(MethodBench, ARunThatTakesTooLongEndsEarlyAndSaysSo) {
   double fraction = 0;
   const MethodResult whole = run_method("whole", falling_cups(), ModelLibrary(), kNoLimit);
   MethodResult cut = run_method("cut", falling_cups(), ModelLibrary(), 0, [&](double s) { fraction = s; });
-  EXPECT_EQ(cut.totals.substeps, 0u);  // the first frame is that of the start
+  EXPECT_EQ(cut.totals.substeps, 0u);  // the first frame shows the start, so there is no sub-step
   EXPECT_GT(whole.totals.substeps, 0u);
   EXPECT_EQ(fraction, 0);
   EXPECT_NE(cut.fault.find("--limit"), std::string::npos) << cut.fault;
   EXPECT_FALSE(cut.deviation(whole));
   MethodResult merged = whole;
-  merge(merged, cut);  // its shorter time is that of fewer steps
+  merge(merged, cut);  // `cut` is faster only because it has fewer steps
   EXPECT_EQ(merged.seconds, whole.seconds);
 }
 

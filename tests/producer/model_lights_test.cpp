@@ -52,7 +52,7 @@ struct Room : render::GltfSample {
   }
 };
 
-/// A scene whose only body shows the room.
+/// Returns a scene whose only body shows the room.
 std::string scene_of(const std::string& more, const std::string& body = "") {
   return R"({"bodies": [{"name": "room", "motion": "static", "collides": false,
       "shape": {"type": "box", "size": [0.01, 0.01, 0.01]}, "model": {"file": "room.gltf"})" +

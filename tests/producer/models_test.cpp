@@ -50,7 +50,7 @@ TEST(ModelSize, AutoBringsALikelyUnitToMetres) {
   EXPECT_EQ(scale(180, Source::none), 0.02) << "copies scale the size";
 }
 
-/// The scale of bodies with `scale: "auto"` whose shapes are the files or nodes `names` in a folder.
+/// Returns the scale of bodies with `scale: "auto"` whose shapes are the files or nodes `names` in a folder.
 std::vector<Real> automatic_scales(const render::ScratchFolder& folder,
                                    const std::vector<std::string>& names) {
   Scene scene;

@@ -31,7 +31,7 @@ struct Shown {
   Simulation simulation;
 };
 
-/// A scene of kinematic bodies and overlays.
+/// Returns a scene of kinematic bodies and overlays.
 std::string overlaid(const std::string& bodies, const std::string& overlays) {
   return R"({"bodies": [)" + bodies + R"(], "overlays": [)" + overlays + "]}";
 }
@@ -118,7 +118,8 @@ TEST(Overlays, ContactsOfAllPairsArePushedApart) {
   EXPECT_NEAR(heights[1], 0.997, 1e-5);
 }
 
-/// A cube of 2 kg that comes to rest on the floor within half a second, and one in free fall far above.
+/// Returns a cube of 2 kg that comes to rest on the floor within half a second, and one in free fall far
+/// above.
 std::string resting_and_falling(const std::string& overlays, const std::string& more = "") {
   return R"({"materials": [{"name": "wood", "restitution": 0}], "bodies": [
     {"name": "floor", "motion": "static", "shape": {"type": "plane"}, "material": "wood"},
@@ -132,7 +133,7 @@ Shown after_half_a_second(const std::string& text) {
   for (int frame = 0; frame < 5; ++frame) shown.simulation.advance();
   return shown;
 }
-/// The vectors from start to tip of all arrows in a set.
+/// Returns the vectors from start to tip of all arrows in a set.
 std::vector<Vector3f> arrows(const LineSet& set) {
   std::vector<Vector3f> all;
   for (std::size_t i = 1; i < set.lines.size(); ++i)

@@ -1,4 +1,4 @@
-// Looks of particles with pictures and meshes: what reaches the drawing, and which scenes are refused.
+// Looks of particles with pictures and meshes: the data that the renderer gets, and the refused scenes.
 
 #include <cmath>
 #include <map>
@@ -94,7 +94,7 @@ TEST(ParticleLooks, KeysWithoutEffectAndImpossibleSheetsAreNamed) {
   expect(R"({"sheet": {"columns": 2}})", "there is none");
   expect(R"({"texture": "a.png", "sheet": {"columns": 3}})", "8x4 pixels cannot be divided into 3 columns");
   expect(R"({"texture": "a.png", "sheet": {"columns": 64, "rows": 64}})",
-         "4096 pictures; a sheet has at most 1024");
+         "4096 pictures (columns x rows); a sheet has at most 1024");
   expect(R"({"style": "sphere", "spin_deg_per_s": 10})", "has no effect");
   expect(R"({"style": "mesh"})", "needs an object to draw");
   expect(R"({"style": "mesh", "mesh": {"shape": {"type": "plane"}}})", "a plane is infinite");

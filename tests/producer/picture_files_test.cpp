@@ -107,8 +107,9 @@ TEST(SkyPictures, OfAWrongKindAreRefusedWithTheirPlace) {
     return findings_of(R"({"environment": {)" + environment + "}}", folder);
   };
   EXPECT_EQ(with(R"("picture": {"file": "a.png"})"), "");
-  EXPECT_EQ(with(R"("picture": {"file": "square.png"})"),
-            "/environment/picture: square.png: a picture of the sky is twice as wide as high, not 4x4\n");
+  EXPECT_EQ(
+      with(R"("picture": {"file": "square.png"})"),
+      "/environment/picture: square.png: a picture of the sky must be twice as wide as high, got 4x4\n");
   EXPECT_EQ(with(R"("picture": {"file": "a.png"}, "clouds": 0.5)"),
             "/environment/clouds: a sky from a picture has the clouds of the picture; remove \"clouds\" or "
             "\"picture\"\n");

@@ -26,7 +26,7 @@ Scene parsed_scene(const std::string& text) {
   return parse_scene(text, "scene", ".").scene;
 }
 
-TEST(Placement, NothingToPlaceLeavesTheOriginalAlone) {
+TEST(Placement, WithoutPlacementThereIsOnlyTheOriginal) {
   const Copies copies = copies_of({}, {1, 2, 3});
   ASSERT_EQ(copies.placed.size(), 1u);
   EXPECT_EQ(copies.placed[0].suffix, "");

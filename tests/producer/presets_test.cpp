@@ -108,7 +108,7 @@ TEST(Effects, ParticleEventsCreateOtherParticles) {
     for (const PointSet& set : simulation.snapshot().point_sets) all.push_back(set.points.size());
     return all;
   };
-  while (simulation.frame() < 9) simulation.advance();  // 0.4 s: all in flight
+  while (simulation.frame() < 9) simulation.advance();  // 0.4 s: all particles are in flight
   EXPECT_EQ(counts(), (std::vector<std::size_t>{4, 32, 8, 0, 0}));
   while (simulation.frame() < 13) simulation.advance();  // 0.6 s: they have hit the ground once, at 0.55 s
   EXPECT_EQ(counts(), (std::vector<std::size_t>{4, 48, 8, 12, 0}));

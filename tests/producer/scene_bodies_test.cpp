@@ -138,7 +138,7 @@ TEST(Fills, HoldAllBallsAtTheirDistance) {
                           : shape.index() == 1 ? std::numbers::pi / 4 * 0.8
                                                : std::numbers::pi / 6;
       const Real fraction = static_cast<Real>(places.size()) * std::numbers::pi / 6 * d * d * d / volume;
-      // Less than the ideal 0.74, 0.52 and 0.38 by the layer at the walls.
+      // The density is less than the ideal 0.74, 0.52 and 0.38, because of the layer at the walls.
       const Real ideal = packing == Packing::hexagonal ? 0.7405 : packing == Packing::cubic ? 0.5236 : 0.385;
       EXPECT_LT(fraction, ideal + 1e-9);
       EXPECT_GT(fraction, 0.6 * ideal) << static_cast<int>(packing) << " " << shape.index();
@@ -200,7 +200,7 @@ TEST(Fills, MakeParticlesAndCopiesOfBodies) {
             std::string("/bodies/0/fill") + no_room);
   EXPECT_EQ(body_scene_errors(R"("particles": [{"fill": {"spacing": 2}}])"),
             std::string("/particles/0/fill") + no_room);
-  // A thin and very long volume, in which few of the places of the box around it are.
+  // A thin and very long volume contains only few places of its bounding box.
   EXPECT_EQ(
       body_scene_errors(
           R"("particles": [{"fill": {"shape": {"type": "cylinder", "radius": 0.06, "height": 1e9}, "spacing": 0.1}}])"),

@@ -167,19 +167,20 @@ TEST(SceneCheck, AFilmHasAtLeastOneFrame) {
 }
 
 TEST(SceneCheck, KeysWithoutEffectGiveWarnings) {
-  EXPECT_EQ(warnings_of(R"({
+  EXPECT_EQ(
+      warnings_of(R"({
     "materials": [{"name": "lone"}],
     "bodies": [{"name": "b", "motion": "static", "velocity": [1, 0, 0]}, {"mass": 2, "density": 7}],
     "emitters": [{"rate": 0}],
     "springs": [{"a": {"body": "b"}, "b": {"position": [0, 1, 0]}}],
     "render": {"size": [321, 180]}})"),
-            "/materials/0: the material 'lone' is not used\n"
-            "/bodies/0/velocity: has no effect: the body is not dynamic\n"
-            "/bodies/1/density: has no effect: \"mass\" is given\n"
-            "/emitters/0: releases no particles: rate, count and bursts are zero, or their times are outside "
-            "the film\n"
-            "/springs/0: has no effect: neither end can move\n"
-            "/render/size: is odd; most video formats need an even width and height\n");
+      "/materials/0: the material 'lone' is not used\n"
+      "/bodies/0/velocity: has no effect: the body is not dynamic\n"
+      "/bodies/1/density: has no effect: \"mass\" is given\n"
+      "/emitters/0: releases no particles: rate, count and bursts are zero, or their times are outside "
+      "the film\n"
+      "/springs/0: has no effect: neither end can move\n"
+      "/render/size: has an odd width or height; most video formats need even numbers, such as 1280 x 720\n");
 }
 
 TEST(SceneCheck, ContactRulesNameTwoMaterialsOnce) {
@@ -188,7 +189,7 @@ TEST(SceneCheck, ContactRulesNameTwoMaterialsOnce) {
     "contacts": [{"materials": ["ice", "steel"], "friction": 0.02}, {"materials": ["steel", "ice"], "friction": 1},
                  {"materials": ["ice", "stele"], "restitution": 1}, {"materials": ["ice"]}, {"friction": 1},
                  {"materials": ["ice", ""], "restitution": 2}]})"),
-            "/contacts/1/materials: are the same pair as in /contacts/0\n"
+            "/contacts/1/materials: are the same pair as in /contacts/0; remove one of the two rules\n"
             "/contacts/2/materials/1: there is no material 'stele'; did you mean 'steel'?\n"
             "/contacts/3/materials: must be a list of 2 values, got 1 items\n"
             "/contacts/4/materials: is required: names of two materials, in any order; may be the same\n"
@@ -368,15 +369,15 @@ TEST(SceneCheck, BoundsCountDescendants) {
 }
 
 TEST(SceneCheck, ForcesNameParticles) {
-  EXPECT_EQ(
-      errors_of(R"({
+  EXPECT_EQ(errors_of(R"({
     "emitters": [{"name": "rain", "on_collision": [{"name": "splash"}], "repeat": {"count": 2, "offset": [1, 0, 0]}}],
     "forces": [{"type": "turbulence", "particles": ["rain", "rain/splash", "rain_1/splash"]},
                {"type": "vortex", "particles": ["rain/spalsh"]}, {"type": "grab", "keyframes": [{}]},
                {"type": "coulomb"}]})"),
-      "/forces/1/particles/0: there are no particles 'rain/spalsh'; did you mean 'rain/splash'?\n"
-      "/forces/2: needs a \"body\", \"particles\" or \"cloths\"\n"
-      "/forces/3/particles: is required: names of groups and emitters whose particles act on each other\n");
+            "/forces/1/particles/0: there are no particles 'rain/spalsh'; did you mean 'rain/splash'?\n"
+            "/forces/2: needs a \"body\", \"particles\" or \"cloths\"\n"
+            "/forces/3/particles: is required: names of particle groups and emitters whose particles act on "
+            "each other\n");
 }
 
 TEST(SceneCheck, ASurfaceHasRoomForAParticle) {

@@ -16,7 +16,7 @@ Scene loaded_scene(const std::string& text, const std::vector<std::string>& over
   return parse_scene(text, "s", OFFSTAGE_SOURCE_DIR, overrides).scene;
 }
 
-/// All problems of a scene, one per line.
+/// Returns all problems of a scene, one per line.
 std::string load_errors(const std::string& text, const std::vector<std::string>& overrides = {}) {
   try {
     parse_scene(text, "s", OFFSTAGE_SOURCE_DIR, overrides);

@@ -49,7 +49,7 @@ class SceneSchema : public testing::Test {
     json rule;  // the schema of the value
   };
 
-  /// Whether a path leads into child particles of child particles, which is recursive.
+  /// Returns whether a path leads into child particles of child particles, which is recursive.
   static bool is_deep(const std::string& path) {
     int lists = 0;
     for (std::size_t at = 0; (at = path.find("/0", at)) != std::string::npos; ++at) ++lists;
@@ -118,7 +118,7 @@ class SceneSchema : public testing::Test {
   }
 };
 
-/// A number outside the limits in `rule`, below or above.
+/// Returns a number outside the limits in `rule`, below or above.
 std::optional<json> beyond(const json& rule, bool low) {
   if (low && rule.contains("minimum")) return rule.at("minimum").get<double>() - 1.5;
   if (low && rule.contains("exclusiveMinimum")) return rule.at("exclusiveMinimum");

@@ -1,5 +1,5 @@
-// Bodies, contacts and forces of a scene reach the simulation: compared with closed forms that depend on each
-// of the keys.
+// Bodies, contacts and forces of a scene have their effect in the simulation. The results are compared with
+// closed forms that depend on each of the keys.
 
 #include "producer/build/simulation.h"
 
@@ -45,7 +45,8 @@ std::string balls(const std::vector<double>& places, const std::string& more) {
          R"(], "output": {"fps": 10, "duration": 1.1}, )" + more + "}";
 }
 
-/// A cube of 1 kg on a floor, for two seconds; the arguments add keys to the floor, the cube and the scene.
+/// Returns a scene of two seconds with a box of 1 kg on a floor. The arguments add keys to the floor, the box
+/// and the scene.
 std::string cube_on_floor(const std::string& floor, const std::string& cube, const std::string& scene) {
   return R"({"bodies": [{"name": "floor", "motion": "static", "shape": {"type": "plane"}, "material": "floor")" +
          floor +
@@ -53,7 +54,7 @@ std::string cube_on_floor(const std::string& floor, const std::string& cube, con
              "position": [0, 0.05, 0], "material": "cube")" +
          cube + R"(}], "output": {"fps": 10, "duration": 2.1}, )" + scene + "}";
 }
-/// Stopping distance of a body that slides with 2 m/s.
+/// Returns the stopping distance of a body that slides with 2 m/s.
 Real stopping_distance(Real friction) {
   return 4 / (2 * friction * kGravity);
 }

@@ -68,7 +68,7 @@ TEST(Sweep, FiguresHaveNoTimesSoThatTheyRepeat) {
     EXPECT_NE(table.find(name), std::string::npos) << name;
 }
 
-/// Whether a rectangle of an image has a pixel that differs from the lower right corner of the image.
+/// Returns whether a rectangle of an image has a pixel that differs from the lower right corner of the image.
 bool is_drawn(const render::Image& image, int left, int top, int right, int bottom) {
   const auto at = [&](int x, int y) {
     return image.rgba[4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width_px) +
@@ -81,7 +81,7 @@ bool is_drawn(const render::Image& image, int left, int top, int right, int bott
   return false;
 }
 
-TEST(ContactSheet, LabelsStayUnderTheirPictureHoweverLongTheyAre) {
+TEST(ContactSheet, LongLabelsStayUnderTheirPicture) {
   render::Image picture{160, 90, {}};
   picture.rgba.assign(4 * picture.pixel_count(), 255);
   const std::string longest(300, 'W');

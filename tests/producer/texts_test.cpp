@@ -17,7 +17,7 @@ render::Image grey() {
   return {kWidth, kHeight, std::vector<uint8_t>(std::size_t{4} * kWidth * kHeight, 128)};
 }
 
-/// The picture of one text over grey at a given time.
+/// Returns the picture of one text over grey at a given time.
 render::Image shown(const TextOverlay& overlay, double time = 1.5) {
   Scene scene;
   scene.overlays.push_back(overlay);

@@ -1,4 +1,4 @@
-// Finds the files of a scene, and notices their changes.
+// Finds the files of a scene, and detects their changes.
 
 #include "producer/run/watch.h"
 

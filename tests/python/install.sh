@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# `pip install` of the repository: the package works from its own folder, with its presets.
+# After `pip install` of the repository, the package works from its own folder, with its presets.
 # usage: install.sh SOURCE_DIR BUILD_DIR
 set -euo pipefail
 source=$(realpath "$1")

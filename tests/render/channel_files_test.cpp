@@ -13,7 +13,7 @@ namespace {
 
 constexpr float kNothing = std::numeric_limits<float>::infinity();
 
-/// Four pixels in a row; the last one shows nothing.
+/// Returns the channels of four pixels in a row. The last pixel shows no object.
 Channels sample() {
   return {.width_px = 4,
           .height_px = 1,

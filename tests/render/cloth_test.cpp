@@ -114,7 +114,8 @@ TEST(ClothSurface, RefusesInvalidMeshesAndHidesNonFiniteOnes) {
 TEST(StageCloth, SheetFacingTheSunHasItsAlbedoFromBothSides) {
   for (const float side : {1.0f, -1.0f}) {
     ClothStage s(plain(), {0, 0, side}, {0, 0, 5 * side});
-    // As of the white box of StageTest: Fresnel takes 4 %, the rough highlight gives some back.
+    // The same as for the white box in StageTest: the Fresnel term removes 4 %, and the rough highlight adds
+    // some of it.
     EXPECT_NEAR(center_pixel(s.draw()).x(), 1, 0.06);
   }
 }
@@ -134,7 +135,8 @@ TEST(StageCloth, LightShinesThroughAThinSheetAndOnlyThroughThat) {
     return center_pixel(s.draw()).x();
   };
   EXPECT_LT(seen(0), 0.02f);
-  EXPECT_NEAR(seen(0.5f), 0.5f * 0.9f, 0.1f);  // half of the light; the wrap takes a tenth and more
+  EXPECT_NEAR(seen(0.5f), 0.5f * 0.9f,
+              0.1f);  // half of the light; the wrapped lighting removes a tenth or more
 }
 
 TEST(StageCloth, SheetInGrazingLightDoesNotShadowItself) {
@@ -157,7 +159,8 @@ TEST(StageCloth, ThrowsItsShadowOnObjectsBehind) {
   EXPECT_LT(shadowed, 0.3f * below());
 }
 
-/// Mean of the red of a few pixels in the middle, or below it, of a frame of `count` sub-frames.
+/// Returns the mean red of a few pixels in the middle of a frame of `count` sub-frames, or `below_px` pixels
+/// below the middle.
 float mean_red(ClothStage& s, int count, int below_px = 0) {
   HdrImage sum;
   for (int i = 0; i < count; ++i) s.stage.draw(sample_offsets(i, count), sum);
@@ -167,7 +170,7 @@ float mean_red(ClothStage& s, int count, int below_px = 0) {
   return result;
 }
 
-/// Black cloth of an alpha.
+/// Returns the material of black cloth with this alpha.
 Material sheer(float alpha) {
   Material m = plain();
   m.color = {0, 0, 0, alpha};
@@ -197,13 +200,13 @@ TEST(StageCloth, TwoLayersHideMoreThanOneInAnyOrder) {
     ClothStage s(sheer(0.5f), {0, 0, -1});
     s.add(make_box({8, 8, 0.1f}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {1, 1, 1}}, {0, 0, -1});
     Sheet sheet(12);
-    std::ranges::reverse(sheet.triangles);  // its back in front, as in a fold
+    std::ranges::reverse(sheet.triangles);  // its back faces the camera, as in a fold
     for (Vector3f& p : sheet.points) p.z() = second;
     const ClothHandle other = s.stage.add_cloth({.triangles = sheet.triangles, .uvs = sheet.uvs},
                                                 s.stage.add_material(sheer(0.25f)));
     s.stage.set_cloth(other, sheet.points);
     const float seen = mean_red(s, 16);
-    EXPECT_LT(seen, 0.45f);  // 0.375 where their holes have nothing to do with each other
+    EXPECT_LT(seen, 0.45f);  // 0.375 if the holes of the layers are independent
     EXPECT_GT(seen, 0.2f);
   }
 }

@@ -40,7 +40,7 @@ bool is_sound(const Mesh& mesh) {
          std::all_of(mesh.uvs.begin(), mesh.uvs.end(), finite);
 }
 
-/// The poses of all animations, at several times, are finite.
+/// Returns whether the poses of all animations, at several times, are finite.
 bool moves_soundly(const ModelRig& rig) {
   for (std::size_t clip = 0; clip < rig.clips.size(); ++clip)
     for (const float fraction : {0.0f, 0.3f, 1.0f}) {
@@ -52,7 +52,7 @@ bool moves_soundly(const ModelRig& rig) {
   return true;
 }
 
-/// What the files come to; a file's fault is an empty string if there is none.
+/// The results of reading many files. The fault of a file is an empty string if there is none.
 struct Tally {
   int loaded = 0, refused = 0;
   double slowest_s = 0;
@@ -81,7 +81,8 @@ struct Tally {
   }
 };
 
-/// Whether the libraries under this test are; the test itself may be compiled without.
+/// Returns whether the tested libraries are compiled with the address sanitizer. The test itself may be
+/// compiled without it.
 bool is_address_sanitized() {
   return __asan_init != nullptr;
 }
@@ -104,7 +105,8 @@ TEST(ModelCorpus, EveryFileLoadsOrIsRefusedInOneLine) {
   EXPECT_LT(tally.slowest_s, 10);
 }
 
-/// Some of the triangles of every model are opaque: readers leave alpha at 0 where a format has none.
+/// Returns whether some triangles of a model are opaque. This detects a reader that leaves alpha at 0 because
+/// the format has none.
 bool has_something_opaque(const Model& model) {
   return std::ranges::any_of(model.parts, [&](const Model::Part& part) {
     const Material& look = model.materials[static_cast<std::size_t>(part.material)];

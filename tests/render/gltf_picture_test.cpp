@@ -242,7 +242,7 @@ TEST(GltfPicture, DoubleSidedSurfacesAreSeenFromBehind) {
   expect_color(both.color_at(0, 0), kPureWhite);
 }
 
-/// Light from the sun on a rough square, by its normals or by its normal map.
+/// Returns the light from the sun on a rough square, by its normals or by its normal map.
 Vector3f sunlit(GltfSample& sample, const Vector3f& sun) {
   sample.pbr()["metallicFactor"] = 0;
   sample.pbr()["roughnessFactor"] = 1;
@@ -331,7 +331,7 @@ TEST(GltfPicture, OcclusionHidesMirroredLightButNoDirectLight) {
   EXPECT_NEAR(light(0.5, 1, false) / light(1, 1, false), 0.5f, 0.02f)
       << "rough metal reflects from all around";
   EXPECT_GT(light(1, 0.5, true), 0.01f);
-  // The rest is what the mirror image has of the sun's disc.
+  // The remaining light is the mirror image of the sun's disc.
   EXPECT_NEAR(light(0, 0.5, true) / light(1, 0.5, true), 1, 0.002f);
 }
 
@@ -358,8 +358,8 @@ TEST(GltfPicture, TransmissionShowsTheBackground) {
   expect_color(picture.color_at(0.2f, 0.2f), {0.2f, 0.2f, 0.6f}, 0.02f);
 }
 
-// Two squares with their fronts outside enclose glass. Light passes both, and is tinted as on the nominal way
-// through it.
+// Two squares with outward fronts enclose glass. The light that passes both has the tint of the nominal
+// thickness.
 TEST(GltfPicture, AVolumeTintsTheLightThroughItByItsThickness) {
   const auto behind = [](double thickness) {
     GltfSample sample;
@@ -441,7 +441,7 @@ TEST(GltfPicture, AFilmOfAQuarterWaveReflectsPurple) {
   EXPECT_LT(coated.maxCoeff(), bare.y());
   const Vector3f half = highlight(film(1, 0.5), 0);
   EXPECT_LT((half - 0.5f * (bare + coated)).cwiseAbs().maxCoeff(), 0.02f * bare.y());
-  const Vector3f twice = highlight(film(2, 1), 0);  // a half wave is as if it were not there
+  const Vector3f twice = highlight(film(2, 1), 0);  // a film of half a wavelength has no effect
   EXPECT_NEAR(twice.y() / bare.y(), 1, 0.15f);
   const Vector3f metal = highlight(film(2, 1), 1);
   EXPECT_GT((metal / metal.maxCoeff() - Vector3f::Ones()).cwiseAbs().maxCoeff(), 0.05f) << "metal is tinted";

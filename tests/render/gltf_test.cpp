@@ -387,9 +387,9 @@ TEST(GltfPacked, DracoMeshoptAndWebpAreUnpackedOrRefusedByName) {
   }
 }
 
-// Each of these files lies about a size, an index or a type. The reader must find the lie itself: a crash of
-// its process would be refused with another message.
-TEST(GltfHostile, LiesAboutSizesAndIndicesAreFound) {
+// Each of these files has a wrong size, index or type. The reader must detect it: after a crash of its
+// process, the message would be another one.
+TEST(GltfHostile, WrongSizesAndIndicesAreFound) {
   const std::vector<std::pair<const char*, std::function<void(GltfSample&)>>> lies = {
       {"count", [](GltfSample& s) { s.document["accessors"][0]["count"] = 4000000000u; }},
       {"view length", [](GltfSample& s) { s.document["bufferViews"][0]["byteLength"] = 1e15; }},

@@ -10,7 +10,7 @@
 namespace offstage::render {
 namespace {
 
-/// A gradient with some structure; `alpha` is that of the first pixel.
+/// Returns a gradient with some structure; `alpha` is that of the first pixel.
 Image test_image(int width, int height, uint8_t alpha = 255) {
   Image image{width, height, {}};
   for (int y = 0; y < height; ++y) {
@@ -126,7 +126,7 @@ TEST(WriteFileAtomically, SaysWhyAFolderIsRefused) {
   EXPECT_EQ(folder.names(), std::set<std::string>{"file"});
 }
 
-TEST(WriteFileAtomically, LeavesTheOldFileAloneWhenTheDiskIsFull) {
+TEST(WriteFileAtomically, KeepsTheOldFileWhenTheDiskIsFull) {
   const ScratchFolder folder;
   folder.put("a.bin", "old");
   const int status = status_of_child([&] {

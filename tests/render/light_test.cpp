@@ -21,7 +21,8 @@ struct Floor {
     const Vector2f place = project(camera, {x, 0, z}, 160, 120);
     return pixel(s.draw(offsets), static_cast<int>(place.x()), static_cast<int>(place.y())).y();
   }
-  /// The mean of 16 sub-frames and of five points along Z. The scene is drawn once, at the first call.
+  /// Returns the mean of 16 sub-frames and of five points along Z. The scene is drawn once, at the first
+  /// call.
   float mean_at(float x, float z) {
     if (mean.rgba.empty())
       for (int i = 0; i < 16; ++i) s.stage.draw(sample_offsets(i, 16), mean);

@@ -29,8 +29,8 @@ std::string base64(const std::vector<T>& values) {
   return text;
 }
 
-/// A glTF file with one triangle (0,0,0) (1,0,0) (0,1,0) and texture coordinates equal to x, y. `more` are
-/// further members of the document, `nodes` its nodes, the first of which is the scene's.
+/// Returns a glTF file with one triangle (0,0,0) (1,0,0) (0,1,0) and texture coordinates equal to x, y.
+/// `more` are further members of the document, `nodes` its nodes, the first of which is the scene's.
 std::string gltf(const std::string& nodes = R"([{"mesh":0}])", const std::string& more = "") {
   const std::vector<float> data = {0, 0, 0, 1, 0, 0, 0, 1, 0, /*uv*/ 0, 0, 1, 0, 0, 1};
   return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":)" + nodes +
@@ -51,7 +51,7 @@ double signed_volume(const Mesh& mesh) {
   return volume;
 }
 
-/// The part's only vertex at a position.
+/// Returns the part's only vertex at a position.
 std::size_t vertex_at(const Mesh& mesh, const Vector3f& position) {
   const auto found = std::find_if(mesh.positions.begin(), mesh.positions.end(),
                                   [&](const Vector3f& p) { return (p - position).norm() < 1e-6f; });
@@ -86,7 +86,7 @@ TEST(ReadModel, GivesFlatFacesToACubeWithoutNormals) {
 }
 
 TEST(ReadModel, CutsPolygonsWithoutSliversAndGaps) {
-  // Prisms of combs with corners in a line; assimp's ears have no area there.
+  // Prisms of combs with collinear corners, where the ears of assimp have no area.
   const ScratchFolder folder;
   for (const int teeth : {1, 2, 5, 100}) {
     std::vector<std::pair<int, int>> outline = {{0, 0}, {2 * teeth, 0}, {2 * teeth, 1}};

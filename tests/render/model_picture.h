@@ -1,5 +1,5 @@
 #pragma once
-/// Draws a model file alone, to compare its pixels with what the file format requires.
+/// Draws a model file without other objects, to compare its pixels with the requirements of the file format.
 
 #include <algorithm>
 #include <cmath>
@@ -29,7 +29,7 @@ inline void put_on_sheet(const HdrImage& light) {
   for (const float value : light.rgba)
     image.rgba.push_back(static_cast<uint8_t>(std::lround(255 * srgb_encode(std::clamp(value, 0.0f, 1.0f)))));
   for (std::size_t i = 3; i < image.rgba.size(); i += 4) image.rgba[i] = 255;
-  static std::vector<uint8_t> latest;  // tests draw again for each pixel that they look at
+  static std::vector<uint8_t> latest;  // tests draw the picture again for each pixel that they compare
   if (image.rgba == latest) return;
   latest = image.rgba;
   const auto* test = testing::UnitTest::GetInstance()->current_test_info();

@@ -67,7 +67,7 @@ struct Veil {
   Vector3f color;
   float alpha;
 };
-/// The colour of translucent layers, the nearest first.
+/// Returns the colour of translucent layers, the nearest first.
 Vector3f over(std::initializer_list<Veil> layers) {
   Vector3f sum(0, 0, 0);
   float through = 1;
@@ -268,7 +268,7 @@ View view_from(const Vector3f& eye) {
   return make_view({.eye = eye, .target = {0, 0, 0}}, {}, 96, 64);
 }
 
-TEST(PaintOrder, RunsAreBoundedHoweverKindsAlternateAndKeepTheOrderOfEachKind) {
+TEST(PaintOrder, RunsAreBoundedForAnyOrderOfKindsAndKeepTheOrderOfEachKind) {
   const auto points = [](float first, int n) {
     std::vector<Point> result;
     for (int i = 0; i < n; ++i)

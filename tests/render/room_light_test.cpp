@@ -25,7 +25,7 @@ struct RoomMeeting {
   Vector3d normal = Vector3d::Zero(), albedo = Vector3d::Zero();
 };
 
-/// The walls from inside, or the block from outside.
+/// Returns the first surface that a ray meets: a wall of the room from inside, or the block from outside.
 RoomMeeting meet_room(const Vector3d& from, const Vector3d& direction) {
   RoomMeeting first;
   for (int axis = 0; axis < 3; ++axis) {
@@ -47,7 +47,8 @@ RoomMeeting meet_room(const Vector3d& from, const Vector3d& direction) {
 
 class RoomReference {
  public:
-  /// Mean of the light that arrives at points of the floor in a square, as the radiance of a white surface.
+  /// Returns the mean of the light that arrives at points of the floor in a square, as the radiance of a
+  /// white surface.
   Vector3d on_floor(const Vector3d& middle, double half, int paths) {
     Vector3d sum = Vector3d::Zero();
     for (int i = 0; i < paths; ++i) {

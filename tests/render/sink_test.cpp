@@ -24,7 +24,7 @@ Image flat(int width, int height, std::array<uint8_t, 4> color) {
   return image;
 }
 
-/// Sixteen grey columns that move by one column per frame.
+/// Returns a picture with sixteen grey columns, which move by one column per frame.
 Image greys(int width, int height, int frame) {
   Image image{width, height, {}};
   for (int i = 0; i < width * height; ++i) {
@@ -54,7 +54,7 @@ class EnvironmentVariable {
   const char* name_;
 };
 
-/// A replacement for ffmpeg that lists the real encoders, and otherwise runs the shell code `body`.
+/// Returns a replacement for ffmpeg that lists the real encoders, and otherwise runs the shell code `body`.
 std::filesystem::path fake_ffmpeg(const ScratchFolder& folder, const std::string& body) {
   const auto path = folder.put(
       "fake-ffmpeg", "#!/bin/sh\ncase \"$*\" in *-encoders*) exec ffmpeg -encoders;; esac\n" + body);
@@ -81,7 +81,7 @@ TEST(PngSink, MakesItsFoldersAndOneFileAFrame) {
   EXPECT_EQ(read_image(folder / "a/b/f012.png").rgba, flat(3, 2, {4, 5, 6, 255}).rgba);
 }
 
-/// A picture whose left half is `a` and whose right half is `b`.
+/// Returns a picture whose left half is `a` and whose right half is `b`.
 HdrImage two_lights(float a, float b) {
   HdrImage image{32, 16, {}};
   for (std::size_t i = 0; i < image.pixel_count(); ++i) {
@@ -324,7 +324,7 @@ TEST(CheckVideo, RefusesUnsupportedSettingsOfAFormatWithAdvice) {
   EXPECT_EQ(advice({.path = "a.mov", .width_px = 65, .height_px = 49, .alpha = true}), "");
 }
 
-/// The bytes that a pipe sink writes to standard output for two frames.
+/// Returns the bytes that a pipe sink writes to standard output for two frames.
 std::string piped(bool y4m, const Image& image) {
   const ScratchFolder folder;
   const std::string file = (folder / "out").string();

@@ -19,7 +19,7 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 
-/// A picture of 256x128 pixels with radiance(direction).
+/// Returns a picture of the sky in which a pixel has radiance(direction).
 template <class Radiance>
 HdrImage sky_of(Radiance radiance, int columns = 256) {
   HdrImage image{columns, columns / 2, {}};
@@ -36,7 +36,7 @@ HdrImage sky_of(Radiance radiance, int columns = 256) {
   return image;
 }
 
-/// A disc of this radius around a direction, before black.
+/// Returns a black sky with a disc of this radius around a direction.
 HdrImage disc_sky(const Vector3f& middle, float radius_deg, const Vector3f& radiance, float rest = 0,
                   int columns = 256) {
   const float edge = std::cos(radius_deg * kPi / 180);
@@ -115,7 +115,7 @@ TEST(SkyPicture, HasTwiceTheWidthAndLight) {
                std::invalid_argument);
 }
 
-/// A stage that is lit by a picture alone.
+/// A stage that is lit only by a picture of the sky.
 struct LitStage : SmallStage {
   explicit LitStage(const HdrImage& sky, float turn_deg = 0, bool visible = false, float intensity = 1)
       : SmallStage(160, 120) {
@@ -285,7 +285,7 @@ TEST(StageSkyPicture, RoughMetalMirrorsTheBrightPartOnce) {
   }
 }
 
-/// The split-sum reflectance of light.glsl (B. Karis, 2014) of a dielectric.
+/// Returns the split-sum reflectance of light.glsl (B. Karis, 2014) of a dielectric.
 float reflectance_of_glass(float roughness, float nv) {
   const Vector4f r =
       roughness * Vector4f(-1, -0.0275f, -0.572f, 0.022f) + Vector4f(1, 0.0425f, 1.04f, -0.04f);
@@ -293,7 +293,7 @@ float reflectance_of_glass(float roughness, float nv) {
   return 0.04f * (-1.04f * t + r.z()) + (1.04f * t + r.w());
 }
 
-// Black glass shows its mirror image alone: the mean of the sky over the lobe times the reflectance. The
+// Black glass shows only its mirror image: the mean of the sky over the lobe times the reflectance. The
 // bright part is so large that both strategies to find it have a weight.
 TEST(StageSkyPicture, RoughGlassMirrorsTheBrightPartOnce) {
   const Vector3f middle = Vector3f(0, 1, -1).normalized(), view = Vector3f(0, 1, 1).normalized();
@@ -450,7 +450,7 @@ TEST(LightImage, PngOfSixteenBitsKeepsThemAsLightAndHasEightAsTexture) {
 
 // --- Textures ---
 
-/// A picture of two colours, side by side.
+/// Returns a picture of two colours, side by side.
 Image half_red_half_green() {
   return {2, 1, {255, 0, 0, 255, 0, 255, 0, 255}};
 }

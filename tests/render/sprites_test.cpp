@@ -14,7 +14,7 @@ namespace {
 constexpr std::array<uint8_t, 4> kRed = {255, 0, 0, 255}, kGreen = {0, 255, 0, 255}, kBlue = {0, 0, 255, 255},
                                  kWhite = {255, 255, 255, 255}, kNothing = {255, 255, 255, 0};
 
-/// An image of equal square cells, in rows.
+/// Returns an image of equal square cells, in rows.
 Image cells(int columns, int cell_px, std::initializer_list<std::array<uint8_t, 4>> colors) {
   const int rows = static_cast<int>(colors.size()) / columns;
   Image image{columns * cell_px, rows * cell_px, {}, true};
@@ -31,7 +31,7 @@ struct SpriteStage : SmallStage {
     stage.set_sun({.intensity = 0, .shadows = false});
     stage.set_environment({.intensity = 0, .visible = false});
   }
-  /// A sprite at the origin; its square is about 35 pixels wide.
+  /// Returns a sprite at the origin; its square is about 35 pixels wide.
   HdrImage drawn(const PointsDef& def, const Image& picture, const Point& point) {
     const PointsHandle set = stage.add_points(def, picture);
     stage.set_points(set, std::array{point});

@@ -129,7 +129,7 @@ TEST(FilterEdges, SmoothsTheStepsOfASlantedEdge) {
   EXPECT_LT(error(smooth), 0.67 * error(sharp));
 }
 
-TEST(FilterEdges, LeavesFlatAndGentlyShadedAreasAlone) {
+TEST(FilterEdges, DoesNotChangeFlatAndGentlyShadedAreas) {
   Image image{32, 32, {}};
   for (int y = 0; y < 32; ++y) {
     for (int x = 0; x < 32; ++x) {

@@ -19,7 +19,7 @@ Environment even_sky(float radiance) {
   return {.zenith = all, .horizon = all, .ground = all};
 }
 
-/// The mean of n sub-frames.
+/// Returns the mean of n sub-frames.
 HdrImage mean_of(SmallStage& s, int n) {
   HdrImage sum;
   for (int i = 0; i < n; ++i) s.stage.draw(sample_offsets(i, n), sum);
@@ -27,7 +27,7 @@ HdrImage mean_of(SmallStage& s, int n) {
   return sum;
 }
 
-/// Mean of a square of pixels around a point.
+/// Returns the mean of a square of pixels around a point.
 float mean_around(const HdrImage& picture, const Vector2f& place, int half) {
   float sum = 0;
   for (int dy = -half; dy <= half; ++dy)
@@ -181,7 +181,8 @@ TEST_F(TracedLight, OfTheSunIsFocusedByABallOfGlass) {
   EXPECT_GT(light_at(0), 5 * open);
   EXPECT_LT(light_at(0.2f), 0.3f * open);  // in its shadow
 
-  // From far above, a ball spreads the light over a wide area and keeps it, but for what its surfaces mirror.
+  // From far above the floor, a ball spreads the light over a wide area. No light is lost except the part
+  // that its surfaces reflect.
   s.stage.remove(ball);
   look({.eye = {0, 2.1f, 0.001f}, .target = {0, 0, 0}, .fov_deg = 140});  // each pixel shows the same area
   const auto sum = [&] {
@@ -247,7 +248,7 @@ TEST_F(TracedLight, OfASmallBrightPatchHasLittleNoise) {
 // The furnace for particles: inside a closed ball, they have the light of its wall, whatever the sky outside.
 TEST_F(TracedLight, ParticlesIndoorsHaveTheLightOfTheWalls) {
   Environment sky = even_sky(2);
-  sky.visible = false;  // not through the particle, either
+  sky.visible = false;  // the sky is also not visible through the particle
   s.stage.set_environment(sky);
   look({.eye = {0, 0, 1.5f}, .target = {0, 0, 0}, .fov_deg = 40});
   const auto brightness = [&](PointStyle style, float wall) {
@@ -406,7 +407,7 @@ TEST_F(TracedLight, SumsCountTheLightRemovedFromVeryBrightRays) {
   const LightSums before = s.stage.light_sums();
   s.draw();
   const LightSums& after = s.stage.light_sums();
-  // 450 parts of 500 are taken.
+  // 450 of 500 parts of the light are removed.
   EXPECT_NEAR((after.removed - before.removed) / (after.arriving - before.arriving), 0.9, 0.02);
 }
 

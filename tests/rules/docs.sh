@@ -38,7 +38,7 @@ while read -r name; do
   [ -e "demos/scenes/$name.json" ] || problem "docs/book.md: there is no scene '$name'"
 done < <(grep -oE 'scenes? `[a-z_]+`(, `[a-z_]+`)*' docs/book.md | grep -oE '`[a-z_]+`' | tr -d '`' | sort -u)
 
-# Names of functions, classes, keys and scenes; those of one or two letters are mathematics.
+# Names of functions, classes, keys and scenes. Names of one or two letters are variables of equations.
 words=$(grep -rhoE '[A-Za-z_][A-Za-z0-9_]+' sim effects render demos --include='*.h' --include='*.cpp' | sort -u)
 scenes=$(basename -s .json demos/scenes/*.json)
 while read -r name; do

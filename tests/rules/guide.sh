@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Every scene of the tutorial is valid, warnings about unused materials apart:  guide.sh OFFSTAGE SOURCE_DIR
+# Every scene of the tutorial is valid and has no warnings, except about unused materials:  guide.sh OFFSTAGE SOURCE_DIR
 set -euo pipefail
 failed=0
 count=0

@@ -12,7 +12,7 @@ import re
 import subprocess
 import sys
 
-# The names of the standard library that headers use, by the header that they need. Another may give them as well.
+# Names of the standard library, by the header that declares them. Another header may declare them, too.
 GIVEN_BY = {
     "algorithm": "min max minmax clamp copy find_if swap_ranges ranges sort",
     "any": "any",
@@ -60,7 +60,7 @@ GIVEN_BY = {
     "vector": "vector erase",
 }
 NEEDED = {name: header for header, names in GIVEN_BY.items() for name in names.split()}
-# Headers of the standard library that are specified to give names of others.
+# Headers of the standard library that also declare the names of other headers, by the C++ standard.
 ALSO_GIVES = {
     "algorithm": ["initializer_list"], "array": ["compare", "initializer_list", "cstddef"], "deque": ["compare", "initializer_list"],
     "filesystem": ["compare"], "map": ["compare", "initializer_list"], "mutex": ["chrono"], "condition_variable": ["chrono", "mutex"],
@@ -69,7 +69,8 @@ ALSO_GIVES = {
     "tuple": ["compare"], "utility": ["compare", "initializer_list"], "variant": ["compare"],
     "vector": ["compare", "initializer_list"],
 }
-# std::size_t is given by every container, string and view, and move, forward and swap by what no program avoids.
+# Every header of a container, string or view declares std::size_t. move, forward and swap are in headers that
+# every program includes.
 EVERYWHERE = {"size_t", "ptrdiff_t", "nullptr_t", "move", "forward", "swap"}
 FOLDERS = ("sim", "effects", "render", "demos/producer", "demos/engine", "demos/tune")
 

@@ -53,7 +53,7 @@ for header in $public; do
 done
 forbid "$(ls -d demos/producer tests/producer tests/cli 2>/dev/null | tr '\n' ' ')" 'assimp|glad|GL/|stb|libdeflate' "only render uses GL, assimp, stb and libdeflate"
 
-# Who may use what: a library and the files, without their endings, that include it.
+# Libraries, and the files (without their endings) that may include them.
 only() {
   local users
   users=$(grep -rlE "include *[<\"]$1" sim effects render demos | sed 's/\.[a-z]*$//' | sort -u | tr '\n' ' ')

@@ -16,7 +16,7 @@ using producer::Object;
 using producer::parse_json;
 using producer::to_text;
 
-TEST(TextEdit, ReplacesTheBytesOfAValueAlone) {
+TEST(TextEdit, ReplacesOnlyTheBytesOfAValue) {
   const std::string text =
       "{\r\n  \"a\" : 1.50, // one\r\n  /* two */ \"b\":[1e3,  2 ,{\"c\": \"x // no comment\"}]\r\n}\r\n";
   EXPECT_EQ(

@@ -35,7 +35,7 @@ Quat about_z(Real angle) {
   return Quat(Eigen::AngleAxisd(angle, Vec3::UnitZ()));
 }
 
-/// A rod of length 1 attached at the origin, rotated by an angle from hanging down.
+/// Returns a rod of length 1 attached at the origin, rotated by an angle from hanging down.
 BodyHandle add_pendulum(World& world, Real angle, Real width = 0.02,
                         JointDef joint = {.type = JointType::revolute}) {
   const Quat turn = about_z(angle);
@@ -74,8 +74,8 @@ TEST(CompoundPendulum, HasThePeriodOfTheEllipticIntegral) {
   }
 }
 
-/// Reference for two rods: angles from hanging down and their rates, [t1, t2, t1', t2'], integrated by RK4
-/// with steps of 1e-5 s.
+/// Returns a reference for two rods by RK4 with steps of 1e-5 s. `y`: angles from hanging down, and their
+/// rates, [t1, t2, t1', t2'].
 std::array<Real, 4> double_pendulum(std::array<Real, 4> y, Real time) {
   constexpr Real m = 1, l = 1, a = 0.5, width = 0.05;
   constexpr Real inertia = m * (l * l + width * width) / 12;
@@ -157,7 +157,7 @@ struct Chain {
   std::vector<JointHandle> joints;
 };
 
-/// A horizontal chain of links of half a metre that starts at the origin.
+/// Returns a horizontal chain of links of half a metre that starts at the origin.
 Chain add_chain(World& world, int links, JointDef joint = {}) {
   Chain chain;
   for (int i = 0; i < links; ++i) {

@@ -1,5 +1,5 @@
-/// R12 with the full simulation: bullets of 300 m/s do not pass through a plate of 1 cm, for all combinations
-/// of shapes.
+/// Bullets of 300 m/s do not pass through a plate of 1 cm, for all combinations of shapes, with the full
+/// simulation (physics R12).
 
 #include <algorithm>
 #include <cmath>
@@ -21,8 +21,8 @@ class BodyBullet : public BothSolvers {
     sheet.triangles = {{0, 2, 1}, {0, 3, 2}};
     return sheet;
   }
-  /// Whether a bullet reaches the far side of a plate within the time for twice its path, unless it slid off
-  /// the plate's edge.
+  /// Returns whether a bullet reaches the far side of a plate within the time for twice its path, unless it
+  /// slid off the plate's edge.
   static bool gets_through(World& world, BodyHandle bullet, BodyHandle plate, Real max_step) {
     const auto seen_from_plate = [&] {
       return world.body(plate).pose.point_to_body(world.body(bullet).centre);

@@ -17,7 +17,8 @@ namespace {
 
 class BodyDeterminism : public testing::TestWithParam<SolverKind> {
  protected:
-  /// Several heaps of all shapes, some of them bouncing, and a ball that rolls into them.
+  /// Simulates several heaps of all shapes, some of which bounce, and a ball that rolls into them. Returns
+  /// the state hash.
   static StateHash heaps(int per_heap, Real restitution) {
     World world({.solver = GetParam()});
     world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0});
@@ -58,9 +59,10 @@ class CrowdDeterminism : public BodyDeterminism {
     std::size_t touching = 0;  ///< greatest number of pairs at once
   };
 
-  /// A heap that is pushed together, and columns that fall beside it; some of each bounce. The world uses
-  /// threads for 200 awake bodies, the fast solver for 384 touching pairs (48 batches of eight), and the
-  /// exact solver for islands, which it solves in parallel: it gets a smaller heap and more columns.
+  /// Simulates a heap that is pushed together, and columns that fall beside it. Some bodies of each bounce.
+  /// The world uses threads for 200 awake bodies, the fast solver for 384 touching pairs (48 batches of
+  /// eight), and the exact solver for islands, which it solves in parallel: it gets a smaller heap and more
+  /// columns.
   static Outcome crowd() {
     const bool is_exact = GetParam() == SolverKind::exact;
     const int side = is_exact ? 3 : 6, high = is_exact ? 4 : 7;  // size of the heap

@@ -27,10 +27,10 @@ inline std::string solver_name(const testing::TestParamInfo<SolverKind>& info) {
 
 class BothSolvers : public testing::TestWithParam<SolverKind> {
  protected:
-  /// Whether the solver's results are exact up to rounding.
+  /// Returns whether the solver's results are exact up to rounding.
   static bool is_exact() { return GetParam() == SolverKind::exact || is_lcp(); }
   static bool is_lcp() { return GetParam() == SolverKind::lcp; }
-  /// The definition of a world with the solver under test.
+  /// Returns the definition of a world with the solver under test.
   static WorldDef def(Real max_step = 1.0 / 240) {
     return {.max_step = max_step, .solver = GetParam(), .sleep = false};
   }
@@ -82,7 +82,7 @@ inline Tally run(World& world, Real seconds, Real sampling = 1.0 / 240) {
   return all;
 }
 
-/// The pose of a plane that descends towards +x at an angle.
+/// Returns the pose of a plane that descends towards +x at an angle.
 inline Pose incline(Real angle) {
   return {Vec3::Zero(), Quat(Eigen::AngleAxisd(-angle, Vec3::UnitZ()))};
 }

@@ -17,7 +17,7 @@ struct PlacedBox {
   Mat3 axes;
 };
 
-/// Depth of the overlap of two boxes by the separating axis theorem; 0 if they are apart.
+/// Returns the depth of the overlap of two boxes by the separating axis theorem; 0 if they are apart.
 Real overlap(const PlacedBox& a, const PlacedBox& b) {
   const Vec3 way = b.centre - a.centre;
   if (way.norm() >= a.half.norm() + b.half.norm()) return 0;

@@ -1,4 +1,4 @@
-/// R12: fast small bodies never pass thin ones between two steps.
+/// Small fast bodies never pass through thin bodies between two steps (physics R12).
 
 #include <gtest/gtest.h>
 

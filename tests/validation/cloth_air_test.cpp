@@ -37,7 +37,8 @@ Vec3 mean_velocity(const ClothDef& def, const ClothView& view) {
   return sum / mass_of_cloth(def);
 }
 
-/// Integrator, step of the world, whether the cloth moves along its normal or along itself.
+/// Parameters: integrator, step of the world [s], whether the cloth moves along its normal (false: along
+/// itself).
 class ClothDecay : public testing::TestWithParam<std::tuple<ClothIntegrator, Real, bool>> {};
 
 TEST_P(ClothDecay, SlowsDownAsUnderAQuadraticDrag) {
@@ -67,7 +68,7 @@ INSTANTIATE_TEST_SUITE_P(Integrators, ClothDecay,
                                                           ClothIntegrator::symplectic, ClothIntegrator::rk4),
                                           testing::Values(1.0 / 240, 1.0 / 60), testing::Bool()));
 
-/// Integrator, step of the world, areal density.
+/// Parameters: integrator, step of the world [s], areal density [kg/m^2].
 class ClothFall : public testing::TestWithParam<std::tuple<ClothIntegrator, Real, Real>> {};
 
 TEST_P(ClothFall, ReachesItsTerminalSpeed) {
@@ -92,7 +93,7 @@ INSTANTIATE_TEST_SUITE_P(Integrators, ClothFall,
                                                           ClothIntegrator::symplectic, ClothIntegrator::rk4),
                                           testing::Values(1.0 / 240, 1.0 / 60), testing::Values(0.01, 0.15)));
 
-/// Step of the world.
+/// Parameter: step of the world [s].
 class RisingBalloon : public testing::TestWithParam<Real> {};
 
 TEST_P(RisingBalloon, HasTheDragThatBalancesItsLift) {
@@ -131,7 +132,7 @@ TEST_P(RisingBalloon, HasTheDragThatBalancesItsLift) {
 
 INSTANTIATE_TEST_SUITE_P(Steps, RisingBalloon, testing::Values(1.0 / 60, 1.0 / 240));
 
-/// Integrator and step of the world.
+/// Parameters: integrator, step of the world [s].
 class ClothSail : public testing::TestWithParam<std::tuple<ClothIntegrator, Real>> {};
 
 TEST_P(ClothSail, TakesTheWholePressureOfTheWind) {
@@ -172,7 +173,7 @@ INSTANTIATE_TEST_SUITE_P(Steps, ClothSail,
                                                           ClothIntegrator::implicit),
                                           testing::Values(1.0 / 240, 1.0 / 60)));
 
-/// Integrator and step of the world.
+/// Parameters: integrator, step of the world [s].
 class ClothGust : public testing::TestWithParam<std::tuple<ClothIntegrator, Real>> {};
 
 TEST_P(ClothGust, NeverMakesAFoilFasterThanItself) {
@@ -221,7 +222,7 @@ class Flag {
     Real amplitude;  ///< of the free end, from peak to peak [m]
     Real frequency;  ///< [Hz]
   };
-  /// Of some seconds, after others.
+  /// Returns the swing during `seconds`, which follow the first `after` seconds.
   Swing swing(int seconds, int after) {
     std::vector<Real> place;
     for (int i = 0; i < 60 * (after + seconds); ++i) {
@@ -247,7 +248,7 @@ class Flag {
   ClothHandle cloth_;
 };
 
-/// Wind [m/s] and step of the world [s].
+/// Parameters: wind [m/s], step of the world [s].
 class FlagFlutter : public testing::TestWithParam<std::pair<Real, Real>> {};
 
 TEST_P(FlagFlutter, HasTheStrouhalNumberOfFlappingFlags) {
@@ -284,7 +285,7 @@ TEST(FlagFlutter, BeginsAtACriticalWind) {
   EXPECT_GT(fast.frequency, 1.3 * slow.frequency);
 }
 
-/// Mass of the load [kg] and step of the world [s].
+/// Parameters: mass of the load [kg], step of the world [s].
 class Parachute : public testing::TestWithParam<std::pair<Real, Real>> {};
 
 TEST_P(Parachute, DescendsByItsDragArea) {

@@ -37,7 +37,7 @@ void make_stable(ClothDef& def, ClothIntegrator integrator) {
   ASSERT_GT(largest_stable_step(def).step, def.substep);
 }
 
-/// A strip along x of cells of the given size, four wide.
+/// Returns a strip along x of cells of the given size, four wide.
 ClothDef bend_strip(BendModel model, Real radius, Real length, Real cell) {
   const auto cells = static_cast<uint32_t>(std::lround(length / cell));
   ClothDef def = effects::grid_cloth({length, 4 * cell, cells, 4}, {}, limp(model, radius));
@@ -46,7 +46,7 @@ ClothDef bend_strip(BendModel model, Real radius, Real length, Real cell) {
   return def;
 }
 
-/// Energy with that of the springs, momentum and angular momentum.
+/// Energy (including the springs), momentum and angular momentum of a cloth.
 struct Motion {
   Real energy = 0;
   Vec3 momentum = Vec3::Zero(), spin = Vec3::Zero();
@@ -97,7 +97,7 @@ TEST_P(ClothBendLimit, AClampedLimpStripTurnsDownOnAQuarterCircle) {
 TEST_P(ClothBendLimit, KeepsMomentumAndTakesEnergy) {
   // A strip whose ends are thrown together.
   const auto [model, integrator] = GetParam();
-  // The implicit integrator does not keep it; that of the limit alone is exact, see below.
+  // The implicit integrator does not conserve angular momentum. The corrections of the limit do; see below.
   const Real spin_tolerance = integrator == ClothIntegrator::implicit ? kInfinity : 0.02;
   ClothDef def = bend_strip(model, 0.05, 0.2, 0.01);
   make_stable(def, integrator);

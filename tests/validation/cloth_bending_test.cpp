@@ -50,7 +50,7 @@ void flip_to_delaunay(std::vector<Triangle>& triangles, const std::vector<Vec3>&
   }
 }
 
-/// A strip of the length 1 along x and the width 0.25, of `cells` by a quarter of it.
+/// Returns a strip along x with `cells` cells along its length, and cells of the same size across it.
 TriangleMesh strip(Mesh kind, uint32_t cells, Real length, Real width) {
   TriangleMesh mesh;
   const uint32_t rows = std::max(2u, static_cast<uint32_t>(std::lround(cells * width / length)));

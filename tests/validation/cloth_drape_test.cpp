@@ -18,7 +18,7 @@ namespace {
 
 constexpr Real kSwatchRadius = 0.15, kStandRadius = 0.09, kStandHeight = 0.24;
 
-/// Nearly equilateral triangles between circles with 6, 12, 18 ... vertices.
+/// Returns a disc of nearly equilateral triangles between circles with 6, 12, 18 ... vertices.
 TriangleMesh disc_of_rings(uint32_t rings) {
   TriangleMesh mesh;
   mesh.vertices.push_back(Vec3::Zero());

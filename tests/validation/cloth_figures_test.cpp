@@ -1,5 +1,5 @@
-/// Cloth and its figures: loads against closed forms, the stretch limit under bodies, momentum, and bodies
-/// that it has to stop.
+/// Statistics of cloth: loads compared with closed forms, the stretch limit under bodies, momentum, and
+/// bodies that a cloth stops.
 
 #include <algorithm>
 #include <cmath>
@@ -21,7 +21,7 @@ Quat turned(Real angle, const Vec3& axis) {
   return Quat(Eigen::AngleAxis<Real>(angle, axis));
 }
 
-/// A strip of 0.2 m x 1 m that hangs from its upper edge, with a body at its lower one; `strain` is that at
+/// A strip of 0.2 m x 1 m that hangs from its upper edge, with a body at its lower one; `strain`: strain at
 /// the start.
 struct HangingStrip {
   HangingStrip(const effects::Fabric& fabric, Real mass, Real strain, Real step, ClothIntegrator integrator)
@@ -47,7 +47,7 @@ struct HangingStrip {
     }
     cloth = world.add_cloth(def);
   }
-  /// How much longer the strip is than at rest on the mean of some seconds [m].
+  /// Returns the mean elongation of the strip over some seconds, relative to its rest length [m].
   Real mean_elongation(int seconds) {
     Real sum = 0;
     for (int i = 0; i < 60 * seconds; ++i) {
@@ -63,7 +63,7 @@ struct HangingStrip {
   ClothHandle cloth;
 };
 
-/// Fabric, fraction of the load at its limit, and step of the world.
+/// Parameters: fabric, load as a fraction of the load at the stretch limit, step of the world [s].
 class ClothUnderALoad : public testing::TestWithParam<std::tuple<std::string, Real, Real>> {};
 
 TEST_P(ClothUnderALoad, StretchesByItsStiffness) {
@@ -82,7 +82,7 @@ INSTANTIATE_TEST_SUITE_P(Fabrics, ClothUnderALoad,
                          testing::Combine(testing::Values("silk", "cotton", "denim", "leather", "rubber"),
                                           testing::Values(0.3, 0.9), testing::Values(1.0 / 240, 1.0 / 60)));
 
-/// Integrator and step of the world.
+/// Parameters: integrator, step of the world [s].
 class StiffClothUnderALoad : public testing::TestWithParam<std::tuple<ClothIntegrator, Real>> {};
 
 TEST_P(StiffClothUnderALoad, StretchesByItsStiffnessAtTheDefaultSubstep) {
@@ -112,7 +112,7 @@ TEST_P(ClothLimit, HoldsUnderABodyThatWouldStretchItFurther) {
     strain = std::max(strain, strip.world.cloth_report(strip.cloth).max_strain);
   }
   EXPECT_LE(strain, 0.1 + 1e-9);
-  // It hangs there, neither held up nor thrown back.
+  // The body hangs at this height; it is neither held higher nor thrown back.
   EXPECT_NEAR(strip.world.body(strip.body).pose.position.y(), -0.6, 0.01);
   EXPECT_LT(strip.world.body(strip.body).velocity.norm(), 0.2);
 }
@@ -223,7 +223,7 @@ INSTANTIATE_TEST_SUITE_P(Shapes, ClothHangs,
                          testing::Values(Shape(Cylinder{0.02, 2}), Shape(Sphere{0.02}),
                                          Shape(Capsule{0.01, 2})));
 
-/// Whether a sheet is sheared, or stretched along its threads.
+/// Parameter: whether the sheet is sheared; false: it is stretched along its threads.
 class ClothDamping : public testing::TestWithParam<bool> {};
 
 TEST_P(ClothDamping, OfEachKindOfSpringIsItsFractionOfTheCriticalOne) {
@@ -283,7 +283,7 @@ TEST(StiffCloth, ThatTouchesItselfStaysBoundedAndFinite) {
   world.add_body({.shape = Cylinder{0.09, 0.6}, .motion = MotionType::static_body});
   const ClothHandle cloth = world.add_cloth(def);
   for (int i = 0; i < 15; ++i) ASSERT_TRUE(world.step(1.0 / 30).finite);
-  // As a card would, it lies flat on the disc, which is half as wide.
+  // The cloth lies flat on the disc, which is half as wide, as a card would.
   Real lowest = 1;
   for (const Vec3& p : world.cloth(cloth).points) lowest = std::min(lowest, p.y());
   EXPECT_GT(lowest, 0.28);

@@ -68,7 +68,7 @@ TEST(ClothGas, ABalloonHitByADartTearsAndShrinks) {
   EXPECT_LT(volume() - rest, 0.5 * (blown_up - rest));
 }
 
-/// A sphere of the balloon's skin that helium fills.
+/// Returns a sphere with the skin of a balloon that is filled with helium.
 ClothDef helium_balloon() {
   ClothDef def = effects::sphere_cloth(0.1, 2, {}, effects::find_fabric("balloon")->fabric);
   def.pressure = 8440;
@@ -107,7 +107,7 @@ TEST(ClothGas, LiftsAWeightOnACordByArchimedes) {
     ASSERT_TRUE(world.cloth_report(cloth).finite);
   }
   EXPECT_GT(expected, 0.01 * total);
-  // A pinned point takes part in its body's last change of velocity only in the next sub-step.
+  // A pinned point gets the last change of its body's velocity only in the next sub-step.
   EXPECT_NEAR(momentum(), expected, 2e-3 * expected);
   EXPECT_GT(world.body(weight).pose.position.y(), -0.5);
 }
@@ -140,7 +140,7 @@ TEST(ClothGas, FillsABalloonInItsTime) {
   EXPECT_NEAR(filled / 3 / volume, 2500, 150);
 }
 
-/// Self-collision.
+/// Parameter: whether the cloth has self-collision.
 class PoppedBalloon : public testing::TestWithParam<bool> {};
 
 TEST_P(PoppedBalloon, FliesFreelyAndNoFasterThanItsGas) {
@@ -182,7 +182,7 @@ TEST_P(PoppedBalloon, FliesFreelyAndNoFasterThanItsGas) {
 
 INSTANTIATE_TEST_SUITE_P(SelfCollision, PoppedBalloon, testing::Bool());
 
-/// Divisions of the sphere.
+/// Parameter: number of divisions of the sphere.
 class StretchedBalloon : public testing::TestWithParam<uint32_t> {};
 
 TEST_P(StretchedBalloon, StaysRoundAndComesToRest) {
@@ -209,7 +209,7 @@ TEST_P(StretchedBalloon, StaysRoundAndComesToRest) {
 
 INSTANTIATE_TEST_SUITE_P(Balloons, StretchedBalloon, testing::Values(2, 3));
 
-/// Number of segments of a cord.
+/// Parameter: number of segments of the cord.
 class ClothCord : public testing::TestWithParam<uint32_t> {};
 
 TEST_P(ClothCord, StretchesByItsStiffness) {

@@ -14,7 +14,7 @@
 namespace offstage::sim {
 namespace {
 
-/// A square cloth in the plane y = 0, pinned along its border.
+/// Returns a square cloth in the plane y = 0, pinned along its border.
 ClothDef framed_cloth(const effects::Fabric& fabric, Real side, uint32_t cells) {
   ClothDef def = effects::grid_cloth({side, side, cells, cells}, {}, fabric);
   for (uint32_t i = 0; i < def.vertices.size(); ++i)
@@ -23,12 +23,12 @@ ClothDef framed_cloth(const effects::Fabric& fabric, Real side, uint32_t cells) 
   return def;
 }
 
-/// Fabric, cells and speed.
+/// Parameters: fabric, number of cells, speed of the ball [m/s].
 class ClothRebound : public testing::TestWithParam<std::tuple<std::string, uint32_t, Real>> {};
 
 TEST_P(ClothRebound, LeavesAlongTheAxisOnWhichTheBallCame) {
-  // Of a ball on the axis of a symmetric cloth, which reaches its stretch limit. What stops the ball acts on
-  // one side as on the other, but for rounding and the order in which contacts and springs are solved.
+  // A ball hits a symmetric cloth on its axis, and the cloth reaches its stretch limit. The forces on the
+  // ball are symmetric, except for rounding and the order in which contacts and springs are solved.
   const auto [name, cells, speed] = GetParam();
   const bool is_denim = name == "denim";
   const Real radius = is_denim ? 0.1 : 0.16, mass = is_denim ? 1 : 3.1;
@@ -47,7 +47,7 @@ TEST_P(ClothRebound, LeavesAlongTheAxisOnWhichTheBallCame) {
     lowest = std::min(lowest, state.pose.position.y() - radius);
     ASSERT_LT(report.cloth.penetration, fabric.thickness) << i;
     ASSERT_LT(std::hypot(state.velocity.x(), state.velocity.z()), 0.05 * speed) << i;
-    // Nothing acts but the cloth, which is at rest at first.
+    // Only the cloth acts on the ball, and it is at rest at first.
     ASSERT_LE(state.velocity.norm(), speed * (1 + 1e-9)) << i;
   }
   // The cloth gave way nearly as far as its limit lets it, 0.6 sqrt(1.1^2 - 1) = 0.275 m, and threw the ball
@@ -61,7 +61,7 @@ INSTANTIATE_TEST_SUITE_P(Balls, ClothRebound,
                          testing::Combine(testing::Values("cotton", "denim"), testing::Values(24, 40),
                                           testing::Values(5.5, 12.0)));
 
-/// Fabric, length over rest length at which it tears, and where the ball comes [m].
+/// Parameters: fabric, length over rest length at which it tears, position of the impact [m].
 class ClothBullet : public testing::TestWithParam<std::tuple<std::string, Real, Real>> {};
 
 TEST_P(ClothBullet, GoesThroughOnlyWhereTheClothTears) {
@@ -93,7 +93,7 @@ INSTANTIATE_TEST_SUITE_P(Fabrics, ClothBullet,
                                           testing::Values(0.0, 0.009, 0.0125)));
 
 TEST(ClothImpacts, GiveAFreeClothNoEnergyOfTheirOwn) {
-  // The cloth is forty times lighter than the ball that takes it along, and soon as long as it can be.
+  // The cloth is forty times lighter than the ball that hits it, and soon reaches its stretch limit.
   ClothDef def = effects::grid_cloth({0.4, 0.4, 8, 8}, {}, effects::find_fabric("cotton")->fabric);
   def.air.density = 0;
   World world({.gravity = Vec3::Zero(), .max_step = 1.0 / 120});
@@ -109,7 +109,7 @@ TEST(ClothImpacts, GiveAFreeClothNoEnergyOfTheirOwn) {
   EXPECT_GT(contacts, 0);
 }
 
-/// Integrator, longest step of the world and mass of the ball.
+/// Parameters: integrator, steps of the world per second, mass of the ball [kg].
 class ClothHit : public testing::TestWithParam<std::tuple<ClothIntegrator, Real, Real>> {};
 
 TEST_P(ClothHit, GivesBallAndFreeClothNoEnergyAndKeepsTheirMomentum) {

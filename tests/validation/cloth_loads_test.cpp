@@ -1,4 +1,4 @@
-/// What air, pressure, seams and weight do to cloth, against closed forms.
+/// Effects of air, pressure, seams and weight on cloth, compared with closed forms.
 
 #include <cmath>
 
@@ -79,7 +79,7 @@ TEST(ClothAir, AnOpenBoxTakesTheStagnationPressureOfItsMouth) {
   EXPECT_NEAR(force.y(), 0.9 * 1.2 / 2 * kWind * kWind * 0.25, 0.01 * force.y());
   EXPECT_NEAR(force.x(), 0, 1e-9);
 
-  // From behind it catches nothing.
+  // Wind from behind has no effect.
   World lee({.gravity = Vec3::Zero(), .wind = {0, -kWind, 0}, .max_step = kStep});
   const ClothHandle other = lee.add_cloth(def);
   lee.step(kStep);
@@ -107,7 +107,7 @@ TEST(ClothPressure, HoldsASkinByBoylesLaw) {
   EXPECT_GT(enclosed_volume(view.points, view.triangles), 1.05 * rest);
 }
 
-/// The stretch limit, and how far the seam is open at first [m].
+/// Parameters: stretch limit, width of the open seam at first [m].
 class ClothSeams : public testing::TestWithParam<std::pair<Real, Real>> {};
 
 TEST_P(ClothSeams, HoldAWeightClosed) {
@@ -147,7 +147,7 @@ TEST_P(ClothSeams, HoldAWeightClosed) {
   const ClothView view = world.cloth(cloth);
   for (const ClothSeam& s : def.seams)
     EXPECT_LT((view.points[s.a] - view.points[s.b]).norm(), 1.05 * def.thickness);
-  // And it carries: without the seam the weight had fallen by metres.
+  // The seam carries the weight, which would otherwise have fallen by metres.
   EXPECT_GT(world.body(weight).centre.y(), 1.2);
 }
 
@@ -183,7 +183,8 @@ ClothDef lossless(ClothDef def) {
 class ClothSwing : public testing::TestWithParam<std::pair<ClothIntegrator, Real>> {};
 
 TEST_P(ClothSwing, AWeightThatBouncesOnThemGainsNoEnergy) {
-  // It swings about where it will hang, as far down as up: explicit integrators keep that, others damp it.
+  // The cloth swings about its position of rest, equally far down and up. Explicit integrators keep this
+  // amplitude; others damp it.
   const auto [integrator, rate] = GetParam();
   ClothDef def = lossless(effects::grid_cloth({0.5, 0.8, 10, 16}, {}, cotton()));
   for (Vec3& v : def.vertices) v = Vec3(v.x(), 1.6 - v.z(), 0);  // hangs
@@ -277,7 +278,7 @@ TEST(ClothHanging, AStripHangsInACatenary) {
   }
 }
 
-TEST(ClothPins, AClothCarriedByABodyHandsBlowsOnToIt) {
+TEST(ClothPins, AClothOnABodyTransmitsImpactsToIt) {
   // A frame in free space carries a taut cloth; a ball flies into it. Nothing else can take up momentum.
   World world({.gravity = Vec3::Zero()});
   const BodyHandle frame = world.add_body({.shape = Box{{1, 0.02, 1}}, .mass = 2, .collides = false});

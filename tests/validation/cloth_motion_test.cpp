@@ -16,7 +16,7 @@ namespace {
 
 constexpr uint32_t kMovingCells = 24;
 
-/// A square metre of cloth in a vacuum, horizontal at first and pinned along one edge.
+/// Returns a square metre of cloth in a vacuum, horizontal at first and pinned along one edge.
 ClothDef hanging_cloth(const std::string& fabric) {
   ClothDef def =
       effects::grid_cloth({1, 1, kMovingCells, kMovingCells}, {}, effects::find_fabric(fabric)->fabric);
@@ -25,7 +25,8 @@ ClothDef hanging_cloth(const std::string& fabric) {
   return def;
 }
 
-/// The same, pinned at two corners alone, between which it swings and folds on itself.
+/// Returns a square metre of cloth that is pinned only at two corners, between which it swings and folds onto
+/// itself.
 ClothDef folding_cloth(const std::string& fabric) {
   ClothDef def = hanging_cloth(fabric);
   def.pins = {def.pins.front(), def.pins.back()};
@@ -34,8 +35,8 @@ ClothDef folding_cloth(const std::string& fabric) {
 
 struct SwingRecord {
   Real fall = 0;     // energy of the fall of all points to where they hang straight down [J]
-  Real rise = 0;     // greatest, of the energy over its least value before [J]
-  Real kinetic = 0;  // greatest in the last second [J]
+  Real rise = 0;     // greatest increase of the energy over its smallest earlier value [J]
+  Real kinetic = 0;  // greatest kinetic energy in the last second [J]
   uint64_t limited = 0, touches = 0, crossings = 0;
 };
 
@@ -60,7 +61,7 @@ SwingRecord swing_of(const ClothDef& def, Real step) {
   return motion;
 }
 
-/// Fabric and step of the world [s].
+/// Parameters: fabric, step of the world [s].
 class MovingCloth : public testing::TestWithParam<std::tuple<std::string, Real>> {};
 
 TEST_P(MovingCloth, SwingsOnAtItsStretchLimitAndGainsNothing) {
@@ -87,7 +88,7 @@ INSTANTIATE_TEST_SUITE_P(Fabrics, MovingCloth,
                          testing::Combine(testing::Values("silk", "cotton"),
                                           testing::Values(1.0 / 60, 1.0 / 240)));
 
-/// Self-collision.
+/// Parameter: whether the cloth has self-collision.
 class TurningBall : public testing::TestWithParam<bool> {};
 
 TEST_P(TurningBall, TakesItsClothAlong) {

@@ -45,7 +45,7 @@ class HeavyLoop {
  private:
   static constexpr int kSteps = 20, kPoints = 400;
 
-  /// Angle and place of the middle less those that it should have.
+  /// Returns the differences between the actual and the required angle and position of the middle.
   Eigen::Vector2d residual(const Eigen::Vector2d& unknown) {
     using State = Eigen::Vector4d;  // theta, theta', x, y
     const auto slope = [&](Real s, const State& y) {
@@ -73,7 +73,7 @@ TEST(HeavyLoop, AgreesWithPeircesWeightlessLoops) {
   EXPECT_NEAR(HeavyLoop(std::numbers::pi / 2, 0.5, 1, 0).height(), 0.1337, 1e-3);
 }
 
-/// Angle at the clamp: 0 for a ring loop, pi/2 for a heart loop.
+/// Parameter: angle at the clamp, 0 for a ring loop, pi/2 for a heart loop.
 class ClothLoop : public testing::TestWithParam<Real> {};
 
 TEST_P(ClothLoop, HangsAsAHeavyElasticStrip) {
@@ -124,7 +124,7 @@ TEST_P(ClothLoop, HangsAsAHeavyElasticStrip) {
 
 INSTANTIATE_TEST_SUITE_P(Loops, ClothLoop, testing::Values(0, std::numbers::pi / 2));
 
-/// A free strip along x that is bent to a part of a cylinder of the radius 1 / `curvature`.
+/// Returns a free strip along x that is bent to a part of a cylinder with the radius 1 / `curvature`.
 ClothDef bent_strip(const effects::Fabric& fabric, uint32_t cells, Real length, Real curvature) {
   ClothDef def = effects::grid_cloth({length, 0.2 * length, cells, cells / 5}, {}, fabric);
   for (Vec3& p : def.vertices) {

@@ -164,7 +164,7 @@ TEST(ClothValidation, NoCornerOfABoxPokesThroughACoarseCloth) {
                                                  {view.points[t[0]], view.points[t[1]], view.points[t[2]]}));
 }
 
-TEST(ClothValidation, HangsAsFarHoweverFinelyItIsDivided) {
+TEST(ClothValidation, HangsEquallyFarForAnyNumberOfCells) {
   Real sag[2];
   for (uint32_t k : {0u, 1u}) {
     World world;

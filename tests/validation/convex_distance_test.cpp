@@ -13,7 +13,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Difference between a distance and the separation along its normal: zero if both are right.
+/// Returns the difference between a distance and the separation along its normal: zero if both are right.
 Real normal_error(const ConvexPair& pair, const Separation& s) {
   Real low = 1e300, high = -1e300;
   for (const Vec3& v : pair.a.vertices()) low = std::min(low, s.normal.dot(v));
@@ -22,7 +22,7 @@ Real normal_error(const ConvexPair& pair, const Separation& s) {
   return std::abs(low - high - s.distance);
 }
 
-/// Distance of a point outside a polyhedron; zero inside.
+/// Returns the distance of a point outside a polyhedron; zero inside.
 Real outside(const ConvexPolyhedron& p, const Vec3& point) {
   return std::max(0.0, brute_force_separation(p, ConvexPolyhedron({point}, {}), {}).distance);
 }

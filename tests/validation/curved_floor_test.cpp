@@ -19,8 +19,8 @@ using std::numbers::pi;
 constexpr Real kTroughGravity = 9.81, kTroughRadius = 1, kTroughBall = 0.1, kStartSlope = 0.2,
                kTroughSeconds = 8;
 
-/// Half a cylinder of radius kTroughRadius about the z axis at height kTroughRadius, open at the top, of flat
-/// strips whose edges are on the cylinder.
+/// Returns half a cylinder of radius kTroughRadius about the z axis at height kTroughRadius, open at the top,
+/// of flat strips whose edges are on the cylinder.
 TriangleMesh strip_trough(int strips) {
   TriangleMesh m;
   for (int i = 0; i <= strips; ++i) {
@@ -48,14 +48,14 @@ struct TroughPath {
   }
 };
 
-/// Energy of a ball that slides without friction, in closed form: constant acceleration on each line, and at
-/// each seam the speed falls by the cosine of its angle. It starts at rest in the middle of a line. The
-/// energy is per mass, above that at rest at the bottom of a round trough [J/kg].
+/// Returns the energy of a ball that slides without friction, in closed form: constant acceleration on each
+/// line, and at each seam the speed falls by the cosine of its angle. It starts at rest in the middle of a
+/// line. The energy is per mass, above that at rest at the bottom of a round trough [J/kg].
 Real sliding_energy(const TroughPath& path, Real seconds) {
   const Real half = path.distance * std::tan(path.turn / 2);
   Real slope = path.start, s = 0, v = 0, left = seconds;
   for (int seams = 0; seams < 100000; ++seams) {
-    // The next end of the line: below first, or above if the ball turns back before that.
+    // The next end of the line: the lower end first, or the upper one if the ball turns back before.
     const Real a = -kTroughGravity * std::sin(slope);
     Real time = left;
     Real side = 0;
@@ -94,7 +94,8 @@ class CurvedFloor : public testing::TestWithParam<std::tuple<SolverKind, int>> {
                 .friction = friction});
     return w;
   }
-  /// Energy per mass after kTroughSeconds, as sliding_energy(), and at the start.
+  /// Returns the energy per mass after kTroughSeconds and at the start, relative to the same level as
+  /// sliding_energy().
   static std::pair<Real, Real> energy(int strips, const Shape& shape, const Quat& pose, Real friction) {
     World w = world_with_trough(strips, friction);
     w.add_body({.shape = shape,
@@ -165,8 +166,8 @@ TEST_P(CurvedFloor, LetsACartRollAsARoundTrough) {
   }
 }
 
-// At a step of one frame these seams close at up to 0.5 m/s, so that impacts are looked for; contacts that
-// close more slowly were then left out, and pushed the body out of the overlap later.
+// At a step of one frame these seams close at up to 0.5 m/s, so that times of impact are searched. An earlier
+// version then ignored contacts that close more slowly, and pushed the body out of the overlap later.
 TEST_P(CurvedFloor, NeverGivesEnergyAtCoarseSeams) {
   const Quat lying(Eigen::AngleAxisd(pi / 2, Vec3::UnitX()));
   for (const int strips : {45, 90})

@@ -53,7 +53,8 @@ TEST(Determinism, SameHashForAnyNumberOfThreadsAndEveryRepeat) {
   }
 }
 
-/// A box that slides to rest, one that bounces and tumbles, and one that slides off an inclined box.
+/// Simulates a box that slides to rest, one that bounces and tumbles, and one that slides off an inclined
+/// box. Returns the state hash.
 StateHash sliding() {
   World world({.solver = SolverKind::exact});
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0.4, .friction = 0.3});
@@ -75,7 +76,7 @@ StateHash sliding() {
   return world.state_hash();
 }
 
-/// Balls, a box and a capsule that fly into a row of bodies and bounce.
+/// Simulates balls, a box and a capsule that fly into a row of bodies and bounce. Returns the state hash.
 StateHash bouncing(SolverKind solver) {
   World world({.solver = solver});
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0.7});
@@ -113,7 +114,8 @@ StateHash heap() {
   return world.state_hash();
 }
 
-/// A tilted chain with alternating hinges and ball joints that falls on the ground.
+/// Simulates a tilted chain with alternating hinges and ball joints that falls on the ground. Returns the
+/// state hash.
 StateHash chain(SolverKind solver) {
   World world({.solver = solver});
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0.2});

@@ -1,5 +1,5 @@
-/// Motors that move bodies in contact with others. A motor supplies and takes energy, which is no reason to
-/// distrust a solution.
+/// Motors that move bodies in contact with others. A motor supplies or removes energy, so a change of energy
+/// must not make the solver reject its solution.
 
 #include <gtest/gtest.h>
 

@@ -14,7 +14,7 @@ using namespace sim;
 
 constexpr int kDraws = 100'000;
 
-/// All particles of one release at the time of their creation.
+/// Returns all particles of one release at the time of their creation.
 ParticleArrays release(const EmitterDef& def) {
   World world({.gravity = Vec3::Zero()});
   const auto system = world.add_particle_system({});

@@ -13,8 +13,8 @@
 namespace offstage::sim {
 namespace {
 
-/// One body, integrated with equal steps. The adaptive integrators also take these steps, because their
-/// tolerance is infinite.
+/// Returns a body that was integrated with equal steps. The adaptive integrators also take these steps,
+/// because their tolerance is infinite.
 RigidBody moved(const RigidBody& start, const Vec3& gravity, IntegratorKind kind, int steps, Real time) {
   WorldState world;
   world.def.gravity = gravity;
@@ -71,7 +71,7 @@ TEST(FreeFallOfABody, WithoutDragIsExactForEveryIntegrator) {
   }
 }
 
-/// A body with rotational symmetry about z that rotates about a tilted axis.
+/// Returns a body with rotational symmetry about z that rotates about a tilted axis.
 RigidBody symmetric_top() {
   RigidBody top;
   top.inertia = Vec3(0.5, 0.5, 0.2).asDiagonal();
@@ -80,8 +80,8 @@ RigidBody symmetric_top() {
   return top;
 }
 
-/// The exact orientation of the top: precession about H with the rate |H| / I_across, after a spin about z
-/// with the rate w_z (1 - I_z / I_across).
+/// Returns the exact orientation of the top: precession about H with the rate |H| / I_across, after a spin
+/// about z with the rate w_z (1 - I_z / I_across).
 Quat exact_top(const RigidBody& top, Real t) {
   const Vec3 H = top.angular_momentum;
   const Vec3 w = top.angular_velocity();

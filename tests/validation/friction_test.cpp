@@ -12,7 +12,7 @@ constexpr Real kFrictionGravity = 9.81;
 
 class Incline : public BothSolvers {
  protected:
-  /// Displacement, in the plane's axes, of a box of 0.2 m that starts at rest, after `seconds`.
+  /// Returns the displacement of a box of 0.2 m that starts at rest, after `seconds`, in the plane's axes.
   static Vec3 way(const Shape& shape, Real height, const BodyDef& ground, Real angle, Real seconds,
                   Real* fastest = nullptr) {
     World world(def());
@@ -290,7 +290,7 @@ struct FallingRod {
     // Without friction the centre moves vertically: T = (I + m d^2 sin^2 phi) phi'^2 / 2, V = m g d cos phi.
     return mass * d * s * (kFrictionGravity - d * c * rate * rate) / (inertia + mass * d * d * s * s);
   }
-  /// The angle after `seconds`, from rest at `phi`, by RK4.
+  /// Returns the angle after `seconds`, from rest at `phi`, by RK4.
   Real angle(Real phi, Real seconds) const {
     constexpr int kSteps = 20000;
     const Real h = seconds / kSteps;
@@ -347,13 +347,13 @@ OFFSTAGE_BOTH_SOLVERS(Solvers, Rod);
 class Dome : public BothSolvers {
  protected:
   struct Flight {
-    Real cosine;   ///< cosine of the polar angle where it left, by its horizontal velocity
+    Real cosine;   ///< cosine of the polar angle where the ball left the sphere, from its horizontal velocity
     Real touched;  ///< cosine of the polar angle where a force last acted
     Real energy;   ///< energy lost, in units of m g (R + r)
   };
-  /// A ball of radius 1 m moves down a sphere of radius 9 m. It starts near the top with the speed that it
-  /// would have gained from there, rolling if there is friction. In flight v_x stays constant, and at the
-  /// point of departure v_x^2 = g (R + r) cos^3.
+  /// Simulates a ball of radius 1 m that moves down a sphere of radius 9 m. It starts near the top with the
+  /// speed that it would have gained from there, rolling if there is friction. In flight v_x stays constant,
+  /// and at the point of departure v_x^2 = g (R + r) cos^3.
   static Flight leave(Real max_step, Real friction, Real fraction) {
     constexpr Real kSphere = 9, kBall = 1, kWay = kSphere + kBall, kStart = 0.1;
     World world(def(max_step));

@@ -28,12 +28,13 @@ struct Silo {
 
 struct Discharge {
   Real rate = 0;  ///< [kg/s]
-  /// As weighed: the mass of the grains over the volume that they fill in the silo, with the voids at its
-  /// walls [kg/m^3].
+  /// Mass of the grains divided by the volume that they fill in the silo, including the voids at its walls
+  /// [kg/m^3].
   Real bulk_density = 0;
   Real fill = 0;  ///< height of the grains at rest [m]
 
-  /// Beverloo, Leniger and van de Velde 1961, with C = 0.58 and k = 1.4 for spheres.
+  /// Returns the discharge rate by Beverloo, Leniger and van de Velde (1961) [kg/s], with C = 0.58 and k =
+  /// 1.4 for spheres.
   Real expected(Real orifice) const {
     return 0.58 * bulk_density * std::sqrt(9.81) * std::pow(orifice - 1.4 * kGrain, 2.5);
   }
@@ -136,7 +137,7 @@ struct HopperCase {
 class Hopper : public testing::TestWithParam<HopperCase> {};
 
 // Grains that jam above the hole, and those that the walls carry, make the rate independent of the fill.
-TEST_P(Hopper, DischargesAsBeverlooSaysWhateverItsFill) {
+TEST_P(Hopper, DischargesByBeverloosLawForAnyFill) {
   std::vector<Real> rates;
   for (const int layers : GetParam().layers) {
     const Discharge d = SiloRun({GetParam().orifice, GetParam().width, layers}).run();

@@ -175,7 +175,8 @@ OFFSTAGE_BOTH_SOLVERS(Solvers, ElasticPair);
 
 class Cradle : public BothSolvers {
  protected:
-  /// Five balls in a row; the first `moving` ones approach at 1 m/s. Returns the speeds after the impacts.
+  /// Simulates five balls in a row, of which the first `moving` balls approach at 1 m/s. Returns the speeds
+  /// after the impacts.
   static std::vector<Real> speeds(std::size_t moving, ImpactLaw law) {
     constexpr Real kRadius = 0.05;
     WorldDef def_ = weightless();

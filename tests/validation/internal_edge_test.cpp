@@ -29,8 +29,9 @@ BodyDef fixed_body(const Shape& shape, const Vec3& at, Real friction) {
           .friction = friction};
 }
 
-/// A sheet in columns along x, each divided into cells along z, with two triangles per cell: `rows(i)` cells
-/// in the i-th column, heights from `height(x, z)`. Inner corners are displaced by up to `jitter` of a cell.
+/// Returns a sheet in columns along x, each divided into cells along z, with two triangles per cell:
+/// `rows(i)` cells in the i-th column, heights from `height(x, z)`. Inner corners are displaced by up to
+/// `jitter` of a cell.
 TriangleMesh triangle_sheet(Real from, Real to, int columns, const std::function<int(int)>& rows,
                             const std::function<Real(Real, Real)>& height, Real jitter = 0) {
   TriangleMesh m;
@@ -204,7 +205,8 @@ TEST_P(InternalEdges, DoNotStopRollingBodies) {
   }
 }
 
-/// A board with two round skids across, or on four balls: parts that meet a seam with a corner of a polygon.
+/// Returns a board with two round skids across, or on four balls: parts that meet a seam with a corner of a
+/// polygon.
 MeshHandle add_sledge(World& world, bool has_balls) {
   const auto part = [](const Shape& shape, const Vec3& at, const Quat& turn = Quat::Identity()) {
     return placed(solid_mesh(shape), {at, turn});
@@ -259,8 +261,8 @@ TEST_P(InternalEdges, DoNotStopBodiesInAnyDirection) {
     for (const Case& c : cases)
       for (const Real speed : {1.0, 4.0, 10.0})
         for (const bool rolls : {true, false}) {
-          // A face gets the nearest point of a body that is beside it, so that by the fast solver the flat
-          // end of a fast cylinder may hit a tile that it passes.
+          // A face gets the nearest point of a body that is beside it. With the fast solver, the flat end of
+          // a fast cylinder may therefore hit a tile that it passes.
           ++number;
           if (!is_exact() && !rolls && speed > 5 && std::holds_alternative<Cylinder>(c.shape)) continue;
           const Real heading = 2 * std::numbers::pi * random.uniform(number, 0);
@@ -437,7 +439,7 @@ OFFSTAGE_ALL_SOLVERS(Solvers, InternalEdges);
 
 class RoundMeshes : public BothSolvers {};
 
-/// A cone about Y with its base at y = 0, made of triangles.
+/// Returns a cone about Y with its base at y = 0, made of triangles.
 TriangleMesh cone_mesh(Real radius, Real height, uint32_t around, uint32_t rings) {
   TriangleMesh m;
   m.vertices.emplace_back(0, height, 0);

@@ -50,8 +50,8 @@ TEST_P(JointLimits, KeepAngularMomentum) {
     EXPECT_NEAR(w.joint(joint).coordinate, 0.25, 5e-3) << "the sledge is at the end of its rail";
     const Momenta after(w);
     EXPECT_LT((after.linear - before.linear).norm(), 1e-12 * before.linear.norm());
-    // An error of the second order in the angle of a step, 6e-4 and 1e-2; one of the first order was 1e-2 and
-    // 6e-2.
+    // The error is of second order in the angle of a step: 6e-4 and 1e-2. An error of first order would be
+    // 1e-2 and 6e-2.
     const Real turn = 6.1 * step;
     EXPECT_LT((after.angular - before.angular).norm(), turn * turn * before.angular.norm()) << step;
   }

@@ -53,7 +53,7 @@ TEST(LcpSolver, StopsEarlierByTheSquareRootOfTwoAcrossThePyramid) {
   }
 }
 
-// Stacks and hinged links with limits and motors are solved by pivoting alone.
+// Stacks and hinged links with limits and motors are solved only by pivoting.
 TEST(LcpSolver, SolvesStacksAndJointsWithoutFallbacks) {
   World world = lcp_world();
   add_lcp_floor(world);

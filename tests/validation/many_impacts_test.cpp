@@ -63,8 +63,8 @@ TEST(ManyImpacts, BallsOfAColumnThatReboundIntoEachOtherDoNotOverlap) {
           }
 }
 
-// The same beyond the number of impacts that are traced back to in a sub-step: the others are plastic, and
-// the balls that are pushed meet balls that were far from them at the start.
+// This column has more impacts than are traced back in a sub-step. The other impacts are plastic, and pushed
+// balls hit balls that were far away at the start of the sub-step.
 TEST(ManyImpacts, BallsOfALongColumnDoNotPassThroughEachOther) {
   BallColumn column(SolverKind::fast, 1.0 / 60, 60, 0.5, 0.02, 5);
   Real deepest = 0;

@@ -91,7 +91,7 @@ TEST(LennardJones, PairOscillatesBetweenItsTurningPoints) {
   EXPECT_NEAR(greatest / far, 1, 1e-4);
 }
 
-/// A lattice of molecules with thermal velocities, in two particle systems.
+/// Returns a lattice of molecules with thermal velocities, in two particle systems.
 World gas(std::array<ParticleSystemHandle, 2>& systems) {
   World world({.gravity = Vec3::Zero()});
   std::mt19937 random(1);

@@ -41,7 +41,7 @@ Real rebound(World& world, bool internal) {
   return world.particles(system).velocity[0].y();
 }
 
-/// Velocity after an elastic impact on a body of this effective mass.
+/// Returns the velocity after an elastic impact on a body of this effective mass.
 Real rebound_from(Real mass) {
   return kHitSpeed * (mass - 0.5) / (mass + 0.5);
 }
@@ -138,7 +138,8 @@ TEST(ParticlesAndBodies, ManyHitsOnALightBodyInOneStepKeepMomentumAndEnergy) {
     }
 }
 
-/// An elastic gas in a shaft, below a lid with weight; returns its greatest relative change of energy.
+/// Simulates an elastic gas in a shaft, below a lid with weight. Returns the greatest relative change of
+/// energy.
 Real gas_drift(bool joined, bool internal, Real max_step, Real seconds) {
   World world({.max_step = max_step, .sleep = false});
   const auto wall = [&](const Vec3& at, const Vec3& normal) {

@@ -11,7 +11,8 @@
 namespace offstage::sim {
 namespace {
 
-/// Complete elliptic integral of the first kind by the arithmetic-geometric mean; m = k^2.
+/// Returns the complete elliptic integral of the first kind with the parameter m = k^2, by the
+/// arithmetic-geometric mean.
 Real elliptic_k(Real m) {
   Real a = 1, b = std::sqrt(1 - m);
   for (int i = 0; i < 40 && a != b; ++i) {

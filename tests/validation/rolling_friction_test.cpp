@@ -160,7 +160,8 @@ TEST_P(TurningFriction, BallAndPlankReachOneSpeed) {
   EXPECT_NEAR(w.body(plank).velocity.x(), 10.0 / 30, 1e-4);
 }
 
-/// With the fast solver, joints pass on too little of it: a known limit (docs/physics.md, R14).
+/// With the fast solver, joints transmit too little of the rolling friction: a known limit (docs/physics.md,
+/// R14).
 TEST_P(TurningFriction, ACartIsSlowedByItsWheels) {
   constexpr Real kRho = 0.01;
   World w = world();

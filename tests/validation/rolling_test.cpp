@@ -58,7 +58,8 @@ TEST_P(MovingContact, RollingBodiesKeepTheirSpeed) {
     }
 }
 
-/// A cart: two axles with wheels on a chassis that touches nothing else. The rear axle may have a motor.
+/// Returns a cart: two axles with wheels on a chassis that touches nothing else. The rear axle may have a
+/// motor.
 BodyHandle add_cart(World& w, Real speed, Real torque) {
   constexpr Real kRadius = 0.3;
   const BodyHandle chassis = w.add_body({.shape = Box{{2, 0.2, 1}},
@@ -109,21 +110,22 @@ struct Coin {
   Real mass = 0.44;
 
   Vec3 axis() const { return {std::sin(tilt), std::cos(tilt), 0}; }
-  /// Vector from the centre to the contact.
+  /// Returns the vector from the centre to the contact.
   Vec3 arm() const {
     const Vec3 down = -(Vec3::UnitY() - std::cos(tilt) * axis()).normalized();
     return radius * down - height / 2 * axis();
   }
-  /// The contact point and the centre are at rest, so the coin rotates about the line through both. This
-  /// rotation is the sum of the precession about the vertical and a spin about the coin's axis.
+  /// Returns the angular velocity for a precession of 1 rad/s. The contact point and the centre are at rest,
+  /// so the coin rotates about the line through both. This rotation is the sum of the precession about the
+  /// vertical and a spin about the coin's axis.
   Vec3 angular_velocity_per_precession() const {
     const Vec3 line = arm().normalized();
     Eigen::Matrix2d parts;
     parts << line.x(), -axis().x(), line.y(), -axis().y();
     return Vec3((parts.inverse() * Eigen::Vector2d(0, 1)).x() * line);
   }
-  /// The rate of precession at which the torque of the normal force rotates the angular momentum about the
-  /// vertical.
+  /// Returns the rate of precession at which the torque of the normal force rotates the angular momentum
+  /// about the vertical.
   Real precession() const {
     const Real across = mass * (3 * radius * radius + height * height) / 12,
                along = mass * radius * radius / 2;
@@ -141,7 +143,7 @@ struct Coin {
   }
 };
 
-/// The relative energy gain of a coin within two seconds.
+/// Returns the relative energy gain of a coin within two seconds.
 Real gain(const Coin& coin, const WorldDef& def, Real friction) {
   World w(def);
   w.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = friction});
@@ -313,7 +315,8 @@ INSTANTIATE_TEST_SUITE_P(Solvers, MovingContact,
                                           testing::Values(60, 240)),
                          name_of);
 
-/// A heap of boxes, balls and cylinders that fall and slide; bodies are added in a permuted order.
+/// Simulates a heap of boxes, balls and cylinders that fall and slide, and returns their poses. The bodies
+/// are added in a permuted order.
 std::vector<Pose> heap_after(SolverKind solver, std::size_t first, std::size_t stride) {
   constexpr std::size_t kCount = 19;
   World w(WorldDef{.solver = solver});

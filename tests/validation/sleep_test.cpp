@@ -18,7 +18,7 @@ class Sleep : public BothSolvers {
     BodyHandle support;
     std::vector<BodyHandle> stack;
   };
-  /// A sleeping stack of three boxes on a block.
+  /// Returns a sleeping stack of three boxes on a block.
   static Scene sleeping_stack() {
     WorldDef sleepy = def();
     sleepy.sleep = true;

@@ -16,7 +16,7 @@ BodyHandle add_ground(World& world, Real friction = 0.5) {
       {.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = friction});
 }
 
-/// A stack of boxes of 0.2 m; the k-th has `mass(k)`.
+/// Returns a stack of boxes of 0.2 m; the k-th has `mass(k)`.
 template <class Mass>
 std::vector<BodyHandle> add_stack(World& world, int count, Mass&& mass) {
   std::vector<BodyHandle> boxes;
@@ -186,8 +186,8 @@ OFFSTAGE_BOTH_SOLVERS(Solvers, Rocking);
 
 class Cards : public BothSolvers {
  protected:
-  /// Two cards lean against a post between them. Post and cards are frictionless, so only the friction of the
-  /// floor holds a card: m g (L/2 sin a - t/2 cos a) = mu m g L cos a about its lower edge.
+  /// Simulates two cards that lean against a post between them. Post and cards are frictionless, so only the
+  /// friction of the floor holds a card: m g (L/2 sin a - t/2 cos a) = mu m g L cos a about its lower edge.
   static Real height_after(Real fraction_of_bound, Real seconds) {
     constexpr Real kLength = 0.4, kThick = 0.01, kTilt = 20 * std::numbers::pi / 180, kPost = 0.02;
     const Real bound =
@@ -233,9 +233,9 @@ struct Arch {
   static constexpr int kWedges = 9;
   static constexpr Real kInner = 1, kOuter = 1.5, kSpan = 75 * std::numbers::pi / 180;
 
-  /// The joint at theta carries a thrust with horizontal component H and the weight V ~ theta of the wedges
-  /// between it and the crown. It does not slip if the thrust is within phi of the joint's normal: V /
-  /// tan(theta + phi) <= H <= V / tan(theta - phi).
+  /// Returns whether an arch can stand. The joint at the angle theta carries a thrust with horizontal
+  /// component H and the weight V ~ theta of the wedges between it and the crown. It does not slip if the
+  /// thrust is within phi of the joint's normal: V / tan(theta + phi) <= H <= V / tan(theta - phi).
   static bool can_stand(Real mu) {
     const Real phi = std::atan(mu);
     Real low = 0, high = 1e9;
@@ -268,7 +268,7 @@ struct Arch {
 
 class Masonry : public BothSolvers {
  protected:
-  /// The largest displacement of a wedge at the end.
+  /// Returns the largest displacement of a wedge at the end.
   static Real displacement(Real mu, Real seconds) {
     World world(def());
     std::vector<BodyHandle> stones;
@@ -310,7 +310,7 @@ class Pile : public BothSolvers {
     }
   }
 
-  /// A box of random size and orientation.
+  /// Returns a box of random size and orientation.
   static BodyDef box(const Scatter& random, uint64_t i, const Vec3& at) {
     const auto u = [&](uint64_t k) { return 2 * random.uniform(i, k) - 1; };
     const Quat turn = Quat(u(0), u(1), u(2), u(3)).normalized();

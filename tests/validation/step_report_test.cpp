@@ -8,7 +8,7 @@
 namespace offstage::sim {
 namespace {
 
-/// The sum of the reports over a time.
+/// Returns the sum of the reports of all steps in a period.
 StepFigures figures_of(World& world, Real seconds) {
   StepFigures all;
   const Real end = world.time() + seconds - 1.0 / 480;

@@ -22,8 +22,8 @@ struct SpringRun {
   Real length = 0;                             // length of the spring at the end
 };
 
-/// Ten seconds of a ball on a spring of rest length 1 m with k/m = 1e6, at h = 1/30: h^2 k/m = 1111, where
-/// the limits of explicit methods are 4 to 8.
+/// Simulates ten seconds of a ball on a spring of rest length 1 m with k/m = 1e6 /s^2 at h = 1/30 s. So h^2
+/// k/m = 1111, while explicit methods are stable only up to 4 or 8.
 SpringRun swing(const Vec3& position, const Vec3& attachment) {
   World world(implicit(Vec3::Zero()));
   const auto ball = world.add_body({.shape = Sphere{0.1},

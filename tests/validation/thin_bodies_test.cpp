@@ -19,7 +19,7 @@ BodyDef smooth_ground() {
           .friction = 0};
 }
 
-/// The deepest overlap at the end of a frame [m].
+/// Returns the deepest overlap at the end of a frame [m].
 Real deepest_in_a_second(World& w) {
   Real deepest = 0;
   for (int k = 0; k < 60; ++k) {
@@ -33,8 +33,8 @@ class ThinBodies : public BothSolvers {};
 
 // The moment of inertia of these needles about their axis is a thousandth of that across it. All forces pass
 // through the axis, so a needle never spins about it, but an error of its arm would spin it up. The fast
-// solver solves what closes in a step by a prediction, which is less accurate for a needle that turns far in
-// it.
+// solver predicts contacts that close in a step. The prediction is less accurate for a needle that turns far
+// in a step.
 TEST_P(ThinBodies, NeedlesThatHitTheGroundGainNoEnergy) {
   Dice dice(5);
   for (int i = 0; i < 40; ++i)

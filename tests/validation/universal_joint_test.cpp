@@ -24,7 +24,7 @@ struct PairState {
   }
 };
 
-/// A heavy capsule and a ball with little inertia, each half a metre from the joint between them.
+/// Returns a heavy capsule and a ball with little inertia, each half a metre from the joint between them.
 World heavy_and_light(Real max_step) {
   World world({.gravity = Vec3::Zero(), .max_step = max_step, .sleep = false});
   BodyDef heavy;

@@ -18,7 +18,7 @@ struct Where {
 /// Greatest number of problems that are listed; the rest are only counted.
 inline constexpr std::size_t kMostProblems = 50;
 
-/// One problem: "file:line:col: /path: the error; the allowed values".
+/// One problem. describe() returns "FILE:LINE:COLUMN: /PATH: the error; the allowed values".
 struct Problem {
   Where where;
   std::string what;

@@ -144,12 +144,13 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
   }
 
  private:
-  /// "; expected ',' or '}'", if nlohmann's message says so.
+  /// Returns a text such as "; expected ',' or '}'" if nlohmann's message contains it; otherwise an empty
+  /// text.
   static std::string expected(const std::string& what) {
     const std::size_t at = what.rfind("; expected ");
     return at == std::string::npos ? "" : what.substr(at);
   }
-  /// The reason in nlohmann's message, without exception number, position and last token.
+  /// Returns the reason in nlohmann's message, without exception number, position and last token.
   static std::string reason(const std::string& what) {
     const std::size_t dash = what.find(" - "), bracket = what.find("] ");
     const std::size_t begin = dash != std::string::npos      ? dash + 3
@@ -218,7 +219,7 @@ void append_number(double v, std::string& out) {
     return;
   }
   char buffer[32];
-  // With an exponent, so that it is not read back as an integer that is too long.
+  // The number gets an exponent. Otherwise it would be read back as an integer that does not fit in 64 bits.
   const bool large = std::abs(v) >= kManyDigits;
   const auto format = large ? std::chars_format::scientific : std::chars_format::general;
   out.append(buffer, std::to_chars(buffer, buffer + sizeof buffer, v, format).ptr);

@@ -27,7 +27,7 @@ class JsonObject {
   bool flag(const std::string& key, bool otherwise) const;
   /// Returns an integer from 0 to `most`; `otherwise` if the key is missing.
   int count(const std::string& key, int otherwise, int most) const;
-  /// The objects of a list; none if the key is missing.
+  /// Returns the objects of a list; none if the key is missing.
   std::vector<JsonObject> objects(const std::string& key) const;
   /// Returns a value of any type; null if the key is missing.
   nlohmann::json value(const std::string& key) const;

@@ -25,7 +25,7 @@ void show_status(std::string_view line);
 /// Keeps the status line visible and continues below it.
 void end_status_line();
 
-/// Columns of the terminal at standard error; 80 if unknown.
+/// Returns the number of columns of the terminal at standard error; 80 if it is unknown.
 int terminal_width();
 
 template <class... Args>

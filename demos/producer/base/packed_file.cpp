@@ -42,7 +42,7 @@ std::vector<uint8_t> pack(const FileKind& kind, std::span<const uint8_t> payload
 std::vector<uint8_t> unpack(const FileKind& kind, std::span<const uint8_t> bytes, const std::string& source) {
   const auto refuse = [&](const std::string& why) { throw render::FileError(source + ": " + why); };
   Header header;
-  if (bytes.size() < sizeof header) refuse(fmt::format("not a {} (too short)", kind.name));
+  if (bytes.size() < sizeof header) refuse(fmt::format("not a {}: the file is too short", kind.name));
   std::memcpy(&header, bytes.data(), sizeof header);
   Header expected{};
   std::copy_n(kind.magic.begin(), std::min(kind.magic.size(), sizeof expected.magic), expected.magic);
@@ -51,16 +51,16 @@ std::vector<uint8_t> unpack(const FileKind& kind, std::span<const uint8_t> bytes
   if (header.version != kind.version)
     refuse(fmt::format("{} has format {}, but this program reads format {}; create it again", kind.name,
                        header.version, kind.version));
-  const std::string damaged = fmt::format("damaged {} ", kind.name);
-  if (header.payload_size > kMaxPayload) refuse(damaged + "(size)");
+  const std::string damaged = fmt::format("damaged {}: ", kind.name);
+  if (header.payload_size > kMaxPayload) refuse(damaged + "its size is wrong; create it again");
   const auto packed = bytes.subspan(sizeof header);
   // The size in the header is not trusted unless the zstd frame has the same size.
   if (ZSTD_getFrameContentSize(packed.data(), packed.size()) != header.payload_size)
-    refuse(damaged + "(size)");
+    refuse(damaged + "its size is wrong; create it again");
   std::vector<uint8_t> payload(header.payload_size);
   const std::size_t n = ZSTD_decompress(payload.data(), payload.size(), packed.data(), packed.size());
   if (ZSTD_isError(n) || n != payload.size() || XXH3_64bits(payload.data(), n) != header.checksum)
-    refuse(damaged + "(checksum)");
+    refuse(damaged + "its checksum is wrong; create it again");
   return payload;
 }
 

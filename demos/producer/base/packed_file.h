@@ -62,7 +62,8 @@ class ByteReader {
 
   template <class T>
   requires std::is_arithmetic_v<T> T take() {
-    if (bytes_.size() < sizeof(T)) throw render::FileError(source_ + ": damaged (too short)");
+    if (bytes_.size() < sizeof(T))
+      throw render::FileError(source_ + ": damaged: the file ends too early; create it again");
     T value;
     std::memcpy(&value, bytes_.data(), sizeof value);
     bytes_ = bytes_.subspan(sizeof value);
@@ -80,12 +81,13 @@ class ByteReader {
   std::size_t take_count(std::size_t record_size) {
     const auto n = take<uint64_t>();
     if (n > bytes_.size() / record_size)
-      throw render::FileError(source_ + ": damaged (a list is longer than the file)");
+      throw render::FileError(source_ + ": damaged: a list is longer than the file; create it again");
     return n;
   }
   /// Throws render::FileError unless all data were read.
   void expect_end() const {
-    if (!bytes_.empty()) throw render::FileError(source_ + ": damaged (bytes follow its end)");
+    if (!bytes_.empty())
+      throw render::FileError(source_ + ": damaged: bytes follow its end; create it again");
   }
 
  private:

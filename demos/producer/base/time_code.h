@@ -5,7 +5,7 @@
 
 namespace offstage::producer {
 
-/// "0:02.50" for 2.5 s: minutes, seconds and hundredths.
+/// Returns a time as minutes, seconds and hundredths, such as "0:02.50" for 2.5 s.
 std::string time_code(double seconds);
 
 }  // namespace offstage::producer

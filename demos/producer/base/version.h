@@ -5,12 +5,13 @@
 
 namespace offstage::producer {
 
-/// "0.1.0"
+/// Returns the version, such as "0.1.0".
 std::string_view version();
-/// "0.1.0 (commit 9e8ad74bd0c1)", with "-modified" after the commit if the source had changes; without the
-/// commit if the source is not under Git.
+/// Returns the version with the Git commit, such as "0.1.0 (commit 9e8ad74bd0c1)". "-modified" follows the
+/// commit if the source had changes. Without Git, the commit is missing.
 std::string_view version_text();
-/// Folder of the sources at build time, for a program that was not installed.
+/// Returns the folder that contained the sources at build time. A program that was not installed finds its
+/// files there.
 std::string_view source_folder();
 
 }  // namespace offstage::producer

@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Affine3d;
 
-/// Rotation and translation of a node's transform.
+/// Returns the transform of a node without its scaling.
 Affine3d rigid(const Eigen::Affine3f& world) {
   const Affine3d m = world.cast<double>();
   Eigen::Matrix3d rotation = m.rotation();
@@ -26,7 +26,7 @@ void append(const render::Mesh& mesh, const Affine3d& piece_from_mesh, sim::Tria
     out.triangles.push_back({base + mesh.indices[i], base + mesh.indices[i + 1], base + mesh.indices[i + 2]});
 }
 
-/// The joint that moves a vertex most, as a node; -1 if none does.
+/// Returns the node of the joint with the largest weight for a vertex; -1 if the vertex has no joint.
 int leading_joint(const render::RigSurface& surface, const render::RigSkin& skin, std::size_t vertex) {
   float most = 0;
   int node = -1;
@@ -38,7 +38,7 @@ int leading_joint(const render::RigSurface& surface, const render::RigSkin& skin
   return node;
 }
 
-/// Whether a set of points fills a volume.
+/// Returns whether the convex hull of some points has a volume: they must not lie in a plane.
 bool is_solid(const std::vector<Vec3>& points) {
   sim::Aabb box;
   for (const Vec3& p : points) box.extend(p);

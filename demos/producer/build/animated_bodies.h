@@ -1,5 +1,5 @@
 #pragma once
-/// Bodies whose model file plays an animation: the pieces that collide, and their motion.
+/// The pieces of an animated model file that collide, and their motion.
 
 #include <vector>
 
@@ -14,9 +14,9 @@ namespace offstage::producer {
 /// Returns the time within the clip [s]. `duration`: length of the clip [s]; `time`: time of the film [s].
 double clip_time(const ModelAnimation& animation, double duration, double time);
 
-/// The pieces of a model that collide, with their shapes at the start of a clip. Scaling of nodes during the
-/// clip, and morph targets, do not change these shapes. Bones with fewer than four vertices, or with a flat
-/// skin, have no piece.
+/// Returns the pieces of a model that collide, with their shapes at the start of a clip. Scaling of nodes
+/// during the clip, and morph targets, do not change these shapes. Bones with fewer than four vertices, or
+/// with a flat skin, have no piece.
 std::vector<AnimatedPiece> collision_pieces(const render::ModelRig& rig, int clip,
                                             const DecompositionCache& cache);
 

@@ -78,7 +78,7 @@ Vec3 second_axis_of(const JointBehaviour& joint) {
   return joint.second_axis.value_or(joint.type == sim::JointType::gear ? joint.axis : Vec3(Vec3::UnitX()));
 }
 
-/// One joint for each copy of its first body.
+/// Adds one joint for each copy of the joint's first body.
 void add_copies(const Joint& joint, const Scene& scene, Scene& flat) {
   const Body *a = named(scene.bodies, joint.a), *b = named(scene.bodies, joint.b);
   if (!has_copies(a) || copy_count(a->placement) > kMaxCopies) {

@@ -12,9 +12,9 @@ namespace offstage::producer {
 void expand_joints(const Scene& scene, Scene& flat, std::vector<Problem>& errors,
                    std::vector<Problem>& warnings);
 
-/// Whether joints of this type have a length, which `length_limits` can limit.
+/// Returns whether joints of this type have a length, which `length_limits` can limit.
 bool has_rope(sim::JointType type);
-/// The length of a joint for which has_rope() is true, at time 0 [m].
+/// Returns the length of a joint for which has_rope() is true, at time 0 [m].
 Real rope_length(const Joint& joint);
 
 /// Converts a joint. The caller sets the bodies.

@@ -14,7 +14,8 @@ std::optional<std::string> holder(const std::string& end) {
   return end == "world" ? std::string() : end;
 }
 
-/// Corners of a polygon of `n` sides of length `side` that hangs between two points at any heights.
+/// Returns the corners of a polygonal chain of `n` sides of the length `side` that hangs between two points
+/// at any heights.
 std::vector<Vec3> hanging_nodes(const Vec3& from, const Vec3& to, int n, Real side) {
   const Vec3 across = to - from;
   const Real span = across.norm();
@@ -23,7 +24,7 @@ std::vector<Vec3> hanging_nodes(const Vec3& from, const Vec3& to, int n, Real si
     for (int i = 0; i <= n; ++i) nodes.push_back(from + across * i / n);
     return nodes;
   }
-  // On a circle: span = 2 R sin(n asin(side / 2R)); half the angle of a side by bisection.
+  // The corners lie on a circle: span = 2 R sin(n asin(side / 2R)). Bisection finds half the angle of a side.
   Real low = 0, high = std::numbers::pi / n;
   for (int k = 0; k < 80; ++k) {
     const Real half = (low + high) / 2;
@@ -42,8 +43,8 @@ std::vector<Vec3> hanging_nodes(const Vec3& from, const Vec3& to, int n, Real si
 
 }  // namespace
 
-/// Points in equal steps along a polyline. A polyline without length, which the checks of the scene refuse
-/// later, gives the same point for each step.
+/// Returns points in equal steps along a polyline. A polyline without length, which the checks of the scene
+/// refuse later, gives the same point for each step.
 std::vector<Vec3> along_path(const std::vector<Vec3>& path, int steps) {
   Real total = 0;
   for (std::size_t i = 1; i < path.size(); ++i) total += (path[i] - path[i - 1]).norm();
@@ -89,7 +90,8 @@ Parts build(const Chain& chain) {
     Joint& j = make.joint("joint_" + std::to_string(i), a, b, nodes[k]);
     j.behaviour.axis = i < chain.links ? nodes[k + 1] - nodes[k] : nodes[k] - nodes[k - 1];
     if (chain.swing_deg < 180) j.behaviour.swing_deg = chain.swing_deg;
-    // A joint represents the half links beside it; a joint at an end bends at most as far as its half link.
+    // The stiffness of a joint stands for the bending of the half links on both sides of it. A joint at an
+    // end has only one half link.
     const Real length = ((i > 0 ? side(k - 1) : 0) + (i < chain.links ? side(k) : 0)) / 2;
     if (chain.bend_stiffness > 0) j.behaviour.stiffness = chain.bend_stiffness / length;
     j.behaviour.friction = chain.friction;
@@ -132,7 +134,7 @@ Parts build(const Bridge& bridge) {
   return std::move(make.parts);
 }
 
-/// Lengths are fractions of the height; x points to the figure's left, z to its front.
+/// Builds a ragdoll. Lengths are fractions of the height; x points to the figure's left, z to its front.
 Parts build(const Ragdoll& doll) {
   ArticulationBuilder make(doll.where, doll.name);
   const Real H = doll.height;
@@ -147,15 +149,15 @@ Parts build(const Ragdoll& doll) {
     b.density = doll.density;
   };
   const auto box = [&](Real x, Real y, Real z) { return sim::Box{H * Vec3(x, y, z)}; };
-  /// A limb between two heights with round ends.
+  /// Returns a limb with round ends between two heights.
   const auto limb = [&](Real top, Real bottom, Real radius) {
     return sim::Capsule{H * radius, H * (top - bottom - 2 * radius)};
   };
   // The volume of all parts is kVolume H^3. The dry friction of a limp joint can bear the fraction kLimp of
   // the torque that would hold the whole figure horizontally at its feet.
   constexpr Real kVolume = 0.0098, kLimp = 0.004, kGravity = 9.81;
-  // The knees lie in front of the legs' axes, so that the weight bends them: with all joints in one line, the
-  // figure would stand by their friction.
+  // The knees are in front of the axes of the legs, so that the weight of the figure bends them. With all
+  // joints in one line, the friction in the joints would keep the figure standing.
   constexpr Real kKnee = 0.025;
   const Real torque = doll.stiffness * kLimp * kVolume * doll.density * H * H * H * kGravity * H;
   const auto join = [&](const std::string& a, const std::string& b, const Vec3& anchor, const Vec3& axis,

@@ -1,6 +1,6 @@
 #pragma once
-/// Shapes of bodies that are made of several solids, for the simulation; keys and sizes of all shapes. See
-/// scene.h.
+/// The solids of which some shapes of bodies consist, and the sizes, masses and mesh keys of all shapes.
+/// scene.h defines the shapes.
 
 #include <optional>
 #include <vector>
@@ -40,8 +40,8 @@ Vec3 half_extent(const Compound& s);
 /// Returns the solids of which a torus, tube, open box or compound consists; none for other shapes.
 std::vector<sim::SolidMesh> solids_of(const Shape& shape);
 
-/// Whether the collision shape of a body is a mesh: a mesh file, or a shape for which solids_of() is not
-/// empty.
+/// Returns whether the collision shape of a body is a mesh: a mesh file, or a shape for which solids_of() is
+/// not empty.
 bool is_mesh(const Body& body);
 
 /// Returns numbers that identify the result of solids_of(). Shapes with equal numbers have equal solids.

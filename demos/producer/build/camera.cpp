@@ -22,7 +22,7 @@ Real vertical_fov_deg(const Lens& lens, const Eigen::Vector2i& size) {
   return 2 * std::atan(kHalfWidth_mm / *lens.focal_mm * size.y() / size.x()) / kRadians;
 }
 
-/// Half the size of the box around a shape.
+/// Returns half the size of the box around a shape.
 template <class S>
 Vec3 half_extent(const S& s, const ModelLibrary&) {
   return producer::half_extent(s);
@@ -38,7 +38,7 @@ Eigen::AlignedBox3f box_of(const Body& body, const ModelLibrary& models) {
   return {(body.position - reach).cast<float>(), (body.position + reach).cast<float>()};
 }
 
-/// The value of keys that may be left to the lens.
+/// Interpolates a vector of the camera's keys at a time. `value` returns this vector for a key.
 template <class Value>
 Vec3 follow_keys(const KeyframedCamera& camera, double time, Value&& value) {
   sim::KeyframeTrack track{.keys = {}, .interpolation = camera.interpolation};
@@ -75,7 +75,8 @@ View view_of(const OrbitCamera& c, const View& lens, double time) {
           lens.fov_deg, lens.focus};
 }
 
-/// `world_of`: gives the pose of a camera, which looks along -z.
+/// Returns the view of a camera of a model file. `world_of` returns the pose of the camera, which looks along
+/// -z.
 View view_of(const ModelCamera& c, const View& lens, const render::Model::Camera& camera,
              const auto& world_of) {
   const Eigen::Affine3f world = world_of(camera);
@@ -121,7 +122,7 @@ render::Camera CameraRig::at(double time, const BodyPlaces& places,
     view.up = Vec3::UnitY();
   }
   if (!fitted_.isEmpty()) {
-    // The ball around the bodies touches the nearer sides of the picture.
+    // The bounding sphere of the bodies touches the two sides of the picture that are closer to each other.
     const Real aspect = Real(scene_.render.size.x()) / scene_.render.size.y();
     const Real half = std::atan(std::tan(0.5 * view.fov_deg * kRadians) * std::min(1.0, aspect));
     const Real distance = 0.5 * static_cast<Real>(fitted_.diagonal().norm()) / std::sin(half);

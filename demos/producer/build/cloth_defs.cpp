@@ -49,7 +49,7 @@ uint32_t nearest_vertex(const std::vector<Vec3>& places, const Vec3& point) {
   return static_cast<uint32_t>(std::ranges::min_element(places, nearer) - places.begin());
 }
 
-/// Coordinates along the two longest directions of the bounding box.
+/// Returns the coordinates of the places along the two longest axes of their bounding box.
 std::vector<Vector2f> projected(const std::vector<Vec3>& places) {
   sim::Aabb box;
   for (const Vec3& p : places) box.extend(p);
@@ -62,8 +62,8 @@ std::vector<Vector2f> projected(const std::vector<Vec3>& places) {
   return uvs;
 }
 
-/// The texture coordinates of a model in metres, scaled to the mean length of its edges; empty if some
-/// triangle has none.
+/// Returns the texture coordinates of a model [m]. They are scaled so that edges have their actual length on
+/// average. Empty if a triangle has no texture coordinates.
 std::vector<Vector2f> model_uvs(const render::Model& model, const sim::ClothDef& def) {
   std::vector<Vector2f> corners;
   for (const render::Model::Part& part : model.parts) {

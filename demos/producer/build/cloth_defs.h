@@ -17,10 +17,11 @@ namespace offstage::producer {
 /// Greatest number of vertices of a cloth.
 inline constexpr std::size_t kMaxClothVertices = 250'000;
 
-/// A cloth in its own frame, and placed in the world.
+/// A cloth that is not deformed: its vertices in its own frame, and its definition in the world.
 struct FlatCloth {
-  sim::ClothDef def;         ///< definition of the cloth, without pins, which need the bodies
-  std::vector<Vec3> places;  ///< positions of its vertices in its own frame, without those of cords [m]
+  sim::ClothDef def;  ///< definition of the cloth without its pins, because pins refer to bodies
+  std::vector<Vec3>
+      places;  ///< positions of the vertices in the cloth's frame, without the vertices of cords [m]
   std::vector<Eigen::Vector2f> uvs;  ///< coordinates along the cloth for all vertices [m]
   std::vector<uint32_t> cord_ends;   ///< for each cord, the index of its last vertex
 
@@ -31,20 +32,20 @@ struct FlatCloth {
 /// std::invalid_argument for an impossible shape or fabric.
 FlatCloth flat_cloth(const Cloth& cloth, const render::Model* model);
 
-/// Number of vertices of a cloth, without those of cords. `model`: see flat_cloth().
+/// Returns the number of vertices of a cloth, without the vertices of its cords. `model`: see flat_cloth().
 std::size_t vertex_count(const Cloth& cloth, const render::Model* model);
 
 /// Returns the fabric that a cloth names, with the changes that the cloth makes to it. Throws
 /// std::invalid_argument for an unknown name.
 effects::Fabric fabric_of(const Cloth& cloth);
-/// Names of all fabrics.
+/// Returns the names of all fabrics.
 std::vector<std::string> fabric_names();
 
 /// Returns the vertices held by a pin, possibly none. Throws std::invalid_argument for a side or corner of a
 /// cloth that is not a grid.
 std::vector<uint32_t> pinned_vertices(const ClothPin& pin, const Cloth& cloth, const FlatCloth& flat);
 const PinScope& scope_of(const ClothPin& pin);
-/// Error message for a pin that holds no vertex, with the extent of the cloth.
+/// Returns the error message for a pin that holds no vertex, with the extent of the cloth.
 std::string selects_nothing(const FlatCloth& flat);
 /// Returns the pairs of vertices that a seam joins. Throws std::invalid_argument if the sides have different
 /// numbers of vertices, or if the cloth is not a grid.

@@ -17,8 +17,8 @@ constexpr FileKind kPartsKind = {"offparts", 5, "convex decomposition"};
 using sim::ConvexDecomposition;
 using sim::ConvexPolyhedron;
 
-/// `mesh_hash`: of the mesh and the settings. It is stored in the file, so that a renamed file is not used
-/// for another mesh.
+/// Returns the bytes of a file with a decomposition. The file contains `mesh_hash`, a hash of the mesh and
+/// the settings, so that a renamed file is not used for another mesh.
 std::vector<uint8_t> serialize(const ConvexDecomposition& d, const XXH128_hash_t& mesh_hash) {
   ByteWriter out;
   out.put(uint64_t{mesh_hash.low64});

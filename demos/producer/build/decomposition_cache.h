@@ -18,12 +18,13 @@ class DecompositionCache {
   /// Uses $XDG_CACHE_HOME/offstage, else $HOME/.cache/offstage; stores nothing if neither is set.
   static DecompositionCache of_user();
 
-  /// Returns a decomposition from the disk, or computes and stores it. A damaged file is computed again. A
-  /// folder that cannot be written to is not an error, because the cache only saves time.
+  /// Returns a decomposition from the disk, or computes and stores it. If the file is damaged, the
+  /// decomposition is computed again. A folder that cannot be written to is not an error, because the cache
+  /// only saves time.
   sim::ConvexDecomposition decompose(const sim::TriangleMesh& mesh,
                                      const sim::DecompositionSettings& settings = {}) const;
 
-  /// File of a mesh's decomposition, whether it exists or not; empty if nothing is stored.
+  /// Returns the file of a mesh's decomposition, whether it exists or not; empty if nothing is stored.
   std::filesystem::path file(const sim::TriangleMesh& mesh,
                              const sim::DecompositionSettings& settings = {}) const;
 

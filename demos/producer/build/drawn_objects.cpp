@@ -11,10 +11,10 @@
 namespace offstage::producer {
 namespace {
 
-/// Half the edge of the square that stands for an infinite plane [m]: from 300 m up, it still reaches to
-/// where its horizon hides it.
+/// Half the length of an edge of the square that stands for an infinite plane [m]. Seen from a height of 300
+/// m, the edge is so close to the horizon that it cannot be seen.
 constexpr float kGroundHalfSize = 256'000;
-constexpr float kGroundTexture_m = 2000;  // of one copy of its texture
+constexpr float kGroundTexture_m = 2000;  // width of one copy of the plane's texture
 
 }  // namespace
 
@@ -67,7 +67,7 @@ render::Mesh mesh_of(const sim::ConvexPolyhedron& part) {
 
 namespace {
 
-/// The transform of texture coordinates that scales and turns a texture of this size.
+/// Returns the transform of texture coordinates that scales and turns a texture of this size.
 std::array<Eigen::Vector3f, 2> texture_rows(const Material& material, const render::Image& image) {
   const float angle = to_float(material.texture_angle_deg) * std::numbers::pi_v<float> / 180;
   const float scale = 1 / to_float(material.texture_scale);
@@ -116,7 +116,8 @@ render::Material material_of(const Scene& scene, const Cloth& cloth, const Model
   const auto it = std::ranges::find(scene.materials, cloth.material, &Material::name);
   if (it == scene.materials.end()) return m;
   render::Fabric fabric = m.fabric;
-  fabric.back_color.reset();  // it belonged to another front colour
+  fabric.back_color
+      .reset();  // the back colour suited the colour of the fabric, which the material has replaced
   if (const std::optional<FabricLook>& look = it->fabric) {
     fabric = {.weave = look->weave,
               .thread = to_float(look->thread),

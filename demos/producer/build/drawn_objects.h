@@ -11,8 +11,8 @@
 
 namespace offstage::producer {
 
-/// The mesh of a primitive, centred as in the simulation. Boxes have a small bevel, whose edges reflect
-/// light. A plane is a very large square.
+/// Returns the mesh of a primitive, centred as in the simulation. Boxes have a small bevel, whose edges
+/// reflect light. A plane is a very large square.
 render::Mesh mesh_of(const sim::Sphere& s);
 render::Mesh mesh_of(const sim::Box& s);
 render::Mesh mesh_of(const sim::Capsule& s);
@@ -30,7 +30,7 @@ render::Mesh mesh_of(const sim::ConvexPolyhedron& part);
 /// `textures`.
 render::Material material_of(const Scene& scene, const std::string& name, const ModelLibrary& models,
                              std::vector<render::Image>& textures);
-/// The material of a cloth: that of its fabric, with the changes of the scene's material.
+/// Returns the material of a cloth: the material of its fabric, changed by the scene's material.
 render::Material material_of(const Scene& scene, const Cloth& cloth, const ModelLibrary& models,
                              std::vector<render::Image>& textures);
 

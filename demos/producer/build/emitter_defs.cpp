@@ -20,7 +20,8 @@ effects::EmitterSurface surface_of(const DiscSurface& s) {
           .pose = {s.position, sim::rotation_between(Vec3::UnitY(), s.direction)},
           .radius = s.radius};
 }
-/// A face that could not be resolved; the scene is refused.
+/// Returns a placeholder for a face that could not be resolved. The scene has an error in this case, so the
+/// placeholder is never used.
 effects::EmitterSurface surface_of(const FaceSurface& s) {
   return {.kind = effects::SurfaceKind::plane, .pose = {s.position, Quat::Identity()}, .size = {1, 1}};
 }
@@ -30,7 +31,7 @@ effects::EmitterSurface surface_of(const MeshSurface& s) {
 
 // --- Bounds ---
 
-/// Bounds an unclipped normal distribution far from its mean.
+/// Gives an unclipped normal distribution bounds that are far from its mean.
 void bound(Varying& v) {
   constexpr Real kDeviations = 4;
   auto* normal = std::get_if<effects::Normal>(&v);
@@ -40,12 +41,12 @@ void bound(Varying& v) {
 }
 constexpr uint64_t kNoLimit = std::numeric_limits<uint64_t>::max();
 
-/// Estimated number of collisions of a particle in its life.
+/// Returns the estimated number of collisions of a particle in its life.
 Real expected_hits(const ParticleSource& source) {
   return source.behaviour.dies_on_hit ? 1 : 4;
 }
 
-/// Bounds of an emitter with and without the limits on the number of particles.
+/// Bounds on the particles of an emitter, with and without the limit `max_alive`.
 struct Bounds {
   effects::WorstCase possible, limited;
 };

@@ -27,7 +27,7 @@ effects::SplitDef split_def(const ParticleSource& source, const std::string& nam
 effects::TrailDef trail_def(const TrailSource& trail, const std::string& name, uint64_t seed);
 effects::SubEmitterDef event_def(const Emission& emission, const std::string& name, uint64_t seed);
 
-/// Greatest number of particles of a source.
+/// Bounds on the number of particles of a source.
 struct SourceBound {
   effects::WorstCase possible;  ///< bounds without the limit `max_alive`
   uint64_t alive = 0;           ///< number of particles at once, limited by max_alive

@@ -13,7 +13,7 @@
 namespace offstage::producer {
 namespace {
 
-/// A closed model with the means to find distances to it.
+/// A closed model, and a search structure for distances to its surface.
 struct SolidModel {
   explicit SolidModel(const sim::TriangleMesh& solid) : mesh(solid) {
     for (const Vec3& v : solid.vertices) box.extend(v);
@@ -22,7 +22,7 @@ struct SolidModel {
   sim::Aabb box;
 };
 
-/// Half the size of the box around a volume.
+/// Returns half the size of the box around a volume.
 Vec3 half_size(const BoxFill& b) {
   return b.size / 2;
 }
@@ -37,7 +37,7 @@ Vec3 half_size(const SolidModel& m) {
   return m.box.sizes() / 2;
 }
 
-/// Middle of the box around a volume.
+/// Returns the middle of the box around a volume.
 template <class Volume>
 Vec3 middle(const Volume& volume) {
   if constexpr (std::is_same_v<Volume, SolidModel>)
@@ -46,7 +46,7 @@ Vec3 middle(const Volume& volume) {
     return Vec3::Zero();
 }
 
-/// Whether a ball of this radius is inside.
+/// Returns whether a ball with the centre p and the radius r is inside the volume.
 bool holds(const BoxFill& b, const Vec3& p, Real r) {
   return ((b.size / 2 - p.cwiseAbs()).array() >= r).all();
 }
@@ -68,8 +68,9 @@ Real layer_step(Real d, bool cubic) {
   return cubic ? d : d * std::sqrt(2.0 / 3);
 }
 
-/// Layers of rows: each row is shifted by half a step from the last one, each layer by a third of the
-/// triangle between rows, which is the closest packing of balls; or a cubic grid.
+/// Calls `add` for the places of the closest packing of balls, or of a cubic grid, until it returns false.
+/// The closest packing consists of layers of rows. Each row is shifted by half a step from the previous one,
+/// and each second layer is shifted by a third of the distance of rows.
 template <class Add>
 void lay_lattice(const Vec3& half, Real d, bool cubic, Add&& add) {
   const Real row = row_step(d, cubic), layer = layer_step(d, cubic);
@@ -93,7 +94,8 @@ void lay_lattice(const Vec3& half, Real d, bool cubic, Add&& add) {
   }
 }
 
-/// Random sequential addition: places are tried until many in a row have no room.
+/// Calls `add` for random places (random sequential addition). Ends when many places in succession have no
+/// room.
 template <class Add>
 void lay_random(const Vec3& half, Real d, uint64_t seed, Add&& add) {
   constexpr int kTries = 2000;
@@ -129,8 +131,9 @@ void lay_random(const Vec3& half, Real d, uint64_t seed, Add&& add) {
 
 }  // namespace
 
-/// Whether the box around a volume has so many places that the volume has more than `most`, or is much
-/// thinner than the spacing: a box is less than twice as large as a cylinder or ball in it.
+/// Returns whether a volume certainly has more than `most` places, or is much thinner than the spacing. The
+/// number follows from the box around the volume, which is less than twice as large as a cylinder or ball in
+/// it.
 bool exceeds(const Vec3& half, const Fill& fill, Real spacing, std::size_t most) {
   const bool cubic = fill.packing == Packing::cubic;
   const Vec3 counts =
@@ -143,8 +146,8 @@ std::vector<Vec3> fill_places(const Fill& fill, Real spacing, std::size_t most) 
   constexpr Real kRounding = 1e-9;
   const auto fill_volume = [&](const auto& volume) {
     const Vec3 offset = middle(volume), half = half_size(volume);
-    // Adds a place if it is inside; returns whether the search goes on, or for a random one whether it
-    // was added.
+    // Adds a place if it is inside. Returns whether the search continues; for a random place, returns whether
+    // it was added.
     const auto add = [&](const Vec3& from_middle, bool random = false) {
       const Vec3 p = offset + from_middle;
       const bool inside = holds(volume, p, spacing / 2 * (1 - kRounding)) && places.size() <= most;

@@ -10,7 +10,7 @@
 namespace offstage::producer {
 namespace {
 
-/// Albedo of the ground plane, if there is a visible one.
+/// Returns the albedo of the ground plane, if there is a visible one.
 std::optional<Eigen::Vector3f> ground_albedo(const Scene& scene) {
   for (const Body& body : scene.bodies) {
     if (!std::holds_alternative<sim::Plane>(body.shape) || !body.visible) continue;
@@ -43,7 +43,9 @@ struct LampOf {
   }
 
   std::optional<render::Lamp> operator()(const SunLight&) const { return {}; }
-  std::optional<render::Lamp> operator()(const ModelLights&) const { return {}; }  // several: see lamps_of()
+  std::optional<render::Lamp> operator()(const ModelLights&) const {
+    return {};
+  }  // the lights of a file are several lamps; see lamps_of()
   std::optional<render::Lamp> operator()(const PointLight& l) const {
     render::Lamp lamp = base(l);
     lamp.radius = to_float(l.radius);
@@ -69,7 +71,7 @@ struct LampOf {
 // A surface that reflects all light has the radiance E / pi under the irradiance E.
 constexpr float kPerCandela = 1 / std::numbers::pi_v<float>;
 
-/// Calls each(settings, light, body) for all lights of model files that an entry of the scene stands for.
+/// Calls each(settings, light, body) for every light of a model file that an entry of `lights` selects.
 template <class Each>
 void for_each_file_light(const Light& light, const Scene& scene, const ModelLibrary& models, Each each) {
   const auto* settings = std::get_if<ModelLights>(&light);

@@ -1,5 +1,5 @@
 #pragma once
-/// Conversion of a scene's lights and environment to those of the stage.
+/// Converts the lights and the environment of a scene to lights and an environment of the stage.
 
 #include <string>
 #include <vector>
@@ -19,7 +19,7 @@ render::Environment environment_of(const Scene& scene);
 /// Returns all lights except the sun, in scene order. `time` is the time of the film [s].
 std::vector<render::Lamp> lamps_of(const Scene& scene, const ModelLibrary& models, double time,
                                    const BodyPlaces& places, const std::vector<BodySample>& moving);
-/// The names of the lights that lamps_of() returns; empty for a light without a name.
+/// Returns the names of the lights that lamps_of() returns; empty for a light without a name.
 std::vector<std::string> lamp_names(const Scene& scene, const ModelLibrary& models);
 
 }  // namespace offstage::producer

@@ -27,7 +27,7 @@ class LineSketch {
   void line(const sim::Vec3& a, const sim::Vec3& b, const Eigen::Vector4f& color, float width_a = 1,
             float width_b = 1);
   void dot(const sim::Vec3& at, const Eigen::Vector4f& color, float width);
-  /// Adds a circle about an axis of any length but 0.
+  /// Adds a circle about an axis. The axis may have any length except 0.
   void ring(const sim::Vec3& centre, const sim::Vec3& axis, sim::Real radius, const Eigen::Vector4f& color,
             int segments = 24);
   void arrow(const sim::Vec3& from, const sim::Vec3& to, const Eigen::Vector4f& color);

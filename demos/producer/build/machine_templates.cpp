@@ -10,7 +10,8 @@ namespace {
 constexpr Real kGravity = 9.81;
 constexpr Real kDegrees = 180 / std::numbers::pi;
 
-/// A motor that follows keys smoothly, held rigidly within its maximum effort.
+/// Returns a motor that follows keys along a smooth curve. It follows them rigidly unless this needs more
+/// than the maximum effort.
 JointMotor follow(sim::Motor::Mode mode, const std::vector<MotorKey>& keys,
                   std::optional<Real> max_effort = {}) {
   return {.mode = mode, .keys = keys, .smooth = true, .max_effort = max_effort};
@@ -21,7 +22,7 @@ std::vector<MotorKey> mapped(std::vector<MotorKey> keys, auto&& value) {
   return keys;
 }
 
-/// A part of a machine at some pose: positions and directions are in the machine's frame.
+/// Builds a machine at a pose. Positions and directions are in the machine's frame.
 class MachineBuilder {
  public:
   template <class Machine>
@@ -64,8 +65,9 @@ class MachineBuilder {
 
 }  // namespace
 
-/// The chassis is low and narrow, so that the wheels can turn beside it; the body is above them. Each wheel
-/// is on a hub that slides up and down on a spring, the front wheels with a steering knuckle between.
+/// Builds a car. The chassis is low and narrow, so that the front wheels can be steered beside it; the body
+/// is above the wheels. Each wheel turns on a hub, which slides up and down on a spring. Steering knuckles
+/// connect the front wheels to their hubs.
 Parts build(const Vehicle& car) {
   using enum sim::JointType;
   MachineBuilder make(car);
@@ -99,7 +101,7 @@ Parts build(const Vehicle& car) {
       inside(make.box(hub, car.trim, size, hub_mass, centre));
       Joint& spring = make.join(prismatic, hub, hub, "chassis", centre);
       spring.behaviour.limits = std::array{-travel, travel};
-      // Supports the car's weight with gravity on Earth.
+      // The target supports the weight of the car in the gravity of the Earth.
       spring.behaviour.motor = JointMotor{.mode = sim::Motor::Mode::position,
                                           .target = -load * kGravity / stiffness,
                                           .stiffness = stiffness,

@@ -140,7 +140,7 @@ void add_to(XXH3_state_t* hash, const render::Model& model) {
   for (const render::Image& texture : model.textures) add_to(hash, texture);
 }
 
-/// Whether a user should know that the parts of a model are not the model.
+/// Returns whether the convex parts differ from the model so much that the user gets a warning.
 bool is_inaccurate(const sim::ConvexDecomposition& parts, const sim::DecompositionSettings& settings) {
   using Method = sim::ConvexDecomposition::Method;
   return parts.method == Method::none ||
@@ -157,7 +157,7 @@ std::string inaccuracy(const sim::ConvexDecomposition& parts) {
       parts.parts.size(), 100 * parts.difference, parts.note);
 }
 
-/// The model file that a look draws, or null.
+/// Returns the model file that a look draws, or null.
 const MeshFile* mesh_file(const ParticleLook& look) {
   return look.style == LookStyle::mesh && look.mesh ? std::get_if<MeshFile>(&look.mesh->shape) : nullptr;
 }
@@ -171,7 +171,7 @@ void for_each_look(const Scene& scene, Visit visit) {
                     [&](const ParticleSource& source, const auto&...) { visit(source.look, source.where); });
 }
 
-/// All files that a scene names. Each is stored with the first place in the scene that names it.
+/// All files that a scene names. Each file is stored with the first place in the scene that names it.
 struct Files {
   std::map<std::string, Where> models, textures;
   std::set<std::string> animated;   ///< model files that are read with their animations
@@ -205,8 +205,8 @@ Files files_of(const Scene& scene) {
   return files;
 }
 
-/// Bodies whose convex parts are needed, for collisions with a dynamic body or for an overlay, with the first
-/// place that needs them.
+/// Returns the names of the bodies whose convex parts are needed, for collisions with a dynamic body or for
+/// an overlay. Each has the first place in the scene that needs its parts.
 std::map<std::string, Where> bodies_in_parts(const Scene& scene) {
   std::map<std::string, Where> names;
   const auto need = [&](const std::string& body, const Where& where) { names.emplace(body, where); };
@@ -321,7 +321,7 @@ void ModelLibrary::read_animations(const Scene& scene, const DecompositionCache&
     where.path += "/animation";
     if (rig.clips.empty()) {
       problems.push_back(
-          {where, file + ": has no animation that can be played; glTF 2.0 files can have some"});
+          {where, file + ": has no animation that can be played; use a glTF 2.0 file with an animation"});
     } else if (clip < 0) {
       std::vector<std::string> names;
       for (const render::RigClip& known : rig.clips) names.push_back(known.name);

@@ -30,8 +30,8 @@ struct AnimatedPiece {
 class ModelLibrary {
  public:
   ModelLibrary() = default;
-  /// Called with a description before each step that may take seconds, and with "" after it. It may throw to
-  /// stop the work.
+  /// Function that is called with a description before each step that may take seconds, and with an empty
+  /// text after the step. It may throw to stop the work.
   using StepCallback = std::function<void(const std::string& step)>;
 
   /// Reads every model and texture that the (flat) scene names, relative to `folder` (or see `model_file`),
@@ -41,19 +41,20 @@ class ModelLibrary {
                std::vector<Problem>& warnings, const StepCallback& on_step = {});
 
   const render::Model& model(const std::string& file) const { return models_.at(file); }
-  /// Key of the convex parts of a model: its file and the settings of the decomposition.
+  /// Returns the key of the convex parts of a model: its file and the settings of the decomposition.
   static std::string parts_key(const MeshFile& mesh);
-  /// The unscaled convex parts of a model, or null if they are not needed.
+  /// Returns the unscaled convex parts of a model, or null if no object needs them.
   const sim::ConvexDecomposition* parts(const MeshFile& mesh) const {
     const auto it = parts_.find(parts_key(mesh));
     return it == parts_.end() ? nullptr : &it->second;
   }
-  /// The colliding pieces of a body with an animated shape.
+  /// Returns the colliding pieces of a body with an animated shape.
   const std::vector<AnimatedPiece>& pieces(const Body& body) const { return pieces_.at(animation_key(body)); }
   const render::Image& texture(const std::string& file) const { return textures_.at(file); }
-  /// The picture of the sky; null if the scene has none.
+  /// Returns the picture of the sky; null if the scene has none.
   const std::shared_ptr<const render::SkyPicture>& sky() const { return sky_; }
-  /// A model that was decomposed into convex parts, and the duration. Parts from the cache take little time.
+  /// A model that was decomposed into convex parts, and the time that this took. Parts from the cache take
+  /// little time.
   struct Decomposed {
     std::string file;
     std::size_t triangles = 0;
@@ -62,7 +63,7 @@ class ModelLibrary {
   };
   const std::vector<Decomposed>& decomposed() const { return decomposed_; }
 
-  /// Digest of all data read, so that a run detects when a file changed.
+  /// Returns a hash of all data that were read. It shows a run whether a file has changed.
   const std::string& digest() const { return digest_; }
 
  private:
@@ -86,17 +87,17 @@ class ModelLibrary {
   std::string digest_;
 };
 
-/// The model file whose animation a body plays.
+/// Returns the model file whose animation a body plays.
 const std::string& animated_file(const Body& body);
 
-/// A scale factor and why it was chosen, in words.
+/// A scale factor, and the reason for it as text.
 struct ChosenScale {
   Real factor = 1;
   std::string reason;
 };
-/// The factor that brings a model from its file's likely unit to metres: 1, 0.01 (centimetres) or 0.001
-/// (millimetres). `largest_side`: longest edge of the box around the file's content, in the unit that was
-/// read or assumed [m].
+/// Returns the factor that brings a model from its file's likely unit to metres: 1, 0.01 (centimetres) or
+/// 0.001 (millimetres). `largest_side`: longest edge of the box around the file's content, in the unit that
+/// was read or assumed [m].
 ChosenScale automatic_scale(Real largest_side, render::Model::UnitSource unit);
 /// Returns the factor for a model that was read; Model::file_size must be known.
 ChosenScale automatic_scale(const render::Model& model);
@@ -114,17 +115,17 @@ Real scale_of(const Use& use, const ModelLibrary& models) {
     return fitted_scale(use.scale, {}, models.model(use.file));
 }
 
-/// All triangles of a model as one mesh for the simulation, scaled.
+/// Returns all triangles of a model as one mesh for the simulation, multiplied by the scale factor.
 sim::TriangleMesh collision_mesh(const render::Model& model, double scale);
 /// Returns the name of a method of decomposition: "exact", "approximate" ...
 std::string method_name(sim::ConvexDecomposition::Method method);
 
-/// The convex parts of a model, scaled like its mesh.
+/// Returns the convex parts of a model, scaled like its mesh.
 sim::ConvexDecomposition scaled(sim::ConvexDecomposition decomposition, double scale);
 
-/// XXH3-128 in hexadecimal of a mesh.
+/// Returns the hash XXH3-128 of a mesh in hexadecimal.
 std::string mesh_hash(const sim::TriangleMesh& mesh);
-/// XXH3-128 in hexadecimal of a text.
+/// Returns the hash XXH3-128 of a text in hexadecimal.
 std::string text_hash(const std::string& text);
 
 }  // namespace offstage::producer

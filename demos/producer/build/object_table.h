@@ -14,7 +14,7 @@
 namespace offstage::producer {
 
 struct ObjectTable {
-  /// The scene must outlive the table.
+  /// Builds the table of a scene, which must outlive the table.
   explicit ObjectTable(const Scene& scene);
 
   struct BodyEntry {

@@ -24,7 +24,8 @@ sim::Pose relative(const sim::Pose& a, const sim::Pose& b) {
   return {a.point_to_body(b.position), a.orientation.conjugate() * b.orientation};
 }
 
-/// Radiance of a colour as bright as in sunlight.
+/// Returns the radiance that a surface of this colour has in sunlight, so that lines are as bright as
+/// objects.
 Vector4f light(const Vector4f& color) {
   constexpr float kSunlit = 3;
   return {kSunlit * color.x(), kSunlit * color.y(), kSunlit * color.z(), color.w()};
@@ -48,7 +49,7 @@ Edges edges_of(const sim::Aabb& box) {
 Edges edges_of(const sim::Obb& box) {
   return box_edges(box.centre, box.axes * box.half.asDiagonal());
 }
-/// Three great circles.
+/// Returns three great circles of a sphere as edges.
 Edges edges_of(const sim::BoundingSphere& ball) {
   constexpr int kSegments = 32;
   Edges edges;
@@ -89,7 +90,8 @@ void draw_point(const Vec3& p, const Vec3& normal, const Vec3& arrow, Real size,
   if (!arrow.isZero(0)) sketch.arrow(p, p + arrow, color);
 }
 
-/// `object` leaves room for the ids of points.
+/// Draws the contact points and the outline of a manifold. The lines of a point have the id `object` + the id
+/// of the point.
 void draw_manifold(const sim::Manifold& m, const sim::Pose& world_from_a, Real size, const Vector4f& color,
                    uint64_t object, LineSketch& sketch) {
   const Vec3 normal = world_from_a.vector_to_world(m.normal);
@@ -106,9 +108,9 @@ uint64_t pair_id(sim::BodyHandle a, sim::BodyHandle b) {
   return (uint64_t{a.index} << 40) ^ (uint64_t{b.index} << 16);
 }
 
-/// The simulation's contacts between all bodies, or between two given ones, by pair. The contacts of a pair
-/// are sorted by their position on the body. Their original order is by depth, which may change while the
-/// points stay.
+/// Returns the contacts of the simulation between all bodies, or between two given bodies. They are sorted by
+/// pair, and within a pair by their position on the body. The simulation sorts them by depth, which may
+/// change while the points stay.
 std::vector<sim::ContactState> contacts_of(const sim::World& world, sim::BodyHandle a, sim::BodyHandle b) {
   std::vector<sim::ContactState> contacts = world.contacts();
   if (a)
@@ -226,7 +228,8 @@ struct Overlays::Builder {
         tree.volumes.push_back({static_cast<int>(level), leaf, edges_of(volume)});
     });
   }
-  /// Whether bodies may touch without contacts in the simulation: at least one moves, and neither is dynamic.
+  /// Returns whether bodies may touch without contacts in the simulation: at least one moves, and neither is
+  /// dynamic.
   static bool touch_by_geometry(const Body& a, const Body& b) {
     using enum sim::MotionType;
     const auto is_plane = [](const Body& body) { return std::holds_alternative<sim::Plane>(body.shape); };

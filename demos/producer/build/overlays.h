@@ -1,6 +1,6 @@
 #pragma once
-/// The simulation side of overlays: bounding trees, closest points, contacts, velocities and islands of
-/// bodies, and the strain of cloths, as lines in the world. They only read the world.
+/// Converts the state of a simulation to the lines of overlays: bounding trees, closest points, contacts,
+/// velocities and islands of bodies, and the strain of cloths. Overlays do not change the simulation.
 
 #include <deque>
 #include <map>
@@ -22,18 +22,18 @@ class Overlays {
   using BodiesByName = std::map<std::string, sim::BodyHandle>;
   using ClothsByName = std::map<std::string, sim::ClothHandle>;
 
-  /// The scene must outlive the overlays.
+  /// Prepares the overlays of a scene, which must outlive this object.
   Overlays(const Scene& scene, const sim::World& world, const BodiesByName& bodies,
            const ClothsByName& cloths);
 
-  /// Returns the lines of each overlay for the current state of the world, in scene order; none for the parts
-  /// of bodies, which are not lines.
+  /// Returns the lines of each overlay for the current state of the world, in scene order. The overlay of the
+  /// parts of a body has no lines, because the parts are drawn as surfaces.
   std::vector<LineSet> lines(const sim::World& world) const;
   /// Records the current state for overlays that draw past states. Must be called as time advances.
   void record(const sim::World& world);
 
  private:
-  /// The volumes of a tree down to the deepest level shown, as edges in the body's frame.
+  /// The bounding volumes of a tree down to the deepest level that is drawn, as edges in the body's frame.
   struct TreeLines {
     struct Volume {
       int level;
@@ -44,7 +44,7 @@ class Overlays {
     sim::BodyHandle body;
     std::vector<Volume> volumes;
   };
-  /// A body as used by the narrow phase.
+  /// A body in the form that the narrow phase needs.
   struct Collider {
     sim::BodyHandle body;
     sim::Shape shape;

@@ -14,8 +14,8 @@ effects::RampKind ramp_kind(const ParticleLook& look) {
   return look.ramp;
 }
 
-/// The colours of a glowing body along a ramp of temperatures. Colour is not linear between two temperatures,
-/// so the ramp of colours has more keys.
+/// Returns the colours of a black body along a ramp of temperatures. Colour is not a linear function of
+/// temperature, so the result has more keys than the ramp.
 effects::ColorRamp glow_of(const std::vector<std::pair<Real, Real>>& kelvin) {
   constexpr int kSteps = 16;
   const auto hottest = static_cast<float>(

@@ -19,7 +19,7 @@
 
 namespace offstage::producer {
 
-/// Computes colour, size and rotation of particles from their look.
+/// Computes the colour, size and rotation of particles from their look and age.
 class LookRamps {
  public:
   LookRamps(const ParticleLook& look, uint64_t seed, const std::string& name);
@@ -44,7 +44,7 @@ class ParticleSources {
   /// Returns the body with this name; null for an empty name.
   using FindBody = std::function<sim::BodyHandle(const std::string&)>;
 
-  /// Throws SceneError for an emitter with invalid parameters.
+  /// Builds the particle systems of all emitters. Throws SceneError for an emitter with invalid parameters.
   ParticleSources(const Scene& scene, const ModelLibrary& models, sim::World& world, const FindBody& body);
 
   /// Returns how long before time 0 the first particles are created [s]; 0 if no emitter prewarms.
@@ -66,7 +66,7 @@ class ParticleSources {
   void for_each_system(Visit&& visit) const {
     for (const System& system : systems_) visit(system.name, system.handle, system.look);
   }
-  /// The system of a source, by its full name; null if there is none.
+  /// Returns the system of a source, by its full name; null if there is none.
   sim::ParticleSystemHandle system(const std::string& name) const;
 
  private:

@@ -26,15 +26,15 @@ Affine3f affine(const Vec3& position, const Quat& orientation, Real scale = 1) {
          Eigen::Scaling(to_float(scale));
 }
 
-/// The parts overlay of a body, or null.
+/// Returns the overlay that draws the convex parts of a body, or null.
 const PartsOverlay* parts_overlay(const Scene& scene, const std::string& body) {
   for (const Overlay& overlay : scene.overlays)
     if (const auto* parts = std::get_if<PartsOverlay>(&overlay); parts && parts->body == body) return parts;
   return nullptr;
 }
 
-/// Brings meshes, each with its place in a whole, into the unit ball: the centre of the whole's box to the
-/// origin, the farthest vertex to a distance of 1.
+/// Returns the transform that fits some meshes with their poses into the unit ball. It moves the centre of
+/// their common bounding box to the origin, and the vertex farthest from it to a distance of 1.
 Affine3f into_unit_ball(const std::vector<std::pair<render::Mesh, Affine3f>>& meshes) {
   Eigen::AlignedBox3f box;
   for (const auto& [mesh, whole_from_part] : meshes)
@@ -278,7 +278,7 @@ void Picture::add_body(const ObjectTable::BodyEntry& entry, const ModelLibrary& 
 void Picture::add_animated(const std::string& file, const Affine3f& body_from_model, const Body& body,
                            const ModelLibrary& models, DrawnBody& drawn) {
   const render::Model& model = models.model(file);
-  model_parts(file, body.material, models);  // uploads its materials
+  model_parts(file, body.material, models);  // called here because it uploads the materials
   const std::vector<render::MaterialHandle>& own_materials = models_.at(file).second;
   AnimatedLook look{
       &model.rig, &body.animation.value(), model.rig.clip(body.animation->clip), body_from_model, {}};
@@ -323,7 +323,7 @@ render::HdrImage Picture::linear() const {
 render::Channels Picture::channels(const Snapshot& previous, const Snapshot& current) {
   const double frame_time = &previous == &current ? 0 : scene_.output.fps.seconds(1);
   place(previous, previous, 1, frame_time);
-  // The instances belong to the particles of the current state, which thus have a motion.
+  // Instances are numbered by the particles of the current state, so that each has a motion in the channels.
   std::vector<render::Point> before;
   for (std::size_t set = 0; set < meshes_.size(); ++set) {
     if (!meshes_[set].look) continue;
@@ -344,8 +344,8 @@ render::Image Picture::draw(const Snapshot& previous, const Snapshot& current,
   std::ranges::fill(sum_.rgba, 0.f);
   for (int i = 0; i < n; ++i) {
     if (stop && stop()) return {};
-    // Sub-frames are in the middle of equal parts of the time during which the shutter is open, which ends at
-    // the frame's time.
+    // The shutter closes at the frame's time. The time during which it is open is divided into equal parts,
+    // and a sub-frame shows the middle of each part.
     const float open =
         to_float(scene_.render.shutter) * (1 - (static_cast<float>(i) + 0.5f) / static_cast<float>(n));
     const float w = n == 1 || &previous == &current ? 1 : 1 - open;

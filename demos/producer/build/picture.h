@@ -25,7 +25,7 @@ namespace offstage::producer {
 
 class Picture {
  public:
-  /// The context must be current on this thread and outlive the picture.
+  /// Builds the stage of a scene. The context must be current on this thread and outlive the picture.
   /// `quick`: see render::StageDef.
   Picture(const Scene& scene, const ModelLibrary& models, render::Context& context, bool quick = false);
 
@@ -35,21 +35,22 @@ class Picture {
   /// ends soon and the image has no pixels.
   render::Image draw(const Snapshot& previous, const Snapshot& current,
                      const std::function<bool()>& stop = {});
-  /// Linear light of the latest frame with its exposure and glow, without tone curve and texts.
+  /// Returns the linear light of the latest frame with its exposure and glow, without tone curve and texts.
   render::HdrImage linear() const;
-  /// Sums over all pictures so far.
+  /// Returns the sums of the light in all pictures so far.
   render::LightSums light_sums() const { return stage_.light_sums(); }
-  /// The camera of the latest picture.
+  /// Returns the camera of the latest picture.
   const render::Camera& camera() const { return latest_camera_; }
 
-  /// Depth, normals, ids and motion at `current`; motion since `previous`, both as for `draw`.
+  /// Draws the channels of the frame at `current`: depth, normal, id, and the motion since `previous`. The
+  /// arguments are the same as for draw().
   render::Channels channels(const Snapshot& previous, const Snapshot& current);
 
  private:
   struct DrawnPart {
     render::InstanceHandle instance;
     Eigen::Affine3f body_from_part;
-    // Displacement by an explosion of 1, in the body's frame.
+    // Displacement of the part at `explode` = 1, in the body's frame.
     Eigen::Vector3f outwards = Eigen::Vector3f::Zero();
   };
   /// A model that plays an animation.
@@ -66,12 +67,12 @@ class Picture {
     std::vector<Surface> surfaces;
   };
   struct DrawnBody {
-    std::optional<std::size_t> slot;  // in Snapshot::bodies; none: it never moves
+    std::optional<std::size_t> slot;  // index in Snapshot::bodies; none: the body never moves
     Eigen::Affine3f world_from_body;  // at time 0
-    const PartsOverlay* overlay;      // if it is drawn as convex parts; otherwise null
+    const PartsOverlay* overlay;      // overlay that draws the body as convex parts; null: there is none
     Real appear_at, remove_at;
     std::vector<DrawnPart> parts;
-    std::optional<AnimatedLook> animated;  // instead of `parts`
+    std::optional<AnimatedLook> animated;  // the body is drawn as an animated model instead of `parts`
   };
 
   /// Particles that are drawn as instances of a mesh. Instance i shows the i-th particle of the current
@@ -81,12 +82,12 @@ class Picture {
     struct Part {
       render::MeshHandle mesh;
       render::MaterialHandle material;
-      Eigen::Affine3f unit_from_part;  // brings the mesh to its place in the unit ball
+      Eigen::Affine3f unit_from_part;  // transform of the mesh to its place in the unit ball
     };
     std::vector<Part> parts;
     bool casts_shadow = true;
     uint32_t object = 0;
-    std::vector<render::InstanceHandle> instances;  // for each particle, one for each part
+    std::vector<render::InstanceHandle> instances;  // one instance for each part of each particle
     std::size_t shown = 0;                          // number of visible particles
   };
 
@@ -101,7 +102,8 @@ class Picture {
 
   render::MaterialHandle material(const std::string& name, const ModelLibrary& models);
   void add_body(const ObjectTable::BodyEntry& entry, const ModelLibrary& models);
-  /// The parts of a model with their materials, or all with the material `name` unless it is empty.
+  /// Returns the parts of a model with their materials. If `name` is not empty, all parts have the material
+  /// of this name.
   std::vector<std::pair<render::MeshHandle, render::MaterialHandle>> model_parts(const std::string& file,
                                                                                  const std::string& name,
                                                                                  const ModelLibrary& models);
@@ -138,7 +140,7 @@ class Picture {
   /// `orientations`: rotation of each point, or empty.
   void place_meshes(DrawnMeshes& drawn, std::span<const render::Point> points,
                     std::span<const Eigen::Quaternionf> orientations);
-  /// Time between two sub-frames; 0 if there is only one [s].
+  /// Returns the time between two sub-frames; 0 if there is only one [s].
   float subframe_time() const;
   void set_balls(std::size_t set, std::span<const render::Point> balls);
   void place_cloths(const Snapshot& previous, const Snapshot& current, float w, double frame_time);
@@ -152,7 +154,7 @@ class Picture {
   std::map<std::string, render::MaterialHandle> materials_;
   std::map<std::string, std::pair<std::vector<render::MeshHandle>, std::vector<render::MaterialHandle>>>
       models_;
-  std::map<std::vector<float>, render::MeshHandle> primitives_;  // by kind and sizes
+  std::map<std::vector<float>, render::MeshHandle> primitives_;  // keys: kind and sizes of a shape
   BodyPlaces places_;
   CameraRig camera_;
   render::Camera latest_camera_;
@@ -163,16 +165,16 @@ class Picture {
   std::vector<render::PointStyle> styles_;  // of the same
   std::vector<bool> ages_within_frame_;     // of the same: pictures of a sheet change between sub-frames
   std::vector<DrawnMeshes> meshes_;         // of the same
-  // Motion blur of balls that move too far in a sub-frame; or null.
+  // Streaks that replace the balls that move too far in a sub-frame; null: the set has none.
   std::vector<render::PointsHandle> blur_streaks_;
-  std::map<std::string, render::MaterialHandle> fabrics_;  // by fabric and material
+  std::map<std::string, render::MaterialHandle> fabrics_;  // keys: fabric and material
   std::vector<DrawnCloth> cloths_;
   std::vector<render::LinesHandle> overlays_;  // null for overlays without lines
   std::vector<render::Point> scratch_, scratch_blur_streaks_;
   std::vector<Eigen::Vector3f> scratch_places_;
   std::vector<render::Line> scratch_lines_;
   render::HdrImage sum_;
-  float latest_scale_ = 1;  // brings the sum to exposed light
+  float latest_scale_ = 1;  // factor from the sum of the sub-frames to exposed light
 };
 
 }  // namespace offstage::producer

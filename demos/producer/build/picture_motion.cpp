@@ -26,8 +26,9 @@ BodySample interpolate(const BodySample& a, const BodySample& b, float w) {
   return {a.position + w * (b.position - a.position), a.orientation.slerp(w, b.orientation)};
 }
 
-/// Position of a particle at fraction w of the interval `dt` between two states: the cubic through both
-/// states if it flew freely; a straight line if it bounced in between, which a cubic would overshoot.
+/// Returns the position of a particle at the fraction w of the interval `dt` between two states. The path is
+/// the cubic through both states if the particle flew freely. It is a straight line if the particle bounced
+/// in between, because a cubic would overshoot.
 Vector3f interpolate(const render::Point& a, const render::Point& b, float w, float dt) {
   const Vector3f step = b.position - a.position;
   const Vector3f mean_velocity = 0.5f * (a.velocity + b.velocity);
@@ -38,9 +39,9 @@ Vector3f interpolate(const render::Point& a, const render::Point& b, float w, fl
          dt * ((w3 - 2 * w2 + w) * a.velocity + (w3 - w2) * b.velocity);
 }
 
-/// Position of a cloth point between two states, by the cubic through both. If there was an impact in
-/// between, the velocities at both ends are misleading; their deviation from the mean velocity is limited to
-/// half of it.
+/// Returns the position of a cloth point between two states, by the cubic through both. If there was an
+/// impact in between, the velocities at both ends are misleading; their deviation from the mean velocity is
+/// limited to half of it.
 Vector3f interpolate(const Vector3f& a, const Vector3f& va, const Vector3f& b, const Vector3f& vb, float w,
                      float dt) {
   const Vector3f step = b - a;
@@ -54,7 +55,8 @@ Vector3f interpolate(const Vector3f& a, const Vector3f& va, const Vector3f& b, c
   return a + w * step + w * rest * (rest * limited(va) - w * limited(vb));
 }
 
-/// A direction for each number, uniform on the sphere.
+/// Returns a direction that depends only on the number. The directions are uniformly distributed on the
+/// sphere.
 Vector3f direction_of(uint64_t id) {
   const effects::RandomStream random(0, effects::stream_id("axis of a mesh"));
   const Real z = 2 * random.uniform(id, 0) - 1, r = std::sqrt(std::max(1 - z * z, 0.0));
@@ -62,7 +64,7 @@ Vector3f direction_of(uint64_t id) {
   return Vec3(r * turn.cos, r * turn.sin, z).cast<float>();
 }
 
-/// Pose and size of a particle that is drawn as a mesh.
+/// Returns the pose and size of a particle that is drawn as a mesh.
 Affine3f pose_of(const render::Point& point, const Eigen::Quaternionf& by_contacts, const LookMesh& look) {
   const Vector3f axis = look.axis ? Vector3f(look.axis->cast<float>().normalized()) : direction_of(point.id);
   Eigen::Quaternionf turn(Eigen::AngleAxisf(point.angle, axis));

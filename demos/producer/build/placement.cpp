@@ -17,13 +17,13 @@ namespace {
 using Eigen::Vector2d;
 using sim::Pose;
 
-/// Rotation about +Y.
+/// Returns the rotation about +Y.
 Quat turn(Real radians) {
   const auto [sin, cos] = effects::sincos(radians / 2);
   return {cos, 0, sin, 0};
 }
 
-/// Rotation about the vertical through `pivot`, then displacement.
+/// Returns the motion that rotates about the vertical axis through `pivot` and then moves by `shift`.
 Pose turn_about(const Vec3& pivot, const Quat& q, const Vec3& shift) {
   return {pivot - q * pivot + shift, q};
 }
@@ -44,8 +44,8 @@ Pose on_grid(const Grid& grid, int i) {
   return {cell.cwiseProduct(grid.spacing), Quat::Identity()};
 }
 
-/// Dart throwing: a random place is tried again if it is too near to another one, for a bounded number of
-/// times.
+/// Scatters copies by dart throwing: if a random place is too close to an earlier one, another place is
+/// tried, up to a limit.
 class Scatterer {
  public:
   Scatterer(const Scatter& scatter, uint64_t seed, std::string_view name)
@@ -56,8 +56,8 @@ class Scatterer {
 
   void begin_group() { cells_.clear(); }
 
-  /// The i-th scattered copy, counted over all originals, for an original at `position`; nothing if there is
-  /// no room.
+  /// Returns the i-th scattered copy, counted over all originals, for an original at `position`; nothing if
+  /// there is no room.
   std::optional<std::pair<Pose, Real>> place(uint64_t i, const Vec3& position) {
     for (uint64_t attempt = 0; attempt < kAttempts; ++attempt) {
       const uint64_t index = i * kAttempts + attempt;
@@ -78,8 +78,8 @@ class Scatterer {
   enum Property : uint32_t { kX, kZ, kTurn, kScale };
   using Cell = std::pair<int, int>;
 
-  /// Takes the place unless another place of its group is nearer than min_distance. Only the neighbouring
-  /// cells can contain such a place.
+  /// Reserves the place unless another place of its group is closer than min_distance. Returns whether it
+  /// did. Only the neighbouring cells can contain such a place.
   bool claim(const Vector2d& p) {
     const Cell cell(static_cast<int>(std::floor(p.x() / cell_)), static_cast<int>(std::floor(p.y() / cell_)));
     for (int dx = -1; dx <= 1; ++dx) {
@@ -290,7 +290,7 @@ void name_copies(const std::vector<T>& originals, const std::vector<T>& copies,
   names = std::move(all);
 }
 
-/// Adds the places of a group's fill to it.
+/// Adds the places of a particle group's fill to the group.
 void resolve_fill(ParticleGroup& group, std::vector<Problem>& errors) {
   if (!group.fill) return;
   constexpr std::size_t kMostPlaces = 5'000'000;
@@ -322,7 +322,7 @@ void resolve_splits(ParticleSource& source, Real step) {
   all(source.on_death);
 }
 
-/// Replaces a face by the rectangle or disc that it is.
+/// Replaces a face as the surface of an emitter by a rectangle or a disc.
 void resolve_face(const Scene& flat, Emitter& emitter, std::vector<Problem>& errors) {
   const auto* face = std::get_if<FaceSurface>(&emitter.surface);
   if (!face) return;

@@ -22,7 +22,7 @@ inline constexpr int kMaxCopies = 100'000;  ///< limit for one object
 struct PlacedCopy {
   sim::Pose motion;    ///< maps the original to the copy, in world coordinates
   Real scale = 1;      ///< factor of the object's size
-  std::string suffix;  ///< suffix of its name: "_0", "_1" ...
+  std::string suffix;  ///< suffix of the copy's name: "_0", "_1" ...
 };
 
 struct Copies {
@@ -30,10 +30,10 @@ struct Copies {
   int left_out = 0;  ///< number of scattered copies without room at min_distance from the others
 };
 
-/// Whether a fill lacks the spacing that copies need.
+/// Returns whether a fill lacks the spacing that copies need.
 bool needs_spacing(const Placement& placement);
 
-/// Number of copies of a placement; kMaxCopies + 1 if there are more than kMaxCopies.
+/// Returns the number of copies of a placement; kMaxCopies + 1 if there are more than kMaxCopies.
 int copy_count(const Placement& placement);
 
 /// Returns the copies of an object at `position`; one without suffix if there is no placement. The random

@@ -29,7 +29,7 @@ std::string unknown_place(const std::string& file, const char* kind, const std::
   return fmt::format("{}: has no {} '{}'{}", file, kind, name, suggestion(name, names));
 }
 
-/// Whether the animation that a body plays moves a node.
+/// Returns whether the animation that a body plays moves a node.
 bool is_animated(const Body& body, const render::Model::Place& place, const render::ModelRig& rig) {
   if (!body.animation || place.node < 0) return false;
   const int clip = rig.clip(body.animation->clip);

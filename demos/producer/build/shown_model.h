@@ -13,12 +13,12 @@ namespace offstage::producer {
 
 using FileLight = render::Model::Light;
 
-/// A model file as a body shows it.
+/// The model file that a body shows.
 struct ShownModel {
   std::string file;
   Eigen::Affine3f body_from_model = Eigen::Affine3f::Identity();
 };
-/// The model file that is drawn for a body; empty if it is drawn as its shape.
+/// Returns the model file that is drawn for a body; empty if it is drawn as its shape.
 std::optional<ShownModel> shown_model(const Body& body, const ModelLibrary& models);
 
 /// Returns the body with a name, which must exist.
@@ -26,11 +26,11 @@ const Body& body_of(const Scene& scene, const std::string& name);
 /// Returns the camera of the model file that an entry of the scene selects; null if there is none.
 const render::Model::Camera* find_camera(const ModelCamera& camera, const Scene& scene,
                                          const ModelLibrary& models);
-/// Whether an entry of the scene's lights selects the light `light` of its file.
+/// Returns whether an entry of the scene's lights selects the light `light` of its file.
 bool has_light(const ModelLights& lights, const FileLight& light);
 
-/// Pose of a camera or light of the file that a body shows, in the body's frame, at a time of the film [s].
-/// It contains the model's scale.
+/// Returns the pose of a camera or light of the file that a body shows, in the body's frame, at a time of the
+/// film [s]. It contains the model's scale.
 Eigen::Affine3f pose_in_body(const Body& body, const render::Model::Place& place, const ModelLibrary& models,
                              double time);
 

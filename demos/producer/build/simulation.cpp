@@ -60,7 +60,7 @@ ClothSample cloth_sample(const sim::ClothView& view) {
   return sample;
 }
 
-/// Key of the collision mesh of a model.
+/// Returns the key of the collision mesh of a model.
 std::string mesh_key(const MeshFile& file, const ModelLibrary& models) {
   return fmt::format("{}\n{}\n{}\n{:a}", models.digest(), ModelLibrary::parts_key(file),
                      models.parts(file) ? "parts" : "", scale_of(file, models));
@@ -72,7 +72,7 @@ nlohmann::ordered_json stats_json(const Vec3& v) {
 
 }  // namespace
 
-/// Cloths that are softer than they should be, and those that tore.
+/// Records the cloths whose stiffness was reduced, and the cloths that tore.
 void Simulation::note_cloths() {
   world_.for_each_cloth([&](sim::ClothHandle handle) {
     const sim::ClothReport& report = world_.cloth_report(handle);
@@ -147,7 +147,7 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models, Coll
     }
     if (body.has_animated_shape() && body.collides) {
       animated.emplace_back(&body, def);
-      def.collides = false;  // its pieces do
+      def.collides = false;  // the pieces of the animated shape collide instead
     }
     const sim::BodyHandle handle = at_place(body.where, [&] {
       std::visit(

@@ -20,8 +20,8 @@
 
 namespace offstage::producer {
 
-/// The physics cannot continue, because a quantity became infinite or NaN. The exception contains the state
-/// as JSON text, which can be saved.
+/// Thrown if the simulation cannot continue, because a quantity became infinite or NaN. The exception
+/// contains the state as JSON text, which can be saved.
 class DivergedError : public std::runtime_error {
  public:
   DivergedError(const std::string& what, std::string state)
@@ -35,20 +35,20 @@ class DivergedError : public std::runtime_error {
 /// Statistics of a run: the figures of all steps together. Contacts and penetration are also given for the
 /// end of the run.
 struct SimulationTotals : sim::StepFigures {
-  uint64_t waiting = 0, skipped = 0;  ///< counts of the emitters
+  uint64_t waiting = 0, skipped = 0;  ///< numbers of particles that emitters postponed, and did not release
   uint64_t most_contacts = 0;         ///< greatest number of contact points of bodies at the end of a frame
   std::vector<std::string> broken_joints;  ///< names of broken joints, in the order in which they broke
   std::vector<std::string> lost_bodies;    ///< bodies that left the world's bounds and were frozen there
-  /// By cloth: the smallest factor by which the stiffness of a spring was reduced.
+  /// For each cloth with reduced stiffness: the smallest factor of the stiffness of a spring.
   std::map<std::string, sim::Real> softened_cloths;
   std::map<std::string, sim::ClothTear> first_tears;
-  /// Bodies with approximate contact forces, and how often a solver fell back for them.
+  /// For each body with approximate contact forces: the number of fall-backs of its solver.
   std::map<std::string, uint64_t> rough_bodies;
   double first_rough_s = 0;  ///< time of the first fall-back [s]
   double step_s = 0;         ///< longest internal step [s]
 };
 
-/// Collision meshes. The key contains the model's data, its scale and its decomposition settings.
+/// Collision meshes by a key, which contains the model's data, its scale and its decomposition settings.
 using CollisionMeshes = std::map<std::string, std::shared_ptr<const sim::CollisionMesh>>;
 
 class Simulation {
@@ -71,7 +71,7 @@ class Simulation {
   Snapshot snapshot() const;
 
   const sim::World& world() const { return world_; }
-  /// Energy of the world. Throws DivergedError if it is not finite.
+  /// Returns the energy of the world. Throws DivergedError if it is not finite.
   sim::Energy energy() const;
   /// Throws DivergedError with the current state and the reason.
   [[noreturn]] void fail(const std::string& what) const;

@@ -22,8 +22,8 @@ struct BodySample {
   Eigen::Quaternionf orientation;
 };
 
-/// Ends of a spring, of a joint that is a rod or rope, or of a segment of a cord; both are equal if it does
-/// not exist any more.
+/// Ends of a rod: a spring, a joint that is a rod or rope, or a segment of a cord. Both ends are equal if the
+/// rod does not exist any more.
 struct RodSample {
   Eigen::Vector3f a, b;
 };

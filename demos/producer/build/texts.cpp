@@ -53,7 +53,7 @@ void write_text(const TextOverlay& overlay, const Snapshot& moment, render::Imag
   for (const std::string& line : lines) {
     const int width = scale * render::text_width_px(line);
     const int x = middle ? (image.width_px - width) / 2 : right ? image.width_px - margin - width : margin;
-    // A dark copy behind it, so that it is readable on any background.
+    // A dark copy behind the text makes it readable on any background.
     const int shift = std::max(1, scale / 2);
     render::draw_text(image, x + shift, y + shift, line, scale, {0, 0, 0});
     render::draw_text(image, x, y, line, scale, bytes_of(overlay.color));

@@ -1,4 +1,4 @@
-// bench.
+// The command bench: compares the algorithms of a scene.
 
 #include <algorithm>
 #include <chrono>
@@ -26,7 +26,7 @@ struct BenchOptions {
   LogOptions log;
 };
 
-/// Shows which method runs: in a status line on a terminal, or with a line for each run in a log file.
+/// Shows which method is running: in a status line on a terminal, or by a line for each run in a log file.
 class BenchProgress {
  public:
   BenchProgress(const LogOptions& log_options, std::size_t runs)

@@ -1,4 +1,4 @@
-// cache.
+// The command cache: lists, verifies and clears caches.
 
 #include <map>
 #include <memory>

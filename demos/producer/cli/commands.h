@@ -107,7 +107,7 @@ void print_warnings(const std::vector<Problem>& warnings);
 /// quiet. Throws the exceptions of ModelLibrary. After a signal it throws Interrupted before the next model.
 ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
                          const LogOptions& log_options);
-/// As above, but appends warnings to `warnings` instead of printing them.
+/// Like the function above, but appends warnings to `warnings` instead of printing them.
 ModelLibrary load_models(const LoadedScene& loaded, const SceneOptions& options,
                          const LogOptions& log_options, std::vector<Problem>& warnings);
 /// Returns a hash of all settings that determine the pixels of a scene's frames.

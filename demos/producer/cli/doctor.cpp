@@ -1,4 +1,4 @@
-// doctor: the capabilities of this machine.
+// The command doctor: reports the capabilities of this machine.
 
 #include <array>
 #include <chrono>

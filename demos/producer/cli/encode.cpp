@@ -1,4 +1,4 @@
-// encode: a video of existing frames.
+// The command encode: makes a video of existing frames.
 
 #include <algorithm>
 #include <array>
@@ -31,7 +31,7 @@ struct EncodeOptions {
   std::vector<std::string> frames;  ///< the pattern of the frames, as the only item
   LogOptions log;
   std::string out;
-  std::optional<std::string> fps;  ///< default: the rate of the manifest beside the frames, or 30
+  std::optional<std::string> fps;  ///< frame rate; default: the rate in the manifest beside the frames, or 30
   bool allow_gaps = false, force = false;
 };
 

@@ -1,4 +1,4 @@
-// export.
+// The command export: writes the motion of a film for other programs.
 
 #include <functional>
 #include <memory>

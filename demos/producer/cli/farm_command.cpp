@@ -1,4 +1,4 @@
-// farm.
+// The command farm: renders a film in many processes.
 
 #include <algorithm>
 #include <atomic>

@@ -1,4 +1,4 @@
-// frame.
+// The command frame: draws one frame.
 
 #include <filesystem>
 #include <memory>

@@ -1,4 +1,4 @@
-// compare and bless.
+// The commands compare and bless: compare scenes with their goldens, and record goldens.
 
 #include <algorithm>
 #include <chrono>

@@ -1,4 +1,4 @@
-// schema and info, and functions shared by the commands.
+// The commands schema and info, and functions that several commands share.
 
 #include <cerrno>
 #include <map>

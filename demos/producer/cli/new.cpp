@@ -1,4 +1,4 @@
-// new: writes a first scene.
+// The command new: writes a first scene.
 
 #include <algorithm>
 #include <cctype>

@@ -1,4 +1,4 @@
-// presets: the presets that a scene can name.
+// The command presets: lists the presets that a scene can name.
 
 #include <algorithm>
 #include <memory>
@@ -12,7 +12,7 @@
 #include "producer/cli/commands.h"
 #include "producer/format/presets.h"
 #include "producer/format/scene_table.h"
-#include "producer/format/table_joint.h"
+#include "producer/format/table_articulation.h"
 
 namespace offstage::producer {
 namespace {

@@ -1,4 +1,4 @@
-// render.
+// The command render: makes a film.
 
 #include <algorithm>
 #include <array>
@@ -47,7 +47,7 @@ struct Plan {
   std::vector<int> frames;
   std::string settings;
   int threads = 1, jobs = 1;
-  // Whether frames are drawn first and a video is then made of them, which can be resumed.
+  // Whether the frames are drawn to files first, and then encoded to a video. Such a run can be resumed.
   bool through_frames = false;
   fs::path frames_pattern;  // pattern of these frames
   ChannelFiles channels;
@@ -97,7 +97,7 @@ void check_format(const Plan& plan) {
   const bool texts = std::ranges::any_of(
       scene.overlays, [](const Overlay& overlay) { return std::holds_alternative<TextOverlay>(overlay); });
   if (format == render::FrameFormat::exr && texts)
-    log("warning: the text overlays are not in the EXR frames, which hold the light of the scene alone\n");
+    log("warning: the text overlays are not in the EXR frames, which contain only the light of the scene\n");
 }
 
 Plan make_plan(const RenderOptions& options, const ModelLibrary& models, LoadedScene loaded) {
@@ -192,7 +192,7 @@ int render_to_frames(const Plan& plan, const ModelLibrary& models, const RenderO
     if (!assemble_video(plan)) stats.interrupted_by = interrupt_signal();
   }
   if (plan.through_frames && !stats.interrupted_by) {
-    folder.lock = {};  // releases the lock, whose file would prevent the removal of the folder
+    folder.lock = {};  // releases the lock, because its file would prevent the removal of the folder
     remove_frames(plan.frames_pattern.parent_path());
   }
   report_run(stats, options.log, options.stats);
@@ -309,7 +309,7 @@ void check_file(const std::string& file, bool force) {
 
 void check_distinct(const std::string& a, const std::string& b) {
   if (!a.empty() && fs::path(a).lexically_normal() == fs::path(b).lexically_normal())
-    throw OutputError(a + ": is used for two outputs");
+    throw OutputError(a + ": is used for two outputs; give them different names");
 }
 
 void check_png(const std::string& file) {

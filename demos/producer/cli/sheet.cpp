@@ -1,4 +1,4 @@
-// sheet.
+// The command sheet: draws small frames of the whole film in one picture.
 
 #include <algorithm>
 #include <cmath>

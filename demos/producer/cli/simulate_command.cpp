@@ -1,4 +1,4 @@
-// simulate.
+// The command simulate: simulates without drawing.
 
 #include <array>
 #include <memory>

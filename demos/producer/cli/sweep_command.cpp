@@ -1,4 +1,4 @@
-// sweep.
+// The command sweep: renders a scene with different values.
 
 #include <algorithm>
 #include <atomic>
@@ -37,8 +37,8 @@ struct SweepOptions {
   SceneOptions scene;
   std::vector<std::string> vary;
   std::vector<double> at;  ///< times [s]; empty: the middle of the film
-  std::string out, csv;    ///< csv empty: beside the sheet
-  int columns = 0;         ///< 0: chosen according to the variations
+  std::string out, csv;    ///< an empty `csv` means a file beside the sheet
+  int columns = 0;         ///< number of columns of the sheet; 0: chosen according to the variations
   int threads = 0, jobs = 0;
   bool resume = false, force = false, quiet = false;
   render::GlPlatform gl = render::GlPlatform::automatic;
@@ -265,8 +265,8 @@ double available_memory_mb() {
   return INFINITY;
 }
 
-/// Processes the runs on several threads. The first run is done alone, to measure how much memory a run
-/// needs.
+/// Processes the runs on several threads. Only the first run is done at first, to measure how much memory a
+/// run needs.
 class Crew {
  public:
   Crew(Sweep& sweep, const SweepOptions& options) : sweep_(sweep), options_(options) {}

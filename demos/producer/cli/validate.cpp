@@ -1,4 +1,4 @@
-// validate.
+// The command validate: checks a scene and estimates its cost.
 
 #include <algorithm>
 #include <cmath>

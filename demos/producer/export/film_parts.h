@@ -80,7 +80,7 @@ class FilmParts {
   std::vector<std::string> lamps;  ///< names of the lights, in the order of lamps_at()
   render::Sun sun;
 
-  /// Return the camera and the lights at the time of a snapshot.
+  /// Each function returns the camera or the lights at the time of a snapshot.
   render::Camera camera_at(const Snapshot& snapshot) const;
   std::vector<render::Lamp> lamps_at(const Snapshot& snapshot) const;
 

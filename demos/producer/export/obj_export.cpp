@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A name without white space, as OBJ requires.
+/// Returns the name with its white space replaced, as OBJ requires.
 std::string one_word(const std::string& name) {
   std::string out;
   for (const char c : name) out += static_cast<unsigned char>(c) <= 0x20 ? '_' : c;

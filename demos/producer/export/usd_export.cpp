@@ -41,7 +41,8 @@ std::string sampled(std::string_view attribute, const SampleTrack<T>& track) {
 /// An attribute that is an array of numbers at each frame.
 class SpooledAttribute {
  public:
-  /// `interpolation`: how the values are assigned to the points; empty: the default of this attribute in USD.
+  /// Begins an attribute. `interpolation`: how USD assigns the values to the points; empty: the default of
+  /// the attribute.
   SpooledAttribute(std::string declaration, const fs::path& folder, std::string interpolation = {})
       : declaration_(std::move(declaration)), interpolation_(std::move(interpolation)), spool_(folder) {}
   void add(int frame, const std::string& value) { spool_.append(fmt::format("  {}: {},\n", frame, value)); }

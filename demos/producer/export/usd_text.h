@@ -30,12 +30,12 @@ std::string quoted(std::string_view text);
 std::string text(float value);
 std::string text(const Eigen::Vector2f& v);
 std::string text(const Eigen::Vector3f& v);
-/// A quatf, with the real part first.
+/// Returns the rotation as a quatf of USD, with the real part first.
 std::string text(const Eigen::Quaternionf& q);
-/// A matrix4d. In USD, a row vector is multiplied by the matrix from the right, so the text has the transpose
-/// of `transform`.
+/// Returns the transform as a matrix4d of USD. In USD, a row vector is multiplied by the matrix from the
+/// right, so the text has the transpose of `transform`.
 std::string text(const Eigen::Matrix4f& transform);
-/// A token.
+/// Returns the text as a token of USD.
 std::string text(const std::string& token);
 
 /// Returns a list of values: "[a, b, ...]".

@@ -47,15 +47,15 @@ inline constexpr Limits kPositive{.low = 0, .open_low = true};
 inline constexpr Limits kNotNegative{.low = 0};
 inline constexpr Limits kFraction{.low = 0, .high = 1};
 inline constexpr Limits kDirection{.nonzero = true};
-/// From `low` to `high`, both included.
+/// Returns the limits from `low` to `high`, both included.
 constexpr Limits between(Real low, Real high) {
   return {.low = low, .high = high};
 }
-/// Greater than `low` and less than `high`.
+/// Returns the limits of values greater than `low` and less than `high`.
 constexpr Limits inside(Real low, Real high) {
   return {.low = low, .high = high, .open_low = true, .open_high = true};
 }
-/// Greater than `low` and at most `high`.
+/// Returns the limits of values greater than `low` and at most `high`.
 constexpr Limits over(Real low, Real high) {
   return {.low = low, .high = high, .open_low = true};
 }
@@ -225,13 +225,13 @@ struct Key {
   }
 };
 
-/// An object of type T with the defaults of all its keys.
+/// Returns an object of type T in which all keys have their defaults.
 template <class T>
 const T& initial_object() {
   static const T object{};
   return object;
 }
-/// Offset of a part in the initial object [bytes].
+/// Returns the offset of a part in the initial object [bytes].
 template <class T, class Part>
 std::ptrdiff_t offset_in(const Part& part) {
   return reinterpret_cast<const std::byte*>(&part) - reinterpret_cast<const std::byte*>(&initial_object<T>());

@@ -67,7 +67,7 @@ class Checker : SceneChecker {
     for (const Force& force : scene_.forces)
       std::visit(
           [&](const auto& f) {
-            // An empty path: its type was invalid, so it was not read.
+            // An empty path means that the type of the force was invalid, so that it was not read.
             if (!f.where.path.empty()) check_force(f);
           },
           force);
@@ -175,7 +175,7 @@ class Checker : SceneChecker {
       if (!used_materials_.contains(material.name))
         warn(material.where.path, "the material '" + material.name + "' is not used");
       else
-        check_grain(material);
+        check_cross_friction(material);
   }
   /// Checks the files and the material of a look.
   void check_look(const std::string& path, const ParticleLook& look) {
@@ -191,7 +191,7 @@ class Checker : SceneChecker {
     }
   }
   /// Checks `cross_friction`, which has an effect only if a body with a `friction_axis` has the material.
-  void check_grain(const Material& material) {
+  void check_cross_friction(const Material& material) {
     bool any = false;
     for (const Body& body : scene_.bodies) any = any || (body.material == material.name && has_grain(body));
     if (material.cross_friction && !any)
@@ -215,7 +215,8 @@ class Checker : SceneChecker {
           fail(path + "/materials" + step(i),
                "there is no material '" + name + "'" + suggestion(name, names_of(scene_.materials)));
       const auto [it, fresh] = owners.emplace(std::minmax(a, b), path);
-      if (!fresh) fail(path + "/materials", "are the same pair as in " + it->second);
+      if (!fresh)
+        fail(path + "/materials", "are the same pair as in " + it->second + "; remove one of the two rules");
       if (!rule.restitution && !rule.friction && !rule.static_friction && !rule.rolling_friction &&
           !rule.spinning_friction)
         warn(path, "has no effect: it has neither restitution nor friction");

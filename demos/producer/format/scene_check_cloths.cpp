@@ -61,7 +61,7 @@ class ClothChecker : CheckBase {
   void check_shape(const Cloth& cloth, FlatCloth flat) {
     for (const ClothPin& pin : cloth.pins) {
       const PinScope& scope = scope_of(pin);
-      if (scope.where.path.empty()) continue;  // its type was invalid, so it was not read
+      if (scope.where.path.empty()) continue;  // the type of the pin was invalid, so that it was not read
       const std::vector<uint32_t> held = pinned_vertices(pin, cloth, flat);
       if (held.empty()) fail(scope.where.path, selects_nothing(flat));
     }

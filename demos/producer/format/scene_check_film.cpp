@@ -21,7 +21,7 @@ class FilmChecker : SceneChecker {
     for (const Overlay& overlay : scene_.overlays)
       std::visit(
           [&](const auto& o) {
-            // An empty path: its type was invalid, so it was not read.
+            // An empty path means that the type of the overlay was invalid, so that it was not read.
             if (!o.where.path.empty()) check_overlay(o);
           },
           overlay);
@@ -189,7 +189,8 @@ class FilmChecker : SceneChecker {
     check_not_random("/render/exposure", scene_.render.exposure);
     const auto& size = scene_.render.size;
     if (size.x() % 2 != 0 || size.y() % 2 != 0)
-      warn("/render/size", "is odd; most video formats need an even width and height");
+      warn("/render/size",
+           "has an odd width or height; most video formats need even numbers, such as 1280 x 720");
     if (scene_.frame_count() < 1)
       fail("/output/duration",
            fmt::format("is shorter than one frame at {} frames per second", scene_.output.fps.text()));

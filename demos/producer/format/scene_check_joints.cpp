@@ -29,7 +29,8 @@ class JointChecker : CheckBase {
     for (const ArticulationTemplate& articulation : scene_.articulations)
       std::visit(
           [this](const auto& a) {
-            if (!a.where.path.empty()) check(a);  // an empty path: its type was invalid, so it was not read
+            if (!a.where.path.empty())
+              check(a);  // an empty path: the type was invalid, so the articulation was not read
           },
           articulation);
   }
@@ -187,7 +188,8 @@ class JointChecker : CheckBase {
     check_keys(path + "/steer", vehicle.steer);
     for (std::size_t i = 0; i < vehicle.steer.size(); ++i)
       if (!(std::abs(vehicle.steer[i].target) <= kMostSteering))
-        fail(path + "/steer/" + std::to_string(i) + "/target", "must be from -35 to 35 degrees");
+        fail(path + "/steer/" + std::to_string(i) + "/target",
+             "must be from -35 to 35 degrees, the limits of the steering");
     if (!(vehicle.wheel_radius <= 0.2 * std::min(vehicle.length, 2 * vehicle.width)))
       fail(path + "/wheel_radius", "must be at most a fifth of the length and two fifths of the width");
   }

@@ -85,7 +85,7 @@ class ParticleChecker : CheckBase {
     if (look.sheet && (look.texture.empty() || look.style != LookStyle::sprite))
       warn(path + "/sheet", "has no effect: it divides the texture of sprites, and there is none");
     if (look.sheet && look.sheet->columns * look.sheet->rows > render::kMostSheetPictures)
-      fail(path + "/sheet", fmt::format("has {} pictures; a sheet has at most {}",
+      fail(path + "/sheet", fmt::format("has {} pictures (columns x rows); a sheet has at most {}",
                                         look.sheet->columns * look.sheet->rows, render::kMostSheetPictures));
     const auto moves = [](const Varying& v) {
       return effects::lower_bound(v) != 0 || effects::upper_bound(v) != 0;

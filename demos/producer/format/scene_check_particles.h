@@ -21,7 +21,8 @@ struct ParticleBound {
   std::string name;
   uint64_t alive = 0;
 };
-/// Returns the bound of each particle system. `scene` must have its copies expanded.
+/// Returns the upper bound of the number of particles for each particle system. `scene` must have its copies
+/// expanded.
 std::vector<ParticleBound> particle_bounds(const Scene& scene);
 
 }  // namespace offstage::producer

@@ -1,5 +1,6 @@
 #include "producer/format/scene_table.h"
 
+#include "producer/format/table_articulation.h"
 #include "producer/format/table_body.h"
 #include "producer/format/table_camera.h"
 #include "producer/format/table_cloth.h"

@@ -11,7 +11,7 @@
 /// - `emitters`, with trails, splits and sub-emitters: table_emitter.h
 /// - `effects`: table_effect.h
 /// - `springs`: table_spring.h
-/// - `joints`, `articulations`: table_joint.h
+/// - `joints`: table_joint.h; `articulations`: table_articulation.h
 /// - `cloths`: table_cloth.h
 /// - `forces`: table_force.h
 /// - `overlays`: table_overlay.h

@@ -19,7 +19,7 @@ struct Table<ModelLook> {
   static constexpr const char* kName = "model";
   static constexpr const char* kHelp = "A model file drawn instead of the body's shape.";
   static Fields<ModelLook> fields() {
-    return {{"file", &ModelLook::file, "model file", kRequired},
+    return {{"file", &ModelLook::file, kModelFileHelp, kRequired},
             {"scale", &ModelLook::scale, kModelScaleHelp, "", kScale},
             {"fit", &ModelLook::fit, kModelFitHelp, "m", kPositive},
             {"position", &ModelLook::position, "position of the model's origin in the body's frame", "m"},
@@ -51,8 +51,10 @@ struct Table<ModelAnimation> {
     using T = ModelAnimation;
     return {
         {"clip", &T::clip, "name of the animation, or its number from 0; empty: the first one"},
-        {"speed", &T::speed, "seconds of the animation per second", "", kNotNegative},
-        {"start", &T::start, "time at which the animation starts; until then its first pose is held", "s"},
+        {"speed", &T::speed, "speed of playback: seconds of the animation per second of the film", "",
+         kNotNegative},
+        {"start", &T::start,
+         "time of the film at which the animation starts; until then its first pose is held", "s"},
         {"loop", &T::loop, "whether the animation starts again at its end; false: its last pose is held"}};
   }
 };
@@ -67,19 +69,19 @@ struct Table<Body> {
         {"motion", &T::motion,
          "`static` bodies never move, `kinematic` bodies follow their keyframes and spin, `dynamic` bodies "
          "are moved by forces"},
-        {"shape", &T::shape, "collision shape"},
+        {"shape", &T::shape, "shape with which the body collides"},
         {"model", &T::model, "model file drawn instead of the shape"},
         {"animation", &T::animation,
          "animation of the model file that is played. If the file is the body's shape, its moving nodes and "
-         "bones "
-         "push other bodies; if it is its `model`, they are only drawn"},
+         "bones push other bodies; if it is its `model`, they are only drawn"},
         {"material", &T::material, "name of a material; empty: grey, or the materials of the model file"},
         {"position", &T::position, "position of the body's origin at time 0", "m"},
         {"orientation", &T::orientation, "orientation of the body at time 0"},
         {"velocity", &T::velocity, "velocity of the centre of mass at time 0; dynamic bodies only", "m/s"},
         {"angular_velocity", &T::angular_velocity,
          "angular velocity at time 0, in world axes; dynamic bodies only", "rad/s"},
-        {"density", &T::density, "density; determines the mass unless `mass` is given", "kg/m^3", kPositive},
+        {"density", &T::density, "density of the body; determines the mass unless `mass` is given", "kg/m^3",
+         kPositive},
         {"mass", &T::mass, "mass of a dynamic body; 0: computed from density and volume", "kg", kNotNegative},
         {"centre", &T::centre, "centre of mass in the body's frame; default: the shape's centre of mass",
          "m"},
@@ -89,8 +91,10 @@ struct Table<Body> {
          "kg m^2", kPositive},
         {"inertia_products", &T::inertia_products,
          "off-diagonal elements Ixy, Iyz and Izx of the inertia matrix; need `inertia`", "kg m^2"},
-        {"linear_drag", &T::linear_drag, "drag force per speed relative to the air", "kg/s", kNotNegative},
-        {"angular_drag", &T::angular_drag, "drag torque per angular speed", "kg m^2/s", kNotNegative},
+        {"linear_drag", &T::linear_drag, "drag force per speed relative to the air; 0: no drag", "kg/s",
+         kNotNegative},
+        {"angular_drag", &T::angular_drag, "drag torque per angular speed; 0: no drag", "kg m^2/s",
+         kNotNegative},
         {"friction_axis", &T::friction_axis,
          "direction in the body's frame along which the material's `friction` applies; across it, "
          "`cross_friction` applies; zero: friction is the same in all directions. If both bodies of a "
@@ -98,11 +102,11 @@ struct Table<Body> {
         {"surface_velocity", &T::surface_velocity,
          "velocity of the surface relative to the body, as on a conveyor belt; in the body's frame", "m/s"},
         {"collides", &T::collides, "whether the body collides with bodies, particles and cloths"},
-        {"visible", &T::visible, "is drawn"},
-        {"casts_shadow", &T::casts_shadow, "casts a shadow"},
+        {"visible", &T::visible, "whether the object is drawn"},
+        {"casts_shadow", &T::casts_shadow, "whether the object casts a shadow"},
         {"keyframes", &T::keyframes, "poses over time; kinematic bodies only"},
         {"interpolation", &T::interpolation, kInterpolationHelp},
-        {"loop", &T::loop, "repeats the keyframes; otherwise the last pose is held"},
+        {"loop", &T::loop, "whether the keyframes repeat; false: the last pose is held"},
         {"appear_at", &T::appear_at,
          "time at which the body appears, at its pose and velocity of time 0; its joints then connect it to "
          "the other bodies, in their poses at that time",

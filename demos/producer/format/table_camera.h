@@ -10,25 +10,30 @@ namespace offstage::producer {
 template <>
 struct Table<Lens> {
   static Fields<Lens> fields() {
-    return {
-        {"fov_deg", &Lens::fov_deg, "vertical field of view", "degrees", inside(0, 180)},
-        {"focal_mm", &Lens::focal_mm,
-         "focal length for a picture 36 mm wide, instead of fov_deg: 24 is wide, 50 is normal, 100 is long",
-         "mm", between(1, 2000)},
-        {"aperture", &Lens::aperture, "diameter of the lens opening; 0: everything is in focus", "m",
-         kNotNegative},
-        {"focus", &Lens::focus, "focus distance; 0: the distance of the target", "m", kNotNegative},
-        {"focus_on", &Lens::focus_on, "name of a body that is kept in focus"},
-        {"look_at", &Lens::look_at, "name of a body that the camera keeps turning to"},
-        {"fit", &Lens::fit,
-         "names of bodies that fill the picture: the camera keeps its direction and moves as close as it can "
-         "while all of them are visible at time 0"}};
+    return {{"fov_deg", &Lens::fov_deg, "vertical field of view", "degrees", inside(0, 180)},
+            {"focal_mm", &Lens::focal_mm,
+             "focal length for a picture 36 mm wide, instead of `fov_deg`: 24 is a wide-angle lens, 50 a "
+             "normal lens, 100 a telephoto lens",
+             "mm", between(1, 2000)},
+            {"aperture", &Lens::aperture,
+             "diameter of the lens opening; larger: objects out of focus are more blurred; 0: everything is "
+             "in focus",
+             "m", kNotNegative},
+            {"focus", &Lens::focus,
+             "distance from the camera to the plane that is in focus; 0: the distance of the target", "m",
+             kNotNegative},
+            {"focus_on", &Lens::focus_on,
+             "name of a body that is kept in focus, instead of `focus`; empty: none"},
+            {"look_at", &Lens::look_at, "name of a body that the camera keeps turning to; empty: none"},
+            {"fit", &Lens::fit,
+             "names of bodies that fill the picture: the camera keeps its direction and moves as close as it "
+             "can while all of them are visible at time 0"}};
   }
 };
 template <>
 struct Table<StaticCamera> {
   static constexpr const char* kName = "static_camera";
-  static constexpr const char* kHelp = "A camera on a tripod.";
+  static constexpr const char* kHelp = "A camera that does not move.";
   static Fields<StaticCamera> fields() {
     return Fields<StaticCamera>{{"eye", &StaticCamera::eye, "position of the camera", "m"},
                                 {"target", &StaticCamera::target, "point that the camera looks at", "m"}}
@@ -38,7 +43,7 @@ struct Table<StaticCamera> {
 template <>
 struct Table<CameraKey> {
   static constexpr const char* kName = "camera_key";
-  static constexpr const char* kHelp = "A view at a time.";
+  static constexpr const char* kHelp = "Position and direction of a moving camera at a time.";
   static Fields<CameraKey> fields() {
     return {{"time", &CameraKey::time, "time of the key; times must increase", "s"},
             {"eye", &CameraKey::eye, "position of the camera", "m"},
@@ -119,13 +124,11 @@ struct Table<NamedCamera> {
   static constexpr const char* kName = "named_camera";
   static constexpr const char* kHelp =
       "A further camera. `render --camera NAME` draws it instead of `camera`, `--camera all` draws all of "
-      "them in "
-      "one run.";
+      "them in one run.";
   static Fields<NamedCamera> fields() {
     return {{"name", &NamedCamera::name,
              "name of the camera, a part of the names of its files: letters, digits, _ and -; not `main`, "
-             "which is "
-             "the name of `camera`, and not `all`",
+             "which is the name of `camera`, and not `all`",
              kRequired},
             {"camera", &NamedCamera::camera, "the camera"}};
   }

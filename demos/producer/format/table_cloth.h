@@ -27,7 +27,7 @@ struct Table<SphereCloth> {
   static constexpr const char* kName = "cloth_sphere";
   static constexpr const char* kHelp = "A closed sphere around the origin of the cloth's frame.";
   static Fields<SphereCloth> fields() {
-    return {{"radius", &SphereCloth::radius, "radius", "m", kPositive},
+    return {{"radius", &SphereCloth::radius, "radius of the sphere", "m", kPositive},
             {"divisions", &SphereCloth::divisions,
              "number of subdivisions of an icosahedron, each of which divides every triangle into four: 3 "
              "gives 642 vertices",
@@ -52,29 +52,36 @@ struct Table<FabricChanges> {
     using T = FabricChanges;
     return {
         {"areal_density", &T::areal_density,
-         "mass per area; default of this key and all keys up to `min_bend_radius`: the value of the fabric",
+         "mass per area. Default of this key, and of all keys up to `min_bend_radius` that state no other "
+         "default: the value of the `fabric`",
          "kg/m^2", kPositive},
-        {"stretch", &T::stretch, "force per width at a strain of 1, along the threads", "N/m", kPositive},
-        {"shear", &T::shear, "shear modulus times thickness: shear force per width at a shear angle of 1",
+        {"stretch", &T::stretch, "stiffness along the threads: tensile force per width at a strain of 1",
+         "N/m", kPositive},
+        {"shear", &T::shear,
+         "stiffness against shear, the change of the angle between the threads: shear force per width at a "
+         "shear angle of 1 rad",
          "N/m", kNotNegative},
-        {"bend", &T::bend, "flexural rigidity: moment per width at a curvature of 1/m", "N m", kNotNegative},
+        {"bend", &T::bend,
+         "flexural rigidity, the stiffness against bending: moment per width at a curvature of 1/m", "N m",
+         kNotNegative},
         {"bend_damping", &T::bend_damping,
          "damping time of bending: the moment is bend * (curvature + bend_damping * its rate of change)", "s",
          kNotNegative},
         {"bend_model", &T::bend_model,
          "`plate`: a thin plate, whose flexural rigidity is `bend` on any mesh; `springs`: the book's "
-         "springs "
-         "between second neighbours, which resist sharp folds but hardly a slight curvature"},
-        {"damping", &T::damping, "fraction of the critical damping of a spring", "", between(0, 10)},
+         "springs between second neighbours, which resist sharp folds but hardly a slight curvature"},
+        {"damping", &T::damping, "damping of the springs, as a fraction of their critical damping", "",
+         between(0, 10)},
         {"stretch_damping", &T::stretch_damping,
-         "fraction of the critical damping of springs along the threads; default of this and the next two "
-         "keys: `damping`",
+         "damping of springs along the threads, as a fraction of their critical damping; default: `damping`",
          "", between(0, 10)},
         {"shear_damping", &T::shear_damping,
-         "fraction of the critical damping of springs diagonally across the cells", "", between(0, 10)},
+         "damping of springs diagonally across the cells, as a fraction of their critical damping; default: "
+         "`damping`",
+         "", between(0, 10)},
         {"bend_spring_damping", &T::bend_spring_damping,
-         "fraction of the critical damping of springs between second neighbours, with the `bend_model` "
-         "`springs`",
+         "damping of springs between second neighbours, as a fraction of their critical damping, with the "
+         "`bend_model` `springs`; default: `damping`",
          "", between(0, 10)},
         {"friction", &T::friction,
          "coefficient of friction against bodies; a contact uses the geometric mean of the values of cloth "
@@ -83,14 +90,16 @@ struct Table<FabricChanges> {
         {"self_friction", &T::self_friction, "coefficient of friction between cloths", "", kNotNegative},
         {"thickness", &T::thickness, "distance that cloth keeps from bodies and from other layers", "m",
          over(0, 1)},
-        {"drag", &T::drag, "coefficient of the pressure of an air flow perpendicular to the cloth", "",
-         kNotNegative},
-        {"lift", &T::lift, "coefficient of the force across an oblique air flow; at most `drag`", "",
+        {"drag", &T::drag,
+         "drag coefficient: pressure of an air flow perpendicular to the cloth over its stagnation pressure",
+         "", kNotNegative},
+        {"lift", &T::lift, "lift coefficient: force across an oblique air flow; at most `drag`", "",
          kNotNegative},
         {"max_stretch", &T::max_stretch,
-         "largest length along the threads relative to the rest length; 0: no limit", "", kNotNegative},
+         "greatest length along the threads, as a multiple of the rest length; 0: no limit", "",
+         kNotNegative},
         {"max_shear", &T::max_shear,
-         "largest length diagonally to the threads relative to the rest length; 0: no limit", "",
+         "greatest length diagonally to the threads, as a multiple of the rest length; 0: no limit", "",
          kNotNegative},
         {"min_bend_radius", &T::min_bend_radius,
          "smallest radius to which the cloth bends from its shape at rest; 0: no limit. The limit works with "
@@ -134,7 +143,8 @@ struct Table<SidePin> {
   static Fields<SidePin> fields() {
     return Fields<SidePin>{
         {"side", &SidePin::side, "side to hold"},
-        {"every", &SidePin::every, "holds every n-th vertex of the side, starting with the first", "",
+        {"every", &SidePin::every,
+         "n, if every n-th vertex of the side is held, starting with the first; 1: all vertices", "",
          between(1, 1000)}}
         .with_base<PinScope>();
   }
@@ -144,7 +154,8 @@ struct Table<NearestPin> {
   static constexpr const char* kName = "nearest_pin";
   static constexpr const char* kHelp = "Holds the vertex nearest to a point.";
   static Fields<NearestPin> fields() {
-    return Fields<NearestPin>{{"point", &NearestPin::point, "point in the cloth's frame", "m"}}
+    return Fields<NearestPin>{
+        {"point", &NearestPin::point, "point in the cloth's frame; the vertex nearest to it is held", "m"}}
         .with_base<PinScope>();
   }
 };
@@ -175,7 +186,8 @@ struct Table<SideSeam> {
     return {{"a", &SideSeam::a, "one side"},
             {"b", &SideSeam::b, "the other side, with the same number of vertices"},
             {"reversed", &SideSeam::reversed,
-             "connects the first vertex of one side to the last vertex of the other"}};
+             "whether the first vertex of one side is connected to the last vertex of the other; false: to "
+             "the first"}};
   }
 };
 template <>
@@ -218,9 +230,11 @@ struct Table<ClothCord> {
          "m", kNotNegative},
         {"segments", &T::segments, "number of segments of the cord", "", between(1, 1000)},
         {"stiffness", &T::stiffness, "tensile force of the cord at a strain of 1", "N", kPositive},
-        {"mass_per_length", &T::mass_per_length, "mass per length", "kg/m", kPositive},
-        {"damping", &T::damping, "fraction of the critical damping of a segment", "", between(0, 10)},
-        {"visible", &T::visible, "is drawn"},
+        {"mass_per_length", &T::mass_per_length, "mass of the cord per length", "kg/m", kPositive},
+        {"damping", &T::damping,
+         "damping of the cord along its length, as a fraction of the critical damping of a segment", "",
+         between(0, 10)},
+        {"visible", &T::visible, "whether the object is drawn"},
         {"radius", &T::radius, "radius of the drawn cord", "m", kPositive},
         {"material", &T::material, "name of a material; empty: the default material"}};
   }
@@ -248,16 +262,16 @@ struct Table<Cloth> {
             {"material", &T::material, "name of a material; empty: the appearance of the fabric"},
             {"position", &T::position, "position of the cloth's origin at time 0", "m"},
             {"orientation", &T::orientation, "orientation of the cloth at time 0"},
-            {"velocity", &T::velocity, "velocity at time 0", "m/s"},
+            {"velocity", &T::velocity, "velocity at time 0, in world axes", "m/s"},
             {"pins", &T::pins, "vertices that are held"},
             {"seams", &T::seams, "vertices that are sewn together"},
             {"cords", &T::cords, "strings and springs that hang on vertices"},
             {"seam_time", &T::seam_time, "time in which seams are pulled together", "s", kPositive},
             {"collides", &T::collides, "whether the cloth collides with bodies and particles"},
             {"self_collision", &T::self_collision,
-             "collides with itself, and with other cloths that have `self_collision`"},
+             "whether the cloth collides with itself, and with other cloths that have `self_collision`"},
             {"tear", &T::tear,
-             "length at which threads tear, relative to their rest length; must be above 1; 0: they never "
+             "length at which threads tear, as a multiple of their rest length: above 1, or 0: they never "
              "tear",
              "", kNotNegative},
             {"pressure", &T::pressure,
@@ -279,22 +293,22 @@ struct Table<Cloth> {
             {"air_density", &T::air_density, "density of the surrounding air; 0: no air", "kg/m^3",
              kNotNegative},
             {"integrator", &T::integrator,
-             "integration method of the springs; `symplectic` and `rk4` are explicit: stable only for soft "
-             "cloth and short sub-steps"},
+             "method that integrates the motion of the springs; `symplectic` and `rk4` are explicit: stable "
+             "only for soft cloth and short sub-steps"},
             {"substep", &T::substep,
              "longest step of the cloth, at most one sub-step of the world. With the integrator `relaxed`, "
              "springs divide it into as many shorter steps as their stiffness needs",
              "s", over(0, 1)},
             {"soften", &T::soften,
-             "with the integrator `relaxed`: springs take a single step in each `substep`, which is faster. "
-             "The stiffness of springs that are too stiff for this step is reduced, and a warning gives the "
-             "factor"},
+             "with the integrator `relaxed`: whether springs take a single step in each `substep`, which is "
+             "faster. The stiffness of springs that are too stiff for this step is reduced, and a warning "
+             "gives the factor"},
             {"appear_at", &T::appear_at, "time at which the cloth appears, with its shape of time 0", "s",
              kNotNegative},
             {"remove_at", &T::remove_at, "time at which the cloth is removed; must be later than `appear_at`",
              "s", kPositive},
-            {"visible", &T::visible, "is drawn"},
-            {"casts_shadow", &T::casts_shadow, "casts a shadow"},
+            {"visible", &T::visible, "whether the object is drawn"},
+            {"casts_shadow", &T::casts_shadow, "whether the object casts a shadow"},
         })
         .with(&T::placement);
   }

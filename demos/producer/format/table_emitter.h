@@ -24,28 +24,28 @@ struct Table<Split> {
       "parent's value at the time of the split.";
   static Fields<Split> fields() {
     using T = Split;
-    return {
-        {"enabled", &T::enabled, "whether particles split at all"},
-        {"count", &T::count, "number of children per split, rounded to an integer", "", between(0, 1000)},
-        {"age", &T::age, "age of a particle at its first split", "s", kPositive},
-        {"delay", &T::delay, "time from one split of a particle to its next", "s", kPositive},
-        {"delay_steps", &T::delay_steps,
-         "instead of `delay`: time from one split of a particle to its next, as a number of sub-steps of "
-         "`world.step`; 0: `delay` "
-         "applies",
-         "", between(0, 1e6)},
-        {"depth", &T::depth,
-         "largest number of splits in the history of a particle, including the splits of its ancestors", "",
-         between(1, 16)},
-        {"velocity_percent", &T::velocity_percent,
-         "fraction of the parent's velocity that a child starts with", "%"},
-        {"spread_deg", &T::spread_deg, "angle between a child's direction and the parent's", "degrees",
-         kAngles},
-        {"radius_percent", &T::radius_percent, "radius of a child, relative to the parent's", "%", kPositive},
-        {"mass_percent", &T::mass_percent,
-         "mass of a child, relative to the parent's; 0: the same density as the parent", "%", kNotNegative},
-        {"lifespan_percent", &T::lifespan_percent, "lifespan of a child, relative to the parent's", "%",
-         kPositive}};
+    return {{"enabled", &T::enabled, "whether particles split at all"},
+            {"count", &T::count, "number of children per split, rounded to an integer", "", between(0, 1000)},
+            {"age", &T::age, "age of a particle at its first split", "s", kPositive},
+            {"delay", &T::delay, "time from one split of a particle to its next", "s", kPositive},
+            {"delay_steps", &T::delay_steps,
+             "instead of `delay`: time from one split of a particle to its next, as a number of sub-steps of "
+             "`world.step`; 0: `delay` applies",
+             "", between(0, 1e6)},
+            {"depth", &T::depth,
+             "largest number of splits in the history of a particle, including the splits of its ancestors",
+             "", between(1, 16)},
+            {"velocity_percent", &T::velocity_percent,
+             "percentage of the parent's velocity that a child starts with", "%"},
+            {"spread_deg", &T::spread_deg, "angle between a child's direction of motion and its parent's",
+             "degrees", kAngles},
+            {"radius_percent", &T::radius_percent,
+             "radius of a child, as a percentage of the parent's radius", "%", kPositive},
+            {"mass_percent", &T::mass_percent,
+             "mass of a child, as a percentage of the parent's mass; 0: the same density as the parent", "%",
+             kNotNegative},
+            {"lifespan_percent", &T::lifespan_percent,
+             "lifespan of a child, as a percentage of the parent's lifespan", "%", kPositive}};
   }
 };
 template <>
@@ -57,7 +57,8 @@ struct Table<ParticleSource> {
         {"spread_deg", &T::spread_deg, "angle between a particle's velocity and the direction of the release",
          "degrees", kAngles},
         {"radius", &T::radius, "radius of a particle", "m", kPositive},
-        {"density", &T::density, "density; determines the mass unless `mass` is given", "kg/m^3", kPositive},
+        {"density", &T::density, "density of a particle; determines the mass unless `mass` is given",
+         "kg/m^3", kPositive},
         {"mass", &T::mass, "mass of a particle; 0: computed from density and radius", "kg", kNotNegative},
         {"lifespan", &T::lifespan, "age at which a particle is removed", "s", kPositive},
         {"restitution", &T::restitution,
@@ -67,7 +68,9 @@ struct Table<ParticleSource> {
          "body",
          "", kNotNegative},
         {"charge", &T::charge, "electric charge of a particle", "C"},
-        {"max_alive", &T::max_alive, "largest number of particles that exist at once", "", between(1, 2e7)},
+        {"max_alive", &T::max_alive,
+         "greatest number of particles of this source that exist at once; further particles are not released",
+         "", between(1, 2e7)},
         {"look", &T::look, "how particles are drawn"},
     }
         .with(&T::behaviour);
@@ -77,7 +80,7 @@ struct Table<ParticleSource> {
 template <class T>
 Fields<T> with_offspring(Fields<T> fields) {
   return std::move(fields).then({
-      {"split", &T::split, "its particles release children of the same kind"},
+      {"split", &T::split, "how particles split into children of the same kind"},
       {"trails", &T::trails, "other particles that each particle leaves along its path"},
       {"on_age", &T::on_age, "other particles that are created when a particle reaches an age"},
       {"on_collision", &T::on_collision, "other particles that are created when a particle collides"},
@@ -87,7 +90,8 @@ Fields<T> with_offspring(Fields<T> fields) {
 template <>
 struct Table<TrailSource> {
   static constexpr const char* kName = "trail";
-  static constexpr const char* kHelp = "Particles that each parent leaves along its path, evenly in time.";
+  static constexpr const char* kHelp =
+      "Particles that each particle of the parent source leaves along its path, evenly in time.";
   static Fields<TrailSource> fields() {
     using T = TrailSource;
     return with_offspring(Fields<T>{
@@ -98,7 +102,7 @@ struct Table<TrailSource> {
         {"start_age", &T::start_age, "age of the parent at which the trail starts", "s", kNotNegative},
         {"end_age", &T::end_age, "age of the parent at which the trail ends", "s", kNotNegative},
         {"velocity_percent", &T::velocity_percent,
-         "fraction of the parent's velocity that a new particle starts with; `speed` is added backwards",
+         "percentage of the parent's velocity that a new particle starts with; `speed` is added backwards",
          "%"},
     }
                               .with_base<ParticleSource>());
@@ -121,7 +125,7 @@ Fields<T> event_fields() {
        "axis of the release: `velocity` is the parent's velocity; `normal` is the normal of the surface that "
        "the parent hit, or the parent's velocity if it hit none"},
       {"velocity_percent", &T::velocity_percent,
-       "fraction of the parent's velocity that a new particle starts with; `speed` is added along the axis",
+       "percentage of the parent's velocity that a new particle starts with; `speed` is added along the axis",
        "%"},
       {"max_per_step", &T::max_per_step, "largest number of particles created in one sub-step", "",
        between(1, 1e6)},
@@ -163,7 +167,7 @@ struct Table<PlaneSurface> {
             {"direction", &PlaneSurface::direction, "normal of the rectangle, in the emitter's frame", "",
              kDirection},
             {"turn_deg", &PlaneSurface::turn_deg, "rotation of the rectangle about its normal", "degrees"},
-            {"size", &PlaneSurface::size, "lengths of the two edges", "m", kPositive}};
+            {"size", &PlaneSurface::size, "lengths of the two edges of the rectangle", "m", kPositive}};
   }
 };
 template <>
@@ -192,11 +196,8 @@ struct Table<MeshSurface> {
   static constexpr const char* kHelp = "A model that releases particles along the normals of its faces.";
   static Fields<MeshSurface> fields() {
     return {
-        {"file", &MeshSurface::file, "model file", kRequired},
-        {"scale", &MeshSurface::scale,
-         "scale factor of the model; `auto` converts the likely unit of the file to metres (docs/models.md). "
-         "`offstage info FILE` shows the factor",
-         "", kPositive},
+        {"file", &MeshSurface::file, kModelFileHelp, kRequired},
+        {"scale", &MeshSurface::scale, kModelScaleHelp, "", kPositive},
         {"position", &MeshSurface::position, "position of the model's origin, in the emitter's frame", "m"},
         {"orientation", &MeshSurface::orientation, "orientation of the model, in the emitter's frame"}};
   }
@@ -215,9 +216,11 @@ struct Table<FaceSurface> {
   static Fields<FaceSurface> fields() {
     using T = FaceSurface;
     return {{"face", &T::face,
-             "top and bottom are at +y and -y, right and left at +x and -x, front and back at +z and -z"},
-            {"position", &T::position, "centre of the cuboid, without a body", "m"},
-            {"size", &T::size, "edges of the cuboid, without a body", "m", kPositive}};
+             "face that releases particles: top and bottom are at +y and -y, right and left at +x and -x, "
+             "front and back at +z and -z"},
+            {"position", &T::position, "centre of the cuboid in the world, if the emitter has no body", "m"},
+            {"size", &T::size, "lengths of the cuboid's edges along x, y and z, if the emitter has no body",
+             "m", kPositive}};
   }
 };
 template <>
@@ -271,11 +274,11 @@ struct Table<Emitter> {
          "velocity",
          "", kNotNegative},
         {"recoil", &T::recoil,
-         "each new particle pushes the body back with its momentum relative to the body; dynamic bodies "
-         "only"},
+         "whether each new particle pushes the body back with its momentum relative to the body; dynamic "
+         "bodies only"},
         {"overlap", &T::overlap,
-         "new particles may overlap and never wait for space; for particles that do not collide with each "
-         "other"},
+         "whether new particles may overlap, so that they never wait for space; only for particles that do "
+         "not collide with each other"},
         {"rate", &T::rate, "number of particles released one by one per second", "1/s", between(0, 1e9)},
         {"rate_per_metre", &T::rate_per_metre,
          "number of particles released evenly along each metre of the path of the body, in addition to "
@@ -284,16 +287,18 @@ struct Table<Emitter> {
         {"count", &T::count, "number of particles released together in every `interval`, rounded", "",
          kCounts},
         {"interval", &T::interval, "time from one release of `count` particles to the next", "s", kPositive},
-        {"bursts", &T::bursts, "many particles at given times"},
-        {"start", &T::start, "time at which `rate` and `count` start", "s", kNotNegative},
-        {"end", &T::end, "time at which all releases end; existing particles stay until their lifespan ends",
+        {"bursts", &T::bursts, "releases of many particles at given times"},
+        {"start", &T::start, "time at which releases by `rate` and `count` start", "s", kNotNegative},
+        {"end", &T::end,
+         "time at which all releases end; particles that exist at that time stay until the end of their "
+         "lifespan",
          "s", kNotNegative},
-        {"windows", &T::windows, "periods in which `rate` and `count` release; empty: always"},
+        {"windows", &T::windows,
+         "periods to which releases by `rate` and `count` are limited; empty: no limits"},
         {"prewarm", &T::prewarm,
          "time for which the emitter has already been running at `start`. Until time 0, particles move and "
-         "collide "
-         "while dynamic bodies, cloths and particle groups stand still, kinematic bodies follow their keys, "
-         "and forces have their values of time 0",
+         "collide while dynamic bodies, cloths and particle groups stand still, kinematic bodies follow "
+         "their keys, and forces have their values of time 0",
          "s", kNotNegative},
     }
                               .with_base<ParticleSource>()

@@ -16,8 +16,7 @@ struct Table<SkyPictureSettings> {
   static constexpr const char* kName = "sky picture";
   static constexpr const char* kHelp =
       "A picture of the whole sky in equirectangular projection, twice as wide as high. It lights the scene "
-      "in "
-      "place of the colours, and is the background. A scene with a picture has no sun by default.";
+      "in place of the colours, and is the background. A scene with a picture has no sun by default.";
   static Fields<SkyPictureSettings> fields() {
     using T = SkyPictureSettings;
     return {
@@ -25,13 +24,15 @@ struct Table<SkyPictureSettings> {
          "picture relative to the scene: Radiance HDR or OpenEXR with linear light, or PNG, JPEG or WebP in "
          "sRGB. Its centre is at -z, its right half at +x",
          kRequired},
-        {"turn_deg", &T::turn_deg, "turns the picture counter-clockwise, as seen from above", "deg"},
+        {"turn_deg", &T::turn_deg,
+         "angle by which the picture is turned about the vertical axis, counter-clockwise as seen from above",
+         "degrees"},
         {"blur_deg", &T::blur_deg,
-         "standard deviation of a blur of the background, which does not change the light; 0: sharp", "deg",
-         between(0, 90)},
+         "standard deviation of a blur of the background, which does not change the light; 0: sharp",
+         "degrees", between(0, 90)},
         {"visible", &T::visible,
-         "if false, the picture only lights the scene and appears in reflections; the background shows the "
-         "colours"}};
+         "whether the background shows the picture; false: the picture only lights the scene and appears in "
+         "reflections, and the background shows the colours"}};
   }
 };
 template <>
@@ -56,8 +57,7 @@ struct Table<EnvironmentSettings> {
              "`sky` draws the sky, and frames have no alpha channel; `transparent` draws none, and all "
              "frames have an alpha channel"},
             {"picture", &T::picture,
-             "a picture of the sky in place of the colours and clouds; `intensity` "
-             "scales it"}};
+             "a picture of the sky in place of the colours and clouds; `intensity` scales it"}};
   }
 };
 

@@ -19,12 +19,14 @@ struct Table<FabricLook> {
   static Fields<FabricLook> fields() {
     using T = FabricLook;
     return {
-        {"weave", &T::weave, "weave of the threads; `none`: a film, such as leather"},
+        {"weave", &T::weave, "weave of the threads; `none`: a surface without threads, such as leather"},
         {"thread", &T::thread, "width of a thread", "m", kPositive},
-        {"relief", &T::relief, "depth of the pattern of the threads", "", kFraction},
-        {"sheen", &T::sheen, "light scattered by fibres, visible at grazing angles", "", kFraction},
-        {"sheen_color", &T::sheen_color, "colour of the sheen"},
-        {"translucency", &T::translucency, "fraction of the light that shines through", "", kFraction},
+        {"relief", &T::relief, "depth of the shading between threads; 0: a flat surface", "", kFraction},
+        {"sheen", &T::sheen, "strength of the light that fibres scatter, visible at grazing angles; 0: none",
+         "", kFraction},
+        {"sheen_color", &T::sheen_color, "colour of the light that fibres scatter (`sheen`)"},
+        {"translucency", &T::translucency,
+         "fraction of the light that shines through the cloth to its other side", "", kFraction},
         {"back_color", &T::back_color, "colour of the back; default: the colour of the front"},
     };
   }

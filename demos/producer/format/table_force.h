@@ -12,7 +12,7 @@ namespace offstage::producer {
 template <>
 struct Table<sim::Everywhere> {
   static constexpr const char* kName = "everywhere";
-  static constexpr const char* kHelp = "No limits.";
+  static constexpr const char* kHelp = "The whole world.";
   static Fields<sim::Everywhere> fields() { return {}; }
 };
 template <>
@@ -46,7 +46,8 @@ struct Tags<sim::Region> {
 
 inline constexpr Limits kDropRate = between(0, 16);
 inline constexpr const char* kDropRateHelp =
-    "exponent of the decrease from the centre of the region to zero at its edge; 0: uniform";
+    "exponent of the decrease of the force from the centre of the region to zero at its edge; 0: uniform; a "
+    "larger exponent concentrates the force at the centre";
 inline constexpr const char* kParticlesHelp =
     "names of particle groups, emitters, or child particles, such as rain/splash";
 inline constexpr const char* kClothsHelp =
@@ -58,7 +59,8 @@ inline constexpr const char* kBodiesHelp =
 inline constexpr const char* kForceNameHelp =
     "unique name; default: force_N, where N is the index in the list";
 inline constexpr const char* kAirDragHelp =
-    "drag force per speed relative to this air; 0: the air acts only through the drag of each object";
+    "drag force on an object per speed relative to this air; 0: the air acts only through the drag of each "
+    "object";
 
 template <>
 struct Table<ForceScope> {
@@ -83,7 +85,7 @@ Fields<T> field_keys(Fields<T> own) {
 template <class T>
 Fields<T> pair_keys(Fields<T> own) {
   return std::move(own).then(
-      {{"particles", &T::particles, "names of groups and emitters whose particles act on each other",
+      {{"particles", &T::particles, "names of particle groups and emitters whose particles act on each other",
         kRequired},
        {"cut_off", &T::cut_off,
         "particles at a greater distance do not act on each other, which saves much time; 0: no limit", "m",
@@ -150,12 +152,14 @@ struct Table<Grab> {
     return {{"name", &T::name, kForceNameHelp},
             {"body", &T::body, "name of a dynamic body; empty: none"},
             {"particles", &T::particles, kParticlesHelp},
-            {"cloths", &T::cloths, "names of cloths"},
+            {"cloths", &T::cloths, "names of cloths whose points the hand can hold"},
             {"point", &T::point, "point of the body that is held, in the body's frame", "m"},
             {"keyframes", &T::keyframes, "positions of the hand; at least one"},
             {"interpolation", &T::interpolation, kInterpolationHelp},
-            {"stiffness", &T::stiffness, "force per distance from the hand", "N/m", kNotNegative},
-            {"damping", &T::damping, "force per speed relative to the hand", "N s/m", kNotNegative},
+            {"stiffness", &T::stiffness, "stiffness of the springs: force per distance from the hand", "N/m",
+             kNotNegative},
+            {"damping", &T::damping, "damping of the springs: force per speed relative to the hand", "N s/m",
+             kNotNegative},
             {"reach", &T::reach,
              "particles and cloth points at a greater distance from the hand are not held", "m", kPositive},
             {"start", &T::start, "time at which the hand grabs", "s", kNotNegative},
@@ -183,8 +187,8 @@ template <>
 struct Table<AppliedForce> {
   static constexpr const char* kName = "applied_force";
   static constexpr const char* kHelp =
-      "A force at a point of each of some bodies, and a torque, constant or over time: a thruster, a motor, "
-      "a push.";
+      "A force at a point of each named body, and a torque: a thruster, a motor, a push. Both are constant "
+      "or follow keyframes.";
   static Fields<AppliedForce> fields() {
     using T = AppliedForce;
     return {
@@ -196,8 +200,11 @@ struct Table<AppliedForce> {
         {"point", &T::point, "point of application in the body's frame; default: the centre of mass", "m"},
         {"axes", &T::axes,
          "axes of `force` and `torque`: `world` axes are fixed, `body` axes turn with the body"},
-        {"force", &T::force, "force, without keyframes", "N"},
-        {"torque", &T::torque, "torque in addition to the torque of `force`, without keyframes", "N m"},
+        {"force", &T::force, "constant force on each body; not with `keyframes`", "N"},
+        {"torque", &T::torque,
+         "constant torque on each body, in addition to the torque that `force` exerts about the centre of "
+         "mass; not with `keyframes`",
+         "N m"},
         {"keyframes", &T::keyframes,
          "force and torque over time, instead of `force` and `torque`; constant before the first key and "
          "after the last key"},
@@ -223,7 +230,9 @@ struct Table<Explosion> {
         {"impulse", &T::impulse, "impulse on an object at the centre; negative: towards the centre", "N s"},
         {"radius", &T::radius, "distance from the centre at which the effect ends", "m", kPositive},
         {"drop_rate", &T::drop_rate,
-         "exponent of the decrease from the centre to zero at the radius; 0: uniform", "", kDropRate}};
+         "exponent of the decrease of the impulse from the centre to zero at the radius; 0: uniform; a "
+         "larger exponent concentrates the impulse at the centre",
+         "", kDropRate}};
   }
 };
 template <>
@@ -236,7 +245,7 @@ struct Table<VortexField> {
     using T = VortexField;
     return field_keys(Fields<T>{
         {"name", &T::name, kForceNameHelp},
-        {"point", &T::point, "a point of the axis", "m"},
+        {"point", &T::point, "a point on the axis, in the world", "m"},
         {"axis", &T::axis, "direction of the axis; the air turns by the right-hand rule", "", kDirection},
         {"circulation", &T::circulation, "strength of the vortex; negative: the air turns the other way",
          "m^2/s"},

@@ -1,10 +1,8 @@
 #pragma once
-/// The keys of joints and of ready-made articulations.
+/// The keys of joints and of their motors.
 
 #include <array>
 
-#include "producer/format/table_placement.h"
-#include "producer/format/table_shape.h"
 #include "producer/format/values.h"
 
 namespace offstage::producer {
@@ -25,7 +23,8 @@ struct Table<MotorKey> {
   static constexpr const char* kHelp = "A motor's target at a time.";
   static Fields<MotorKey> fields() {
     return {{"time", &MotorKey::time, "time of the key; times must increase", "s"},
-            {"target", &MotorKey::target, "target, in the unit of the motor's `target`"},
+            {"target", &MotorKey::target,
+             "target position or speed of the motor at this time, in the unit of `target` of the motor"},
             {"interpolation", &MotorKey::interpolation,
              "interpolation from this key to the next; default: the interpolation of the motor"}};
   }
@@ -33,24 +32,28 @@ struct Table<MotorKey> {
 template <>
 struct Table<JointMotor> {
   static constexpr const char* kName = "motor";
-  static constexpr const char* kHelp = "Motor of a revolute, prismatic or distance joint.";
+  static constexpr const char* kHelp = "Motor of a revolute, prismatic, screw or distance joint.";
   static Fields<JointMotor> fields() {
     using T = JointMotor;
-    return {{"mode", &T::mode,
-             "quantity that the motor controls: a speed, or a position relative to the position at time 0"},
-            {"target", &T::target,
-             "target position in degrees or metres, or target speed in degrees per second or metres per "
-             "second; `keys` "
-             "replace it"},
-            {"keys", &T::keys, "targets over time"},
-            {"interpolation", &T::interpolation, kInterpolationHelp},
-            {"smooth", &T::smooth, "whether a `monotone` curve has zero speed at every key"},
-            {"max_effort", &T::max_effort, "greatest torque or force; default: unlimited", "N m or N",
-             kNotNegative},
-            {"stiffness", &T::stiffness, "stiffness of position control, per radian or metre; 0: rigid",
-             "N m or N/m", kNotNegative},
-            {"damping", &T::damping, "damping of position control with a stiffness, per speed",
-             "N m s or N s/m", kNotNegative}};
+    return {
+        {"mode", &T::mode,
+         "quantity that the motor controls: a speed, or a position relative to the position at time 0"},
+        {"target", &T::target,
+         "constant target: a position in degrees or metres, or a speed in degrees per second or metres per "
+         "second; not with `keys`"},
+        {"keys", &T::keys, "targets over time, instead of `target`"},
+        {"interpolation", &T::interpolation, kInterpolationHelp},
+        {"smooth", &T::smooth,
+         "whether a `monotone` curve through the keys has zero slope at every key, so that a position motor "
+         "stops there"},
+        {"max_effort", &T::max_effort, "greatest torque or force of the motor; default: unlimited",
+         "N m or N", kNotNegative},
+        {"stiffness", &T::stiffness,
+         "torque or force of the motor per radian or metre from the target position; 0: the position is "
+         "controlled rigidly",
+         "N m or N/m", kNotNegative},
+        {"damping", &T::damping, "torque or force per speed that damps position control; needs a `stiffness`",
+         "N m s or N s/m", kNotNegative}};
   }
 };
 
@@ -69,19 +72,18 @@ struct Table<JointBehaviour> {
          "`ratio` metres along it per turn; `pulley` is a rope from `anchor` over `pulley_a` and `pulley_b` "
          "to `anchor_b`. Gears and racks only couple motions: their bodies need other joints, which hold "
          "them on a carrier that does not turn"},
-        {"axis", &T::axis, "axis of rotation or sliding; for a spherical joint, axis of the twist", "",
-         kDirection},
+        {"axis", &T::axis,
+         "axis of rotation or sliding; for a spherical joint, axis of the twist. It is a direction in the "
+         "world at time 0 or, for a joint of a model, in the frame of `node`",
+         "", kDirection},
         {"second_axis", &T::second_axis,
-         "second axis of a universal joint, axis of `b` of a gear, or direction of a rack; default: +X, or "
-         "`axis` for "
-         "a gear",
+         "second axis of a universal joint, axis of `b` of a gear, or direction of a rack, in the same frame "
+         "as `axis`; default: +X, or `axis` for a gear",
          "", kDirection},
         {"ratio", &T::ratio,
          "gear: teeth of `b` / teeth of `a`, negative for an internal gear or a belt; rack: radius of the "
-         "pinion in m, "
-         "negative for the other direction; screw: lead in m per turn, positive for a right-handed thread; "
-         "pulley: "
-         "number of strands at `b`. Not 0"},
+         "pinion in m, negative for the other direction; screw: lead in m per turn, positive for a "
+         "right-handed thread; pulley: number of strands at `b`. Not 0"},
         {"limits", &T::limits,
          "least and greatest displacement of a prismatic joint, or change of the distance of a distance "
          "joint: a rope has [-its length, 0]",
@@ -92,7 +94,9 @@ struct Table<JointBehaviour> {
          "distance from `anchor_b` to `pulley_b`. Without limits, the rope of a pulley cannot get longer "
          "than at the start",
          "m", kNotNegative},
-        {"limits_deg", &T::limits_deg, "least and greatest angle; for a spherical joint, of the twist",
+        {"limits_deg", &T::limits_deg,
+         "least and greatest angle of rotation about `axis`; 0 is the angle at time 0. For a spherical joint "
+         "these are limits of the twist",
          "degrees"},
         {"swing_deg", &T::swing_deg,
          "spherical joint: largest angle between the axes of the two bodies; universal joint: largest angle "
@@ -104,16 +108,17 @@ struct Table<JointBehaviour> {
          "", kFraction},
         {"stiffness", &T::stiffness,
          "spherical joint: torque per angle of rotation from the pose of time 0, about any axis; for the "
-         "other types use a "
-         "motor with a stiffness",
+         "other types use a motor with a stiffness",
          "N m/rad", kNotNegative},
-        {"friction", &T::friction, "dry friction: greatest torque or force against the motion", "N m or N",
-         kNotNegative},
-        {"damping", &T::damping, "viscous damping: torque or force per speed", "N m s or N s/m",
+        {"friction", &T::friction, "dry friction of the joint: greatest torque or force against its motion",
+         "N m or N", kNotNegative},
+        {"damping", &T::damping, "viscous damping of the joint: torque or force per speed", "N m s or N s/m",
          kNotNegative},
         {"motor", &T::motor, "motor that drives the joint"},
-        {"max_force", &T::max_force, "force at which the joint breaks; default: never", "N", kPositive},
-        {"max_torque", &T::max_torque, "torque at which the joint breaks; default: never", "N m", kPositive},
+        {"max_force", &T::max_force, "force above which the joint breaks; default: it never breaks", "N",
+         kPositive},
+        {"max_torque", &T::max_torque, "torque above which the joint breaks; default: it never breaks", "N m",
+         kPositive},
     };
   }
 };
@@ -129,10 +134,15 @@ struct Table<Joint> {
         {"name", &T::name, "unique name; default: joint_N, where N is the index in the list"},
         {"a", &T::a, "name of a body", kRequired},
         {"b", &T::b, "name of a body; empty: the world"},
-        {"anchor", &T::anchor, "point at which the bodies are joined", "m"},
-        {"anchor_b", &T::anchor_b, "distance joint or pulley: the end on `b`; rack: a point of `b`", "m"},
-        {"pulley_a", &T::pulley_a, "fixed point over which the rope of `a` runs", "m"},
-        {"pulley_b", &T::pulley_b, "fixed point over which the rope of `b` runs", "m"}}
+        {"anchor", &T::anchor, "point at which the bodies are joined, in the world at time 0", "m"},
+        {"anchor_b", &T::anchor_b,
+         "distance joint or pulley: point of `b` at which the rod or the rope ends, in the world at time 0; "
+         "rack: a point of `b`",
+         "m"},
+        {"pulley_a", &T::pulley_a, "for a pulley: fixed point in the world over which the rope from `a` runs",
+         "m"},
+        {"pulley_b", &T::pulley_b, "for a pulley: fixed point in the world over which the rope from `b` runs",
+         "m"}}
         .with(&T::behaviour)
         .then({{"collide", &T::collide, "whether the two bodies also collide with each other"},
                {"appear_at", &T::appear_at,
@@ -141,198 +151,10 @@ struct Table<Joint> {
                 "s", kNotNegative},
                {"remove_at", &T::remove_at,
                 "time at which the joint is removed; must be later than `appear_at`", "s", kPositive},
-               {"visible", &T::visible, "whether a distance joint is drawn, as a straight rod"},
-               {"radius", &T::radius, "radius of the rod", "m", kPositive},
+               {"visible", &T::visible, "whether a distance joint is drawn as a straight rod"},
+               {"radius", &T::radius, "radius of the drawn rod", "m", kPositive},
                {"material", &T::material, "name of the rod's material; empty: grey"}});
   }
-};
-
-template <>
-struct Table<Chain> {
-  static constexpr const char* kName = "chain";
-  static constexpr const char* kHelp =
-      "Links in a row from one point to another: bodies NAME/link_0, NAME/link_1 and so on, and joints "
-      "NAME/joint_0, NAME/joint_1 and so on.";
-  static Fields<Chain> fields() {
-    using T = Chain;
-    return {
-        {"name", &T::name, "unique name; default: articulation_N, where N is the index in the list"},
-        {"from", &T::from, "start of the chain", "m"},
-        {"to", &T::to, "end of the chain", "m"},
-        {"path", &T::path,
-         "instead of `from` and `to`: at least two points in the world, along which the links are laid in "
-         "equal steps",
-         "m"},
-        {"links", &T::links, "number of links", "", between(1, 10000)},
-        {"sag", &T::sag,
-         "length of the chain relative to the distance of its ends; above 1.0005 if both ends are held still",
-         "", between(1, 3)},
-        {"radius", &T::radius, "radius of a link", "m", kPositive},
-        {"density", &T::density, "density of a link", "kg/m^3", kPositive},
-        {"material", &T::material, "name of a material; empty: grey"},
-        {"start", &T::start,
-         "name of the body that holds the first link, or `world`; empty: the end is free"},
-        {"end", &T::end, "name of the body that holds the last link, or `world`; empty: the end is free"},
-        {"swing_deg", &T::swing_deg, "largest angle between neighbouring links", "degrees", between(0, 180)},
-        {"bend_stiffness", &T::bend_stiffness,
-         "flexural rigidity (Young's modulus times second moment of area) of an elastic rod that is "
-         "unstressed as it is laid out; twisting has the same stiffness. A joint between links of the length "
-         "l has the stiffness `bend_stiffness` / l per radian, so the rod bends alike for any number of "
-         "links, at most 32. The bodies that hold the ends of the chain clamp them",
-         "N m^2", kNotNegative},
-        {"friction", &T::friction, "dry friction of each joint", "N m", kNotNegative},
-        {"damping", &T::damping, "viscous damping of each joint", "N m s", kNotNegative},
-        {"max_force", &T::max_force, "force at which a joint breaks; default: never", "N", kPositive}};
-  }
-};
-template <>
-struct Table<Ragdoll> {
-  static constexpr const char* kName = "ragdoll";
-  static constexpr const char* kHelp =
-      "A standing person who faces +Z and collapses when the film starts: bodies NAME/pelvis, chest, head, "
-      "upper_arm_left and so on, with joints that bend as human joints do.";
-  static Fields<Ragdoll> fields() {
-    using T = Ragdoll;
-    return Fields<T>{
-        {"name", &T::name, "unique name; default: articulation_N, where N is the index in the list"},
-        {"position", &T::position, "point on the ground between the feet", "m"},
-        {"orientation", &T::orientation, "orientation of the figure, about `position`"},
-        {"velocity", &T::velocity, "velocity of the figure at time 0", "m/s"},
-        {"height", &T::height, "height of the figure", "m", between(0.1, 10)},
-        {"density", &T::density, "density of the body parts", "kg/m^3", kPositive},
-        {"stiffness", &T::stiffness,
-         "factor of the dry friction of the joints: with 0 they rotate freely, with 1 they are as stiff as "
-         "in a limp adult",
-         "", kNotNegative},
-        {"skin", &T::skin, "name of the material of head, hands and feet; empty: grey"},
-        {"shirt", &T::shirt, "name of the material of trunk and arms; empty: grey"},
-        {"trousers", &T::trousers, "name of the material of pelvis and legs; empty: grey"}}
-        .with(&T::placement);
-  }
-};
-template <>
-struct Table<Bridge> {
-  static constexpr const char* kName = "bridge";
-  static constexpr const char* kHelp =
-      "Planks hinged to each other between two banks: bodies NAME/plank_0, NAME/plank_1 and so on.";
-  static Fields<Bridge> fields() {
-    using T = Bridge;
-    return {
-        {"name", &T::name, "unique name; default: articulation_N, where N is the index in the list"},
-        {"from", &T::from, "start of the bridge", "m"},
-        {"to", &T::to, "end of the bridge", "m"},
-        {"planks", &T::planks, "number of planks", "", between(1, 1000)},
-        {"width", &T::width, "width of the deck", "m", kPositive},
-        {"thickness", &T::thickness, "thickness of a plank", "m", kPositive},
-        {"density", &T::density, "density of a plank", "kg/m^3", kPositive},
-        {"material", &T::material, "name of a material; empty: grey"},
-        {"sag", &T::sag, "length of the deck relative to the distance of the banks", "", between(1.0005, 2)},
-        {"damping", &T::damping, "viscous damping of each hinge", "N m s", kNotNegative},
-        {"max_force", &T::max_force, "force at which a hinge breaks; default: never", "N", kPositive}};
-  }
-};
-template <>
-struct Table<Vehicle> {
-  static constexpr const char* kName = "vehicle";
-  static constexpr const char* kHelp =
-      "A car with springs, driven by its rear wheels and steered by its front wheels: bodies NAME/chassis, "
-      "body, cabin, hub_front_left, knuckle_left, wheel_front_left and so on. It faces +Z.";
-  static Fields<Vehicle> fields() {
-    using T = Vehicle;
-    return Fields<T>{
-        {"name", &T::name, "unique name; default: articulation_N, where N is the index in the list"},
-        {"position", &T::position, "point on the ground at the centre of the wheels", "m"},
-        {"orientation", &T::orientation, "orientation of the car, about `position`"},
-        {"velocity", &T::velocity, "velocity of the car at time 0", "m/s"},
-        {"length", &T::length, "length of the car's body", "m", kPositive},
-        {"width", &T::width, "width over the wheels", "m", kPositive},
-        {"wheel_radius", &T::wheel_radius, "radius of each wheel", "m", kPositive},
-        {"mass", &T::mass, "mass of the whole car", "kg", kPositive},
-        {"suspension_hz", &T::suspension_hz, "frequency of the car's vibration on its springs", "Hz",
-         between(0.2, 10)},
-        {"speed", &T::speed,
-         "target speed of the rear wheels over time, in m/s; empty: the car rolls freely"},
-        {"steer", &T::steer, "angle of the front wheels over time, in degrees, positive to the left"},
-        {"max_torque", &T::max_torque, "greatest torque of each rear wheel", "N m", kNotNegative},
-        {"paint", &T::paint, "name of the material of the car's body; empty: grey"},
-        {"trim", &T::trim, "name of the material of chassis and cabin; empty: grey"},
-        {"tyre", &T::tyre, "name of the material of the wheels; empty: grey"}}
-        .with(&T::placement);
-  }
-};
-template <>
-struct Table<Crane> {
-  static constexpr const char* kName = "crane";
-  static constexpr const char* kHelp =
-      "A tower crane whose jib points along +X, with a load on its rope: bodies NAME/mast, jib, "
-      "counterweight, trolley, load, joints NAME/slew, travel, rope.";
-  static Fields<Crane> fields() {
-    using T = Crane;
-    return Fields<T>{
-        {"name", &T::name, "unique name; default: articulation_N, where N is the index in the list"},
-        {"position", &T::position, "foot of the mast", "m"},
-        {"orientation", &T::orientation, "orientation of the crane, about `position`"},
-        {"height", &T::height, "height of the mast", "m", kPositive},
-        {"reach", &T::reach, "length of the jib", "m", kPositive},
-        {"load_mass", &T::load_mass, "mass of the load", "kg", kPositive},
-        {"load_size", &T::load_size, "edge of the load, a cube", "m", kPositive},
-        {"slew", &T::slew, "rotation of the jib over time, in degrees"},
-        {"trolley", &T::trolley,
-         "outward displacement of the trolley over time, in metres, from its place at 0.6 of the reach"},
-        {"hoist", &T::hoist, "upward displacement of the load over time, in metres"},
-        {"frame", &T::frame, "name of the material of mast, jib and trolley; empty: grey"},
-        {"load", &T::load, "name of the material of load and counterweight; empty: grey"}}
-        .with(&T::placement);
-  }
-};
-template <>
-struct Table<NodeJoint> {
-  static constexpr const char* kName = "node_joint";
-  static constexpr const char* kHelp =
-      "The joint between a node of a model and the link above it, at the node's origin.";
-  static Fields<NodeJoint> fields() {
-    using T = NodeJoint;
-    return Fields<T>{
-        {"node", &T::node, "name of a node; the joint's axes are in the frame of that node", kRequired}}
-        .with(&T::behaviour);
-  }
-};
-template <>
-struct Table<ModelTree> {
-  static constexpr const char* kName = "model_tree";
-  static constexpr const char* kHelp =
-      "A model file whose nodes are links: each node with triangles is a body NAME/NODE, and joint NAME/NODE "
-      "connects it to the nearest such node above it. `offstage info FILE` lists the nodes.";
-  static Fields<ModelTree> fields() {
-    using T = ModelTree;
-    return Fields<T>{
-        {"name", &T::name, "unique name; default: articulation_N, where N is the index in the list"},
-        {"file", &T::file, "model file", kRequired},
-        {"position", &T::position, "position of the model's origin", "m"},
-        {"orientation", &T::orientation, "orientation of the model, about `position`"},
-        {"velocity", &T::velocity, "velocity of all links at time 0", "m/s"},
-        {"scale", &T::scale,
-         "scale factor of the model; `auto` converts the likely unit of the file to metres (docs/models.md). "
-         "`offstage info FILE` shows the factor",
-         "", kPositive},
-        {"density", &T::density, "density of the links", "kg/m^3", kPositive},
-        {"base", &T::base,
-         "name of the body that holds the uppermost nodes, or `world`; empty: these nodes are free"},
-        {"material", &T::material, "name of a material; empty: the materials of the file"},
-        {"collides", &T::collides, "whether links collide with all objects that they are not joined to"},
-        {"joints", &T::joints,
-         "the joints that are not plain spherical joints, such as joints with a motor or limits"},
-        {"friction", &T::friction, "dry friction of the other joints", "N m", kNotNegative},
-        {"damping", &T::damping, "viscous damping of the other joints", "N m s", kNotNegative}}
-        .with(&T::placement);
-  }
-};
-template <>
-struct Tags<ArticulationTemplate> {
-  static constexpr const char* kName = "articulation";
-  static constexpr const char* kHelp = "Ready-made bodies with their joints.";
-  static constexpr std::array kTags = {"chain", "ragdoll", "bridge", "vehicle", "crane", "model"};
-  static constexpr bool kRequired = true;
 };
 
 }  // namespace offstage::producer

@@ -19,22 +19,21 @@ struct Table<SunLight> {
         {"intensity", &T::intensity, "brightness of a white surface that faces the sun", "", kNotNegative},
         {"size_deg", &T::size_deg, "angular diameter of the sun's disc; larger: softer shadows", "degrees",
          between(0, 90)},
-        {"shadows", &T::shadows, "casts shadows"}};
+        {"shadows", &T::shadows, "whether the light casts shadows"}};
   }
 };
 template <>
 struct Table<LampBase> {
   static Fields<LampBase> fields() {
     using T = LampBase;
-    return {{"body", &T::body,
-             "name of the body that carries the light; `position` and `target` are then in the body's frame; "
-             "empty: none"},
-            {"position", &T::position, "position of the light", "m"},
-            {"color", &T::color, "colour of the light"},
-            {"intensity", &T::intensity,
-             "brightness of a white surface that faces the light 1 m away; a number or a curve over time", "",
-             kNotNegative},
-            {"shadows", &T::shadows, "casts shadows"}};
+    return {
+        {"body", &T::body, "name of the body that carries the light; empty: the light stays in the world"},
+        {"position", &T::position, "position of the light, in the world or in the frame of `body`", "m"},
+        {"color", &T::color, "colour of the light"},
+        {"intensity", &T::intensity,
+         "brightness of a white surface that faces the light 1 m away; a number or a curve over time", "",
+         kNotNegative},
+        {"shadows", &T::shadows, "whether the light casts shadows"}};
   }
 };
 template <>
@@ -54,9 +53,11 @@ struct Table<SpotLight> {
   static Fields<SpotLight> fields() {
     using T = SpotLight;
     return Fields<T>{
-        {"target", &T::target, "point that the light aims at", "m"},
+        {"target", &T::target, "point that the light aims at, in the world or in the frame of `body`", "m"},
         {"angle_deg", &T::angle_deg, "full angle of the cone", "degrees", between(1, 150)},
-        {"softness", &T::softness, "fraction of the cone over which its edge fades", "", kFraction},
+        {"softness", &T::softness,
+         "fraction of the cone over which the light fades to zero at its edge; 0: a sharp edge", "",
+         kFraction},
         {"radius", &T::radius, "radius of the lamp; larger: softer shadows", "m", kPositive}}
         .with_base<LampBase>();
   }
@@ -67,8 +68,9 @@ struct Table<AreaLight> {
   static constexpr const char* kHelp = "A glowing rectangle: a window, a lamp with a large screen.";
   static Fields<AreaLight> fields() {
     using T = AreaLight;
-    return Fields<T>{{"target", &T::target, "point that the light aims at", "m"},
-                     {"size", &T::size, "width and height; larger: softer shadows", "m", kPositive}}
+    return Fields<T>{
+        {"target", &T::target, "point that the light aims at, in the world or in the frame of `body`", "m"},
+        {"size", &T::size, "width and height of the rectangle; larger: softer shadows", "m", kPositive}}
         .with_base<LampBase>();
   }
 };
@@ -78,10 +80,8 @@ struct Table<ModelLights> {
   static constexpr const char* kHelp =
       "Lights of the glTF file that a body shows (KHR_lights_punctual). They move with the body and with the "
       "animation that the body plays. Their candela and lux are converted by 1 / pi: a white surface that "
-      "faces "
-      "a lamp of 1 cd at a distance of 1 m has a luminance of 1 / pi cd/m^2, and 1 cd/m^2 is the brightness "
-      "1. "
-      "`offstage info FILE` lists the lights of a file.";
+      "faces a lamp of 1 cd at a distance of 1 m has a luminance of 1 / pi cd/m^2, and 1 cd/m^2 is the "
+      "brightness 1. `offstage info FILE` lists the lights of a file.";
   static Fields<ModelLights> fields() {
     using T = ModelLights;
     return {
@@ -94,7 +94,7 @@ struct Table<ModelLights> {
          kPositive},
         {"size_deg", &T::size_deg, "angular diameter of a directional light, which becomes the scene's sun",
          "degrees", between(0, 90)},
-        {"shadows", &T::shadows, "cast shadows"}};
+        {"shadows", &T::shadows, "whether the lights cast shadows"}};
   }
 };
 template <>

@@ -12,7 +12,8 @@ struct Table<LineLook> {
   static Fields<LineLook> fields() {
     return {{"width", &LineLook::width, "width of the lines, as a fraction of the picture's height", "",
              over(0, 0.1)},
-            {"hidden", &LineLook::hidden, "opacity of lines behind an object", "", kFraction}};
+            {"hidden", &LineLook::hidden, "opacity of lines that are behind an object; 0: hidden", "",
+             kFraction}};
   }
 };
 
@@ -83,8 +84,8 @@ struct Table<ContactsOverlay> {
          "m", kNotNegative},
         {"size", &T::size, "radius of the rings; the length of arrows is four times this", "m", kPositive},
         {"force_scale", &T::force_scale,
-         "length of the arrows per contact force, which then includes friction; 0: all arrows have one "
-         "length",
+         "length of the arrows per contact force, including friction; 0: all arrows have the same length and "
+         "show only the normal",
          "m/N", kNotNegative},
         {"color", &T::color, "colour of rings and arrows"}}
         .with_base<LineLook>();
@@ -96,13 +97,13 @@ struct Table<VelocitiesOverlay> {
   static constexpr const char* kHelp = "Velocities of bodies, as arrows from their centres of mass.";
   static Fields<VelocitiesOverlay> fields() {
     using T = VelocitiesOverlay;
-    return Fields<T>{
-        {"body", &T::body, "name of a body; empty: all bodies that are not static"},
-        {"scale", &T::scale, "length of the arrows per speed", "s", kNotNegative},
-        {"angular_scale", &T::angular_scale,
-         "length of arrows along the axis of rotation, per angular speed; 0: none", "m s/rad", kNotNegative},
-        {"color", &T::color, "colour of the velocity arrows"},
-        {"angular_color", &T::angular_color, "colour of the angular velocity arrows"}}
+    return Fields<T>{{"body", &T::body, "name of a body; empty: all bodies that are not static"},
+                     {"scale", &T::scale, "length of the arrows per speed", "s", kNotNegative},
+                     {"angular_scale", &T::angular_scale,
+                      "length of the arrows along the axis of rotation, per angular speed; 0: no such arrows",
+                      "m s/rad", kNotNegative},
+                     {"color", &T::color, "colour of the velocity arrows"},
+                     {"angular_color", &T::angular_color, "colour of the angular velocity arrows"}}
         .with_base<LineLook>();
   }
 };
@@ -114,7 +115,9 @@ struct Table<IslandsOverlay> {
       "island.";
   static Fields<IslandsOverlay> fields() {
     using T = IslandsOverlay;
-    return Fields<T>{{"asleep", &T::asleep, "brightness of sleeping bodies", "", kFraction}}
+    return Fields<T>{{"asleep", &T::asleep,
+                      "brightness of the boxes of sleeping bodies, relative to the other boxes", "",
+                      kFraction}}
         .with_base<LineLook>();
   }
 };
@@ -129,7 +132,7 @@ struct Table<JointsOverlay> {
     return Fields<T>{
         {"joint", &T::joint, "name of a joint; empty: all"},
         {"size", &T::size, "radius of the rings; axes are four times as long", "m", kPositive},
-        {"force_scale", &T::force_scale, "length of the arrows per force; 0: none", "m/N", kNotNegative},
+        {"force_scale", &T::force_scale, "length of the arrows per force; 0: no arrows", "m/N", kNotNegative},
         {"color", &T::color, "colour of lines and rings"},
         {"force_color", &T::force_color, "colour of the arrows"}}
         .with_base<LineLook>();
@@ -154,7 +157,8 @@ struct Table<TrailsOverlay> {
   static Fields<TrailsOverlay> fields() {
     using T = TrailsOverlay;
     return Fields<T>{{"body", &T::body, "name of a body; empty: all dynamic bodies"},
-                     {"duration", &T::duration, "length of a trail in time", "s", over(0, 60)},
+                     {"duration", &T::duration,
+                      "time before the frame that a trail covers; longer: longer trails", "s", over(0, 60)},
                      {"color", &T::color, "colour of the trails; default: another colour for each body"}}
         .with_base<LineLook>();
   }
@@ -166,13 +170,13 @@ struct Names<TextPlace> {
 template <>
 struct Table<TextOverlay> {
   static constexpr const char* kName = "text_overlay";
-  static constexpr const char* kHelp = "Text on the picture.";
+  static constexpr const char* kHelp = "Text over the picture.";
   static Fields<TextOverlay> fields() {
     using T = TextOverlay;
     return {{"text", &T::text,
              "ASCII text; {time}, {frame}, {bodies} and {particles} are replaced by their values, a line "
              "break starts a new line"},
-            {"place", &T::place, "place in the picture"},
+            {"place", &T::place, "corner of the picture in which the text stands, or its centre"},
             {"size", &T::size, "height of a line, as a fraction of the picture's height", "", over(0, 0.5)},
             {"color", &T::color, "colour of the letters"},
             {"from", &T::from, "time at which the text appears", "s"},

@@ -67,17 +67,21 @@ struct Table<ParticleLook> {
         {"style", &T::style, "kind of picture drawn for each particle"},
         {"color", &T::color, "base colour; alpha is the opacity"},
         {"color_over_age", &T::color_over_age,
-         "multiplies `color`; age 0 is the birth time, 1 the end of the lifespan"},
+         "colours that multiply `color`, each at an age: 0 is the birth time, 1 the end of the lifespan"},
         {"temperature_over_age", &T::temperature_over_age,
-         "multiplies the colour by the colour of a black body of this temperature, and by its brightness "
-         "relative to the hottest key",
+         "temperatures, each at an age in [0, 1]. The colour of the particle is multiplied by the colour of "
+         "a black body of this temperature, and by the brightness of the black body relative to the hottest "
+         "key",
          "K", kTemperature},
-        {"size_over_age", &T::size_over_age, "multiplies the drawn radius", "", kNotNegative},
-        {"ramp", &T::ramp, "interpolation between the keys over age"},
-        {"color_deviation", &T::color_deviation, "standard deviation of the brightness between particles", "",
-         kFraction},
+        {"size_over_age", &T::size_over_age,
+         "factors of the drawn radius, each at an age in [0, 1]; the radius for collisions stays the same",
+         "", kNotNegative},
+        {"ramp", &T::ramp,
+         "interpolation between the keys of `color_over_age`, `temperature_over_age` and `size_over_age`"},
+        {"color_deviation", &T::color_deviation,
+         "standard deviation of the brightness from particle to particle; 0: equal particles", "", kFraction},
         {"channel_deviation", &T::channel_deviation,
-         "standard deviations of red, green, blue and opacity between particles", "", kNotNegative},
+         "standard deviations of red, green, blue and opacity from particle to particle", "", kNotNegative},
         {"additive", &T::additive,
          "whether particles add light to the background instead of covering it; default: true for sparks and "
          "fire"},
@@ -85,16 +89,17 @@ struct Table<ParticleLook> {
          "whether sun and sky light the particles; if false, their colour is emitted light; default: true "
          "except for sparks and fire"},
         {"casts_shadow", &T::casts_shadow,
-         "casts a shadow; default: true for sprites, streaks, spheres and smoke"},
+         "whether the particles cast shadows; default: true for sprites, streaks, spheres and smoke"},
         {"softness", &T::softness, "width of the soft rim as a fraction of the radius; default: 0.5", "",
          kFraction},
         {"stretch", &T::stretch,
-         "a streak is as long as its particle's motion in this time; smoke, fire, flakes and sprites are "
-         "lengthened by the same distance; default: 1/60, for sparks 1/40, for fire 0.1, for smoke and "
-         "sprites "
-         "0",
+         "length of a streak, as the time in which the particle moves by this length; smoke, fire, flakes "
+         "and sprites are lengthened by the same distance; default: 1/60, for sparks 1/40, for fire 0.1, for "
+         "smoke and sprites 0",
          "s", kNotNegative},
-        {"taper", &T::taper, "fraction by which a streak fades towards its tail; default: 0, for sparks 1",
+        {"taper", &T::taper,
+         "fraction by which a streak fades towards its tail; 1: the tail is invisible; default: 0, for "
+         "sparks 1",
          "", kFraction},
         {"metallic", &T::metallic, "for spheres: 0 is a dielectric, 1 a metal; default: 0", "", kFraction},
         {"roughness", &T::roughness, "for spheres: 0 is a mirror, 1 is dull; default: 0.3", "", kFraction},
@@ -106,8 +111,7 @@ struct Table<ParticleLook> {
         {"mesh", &T::mesh, "the object that the style `mesh` draws, with its own material"},
         {"angle_deg", &T::angle_deg,
          "rotation of a new particle, counter-clockwise as seen by the camera, or about the axis of the "
-         "mesh; "
-         "for sprites with a texture, flakes and meshes",
+         "mesh; for sprites with a texture, flakes and meshes",
          "degrees"},
         {"spin_deg_per_s", &T::spin_deg_per_s, "speed of the rotation that starts at `angle_deg`",
          "degrees/s"},

@@ -14,22 +14,22 @@ struct Table<sim::ParticleSystemDef> {
   static Fields<sim::ParticleSystemDef> fields() {
     using T = sim::ParticleSystemDef;
     return {
-        {"linear_drag", &T::linear_drag, "drag force per speed relative to the air", "kg/s", kNotNegative},
+        {"linear_drag", &T::linear_drag,
+         "drag force on each particle per speed relative to the air; 0: no drag", "kg/s", kNotNegative},
         {"gravity", &T::gravity, "whether the world's gravity acts on the particles"},
         {"force", &T::force, "constant force on each particle", "N"},
-        {"collides", &T::collides, "whether particles collide with bodies"},
+        {"collides", &T::collides, "whether the particles collide with bodies"},
         {"internal", &T::internal, "whether particles of this system collide with each other"},
         {"external", &T::external,
          "whether particles collide with particles of other systems that also have `external`"},
         {"rotates", &T::rotates,
          "contacts turn the particles as solid balls, so that they roll and friction acts at their surface; "
          "otherwise they slide without turning. Objects of the style `mesh` show the rotation. Sand and "
-         "other "
-         "granular materials need it to flow and heap"},
+         "other granular materials need it to flow and heap"},
         {"dies_on_hit", &T::dies_on_hit, "whether a particle is removed at its first collision"},
         {"integrator", &T::integrator,
-         "integration method of particles without springs; `leapfrog` is of second order at the cost of one "
-         "force evaluation, and is stable for any drag"},
+         "method that integrates the motion of particles without springs; `leapfrog` is of second order, "
+         "needs one evaluation of the forces per sub-step, and is stable for any drag"},
     };
   }
 };
@@ -39,9 +39,9 @@ struct Table<ParticlePlace> {
   static constexpr const char* kName = "particle";
   static constexpr const char* kHelp = "One particle of a group.";
   static Fields<ParticlePlace> fields() {
-    return {{"position", &ParticlePlace::position, "position at time 0", "m"},
-            {"velocity", &ParticlePlace::velocity, "velocity at time 0", "m/s"},
-            {"color", &ParticlePlace::color, "colour, instead of the colour of the look"}};
+    return {{"position", &ParticlePlace::position, "position of the particle at time 0", "m"},
+            {"velocity", &ParticlePlace::velocity, "velocity at time 0, in world axes", "m/s"},
+            {"color", &ParticlePlace::color, "colour of the particle, instead of the colour of the `look`"}};
   }
 };
 template <>
@@ -62,13 +62,14 @@ struct Table<ParticleGroup> {
          "(docs/models.md)",
          "", kScale},
         {"fit", &T::fit,
-         "edges of a box. The points get the largest size that fits into the box; `scale` then multiplies "
-         "that size",
+         "lengths of the edges of a box along the axes of the file. The points get the largest size that "
+         "fits into the box; `scale` then multiplies that size",
          "m", kPositive},
-        {"position", &T::position, "position of the file's origin", "m"},
-        {"orientation", &T::orientation, "orientation of the file's axes"},
-        {"max_points", &T::max_points, "greatest number of points; a file with more is thinned out evenly",
-         "", between(1, 2e7)},
+        {"position", &T::position, "position of the origin of `file` in the world", "m"},
+        {"orientation", &T::orientation, "orientation of the axes of `file` in the world"},
+        {"max_points", &T::max_points,
+         "greatest number of points read from `file`; of a larger file, evenly spaced points are omitted", "",
+         between(1, 2e7)},
         {"radius", &T::radius, "radius of each particle", "m", kPositive},
         {"mass", &T::mass, "mass of each particle", "kg", kPositive},
         {"restitution", &T::restitution,

@@ -19,7 +19,8 @@ struct Table<Repeat> {
     return {{"count", &Repeat::count, "number of copies, including the original", "", between(1, kMaxCopies)},
             {"offset", &Repeat::offset, "displacement from one copy to the next", "m"},
             {"turn_deg", &Repeat::turn_deg, "rotation from one copy to the next", "degrees"},
-            {"pivot", &Repeat::pivot, "a point of the vertical axis that copies turn about", "m"}};
+            {"pivot", &Repeat::pivot,
+             "a point on the vertical axis about which copies are turned, in the world", "m"}};
   }
 };
 template <>
@@ -42,17 +43,18 @@ struct Table<Scatter> {
             {"size", &Scatter::size, "size of the rectangle along x and z", "m", kNotNegative},
             {"min_distance", &Scatter::min_distance,
              "least distance between copies; a copy that finds no place is omitted", "m", kNotNegative},
-            {"turn", &Scatter::turn, "whether each copy is turned about its vertical axis by a random angle"},
-            {"scale", &Scatter::scale, "scale factor of a body's shape and model", "", kScale},
+            {"turn", &Scatter::turn,
+             "whether each copy is turned by a random angle about the vertical axis through its origin"},
+            {"scale", &Scatter::scale, "scale factor of the shape and the model of each copy", "", kScale},
             {"seed", &Scatter::seed, "seed of the random numbers that place the copies", "", kNotNegative}};
   }
 };
 template <>
 struct Table<BoxFill> {
   static constexpr const char* kName = "box_fill";
-  static constexpr const char* kHelp = "A cuboid along the axes of the world.";
+  static constexpr const char* kHelp = "A cuboid with edges along the axes of the world.";
   static Fields<BoxFill> fields() {
-    return {{"size", &BoxFill::size, "full lengths of the edges", "m", kPositive}};
+    return {{"size", &BoxFill::size, "full lengths of the edges along x, y and z", "m", kPositive}};
   }
 };
 template <>
@@ -60,15 +62,17 @@ struct Table<CylinderFill> {
   static constexpr const char* kName = "cylinder_fill";
   static constexpr const char* kHelp = "A vertical cylinder.";
   static Fields<CylinderFill> fields() {
-    return {{"radius", &CylinderFill::radius, "radius", "m", kPositive},
-            {"height", &CylinderFill::height, "height", "m", kPositive}};
+    return {{"radius", &CylinderFill::radius, "radius of the cylinder", "m", kPositive},
+            {"height", &CylinderFill::height, "height of the cylinder", "m", kPositive}};
   }
 };
 template <>
 struct Table<SphereFill> {
   static constexpr const char* kName = "sphere_fill";
   static constexpr const char* kHelp = "A ball.";
-  static Fields<SphereFill> fields() { return {{"radius", &SphereFill::radius, "radius", "m", kPositive}}; }
+  static Fields<SphereFill> fields() {
+    return {{"radius", &SphereFill::radius, "radius of the ball", "m", kPositive}};
+  }
 };
 template <>
 struct Table<MeshFill> {
@@ -77,7 +81,7 @@ struct Table<MeshFill> {
   static Fields<MeshFill> fields() {
     return {{"file", &MeshFill::file,
              "model file relative to the scene, or the name of a model that comes with offstage; FILE#NODE "
-             "selects one node. Its origin is at `position`",
+             "selects one node. The model's origin is at `position`",
              kRequired},
             {"scale", &MeshFill::scale, kModelScaleHelp, "", kScale},
             {"fit", &MeshFill::fit, kModelFitHelp, "m", kPositive}};
@@ -99,8 +103,7 @@ struct Table<Fill> {
   static constexpr const char* kName = "fill";
   static constexpr const char* kHelp =
       "Fills a volume with copies of a body, or with particles: a jar of marbles, a pool of drops. All "
-      "centres are at "
-      "least half the spacing inside the volume.";
+      "centres are at least half the spacing inside the volume.";
   static Fields<Fill> fields() {
     return {
         {"shape", &Fill::shape, "volume that is filled"},
@@ -112,8 +115,7 @@ struct Table<Fill> {
          "m", kNotNegative},
         {"packing", &Fill::packing,
          "arrangement of the centres: `hexagonal` is the closest (balls that touch fill 74 %), `cubic` is a "
-         "grid "
-         "(52 %), `random` places them one after the other at random (about 28 %)"},
+         "grid (52 %), `random` places them one after the other at random (about 28 %)"},
         {"seed", &Fill::seed, "seed of the random numbers of the `random` arrangement", "", kNotNegative}};
   }
 };

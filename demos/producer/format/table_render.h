@@ -26,13 +26,17 @@ struct Table<RenderSettings> {
   static Fields<RenderSettings> fields() {
     using T = RenderSettings;
     return {
-        {"size", &T::size, "width and height; most video formats need even numbers", "pixels",
+        {"size", &T::size, "width and height of the picture; most video formats need even numbers", "pixels",
          between(16, 16384)},
-        {"quality", &T::quality, "number of sub-frames per frame: `draft` 1, `preview` 4, `final` 16"},
+        {"quality", &T::quality,
+         "number of sub-frames whose mean is a frame: `draft` 1, `preview` 4, `final` 16; more sub-frames "
+         "smooth edges, motion blur and soft shadows, and take more time"},
         {"shutter", &T::shutter,
-         "fraction of the frame time during which the shutter is open; gives motion blur", "", kFraction},
-        {"exposure", &T::exposure, "brightness factor of the whole picture; a number or a curve over time",
-         "", kPositive},
+         "fraction of the time between two frames during which the shutter is open; larger: more motion "
+         "blur; 0: none",
+         "", kFraction},
+        {"exposure", &T::exposure,
+         "factor of the brightness of the whole picture; a number or a curve over time", "", kPositive},
         {"metering", &T::metering,
          "`fixed` uses `exposure` unchanged; `automatic` also brings each frame to the same average "
          "brightness"},

@@ -7,19 +7,24 @@
 
 namespace offstage::producer {
 
-/// Help texts of the keys `scale` and `fit`, which every object with a model file has.
+/// Help texts of the keys `file`, `scale` and `fit` of objects with a model file.
+inline constexpr const char* kModelFileHelp =
+    "model file relative to the scene, or the name of a model that comes with offstage; FILE#NODE selects "
+    "one node";
 inline constexpr const char* kModelScaleHelp =
     "scale factor of the model; `auto` converts the likely unit of the file to metres (docs/models.md). "
     "`offstage info FILE` shows the factor";
 inline constexpr const char* kModelFitHelp =
-    "edges of a box along the model's axes. The model gets the largest size that fits into the box, whatever "
-    "its unit; `scale` then multiplies that size";
+    "lengths of the edges of a box along the model's axes. The model gets the largest size that fits into "
+    "the box, whatever its unit; `scale` then multiplies that size";
 
 template <>
 struct Table<sim::Sphere> {
   static constexpr const char* kName = "sphere";
   static constexpr const char* kHelp = "A ball centred on the body.";
-  static Fields<sim::Sphere> fields() { return {{"radius", &sim::Sphere::radius, "radius", "m", kPositive}}; }
+  static Fields<sim::Sphere> fields() {
+    return {{"radius", &sim::Sphere::radius, "radius of the ball", "m", kPositive}};
+  }
 };
 template <>
 struct Table<sim::Box> {
@@ -34,7 +39,7 @@ struct Table<sim::Capsule> {
   static constexpr const char* kName = "capsule";
   static constexpr const char* kHelp = "A cylinder along y with a hemisphere on each end.";
   static Fields<sim::Capsule> fields() {
-    return {{"radius", &sim::Capsule::radius, "radius", "m", kPositive},
+    return {{"radius", &sim::Capsule::radius, "radius of the cylinder and the hemispheres", "m", kPositive},
             {"height", &sim::Capsule::height, "distance between the centres of the hemispheres", "m",
              kNotNegative}};
   }
@@ -44,7 +49,7 @@ struct Table<sim::Cylinder> {
   static constexpr const char* kName = "cylinder";
   static constexpr const char* kHelp = "A cylinder along y, centred on the body.";
   static Fields<sim::Cylinder> fields() {
-    return {{"radius", &sim::Cylinder::radius, "radius", "m", kPositive},
+    return {{"radius", &sim::Cylinder::radius, "radius of the cylinder", "m", kPositive},
             {"height", &sim::Cylinder::height, "length along y", "m", kPositive}};
   }
 };
@@ -106,10 +111,7 @@ struct Table<MeshFile> {
       "A model file as a collision shape: its triangles collide and determine the mass.";
   static Fields<MeshFile> fields() {
     return {
-        {"file", &MeshFile::file,
-         "model file relative to the scene, or the name of a model that comes with offstage; FILE#NODE "
-         "selects one node",
-         kRequired},
+        {"file", &MeshFile::file, kModelFileHelp, kRequired},
         {"scale", &MeshFile::scale, kModelScaleHelp, "", kScale},
         {"fit", &MeshFile::fit, kModelFitHelp, "m", kPositive},
         {"decomposition", &MeshFile::decomposition,
@@ -150,8 +152,7 @@ struct Table<sim::Tube> {
   static constexpr const char* kName = "tube";
   static constexpr const char* kHelp =
       "A hollow cylinder along y, open at both ends, centred on the body. It collides as 48 convex parts; "
-      "its mass is "
-      "exact.";
+      "its mass is exact.";
   static Fields<sim::Tube> fields() {
     return {
         {"radius", &sim::Tube::radius, "radius of the outside", "m", kPositive},
@@ -202,7 +203,9 @@ struct Table<Compound> {
       "Several shapes that form one rigid body, such as a hammer. The mass and the inertia are sums over the "
       "parts; where two parts overlap, the mass of both counts. Round parts collide with 32 to 48 flat "
       "sides.";
-  static Fields<Compound> fields() { return {{"parts", &Compound::parts, "parts; at least one", kRequired}}; }
+  static Fields<Compound> fields() {
+    return {{"parts", &Compound::parts, "shapes of which the body consists; at least one", kRequired}};
+  }
 };
 template <>
 struct Tags<Shape> {

@@ -13,7 +13,8 @@ struct Table<SpringEnd> {
     return {{"body", &SpringEnd::body, "name of a body; empty: none"},
             {"particles", &SpringEnd::particles, "name of a particle group; empty: none"},
             {"index", &SpringEnd::index, "index of the particle in its group", "", between(0, 1e9)},
-            {"position", &SpringEnd::position, "position in the body's frame, or in the world", "m"}};
+            {"position", &SpringEnd::position,
+             "position of the end in the frame of `body`, or in the world without a body", "m"}};
   }
 };
 template <>
@@ -25,11 +26,12 @@ struct Table<Spring> {
     return {
         {"name", &T::name, "unique name; default: spring_N, where N is the index in the list"},
         {"a", &T::a, "first end of the spring"},
-        {"b", &T::b, "the second end of the spring"},
-        {"stiffness", &T::stiffness, "force per extension", "N/m", kNotNegative},
-        {"damping", &T::damping, "force per speed of extension", "N s/m", kNotNegative},
-        {"rest_length", &T::rest_length, "length without force; negative: the distance of the ends at time 0",
-         "m"},
+        {"b", &T::b, "second end of the spring"},
+        {"stiffness", &T::stiffness, "stiffness of the spring: force per extension", "N/m", kNotNegative},
+        {"damping", &T::damping, "damping of the spring: force per speed of extension", "N s/m",
+         kNotNegative},
+        {"rest_length", &T::rest_length,
+         "length at which the spring exerts no force; negative: the distance of the ends at time 0", "m"},
         {"visible", &T::visible, "whether the spring is drawn as a rod"},
         {"radius", &T::radius, "radius of the rod", "m", kPositive},
         {"material", &T::material, "name of the rod's material; empty: grey"},

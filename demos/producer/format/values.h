@@ -32,8 +32,8 @@ struct Codec<Real> {
   static Node write(const Real& value);
   static Description describe(Catalogue& all, const Spec& spec);
 };
-/// A number of single precision, which structs of the renderer use. Its JSON form is that of any other
-/// number.
+/// A number of single precision, which structs of the renderer use. Its JSON form is the same as for other
+/// numbers.
 template <>
 struct Codec<float> {
   static void read(Reader& in, const Node& node, const Spec& spec, float& out) {

@@ -31,8 +31,9 @@ struct NormalSpecs {
   std::array<const Spec*, 5> all() const { return {&mean, &deviation, &min, &max, &clip}; }
 };
 
-/// A limit that is itself allowed truncates a distribution. An excluded limit, such as "greater than 0", does
-/// not: there is no smallest allowed value at which to truncate.
+/// Returns the distribution, truncated at the limits. A limit that is itself an allowed value truncates the
+/// distribution. An excluded limit, such as "greater than 0", does not, because there is no smallest allowed
+/// value.
 Normal within(const Limits& limits) {
   Normal normal;
   if (!limits.open_low) normal.min = std::max(normal.min, limits.low);

@@ -42,17 +42,21 @@ fs::path snapshot_file(const CacheInfo& info, int frame) {
 }  // namespace
 
 CacheInfo read_cache_info(const fs::path& folder) {
-  if (!is_cache(folder)) throw render::FileError(folder.string() + ": is not a cache of snapshots");
+  if (!is_cache(folder))
+    throw render::FileError(
+        folder.string() +
+        ": is not a cache of snapshots; `offstage simulate SCENE --cache FOLDER` writes one");
   CacheInfo info{.folder = folder, .bytes = bytes_in(folder)};
   const std::optional<JsonObject> published = read_json_file(folder / SnapshotCache::kFile);
   if (!published) {
-    info.problem = "its simulation did not finish";
+    info.problem = "its simulation did not finish; simulate again with --force";
     return info;
   }
   info.format = published->count("offstage_cache", 0, kMostFrames);
   if (info.format != SnapshotCache::kFormat) {
-    info.problem = fmt::format("format {} of another version of the program; this one reads format {}",
-                               info.format, SnapshotCache::kFormat);
+    info.problem = fmt::format(
+        "format {} of another version of the program; this one reads format {}; simulate again with --force",
+        info.format, SnapshotCache::kFormat);
     return info;
   }
   info.frames = published->count("frames", 0, kMostFrames);
@@ -62,7 +66,8 @@ CacheInfo read_cache_info(const fs::path& folder) {
       info.generation.find('/') != std::string::npos)
     published->refuse("generation", "the name of a generation's folder");
   std::error_code error;
-  if (!fs::is_directory(folder / info.generation, error)) info.problem = "its snapshots were deleted";
+  if (!fs::is_directory(folder / info.generation, error))
+    info.problem = "its snapshots were deleted; simulate again with --force";
   return info;
 }
 
@@ -107,7 +112,10 @@ std::vector<std::string> verify_cache(const CacheInfo& info, std::size_t most) {
 }
 
 uint64_t clear_cache(const fs::path& folder, std::string& problem) {
-  if (!is_cache(folder)) throw render::FileError(folder.string() + ": is not a cache of snapshots");
+  if (!is_cache(folder))
+    throw render::FileError(
+        folder.string() +
+        ": is not a cache of snapshots; `offstage simulate SCENE --cache FOLDER` writes one");
   const uint64_t before = bytes_in(folder);
   std::error_code error;
   // removed first, so that no further process opens the cache

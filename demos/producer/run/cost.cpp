@@ -31,7 +31,8 @@ constexpr double kTriangle_s = 0.1e-6;             // a sub-frame of a triangle 
 constexpr double kClothPicture_s = 0.09;           // time per sub-frame of a cloth, independent of its mesh
 constexpr double kPixel_s = 40e-3 / (1280 * 720);  // a sub-frame of a pixel of ground
 
-/// Time of a sub-frame for a particle of each style; puffs cover many pixels.
+/// Returns the time to draw a particle of this look in a sub-frame [s]. Smoke and fire take longest, because
+/// their particles cover many pixels.
 double drawn_particle_s(const ParticleLook& look) {
   constexpr double kStreak = 2.4e-6, kBall = 5e-6, kPuff = 60e-6;
   switch (look.style) {

@@ -24,7 +24,7 @@ std::string command_text(const FarmPlan& plan, const std::vector<std::string>& w
   return text;
 }
 
-/// The common beginning of all scripts.
+/// Returns the common beginning of all scripts.
 std::string head(const FarmPlan& plan, const std::string& title) {
   return fmt::format(
       "#!/bin/sh\n# {}: {}\nset -eu\ncd {}\nmkdir -p done\n"
@@ -145,7 +145,9 @@ void write_farm(const FarmPlan& plan) {
 FarmPlan read_farm(const fs::path& work) {
   const std::optional<JsonObject> json = read_json_file(work / "farm.json");
   if (!json || json->count("offstage_farm", 0, kMostFrames) != kFarmFormat)
-    throw render::FileError(work.string() + ": is not the folder of a farm");
+    throw render::FileError(
+        work.string() +
+        ": is not the folder of a farm; give the folder that `offstage farm` wrote, such as FILM.mp4.farm");
   FarmPlan plan;
   plan.work = fs::absolute(work);
   plan.program = json->text("program");

@@ -24,7 +24,7 @@ struct GoldenFrame {
 };
 
 struct Golden {
-  std::string scene;   ///< name of the golden; the names of its files begin with it
+  std::string scene;   ///< name of the golden, with which the names of its files begin
   std::string source;  ///< the scene's file, relative to the folder of goldens; empty: not recorded
   /// Reason for the latest change of the golden, and fingerprint of the machine that drew it.
   std::string reason, fingerprint;

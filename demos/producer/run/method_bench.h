@@ -34,15 +34,18 @@ struct MethodResult {
   std::string fault;
 
   double steps_per_second() const;
-  /// Number of iterations of the contact solvers and the impact solver: Newton steps, sweeps and pivots.
+  /// Returns the number of iterations of the contact solvers and the impact solver: Newton steps, sweeps and
+  /// pivots.
   uint64_t iterations() const;
-  /// Number of pivots of the solver `lcp`, which solves contacts as a linear complementarity problem.
+  /// Returns the number of pivots of the solver `lcp`, which solves contacts as a linear complementarity
+  /// problem.
   uint64_t pivots() const;
-  /// Number of cases that the intended algorithm did not solve: fall-backs of the contact solvers, exceeded
-  /// budgets and limits of impacts, suppressed restitution, and failed projections of joints.
+  /// Returns the number of cases that the intended algorithm did not solve: fall-backs of the contact
+  /// solvers, exceeded budgets and limits of impacts, suppressed restitution, and failed projections of
+  /// joints.
   uint64_t fallbacks() const;
-  /// Greatest distance between the positions of a body at the end of this run and at the end of `other` [m];
-  /// nothing if either run ended early.
+  /// Returns the greatest distance between the positions of a body at the end of this run and at the end of
+  /// `other` [m]; nothing if either run ended early.
   std::optional<double> deviation(const MethodResult& other) const;
 };
 

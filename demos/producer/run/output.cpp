@@ -233,7 +233,9 @@ FrameFolder prepare_frames(const fs::path& pattern, const ChannelFiles& channels
   if (is_part) {
     result.lock.share();
     if (!is_ours(read_json_file(manifest_path), pattern, manifest))
-      throw OutputError(folder.string() + ": another run has just begun to write here");
+      throw OutputError(
+          folder.string() +
+          ": another run has just begun to write here; wait for its end, or choose another output");
   }
   return result;
 }

@@ -39,7 +39,7 @@ double ms_since(Clock::time_point start) {
 /// thread that writes share one object.
 class ProgressMeter {
  public:
-  /// `drawing_ms`: initial estimate of the drawing time of a frame.
+  /// `drawing_ms`: initial estimate of the time to draw a frame [ms].
   ProgressMeter(const ProgressCallback& callback, int frames, int frames_to_simulate, double drawing_ms)
       : callback_(callback), guess_ms_(drawing_ms) {
     latest_.total = frames;
@@ -96,7 +96,8 @@ class ProgressMeter {
 
 class LiveSource : public StateSource {
  public:
-  /// The requested states are written to `kept`, unless it is empty. `keep_at_most`: see RenderJob.
+  /// Prepares a simulation. The requested states are written to `kept`, unless it is empty. `keep_at_most`:
+  /// see RenderJob.
   LiveSource(const Scene& scene, const ModelLibrary& models, std::optional<SnapshotCache>& kept,
              std::optional<uint64_t> keep_at_most)
       : simulation_(scene, models),

@@ -30,7 +30,8 @@ std::vector<std::string> notes_of(const SimulationTotals& t) {
                     "it moving.",
                     body));
   for (const std::string& joint : t.broken_joints)
-    notes.push_back(fmt::format("note: joint '{}' broke", joint));
+    notes.push_back(
+        fmt::format("note: joint '{}' broke, because its load exceeded max_force or max_torque", joint));
   if (t.joints.unsolved)
     notes.push_back(fmt::format(
         "warning: the motion of joints did not converge {} times; joints may come apart or slow down. "

@@ -65,7 +65,7 @@ void SnapshotCache::create(const std::string& key, int frames, bool force) {
   std::string name = (folder_ / (std::string(kGenerationPrefix) + "XXXXXX")).string();
   if (::mkdtemp(name.data()) == nullptr) render::throw_file_error(folder_, "cannot create a folder");
   generation_ = name;
-  // mkdtemp() gives permissions to the owner alone.
+  // mkdtemp() gives permissions only to the owner.
   fs::permissions(generation_, fs::status(folder_, error).permissions(), error);
   hold_ = open_folder(generation_);
   ::flock(hold_.fd(), LOCK_EX | LOCK_NB);

@@ -18,9 +18,9 @@ struct Overrides {
 struct Effect {
   Where where;
   std::string preset;
-  std::string name;  ///< prefix for the names of its objects; default: the preset's name
+  std::string name;  ///< prefix of the names of the effect's objects; default: the preset's name
   Vec3 position = Vec3::Zero();
-  std::string body;  ///< body that carries the emitters; `position` is then in its frame
+  std::string body;  ///< body that carries the emitters; `position` is then in the body's frame
   Real start = 0;
   Overrides overrides;
 };

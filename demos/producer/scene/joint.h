@@ -35,7 +35,7 @@ struct JointMotor {
 struct JointBehaviour {
   sim::JointType type = sim::JointType::spherical;
   Vec3 axis = Vec3::UnitZ();
-  std::optional<Vec3> second_axis;  ///< default: +X, or `axis` for a gear
+  std::optional<Vec3> second_axis;  ///< direction of the second axis; default: +X, or `axis` for a gear
   Real ratio = 1;                   ///< gear [1], rack [m], screw [m per turn] or pulley [1]
   /// Limits of the displacement of a sliding joint, or of the change of a length [m].
   std::optional<std::array<Real, 2>> limits;

@@ -9,7 +9,7 @@
 namespace offstage::producer {
 namespace {
 
-/// The defaults of a style. Self-luminous particles cast no shadow.
+/// Returns the defaults of a style. Self-luminous particles cast no shadow.
 render::PointsDef usual_look(LookStyle style) {
   using render::PointStyle;
   switch (style) {

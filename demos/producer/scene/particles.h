@@ -28,7 +28,8 @@ enum class LookStyle { sprite, streak, sphere, smoke, fire, flake, drop, spark, 
 /// particle's radius.
 struct LookMesh {
   Shape shape = sim::Box{};
-  std::string material;       ///< name; empty: the default material, or that of the model file
+  std::string
+      material;  ///< name of the material; empty: the default material, or the material of the model file
   std::optional<Vec3> axis;   ///< axis of rotation; default: a random axis for each particle
   bool along_motion = false;  ///< whether the mesh's +Y axis points along the velocity
 };
@@ -49,11 +50,11 @@ struct ParticleLook {
   std::optional<Real> softness, stretch, taper, metallic, roughness;
   std::string texture;  ///< picture of sprites; empty: a soft disc
   std::optional<render::SpriteSheet> sheet;
-  std::optional<LookMesh> mesh;  ///< what the style `mesh` draws; required by that style
+  std::optional<LookMesh> mesh;  ///< object that the style `mesh` draws, which this style requires
   Varying angle_deg = 0.0;       ///< angle of a particle at its birth time [degrees]
   Varying spin_deg_per_s = 0.0;
 
-  /// Whether a rotation of a particle changes its appearance.
+  /// Returns whether a rotation of a particle changes its appearance.
   bool turns() const;
 };
 
@@ -64,7 +65,7 @@ render::PointsDef points_def(const ParticleLook& look);
 struct ParticlePlace {
   Vec3 position = Vec3::Zero();
   Vec3 velocity = Vec3::Zero();
-  std::optional<Color> color;  ///< default: the colour of the look
+  std::optional<Color> color;  ///< colour of the particle; default: the colour of the look
 };
 
 /// Particles placed one by one, or as the points of a file.

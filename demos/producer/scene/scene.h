@@ -47,7 +47,7 @@ struct FabricLook {
   Real sheen = 0.2;
   Color sheen_color;
   Real translucency = 0.15;
-  std::optional<Color> back_color;  ///< default: the colour of the front
+  std::optional<Color> back_color;  ///< colour of the back; default: the colour of the front
 };
 
 /// Mapping of a texture. `surface` uses the texture coordinates of the mesh; `triplanar` projects the texture
@@ -109,8 +109,8 @@ struct ModelAnimation {
 
 struct BodyKey {
   Real time = 0;
-  std::optional<Vec3> position;     ///< default: position of the body
-  std::optional<Quat> orientation;  ///< default: orientation of the body
+  std::optional<Vec3> position;     ///< position at this key; default: position of the body
+  std::optional<Quat> orientation;  ///< orientation at this key; default: orientation of the body
   /// Interpolation to the next key; default: the interpolation of the body.
   std::optional<sim::Interpolation> interpolation;
 };
@@ -122,7 +122,8 @@ struct Body {
   Shape shape = sim::Box{};
   std::optional<ModelLook> model;
   std::optional<ModelAnimation> animation;
-  std::string material;  ///< name; empty: the default material, or that of the model file
+  std::string
+      material;  ///< name of the material; empty: the default material, or the material of the model file
   Vec3 position = Vec3::Zero();
   Quat orientation = Quat::Identity();
   Vec3 velocity = Vec3::Zero();
@@ -130,12 +131,14 @@ struct Body {
   Real density = 1000;
   Real mass = 0;
   std::optional<Vec3> centre;   ///< centre of mass, in the body's frame; default: computed from the shape
-  std::optional<Vec3> inertia;  ///< Ixx, Iyy, Izz about the centre of mass; default: from the shape
-  Vec3 inertia_products = Vec3::Zero();  ///< Ixy, Iyz, Izx of the inertia matrix, with `inertia`
+  std::optional<Vec3> inertia;  ///< moments of inertia Ixx, Iyy, Izz about the centre of mass; default:
+                                ///< computed from the shape
+  Vec3 inertia_products = Vec3::Zero();  ///< products of inertia Ixy, Iyz, Izx; they need `inertia`
   Real linear_drag = 0;
   Real angular_drag = 0;
-  Vec3 friction_axis = Vec3::Zero();     ///< friction axis of the surface, in the body's frame
-  Vec3 surface_velocity = Vec3::Zero();  ///< velocity of the surface relative to the body, in its frame
+  Vec3 friction_axis = Vec3::Zero();  ///< friction axis of the surface, in the body's frame
+  Vec3 surface_velocity =
+      Vec3::Zero();  ///< velocity of the surface relative to the body, in the body's frame
   bool collides = true;
   bool visible = true;
   bool casts_shadow = true;
@@ -147,7 +150,7 @@ struct Body {
   Real remove_at = 1e30;
   Placement placement;  ///< in the file, the keys of the placement are keys of the body
 
-  /// Whether an animation moves the parts of the body's collision shape.
+  /// Returns whether an animation moves the parts of the body's collision shape.
   bool has_animated_shape() const { return animation && !model && std::holds_alternative<MeshFile>(shape); }
 };
 
@@ -184,13 +187,14 @@ struct TreeOverlay : LineLook {
   Where where;
   std::string body;
   BoundingVolumeKind volume = BoundingVolumeKind::obb;
-  Varying level = 3.0;  ///< 0: the root; between two integers the levels fade into each other
+  Varying level =
+      3.0;  ///< level that is drawn, 0 is the root; between two integers the levels fade into each other
 };
 /// Draws the convex parts of a mesh body in different colours, instead of the body.
 struct PartsOverlay {
   Where where;
   std::string body;
-  Varying explode = 0.0;  ///< moves the parts away from the centre, by this fraction of their distance
+  Varying explode = 0.0;  ///< displacement of each part from the centre, as a fraction of its distance
 };
 /// Draws the closest points of two bodies, or their penetration if they overlap.
 struct ClosestOverlay : LineLook {
@@ -212,7 +216,7 @@ struct ContactsOverlay : LineLook {
 /// Draws velocities of bodies as arrows from their centres of mass.
 struct VelocitiesOverlay : LineLook {
   Where where;
-  std::string body;        ///< empty: all moving bodies
+  std::string body;        ///< name of a body; empty: all moving bodies
   Real scale = 0.2;        ///< length per m/s
   Real angular_scale = 0;  ///< length of a second arrow along the axis of rotation, per rad/s
   Color color{{0.2f, 0.8f, 1, 1}};
@@ -226,7 +230,7 @@ struct IslandsOverlay : LineLook {
 /// Draws the positions, free axes and loads of joints.
 struct JointsOverlay : LineLook {
   Where where;
-  std::string joint;     ///< empty: all joints
+  std::string joint;     ///< name of a joint; empty: all joints
   Real size = 0.08;      ///< radius of the ring around an axis; the axis is drawn four times as long
   Real force_scale = 0;  ///< length of an arrow per newton on body a; 0: no arrows
   Color color{{1, 0.45f, 0.1f, 1}};
@@ -235,15 +239,15 @@ struct JointsOverlay : LineLook {
 /// Draws the threads of cloths in colours of their strain, from blue (0) to red (`strain`).
 struct ClothOverlay : LineLook {
   Where where;
-  std::string cloth;   ///< empty: all cloths
+  std::string cloth;   ///< name of a cloth; empty: all cloths
   Real strain = 0.05;  ///< strain at which a thread is red
 };
 /// Draws the paths along which the centres of mass of bodies have moved.
 struct TrailsOverlay : LineLook {
   Where where;
-  std::string body;            ///< empty: all dynamic bodies
+  std::string body;            ///< name of a body; empty: all dynamic bodies
   Real duration = 1;           ///< time span of the path [s]
-  std::optional<Color> color;  ///< default: a different colour for each body
+  std::optional<Color> color;  ///< colour of the paths; default: a different colour for each body
 };
 enum class TextPlace { top_left, top_right, bottom_left, bottom_right, center };
 /// Text on the picture.
@@ -278,7 +282,8 @@ struct CameraKey {
   Real time = 0;
   Vec3 eye = {4, 2.5, 6};
   Vec3 target = Vec3::Zero();
-  std::optional<Real> fov_deg, focus;  ///< default: the camera's
+  std::optional<Real> fov_deg,
+      focus;  ///< field of view and focus distance at this key; default: those of the camera
   /// Interpolation to the next key; default: the interpolation of the camera.
   std::optional<sim::Interpolation> interpolation;
 };
@@ -349,7 +354,7 @@ struct ModelLights {
   Where where;
   std::string body;
   std::string name;     ///< name of the light's node; empty: all lights of the file
-  Real intensity = 1;   ///< factor of their intensities
+  Real intensity = 1;   ///< factor of the intensities of the lights
   Real radius = 0.01;   ///< radius of point and spot lights
   Real size_deg = 0.5;  ///< angular diameter of directional lights
   bool shadows = true;
@@ -370,7 +375,8 @@ struct SkyPictureSettings {
 struct EnvironmentSettings {
   Color zenith{{0.2f, 0.42f, 0.88f, 1}};
   Color horizon{{0.95f, 1.05f, 1.15f, 1}};
-  std::optional<Color> ground;  ///< default: the albedo of the ground plane
+  std::optional<Color>
+      ground;  ///< colour below the horizon; default: the light that the ground plane reflects
   Real intensity = 1;
   Real fog = 0;
   Real clouds = 0;
@@ -405,13 +411,13 @@ struct OutputSettings {
   std::vector<render::Channel> channels;  ///< numeric channels, in files beside the frames or the video
   render::ChannelFormat channel_format = render::ChannelFormat::exr;
 
-  /// Time of frame k [s], k from 1.
+  /// Returns the time of frame k [s], k from 1.
   Real time_of(int frame) const { return start + fps.seconds(frame - 1); }
 };
 
 struct Scene {
   int version = 1;
-  std::string name;  ///< default: the name of the file
+  std::string name;  ///< name of the scene; default: the name of the file
   std::string description;
   std::string fill_digest;  ///< after loading: digest of the models that fills read; empty if there are none
   WorldSettings world;

@@ -25,8 +25,8 @@ using sim::Vec3;
 /// A time from this value on means "never" [s]. The default of `remove_at` is greater.
 inline constexpr Real kForever = 1e29;
 
-/// Whether an object exists at `time` [s]: from `appear_at` until just before `remove_at`. A tolerance of
-/// 1e-9 s absorbs rounding errors.
+/// Returns whether an object exists at `time` [s]: from `appear_at` until just before `remove_at`. A
+/// tolerance of 1e-9 s absorbs rounding errors.
 inline bool exists(Real appear_at, Real remove_at, Real time) {
   constexpr Real kRounding = 1e-9;
   return time >= appear_at - kRounding && time < remove_at - kRounding;
@@ -57,7 +57,7 @@ struct ModelScale {
 struct MeshDecomposition {
   sim::DecompositionMethod method = sim::DecompositionMethod::automatic;
   Real max_error = sim::DecompositionSettings().max_error;
-  std::optional<int> max_parts;  ///< default: see sim::DecompositionSettings
+  std::optional<int> max_parts;  ///< greatest number of parts; default: see sim::DecompositionSettings
   Real min_angle_deg = 20;
   Real min_distance = sim::DecompositionSettings().min_distance;
 };
@@ -82,7 +82,7 @@ struct CompoundPart {
   PartShape shape = sim::Box{};
   Vec3 position = Vec3::Zero();  ///< position of the part, in the body's frame
   Quat orientation = Quat::Identity();
-  std::optional<Real> density;  ///< default: density of the body
+  std::optional<Real> density;  ///< density of the part; default: the density of the body
   std::string material;         ///< name of the material; empty: material of the body
 };
 /// A shape that consists of several solids, which form one rigid body.

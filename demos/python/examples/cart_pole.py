@@ -15,7 +15,7 @@ import offstage
 
 
 class CartPole:
-    """The pole hangs on a hinge of the cart, which slides on a rail. Action: force on the cart [N], within +-10."""
+    """A pole on a hinge of a cart, which slides on a rail. The action is the force on the cart [N], from -10 to 10."""
 
     rail, pole_length, dt, force_limit = 2.4, 1.0, 1 / 50, 10.0
 
@@ -39,7 +39,7 @@ class CartPole:
         return self.observation(), {}
 
     def observation(self):
-        """(4,): position of the cart [m], its speed [m/s], angle of the pole from upright [rad], its rate [rad/s]."""
+        """Returns (4,): position and speed of the cart [m, m/s], angle from upright and angular speed of the pole [rad, rad/s]."""
         slide, hinge = self.world.joint(self.slide), self.world.joint(self.hinge)
         return np.array([slide["coordinate"], slide["speed"], self.start_angle + hinge["coordinate"], hinge["speed"]])
 
@@ -61,7 +61,7 @@ class CartPole:
         return observation, 1.0, bool(terminated), False, {}
 
     def render(self, stage=None):
-        """(height, width, 4) uint8."""
+        """Returns the picture as (height, width, 4) uint8."""
         if stage is None:
             stage = Picture()
         return stage.draw(self.world, {self.cart: "cart", self.pole: "pole"})
@@ -91,7 +91,7 @@ def balance(observation):
 
 
 def run_one(steps=250, seed=0):
-    """The number of steps until the pole has fallen, at most `steps`."""
+    """Returns the number of steps until the pole has fallen, at most `steps`."""
     env = CartPole()
     observation, _ = env.reset(seed)
     for i in range(steps):
@@ -102,7 +102,7 @@ def run_one(steps=250, seed=0):
 
 
 def run_many(count=16, steps=100):
-    """All worlds are stepped together by threads, without the interpreter lock."""
+    """Steps many worlds together in several threads, without the interpreter lock."""
     envs = [CartPole() for _ in range(count)]
     observations = [env.reset(seed)[0] for seed, env in enumerate(envs)]
     for _ in range(steps):

@@ -10,7 +10,7 @@ import offstage
 
 
 class PushedStack:
-    """Boxes on the ground. Action: impulse on a box as a change of its velocity along X [m/s]."""
+    """A stack of boxes on the ground. The action is the change of the velocity of a box along X by a push [m/s]."""
 
     def __init__(self, boxes=5, size=0.2):
         self.boxes, self.size = boxes, size
@@ -27,7 +27,7 @@ class PushedStack:
         return self.observation(), {}
 
     def observation(self):
-        """(boxes, 13): position, orientation [w, x, y, z], velocity, angular velocity."""
+        """Returns (boxes, 13): position, orientation [w, x, y, z], velocity and angular velocity of each box."""
         return self.world.bodies(self.bodies)
 
     def step(self, box, speed):
@@ -42,7 +42,7 @@ class PushedStack:
 
 
 def smallest_push(box, steps=8):
-    """Speed of the push that just brings the stack down [m/s], by bisection."""
+    """Returns the smallest change of velocity that makes the stack fall [m/s], by bisection."""
     low, high = 0.0, 8.0
     for _ in range(steps):
         middle = (low + high) / 2

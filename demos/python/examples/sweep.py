@@ -12,7 +12,7 @@ import offstage
 
 
 def figures(scene_file, path, values, duration=1.0):
-    """Number of particles and height of the highest [m] at the end, for each value at `path`. Nothing is rendered."""
+    """Returns the number of particles and the greatest height [m] at the end, for each value at `path`. Draws nothing."""
     rows = []
     for value in values:
         scene = offstage.load(scene_file, set={path: value, "output.duration": duration})

@@ -25,14 +25,16 @@ from . import _offstage  # noqa: E402
 
 
 def load(file, set=None, allow=()):
-    """A Scene from a file. `set` overrides values by their paths: {"emitters.0.rate": 200}. `allow`: folders besides the
-    scene's own that its files may lie in. Raises SceneError, whose `problems` have file, line, column, path and what.
+    """Returns the Scene in a file.
+
+    `set` overrides values by their paths: {"emitters.0.rate": 200}. `allow`: folders, besides the scene's own, from which it
+    may read files. Raises SceneError, whose `problems` have file, line, column, path and what.
     """
     return _offstage.load(_os.fspath(file), set or {}, list(allow))
 
 
 def scene(source, set=None, folder=".", name="scene", allow=()):
-    """A Scene from a file, a dict, or one that is loaded already.
+    """Returns a Scene from a file or a dict. Returns a Scene unchanged.
 
     `set` overrides values by their paths: {"emitters.0.rate": 200}. Files that a dict names are relative to `folder`;
     `name` stands for the file in messages. Raises SceneError, whose `problems` have file, line, column, path and what.
@@ -47,18 +49,18 @@ def scene(source, set=None, folder=".", name="scene", allow=()):
 
 
 def render(source, frames="", *, images=True, channels=False, cache=None, set=None, threads=0, gl="", progress=None):
-    """Iterates over the frames of a film; the next ones are made meanwhile.
+    """Iterates over the frames of a film. A separate thread renders a few frames in advance.
 
-    source    file, dict or Scene
+    source    scene: a file, a dict or a Scene
     frames    "1-30,40,50-90x2"; negative numbers count from the end; empty: all
-    images    False: states (and channels) alone, nothing is drawn
-    channels  also depth, normal, id and motion
-    cache     folder of `offstage simulate --cache`, instead of simulating
-    threads   of the rasterizer; 0: all. The first call of a process decides
-    gl        "osmesa", "egl", "egl:gpu"; the first call of a process decides
+    images    whether frames have pictures; False: only states, and channels if requested
+    channels  whether frames have the channels depth, normal, id and motion
+    cache     folder that `offstage simulate --cache` wrote; states are read from it instead of simulating
+    threads   number of threads that draw; 0: all. Only the first call in a process has an effect
+    gl        "osmesa", "egl" or "egl:gpu". Only the first call in a process has an effect
     progress  called as progress(done, total) for each frame
 
-    The pixels and states are those of the program. `film.cancel()` ends a film.
+    The pixels and states are the same as those of the command line. `film.cancel()` ends a film.
     """
     film = _offstage._film(scene(source, set), frames, images, channels, None if cache is None else _os.fspath(cache),
                            threads, gl)
@@ -90,7 +92,7 @@ class Cache:
         return self.frames
 
     def __getitem__(self, frame):
-        """The Snapshot of a frame, from 1."""
+        """Returns the Snapshot of a frame; frames are numbered from 1."""
         if not 1 <= frame <= self.frames:
             raise IndexError(f"the cache has frames 1-{self.frames}")
         return _offstage._cache_snapshot(self.folder, frame)

@@ -62,25 +62,33 @@ std::unique_ptr<Film> make_film(const std::shared_ptr<SharedScene>& scene, const
 }  // namespace
 
 void bind_film(py::module_& m) {
-  py::class_<PythonFrame>(m, "Frame", "A frame of a film. Rows run from the top down.")
-      .def_readonly("number", &PythonFrame::number, "From 1.")
-      .def_readonly("time", &PythonFrame::time, "[s]")
-      .def_readonly("snapshot", &PythonFrame::snapshot, "The state that it shows.")
-      .def_readonly("image", &PythonFrame::image,
-                    "(height, width, 4) uint8: RGBA, sRGB, straight alpha; or None.")
+  py::class_<PythonFrame>(
+      m, "Frame", "A frame of a film. The rows of its arrays run from the top of the picture to the bottom.")
+      .def_readonly("number", &PythonFrame::number, "Number of the frame, from 1.")
+      .def_readonly("time", &PythonFrame::time, "Time of the film [s].")
+      .def_readonly("snapshot", &PythonFrame::snapshot,
+                    "Snapshot with the state of the simulation that the frame shows.")
+      .def_readonly(
+          "image", &PythonFrame::image,
+          "Picture, (height, width, 4) uint8: RGBA in sRGB with straight alpha. None without `images`.")
       .def_readonly("depth", &PythonFrame::depth,
-                    "(height, width) float32 [m], infinite without a surface; or None.")
-      .def_readonly("normal", &PythonFrame::normal, "(height, width, 3) float32, world axes; or None.")
-      .def_readonly("id", &PythonFrame::id,
-                    "(height, width) uint32: number of the object, 0 for none; or None.")
+                    "Distance along the view direction, (height, width) float32 [m]; infinite where no "
+                    "surface is visible. None without `channels`.")
+      .def_readonly("normal", &PythonFrame::normal,
+                    "Unit normals of the visible surfaces in world axes, (height, width, 3) float32. None "
+                    "without `channels`.")
+      .def_readonly(
+          "id", &PythonFrame::id,
+          "Numbers of the visible objects, (height, width) uint32; 0: no object. None without `channels`.")
       .def_readonly("motion", &PythonFrame::motion,
-                    "(height, width, 2) float32 [px] since the previous frame; or None.");
+                    "Motion on the picture since the previous frame, (height, width, 2) float32 [px]. None "
+                    "without `channels`.");
   py::class_<Film>(m, "Film",
                    "An iterator over the frames of a film, which a separate thread renders in advance.")
       .def("__iter__", [](py::object self) { return self; })
       .def("__next__", &next_frame)
       .def("__len__", &Film::total)
-      .def("cancel", &Film::cancel, "Ends the film; the iterator then stops.")
+      .def("cancel", &Film::cancel, "Ends the film. The iterator returns no further frames.")
       .def_property_readonly("done", &Film::done, "Number of frames that the iterator has returned.")
       .def_property_readonly("total", &Film::total);
   m.def("_film", &make_film, py::arg("scene"), py::arg("frames"), py::arg("images"), py::arg("channels"),

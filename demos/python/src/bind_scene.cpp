@@ -115,20 +115,19 @@ py::array bodies_of(const py::object& self, bool orientations) {
 void bind_snapshot(py::module_& m) {
   py::class_<Snapshot, std::shared_ptr<Snapshot>>(
       m, "Snapshot",
-      "The state of one frame, as the drawing gets it. Arrays are read-only views without a copy; they keep "
-      "the\n"
-      "snapshot alive. Numbers are float32, in metres and seconds, Y up.")
+      "The state of the simulation at one frame. Arrays are read-only views without a copy, which keep the "
+      "snapshot alive.\nNumbers are float32 in metres and seconds; Y is up.")
       .def_readonly("frame", &Snapshot::frame)
-      .def_readonly("time", &Snapshot::time, "[s]")
+      .def_readonly("time", &Snapshot::time, "Time of the film [s].")
       .def_property_readonly(
           "state_hash", [](const Snapshot& s) { return s.state_hash.hex(); },
-          "Hash of the whole state: 32 digits, the same as the program's.")
+          "Hash of the whole state: 32 hexadecimal digits. The command line prints the same hash.")
       .def_property_readonly(
           "positions", [](const py::object& self) { return bodies_of(self, false); },
-          "(n, 3): origins of the moving bodies [m], in the order of Scene.moving_bodies.")
+          "Origins of the moving bodies, (n, 3) [m], in the order of Scene.moving_bodies.")
       .def_property_readonly(
           "orientations_xyzw", [](const py::object& self) { return bodies_of(self, true); },
-          "(n, 4): unit quaternions [x, y, z, w] of the moving bodies, body to world.")
+          "Rotations of the moving bodies from body to world, (n, 4): unit quaternions [x, y, z, w].")
       .def_property_readonly(
           "orientations",
           [](const Snapshot& s) {
@@ -141,7 +140,8 @@ void bind_snapshot(py::module_& m) {
             }
             return out;
           },
-          "(n, 4): unit quaternions [w, x, y, z] of the moving bodies, body to world; a copy.")
+          "Rotations of the moving bodies from body to world, (n, 4): unit quaternions [w, x, y, z]. The "
+          "array is a copy.")
       .def_property_readonly(
           "point_sets",
           [](const py::object& self) {
@@ -150,8 +150,8 @@ void bind_snapshot(py::module_& m) {
               out.append(points_of(set, self));
             return out;
           },
-          "One dict per entry of Scene.point_sets: position (n, 3), velocity (n, 3), radius, color (n, 4), "
-          "age, id.")
+          "Particles: one dict for each entry of Scene.point_sets, with the arrays position (n, 3), velocity "
+          "(n, 3), radius, color (n, 4), age and id.")
       .def_property_readonly(
           "cloths",
           [](const py::object& self) {
@@ -160,20 +160,21 @@ void bind_snapshot(py::module_& m) {
               out.append(cloth_of(cloth, self));
             return out;
           },
-          "One dict per entry of Scene.cloths: position (n, 3), velocity (n, 3); triangles (t, 3) and "
-          "sources once it tore.")
+          "Cloths: one dict for each entry of Scene.cloths, with the arrays position (n, 3) and velocity (n, "
+          "3). A torn cloth also has triangles (t, 3) and sources.")
       .def(
           "to_bytes",
           [](const Snapshot& s) {
             const std::vector<uint8_t> bytes = producer::serialize(s);
             return py::bytes(reinterpret_cast<const char*>(bytes.data()), bytes.size());
           },
-          "The bytes of a snapshot file (docs/cache.md).");
+          "Returns the bytes of a snapshot file (docs/cache.md).");
 }
 
 void bind_scene_class(py::module_& m) {
   py::class_<SharedScene, std::shared_ptr<SharedScene>>(
-      m, "Scene", "A scene that was read and checked. It never changes; override values when it is loaded.")
+      m, "Scene",
+      "A scene that was read and checked. It cannot be changed; override its values when you load it.")
       .def_property_readonly("name", [](const SharedScene& s) { return s.loaded.scene.name; })
       .def_property_readonly("frame_count", [](const SharedScene& s) { return s.loaded.scene.frame_count(); })
       .def_property_readonly("fps",
@@ -183,7 +184,7 @@ void bind_scene_class(py::module_& m) {
           [](const SharedScene& s) {
             return py::make_tuple(s.loaded.scene.render.size.x(), s.loaded.scene.render.size.y());
           },
-          "(width, height) of the pictures [px].")
+          "Size of the pictures: (width, height) [px].")
       .def_property_readonly(
           "moving_bodies", [](const SharedScene& s) { return names_of_moving_bodies(s.loaded.scene); },
           "Names of the bodies that are not static, in the order of Snapshot.positions.")
@@ -193,20 +194,19 @@ void bind_scene_class(py::module_& m) {
       .def_property_readonly("warnings", [](const SharedScene& s) { return s.loaded.warnings; })
       .def_property_readonly(
           "simulation_key", [](const SharedScene& s) { return producer::simulation_key(s.loaded, s.models); },
-          "The key by which a cache of this scene is found.")
+          "Hash of everything that affects the simulation. A cache of this scene has the same key.")
       .def(
           "to_dict",
           [](const SharedScene& s) { return py::module_::import("json").attr("loads")(s.loaded.canonical); },
-          "The effective scene with every default.")
+          "Returns the scene with all overrides and defaults as a dict.")
       .def("__repr__", [](const SharedScene& s) {
         return "<offstage.Scene '" + s.loaded.scene.name + "', " +
                std::to_string(s.loaded.scene.frame_count()) + " frames>";
       });
   m.def("load", &load, py::arg("file"), py::arg("set") = py::dict(),
         py::arg("allow") = std::vector<std::string>{},
-        "Reads a scene file. `set` overrides values: {\"emitters.0.rate\": 200}. `allow`: folders besides "
-        "the scene's\n"
-        "own that its files may lie in. Raises SceneError with every problem.");
+        "Reads a scene file. `set` overrides values: {\"emitters.0.rate\": 200}. `allow`: folders, besides "
+        "the\nscene's own, from which it may read files. Raises SceneError with every problem.");
   m.def("_parse", &parse);
 }
 
@@ -236,8 +236,8 @@ void bind_simulation(py::module_& m) {
   using Released = py::call_guard<py::gil_scoped_release>;
   py::class_<SceneSimulation>(
       m, "Simulation",
-      "The simulation of a scene, without drawing. Different simulations may run in different\n"
-      "threads; one belongs to one thread at a time.")
+      "The simulation of a scene, without drawing. Different threads may use different simulations at the "
+      "same\ntime, but only one thread at a time may use a simulation.")
       .def(py::init<std::shared_ptr<SharedScene>>(), py::arg("scene"), Released())
       .def(
           "advance", [](SceneSimulation& s) { return std::const_pointer_cast<Snapshot>(s.advance()); },
@@ -255,7 +255,8 @@ void bind_simulation(py::module_& m) {
             return py::dict(py::arg("kinetic") = e.kinetic, py::arg("potential") = e.potential,
                             py::arg("elastic") = e.elastic);
           },
-          "[J]");
+          "Energy of the bodies, particles and cloths: a dict with kinetic, potential and elastic energy "
+          "[J].");
 }
 
 void bind_cache(py::module_& m) {
@@ -279,7 +280,8 @@ void bind_scene(py::module_& m) {
   bind_simulation(m);
   bind_cache(m);
   m.def("parse_frames", &producer::parse_frames, py::arg("text"), py::arg("count"),
-        "Frame numbers of a text such as \"1-30,40,50-90x2\" in a film of `count` frames.");
+        "Returns the frame numbers that a text selects, such as \"1-30,40,50-90x2\" in a film of `count` "
+        "frames.");
 }
 
 }  // namespace offstage::python

@@ -213,11 +213,12 @@ void set_points(ThreadStage& stage, render::PointsHandle handle,
 }  // namespace
 
 void bind_stage(py::module_& m) {
-  py::class_<render::MaterialHandle>(m, "Material", "Names a material of a Stage.");
-  py::class_<render::InstanceHandle>(m, "Instance", "Names a drawn mesh of a Stage.");
-  py::class_<render::PointsHandle>(m, "Points", "Names a set of drawn balls of a Stage.");
-  py::class_<ThreadStage>(m, "Stage",
-                          "Draws what a World simulates: objects with handles, placed by transforms.")
+  py::class_<render::MaterialHandle>(m, "Material", "Handle of a material of a Stage.");
+  py::class_<render::InstanceHandle>(m, "Instance", "Handle of a mesh that a Stage draws.");
+  py::class_<render::PointsHandle>(m, "Points", "Handle of a set of balls that a Stage draws.");
+  py::class_<ThreadStage>(
+      m, "Stage",
+      "Draws objects, for example those of a World. Handles name the objects, and set_pose() moves them.")
       .def(py::init([](int width_px, int height_px) {
              pin_environment_once(0, render::gl_platform_of_environment());
              return std::make_unique<ThreadStage>(width_px, height_px);
@@ -225,14 +226,15 @@ void bind_stage(py::module_& m) {
            py::arg("width") = 640, py::arg("height") = 360, Released())
       .def("add_material", &add_material, py::arg("color") = Triple{0.8, 0.8, 0.8}, py::arg("alpha") = 1,
            py::arg("metallic") = 0, py::arg("roughness") = 0.5, py::arg("transmission") = 0,
-           py::arg("emission") = Triple{0, 0, 0}, "Colours are linear.")
+           py::arg("emission") = Triple{0, 0, 0},
+           "Adds a material and returns its handle. Colours are linear.")
       .def(
           "add_shape",
           [](ThreadStage& stage, const sim::Shape& shape, render::MaterialHandle material, uint32_t object) {
             return add_instance(stage, mesh_of(shape), material, object);
           },
           py::arg("shape"), py::arg("material"), py::arg("object") = 0,
-          "`object`: its number in the channel `id`.")
+          "Adds a shape and returns its handle. `object`: number of the object in the channel `id`.")
       .def(
           "add_mesh",
           [](ThreadStage& stage,
@@ -261,7 +263,7 @@ void bind_stage(py::module_& m) {
                         }))
                         .first;
           },
-          "A set of balls.")
+          "Adds a set of balls and returns its handle; set_points() sets their positions.")
       .def("set_points", &set_points, py::arg("points"), py::arg("positions"), py::arg("radius"),
            py::arg("color") = Triple{0.8, 0.8, 0.8})
       .def(
@@ -273,11 +275,12 @@ void bind_stage(py::module_& m) {
             });
           },
           py::arg("eye"), py::arg("target") = Triple{0, 0, 0}, py::arg("fov_deg") = 40,
-          "Vertical field of view.")
+          "Sets the camera. `fov_deg`: vertical field of view [degrees].")
       .def("image", &image, py::arg("samples") = 4, py::arg("exposure") = 1,
-           "(height, width, 4) uint8, RGBA.")
+           "Draws the picture: (height, width, 4) uint8, RGBA. `samples`: number of sub-frames.")
       .def("channels", &channels,
-           "depth (height, width) [m], normal (height, width, 3), id (height, width).");
+           "Draws the channels: a dict with depth (height, width) [m], normal (height, width, 3) and id "
+           "(height, width).");
 }
 
 }  // namespace offstage::python

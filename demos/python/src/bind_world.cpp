@@ -247,7 +247,7 @@ std::unique_ptr<LiveWorld> make_world(const py::kwargs& kwargs) {
 
 template <class H>
 void bind_handle(py::module_& m, const char* name) {
-  py::class_<H>(m, name, "Names one object of a World.")
+  py::class_<H>(m, name, "Handle of an object of a World.")
       .def("__bool__", [](H h) { return static_cast<bool>(h); })
       .def("__eq__", [](H a, H b) { return a == b; })
       .def("__hash__", [](H h) { return (uint64_t{h.generation} << 32) | h.index; })
@@ -258,12 +258,12 @@ void bind_handle(py::module_& m, const char* name) {
 void bind_state(py::class_<LiveWorld>& world) {
   world
       .def("step", &step, py::arg("sampling_time"), py::arg("before") = py::none(),
-           "Advances by a time [s] and returns the figures of the step. `before(start, end)` is called "
-           "before each\n"
-           "sub-step; without it, other Python threads run meanwhile.")
+           "Advances by a time [s] and returns the statistics of the step as a dict. `before(start, end)` is "
+           "called before each\nsub-step. Without `before`, other Python threads can run during the step.")
       .def(
           "prewarm", [](LiveWorld& w, double from, double to) { return to_dict(w.world.prewarm(from, to)); },
-          py::arg("start"), py::arg("end"), "Advances particles alone, before the first step.")
+          py::arg("start"), py::arg("end"),
+          "Advances only the particles from `start` to `end` [s]. Must be called before the first step.")
       .def(
           "set_velocity",
           [](LiveWorld& w, sim::BodyHandle body, const Triple& v, const Triple& omega) {
@@ -271,10 +271,11 @@ void bind_state(py::class_<LiveWorld>& world) {
           },
           py::arg("body"), py::arg("velocity"), py::arg("angular_velocity") = Triple{0, 0, 0})
       .def("body", &body_dict, py::arg("body"),
-           "State of a body: position, orientation [w, x, y, z], centre of mass, velocities.")
+           "Returns the state of a body as a dict: position, orientation [w, x, y, z], centre of mass and "
+           "velocities.")
       .def("bodies", &body_states, py::arg("bodies"),
-           "(n, 13) float64: position, orientation [w, x, y, z], velocity and angular velocity of many "
-           "bodies.")
+           "Returns the states of many bodies, (n, 13) float64: position, orientation [w, x, y, z], velocity "
+           "and angular velocity.")
       .def(
           "body_motion",
           [](const LiveWorld& w, sim::BodyHandle body, double time) {
@@ -285,11 +286,15 @@ void bind_state(py::class_<LiveWorld>& world) {
           py::arg("body"), py::arg("time"))
       .def("joint", &joint_dict, py::arg("joint"))
       .def("particles", &particle_dict, py::arg("system"),
-           "Arrays of a system, by the order of creation: position (n, 3), ...")
-      .def("particle_events", &event_list, "Events of the last sub-step, of systems that report them.")
+           "Returns the particles of a system as a dict of arrays, in the order of their creation: position "
+           "(n, 3), ...")
+      .def("particle_events", &event_list,
+           "Returns the collisions and deaths of particles in the last sub-step, for the systems that report "
+           "them.")
       .def("cloth", &cloth_dict, py::arg("cloth"),
-           "position (n, 3), velocity, triangles (t, 3), sources, version, max_strain, max_bend.")
-      .def("contacts", &contact_list, "Contact points at the end of the last step.")
+           "Returns the state of a cloth as a dict: position (n, 3), velocity (n, 3), triangles (t, 3), "
+           "sources, version, max_strain and max_bend.")
+      .def("contacts", &contact_list, "Returns the contact points at the end of the last step.")
       .def(
           "overlaps",
           [](const LiveWorld& w, double least) {
@@ -299,7 +304,8 @@ void bind_state(py::class_<LiveWorld>& world) {
               out.append(py::make_tuple(o.a, o.b, o.depth));
             return out;
           },
-          py::arg("least") = 1e-9, "(a, b, depth [m]) of bodies that overlap.")
+          py::arg("least") = 1e-9,
+          "Returns (a, b, depth [m]) for each pair of bodies that overlap by at least `least` [m].")
       .def(
           "moved",
           [](const LiveWorld& w) {
@@ -307,7 +313,7 @@ void bind_state(py::class_<LiveWorld>& world) {
             for (const sim::MovedBody& m : w.world.moved()) moved.push_back(m.body);
             return moved;
           },
-          "Bodies whose pose changed during the last step.")
+          "Returns the bodies whose pose changed during the last step.")
       .def(
           "island", [](const LiveWorld& w, sim::BodyHandle body) { return w.world.island(w.body(body)); },
           py::arg("body"))
@@ -316,7 +322,7 @@ void bind_state(py::class_<LiveWorld>& world) {
           [](const LiveWorld& w, sim::BodyHandle body) { return w.world.is_asleep(w.body(body)); },
           py::arg("body"))
       .def_property_readonly(
-          "time", [](const LiveWorld& w) { return w.world.time(); }, "[s]")
+          "time", [](const LiveWorld& w) { return w.world.time(); }, "Time of the simulation [s].")
       .def_property_readonly("body_count", [](const LiveWorld& w) { return w.world.body_count(); })
       .def_property_readonly("particle_count", [](const LiveWorld& w) { return w.world.particle_count(); })
       .def_property_readonly(
@@ -326,7 +332,7 @@ void bind_state(py::class_<LiveWorld>& world) {
             return py::dict(py::arg("kinetic") = e.kinetic, py::arg("potential") = e.potential,
                             py::arg("elastic") = e.elastic);
           },
-          "[J]")
+          "Energy of the world: a dict with kinetic, potential and elastic energy [J].")
       .def_property_readonly("state_hash", [](const LiveWorld& w) { return w.world.state_hash().hex(); });
 }
 
@@ -340,15 +346,17 @@ void bind_world(py::module_& m) {
   bind_handle<sim::ClothHandle>(m, "ClothHandle");
   bind_handle<sim::ForceHandle>(m, "ForceHandle");
   bind_shapes(m);
-  py::class_<LiveWorld> world(
-      m, "World",
-      "A simulation that is built object by object. Units: m, kg, s, rad; Y up. A world belongs to\n"
-      "one thread at a time.");
+  py::class_<LiveWorld> world(m, "World",
+                              "A simulation that is built object by object. Units are m, kg, s and rad; Y is "
+                              "up. Only one thread at a "
+                              "time\nmay use a world.");
   world.def(
       py::init(&make_world),
       "Keywords: gravity, wind, max_step, integrator, integration_error, solver ('exact', 'fast', 'auto',\n"
-      "'lcp'), impact ('simultaneous', 'sequential'), collision_speed, sleep, bounds; the book's algorithms\n"
-      "beside the default ones: narrow_phase ('gjk', 'vclip'), broad_phase ('multi_grid', 'grid'), "
+      "'lcp'), impact ('simultaneous', 'sequential'), collision_speed, sleep, bounds. Further keywords "
+      "select\n"
+      "algorithms of the book instead of the default ones: narrow_phase ('gjk', 'vclip'), broad_phase "
+      "('multi_grid', 'grid'), "
       "cell_factor,\n"
       "impact_time ('advancement', 'bisection'), trees ('aabb', 'obb', 'sphere', 'mixed'), tree_split "
       "('mean',\n"
@@ -357,7 +365,8 @@ void bind_world(py::module_& m) {
   bind_building(world);
   bind_state(world);
   m.def("step_all", &step_all, py::arg("worlds"), py::arg("sampling_time"), py::arg("threads") = 0,
-        "Steps many worlds at once without the interpreter lock; returns for each whether it is finite.");
+        "Steps many worlds in parallel without the interpreter lock. Returns for each world whether its "
+        "state is finite.");
 }
 
 }  // namespace offstage::python

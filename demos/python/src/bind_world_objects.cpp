@@ -432,9 +432,9 @@ void add_contact_rule(LiveWorld& w, const std::string& a, const std::string& b,
 }  // namespace
 
 void bind_shapes(py::module_& m) {
-  py::class_<sim::Sphere>(m, "Sphere", "Radius [m].")
+  py::class_<sim::Sphere>(m, "Sphere", "A ball: radius [m].")
       .def(py::init([](double radius) { return sim::Sphere{radius}; }), py::arg("radius") = 0.5);
-  py::class_<sim::Box>(m, "Box", "Full edge lengths [m].")
+  py::class_<sim::Box>(m, "Box", "A cuboid: full lengths of the edges [m].")
       .def(py::init([](const Triple& size) { return sim::Box{vec(size)}; }),
            py::arg("size") = Triple{1, 1, 1});
   const auto round = [&](auto shape, const char* name, const char* doc) {
@@ -445,27 +445,29 @@ void bind_shapes(py::module_& m) {
              }),
              py::arg("radius") = shape.radius, py::arg("height") = shape.height);
   };
-  round(sim::Capsule{}, "Capsule", "Radius, and distance between the centres of the caps [m]; along Y.");
-  round(sim::Cylinder{}, "Cylinder", "Radius and height [m]; along Y.");
-  round(sim::Cone{}, "Cone", "Radius of the base and height [m]; the apex is at +Y.");
+  round(sim::Capsule{}, "Capsule",
+        "A capsule along Y: radius, and distance between the centres of the caps [m].");
+  round(sim::Cylinder{}, "Cylinder", "A cylinder along Y: radius and height [m].");
+  round(sim::Cone{}, "Cone", "A cone along Y with its apex at +Y: radius of the base and height [m].");
   py::class_<sim::Frustum>(
-      m, "Frustum", "A cone with its tip cut off: radius of the base, radius of the top and height [m].")
+      m, "Frustum",
+      "A cone along Y with its tip cut off: radius of the base, radius of the top and height [m].")
       .def(py::init([](double radius, double top_radius, double height) {
              return sim::Frustum{radius, top_radius, height};
            }),
            py::arg("radius") = 0.5, py::arg("top_radius") = 0.25, py::arg("height") = 1);
-  py::class_<sim::Ellipsoid>(m, "Ellipsoid", "Half axes along x, y and z [m].")
+  py::class_<sim::Ellipsoid>(m, "Ellipsoid", "An ellipsoid: half axes along x, y and z [m].")
       .def(py::init([](const Triple& radii) { return sim::Ellipsoid{vec(radii)}; }),
            py::arg("radii") = Triple{0.5, 0.25, 0.25});
   py::class_<sim::Plane>(m, "Plane", "The half-space y <= 0 of the body's frame; not for dynamic bodies.")
       .def(py::init<>());
-  py::class_<sim::MeshShape>(m, "MeshShape", "A mesh that World.add_mesh registered.");
+  py::class_<sim::MeshShape>(m, "MeshShape", "A mesh that World.add_mesh() registered.");
 }
 
 void bind_building(py::class_<LiveWorld>& world) {
   world
       .def("add_mesh", &add_mesh, py::arg("vertices"), py::arg("triangles"),
-           "Registers a mesh: (n, 3) vertices [m], (m, 3) indices. Returns a shape.")
+           "Registers a mesh of (n, 3) vertices [m] and (m, 3) indices. Returns its shape for add_body().")
       .def("add_body", &add_body, py::arg("shape"),
            "Adds a body. Keywords, as in docs/python.md: name, motion ('static', 'kinematic', 'dynamic'), "
            "position,\n"
@@ -478,11 +480,12 @@ void bind_building(py::class_<LiveWorld>& world) {
            "spinning_friction, surface_velocity, collides, appear_at, remove_at;\n"
            "keyframes [(time, position, orientation)], interpolation, loop, spin of kinematic bodies.")
       .def("add_particle_system", &add_particle_system,
-           "Keywords: name, linear_drag, gravity, force, collides, internal, external, rotates, "
+           "Adds a particle system. Keywords: name, linear_drag, gravity, force, collides, internal, "
+           "external, rotates, "
            "dies_on_hit, report_collisions,\n"
            "report_deaths, integrator.")
       .def("add_particles", &add_particles, py::arg("system"), py::arg("positions"),
-           "Adds particles at (n, 3) positions and returns their ids. Keywords, a number or n numbers each: "
+           "Adds particles at (n, 3) positions and returns their ids. Keywords, each with one or n numbers: "
            "velocities\n"
            "(n, 3), mass, radius, lifespan, restitution, friction, charge.")
       .def("add_joint", &add_joint, py::arg("type"), py::arg("a"), py::arg("b") = py::none(),
@@ -497,12 +500,14 @@ void bind_building(py::class_<LiveWorld>& world) {
            "motor_stiffness, motor_damping.")
       .def("add_spring", &add_spring, py::arg("a"), py::arg("b"), py::arg("stiffness") = 100,
            py::arg("damping") = 0, py::arg("rest_length") = py::none(),
-           "Each end is (body, point in its frame), (system, particle id) or a point of the world.")
+           "Adds a damped spring. Each end is (body, point in its frame), (system, particle id) or a point "
+           "of the world.")
       .def("add_force", &add_force, py::arg("type"),
-           "Types and their keywords are those of the scene's forces (docs/python.md); bodies, systems, "
-           "cloths, start, end.")
+           "Adds a force. Types and keywords are the same as for forces of a scene (docs/python.md). Further "
+           "keywords: "
+           "bodies,\nsystems, cloths, start, end.")
       .def("add_grid_cloth", &add_grid_cloth, py::arg("size"), py::arg("cells"),
-           "A rectangle of a fabric. Keywords: position, orientation, fabric, pins, name, velocity, "
+           "Adds a rectangular cloth. Keywords: position, orientation, fabric, pins, name, velocity, "
            "collides,\n"
            "self_collision, tear, pressure, inflate_time, gas_density, ram_pressure, air_density, "
            "integrator, soften,\n"
@@ -518,7 +523,8 @@ void bind_building(py::class_<LiveWorld>& world) {
       .def("add_contact_rule", &add_contact_rule, py::arg("a"), py::arg("b"),
            py::arg("restitution") = py::none(), py::arg("friction") = py::none(),
            py::arg("static_friction") = py::none(), py::arg("rolling_friction") = py::none(),
-           py::arg("spinning_friction") = py::none(), "Coefficients for a pair of materials.");
+           py::arg("spinning_friction") = py::none(),
+           "Sets the coefficients for contacts of a pair of materials.");
   const auto removal = [&]<class H>(H) {
     world.def(
         "remove", [](LiveWorld& w, H handle) { return w.remove(handle); }, py::arg("object"),

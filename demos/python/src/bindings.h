@@ -9,7 +9,7 @@ namespace offstage::python {
 
 class LiveWorld;
 
-void bind_scene(py::module_& m);  ///< Scene, Simulation, Snapshot, caches
+void bind_scene(py::module_& m);  ///< adds Scene, Simulation, Snapshot and the functions of caches
 void bind_film(py::module_& m);   ///< render()
 void bind_world(py::module_& m);  ///< World, handles, step_all()
 void bind_shapes(py::module_& m);

@@ -37,7 +37,7 @@ class Keywords {
     try {
       value = given_[name].template cast<T>();
     } catch (const py::cast_error&) {
-      throw std::invalid_argument(std::string(name) + ": has the wrong type");
+      throw std::invalid_argument(std::string(name) + ": has the wrong type; see docs/python.md");
     }
   }
   void take(const char* name, sim::Vec3& value) {

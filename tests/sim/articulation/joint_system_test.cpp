@@ -13,7 +13,7 @@ namespace {
 constexpr uint32_t kDriven = JointSystem::kDriven;
 using Topology = JointSystem::Topology;
 
-/// A matrix close to the identity, whose columns are about as independent as the rows of real joints.
+/// Returns a matrix close to the identity, whose columns are about as independent as the rows of real joints.
 Mat6 random_columns(Dice& dice, uint32_t count) {
   Mat6 m = Mat6::Zero();
   for (Eigen::Index j = 0; j < count; ++j)
@@ -33,7 +33,7 @@ std::vector<JointRows> random_rows(Dice& dice, const std::vector<Topology>& join
   return rows;
 }
 
-/// Random links whose masses span three decades.
+/// Returns random links whose masses span three decades.
 std::vector<LinkMobility> random_links(Dice& dice, uint32_t count) {
   std::vector<LinkMobility> links;
   for (uint32_t i = 0; i < count; ++i) {

@@ -1,5 +1,5 @@
-/// After a tear or a clamp, the bending of a cloth is computed again only around it. The result is that of a
-/// cloth assigned as a whole, to the last bit.
+/// After a tear or a clamp, the bending of a cloth is computed again only around it. The result has the same
+/// bits as for a cloth that is computed as a whole.
 
 #include <algorithm>
 
@@ -36,7 +36,7 @@ struct Sheet {
       }
     masses.assign(rest.size(), 0.01);
   }
-  /// The triangles beyond x at a vertex get a point of their own.
+  /// Tears the sheet at a vertex: the triangles beyond its x coordinate get a new point.
   void part(uint32_t vertex) {
     const auto own = static_cast<uint32_t>(rest.size());
     const Real x = rest[vertex].x();

@@ -35,7 +35,7 @@ struct Swarm {
     margin.assign(from.size(), 0.01);
     tree.build(triangles, from);
   }
-  /// Whether along some axis one triangle is above the other at the start and at the end.
+  /// Returns whether along some axis one triangle is above the other at the start and at the end.
   bool apart(uint32_t a, uint32_t b) const {
     const auto above = [&](const Triangle& p, const Triangle& q, int axis, const std::vector<Vec4>& x) {
       Real least = 1e9, greatest = -1e9;

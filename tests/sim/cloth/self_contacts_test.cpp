@@ -32,7 +32,7 @@ struct Layers {
     points.start = points.position;
     for (std::size_t i = 0; i < 6; ++i) points.position[i] += i < 3 ? lower : upper;
   }
-  /// What of their moves goes beyond the drift that all make in any case.
+  /// Shortens the moves of the layers, except for the common drift.
   void shorten(const Vec4& drift, MoveFractions fractions) {
     contacts.find_doubtful(points, kStep, std::vector<Vec4>(6, drift));
     std::vector<uint32_t> lowered;
@@ -53,8 +53,8 @@ struct Layers {
   SelfContacts contacts;
 };
 
-// Moves that leave a seventh of the distance each time would soon leave none that has a side.
-TEST(SelfContacts, KeepADistanceHoweverOftenTheyArePressed) {
+// If each move left a seventh of the distance, rounding would soon decide on which side a layer is.
+TEST(SelfContacts, KeepADistanceAfterAnyNumberOfMoves) {
   Layers layers(0.02);
   for (int i = 0; i < 60; ++i) {
     layers.move(Vec4::Zero(), Vec4(0, -0.85 * layers.least_height(), 0, 0));
@@ -62,7 +62,7 @@ TEST(SelfContacts, KeepADistanceHoweverOftenTheyArePressed) {
   }
 }
 
-// They fall together unhindered, until the lower one stops.
+// Both layers fall together freely, until the lower layer stops.
 TEST(SelfContacts, LetLayersMoveTogetherAndHoldTheOneBehind) {
   Layers layers(0.03);
   const Vec4 way(0, -0.02, 0, 0);
@@ -75,7 +75,8 @@ TEST(SelfContacts, LetLayersMoveTogetherAndHoldTheOneBehind) {
   EXPECT_LT(layers.least_height(), 0.03);
 }
 
-// The upper one stands still in the world, but comes near in the frame that the lower one is held back in.
+// The upper layer is at rest in the world, but approaches in the moving frame in which the moves of the lower
+// layer are shortened.
 TEST(SelfContacts, HoldLayersApartInTheFrameOfTheirDrift) {
   Layers layers(0.015);
   layers.make(Vec4::Zero(), Vec4::Zero());
@@ -84,7 +85,7 @@ TEST(SelfContacts, HoldLayersApartInTheFrameOfTheirDrift) {
   EXPECT_GT(layers.least_height(), 0);
 }
 
-// The search covers the displacements of all points, and these two are too far apart for them.
+// The search radius covers the displacements of all points. These two points are farther apart.
 TEST(SelfContacts, FindPairsThatAMovingFrameBroughtNear) {
   Layers layers(0.03);
   layers.make(Vec4::Zero(), Vec4::Zero());

@@ -34,7 +34,7 @@ std::vector<Aabb> random_boxes(std::size_t n, bool clustered) {
   return boxes;
 }
 
-/// A torus with flat, straight and coincident triangles added.
+/// Returns a torus with flat, straight and coincident triangles added.
 TriangleMesh rough_mesh() {
   TriangleMesh mesh = torus_mesh(1, 0.4, 16, 8);
   const Scatter random{7};
@@ -193,7 +193,7 @@ TEST(AabbTree, CoincidentItemsShareALeafAndEmptyTreesHaveNothing) {
   EXPECT_TRUE(empty.bounds().isEmpty());
 }
 
-/// The corners of a box that is rotated and away from the origin.
+/// Returns the corners of a box that is rotated and away from the origin.
 std::vector<Vec3> turned_box(const Vec3& size, const Quat& q) {
   std::vector<Vec3> points;
   for (const Vec3& v : box_mesh(size).vertices) points.push_back(q * v + Vec3(5, -3, 2));

@@ -29,7 +29,8 @@ struct PlacedBoxes {
   Real size, margin;
 };
 
-/// A random rotation, quarter turns, a turn about an axis of A, or a tiny perturbation of one of these.
+/// Returns a random rotation, quarter turns, a turn about an axis of A, or a tiny perturbation of one of
+/// these.
 Quat turn(Dice& dice) {
   Quat q = dice.chance(0.3) ? dice.rotation() : Quat::Identity();
   if (dice.chance(0.5))
@@ -147,7 +148,7 @@ TEST(BoxBox, BricksRestOnTheHalfThatTheyShare) {
 
 // The configurations of a stack at rest: small gaps and overlaps, tilted and moved by tiny amounts. The
 // fallback to GJK costs three times as much, so it must be rare.
-TEST(BoxBox, AStackAtRestKeepsItsPointsWithoutOtherHelp) {
+TEST(BoxBox, AStackAtRestKeepsItsPointsAndSeldomNeedsGjk) {
   Dice dice(5);
   constexpr Real kMargin = 0.01;
   Manifold first;

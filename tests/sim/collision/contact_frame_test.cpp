@@ -45,7 +45,8 @@ TEST(ContactFrame, RateIsTheDerivative) {
     const auto at = [&](Real t) { return contact_frame(Quat(Eigen::AngleAxisd(t, w)) * n); };
     const Vec3 size = n.cwiseAbs();
     const Real second = size.sum() - size.minCoeff() - size.maxCoeff();
-    if (second - size.minCoeff() < 10 * h) continue;  // another component becomes the smallest within h
+    if (second - size.minCoeff() < 10 * h)
+      continue;  // skipped: another component becomes the smallest within h
     const ContactFrame rate = contact_frame_rate(contact_frame(n), w.cross(n));
     const Mat3 difference = (matrix(at(h)) - matrix(at(-h))) / (2 * h);
     ASSERT_LT((matrix(rate) - difference).norm(), 1e-9);
@@ -81,7 +82,7 @@ Separation separation(const Pair& pair, const Pose& a, const Pose& b) {
   return gjk(pair.a, pair.b, relative(a, b), fresh);
 }
 
-/// Central difference of the normal over a time step, from the geometry alone.
+/// Returns the central difference of the normal over a time step. It is computed only from the geometry.
 Vec3 difference(const Pair& pair, const Twist& a, const Twist& b, Real h) {
   const auto normal = [&](Real t) {
     const Pose at = moved(pair.world_from_a, a, t);

@@ -89,8 +89,8 @@ TEST(Support, ClimbsToTheTopOfEveryPolyhedron) {
   }
 }
 
-/// A lens of 290 triangles. Flattening is an affine map and keeps it convex; noise does not, so the hull is
-/// taken again.
+/// Returns a lens of 290 triangles. Flattening is an affine map and keeps it convex; noise does not, so the
+/// hull is taken again.
 ConvexPolyhedron lens(Real thickness, Real noise) {
   std::vector<Vec3> cloud;
   for (int ring = 0; ring <= 6; ++ring)

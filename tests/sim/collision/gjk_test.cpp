@@ -80,7 +80,7 @@ TEST(Gjk, CrossesTouchingSmoothly) {
   struct Rest {
     Convex a, b;
     Quat rotation;
-    Real height;  // of B's centre when the solids touch
+    Real height;  // height of B's centre when the solids touch
     bool curved;
   };
   const std::vector<Rest> rests = {
@@ -199,13 +199,13 @@ Real size_of(const Placed& p) {
   return convex(p.a).reach() + convex(p.b).reach() + p.a_from_b.position.norm();
 }
 
-/// Support distance along `n`, including the radius.
+/// Returns the support distance along `n`, including the radius.
 Real height_along(const Convex& c, const Vec3& n) {
   uint32_t vertex = 0;
   return n.dot(c.support(n, vertex)) + c.radius;
 }
 
-/// A lower bound of the distance, which is exact if n is the right normal.
+/// Returns a lower bound of the distance, which is exact if n is the right normal.
 Real separation_along(const Placed& p, const Vec3& n) {
   return -height_along(convex(p.a), -n) - height_along(convex(p.b), p.a_from_b.vector_to_body(n)) -
          n.dot(p.a_from_b.position);

@@ -9,7 +9,7 @@ namespace {
 
 constexpr uint32_t kObjects = 120;
 
-/// A box near the box of the previous object, as in a chain.
+/// Returns a box near the box of the previous object, as in a chain.
 Aabb link_box(const Scatter& random, uint64_t event, uint32_t object) {
   const Vec3 centre(0.3 * (object % 40), object / 40, 0.3 * random.uniform(event, 0));
   const Vec3 half = Vec3::Constant(0.05 + 0.2 * random.uniform(event, 1));

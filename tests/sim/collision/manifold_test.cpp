@@ -34,8 +34,8 @@ std::set<uint32_t> ids(const Manifold& m) {
   return result;
 }
 
-/// Area of the largest quadrilateral whose corners are among the given points of a plane with normal n. All
-/// orders of the corners are tried.
+/// Returns the area of the largest quadrilateral whose corners are among the given points of a plane with
+/// normal n. All orders of the corners are tried.
 Real area(const Vec3& n, std::vector<Vec3> p) {
   if (p.size() < 3) return 0;
   const auto triangle = [&](const Vec3& a, const Vec3& b, const Vec3& c) {
@@ -164,7 +164,7 @@ TEST(Manifold, AStackOfEqualBoxesKeepsItsIdsWhileItCreeps) {
 
 // Here a pair of crossing edges often has slightly less penetration than the faces, and would be selected in
 // some steps only.
-TEST(Manifold, BoxesTwistedUponEachOtherKeepTheFacesNormalWhileTheyRock) {
+TEST(Manifold, TwistedBoxesOnEachOtherKeepTheFaceNormalWhileTheyRock) {
   const Convex box = convex(Box{Vec3::Ones()});
   const Quat twist(Eigen::AngleAxisd(kPi / 4, Vec3::UnitY()));
   Dice dice(19);
@@ -190,7 +190,7 @@ TEST(Manifold, AnEdgeOnAFaceHasTwoPointsAndAVertexOne) {
   EXPECT_NEAR(vertex.points[0].separation, 0, 1e-12);
 }
 
-// Two beams of 3 m, each standing on one of its edges, one on the other.
+// Two beams of 3 m, one on the other. Each stands on one of its edges.
 TEST(Manifold, EdgesMeetInTwoPointsAlongEachOtherAndInOneAcross) {
   const ConvexPolyhedron upright = box_polyhedron({3, 1, 1});
   std::vector<Vec3> corners;

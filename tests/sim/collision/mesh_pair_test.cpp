@@ -130,7 +130,7 @@ TEST(MeshPair, EmptyMeshesMeetNothing) {
   });
 }
 
-// Compared with the answers of another library.
+// The results are compared with the library FCL.
 TEST(MeshPair, AgreesWithFcl) {
   const TriangleMesh mesh_a = bumpy_sphere(12, 8, 1), mesh_b = torus_mesh(0.8, 0.3, 12, 8);
   const AllTrees trees_a(mesh_a), trees_b(mesh_b);

@@ -24,7 +24,8 @@ struct Piece {
   CollisionShape collision;
 };
 
-/// An L of square cross-section: a bar of 2 x 0.5 x 0.5 and a post of 0.5 x 1.5 x 0.5 on its left end.
+/// Returns an L of square cross-section: a bar of 2 x 0.5 x 0.5 and a post of 0.5 x 1.5 x 0.5 on its left
+/// end.
 TriangleMesh l_mesh() {
   TriangleMesh mesh;
   const std::array<Eigen::Vector2d, 6> outline = {
@@ -257,7 +258,8 @@ TEST(NarrowPhase, OpenSurfacesAreTwoSided) {
   }
 }
 
-/// Two squares along x that meet at x = 0, at height `height`. The second one rises by `rise` per metre.
+/// Returns two squares along x that meet at x = 0, at the height `height`. The second one rises by `rise` per
+/// metre.
 TriangleMesh folded_sheet(Real rise, Real height) {
   TriangleMesh m;
   for (const Real x : {-1.0, 0.0, 1.0})
@@ -292,7 +294,7 @@ TEST(NarrowPhase, ATriangleGivesItsNormalAtAnyHeightInItsMesh) {
   }
 }
 
-TEST(NarrowPhase, AnEdgeOfASheetHasTheNormalsBetweenItsFacesAlone) {
+TEST(NarrowPhase, AnEdgeOfASheetHasOnlyTheNormalsBetweenItsFaces) {
   const Piece box(Box{Vec3::Constant(0.5)}), ball(Sphere{0.25}), drum(Cylinder{0.25, 0.5});
   for (const Piece* piece : {&box, &ball, &drum}) {
     // Short of the edge by less than the margin: the triangles beyond the edge are near, but in the same
@@ -336,7 +338,8 @@ TEST(NarrowPhase, ABodySinkingIntoASheetStaysOnItsSide) {
     }
 }
 
-/// The reference of the tests: samples many times, then bisects the first interval that ends in contact.
+/// Returns the time of the first contact, as a reference. Tests many times for contact, then bisects the
+/// first interval that ends in contact.
 std::optional<Real> first_contact(const MovingShape& a, const MovingShape& b, Real tolerance, int looks) {
   const auto near = [&](Real fraction) {
     PairCache none;

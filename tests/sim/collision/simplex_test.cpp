@@ -54,7 +54,7 @@ TEST(NearestPoint, PrefersTheFaceToTheEdgeUnderTheOrigin) {
 }
 
 // The nearest point is perpendicular to its edge to the rounding of its own length, not of the edge's length.
-TEST(NearestPoint, OfAnEdgeIsSquareToItHoweverNear) {
+TEST(NearestPoint, OfAnEdgeIsPerpendicularToItAtAnyDistance) {
   Dice dice(3);
   for (int i = 0; i < 10'000; ++i) {
     const Mat3 R = dice.rotation().toRotationMatrix();

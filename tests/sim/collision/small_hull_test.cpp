@@ -10,7 +10,7 @@
 namespace offstage::sim {
 namespace {
 
-/// The formula of the specification, summed over the triangles of Qhull's hull.
+/// Returns the covariance by the formula in the specification, summed over the triangles of Qhull's hull.
 Mat3 covariance_of_hull(std::span<const Vec3> points) {
   const TriangleMesh hull = convex_hull(points).triangles();
   Real area = 0;

@@ -27,8 +27,9 @@ Real distance(const MovingConvex& a, const MovingConvex& b, Real fraction) {
       .distance;
 }
 
-/// The book's method (4.4): samples equal intervals and bisects the first one that ends in contact. It agrees
-/// with conservative advancement if the intervals are short enough; it can miss thin objects.
+/// Returns the time of impact by the book's method (4.4). It samples equal intervals and bisects the first
+/// one that ends in contact. It agrees with conservative advancement if the intervals are short enough; it
+/// can miss thin objects.
 std::optional<Real> bisection(const MovingConvex& a, const MovingConvex& b, Real near, int looks) {
   if (distance(a, b, 0) <= near) return 0;
   for (int k = 1; k <= looks; ++k) {

@@ -23,14 +23,15 @@ struct Sample {
     const Real x = next(), y = next(), z = next();
     return {x - 0.5, y - 0.5, z - 0.5};
   }
-  /// Half extents of a box, which may be flat, straight or a point.
+  /// Returns half extents of a box, which may be flat, straight or a point.
   Vec3 half() {
     Vec3 h = vec() + Vec3::Constant(0.5);
     for (int k = 0; k < 3; ++k)
       if (next() < 0.15) h[k] = 0;
     return h;
   }
-  /// Parallel axes are frequent, because the cross products of parallel edges are rounding noise.
+  /// Returns a rotation. Parallel axes are frequent, because the cross products of parallel edges are
+  /// rounding noise.
   Quat turn() {
     const int kind = static_cast<int>(next() * 4);
     const Quat half_turns[] = {Quat::Identity(), Quat(std::sqrt(0.5), 0, std::sqrt(0.5), 0)};
@@ -82,7 +83,7 @@ bool inside(const Obb& box, const Vec3& p) {
   return ((box.axes.transpose() * (p - box.centre)).cwiseAbs().array() <= box.half.array()).all();
 }
 
-/// Distance of two boxes, by all pairs of triangles of their surfaces.
+/// Returns the distance of two boxes, by all pairs of triangles of their surfaces.
 Real true_distance(const Body& a, const Body& b) {
   Real d2 = inside(a.box, b.box.centre) || inside(b.box, a.box.centre) ? 0 : 1e30;
   const auto surface_b = surface(b.box);

@@ -54,8 +54,8 @@ TEST(Collision, AxesWithTheirOwnCoefficientsStickOrSlideByThemselves) {
   }
 }
 
-/// Violation of Coulomb's law after the impact: the residual of the contact problem whose target is the
-/// normal velocity.
+/// Returns the violation of Coulomb's law after the impact: the residual of the contact problem whose target
+/// is the normal velocity.
 Real violation(ContactSample s, const Vec3& p) {
   apply(s.contacts[0], p, s.bodies);
   s.contacts[0].impulse = p;
@@ -116,7 +116,7 @@ TEST(Collision, ClustersKeepMomentumAndNeverGainEnergy) {
   }
 }
 
-/// Five balls in a row along x, the first `moving` of them at 1 m/s.
+/// Returns five balls in a row along x, of which the first `moving` balls have 1 m/s.
 ContactSample cradle(int moving) {
   ContactSample s;
   for (int i = 0; i < 5; ++i) {

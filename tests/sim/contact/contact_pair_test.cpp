@@ -9,7 +9,7 @@
 namespace offstage::sim {
 namespace {
 
-/// A body as the world makes it.
+/// Returns a body in the state in which World::add_body() creates it.
 std::unique_ptr<Body> make_body(const Shape& shape, MotionType motion, const Pose& pose) {
   auto body = std::make_unique<Body>();
   body->def.shape = shape;

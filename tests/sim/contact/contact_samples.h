@@ -24,7 +24,7 @@ struct ContactSample {
       if (b.is_moved()) p += b.velocity / b.inverse_mass;
     return p;
   }
-  /// Angular momentum of all bodies about the origin; `positions` must be set [kg m^2/s].
+  /// Returns the angular momentum of all bodies about the origin; `positions` must be set [kg m^2/s].
   Vec3 angular_momentum() const {
     Vec3 h = Vec3::Zero();
     for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -35,7 +35,7 @@ struct ContactSample {
     }
     return h;
   }
-  /// Greatest component of the relative velocities at the contacts [m/s].
+  /// Returns the greatest component of the relative velocities at the contacts [m/s].
   Real speed() const {
     Real s = 0;
     for (const Contact& c : contacts) s = std::max(s, c.relative_velocity(bodies).cwiseAbs().maxCoeff());
@@ -70,8 +70,8 @@ inline Contact contact_between(uint32_t a, uint32_t b, const Vec3& normal, const
   return c;
 }
 
-/// Random bodies with contacts at random places; the last body is static. All target velocities are zero, so
-/// a solution always exists.
+/// Returns random bodies with contacts at random places; the last body is static. All target velocities are
+/// zero, so a solution always exists.
 inline ContactSample random_contacts(Dice& dice, uint32_t bodies, uint32_t contacts, Real most_friction,
                                      bool isotropic) {
   ContactSample s;
@@ -95,7 +95,7 @@ inline ContactSample random_contacts(Dice& dice, uint32_t bodies, uint32_t conta
   return s;
 }
 
-/// A stack of unit cubes of 1 kg on the ground (the last body), all moving at `velocity`.
+/// Returns a stack of unit cubes of 1 kg on the ground (the last body), all moving at `velocity`.
 inline ContactSample stacked_boxes(uint32_t boxes, const Vec3& velocity, Real friction) {
   ContactSample s;
   for (uint32_t i = 0; i < boxes; ++i) {

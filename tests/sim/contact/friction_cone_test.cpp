@@ -18,7 +18,7 @@ Contact with_friction(Real t, Real k) {
   return c;
 }
 
-/// Circular cones and pyramids, flat or steep, and degenerate ones without friction.
+/// Returns a contact with a circular cone or a pyramid, which may be flat, steep, or without friction.
 Contact random_cone(Dice& dice) {
   const Real t = dice.chance(0.15) ? 0 : dice.uniform(0, 2), k = dice.chance(0.15) ? 0 : dice.uniform(0, 2);
   return with_friction(t, dice.chance(0.5) ? t : k);

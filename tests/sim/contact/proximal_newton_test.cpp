@@ -10,7 +10,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Largest difference between two solutions, as velocities of the bodies.
+/// Returns the largest difference between two solutions, as velocities of the bodies.
 Real largest_difference(const ContactSample& x, const ContactSample& y) {
   Real d = 0;
   for (std::size_t i = 0; i < x.bodies.size(); ++i)
@@ -95,7 +95,7 @@ TEST(ProximalNewton, ASlidingStackIsSlowedByFriction) {
 
 // The solution of one step is the initial guess of the next: at rest, it is confirmed without a
 // factorization.
-TEST(ProximalNewton, ConfirmsAGuessThatIsTheAnswer) {
+TEST(ProximalNewton, ConfirmsAGuessThatIsTheSolution) {
   ProximalNewton solver;
   ContactSample s = stacked_boxes(10, {0, -0.04, 0}, 0.5);
   EXPECT_GT(solver.solve(s.bodies, s.contacts)->factorizations, 0u);

@@ -22,7 +22,7 @@ Real greatest_move(const BoxScene& now, const BoxScene& before) {
   return most;
 }
 
-/// Overlapping and approaching boxes without any static body.
+/// Returns boxes that overlap or approach each other, without a static body.
 BoxScene floating_boxes(uint64_t seed) {
   BoxScene s;
   Dice dice(seed);

@@ -40,7 +40,7 @@ TEST(Fields, PullTowardsTheirPointWhileTheyAreOn) {
 }
 
 // Equation of motion: v' = -(k/m)(v - wind).
-TEST(Wind, CarriesABodyUpToItsSpeed) {
+TEST(Wind, AcceleratesABodyToItsSpeed) {
   const ForceDef wind{.effect = WindField{.wind = {5, 0, 1}, .drag = 3}};
   const std::vector<ActiveForce> active = {{&wind, {}}};
   const BodyForces forces{Vec3::Zero(), active};
@@ -98,9 +98,9 @@ TEST(ActiveForce, ActsOnTheNamedBodiesOnly) {
   EXPECT_FALSE((ActiveForce{&named, {}}.acts_on(a)));  // the named body has been removed
 }
 
-// Below the middle of a face, the impulse has no torque. Beside the middle it turns the box. It never turns a
+// An explosion below the middle of a face does not turn the box. Beside the middle it does. It never turns a
 // ball.
-TEST(Explosion, BlowsAwayFromItsPointAndSpinsTheExposedSide) {
+TEST(Explosion, PushesAwayFromItsPointAndSpinsTheExposedSide) {
   const Shape box = Box{{2, 1, 1}}, ball = Sphere{0.5};
   const Pose pose{Vec3(0, 3, 0)};
   Explosion bang{.point = {0, 2, 0}, .impulse = 10, .radius = 2};

@@ -17,8 +17,8 @@ PreciseVec precise(const Vec3& v) {
   return v.cast<Precise>();
 }
 
-/// The minimum of a convex function on [0, 1] by golden section search, without any case distinctions.
-/// Searches can be nested.
+/// Returns the minimum of a convex function on [0, 1] by golden section search, without any case
+/// distinctions. Searches can be nested.
 template <class F>
 Precise minimum(int steps, F&& f) {
   constexpr Precise kRatio = 0.618033988749894848204586834L;
@@ -61,8 +61,8 @@ struct Sample {
   uint32_t used = 0;
 
   Real next() { return random.uniform(i, used++); }
-  /// A point on a coarse grid, a random point, or one near the previous point, so that degenerate and nearly
-  /// degenerate figures are frequent.
+  /// Returns a point on a coarse grid, a random point, or one near the previous point, so that degenerate and
+  /// nearly degenerate figures are frequent.
   Vec3 point(const Vec3& last) {
     const Real kind = next();
     const Vec3 p(next() - 0.5, next() - 0.5, next() - 0.5);

@@ -46,7 +46,7 @@ void expect_exact(const ConvexDecomposition& d, Real volume, Real size) {
   for (const ConvexPolyhedron& p : d.parts) EXPECT_LE(concavity(p), 1e-9 * size);
 }
 
-/// Winding number of the surface about a point, as the sum of all solid angles.
+/// Returns the winding number of the surface about a point, as the sum of all solid angles.
 Real winding(const TriangleMesh& mesh, const Vec3& p) {
   Real sum = 0;
   for (const Triangle& t : mesh.triangles) {
@@ -57,7 +57,7 @@ Real winding(const TriangleMesh& mesh, const Vec3& p) {
   return sum / (4 * std::numbers::pi);
 }
 
-/// Height of a point over the highest face plane; negative inside.
+/// Returns the height of a point over the highest face plane; negative inside.
 Real height_over(const ConvexPolyhedron& part, const Vec3& p) {
   Real height = -std::numeric_limits<Real>::infinity();
   for (uint32_t f = 0; f < part.face_count(); ++f)
@@ -65,7 +65,7 @@ Real height_over(const ConvexPolyhedron& part, const Vec3& p) {
   return height;
 }
 
-/// Random points in the bounding box of a mesh.
+/// Returns random points in the bounding box of a mesh.
 std::vector<Vec3> scattered_points(const TriangleMesh& mesh, uint64_t count) {
   Aabb box;
   for (const Vec3& v : mesh.vertices) box.extend(v);
@@ -152,8 +152,8 @@ TEST(Decomposition, PartsShareTheCornersOfACutBitwise) {
   EXPECT_GE(shared, 2);  // at least those of the reflex edge
 }
 
-/// Prism of an L whose caps are cut into ears, as model readers do it: the third ear of each cap is a sliver,
-/// between three corners in a line.
+/// Returns an L-shaped prism whose caps are triangulated by cutting ears, as model readers do. The third ear
+/// of each cap has three corners on one line.
 TriangleMesh l_prism_of_ears() {
   const std::array<std::array<Real, 2>, 6> outline = {{{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}}};
   TriangleMesh mesh;
@@ -288,7 +288,7 @@ TEST(Decomposition, PartsAreRebuiltBitwiseFromVerticesAndFaces) {
   }
 }
 
-/// Fraction of the points inside the surface that lie in some part.
+/// Returns the fraction of the points inside the surface that lie in some part.
 Real covered(const TriangleMesh& mesh, const ConvexDecomposition& d, uint64_t points) {
   int inside = 0, held = 0;
   for (const Vec3& p : scattered_points(mesh, points)) {
@@ -300,8 +300,8 @@ Real covered(const TriangleMesh& mesh, const ConvexDecomposition& d, uint64_t po
   return static_cast<Real>(held) / inside;
 }
 
-/// Greatest height of a point of the surface over the part that is nearest, as a fraction of the mesh's
-/// extent.
+/// Returns the greatest height of a point of the surface over the part that is nearest, as a fraction of the
+/// mesh's extent.
 Real greatest_gap(const TriangleMesh& mesh, const ConvexDecomposition& d) {
   Real gap = 0;
   for (const Triangle& t : mesh.triangles) {
@@ -399,7 +399,8 @@ TEST(ApproximateDecomposition, IsTheSameOnAnyNumberOfThreads) {
     EXPECT_TRUE(std::ranges::equal(one.parts[k].vertices(), many.parts[k].vertices()));
 }
 
-/// Volume in which the parts and the solid differ, by random points, as a fraction of the solid's.
+/// Returns the volume in which the parts and the solid differ, by random points, as a fraction of the
+/// solid's.
 Real sampled_difference(const TriangleMesh& mesh, const ConvexDecomposition& d, uint64_t points) {
   int inside = 0, different = 0;
   for (const Vec3& p : scattered_points(mesh, points)) {

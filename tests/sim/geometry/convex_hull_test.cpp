@@ -10,7 +10,7 @@
 namespace offstage::sim {
 namespace {
 
-/// Distance of the farthest point outside the hull.
+/// Returns the distance of the farthest point outside the hull.
 Real excess(const ConvexPolyhedron& hull, const std::vector<Vec3>& points) {
   Real worst = 0;
   for (uint32_t f = 0; f < hull.face_count(); ++f)
@@ -22,9 +22,9 @@ long euler_characteristic(const ConvexPolyhedron& p) {
   return static_cast<long>(p.vertices().size()) - static_cast<long>(p.edges().size()) + p.face_count();
 }
 
-/// Six times the volume of the convex hull of points with small integer coordinates, exactly. Every plane
-/// through three points with all others on one side is a face plane; the area of its polygon comes from the
-/// pairs of neighbouring corners.
+/// Returns six times the volume of the convex hull of points with small integer coordinates, exactly. Every
+/// plane through three points with all others on one side is a face plane; the area of its polygon comes from
+/// the pairs of neighbouring corners.
 long brute_volume(const std::vector<Vec3>& points) {
   using Int3 = Eigen::Matrix<long, 3, 1>;
   std::vector<Int3> p;

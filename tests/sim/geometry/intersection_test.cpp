@@ -42,9 +42,10 @@ bool separated(const WholeVec& axis, const std::vector<WholeVec>& a, const std::
   return before(*a_high, *b_low) || before(*b_high, *a_low);
 }
 
-/// Convex hulls of points are disjoint if and only if some plane strictly separates them. A separating plane
-/// can be turned until its normal is a difference of two points, is perpendicular to two such differences, or
-/// is perpendicular to one within the plane of two.
+/// Returns whether the convex hulls of two sets of points intersect, exactly. They are disjoint if and only
+/// if some plane strictly separates them. A separating plane can be turned until its normal is a difference
+/// of two points, is perpendicular to two such differences, or is perpendicular to one within the plane of
+/// two.
 bool exactly_intersect(const std::vector<WholeVec>& a, const std::vector<WholeVec>& b) {
   std::vector<WholeVec> differences, normals;
   for (const auto* own : {&a, &b})
@@ -68,7 +69,7 @@ std::vector<WholeVec> hull(const P&... points) {
   return {whole(points)...};
 }
 
-/// A point of a grid so small that most triangles are degenerate, touch, or are coplanar.
+/// Returns a point of a grid so small that most triangles are degenerate, touch, or are coplanar.
 Vec3 grid_point(int side, int stretch) {
   const auto coordinate = rc::gen::map(rc::gen::inRange(0, side), [=](int i) { return Real(i * stretch); });
   return {*coordinate, *coordinate, *coordinate};

@@ -50,7 +50,7 @@ TEST(Topology, VertexListsAreAscendingAndComplete) {
   }
 }
 
-TEST(Topology, CornerOfABoxPointsAlongTheDiagonalHoweverItIsTriangulated) {
+TEST(Topology, CornerOfABoxPointsAlongTheDiagonalForAnyTriangulation) {
   const TriangleMesh mesh = box_mesh(Vec3::Ones());
   const MeshTopology topology(mesh);
   for (uint32_t v = 0; v < 8; ++v)

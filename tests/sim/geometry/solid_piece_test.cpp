@@ -16,7 +16,7 @@
 namespace offstage::sim {
 namespace {
 
-/// A closed surface that intersects itself many times.
+/// Returns a closed surface that intersects itself many times.
 TriangleMesh tangle() {
   TriangleMesh mesh = torus_mesh(1, 0.3, 9, 7);
   const Scatter random{5};

@@ -24,8 +24,8 @@ Mat6 random_block(Dice& dice) {
   return m;
 }
 
-/// A matrix like that of a contact problem: a mass on the diagonal for each row, and for each pair a stiff
-/// B^T B coupling both of its rows.
+/// Returns a matrix like that of a contact problem: a mass on the diagonal for each row, and for each pair a
+/// stiff B^T B coupling both of its rows.
 Matrix random_matrix(Dice& dice, uint32_t rows, const Pairs& pairs, Real stiffness) {
   Matrix m{std::vector<Mat6>(rows, Mat6::Identity()), {}, Eigen::MatrixXd::Identity(6 * rows, 6 * rows)};
   for (const auto& [i, j] : pairs) {

@@ -25,7 +25,7 @@ MatrixXd random_lcp_matrix(Dice& dice, Index rows, Index columns) {
   return m;
 }
 
-/// Reference solution: tries all 2^n sets of active contacts.
+/// Returns the reference solution. Tries all 2^n sets of active contacts.
 VectorXd enumerated(const MatrixXd& A, const VectorXd& b) {
   const Index n = b.size();
   for (uint32_t set = 0; set < (1u << n); ++set) {

@@ -71,7 +71,8 @@ TEST(ParticlePairs, HeadOnAndObliqueCollisionsHaveTheClosedForm) {
     }
 }
 
-/// Five touching particles in a row, hit by the first `hitting` ones; returns the velocities afterwards.
+/// Simulates five particles in a row along x, of which the first `hitting` ones hit the others with 1 m/s.
+/// Returns the velocities afterwards.
 std::vector<Real> cradle(ImpactLaw law, int hitting) {
   World world({.gravity = Vec3::Zero(), .impact = law});
   const auto system = world.add_particle_system({.internal = true});

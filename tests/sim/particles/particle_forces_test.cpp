@@ -10,7 +10,7 @@
 namespace offstage::sim {
 namespace {
 
-/// The acceleration that one force gives a particle of 2 kg whose own drag coefficient is 0.5 kg/s.
+/// Returns the acceleration that one force gives a particle of 2 kg whose own drag coefficient is 0.5 kg/s.
 Vec3 acceleration(const ForceDef& def, const Vec3& x, const Vec3& v = Vec3::Zero(), Real t = 0) {
   const ParticleForces forces({.linear_drag = 0.5, .gravity = false}, Vec3::Zero(), Vec3::Zero(), {&def});
   const Real mass[] = {2};
@@ -144,7 +144,7 @@ TEST(ParticleForces, StiffForcesAreStableWithImplicitEuler) {
 
 // The same particle in a system coupled by springs, in a system whose particles attract each other, and
 // alone.
-TEST(ParticleForces, AreTheSameHoweverASystemIsIntegrated) {
+TEST(ParticleForces, AreTheSameForEveryKindOfSystem) {
   std::array<Vec3, 3> ends;
   for (std::size_t kind = 0; kind < ends.size(); ++kind) {
     World world;

@@ -1,4 +1,4 @@
-/// The figures of steps add up, by the lists of the parts of a report.
+/// Statistics of several steps are combined. Each part of a report lists its statistics.
 
 #include <set>
 #include <string>

@@ -41,7 +41,8 @@ def add_lights(lights):
         color = light.get("color", [1, 1, 1])
         intensity = light.get("intensity", 10)
         if light["type"] == "sun":
-            # Our unit is the radiance of a white surface that faces the light; Blender's is the irradiance.
+            # offstage gives the radiance of a white surface that faces the light. Blender needs the
+            # irradiance.
             add_light("SUN", "sun", mathutils.Vector(), -z_up(light["direction"]), color,
                       energy=math.pi * light.get("intensity", 3), angle=math.radians(light.get("size_deg", 1.5)))
         elif light["type"] == "point":
