@@ -184,8 +184,8 @@ ClothDef grid_cloth(const GridSize& size, const sim::Pose& pose, const Fabric& f
                    SpringKind::bend);
     }
   // A shear of gamma changes the diagonals of a cell by gamma dx dz / |d|. The energy of both springs
-  // together equals the energy by the shear modulus over the cell's area. Each diagonal is the counterpart of
-  // the other.
+  // together equals the energy by the shear modulus over the cell's area. The two diagonals of a cell are
+  // counterparts (ClothSpring).
   const Real shear = fabric.shear * (dx * dx + dz * dz) / (2 * dx * dz);
   for (uint32_t r = 0; r < nz; ++r)
     for (uint32_t c = 0; c < nx; ++c) {

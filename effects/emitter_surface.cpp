@@ -62,7 +62,8 @@ ReleaseSurface::ReleaseSurface(const EmitterSurface& surface)
 void ReleaseSurface::add_faces(const sim::TriangleMesh& mesh) {
   for (const sim::Triangle& t : mesh.triangles) {
     for (uint32_t corner : t)
-      if (corner >= mesh.vertices.size()) throw std::invalid_argument("surface.mesh has an index too large");
+      if (corner >= mesh.vertices.size())
+        throw std::invalid_argument("surface.mesh has a vertex index out of range");
     const Vec3& p = mesh.vertices[t[0]];
     const Vec3 e1 = mesh.vertices[t[1]] - p, e2 = mesh.vertices[t[2]] - p, cross = e1.cross(e2);
     const Real twice = cross.norm();

@@ -22,7 +22,7 @@ void check(const std::string& owner, const char* field, const Varying& v, const 
   const Real low = lower_bound(v), high = upper_bound(v);
   if (std::isnan(low) || std::isnan(high)) refuse("is not a number");
   if (limits.low_open && !(low > limits.low))
-    refuse("can be " + std::to_string(low) + ", allowed is > " + std::to_string(limits.low) +
+    refuse("can be " + std::to_string(low) + ", but must be > " + std::to_string(limits.low) +
            "; give it a min");
   if (high < limits.low || low > limits.high)
     refuse("is outside " + std::to_string(limits.low) + " to " + std::to_string(limits.high));

@@ -42,7 +42,7 @@ Real logarithm(Real x) {
   const Real s = (m - 1) / (m + 1), s2 = s * s;
   constexpr Real kSeries[] = {1.0 / 3,  1.0 / 5,  1.0 / 7,  1.0 / 9,  1.0 / 11,
                               1.0 / 13, 1.0 / 15, 1.0 / 17, 1.0 / 19, 1.0 / 21};
-  // log 2 in two parts. The first has trailing zeros, so that k times it is exact.
+  // log 2 in two parts. The first has trailing zeros, so that its product with k is exact.
   constexpr Real kLog2High = 0x1.62e42fee00000p-1, kLog2Low = 0x1.a39ef35793c76p-33;
   const Real artanh_rest = s * s2 * polynomial(kSeries, s2);
   return k * kLog2High + (2 * s + (2 * artanh_rest + k * kLog2Low));

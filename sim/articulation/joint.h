@@ -39,8 +39,8 @@ enum class JointType : uint8_t {
   /// turn, positive for a right-handed thread.
   screw,
   /// A rope that runs from `anchor` on body a over the fixed points `pulley_a` and `pulley_b` to `anchor_b`
-  /// on body b. The length |anchor - pulley_a| + ratio |anchor_b - pulley_b| never exceeds its initial value,
-  /// when the joint is created.
+  /// on body b. The length |anchor - pulley_a| + ratio |anchor_b - pulley_b| never exceeds the value that it
+  /// has when the joint is created.
   pulley,
 };
 

@@ -132,8 +132,8 @@ bool JointSystem::factorize(Matrix<N>& m) {
   for (int attempt = 0; attempt < kAttempts; ++attempt, fraction *= kMore) {
     for (std::size_t j = 0; j < joints_.size(); ++j) {
       m.diagonal[j].diagonal() *= 1 + fraction;
-      // The diagonal block of a joint between two hubs is empty. Its addition is then a fraction of the block
-      // that it would have without rows for hubs.
+      // The diagonal block of a joint between two hubs is empty. The addition is then a fraction of the block
+      // that the joint would have without rows for hubs.
       if (kinds_[j].is_empty) m.diagonal[j].diagonal() += fraction * own_diagonal<N>(j);
     }
     if (m.factor.factorize(m.diagonal, m.off)) return true;

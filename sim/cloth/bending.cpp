@@ -177,8 +177,8 @@ std::optional<GradientWeights> polynomial_gradient(std::span<const FlatPoint> po
   return weights;
 }
 
-/// Recovers the gradient at a point. `clamped`: by triangle, whether it is clamped. A point of clamped
-/// triangles gets the mean of their gradients, without the others.
+/// Recovers the gradient at a point. `clamped`: by triangle, whether it is clamped. If any triangle at the
+/// point is clamped, the result is the mean of the gradients on the clamped triangles alone.
 Recovered recover(const Unfolding& unfolding, std::span<const Triangle> triangles,
                   std::span<const uint8_t> clamped, uint32_t point) {
   Recovered result{unfolding.fan(point, false), {}};

@@ -28,7 +28,7 @@ void ClothSystem::assemble() {
   first_spring_.clear();
   bend_limits_.clear();
   std::vector<StretchLimit::Limit> limits, ties;
-  std::vector<Triangle> colliding, touching;  // with cloth; with bodies
+  std::vector<Triangle> colliding, touching;  // triangles that collide with cloth; with bodies
   for (uint32_t c = 0; c < cloths_.size(); ++c) {
     Cloth& cloth = *cloths_[c];
     cloth.assign_bending();

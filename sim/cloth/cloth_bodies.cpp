@@ -42,7 +42,7 @@ void ClothBody::fall_along_parabola(const Vec3& gravity) {
       (obstacle_.end.point_to_world(obstacle_.centre) - obstacle_.start.point_to_world(obstacle_.centre)) /
       h_;
   const Vec3 bow = (velocity_ - mean) * h_;
-  // An impact causes a greater change of velocity.
+  // A greater deviation is due to an impact; the path then stays a line.
   if (bow.norm() <= gravity.norm() * h_ * h_) bow_ = bow;
 }
 

@@ -96,15 +96,16 @@ class ClothBody {
 
   Obstacle obstacle_;
   Real h_;
-  Vec3 velocity_, angular_velocity_;  // of the centre of mass, at the end of the world's sub-step
+  Vec3 velocity_, angular_velocity_;  // at the centre of mass, at the end of the world's sub-step
   Vec3 surface_velocity_;
   Vec3 gained_ = Vec3::Zero(), gained_spin_ = Vec3::Zero();  // changes of the velocities due to cloth
-  Vec3 shift_ = Vec3::Zero(), turn_ = Vec3::Zero();          // displacement, rotation by cloth
-  Vec3 centre_ = Vec3::Zero();                               // of mass, at the end of the cloth's sub-step
-  Pose start_, end_;         // at the start and the end of the cloth's sub-step
+  Vec3 shift_ = Vec3::Zero(), turn_ = Vec3::Zero();          // displacement and rotation by cloth
+  Vec3 centre_ = Vec3::Zero();  // centre of mass at the end of the cloth's sub-step
+  Pose start_, end_;            // poses at the start and the end of the cloth's sub-step
   Vec3 bow_ = Vec3::Zero();  // deviation of the path from a line: half the acceleration times the square of
                              // the world's sub-step
-  Real dt_ = 0, to_ = 0;     // length of the cloth's sub-step [s]; its end as a fraction of the world's
+  Real dt_ = 0, to_ = 0;     // dt_: length of the cloth's sub-step [s]; to_: its end as a fraction
+                             // of the world's sub-step
   Reaction reaction_;
   std::optional<Reaction> pin_load_;
 };

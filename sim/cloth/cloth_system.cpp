@@ -79,9 +79,8 @@ Real ClothSystem::parts_in(Real h, Real speed) const {
   const Real shortest = longest / kMostDivision;
   if (speed > 0)
     longest = std::min(longest, std::max(kMostApproach * corner_contacts_.mean_edge() / speed, shortest));
-  // Fast cloth such as torn skin needs short sub-steps. In a long one, its moves would be shortened only far
-  // from their start. Springs between points with and without shortened moves would then gain much more
-  // energy than the motion loses.
+  // Fast cloth such as torn skin needs short sub-steps. In a long one, springs between a point whose move is
+  // shortened and a point whose move is not would gain much more energy than the motion loses.
   if (const Real rate = fastest_strain_rate(); rate > 0)
     longest = std::min(longest, std::max(kMostStrain / rate, shortest));
   return std::clamp(std::ceil(h / longest * (1 - 1e-12)), 1.0, kMaxParts);

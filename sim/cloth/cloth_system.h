@@ -50,7 +50,7 @@ class ClothSystem {
   /// The frame in which the moves of a piece of cloth are shortened. The frame moves with the piece, all
   /// cloth that it may cross and the dynamic bodies that hold it.
   struct Frame {
-    bool rests = false;                 // it is the world's frame
+    bool rests = false;                 // whether it is the world's frame
     bool anchored = false;              // a fixed object holds it
     bool carries = false;               // dynamic bodies are pinned to it
     const ClothBody* leader = nullptr;  // the only body that holds it, if that is not dynamic

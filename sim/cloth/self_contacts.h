@@ -71,7 +71,7 @@ class SelfContacts {
   struct Contact {
     uint32_t pair;
     std::array<Real, 4> weights;  // weights of the points in the vector between the closest points
-    Vec4 normal;                  // from the second element to the first
+    Vec4 normal;                  // direction from the second element to the first
     Real distance;                // distance at the start of the sub-step
     bool pushes;                  // if false, contacts of its neighbours push in its place
   };

@@ -70,7 +70,7 @@ class TautSprings {
   /// One end of a row: a point, which a body may carry, a point of a body, or a weighted mean of points.
   struct Place {
     uint32_t point, body;
-    Vec3 arm;  // from the body's centre
+    Vec3 arm;  // vector from the body's centre
   };
   /// A place within a triangle: the weighted mean of the places of its corners.
   struct MeanPlace {

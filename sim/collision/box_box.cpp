@@ -29,7 +29,7 @@ struct Placed {
 
 /// Gap between the boxes along each axis; negative where they overlap.
 struct Gaps {
-  Lanes a, b;  ///< along the axes of A and of B
+  Lanes a, b;  ///< gaps along the axes of A and of B
   /// Gaps along the cross products of A's axes with B's, times the sine of the angle between the axes.
   std::array<Lanes, 3> products;
 
@@ -269,8 +269,8 @@ struct FacePair {
     return {reference.half, face, facing(incident.half, towards, slack), incident.half, at, body, slop};
   }
 
-  /// Whether the distance of two separate boxes is the `gap` along the normal of the reference face. It is if
-  /// the lowest corner over the plane of the face is over the face.
+  /// Whether the distance of two separate boxes is the `gap` along the normal of the reference face. This
+  /// holds if the lowest corner of the incident face lies above the reference face, and not beside it.
   ///
   /// Faces at a small angle may also count. Let a point of the incident box be over the face, `depth` from
   /// its border, and higher by `drop` than the lowest corner, whose height is h. Boxes are convex, so at a

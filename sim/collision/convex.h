@@ -20,7 +20,7 @@ struct Convex {
   /// of the base, half height, radius of the top), where a cone's top has radius 0. Ellipsoid: half axes.
   /// Segment: half length in y.
   Vec3 half = Vec3::Zero();
-  Real radius = 0;  ///< around the core [m]
+  Real radius = 0;  ///< radius around the core [m]
   const ConvexPolyhedron* polyhedron = nullptr;
   std::array<const Vec3*, 3> corners{};  ///< corners of a triangle
 

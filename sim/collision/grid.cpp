@@ -84,7 +84,8 @@ std::size_t Grid::copies() const {
                                [](const CellTable& table) { return table.copies(); });
 }
 
-// A level matters for the search if one grid has objects of this level and the other grid contains any.
+// A table finds pairs with at least one object of its own level. So a grid needs the table of a level if it
+// has objects of this level, or if it has finer objects and the other grid has objects of this level.
 
 std::size_t Grid::enter_to_stay(const Grid& moving) {
   const std::size_t before = copies();

@@ -102,8 +102,9 @@ int side_of_penetrating(const SurfaceTriangle& t, Real height, int before, SideO
 /// direction from the triangle's nearest point `point` to the piece, and `middle` the piece's centre, in the
 /// mesh's frame.
 ///
-/// The direction shows the side if the piece is separate from the triangle and the surface faces the piece
-/// there. A piece next to the triangle that penetrates the surface elsewhere is seen from behind.
+/// The direction shows the side if the piece is separate from the triangle and the surface allows a contact
+/// in this direction. If the piece penetrates the surface at another triangle, the direction may show the
+/// wrong side; side_of_penetrating() then decides.
 template <class SideOfFace>
 void set_side(SurfaceTriangle& t, Real distance, const Vec3& outward, const Vec3& point, const Vec3& middle,
               int before, SideOfFace&& side_of_face) {
@@ -241,9 +242,9 @@ class PiecePair {
   Convex a_, b_;
 };
 
-/// A shape inside a hollow shape whose pieces it does not touch: its depth, in the frame of the hollow shape.
-/// It is pushed out in the direction from its centre to the nearest point of the surface. If it is outside,
-/// there is no result.
+/// The depth of a shape inside a hollow shape whose pieces it does not touch. The inner shape is pushed out
+/// in the direction from its centre to the nearest point of the hollow shape's surface. There is no result if
+/// the centre is outside.
 struct Inside {
   Real depth;
   Vec3 outward, deepest;  // hollow's frame

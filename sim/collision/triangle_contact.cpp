@@ -78,7 +78,7 @@ void sphere_triangle_manifold(const Vec3& centre, Real radius, const SurfaceTria
     (nearest.weights[k] == 0 ? without : with) = k;
     excluded += nearest.weights[k] == 0;
   }
-  // If the sphere penetrates the surface, its centre sees the other side.
+  // If the sphere penetrates the surface, its centre may be on the other side of the triangle.
   const bool through = height < 0 && distance < radius;
   const SurfaceTriangle seen{triangle.mesh, triangle.face, height < 0 ? -triangle.side : triangle.side};
   Vec3 outward = up;

@@ -336,13 +336,13 @@ Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3&
       const Vec3 scaled = ellipsoid->radii.cwiseProduct(orientation.conjugate() * out);
       return Vec3(ellipsoid->radii.cwiseProduct(scaled.normalized()));
     };
-    // The difference of the distances from the point that faces the other body is an error of the manifold,
-    // which is kept.
+    // The contact can be next to the point that faces the other body, because of an error of the manifold.
+    // This difference stays the same in the body's frame.
     return with_body(arm) + to * (facing(to, out_to) - facing(from, out_from));
   }
   if (!is_revolved(shape)) return with_body(arm);
-  // The angle of the point from the meridian that faces the other body is only an error of the manifold, and
-  // does not change.
+  // The angle between the point and the meridian that faces the other body is an error of the manifold. It
+  // stays the same.
   const Vec3 off_axis = centre_off_axis(body), from_axis = arm + from * off_axis;
   return meridian_turn(from_axis, from, out_from, to, out_to) * from_axis - to * off_axis;
 }

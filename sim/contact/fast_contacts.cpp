@@ -14,9 +14,9 @@ namespace {
 /// Separation of points that must not push [m].
 constexpr Real kOutOfReach = 1e3;
 
-/// Whether points of a body can be left out when its next impact will be traced back to. They cannot for two
-/// kinds of bodies: pieces that have no known point may meet first, and a thin body may spin far in the rest
-/// of the sub-step.
+/// Whether points of a body can be left out of a step that will be traced back to the body's next impact. Two
+/// kinds of bodies do not allow this. If a body has several pieces, a piece without a known point may touch
+/// first. A thin body may spin far in the rest of the sub-step.
 bool waits_for_impacts(Body& body) {
   const CollisionShape& shape = body.collision_shape();
   return (shape.is_plane() || shape.piece_count() == 1) && !(body.is_dynamic() && body.rigid.is_thin());

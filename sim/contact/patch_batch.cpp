@@ -472,7 +472,7 @@ Groups relative_now(const PatchBatch& p, const LaneTwist& a, const LaneTwist& b,
 
 /// Whether friction changes the normal velocity noticeably in any lane. Between two balls it does not.
 bool is_coupled(const PatchBatch& p) {
-  constexpr float kNoticeable = 1e-4F;  // square of the least fraction that is noticeable
+  constexpr float kNoticeable = 1e-4F;  // square of the least noticeable change, as a fraction
   const FloatLanes &x = p.coupling.x.x, &y = p.coupling.y.x, &K = p.normal_mobility.xx;
   return _mm256_movemask_ps(FloatLanes(x * x + y * y > kNoticeable * K * K)) != 0;
 }

@@ -73,7 +73,7 @@ struct PatchBatch {
   bool resists_turning;                  ///< whether a lane has rolling or spinning friction
   Lanes rolling;                         ///< radius of the disc of rolling friction per normal impulse [m]
   Lanes spin_arm;                        ///< spinning friction divided by the coefficient of friction [m]
-  Vector rolling_impulse;                ///< about t and k in y and z, like the normal group; x is 0 [N m s]
+  Vector rolling_impulse;                ///< angular impulse about t and k, in y and z; x is 0 [N m s]
   Vector rolling_before, rolling_shift;  ///< rolling friction, as Point::before and Point::shift
   /// Friction along t and k, and about n; for the meanings see Point.
   Vector friction_impulse, friction_mean, friction_before, friction_shift;

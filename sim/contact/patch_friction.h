@@ -163,7 +163,8 @@ inline PatchVector rolling_impulse(const PatchBatch& p, const PatchVector& u) {
       k{p.coupling.x.z, p.coupling.y.z, p.coupling.z.z};
   const PatchVector St = p.friction_stiffness * t, Sk = p.friction_stiffness * k;
   const FloatLanes sticks = p.pressure > zero ? zero : float_lanes(1);
-  // The friction's fraction of the mobility is at most nearly all of it.
+  // The mobility that remains for rolling while the friction sticks. It is a Schur complement and therefore
+  // positive.
   const FloatLanes yy = K.yy - sticks * dot(t, St), yz = K.yz - sticks * dot(t, Sk),
                    zz = K.zz - sticks * dot(k, Sk);
   const FloatLanes scale = lane_inverse(yy * zz - yz * yz);

@@ -20,14 +20,15 @@ class AdaptiveIntegrator : public Integrator {
   /// `error_order`: the error of a step of length h is proportional to h^error_order.
   explicit AdaptiveIntegrator(int error_order) : error_order_(error_order) {}
 
-  /// Prepares for the attempts; called before the first one.
+  /// Prepares for the attempts. Called before the first one.
   virtual void begin(const DynamicSystem&, Real, std::span<const Real>, std::span<const Real>,
                      IntegratorWorkspace&) const {}
   /// Takes a step from (x, p) to work.next_x, work.next_p, and estimates its error in work.error_x,
   /// work.error_p.
   virtual void attempt(const DynamicSystem& system, Real t, Real h, std::span<const Real> x,
                        std::span<const Real> p, IntegratorWorkspace& work) const = 0;
-  /// It is called after an attempt whose error is accepted; it may still correct the result.
+  /// Called after an attempt whose error is accepted. An integrator may correct the result of the attempt
+  /// here.
   virtual void accept(IntegratorWorkspace&) const {}
 
  private:

@@ -29,7 +29,8 @@ struct Turbulence {
   uint32_t drop_rate = 0;
 };
 
-/// The eddies of one size at a time.
+/// The eddies of one size at one time. At regular times, the ticks, each corner of the lattice gets a new
+/// random velocity. Between two ticks the velocities of both are mixed.
 struct EddyLattice {
   Real cells;   ///< cells per metre
   Vec3 origin;  ///< [cells]

@@ -267,7 +267,7 @@ ConvexDecomposition decompose_open(const TriangleMesh& mesh, const Decomposition
 ConvexDecomposition decompose(const TriangleMesh& mesh, const MeshTopology& topology,
                               const DecompositionSettings& settings) {
   using Wanted = DecompositionMethod;
-  if (mesh.triangles.empty()) return no_parts("no faces");
+  if (mesh.triangles.empty()) return no_parts("the mesh has no faces");
   if (!topology.defects().closed()) return decompose_open(mesh, settings, topology.defects().describe());
   if (topology.defects().inverted) {
     const TriangleMesh outward = turned_over(mesh);
@@ -276,7 +276,7 @@ ConvexDecomposition decompose(const TriangleMesh& mesh, const MeshTopology& topo
   const Real volume = mass_properties(mesh).volume;
   if (!(volume > 0)) return no_parts("the surface encloses no volume");
   if (settings.method == Wanted::hull) return hull_alone(mesh, volume);
-  std::string why = "asked for";
+  std::string why = "requested";
   if (settings.method != Wanted::approximate) {
     ExactResult exact = decompose_exactly(mesh, topology, volume, settings);
     if (!exact.parts.empty()) {

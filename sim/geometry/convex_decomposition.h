@@ -67,8 +67,8 @@ struct ConvexDecomposition {
 /// Decomposes a welded mesh with finite coordinates; the mesh may be inside out. The result does not depend
 /// on the number of threads. Parts of the exact method do not overlap, and the sum of their volumes is the
 /// volume of the solid within 1e-6. Faces that are flat within 2e-7 of the mesh's diagonal count as flat.
-/// Approximate parts may differ from the solid by up to 2 % of its diagonal more than is necessary for their
-/// number.
+/// Approximate parts are trimmed, so they may omit features of the solid up to a depth of 2 % of its
+/// diagonal.
 ConvexDecomposition decompose(const TriangleMesh& mesh, const MeshTopology& topology,
                               const DecompositionSettings& settings = {});
 

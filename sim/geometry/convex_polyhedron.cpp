@@ -29,7 +29,8 @@ ConvexPolyhedron::ConvexPolyhedron(std::vector<Vec3> vertices, std::span<const s
     if (face.size() < 3) throw std::invalid_argument("a face needs at least three vertices");
     for (uint32_t v : face)
       if (v >= vertices_.size())
-        throw std::invalid_argument("a face has the vertex index " + std::to_string(v) + " of " +
+        throw std::invalid_argument("vertex index " + std::to_string(v) +
+                                    " of a face is out of range; there are " +
                                     std::to_string(vertices_.size()) + " vertices");
     face_vertices_.items.insert(face_vertices_.items.end(), face.begin(), face.end());
     face_vertices_.start.push_back(static_cast<uint32_t>(face_vertices_.items.size()));

@@ -221,7 +221,7 @@ HulledPiece with_hull(SolidPiece solid, uint32_t solid_id) {
 std::vector<ReflexEdge> sharp_reflex_edges(const SolidPiece& solid) {
   struct Half {
     Vec3 normal;
-    Vec3 inward;  // from the edge towards a third corner
+    Vec3 inward;  // direction from the edge towards a third corner
   };
   std::unordered_map<uint64_t, Half> halves;
   std::vector<ReflexEdge> list;

@@ -120,7 +120,7 @@ class HullSketch {
 
   std::span<const Vec3> points_;
   std::vector<uint32_t> owner_;
-  std::vector<Face> faces_;  // also those that were replaced
+  std::vector<Face> faces_;  // all faces, including those that were replaced
   std::vector<uint32_t> alive_;
   std::vector<uint32_t> seen_;
   std::vector<std::pair<uint32_t, uint32_t>> outline_;

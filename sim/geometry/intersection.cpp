@@ -119,7 +119,7 @@ bool segment_intersects_triangle(const Vec3& p, const Vec3& q, const TriangleVer
     const std::array<Vec3, 2> segment = {p, q};
     return !(collinear(t) && skew(segment, t)) && coplanar_intersect(segment, t);
   }
-  // The line crosses the plane, and the triangle if all edges have it on the same side.
+  // The line crosses the plane. It crosses the triangle if it passes all edges on the same side.
   int low = 0, high = 0;
   for (std::size_t i = 0; i < 3; ++i) {
     const int side = sign(orient3d(p, q, t[i], t[(i + 1) % 3]));

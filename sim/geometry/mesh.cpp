@@ -124,7 +124,7 @@ Real signed_volume6(const TriangleMesh& mesh) {
 void unify_winding(TriangleMesh& mesh) {
   struct Neighbour {
     uint32_t face;
-    bool is_opposed;  // it is wound the other way
+    bool is_opposed;  // whether it is wound the other way
   };
   const std::size_t faces = mesh.triangles.size();
   std::vector<std::vector<Neighbour>> neighbours(faces);

@@ -33,9 +33,9 @@ Real thickness(const TriangleMesh& mesh, uint32_t face, Real area2) {
 
 /// Connected regions of triangles that lie in one plane.
 struct FlatRegions {
-  std::vector<FacePlane> planes;               // of each region
+  std::vector<FacePlane> planes;               // plane of each region
   std::vector<std::vector<uint32_t>> members;  // triangles of each region, in their order
-  std::vector<uint32_t> region;                // of each triangle
+  std::vector<uint32_t> region;                // region of each triangle
 };
 
 /// Divides the triangles into connected regions that lie in one plane. Planes grow from the largest

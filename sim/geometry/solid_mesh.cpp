@@ -14,8 +14,8 @@ namespace {
 using Vec2 = Eigen::Vector2d;
 
 constexpr uint32_t kRoundSides = 48;  // flat sides around an axis of revolution
-constexpr uint32_t kTubeSides = 24;   // around the tube of a torus
-constexpr uint32_t kBallSides = 32;   // around a ball
+constexpr uint32_t kTubeSides = 24;   // flat sides around the tube of a torus
+constexpr uint32_t kBallSides = 32;   // flat sides around a ball
 
 /// Returns `count` evenly spaced points of the unit circle. `count` must be a multiple of 4, and 4 or 6 times
 /// a power of two: angles are halved with square roots, which gives the same bits on every machine.

@@ -165,7 +165,7 @@ Outcome Dantzig::bring_in(Index m) {
   return Outcome::postponed;
 }
 
-/// Removes the rounding errors of the steps by another solution with the matrix itself.
+/// Removes the rounding errors of the steps by one step of iterative refinement with the matrix itself.
 void Dantzig::refine() {
   a_ = A_ * result_.f + b_;
   x_.resize(factor_.size());

@@ -10,8 +10,8 @@ constexpr Real kSingular = 1e-13;
 
 }  // namespace
 
-/// Applies the rotation that takes (x, y) to (|xy|, 0) to two rows of R, from the column `from` on, and to
-/// the columns of Q.
+/// Applies the rotation that takes (x, y) to (|(x, y)|, 0). It changes two rows of R, from the column `from`
+/// on, and two columns of Q.
 void UpdatedQr::rotate(Eigen::Index upper, Eigen::Index lower, Eigen::Index from, Real x, Real y) {
   if (y == 0) return;
   const Real length = std::sqrt(x * x + y * y), c = x / length, s = y / length;

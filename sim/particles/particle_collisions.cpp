@@ -13,8 +13,8 @@ constexpr std::size_t kCollisionChunk = 1024;
 /// layers unless they are fast.
 constexpr Real kLayer = 3;
 /// The search distance of partners increases by this multiple of the greatest change of a path. The middle of
-/// each path and half its length each change by at most half of it, and by as much again if a particle was
-/// created within the sub-step.
+/// a path and half of its length each change by at most half of the change of the path, and by as much again
+/// for a particle that was created within the sub-step.
 constexpr Real kSlack = 3;
 
 template <class F>

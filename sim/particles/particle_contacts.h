@@ -69,7 +69,7 @@ class ParticleContacts {
     float time;          // start of the contact [s]
 
     Vec3 normal() const { return normal_single.cast<Real>(); }
-    Vec3 impulse() const { return impulse_single.cast<Real>(); }  // on the first particle, world [N s]
+    Vec3 impulse() const { return impulse_single.cast<Real>(); }  // on the first particle [N s]
     /// Returns a tangential impulse, shortened to the friction `limit` [N s].
     Vec3 held(const Vec3& along, Real limit) const {
       const Real size2 = along.squaredNorm();

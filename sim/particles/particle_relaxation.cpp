@@ -42,9 +42,9 @@ struct Heap {
   Real mass = 0;     ///< [kg]
 };
 
-/// Limits the impulses of resting particles on each body. An impulse against the body's motion can at most
-/// stop the body. Beyond that, the momentum is limited to the momentum of these particles relative to the
-/// body. The angular momentum is limited to the same momentum times the greatest lever arm.
+/// Limits the impulse of resting particles on each body to the sum of two parts. The first part acts against
+/// the motion of the body and at most stops it. The second part is at most the momentum of these particles
+/// relative to the body, and its angular impulse is at most this momentum times the greatest lever arm.
 void limit_loads(std::span<Reaction> reactions, std::map<uint32_t, Load>& loads) {
   for (const Reaction& r : reactions)
     if (const auto load = loads.find(r.body); load != loads.end()) {

@@ -40,7 +40,7 @@ struct ParticleSystem::Scratch {
 
 /// A particle that hits a dynamic body, with its flight so far.
 struct ParticleSystem::Striker {
-  Real time;  // as a fraction of the sub-step
+  Real time;  // time of the hit, as a fraction of the sub-step
   std::size_t particle;
   Flight flight;
   bool integrated;

@@ -19,7 +19,7 @@ Real fastest_point(const Body& body) {
   return body.rigid.velocity().norm() + body.rigid.angular_velocity().norm() * body.extent;
 }
 
-/// Returns the wrench of a spring on a sleeping body, which is at one or both of its ends.
+/// Returns the wrench of a spring on a sleeping body. The body is at one end of the spring or at both.
 Wrench spring_push(const WorldState& world, const Spring& spring, const Body& body, Real time) {
   const auto motion = [&](const Attachment& end) -> Motion {
     if (const auto* p = std::get_if<ParticlePoint>(&end)) {

@@ -25,9 +25,9 @@ constexpr Real kRoom = 0.03, kSteps = 2;
 /// Greatest deviation of a path from its chord, as a fraction of the extent. Only rotations of more than half
 /// a radian exceed it.
 constexpr Real kWide = 0.036;
-/// Contact points are reused while the relative motion of the bodies is at most this length [m] and at most
-/// this fraction of the smaller body's size. Meanwhile only the separations are updated in each step, to
-/// second order.
+/// Contact points are reused while the relative motion of the bodies is at most kReuse [m] and at most
+/// kReuseFraction of the smaller body's size. Meanwhile only the separations are updated in each step, to
+/// second order. With the exact solvers the limit is kExactReuse [m].
 constexpr Real kReuse = 1e-4, kReuseFraction = 2e-4, kExactReuse = 1e-8;
 /// A body that hits another body of the same mass without restitution moves on with this fraction of its
 /// speed, and so does the other body. Impacts are propagated kPassedOn times. The next one would have a

@@ -31,7 +31,7 @@ class FreeMotion {
 
  private:
   WorldState& world_;
-  std::vector<std::unique_ptr<CoupledSystem>> systems_;  // of this sub-step
+  std::vector<std::unique_ptr<CoupledSystem>> systems_;  // systems of this sub-step
 };
 
 }  // namespace offstage::sim

@@ -33,7 +33,7 @@ constexpr std::size_t kMostRimBodies = 8;
 /// Greatest number of times that an island continues from the same impact because new contacts of the same
 /// bodies were found.
 constexpr int kMostPasses = 4;
-/// Contact points with a smaller separation take part in a collision [m].
+/// Contact points with a separation below this take part in a collision [m].
 constexpr Real kCluster = 1e-4;
 
 /// Whether a body is awake and belongs to this island.
@@ -159,8 +159,8 @@ uint32_t ImpactStage::gather(const ContactPair& pair, Real time) {
   return island;
 }
 
-/// Merges an island with all islands that it will hit at `time` or later, and with those that these will hit.
-/// One solution then replaces many impacts.
+/// Merges an island with all islands that it will hit at `time` or later. The merged island is extended in
+/// the same way, until it hits no other island. One solution then replaces many impacts.
 void ImpactStage::join_pending(uint32_t number, Real time) {
   for (bool grown = true; grown;) {
     grown = false;

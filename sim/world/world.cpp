@@ -150,8 +150,8 @@ void check_mesh(const std::string& object, const TriangleMesh& mesh) {
   for (const Triangle& t : mesh.triangles)
     for (uint32_t v : t)
       if (v >= mesh.vertices.size())
-        refuse(object, "vertex index " + std::to_string(v) + " of " + std::to_string(mesh.vertices.size()) +
-                           " vertices");
+        refuse(object, "vertex index " + std::to_string(v) + " is out of range; the mesh has " +
+                           std::to_string(mesh.vertices.size()) + " vertices");
 }
 
 RigidBody make_rigid_body(const std::string& object, const BodyDef& def, const Solid& solid) {

@@ -11,7 +11,7 @@ ClothHandle World::add_cloth(const ClothDef& def) {
   const std::string object = def.name.empty() ? "cloth" : "cloth \"" + def.name + '"';
   std::string wrong = problem(def);
   if (!(def.appear_at >= 0) || !std::isfinite(def.appear_at) || !(def.remove_at > def.appear_at))
-    wrong = "remove_at must be later than appear_at, which is at least 0";
+    wrong = "appear_at must be >= 0 and remove_at later than appear_at";
   if (!wrong.empty()) throw std::invalid_argument(object + ": " + wrong);
   for (std::size_t i = 0; i < def.pins.size(); ++i)
     if (def.pins[i].body && !impl_->bodies.find(def.pins[i].body))

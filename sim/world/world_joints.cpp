@@ -83,7 +83,7 @@ void check(const JointDef& def) {
     if (const Motor::Key& key = def.motor.targets[i]; !std::isfinite(key.time) ||
                                                       !std::isfinite(key.target) ||
                                                       (i > 0 && key.time <= def.motor.targets[i - 1].time))
-      refuse(def, "motor.targets: must be finite, with strictly increasing times");
+      refuse(def, "motor.targets must be finite, with strictly increasing times");
 }
 
 }  // namespace
@@ -123,11 +123,11 @@ JointHandle World::add_joint(const JointDef& def) {
   };
   if (!becomes_dynamic(joint->a) && !becomes_dynamic(joint->b))
     refuse(def, "at least one of its bodies must be dynamic");
-  if (joint->a == joint->b) refuse(def, "a and b are the same");
+  if (joint->a == joint->b) refuse(def, "a and b are the same body; a joint connects two bodies");
   if (def.type == JointType::pulley && !def.has_limits()) joint->def.upper = 0;
   fit(*joint);
   if (!(def.appear_at >= 0) || !(def.remove_at > def.appear_at))
-    refuse(def, "remove_at must be later than appear_at, which is at least 0");
+    refuse(def, "appear_at must be >= 0 and remove_at later than appear_at");
   joint->is_absent = def.appear_at > 0 || (joint->a && joint->a->absent) || (joint->b && joint->b->absent);
   impl_->has_lifetimes |= joint->is_absent || std::isfinite(def.remove_at);
   for (Body* end : {joint->a, joint->b})
