@@ -22,7 +22,7 @@ struct ClothPoints {
   std::vector<Vec4> position;
   std::vector<Vec4> start;         ///< position at the start of the cloth's sub-step
   std::vector<Vec4> velocity;      ///< mean velocity over the last sub-step of the cloth
-  std::vector<Vec4> outer;         ///< by all forces except springs, contacts and drag
+  std::vector<Vec4> outer;         ///< acceleration by all forces except springs, contacts and drag
   std::vector<Vec4> acceleration;  ///< acceleration including the drag of the air at a velocity (air_drag.h)
   std::vector<Vec4> flow;          ///< velocity of the air
   std::vector<Vec4> rest;          ///< position in the unstrained cloth

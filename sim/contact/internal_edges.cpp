@@ -365,8 +365,8 @@ class BodyContacts {
     const Manifold on_plane =
         placed(plane_manifold(v.x().collision_shape().piece(v.x_piece), plane_from_x, margin), plane);
     Manifold m = without_points(v, normal);
-    // The piece stands on the face, not in the slope. If it were deeper, the slope would be the corner of a
-    // flush object.
+    // The piece stands on the face and not in the slope. If it is deeper in the slope than `least`, the slope
+    // is not a slope but the corner of a flush object.
     const Real least = std::min({0.0, v.separation(), face.separation()}) - flush_;
     const auto add = [&](const ContactPoint& p) {
       const auto& [on_a, on_b] = v.x_is_a ? std::tie(p.on_a, p.on_b) : std::tie(p.on_b, p.on_a);

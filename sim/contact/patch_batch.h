@@ -64,8 +64,8 @@ struct PatchBatch {
   /// twist of the friction group per unit wrench of the normal group.
   Symmetric normal_mobility, friction_mobility;
   LaneMatrix<Lanes> coupling;
-  /// Inverse of friction_mobility. Patches of one point have no torque; for them it is the inverse of the
-  /// part along t and k, and zz is the reciprocal of a bound of its eigenvalues.
+  /// Inverse of friction_mobility. Patches of one point have no torque. For them it is the inverse of the 2 x
+  /// 2 part along t and k, and zz is the reciprocal of an upper bound of the eigenvalues of this part.
   Symmetric friction_stiffness;
   PatchGroups approach;  ///< twist due to the velocities at the start, conveyors included
   Lanes conveyed;        ///< component of `approach` along n due to conveyors [m/s]

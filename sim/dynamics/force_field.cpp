@@ -118,7 +118,7 @@ std::string problem(const WindField& f) {
 }
 std::string problem(const Vortex& f) {
   if (!f.point.allFinite()) return "point must be finite";
-  if (!f.axis.allFinite() || !(f.axis.norm() > 0)) return "axis must be finite and not 0";
+  if (!f.axis.allFinite() || !(f.axis.norm() > 0)) return "axis must be finite and not 0 0 0";
   if (!std::isfinite(f.circulation)) return "circulation must be finite";
   if (!is_positive(f.radius)) return "radius must be a finite number > 0";
   return is_not_negative(f.drag) ? problem(f.region) : "drag must be a finite number >= 0";

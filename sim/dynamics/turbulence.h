@@ -36,7 +36,7 @@ struct EddyLattice {
   Vec3 origin;  ///< [cells]
   /// Keys of the hashes that give the corners' velocities, at the ticks before and after this time.
   std::array<uint32_t, 2> key;
-  std::array<float, 2> fraction;  ///< fractions of these ticks
+  std::array<float, 2> fraction;  ///< weights of the velocities at these ticks
   float bias;                     ///< makes the mean of the hashes 0
 };
 
