@@ -117,9 +117,9 @@ class RowMaker {
   }
 
   /// Returns a row that also contains the change of speed because the direction turns within the interval. It
-  /// is used only for limits. For motors no case is known in which it improves accuracy. With it, the gripper
-  /// of demos/scenes/robot_arm.json diverged, because the exact solver often leaves its contacts to the
-  /// fall-back.
+  /// is used only for limits. For motors, no case is known in which this change improves the accuracy. With
+  /// this change in its motors, the gripper of demos/scenes/robot_arm.json diverged, because the exact solver
+  /// often leaves the contacts of the gripper to the fall-back.
   BoundedRow turning_with(const Direction& d) const {
     BoundedRow r = bounded(d);
     const auto turn = [&](const LinkMotion& motion) { return h_ * motion.angular_velocity.norm(); };

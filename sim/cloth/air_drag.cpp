@@ -113,10 +113,10 @@ void AirDrag::drag_points(ClothPoints& points) {
 
 /// Adds the force of the air on each triangle: F = c |u| D u with D = (C_D - C_L) 1 + C_L n n^T, a third to
 /// each corner. The exact derivative is c (|u| D + D u u^T / |u|). Here D u u^T D / u.D u replaces D u u^T,
-/// which makes it symmetric, and keeps it exact for air along the normal and along the cloth. Where air stops
-/// the triangle within the time of the linearisation, the implicit fraction of the first term is increased,
-/// so that the triangle does not rebound. With both terms the result is exact along u, too: the velocity
-/// falls as u / (1 + k u t). Four triangles are computed at a time, one in each lane of a register.
+/// which makes the derivative symmetric, and keeps it exact for air along the normal and along the cloth.
+/// Where air stops the triangle within the time of the linearisation, the implicit fraction of the first term
+/// is increased, so that the triangle does not rebound. With both terms the result is exact along u, too: the
+/// velocity falls as u / (1 + k u t). Four triangles are computed at a time, one in each lane of a register.
 void AirDrag::drag_triangles(ClothPoints& points) {
   const std::size_t n = from_.size();
   wind_.resize(n);

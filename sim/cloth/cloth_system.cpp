@@ -104,9 +104,9 @@ void ClothSystem::substep(Real from, Real to, Real dt) {
   end_substep(dt);
 }
 
-/// Solves the contacts of cloth with bodies, which push it off their path. Where springs are too long,
-/// contacts and springs are solved together, and linearised again in each round. This includes bodies that
-/// cloth does not touch in this sub-step but soon may: cloth under a body often moves ahead of it for a
+/// Solves the contacts of cloth with bodies, which push the cloth out of their way. Where springs are too
+/// long, contacts and springs are solved together, and linearised again in each round. This includes bodies
+/// that cloth does not touch in this sub-step but soon may: cloth under a body often moves ahead of it for a
 /// sub-step.
 void ClothSystem::touch_bodies(Real dt) {
   contacts_.find_runaways(points_);

@@ -48,8 +48,8 @@ TrianglePoint nearest_to_axis(const Rounding& shape, const std::array<Vec3, 3>& 
 }  // namespace
 
 bool RoundContacts::concerns(const Solid& solid, Real edge, Real thickness) {
-  // Midway between two points at this distance, a straight edge is nearer to the shape by edge^2 / (8 (radius
-  // + thickness)).
+  // If both ends of a straight edge keep the distance `thickness`, its middle is nearer to the shape by
+  // edge^2 / (8 (radius + thickness)).
   const std::optional<Rounding> shape = rounding(solid);
   return shape && edge * edge > 8 * (shape->radius + thickness) * (1 - kTriangleDistance) * thickness;
 }

@@ -11,7 +11,7 @@ namespace offstage::sim {
 namespace {
 
 /// The search finds pairs whose gap is up to this many thicknesses. Points may deviate from their predicted
-/// paths by half of it.
+/// paths by half of this gap.
 constexpr Real kMargin = 0.8;
 /// The margin for pairs that are searched again while the other points keep their predicted paths. The other
 /// points may deviate by a quarter of kMargin.

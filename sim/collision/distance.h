@@ -1,7 +1,7 @@
 #pragma once
-/// Signed distance of points to solids, with its gradient. A solid is a shape, with its registered mesh if it
-/// is a mesh. Points and normals are in the frame of the shape. Distances to primitives are exact inside and
-/// outside. They are therefore convex functions of the point; sphere_sweep.h relies on this.
+/// Signed distance of points to solids, with its gradient. A solid is a shape, together with the registered
+/// mesh for a MeshShape. Points and normals are in the frame of the shape. Distances to primitives are exact
+/// inside and outside. They are therefore convex functions of the point; sphere_sweep.h relies on this.
 
 #include <limits>
 

@@ -1,10 +1,10 @@
 #pragma once
 /// Contacts that close within an interval while other contacts already support a body (physics R9).
 ///
-/// If a whole interval is solved at once, a contact that closes within it pushes from the start, before the
-/// body has reached it. A ball that rolls over the concave seams of a bowl then loses a little energy at each
-/// seam: the work of its weight over the gap. To avoid this, the interval is divided at the times at which
-/// contacts close. The frames and arms of the contacts stay constant.
+/// If a whole interval is solved at once, a contact that closes within the interval pushes from the start,
+/// before the body has reached the surface. A ball that rolls over the concave seams of a bowl then loses a
+/// little energy at each seam: the work of its weight over the gap. To avoid this, the interval is divided at
+/// the times at which contacts close. The frames and arms of the contacts stay constant.
 
 #include <optional>
 #include <span>
@@ -46,7 +46,7 @@ struct ClosingSolution {
 struct ClosingProblem {
   std::span<const ContactBody> start;  ///< bodies with their velocities at the start of the interval
   std::span<const ContactBody>
-      free;  ///< bodies with the velocities that they would have at its end without contacts and bounded rows
+      free;  ///< bodies with the velocities that they would have at the end without contacts and bounded rows
   /// Contacts with initial guesses of the impulses over the interval. Only points that touch at the start
   /// have targets.
   std::span<const Contact> contacts;

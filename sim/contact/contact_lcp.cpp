@@ -18,7 +18,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// This fraction of the diagonal is added to it, so that redundant contacts share their load in a unique way.
+/// This fraction of the diagonal is added to the diagonal, so that redundant contacts share their load in a
+/// unique way.
 constexpr Real kFraction = 1e-7;
 /// Greatest accepted residual, as a fraction of scale().
 constexpr Real kLcpAccepted = 1e-8;

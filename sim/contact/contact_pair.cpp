@@ -130,8 +130,8 @@ Weights weights(const Manifold& m, const ContactFrame& frame, const Pose& a, con
 
 /// Corrects the points of a rim over a face. A manifold represents a disc by a polygon. The lowest point of a
 /// leaning disc is between two corners, and a corner in its place would make the contact jump along the rim.
-/// The corners next to the lowest point are omitted: they touch because the contact moves along the rim,
-/// which their velocity at the start does not show.
+/// The corners next to the lowest point are omitted: they touch only because the contact has moved along the
+/// rim, and the velocity of the material at the start does not show this motion.
 class LeaningRim {
  public:
   /// Prepares the corrections if the shape has a rim. `core`: pose of the shape in the frame of the manifold.
@@ -440,7 +440,7 @@ void ContactPair::add_speculative_contacts(Real duration) {
   }
 }
 
-/// Finds the contact of a pair with a sphere. Its stored force keeps its direction in the world, because a
+/// Finds the contact of a pair with a sphere. The stored force keeps its direction in the world, because a
 /// rolling sphere turns while the force does not.
 void ContactPair::find_one_point(const Pose& a, const Pose& b, Real margin) {
   const bool known = !placed_.empty();

@@ -84,8 +84,8 @@ class alignas(64) ContactPair {
   TestCounts take_tests() { return std::exchange(cache_.tests, {}); }
 
   /// Finds the contact points of the bodies in the given poses. Surfaces must be within `margin` [m] of each
-  /// other. If their relative pose has changed by less than `reuse` [m], the points are reused and only their
-  /// separations are updated. `turning`: see find_manifolds().
+  /// other. If the relative pose of the bodies has changed by less than `reuse` [m], the points are reused
+  /// and only their separations are updated. `turning`: see find_manifolds().
   void find(const Pose& a, const Pose& b, Real margin, Real reuse, bool turning);
 
   /// Adds speculative contacts to the contacts that find() found at the interval's start. A speculative

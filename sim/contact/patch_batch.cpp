@@ -449,7 +449,7 @@ Single solve_single_friction(PatchBatch& p, Single& u) {
 }
 
 /// Returns the change of the relative twist at the end of a sub-step because arms and frames turn.
-/// turning_displacement() returns the displacement until its start.
+/// turning_displacement() returns the displacement that this change has caused before the sub-step.
 Groups turning_velocity(const PatchBatch& p, const SubstepTime& time) {
   const FloatLanes s = _mm256_set1_ps(time.s), s2 = s * s;
   return {s * p.gain.normal + Vector{s2 * p.bow.x, FloatLanes{}, FloatLanes{}},

@@ -498,7 +498,8 @@ Real ProximalNewton::gradient_speed() const {
   for (std::size_t row = 0; row < gradient_.size(); ++row) {
     const Vec6& g = gradient_[row];
     const Real mass = mass_[row](0, 0);
-    // The angular part uses a lower bound of the inertia, because the trace exceeds its eigenvalues.
+    // The angular part is a lower bound, because the trace of the inertia is used in place of the moments of
+    // inertia, which are smaller.
     const Mat3& inertia = mass_[row].bottomRightCorner<3, 3>();
     const Real radius = std::sqrt(inertia.trace() / mass);
     worst = std::max(worst, (g.head<3>().norm() + g.tail<3>().norm() / std::max(radius, 1e-12)) / mass);

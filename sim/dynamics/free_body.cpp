@@ -16,8 +16,8 @@ namespace {
 /// the fastest spin that the body's angular momentum allows: a thin body that turns about a short axis may
 /// later spin about its long axis.
 constexpr Real kTurn = 0.5, kMostPieces = 8;
-/// If more pieces were needed, SplitRotation is used. Its pieces are limited by the angle of a kick and by
-/// the angle of the nutation [rad], and their number by kMostKicks.
+/// If more pieces were needed, SplitRotation is used. In one of its pieces, the angle of a kick is at most
+/// kKick and the angle of the nutation at most kNutation [rad]. The number of pieces is at most kMostKicks.
 constexpr Real kKick = 0.05, kNutation = 0.2, kMostKicks = 1000;
 /// Accepted relative error of the energy of a free rotation; the exact energy is constant.
 constexpr Real kRotationEnergy = 1e-3;

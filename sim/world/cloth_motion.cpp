@@ -91,7 +91,8 @@ std::vector<Reaction> ClothMotion::answer(std::span<const ClothBody> near, Real 
     Body& body = world_.body_at(at.obstacle().body);
     const bool left = std::exchange(body.on_cloth, at.touched) && !at.touched;
     if (!body.is_dynamic()) continue;
-    // A body on cloth sleeps while the cloth is at rest. It wakes when the cloth moves or leaves it.
+    // A body on cloth sleeps while the cloth is at rest. The body wakes when the cloth moves or no longer
+    // touches the body.
     if (left || at.touching_speed > kClothRest) active_.wake(body);
     if (body.asleep && at.pin_load()) {
       const Wrench pull{at.pin_load()->impulse / h, at.pin_load()->angular_impulse / h};

@@ -6,8 +6,8 @@
 
 namespace offstage::sim {
 
-/// Derivatives at an end of a spring: of its place and velocity by the state of its object, and of that
-/// object's rates by a force at the end.
+/// Derivatives at an end of a spring, which is attached to an object: the place and the velocity of the end
+/// by the state of the object, and the rates of the object by a force at the end.
 struct CoupledGroup::EndDerivative {
   using Matrix3X = Eigen::Matrix<Real, 3, Eigen::Dynamic, 0, 3, 13>;
   using MatrixX3 = Eigen::Matrix<Real, Eigen::Dynamic, 3, 0, 13, 3>;
