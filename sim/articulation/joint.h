@@ -58,7 +58,8 @@ struct Motor {
   std::vector<Key> targets = {};  ///< strictly increasing times; empty: the target is 0
   /// Whether targets are interpolated by a cubic whose rate is zero at every key.
   bool smooth = false;
-  Real max_effort = std::numeric_limits<Real>::infinity();  ///< [N m] or [N]
+  /// Greatest torque [N m] or force [N] of the motor, >= 0.
+  Real max_effort = std::numeric_limits<Real>::infinity();
   /// For a position target: effort = stiffness (target - position) - damping speed. With stiffness 0 the
   /// target is held rigidly within max_effort.
   Real stiffness = 0, damping = 0;

@@ -78,7 +78,7 @@ CurveSample<N> sample_segment(std::size_t count, Key&& key, bool loop, std::size
   const Value m0 = i > 0 || loop ? tangent((i + segments - 1) % segments, i) : mean;
   const Value m1 = i + 1 < segments || loop ? tangent(i, (i + 1) % segments) : mean;
   const Real s2 = s * s, s3 = s2 * s;
-  // This form reproduces equal values to the last bit.
+  // In this form the result is exactly a.value if both values are equal.
   return {a.value + (3 * s2 - 2 * s3) * (b.value - a.value) + (s3 - 2 * s2 + s) * span * m0 +
               (s3 - s2) * span * m1,
           (6 * s2 - 6 * s) / span * (a.value - b.value) + (3 * s2 - 4 * s + 1) * m0 + (3 * s2 - 2 * s) * m1};

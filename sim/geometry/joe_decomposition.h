@@ -19,8 +19,8 @@ struct CutLimits {
   Real distance = 0;
   // The method fails beyond these bounds.
   std::size_t max_parts = 1024;
-  Real max_work = 5e7;  ///< bound of the work: for each tried plane, the number of half-edges of the
-                        ///< polyhedron that it cuts, summed
+  Real max_work = 5e7;  ///< bound of the work: the sum, over all tried planes, of the number of
+                        ///< half-edges of the polyhedron to be cut
 };
 
 /// Whether the interior dihedral angle at a half-edge is greater than pi.
