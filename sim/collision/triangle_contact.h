@@ -24,8 +24,7 @@ struct PairTriangles {
 
 /// Appends the manifolds of two pieces, at least one of them a triangle, to `found`; see manifold(). Points
 /// at which the surface around a triangle does not allow the normal are replaced by points in front of the
-/// triangle's face. `turning`: whether a body turns by a
-/// large angle in the sub-step; see find_manifolds().
+/// triangle's face. `turning`: whether a body turns by a large angle in the sub-step; see find_manifolds().
 void find_triangle_manifolds(const Convex& a, const Convex& b, const PairTriangles& triangles,
                              const Pose& a_from_b, const Separation& s, Real margin, bool turning,
                              std::vector<Manifold>& found);

@@ -163,8 +163,9 @@ void RelaxationSolver::plan(uint32_t substeps) {
     if (joints > 0) ranges_.push_back({Stage::join, 0, joints, joints, i + 1});
     ranges_.push_back({i + 1 < substeps ? Stage::advance : Stage::advance_last, 0, bodies, kBodiesPerBlock});
   }
-  // Contacts that closed in the last sub-step still have the velocity with which they closed.
   plan_push(substeps, joints);
+  // Contacts that closed in the last sub-step still have the velocity with which they closed. One more sweep
+  // stops them.
   ++sweeps_;
   plan_colors(Stage::solve, substeps);
   if (joints > 0) ranges_.push_back({Stage::join_last, 0, joints, joints, substeps});

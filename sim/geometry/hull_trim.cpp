@@ -74,8 +74,8 @@ class HullTrimmer {
   /// A face moved inwards.
   struct Trim {
     Real depth = 0;    // [m]
-    Real removed = 0;  // volume of the hull [m^3]
-    Real lost = 0;     // volume of the solid in it [m^3]
+    Real removed = 0;  // volume that the trim removes from the hull [m^3]
+    Real lost = 0;     // volume of the solid in the removed part [m^3]
     /// Returns the volume by which the difference of hull and solid decreases: the removed empty space minus
     /// the lost part of the solid [m^3].
     Real gain() const { return removed - 2 * lost; }
