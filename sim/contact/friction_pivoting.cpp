@@ -260,8 +260,8 @@ void Pivoting::change(const Block& block) {
 }
 
 /// Whether row m needs no more force; if so, sets its state. A normal row may depend linearly on others that
-/// already give it the right velocity. Its load is then transferred to them, until it is zero or one of them
-/// changes its state.
+/// already give it the right velocity. The load of row m is then transferred to these rows, until the load is
+/// zero or one of these rows changes its state.
 bool Pivoting::is_settled(Index m) {
   if (m % 3 == 0) {
     if (F_[m] > 0) return std::abs(a_[m]) <= zero_ && enter(m);

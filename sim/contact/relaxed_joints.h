@@ -49,7 +49,8 @@ class RelaxedJoints {
   /// Indices of the bodies of a part.
   std::span<const uint32_t> bodies(uint32_t part) const { return parts_[part].bodies; }
   /// Adds the effect of the joints in the step to the bodies, in double precision. `late`: by body, the
-  /// excess displacement by the sub-steps per change of velocity [s]; this function corrects it.
+  /// excess displacement by the sub-steps divided by the change of velocity [s]; this function removes the
+  /// excess.
   void add_motion(std::span<RelaxedBody> bodies, std::span<const Real> late) const;
   /// Writes the impulses of the whole step to the problem and the contacts.
   void finish();
