@@ -151,7 +151,8 @@ Real normal_quantile(Real p) {
 SinCos sincos(Real x) {
   constexpr Real kFar = 1e6;
   if (std::abs(x) > kFar) x = std::fmod(x, 2 * std::numbers::pi);  // exact, with the same bits everywhere
-  // Computes x - k pi/2 with pi/2 in three parts; k times each of the first two is exact for |x| < 1e6.
+  // Computes x - k pi/2 with pi/2 in three parts; the product of k and each of the first two is exact for |x|
+  // < 1e6.
   constexpr Real kHalfPi1 = 0x1.921fb54400000p+0, kHalfPi2 = 0x1.0b4611a600000p-34,
                  kHalfPi3 = 0x1.3198a2e037073p-69;
   const Real k = std::floor(x * 0.63661977236758134 + 0.5);

@@ -69,7 +69,8 @@ class ParticleContacts {
     float time;          // start of the contact [s]
 
     Vec3 normal() const { return normal_single.cast<Real>(); }
-    Vec3 impulse() const { return impulse_single.cast<Real>(); }  // on the first particle [N s]
+    /// Impulse on the first particle, world axes [N s].
+    Vec3 impulse() const { return impulse_single.cast<Real>(); }
     /// Returns a tangential impulse, shortened to the friction `limit` [N s].
     Vec3 held(const Vec3& along, Real limit) const {
       const Real size2 = along.squaredNorm();

@@ -128,7 +128,7 @@ void ImpactStage::resolve() {
     } else {
       continue_from(island, event.time);
     }
-    // The speculative contacts of these bodies are no longer valid.
+    // The pending impacts of these bodies are no longer valid; the next ones are searched again.
     const auto involved = [&](const ContactPair& p) { return is_in(p.a(), island) || is_in(p.b(), island); };
     std::erase_if(pending_, [&](const Event& e) { return e.is_impact && involved(*e.pair); });
     work += search(involved);
