@@ -43,7 +43,7 @@ const EmitterDef& checked_emitter(const EmitterDef& def) {
   for (const TimeWindow& w : def.release.windows)
     require(w.start < w.end, "windows must end after they start");
   require(def.release.prewarm >= 0 && std::isfinite(def.release.prewarm), "prewarm must be >= 0");
-  require(def.release.direction.allFinite(), "direction is not finite");
+  require(def.release.direction.allFinite(), "direction must be finite");
   return def;
 }
 

@@ -56,7 +56,7 @@ ReleaseSurface::ReleaseSurface(const EmitterSurface& surface)
       add_faces(surface.mesh);
       if (!(area_ > 0)) throw std::invalid_argument("surface.mesh has no area");
   }
-  if (!std::isfinite(area_)) throw std::invalid_argument("surface is not finite");
+  if (!std::isfinite(area_)) throw std::invalid_argument("surface must be finite");
 }
 
 void ReleaseSurface::add_faces(const sim::TriangleMesh& mesh) {

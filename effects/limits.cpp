@@ -20,7 +20,7 @@ void check(const std::string& owner, const char* field, const Varying& v, const 
       if (!(c->keys[i - 1].first < c->keys[i].first)) refuse("is a curve whose times do not increase");
   }
   const Real low = lower_bound(v), high = upper_bound(v);
-  if (std::isnan(low) || std::isnan(high)) refuse("is not a number");
+  if (std::isnan(low) || std::isnan(high)) refuse("must be a number");
   if (limits.low_open && !(low > limits.low))
     refuse("can be " + std::to_string(low) + ", but must be > " + std::to_string(limits.low) +
            "; give it a min");

@@ -25,11 +25,11 @@ std::string vertex_problem(const ClothDef& def) {
     return "rest_vertices must be empty or have one position for each vertex";
   if (def.masses.size() != def.vertices.size()) return "masses must have one value for each vertex";
   for (std::size_t i = 0; i < def.vertices.size(); ++i) {
-    if (!def.vertices[i].allFinite()) return element("vertices", i) + "is not finite";
+    if (!def.vertices[i].allFinite()) return element("vertices", i) + "must be finite";
     if (!is_positive(def.masses[i])) return element("masses", i) + "must be a finite number > 0";
   }
   for (std::size_t i = 0; i < def.rest_vertices.size(); ++i)
-    if (!def.rest_vertices[i].allFinite()) return element("rest_vertices", i) + "is not finite";
+    if (!def.rest_vertices[i].allFinite()) return element("rest_vertices", i) + "must be finite";
   return {};
 }
 
@@ -60,8 +60,8 @@ std::string index_problem(const ClothDef& def) {
   }
   for (std::size_t i = 0; i < def.pins.size(); ++i) {
     if (def.pins[i].vertex >= count) return element("pins", i) + "refers to a vertex that does not exist";
-    if (!def.pins[i].position.allFinite()) return element("pins", i) + "position is not finite";
-    if (std::isnan(def.pins[i].until)) return element("pins", i) + "until is not a number";
+    if (!def.pins[i].position.allFinite()) return element("pins", i) + "position must be finite";
+    if (std::isnan(def.pins[i].until)) return element("pins", i) + "until must be a number";
   }
   for (std::size_t i = 0; i < def.seams.size(); ++i)
     if (def.seams[i].a >= count || def.seams[i].b >= count || def.seams[i].a == def.seams[i].b)
@@ -74,7 +74,7 @@ std::string limit_problem(const char* field, Real value) {
 }
 
 std::string number_problem(const ClothDef& def) {
-  if (!def.velocity.allFinite()) return "velocity is not finite";
+  if (!def.velocity.allFinite()) return "velocity must be finite";
   const std::pair<const char*, Real> positive[] = {
       {"thickness", def.thickness}, {"substep", def.substep}, {"seam_time", def.seam_time}};
   for (const auto& [field, value] : positive)
@@ -94,7 +94,7 @@ std::string number_problem(const ClothDef& def) {
     if (!is_not_negative(value)) return std::string(field) + " must be a finite number >= 0";
   if (!(def.rest_curvature >= 0 && def.rest_curvature <= 1)) return "rest_curvature must be 0 to 1";
   if (def.air.lift > def.air.drag) return "air.lift must not be above air.drag";
-  if (!std::isfinite(def.pressure)) return "pressure is not finite";
+  if (!std::isfinite(def.pressure)) return "pressure must be finite";
   for (const std::string& wrong :
        {limit_problem("max_stretch", def.max_stretch), limit_problem("max_shear", def.max_shear),
         limit_problem("tear", def.tear)})

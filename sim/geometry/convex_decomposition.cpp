@@ -276,7 +276,7 @@ ConvexDecomposition decompose(const TriangleMesh& mesh, const MeshTopology& topo
   const Real volume = mass_properties(mesh).volume;
   if (!(volume > 0)) return no_parts("the surface encloses no volume");
   if (settings.method == Wanted::hull) return hull_alone(mesh, volume);
-  std::string why = "requested";
+  std::string why = "the approximate method was requested";
   if (settings.method != Wanted::approximate) {
     ExactResult exact = decompose_exactly(mesh, topology, volume, settings);
     if (!exact.parts.empty()) {

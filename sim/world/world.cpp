@@ -40,7 +40,7 @@ void check_not_negative(const std::string& object, const char* field, Real value
 }
 
 void check_finite(const std::string& object, const char* field, const Vec3& value) {
-  if (!value.allFinite()) refuse(object, std::string(field) + " is not finite");
+  if (!value.allFinite()) refuse(object, std::string(field) + " must be finite");
 }
 
 void check_pose(const std::string& object, const char* field, const Pose& pose) {
@@ -96,10 +96,10 @@ void check_restitution(const std::string& object, Real e) {
 /// The principal moments of a solid are integrals of squares, so none exceeds the sum of the other two.
 void check_inertia(const std::string& object, const Mat3& inertia) {
   constexpr Real kRounding = 1e-9;
-  if (!inertia.allFinite()) refuse(object, "inertia is not finite");
+  if (!inertia.allFinite()) refuse(object, "inertia must be finite");
   const Real scale = inertia.cwiseAbs().maxCoeff();
   if (!((inertia - inertia.transpose()).cwiseAbs().maxCoeff() <= kRounding * scale))
-    refuse(object, "inertia is not symmetric");
+    refuse(object, "inertia must be symmetric");
   const Vec3 moments = diagonalise(inertia).moments;
   std::ostringstream values;
   values << moments.x() << ", " << moments.y() << " and " << moments.z() << " kg m^2";

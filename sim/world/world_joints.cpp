@@ -31,7 +31,7 @@ void check_kind(const JointDef& def) {
   if (!(def.ratio > 0))
     refuse(def, "ratio is " + std::to_string(def.ratio) + ", allowed is > 0 for a pulley");
   if (!def.pulley_a.allFinite() || !def.pulley_b.allFinite())
-    refuse(def, "pulley_a or pulley_b is not finite");
+    refuse(def, "pulley_a and pulley_b must be finite");
   if (!((def.anchor - def.pulley_a).norm() > 1e-9) || !((def.anchor_b - def.pulley_b).norm() > 1e-9))
     refuse(def, "an anchor is at its pulley; both strands of the rope need a length");
 }
@@ -41,7 +41,7 @@ void check(const JointDef& def) {
                                  {"anchor_b", def.anchor_b},
                                  {"axis", def.axis},
                                  {"second_axis", def.second_axis}})
-    if (!v.allFinite()) refuse(def, std::string(field) + " is not finite");
+    if (!v.allFinite()) refuse(def, std::string(field) + " must be finite");
   if (!(def.axis.norm() > 1e-9)) refuse(def, "axis is 0 0 0, allowed is any direction");
   if (def.type == JointType::universal && !(def.axis.normalized().cross(def.second_axis).norm() > 1e-6))
     refuse(def, "second_axis is along axis, allowed is any direction across it");
