@@ -1,3 +1,5 @@
+#include <utility>
+
 #include "sim/cloth/cloth_integrators.h"
 #include "sim/cloth/spring_run.h"
 
@@ -7,6 +9,8 @@ namespace {
 constexpr int kMaxIterations = 300;
 /// Square of the accepted residual over the right side, in the preconditioner's norm.
 constexpr Real kTolerance2 = 1e-12;
+/// Greatest number of solutions with other sets of supports. What is left then is up to the contacts.
+constexpr int kMaxTurnsOfSupports = 4;
 
 /// The system of an implicit step of cloth, backward Euler (step_implicit()). Its matrix has a block alpha u
 /// u^T + beta 1 for each spring between its ends, the matrix of bending, and the masses.
@@ -43,8 +47,11 @@ class ImplicitSystem {
     for (Mat3& b : block_) b = b.inverse().eval();
   }
 
-  /// y = A p, 0 for pinned points.
-  void multiply(const SpringRun& p, SpringRun& y) const {
+  /// Points that rest on their supports: their motion along the normals is given.
+  std::vector<Support*> resting;
+
+  /// y = A p.
+  void multiply_all(const SpringRun& p, SpringRun& y) const {
     for (std::size_t i = 0; i < p.size(); ++i) y[i] = points_.mass[cloth_.begin + i] * p[i];
     for (std::size_t i = 0; i < drag_.size(); ++i) y[i] += dragged(i, p[i]);
     for (std::size_t k = 0; k < links_.size(); ++k) {
@@ -57,7 +64,23 @@ class ImplicitSystem {
       y[b] -= f;
     }
     if (bending_ > 0) cloth_.bending.multiply(p, bending_, y);
-    clear_held(y);
+  }
+
+  /// y = A p, without the components of given motions.
+  void multiply(const SpringRun& p, SpringRun& y) const {
+    multiply_all(p, y);
+    clear_given(y);
+  }
+
+  /// Removes the components along which motion is given: all of pinned points, and the normal one of those
+  /// that rest on supports.
+  void clear_given(SpringRun& y) const {
+    for (std::size_t i = 0; i < y.size(); ++i)
+      if (is_held(points_, cloth_.begin + i)) y[i].setZero();
+    for (const Support* s : resting) {
+      Vec4& at = y[s->point - cloth_.begin];
+      at -= s->normal.dot(at) * s->normal;
+    }
   }
 
   /// Adds the impulses of springs on pinned points, if all points move with v through the step.
@@ -82,6 +105,7 @@ class ImplicitSystem {
 
   void precondition(const SpringRun& r, SpringRun& z) const {
     for (std::size_t i = 0; i < r.size(); ++i) z[i] = padded(block_[i] * r[i].head<3>());
+    clear_given(z);
   }
 
   /// Impulse of the linear part of the drag on point i at a velocity.
@@ -89,7 +113,7 @@ class ImplicitSystem {
     return drag_.empty() ? Vec4(Vec4::Zero()) : padded(drag_[i] * v.head<3>());
   }
 
-  /// M v + h (spring forces + M a), 0 for pinned points. The drag is that of its velocity, plus the linear
+  /// M v + h (spring forces + M a). The drag is that of its velocity, plus the linear
   /// terms.
   SpringRun right_side(const SpringRun& v, Real h) const {
     SpringRun b(v.size());
@@ -104,7 +128,6 @@ class ImplicitSystem {
       b[cloth_.springs[k].b - cloth_.begin] += f;
     }
     if (bending_ > 0) cloth_.bending.add_forces(cloth_.part(points_.start), h, b);
-    clear_held(b);
     return b;
   }
 
@@ -113,11 +136,6 @@ class ImplicitSystem {
     Vec4 direction;
     Real along, across, force;
   };
-
-  void clear_held(SpringRun& y) const {
-    for (std::size_t i = 0; i < y.size(); ++i)
-      if (is_held(points_, cloth_.begin + i)) y[i].setZero();
-  }
 
   const ClothPoints& points_;
   const ClothRange& cloth_;
@@ -133,11 +151,12 @@ Real dot(const SpringRun& a, const SpringRun& b) {
   return sum;
 }
 
-/// Preconditioned conjugate gradients from a guess v, whose held points keep it.
+/// Preconditioned conjugate gradients from a guess v, which has the given motions.
 bool solve(const ImplicitSystem& system, const SpringRun& b, SpringRun& v) {
   SpringRun r(v.size()), z(v.size()), y(v.size());
   system.multiply(v, y);
   for (std::size_t i = 0; i < r.size(); ++i) r[i] = b[i] - y[i];
+  system.clear_given(r);
   system.precondition(b, z);
   const Real enough = kTolerance2 * dot(b, z);
   system.precondition(r, z);
@@ -159,9 +178,41 @@ bool solve(const ImplicitSystem& system, const SpringRun& b, SpringRun& v) {
   return false;
 }
 
+/// Solves for the velocities v with the supports that push: an active-set method, which begins with the
+/// points whose present velocities would take them beyond their planes.
+bool solve_on_supports(ImplicitSystem& system, std::span<Support> supports, const SpringRun& b, Real h,
+                       std::size_t first, SpringRun& v) {
+  std::vector<uint8_t> rests(supports.size());
+  const auto lacks = [&](const Support& s) { return s.least(1) / h - s.normal.dot(v[s.point - first]); };
+  for (std::size_t k = 0; k < supports.size(); ++k) rests[k] = lacks(supports[k]) >= 0;
+  SpringRun image(v.size());
+  for (int turn = 1;; ++turn) {
+    system.resting.clear();
+    for (std::size_t k = 0; k < supports.size(); ++k) {
+      if (!rests[k]) continue;
+      system.resting.push_back(&supports[k]);
+      v[supports[k].point - first] += lacks(supports[k]) * supports[k].normal;
+    }
+    const bool converged = solve(system, b, v);
+    if (supports.empty()) return converged;
+    system.multiply_all(v, image);
+    bool changed = false;
+    for (std::size_t k = 0; k < supports.size(); ++k) {
+      Support& s = supports[k];
+      const std::size_t i = s.point - first;
+      s.impulse = rests[k] ? h * s.normal.dot(image[i] - b[i]) : 0;
+      const bool pushes = rests[k] ? s.impulse >= 0 : lacks(s) > 0;
+      changed |= std::exchange(rests[k], pushes) != pushes;
+      s.impulse = std::max(s.impulse, 0.0);
+    }
+    if (!changed || turn == kMaxTurnsOfSupports) return converged;
+  }
+}
+
 /// The error of the solution in the momentum of a free cloth is distributed over all of its points.
 void keep_momentum(const ClothPoints& points, const ClothRange& cloth, const ImplicitSystem& system,
                    const SpringRun& b, SpringRun& v) {
+  if (!system.resting.empty()) return;
   Vec4 lost = Vec4::Zero();
   Real mass = 0;
   for (std::size_t i = 0; i < v.size(); ++i) {
@@ -177,13 +228,17 @@ void keep_momentum(const ClothPoints& points, const ClothRange& cloth, const Imp
 bool step_implicit(ClothPoints& points, const ClothRange& cloth, Real h) {
   SpringRun x, v;
   begin_run(points, cloth, h, x, v);
-  const ImplicitSystem system(points, cloth, h);
+  ImplicitSystem system(points, cloth, h);
   const SpringRun b = system.right_side(v, h);
-  const bool converged = solve(system, b, v);
+  const bool converged = solve_on_supports(system, cloth.supports(points), b, h, cloth.begin, v);
   keep_momentum(points, cloth, system, b, v);
   system.pass_on(points, v, h);
   for (std::size_t i = 0; i < x.size(); ++i)
     if (!is_held(points, cloth.begin + i)) points.position[cloth.begin + i] = x[i] + h * v[i];
+  for (const Support* s : system.resting) {
+    const Vec4 move = h * v[s->point - cloth.begin];
+    points.position[s->point] = points.start[s->point] + s->rubbed(move, 1, points.inverse_mass[s->point]);
+  }
   return converged;
 }
 
