@@ -104,6 +104,7 @@ class ClothBody {
   Vec3 bow_ = Vec3::Zero();  // deviation of the path from a line: half the acceleration times the square of
                              // the world's sub-step
   Real dt_ = 0, to_ = 0;     // of cloth's sub-step
+  bool is_still_ = false;    // whether its surface did not move in cloth's sub-step when that began
   Reaction reaction_;
   std::optional<Reaction> pin_load_;
 };

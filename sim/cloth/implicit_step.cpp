@@ -10,7 +10,9 @@ constexpr int kMaxIterations = 300;
 /// Square of the accepted residual over the right side, in the preconditioner's norm.
 constexpr Real kTolerance2 = 1e-12;
 /// Greatest number of solutions with other sets of supports. What is left then is up to the contacts.
-constexpr int kMaxTurnsOfSupports = 4;
+constexpr int kMaxTurnsOfSupports = 2;
+/// A support that is missing or pulls is left to the contacts up to this displacement, in thicknesses.
+constexpr Real kSupportTolerance = 1e-3;
 
 /// The system of an implicit step of cloth, backward Euler (step_implicit()). Its matrix has a block alpha u
 /// u^T + beta 1 for each spring between its ends, the matrix of bending, and the masses.
@@ -180,10 +182,12 @@ bool solve(const ImplicitSystem& system, const SpringRun& b, SpringRun& v) {
 
 /// Solves for the velocities v with the supports that push: an active-set method, which begins with the
 /// points whose present velocities would take them beyond their planes.
-bool solve_on_supports(ImplicitSystem& system, std::span<Support> supports, const SpringRun& b, Real h,
-                       std::size_t first, SpringRun& v) {
+bool solve_on_supports(ImplicitSystem& system, ClothPoints& points, const ClothRange& cloth,
+                       const SpringRun& b, Real h, SpringRun& v) {
+  const std::span<Support> supports = cloth.supports(points);
   std::vector<uint8_t> rests(supports.size());
-  const auto lacks = [&](const Support& s) { return s.least(1) / h - s.normal.dot(v[s.point - first]); };
+  const auto velocity = [&](const Support& s) -> Vec4& { return v[s.point - cloth.begin]; };
+  const auto lacks = [&](const Support& s) { return s.least(1) - h * s.normal.dot(velocity(s)); };
   for (std::size_t k = 0; k < supports.size(); ++k) rests[k] = lacks(supports[k]) >= 0;
   SpringRun image(v.size());
   for (int turn = 1;; ++turn) {
@@ -191,7 +195,7 @@ bool solve_on_supports(ImplicitSystem& system, std::span<Support> supports, cons
     for (std::size_t k = 0; k < supports.size(); ++k) {
       if (!rests[k]) continue;
       system.resting.push_back(&supports[k]);
-      v[supports[k].point - first] += lacks(supports[k]) * supports[k].normal;
+      velocity(supports[k]) += lacks(supports[k]) / h * supports[k].normal;
     }
     const bool converged = solve(system, b, v);
     if (supports.empty()) return converged;
@@ -199,9 +203,10 @@ bool solve_on_supports(ImplicitSystem& system, std::span<Support> supports, cons
     bool changed = false;
     for (std::size_t k = 0; k < supports.size(); ++k) {
       Support& s = supports[k];
-      const std::size_t i = s.point - first;
+      const std::size_t i = s.point - cloth.begin;
+      const Real small = kSupportTolerance * points.thickness[s.point];
       s.impulse = rests[k] ? h * s.normal.dot(image[i] - b[i]) : 0;
-      const bool pushes = rests[k] ? s.impulse >= 0 : lacks(s) > 0;
+      const bool pushes = rests[k] ? s.impulse * points.inverse_mass[s.point] >= -small : lacks(s) > small;
       changed |= std::exchange(rests[k], pushes) != pushes;
       s.impulse = std::max(s.impulse, 0.0);
     }
@@ -230,7 +235,7 @@ bool step_implicit(ClothPoints& points, const ClothRange& cloth, Real h) {
   begin_run(points, cloth, h, x, v);
   ImplicitSystem system(points, cloth, h);
   const SpringRun b = system.right_side(v, h);
-  const bool converged = solve_on_supports(system, cloth.supports(points), b, h, cloth.begin, v);
+  const bool converged = solve_on_supports(system, points, cloth, b, h, v);
   keep_momentum(points, cloth, system, b, v);
   system.pass_on(points, v, h);
   for (std::size_t i = 0; i < x.size(); ++i)
