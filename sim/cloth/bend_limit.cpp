@@ -30,7 +30,7 @@ bool BendLimit::project(ClothPoints& points, Real dt, std::span<const Vec4> kick
   before_.assign(bending_->patch_count(), 0);
   for (const Row& row : rows_) before_[row.patch] = row.impulse;
   apply(points, dt, kick, cuts);
-  return true;
+  return acted_ = true;
 }
 
 Real BendLimit::greatest(const ClothPoints& points) const {

@@ -1,6 +1,7 @@
 #pragma once
-/// The smallest radius to which a cloth bends. In each sub-step, projected Gauss-Seidel sweeps compute
-/// impulses that bend the cloth back wherever its curvature exceeds the limit. The curvature is measured by
+/// The smallest radius to which a cloth bends. In each sub-step, or each step of the springs of the
+/// integrator `relaxed`, projected Gauss-Seidel sweeps compute impulses that
+/// bend the cloth back wherever its curvature exceeds the limit. The curvature is measured by
 /// ClothBending for each triangle and its surroundings (a patch). It does not depend on the mesh, on
 /// stretching or on the direction of a fold.
 ///
@@ -35,6 +36,8 @@ class BendLimit {
   /// each point in addition to displacement / dt. The part of the displacements that must not count as
   /// velocity is appended to `cuts`.
   bool project(ClothPoints& points, Real dt, std::span<const Vec4> kick, std::vector<VelocityCut>& cuts);
+  /// Whether there were any since the last call of this function.
+  bool take_acted() { return std::exchange(acted_, false); }
 
   /// Greatest curvature of the cloth multiplied by the radius; 1 at the limit.
   Real greatest(const ClothPoints& points) const;
@@ -63,7 +66,8 @@ class BendLimit {
   Real radius_;
   std::vector<Row> rows_;
   std::vector<std::pair<uint32_t, Vec4>> gradient_;  // by point: derivative times the radius
-  std::vector<Vec4> move_;    // by point: move due to the impulses; for pinned points the impulse
+  std::vector<Vec4> move_;  // by point: move due to the impulses; for pinned points the impulse
+  bool acted_ = false;
   std::vector<Real> before_;  // by patch: impulse of the last sub-step
 };
 

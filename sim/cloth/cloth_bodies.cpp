@@ -61,9 +61,12 @@ void ClothBody::begin(Real from, Real to, Real dt) {
   centre_ = end_.point_to_world(obstacle_.centre);
   dt_ = dt;
   to_ = to;
+  is_still_ = start_.position == end_.position && start_.orientation.coeffs() == end_.orientation.coeffs() &&
+              obstacle_.angular_velocity == Vec3::Zero() && surface_velocity_ == Vec3::Zero();
 }
 
 Vec3 ClothBody::surface_motion(const Vec3& p) const {
+  if (is_still_ && !is_dynamic()) return Vec3::Zero();
   Vec3 motion = p - start_.point_to_world(end_.point_to_body(p));
   if (obstacle_.turn == 0 &&
       obstacle_.angular_velocity != Vec3::Zero())  // the path of a sphere does not contain its rotation

@@ -106,6 +106,7 @@ class ClothBody {
                              // the world's sub-step
   Real dt_ = 0, to_ = 0;     // dt_: length of the cloth's sub-step [s]; to_: its end as a fraction
                              // of the world's sub-step
+  bool is_still_ = false;    // whether its surface stood still at the start of the cloth's sub-step
   Reaction reaction_;
   std::optional<Reaction> pin_load_;
 };

@@ -18,6 +18,11 @@ constexpr Real kStabilization = 0.3;
 /// Two normals face each other if the cosine of their angle is below this. Cloth between them is pinched.
 constexpr Real kFacing = -0.5;
 constexpr int kStopSweeps = 30;
+/// Points whose free motion ends nearer than this to the distance that they keep from a body have a support,
+/// in thicknesses: springs may move them farther.
+constexpr Real kSupportReach = 0.2;
+/// A point that its support keeps at the right distance but for rounding touches the body, in thicknesses.
+constexpr Real kTouching = 1e-6;
 
 }  // namespace
 
@@ -99,12 +104,12 @@ void ClothContacts::find_runaways(const ClothPoints& points) {
   near_.erase(std::unique(near_.begin(), near_.end(), same), near_.end());
 }
 
-/// Whether the gap between a point and a body is less than `reach`, or the point went through the surface.
-/// The gap is the distance minus the cloth's thickness. Sets `t`.
-bool ClothContacts::touch(const ClothPoints& points, Near& near, Real reach, Touch& t) const {
+/// Returns whether a point that moves to `at` comes nearer to a body than the cloth's thickness plus `reach`,
+/// or goes through the body's surface. Sets `t`.
+bool ClothContacts::touch(const ClothPoints& points, Near& near, const Vec3& at, Real reach, Touch& t) const {
   ClothBody& body = bodies_[near.body];
   const Real thickness = points.thickness[near.point];
-  const Vec3 place = body.end().point_to_body(points.at(near.point));
+  const Vec3 place = body.end().point_to_body(at);
   // The distance changes at most by the move of the point.
   const Real moved = (place - near.place).norm();
   if (near.distance - moved >= thickness + reach) return false;
@@ -136,7 +141,7 @@ void ClothContacts::collect(const ClothPoints& points, std::vector<BodyContact>&
     ClothBody& body = bodies_[near.body];
     Touch t;
     if (!body.is_dynamic() || !(points.inverse_mass[near.point] > 0)) continue;
-    if (!touch(points, near, points.thickness[near.point], t)) continue;
+    if (!touch(points, near, points.at(near.point), points.thickness[near.point], t)) continue;
     // An initial overlap is removed slowly, because the correction counts as velocity.
     const Vec3 motion = points.at(near.point) - points.start_at(near.point) - body.surface_motion(t.on_body);
     const Real before = std::min(t.gap - t.normal.dot(motion), 0.0);
@@ -146,6 +151,25 @@ void ClothContacts::collect(const ClothPoints& points, std::vector<BodyContact>&
                      t.normal,
                      t.on_body,
                      t.gap - (1 - kTautRecovery) * before});
+  }
+}
+
+void ClothContacts::find_supports(ClothPoints& points, Real dt) {
+  points.supports.clear();
+  for (Near& near : near_) {
+    const uint32_t i = near.point;
+    ClothBody& body = bodies_[near.body];
+    if (body.is_dynamic() || !(points.inverse_mass[i] > 0)) continue;
+    const Vec4 end = points.start[i] + dt * (points.velocity[i] + dt * points.acceleration[i]);
+    Touch t;
+    if (!touch(points, near, end.head<3>(), kSupportReach * points.thickness[i], t)) continue;
+    const Vec4 normal = padded(t.normal), surface = padded(body.surface_motion(t.on_body));
+    const Real gap = std::max(t.gap - normal.dot(end - points.start[i] - surface), 0.0);
+    const Support found{i, normal, gap, surface, std::sqrt(points.friction[i] * body.obstacle().friction)};
+    if (points.supports.empty() || points.supports.back().point != i)
+      points.supports.push_back(found);
+    else if (found.gap < points.supports.back().gap)
+      points.supports.back() = found;
   }
 }
 
@@ -159,7 +183,8 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
     near_to_[point] = &bodies_[near_[k].body];
     near_several_[point] = k + 1 < near_.size() && near_[k + 1].point == point;
     for (Touch t; k < near_.size() && near_[k].point == point; ++k)
-      if (touch(points, near_[k], 0, t)) touches_.push_back(t);
+      if (touch(points, near_[k], points.at(point), kTouching * points.thickness[point], t))
+        touches_.push_back(t);
     const std::size_t count = touches_.size();
     if (count == 0) continue;
     active_[points.cloth[point]] += count;
@@ -326,7 +351,7 @@ void ClothContacts::press(ClothPoints& points, Touch& t, Real dt, Real parts, bo
   Real pressed = t.near->pressed / parts * dt;                // [kg m]
   Vec3 correction = Vec3::Zero(), recovery = Vec3::Zero();
   if (!supported) {
-    const Real push = -t.gap / (w + body.mobility(t.on_body, n));
+    const Real push = std::max(-t.gap, 0.0) / (w + body.mobility(t.on_body, n));
     pressed += push;
     correction = push * n;
     // The initial penetration is removed without a velocity of the point or the body.

@@ -26,6 +26,8 @@ class ClothContacts {
   Real fastest_approach(const ClothPoints& points) const;
   /// Repeats the search for points that moved farther than predicted.
   void find_runaways(const ClothPoints& points);
+  /// Finds the supports of points (ClothPoints::supports) for a sub-step of the cloth of length dt [s].
+  void find_supports(ClothPoints& points, Real dt);
   /// Moves points out of the bodies in a sub-step of the cloth of length dt [s]. `parts`: number of such
   /// sub-steps in the world's sub-step. Displacements that must not count as velocity are appended to `cuts`.
   void solve(ClothPoints& points, Real dt, Real parts, std::vector<VelocityCut>& cuts);
@@ -75,7 +77,7 @@ class ClothContacts {
   };
 
   void look(const ClothPoints& points, uint32_t point, std::vector<Near>& found) const;
-  bool touch(const ClothPoints& points, Near& near, Real reach, Touch& t) const;
+  bool touch(const ClothPoints& points, Near& near, const Vec3& at, Real reach, Touch& t) const;
   void pinch(Touch& a, Touch& b, Real friction);
   void block(Touch& t, ClothBody* holder);
   void press(ClothPoints& points, Touch& t, Real dt, Real parts, bool supported,

@@ -1,12 +1,15 @@
 #pragma once
 /// Integrators of cloth: they move the points of a cloth through a sub-step of length h [s] under springs,
-/// bending and outer accelerations, without contacts. Drag is implicit in all of them (air_drag.h). Pinned
-/// points must already have been moved. If the velocity at the end differs from displacement / h, the
+/// bending and outer accelerations. `relaxed` and `implicit` also keep points above their supports
+/// (ClothPoints::supports), and `relaxed` limits bending. Drag is implicit in all of them (air_drag.h).
+/// Pinned points must already have been moved. If the velocity at the end differs from displacement / h, the
 /// difference is stored in `kick`.
 
+#include <algorithm>
 #include <span>
 
 #include "sim/cloth/air_drag.h"
+#include "sim/cloth/bend_limit.h"
 #include "sim/cloth/bending.h"
 #include "sim/cloth/cloth.h"
 #include "sim/cloth/cloth_points.h"
@@ -21,7 +24,13 @@ struct ClothRange {
   std::span<const ClothSpring> springs;
   ClothBending& bending;
   AirDrag& air;
+  BendLimit* bend_limit;  ///< null: none
 
+  /// Returns the supports of this cloth's points.
+  std::span<Support> supports(ClothPoints& points) const {
+    const auto first = std::ranges::lower_bound(points.supports, begin, {}, &Support::point);
+    return {first, std::ranges::lower_bound(first, points.supports.end(), end, {}, &Support::point)};
+  }
   /// Returns the part of an array over all points that belongs to this cloth.
   template <class T>
   std::span<T> part(std::vector<T>& of_all) const {

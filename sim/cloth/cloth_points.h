@@ -1,7 +1,9 @@
 #pragma once
 /// The points of all cloths of a world, as structures of arrays.
 
+#include <algorithm>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "sim/core/types.h"
@@ -17,6 +19,27 @@ using Vec4 = Eigen::Vector4d;
 inline Vec4 padded(const Vec3& p) {
   return {p.x(), p.y(), p.z(), 0};
 }
+
+/// A body that no impulse moves, under a point that may touch it in a sub-step of the cloth. The integrators
+/// keep the point above the plane that touches the body there. A point that was moved out of the body after
+/// the springs would compress them, and they would gain k h^2 / m times the energy of its motion.
+struct Support {
+  uint32_t point;
+  Vec4 normal;       ///< unit, from the body to the point
+  Real gap;          ///< distance to the plane at the start of the sub-step, >= 0 [m]
+  Vec4 surface;      ///< motion of the body's surface in the sub-step [m]
+  Real friction;     ///< coefficient of friction
+  Real impulse = 0;  ///< along the normal in the last step of the integrator, times that step [kg m], >= 0
+
+  /// Returns the smallest displacement along the normal after the fraction `part` of the sub-step [m].
+  Real least(Real part) const { return part * normal.dot(surface) - gap; }
+  /// Applies Coulomb friction to the displacement of the point in the fraction `part` of the sub-step.
+  Vec4 rubbed(const Vec4& move, Real part, Real inverse_mass) const {
+    const Vec4 relative = move - part * surface, slip = relative - normal.dot(relative) * normal;
+    const Real length = slip.norm();
+    return length > 0 ? Vec4(move - std::min(1.0, friction * impulse * inverse_mass / length) * slip) : move;
+  }
+};
 
 struct ClothPoints {
   std::vector<Vec4> position;
@@ -36,7 +59,8 @@ struct ClothPoints {
       holder;                    ///< the body to which it is pinned; null: not pinned, or pinned to the world
   std::vector<uint8_t> carried;  ///< whether that body is dynamic, so that the point moves with it
   std::vector<Real> thickness, friction, self_friction;
-  std::vector<uint32_t> cloth;  ///< index of the cloth of each point
+  std::vector<uint32_t> cloth;    ///< index of the cloth of each point
+  std::vector<Support> supports;  ///< of the sub-step, by point; at most one of a point
 
   std::size_t size() const { return position.size(); }
   Vec3 at(std::size_t i) const { return position[i].head<3>(); }

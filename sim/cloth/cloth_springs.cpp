@@ -141,8 +141,9 @@ void ClothSprings::add_batch(std::span<const SpringPath* const> paths, std::span
 
 void ClothSprings::add_stages(std::span<const std::size_t> color_ends) {
   apply_.clear();
-  relax_.clear();
-  const auto add = [&](std::size_t color, decltype(Stage::kind) kind) {
+  forward_.clear();
+  backward_.clear();
+  const auto add = [&](std::size_t color, decltype(Stage::kind) kind, std::vector<Stage>& stages) {
     const std::size_t begin = color == 0 ? 0 : color_ends[color - 1], end = color_ends[color];
     if (begin == end) return;
     std::size_t longest = 1;
@@ -150,11 +151,11 @@ void ClothSprings::add_stages(std::span<const std::size_t> color_ends) {
     // Paths of the last colour may share points, so they are swept in order.
     const bool alone = color + 1 == kPathColors;
     const std::size_t block = alone ? end - begin : (kBlock / (kLanes * kChains * longest) + 1) * kChains;
-    (kind == Stage::apply ? apply_ : relax_).push_back({kind, begin, end, block, alone});
+    stages.push_back({kind, begin, end, block, alone});
   };
-  for (std::size_t c = 0; c < color_ends.size(); ++c) add(c, Stage::apply);
-  for (std::size_t c = 0; c < color_ends.size(); ++c) add(c, Stage::forward);
-  for (std::size_t c = color_ends.size(); c-- > 0;) add(c, Stage::backward);
+  for (std::size_t c = 0; c < color_ends.size(); ++c) add(c, Stage::apply, apply_);
+  for (std::size_t c = 0; c < color_ends.size(); ++c) add(c, Stage::forward, forward_);
+  for (std::size_t c = color_ends.size(); c-- > 0;) add(c, Stage::backward, backward_);
 }
 
 void ClothSprings::set_longest_step() {
@@ -217,10 +218,6 @@ void ClothSprings::adapt_to_stretch(const ClothPoints& points) {
 
 void ClothSprings::apply(ClothPoints& points, std::span<Vec4> moves) {
   run(apply_, points, moves);
-}
-
-void ClothSprings::relax(ClothPoints& points, std::span<Vec4> moves) {
-  run(relax_, points, moves);
 }
 
 void ClothSprings::run(std::span<const Stage> stages, ClothPoints& points, std::span<Vec4> moves) {

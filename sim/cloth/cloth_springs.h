@@ -36,8 +36,15 @@ class ClothSprings {
   /// in a step [m]. Pinned points keep their displacements; the impulses on them are added to
   /// ClothPoints::pin_impulse.
   void apply(ClothPoints& points, std::span<Vec4> moves);
-  /// Turns the explicit displacements of apply() into implicit ones, by one symmetric sweep.
-  void relax(ClothPoints& points, std::span<Vec4> moves);
+  /// Turns the explicit displacements of apply() into implicit ones, by one symmetric sweep. Calls
+  /// after_half() after the sweep forwards and after the sweep backwards.
+  template <class AfterHalf>
+  void relax(ClothPoints& points, std::span<Vec4> moves, AfterHalf&& after_half) {
+    run(forward_, points, moves);
+    after_half();
+    run(backward_, points, moves);
+    after_half();
+  }
 
   /// Number of springs whose stiffness was clamped, and the smallest ratio of clamped to defined stiffness.
   uint64_t clamped() const { return clamped_; }
@@ -119,10 +126,10 @@ class ClothSprings {
   std::vector<Elastic> elastic_;
   std::vector<Counterparts> counterparts_;
   std::vector<Batch> batch_;
-  std::vector<Stage> apply_, relax_;  // stages of a step of any length
-  std::vector<Real> inverse_mass_;    // inverse masses for which the springs were prepared
-  bool is_stretched_ = false;         // whether some `most` differs from `most_at_rest`
-  Real prepared_for_ = -1;            // length of the steps that were prepared [s]; < 0: none
+  std::vector<Stage> apply_, forward_, backward_;  // stages of a step of any length
+  std::vector<Real> inverse_mass_;                 // inverse masses for which the springs were prepared
+  bool is_stretched_ = false;                      // whether some `most` differs from `most_at_rest`
+  Real prepared_for_ = -1;                         // length of the steps that were prepared [s]; < 0: none
   Real longest_step_ = 0, least_stiffness_ = 1;
   uint64_t clamped_ = 0;
 };

@@ -91,6 +91,7 @@ void ClothSystem::substep(Real from, Real to, Real dt) {
   points_.start = points_.position;
   cuts_.clear();
   move_held();
+  contacts_.find_supports(points_, dt);
   integrate(dt);
   stop_diverged(dt);
   apply_pin_impulses_to_bodies(dt);
@@ -175,8 +176,9 @@ void ClothSystem::integrate(Real dt) {
     if (held.body) points_.start[held.point] = padded(held.body->start().point_to_world(held.position));
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     const ClothIntegrator integrator = cloths_[c]->def.integrator;
-    const ClothRange range{first_[c], first_[c] + cloths_[c]->points.size(), springs_of(c),
-                           cloths_[c]->bending, air_[c]};
+    const ClothRange range{first_[c],     first_[c] + cloths_[c]->points.size(),
+                           springs_of(c), cloths_[c]->bending,
+                           air_[c],       bend_limit_of(c)};
     if (integrator == ClothIntegrator::symplectic) step_symplectic(points_, range, dt);
     if (integrator == ClothIntegrator::rk4) step_rk4(points_, range, dt, kick_);
     if (integrator == ClothIntegrator::implicit && !step_implicit(points_, range, dt))
@@ -188,9 +190,18 @@ void ClothSystem::integrate(Real dt) {
   for (const Held& held : held_) points_.start[held.point] = held.from;
 }
 
+/// Limits the bending of cloths whose integrator does not.
 void ClothSystem::limit_bending(Real dt) {
-  for (BendLimit& limit : bend_limits_)
-    if (limit.project(points_, dt, kick_, cuts_)) ++cloths_[limit.cloth()]->report.bend_limited;
+  for (BendLimit& limit : bend_limits_) {
+    Cloth& cloth = *cloths_[limit.cloth()];
+    if (cloth.def.integrator != ClothIntegrator::relaxed) limit.project(points_, dt, kick_, cuts_);
+    if (limit.take_acted()) ++cloth.report.bend_limited;
+  }
+}
+
+BendLimit* ClothSystem::bend_limit_of(std::size_t cloth) {
+  const auto at = std::ranges::find(bend_limits_, cloth, &BendLimit::cloth);
+  return at == bend_limits_.end() ? nullptr : &*at;
 }
 
 /// Shortens seams at a constant rate within their time, and then keeps them closed. A delayed seam does not

@@ -1,8 +1,9 @@
 #pragma once
 /// Steps all cloths of a world. A sub-step of the world computes the external forces and the possible
-/// contacts, and then runs sub-steps of cloth. In each of these the integrator moves every cloth. Then the
-/// stretch limit, contacts with cloth and contacts with bodies are solved. Finally moves are shortened until
-/// no spring is too long and no cloth has passed through cloth.
+/// contacts, and then runs sub-steps of cloth. In each of these the integrator moves every cloth and keeps
+/// its points out of fixed and keyframed bodies. Then the stretch limit, other contacts with cloth and
+/// contacts with bodies are solved. Finally moves are shortened until no spring is too long and no cloth has
+/// passed through cloth.
 
 #include <optional>
 #include <span>
@@ -79,6 +80,7 @@ class ClothSystem {
   void substep(Real from, Real to, Real dt);
   void integrate(Real dt);
   void limit_bending(Real dt);
+  BendLimit* bend_limit_of(std::size_t cloth);
   void close_seams(Real dt);
   void end_substep(Real dt);
   void touch_bodies(Real dt);

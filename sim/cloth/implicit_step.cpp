@@ -1,3 +1,5 @@
+#include <utility>
+
 #include "sim/cloth/cloth_integrators.h"
 #include "sim/cloth/spring_run.h"
 
@@ -7,6 +9,10 @@ namespace {
 constexpr int kMaxIterations = 300;
 /// Square of the accepted residual as a fraction of the right side's, in the preconditioner's norm.
 constexpr Real kTolerance2 = 1e-12;
+/// Greatest number of solutions with other sets of supports. What is left then is up to the contacts.
+constexpr int kMaxTurnsOfSupports = 2;
+/// A support that is missing or pulls is left to the contacts up to this displacement, in thicknesses.
+constexpr Real kSupportTolerance = 1e-3;
 
 /// The linear system of an implicit step of cloth by backward Euler (step_implicit()). Its matrix consists of
 /// the masses, the matrix of bending, and a block alpha u u^T + beta 1 for each spring, between its ends.
@@ -43,8 +49,11 @@ class ImplicitSystem {
     for (Mat3& b : block_) b = b.inverse().eval();
   }
 
-  /// Computes y = A p; y is 0 for pinned points.
-  void multiply(const SpringRun& p, SpringRun& y) const {
+  /// Points that rest on their supports: their motion along the normals is given.
+  std::vector<Support*> resting;
+
+  /// Computes y = A p.
+  void multiply_all(const SpringRun& p, SpringRun& y) const {
     for (std::size_t i = 0; i < p.size(); ++i) y[i] = points_.mass[cloth_.begin + i] * p[i];
     for (std::size_t i = 0; i < drag_.size(); ++i) y[i] += dragged(i, p[i]);
     for (std::size_t k = 0; k < links_.size(); ++k) {
@@ -57,7 +66,23 @@ class ImplicitSystem {
       y[b] -= f;
     }
     if (bending_ > 0) cloth_.bending.multiply(p, bending_, y);
-    clear_held(y);
+  }
+
+  /// y = A p, without the components of given motions.
+  void multiply(const SpringRun& p, SpringRun& y) const {
+    multiply_all(p, y);
+    clear_given(y);
+  }
+
+  /// Removes the components along which motion is given: all of pinned points, and the normal one of those
+  /// that rest on supports.
+  void clear_given(SpringRun& y) const {
+    for (std::size_t i = 0; i < y.size(); ++i)
+      if (is_held(points_, cloth_.begin + i)) y[i].setZero();
+    for (const Support* s : resting) {
+      Vec4& at = y[s->point - cloth_.begin];
+      at -= s->normal.dot(at) * s->normal;
+    }
   }
 
   /// Adds the impulses of springs on pinned points, for points that move with v throughout the step.
@@ -82,6 +107,7 @@ class ImplicitSystem {
 
   void precondition(const SpringRun& r, SpringRun& z) const {
     for (std::size_t i = 0; i < r.size(); ++i) z[i] = padded(block_[i] * r[i].head<3>());
+    clear_given(z);
   }
 
   /// Returns the impulse of the linear part of the drag on point i at the velocity v.
@@ -89,8 +115,7 @@ class ImplicitSystem {
     return drag_.empty() ? Vec4(Vec4::Zero()) : padded(drag_[i] * v.head<3>());
   }
 
-  /// Returns M v + h (spring forces + M a), plus the part of the drag that the matrix does not contain; 0 for
-  /// pinned points.
+  /// Returns M v + h (spring forces + M a), plus the part of the drag that the matrix does not contain.
   SpringRun right_side(const SpringRun& v, Real h) const {
     SpringRun b(v.size());
     for (std::size_t i = 0; i < b.size(); ++i) {
@@ -104,7 +129,6 @@ class ImplicitSystem {
       b[cloth_.springs[k].b - cloth_.begin] += f;
     }
     if (bending_ > 0) cloth_.bending.add_forces(cloth_.part(points_.start), h, b);
-    clear_held(b);
     return b;
   }
 
@@ -113,11 +137,6 @@ class ImplicitSystem {
     Vec4 direction;
     Real along, across, force;
   };
-
-  void clear_held(SpringRun& y) const {
-    for (std::size_t i = 0; i < y.size(); ++i)
-      if (is_held(points_, cloth_.begin + i)) y[i].setZero();
-  }
 
   const ClothPoints& points_;
   const ClothRange& cloth_;
@@ -133,12 +152,14 @@ Real dot(const SpringRun& a, const SpringRun& b) {
   return sum;
 }
 
-/// Solves by preconditioned conjugate gradients from the guess v. Pinned points keep their velocity in v.
-/// Returns false if the limit of iterations was reached.
+/// Solves by preconditioned conjugate gradients from the guess v, which has the given motions: those of
+/// pinned points, and those of resting points along their normals. Returns false if the limit of iterations
+/// was reached.
 bool solve(const ImplicitSystem& system, const SpringRun& b, SpringRun& v) {
   SpringRun r(v.size()), z(v.size()), y(v.size());
   system.multiply(v, y);
   for (std::size_t i = 0; i < r.size(); ++i) r[i] = b[i] - y[i];
+  system.clear_given(r);
   system.precondition(b, z);
   const Real enough = kTolerance2 * dot(b, z);
   system.precondition(r, z);
@@ -160,9 +181,45 @@ bool solve(const ImplicitSystem& system, const SpringRun& b, SpringRun& v) {
   return false;
 }
 
+/// Solves for the velocities v and for the supports that push, by an active-set method. It begins with the
+/// supports of points whose present velocities would take them beyond their planes. Returns false if a linear
+/// solution reached its limit of iterations.
+bool solve_on_supports(ImplicitSystem& system, ClothPoints& points, const ClothRange& cloth,
+                       const SpringRun& b, Real h, SpringRun& v) {
+  const std::span<Support> supports = cloth.supports(points);
+  std::vector<uint8_t> rests(supports.size());
+  const auto velocity = [&](const Support& s) -> Vec4& { return v[s.point - cloth.begin]; };
+  const auto lacks = [&](const Support& s) { return s.least(1) - h * s.normal.dot(velocity(s)); };
+  for (std::size_t k = 0; k < supports.size(); ++k) rests[k] = lacks(supports[k]) >= 0;
+  SpringRun image(v.size());
+  for (int turn = 1;; ++turn) {
+    system.resting.clear();
+    for (std::size_t k = 0; k < supports.size(); ++k) {
+      if (!rests[k]) continue;
+      system.resting.push_back(&supports[k]);
+      velocity(supports[k]) += lacks(supports[k]) / h * supports[k].normal;
+    }
+    const bool converged = solve(system, b, v);
+    if (supports.empty()) return converged;
+    system.multiply_all(v, image);
+    bool changed = false;
+    for (std::size_t k = 0; k < supports.size(); ++k) {
+      Support& s = supports[k];
+      const std::size_t i = s.point - cloth.begin;
+      const Real small = kSupportTolerance * points.thickness[s.point];
+      s.impulse = rests[k] ? h * s.normal.dot(image[i] - b[i]) : 0;
+      const bool pushes = rests[k] ? s.impulse * points.inverse_mass[s.point] >= -small : lacks(s) > small;
+      changed |= std::exchange(rests[k], pushes) != pushes;
+      s.impulse = std::max(s.impulse, 0.0);
+    }
+    if (!changed || turn == kMaxTurnsOfSupports) return converged;
+  }
+}
+
 /// Distributes the momentum error of the solution over all points of a free cloth.
 void keep_momentum(const ClothPoints& points, const ClothRange& cloth, const ImplicitSystem& system,
                    const SpringRun& b, SpringRun& v) {
+  if (!system.resting.empty()) return;
   Vec4 lost = Vec4::Zero();
   Real mass = 0;
   for (std::size_t i = 0; i < v.size(); ++i) {
@@ -178,13 +235,17 @@ void keep_momentum(const ClothPoints& points, const ClothRange& cloth, const Imp
 bool step_implicit(ClothPoints& points, const ClothRange& cloth, Real h) {
   SpringRun x, v;
   begin_run(points, cloth, h, x, v);
-  const ImplicitSystem system(points, cloth, h);
+  ImplicitSystem system(points, cloth, h);
   const SpringRun b = system.right_side(v, h);
-  const bool converged = solve(system, b, v);
+  const bool converged = solve_on_supports(system, points, cloth, b, h, v);
   keep_momentum(points, cloth, system, b, v);
   system.pass_on(points, v, h);
   for (std::size_t i = 0; i < x.size(); ++i)
     if (!is_held(points, cloth.begin + i)) points.position[cloth.begin + i] = x[i] + h * v[i];
+  for (const Support* s : system.resting) {
+    const Vec4 move = h * v[s->point - cloth.begin];
+    points.position[s->point] = points.start[s->point] + s->rubbed(move, 1, points.inverse_mass[s->point]);
+  }
   return converged;
 }
 

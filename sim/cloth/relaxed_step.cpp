@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "sim/cloth/cloth_integrators.h"
 #include "sim/cloth/spring_run.h"
@@ -66,6 +67,56 @@ class RelaxedBending {
   SpringRun force_;
 };
 
+/// Keeps supported points above their planes in a step that ends after the fraction `part` of the sub-step.
+/// The impulses of the step so far may also become smaller, so that a point can leave its support.
+void hold_up(const ClothPoints& points, std::span<Support> supports, Real part, std::span<Vec4> moves) {
+  for (Support& s : supports) {
+    const Vec4 moved = points.start[s.point] - points.step_start[s.point] + moves[s.point];
+    const Real lacks = points.mass[s.point] * (s.least(part) - s.normal.dot(moved));
+    const Real impulse = std::max(s.impulse + lacks, 0.0);
+    moves[s.point] += points.inverse_mass[s.point] * (impulse - s.impulse) * s.normal;
+    s.impulse = impulse;
+  }
+}
+
+/// The smallest radius of bending in a sub-step of step_relaxed(). It acts in each step of the springs:
+/// moves across an arc stretch it, and in a long step stiff springs would gain more than motion loses.
+class RelaxedBendLimit {
+ public:
+  RelaxedBendLimit(ClothPoints& points, const ClothRange& cloth) : points_(points), cloth_(cloth) {
+    if (!cloth.bend_limit) return;
+    still_.assign(points.size(), Vec4::Zero());
+    const std::span<const Vec4> own = cloth_.part(std::as_const(points.position));
+    ends_.assign(own.begin(), own.end());
+  }
+
+  /// Moves the points as the limit wants it in a step of length h. Displacements that must not count as
+  /// velocity are added to ClothPoints::start, the others to `moves`.
+  void apply(Real h, std::span<Vec4> moves) {
+    if (!cloth_.bend_limit) return;
+    for (std::size_t k = cloth_.begin; k < cloth_.end; ++k) points_.position[k] = points_.start[k] + moves[k];
+    cuts_.clear();
+    if (!cloth_.bend_limit->project(points_, h, still_, cuts_)) return;
+    for (std::size_t k = cloth_.begin; k < cloth_.end; ++k)
+      if (!is_held(points_, k)) moves[k] = points_.position[k] - points_.start[k];
+    for (const VelocityCut& cut : cuts_) {
+      points_.start[cut.point] += cut.move;
+      moves[cut.point] -= cut.move;
+    }
+  }
+  /// Puts pinned points to where the sub-step ends.
+  void end() {
+    for (std::size_t i = 0; i < ends_.size(); ++i)
+      if (is_held(points_, cloth_.begin + i)) points_.position[cloth_.begin + i] = ends_[i];
+  }
+
+ private:
+  ClothPoints& points_;
+  const ClothRange& cloth_;
+  std::vector<Vec4> still_, ends_;
+  std::vector<VelocityCut> cuts_;
+};
+
 }  // namespace
 
 bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& springs, uint32_t steps,
@@ -79,6 +130,7 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
   const bool bends = !cloth.bending.empty(), drags = !cloth.air.empty();
   std::optional<RelaxedBending> bending;
   if (bends) bending.emplace(points, cloth, dt, h);
+  RelaxedBendLimit bend_limit(points, cloth);
   if (drags) cloth.air.begin(h);
   springs.begin(points, h);
   // Computes a point's move without springs. Its drag is taken at the velocity before the step.
@@ -96,13 +148,23 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
     coast(i, held(i) ? Vec4((points.position[k] - x[i]) / steps) : Vec4(h * points.velocity[k]));
   }
   bool solved = true;
+  const std::span<Support> supports = cloth.supports(points);
   for (uint32_t step = 0; step < steps; ++step) {
+    const Real part = (step + 1.0) / steps;
+    for (Support& s : supports) s.impulse = 0;
     if (bends) bending->apply(points, points.moves);
     springs.apply(points, points.moves);
     for (std::size_t i = 0; drags && i < n; ++i)
       if (!held(i)) moves[i] = velocity[i] + cloth.air.respond(i, moves[i] - velocity[i]);
     if (bends && bending->is_stiff()) solved &= bending->filter(points, points.moves);
-    springs.relax(points, points.moves);
+    hold_up(points, supports, part, points.moves);
+    springs.relax(points, points.moves, [&] { hold_up(points, supports, part, points.moves); });
+    if (cloth.bend_limit) {
+      bend_limit.apply(h, points.moves);
+      hold_up(points, supports, part, points.moves);
+    }
+    for (const Support& s : supports)
+      points.moves[s.point] = s.rubbed(points.moves[s.point], 1.0 / steps, points.inverse_mass[s.point]);
     for (std::size_t i = 0; i < n; ++i) {
       const Vec4 move = moves[i];
       x[i] += move;
@@ -115,10 +177,11 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
       points.pin_impulse[k] *= steps;  // the sum of the impulses times the whole sub-step
     } else {
       points.position[k] = x[i];
-      if (steps > 1) kick[k] = velocity[i] / h - (x[i] - from[i]) / dt;
+      if (steps > 1 || cloth.bend_limit) kick[k] = velocity[i] / h - (x[i] - from[i]) / dt;
     }
     x[i] = from[i];
   }
+  bend_limit.end();
   return solved;
 }
 
