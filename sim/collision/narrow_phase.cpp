@@ -103,16 +103,19 @@ int side_of_penetrating(const SurfaceTriangle& t, Real height, int before, SideO
 /// in the mesh's frame.
 ///
 /// The direction shows the side if the piece is apart from the triangle and the surface faces it there. A
-/// piece that is beside the triangle and penetrates the surface elsewhere is seen from behind.
+/// piece that is beside the triangle and penetrates the surface elsewhere is seen from behind. So is the foot
+/// of a sloping side that comes to the border of a sheet from a flush body and is lower by rounding: within
+/// kNearBorder, the piece's centre must be on the same side.
 template <class SideOfFace>
 void set_side(SurfaceTriangle& t, Real distance, const Vec3& outward, const Vec3& point, const Vec3& middle,
               int before, SideOfFace&& side_of_face) {
-  constexpr Real kAlongside = 0.01;
+  constexpr Real kAlongside = 0.01, kNearBorder = 1e-4;
   const Vec3 front = t.normal();
-  const Real lean = outward.dot(front);
+  const Real lean = outward.dot(front), height = front.dot(middle - t.corner(0));
   t.side = lean >= 0 ? 1 : -1;
-  const bool is_seen = distance > 0 && std::abs(lean) > kAlongside && t.allows(point, outward);
-  if (!is_seen) t.side = side_of_penetrating(t, front.dot(middle - t.corner(0)), before, side_of_face);
+  const bool is_clear = distance > kNearBorder || (distance > 0 && lean * height > 0);
+  const bool is_seen = is_clear && std::abs(lean) > kAlongside && t.allows(point, outward);
+  if (!is_seen) t.side = side_of_penetrating(t, height, before, side_of_face);
 }
 
 /// Two pieces of two shapes that are near each other, for which manifolds are computed.
