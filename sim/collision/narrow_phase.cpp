@@ -87,35 +87,37 @@ Separation plane_separation(const Convex& a, const Pose& a_from_plane) {
   return s;
 }
 
-/// Returns the side of a triangle on which a piece is, even if the piece penetrates the triangle. It is the
-/// previous side if this is known, or else the side known for a neighbouring triangle, or else the side on
-/// which the piece's centre is.
+/// Returns the side of a triangle on which a piece is that does not show it. It is the previous side if this
+/// is known, or else the side known for a neighbouring triangle, or else that of the sign of `guess`.
 template <class SideOfFace>
-int side_of_penetrating(const SurfaceTriangle& t, Real height, int before, SideOfFace&& side_of_face) {
+int unseen_side(const SurfaceTriangle& t, Real guess, int before, SideOfFace&& side_of_face) {
   if (before != 0) return before;
   for (const uint32_t next : t.mesh->surface.across(t.face))
     if (const int side = next == kNoFace ? 0 : side_of_face(next)) return side;
-  return height >= 0 ? 1 : -1;
+  return guess >= 0 ? 1 : -1;
 }
 
 /// Sets the side of a triangle, at first the front, on which the other piece is. `outward` is the direction
 /// from the triangle to the piece at the triangle's nearest point `point`, and `middle` the piece's centre,
-/// in the mesh's frame.
+/// in the mesh's frame. Returns the side to remember; 0 if it is only a guess.
 ///
 /// The direction shows the side if the piece is apart from the triangle and the surface faces it there. A
 /// piece that is beside the triangle and penetrates the surface elsewhere is seen from behind. So is the foot
 /// of a sloping side that comes to the border of a sheet from a flush body and is lower by rounding: within
-/// kNearBorder, the piece's centre must be on the same side.
+/// kNearBorder, the piece's centre must be on the same side. The centre of a long piece may be below the
+/// plane of a triangle whose front the piece approaches beyond a neighbour.
 template <class SideOfFace>
-void set_side(SurfaceTriangle& t, Real distance, const Vec3& outward, const Vec3& point, const Vec3& middle,
-              int before, SideOfFace&& side_of_face) {
-  constexpr Real kAlongside = 0.01, kNearBorder = 1e-4;
+int set_side(SurfaceTriangle& t, Real distance, const Vec3& outward, const Vec3& point, const Vec3& middle,
+             int before, SideOfFace&& side_of_face) {
+  constexpr Real kAlongside = 0.01, kFacing = 0.5, kNearBorder = 1e-4;
   const Vec3 front = t.normal();
   const Real lean = outward.dot(front), height = front.dot(middle - t.corner(0));
-  t.side = lean >= 0 ? 1 : -1;
+  const bool is_beside = distance > 0 && std::abs(lean) <= kAlongside;
   const bool is_clear = distance > kNearBorder || (distance > 0 && lean * height > 0);
-  const bool is_seen = is_clear && std::abs(lean) > kAlongside && t.allows(point, outward);
-  if (!is_seen) t.side = side_of_penetrating(t, height, before, side_of_face);
+  t.side = lean >= 0 ? 1 : -1;
+  if (is_clear && !is_beside && t.allows(point, outward)) return t.side;
+  t.side = unseen_side(t, is_clear && !is_beside ? lean : height, before, side_of_face);
+  return before != 0 || distance <= 0 || (is_clear && std::abs(lean) > kFacing) ? t.side : 0;
 }
 
 /// Two pieces of two shapes that are near each other, for which manifolds are computed.
@@ -205,7 +207,7 @@ class PiecePair {
     triangle.side = height >= 0 ? 1 : -1;
     if (distance2 < sphere.radius * sphere.radius) {
       const auto known = [&](uint32_t face) { return of_b ? known_side_of_b(face) : known_side_of_a(face); };
-      triangle.side = side_of_penetrating(triangle, height, known(triangle.face), known);
+      triangle.side = unseen_side(triangle, height, known(triangle.face), known);
       PairCache::Entry& e = cache_.of(i_, j_);
       if (cache_.keeps_sides) (of_b ? e.side_of_b : e.side_of_a) = static_cast<int8_t>(triangle.side);
     }
@@ -222,16 +224,17 @@ class PiecePair {
       if (*t && (*t)->mesh->surface.is_sliver((*t)->face)) return;
     PairCache::Entry& entry = cache_.of(i_, j_);
     const Separation s = measure(a_, b_, a_from_b_, method, entry);
+    int known_a = 0, known_b = 0;
     if (triangles.b)
-      set_side(*triangles.b, s.distance, a_from_b_.vector_to_body(s.normal), a_from_b_.point_to_body(s.on_b),
-               a_from_b_.point_to_body(a_.centre()), entry.side_of_b,
-               [&](uint32_t f) { return known_side_of_b(f); });
+      known_b = set_side(*triangles.b, s.distance, a_from_b_.vector_to_body(s.normal),
+                         a_from_b_.point_to_body(s.on_b), a_from_b_.point_to_body(a_.centre()),
+                         entry.side_of_b, [&](uint32_t f) { return known_side_of_b(f); });
     if (triangles.a)
-      set_side(*triangles.a, s.distance, -s.normal, s.on_a, a_from_b_.point_to_world(b_.centre()),
-               entry.side_of_a, [&](uint32_t f) { return known_side_of_a(f); });
+      known_a = set_side(*triangles.a, s.distance, -s.normal, s.on_a, a_from_b_.point_to_world(b_.centre()),
+                         entry.side_of_a, [&](uint32_t f) { return known_side_of_a(f); });
     if (cache_.keeps_sides) {
-      if (triangles.a) entry.side_of_a = static_cast<int8_t>(triangles.a->side);
-      if (triangles.b) entry.side_of_b = static_cast<int8_t>(triangles.b->side);
+      entry.side_of_a = static_cast<int8_t>(known_a);
+      entry.side_of_b = static_cast<int8_t>(known_b);
     }
     find_triangle_manifolds(a_, b_, triangles, a_from_b_, s, margin, turning, found);
   }

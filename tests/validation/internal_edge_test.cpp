@@ -667,6 +667,25 @@ TEST_P(Sheets, KeepPressedBodiesOnTheirSide) {
   }
 }
 
+// Much of a rod that falls on hills is below the planes of triangles whose fronts it comes to.
+TEST_P(Sheets, KeepFallingRodsOnTheirSide) {
+  for (int i = 0; i < 6; ++i) {
+    World world(def());
+    world.add_body(fixed_body(
+        MeshShape{world.add_mesh(triangle_sheet(
+            -4, 8, 24, [](int) { return 12; },
+            [](Real x, Real z) { return 0.5 * std::sin(0.55 * x) + 0.3 * std::sin(0.9 * z + 0.3 * x); }))},
+        Vec3::Zero(), 0.5));
+    BodyDef rod = fixed_body(Cylinder{0.01, 1.5}, {2.6 - 0.2 * i, 3, 0.4 - 0.3 * i}, 0.5);
+    rod.motion = MotionType::dynamic;
+    rod.pose.orientation = Quat(Eigen::AngleAxisd(0.6 * i, Vec3::UnitY())) * lying_across();
+    rod.velocity = {0, -12, 0};
+    rod.restitution = 0.3;
+    world.add_body(rod);
+    EXPECT_LT(run(world, 1.5).penetration, 5e-3) << i;
+  }
+}
+
 OFFSTAGE_BOTH_SOLVERS(Solvers, Sheets);
 
 }  // namespace
