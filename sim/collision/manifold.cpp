@@ -322,9 +322,18 @@ Manifold triangle_face_manifold(const Convex& a, const Convex& b, const Pose& a_
   const Vec3 deepest = incident.support(-up, other.vertex);
   const Real level = up.dot(deepest) - offset + slop;
   Candidates candidates;
+  const auto room_inside = [&](const Vec3& p, uint32_t k) {
+    const Vec3& corner = face.corners[k].point;
+    return up.cross(face.corners[(k + 1) % 3].point - corner).normalized().dot(p - corner);
+  };
   const auto add = [&](const Vec3& p, uint32_t id, bool is_corner) {
     const Real separation = up.dot(p) - offset;
     if (separation > (is_corner ? margin : std::min(margin, level))) return;
+    // What is below the plane beyond a valley either penetrates the surface there, which has its own
+    // contacts, or the surface has fallen again below the plane.
+    if (separation < -slop)
+      for (uint32_t k = 0; k < 3; ++k)
+        if (room_inside(p, k) < -slop) return;
     const Vec3 on_face = p - separation * up;
     candidates.add(of_b ? Candidate{p, on_face, separation, id} : Candidate{on_face, p, separation, id});
   };
@@ -332,9 +341,7 @@ Manifold triangle_face_manifold(const Convex& a, const Convex& b, const Pose& a_
   bool is_before = true;
   for (uint32_t k = 0; k < 3; ++k) {
     part.cut(k, room[k]);
-    const Vec3& corner = face.corners[k].point;
-    const Vec3 inward = up.cross(face.corners[(k + 1) % 3].point - corner).normalized();
-    is_before &= inward.dot(deepest - corner) + room[k] >= 0;
+    is_before &= room_inside(deepest, k) + room[k] >= 0;
   }
   for (const Corner& c : part.corners()) {
     bool is_corner = false;

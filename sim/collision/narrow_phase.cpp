@@ -87,33 +87,38 @@ Separation plane_separation(const Convex& a, const Pose& a_from_plane) {
   return s;
 }
 
-/// Returns the side of a triangle on which a piece is, even if the piece penetrates the triangle. It is the
-/// previous side if this is known, or else the side known for a neighbouring triangle, or else the side on
-/// which the piece's centre is.
+/// Returns the side of a triangle on which a piece is that does not show it. It is the previous side if this
+/// is known, or else the side known for a neighbouring triangle, or else that of the sign of `guess`.
 template <class SideOfFace>
-int side_of_penetrating(const SurfaceTriangle& t, Real height, int before, SideOfFace&& side_of_face) {
+int unseen_side(const SurfaceTriangle& t, Real guess, int before, SideOfFace&& side_of_face) {
   if (before != 0) return before;
   for (const uint32_t next : t.mesh->surface.across(t.face))
     if (const int side = next == kNoFace ? 0 : side_of_face(next)) return side;
-  return height >= 0 ? 1 : -1;
+  return guess >= 0 ? 1 : -1;
 }
 
 /// Sets the side of a triangle on which the other piece is; initially it is the front. `outward` is the
 /// direction from the triangle's nearest point `point` to the piece, and `middle` the piece's centre, in the
-/// mesh's frame.
+/// mesh's frame. Returns the side for the next sub-steps to remember, or 0 if the side is only a guess.
 ///
 /// The direction shows the side if the piece is separate from the triangle and the surface allows a contact
-/// in this direction. If the piece penetrates the surface at another triangle, the direction may show the
-/// wrong side; side_of_penetrating() then decides.
+/// in this direction. There are three exceptions. A piece that is beside the triangle and penetrates the
+/// surface at another triangle is seen from behind. The foot of a sloping side may come to the border of a
+/// sheet from a flush body and be lower by rounding: within kNearBorder, the piece's centre must therefore be
+/// on the same side. The centre of a long piece may be below the plane of a triangle whose front the piece
+/// approaches from beyond a neighbour; unseen_side() then decides.
 template <class SideOfFace>
-void set_side(SurfaceTriangle& t, Real distance, const Vec3& outward, const Vec3& point, const Vec3& middle,
-              int before, SideOfFace&& side_of_face) {
-  constexpr Real kAlongside = 0.01;
+int set_side(SurfaceTriangle& t, Real distance, const Vec3& outward, const Vec3& point, const Vec3& middle,
+             int before, SideOfFace&& side_of_face) {
+  constexpr Real kAlongside = 0.01, kFacing = 0.5, kNearBorder = 1e-4;
   const Vec3 front = t.normal();
-  const Real lean = outward.dot(front);
+  const Real lean = outward.dot(front), height = front.dot(middle - t.corner(0));
+  const bool is_beside = distance > 0 && std::abs(lean) <= kAlongside;
+  const bool is_clear = distance > kNearBorder || (distance > 0 && lean * height > 0);
   t.side = lean >= 0 ? 1 : -1;
-  const bool is_seen = distance > 0 && std::abs(lean) > kAlongside && t.allows(point, outward);
-  if (!is_seen) t.side = side_of_penetrating(t, front.dot(middle - t.corner(0)), before, side_of_face);
+  if (is_clear && !is_beside && t.allows(point, outward)) return t.side;
+  t.side = unseen_side(t, is_clear && !is_beside ? lean : height, before, side_of_face);
+  return before != 0 || distance <= 0 || (is_clear && std::abs(lean) > kFacing) ? t.side : 0;
 }
 
 /// Two pieces of two shapes that are near each other, for which manifolds are computed.
@@ -204,7 +209,7 @@ class PiecePair {
     triangle.side = height >= 0 ? 1 : -1;
     if (distance2 < sphere.radius * sphere.radius) {
       const auto known = [&](uint32_t face) { return of_b ? known_side_of_b(face) : known_side_of_a(face); };
-      triangle.side = side_of_penetrating(triangle, height, known(triangle.face), known);
+      triangle.side = unseen_side(triangle, height, known(triangle.face), known);
       PairCache::Entry& e = cache_.of(i_, j_);
       if (cache_.keeps_sides) (of_b ? e.side_of_b : e.side_of_a) = static_cast<int8_t>(triangle.side);
     }
@@ -221,16 +226,17 @@ class PiecePair {
       if (*t && (*t)->mesh->surface.is_sliver((*t)->face)) return;
     PairCache::Entry& entry = cache_.of(i_, j_);
     const Separation s = measure(a_, b_, a_from_b_, method, entry);
+    int known_a = 0, known_b = 0;
     if (triangles.b)
-      set_side(*triangles.b, s.distance, a_from_b_.vector_to_body(s.normal), a_from_b_.point_to_body(s.on_b),
-               a_from_b_.point_to_body(a_.centre()), entry.side_of_b,
-               [&](uint32_t f) { return known_side_of_b(f); });
+      known_b = set_side(*triangles.b, s.distance, a_from_b_.vector_to_body(s.normal),
+                         a_from_b_.point_to_body(s.on_b), a_from_b_.point_to_body(a_.centre()),
+                         entry.side_of_b, [&](uint32_t f) { return known_side_of_b(f); });
     if (triangles.a)
-      set_side(*triangles.a, s.distance, -s.normal, s.on_a, a_from_b_.point_to_world(b_.centre()),
-               entry.side_of_a, [&](uint32_t f) { return known_side_of_a(f); });
+      known_a = set_side(*triangles.a, s.distance, -s.normal, s.on_a, a_from_b_.point_to_world(b_.centre()),
+                         entry.side_of_a, [&](uint32_t f) { return known_side_of_a(f); });
     if (cache_.keeps_sides) {
-      if (triangles.a) entry.side_of_a = static_cast<int8_t>(triangles.a->side);
-      if (triangles.b) entry.side_of_b = static_cast<int8_t>(triangles.b->side);
+      entry.side_of_a = static_cast<int8_t>(known_a);
+      entry.side_of_b = static_cast<int8_t>(known_b);
     }
     find_triangle_manifolds(a_, b_, triangles, a_from_b_, s, margin, turning, found);
   }
