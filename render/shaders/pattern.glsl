@@ -79,7 +79,7 @@ PatternSample pattern_sample(vec3 p, vec3 n) {
   result.color = mix(a, b, wave.x + wave.y - 2.0 * wave.x * wave.y);
 #elif PATTERN == 8  // stripes
   result.color = mix(a, b, square_wave(q / scale, w / scale).x);
-#elif PATTERN == 9  // gingham: stripes both ways, half as strong where only one is
+#elif PATTERN == 9  // gingham: stripes along both axes, half as strong where only one of them is
   vec2 wave = square_wave(q / scale, w / scale);
   result.color = mix(a, b, 0.5 * (wave.x + wave.y));
 #else
