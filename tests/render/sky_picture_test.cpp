@@ -345,8 +345,8 @@ TEST(StageSkyPicture, ABrightSunIsAsBrightInAMirrorAndBehindAPane) {
   }
 }
 
-// A mirror shows a white wall that a small sun does not reach: what bounces from the wall to the sun is a
-// lamp's light, and is not found a second time by chance.
+// A mirror shows a white wall under a small sun. The sun is sampled as a lamp at the wall, so its light must
+// not be added a second time for paths that bounce from the wall to the sun by chance.
 TEST(StageSkyPicture, AMirrorShowsAWallAsBrightAsItIs) {
   const Vector3f sun = Vector3f(0, 1, 1).normalized();
   LitStage s(disc_sky(sun, 10, {100, 100, 100}, 0, 512));

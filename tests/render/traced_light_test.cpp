@@ -268,7 +268,7 @@ TEST_F(TracedLight, ParticlesIndoorsHaveTheLightOfTheWalls) {
     EXPECT_NEAR(brightness(style, 0.5f), 0.5f, 0.05f) << static_cast<int>(style);
     EXPECT_NEAR(brightness(style, 0), 0, 0.01f) << static_cast<int>(style);
   }
-  EXPECT_NEAR(brightness(PointStyle::streak, 0), 0, 0.01f);  // of which drops mirror the sky
+  EXPECT_NEAR(brightness(PointStyle::streak, 0), 0, 0.01f);  // drops, which are streaks, mirror the sky
 }
 
 // A wide screen with a straight edge at height h, and the sun overhead, whose disc has the radius w = h

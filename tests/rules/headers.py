@@ -75,7 +75,8 @@ EVERYWHERE = {"size_t", "ptrdiff_t", "nullptr_t", "move", "forward", "swap"}
 FOLDERS = ("sim", "effects", "render", "demos/producer", "demos/engine", "demos/tune")
 
 
-# A type that a header defines in a namespace, and any that it names itself: nested, declared, a parameter of a template.
+# Finds the types that a header defines in a namespace, and all types that it defines or declares: also nested types and
+# parameters of templates.
 DEFINITION = r"^(?:(?:class|struct|enum(?: class)?) (\w+)(?:[^;{]*)\{)|^using (\w+) =|^concept (\w+)"
 DECLARATION = r"\b(?:enum class|class|struct|enum|using|typename|concept) (\w+)"
 
@@ -104,7 +105,7 @@ class Header:
 
 
 def included_by(path, headers):
-    """The headers of the project that `path` includes, itself or through others, and `path`."""
+    """Returns `path` and the headers of the project that it includes, directly or through others."""
     found, open_paths = set(), [path]
     while open_paths:
         path = open_paths.pop()
@@ -115,7 +116,7 @@ def included_by(path, headers):
 
 
 def missing_includes(path, headers, homes):
-    """What `path` uses and does not include; `homes` are the headers of each type."""
+    """Yields a message for each name that `path` uses without its header; `homes`: the headers of each type."""
     own = included_by(path, headers)
     foreign = set().union(*(headers[p].foreign for p in own))
     given = foreign | {other for name in foreign for other in ALSO_GIVES.get(name, [])}
@@ -132,7 +133,7 @@ def missing_includes(path, headers, homes):
 
 
 def unused_headers(headers):
-    """Headers that no source of the program includes but the one of the same name."""
+    """Returns the headers that only the source file of the same name includes, or no file."""
     used = set()
     for folder in ("sim", "effects", "render", "demos"):
         for at, _, names in os.walk(folder):
@@ -146,7 +147,7 @@ def unused_headers(headers):
 
 
 def compiled_alone(paths, command):
-    """What the compiler says of each header that does not compile alone."""
+    """Yields the compiler's errors for each header that does not compile alone."""
     def compile_one(path):
         return subprocess.run([*command, "-fsyntax-only", "-x", "c++", "-"], text=True, capture_output=True,
                               input=f'#include "{path}"\n', check=False)

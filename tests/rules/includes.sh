@@ -5,7 +5,7 @@
 cd "$1" || exit 2
 status=0
 
-# forbid FOLDERS PATTERN WHY: no file of the folders may include what matches.
+# forbid FOLDERS PATTERN WHY: no file of the folders may include a header that matches the pattern.
 forbid() {
   local rows
   rows=$(grep -rHnE --include=*.h --include=*.cpp "^ *# *include *[<\"]($2)" $1)

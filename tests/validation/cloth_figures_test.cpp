@@ -189,7 +189,7 @@ TEST_P(ClothStops, ABallThatFallsOnIt) {
   for (int i = 0; i < 60; ++i) {
     world.step(1.0 / 240);
     lowest = std::min(lowest, world.body(ball).pose.position.y());
-    // The weight of the cloth, which sags, is worth less than 1 J.
+    // The sagging cloth adds less than 1 J to the energy of the ball.
     const BodyState state = world.body(ball);
     ASSERT_LE(state.velocity.squaredNorm() / 2 + kFiguresGravity * state.pose.position.y(),
               speed * speed / 2 + kFiguresGravity * 1.7 + 1);
@@ -243,7 +243,7 @@ TEST_P(ClothDamping, OfEachKindOfSpringIsItsFractionOfTheCriticalOne) {
                                                                      : kOther;
     EXPECT_NEAR(s.damping, 2 * fraction * std::sqrt(s.stiffness * ma * mb / (ma + mb)), 1e-12);
   }
-  // A pair of them swings as q'' + 2 zeta omega q' + omega^2 q = 0.
+  // Two points on a spring swing as q'' + 2 zeta omega q' + omega^2 q = 0.
   const ClothSpring& s =
       *std::ranges::find(def.springs, sheared ? SpringKind::shear : SpringKind::stretch, &ClothSpring::kind);
   ClothDef pair;

@@ -242,10 +242,10 @@ TEST(ClothHanging, AStripHangsInACatenary) {
   tape.bend = 0;
   tape.max_stretch = 0;
   ClothDef def = effects::grid_cloth({1.5, 0.05, kCells, 2}, {}, tape);
-  def.air.density = 0.4;  // damps its swinging
+  def.air.density = 0.4;  // the air damps the swinging
   def.self_collision = false;
   def.integrator = ClothIntegrator::implicit;
-  // Starts as two straight halves.
+  // The tape starts as two straight halves.
   def.rest_vertices = def.vertices;
   const Real slope = std::sqrt(1.5 * 1.5 - kSpan * kSpan) / kSpan;
   for (Vec3& v : def.vertices) {
