@@ -182,7 +182,7 @@ struct RayScene::Object {
   const std::byte* balls = nullptr;
   const std::byte* colors = nullptr;
   std::size_t stride = 0;
-  float softness = -1;  ///< of sprites; negative: not sprites
+  float softness = -1;  ///< softness of sprites; negative: the object is not a set of sprites
 
   /// Returns the fraction of the light that passes a sprite along a ray; `behind`: distance of the far side
   /// of its ball.

@@ -133,8 +133,8 @@ TEST(Split, InheritsTheVelocityOfItsTimeUnderGravity) {
   EXPECT_NEAR((a.velocity[0] - b.velocity[0]).norm(), 0, 1e-11);
 }
 
-// An emitter adds particles to the system of the children, so particle ids depend on the sub-steps. Random
-// draws must not.
+// An emitter adds particles to the system of the children, so particle ids depend on the sub-steps. The
+// random draws must not depend on them.
 TEST(Split, IsTheSameAtAnyFrameRateAndSubStep) {
   const auto outcome = [](int fps, Real step) {
     World world = empty_world(step);

@@ -1,4 +1,4 @@
-// Bodies whose model file plays an animation: the motion of their pieces, and what these push.
+// Bodies whose model file plays an animation: the motion of their pieces, and the bodies that these push.
 
 #include "producer/build/animated_bodies.h"
 

@@ -121,7 +121,7 @@ TEST(Cloths, SnapshotsHoldEveryPointOfAPinnedSheet) {
   ASSERT_EQ(cloth.points.size(), 49u);
   EXPECT_TRUE(cloth.triangles.empty()) << "a whole cloth has the triangles of the scene";
   EXPECT_LT((cloth.points[0] - Eigen::Vector3f(-0.5f, 2, -0.5f)).norm(), 1e-6f);
-  EXPECT_LT(cloth.points[24].y(), 1.99f) << "its middle sags";
+  EXPECT_LT(cloth.points[24].y(), 1.99f) << "the middle of the cloth sags";
 }
 
 TEST(Cloths, CordsHangOnVerticesAndBodiesAndAreDrawn) {

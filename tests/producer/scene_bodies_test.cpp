@@ -348,7 +348,7 @@ TEST(ClothTables, HoldEveryVertexAndTheGasInside) {
   while (std::getline(cloths, line)) (line.find(",sheet,") != std::string::npos ? sheet : last) = line;
   EXPECT_TRUE(sheet.ends_with(",0,0"));
   const Real volume = volume_inside();
-  EXPECT_GT(volume, 0.002);  // of the ball: 0.0042 m^3
+  EXPECT_GT(volume, 0.002);  // the undeformed ball has 0.0042 m^3
   const std::size_t comma = last.rfind(','), before = last.rfind(',', comma - 1);
   EXPECT_NEAR(std::stod(last.substr(before + 1)), volume, 1e-9);
   // The gas is isothermal: p V = p0 V0, and the skin has grown.

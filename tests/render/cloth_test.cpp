@@ -131,7 +131,7 @@ TEST(StageCloth, BackHasAColourOfItsOwn) {
 
 TEST(StageCloth, LightShinesThroughAThinSheetAndOnlyThroughThat) {
   const auto seen = [](float translucency) {
-    ClothStage s(plain(translucency), {0, 0, -1});  // from behind
+    ClothStage s(plain(translucency), {0, 0, -1});  // the sun is behind the cloth
     return center_pixel(s.draw()).x();
   };
   EXPECT_LT(seen(0), 0.02f);
@@ -246,7 +246,7 @@ TEST(StageCloth, TornSheetHasItsNewTrianglesAndIsOpenBetween) {
                   sheet.triangles.begin() + static_cast<std::ptrdiff_t>(t) + 3);
   }
   s.stage.set_cloth_mesh(s.cloth, left, sheet.uvs);
-  EXPECT_EQ(center_pixel(s.draw()).w(), 0) << "not seen before it has places again";
+  EXPECT_EQ(center_pixel(s.draw()).w(), 0) << "the cloth is invisible until set_cloth() is called";
   s.stage.set_cloth(s.cloth, sheet.points);
   const HdrImage picture = s.draw();
   EXPECT_EQ(center_pixel(picture).w(), 0);

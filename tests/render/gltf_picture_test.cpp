@@ -134,7 +134,7 @@ TEST(GltfPicture, EachTextureHasItsSetOfCoordinates) {
   expect_color(swapped.color_at(-0.5f, 0), kPureRed);
 }
 
-/// The owner of each texture of a material, by its path, with what makes it visible.
+/// A texture of a material, and a function that makes it visible and returns the object that refers to it.
 struct TextureUse {
   const char* name;
   std::function<Json&(GltfSample&)> texture;

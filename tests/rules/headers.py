@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Every header includes what it uses.   headers.py SOURCE_DIR [COMPILER FLAGS...]
+"""Every header includes the headers of the names that it uses.   headers.py SOURCE_DIR [COMPILER FLAGS...]
 
-A file of the program includes it, beside its own source: what tests alone use is in tests.
-Each name of the standard library and of Eigen that a header uses, and each type of this project, comes from a header that it
-includes, itself or through headers of this project; a type may be declared instead. This is read from the text, in a second.
-With a compiler, each header is also compiled alone, which takes minutes and finds what else is missing.
+At least one file of the program, other than the source file of the same name, must include the header: code that only tests
+use belongs in tests/. Each name of the standard library and of Eigen that a header uses, and each type of this project, must
+come from a header that it includes, directly or through headers of this project; a type may be declared instead. These checks
+read only the text and take a second. With a compiler, each header is also compiled by itself. This takes minutes and finds all
+other missing includes.
 """
 import concurrent.futures
 import os

@@ -178,7 +178,7 @@ TEST_P(PoppedBalloon, FliesFreelyAndNoFasterThanItsGas) {
   ASSERT_TRUE(world.cloth_report(cloth).first_tear.has_value());
   EXPECT_TRUE(world.cloth_report(cloth).first_tear->touches_body);
   EXPECT_LT(volume(), 0.3 * full);
-  EXPECT_LT(limited, 5 * world.cloth(cloth).points.size());  // of at least 320 moves of each point
+  EXPECT_LT(limited, 5 * world.cloth(cloth).points.size());  // each point moves at least 320 times
 }
 
 INSTANTIATE_TEST_SUITE_P(SelfCollision, PoppedBalloon, testing::Bool());

@@ -107,7 +107,7 @@ TEST(ManyImpacts, ThePenetrationOfAStepIsTheGreatestInIt) {
   world.add_body({.shape = Sphere{0.5}, .pose = {Vec3(0, 0, 0)}, .restitution = 1});
   world.add_body(
       {.shape = Sphere{0.5}, .pose = {Vec3(0, 0.95, 0)}, .velocity = {0, -20, 0}, .restitution = 1});
-  EXPECT_GE(world.step(1.0 / 240).contacts.penetration, 0.05 - 1e-12) << "though the balls have parted since";
+  EXPECT_GE(world.step(1.0 / 240).contacts.penetration, 0.05 - 1e-12) << "although the balls are apart again";
 }
 
 /// A rack of fifteen touching balls in a triangle, and a cue ball that approaches along its axis. The mirror

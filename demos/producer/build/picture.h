@@ -68,7 +68,7 @@ class Picture {
   };
   struct DrawnBody {
     std::optional<std::size_t> slot;  // index in Snapshot::bodies; none: the body never moves
-    Eigen::Affine3f world_from_body;  // at time 0
+    Eigen::Affine3f world_from_body;  // pose at time 0
     const PartsOverlay* overlay;      // overlay that draws the body as convex parts; null: there is none
     Real appear_at, remove_at;
     std::vector<DrawnPart> parts;

@@ -13,7 +13,7 @@ export const store = {
   selection: [],    // paths of objects; the controls show the last one
   frame: 1, playing: false,
   film: {phase: 'loading', lead_in: 0, simulated: 0, notes: [], statistics: null, message: ''},
-  figures: [],      // by frame - 1
+  figures: [],      // figures of frame k at index k - 1
   presets: [],
   writer: '',
 };
