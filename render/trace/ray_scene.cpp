@@ -314,7 +314,8 @@ void RayScene::Object::describe_mesh(unsigned triangle, const Vector3f& from, co
     hit.color = mixed(mesh->colors[k[0]], mesh->colors[k[1]], mesh->colors[k[2]], uv);
 }
 
-// The mean of the point's projections onto the planes through the corners, across their normals.
+// The result is the mean of three projections of the point, onto the planes through the corners that are
+// perpendicular to the normals of the corners.
 Vector3f RayScene::Object::smoothed(unsigned triangle, const Vector3f& from,
                                     const Vector3f& direction) const {
   std::array<Vector3f, 3> p = mesh->corners(triangle, world_from_mesh), n;
