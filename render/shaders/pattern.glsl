@@ -6,13 +6,14 @@ struct PatternSample {
   vec3 slope;       // gradient of the surface's height, along the object's axes
 };
 
-// Bricks or slabs in rows: `size` of one, `joint` is half the width of the joint, all in metres.
+// A point of bricks or slabs in rows.
 struct Masonry {
   vec2 cell;
   float stone;  // 0 in the joint, 1 on the stone
-  vec2 slope;   // of the rounded edge
+  vec2 slope;   // slope of the rounded edge
 };
 
+// `size`: width and height of a brick [m]; `joint`: half the width of a joint [m].
 Masonry masonry(vec2 p, vec2 size, float joint, float shift_per_row, float rounding, float footprint) {
   float row = floor(p.y / size.y);
   float shift = shift_per_row == 0.0 ? cell_random(vec2(row, 7.0), 11u) : shift_per_row * mod(row, 2.0);

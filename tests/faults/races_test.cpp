@@ -88,7 +88,8 @@ TEST(KilledRun, ForcedOverForeignFramesAndResumedHasItsOwnFramesOnly) {
     const Outcome resumed =
         offstage("render " + tiny_scene() + kOptions + " --seed 7 -o d/ --resume", folder.path());
     if (!has_begun && resumed.code == 2)
-      // killed before it wrote anything: the frames belong to another film, and the message says so
+      // the run was killed before it wrote anything: the frames belong to another film, and the message says
+      // so
       continue;
     EXPECT_EQ(resumed.code, 0) << resumed.err;
     EXPECT_EQ(frames_of(folder / "d"), expected);

@@ -296,8 +296,8 @@ TEST(ParticleTables, HoldEveryParticleOfEveryFrame) {
   std::filesystem::remove_all(folder);
 }
 
-// Rows of two cloths; the volume of the balloon is that of the mesh of its vertices, and its gas keeps p V;
-// the sheet has none.
+// The table has rows for both cloths. The volume of the balloon is the volume of its mesh, and p V of its gas
+// is constant. The sheet has neither volume nor pressure.
 TEST(ClothTables, HoldEveryVertexAndTheGasInside) {
   const LoadedScene loaded = body_scene(R"("output": {"fps": 10, "duration": 0.5},
     "cloths": [{"name": "sheet", "shape": {"type": "grid", "size": [1, 1], "cells": [2, 2]}, "position": [0, 5, 0]},

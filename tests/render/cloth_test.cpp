@@ -200,7 +200,7 @@ TEST(StageCloth, TwoLayersHideMoreThanOneInAnyOrder) {
     ClothStage s(sheer(0.5f), {0, 0, -1});
     s.add(make_box({8, 8, 0.1f}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {1, 1, 1}}, {0, 0, -1});
     Sheet sheet(12);
-    std::ranges::reverse(sheet.triangles);  // its back faces the camera, as in a fold
+    std::ranges::reverse(sheet.triangles);  // the back of the sheet faces the camera, as in a fold
     for (Vector3f& p : sheet.points) p.z() = second;
     const ClothHandle other = s.stage.add_cloth({.triangles = sheet.triangles, .uvs = sheet.uvs},
                                                 s.stage.add_material(sheer(0.25f)));

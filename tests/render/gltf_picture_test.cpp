@@ -171,8 +171,8 @@ const std::vector<TextureUse> kTextureUses = {
        return s.extension("KHR_materials_pbrSpecularGlossiness")["specularGlossinessTexture"];
      }}};
 
-// For each texture, `texCoord` and that of KHR_texture_transform choose the set, independently of the other
-// set.
+// For each texture, `texCoord`, or the `texCoord` of KHR_texture_transform, selects the set of coordinates.
+// The other textures have no effect on this.
 TEST(GltfPicture, EveryTextureUsesTheSetThatItNames) {
   const std::vector<float> across = {0, 1, 1, 1, 1, 0, 0, 0},
                            at_a_point = {0.1f, 0.1f, 0.1f, 0.1f, 0.1f, 0.1f, 0.1f, 0.1f};
@@ -412,8 +412,8 @@ TEST(GltfPicture, RoughTransmissionBlursTheBackground) {
   EXPECT_GT(light_left_of_the_edge(0.6), 0.1f);
 }
 
-// A quarter wave of green in a film whose index is the root of that of the glass: green is not reflected at
-// all (E. Hecht, "Optics", section 9.7), which leaves purple.
+// A film that is a quarter of the wavelength of green thick reflects no green if its index of refraction is
+// the square root of the index of the glass (E. Hecht, "Optics", section 9.7). The reflection is purple.
 TEST(GltfPicture, AFilmOfAQuarterWaveReflectsPurple) {
   const auto highlight = [](const Json& film, double metallic) {
     GltfSample sample;

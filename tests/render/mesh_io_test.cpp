@@ -285,7 +285,7 @@ TEST(ReadModel, SkipsElementsThatCannotBeDrawnWithAWarning) {
   EXPECT_NE(all.find("left out: only triangles are drawn"), std::string::npos) << all;
 }
 
-/// A red triangle with a picture of its shine, a camera, a light, and an animation.
+/// A red triangle with a texture of its specular colour, a camera, a light, and an animation.
 const char kFullCollada[] = R"(<?xml version="1.0"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
 <asset>

@@ -323,7 +323,7 @@ TEST(Lifetimes, OfJointsAndSprings) {
 
 struct Wheel {
   BodyHandle body;
-  Real inertia;  // about its axle
+  Real inertia;  // moment of inertia about the axle
 };
 
 Wheel add_wheel(World& world, Real radius, Real mass, const Vec3& place, const Vec3& axis = Vec3::UnitZ()) {

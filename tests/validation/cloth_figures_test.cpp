@@ -67,7 +67,7 @@ struct HangingStrip {
 class ClothUnderALoad : public testing::TestWithParam<std::tuple<std::string, Real, Real>> {};
 
 TEST_P(ClothUnderALoad, StretchesByItsStiffness) {
-  // (weight + half its own weight) / (stiffness * width) of its length.
+  // The elongation is the fraction (load + half the weight of the strip) / (stiffness * width) of the length.
   const auto [name, fraction, step] = GetParam();
   const effects::Fabric fabric = effects::find_fabric(name)->fabric;
   const Real limit = fabric.max_stretch - 1;
@@ -92,7 +92,7 @@ TEST_P(StiffClothUnderALoad, StretchesByItsStiffnessAtTheDefaultSubstep) {
   fabric.areal_density = 0.3;
   fabric.max_stretch = 0;
   const Real expected = (2 + 0.03) * kFiguresGravity / (20000 * 0.2);
-  HangingStrip strip(fabric, 2, 0, step, integrator);  // it falls into the strip
+  HangingStrip strip(fabric, 2, 0, step, integrator);  // the body falls into the strip
   EXPECT_NEAR(strip.mean_elongation(1), expected, 0.02 * expected);
 }
 

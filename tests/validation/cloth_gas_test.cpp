@@ -214,14 +214,15 @@ INSTANTIATE_TEST_SUITE_P(Balloons, StretchedBalloon, testing::Values(2, 3));
 class ClothCord : public testing::TestWithParam<uint32_t> {};
 
 TEST_P(ClothCord, StretchesByItsStiffness) {
-  // (weight + half its own weight) / stiffness of its length, as any elastic rod.
+  // As for any elastic rod, the elongation is the fraction (load + half the weight of the cord) / stiffness
+  // of the length.
   ClothDef def = effects::grid_cloth({0.2, 0.2, 2, 2}, {}, effects::find_fabric("cotton")->fabric);
   for (uint32_t i = 0; i < def.vertices.size(); ++i)
     def.pins.push_back({.vertex = i, .position = def.vertices[i]});
   const effects::Cord cord{
       .vertex = 4, .end = {0, -0.5, 0}, .segments = GetParam(), .stiffness = 40, .mass_per_length = 0.02};
   const uint32_t last = effects::add_cord(def, cord);
-  // A body and the cloth that holds it are moved one after the other, which shifts its place by about 2 g
+  // A body and the cloth that holds it are moved one after the other, which shifts the body by about 2 g
   // h^2.
   World world({.max_step = 1.0 / 960});
   const BodyHandle weight = world.add_body({.shape = Box{Vec3::Constant(0.02)},

@@ -211,7 +211,7 @@ TEST_P(MovingContact, UnbalancedCylindersKeepTheirEnergy) {
   }
 }
 
-/// A cone or frustum that rolls on its side around the point on the ground where its side, continued, ends.
+/// A cone or frustum that rolls on its side around its apex, or the apex of the extended side, on the ground.
 /// It rotates about the line of contact at any speed: the forces along this line supply the torque.
 struct RollingCone {
   Real radius, top, height;
