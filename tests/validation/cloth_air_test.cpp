@@ -97,8 +97,8 @@ INSTANTIATE_TEST_SUITE_P(Integrators, ClothFall,
 class RisingBalloon : public testing::TestWithParam<Real> {};
 
 TEST_P(RisingBalloon, HasTheDragThatBalancesItsLift) {
-  // A skin so light that the air stops it within a step of 1/60 s. In steady motion the force of the air,
-  // rho A / 2 |u| ((C_D - C_L) u + C_L (u.n) n) summed over the triangles, is lift less weight.
+  // The skin is so light that the air stops it within a step of 1/60 s. In steady motion the force of the
+  // air, rho A / 2 |u| ((C_D - C_L) u + C_L (u.n) n) summed over the triangles, is the lift minus the weight.
   ClothDef def = effects::sphere_cloth(0.1, 2, {}, [] {
     effects::Fabric skin = effects::find_fabric("balloon")->fabric;
     skin.areal_density = 0.01;
