@@ -399,7 +399,7 @@ TEST(GltfPicture, RoughTransmissionBlursTheBackground) {
         picture.stage().add_material({.color = {0, 0, 0, 1}, .emission = {1, 1, 1}}), false);
     (void)behind;
     const HdrImage image = picture.draw();
-    float sum = 0;  // 0.1 to 0.5 m beside the edge
+    float sum = 0;  // over points 0.1 to 0.5 m beside the edge
     int count = 0;
     for (float x = -0.5f; x < -0.1f; x += 0.05f)
       for (float y = -0.8f; y < 0.8f; y += 0.05f) {
