@@ -358,8 +358,9 @@ def dishes():
 
 def parachute():
     """A flat round canopy with a vent, folded in pleats from its top down, and twelve ribbons from its rim: one open
-    sheet. Of the rays from the top every other lies farther out; between neighbours is the angle of the flat sheet, so that nothing is
-    strained. Across two gores of a twelfth the texture's u goes to and fro, so that stripes half as wide colour every other one."""
+    sheet. Every other radial line lies farther outwards. The angle between
+    neighbouring lines is that of the flat sheet, so that nothing is strained. The texture coordinate u runs back and forth over each
+    pair of gores, so that stripes of half their width colour every other gore."""
     sectors, rings, lines, steps = 48, 18, 12, 16
     radius, vent, length, width = 1.7, 0.12, 3.2, 0.03
     step = 2 * math.pi / sectors

@@ -1,4 +1,4 @@
-# Sourced by demos/run.sh and tests/run.sh: installs missing packages, on Debian 12, Debian 13 and Ubuntu 24.04.
+# Sourced by demos/run.sh and tests/run.sh. Installs missing packages, on Debian 12, Debian 13 and Ubuntu 24.04.
 # "a|b": the first of both packages that the release has. "a?": an optional package, installed if the release has it.
 
 build_packages="g++ cmake ninja-build pkg-config python3-glad libeigen3-dev libtbb-dev libegl1 libgl1-mesa-dri libassimp-dev libstb-dev
@@ -38,7 +38,7 @@ install_packages() {
   done
   missing=$(missing_packages "${required[@]}")
   if ! command -v apt-get >/dev/null; then
-    [ -z "$missing" ] || echo "Needed, by their names in Debian, and there is no apt-get here to install them:" $missing >&2
+    [ -z "$missing" ] || echo "Packages are missing, and there is no apt-get to install them. Install them by hand; in Debian they are called:" $missing >&2
     [ -z "$missing" ]
     return
   fi

@@ -1,5 +1,5 @@
-# Writes OUTPUT, a C++ file that defines what producer/base/version.h declares, from VERSION and the commit of SOURCE_DIR; leaves it
-# alone when nothing has changed. Run at every build.
+# Writes OUTPUT, a C++ file that defines the functions of producer/base/version.h, from VERSION and the commit of SOURCE_DIR. Runs in
+# every build; OUTPUT stays unchanged if its content would be the same.
 set(text "${VERSION}")
 find_program(GIT git)
 if(GIT AND EXISTS "${SOURCE_DIR}/.git")

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Draws a picture of every scene and writes demos/README.md around them, and docs/gallery.jpg, the strip of the README:
+# Draws a picture of every scene. Writes demos/README.md, a page of these pictures, and docs/gallery.jpg, the strip in README.md:
 #   demos/gallery.sh [NAME...]     draws only these scenes again
 # Needs build/offstage and ffmpeg. The descriptions are the comments at the start of the scene files.
 set -euo pipefail

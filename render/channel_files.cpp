@@ -33,12 +33,12 @@ std::string comment_of(Channel channel, const ObjectNames& objects) {
     case Channel::normal:
       return "normal in the world: 32767.5 (1 + n) for x, y, z; 0 0 0: nothing";
     case Channel::motion:
-      return "pixels since the frame before: 32768 + 64 x (to the right), 32768 + 64 y (down), 1; third 0: "
+      return "pixels since the previous frame: 32768 + 64 x (to the right), 32768 + 64 y (down), 1; third 0: "
              "nothing";
     case Channel::id:
       break;
   }
-  std::string text = "black: nobody\n";
+  std::string text = "black: no object\n";
   for (const auto& [id, name] : objects) {
     std::array<char, 32> line{};
     std::snprintf(line.data(), line.size(), "%u #%06x ", id, color_of_id(id));

@@ -31,9 +31,8 @@ GlPlatform gl_platform_of_environment();
 
 /// Describes the GL implementation in use; part of a golden image's fingerprint.
 struct ContextInfo {
-  std::string
-      renderer;  ///< GL_RENDERER, such as name of the renderer, such as "llvmpipe (LLVM 15.0.6, 256 bits)"
-  std::string version;  ///< GL_VERSION, such as version, such as "4.5 (Core Profile) Mesa 22.3.6"
+  std::string renderer;  ///< GL_RENDERER: name of the renderer, such as "llvmpipe (LLVM 15.0.6, 256 bits)"
+  std::string version;   ///< GL_VERSION, such as "4.5 (Core Profile) Mesa 22.3.6"
   std::string glsl;
   std::string rays;                          ///< the library that traces light, such as "Embree 3.13.5 avx2"
   GlPlatform platform = GlPlatform::osmesa;  ///< the platform in use, never automatic
@@ -66,10 +65,10 @@ class Context {
 
 /// A device listed by EGL.
 struct EglDevice {
-  bool software = false;  ///< whether the device is llvmpipe, not a GPU
-  std::string name;  ///< name from the vendor's driver, such as name of the device, such as "NVIDIA H100 80GB
-                     ///< HBM3"; may be empty
-  std::string file;  ///< device file, such as /dev/dri/card0; empty if there is none
+  bool software = false;   ///< whether the device is llvmpipe, not a GPU
+  std::string name;        ///< name of the device from the vendor's driver, such as "NVIDIA H100 80GB
+                           ///< HBM3"; may be empty
+  std::string file;        ///< device file, such as /dev/dri/card0; empty if there is none
   std::string extensions;  ///< EGL_EXTENSIONS of the device
 };
 

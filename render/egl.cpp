@@ -165,7 +165,7 @@ Display first_gpu() {
     if (is_software(device)) continue;
     try {
       const Display display = initialized(kDevicePlatform, device);
-      EglContext{display};  // checks that its driver has OpenGL 4.5
+      EglContext{display};  // checks that the driver of the device has OpenGL 4.5
       return display;
     } catch (const UnavailableError& error) {
       reasons += std::string(reasons.empty() ? "" : "; ") + error.what();

@@ -188,7 +188,7 @@ GltfFile::GltfFile(std::filesystem::path path, const InputFolders& folders)
 bool GltfFile::is_version_1() const {
   const GltfValue asset = root_.child("asset");
   const bool is_number =
-      asset.has("version") && (*asset.json())["version"].is_number();  // only 1.0 allows it
+      asset.has("version") && (*asset.json())["version"].is_number();  // only glTF 1.0 allows a number
   return is_number ? asset.number("version", 1) < 2 : asset.text("version", "1.0").starts_with("1.");
 }
 

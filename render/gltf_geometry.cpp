@@ -183,7 +183,7 @@ void GltfGeometry::read_joints(const Source& source, GltfPrimitive& result) {
     if (joint.count == 0 && weight.count == 0) break;
     if (joint.count != n || weight.count != n)
       throw FileError(source.primitive.place() + ": JOINTS" + end + " and WEIGHTS" + end +
-                      " do not fit the vertices");
+                      " must have one element for each vertex");
     joints.push_back(std::move(joint));
     weights.push_back(std::move(weight));
   }
@@ -235,7 +235,8 @@ std::optional<FileSurface> GltfGeometry::morphed(std::size_t mesh, std::size_t i
       const auto accessor = target.index(name, file_.count("accessors"));
       if (!accessor) return;
       const GltfNumbers offsets = file_.numbers(*accessor, 3);
-      if (offsets.count != out.positions.size()) throw target.wrong(name, "does not fit the vertices");
+      if (offsets.count != out.positions.size())
+        throw target.wrong(name, "must have one element for each vertex");
       for (std::size_t i = 0; i < offsets.count; ++i)
         each(i, Vector3f(weight * Eigen::Map<const Vector3f>(offsets.at(i))));
     };

@@ -108,7 +108,7 @@ class GltfImporter {
     model_.warnings = file_.take_warnings();
     const std::vector<std::string> left_out = builder_.left_out();
     model_.warnings.insert(model_.warnings.end(), left_out.begin(), left_out.end());
-    if (!wanted_.empty()) {  // they belong to the whole file
+    if (!wanted_.empty()) {  // cameras and lights belong to the whole file
       model_.cameras.clear();
       model_.lights.clear();
     }

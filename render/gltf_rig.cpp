@@ -152,7 +152,7 @@ void GltfRig::read_targets(const GltfValue& primitive, RigSurface& surface) {
       const auto accessor = source.index(name, file_.count("accessors"));
       if (!accessor) return result;
       const GltfNumbers numbers = file_.numbers(*accessor, 3);
-      if (numbers.count != n) throw source.wrong(name, "does not fit the vertices");
+      if (numbers.count != n) throw source.wrong(name, "must have one element for each vertex");
       for (std::size_t i = 0; i < n; ++i) {
         const Vector3f offset = Eigen::Map<const Vector3f>(numbers.at(i));
         result.push_back(offset.allFinite() ? offset : Vector3f(Vector3f::Zero()));
@@ -205,7 +205,8 @@ std::optional<RigChannel> GltfRig::channel(const GltfValue& animation, std::size
   if (!known || !node || !sampler_index) return std::nullopt;
   channel.node = rig_index_[*node];
   const std::size_t targets = rig_.nodes[static_cast<std::size_t>(channel.node)].weights.size();
-  if (channel.path == Path::weights && targets == 0) return std::nullopt;  // no mesh of the scene has them
+  if (channel.path == Path::weights && targets == 0)
+    return std::nullopt;  // the mesh of this node has no morph targets
   const GltfValue sampler = animation.item("samplers", *sampler_index);
   const std::string how = sampler.text("interpolation", "LINEAR");
   channel.interpolation = how == "STEP"          ? RigChannel::Interpolation::step

@@ -148,12 +148,12 @@ Image decode_image(std::span<const uint8_t> bytes, const std::string& name, uint
   if (is_webp(bytes)) return decode_webp(bytes, name, max_pixels);
   const int size = static_cast<int>(bytes.size());
   if (is_exr(bytes) || stbi_is_hdr_from_memory(bytes.data(), size))
-    throw fail("HDR and EXR are supported only for environment.picture; convert it to PNG");
+    throw fail("HDR and EXR files are supported only for environment.picture; convert the file to PNG");
   int width = 0, height = 0, channels = 0;
   check_declared_size(bytes, name, max_pixels);
   if (bytes[0] == 'P' && stbi_is_16_bit_from_memory(bytes.data(), size)) {
-    throw fail(
-        "PNM of 16 bits is not supported; convert it to PNG");  // stb_image swaps the bytes of their samples
+    throw fail("PNM with 16 bits is not supported; convert the file to PNG");  // stb_image swaps the bytes of
+                                                                               // their samples
   }
   const auto pixels = decode_whole<stbi_uc>(bytes, name, [&](stbi__context* file) {
     return stbi__load_and_postprocess_8bit(file, &width, &height, &channels, STBI_rgb_alpha);

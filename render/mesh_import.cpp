@@ -204,8 +204,7 @@ std::string reason(const Assimp::Importer& importer) {
   return error.empty() ? "no reason given" : error;
 }
 
-/// Returns one message for each kind of content of the file that is not read. Files of FBX are searched,
-/// because their animations are not read.
+/// Returns one message for each kind of content that is ignored, such as animations.
 std::vector<std::string> ignored_by_assimp(const aiScene& scene) {
   std::vector<std::string> lines;
   const auto add = [&lines](std::size_t count, const char* what) {

@@ -148,7 +148,8 @@ class MeshPass {
   gl::Texture white_;
   gl::StreamBuffer rows_;
   std::vector<Batch> opaque_, translucent_;
-  std::vector<const Instance*> see_through_;  ///< instances whose material lets light through, in their order
+  std::vector<const Instance*>
+      see_through_;  ///< instances whose material lets light through, in the order of all
 };
 
 }  // namespace offstage::render

@@ -130,7 +130,7 @@ struct PlyProperty {
 struct PlyHeader {
   enum class Form { text, little, big } form = Form::text;
   std::size_t count = 0;
-  std::vector<PlyProperty> properties;  ///< of the vertices
+  std::vector<PlyProperty> properties;  ///< properties of the vertices
 };
 
 PlyHeader read_ply_header(Text& text) {

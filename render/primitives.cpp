@@ -219,7 +219,7 @@ Mesh make_open_box(const Vector3f& size, float thickness) {
   };
   const Vector3f o = size / 2, i = o - Vector3f::Constant(thickness);
   const Vector3f x = Vector3f::UnitX(), y = Vector3f::UnitY(), z = Vector3f::UnitZ();
-  const float depth = size.y() - thickness;  // of the inside
+  const float depth = size.y() - thickness;  // depth of the inside
   add(-o, size.x() * x, size.z() * z);
   add({-i.x(), -i.y(), -i.z()}, 2 * i.z() * z, 2 * i.x() * x);
   for (const float side : {-1.f, 1.f}) {

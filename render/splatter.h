@@ -94,8 +94,8 @@ class StreakBands {
   /// Returns whether the tiles of a band from `left` to `right` contain streaks, from number `first` on, that
   /// were not drawn yet.
   bool any(int bottom, int left, int right, uint32_t first) const;
-  /// Draws those streaks from `first` on that were not drawn yet over a strip. `distance` converts values of
-  /// the depth buffer: the distance along the view axis is distance.x / (depth + distance.y) [m].
+  /// Draws the streaks from number `first` on that were not drawn yet over a strip. `distance` converts
+  /// values of the depth buffer: the distance along the view axis is distance.x / (depth + distance.y) [m].
   void blend_over(const Strip& strip, const Eigen::Vector2f& distance, uint32_t first);
 
  private:

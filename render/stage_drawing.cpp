@@ -42,7 +42,8 @@ void Stage::Impl::prepare_sky() {
   glBindTextureUnit(kSkyBackgroundUnit, sky_background);
 }
 
-// This is the depth of pixels without a surface.
+// Draws the sky at the far plane. The depth test limits it to pixels without a surface, which have this
+// depth.
 void Stage::Impl::draw_sky() {
   Features defines = {"FLAT 1"};
   for (const std::string& feature : features)
@@ -194,7 +195,7 @@ void Stage::Impl::draw_opaque(std::span<const Cloth* const> sheets, std::span<Po
   glViewport(0, 0, def.width_px, def.height_px);
   glDepthMask(GL_FALSE);
   if (def.quick) draw_plain();
-  glDepthFunc(GL_GEQUAL);  // over themselves
+  glDepthFunc(GL_GEQUAL);  // a surface passes the test against its own depth, which was drawn before
   for (const Cloth* cloth : sheets)
     if (!cloth->is_translucent()) cloth_pass.draw(*cloth, features);
   mesh_pass.draw_opaque(MeshPass::Shading::traced);
@@ -253,7 +254,7 @@ auto Stage::Impl::find_bodies(std::span<const Cloth* const> sheets, const View& 
   return ordered;
 }
 
-// For bodies that have particles around them, but within their box.
+// Sets the visible surfaces of the bodies that have particles in their boxes; see Region::set_surface().
 void Stage::Impl::probe_surfaces(std::span<const TranslucentBody> bodies, std::span<PointSet* const> sets,
                                  const FrameUniforms& frame, std::vector<Region>& regions) {
   const Eigen::AlignedBox2i all(Eigen::Vector2i(0, 0), Eigen::Vector2i(def.width_px, def.height_px));

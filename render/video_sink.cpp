@@ -166,7 +166,7 @@ class VideoSink final : public FrameSink {
   OutputFile file_;
   BoundedCapture words_;
   FrameChannel channel_;
-  ChildProcess process_;  // last, so that it ends before the file is destroyed
+  ChildProcess process_;  // the last member, so that ffmpeg ends before the file is destroyed
   int frames_ = 0;
   bool closed_ = false;
 };

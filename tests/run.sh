@@ -26,7 +26,7 @@ install_packages $build_packages $test_packages
 cores=$(nproc)
 failed=0
 
-# Builds the benchmarks against other engines, if their program is there (tests/bench/RESULTS.md).
+# Builds the benchmarks against other engines, if their files are there (tests/bench/RESULTS.md).
 peers=()
 [ -d ../shared/peers ] && peers=("-DOFFSTAGE_PEERS=$(realpath ../shared/peers)")
 

@@ -40,7 +40,8 @@ TriangleMesh cubes(int nx, int ny, int nz, Filled&& filled) {
             for (std::size_t c = 0; c < 4; ++c) {
               std::array<int, 3> corner = {i, j, k};
               corner[axis] += side;
-              // Counter-clockwise about the axis, and clockwise on the low side.
+              // The corners are counter-clockwise about the axis on the high side, and clockwise on the low
+              // side.
               const std::size_t turn = side == 1 ? c : 3 - c;
               corner[(axis + 1) % 3] += turn == 1 || turn == 2;
               corner[(axis + 2) % 3] += turn >= 2;

@@ -191,7 +191,7 @@ class Engine {
   Clock::time_point lead_in_shown_{};
   bool failed_ = false, complete_reported_ = false;
 
-  std::thread thread_;  // last, so that it ends first
+  std::thread thread_;  // the last member, so that the thread ends first
 };
 
 }  // namespace offstage::engine

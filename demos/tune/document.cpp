@@ -48,7 +48,7 @@ void replace_file(const fs::path& file, const std::string& text) {
   if (error) place = file;
   std::string name = (place.parent_path() / ("." + place.filename().string() + ".XXXXXX")).string();
   const int fd = mkostemp(name.data(), O_CLOEXEC);
-  if (fd < 0) refuse_file(place.parent_path(), "a file cannot be made there", errno);
+  if (fd < 0) refuse_file(place.parent_path(), "a file cannot be created there", errno);
   struct stat before {};
   const mode_t mask = umask(0);
   umask(mask);

@@ -77,7 +77,7 @@ class Document {
   std::size_t now_ = 0;
   std::string group_;  // group of the latest change
   std::deque<Version> versions_;
-  std::size_t bytes_ = 0;  // size of `versions_`
+  std::size_t bytes_ = 0;  // size of the texts in versions_ [bytes]
   uint64_t ids_ = 0;
 };
 

@@ -32,7 +32,7 @@ std::string random_token() {
   return token;
 }
 
-/// Compares in constant time.
+/// Compares two texts. The time does not show how many characters of the token are right.
 bool equal(const std::string& a, const std::string& b) {
   if (a.size() != b.size()) return false;
   unsigned char difference = 0;
@@ -298,7 +298,7 @@ HttpServer::HttpServer(Session& session, int port) : impl_(std::make_unique<Impl
 HttpServer::~HttpServer() {
   impl_->session.close();
   const auto stop = [](httplib::Server& server) {
-    // The server is starting.
+    // stop() has no effect while the server is starting.
     while (!server.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     server.stop();
   };

@@ -102,7 +102,7 @@ class Session {
   Json latest_film_;  // latest progress, for new tabs
   std::unique_ptr<engine::Engine> engine_;
   std::atomic<bool> closing_ = false;
-  std::thread watcher_;  // last, so that it ends first
+  std::thread watcher_;  // the last member, so that the thread ends first
 };
 
 }  // namespace offstage::tune

@@ -138,7 +138,7 @@ std::optional<std::size_t> child_of(const Part& parent, const std::string& step)
 /// Result of following a path: the deepest existing value, its parent, and the number of steps.
 struct FollowedPath {
   const Part* parent = nullptr;
-  std::size_t index = 0;  ///< in the parent
+  std::size_t index = 0;  ///< index of the value in its parent
   const Part* end;
   std::size_t steps = 0;
 };
@@ -204,7 +204,7 @@ std::string append_to(std::string_view text, const Part& container, const std::s
   const Part& last = container.parts.back();
   const auto indent = own_line_indent(text, last.begin());
   const auto end = rest_of_line(text, last.value.end);
-  // On a line of its own, after the comment of the last member.
+  // The new member gets its own line, below the comment of the last member.
   if (indent && end && *end < container.value.end) {
     result.insert(*end, std::string(line_end(text)) + *indent + member);
     return result.insert(last.value.end, ",");
@@ -234,7 +234,7 @@ std::vector<ByteRange> bytes_to_remove(std::string_view text, const Part& contai
   const auto end = rest_of_line(text, gone.end);
   if (own_line && end) {
     gone.end = *end;
-    gone.begin = text.substr(0, gone.begin).find_last_of('\n');  // with the line break before it
+    gone.begin = text.substr(0, gone.begin).find_last_of('\n');  // also removes the line break before it
     if (gone.begin > 0 && text[gone.begin - 1] == '\r') --gone.begin;
   } else if (!is_last) {
     gone.end = std::min(text.find_first_not_of(" \t", gone.end), text.size());

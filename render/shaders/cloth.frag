@@ -18,7 +18,7 @@ void main() {
   opacity *= texture(base_color_texture, texture_place(uv)).a;
 #endif
 #ifdef SURFACE
-  float alpha = opacity;  // all layers take the light of the nearest one, which is even then
+  float alpha = opacity;  // without dither, because all layers take the light of the nearest one
 #else
   float alpha = alpha_of(cover_of(opacity, dot(n, view)), uv);
 #endif
@@ -46,7 +46,7 @@ void main() {
   }
   Threads weave = threads(uv);
   s.albedo *= weave.shade;
-  // Deeper colour, because the light has travelled farther.
+  // The transmitted light has a more saturated colour, because it has travelled farther in the cloth.
   through *= s.albedo / max(max(s.albedo.r, s.albedo.g), max(s.albedo.b, 1e-3));
   slope += weave.slope;
   mat2x3 along = cloth_frame(position, n, uv);

@@ -9,7 +9,8 @@ layout(location = 2) out vec2 uv;
 invariant gl_Position;
 
 void main() {
-  // The single layer stands for the visible side; towards the outline it blends into the other side.
+  // The mesh is the middle layer. It is moved to the surface on the visible side, and less towards the outline, where
+  // both surfaces meet.
   vec3 view = normalize(frame.eye.xyz - in_position);
   float lift = in_normal.w * clamp(8.0 * dot(in_normal.xyz, view), -1.0, 1.0);
   position = in_position + lift * in_normal.xyz;

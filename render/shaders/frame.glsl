@@ -1,6 +1,6 @@
 // Uniforms of a frame that all shaders share; the same fields as FrameUniforms in frame.h.
-// Values that shading reads for nearly every pixel. One member a declaration: for lists, NVIDIA's compiler (driver 580)
-// assigns one location to all members.
+// FRAME_FIELDS are the values that shading reads for nearly every pixel. Each has its own declaration, because NVIDIA's
+// compiler (driver 580) assigns one location to all members of a list.
 #define NONE
 #define FRAME_FIELDS(qualifier) \
   qualifier vec4 eye;               /* w: size of a pixel at distance 1 */ \

@@ -2,8 +2,8 @@
 layout(binding = 20) uniform sampler2D traced_through;  // w: visible fraction of the sun
 layout(binding = 21) uniform sampler2D traced_by_glass; // mirror image
 #ifdef PARTICLES
-// The tracer does not know sprites, streaks and smoke. Behind glass they are taken from the picture: it is compared with
-// a copy that lacks them, at the place where a ray leaves the glass if its far side is a ball as thick as the piece.
+// Rays do not find sprites, streaks and smoke. Their light behind glass is the difference of two pictures, with and without
+// them. The pictures are read where the refracted ray would arrive if the piece of glass were a ball of its thickness.
 layout(location = 1) uniform float thickness;  // [m]; 0: a sheet
 layout(binding = 12) uniform sampler2D behind;
 layout(binding = 22) uniform sampler2D behind_without_particles;

@@ -44,8 +44,8 @@ struct Light {
   vec4 mirrored;  // light from the mirrored direction; w: 1 if known, else the sky is mirrored
 };
 
-// Light from the mirrored direction. A rough surface, whose mirror image was not traced, reflects the sky as far as it is
-// open, and the rougher it is, the more of all the light around.
+// Light from the mirrored direction. If the mirror image was not traced, the surface reflects the visible part of the sky.
+// With increasing roughness this changes to the light from all directions.
 vec3 reflected_light(vec3 view, vec3 normal, float roughness, Light light) {
   float nv = max(abs(dot(normal, view)), 1e-3), open = saturate((nv + light.open) * (nv + light.open) - 1.0 + light.open);
   vec3 sky = mix(sky_reflection(reflect(-view, normal), roughness) * open, light.around, roughness * roughness);

@@ -5,7 +5,7 @@ layout(location = 2) in vec4 in_color;
 layout(location = 0) uniform vec2 half_size;  // half the size of the picture [px]
 layout(location = 1) uniform float half_width;  // half the width of a line with the factor 1 [px]
 
-layout(location = 0) out vec2 place;             // along the line from a, and across it [px]
+layout(location = 0) out vec2 place;             // coordinates along the line from a, and across it [px]
 layout(location = 1) flat out vec3 stroke;       // length, half width at a and at b [px]
 layout(location = 2) flat out vec4 color;
 

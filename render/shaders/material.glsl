@@ -2,9 +2,9 @@ layout(std140, binding = 1) uniform Material {
   vec4 color;
   vec4 pattern_color;  // w: size of a cell [m]
   vec4 emission;
-  vec4 surface;        // metallic, roughness; of fabric: width of a thread [m], relief
-  vec4 back;           // of fabric: colour of its back; w: translucency
-  vec4 sheen;          // of fabric: colour; w: 1 if the back has a colour of its own
+  vec4 surface;        // metallic, roughness; for fabric, also the width of a thread [m] and the relief
+  vec4 back;           // for fabric: colour of the back; w: translucency
+  vec4 sheen;          // for fabric: colour of the sheen; w: 1 if the back has a colour of its own
   vec4 glass;  // fraction of transmitted light, 1 / index of refraction
 #ifdef DETAILED
   vec4 specular;  // reflectance of a dielectric that faces the eye; w: glossiness, negative if not used
@@ -25,7 +25,8 @@ layout(binding = 15) uniform sampler2D occlusion_texture;
 layout(binding = 16) uniform sampler2D transmission_texture;
 layout(binding = 17) uniform sampler2D specular_texture;
 
-// Coordinates of the k-th texture, and the same from both sets.
+// Return the transformed coordinates of the k-th texture: from the given coordinates, or from the set of coordinates that
+// the texture uses.
 vec2 transformed_uv(int k, vec2 uv) {
   vec3 p = vec3(uv, 1.0);
   return vec2(dot(material.uv_rows[2 * k].xyz, p), dot(material.uv_rows[2 * k + 1].xyz, p));

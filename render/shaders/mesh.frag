@@ -29,9 +29,9 @@ float filtered_roughness(float roughness, vec3 normal) {
 }
 
 #ifdef DETAILED
-// The normal by the normal map, whose Y axis points against v. Without given tangents, the directions of u and v come
-// from derivatives (M. Mikkelsen, "Bump Mapping Unparametrized Surfaces on the GPU", 2010). The same bumps are seen
-// from the back.
+// Returns the normal from the normal map, whose Y axis points against v. Without given tangents, the directions of u and v come
+// from derivatives (M. Mikkelsen, "Bump Mapping Unparametrized Surfaces on the GPU", 2010). The back shows the
+// same bumps.
 vec3 mapped_normal(vec3 n) {
   vec2 place = uv_of(3, uv);
   vec3 texel = 2.0 * texture(normal_texture, place).xyz - 1.0;
@@ -50,9 +50,9 @@ vec3 mapped_normal(vec3 n) {
   return normalize(facing * (texel.x * along_u + texel.y * against_v) + max(texel.z, 0.01) * n);
 }
 
-// Fraction of the mirrored light where an occlusion map leaves a fraction of the light around: rough surfaces reflect from all
-// around, smooth ones from one direction, which is the less hidden the more directly it is seen (S. Lagarde and C. de
-// Rousiers, "Moving Frostbite to Physically Based Rendering", 2014). 1 without occlusion.
+// Returns the fraction of the mirrored light that an occlusion map leaves; 1 without occlusion. Rough surfaces reflect light
+// from all directions, so the fraction is that of the ambient light. Smooth surfaces reflect light from one direction, which is
+// less hidden in a perpendicular view (S. Lagarde and C. de Rousiers, "Moving Frostbite to Physically Based Rendering", 2014).
 float mirrored_fraction_of(float occlusion, float roughness, float nv) {
   return saturate(pow(nv + occlusion, exp2(-16.0 * roughness - 1.0)) - 1.0 + occlusion);
 }

@@ -22,7 +22,7 @@ layout(location = 4) out vec4 tangent;
 layout(location = 2) out vec2 uv;
 #endif
 #if defined(PATTERN) || defined(TRIPLANAR)
-// Behind those of the frame.
+// These locations follow the fields of FlatFrame.
 layout(location = 27) out vec3 object_position;
 layout(location = 28) out vec3 object_normal;
 layout(location = 29) flat out vec3 axis_x;  // the object's axes in the world

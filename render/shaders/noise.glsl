@@ -42,8 +42,8 @@ float noise(vec3 p) {
 // 1 while a detail of this size is larger than the pixel's footprint, 0 when it is much smaller.
 float visible(float footprint, float size) { return 1.0 - smoothstep(0.2, 0.7, footprint / size); }
 
-// Fraction of a box of width w around p in which a square wave of period 2 is high. At a hem w can be 0, and the
-// difference is then mostly rounding; a fraction outside of [0, 1] would make colours negative.
+// Returns the fraction of a box of width w around p in which a square wave of period 2 is high. At the border of a cloth w can
+// be 0. The difference would then be mostly a rounding error, and a fraction outside of [0, 1] would make colours negative.
 vec2 square_wave(vec2 p, vec2 w) {
   w = max(w, 1e-3);
   return clamp(0.5 + (abs(fract((p - 0.5 * w) * 0.5) - 0.5) - abs(fract((p + 0.5 * w) * 0.5) - 0.5)) / w, 0.0, 1.0);

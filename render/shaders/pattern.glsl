@@ -6,13 +6,14 @@ struct PatternSample {
   vec3 slope;       // gradient of the surface's height, along the object's axes
 };
 
-// Bricks or slabs in rows: `size` of one, `joint` is half the width of the joint, all in metres.
+// A point of bricks or slabs in rows.
 struct Masonry {
   vec2 cell;
   float stone;  // 0 in the joint, 1 on the stone
-  vec2 slope;   // of the rounded edge
+  vec2 slope;   // slope of the rounded edge
 };
 
+// `size`: width and height of a brick [m]; `joint`: half the width of a joint [m].
 Masonry masonry(vec2 p, vec2 size, float joint, float shift_per_row, float rounding, float footprint) {
   float row = floor(p.y / size.y);
   float shift = shift_per_row == 0.0 ? cell_random(vec2(row, 7.0), 11u) : shift_per_row * mod(row, 2.0);
@@ -79,7 +80,7 @@ PatternSample pattern_sample(vec3 p, vec3 n) {
   result.color = mix(a, b, wave.x + wave.y - 2.0 * wave.x * wave.y);
 #elif PATTERN == 8  // stripes
   result.color = mix(a, b, square_wave(q / scale, w / scale).x);
-#elif PATTERN == 9  // gingham: stripes both ways, half as strong where only one is
+#elif PATTERN == 9  // gingham: stripes along both axes, half as strong where only one of them is
   vec2 wave = square_wave(q / scale, w / scale);
   result.color = mix(a, b, 0.5 * (wave.x + wave.y));
 #else

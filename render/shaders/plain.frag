@@ -1,5 +1,5 @@
-// Colours the plain surfaces of a quick picture in their light, from what surface.glsl wrote: one invocation for a pixel,
-// in place of one for each triangle that is met there.
+// Shades the plain surfaces of a quick picture from the values that surface.glsl wrote. There is one invocation for each
+// pixel, instead of one for each triangle in it.
 layout(binding = 25) uniform sampler2D surface_places;
 layout(binding = 26) uniform sampler2D surface_normals;
 layout(binding = 27) uniform sampler2D surface_colors;  // a: 0 where the surface is not plain, else 0.5 + 0.5 * metallic

@@ -14,7 +14,7 @@ layout(binding = 1) uniform sampler2DArray pictures;  // premultiplied
 layout(binding = 4) uniform sampler2D scene_depth;
 layout(location = 0) out vec4 color;
 
-// Fades out where a sprite meets a surface, instead of being cut.
+// Returns a factor that fades a sprite out where it meets a surface, so that the surface does not cut it.
 float depth_fade(float radius) {
   float behind = uniforms.depth.x / (texelFetch(scene_depth, ivec2(gl_FragCoord.xy), 0).r + uniforms.depth.y);
   return saturate((behind - 1.0 / gl_FragCoord.w) / radius);

@@ -5,9 +5,9 @@ layout(location = 2) in vec4 in_color;
 #if STYLE != 2
 layout(location = 3) in vec4 style;       // softness, stretch [s]; fraction of the sun, or -1: not lit; additive
 layout(location = 4) in vec4 in_picture;  // angle, two layers of the sheet, fraction of the second one
-layout(location = 5) in vec4 in_light[3]; // of lamps and from around: constant and slope of red, green, blue
+layout(location = 5) in vec4 in_light[3]; // light of lamps and from around: constant and slope of red, green, blue
 #ifdef PICTURES
-layout(location = 8) in vec2 in_size;     // of the picture, which is in the corner of its layer [px]
+layout(location = 8) in vec2 in_size;     // size of the picture [px], which is in the corner of its layer
 #endif
 #endif
 
@@ -51,7 +51,7 @@ vec3 light_around(vec3 n) {
 #endif
 
 #if STYLE == 0
-// A puff is a soft ball: bright towards the light, and brighter still against it.
+// A puff is a soft ball. It is bright on the side of the light, and brighter if the light is behind it.
 vec3 puff_light(vec3 n, vec3 to_viewer) {
   vec3 l = frame.sun_direction.xyz;
   float forward = saturate(-dot(l, to_viewer)), forward2 = forward * forward;
@@ -81,7 +81,7 @@ void main() {
 #if STYLE == 2
   vec3 w = cross(viewer.xyz, u);
   float half_side = drawn;
-  // The silhouette is that of the cone from the eye that touches the ball.
+  // The cone from the eye that touches the ball gives its silhouette.
   float sine = radius * frame.eye.w / viewer.w;
   half_side *= inversesqrt(max(1.0 - sine * sine, 0.02));
   vec3 at = p + half_side * (u * corner.x + w * corner.y);
@@ -95,7 +95,7 @@ void main() {
     u = cross(w, viewer.xyz);
   }
   alpha *= thinning * thinning;
-  // With its rounded ends its length equals its motion.
+  // The length of a particle, with its rounded ends, is the length of its motion.
   float straight = max(half_length - drawn, 0.0) / drawn;
   vec3 lengthening = half_axis * (half_length > drawn ? 1.0 - drawn / half_length : 0.0);
 #ifdef PICTURES
@@ -104,7 +104,7 @@ void main() {
   vec3 side_u = u * turn_cos + w * turn_sin, side_w = w * turn_cos - u * turn_sin;
   vec2 from_center = drawn * side * corner;
   vec3 offset = side_u * from_center.x + side_w * from_center.y;
-  // A picture is stretched along the motion, wherever its own axes point to.
+  // A picture is stretched along the motion, whatever the direction of its own axes.
   vec3 at = p + offset + lengthening * (half_length > drawn ? dot(offset, w) / drawn : 0.0);
   place = vec3(vec2(0.5 + 0.5 * corner.x, 0.5 - 0.5 * corner.y) * (in_size / vec2(textureSize(pictures, 0).xy)), 0.0);
   picture = in_picture.yzw;

@@ -1,6 +1,6 @@
 // Composites smoke and fire, drawn in a smaller picture, over the scene. Of the four texels around a pixel, those with
 // a scene depth similar to the pixel's are used.
-// Pixels per texel; depth over which puffs change little, and that of the farthest puff [m].
+// x: pixels per texel; y: depth over which puffs change little [m]; z: depth of the farthest puff [m].
 layout(location = 0) uniform vec3 scale;
 layout(location = 1) uniform ivec4 region;  // texels with content: first, last
 layout(binding = 4) uniform sampler2D scene_depth;

@@ -9,9 +9,10 @@ float hole(vec2 uv) {
   return dither(gl_FragCoord.xy, frame.sun_direction.w + dot(uv, vec2(0.5, 0.8)) + (gl_FrontFacing ? 0.0 : 0.5));
 }
 
-// Alpha at a point in one of n sub-frames: the part of the cover [0, cover) in the sub-frame's n-th of [0, 1). Most
-// values are 0 or 1, so the order of layers hardly matters; the mean over all sub-frames is the cover.
+// Returns alpha at a point in one of n sub-frames: the fraction of the interval [first, first + 1 / n) that is below `cover`.
+// The intervals of all sub-frames fill [0, 1), so the mean of alpha is the cover. Most values are 0 or 1, so the order of
+// layers hardly matters.
 float alpha_of(float cover, vec2 uv) {
-  float n = uniforms.air.z, first = hole(uv), past = first + 1.0 / n - 1.0;  // the last one continues from 0
+  float n = uniforms.air.z, first = hole(uv), past = first + 1.0 / n - 1.0;  // an interval that exceeds 1 continues from 0
   return n * (clamp(cover - first, 0.0, 1.0 / n) + max(min(cover, past), 0.0));
 }

@@ -5,7 +5,7 @@ layout(location = 0) out vec4 color;
 layout(binding = 24) uniform sampler2D sky_background;
 #endif
 
-// Fair-weather clouds on a high level: their thickness, at least 0.
+// Returns the thickness of fair-weather clouds in a high layer, at least 0.
 float cloud_thickness(vec2 p) {
   float sum = 0.0, amplitude = 0.5;
   // Not a constant, so that the loop is not unrolled, which would take long to compile.

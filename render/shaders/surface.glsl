@@ -1,7 +1,7 @@
-// Writes a visible surface for the tracer of light, in place of its colour.
+// Writes the data of a visible surface from which its light is traced, instead of its colour.
 layout(location = 0) out vec4 surface_place;    // position; w: roughness, + 2 if it mirrors, + 4 on cloth, + 8 if it is metal
 layout(location = 1) out vec4 surface_normals;  // smooth normal, normal of the triangle
-layout(location = 2) out vec4 surface_color;    // in quick pictures alone; see plain.frag
+layout(location = 2) out vec4 surface_color;    // only in quick pictures; see plain.frag
 
 vec2 octahedral(vec3 n) {
   n /= abs(n.x) + abs(n.y) + abs(n.z);

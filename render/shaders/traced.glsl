@@ -2,7 +2,7 @@
 layout(binding = 8) uniform sampler2D traced_arriving;    // from the sky and other surfaces; w: visible fraction of the sun
 layout(binding = 10) uniform sampler2D traced_lamps;      // diffuse light of lamps
 layout(binding = 18) uniform sampler2D traced_mirrored;   // w: 1 where it was computed
-layout(binding = 19) uniform sampler2D traced_highlights; // lobes of lamps; w: their Fresnel factor
+layout(binding = 19) uniform sampler2D traced_highlights; // specular light of lamps; w: its Fresnel factor
 
 float luminance(vec3 c) { return dot(c, vec3(0.2126, 0.7152, 0.0722)); }
 

@@ -15,7 +15,7 @@ PixelSampler AirLight::sampler_of(float number) const {
   return {bits >> 8, bits & 255, offsets_.index, offsets_.count};
 }
 
-// Eight rays from the front of the ball, which belong to eight neighbouring pixels of the sequence.
+// Traces eight rays from the front of the ball. They use the samples of eight neighbouring pixels.
 float AirLight::sun(const Vector3f& center, float radius, float number) const {
   if (sources_.sun.intensity <= 0) return 0;
   if (!sources_.sun.shadows) return 1;

@@ -51,7 +51,8 @@ struct LightTracer::Beam {
 
   Beam(const GlassPiece* glass, const Sun* the_sun, const SunDisc* sun_disc, const RayLamp* the_lamp)
       : piece(glass), sun(the_sun), disc(sun_disc), lamp(the_lamp) {
-    // Other points of a lamp may be on the other side of a face, and those of the sky are all around.
+    // The least cosine between the light and a face. Light also arrives from other points of a lamp than its
+    // centre, and from all sides of a sky.
     const float least = lamp != nullptr && lamp->is_sky() ? 1.0f : 0.02f;
     for (int face = 0; face < 6; ++face) {
       const LampPoint<float> at = point(piece->middle_of(face), {0.5f, 0.5f});

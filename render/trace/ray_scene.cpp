@@ -182,7 +182,7 @@ struct RayScene::Object {
   const std::byte* balls = nullptr;
   const std::byte* colors = nullptr;
   std::size_t stride = 0;
-  float softness = -1;  ///< of sprites; negative: not sprites
+  float softness = -1;  ///< softness of sprites; negative: the object is not a set of sprites
 
   /// Returns the fraction of the light that passes a sprite along a ray; `behind`: distance of the far side
   /// of its ball.
@@ -314,7 +314,8 @@ void RayScene::Object::describe_mesh(unsigned triangle, const Vector3f& from, co
     hit.color = mixed(mesh->colors[k[0]], mesh->colors[k[1]], mesh->colors[k[2]], uv);
 }
 
-// The mean of the point's projections onto the planes through the corners, across their normals.
+// The result is the mean of three projections of the point, onto the planes through the corners that are
+// perpendicular to the normals of the corners.
 Vector3f RayScene::Object::smoothed(unsigned triangle, const Vector3f& from,
                                     const Vector3f& direction) const {
   std::array<Vector3f, 3> p = mesh->corners(triangle, world_from_mesh), n;

@@ -38,7 +38,7 @@ void time_points(benchmark::State& state, const PointsDef& def, const Vector3f& 
   const PointsHandle points = stage.add_points(def);
   HdrImage sum;
   stage.set_points(points, values);
-  stage.draw({}, sum);  // compiles what the scene needs
+  stage.draw({}, sum);  // compiles the shader programs of the scene
   for (auto _ : state) {
     stage.set_points(points, values);
     stage.draw({}, sum);

@@ -4,7 +4,7 @@
 The sprinkler scene at 640x360. For each round a slider moves one step; the time to the first new picture on the canvas
 and the rate of new pictures in the following two seconds are measured inside the page. Prints medians, the processor time
 of the server, and the load average, since other work on the machine has an effect. --first: the server and the browser
-have priority over all other processes (real-time scheduling, which needs permission), which comes near an idle machine."""
+have priority over all other processes (real-time scheduling, which needs permission), which gives nearly the times of an idle machine."""
 
 import os
 import pathlib

@@ -78,7 +78,7 @@ TEST_F(Caches, ClearRemovesTheCacheAndNothingElse) {
   EXPECT_EQ(run.code, 0) << run.err;
   EXPECT_EQ(contents(folder_ / "caches").size(), 1u);
   EXPECT_EQ(read_file(folder_ / "caches/one/notes.txt"), "mine");
-  EXPECT_EQ(cache("clear caches/one").code, 1) << "it is no cache any more";
+  EXPECT_EQ(cache("clear caches/one").code, 1) << "the folder is not a cache any more";
   EXPECT_EQ(cache("clear caches").code, 1);
 }
 

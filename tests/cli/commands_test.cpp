@@ -173,7 +173,7 @@ TEST(Commands, FiguresOfContactsAreInTheStats) {
   write_file(folder / "s.json", falling_crate(R"(, "world": {"solver": "exact", "sleep": false})"));
   const Outcome run = offstage("simulate s.json --progress none", folder.path());
   ASSERT_EQ(run.code, 0) << run.err;
-  EXPECT_EQ(run.err, "") << "nothing to warn of";
+  EXPECT_EQ(run.err, "") << "there are no warnings";
   const json stats = json::parse(run.out);
   EXPECT_EQ(stats["contacts"], 4);
   EXPECT_EQ(stats["islands"], 1);
@@ -431,10 +431,10 @@ TEST(Commands, AModelIsFoundBesideTheSceneOrInTheInstalledModels) {
                    file + R"("}}], "output": {"duration": 0.1}})");
     return offstage("simulate s.json", folder.path());
   };
-  EXPECT_EQ(with("duck.glb").code, 0) << "of assets/models";
+  EXPECT_EQ(with("duck.glb").code, 0) << "the model in assets/models";
   write_file(folder / "duck.glb", "not a model");
-  EXPECT_EQ(with("duck.glb").code, 3) << "its own comes first";
-  EXPECT_EQ(with("./rock.glb").code, 3) << "a folder is meant as it stands";
+  EXPECT_EQ(with("duck.glb").code, 3) << "a file in the scene's folder has priority";
+  EXPECT_EQ(with("./rock.glb").code, 3) << "a name with a folder is not searched in assets/models";
   EXPECT_EQ(with("no_such.glb").code, 3);
 }
 

@@ -22,7 +22,7 @@ TEST(Farm, LocalProcessesMakeTheSameFilmByteForByte) {
   EXPECT_EQ(status.code, 0) << status.out;
   EXPECT_NE(status.out.find("chunks: 3 of 3 done, 12 frames"), std::string::npos) << status.out;
   EXPECT_EQ(offstage("farm " + tiny_scene() + " -o farm.mp4 --local 2", folder.path()).code, 2)
-      << "it is there";
+      << "the farm already exists";
 }
 
 TEST(Farm, AFailedChunkIsTriedAgainAndResumed) {

@@ -40,7 +40,7 @@ TEST(New, EveryTemplateIsAValidSceneThatRendersAtOnce) {
     EXPECT_NE(made.out.find("offstage my_" + name + ".json"), std::string::npos) << made.out;
     const Outcome valid = offstage("validate --no-estimate my_" + name + ".json", folder.path());
     EXPECT_EQ(valid.code, 0) << valid.err;
-    EXPECT_EQ(valid.err, "") << "without warnings";
+    EXPECT_EQ(valid.err, "") << "there are no warnings";
     const Outcome drawn = offstage(
         "my_" + name + ".json --size 64x36 --quality draft --frames 1,12 -q -o " + name + "/", folder.path());
     EXPECT_EQ(drawn.code, 0) << drawn.err;
@@ -58,12 +58,12 @@ TEST(New, NeverReplacesAFileUnaskedAndSuggestsTemplates) {
   const Outcome slip = offstage("new a --template sprinkle", folder.path());
   EXPECT_EQ(slip.code, 2);
   EXPECT_NE(slip.err.find("did you mean 'sprinkler'?"), std::string::npos) << slip.err;
-  EXPECT_NE(slip.err.find("explosion"), std::string::npos) << "and lists all";
+  EXPECT_NE(slip.err.find("explosion"), std::string::npos) << "the message lists all templates";
   EXPECT_EQ(offstage("new nowhere/a", folder.path()).code, 2);
   EXPECT_EQ(contents(folder.path()).size(), 1u);
   EXPECT_EQ(offstage("new rain --force", folder.path()).code, 0);
   EXPECT_NE(read_file(folder / "rain.json").find("\"preset\": \"rain\""), std::string::npos)
-      << "the template of that name";
+      << "the template with the name of the scene is used";
 }
 
 TEST(BareScene, RendersToItsNameInTheCurrentFolder) {
@@ -72,7 +72,7 @@ TEST(BareScene, RendersToItsNameInTheCurrentFolder) {
   ASSERT_EQ(run.code, 0) << run.err;
   EXPECT_EQ(run.out, "tiny.mp4\n");
   EXPECT_EQ(probe(folder / "tiny.mp4"), "24/1,12");
-  EXPECT_EQ(offstage(tiny_scene(), folder.path()).code, 2) << "as with render, nothing is replaced unasked";
+  EXPECT_EQ(offstage(tiny_scene(), folder.path()).code, 2) << "existing files are kept, as by render";
   EXPECT_EQ(offstage("--quality draft " + tiny_scene() + " -o a.mkv --frames 1-2", folder.path()).code, 0);
   EXPECT_EQ(probe(folder / "a.mkv"), "24/1,2");
 }
@@ -121,8 +121,8 @@ TEST_F(Encode, GivesTheVideoThatTheRenderWouldHaveGiven) {
       offstage("render " + tiny_scene() + " -o b.mp4 --frames 3-7 -q --fps 30000/1001", folder_.path()).code,
       0);
   EXPECT_EQ(read_file(folder_ / "a.mp4"), read_file(folder_ / "b.mp4"));
-  EXPECT_EQ(probe(folder_ / "a.mp4"), "30000/1001,5") << "the rate is that of the manifest";
-  EXPECT_EQ(encode("f/ -o a.mp4 -q").code, 2) << "it is there";
+  EXPECT_EQ(probe(folder_ / "a.mp4"), "30000/1001,5") << "the manifest gives the frame rate";
+  EXPECT_EQ(encode("f/ -o a.mp4 -q").code, 2) << "the video already exists";
   EXPECT_EQ(encode("f/ -o a.mp4 -q --force --fps 12").code, 0);
   EXPECT_EQ(probe(folder_ / "a.mp4"), "12/1,5");
 }
@@ -234,7 +234,7 @@ TEST(Progress, IsSilentOnAPipeAndABarOnRequest) {
       offstage("render " + tiny_scene() + " -o b/ --frames 1-3 --progress bar", folder.path());
   ASSERT_EQ(bar.code, 0);
   EXPECT_NE(bar.err.find("]  100 %  frame 3/3"), std::string::npos) << bar.err;
-  EXPECT_EQ(std::count(bar.err.begin(), bar.err.end(), '\n'), 1) << "one steady line";
+  EXPECT_EQ(std::count(bar.err.begin(), bar.err.end(), '\n'), 1) << "the progress stays on one line";
   std::istringstream states(bar.err);
   for (std::string state; std::getline(states, state, '\r');)
     EXPECT_LT(state.size(), 80u + 4) << "narrower than the terminal, with the control sequence: " << state;

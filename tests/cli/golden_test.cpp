@@ -38,7 +38,7 @@ TEST_F(Golden, StatesKeptByOneComparisonAreDrawnByAnother) {
   EXPECT_EQ(run.code, 0) << run.out << run.err;
   EXPECT_NE(run.out.find("identical"), std::string::npos);
   EXPECT_EQ(compare("--states kept --set world.gravity=[0,-9.9081,0]").code, 1)
-      << "those of another simulation";
+      << "the states belong to another simulation";
 }
 
 TEST_F(Golden, OnePercentOfAPhysicalParameterIsAChangeOfTheSimulation) {
@@ -69,7 +69,7 @@ TEST_F(Golden, MissingGoldenAndEmptyReasonAreErrors) {
   EXPECT_EQ(
       offstage(std::string("bless ") + kScene + " --golden g --reason why", folder_.path(), "CI=true").code,
       2)
-      << "never in CI";
+      << "bless does not run in CI";
 }
 
 TEST_F(Golden, PicturesCompareByPixels) {

@@ -447,7 +447,7 @@ TEST(Render, AThreadThatCannotBeStartedIsAnErrorNotAHang) {
   const Outcome run = offstage("render " + tiny_scene() + " -q -o out/ --jobs 64", folder.path(),
                                "ulimit -v 400000; timeout 60");
   EXPECT_NE(run.code, 0);
-  EXPECT_NE(run.code, 124) << "it hung";
+  EXPECT_NE(run.code, 124) << "the program hung";
 }
 
 TEST(Render, UnwritablePlaceIsAnErrorThatNamesIt) {
@@ -524,7 +524,7 @@ TEST(Render, ChannelsAreWrittenInAFolderBesideAVideo) {
     EXPECT_EQ(files.at(name).substr(1, 3), "PNG") << name;
   EXPECT_NE(files.at("0002.id.png").find(" thrown\n"), std::string::npos);
   std::filesystem::remove(folder / "a.gif");
-  EXPECT_EQ(offstage(command, folder.path()).code, 2) << "what is there is kept";
+  EXPECT_EQ(offstage(command, folder.path()).code, 2) << "existing channels are kept";
   EXPECT_EQ(offstage(command + " --force", folder.path()).code, 0);
 }
 
@@ -540,10 +540,11 @@ TEST(Render, ChannelsOfAnEarlierFilmDoNotStayBesideAnother) {
   ASSERT_EQ(names(), (std::set<std::string>{"0001.exr", "0002.exr", "0003.exr"}));
   ASSERT_EQ(offstage(command + "--frames 1-2 --channels id --channel-format png --force", folder.path()).code,
             0);
-  EXPECT_EQ(names(), (std::set<std::string>{"0001.id.png", "0002.id.png"})) << "of a shorter film";
+  EXPECT_EQ(names(), (std::set<std::string>{"0001.id.png", "0002.id.png"}))
+      << "the channels of the longer film were removed";
 
   std::filesystem::remove(folder / "a.gif");
-  EXPECT_EQ(offstage(command + "--frames 1-2", folder.path()).code, 2) << "what is there is kept";
+  EXPECT_EQ(offstage(command + "--frames 1-2", folder.path()).code, 2) << "existing channels are kept";
   EXPECT_EQ(names().size(), 2u);
   write_file(folder / "a.channels" / "notes.txt", "of someone else");
   ASSERT_EQ(offstage(command + "--frames 1-2 --force", folder.path()).code, 0);

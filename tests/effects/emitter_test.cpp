@@ -9,7 +9,7 @@ namespace {
 
 using namespace sim;
 
-/// The state of a particle at its own birth.
+/// The state of a particle at its birth time.
 struct FirstState {
   Real time;
   Vec3 position, velocity;

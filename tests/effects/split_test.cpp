@@ -94,8 +94,8 @@ TEST(Split, ChildrenInheritTheirPercentagesExactly) {
   }
 }
 
-// Children that share the parent's mass and keep its speed, in directions all around it, carry its momentum
-// times the mean cosine of their angle.
+// Children share the parent's mass, keep its speed and fly in directions all around it. Their total momentum
+// is the momentum of the parent times the mean cosine of their angle.
 TEST(Split, MomentumIsInherited) {
   World world = empty_world();
   const auto parents = world.add_particle_system({}), children = world.add_particle_system({});
@@ -133,8 +133,8 @@ TEST(Split, InheritsTheVelocityOfItsTimeUnderGravity) {
   EXPECT_NEAR((a.velocity[0] - b.velocity[0]).norm(), 0, 1e-11);
 }
 
-// An emitter adds particles to the system of the children, so particle ids depend on the sub-steps. Random
-// draws must not.
+// An emitter adds particles to the system of the children, so particle ids depend on the sub-steps. The
+// random draws must not depend on them.
 TEST(Split, IsTheSameAtAnyFrameRateAndSubStep) {
   const auto outcome = [](int fps, Real step) {
     World world = empty_world(step);

@@ -177,7 +177,7 @@ TEST_F(Engines, ReadFilesAgainWhenTheSceneUsesThemOtherwise) {
   EXPECT_TRUE(fails(show(R"(, "camera": {"type": "model", "body": "room", "name": "missing"})")));
 }
 
-// The lens of the scene's camera remains while the view is moved, wherever its field of view is stated.
+// While the user moves the view, the scene's camera keeps its field of view, which several keys can state.
 TEST_F(Engines, KeepTheFieldOfViewOfAMovedCamera) {
   render::GltfSample room;
   room.document["nodes"].push_back({{"camera", 0}, {"translation", {0, 0, 5}}});

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Blender reads what `offstage export` writes: positions agree with the trace, and Cycles draws it.
+# Blender reads exported films: positions agree with the trace, and Cycles draws the objects.
 # usage: blender.sh OFFSTAGE SOURCE_DIR PICTURES
 # Tests the formats that Debian's Blender supports, which is built without USD and Alembic: glTF for a wall and a cloth, PLY for a
 # fountain.

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What `offstage export` writes is the simulation: positions agree with the trace to 1e-5 m, in every format.
+"""Exported films have the simulated motion: positions agree with the trace to 1e-5 m, in every format.
 
 usage: export_test.py OFFSTAGE SOURCE_DIR
 """

@@ -1,4 +1,4 @@
-"""Small readers of what `offstage export` writes, independent of the program: USD text, glTF binary, PLY."""
+"""Small readers of exported files (USD text, glTF binary, PLY), independent of the program."""
 
 import json
 import re

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Renders a film with a real Slurm on the loopback interface, with a node that fails during the film:  slurm.sh OFFSTAGE SOURCE_DIR
-# Starts munged, slurmctld and two slurmd as the present user, which must be root, with files in a folder of their own.
+# Starts munged, slurmctld and two slurmd as the present user, which must be root, with files in a separate folder.
 set -euo pipefail
 offstage=$(realpath "$1")
 scene=$(realpath "$2")/tests/data/tiny.json

@@ -56,7 +56,7 @@ TEST(TwoRuns, TheSecondIsRefusedWithTheNameOfTheFirst) {
   EXPECT_EQ(first.end(), 0);
   EXPECT_EQ(frames_of(folder / "d"), film_of_seed(7));
   EXPECT_EQ(offstage("render " + tiny_scene() + kOptions + " -o d/ --force", folder.path()).code, 0)
-      << "the lock went with its owner";
+      << "the lock ends with the process that holds it";
 }
 
 TEST(TwoRuns, PartsOfOneFilmShareAFolder) {
@@ -88,7 +88,8 @@ TEST(KilledRun, ForcedOverForeignFramesAndResumedHasItsOwnFramesOnly) {
     const Outcome resumed =
         offstage("render " + tiny_scene() + kOptions + " --seed 7 -o d/ --resume", folder.path());
     if (!has_begun && resumed.code == 2)
-      // killed before it wrote anything: the frames belong to another film, and the message says so
+      // the run was killed before it wrote anything: the frames belong to another film, and the message says
+      // so
       continue;
     EXPECT_EQ(resumed.code, 0) << resumed.err;
     EXPECT_EQ(frames_of(folder / "d"), expected);
@@ -154,7 +155,7 @@ TEST(CacheOfSnapshots, RewrittenUnderItsReaderGivesOneSimulation) {
     EXPECT_EQ(frames_of(folder / "d"), expected);
     EXPECT_NE(offstage("render " + tiny_scene() + kOptions + " --seed 7 --cache c -o e/", folder.path()).code,
               0)
-        << "the cache is of another simulation now";
+        << "the cache now belongs to another simulation";
   }
 }
 

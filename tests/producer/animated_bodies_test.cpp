@@ -1,4 +1,4 @@
-// Bodies whose model file plays an animation: the motion of their pieces, and what these push.
+// Bodies whose model file plays an animation: the motion of their pieces, and the bodies that these push.
 
 #include "producer/build/animated_bodies.h"
 
@@ -152,8 +152,8 @@ TEST(AnimatedBodies, BonesCollideAsTheHullsOfTheirSkin) {
   EXPECT_EQ(names, (std::vector<std::string>{"foot", "ring", "bone_0", "bone_1", "bone_2", "bone_3", "bone_4",
                                              "bone_5"}));
   // The hulls follow the skin. A vertex that two bones share equally lies half way between its two rigid
-  // places: half of the change of the bend since the start of the clip, at most twice 0.34 rad, times its
-  // distance from the joint, at most the radius of 0.185 m.
+  // places. Its distance from each is half of the change of the bend angle since the start of the clip (at
+  // most 2 * 0.34 rad) times its distance from the joint (at most the radius of 0.185 m).
   const double shared = 0.5 * (2 * 0.34) * 0.185;
   const render::ModelRig& rig = scene.models.model("tentacle.glb").rig;
   std::vector<sim::KeyframeTrack> tracks;

@@ -74,7 +74,7 @@ TEST(CameraRig, KeysCarryFieldOfViewAndFocus) {
   EXPECT_NEAR(set.at(0).fov_deg, 60, 1e-4);
   EXPECT_NEAR(set.at(2).fov_deg, 30, 1e-4);
   EXPECT_NEAR(set.at(0).focus, 2, 1e-5);
-  EXPECT_NEAR(set.at(2).focus, 5, 1e-5) << "that of the target";
+  EXPECT_NEAR(set.at(2).focus, 5, 1e-5) << "the distance of the target";
   EXPECT_GT(set.at(1).fov_deg, 31);
   EXPECT_LT(set.at(1).fov_deg, 59);
 }

@@ -112,7 +112,7 @@ TEST(LongSwatches, HaveTheDrapeCoefficientsOfTheirCaption) {
     const std::size_t at = caption.find(cloth.name + " ");
     ASSERT_NE(at, std::string::npos) << cloth.name;
     EXPECT_NEAR(std::stod(caption.substr(at + cloth.name.size())), drape, 1) << cloth.name;
-    EXPECT_GT(drape, before) << cloth.name;  // from the limpest to the stiffest
+    EXPECT_GT(drape, before) << cloth.name;  // the fabrics are listed from the softest to the stiffest
     before = drape;
     ++read;
   }

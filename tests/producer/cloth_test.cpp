@@ -121,7 +121,7 @@ TEST(Cloths, SnapshotsHoldEveryPointOfAPinnedSheet) {
   ASSERT_EQ(cloth.points.size(), 49u);
   EXPECT_TRUE(cloth.triangles.empty()) << "a whole cloth has the triangles of the scene";
   EXPECT_LT((cloth.points[0] - Eigen::Vector3f(-0.5f, 2, -0.5f)).norm(), 1e-6f);
-  EXPECT_LT(cloth.points[24].y(), 1.99f) << "its middle sags";
+  EXPECT_LT(cloth.points[24].y(), 1.99f) << "the middle of the cloth sags";
 }
 
 TEST(Cloths, CordsHangOnVerticesAndBodiesAndAreDrawn) {
@@ -145,11 +145,11 @@ TEST(Cloths, CordsHangOnVerticesAndBodiesAndAreDrawn) {
   EXPECT_TRUE(is_vertex(snapshot.rods[0].a));
   EXPECT_TRUE(is_vertex(snapshot.rods[5].a));
   for (std::size_t i : {0u, 1u, 2u, 3u, 5u}) EXPECT_EQ(snapshot.rods[i].b, snapshot.rods[i + 1].a);
-  // Its end is fastened to the top of the weight.
+  // The end of the first cord is attached to the top of the weight.
   const BodySample& weight = snapshot.bodies.at(0);
   const Eigen::Vector3f place = weight.position + weight.orientation * Eigen::Vector3f(0, 0.05f, 0);
   EXPECT_LT((snapshot.rods[4].b - place).norm(), 1e-5f);
-  // The free end has fallen.
+  // The free end of the second cord has fallen.
   EXPECT_LT(snapshot.rods[6].b.y(), 1.9f);
 }
 

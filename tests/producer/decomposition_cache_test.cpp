@@ -54,7 +54,7 @@ TEST(DecompositionCache, DamagedFilesAreMadeAgain) {
   const auto size = std::filesystem::file_size(cache.file(mesh));
   std::filesystem::resize_file(cache.file(mesh), size / 2);
   EXPECT_TRUE(equal(cache.decompose(mesh), made));
-  EXPECT_EQ(std::filesystem::file_size(cache.file(mesh)), size) << "mended";
+  EXPECT_EQ(std::filesystem::file_size(cache.file(mesh)), size) << "the file is complete again";
   std::ofstream(cache.file(mesh)) << "something else altogether, longer than a header of thirty-two bytes";
   EXPECT_TRUE(equal(cache.decompose(mesh), made));
 }

@@ -166,9 +166,9 @@ TEST(Articulations, BallsThatHitAnElasticChainAddNoEnergy) {
       }
 }
 
-// It swings with the angular frequency 3.516 sqrt(B / m L^4) of the first mode, to twice the sag at rest.
-// The springs act at the end of a sub-step, which damps this mode by the fraction omega h / 2 of the critical
-// damping.
+// A released chain swings with the angular frequency 3.516 sqrt(B / m L^4) of the first mode, to twice the
+// sag at rest. The springs act at the end of a sub-step, which damps this mode by the fraction omega h / 2 of
+// the critical damping.
 TEST(Articulations, AChainWithBendStiffnessSwingsAsACantilever) {
   constexpr int kLinks = 16;
   const Real omega = 3.516 * std::sqrt(30 * 9.81 / weight_of_rod(kLinks));
@@ -179,7 +179,8 @@ TEST(Articulations, AChainWithBendStiffnessSwingsAsACantilever) {
     const auto end = sags.begin() + static_cast<std::ptrdiff_t>(1.2 * 2 * std::numbers::pi / omega * 60);
     const auto lowest = std::max_element(sags.begin(), end), highest = std::min_element(lowest, end);
     EXPECT_NEAR(static_cast<Real>(highest - lowest) / 60, std::numbers::pi / omega, 1.0 / 60) << solver;
-    const Real decay = std::exp(-std::numbers::pi * omega / 480 / 2);  // in half a period
+    const Real decay =
+        std::exp(-std::numbers::pi * omega / 480 / 2);  // factor of the amplitude in half a period
     EXPECT_NEAR(*lowest, rest * (1 + decay), 0.1 * rest) << solver;
     EXPECT_NEAR(*highest, rest * (1 - decay * decay), 0.1 * rest) << solver;
   }
@@ -259,7 +260,7 @@ TEST(Vehicle, SpeedAndTurningCircleFollowFromTheWheels) {
     return simulation.world().body(chassis);
   };
   const sim::BodyState standing = advance_to(0.5);
-  EXPECT_LT(standing.velocity.norm(), 0.01) << "its springs bear it where it stands";
+  EXPECT_LT(standing.velocity.norm(), 0.01) << "the springs hold the car at its initial height";
   const sim::BodyState driving = advance_to(4);
   EXPECT_NEAR(driving.velocity.z(), 3, 0.03);
   EXPECT_NEAR(driving.pose.position.z(), 3.0 / 2 * 3 + 3 * 0.5, 0.15);

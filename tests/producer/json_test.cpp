@@ -96,7 +96,7 @@ TEST(Json, EveryRepeatedKeyIsAnError) {
 TEST(Json, NestingIsBounded) {
   const std::string open(kMaxDepth, '['), close(kMaxDepth, ']');
   EXPECT_NO_THROW(parse_json(open + close, "f"));
-  EXPECT_EQ(error_of("[" + open + close + "]"), "f:1:65: nested deeper than 64 levels");
+  EXPECT_EQ(error_of("[" + open + close + "]"), "f:1:65: is nested deeper than 64 levels");
   EXPECT_NE(error_of(std::string(1'000'000, '[')), "accepted");
 }
 

@@ -88,7 +88,7 @@ TEST(ModelSize, AutoCountsInstancesAndSkins) {
   instances.document["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["TRANSLATION"] =
       instances.accessor(std::vector<float>{0, 0, 0, 500, 0, 0}, "VEC3");
 
-  render::GltfSample skin;  // of 2 m, on a node whose transform is ignored
+  render::GltfSample skin;  // a skin of 2 m, on a node whose transform is ignored
   skin.set("JOINTS_0", std::vector<uint8_t>(16, 0), "VEC4");
   skin.set("WEIGHTS_0", std::vector<float>{1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}, "VEC4");
   skin.document["skins"] = {{{"joints", {1}}}};

@@ -164,7 +164,7 @@ TEST(Overlays, VelocitiesAreArrowsFromTheCentre) {
   EXPECT_TRUE(shown_arrows[0].isApprox(0.5f * Vector3f(1, -9.81f * 0.5f, 0), 1e-5f));
   EXPECT_TRUE(shown_arrows[1].isApprox(Vector3f(0, 0, 0.5f), 1e-5f));
   EXPECT_TRUE(shown.lines(0).lines[0].a.isApprox(Vector3f(3.5f, 90 - 9.81f / 8, 0), 1e-5f));
-  EXPECT_EQ(arrows(shown.lines(1)).size(), 1u) << "what rests has none, nor has the floor";
+  EXPECT_EQ(arrows(shown.lines(1)).size(), 1u) << "the resting body and the floor have no arrow";
 }
 
 TEST(Overlays, TrailsLieOnThePathAndEndAtTheirAge) {
@@ -183,14 +183,14 @@ TEST(Overlays, TrailsLieOnThePathAndEndAtTheirAge) {
       oldest = std::min(oldest, t);
       newest = std::max(newest, t);
     }
-    EXPECT_GE(line.color.w(), last_alpha) << "towards the body it is fresher";
+    EXPECT_GE(line.color.w(), last_alpha) << "the trail gets more opaque towards the body";
     last_alpha = line.color.w();
     way += (line.b - line.a).norm();
   }
   const double now = shown.simulation.world().time();
-  EXPECT_NEAR(newest, now, 1e-4) << "it reaches the body";
+  EXPECT_NEAR(newest, now, 1e-4) << "the trail reaches the body";
   EXPECT_NEAR(oldest, now - 0.4, 0.05);
-  EXPECT_NEAR(way, 0.4 * std::hypot(2, 3 - 9.81 * (now - 0.2)), 0.4) << "without gaps";
+  EXPECT_NEAR(way, 0.4 * std::hypot(2, 3 - 9.81 * (now - 0.2)), 0.4) << "the trail has no gaps";
 }
 
 TEST(Overlays, IslandsShareAColourAndSleepingOnesAreDim) {

@@ -53,8 +53,8 @@ TEST(Textures, AreScaledAndTurnedAboutTheirCentre) {
     return Eigen::Vector2f(m.base_color_texture.rows[0].dot(place), m.base_color_texture.rows[1].dot(place));
   };
   EXPECT_NEAR((texel(0.5f, 0.5f) - Eigen::Vector2f(0.5f, 0.5f)).norm(), 0, 1e-6f);
-  // Turned counter-clockwise, the lower edge of the picture is at the right; at half the size, half as far
-  // away.
+  // The texture is turned counter-clockwise, so the lower edge of the picture is at the right. The texture
+  // has half its size, so the edge is half as far away.
   EXPECT_NEAR((texel(0.75f, 0.5f) - Eigen::Vector2f(0.5f, 1)).norm(), 0, 1e-6f);
   EXPECT_FALSE(m.triplanar);
 }

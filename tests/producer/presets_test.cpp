@@ -110,9 +110,10 @@ TEST(Effects, ParticleEventsCreateOtherParticles) {
   };
   while (simulation.frame() < 9) simulation.advance();  // 0.4 s: all particles are in flight
   EXPECT_EQ(counts(), (std::vector<std::size_t>{4, 32, 8, 0, 0}));
-  while (simulation.frame() < 13) simulation.advance();  // 0.6 s: they have hit the ground once, at 0.55 s
+  while (simulation.frame() < 13)
+    simulation.advance();  // 0.6 s: all particles hit the ground once, at 0.55 s
   EXPECT_EQ(counts(), (std::vector<std::size_t>{4, 48, 8, 12, 0}));
-  while (simulation.frame() < 23) simulation.advance();  // 1.1 s: all have died
+  while (simulation.frame() < 23) simulation.advance();  // 1.1 s: all particles have died
   const std::vector<std::size_t> end = counts();
   EXPECT_EQ(end[0], 0u);
   EXPECT_EQ(end[4], 20u);

@@ -296,8 +296,8 @@ TEST(ParticleTables, HoldEveryParticleOfEveryFrame) {
   std::filesystem::remove_all(folder);
 }
 
-// Rows of two cloths; the volume of the balloon is that of the mesh of its vertices, and its gas keeps p V;
-// the sheet has none.
+// The table has rows for both cloths. The volume of the balloon is the volume of its mesh, and p V of its gas
+// is constant. The sheet has neither volume nor pressure.
 TEST(ClothTables, HoldEveryVertexAndTheGasInside) {
   const LoadedScene loaded = body_scene(R"("output": {"fps": 10, "duration": 0.5},
     "cloths": [{"name": "sheet", "shape": {"type": "grid", "size": [1, 1], "cells": [2, 2]}, "position": [0, 5, 0]},
@@ -348,7 +348,7 @@ TEST(ClothTables, HoldEveryVertexAndTheGasInside) {
   while (std::getline(cloths, line)) (line.find(",sheet,") != std::string::npos ? sheet : last) = line;
   EXPECT_TRUE(sheet.ends_with(",0,0"));
   const Real volume = volume_inside();
-  EXPECT_GT(volume, 0.002);  // of the ball: 0.0042 m^3
+  EXPECT_GT(volume, 0.002);  // the undeformed ball has 0.0042 m^3
   const std::size_t comma = last.rfind(','), before = last.rfind(',', comma - 1);
   EXPECT_NEAR(std::stod(last.substr(before + 1)), volume, 1e-9);
   // The gas is isothermal: p V = p0 V0, and the skin has grown.

@@ -175,7 +175,7 @@ TEST(Simulation, BodiesThatMeetSlowlyDoNotBounce) {
                         R"(}, "materials": [{"name": "rubber", "restitution": 1}],
       "bodies": [{"motion": "static", "shape": {"type": "plane"}, "material": "rubber"},
                  {"name": "ball", "shape": {"type": "sphere"}, "position": [0, 0.7, 0], "material": "rubber"}],
-      "output": {"fps": 100, "duration": 0.41}})");  // it falls for 0.2 s
+      "output": {"fps": 100, "duration": 0.41}})");  // the ball falls for 0.2 s
     return run.body("ball").centre.y();
   };
   EXPECT_NEAR(top("0.05"), 0.7, 0.01);

@@ -53,7 +53,7 @@ TEST(Snapshot, IsReadBackUnchanged) {
   ASSERT_EQ(back.overlays.size(), 3u);
   EXPECT_EQ(back.overlays[1].lines[0].b, Eigen::Vector3f(4, 5, 6));
   EXPECT_EQ(back.overlays[1].ids[1], 8u);
-  EXPECT_EQ(serialize(back), bytes) << "every field is carried";
+  EXPECT_EQ(serialize(back), bytes) << "every field is stored";
 }
 
 TEST(Snapshot, AnyDamagedByteIsNoticed) {

@@ -1,4 +1,4 @@
-"""Scenes, simulations and films from Python are those of the program."""
+"""Scenes, simulations and films from Python agree with those of the program."""
 
 import json
 import struct

@@ -52,7 +52,7 @@ TEST(ChannelPng, MotionIsInSixtyFourthsOfAPixel) {
   EXPECT_EQ(pixel(image, 0)[1], 128);
   EXPECT_EQ(pixel(image, 1)[0], 126);
   EXPECT_EQ(pixel(image, 1)[1], 255);
-  EXPECT_EQ(pixel(image, 2), (std::vector{0, 255, 0})) << "as far as the numbers go";
+  EXPECT_EQ(pixel(image, 2), (std::vector{0, 255, 0})) << "motion is limited to the range of the numbers";
 }
 
 TEST(ChannelPng, AColourGivesBackItsId) {

@@ -131,7 +131,7 @@ TEST(StageCloth, BackHasAColourOfItsOwn) {
 
 TEST(StageCloth, LightShinesThroughAThinSheetAndOnlyThroughThat) {
   const auto seen = [](float translucency) {
-    ClothStage s(plain(translucency), {0, 0, -1});  // from behind
+    ClothStage s(plain(translucency), {0, 0, -1});  // the sun is behind the cloth
     return center_pixel(s.draw()).x();
   };
   EXPECT_LT(seen(0), 0.02f);
@@ -200,7 +200,7 @@ TEST(StageCloth, TwoLayersHideMoreThanOneInAnyOrder) {
     ClothStage s(sheer(0.5f), {0, 0, -1});
     s.add(make_box({8, 8, 0.1f}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {1, 1, 1}}, {0, 0, -1});
     Sheet sheet(12);
-    std::ranges::reverse(sheet.triangles);  // its back faces the camera, as in a fold
+    std::ranges::reverse(sheet.triangles);  // the back of the sheet faces the camera, as in a fold
     for (Vector3f& p : sheet.points) p.z() = second;
     const ClothHandle other = s.stage.add_cloth({.triangles = sheet.triangles, .uvs = sheet.uvs},
                                                 s.stage.add_material(sheer(0.25f)));
@@ -246,7 +246,7 @@ TEST(StageCloth, TornSheetHasItsNewTrianglesAndIsOpenBetween) {
                   sheet.triangles.begin() + static_cast<std::ptrdiff_t>(t) + 3);
   }
   s.stage.set_cloth_mesh(s.cloth, left, sheet.uvs);
-  EXPECT_EQ(center_pixel(s.draw()).w(), 0) << "not seen before it has places again";
+  EXPECT_EQ(center_pixel(s.draw()).w(), 0) << "the cloth is invisible until set_cloth() is called";
   s.stage.set_cloth(s.cloth, sheet.points);
   const HdrImage picture = s.draw();
   EXPECT_EQ(center_pixel(picture).w(), 0);

@@ -99,7 +99,7 @@ TEST(ConfinedChild, AHangingJobIsEnded) {
       const std::atomic<int> never{0};
       never.wait(0);
     });
-    FAIL() << "it ended by itself";
+    FAIL() << "the job ended by itself";
   } catch (const FileError& e) {
     EXPECT_NE(std::string(e.what()).find("no progress for 1 s"), std::string::npos) << e.what();
   }

@@ -134,7 +134,7 @@ TEST(GltfPicture, EachTextureHasItsSetOfCoordinates) {
   expect_color(swapped.color_at(-0.5f, 0), kPureRed);
 }
 
-/// The owner of each texture of a material, by its path, with what makes it visible.
+/// A texture of a material, and a function that makes it visible and returns the object that refers to it.
 struct TextureUse {
   const char* name;
   std::function<Json&(GltfSample&)> texture;
@@ -171,8 +171,8 @@ const std::vector<TextureUse> kTextureUses = {
        return s.extension("KHR_materials_pbrSpecularGlossiness")["specularGlossinessTexture"];
      }}};
 
-// For each texture, `texCoord` and that of KHR_texture_transform choose the set, independently of the other
-// set.
+// For each texture, `texCoord`, or the `texCoord` of KHR_texture_transform, selects the set of coordinates.
+// The other textures have no effect on this.
 TEST(GltfPicture, EveryTextureUsesTheSetThatItNames) {
   const std::vector<float> across = {0, 1, 1, 1, 1, 0, 0, 0},
                            at_a_point = {0.1f, 0.1f, 0.1f, 0.1f, 0.1f, 0.1f, 0.1f, 0.1f};
@@ -399,7 +399,7 @@ TEST(GltfPicture, RoughTransmissionBlursTheBackground) {
         picture.stage().add_material({.color = {0, 0, 0, 1}, .emission = {1, 1, 1}}), false);
     (void)behind;
     const HdrImage image = picture.draw();
-    float sum = 0;  // 0.1 to 0.5 m beside the edge
+    float sum = 0;  // over points 0.1 to 0.5 m beside the edge
     int count = 0;
     for (float x = -0.5f; x < -0.1f; x += 0.05f)
       for (float y = -0.8f; y < 0.8f; y += 0.05f) {
@@ -412,8 +412,8 @@ TEST(GltfPicture, RoughTransmissionBlursTheBackground) {
   EXPECT_GT(light_left_of_the_edge(0.6), 0.1f);
 }
 
-// A quarter wave of green in a film whose index is the root of that of the glass: green is not reflected at
-// all (E. Hecht, "Optics", section 9.7), which leaves purple.
+// A film that is a quarter of the wavelength of green thick reflects no green if its index of refraction is
+// the square root of the index of the glass (E. Hecht, "Optics", section 9.7). The reflection is purple.
 TEST(GltfPicture, AFilmOfAQuarterWaveReflectsPurple) {
   const auto highlight = [](const Json& film, double metallic) {
     GltfSample sample;

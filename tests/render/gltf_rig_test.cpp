@@ -64,7 +64,7 @@ TEST(GltfAnimations, TurnAtAConstantRateAndChildrenFollow) {
   const float h = std::numbers::sqrt2_v<float> / 2;
   animate(sample, 0, "rotation", {0, 1}, {0, 0, 0, 1, 0, 0, h, h}, "VEC4");  // a quarter turn about z
   const Model model = with_rig(sample);
-  const float angle = std::numbers::pi_v<float> / 6;  // of a third
+  const float angle = std::numbers::pi_v<float> / 6;  // a third of the turn
   EXPECT_LT((origin_of(model, 0, 1.0f / 3, 1) - Vector3f(2 * std::cos(angle), 2 * std::sin(angle), 0)).norm(),
             1e-5f);
   ASSERT_EQ(model.rig.surfaces.size(), 1u);

@@ -153,7 +153,7 @@ TEST(ReadModel, ListsTheNodesWithTrianglesAndReadsOneOfThem) {
   EXPECT_TRUE(whole.nodes[1].position.isApprox(Vector3f(12, 1, 0), 1e-6f));
   EXPECT_TRUE((whole.nodes[1].orientation * Vector3f::UnitX()).isApprox(Vector3f::UnitY(), 1e-5f));
 
-  // Its own triangle alone, as large as in the whole model, from where it is.
+  // A node by itself: only its triangle, in the frame of the node, in the same size as in the whole model.
   const Model arm = read_model(file.string() + "#arm_2");
   EXPECT_EQ(arm.triangle_count(), 1u);
   EXPECT_TRUE(arm.bounds().min().isApprox(Vector3f(0, 0, 0), 1e-5f)) << arm.bounds().min().transpose();
@@ -285,7 +285,7 @@ TEST(ReadModel, SkipsElementsThatCannotBeDrawnWithAWarning) {
   EXPECT_NE(all.find("left out: only triangles are drawn"), std::string::npos) << all;
 }
 
-/// A red triangle with a picture of its shine, a camera, a light, and an animation.
+/// A red triangle with a texture of its specular colour, a camera, a light, and an animation.
 const char kFullCollada[] = R"(<?xml version="1.0"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
 <asset>
@@ -477,7 +477,8 @@ TEST(ReadModel, SurvivesFilesThatCrashTheReader) {
                                    nested + "OBJECT poly\nkids 0\n")),
             "");
   EXPECT_NE(refusal(folder.put("count.off", "OFF\n3 1000000000 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")), "");
-  EXPECT_EQ(read_model(folder.put("good.obj", kTetrahedron)).triangle_count(), 4u) << "the reader works on";
+  EXPECT_EQ(read_model(folder.put("good.obj", kTetrahedron)).triangle_count(), 4u)
+      << "the reader still works";
 }
 
 TEST(ReadModel, GivesTheSameModelEveryTime) {

@@ -130,8 +130,8 @@ TEST(Mtl, StatementsAreParsedAndBrokenOnesSkipped) {
   EXPECT_FALSE(m.maps.contains("map_d"));
 }
 
-// Options with fewer than three values, quoted names, and statements that assimp's reader refuses the file
-// for.
+// Options with fewer than three values, quoted names, and statements because of which assimp would refuse the
+// file.
 TEST(ObjPicture, TexturesAreFoundAfterOptionsOfAnyLength) {
   for (const char* options :
        {"", "-o 0 0", "-s 1", "-s 1 1 -clamp on", "-s 1 1 1 -o 0 0 0", "-mm 0 1 -texres 64"})

@@ -16,7 +16,7 @@ constexpr double kPi = std::numbers::pi;
 struct Named {
   const char* name;
   Mesh mesh;
-  double area, volume;  // of the exact shape
+  double area, volume;  // values of the exact shape
   Vector3f size;
 };
 

@@ -17,7 +17,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kHalfRoom = 1, kHalfLamp = 0.4, kLampHeight = 0.98, kHalfBlock = 0.3;
-const Vector3d kBlock(0.35, -0.7, -0.3);  // its centre; it stands on the floor
+const Vector3d kBlock(0.35, -0.7, -0.3);  // centre of the block, which stands on the floor
 const Vector3d kWhiteWall(0.7, 0.7, 0.7), kRedWall(0.6, 0.1, 0.1), kGreenWall(0.1, 0.5, 0.1);
 
 struct RoomMeeting {

@@ -272,7 +272,7 @@ TEST(VideoSink, RunsTheEncoderInItsOwnProcessGroup) {
       fake_ffmpeg(folder, "cut -d' ' -f5 /proc/$$/stat >" + report.string() + "; cat >/dev/null\n"));
   const auto sink = make_video_sink({.path = folder / "a.mp4", .width_px = 32, .height_px = 32});
   sink->write(0, greys(32, 32, 0));
-  EXPECT_THROW(sink->close(), FileError) << "success without a film is none";
+  EXPECT_THROW(sink->close(), FileError) << "exit code 0 of ffmpeg without a film is a failure";
   const int group = std::stoi(file_content(report));
   EXPECT_GT(group, 0);
   EXPECT_NE(group, ::getpgrp());

@@ -67,8 +67,8 @@ TEST(SkyPicture, OfOneColourIsThatColourEverywhere) {
   }
 }
 
-// The light of a disc of radius r on a white surface that faces it is L sin(r)^2, that of the rest of the sky
-// R (1 - sin(r)^2). Edges of 0.35 degrees change the first by 1 %.
+// On a white surface that faces a disc of radius r, the light of the disc is L sin(r)^2, and the light of the
+// rest of the sky is R (1 - sin(r)^2). Edges of 0.35 degrees change the light of the disc by 1 %.
 TEST(SkyPicture, DimAndBrightPartAddUpToTheLightOfADisc) {
   const Vector3f middle = Vector3f(0.5f, 0.7f, -0.3f).normalized();
   const float fraction = std::pow(std::sin(12 * kPi / 180), 2.0f);
@@ -345,8 +345,8 @@ TEST(StageSkyPicture, ABrightSunIsAsBrightInAMirrorAndBehindAPane) {
   }
 }
 
-// A mirror shows a white wall that a small sun does not reach: what bounces from the wall to the sun is a
-// lamp's light, and is not found a second time by chance.
+// A mirror shows a white wall under a small sun. The sun is sampled as a lamp at the wall, so its light must
+// not be added a second time for paths that bounce from the wall to the sun by chance.
 TEST(StageSkyPicture, AMirrorShowsAWallAsBrightAsItIs) {
   const Vector3f sun = Vector3f(0, 1, 1).normalized();
   LitStage s(disc_sky(sun, 10, {100, 100, 100}, 0, 512));

@@ -116,7 +116,7 @@ TEST(StageSprites, AreDrawnInOneOrderWithThoseOfOtherSets) {
 
 // Sheets share textures, so that sprites of all of them are drawn by few calls.
 TEST(SpriteTextures, HoldPicturesOfDifferentSizesTogetherUntilTheyWasteMemory) {
-  SmallStage stage;  // its context
+  SmallStage stage;  // provides the GL context
   SpriteTextures textures;
   const auto book = textures.add(sprite_pictures(cells(2, 16, {kRed, kGreen, kBlue, kWhite}), 2, 2));
   const auto wide = textures.add(sprite_pictures(cells(1, 48, {kRed}), 2, 1));

@@ -400,7 +400,7 @@ TEST(Stage, LensBlursOnlyObjectsOutOfFocus) {
     SmallStage s;
     s.stage.set_camera({.eye = {0, 0, 5}, .aperture = 0.6f, .focus = 5});
     s.add(make_box({1, 40, 0.01f}), glowing({1, 1, 1}),
-          {0.5f, 0, z});  // its left edge is in the middle of the picture
+          {0.5f, 0, z});  // the left edge of the box is in the middle of the picture
     HdrImage sum;
     constexpr int kSamples = 16;
     for (int i = 0; i < kSamples; ++i) s.stage.draw({.lens = sample_offsets(i, kSamples).lens}, sum);

@@ -126,7 +126,7 @@ TEST_F(TracedLight, OfASmallGlowingMeshHasNoNoise) {
       EXPECT_NEAR(pixel(picture, static_cast<int>(below.x()) + dx, static_cast<int>(below.y())).y() / middle,
                   1, 0.1f);
     scene.add(make_box({0.5f, 0.01f, 0.5f}), {.color = {0, 0, 0, 1}, .roughness = 1},
-              {0, 0.5f * height, 0});  // in the way
+              {0, 0.5f * height, 0});  // an obstacle between light and floor
     EXPECT_LT(mean_around(mean_of(scene, 4), below, 4), 0.03f * middle);
   }
 }
@@ -179,7 +179,7 @@ TEST_F(TracedLight, OfTheSunIsFocusedByABallOfGlass) {
   const float open = light_at(0);
   const InstanceHandle ball = s.add(make_sphere(0.3f), clear, {0, 0.45f, 0});
   EXPECT_GT(light_at(0), 5 * open);
-  EXPECT_LT(light_at(0.2f), 0.3f * open);  // in its shadow
+  EXPECT_LT(light_at(0.2f), 0.3f * open);  // in the shadow of the ball
 
   // From far above the floor, a ball spreads the light over a wide area. No light is lost except the part
   // that its surfaces reflect.
@@ -268,7 +268,7 @@ TEST_F(TracedLight, ParticlesIndoorsHaveTheLightOfTheWalls) {
     EXPECT_NEAR(brightness(style, 0.5f), 0.5f, 0.05f) << static_cast<int>(style);
     EXPECT_NEAR(brightness(style, 0), 0, 0.01f) << static_cast<int>(style);
   }
-  EXPECT_NEAR(brightness(PointStyle::streak, 0), 0, 0.01f);  // of which drops mirror the sky
+  EXPECT_NEAR(brightness(PointStyle::streak, 0), 0, 0.01f);  // drops, which are streaks, mirror the sky
 }
 
 // A wide screen with a straight edge at height h, and the sun overhead, whose disc has the radius w = h

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Every header includes what it uses.   headers.py SOURCE_DIR [COMPILER FLAGS...]
+"""Every header includes the headers of the names that it uses.   headers.py SOURCE_DIR [COMPILER FLAGS...]
 
-A file of the program includes it, beside its own source: what tests alone use is in tests.
-Each name of the standard library and of Eigen that a header uses, and each type of this project, comes from a header that it
-includes, itself or through headers of this project; a type may be declared instead. This is read from the text, in a second.
-With a compiler, each header is also compiled alone, which takes minutes and finds what else is missing.
+At least one file of the program, other than the source file of the same name, must include the header: code that only tests
+use belongs in tests/. Each name of the standard library and of Eigen that a header uses, and each type of this project, must
+come from a header that it includes, directly or through headers of this project; a type may be declared instead. These checks
+read only the text and take a second. With a compiler, each header is also compiled by itself. This takes minutes and finds all
+other missing includes.
 """
 import concurrent.futures
 import os
@@ -75,7 +76,8 @@ EVERYWHERE = {"size_t", "ptrdiff_t", "nullptr_t", "move", "forward", "swap"}
 FOLDERS = ("sim", "effects", "render", "demos/producer", "demos/engine", "demos/tune")
 
 
-# A type that a header defines in a namespace, and any that it names itself: nested, declared, a parameter of a template.
+# Finds the types that a header defines in a namespace, and all types that it defines or declares: also nested types and
+# parameters of templates.
 DEFINITION = r"^(?:(?:class|struct|enum(?: class)?) (\w+)(?:[^;{]*)\{)|^using (\w+) =|^concept (\w+)"
 DECLARATION = r"\b(?:enum class|class|struct|enum|using|typename|concept) (\w+)"
 
@@ -104,7 +106,7 @@ class Header:
 
 
 def included_by(path, headers):
-    """The headers of the project that `path` includes, itself or through others, and `path`."""
+    """Returns `path` and the headers of the project that it includes, directly or through others."""
     found, open_paths = set(), [path]
     while open_paths:
         path = open_paths.pop()
@@ -115,7 +117,7 @@ def included_by(path, headers):
 
 
 def missing_includes(path, headers, homes):
-    """What `path` uses and does not include; `homes` are the headers of each type."""
+    """Yields a message for each name that `path` uses without its header; `homes`: the headers of each type."""
     own = included_by(path, headers)
     foreign = set().union(*(headers[p].foreign for p in own))
     given = foreign | {other for name in foreign for other in ALSO_GIVES.get(name, [])}
@@ -132,7 +134,7 @@ def missing_includes(path, headers, homes):
 
 
 def unused_headers(headers):
-    """Headers that no source of the program includes but the one of the same name."""
+    """Returns the headers that only the source file of the same name includes, or no file."""
     used = set()
     for folder in ("sim", "effects", "render", "demos"):
         for at, _, names in os.walk(folder):
@@ -146,7 +148,7 @@ def unused_headers(headers):
 
 
 def compiled_alone(paths, command):
-    """What the compiler says of each header that does not compile alone."""
+    """Yields the compiler's errors for each header that does not compile alone."""
     def compile_one(path):
         return subprocess.run([*command, "-fsyntax-only", "-x", "c++", "-"], text=True, capture_output=True,
                               input=f'#include "{path}"\n', check=False)

@@ -5,7 +5,7 @@
 cd "$1" || exit 2
 status=0
 
-# forbid FOLDERS PATTERN WHY: no file of the folders may include what matches.
+# forbid FOLDERS PATTERN WHY: no file of the folders may include a header that matches the pattern.
 forbid() {
   local rows
   rows=$(grep -rHnE --include=*.h --include=*.cpp "^ *# *include *[<\"]($2)" $1)
@@ -18,12 +18,12 @@ forbid() {
 json='nlohmann|CLI/|valijson'
 forbid sim "render/|effects/|producer/|$json|assimp|glad|GL/|stb|libdeflate" "sim includes more than std, Eigen, oneTBB, Qhull and xxhash"
 forbid effects "render/|producer/|$json|assimp|glad|GL/|stb|libdeflate" "effects includes more than sim"
-forbid render "sim/|effects/|producer/|CLI/|valijson" "render knows something of physics or of scenes"
+forbid render "sim/|effects/|producer/|CLI/|valijson" "render includes physics or scenes"
 # glTF files are JSON; one header of its reader wraps the library.
-forbid "$(find render -name '*.h' -o -name '*.cpp' | grep -v '^render/gltf_json.h$' | tr '\n' ' ')" nlohmann "JSON is read in render/gltf_json.h alone"
-forbid "$(find render -name '*.h' -o -name '*.cpp' | grep -v '^render/trace/' | tr '\n' ' ')" "embree|glm/" "Embree and GLM are used in render/trace alone"
-forbid demos/producer "engine/|tune/|pybind11" "producer includes what is built on it"
-forbid demos/engine "tune/|httplib" "engine includes what is built on it"
+forbid "$(find render -name '*.h' -o -name '*.cpp' | grep -v '^render/gltf_json.h$' | tr '\n' ' ')" nlohmann "render reads JSON only in render/gltf_json.h"
+forbid "$(find render -name '*.h' -o -name '*.cpp' | grep -v '^render/trace/' | tr '\n' ' ')" "embree|glm/" "Embree and GLM are used only in render/trace"
+forbid demos/producer "engine/|tune/|pybind11" "producer includes a library that depends on it"
+forbid demos/engine "tune/|httplib" "engine includes a library that depends on it"
 # Floors: within a library, a folder includes itself and the folders before it in the list.
 # floors FOLDER PREFIX FLOOR...; "." is the folder's own files.
 floors() {

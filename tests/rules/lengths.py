@@ -2,7 +2,7 @@
 """No function is longer than a page or two.   lengths.py SOURCE_DIR
 
 Prints each function of more than 80 lines, which is an error, and with --files each file of more than 600 lines.
-A function is what clang-format leaves between a line that ends in `{` and the line `}` of the same indentation.
+A function is the text from a line that ends in `{` to the line `}` of the same indentation, as clang-format lays it out.
 """
 import os
 import re

@@ -323,7 +323,7 @@ TEST(Lifetimes, OfJointsAndSprings) {
 
 struct Wheel {
   BodyHandle body;
-  Real inertia;  // about its axle
+  Real inertia;  // moment of inertia about the axle
 };
 
 Wheel add_wheel(World& world, Real radius, Real mass, const Vec3& place, const Vec3& axis = Vec3::UnitZ()) {
@@ -431,8 +431,8 @@ TEST(Pulleys, AreAtwoodsMachines) {
 
 // --- Limits ---
 
-// A slider falls on its limit and rebounds with e of its speed: to e^2 of the height, within the distance of
-// one sub-step.
+// A slider falls on its limit and rebounds with e times its speed, so it rises to e^2 times the height, up to
+// the distance that it moves in a sub-step.
 TEST(JointLimits, HaveARestitution) {
   for (const Real e : {0.5, 0.9}) {
     World world(sleepless());

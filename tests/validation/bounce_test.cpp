@@ -13,7 +13,7 @@ constexpr Real kRadius = 0.05;
 
 struct Drop {
   std::vector<Real> apexes;  // heights above the rest position after each bounce
-  Real rest_height;          // at the end
+  Real rest_height;          // height at the end
 };
 
 /// Drops a particle from 1 m onto a shape whose top is at y = 0.

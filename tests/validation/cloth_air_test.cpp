@@ -97,8 +97,8 @@ INSTANTIATE_TEST_SUITE_P(Integrators, ClothFall,
 class RisingBalloon : public testing::TestWithParam<Real> {};
 
 TEST_P(RisingBalloon, HasTheDragThatBalancesItsLift) {
-  // A skin so light that the air stops it within a step of 1/60 s. In steady motion the force of the air,
-  // rho A / 2 |u| ((C_D - C_L) u + C_L (u.n) n) summed over the triangles, is lift less weight.
+  // The skin is so light that the air stops it within a step of 1/60 s. In steady motion the force of the
+  // air, rho A / 2 |u| ((C_D - C_L) u + C_L (u.n) n) summed over the triangles, is the lift minus the weight.
   ClothDef def = effects::sphere_cloth(0.1, 2, {}, [] {
     effects::Fabric skin = effects::find_fabric("balloon")->fabric;
     skin.areal_density = 0.01;
@@ -214,12 +214,13 @@ class Flag {
     for (uint32_t i = 0; i < def.vertices.size(); ++i)
       if (def.vertices[i].x() < -0.499) def.pins.push_back({.vertex = i, .position = def.vertices[i]});
     def.rest_vertices = def.vertices;
-    for (Vec3& p : def.vertices) p.z() += 0.002 * std::sin(6 * (p.x() + 0.5));  // what begins the motion
+    for (Vec3& p : def.vertices)
+      p.z() += 0.002 * std::sin(6 * (p.x() + 0.5));  // a small deflection, from which the motion grows
     cloth_ = world_.add_cloth(def);
   }
 
   struct Swing {
-    Real amplitude;  ///< of the free end, from peak to peak [m]
+    Real amplitude;  ///< amplitude of the free end, from peak to peak [m]
     Real frequency;  ///< [Hz]
   };
   /// Returns the swing during `seconds`, which follow the first `after` seconds.
@@ -271,9 +272,9 @@ INSTANTIATE_TEST_SUITE_P(Winds, FlagFlutter,
                                          std::pair(5.0, 1.0 / 60), std::pair(10.0, 1.0 / 60)));
 
 TEST(FlagFlutter, BeginsAtACriticalWind) {
-  // A stiff flag comes to rest in a slow wind, and flaps in a faster one: bending waves of a wavelength about
-  // as long as it have the speed 2 pi / L sqrt(B / sigma) = 0.8 m/s, and the air drives what is slower than
-  // itself by more than damping takes.
+  // A stiff flag comes to rest in a slow wind, and flaps in a faster one. Bending waves as long as the flag
+  // have the speed 2 pi / L sqrt(B / sigma) = 0.8 m/s. They grow if the air is so much faster than the waves
+  // that they gain more energy than damping removes.
   effects::Fabric card = effects::find_fabric("cotton")->fabric;
   card.areal_density = 0.12;
   card.bend = 2e-3;

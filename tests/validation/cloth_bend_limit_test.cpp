@@ -29,7 +29,8 @@ effects::Fabric limp(BendModel model, Real radius) {
   return f;
 }
 
-/// Softer and slower for explicit integrators, which would be unstable.
+/// Sets the integrator. Explicit integrators get softer springs and shorter steps, without which they are
+/// unstable.
 void make_stable(ClothDef& def, ClothIntegrator integrator) {
   def.integrator = integrator;
   if (integrator != ClothIntegrator::symplectic && integrator != ClothIntegrator::rk4) return;
@@ -67,13 +68,13 @@ Motion motion_of(const Cloth& cloth) {
 class ClothBendLimit : public testing::TestWithParam<std::tuple<BendModel, ClothIntegrator>> {};
 
 TEST_P(ClothBendLimit, AClampedLimpStripTurnsDownOnAQuarterCircle) {
-  // Its weight bends it as far as it can, from horizontal to vertical: its lower part is limp and straight.
+  // The weight of the strip bends it to the limit, from horizontal to vertical. Its lower part is straight.
   const auto [model, integrator] = GetParam();
   constexpr Real kLength = 0.2, kCell = 0.01, kRadius = 0.05;
   constexpr Real kWithin = 0.75 * kCell;  // the ends of the arc lie within cells
   ClothDef def = bend_strip(model, kRadius, kLength, kCell);
   make_stable(def, integrator);
-  def.air.density = 40;  // comes to rest
+  def.air.density = 40;  // dense air brings the strip to rest
   const Real edge = def.vertices[0].x();
   for (uint32_t i = 0; i < def.vertices.size(); ++i)
     if (def.vertices[i].x() < edge + 1.5 * kCell)
@@ -96,7 +97,7 @@ TEST_P(ClothBendLimit, AClampedLimpStripTurnsDownOnAQuarterCircle) {
 }
 
 TEST_P(ClothBendLimit, KeepsMomentumAndTakesEnergy) {
-  // A strip whose ends are thrown together.
+  // The ends of a strip are thrown together.
   const auto [model, integrator] = GetParam();
   // The implicit integrator does not conserve angular momentum. The corrections of the limit do; see below.
   const Real spin_tolerance = integrator == ClothIntegrator::implicit ? kInfinity : 0.02;

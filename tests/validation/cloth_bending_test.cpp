@@ -93,7 +93,7 @@ effects::Fabric card(Real rigidity, Real density) {
 class ClothCantilever : public testing::TestWithParam<std::tuple<Mesh, ClothIntegrator>> {};
 
 TEST_P(ClothCantilever, SagsByItsFlexuralRigidity) {
-  // w L^4 / 8 B at the end of a length L.
+  // The end of a clamped strip of the length L sags by w L^4 / 8 B.
   const auto [mesh, integrator] = GetParam();
   constexpr uint32_t kCells = 20;
   constexpr Real kLength = 0.1, kRigidity = 0.01, kDensity = 0.2;

@@ -40,7 +40,8 @@ TriangleMesh disc_of_rings(uint32_t rings) {
   return mesh;
 }
 
-/// Cells of a square, drawn out to a disc. Their diagonals are parallel or alternate.
+/// Returns a square of cells that is deformed to a disc. The diagonals of the cells are parallel or
+/// alternate.
 TriangleMesh disc_of_cells(uint32_t cells, bool alternate) {
   TriangleMesh mesh;
   for (uint32_t r = 0; r <= cells; ++r)
@@ -59,7 +60,7 @@ TriangleMesh disc_of_cells(uint32_t cells, bool alternate) {
   return mesh;
 }
 
-/// (shadow - stand) / (disc - stand) in per cent, mean of the last half second of three.
+/// Returns (shadow - stand) / (disc - stand) in per cent: the mean over the last half second of a run of 3 s.
 Real drape_coefficient(const TriangleMesh& mesh, const std::string& fabric) {
   World world({.max_step = 1.0 / 240});
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .friction = 0.5});
@@ -81,9 +82,9 @@ Real drape_coefficient(const TriangleMesh& mesh, const std::string& fabric) {
 class ClothDrape : public testing::TestWithParam<std::string> {};
 
 TEST_P(ClothDrape, DiffersLittleBetweenMeshes) {
-  // Which number of folds a disc takes is a matter of chance: meshes of the same fabric differ by 3 to 12
-  // points (measured), and its pieces in a drape meter, too. A mesh of 8 rings, whose edges are a fourth of a
-  // fold, is too coarse: it gives 10 to 23 points less for silk, cotton and denim.
+  // The number of folds of a disc is a matter of chance: meshes of the same fabric differ by 3 to 12 points
+  // (measured), as pieces of real fabric do in a drape meter. A mesh of 8 rings, whose edges are as long as a
+  // fourth of a fold, is too coarse: it gives 10 to 23 points less for silk, cotton and denim.
   std::vector<Real> drapes;
   for (const TriangleMesh& mesh : {disc_of_rings(12), disc_of_cells(20, true), disc_of_cells(20, false)})
     drapes.push_back(drape_coefficient(mesh, GetParam()));

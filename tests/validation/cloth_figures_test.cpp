@@ -67,7 +67,7 @@ struct HangingStrip {
 class ClothUnderALoad : public testing::TestWithParam<std::tuple<std::string, Real, Real>> {};
 
 TEST_P(ClothUnderALoad, StretchesByItsStiffness) {
-  // (weight + half its own weight) / (stiffness * width) of its length.
+  // The elongation is the fraction (load + half the weight of the strip) / (stiffness * width) of the length.
   const auto [name, fraction, step] = GetParam();
   const effects::Fabric fabric = effects::find_fabric(name)->fabric;
   const Real limit = fabric.max_stretch - 1;
@@ -92,7 +92,7 @@ TEST_P(StiffClothUnderALoad, StretchesByItsStiffnessAtTheDefaultSubstep) {
   fabric.areal_density = 0.3;
   fabric.max_stretch = 0;
   const Real expected = (2 + 0.03) * kFiguresGravity / (20000 * 0.2);
-  HangingStrip strip(fabric, 2, 0, step, integrator);  // it falls into the strip
+  HangingStrip strip(fabric, 2, 0, step, integrator);  // the body falls into the strip
   EXPECT_NEAR(strip.mean_elongation(1), expected, 0.02 * expected);
 }
 
@@ -189,7 +189,7 @@ TEST_P(ClothStops, ABallThatFallsOnIt) {
   for (int i = 0; i < 60; ++i) {
     world.step(1.0 / 240);
     lowest = std::min(lowest, world.body(ball).pose.position.y());
-    // The weight of the cloth, which sags, is worth less than 1 J.
+    // The sagging cloth adds less than 1 J to the energy of the ball.
     const BodyState state = world.body(ball);
     ASSERT_LE(state.velocity.squaredNorm() / 2 + kFiguresGravity * state.pose.position.y(),
               speed * speed / 2 + kFiguresGravity * 1.7 + 1);
@@ -243,7 +243,7 @@ TEST_P(ClothDamping, OfEachKindOfSpringIsItsFractionOfTheCriticalOne) {
                                                                      : kOther;
     EXPECT_NEAR(s.damping, 2 * fraction * std::sqrt(s.stiffness * ma * mb / (ma + mb)), 1e-12);
   }
-  // A pair of them swings as q'' + 2 zeta omega q' + omega^2 q = 0.
+  // Two points on a spring swing as q'' + 2 zeta omega q' + omega^2 q = 0.
   const ClothSpring& s =
       *std::ranges::find(def.springs, sheared ? SpringKind::shear : SpringKind::stretch, &ClothSpring::kind);
   ClothDef pair;

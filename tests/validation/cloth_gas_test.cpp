@@ -62,8 +62,8 @@ TEST(ClothGas, ABalloonHitByADartTearsAndShrinks) {
     lowest = std::min(lowest, world.body(dart).pose.position.y());
   }
   EXPECT_TRUE(world.cloth_report(cloth).first_tear.has_value());
-  EXPECT_LT(lowest, 0);  // it went through the skin, and beyond the centre
-  // Its gas has left, and the skin goes back to its volume at rest.
+  EXPECT_LT(lowest, 0);  // the dart went through the skin and beyond the centre
+  // The gas has left the balloon, and the skin returns to its volume at rest.
   const Real rest = enclosed_volume(def.vertices, def.triangles);
   EXPECT_LT(volume() - rest, 0.5 * (blown_up - rest));
 }
@@ -81,8 +81,8 @@ Real mass_of(const ClothDef& def) {
 }
 
 TEST(ClothGas, LiftsAWeightOnACordByArchimedes) {
-  // Whatever the balloon, its cord and the weight do to each other, their momentum grows by the weight of the
-  // displaced air less the weights of all.
+  // The total momentum of the balloon, its cord and the weight grows by the external forces: the weight of
+  // the displaced air minus the weights of the three.
   ClothDef def = helium_balloon();
   def.air.drag = def.air.lift = 0;
   const uint32_t last = effects::add_cord(def, {.vertex = 0, .end = {0, -0.8, 0}});
@@ -113,7 +113,8 @@ TEST(ClothGas, LiftsAWeightOnACordByArchimedes) {
 }
 
 TEST(ClothGas, FillsABalloonInItsTime) {
-  // While it is blown up slowly, the virial of the springs is that of the pressure, 3 p V = 3 p0 V0 t / T.
+  // While a balloon is inflated slowly, the virial of its springs equals that of the pressure: 3 p V = 3 p0
+  // V0 t / T.
   ClothDef def = helium_balloon();
   def.gas_density.reset();
   def.inflate_time = 2;
@@ -133,7 +134,7 @@ TEST(ClothGas, FillsABalloonInItsTime) {
     const Real fraction = std::min(1.0, i / 40.0);
     EXPECT_NEAR(virial, fraction * filled, 0.02 * filled) << "after " << i / 20.0 << " s";
   }
-  // Blown up from 20 to 30 cm, it has the pressure of a balloon.
+  // A balloon that was inflated from 20 to 30 cm has the pressure of a real one.
   const ClothView view = world.cloth(cloth);
   const Real volume = enclosed_volume(view.points, view.triangles);
   EXPECT_NEAR(std::cbrt(volume * 3 / (4 * std::numbers::pi)), 0.15, 0.003);
@@ -144,8 +145,8 @@ TEST(ClothGas, FillsABalloonInItsTime) {
 class PoppedBalloon : public testing::TestWithParam<bool> {};
 
 TEST_P(PoppedBalloon, FliesFreelyAndNoFasterThanItsGas) {
-  // By Bernoulli's equation gas of the gauge pressure p leaves at sqrt(2 p / rho); the remains of the skin
-  // cannot be pushed faster by it. Its shreds touch, but hardly ever have to be held back.
+  // By Bernoulli's equation, gas of the gauge pressure p flows out at the speed sqrt(2 p / rho), so it cannot
+  // push the remains of the skin faster. The shreds of the skin touch, but their moves are rarely shortened.
   ClothDef def = effects::sphere_cloth(0.1, 3, {}, effects::find_fabric("balloon")->fabric);
   def.pressure = 8440;
   def.gas_density = 0.17;
@@ -177,7 +178,7 @@ TEST_P(PoppedBalloon, FliesFreelyAndNoFasterThanItsGas) {
   ASSERT_TRUE(world.cloth_report(cloth).first_tear.has_value());
   EXPECT_TRUE(world.cloth_report(cloth).first_tear->touches_body);
   EXPECT_LT(volume(), 0.3 * full);
-  EXPECT_LT(limited, 5 * world.cloth(cloth).points.size());  // of at least 320 moves of each point
+  EXPECT_LT(limited, 5 * world.cloth(cloth).points.size());  // each point moves at least 320 times
 }
 
 INSTANTIATE_TEST_SUITE_P(SelfCollision, PoppedBalloon, testing::Bool());
@@ -213,14 +214,15 @@ INSTANTIATE_TEST_SUITE_P(Balloons, StretchedBalloon, testing::Values(2, 3));
 class ClothCord : public testing::TestWithParam<uint32_t> {};
 
 TEST_P(ClothCord, StretchesByItsStiffness) {
-  // (weight + half its own weight) / stiffness of its length, as any elastic rod.
+  // As for any elastic rod, the elongation is the fraction (load + half the weight of the cord) / stiffness
+  // of the length.
   ClothDef def = effects::grid_cloth({0.2, 0.2, 2, 2}, {}, effects::find_fabric("cotton")->fabric);
   for (uint32_t i = 0; i < def.vertices.size(); ++i)
     def.pins.push_back({.vertex = i, .position = def.vertices[i]});
   const effects::Cord cord{
       .vertex = 4, .end = {0, -0.5, 0}, .segments = GetParam(), .stiffness = 40, .mass_per_length = 0.02};
   const uint32_t last = effects::add_cord(def, cord);
-  // A body and the cloth that holds it are moved one after the other, which shifts its place by about 2 g
+  // A body and the cloth that holds it are moved one after the other, which shifts the body by about 2 g
   // h^2.
   World world({.max_step = 1.0 / 960});
   const BodyHandle weight = world.add_body({.shape = Box{Vec3::Constant(0.02)},

@@ -48,7 +48,7 @@ TEST_P(ClothRebound, LeavesAlongTheAxisOnWhichTheBallCame) {
     lowest = std::min(lowest, state.pose.position.y() - radius);
     ASSERT_LT(report.cloth.penetration, fabric.thickness) << i;
     ASSERT_LT(std::hypot(state.velocity.x(), state.velocity.z()), 0.05 * speed) << i;
-    // Only the cloth acts on the ball, and it is at rest at first.
+    // Only the cloth acts on the ball, and the cloth is at rest at first.
     ASSERT_LE(state.velocity.norm(), speed * (1 + 1e-9)) << i;
   }
   // The cloth gave way nearly as far as its limit lets it, 0.6 sqrt(1.1^2 - 1) = 0.275 m, and threw the ball
@@ -62,7 +62,7 @@ INSTANTIATE_TEST_SUITE_P(Balls, ClothRebound,
                          testing::Combine(testing::Values("cotton", "denim"), testing::Values(24, 40),
                                           testing::Values(5.5, 12.0)));
 
-/// Parameters: fabric, length over rest length at which it tears, position of the impact [m].
+/// Parameters: fabric, length over rest length at which the cloth tears, position of the impact [m].
 class ClothBullet : public testing::TestWithParam<std::tuple<std::string, Real, Real>> {};
 
 TEST_P(ClothBullet, GoesThroughOnlyWhereTheClothTears) {

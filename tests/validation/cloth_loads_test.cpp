@@ -41,7 +41,8 @@ TEST(ClothAir, AFlatSheetFallsAtItsTerminalSpeed) {
 }
 
 TEST(ClothAir, LiftsAndDragsAPlateAslantAsItsCoefficientsSay) {
-  // F = rho A / 2 U^2 ((C_D - C_L) u + C_L (u.n) n), u and n unit: along the wind and across it.
+  // F = rho A / 2 U^2 ((C_D - C_L) u + C_L (u.n) n), with the unit vectors u and n; its components are
+  // along the wind and across it.
   constexpr Real kWind = 10, kStep = 1e-4, kSide = 0.8;
   for (Real angle : {0.2, 0.7, 1.3}) {
     World world({.gravity = Vec3::Zero(), .wind = {kWind, 0, 0}, .max_step = kStep});
@@ -87,7 +88,8 @@ TEST(ClothAir, AnOpenBoxTakesTheStagnationPressureOfItsMouth) {
 }
 
 TEST(ClothPressure, HoldsASkinByBoylesLaw) {
-  // At rest the virial of the springs is that of the pressure: sum k (l - L) l = 3 p V; and p V = p0 V0.
+  // At rest, the virial of the springs equals that of the pressure: sum k (l - L) l = 3 p V. The gas has p V
+  // = p0 V0.
   effects::Fabric rubber = effects::find_fabric("rubber")->fabric;
   rubber.damping = 0.3;
   World world({.gravity = Vec3::Zero()});
@@ -242,10 +244,10 @@ TEST(ClothHanging, AStripHangsInACatenary) {
   tape.bend = 0;
   tape.max_stretch = 0;
   ClothDef def = effects::grid_cloth({1.5, 0.05, kCells, 2}, {}, tape);
-  def.air.density = 0.4;  // damps its swinging
+  def.air.density = 0.4;  // the air damps the swinging
   def.self_collision = false;
   def.integrator = ClothIntegrator::implicit;
-  // Starts as two straight halves.
+  // The tape starts as two straight halves.
   def.rest_vertices = def.vertices;
   const Real slope = std::sqrt(1.5 * 1.5 - kSpan * kSpan) / kSpan;
   for (Vec3& v : def.vertices) {

@@ -15,15 +15,15 @@ namespace {
 
 constexpr Real kShapesGravity = 9.81;
 
-/// Half of a loop, a heavy strip of the length `half` that bends without stretching: from the clamp at the
-/// origin, where its direction has the angle `start` against the horizontal, to the middle of the loop, where
-/// it is horizontal again by symmetry, having turned to -pi. With the force F along x in the loop, B theta''
-/// = F sin theta + w (half - s) cos theta, w the weight per area.
+/// Half of a loop: a heavy strip of the length `half` that bends without stretching. It begins at a clamp at
+/// the origin, where its angle to the horizontal is `start`, and ends in the middle of the loop, where its
+/// angle is -pi by symmetry. The angle theta satisfies B theta'' = F sin theta + w (half - s) cos theta,
+/// where F is the force along x in the loop and w the weight per area.
 class HeavyLoop {
  public:
   HeavyLoop(Real start, Real half, Real rigidity, Real weight)
       : start_(start), half_(half), rigidity_(rigidity) {
-    // From the weightless loop on, whose curvature is about constant.
+    // The iteration starts with the weightless loop, whose curvature is about constant.
     Eigen::Vector2d unknown(0, -(start + std::numbers::pi) / half);
     for (int i = 0; i <= kSteps; ++i) {
       weight_ = weight * i / kSteps;
@@ -39,7 +39,7 @@ class HeavyLoop {
     }
     miss_ = residual(unknown).norm();
   }
-  Real height() const { return -lowest_; }  ///< from the clamp to the middle [m]
+  Real height() const { return -lowest_; }  ///< height from the clamp to the middle [m]
   Real miss() const { return miss_; }
 
  private:
@@ -68,7 +68,7 @@ class HeavyLoop {
 };
 
 TEST(HeavyLoop, AgreesWithPeircesWeightlessLoops) {
-  // Heights of his ring and heart loops in lengths of the strip.
+  // Heights of Peirce's ring and heart loops, as fractions of the length of the strip.
   EXPECT_NEAR(HeavyLoop(0, 0.5, 1, 0).height(), 0.3183, 1e-3);
   EXPECT_NEAR(HeavyLoop(std::numbers::pi / 2, 0.5, 1, 0).height(), 0.1337, 1e-3);
 }
@@ -90,11 +90,12 @@ TEST_P(ClothLoop, HangsAsAHeavyElasticStrip) {
   fabric.areal_density = kDensity;
   fabric.bend = kRigidity;
   fabric.bend_damping = 0.02;
-  // A cell more at each end, which is clamped.
+  // The strip has an additional, clamped cell at each end.
   ClothDef def = effects::grid_cloth({kLength + 2 * cell, 3 * cell, kCells + 2, 3}, {}, fabric);
   def.self_collision = def.collides = false;
   def.rest_vertices = def.vertices;
-  // It starts as an arc and a straight piece of its radius in each half.
+  // At the start, each half is an arc; in a heart loop, a straight piece as long as the radius of the arc
+  // follows.
   const Real turn = start + std::numbers::pi, radius = half / (turn + (start > 0 ? 1 : 0));
   const auto place = [&](Real s) {
     if (s < 0) return Eigen::Vector2d(s * std::cos(start), s * std::sin(start));

@@ -85,7 +85,7 @@ TEST(SpringPaths, AtAPointWithMoreSpringsThanColoursAllAreTaken) {
   points.position.push_back(Vec4::Zero());
   std::vector<ClothSpring> springs;
   for (uint32_t i = 0; i < kCount; ++i) {
-    const Real angle = 3.14159265358979 / 2 * i / kCount;  // none goes on with another
+    const Real angle = 3.14159265358979 / 2 * i / kCount;  // no two springs are on one line
     points.position.push_back({std::cos(angle), std::sin(angle), 0, 0});
     springs.push_back({.a = 0, .b = i + 1});
   }

@@ -95,7 +95,8 @@ TEST(SymmetricTop, TurnsTorqueFreeAsTheClosedFormWithTheOrderOfTheIntegrator) {
   constexpr Real kTime = 2;
   const Quat exact = exact_top(top, kTime);
   for (const auto& [kind, order] : kOrders) {
-    // The sine of half the angle between them; unlike an arc cosine, it is accurate for small angles.
+    // The error is the sine of half the angle between both orientations. Unlike an arc cosine, it is accurate
+    // for small angles.
     const auto error = [&](int steps) {
       return (moved(top, Vec3::Zero(), kind, steps, kTime).orientation * exact.conjugate()).vec().norm();
     };

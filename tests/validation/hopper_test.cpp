@@ -18,11 +18,11 @@ namespace {
 constexpr Real kGrain = 0.01, kGrainDensity = 2500;  // diameter [m], [kg/m^3]
 constexpr Real kGrainMass = kGrainDensity * std::numbers::pi / 6 * kGrain * kGrain * kGrain;
 constexpr Real kPlate = 0.002;                              // thickness of the floor [m]
-constexpr Real kSiloStep = 1.0 / 480, kSiloFriction = 0.3;  // of glass beads
+constexpr Real kSiloStep = 1.0 / 480, kSiloFriction = 0.3;  // friction of glass beads
 
 struct Silo {
   Real orifice;  ///< diameter of the hole in the floor [m]
-  Real width;    ///< of the square silo [m]
+  Real width;    ///< width of the square silo [m]
   int layers;    ///< number of layers of grains that fall in
 };
 

@@ -334,8 +334,7 @@ TEST_P(Clatter, OfAnElasticBodyKeepsItsEnergy) {
 
 OFFSTAGE_ALL_SOLVERS(Solvers, Clatter);
 
-// The free end of a rod is not stopped by the floor, so the impulse at the other end is that of its own
-// impact.
+// The free end of a rod does not touch the floor, so only the impact at the other end determines the impulse.
 TEST(AutomaticSolver, ResolvesAnInelasticImpactOfARodAtItsTime) {
   for (const Real step : {1.0 / 240, 1.0 / 60}) {
     World world({.gravity = Vec3::Zero(), .max_step = step, .sleep = false});

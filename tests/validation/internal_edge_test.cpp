@@ -245,7 +245,7 @@ TEST_P(InternalEdges, DoNotStopBodiesInAnyDirection) {
   struct Case {
     const char* name;
     Shape shape;
-    Real radius;  // of rolling
+    Real radius;  // rolling radius
     Quat turn;
   };
   const Case cases[] = {{"ball", Sphere{0.05}, 0.05, Quat::Identity()},
@@ -342,7 +342,7 @@ TEST_P(InternalEdges, DoNotStopAStandingRing) {
 TEST_P(InternalEdges, DoNotStopConesThatRollInCircles) {
   constexpr Real kRadius = 0.1, kHeight = 0.3;
   const Real angle = std::atan2(kRadius, kHeight);
-  const Vec3 axis(std::cos(angle), std::sin(angle), 0);  // to the base
+  const Vec3 axis(std::cos(angle), std::sin(angle), 0);  // from the apex to the base
   for (const char* kind : {"plane", "two triangles", "a mesh", "slivers", "T-vertices", "tiles",
                            "tiles of mesh", "convex parts"})
     for (const Real step : {1.0 / 240, 1.0 / 60})

@@ -75,8 +75,8 @@ TEST(ManyImpacts, BallsOfALongColumnDoNotPassThroughEachOther) {
   EXPECT_LT(deepest, 0.01);
 }
 
-// A ball rebounds from the floor into one that falls onto it, and both stop. Their impact is not traced back
-// to, because it is plastic: the motion after the first impact must start again with both.
+// A ball rebounds from the floor into another falling ball, and both stop. Their impact is plastic, so it is
+// not traced back: the motion of both balls after the first impact must be computed again.
 TEST(ManyImpacts, ABallThatReboundsIntoAnotherStopsWithIt) {
   for (const SolverKind solver : {SolverKind::fast, SolverKind::automatic})
     for (const Real gap : {0.001, 0.01, 0.05}) {
@@ -93,7 +93,7 @@ TEST(ManyImpacts, ABallThatReboundsIntoAnotherStopsWithIt) {
       const BodyHandle low = ball(0.52), high = ball(1.52 + gap);
       world.step(kStep);
       const BodyState a = world.body(low), b = world.body(high);
-      // They meet half-way when the lower one is back where the gap has closed.
+      // The balls meet in the middle of the gap, because both move at the same speed after the rebound.
       const Real met = 0.5 + gap / 2;
       EXPECT_NEAR(a.velocity.y() + b.velocity.y(), 0, 1e-9) << named(solver, kStep) << ", gap " << gap;
       EXPECT_NEAR(a.centre.y(), met, 1e-4) << named(solver, kStep) << ", gap " << gap;
@@ -107,7 +107,7 @@ TEST(ManyImpacts, ThePenetrationOfAStepIsTheGreatestInIt) {
   world.add_body({.shape = Sphere{0.5}, .pose = {Vec3(0, 0, 0)}, .restitution = 1});
   world.add_body(
       {.shape = Sphere{0.5}, .pose = {Vec3(0, 0.95, 0)}, .velocity = {0, -20, 0}, .restitution = 1});
-  EXPECT_GE(world.step(1.0 / 240).contacts.penetration, 0.05 - 1e-12) << "though the balls have parted since";
+  EXPECT_GE(world.step(1.0 / 240).contacts.penetration, 0.05 - 1e-12) << "although the balls are apart again";
 }
 
 /// A rack of fifteen touching balls in a triangle, and a cue ball that approaches along its axis. The mirror

@@ -70,7 +70,7 @@ TEST(ParticlesAndJoints, AJointAtItsLimitMovesInOneDirectionOnly) {
     for (const bool opens : {false, true}) {
       World world = weightless();
       JointDef hinge{.type = JointType::revolute, .a = add_plate(world), .anchor = {-0.5, 0, 0}};
-      (opens ? hinge.upper : hinge.lower) = 0;  // an impact from above turns it clockwise
+      (opens ? hinge.upper : hinge.lower) = 0;  // an impact from above turns the plate clockwise
       world.add_joint(hinge);
       EXPECT_NEAR(rebound(world, internal), opens ? rebound_from(inertia / (reach * reach)) : kHitSpeed,
                   1e-9);

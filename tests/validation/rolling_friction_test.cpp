@@ -137,7 +137,7 @@ TEST_P(TurningFriction, SpinningTakesFrictionFromSliding) {
   }
   run(w, kTime);
   const Real lambda = (1 + 1 / kBall) * kMu * kGravity / (kArm * kSpin);
-  // The centre loses 1 / (1 + 1 / k) of what the contact loses.
+  // The change of the centre's speed is 1 / (1 + 1 / k) of the change of the sliding speed at the contact.
   const Real lost = (kSpeed - u) / (1 + 1 / kBall);
   EXPECT_NEAR(kSpeed - w.body(ball).velocity.x(), lost,
               lost * (0.005 + lambda * lambda * kTime * step() / 2));

@@ -211,7 +211,7 @@ TEST_P(MovingContact, UnbalancedCylindersKeepTheirEnergy) {
   }
 }
 
-/// A cone or frustum that rolls on its side around the point on the ground where its side, continued, ends.
+/// A cone or frustum that rolls on its side around its apex, or the apex of the extended side, on the ground.
 /// It rotates about the line of contact at any speed: the forces along this line supply the torque.
 struct RollingCone {
   Real radius, top, height;
@@ -219,7 +219,7 @@ struct RollingCone {
   void expect_steady(const WorldDef& def, Real spin) const {
     const Shape shape = top > 0 ? Shape(Frustum{radius, top, height}) : Shape(Cone{radius, height});
     const Real whole = height * radius / (radius - top), angle = std::atan2(radius, whole);
-    const Vec3 axis(std::cos(angle), std::sin(angle), 0);  // to the base
+    const Vec3 axis(std::cos(angle), std::sin(angle), 0);  // from the apex to the base
     World w(def);
     w.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = 0.8});
     BodyDef cone{.shape = shape,

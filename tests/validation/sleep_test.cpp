@@ -330,7 +330,7 @@ OFFSTAGE_BOTH_SOLVERS(Solvers, Joined);
 
 class Rain : public BothSolvers {};
 
-// Particles fall on a falling stack: none gets inside a body, and the stack lands as without them.
+// Particles fall on a falling stack: none gets inside a body, and the stack lands as without particles.
 TEST_P(Rain, OnBodiesThatMove) {
   World world(def());
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0});

@@ -204,7 +204,7 @@ class Cards : public BothSolvers {
     BodyHandle card;
     for (const Real side : {-1.0, 1.0}) {
       const Quat turn(Eigen::AngleAxisd(side * kTilt, Vec3::UnitZ()));
-      // The upper edge of its inner face touches the post, the lower edge the floor.
+      // The upper edge of the card's inner face touches the post, the lower edge touches the floor.
       const Vec3 top = turn * Vec3(-side * kThick / 2, kLength / 2, 0),
                  foot = turn * Vec3(-side * kThick / 2, -kLength / 2, 0);
       const Vec3 centre(side * kPost / 2 - top.x(), -foot.y(), 0);

@@ -188,7 +188,7 @@ class TreeBuilder : public nlohmann::json_sax<nlohmann::json> {
   template <class T>
   bool open(T&& container) {
     if (open_.size() == kMaxDepth)
-      return fail(here(), "nested deeper than " + std::to_string(kMaxDepth) + " levels");
+      return fail(here(), "is nested deeper than " + std::to_string(kMaxDepth) + " levels");
     // The address stays valid, because the parent grows only after this is closed.
     open_.push_back(&add(std::forward<T>(container)));
     return true;

@@ -18,7 +18,7 @@ struct Header {
   uint32_t version;
   uint32_t reserved;
   uint64_t payload_size;  // uncompressed
-  uint64_t checksum;      // of the uncompressed payload
+  uint64_t checksum;      // checksum of the uncompressed payload
 };
 static_assert(sizeof(Header) == 32);
 

@@ -120,7 +120,7 @@ void expand_joints(const Scene& scene, Scene& flat, std::vector<Problem>& errors
   for (const ArticulationTemplate& articulation : scene.articulations)
     std::visit(
         [&](const auto& a) {
-          if (a.where.path.empty()) return;  // its type was invalid, and it was not read
+          if (a.where.path.empty()) return;  // the articulation has an invalid type and was not read
           if constexpr (requires { a.placement; })
             add_copies(a, scene.world.seed, flat, errors, warnings);
           else

@@ -360,7 +360,7 @@ void ModelLibrary::decompose_models(const Scene& scene, const DecompositionCache
   for (const Body& body : scene.bodies) {
     const auto* mesh = std::get_if<MeshFile>(&body.shape);
     const auto need = needed.find(body.name);
-    if (body.has_animated_shape()) continue;  // its pieces collide
+    if (body.has_animated_shape()) continue;  // the pieces of its animation collide instead
     if (!mesh || need == needed.end()) continue;
     if (!parts_.contains(parts_key(*mesh))) {
       const std::size_t triangles = model(mesh->file).triangle_count();
@@ -377,7 +377,7 @@ void ModelLibrary::decompose_models(const Scene& scene, const DecompositionCache
       if (on_step) on_step("");
     }
     const sim::ConvexDecomposition& parts = parts_.at(parts_key(*mesh));
-    // A body that is not dynamic then collides by its triangles.
+    // Inexact parts matter only for dynamic bodies: other bodies collide by their triangles instead.
     const bool matters = body.motion == sim::MotionType::dynamic;
     if (matters && is_inaccurate(parts, settings_of(mesh->decomposition)) &&
         warned.insert(parts_key(*mesh)).second)

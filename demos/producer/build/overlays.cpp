@@ -16,7 +16,7 @@ using Eigen::Vector4f;
 using Edges = std::vector<std::pair<Vec3, Vec3>>;
 
 constexpr Real kTrailStep = 1.0 / 120;        // [s]
-constexpr float kDotWidth = 4;                // in widths of a line
+constexpr float kDotWidth = 4;                // width of a dot, in widths of a line
 constexpr Real kShortestArrow = 5e-3;         // [m]; a shorter one would be unrecognizable
 constexpr uint64_t kByGeometry = 1ull << 63;  // flag in the ids of contacts
 

@@ -108,7 +108,7 @@ class Overlays {
   static LineSet draw(const ClothLines& cloths, const sim::World& world);
   static LineSet draw(const TrailLines& trails, const sim::World& world);
 
-  std::map<std::string, Collider> colliders_;  // by body
+  std::map<std::string, Collider> colliders_;  // by the name of the body
   std::vector<Source> sources_;
 };
 

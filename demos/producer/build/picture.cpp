@@ -278,7 +278,7 @@ void Picture::add_body(const ObjectTable::BodyEntry& entry, const ModelLibrary& 
 void Picture::add_animated(const std::string& file, const Affine3f& body_from_model, const Body& body,
                            const ModelLibrary& models, DrawnBody& drawn) {
   const render::Model& model = models.model(file);
-  model_parts(file, body.material, models);  // called here because it uploads the materials
+  model_parts(file, body.material, models);  // this call uploads the materials
   const std::vector<render::MaterialHandle>& own_materials = models_.at(file).second;
   AnimatedLook look{
       &model.rig, &body.animation.value(), model.rig.clip(body.animation->clip), body_from_model, {}};

@@ -68,7 +68,7 @@ class Picture {
   };
   struct DrawnBody {
     std::optional<std::size_t> slot;  // index in Snapshot::bodies; none: the body never moves
-    Eigen::Affine3f world_from_body;  // at time 0
+    Eigen::Affine3f world_from_body;  // pose at time 0
     const PartsOverlay* overlay;      // overlay that draws the body as convex parts; null: there is none
     Real appear_at, remove_at;
     std::vector<DrawnPart> parts;
@@ -162,9 +162,9 @@ class Picture {
   // Objects of the stage for the entries of an ObjectTable.
   std::vector<render::InstanceHandle> rods_;  // null if invisible
   std::vector<render::PointsHandle> points_;
-  std::vector<render::PointStyle> styles_;  // of the same
-  std::vector<bool> ages_within_frame_;     // of the same: pictures of a sheet change between sub-frames
-  std::vector<DrawnMeshes> meshes_;         // of the same
+  std::vector<render::PointStyle> styles_;  // style of each point set
+  std::vector<bool> ages_within_frame_;     // whether a point set's pictures change between sub-frames
+  std::vector<DrawnMeshes> meshes_;         // instances of each point set
   // Streaks that replace the balls that move too far in a sub-frame; null: the set has none.
   std::vector<render::PointsHandle> blur_streaks_;
   std::map<std::string, render::MaterialHandle> fabrics_;  // keys: fabric and material

@@ -23,7 +23,8 @@ template <class Place>
 std::string unknown_place(const std::string& file, const char* kind, const std::string& name,
                           const std::vector<Place>& known) {
   if (known.empty())
-    return fmt::format("{}: has no {}s; `offstage info FILE` lists what a file has", file, kind);
+    return fmt::format("{}: has no {}s; `offstage info FILE` lists the cameras and lights of a file", file,
+                       kind);
   std::vector<std::string> names;
   for (const Place& place : known) names.push_back(place.name);
   return fmt::format("{}: has no {} '{}'{}", file, kind, name, suggestion(name, names));

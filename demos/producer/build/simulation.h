@@ -142,8 +142,8 @@ class Simulation {
   std::vector<Group> groups_;
   std::vector<NamedCloth> cloths_;
   std::map<std::string, sim::BodyHandle> bodies_;
-  std::vector<sim::Pose> moving_poses_;             // kept up to date from World::moved()
-  std::map<sim::BodyHandle, std::size_t> slot_of_;  // by handle
+  std::vector<sim::Pose> moving_poses_;             // by slot; kept up to date from World::moved()
+  std::map<sim::BodyHandle, std::size_t> slot_of_;  // slots of moving bodies
   std::vector<DrawnSpring> springs_;
   std::vector<DrawnJoint> joints_;
   std::optional<Overlays> overlays_;

@@ -101,7 +101,8 @@ Command add_bench(CLI::App& app) {
   BenchOptions& bench = *options;
   CLI::App* command = app.add_subcommand(
       "bench",
-      "Simulate a scene by each choice of solver and collision detection, and print a table of their speed, "
+      "Simulate a scene with each choice of solver and collision detection, and print a table of their "
+      "speed, "
       "work, fall-backs and errors. The whole film is simulated once for each choice, without pictures; "
       "--duration shortens it");
   add_scene(*command, bench.scene);

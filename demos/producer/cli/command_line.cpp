@@ -74,7 +74,7 @@ void open_standard_streams() {
 /// Writes buffered results to standard output. Returns `code`, or the code of a failed run if writing fails.
 int flushed(int code) {
   if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return code;
-  log("offstage: standard output: {}\n", std::strerror(errno));
+  log("offstage: standard output cannot be written: {}\n", std::strerror(errno));
   return code == kOk ? kRunFailed : code;
 }
 

@@ -79,7 +79,8 @@ bool same_picture(const fs::path& a, const fs::path& b, const std::string& repor
 int compare_pictures(const CompareOptions& options) {
   const fs::path a = options.inputs[0], b = options.inputs[1];
   if (fs::is_directory(a) != fs::is_directory(b))
-    throw render::FileError(a.string() + " and " + b.string() + ": compare two pictures or two folders");
+    throw render::FileError(a.string() + " and " + b.string() +
+                            ": one is a folder and the other is not; compare two pictures or two folders");
   if (!fs::is_directory(a)) return same_picture(a, b, options.report) ? kOk : kImagesDiffer;
   std::set<std::string> names = pictures_in(a);
   names.merge(pictures_in(b));

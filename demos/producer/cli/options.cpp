@@ -20,7 +20,7 @@ void add_allow(CLI::App& command, std::vector<std::string>& allow) {
   command
       .add_option(
           "--allow", allow,
-          "A folder besides the scene's own that includes, models and textures may lie in (repeatable)")
+          "Allow the scene to read files from this folder, too: includes, models, textures (repeatable)")
       ->allow_extra_args(false);
 }
 
@@ -78,9 +78,9 @@ void add_channels(CLI::App& app, SceneOptions& scene) {
                  "normal, id, motion [px since the previous frame]; several with commas")
       ->delimiter(',')
       ->check(CLI::IsMember({"depth", "normal", "id", "motion"}));
-  app.add_option(
-         "--channel-format", scene.channel_format,
-         "exr: FRAME.exr with all channels as floating-point numbers; png: FRAME.depth.png and so on, scaled")
+  app.add_option("--channel-format", scene.channel_format,
+                 "exr: FRAME.exr with all channels as floating-point numbers; png: FRAME.depth.png and so "
+                 "on, each with its scale in its comment")
       ->check(CLI::IsMember({"exr", "png"}));
 }
 

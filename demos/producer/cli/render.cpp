@@ -415,7 +415,7 @@ Command add_render(CLI::App& app, const WatchCommand& watch) {
       ->add_flag("--watch", render.watch,
                  "Render again whenever the scene, an include, a model or a texture changes, until "
                  "Ctrl-C;\nthe output is replaced only by a complete result, never after an error. Changes "
-                 "of cameras,\nlights and looks do not simulate again")
+                 "of cameras,\nlights and looks need no new simulation")
       ->excludes(resume)
       ->excludes(dry_run);
   command->add_option("--stats", render.stats, "Write statistics of the run to this JSON file");

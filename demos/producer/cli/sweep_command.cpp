@@ -382,7 +382,7 @@ int sweep_command(const SweepOptions& options) {
   if (options.force) remove_finished(sweep.finished);
   fs::create_directories(sweep.finished, error);
   if (error)
-    throw render::FileError(sweep.finished.string() + ": cannot make the folder: " + error.message());
+    throw render::FileError(sweep.finished.string() + ": cannot create the folder: " + error.message());
   const std::size_t done = Crew(sweep, options).work(options.jobs > 0 ? options.jobs : all_threads);
   if (done < sweep.runs.size()) {
     log("interrupted: {} of {} runs done; continue with the same command and --resume{}\n", done,

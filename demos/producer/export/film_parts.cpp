@@ -206,8 +206,7 @@ class FilmParts::Builder {
   UniqueNames names_, material_names_;
   std::map<std::vector<float>, std::size_t> meshes_done_;
   std::map<std::string, std::size_t> materials_done_;
-  /// The parts that were made for each model file. The flag tells whether they have the materials of the
-  /// file.
+  /// The parts that were made for each model file. Key: the file, and whether the parts have its materials.
   std::map<std::pair<std::string, bool>, std::pair<std::size_t, std::size_t>> models_done_;
 };
 

@@ -279,7 +279,7 @@ class Checker : SceneChecker {
            "has no effect: each moving part of an animated model is divided on its own");
     const std::string& file = body.model ? body.model->file : shape->file;
     if (file.find('#') != std::string::npos)
-      fail(path, fmt::format("plays in a whole file; '{}' is one of its nodes", file));
+      fail(path, fmt::format("needs a whole file, but '{}' selects one node; omit #NODE", file));
   }
 
   void check_place(const Vec3& position, const std::string& path) {

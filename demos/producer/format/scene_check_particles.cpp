@@ -16,7 +16,7 @@ namespace offstage::producer {
 namespace {
 
 constexpr Real kMostParticles = 2e7;
-constexpr Real kTolerance = 1.01;  // a particle that ends and one that begins at the same time both count
+constexpr Real kTolerance = 1.01;  // a particle that ends when another one begins may be counted, too
 constexpr Real kSmallest = 1e-6;   // radius [m]
 
 Real film_end(const Scene& scene) {

@@ -163,7 +163,8 @@ class Includer {
     const fs::path identity = identity_of(file);
     if (std::find(open.begin(), open.end(), identity) != open.end())
       return refuse("'" + *name + "' includes itself");
-    if (files_.size() >= kMostFiles) return refuse("more than " + std::to_string(kMostFiles) + " files");
+    if (files_.size() >= kMostFiles)
+      return refuse("the scene consists of more than " + std::to_string(kMostFiles) + " files");
     if (const std::string wrong = scene_.wrong_place(file); !wrong.empty()) return refuse(wrong);
     std::string text;
     try {

@@ -43,7 +43,7 @@ struct Table<Scene> {
         {"articulations", &T::articulations, "ready-made bodies with their joints"},
         {"cloths", &T::cloths, "cloths"},
         {"forces", &T::forces, "force fields, moving air, hands, explosions, forces between particles"},
-        {"overlays", &T::overlays, "lines and text that show how the simulation sees the scene"},
+        {"overlays", &T::overlays, "lines and text over the picture that show the state of the simulation"},
         {"camera", &T::camera, "the camera"},
         {"cameras", &T::cameras,
          "further cameras; the option `--camera NAME` draws one of them instead of `camera`"},

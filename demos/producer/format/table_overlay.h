@@ -186,7 +186,8 @@ struct Table<TextOverlay> {
 template <>
 struct Tags<Overlay> {
   static constexpr const char* kName = "overlay";
-  static constexpr const char* kHelp = "Something drawn over the picture to show how the simulation sees it.";
+  static constexpr const char* kHelp =
+      "Lines or text over the picture that show the state of the simulation.";
   static constexpr std::array kTags = {"tree",    "parts",  "closest", "contacts", "velocities",
                                        "islands", "joints", "cloth",   "trails",   "text"};
   static constexpr bool kRequired = true;

@@ -68,7 +68,7 @@ struct Table<ParticleGroup> {
         {"position", &T::position, "position of the origin of `file` in the world", "m"},
         {"orientation", &T::orientation, "orientation of the axes of `file` in the world"},
         {"max_points", &T::max_points,
-         "greatest number of points read from `file`; of a larger file, evenly spaced points are omitted", "",
+         "greatest number of points read from `file`; a larger file is thinned evenly to this number", "",
          between(1, 2e7)},
         {"radius", &T::radius, "radius of each particle", "m", kPositive},
         {"mass", &T::mass, "mass of each particle", "kg", kPositive},

@@ -115,7 +115,7 @@ FrameSequence find_sequence(const std::string& text, bool allow_gaps) {
     }
     if (head.width_px != sequence.width_px || head.height_px != sequence.height_px)
       throw render::FileError(
-          fmt::format("{}: is {}x{}, but frame {} is {}x{}; all frames of a video have one size",
+          fmt::format("{}: is {}x{}, but frame {} is {}x{}; all frames of a video must have the same size",
                       frame.path.string(), head.width_px, head.height_px, sequence.frames.front().number,
                       sequence.width_px, sequence.height_px));
     sequence.may_be_transparent |= head.alpha;

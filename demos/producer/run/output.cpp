@@ -156,7 +156,7 @@ std::vector<fs::path> files_of_frames(const fs::path& folder) {
 void remove_frames(const fs::path& folder) {
   std::error_code error;
   for (const fs::path& file : files_of_frames(folder)) fs::remove(file, error);
-  fs::remove(folder, error);  // unless it contains other files
+  fs::remove(folder, error);  // fails if the folder contains other files, which is intended
 }
 
 namespace {
@@ -256,7 +256,7 @@ bool holds_channels(const fs::path& folder) {
 void remove_channels(const fs::path& folder) {
   std::error_code error;
   for (const fs::path& path : channels_in(folder)) fs::remove(path, error);
-  fs::remove(folder, error);  // unless it contains other files
+  fs::remove(folder, error);  // fails if the folder contains other files, which is intended
 }
 
 void prepare_channels(const fs::path& folder, bool replace) {

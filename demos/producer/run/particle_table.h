@@ -39,7 +39,7 @@ class ParticleTable {
   std::filesystem::path path_;
   std::optional<CsvFile> csv_;
   CsvRows rows_;
-  std::size_t row_count_ = 0;  // in rows_
+  std::size_t row_count_ = 0;  // number of rows in rows_
   std::optional<render::OutputFile> binary_;
   std::vector<uint8_t> bytes_;
 };

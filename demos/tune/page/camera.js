@@ -119,7 +119,7 @@ byId('camera-write').addEventListener('click', async () => {
   if (!store.doc.camera) return;
   const now = store.value.camera ?? {}, keep = ['fov_deg', 'focal_mm', 'aperture', 'focus', 'focus_on'];
   const camera = {type: 'static', eye: tidy(store.doc.camera.eye), target: tidy(store.doc.camera.target), ...Object.fromEntries(keep.filter(k => k in now).map(k => [k, now[k]]))};
-  // These cameras have a field of view that is not their own member.
+  // The field of view of these cameras comes from the model file or from keyframes.
   if (!('focal_mm' in now) && (now.type === 'model' || now.keyframes?.some(k => 'fov_deg' in k))) camera.fov_deg = tidy([view.camera.fov])[0];
   if (await edit([{set: '/camera', value: toText(camera)}], 'camera', ['/camera'])) { setView({camera: null}); toast('The camera was written to the scene.'); }
 });

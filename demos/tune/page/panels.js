@@ -65,7 +65,7 @@ const kOverlays = [
   ['islands', 'Islands', 'groups of bodies that touch each other', () => ({type: 'islands'})],
   ['trails', 'Trails', 'paths of bodies', () => ({type: 'trails'})],
   ['cloth', 'Strain of cloth', 'blue at rest, red where it is stretched', () => ({type: 'cloth'})],
-  ['tree', 'Bounding tree', 'of the selected body with a mesh', () => { const [list, i] = stepsOf(store.selection.at(-1) ?? ''); const b = list === 'bodies' && listOf('bodies')[i]; return b?.shape?.type === 'mesh' && b.name ? {type: 'tree', body: b.name} : null; }],
+  ['tree', 'Bounding tree', 'bounding volumes of the selected body, which must have a mesh', () => { const [list, i] = stepsOf(store.selection.at(-1) ?? ''); const b = list === 'bodies' && listOf('bodies')[i]; return b?.shape?.type === 'mesh' && b.name ? {type: 'tree', body: b.name} : null; }],
 ];
 export function showOverlays(anchor) {
   const on_ = type => (store.doc.overlays ?? []).some(o => o.type === type);

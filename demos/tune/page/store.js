@@ -13,7 +13,7 @@ export const store = {
   selection: [],    // paths of objects; the controls show the last one
   frame: 1, playing: false,
   film: {phase: 'loading', lead_in: 0, simulated: 0, notes: [], statistics: null, message: ''},
-  figures: [],      // by frame - 1
+  figures: [],      // figures of frame k at index k - 1
   presets: [],
   writer: '',
 };
@@ -136,8 +136,8 @@ async function drain() {
   emit('idle');
 }
 
-// During a drag, the next change of a value or of the camera waits for the first picture of the change before, which it
-// would end: so the film follows the pointer. It waits for a limited time, and not after the drag.
+// A new version or camera ends the work on the previous one. During a drag, each change therefore waits until the first
+// picture of the previous change is shown, so that the film follows the pointer. The wait is limited, and ends with the drag.
 const kLongestWait_ms = 1000;
 let dragging = false, endWait = () => {};
 const firstPicture = () => new Promise(done => {

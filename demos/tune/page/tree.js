@@ -273,11 +273,11 @@ export function setRowValue(f) { rowValue = f; }
 
 function menu(path, anchor) {
   const many = store.selection.includes(path) && store.selection.length > 1 ? store.selection : [path];
-  const entry = (text, run, title) => el('button', {class: 'entry', title, onclick: () => { close(); if (many.every(p => find(store.root, p))) run(); }}, text);  // they may be gone
+  const entry = (text, run, title) => el('button', {class: 'entry', title, onclick: () => { close(); if (many.every(p => find(store.root, p))) run(); }}, text);  // an object may have been removed meanwhile
   const close = popover(anchor, nameOf(path), el('div', {class: 'menu'},
     entry(many.length > 1 ? `Duplicate ${many.length} objects` : 'Duplicate', () => duplicate(many)), entry('Rename', () => rename(path)),
     entry('Copy', () => copyObjects(many), 'As scene JSON (Ctrl+C)'), entry('Paste over', () => fromClipboard(text => pasteOver(many, text)), 'Replace it by the scene JSON in the clipboard (Ctrl+V)'),
-    entry('Paste as new', () => fromClipboard(text => pasteNew(stepsOf(path)[0], text)), 'Add what the clipboard holds to the same list'),
+    entry('Paste as new', () => fromClipboard(text => pasteNew(stepsOf(path)[0], text)), 'Add the scene JSON in the clipboard to the same list'),
     entry('Show in the text', () => emit('show-text', path)), entry(many.length > 1 ? `Delete ${many.length} objects` : 'Delete', () => remove(many))));
 }
 

@@ -92,7 +92,7 @@ TEST(BoxBox, AgreesWithTheDistanceAndTheManifoldOfConvexSolids) {
     }
     if ((m.normal - expected.normal).norm() > 1e-5) {
       ASSERT_LT(std::abs(s.distance), 1.01e-3 * p.margin)
-          << "only of boxes that touch the normal can be chosen";
+          << "the normal is ambiguous only if the boxes touch";
       continue;
     }
     ++same;

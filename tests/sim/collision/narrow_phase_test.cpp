@@ -224,7 +224,7 @@ TEST(NarrowPhase, ABodyInsideASolidIsInPenetration) {
   for (const CollisionShape* solid : {&parts.collision, &hollow}) {
     EXPECT_TRUE(touching(*solid, ball.collision, pose({1, 0, 0})));
     EXPECT_TRUE(touching(ball.collision, *solid, pose({-1, 0, 0})));
-    EXPECT_FALSE(touching(*solid, ball.collision, pose({0, 0, 0}))) << "the hole";
+    EXPECT_FALSE(touching(*solid, ball.collision, pose({0, 0, 0}))) << "the ball is in the hole";
     const PosePath resting{Pose{}}, inside(pose({1, 0, 0}));
     const auto impact =
         time_of_impact(MovingShape{*solid, resting}, MovingShape{ball.collision, inside}, 1e-6);
@@ -235,8 +235,8 @@ TEST(NarrowPhase, ABodyInsideASolidIsInPenetration) {
   PairCache cache;
   const auto s = separation(hollow, ball.collision, pose({0.9, 0, 0}), cache);
   ASSERT_TRUE(s);
-  EXPECT_NEAR(s->distance, -0.4, 0.01) << "0.3 to the inner side of the tube, and its own radius";
-  EXPECT_NEAR(s->normal.x(), 1, 0.02) << "the solid goes outwards, the ball to the hole";
+  EXPECT_NEAR(s->distance, -0.4, 0.01) << "0.3 to the inner side of the tube, plus the radius of the ball";
+  EXPECT_NEAR(s->normal.x(), 1, 0.02) << "the solid is pushed outwards, the ball towards the hole";
 }
 
 TEST(NarrowPhase, OpenSurfacesAreTwoSided) {

@@ -39,8 +39,8 @@ TEST(NearestPoint, SupportsItsSimplex) {
   }
 }
 
-// The plane of the triangle is 1e-8 from the origin, nearly below the middle of an edge. From the edge alone
-// the direction is accurate to 1e-8, from the face it is exact.
+// The plane of the triangle is 1e-8 from the origin, nearly below the middle of an edge. The
+// direction is accurate to 1e-8 if it is computed from the edge, and exact from the face.
 TEST(NearestPoint, PrefersTheFaceToTheEdgeUnderTheOrigin) {
   Dice dice(2);
   for (int i = 0; i < 10'000; ++i) {
@@ -53,7 +53,8 @@ TEST(NearestPoint, PrefersTheFaceToTheEdgeUnderTheOrigin) {
   }
 }
 
-// The nearest point is perpendicular to its edge to the rounding of its own length, not of the edge's length.
+// The vector to the nearest point is perpendicular to the edge. The error is a rounding error of the length
+// of this vector, not of the length of the edge.
 TEST(NearestPoint, OfAnEdgeIsPerpendicularToItAtAnyDistance) {
   Dice dice(3);
   for (int i = 0; i < 10'000; ++i) {

@@ -37,8 +37,8 @@ TEST(ContactLcp, WithoutFrictionAgreesWithTheExactSolver) {
   EXPECT_GT(pivots, 200u);
 }
 
-// The normal impulses follow the complementarity conditions, and the tangential ones have the limits of the
-// pyramid, with the greatest force where they slide.
+// The normal impulses satisfy the complementarity conditions. The tangential impulses stay within the
+// pyramid, and are at its limits where contacts slide.
 TEST(ContactLcp, SolutionsObeyTheConditionsOfThePyramid) {
   Dice dice(12);
   int solved = 0, beyond_the_cone = 0;
@@ -109,7 +109,7 @@ TEST(ContactLcp, JointsHoldAndTheirBoundedRowsKeepTheirBounds) {
       EXPECT_NEAR(turn, 2, 1e-12);
       EXPECT_LT(std::abs(bounded[0].impulse), strength);
     }
-    // The impulses that are reported are those that act.
+    // The reported impulses are the impulses that act on the bodies.
     const Vec3 momentum = (bodies[0].velocity + bodies[1].velocity) / 0.5 - Vec3(0, -4, 0);
     EXPECT_LT((momentum - contacts[0].to_world(contacts[0].impulse)).norm(), 1e-12);
     Vec3 second = Vec3::Zero();

@@ -231,8 +231,8 @@ TEST(Relaxation, ConveyorCarriesTheBox) {
   EXPECT_NEAR(s.bodies.back().pose.position.x(), 1 - reached / 2, 1e-3);
 }
 
-// A body turns about a point that it touches, as a manifold that has shrunk to this point remembers it: one
-// point has no torque, so the part of the body that would turn into the other one does not collide.
+// A patch of one point has no torque about its normal. The first patch keeps a torque from an earlier step,
+// in which it had more points. This torque must not turn the body, so the second patch gets no impulse.
 TEST(Relaxation, APointHasNoTorque) {
   std::vector<RelaxedBody> bodies(2);
   bodies[0].inverse_mass = 1;

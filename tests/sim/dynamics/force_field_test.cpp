@@ -52,7 +52,7 @@ TEST(Wind, AcceleratesABodyToItsSpeed) {
   EXPECT_NEAR((body.velocity() - (1 - std::exp(-1.5)) * Vec3(5, 0, 1)).norm(), 0, 1e-9);
 }
 
-// The air velocity is the one that particles feel. If the field has no drag of its own, the body's drag
+// The air velocity is the one that particles feel. If the field has no drag, the body's drag
 // coefficient applies.
 TEST(Air, MovesBodiesByItsOwnDragOrTheirs) {
   const Turbulence turbulence{.speed = 3, .drag = 0.5, .region = SphereRegion{{0, 0, 0}, 4}, .drop_rate = 1};

@@ -149,7 +149,7 @@ TEST(Decomposition, PartsShareTheCornersOfACutBitwise) {
   for (const Vec3& v : d.parts[0].vertices())
     shared += std::find(d.parts[1].vertices().begin(), d.parts[1].vertices().end(), v) !=
               d.parts[1].vertices().end();
-  EXPECT_GE(shared, 2);  // at least those of the reflex edge
+  EXPECT_GE(shared, 2);  // at least the corners of the reflex edge
 }
 
 /// Returns an L-shaped prism whose caps are triangulated by cutting ears, as model readers do. The third ear

@@ -41,8 +41,8 @@ TEST(SolidMass, OfCutShapesIsThatOfTheWholeWithoutTheCut) {
               {mass_properties(Shape(Box{{0.5, 0.45, 0.7}})), {Vec3(0, 0.025, 0), Quat::Identity()}, -1}}));
 }
 
-// The moments of an ellipsoid are V/5 (b^2 + c^2); Pappus gives the volume of a torus, and slices across its
-// axis its moment about it, by a sum of thin tubes.
+// The moments of an ellipsoid are V/5 (b^2 + c^2). Pappus' theorem gives the volume of a torus. The moment of
+// the torus about its axis is a sum over thin tubes around the axis.
 TEST(SolidMass, OfAnEllipsoidAndATorus) {
   const MassProperties e = mass_properties(Shape(Ellipsoid{{0.3, 0.2, 0.1}}));
   EXPECT_NEAR(e.volume, 4.0 / 3 * kPi * 0.006, 1e-15);

@@ -130,8 +130,8 @@ TEST(ParticleRest, SlidesByTheFrictionAlongAndAcrossTheFrictionAxis) {
   }
 }
 
-/// Releases a loose column of sand and returns the ratio of its final height to its radius. Particles do not
-/// rotate, so a regular lattice would not collapse.
+/// A heap to which a loose column of sand has collapsed. The particles do not rotate, so a regular lattice
+/// would not collapse.
 struct Heap {
   Real slope, kinetic_energy_each, overlap;
 };

@@ -87,7 +87,7 @@ TEST(CoupledSystem, APartResetAndSteppedAgainMovesTheSame) {
     all.restore(involved);
     EXPECT_NE(sky[bodies[0]].position, lone.position);
     EXPECT_NE(sky.world.systems[beads].arrays.position[0], held);
-    EXPECT_TRUE(same_state(sky[bodies[5]], other));  // not connected, hence unchanged
+    EXPECT_TRUE(same_state(sky[bodies[5]], other));  // not connected, so the body is unchanged
     const std::vector<Body*> part = connected(sky.world, involved);
     ASSERT_EQ(part, (std::vector<Body*>{sky.body(bodies[0]), sky.body(bodies[1]), sky.body(bodies[3])}));
     CoupledSystem again(sky.world, part);

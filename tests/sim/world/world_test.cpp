@@ -191,7 +191,7 @@ TEST(World, ANewParticleIsIntegratedOverItsPartOfTheSubStep) {
   EXPECT_NEAR(world.particles(system).age[0], 0.13, 1e-15);
 }
 
-/// The same equation of motion, written as a DynamicSystem of its own.
+/// The same equation of motion as a separate DynamicSystem.
 class DragAndGravity final : public DynamicSystem {
  public:
   void velocity(Real, std::span<const Real>, std::span<const Real> p, std::span<Real> dx) const override {
