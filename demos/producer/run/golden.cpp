@@ -93,6 +93,16 @@ std::string judge_frame(const GoldenFrame& expected, const GoldenFrame& actual, 
                      amount);
 }
 
+/// Returns the cache of convex decompositions for a golden. The user's cache is not used, so that goldens
+/// test decompositions, too. They are stored beside the states.
+DecompositionCache parts_cache(const GoldenStates& states) {
+  if (!states.from.empty()) return DecompositionCache(fs::path(states.from) / "parts");
+  if (states.keep.empty()) return {};
+  const fs::path folder = fs::path(states.keep) / "parts";
+  fs::remove_all(folder);  // decompositions of an earlier program
+  return DecompositionCache(folder);
+}
+
 }  // namespace
 
 std::vector<std::string> golden_overrides() {
@@ -147,8 +157,7 @@ Golden draw_golden(const LoadedScene& scene, int threads, const GoldenStates& st
   if (!states.from.empty()) job.cache = states.from;
   if (job.frames[0] == job.frames[1]) job.frames.pop_back();
   std::vector<Problem> warnings;
-  const ModelLibrary models(scene.scene, scene.folder, DecompositionCache(),
-                            warnings);  // no files from outside
+  const ModelLibrary models(scene.scene, scene.folder, parts_cache(states), warnings);
   MemorySink sink(golden.frames);
   const RunStats stats = render_frames(scene, models, job, sink, progress);
   if (stats.interrupted_by) throw Interrupted(stats.interrupted_by);

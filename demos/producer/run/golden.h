@@ -31,8 +31,8 @@ struct Golden {
   std::vector<GoldenFrame> frames;
 };
 
-/// Folders with the simulated states of a golden's frames. With these states, the frames can be drawn again
-/// without simulation. An empty name means no folder.
+/// Folders with the simulated states of a golden's frames and the convex decompositions of its models. With
+/// them, the frames can be drawn again without simulation. An empty name means no folder.
 struct GoldenStates {
   std::string keep;  ///< folder to which the states of the golden frames are written
   std::string from;  ///< folder from which the states are read, instead of simulating
