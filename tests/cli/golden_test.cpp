@@ -191,6 +191,23 @@ TEST(GoldenSuites, StatesOfManyScenesAreDrawnAgain) {
   EXPECT_EQ(offstage("compare a.json b.json --golden g --states kept", folder.path()).code, 0);
 }
 
+TEST(GoldenSuites, ConvexPartsAreStoredBesideTheStates) {
+  const TemporaryFolder folder;
+  write_file(folder / "wedge.obj",
+             "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+  write_file(folder / "a.json",
+             R"({"version": 1, "output": {"duration": 0.2}, "render": {"size": [32, 32]},
+                 "bodies": [{"motion": "static", "shape": {"type": "plane"}},
+                            {"shape": {"type": "mesh", "file": "wedge.obj"}, "position": [0, 2, 0]}]})");
+  ASSERT_EQ(offstage("bless a.json --golden g --reason new", folder.path(), "env -u CI").code, 0);
+  for (int round = 0; round < 2; ++round) {
+    const Outcome run = offstage("compare a.json --golden g --keep-states kept", folder.path());
+    EXPECT_EQ(run.code, 0) << run.out << run.err;
+    EXPECT_FALSE(std::filesystem::is_empty(folder / "kept/parts"));
+    EXPECT_EQ(offstage("compare a.json --golden g --states kept", folder.path()).code, 0);
+  }
+}
+
 TEST(GoldenSuites, ScenesAndPicturesDoNotMix) {
   const TemporaryFolder folder;
   write_file(folder / "a.json", falling_ball(1));

@@ -130,7 +130,8 @@ ConvexDecomposition DecompositionCache::decompose(const sim::TriangleMesh& mesh,
   if (folder_.empty()) return sim::decompose(mesh, sim::MeshTopology(mesh), settings);
   const XXH128_hash_t mesh_hash = hash_of(mesh, settings);
   const std::filesystem::path path = folder_ / name_of(mesh_hash);
-  if (auto known = read_kept(path, mesh_hash)) return std::move(*known);
+  if (reads_)
+    if (auto known = read_kept(path, mesh_hash)) return std::move(*known);
   ConvexDecomposition made = sim::decompose(mesh, sim::MeshTopology(mesh), settings);
   try {
     std::filesystem::create_directories(folder_);

@@ -11,8 +11,10 @@ namespace offstage::producer {
 
 class DecompositionCache {
  public:
-  /// Uses a folder, which is created when the first result is stored.
-  explicit DecompositionCache(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  /// Uses a folder, which is created when the first result is stored. `reads`: whether stored results are
+  /// used; if not, all are computed and replace the stored ones.
+  explicit DecompositionCache(std::filesystem::path folder, bool reads = true)
+      : folder_(std::move(folder)), reads_(reads) {}
   /// Creates a cache that stores nothing.
   DecompositionCache() = default;
   /// Uses $XDG_CACHE_HOME/offstage, else $HOME/.cache/offstage; stores nothing if neither is set.
@@ -30,6 +32,7 @@ class DecompositionCache {
 
  private:
   std::filesystem::path folder_;
+  bool reads_ = true;
 };
 
 }  // namespace offstage::producer

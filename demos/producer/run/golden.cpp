@@ -93,14 +93,12 @@ std::string judge_frame(const GoldenFrame& expected, const GoldenFrame& actual, 
                      amount);
 }
 
-/// Returns the cache of convex decompositions for a golden. The user's cache is not used, so that goldens
-/// test decompositions, too. They are stored beside the states.
+/// Returns the cache of convex decompositions for a golden. It neither uses the user's cache nor results of
+/// an earlier program, so that goldens test decompositions, too.
 DecompositionCache parts_cache(const GoldenStates& states) {
   if (!states.from.empty()) return DecompositionCache(fs::path(states.from) / "parts");
-  if (states.keep.empty()) return {};
-  const fs::path folder = fs::path(states.keep) / "parts";
-  fs::remove_all(folder);  // decompositions of an earlier program
-  return DecompositionCache(folder);
+  if (!states.keep.empty()) return DecompositionCache(fs::path(states.keep) / "parts", false);
+  return {};
 }
 
 }  // namespace
@@ -153,8 +151,8 @@ Golden draw_golden(const LoadedScene& scene, int threads, const GoldenStates& st
                 .threads = threads,
                 .cache = {},
                 .keep = {}};
-  if (!states.keep.empty()) job.keep = states.keep;
-  if (!states.from.empty()) job.cache = states.from;
+  if (!states.keep.empty()) job.keep = fs::path(states.keep) / "states";
+  if (!states.from.empty()) job.cache = fs::path(states.from) / "states";
   if (job.frames[0] == job.frames[1]) job.frames.pop_back();
   std::vector<Problem> warnings;
   const ModelLibrary models(scene.scene, scene.folder, parts_cache(states), warnings);

@@ -34,8 +34,8 @@ struct Golden {
 /// Folders with the simulated states of a golden's frames and the convex decompositions of its models. With
 /// them, the frames can be drawn again without simulation. An empty name means no folder.
 struct GoldenStates {
-  std::string keep;  ///< folder to which the states of the golden frames are written
-  std::string from;  ///< folder from which the states are read, instead of simulating
+  std::string keep;  ///< folder to which both are written, in the subfolders `states` and `parts`
+  std::string from;  ///< folder from which both are read, instead of simulating
 };
 
 /// The golden of a scene file, in a folder of goldens. Each golden records its scene file. Two scenes of the
