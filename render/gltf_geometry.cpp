@@ -121,12 +121,12 @@ void GltfGeometry::read_attributes(const Source& given, GltfPrimitive& result) {
   mesh.normals = vectors<3>(source.attribute(file_, "NORMAL", 3));
   if (!mesh.normals.empty()) mesh.tangents = vectors<4>(source.attribute(file_, "TANGENT", 4));
   const auto material = static_cast<std::size_t>(result.surface.material);
-  const auto& [first, second] = materials_.uv_sets(material);
+  const auto sets = materials_.uv_sets(material);
   const auto uvs = [&](int set) {
     if (set < 0) return std::vector<Vector2f>{};
     const std::string name = "TEXCOORD_" + std::to_string(set);
     std::vector<Vector2f> found = vectors<2>(source.attribute(file_, name, 2));
-    const int which = set == first ? 0 : 1;
+    const int which = set == sets[0] ? 0 : 1;
     bool used = false;
     for_each_texture(model_.materials[material],
                      [&](const TextureMap& map) { used |= map.image >= 0 && map.uv_set == which; });
@@ -134,8 +134,8 @@ void GltfGeometry::read_attributes(const Source& given, GltfPrimitive& result) {
       file_.warn(source.primitive.place() + " has no " + name + " for the textures of its material");
     return found;
   };
-  mesh.uvs = uvs(first);
-  mesh.second_uvs = uvs(second);
+  mesh.uvs = uvs(sets[0]);
+  mesh.second_uvs = uvs(sets[1]);
   if (source.primitive.child("attributes").has("COLOR_1"))
     file_.warn(source.primitive.place() + ": COLOR_1 is ignored; COLOR_0 colours vertices");
   const GltfNumbers colors = source.attribute(file_, "COLOR_0", 0);

@@ -37,6 +37,12 @@ struct Inputs {
   vec3 dFdy(const vec3&) const { return vec3(0.577f * footprint); }
 };
 
+// Clang before version 16 does not initialize the members of a struct by parentheses.
+#define PatternSample(...) \
+  PatternSample {          \
+    __VA_ARGS__            \
+  }
+
 struct Checker : Inputs {
 #define PATTERN 1
 #include "pattern.inc"

@@ -499,7 +499,7 @@ Single solve_single_rolling(PatchBatch& p, Single& u, FloatLanes gap, bool& all)
   friction.x += d.y;
   friction.y += d.z;
   p.pressure = zero;
-  p.holds = holds & (t * t + k * k < kHolds * limit_t * limit_k) ? float_lanes(1) : zero;
+  p.holds = (holds & (t * t + k * k < kHolds * limit_t * limit_k)) ? float_lanes(1) : zero;
   u = u + K * d;
   return d;
 }
