@@ -80,16 +80,13 @@ TEST(ConfinedChild, InheritsNoDescriptor) {
 
 TEST(ConfinedChild, FloodsAndCrashesAreErrorsOfTheFile) {
   const ScratchFolder scratch;
-  EXPECT_THROW(
-      answer_of(scratch.path(), []() -> std::string { return std::string(std::size_t{8} << 30, 'x'); }),
-      FileError);
-  EXPECT_THROW(answer_of(scratch.path(),
-                         []() -> std::string {
-                           ::raise(SIGSEGV);
-                           ::_exit(3);  // raise() was refused; this also ends the child
-                           return "";   // Clang 14 fails without it
-                         }),
-               FileError);
+  const auto flood = []() -> std::string { return std::string(std::size_t{8} << 30, 'x'); };
+  const auto crash = []() -> std::string {
+    ::raise(SIGSEGV);
+    ::_exit(3);  // raise() was refused; this also ends the child
+  };
+  EXPECT_THROW(answer_of(scratch.path(), flood), FileError);
+  EXPECT_THROW(answer_of(scratch.path(), crash), FileError);
 }
 
 TEST(ConfinedChild, AHangingJobIsEnded) {
