@@ -259,8 +259,8 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
     const RayMaterial& material = *hit.material;
     const Vector4f color = material.color(hit, travelled * path.cone);
     path.by_chance |= color.w() > 0 && color.w() < 1;
-    if (color.w() < 1 &&
-        sampler.next().x >= color.w()) {  // the path passes through a hole or a translucent surface
+    // The path passes through a hole or a translucent surface.
+    if (color.w() < 1 && sampler.next().x >= color.w()) {
       path.from = off_surface(hit.position, -hit.face);
       continue;
     }
@@ -334,11 +334,12 @@ AirLightAround LightTracer::trace_air(const Vector3f& place, float number, const
     PixelSampler sampler(bits >> 12, bits & 4095, offsets.index, offsets.count);
     const float choice = sampler.next().x;
     const GlowSample sample = sources_.glow.sample(place, Vector3f::Zero(), choice, sampler.next());
-    const Vector3f seen = scene_.transmittance(place, sample.towards, kBeforeGlow * sample.distance);
-    if (sample.density > 0)
+    if (sample.density > 0) {
+      const Vector3f seen = scene_.transmittance(place, sample.towards, kBeforeGlow * sample.distance);
       add(from_objects,
           kAirRays * kEvenDensity / (sample.density + kEvenDensity) * seen.cwiseProduct(sample.radiance),
           sample.towards);
+    }
   }
   AirLightAround result{.light = {}, .sky = above > 0 ? above_arrived / above : 1};
   for (int c = 0; c < 3; ++c) {

@@ -187,6 +187,7 @@ bool solve(const ImplicitSystem& system, const SpringRun& b, SpringRun& v) {
 bool solve_on_supports(ImplicitSystem& system, ClothPoints& points, const ClothRange& cloth,
                        const SpringRun& b, Real h, SpringRun& v) {
   const std::span<Support> supports = cloth.supports(points);
+  if (supports.empty()) return solve(system, b, v);
   std::vector<uint8_t> rests(supports.size());
   const auto velocity = [&](const Support& s) -> Vec4& { return v[s.point - cloth.begin]; };
   const auto lacks = [&](const Support& s) { return s.least(1) - h * s.normal.dot(velocity(s)); };
@@ -200,7 +201,6 @@ bool solve_on_supports(ImplicitSystem& system, ClothPoints& points, const ClothR
       velocity(supports[k]) += lacks(supports[k]) / h * supports[k].normal;
     }
     const bool converged = solve(system, b, v);
-    if (supports.empty()) return converged;
     system.multiply_all(v, image);
     bool changed = false;
     for (std::size_t k = 0; k < supports.size(); ++k) {
