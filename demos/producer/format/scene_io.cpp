@@ -74,7 +74,7 @@ std::vector<Problem> drop_retired_keys(SceneSource& source) {
     if (owner == nullptr || !owner->find(key)) continue;
     const Where where = source.locate("/" + std::string(name) + "/" + key);
     warnings.push_back({where, "has no effect since light is traced; remove it"});
-    const std::string retired = key;
+    const std::string retired = key;  // Clang 14 cannot capture `key`
     std::erase_if(std::get<Object>(owner->value),
                   [&](const Member& member) { return member.key == retired; });
   }

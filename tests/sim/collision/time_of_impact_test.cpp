@@ -120,7 +120,7 @@ TEST(TimeOfImpact, RollingAboveTheFloorNeedsFewAdvances) {
        {Frustum{0.2, 0.2, 0.1}, Quat(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitX()))}}};
   for (const auto& [shape, orientation] : wheels) {
     const Convex wheel = convex(shape);
-    const Quat start = orientation;
+    const Quat start = orientation;  // Clang 14 cannot capture `orientation`
     const auto path_to = [&](Real end_height) {
       return PosePath(Pose{Vec3(-0.3, height, 0), start},
                       Pose{Vec3(0.3, end_height, 0), Quat(Eigen::AngleAxisd(-3, Vec3::UnitZ())) * start});
