@@ -124,8 +124,8 @@ bool is_known_extension(const std::string& name) {
 /// Returns the names of all extensions in a document. Application data (`extras`) are not searched.
 std::set<std::string> extensions_within(const GltfValue::Json& document) {
   std::set<std::string> names;
-  std::vector<const GltfValue::Json*> stack = {
-      &document};  // a recursion would be unsafe, because the depth depends on the file
+  // A recursion would be unsafe, because the depth depends on the file.
+  std::vector<const GltfValue::Json*> stack = {&document};
   while (!stack.empty()) {
     const GltfValue::Json& json = *stack.back();
     stack.pop_back();

@@ -119,8 +119,8 @@ class GltfImporter {
  private:
   std::vector<std::size_t> roots() const {
     std::vector<std::size_t> result;
-    if (file_.count("scenes") ==
-        0) {  // without a scene, the file is a library of meshes: all nodes without a parent are used
+    // Without a scene, the file is a library of meshes: all nodes without a parent are used.
+    if (file_.count("scenes") == 0) {
       std::vector<bool> is_child(nodes_->size(), false);
       for (std::size_t i = 0; i < nodes_->size(); ++i)
         for (const std::size_t child : nodes_->children(i)) is_child[child] = true;

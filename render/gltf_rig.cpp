@@ -205,8 +205,8 @@ std::optional<RigChannel> GltfRig::channel(const GltfValue& animation, std::size
   if (!known || !node || !sampler_index) return std::nullopt;
   channel.node = rig_index_[*node];
   const std::size_t targets = rig_.nodes[static_cast<std::size_t>(channel.node)].weights.size();
-  if (channel.path == Path::weights && targets == 0)
-    return std::nullopt;  // the mesh of this node has no morph targets
+  // The node has no mesh with morph targets.
+  if (channel.path == Path::weights && targets == 0) return std::nullopt;
   const GltfValue sampler = animation.item("samplers", *sampler_index);
   const std::string how = sampler.text("interpolation", "LINEAR");
   channel.interpolation = how == "STEP"          ? RigChannel::Interpolation::step

@@ -51,8 +51,8 @@ class LightPass {
   RayScene scene_;
   Eigen::AlignedBox2i all_px_;
   LightSums sums_;
-  SurfaceBuffer
-      surfaces_;  ///< the surfaces whose light was traced last: all opaque surfaces, or a translucent part
+  /// The surfaces whose light was traced last: all opaque surfaces, or a translucent part.
+  SurfaceBuffer surfaces_;
   LightBuffer light_;
   bool quick_;
   gl::Texture places_, normals_;

@@ -82,8 +82,8 @@ class MaterialImporter {
         material.color == Vector4f::Ones()) {
       give_default_look(material);
     }
-    if (!gltf &&
-        material.color.w() < 1e-3f) {  // many programs write the transparency in place of the opacity
+    // Many programs write the transparency in place of the opacity.
+    if (!gltf && material.color.w() < 1e-3f) {
       material.color.w() = 1;
       model_.warnings.push_back("material '" + material.name + "': opacity 0 is read as opaque");
     }

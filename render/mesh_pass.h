@@ -148,8 +148,8 @@ class MeshPass {
   gl::Texture white_;
   gl::StreamBuffer rows_;
   std::vector<Batch> opaque_, translucent_;
-  std::vector<const Instance*>
-      see_through_;  ///< instances whose material lets light through, in the order of all
+  /// Instances whose material lets light through, in the order of all.
+  std::vector<const Instance*> see_through_;
 };
 
 }  // namespace offstage::render

@@ -11,8 +11,8 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr std::size_t kMostCorners =
-    1024;  // greatest number of corners; the time grows with its square, in the worst case with its cube
+/// Greatest number of corners. The time grows with its square, in the worst case with its cube.
+constexpr std::size_t kMostCorners = 1024;
 /// Areas below this fraction of the square of the polygon's extent count as zero.
 constexpr double kNoArea = 1e-12;
 

@@ -12,11 +12,10 @@ namespace {
 
 constexpr GLuint kColorUnit = 6, kLowDepthUnit = 7;
 constexpr float kMostOpaque = 0.98f;  // greatest opacity of one puff, so that its optical depth is finite
-constexpr double kHalf_px = 8,
-                 kQuarter_px =
-                     64;  // radii from which on the picture is drawn at half and at a quarter of its size
-constexpr float kNearestPuff =
-    1.2f;  // radius from which on a puff fades out, as a fraction of half the picture's height
+/// Radii of puffs from which on their picture is drawn at half and at a quarter of the size.
+constexpr double kHalf_px = 8, kQuarter_px = 64;
+/// Radius from which on a puff fades out, as a fraction of half the picture's height.
+constexpr float kNearestPuff = 1.2f;
 constexpr float kTolerance = 0.25f;  // depth in typical radii over which puffs change little
 constexpr float kFlameCover = 0.6f;  // flames contain soot, so that the brightness of deep flames has a limit
 constexpr float kFlameWobble = 0.5f;  // [rad]

@@ -157,8 +157,8 @@ Vector3f SkyGrid::at(const Vector3f& direction) const {
 
 SkyGrid resampled(const SkyGrid& grid, int columns, int rows) {
   // Sums the cells within each row, and then the rows, weighted by the solid angle of their contribution.
-  const auto fraction_of = [](int from, int to, int k,
-                              int j) {  // fraction of cell k of `from` that lies in cell j of `to`
+  // Returns the fraction of cell k of `from` that lies in cell j of `to`.
+  const auto fraction_of = [](int from, int to, int k, int j) {
     const double a = static_cast<double>(j) * from / to, b = static_cast<double>(j + 1) * from / to;
     return std::max(std::min<double>(k + 1, b) - std::max<double>(k, a), 0.0);
   };

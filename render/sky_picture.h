@@ -67,9 +67,9 @@ class SkyPicture {
   struct Irradiance {
     Vector3f constant = Vector3f::Zero();
     Eigen::Matrix3f slope = Eigen::Matrix3f::Zero();  ///< rows: red, green, blue
-    std::array<Eigen::Matrix3f, 3> curvature = {
-        Eigen::Matrix3f::Zero(), Eigen::Matrix3f::Zero(),
-        Eigen::Matrix3f::Zero()};  ///< symmetric matrices with the trace 0
+    /// Symmetric matrices with the trace 0.
+    std::array<Eigen::Matrix3f, 3> curvature = {Eigen::Matrix3f::Zero(), Eigen::Matrix3f::Zero(),
+                                                Eigen::Matrix3f::Zero()};
   };
   const Irradiance& irradiance() const { return irradiance_; }
 

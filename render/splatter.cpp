@@ -14,8 +14,8 @@ namespace {
 
 constexpr int kTileWidth_px = 64, kTileHeight_px = 16;
 constexpr int kTilePixels = kTileWidth_px * kTileHeight_px;
-constexpr float kHidden =
-    1.0f / 512;  // if less than this fraction of the background is visible, it counts as hidden
+/// The background counts as hidden if less than this fraction of it is visible.
+constexpr float kHidden = 1.0f / 512;
 constexpr int kCheckEvery = 24;
 
 struct Tile {

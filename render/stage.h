@@ -72,10 +72,10 @@ struct Environment {
   /// A picture of the sky that lights the scene in place of the colours, scaled by `intensity`; null: none.
   /// Clouds are then not drawn.
   std::shared_ptr<const SkyPicture> picture = {};
-  float picture_turn_deg =
-      0;  ///< rotation of the picture about +Y [degrees], counter-clockwise as seen from above
-  bool picture_visible =
-      true;  ///< whether the background shows the picture; false: the background and the fog have the colours
+  /// Rotation of the picture about +Y [degrees], counter-clockwise as seen from above.
+  float picture_turn_deg = 0;
+  /// Whether the background shows the picture; false: the background and the fog keep the colours above.
+  bool picture_visible = true;
 };
 
 /// One drawn particle.

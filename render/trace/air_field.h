@@ -15,8 +15,8 @@ class AirField {
   /// A particle.
   struct Ball {
     Vector3f center;
-    float
-        number;  ///< constant pseudo-random number in [0, 1), which selects the traced particles and the rays
+    /// Constant pseudo-random number in [0, 1), which selects the traced particles and the rays.
+    float number;
   };
   /// Traces the light of a sub-frame at some of the `balls`. `open`: see LightTracer::trace_air.
   AirField(const LightTracer& tracer, const SampleOffsets& offsets, std::span<const Ball> balls,

@@ -105,8 +105,8 @@ LightTracer::Photon LightTracer::trace_photon(const Beam& beam, uint32_t number,
       return photon;
     const RayMaterial& material = *hit.material;
     const Vector4f color = material.color(hit, 0);
-    if (color.w() < 1 &&
-        sampler.next().x >= color.w()) {  // the photon passes through a hole or a translucent surface
+    // The photon passes through a hole or a translucent surface.
+    if (color.w() < 1 && sampler.next().x >= color.w()) {
       path.from = off_surface(hit.position, -hit.face);
     } else if (material.transmission <= 0) {
       photon.pixel = visible.find(hit);

@@ -74,8 +74,8 @@ GlowSample Glow::Source::sample_area(const Vector3f& place, float choice,
   const unsigned triangle = mesh->triangle_at(choice);
   const std::array<Vector3f, 3> p = mesh->corners(triangle, world_from_mesh);
   const float root = std::sqrt(uv.x);
-  const Vector2f b(root * (1 - uv.y),
-                   root * uv.y);  // barycentric coordinates, uniformly distributed over the triangle
+  // Barycentric coordinates, uniformly distributed over the triangle.
+  const Vector2f b(root * (1 - uv.y), root * uv.y);
   const Vector3f offset = p[0] + b.x() * (p[1] - p[0]) + b.y() * (p[2] - p[0]) - place;
   const Vector3f normal = (p[1] - p[0]).cross(p[2] - p[0]);
   GlowSample result;

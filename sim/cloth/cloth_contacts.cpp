@@ -262,8 +262,8 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
     uint32_t cloth;
     bool moves = true;  // whether the body moves in this sub-step; a body that holds cloth would move this
                         // cloth beyond its limits
-    Real fraction =
-        1;  // 1 / number of the body's contacts, because all their impulses are found at the same time
+    // 1 / number of the body's contacts, because all their impulses are found at the same time.
+    Real fraction = 1;
     // Recoil of the cloth due to a unit impulse at each of its contacts, times the fraction [1/kg].
     Real recoil = 0;
     Real impulse = 0;  // impulse so far [N s]

@@ -56,8 +56,8 @@ class ExactContacts {
   // By contact: absolute value of the speed at the start minus the part due to rotation [m/s].
   std::vector<Real> approach_;
   std::vector<uint8_t> closing_;  // by body: whether a contact of it closed in the interval
-  std::vector<Real>
-      rest_;  // by body: mean change of velocity over the interval, divided by the change at its end
+  // By body: mean change of velocity over the interval, divided by the change at its end.
+  std::vector<Real> rest_;
   bool may_divide_ = false;                  // whether the interval of the island may be divided
   std::vector<ClosingPoint> points_;         // by contact
   std::vector<Displacement> displacements_;  // by body, if the interval was divided

@@ -27,8 +27,8 @@ struct RandomScene {
   struct Spring {
     SpringDef def;
     std::size_t a = 0;
-    std::optional<std::size_t>
-        b;  ///< body at the second end; none: the end is the point of the world in `def`
+    /// Body at the second end; none: the end is the point of the world in `def`.
+    std::optional<std::size_t> b;
   };
 
   uint64_t seed = 0;

@@ -179,8 +179,8 @@ TEST(Articulations, AChainWithBendStiffnessSwingsAsACantilever) {
     const auto end = sags.begin() + static_cast<std::ptrdiff_t>(1.2 * 2 * std::numbers::pi / omega * 60);
     const auto lowest = std::max_element(sags.begin(), end), highest = std::min_element(lowest, end);
     EXPECT_NEAR(static_cast<Real>(highest - lowest) / 60, std::numbers::pi / omega, 1.0 / 60) << solver;
-    const Real decay =
-        std::exp(-std::numbers::pi * omega / 480 / 2);  // factor of the amplitude in half a period
+    // Factor of the amplitude in half a period.
+    const Real decay = std::exp(-std::numbers::pi * omega / 480 / 2);
     EXPECT_NEAR(*lowest, rest * (1 + decay), 0.1 * rest) << solver;
     EXPECT_NEAR(*highest, rest * (1 - decay * decay), 0.1 * rest) << solver;
   }

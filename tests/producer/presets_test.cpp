@@ -110,8 +110,8 @@ TEST(Effects, ParticleEventsCreateOtherParticles) {
   };
   while (simulation.frame() < 9) simulation.advance();  // 0.4 s: all particles are in flight
   EXPECT_EQ(counts(), (std::vector<std::size_t>{4, 32, 8, 0, 0}));
-  while (simulation.frame() < 13)
-    simulation.advance();  // 0.6 s: all particles hit the ground once, at 0.55 s
+  // 0.6 s: all particles hit the ground once, at 0.55 s.
+  while (simulation.frame() < 13) simulation.advance();
   EXPECT_EQ(counts(), (std::vector<std::size_t>{4, 48, 8, 12, 0}));
   while (simulation.frame() < 23) simulation.advance();  // 1.1 s: all particles have died
   const std::vector<std::size_t> end = counts();

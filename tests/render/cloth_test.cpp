@@ -135,8 +135,8 @@ TEST(StageCloth, LightShinesThroughAThinSheetAndOnlyThroughThat) {
     return center_pixel(s.draw()).x();
   };
   EXPECT_LT(seen(0), 0.02f);
-  EXPECT_NEAR(seen(0.5f), 0.5f * 0.9f,
-              0.1f);  // half of the light; the wrapped lighting removes a tenth or more
+  // Half of the light; the wrapped lighting removes a tenth or more.
+  EXPECT_NEAR(seen(0.5f), 0.5f * 0.9f, 0.1f);
 }
 
 TEST(StageCloth, SheetInGrazingLightDoesNotShadowItself) {

@@ -214,8 +214,8 @@ class Flag {
     for (uint32_t i = 0; i < def.vertices.size(); ++i)
       if (def.vertices[i].x() < -0.499) def.pins.push_back({.vertex = i, .position = def.vertices[i]});
     def.rest_vertices = def.vertices;
-    for (Vec3& p : def.vertices)
-      p.z() += 0.002 * std::sin(6 * (p.x() + 0.5));  // a small deflection, from which the motion grows
+    // A small deflection, from which the motion grows.
+    for (Vec3& p : def.vertices) p.z() += 0.002 * std::sin(6 * (p.x() + 0.5));
     cloth_ = world_.add_cloth(def);
   }
 

@@ -20,8 +20,8 @@ inline constexpr std::size_t kMaxClothVertices = 250'000;
 /// A cloth that is not deformed: its vertices in its own frame, and its definition in the world.
 struct FlatCloth {
   sim::ClothDef def;  ///< definition of the cloth without its pins, because pins refer to bodies
-  std::vector<Vec3>
-      places;  ///< positions of the vertices in the cloth's frame, without the vertices of cords [m]
+  /// Positions of the vertices in the cloth's frame, without the vertices of cords [m].
+  std::vector<Vec3> places;
   std::vector<Eigen::Vector2f> uvs;  ///< coordinates along the cloth for all vertices [m]
   std::vector<uint32_t> cord_ends;   ///< for each cord, the index of its last vertex
 

@@ -43,9 +43,8 @@ struct LampOf {
   }
 
   std::optional<render::Lamp> operator()(const SunLight&) const { return {}; }
-  std::optional<render::Lamp> operator()(const ModelLights&) const {
-    return {};
-  }  // the lights of a file are several lamps; see lamps_of()
+  // The lights of a file are several lamps; see lamps_of().
+  std::optional<render::Lamp> operator()(const ModelLights&) const { return {}; }
   std::optional<render::Lamp> operator()(const PointLight& l) const {
     render::Lamp lamp = base(l);
     lamp.radius = to_float(l.radius);

@@ -24,8 +24,8 @@ void append_cloud(const render::PointCloud& cloud, ParticleGroup& group) {
   const std::size_t n = cloud.positions.size(),
                     taken = std::min(n, static_cast<std::size_t>(group.max_points));
   for (std::size_t k = 0; k < taken; ++k) {
-    const std::size_t i =
-        k * n / taken;  // the product does not overflow, because both factors are at most 2e7
+    // The product does not overflow, because both factors are at most 2e7.
+    const std::size_t i = k * n / taken;
     ParticlePlace place;
     place.position = group.position + group.orientation * (scale * cloud.positions[i].cast<Real>());
     if (!cloud.colors.empty()) place.color = Color{cloud.colors[i]};

@@ -29,8 +29,8 @@ class JointChecker : CheckBase {
     for (const ArticulationTemplate& articulation : scene_.articulations)
       std::visit(
           [this](const auto& a) {
-            if (!a.where.path.empty())
-              check(a);  // an empty path: the type was invalid, so the articulation was not read
+            // The path is empty if the type was invalid. The articulation was not read then.
+            if (!a.where.path.empty()) check(a);
           },
           articulation);
   }

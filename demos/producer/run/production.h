@@ -82,8 +82,8 @@ struct Progress {
   /// Numbers of simulated frames and of frames to simulate. They include frames that are simulated but not
   /// drawn. Both are 0 if nothing is simulated.
   int frames_simulated = 0, frames_to_simulate = 0;
-  bool frame_finished =
-      true;  ///< whether the progress is reported for a finished frame; false: for a simulated one
+  /// Whether the progress is reported for a finished frame; false: for a simulated one.
+  bool frame_finished = true;
   /// Time spent so far. The time of drawing includes encoding, and is summed over all threads.
   double simulating_s = 0, drawing_s = 0;
 };

@@ -28,8 +28,8 @@ enum class LookStyle { sprite, streak, sphere, smoke, fire, flake, drop, spark, 
 /// particle's radius.
 struct LookMesh {
   Shape shape = sim::Box{};
-  std::string
-      material;  ///< name of the material; empty: the default material, or the material of the model file
+  /// Name of the material; empty: the default material, or the material of the model file.
+  std::string material;
   std::optional<Vec3> axis;   ///< axis of rotation; default: a random axis for each particle
   bool along_motion = false;  ///< whether the mesh's +Y axis points along the velocity
 };

@@ -122,8 +122,8 @@ struct Body {
   Shape shape = sim::Box{};
   std::optional<ModelLook> model;
   std::optional<ModelAnimation> animation;
-  std::string
-      material;  ///< name of the material; empty: the default material, or the material of the model file
+  /// Name of the material; empty: the default material, or the material of the model file.
+  std::string material;
   Vec3 position = Vec3::Zero();
   Quat orientation = Quat::Identity();
   Vec3 velocity = Vec3::Zero();
@@ -137,8 +137,8 @@ struct Body {
   Real linear_drag = 0;
   Real angular_drag = 0;
   Vec3 friction_axis = Vec3::Zero();  ///< friction axis of the surface, in the body's frame
-  Vec3 surface_velocity =
-      Vec3::Zero();  ///< velocity of the surface relative to the body, in the body's frame
+  /// Velocity of the surface relative to the body, in the body's frame.
+  Vec3 surface_velocity = Vec3::Zero();
   bool collides = true;
   bool visible = true;
   bool casts_shadow = true;
@@ -187,8 +187,8 @@ struct TreeOverlay : LineLook {
   Where where;
   std::string body;
   BoundingVolumeKind volume = BoundingVolumeKind::obb;
-  Varying level =
-      3.0;  ///< level that is drawn, 0 is the root; between two integers the levels fade into each other
+  /// Level that is drawn, 0 is the root; between two integers the levels fade into each other.
+  Varying level = 3.0;
 };
 /// Draws the convex parts of a mesh body in different colours, instead of the body.
 struct PartsOverlay {
@@ -282,8 +282,8 @@ struct CameraKey {
   Real time = 0;
   Vec3 eye = {4, 2.5, 6};
   Vec3 target = Vec3::Zero();
-  std::optional<Real> fov_deg,
-      focus;  ///< field of view and focus distance at this key; default: those of the camera
+  /// Field of view and focus distance at this key; default: those of the camera.
+  std::optional<Real> fov_deg, focus;
   /// Interpolation to the next key; default: the interpolation of the camera.
   std::optional<sim::Interpolation> interpolation;
 };
@@ -375,8 +375,8 @@ struct SkyPictureSettings {
 struct EnvironmentSettings {
   Color zenith{{0.2f, 0.42f, 0.88f, 1}};
   Color horizon{{0.95f, 1.05f, 1.15f, 1}};
-  std::optional<Color>
-      ground;  ///< colour below the horizon; default: the light that the ground plane reflects
+  /// Colour below the horizon; default: the light that the ground plane reflects.
+  std::optional<Color> ground;
   Real intensity = 1;
   Real fog = 0;
   Real clouds = 0;

@@ -45,8 +45,8 @@ TEST(ContactFrame, RateIsTheDerivative) {
     const auto at = [&](Real t) { return contact_frame(Quat(Eigen::AngleAxisd(t, w)) * n); };
     const Vec3 size = n.cwiseAbs();
     const Real second = size.sum() - size.minCoeff() - size.maxCoeff();
-    if (second - size.minCoeff() < 10 * h)
-      continue;  // skipped: another component becomes the smallest within h
+    // Skipped: another component becomes the smallest within h.
+    if (second - size.minCoeff() < 10 * h) continue;
     const ContactFrame rate = contact_frame_rate(contact_frame(n), w.cross(n));
     const Mat3 difference = (matrix(at(h)) - matrix(at(-h))) / (2 * h);
     ASSERT_LT((matrix(rate) - difference).norm(), 1e-9);
