@@ -26,7 +26,8 @@ Lamp lamp_of_fire(const PointSet& flames) {
       side * (1 - std::exp(-kCover * std::numbers::pi_v<float> * area / std::max(side, 1e-6f)));
   return {.position = place / area,
           .intensity = kDimmed * light / area * (shown / std::numbers::pi_v<float>),
-          .radius = 0.25f * std::min(sizes.x(), sizes.y())};
+          .radius = 0.25f * std::min(sizes.x(), sizes.y()),
+          .in_mirrors = true};
 }
 
 }  // namespace offstage::render

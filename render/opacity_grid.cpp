@@ -67,6 +67,11 @@ void OpacityGrid::deposit(const Vector3f& place, float depth) {
   }
 }
 
+float sun_fraction_in_smoke(float depth, float albedo) {
+  return 0.68f * std::exp(-depth) +
+         albedo * (0.3f * std::exp(-0.35f * depth) + 0.12f * albedo * std::exp(-0.1f * depth));
+}
+
 void OpacityGrid::build(std::span<const Absorber> absorbers, const Vector3f& away) {
   sums_.clear();
   amounts_.clear();

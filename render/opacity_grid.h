@@ -13,6 +13,10 @@ namespace offstage::render {
 
 using Eigen::Vector3f;
 
+/// Returns the fraction of sunlight that arrives at an optical depth in smoke with the reflectance `albedo`.
+/// It is the sum of light that was scattered once, a few times and many times.
+float sun_fraction_in_smoke(float depth, float albedo);
+
 class OpacityGrid {
  public:
   struct Absorber {

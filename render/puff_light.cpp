@@ -5,17 +5,6 @@
 #include <cmath>
 
 namespace offstage::render {
-namespace {
-
-// Returns the fraction of sunlight that arrives at an optical depth in smoke. It is the sum of light that was
-// scattered once, a few times and many times.
-float sun_fraction(float depth, float albedo) {
-  return 0.68f * std::exp(-depth) +
-         albedo * (0.3f * std::exp(-0.35f * depth) + 0.12f * albedo * std::exp(-0.1f * depth));
-}
-
-}  // namespace
-
 PuffLight::PuffLight(const OpacityGrid& opacity, const FrameUniforms& frame_uniforms,
                      const SkyModel& sky_model, const Vector3f& sun_direction, const AirLight& air_light,
                      const AirField& light_around)
@@ -50,9 +39,9 @@ AirRadiance PuffLight::radiance(const Vector3f& place, float radius, const Vecto
   const float white = albedo.maxCoeff();
   const float steepness = slope.norm();
   const float change = std::min(radius * steepness, 3.0f);
-  const float middle = sun_fraction(depth, white), direct = std::exp(-depth);
-  const float light = sun_fraction(std::max(depth - change, 0.0f), white),
-              dark = sun_fraction(depth + change, white);
+  const float middle = sun_fraction_in_smoke(depth, white), direct = std::exp(-depth);
+  const float light = sun_fraction_in_smoke(std::max(depth - change, 0.0f), white),
+              dark = sun_fraction_in_smoke(depth + change, white);
   const float forward = std::max(-to_sun.dot(to_eye), 0.0f), forward2 = forward * forward;
   const Vector3f sun = air.sun(place, radius, number) * frame.sun_radiance.head<3>();
   const float sky_fraction = 0.25f + 0.75f * std::exp(-0.6f * above);

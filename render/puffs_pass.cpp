@@ -16,8 +16,7 @@ constexpr float kMostOpaque = 0.98f;  // greatest opacity of one puff, so that i
 constexpr double kHalf_px = 8, kQuarter_px = 64;
 /// Radius from which on a puff fades out, as a fraction of half the picture's height.
 constexpr float kNearestPuff = 1.2f;
-constexpr float kTolerance = 0.25f;  // depth in typical radii over which puffs change little
-constexpr float kFlameCover = 0.6f;  // flames contain soot, so that the brightness of deep flames has a limit
+constexpr float kTolerance = 0.25f;   // depth in typical radii over which puffs change little
 constexpr float kFlameWobble = 0.5f;  // [rad]
 constexpr float kSpin = 0.35f;        // [rad/s]
 
@@ -54,7 +53,17 @@ void add_drops(const PointSet& set, std::vector<OpacityGrid::Absorber>& absorber
 // Thin parts of flames are redder.
 constexpr float kFlameThin[3] = {0.85f, 0.45f, 0.2f}, kFlameThick[3] = {0.3f, 0.75f, 1.0f};
 
+// The mean of the normal's component towards the eye, over the disc of a ball.
+constexpr float kMeanTowards = 2.0f / 3;
+
 }  // namespace
+
+Vector3f mean_radiance_of_flame(float number) {
+  Vector3f result;
+  for (int k = 0; k < 3; ++k)
+    result[k] = (0.5f + Shape(number).turn) * (kFlameThin[k] + kMeanTowards * kFlameThick[k]);
+  return result;
+}
 
 void PuffsPass::prepare(std::span<const PointSet* const> sets, const Sun& sun) {
   std::vector<OpacityGrid::Absorber> absorbers;

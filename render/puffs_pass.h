@@ -18,6 +18,13 @@
 
 namespace offstage::render {
 
+/// Flames contain soot, so that the brightness of deep flames has a limit: opacity of flames against the
+/// background, as a fraction.
+inline constexpr float kFlameCover = 0.6f;
+/// Returns the mean radiance of a flame, per channel, as a factor of its colour. `number`: the pseudo-random
+/// number of its point.
+Vector3f mean_radiance_of_flame(float number);
+
 class PuffsPass {
  public:
   PuffsPass(int width_px, int height_px) : width_px_(width_px), height_px_(height_px) {}

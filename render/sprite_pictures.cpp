@@ -134,6 +134,14 @@ gl::Texture upload_group(const TextureGroup& group) {
 
 }  // namespace
 
+Vector4f SpritePictures::mean(std::size_t picture) const {
+  const std::vector<uint8_t>& pixel = levels[picture].back();  // the smallest level has one pixel
+  Vector4f result;
+  for (std::size_t c = 0; c < 4; ++c) result[static_cast<int>(c)] = static_cast<float>(pixel[c]) / 255;
+  for (int c = 0; c < 3; ++c) result[c] = srgb_decode(result[c]);
+  return result;
+}
+
 SpritePictures sprite_pictures(const Image& sheet, int columns, int rows) {
   if (columns < 1 || rows < 1 || columns > kMostSheetPictures / rows)
     throw std::invalid_argument("a sheet has 1 to " + std::to_string(kMostSheetPictures) + " pictures");

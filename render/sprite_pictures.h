@@ -9,6 +9,7 @@
 
 #include "render/gl.h"
 #include "render/image.h"
+#include "render/mesh.h"
 
 namespace offstage::render {
 
@@ -18,6 +19,8 @@ struct SpritePictures {
   /// For each picture its mip levels, encoded: RGBA, sRGB colour with premultiplied alpha, rows from the top.
   std::vector<std::vector<std::vector<uint8_t>>> levels;
   bool operator==(const SpritePictures&) const = default;
+  /// Returns the mean of a picture: linear colour, premultiplied; w: opacity.
+  Vector4f mean(std::size_t picture) const;
 };
 
 /// Cuts a sheet into pictures, in rows from the upper left corner. Each has mip levels of its own, so that

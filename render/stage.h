@@ -54,6 +54,9 @@ struct Lamp {
   /// proportion to the cosine.
   bool squared_edge = false;
   bool shadows = true;
+  /// Whether mirror images show the source of the light, as flames. Surfaces with a mirror image then have no
+  /// highlight of the lamp.
+  bool in_mirrors = false;
 };
 
 /// The sky with its ambient light, and the fog. Colours are radiances.

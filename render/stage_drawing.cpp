@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "render/particle_rays.h"
 #include "render/stage_impl.h"
 #include "render/texture.h"
 
@@ -124,11 +125,13 @@ void Stage::Impl::draw_surfaces(std::span<const Cloth* const> sheets, std::span<
 }
 
 void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
-                              std::span<PointSet* const> sets, const View& view, const SampleOffsets& offsets,
-                              const StopTest& stop) {
+                              std::span<PointSet* const> sets, const View& view, const FrameUniforms& frame,
+                              const SampleOffsets& offsets, const StopTest& stop) {
   RayScene& scene = light_pass.scene();
   scene.clear();
   light_sources = {.sun = sun, .sky = sky, .fog = environment.fog};
+  light_sources.open_air.constant = frame.irradiance_at(0);
+  light_sources.open_air.slope << frame.irradiance_at(3), frame.irradiance_at(1), frame.irradiance_at(2);
   for (const Instance* instance : shown) {
     if (!instance->visible) continue;
     const RayMaterial& material = *instance->material->rays;
@@ -166,6 +169,8 @@ void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<
   }
   if (sky.has_bright_part()) light_sources.lamps.emplace_back(sky.turned);
   if (!puffs_pass.grid().empty()) light_sources.smoke = &puffs_pass.grid();
+  set_particles(ray_particles, sets, view, frame.eye.w());
+  if (!ray_particles.empty()) light_sources.particles = &ray_particles;
   light_pass.trace(light_sources, view, offsets, stop);
 }
 
@@ -353,10 +358,8 @@ void Stage::Impl::draw_translucent(std::span<const Cloth* const> sheets, std::sp
   probe_surfaces(bodies, sets, frame, regions);
   paint_order.build(sets, regions, view);
   const AirLight air(light_pass.scene(), light_sources, offsets);
-  AirRadiance open{.constant = frame.irradiance_at(0)};
-  open.slope << frame.irradiance_at(3), frame.irradiance_at(1), frame.irradiance_at(2);
   const AirField around(LightTracer(light_pass.scene(), light_sources), offsets, lit_particles(paint_order),
-                        open);
+                        light_sources.open_air);
   SkyModel sky_of_frame = sky;
   sky_of_frame.sun_direction = frame.sun_direction.head<3>();
   const PuffLight light(puffs_pass.grid(), frame, sky_of_frame, sun.direction.normalized(), air, around);
@@ -426,7 +429,7 @@ void Stage::draw(const SampleOffsets& offsets, HdrImage& sum, const StopTest& st
   s.mesh_pass.prepare(shown, view, s.features);
   const std::vector<const Cloth*> sheets = s.prepare_cloths();
   s.draw_surfaces(sheets, sets);
-  s.trace_light(shown, sheets, sets, view, offsets, stop);
+  s.trace_light(shown, sheets, sets, view, frame, offsets, stop);
   s.draw_opaque(sheets, sets);
   s.trace_glass(view, offsets);
   s.draw_translucent(sheets, sets, view, frame, offsets);

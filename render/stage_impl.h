@@ -84,6 +84,7 @@ struct Stage::Impl {
   Features features;                    ///< light-dependent definitions for the shaders in this sub-frame
   bool particles_behind_glass = false;  ///< whether this sub-frame may show particles through glass
   LightSources light_sources;           ///< sources of light in this sub-frame
+  RayParticles ray_particles;           ///< the particles in mirror images of this sub-frame
 
   Slots<std::unique_ptr<GpuMesh>, MeshTag> meshes{"mesh"};
   Slots<std::unique_ptr<GpuMaterial>, MaterialTag> materials{"material"};
@@ -132,8 +133,8 @@ struct Stage::Impl {
   std::vector<const Cloth*> prepare_cloths();
   void prepare_lamps(std::span<PointSet* const> sets);
   void trace_light(std::span<const Instance* const> shown, std::span<const Cloth* const> sheets,
-                   std::span<PointSet* const> sets, const View& view, const SampleOffsets& offsets,
-                   const StopTest& stop);
+                   std::span<PointSet* const> sets, const View& view, const FrameUniforms& frame,
+                   const SampleOffsets& offsets, const StopTest& stop);
   void trace_glass(const View& view, const SampleOffsets& offsets);
   void draw_surfaces(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets);
   void draw_opaque(std::span<const Cloth* const> sheets, std::span<PointSet* const> sets);

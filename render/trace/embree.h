@@ -9,7 +9,22 @@
 #include <embree3/rtcore.h>
 #endif
 
+#include "render/mesh.h"
+#include "render/trace/ray_tree.h"
+
 namespace offstage::render::embree {
+
+/// Returns the device of the process. The instruction set is fixed, because others round hit distances
+/// differently.
+RTCDevice device();
+/// Returns an empty hierarchy.
+RayTree make_tree(RTCBuildQuality quality);
+/// Attaches a geometry, gives up its reference, and returns its number, which may be chosen.
+unsigned attach(RTCScene tree, RTCGeometry geometry);
+void attach(RTCScene tree, RTCGeometry geometry, unsigned number);
+/// Sets a ray from `from`. `direction` is a unit vector; `length` [m]; `mask`: the groups of objects that the
+/// ray meets.
+void set_ray(RTCRay& ray, const Vector3f& from, const Vector3f& direction, float length, unsigned mask);
 
 using Valid = std::array<int, 8>;  ///< -1: the ray is traced, 0: it is not; must be aligned to 32 bytes
 

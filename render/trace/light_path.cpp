@@ -2,6 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
+
+#include <tbb/parallel_for.h>
+
+#include "render/opacity_grid.h"
+#include "render/trace/air_field.h"
+#include "render/trace/air_light.h"
 
 namespace offstage::render {
 namespace {
@@ -93,6 +100,40 @@ float LightTracer::sun_visibility(const Vector3f& place, const SquarePoint<float
   float fraction = sources_.smoke != nullptr ? std::exp(-sources_.smoke->depth(place)) : 1.0f;
   if (!sun.shadows) return fraction;
   return fraction * scene_.transmittance(place, sun_disc_.direction(uv), kFar).mean();
+}
+
+// Prepares particles for rays, before any ray is traced that can meet them. Computes their light.
+void LightTracer::prepare_particles(MetParticles groups, const SampleOffsets& offsets) const {
+  if (sources_.particles == nullptr || groups == MetParticles::none) return;
+  const std::vector<RayParticleSet*> sets = sources_.particles->build(groups);
+  std::vector<AirField::Ball> balls;
+  for (const RayParticleSet* set : sets)
+    for (std::size_t i = 0; i < set->size(); ++i) balls.push_back({set->center(i), set->numbers[i]});
+  if (balls.empty()) return;
+  const AirField around(*this, offsets, balls, sources_.open_air);
+  const AirLight air(scene_, sources_, offsets);
+  for (RayParticleSet* set : sets) {
+    set->light.resize(set->size());
+    tbb::parallel_for(std::size_t{0}, set->size(), [&](std::size_t i) {
+      const Vector3f place = set->center(i);
+      const float radius = set->radius(i), number = set->numbers[i];
+      const float depth = sources_.smoke != nullptr ? sources_.smoke->depth(place) : 0.0f;
+      const float arrives = set->scattering == Scattering::puff
+                                ? sun_fraction_in_smoke(depth, set->colors[i].head<3>().maxCoeff())
+                                : std::exp(-depth);
+      set->light[i] << around.at(place).light.constant + air.lamps_around(place, radius, number),
+          arrives * air.sun(place, radius, number);
+    });
+  }
+}
+
+// Adds the light of the particles on a segment of a path, and reduces its throughput.
+void LightTracer::meet_particles(float length, Path& path, FoundLight& found) const {
+  const ParticlesOnRay met = sources_.particles->along(
+      path.from, path.direction, length, path.particles,
+      {sources_.sky.sun_direction, sources_.sun.intensity * sources_.sun.color, sources_.fog});
+  (path.by_chance ? found.noisy : found.certain) += path.fraction.cwiseProduct(met.radiance);
+  path.fraction *= met.transmittance;
 }
 
 // Returns the light of lamps on a white surface, by one shadow ray. One lamp is chosen at random, in
@@ -238,7 +279,9 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
   int bounces = 0;
   for (int step = 0; step < kMostSteps; ++step) {
     Hit hit;
-    if (!scene_.first_hit(path.from, path.direction, kFar, hit)) {
+    const bool hits = scene_.first_hit(path.from, path.direction, kFar, hit);
+    if (path.particles != MetParticles::none) meet_particles(hits ? hit.distance : kFar, path, light);
+    if (!hits) {
       add_source(sky_met(path.direction, sharp, path.density));
       return light;
     }

@@ -61,6 +61,7 @@ struct LightTracer::Path {
   float cone;                     ///< angle of the cone of directions that the ray represents [rad]
   Vector3f fraction = {1, 1, 1};  ///< throughput of the path per channel
   bool mirrored = false;          ///< whether mirrors have reflected the path so far
+  MetParticles particles = MetParticles::none;  ///< particles that are visible along the path
   /// Whether the directions depend on random numbers. Only such paths can cause bright dots of noise, so only
   /// their light is limited.
   bool by_chance = false;
@@ -77,6 +78,7 @@ struct LightTracer::Path {
     sampled_place = from;
     sampled_normal = normal;
     glow_is_sampled = true;
+    particles = MetParticles::none;
     direction = outgoing;
     by_chance = true;
     density = -1;

@@ -8,6 +8,7 @@
 #include "render/stage.h"
 #include "render/trace/glow.h"
 #include "render/trace/ray_lamp.h"
+#include "render/trace/ray_particles.h"
 
 namespace offstage::render {
 
@@ -31,6 +32,14 @@ struct GlassPiece {
   bool contains(const Vector3f& place, float margin_m) const;
 };
 
+/// Light at a point in the air. A white surface there with the unit normal n has the radiance
+/// constant + slope * n.
+struct AirRadiance {
+  Vector3f constant = Vector3f::Zero();
+  Eigen::Matrix3f slope = Eigen::Matrix3f::Zero();  ///< rows: red, green, blue
+  Vector3f at(const Vector3f& normal) const { return (constant + slope * normal).cwiseMax(0.0f); }
+};
+
 struct LightSources {
   Sun sun;
   SkyModel sky;
@@ -39,14 +48,8 @@ struct LightSources {
   Glow glow;
   std::vector<GlassPiece> glass;
   const OpacityGrid* smoke = nullptr;  ///< opacity of the smoke; null: there is no smoke
-};
-
-/// Light at a point in the air. A white surface there with the unit normal n has the radiance
-/// constant + slope * n.
-struct AirRadiance {
-  Vector3f constant = Vector3f::Zero();
-  Eigen::Matrix3f slope = Eigen::Matrix3f::Zero();  ///< rows: red, green, blue
-  Vector3f at(const Vector3f& normal) const { return (constant + slope * normal).cwiseMax(0.0f); }
+  RayParticles* particles = nullptr;   ///< the particles in mirror images; null: there are none
+  AirRadiance open_air;                ///< light of the sky on particles, without objects
 };
 
 /// Light at a point in the air from the sky and from objects, without the sun's disc and lamps.

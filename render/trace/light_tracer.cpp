@@ -43,6 +43,20 @@ void set_lane(LaneVectors& lanes, int i, const Vector3f& value) {
   lanes.z[i] = value.z();
 }
 
+/// Returns the particles that are visible in mirror images by a surface.
+MetParticles particles_in_mirror(float roughness) {
+  return roughness > kSharpMirror ? MetParticles::no_drops : MetParticles::all;
+}
+
+/// Returns the particles that are visible in mirror images by any of the surfaces.
+MetParticles particles_in_mirrors(const SurfaceBuffer& surfaces) {
+  MetParticles met = MetParticles::none;
+  for (const Vector4f& place : surfaces.places)
+    if (place.w() >= SurfaceBuffer::kMirrors)
+      met = std::max(met, particles_in_mirror(std::fmod(place.w(), SurfaceBuffer::kMirrors)));
+  return met;
+}
+
 /// Returns the indices of the pixels x ... x + 7 of a row; -1 beyond its end.
 IntLanes pixels_of_row(const SurfaceBuffer& surfaces, int x, int y) {
   const IntLanes columns = IntLanes{0, 1, 2, 3, 4, 5, 6, 7} + x;
@@ -239,7 +253,8 @@ LightTracer::LampLight LightTracer::trace_lamps(const Points& points, const Ligh
     const Lanes by_mirror = mirror_density(rough * rough, nv, clamped_to(dot(n, h), 0, 1));
     const Lanes weight =
         (points.mirrors & (point.density > 0.0f)) ? power_heuristic(point.density, by_mirror) : none + 1;
-    const LaneVectors bright = arriving * (lit ? lobe * weight : none);
+    const IntLanes shown = lamp.def().in_mirrors ? lit & ~points.mirrors : lit;
+    const LaneVectors bright = arriving * (shown ? lobe * weight : none);
     lobes = lobes + bright;
     const Lanes m2 = m * m;
     grazing += (bright.x + bright.y + bright.z) * (m2 * m2 * m);
@@ -266,12 +281,14 @@ Vector3f LightTracer::mirrored_light(const Point& point, const LightView& view, 
   if (outgoing.dot(point.face) <= 0) outgoing = reflected(outgoing, point.face);
   const float nv = std::max(point.normal.dot(point.view), 1e-3f);
   const float nh = std::clamp(point.normal.dot((outgoing + point.view).normalized()), 0.0f, 1.0f);
-  const Path path{.from = point.place,
-                  .direction = outgoing,
-                  .cone = std::max(a, view.pixel_m),
-                  .mirrored = true,
-                  .by_chance = a >= kSharp,
-                  .density = mirror_density(a, nv, nh)};
+  const Path path{
+      .from = point.place,
+      .direction = outgoing,
+      .cone = std::max(a, view.pixel_m),
+      .mirrored = true,
+      .particles = sources_.particles == nullptr ? MetParticles::none : particles_in_mirror(point.roughness),
+      .by_chance = a >= kSharp,
+      .density = mirror_density(a, nv, nh)};
   return radiance(path, sampler, &visible).limited(sums);
 }
 
@@ -495,6 +512,7 @@ void LightTracer::trace_arriving(const SurfaceBuffer& surfaces, const LightView&
   light.has_mirrors = std::ranges::any_of(surfaces.places,
                                           [](const Vector4f& p) { return p.w() >= SurfaceBuffer::kMirrors; });
   if (light.has_mirrors) light.mirrored.resize(pixels);
+  if (light.has_mirrors) prepare_particles(particles_in_mirrors(surfaces), view.offsets);
   for_rows(height, [&](int y) {
     for (int x = 0; x < width; x += kLanes) trace_pixels(surfaces, x, y, view, light);
   });
@@ -592,6 +610,7 @@ void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, con
   glass.lamps.resize(with_lamps);
   glass.highlights.resize(with_lamps);
   const int width = surfaces.width_px;
+  prepare_particles(MetParticles::all, view.offsets);
   glass.sums = sum_over_rows(surfaces.height_px, [&](int y, LightSums& sums) {
     for (int x = 0; x < width; x += kLanes) {
       Points points(surfaces, pixels_of_row(surfaces, x, y));

@@ -130,6 +130,8 @@ class LightTracer {
                     FoundLight& found) const;
   bool follow_smooth(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, bool sharp,
                      bool scattered, Path& path, FoundLight& light) const;
+  void prepare_particles(MetParticles groups, const SampleOffsets& offsets) const;
+  void meet_particles(float length, Path& path, FoundLight& found) const;
   Vector3f direct_light(const Hit& hit, const Vector3f& from, PixelSampler& sampler) const;
   Vector3f glow_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
                    PixelSampler& sampler) const;

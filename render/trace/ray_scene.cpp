@@ -4,10 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <stdexcept>
 #include <string>
 
-#include "render/error.h"
 #include "render/trace/embree.h"
 
 namespace offstage::render {
@@ -28,56 +26,14 @@ constexpr unsigned blocking(RayScene::Focus focus) {
 // others freely.
 constexpr int kMostPassed = 64;
 
-/// Returns the device of the process. The instruction set is fixed, because others round hit distances
-/// differently.
-RTCDevice device() {
-  static const RTCDevice made = [] {
-    RTCDevice result = rtcNewDevice("isa=avx2");
-    if (result == nullptr)
-      throw UnavailableError("Embree cannot be used: this processor lacks the AVX2 instructions");
-    return result;
-  }();
-  return made;
-}
-
-RayTree make_tree(RTCBuildQuality quality) {
-  RayTree tree(rtcNewScene(device()));
-  rtcSetSceneFlags(tree.get(), RTC_SCENE_FLAG_ROBUST);
-  rtcSetSceneBuildQuality(tree.get(), quality);
-  return tree;
-}
-
-/// Attaches a geometry and gives up its reference.
-unsigned attach_to(RTCScene tree, RTCGeometry geometry) {
-  rtcCommitGeometry(geometry);
-  const unsigned id = rtcAttachGeometry(tree, geometry);
-  rtcReleaseGeometry(geometry);
-  return id;
-}
-
 RTCGeometry make_triangles(const void* positions, std::size_t stride, std::size_t count,
                            std::span<const uint32_t> indices) {
-  RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
+  RTCGeometry geometry = rtcNewGeometry(embree::device(), RTC_GEOMETRY_TYPE_TRIANGLE);
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, positions, 0, stride,
                              count);
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, indices.data(), 0,
                              3 * sizeof(uint32_t), indices.size() / 3);
   return geometry;
-}
-
-void set_ray(RTCRay& ray, const Vector3f& from, const Vector3f& direction, float length, unsigned mask) {
-  ray.org_x = from.x();
-  ray.org_y = from.y();
-  ray.org_z = from.z();
-  ray.dir_x = direction.x();
-  ray.dir_y = direction.y();
-  ray.dir_z = direction.z();
-  ray.tnear = 0;
-  ray.tfar = length;
-  ray.time = 0;
-  ray.mask = mask;
-  ray.id = 0;
-  ray.flags = 0;
 }
 
 /// Returns the barycentric coordinates, for the corners b and c, of the point where a ray meets the plane of
@@ -105,12 +61,8 @@ T mixed(const T& a, const T& b, const T& c, const Vector2f& uv) {
 
 }  // namespace
 
-void DeleteRayTree::operator()(RTCSceneTy* tree) const {
-  rtcReleaseScene(tree);
-}
-
 std::string ray_library() {
-  const auto version = rtcGetDeviceProperty(device(), RTC_DEVICE_PROPERTY_VERSION);
+  const auto version = rtcGetDeviceProperty(embree::device(), RTC_DEVICE_PROPERTY_VERSION);
   return "Embree " + std::to_string(version / 10000) + "." + std::to_string(version / 100 % 100) + "." +
          std::to_string(version % 100) + " avx2";
 }
@@ -123,8 +75,9 @@ RayMesh::RayMesh(const Mesh& mesh, const std::vector<Vector3f>& mesh_normals)
 
 RTCSceneTy* RayMesh::tree() const {
   if (!tree_) {
-    tree_ = make_tree(RTC_BUILD_QUALITY_MEDIUM);
-    attach_to(tree_.get(), make_triangles(positions.data(), sizeof(Vector4f), positions.size(), indices));
+    tree_ = embree::make_tree(RTC_BUILD_QUALITY_MEDIUM);
+    embree::attach(tree_.get(),
+                   make_triangles(positions.data(), sizeof(Vector4f), positions.size(), indices));
     rtcCommitScene(tree_.get());
   }
   return tree_.get();
@@ -204,7 +157,7 @@ RayScene::~RayScene() = default;
 void RayScene::clear() {
   objects_.clear();
   cloth_trees_.clear();
-  tree_ = make_tree(RTC_BUILD_QUALITY_LOW);
+  tree_ = embree::make_tree(RTC_BUILD_QUALITY_LOW);
   has_translucent_ = false;
 }
 
@@ -215,7 +168,7 @@ unsigned RayScene::attach(RTCGeometryTy* geometry, Object object, bool casts_sha
                                : focuses     ? kFocusingCaster
                                              : kTranslucentCaster);
   has_translucent_ = has_translucent_ || (casts_shadow && !solid);
-  const unsigned id = attach_to(tree_.get(), geometry);
+  const unsigned id = embree::attach(tree_.get(), geometry);
   if (objects_.size() <= id) objects_.resize(id + 1);
   objects_[id] = std::move(object);
   return id;
@@ -226,7 +179,7 @@ unsigned RayScene::add(const RayMesh& mesh, const RayMaterial& material,
   if (mesh.indices.empty() || !world_from_mesh.matrix().allFinite()) return kNone;
   const float determinant = world_from_mesh.linear().determinant();
   if (determinant == 0) return kNone;
-  RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_INSTANCE);
+  RTCGeometry geometry = rtcNewGeometry(embree::device(), RTC_GEOMETRY_TYPE_INSTANCE);
   rtcSetGeometryInstancedScene(geometry, mesh.tree());
   rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, world_from_mesh.matrix().data());
   Object object{.material = &material, .mesh = &mesh, .world_from_mesh = world_from_mesh};
@@ -248,7 +201,7 @@ void RayScene::add_cloth(std::span<const ClothVertex> vertices, std::span<const 
 void RayScene::add_balls(const Vector4f* balls, const Vector4f* colors, std::size_t stride, std::size_t count,
                          const RayMaterial& material, bool casts_shadow) {
   if (count == 0) return;
-  RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_SPHERE_POINT);
+  RTCGeometry geometry = rtcNewGeometry(embree::device(), RTC_GEOMETRY_TYPE_SPHERE_POINT);
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, balls, 0, stride, count);
   attach(geometry,
          {.material = &material,
@@ -261,11 +214,11 @@ void RayScene::add_balls(const Vector4f* balls, const Vector4f* colors, std::siz
 void RayScene::add_sprites(const Vector4f* balls, const Vector4f* colors, std::size_t stride,
                            std::size_t count, float softness) {
   if (count == 0) return;
-  RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_SPHERE_POINT);
+  RTCGeometry geometry = rtcNewGeometry(embree::device(), RTC_GEOMETRY_TYPE_SPHERE_POINT);
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, balls, 0, stride, count);
   rtcSetGeometryMask(geometry, kSprite);
   has_translucent_ = true;
-  const unsigned id = attach_to(tree_.get(), geometry);
+  const unsigned id = embree::attach(tree_.get(), geometry);
   if (objects_.size() <= id) objects_.resize(id + 1);
   objects_[id] = {.balls = reinterpret_cast<const std::byte*>(balls),
                   .colors = reinterpret_cast<const std::byte*>(colors),
@@ -390,7 +343,7 @@ const RayScene::Object* RayScene::first_object(RTCRayHit& ray) const {
 
 bool RayScene::first_hit(const Vector3f& from, const Vector3f& direction, float length, Hit& hit) const {
   RTCRayHit ray;
-  set_ray(ray.ray, from, direction, length, kAll);
+  embree::set_ray(ray.ray, from, direction, length, kAll);
   const Object* object = first_object(ray);
   if (object == nullptr) return false;
   hit = {};
@@ -404,7 +357,7 @@ Vector3f RayScene::smooth_place(const Vector3f& eye, const Vector3f& place) cons
   const Vector3f offset = place - eye;
   const float length = offset.norm();
   RTCRayHit ray;
-  set_ray(ray.ray, eye, offset / length, 1.001f * length, kAll);
+  embree::set_ray(ray.ray, eye, offset / length, 1.001f * length, kAll);
   const Object* object = first_object(ray);
   if (object == nullptr || object->mesh == nullptr || ray.ray.tfar < 0.999f * length) return place;
   return object->smoothed(ray.hit.primID, eye, offset / length);
@@ -413,7 +366,7 @@ Vector3f RayScene::smooth_place(const Vector3f& eye, const Vector3f& place) cons
 Vector3f RayScene::transmittance(const Vector3f& from, const Vector3f& direction, float length,
                                  Focus focus) const {
   RTCRay ray;
-  set_ray(ray, from, direction, length, blocking(focus));
+  embree::set_ray(ray, from, direction, length, blocking(focus));
   embree::occluded(tree_.get(), ray);
   if (ray.tfar < 0) return Vector3f::Zero();
   return through_translucent(from, direction, length);
@@ -472,7 +425,7 @@ Vector3f RayScene::through_translucent(const Vector3f& from, const Vector3f& dir
   Vector3f fraction = Vector3f::Ones(), place = from;
   for (int layer = 0; has_translucent_ && layer < kMostPassed && length > 0; ++layer) {
     RTCRayHit hit_ray;
-    set_ray(hit_ray.ray, place, direction, length, kDimming);
+    embree::set_ray(hit_ray.ray, place, direction, length, kDimming);
     const Object* object = first_object(hit_ray);
     if (object == nullptr) break;
     float advance = 0;

@@ -15,17 +15,9 @@
 #include "render/lanes.h"
 #include "render/model.h"
 #include "render/trace/ray_material.h"
-
-struct RTCSceneTy;
-struct RTCGeometryTy;
-struct RTCRayHit;
+#include "render/trace/ray_tree.h"
 
 namespace offstage::render {
-
-struct DeleteRayTree {
-  void operator()(RTCSceneTy* tree) const;
-};
-using RayTree = std::unique_ptr<RTCSceneTy, DeleteRayTree>;
 
 /// Returns the version of Embree and its instruction set, for example "Embree 3.13.5 avx2".
 std::string ray_library();

@@ -1,5 +1,7 @@
 #include "render/image_io.h"
 
+#include <array>
+
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
@@ -77,8 +79,10 @@ TEST(DecodeImage, WidensGreyAndNarrowsSixteenBits) {
 TEST(DecodeImage, NamesUnreadableFiles) {
   const std::vector<uint8_t> png = encode_png(test_image(64, 64));
   const std::span<const uint8_t> half(png.data(), png.size() / 2);
-  const std::string deep_pnm("P5 1 1 65535\n\x80\x12");
-  for (const auto bytes : {std::span<const uint8_t>{}, bytes_of("no picture"), bytes_of(deep_pnm), half}) {
+  const std::string text("no picture"), deep_pnm("P5 1 1 65535\n\x80\x12");
+  const std::array<std::span<const uint8_t>, 4> all = {std::span<const uint8_t>{}, bytes_of(text),
+                                                       bytes_of(deep_pnm), half};
+  for (const std::span<const uint8_t> bytes : all) {
     const std::string message = message_of<FileError>([&] { decode_image(bytes, "some.png"); });
     EXPECT_EQ(message.find("some.png: cannot be read as an image: "), 0u) << message;
     EXPECT_EQ(message.find('\n'), std::string::npos);

@@ -329,6 +329,36 @@ TEST_F(TracedLight, MirrorsShowObjectsBehindTheCamera) {
   EXPECT_NEAR(seen.y(), 0.45f, 0.02f);
 }
 
+// In front of an even sky, the middle of a particle with opacity a and radiance c has a c + (1 - a) sky, or
+// sky + a c if it adds light. A white lit particle vanishes (furnace).
+TEST_F(TracedLight, MirrorsShowParticlesBehindTheCamera) {
+  constexpr float kSky = 0.4f, kReflected = 0.9f;
+  s.stage.set_environment(even_sky(kSky));
+  s.add(make_box({2, 2, 0.1f}),
+        {.color = {kReflected, kReflected, kReflected, 1}, .metallic = 1, .roughness = 0.01f});
+  look({.eye = {0, 0, 4}, .target = {0, 0, 0}});
+  const auto seen = [&](const PointsDef& def, float opacity) {
+    const PointsHandle points = s.stage.add_points(def);
+    s.stage.set_points(points, std::array{Point{.position = {0, 0, 8},
+                                                .velocity = {0, 600, 0},
+                                                .radius = 2,
+                                                .color = {1, 1, 1, opacity},
+                                                .id = 1}});
+    const float result = mean_around(mean_of(s, 4), {80, 60}, 1);
+    s.stage.remove(points);
+    return result / kReflected;
+  };
+  for (const PointStyle style :
+       {PointStyle::sprite, PointStyle::flake, PointStyle::streak, PointStyle::smoke}) {
+    SCOPED_TRACE(static_cast<int>(style));
+    EXPECT_NEAR(seen({.style = style, .lit = false, .softness = 0.1f}, 1), 1, 0.03f);
+    EXPECT_NEAR(seen({.style = style, .lit = false, .softness = 0.1f}, 0.5f), 0.5f + 0.5f * kSky, 0.03f);
+    EXPECT_NEAR(seen({.style = style, .additive = true, .lit = false, .softness = 0.1f}, 0.5f), 0.5f + kSky,
+                0.03f);
+    EXPECT_NEAR(seen({.style = style, .softness = 0.1f}, 1), kSky, 0.03f);
+  }
+}
+
 // In a closed room of metal that glows with e and reflects a fraction r, the radiance is e / (1 - r). Seen at
 // a right angle, since metal reflects more at grazing angles.
 TEST_F(TracedLight, InAGlowingRoomOfMirrorsIsTheSumOfAllReflections) {

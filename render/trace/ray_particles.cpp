@@ -1,0 +1,116 @@
+#include "render/trace/ray_particles.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "render/trace/embree.h"
+
+namespace offstage::render {
+namespace {
+
+constexpr int kMostOnRay = 128;              // particles on a segment; the farther ones are left out
+constexpr float kDark = 1.0f / 256;          // transmittance below which nothing behind is visible
+constexpr unsigned kOthers = 1, kDrops = 2;  // groups of particles that a ray can ignore
+
+// Equal to coverage() in shaders/points_shape.glsl.
+float coverage(float across, float softness) {
+  const float x = std::clamp((across - 1 + softness) / softness, 0.0f, 1.0f);
+  return 1 - x * x * (3 - 2 * x);
+}
+
+/// Returns the opacity of a particle for a ray, as a fraction of the opacity in its middle.
+float opacity_on_ray(const RayParticleSet& set, std::size_t i, const Vector3f& from,
+                     const Vector3f& direction) {
+  const auto across = [&](const Vector3f& v) -> Vector3f { return v - v.dot(direction) * direction; };
+  if (!set.lines) {
+    const Vector4f& disc = set.places[i];
+    return coverage(across(disc.head<3>() - from).norm() / disc.w(), set.softness);
+  }
+  // t: the point of the axis that is nearest to the ray, from the head (0) to the tail (1).
+  const Vector4f &head = set.places[2 * i], &tail = set.places[2 * i + 1];
+  const Vector3f axis = across((tail - head).head<3>()), to_head = across(head.head<3>() - from);
+  const float length2 = axis.squaredNorm();
+  const float t = length2 > 0 ? std::clamp(-to_head.dot(axis) / length2, 0.0f, 1.0f) : 0.5f;
+  return coverage((to_head + t * axis).norm() / head.w(), set.softness) * (1 - set.taper * t);
+}
+
+/// Returns the fraction of the sun's light that a particle scatters to the eye. `forward`: cosine between the
+/// ray and the direction to the sun, 0 if it is negative. Equal to the factors in shaders/points.vert,
+/// puff_light.cpp and streaks_pass.cpp, without the direction of the surface.
+float phase(Scattering scattering, float forward) {
+  const float f2 = forward * forward, f4 = f2 * f2;
+  if (scattering == Scattering::puff) return 0.68f + 0.9f * f4 * f2;
+  return scattering == Scattering::drop ? 0.12f + 0.9f * f4 * f4 : 0.4f + 0.8f * f4;
+}
+
+}  // namespace
+
+void RayParticles::clear() {
+  sets_.clear();
+  tree_.reset();
+  built_ = MetParticles::none;
+}
+
+void RayParticles::add(RayParticleSet set) {
+  if (!set.colors.empty()) sets_.push_back(std::move(set));
+}
+
+std::vector<RayParticleSet*> RayParticles::build(MetParticles groups) {
+  std::vector<RayParticleSet*> unlit;
+  if (groups <= built_) return unlit;
+  built_ = groups;
+  std::size_t lines = 0;
+  for (const RayParticleSet& set : sets_)
+    if (set.lines) lines = std::max(lines, set.size());
+  for (std::size_t i = first_of_line_.size(); i < lines; ++i)
+    first_of_line_.push_back(2 * static_cast<uint32_t>(i));
+  tree_ = embree::make_tree(RTC_BUILD_QUALITY_LOW);
+  for (std::size_t k = 0; k < sets_.size(); ++k) {
+    RayParticleSet& set = sets_[k];
+    const bool drops = set.scattering == Scattering::drop;
+    if (drops && groups != MetParticles::all) continue;
+    RTCGeometry geometry = rtcNewGeometry(
+        embree::device(), set.lines ? RTC_GEOMETRY_TYPE_FLAT_LINEAR_CURVE : RTC_GEOMETRY_TYPE_DISC_POINT);
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, set.places.data(), 0,
+                               sizeof(Vector4f), set.places.size());
+    if (set.lines)
+      rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, first_of_line_.data(),
+                                 0, sizeof(uint32_t), set.size());
+    rtcSetGeometryMask(geometry, drops ? kDrops : kOthers);
+    embree::attach(tree_.get(), geometry, static_cast<unsigned>(k));
+    if (set.scattering != Scattering::none && set.light.empty()) unlit.push_back(&set);
+  }
+  rtcCommitScene(tree_.get());
+  return unlit;
+}
+
+ParticlesOnRay RayParticles::along(const Vector3f& from, const Vector3f& direction, float length,
+                                   MetParticles groups, const ParticleAir& air) const {
+  const float forward = std::max(air.to_sun.dot(direction), 0.0f);
+  const unsigned mask = groups == MetParticles::all ? kOthers | kDrops : kOthers;
+  ParticlesOnRay found;
+  float near = 0;
+  for (int k = 0; k < kMostOnRay && found.transmittance > kDark; ++k) {
+    RTCRayHit ray;
+    embree::set_ray(ray.ray, from, direction, length, mask);
+    ray.ray.tnear = near;
+    ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    embree::intersect(tree_.get(), ray);
+    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) break;
+    near = std::nextafter(ray.ray.tfar, std::numeric_limits<float>::infinity());
+    const RayParticleSet& set = sets_[ray.hit.geomID];
+    const std::size_t i = ray.hit.primID;
+    const float opacity = std::min(set.colors[i].w(), 1.0f) * opacity_on_ray(set, i, from, direction);
+    Vector3f radiance = set.colors[i].head<3>();
+    if (set.scattering != Scattering::none)
+      radiance = radiance.cwiseProduct(set.light[i].head<3>() +
+                                       set.light[i].w() * phase(set.scattering, forward) * air.sun_radiance);
+    found.radiance += found.transmittance * opacity * std::exp(-air.fog * ray.ray.tfar) * radiance;
+    found.transmittance *= 1 - set.cover * opacity;
+  }
+  return found;
+}
+
+}  // namespace offstage::render

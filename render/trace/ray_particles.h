@@ -1,0 +1,75 @@
+#pragma once
+/// Private: sprites, flakes, streaks, smoke and fire as rays of mirror images meet them: soft discs that face
+/// the ray, and soft lines. Embree finds the particles on a ray; their opacity is computed here.
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "render/mesh.h"
+#include "render/trace/ray_tree.h"
+
+namespace offstage::render {
+
+/// How particles scatter light. `none`: they are not lit, and their colour is their radiance.
+enum class Scattering { none, puff, flake, drop };
+
+/// Groups of particles that a ray meets. Drops are too small to be visible in blurred mirror images.
+enum class MetParticles { none, no_drops, all };
+
+/// Particles that look alike.
+struct RayParticleSet {
+  bool lines = false;  ///< whether the particles are lines; otherwise they are discs
+  /// Discs: the centre of each particle, and its radius (w). Lines: the head and the tail of each particle,
+  /// both with the radius.
+  std::vector<Vector4f> places;
+  std::vector<Vector4f> colors;  ///< for each particle: linear colour; w: opacity in the middle, in [0, 1]
+  std::vector<float> numbers;    ///< for each particle: see AirLight::sun
+  Scattering scattering = Scattering::none;
+  float cover = 1;  ///< opacity against the background, as a fraction; 0: particles add light
+  float softness = 0.5f, taper = 0;  ///< see PointsDef; softness is positive
+  /// For each lit particle: light of lamps and from around on it; w: fraction of the sun that arrives.
+  std::vector<Vector4f> light;
+
+  std::size_t size() const { return colors.size(); }
+  Vector3f center(std::size_t i) const {
+    return lines ? Vector3f(0.5f * (places[2 * i] + places[2 * i + 1]).head<3>()) : places[i].head<3>();
+  }
+  float radius(std::size_t i) const { return places[lines ? 2 * i : i].w(); }
+};
+
+/// The light between particles.
+struct ParticleAir {
+  Vector3f to_sun, sun_radiance;
+  float fog;  ///< density [1/m]
+};
+
+/// The particles on a segment of a ray.
+struct ParticlesOnRay {
+  Vector3f radiance = Vector3f::Zero();  ///< light that the particles send along the ray
+  float transmittance = 1;               ///< fraction of the light from behind that passes
+};
+
+class RayParticles {
+ public:
+  /// Removes all particles.
+  void clear();
+  /// Adds particles. A set without particles is ignored.
+  void add(RayParticleSet set);
+  bool empty() const { return sets_.empty(); }
+  /// Builds the hierarchy of these groups. Returns the sets whose light must be set before along(), which are
+  /// the lit ones that were not built before.
+  std::vector<RayParticleSet*> build(MetParticles groups);
+  /// Returns the particles on a segment. `direction` is a unit vector; `length` [m]. The groups must have
+  /// been built.
+  ParticlesOnRay along(const Vector3f& from, const Vector3f& direction, float length, MetParticles groups,
+                       const ParticleAir& air) const;
+
+ private:
+  std::vector<RayParticleSet> sets_;     ///< sets by Embree's geometry id
+  std::vector<uint32_t> first_of_line_;  ///< index of the head of each line; shared by all sets of lines
+  RayTree tree_;
+  MetParticles built_ = MetParticles::none;
+};
+
+}  // namespace offstage::render
