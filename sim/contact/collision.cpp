@@ -38,6 +38,11 @@ constexpr uint32_t kCollisionSweeps = 200, kPlasticSweeps = 400, kJointedSweeps 
 constexpr std::size_t kUpdates = 4'000, kMoreUpdates = 1'000;
 constexpr int kBoundedSolves = 3;
 constexpr Real kJointBudget = 1e6;
+/// Clusters of at most kImproved contacts whose sweeps did not converge are solved by the proximal method, if
+/// this costs at most kImproveBudget [ns]. Errors of sweeps depend on the order of the contacts, and would
+/// break the symmetry of a scene.
+constexpr std::size_t kImproved = 100;
+constexpr Real kImproveBudget = 5e5;
 constexpr Real kResting = 1e-11;  ///< speeds of approach below this fraction of the greatest one are ignored
 /// Contacts collide together if their speeds of approach differ by less than this fraction of the greatest
 /// one.
@@ -259,9 +264,31 @@ class Cluster {
     if (!has_swept_)
       for (Contact& c : contacts_) c.impulse.setZero();
     has_swept_ = true;
-    const uint32_t sweeps =
-        projected_gauss_seidel(bodies_, contacts_, sweeps_of(updates), kRounding * fastest_);
-    return {.solves = 1, .iterations = sweeps, .residual = residual(bodies_, contacts_)};
+    const uint32_t most = sweeps_of(updates),
+                   sweeps = projected_gauss_seidel(bodies_, contacts_, most, kRounding * fastest_);
+    ContactWork work{.solves = 1, .iterations = sweeps, .residual = residual(bodies_, contacts_)};
+    if (sweeps == most && contacts_.size() <= kImproved) improve(work);
+    return work;
+  }
+
+  /// Improves the result of sweeps by the proximal method, if this is within its budget.
+  void improve(ContactWork& work) {
+    const std::vector<ContactBody> swept(bodies_.begin(), bodies_.end());
+    const std::vector<Contact> contacts(contacts_.begin(), contacts_.end());
+    std::copy(before_.begin(), before_.end(), bodies_.begin());
+    for (Contact& c : contacts_) c.is_guessed = true;
+    const std::optional<ContactWork> improved =
+        ProximalNewton().solve(bodies_, contacts_, {}, kImproveBudget);
+    if (improved) {
+      work.iterations += improved->iterations;
+      work.factorizations += improved->factorizations;
+      if (improved->residual < work.residual) {
+        work.residual = improved->residual;
+        return;
+      }
+    }
+    std::copy(swept.begin(), swept.end(), bodies_.begin());
+    std::copy(contacts.begin(), contacts.end(), contacts_.begin());
   }
   uint32_t sweeps_of(std::size_t updates) const {
     return static_cast<uint32_t>(std::max<std::size_t>(updates / contacts_.size(), 1));

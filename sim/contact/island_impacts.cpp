@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <tuple>
 #include <vector>
 
@@ -75,8 +76,8 @@ struct CollisionCluster {
 /// Collides the part of a large cluster that the impact reaches: the bouncing contacts and the contacts
 /// around them. If the impulses make other contacts approach faster than `speed`, these contacts and the
 /// contacts around them are added. This is repeated until there are no more. The other contacts need no
-/// impulse. A cluster with more than kCluster contacts or too many extensions is truncated; afterwards the
-/// omitted contacts block as resting contacts.
+/// impulse. After kGrowths extensions, a cluster of at most kCluster contacts is solved as a whole. A larger
+/// one is truncated; afterwards the omitted contacts block as resting contacts.
 ContactWork collide_reached(CollisionCluster& cluster, Real speed, ImpactLaw law,
                             const JointProblem& joints) {
   std::vector<uint8_t> taken(cluster.contacts.size(), 0);
@@ -105,7 +106,10 @@ ContactWork collide_reached(CollisionCluster& cluster, Real speed, ImpactLaw law
       if (!taken[i] && cluster.contacts[i].relative_velocity(cluster.bodies).x() < -speed)
         wanted.push_back(i);
     if (wanted.empty()) break;
-    if (together.size() > kCluster || round == kGrowths) {
+    if (round == kGrowths && taken.size() <= kCluster) {
+      wanted.resize(taken.size());
+      std::iota(wanted.begin(), wanted.end(), 0);
+    } else if (together.size() > kCluster || round >= kGrowths) {
       work.cluster_truncated = 1;
       break;
     }
