@@ -198,10 +198,12 @@ class BodyContacts {
 
   /// Whether a face on which X lies prevents the overlap of a speculative contact. The free motion leads X
   /// into the face, too, and the face lifts it out of that overlap. A wheel that rolls on to the next tile,
-  /// for example, seems to sink at the edge of the tile that it leaves.
+  /// for example, seems to sink at the edge of the tile that it leaves. Dynamic bodies are left out, since
+  /// they may yield instead of lifting X.
   bool is_prevented(const View& v) const {
+    if (v.y().is_dynamic()) return false;
     return std::any_of(faces_.begin(), faces_.end(), [&](const View* face) {
-      if (face->x_piece != v.x_piece) return false;
+      if (face->x_piece != v.x_piece || face->y().is_dynamic()) return false;
       const PlacedManifold& m = face->pair->manifolds()[face->index];
       Real lift = std::numeric_limits<Real>::infinity();
       for (uint32_t k = 0; k < m.manifold.count; ++k)
