@@ -38,6 +38,10 @@ constexpr uint32_t kCollisionSweeps = 200, kPlasticSweeps = 400, kJointedSweeps 
 constexpr std::size_t kUpdates = 4'000, kMoreUpdates = 1'000;
 constexpr int kBoundedSolves = 3;
 constexpr Real kJointBudget = 1e6;
+/// Clusters of at most this many contacts whose sweeps did not converge are solved by the proximal method, if
+/// the budget allows. Errors of sweeps depend on the order of the contacts, and would break the symmetry of a
+/// scene.
+constexpr std::size_t kImproved = 100;
 constexpr Real kResting = 1e-11;  ///< speeds of approach below this fraction of the greatest one are ignored
 /// Contacts collide together if their speeds of approach differ by less than this fraction of the greatest
 /// one.
@@ -209,13 +213,15 @@ void solve_together(std::span<ContactBody> bodies, std::span<Contact> contacts, 
 /// by the factor that conserves energy.
 class Cluster {
  public:
+  /// `budget`: greatest cost of improvements of sweeps [ns]. It is reduced by their cost.
   Cluster(std::span<ContactBody> bodies, std::span<Contact> contacts, std::span<const Real> restitution,
-          const JointProblem& joints, Effort effort)
+          const JointProblem& joints, Effort effort, Real* budget = nullptr)
       : bodies_(bodies),
         contacts_(contacts),
         restitution_(restitution),
         joints_(joints),
         effort_(effort),
+        budget_(budget),
         before_(bodies.begin(), bodies.end()) {
     for (const Contact& c : contacts) velocities_.push_back(c.relative_velocity(bodies));
     for (BoundedRow& r : joints.bounded)
@@ -259,9 +265,32 @@ class Cluster {
     if (!has_swept_)
       for (Contact& c : contacts_) c.impulse.setZero();
     has_swept_ = true;
-    const uint32_t sweeps =
-        projected_gauss_seidel(bodies_, contacts_, sweeps_of(updates), kRounding * fastest_);
-    return {.solves = 1, .iterations = sweeps, .residual = residual(bodies_, contacts_)};
+    const uint32_t most = sweeps_of(updates),
+                   sweeps = projected_gauss_seidel(bodies_, contacts_, most, kRounding * fastest_);
+    ContactWork work{.solves = 1, .iterations = sweeps, .residual = residual(bodies_, contacts_)};
+    if (sweeps == most && contacts_.size() <= kImproved && budget_ && *budget_ > 0) improve(work);
+    return work;
+  }
+
+  /// Improves the result of sweeps by the proximal method, if this is within its budget.
+  void improve(ContactWork& work) {
+    const std::vector<ContactBody> swept(bodies_.begin(), bodies_.end());
+    const std::vector<Contact> contacts(contacts_.begin(), contacts_.end());
+    std::copy(before_.begin(), before_.end(), bodies_.begin());
+    for (Contact& c : contacts_) c.is_guessed = true;
+    ProximalNewton newton;
+    const std::optional<ContactWork> improved = newton.solve(bodies_, contacts_, {}, *budget_);
+    *budget_ -= newton.cost();
+    if (improved) {
+      work.iterations += improved->iterations;
+      work.factorizations += improved->factorizations;
+      if (improved->residual < work.residual) {
+        work.residual = improved->residual;
+        return;
+      }
+    }
+    std::copy(swept.begin(), swept.end(), bodies_.begin());
+    std::copy(contacts.begin(), contacts.end(), contacts_.begin());
   }
   uint32_t sweeps_of(std::size_t updates) const {
     return static_cast<uint32_t>(std::max<std::size_t>(updates / contacts_.size(), 1));
@@ -366,6 +395,7 @@ class Cluster {
   std::span<const Real> restitution_;
   const JointProblem& joints_;
   Effort effort_;
+  Real* budget_;
   std::vector<ContactBody> before_;
   std::vector<Vec3> velocities_;
   Real fastest_ = 0;  ///< greatest of the velocities [m/s]
@@ -518,11 +548,11 @@ namespace {
 
 ContactWork collide_with(std::span<ContactBody> bodies, std::span<Contact> contacts,
                          std::span<const Real> restitution, ImpactLaw law, const JointProblem& joints,
-                         Effort effort) {
+                         Effort effort, Real* budget) {
   if (contacts.empty()) return {};
   ContactWork work = law == ImpactLaw::sequential
                          ? Sequence(bodies, contacts, restitution, joints, effort).solve()
-                         : Cluster(bodies, contacts, restitution, joints, effort).solve();
+                         : Cluster(bodies, contacts, restitution, joints, effort, budget).solve();
   work.solves = 1;
   work.fallbacks = std::min<uint64_t>(work.fallbacks, 1);
   return work;
@@ -532,12 +562,13 @@ ContactWork collide_with(std::span<ContactBody> bodies, std::span<Contact> conta
 
 ContactWork collide(std::span<ContactBody> bodies, std::span<Contact> contacts,
                     std::span<const Real> restitution, ImpactLaw law, const JointProblem& joints) {
-  return collide_with(bodies, contacts, restitution, law, joints, Effort::full);
+  return collide_with(bodies, contacts, restitution, law, joints, Effort::full, nullptr);
 }
 
 ContactWork collide_bounded(std::span<ContactBody> bodies, std::span<Contact> contacts,
-                            std::span<const Real> restitution, ImpactLaw law, const JointProblem& joints) {
-  return collide_with(bodies, contacts, restitution, law, joints, Effort::bounded);
+                            std::span<const Real> restitution, ImpactLaw law, const JointProblem& joints,
+                            Real& budget) {
+  return collide_with(bodies, contacts, restitution, law, joints, Effort::bounded, &budget);
 }
 
 }  // namespace offstage::sim

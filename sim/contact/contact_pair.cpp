@@ -356,7 +356,7 @@ bool ContactPair::predicts(const PlacedManifold& m, const Vec3& normal, const Co
   for (uint32_t k = 0; k < m.manifold.count; ++k) {
     const ContactPoint& p = m.manifold.points[k];
     points[k] = {moved(*a_, ends_a, p.on_a, -n, -normal), moved(*b_, ends_b, p.on_b, n, normal),
-                 p.separation + free_displacement(m, (p.on_a + p.on_b) / 2, p.separation, duration)};
+                 separation_at_end(m, p, duration)};
   }
   for (uint32_t k = 0; k < m.manifold.count; ++k)
     for (uint32_t l = k; l < (between_points ? m.manifold.count : k + 1); ++l) {

@@ -103,6 +103,12 @@ class alignas(64) ContactPair {
   bool predicts(const PlacedManifold& m, const Vec3& normal, const ContactPoint& at_end, Real duration,
                 bool between_points) const;
 
+  /// Returns the separation at the end of an interval of `duration` [s], by the free motion, of a point of a
+  /// manifold of this pair [m].
+  Real separation_at_end(const PlacedManifold& m, const ContactPoint& point, Real duration) const {
+    return point.separation + free_displacement(m, (point.on_a + point.on_b) / 2, point.separation, duration);
+  }
+
   /// Whether the island will be moved back to the impact at this point. The point must then not limit the
   /// approach before the impact. While other points of the pair touch, this requires an approach faster than
   /// `impact_speed` [m/s].
@@ -135,6 +141,8 @@ class alignas(64) ContactPair {
   bool has_sphere() const { return has_sphere_; }
   /// Whether find() was never called for this pair.
   bool is_new() const { return found_margin_ < 0; }
+  /// Distance of surfaces up to which the last find() has searched for contacts [m].
+  Real margin() const { return found_margin_; }
 
   std::vector<PlacedManifold>& manifolds() { return placed_; }
   const std::vector<PlacedManifold>& manifolds() const { return placed_; }

@@ -53,7 +53,8 @@ struct Contact {
   /// Velocity that is added to the relative velocity of the bodies, (n, t, k): the effect of moving surfaces
   /// and of the rotation of the contact's frame [m/s].
   Vec3 offset = Vec3::Zero();
-  /// The part of `offset` without moving surfaces: the velocity terms of physics R9 [m/s].
+  /// The part of `offset` that does no work: the velocity terms of physics R9 and, if the point slides
+  /// throughout the interval, the sliding velocity at its start [m/s].
   Vec3 bias = Vec3::Zero();
   Real target = 0;  ///< smallest normal velocity after the solution [m/s]
   /// Coulomb's coefficients along t and k. If they are equal, friction has the round cone |p_tk| <= mu p_n;

@@ -42,6 +42,10 @@ constexpr Real kRough = 1e-2, kEnergyRounding = 1e-9;
 /// Fraction of the kinetic energy that the velocity terms of a solution may add in a step.
 constexpr Real kTermsShare = 0.02;
 
+/// A point slides throughout the interval if contacts change its sliding velocity by less than this fraction
+/// of its sliding speed at the start.
+constexpr Real kSlidesOn = 0.5;
+
 /// Returns the angular speed of a body's corners [rad/s]. The rotation of round bodies about their axis does
 /// not count.
 Real turning_of_corners(const Body& body) {
@@ -51,6 +55,14 @@ Real turning_of_corners(const Body& body) {
   if (!is_round_about_axis(shape)) return spin.norm();
   const Vec3 axis = body.start_pose.vector_to_world(Vec3::UnitY());
   return (spin - spin.dot(axis) * axis).norm();
+}
+
+/// Returns the sum of the normal forces of a pair at the end of the last interval [N].
+Real last_force(const ContactPair& pair) {
+  Real sum = 0;
+  for (const PlacedManifold& m : pair.manifolds())
+    for (uint32_t k = 0; k < m.manifold.count; ++k) sum += m.forces[k].last.x();
+  return sum;
 }
 
 /// Returns the data of a contact for the division of the interval. `linear`: the bias at the interval's end,
@@ -70,6 +82,7 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
   pairs_.clear();
   forces_.clear();
   approach_.clear();
+  sliding_.clear();
   for (Body* body : island.bodies) {
     body->row = static_cast<uint32_t>(bodies_.size());
     add_body(*body, interval);
@@ -84,7 +97,7 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
                    return turning_of_corners(*body) * interval.duration <= kMostTurned;
                  }));
   may_divide_ = may_divide_ && joints_.act_throughout();
-  for (ContactPair* pair : island.pairs) add_points(*pair, interval);
+  for (ContactPair* pair : island.pairs) add_points(*pair, interval, method);
   if (contacts_.empty() && joints_.bounded().empty()) return {.is_applied = true, .work = {}};
 
   free_ = bodies_;
@@ -92,8 +105,7 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
   Outcome outcome;
   if (method == Method::lcp) outcome.is_applied = solve_lcp(outcome.lcp);
   if (!outcome.is_applied) {
-    const std::optional<ContactWork> work = newton_.solve(bodies_, contacts_, joints_.problem(), budget);
-    cost_ = newton_.cost();
+    const std::optional<ContactWork> work = solve_by_newton(budget);
     if (!work) return outcome;
     outcome.is_applied = is_safe(*work);
     outcome.work = *work;
@@ -104,7 +116,8 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
     // The fast solver has shorter sub-steps, so it loses less energy than an undivided solution.
     const bool is_divided =
         !has_closing() ||
-        divide_at_closings(island, interval, std::min(2 * budget, kMostDivision) - cost_, outcome.work);
+        divide_at_closings(island, interval, std::min(2 * budget, kMostDivision) - newton_.cost(),
+                           outcome.work);
     outcome.is_applied = is_divided || !std::isfinite(budget);
     if (!outcome.is_applied) return outcome;
   }
@@ -115,6 +128,20 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
     for (PointForce* force : forces_) force->last = force->now;
   move_bodies(island, interval);
   return outcome;
+}
+
+/// Solves the contacts by N11. Returns no result if this would cost more than `budget`.
+std::optional<ContactWork> ExactContacts::solve_by_newton(Real budget) {
+  const std::vector<ContactBody> start = bodies_;
+  ContactWork total;
+  for (cost_ = 0;; bodies_ = start) {
+    const std::optional<ContactWork> work =
+        newton_.solve(bodies_, contacts_, joints_.problem(), budget - cost_);
+    cost_ += newton_.cost();
+    if (!work) return {};
+    total.add(*work);
+    if (!remove_sliding()) return total;
+  }
 }
 
 /// Solves the contacts by linear complementarity. If this fails or the result is unsafe, nothing is changed.
@@ -205,6 +232,38 @@ bool ExactContacts::divide_at_closings(const Island& island, const ContactInterv
   return true;
 }
 
+/// Lets the friction of a point oppose its sliding in the middle of the interval, if the point seems to slide
+/// throughout. `u` is the relative velocity at the start with the arms of the middle, and `force` the normal
+/// force of the pair [N].
+void ExactContacts::add_sliding(const Vec3& u, Real force, Real duration) {
+  Contact& c = contacts_.back();
+  const Real speed = u.tail<2>().norm();
+  if (!(force > 0) || speed == 0) return;
+  const Mat3 K = mobility(c, bodies_);
+  // A point that was hardly loaded may be loaded now.
+  const Real stop = std::max(0.0, -c.relative_velocity(bodies_).x()) / K(0, 0);
+  const Real limit = std::max(c.friction_t, c.friction_k) * (duration * force + stop);
+  if (limit * (K(1, 1) + K(2, 2)) / 2 > kSlidesOn * speed) return;
+  const Eigen::Vector2d start = u.tail<2>(), change = start - c.bias.tail<2>();
+  sliding_.push_back({static_cast<uint32_t>(contacts_.size() - 1), start, change});
+  c.bias.tail<2>() += change;
+  c.offset.tail<2>() += change;
+}
+
+/// Finds points that do not slide throughout the interval, contrary to what add_sliding() assumed. Their
+/// friction then opposes the velocity at the end. Returns whether there are any: the contacts must then be
+/// solved again.
+bool ExactContacts::remove_sliding() {
+  return std::erase_if(sliding_, [this](const Sliding& s) {
+           Contact& c = contacts_[s.contact];
+           const Eigen::Vector2d end = c.relative_velocity(bodies_).tail<2>() - s.start;
+           if (c.impulse.x() == 0 || (end - s.start).norm() <= kSlidesOn * s.start.norm()) return false;
+           c.bias.tail<2>() -= s.change;
+           c.offset.tail<2>() -= s.change;
+           return true;
+         }) > 0;
+}
+
 uint32_t ExactContacts::add_body(Body& body, const ContactInterval& interval) {
   bodies_.push_back(body.is_awake()
                         ? ContactBody{1 / body.rigid.mass,
@@ -215,11 +274,12 @@ uint32_t ExactContacts::add_body(Body& body, const ContactInterval& interval) {
   return static_cast<uint32_t>(bodies_.size() - 1);
 }
 
-void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interval) {
+void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interval, Method method) {
   const Real h = interval.duration;
   const uint32_t a = pair.a().is_awake() ? pair.a().row : add_body(pair.a(), interval);
   const uint32_t b = pair.b().is_awake() ? pair.b().row : add_body(pair.b(), interval);
   const Vec3 surface = surface_velocity(pair);
+  const Real force = last_force(pair);
   for (PlacedManifold& m : pair.manifolds())
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       const ContactPoint& point = m.manifold.points[k];
@@ -248,6 +308,9 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       c.impulse = h * m.forces[k].last;
       c.is_guessed = m.forces[k].known;
       contacts_.push_back(c);
+      // The moment of spinning friction has no such velocity in the middle.
+      if (method == Method::proximal && touches && !pair.surface().spinning)
+        add_sliding(u + motion.gain - motion.bow, force, h);
       pairs_.push_back(&pair);
       forces_.push_back(&m.forces[k]);
       approach_.push_back(approach);

@@ -1,6 +1,7 @@
 #pragma once
 /// Solution of the contacts of one island by the exact solver (physics R8, R9, N11).
 
+#include <optional>
 #include <vector>
 
 #include "sim/contact/closing_contacts.h"
@@ -37,8 +38,18 @@ class ExactContacts {
   Real cost() const { return cost_; }
 
  private:
+  /// A point that slides throughout the interval.
+  struct Sliding {
+    uint32_t contact;
+    /// Sliding velocity at the start with the arms of the middle, and this velocity minus the velocity terms
+    /// of a point that does not slide, in (t, k) [m/s].
+    Eigen::Vector2d start, change;
+  };
   uint32_t add_body(Body& body, const ContactInterval& interval);
-  void add_points(ContactPair& pair, const ContactInterval& interval);
+  void add_points(ContactPair& pair, const ContactInterval& interval, Method method);
+  void add_sliding(const Vec3& u, Real force, Real duration);
+  bool remove_sliding();
+  std::optional<ContactWork> solve_by_newton(Real budget);
   bool solve_lcp(ContactWork& work);
   bool has_closing() const;
   bool divide_at_closings(const Island& island, const ContactInterval& interval, Real budget,
@@ -55,6 +66,7 @@ class ExactContacts {
   std::vector<PointForce*> forces_;        // force of each contact, in its pair
   // By contact: absolute value of the speed at the start minus the part due to rotation [m/s].
   std::vector<Real> approach_;
+  std::vector<Sliding> sliding_;
   std::vector<uint8_t> closing_;  // by body: whether a contact of it closed in the interval
   // By body: mean change of velocity over the interval, divided by the change at its end.
   std::vector<Real> rest_;

@@ -6,6 +6,7 @@
 #include <tuple>
 #include <utility>
 
+#include "sim/collision/contact_candidates.h"
 #include "sim/collision/distance.h"
 #include "sim/collision/gjk.h"
 #include "sim/core/parallel_loop.h"
@@ -17,7 +18,8 @@ namespace {
 
 /// Two normals count as equal if the cosine of the angle between them is greater than this.
 constexpr Real kSameDirection = 1 - 1e-10;
-/// Clipping may put points outside of their surface, by up to this fraction of the body's extent.
+/// Clipping may put points outside of their surface, by up to this fraction of the body's extent, and by up
+/// to kRim times the margin of the search.
 constexpr Real kClipped = 2e-3;
 /// Cosines. A surface continues a face if the angle between both normals has a cosine of at least kGoesOn. A
 /// contact pushes along the surface's own normal if the cosine is at least kOwnNormal.
@@ -29,6 +31,8 @@ constexpr std::size_t kMostContacts = 512;
 /// Lateral distance at which the surface is sampled, as a multiple of the greatest flush step. With
 /// kLookOver, the direction from an edge to the sample is at 18 degrees to the normal.
 constexpr Real kLookBeside = 1;
+/// Greatest overlap that counts as prevented [m].
+constexpr Real kPrevented = 2e-4;
 /// Contacts with a slope are searched within this distance beyond the contact that they replace [m].
 constexpr Real kSlopeMargin = 2e-3;
 
@@ -133,7 +137,7 @@ class BodyContacts {
     };
     std::vector<Hidden> hidden;
     for (std::size_t i = 0; i < views_.size(); ++i) {
-      if (views_[i].speculative && is_predicted(views_[i])) {
+      if (views_[i].speculative && (is_predicted(views_[i]) || is_prevented(views_[i]))) {
         verdicts.push_back({views_[i].pair, views_[i].index, {}});
         continue;
       }
@@ -192,6 +196,22 @@ class BodyContacts {
     return true;
   }
 
+  /// Whether a face on which X lies prevents the overlap of a speculative contact. The free motion leads X
+  /// into the face, too, and the face lifts it out of that overlap. A wheel that rolls on to the next tile,
+  /// for example, seems to sink at the edge of the tile that it leaves. Dynamic bodies are left out, since
+  /// they may yield instead of lifting X.
+  bool is_prevented(const View& v) const {
+    if (v.y().is_dynamic()) return false;
+    return std::any_of(faces_.begin(), faces_.end(), [&](const View* face) {
+      if (face->x_piece != v.x_piece || face->y().is_dynamic()) return false;
+      const PlacedManifold& m = face->pair->manifolds()[face->index];
+      Real lift = std::numeric_limits<Real>::infinity();
+      for (uint32_t k = 0; k < m.manifold.count; ++k)
+        lift = std::min(lift, -face->pair->separation_at_end(m, m.manifold.points[k], h_ - time_));
+      return v.separation() + std::max(0.0, lift) * face->normal.dot(v.normal) > -kPrevented;
+    });
+  }
+
   bool predicts(const View& known, const View& v, uint32_t k) const {
     const Vec3 up = known.normal;
     if (known.x_piece != v.x_piece || v.normal.dot(up) < kGoesOn) return false;
@@ -236,7 +256,7 @@ class BodyContacts {
     // Two convex pieces have no internal edge between them: all their contacts are valid.
     if (v.pair == face.pair && v.y_piece == face.y_piece) return std::nullopt;
     const Vec3& on_face = face.on_y(face.deepest);
-    const Real clipped = kClipped * x_.extent;
+    const Real clipped = std::max(kClipped * x_.extent, kRim * v.pair->margin());
     Real low = std::min(0.0, face.separation()) - flush_ - clipped;
     const Real moved = v.speculative ? std::abs(up.dot(x_.pose.position - x_.start_pose.position)) : 0;
     low -= moved;

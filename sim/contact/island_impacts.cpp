@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <tuple>
 #include <vector>
 
@@ -75,10 +76,10 @@ struct CollisionCluster {
 /// Collides the part of a large cluster that the impact reaches: the bouncing contacts and the contacts
 /// around them. If the impulses make other contacts approach faster than `speed`, these contacts and the
 /// contacts around them are added. This is repeated until there are no more. The other contacts need no
-/// impulse. A cluster with more than kCluster contacts or too many extensions is truncated; afterwards the
-/// omitted contacts block as resting contacts.
-ContactWork collide_reached(CollisionCluster& cluster, Real speed, ImpactLaw law,
-                            const JointProblem& joints) {
+/// impulse. After kGrowths extensions, a cluster of at most kCluster contacts is solved as a whole if there
+/// is budget left. Others are truncated; afterwards the omitted contacts block as resting contacts.
+ContactWork collide_reached(CollisionCluster& cluster, Real speed, ImpactLaw law, const JointProblem& joints,
+                            Real& budget) {
   std::vector<uint8_t> taken(cluster.contacts.size(), 0);
   std::vector<std::size_t> wanted = indices_of(cluster.bounces);
   const std::vector<ContactBody> before = cluster.bodies;
@@ -93,7 +94,7 @@ ContactWork collide_reached(CollisionCluster& cluster, Real speed, ImpactLaw law
       restitution.push_back(cluster.restitution[i]);
     }
     cluster.bodies = before;
-    const ContactWork one = collide_bounded(cluster.bodies, contacts, restitution, law, joints);
+    const ContactWork one = collide_bounded(cluster.bodies, contacts, restitution, law, joints, budget);
     work.add(one);
     work.solves = 1;
     work.fallbacks = one.fallbacks;
@@ -105,7 +106,10 @@ ContactWork collide_reached(CollisionCluster& cluster, Real speed, ImpactLaw law
       if (!taken[i] && cluster.contacts[i].relative_velocity(cluster.bodies).x() < -speed)
         wanted.push_back(i);
     if (wanted.empty()) break;
-    if (together.size() > kCluster || round == kGrowths) {
+    if (round == kGrowths && taken.size() <= kCluster && budget > 0) {
+      wanted.resize(taken.size());
+      std::iota(wanted.begin(), wanted.end(), 0);
+    } else if (together.size() > kCluster || round >= kGrowths) {
       work.cluster_truncated = 1;
       break;
     }
@@ -115,7 +119,7 @@ ContactWork collide_reached(CollisionCluster& cluster, Real speed, ImpactLaw law
 
 }  // namespace
 
-CollisionOutcome resolve_collisions(const Island& island, const CollisionSettings& settings) {
+CollisionOutcome resolve_collisions(const Island& island, const CollisionSettings& settings, Real& budget) {
   CollisionCluster cluster;
   for (Body* body : island.bodies) {
     body->row = static_cast<uint32_t>(cluster.bodies.size());
@@ -133,9 +137,9 @@ CollisionOutcome resolve_collisions(const Island& island, const CollisionSetting
     outcome.work = collide(cluster.bodies, cluster.contacts, cluster.restitution, settings.law, problem);
   else if (cluster.contacts.size() <= kSmallCluster)
     outcome.work =
-        collide_bounded(cluster.bodies, cluster.contacts, cluster.restitution, settings.law, problem);
+        collide_bounded(cluster.bodies, cluster.contacts, cluster.restitution, settings.law, problem, budget);
   else
-    outcome.work = collide_reached(cluster, settings.collision_speed, settings.law, problem);
+    outcome.work = collide_reached(cluster, settings.collision_speed, settings.law, problem, budget);
   // Without joints, the work is bounded and only small clusters are factorized.
   const std::size_t dense =
       std::min(cluster.contacts.size(), settings.whole || !problem.empty() ? kSmallCluster : kFewContacts);

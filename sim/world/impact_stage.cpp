@@ -257,7 +257,7 @@ std::size_t ImpactStage::collide(uint32_t number, Real time) {
   contacts_.remove_internal_edge_contacts(island.pairs, time, h_);
   const CollisionSettings settings{
       start_ + time, h_, kCluster, world_.def.collision_speed, world_.def.impact, contacts_.is_exact()};
-  const CollisionOutcome outcome = resolve_collisions(island, settings);
+  const CollisionOutcome outcome = resolve_collisions(island, settings, accurate_left_);
   report_.impacts.collisions += outcome.bounces;
   report_.solvers.impacts.add(outcome.work);
   record_rough_contact(outcome.rough, report_);

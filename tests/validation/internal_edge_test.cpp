@@ -102,6 +102,8 @@ void add_flat_floor(World& world, const std::string& kind, Real friction) {
   } else if (kind == "tiles") {
     for (int i = -6; i < 24; ++i)
       for (int k = -2; k < 2; ++k) add(Box{{0.5, 0.4, 0.5}}, {0.25 + 0.5 * i, -0.2, 0.25 + 0.5 * k});
+  } else if (kind == "long tiles") {
+    for (int i = -3; i < 12; ++i) add(Box{{1, 1, 4}}, {0.5 + i, -0.5, 0});
   } else if (kind == "tiles of mesh") {
     for (int i = -6; i < 24; ++i) {
       const Real x = 0.5 * i;
@@ -200,6 +202,48 @@ TEST_P(InternalEdges, DoNotStopRollingBodies) {
             << mover.name << " on " << floor << ", step " << step;
       }
   }
+}
+
+// A step moves the discs by half of their radius, and gravity lowers their free path by up to 1.4 mm. At the
+// end of a step, a disc then seems to lie deep in the edge of the tile that it has left.
+TEST_P(InternalEdges, DoNotStopFastDiscs) {
+  constexpr Real kStep = 1.0 / 60, kRadius = 0.3;
+  for (const bool rolls : {true, false})
+    for (const Real start : {-1.21, -1.2, -1.19, -1.18})
+      for (const Real speed : {5.0, 8.0}) {
+        World world(def(kStep));
+        add_flat_floor(world, "long tiles", rolls ? 0.8 : 0);
+        const BodyHandle disc = world.add_body({.shape = Cylinder{kRadius, 0.1},
+                                                .pose = {Vec3(start, kRadius, 0.037), lying_across()},
+                                                .velocity = {speed, 0, 0},
+                                                .angular_velocity = {0, 0, rolls ? -speed / kRadius : 0},
+                                                .restitution = 0,
+                                                .friction = rolls ? 0.8 : 0});
+        Real highest = 0;
+        for (int i = 0; i < 60; ++i) {
+          world.step(kStep);
+          highest = std::max(highest, world.body(disc).pose.position.y());
+        }
+        const auto about = [&] { return std::to_string(start) + (rolls ? " rolls" : " slides"); };
+        EXPECT_NEAR(world.body(disc).velocity.x(), speed, tolerance() * speed) << about();
+        EXPECT_LT(highest, kRadius + tolerance()) << about();
+      }
+}
+
+// At steps of 1/30 s a body moves by more than its radius in a step, so that times of impact are searched.
+TEST_P(InternalEdges, DoNotStopBodiesThatPassWholeTilesInAStep) {
+  for (const Mover& mover : {Mover{"cylinder", Cylinder{0.3, 0.1}, 0.05}, Mover{"cone", Cone{0.2, 0.4}, 0.2},
+                             Mover{"box", Box{{0.4, 0.3, 0.4}}, 0.15}})
+    for (int i = 0; i < 8; ++i) {
+      World world(def(1.0 / 30));
+      add_flat_floor(world, "long tiles", 0);
+      BodyDef sliding = moving_body(mover, 12, 0);
+      sliding.pose.position.x() += 0.06 * i;
+      const BodyHandle body = world.add_body(sliding);
+      run(world, 0.8, 1.0 / 30);
+      EXPECT_NEAR(world.body(body).velocity.x(), 12, tolerance() * 12) << mover.name << " from place " << i;
+      EXPECT_NEAR(world.body(body).pose.position.y(), mover.height, tolerance()) << mover.name;
+    }
 }
 
 /// Returns a board with two round skids across, or on four balls: parts that meet a seam with a corner of a

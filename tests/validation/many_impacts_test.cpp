@@ -196,6 +196,38 @@ TEST(ManyImpacts, TenThousandElasticBouncesBetweenWallsAreCounted) {
     }
 }
 
+// A ball hits the tip of a triangle of 21 touching balls along its axis. The cluster has 46 contacts. All
+// solvers give the same solution, which is symmetric.
+TEST(ManyImpacts, OfARackKeepItsSymmetry) {
+  constexpr Real kRadius = 0.02858, kPitch = 2 * kRadius * (1 + 1e-7);
+  constexpr int kRows = 6;
+  for (const SolverKind solver : kAllSolvers)
+    for (const Real step : kBothSteps) {
+      World world({.gravity = Vec3::Zero(), .max_step = step, .solver = solver, .sleep = false});
+      std::vector<std::vector<BodyHandle>> rows(kRows);
+      const auto ball = [&](Real x, Real z, Real speed) {
+        return world.add_body({.shape = Sphere{kRadius},
+                               .pose = {Vec3(x, 0, z)},
+                               .velocity = {speed, 0, 0},
+                               .mass = 0.17,
+                               .restitution = 0.95,
+                               .friction = 0});
+      };
+      for (int i = 0; i < kRows; ++i)
+        for (int k = 0; k <= i; ++k)
+          rows[i].push_back(ball(i * kPitch * std::sqrt(3) / 2, (k - 0.5 * i) * kPitch, 0));
+      ball(-0.5, 0, 8);
+      run(world, 0.5, step);
+      for (int i = 0; i < kRows; ++i)
+        for (int k = 0; k <= i; ++k) {
+          const Vec3 at = world.body(rows[i][k]).centre, mirrored = world.body(rows[i][i - k]).centre;
+          EXPECT_LT((at - Vec3(mirrored.x(), mirrored.y(), -mirrored.z())).norm(), 1e-6)
+              << named(solver, step) << ", ball " << k << " of row " << i;
+        }
+      EXPECT_NEAR(world.body(rows[kRows - 1][0]).velocity.x(), 1.103, 1e-3) << named(solver, step);
+    }
+}
+
 // A bar between jaws that are closer than it is thick: both push it out, so the contact problem has no
 // solution. The bar may stay or be squeezed out slowly, but must not be ejected.
 TEST(ManyImpacts, ContactsThatContradictEachOtherAddNoEnergyAndAreReported) {

@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "sim/world.h"
+#include "solids.h"
 
 namespace offstage::sim {
 namespace {
@@ -275,6 +276,35 @@ TEST_P(MovingContact, ARotatingBoxSlidesFartherAndStopsBothMotionsTogether) {
   }
   EXPECT_NEAR(w.body(box).centre.x(), 2.816, 0.008);
   EXPECT_NEAR(slides_until, turns_until, 0.07);
+}
+
+// The load of three corners is unique. They turn by up to 0.8 rad in a frame. Steps of 1/3840 s give the
+// expected distances with all solvers.
+TEST_P(MovingContact, AFastTurningPlateSlidesAsFarAtAnyStep) {
+  struct Case {
+    Real height, friction, speed, spin, distance;
+  };
+  for (const Case& c :
+       {Case{0.02, 0.3, 4, 30, 4.3027}, {0.02, 0.3, 4, 50, 5.944}, {0.2, 0.3, 4, 40, 5.126}}) {
+    World w = world();
+    w.add_body(ground(c.friction));
+    std::vector<Eigen::Vector2d> corners;
+    for (const Real angle : {0.0, 2 * pi / 3, 4 * pi / 3})
+      corners.emplace_back(0.3 * std::cos(angle), 0.3 * std::sin(angle));
+    const BodyHandle plate =
+        w.add_body({.shape = MeshShape{w.add_mesh(star_shaped_prism(corners, c.height))},
+                    .pose = {Vec3::Zero(), Quat(Eigen::AngleAxisd(-pi / 2, Vec3::UnitX()))},
+                    .velocity = Vec3(c.speed, 0, 0),
+                    .angular_velocity = Vec3(0, c.spin, 0),
+                    .mass = 2,
+                    .restitution = 0,
+                    .friction = c.friction});
+    const Real from = w.body(plate).centre.x();
+    run(w, 3);
+    EXPECT_NEAR(w.body(plate).centre.x() - from, c.distance, 2e-3 * c.distance) << c.spin;
+    EXPECT_LT(w.body(plate).velocity.norm(), 1e-3) << c.spin;
+    EXPECT_LT(w.body(plate).angular_velocity.norm(), 1e-3) << c.spin;
+  }
 }
 
 TEST_P(MovingContact, ABoxOnATurntableStaysWhereItIs) {
