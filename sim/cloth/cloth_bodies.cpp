@@ -99,6 +99,7 @@ void ClothBody::record_pin_impulse(const Vec3& impulse, const Vec3& p) {
 void ClothBody::apply_contact_impulse(const Vec3& impulse, const Vec3& p, Real fraction) {
   const Vec3 gained = gained_, gained_spin = gained_spin_;
   apply_impulse(impulse, p);
+  if (!is_dynamic()) return;
   shift_ += fraction * dt_ * (gained_ - gained);
   turn_ += fraction * dt_ * (gained_spin_ - gained_spin);
   end_ = moved(on_path(to_), obstacle_.centre, shift_, turn_);
