@@ -65,6 +65,16 @@ void ClothBody::begin(Real from, Real to, Real dt) {
               obstacle_.angular_velocity == Vec3::Zero() && surface_velocity_ == Vec3::Zero();
 }
 
+Vec3 ClothBody::rigid_move(const Vec3& p) const {
+  Vec3 end = end_.point_to_world(start_.point_to_body(p));
+  const Real angle = dt_ * obstacle_.angular_velocity.norm();
+  if (obstacle_.turn == 0 && angle > 0) {  // the path of a sphere does not contain its rotation
+    const Eigen::AngleAxis<Real> turn(angle, obstacle_.angular_velocity.normalized());
+    end = end_.position + turn * (end - end_.position);
+  }
+  return end - p;
+}
+
 Vec3 ClothBody::surface_motion(const Vec3& p) const {
   if (is_still_ && !is_dynamic()) return Vec3::Zero();
   Vec3 motion = p - start_.point_to_world(end_.point_to_body(p));
@@ -99,6 +109,7 @@ void ClothBody::record_pin_impulse(const Vec3& impulse, const Vec3& p) {
 void ClothBody::apply_contact_impulse(const Vec3& impulse, const Vec3& p, Real fraction) {
   const Vec3 gained = gained_, gained_spin = gained_spin_;
   apply_impulse(impulse, p);
+  if (!is_dynamic()) return;
   shift_ += fraction * dt_ * (gained_ - gained);
   turn_ += fraction * dt_ * (gained_spin_ - gained_spin);
   end_ = moved(on_path(to_), obstacle_.centre, shift_, turn_);

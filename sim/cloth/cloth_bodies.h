@@ -35,6 +35,10 @@ class ClothBody {
   const Solid& solid() const { return obstacle_.solid; }
   const Obstacle& obstacle() const { return obstacle_; }
   bool is_dynamic() const { return obstacle_.is_dynamic(); }
+  /// Whether the body is dynamic or moves in the cloth's sub-step.
+  bool moves() const {
+    return is_dynamic() || start_.position != end_.position || obstacle_.angular_velocity != Vec3::Zero();
+  }
   /// Mass [kg]; infinite for immovable bodies.
   Real mass() const { return 1 / obstacle_.inverse_mass; }
   const Vec3& centre() const { return centre_; }  ///< centre of mass at the end of the cloth's sub-step
@@ -42,6 +46,8 @@ class ClothBody {
   /// Displacement of the centre of mass during the cloth's sub-step [m].
   Vec3 move() const { return centre_ - start_.point_to_world(obstacle_.centre); }
 
+  /// Displacement in the cloth's sub-step of a point that moves rigidly with the body and starts at `p` [m].
+  Vec3 rigid_move(const Vec3& p) const;
   /// Displacement of the body's surface during the cloth's sub-step [m], at the surface point that is at `p`
   /// (world) at the end of that sub-step.
   Vec3 surface_motion(const Vec3& p) const;

@@ -131,9 +131,10 @@ bool ClothContacts::touch(const ClothPoints& points, Near& near, const Vec3& at,
   near.place = place;
   near.distance = s.distance;
   t.gap = s.distance - thickness;
+  if (!(t.gap < reach)) return false;
   t.normal = body.end().vector_to_world(s.normal);
   t.on_body = body.end().point_to_world(place - s.distance * s.normal);
-  return t.gap < reach;
+  return true;
 }
 
 void ClothContacts::collect(const ClothPoints& points, std::vector<BodyContact>& found) {

@@ -61,6 +61,8 @@ struct ClothPoints {
   std::vector<Real> thickness, friction, self_friction;
   std::vector<uint32_t> cloth;    ///< index of the cloth of each point
   std::vector<Support> supports;  ///< of the sub-step, by point; at most one of a point
+  /// Whether a support pushed the point in the last sub-step, for the integrator `implicit`.
+  std::vector<uint8_t> supported;
 
   std::size_t size() const { return position.size(); }
   Vec3 at(std::size_t i) const { return position[i].head<3>(); }

@@ -24,7 +24,7 @@ constexpr Real kMaxRatio = 6, kMaxRatioOfAll = 14;
 /// stretch that a sub-step of the world adds.
 constexpr Real kMaxAcross = 3;
 /// Springs up to this multiple of their rest length obey kMaxAcross if they obey kMaxRatioOfAll: 3 / 14 > 1 -
-/// 1 / 1.14.
+/// 1 / 1.14. The sums of transverse stiffness are needed only if the few springs beyond it use up the rest.
 constexpr Real kShortEnough = 1.14;
 /// A spring softer than this is never clamped.
 constexpr Real kSoftRatio = 0.5;
@@ -62,8 +62,14 @@ inline FourVectors widened(const std::array<SpringFloats, 3>& v) {
 
 void ClothSprings::assign(std::span<const ClothSpring> springs, const ClothPoints& points) {
   std::vector<Real> around(points.size(), 0);  // by point: sum of k / m of its springs
+  std::vector<uint32_t> count(points.size(), 0);
   for (const ClothSpring& s : springs)
-    for (uint32_t end : {s.a, s.b}) around[end] += s.stiffness / points.mass[end];
+    for (uint32_t end : {s.a, s.b}) {
+      around[end] += s.stiffness / points.mass[end];
+      ++count[end];
+    }
+  most_around_ = springs.empty() ? 0 : std::ranges::max(around);
+  most_springs_ = springs.empty() ? 0 : std::ranges::max(count);
   material_.clear();
   for (const ClothSpring& s : springs) {
     const Real own = s.stiffness * (1 / points.mass[s.a] + 1 / points.mass[s.b]);
@@ -102,6 +108,7 @@ void ClothSprings::assign(std::span<const ClothSpring> springs, const ClothPoint
   prepared_for_ = -1;
   is_stretched_ = false;
   set_longest_step();
+  longest_at_rest_ = longest_step_;
 }
 
 /// Adds paths of equal or decreasing length as one batch.
@@ -188,14 +195,34 @@ inline void ClothSprings::for_rows(const Vec4* x, Look&& look) const {
   }
 }
 
-void ClothSprings::adapt_to_stretch(const ClothPoints& points) {
+/// Returns an upper bound of the transverse stiffness at a point, the sum of k e / (l m) of its springs
+/// [1/s^2], from the springs that are longer than kShortEnough alone. Returns 0 if there are none.
+Real ClothSprings::bound_across(const ClothPoints& points) const {
   const Vec4* const x = points.position.data();
-  auto too_long = Lanes{} > Lanes{};
-  for_rows(x, [&](const Batch&, std::size_t r, const FourVectors& d) {
-    too_long |= d.dot(d) > kShortEnough * kShortEnough * elastic_[r].rest * elastic_[r].rest;
+  Real steepest = 0;
+  for_rows(x, [&](const Batch& batch, std::size_t r, const FourVectors& d) {
+    const Lanes square = d.dot(d);
+    const auto too_long = square > kShortEnough * kShortEnough * elastic_[r].rest * elastic_[r].rest;
+    if ((too_long[0] | too_long[1] | too_long[2] | too_long[3]) == 0) return;
+    const Lanes length = lane_root(square), elongation = elongations(batch, r, length, x);
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const uint32_t spring = elastic_[r].spring[lane];
+      if (too_long[lane] == 0 || spring == kNoSpring) continue;
+      const Material& m = material_[spring];
+      const Real strain = std::max(elongation[lane] / length[lane], 0.0);
+      steepest = std::max(steepest, m.stiffness * strain / std::min(points.mass[m.a], points.mass[m.b]));
+    }
   });
-  const bool is_stretched = (too_long[0] | too_long[1] | too_long[2] | too_long[3]) != 0;
+  return steepest > 0 ? (1 - 1 / kShortEnough) * most_around_ + most_springs_ * steepest : 0;
+}
+
+void ClothSprings::adapt_to_stretch(const ClothPoints& points) {
+  const Real across_bound = bound_across(points);
+  // Neither end of a spring has more than the bound, so most steps need no sums over all springs.
+  const Real at_rest = longest_at_rest_ * longest_at_rest_;
+  const bool is_stretched = clamped_ > 0 ? across_bound > 0 : 2 * across_bound * at_rest > kMaxAcross;
   if (!is_stretched && !is_stretched_) return;
+  const Vec4* const x = points.position.data();
   std::vector<Real> across(points.size(), 0);  // by point: sum of k e / (l m) of its springs
   for_rows(x, [&](const Batch& batch, std::size_t r, const FourVectors& d) {
     const Lanes length = lane_root(d.dot(d)), elongation = elongations(batch, r, length, x);

@@ -102,6 +102,7 @@ class ClothSprings {
   void add_batch(std::span<const SpringPath* const> paths, std::span<const ClothSpring> springs);
   void add_stages(std::span<const std::size_t> color_ends);
   void set_longest_step();
+  Real bound_across(const ClothPoints& points) const;
   void run(std::span<const Stage> stages, ClothPoints& points, std::span<Vec4> moves);
   template <class Look>
   [[gnu::always_inline]] void for_rows(const Vec4* x, Look&& look) const;
@@ -128,9 +129,11 @@ class ClothSprings {
   std::vector<Batch> batch_;
   std::vector<Stage> apply_, forward_, backward_;  // stages of a step of any length
   std::vector<Real> inverse_mass_;                 // inverse masses for which the springs were prepared
-  bool is_stretched_ = false;                      // whether some `most` differs from `most_at_rest`
+  bool is_stretched_ = false;                      // whether some `most` may differ from `most_at_rest`
   Real prepared_for_ = -1;                         // length of the steps that were prepared [s]; < 0: none
-  Real longest_step_ = 0, least_stiffness_ = 1;
+  Real longest_step_ = 0, longest_at_rest_ = 0, least_stiffness_ = 1;
+  Real most_around_ = 0;       // greatest sum of k / m of the springs at a point [1/s^2]
+  uint32_t most_springs_ = 0;  // greatest number of springs at a point
   uint64_t clamped_ = 0;
 };
 

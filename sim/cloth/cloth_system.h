@@ -55,12 +55,15 @@ class ClothSystem {
     bool anchored = false;              // a fixed object holds it
     bool carries = false;               // dynamic bodies are pinned to it
     const ClothBody* leader = nullptr;  // the only body that holds it, if that is not dynamic
-    const ClothBody* pusher = nullptr;  // the only body that it touches or is near, if that is dynamic
+    const ClothBody* pusher = nullptr;  // the only body that it touches or is near, if that moves
     Vec4 move = Vec4::Zero();           // mean move of the leader's points, or of all points and bodies
     Real mass = 0;                      // mass of the same points and bodies
     Vec4 momentum = Vec4::Zero();       // momentum lost by shortening
     Vec4 velocity = Vec4::Zero();       // mean velocity of points and bodies
     Real total_mass = 0;                // mass of points and bodies
+    Real follows = 0;  // fraction of the motion of a keyframed pusher with which the frame moves
+
+    bool follows_keys() const { return pusher && !pusher->is_dynamic(); }
   };
   struct Seam {
     uint32_t cloth;
@@ -102,6 +105,8 @@ class ClothSystem {
   void find_frames();
   const ClothBody* nearby_other_body(uint32_t point);
   void choose_frame(uint32_t point);
+  Vec4 frame_move(uint32_t point);
+  void find_followers();
   bool find_drifts();
   void shorten_moves(Real dt);
   bool shorten_in_pieces();

@@ -182,16 +182,21 @@ bool solve(const ImplicitSystem& system, const SpringRun& b, SpringRun& v) {
 }
 
 /// Solves for the velocities v and for the supports that push, by an active-set method. It begins with the
-/// supports of points whose present velocities would take them beyond their planes. Returns false if a linear
-/// solution reached its limit of iterations.
+/// supports that pushed in the last sub-step, and with those of points whose present velocities would take
+/// them beyond their planes: cloth that lies still needs one solution. Returns false if a linear solution
+/// reached its limit of iterations.
 bool solve_on_supports(ImplicitSystem& system, ClothPoints& points, const ClothRange& cloth,
                        const SpringRun& b, Real h, SpringRun& v) {
   const std::span<Support> supports = cloth.supports(points);
-  if (supports.empty()) return solve(system, b, v);
+  const std::span<uint8_t> pushed = cloth.part(points.supported);
   std::vector<uint8_t> rests(supports.size());
   const auto velocity = [&](const Support& s) -> Vec4& { return v[s.point - cloth.begin]; };
   const auto lacks = [&](const Support& s) { return s.least(1) - h * s.normal.dot(velocity(s)); };
-  for (std::size_t k = 0; k < supports.size(); ++k) rests[k] = lacks(supports[k]) >= 0;
+  const auto small = [&](const Support& s) { return kSupportTolerance * points.thickness[s.point]; };
+  for (std::size_t k = 0; k < supports.size(); ++k)
+    rests[k] = pushed[supports[k].point - cloth.begin] || lacks(supports[k]) > small(supports[k]);
+  std::ranges::fill(pushed, uint8_t{0});
+  if (supports.empty()) return solve(system, b, v);
   SpringRun image(v.size());
   for (int turn = 1;; ++turn) {
     system.resting.clear();
@@ -206,11 +211,12 @@ bool solve_on_supports(ImplicitSystem& system, ClothPoints& points, const ClothR
     for (std::size_t k = 0; k < supports.size(); ++k) {
       Support& s = supports[k];
       const std::size_t i = s.point - cloth.begin;
-      const Real small = kSupportTolerance * points.thickness[s.point];
       s.impulse = rests[k] ? h * s.normal.dot(image[i] - b[i]) : 0;
-      const bool pushes = rests[k] ? s.impulse * points.inverse_mass[s.point] >= -small : lacks(s) > small;
+      const bool pushes =
+          rests[k] ? s.impulse * points.inverse_mass[s.point] >= -small(s) : lacks(s) > small(s);
       changed |= std::exchange(rests[k], pushes) != pushes;
       s.impulse = std::max(s.impulse, 0.0);
+      pushed[i] = pushes;
     }
     if (!changed || turn == kMaxTurnsOfSupports) return converged;
   }

@@ -61,18 +61,41 @@ const ClothBody* ClothSystem::nearby_other_body(uint32_t point) {
   return carrier == carriers_.end() || &frame_of(carrier->points[0]) != &frame ? near : nullptr;
 }
 
-/// Chooses the frame of a point's piece. A free piece that a single free body pushes gets the frame of that
-/// body: in the world's frame, it would be left behind inside the body.
+/// Chooses the frame of a point's piece. A free piece that a single moving body pushes or carries gets a
+/// frame that moves with this body: in the world's frame, it would be left behind inside a body that pushes
+/// it, and it would come to a stop on a body that turns.
 void ClothSystem::choose_frame(uint32_t point) {
   Frame& frame = frame_of(point);
   const ClothBody* near = frame.rests ? nullptr : nearby_other_body(point);
   if (!near) return;
-  const bool is_loose = !frame.anchored && !frame.carries && near->is_dynamic();
+  const bool is_loose = !frame.anchored && !frame.carries && near->moves();
   const bool is_one = !contacts_.is_near_several(point) && (!frame.pusher || frame.pusher == near);
   if (is_loose && is_one)
     frame.pusher = near;
   else
     frame.rests = true;
+}
+
+/// Returns the displacement of a point that moves with the frame of its piece. On a keyframed body this is
+/// the fraction `follows` of the body's motion, which keeps all lengths.
+Vec4 ClothSystem::frame_move(uint32_t point) {
+  const Frame& frame = frame_of(point);
+  if (!frame.follows_keys()) return frame.move;
+  return frame.follows * padded(frame.pusher->rigid_move(points_.start_at(point)));
+}
+
+/// Computes the fraction of the motion of keyframed bodies that their pieces have taken up.
+void ClothSystem::find_followers() {
+  std::vector<Real> together(frames_.size(), 0), whole(frames_.size(), 0);
+  for (uint32_t i = 0; i < points_.size(); ++i) {
+    const Frame& frame = frame_of(i);
+    if (frame.rests || !frame.follows_keys()) continue;
+    const Vec3 along = frame.pusher->rigid_move(points_.start_at(i));
+    together[pieces_.of(i)] += points_.mass[i] * along.dot(points_.at(i) - points_.start_at(i));
+    whole[pieces_.of(i)] += points_.mass[i] * along.squaredNorm();
+  }
+  for (std::size_t k = 0; k < frames_.size(); ++k)
+    frames_[k].follows = whole[k] > 0 ? std::clamp(together[k] / whole[k], 0.0, 1.0) : 0;
 }
 
 /// Computes the move of each frame. It is the move of its leader or of its pusher, or the mean move of the
@@ -100,8 +123,9 @@ bool ClothSystem::find_drifts() {
     if (!frame.rests && frame.mass > 0) frame.move /= frame.mass;
     if (frame.pusher) frame.move = padded(frame.pusher->move());
   }
+  find_followers();
   for (uint32_t i = 0; i < points_.size(); ++i)
-    if (!frame_of(i).rests) drift_[i] = frame_of(i).move;
+    if (!frame_of(i).rests) drift_[i] = frame_move(i);
   return true;
 }
 
@@ -220,7 +244,7 @@ std::vector<Real> ClothSystem::inner_energies(std::span<const Vec4> velocity) {
 std::vector<Real> ClothSystem::elastic_gains(std::span<const Vec4> whole) {
   std::vector<Real> gain(frames_.size(), 0);
   for (const ClothSpring& s : all_springs_) {
-    if (const Frame& frame = frame_of(s.a); frame.anchored || frame.rests) continue;
+    if (const Frame& frame = frame_of(s.a); frame.anchored || frame.rests || frame.follows_keys()) continue;
     const bool alone = s.counterpart_rest == 0;
     if (shortened_[s.a] == kWhole && shortened_[s.b] == kWhole &&
         (alone || (shortened_[s.counterpart[0]] == kWhole && shortened_[s.counterpart[1]] == kWhole)))

@@ -88,17 +88,18 @@ INSTANTIATE_TEST_SUITE_P(Fabrics, MovingCloth,
                          testing::Combine(testing::Values("silk", "cotton"),
                                           testing::Values(1.0 / 60, 1.0 / 240)));
 
-/// Parameter: whether the cloth has self-collision.
-class TurningBall : public testing::TestWithParam<bool> {};
+/// Parameters: whether the cloth has self-collision, max_stretch.
+class TurningBall : public testing::TestWithParam<std::tuple<bool, Real>> {};
 
 TEST_P(TurningBall, TakesItsClothAlong) {
   // Friction drags the cloth until it turns as the ball does; its stretch limit is reached.
   constexpr Real kSpin = 3;
+  const auto [self_collision, max_stretch] = GetParam();
   ClothDef def =
       effects::grid_cloth({1, 1, 20, 20}, {Vec3(0, 0.36, 0)}, effects::find_fabric("cotton")->fabric);
   def.air.density = 0;
-  def.self_collision = GetParam();
-  def.max_stretch = 1.005;
+  def.self_collision = self_collision;
+  def.max_stretch = max_stretch;
   World world({.max_step = 1.0 / 240});
   world.add_body({.shape = Sphere{0.35},
                   .motion = MotionType::kinematic,
@@ -119,10 +120,12 @@ TEST_P(TurningBall, TakesItsClothAlong) {
     }
   }
   EXPECT_GT(limited, 300);
-  EXPECT_NEAR(spin / inertia, kSpin, 0.03 * kSpin);
+  // Cloth that can hardly stretch also slips: where parts of it would cross, they stop.
+  EXPECT_NEAR(spin / inertia, kSpin, (max_stretch > 1.002 ? 0.03 : 0.1) * kSpin);
 }
 
-INSTANTIATE_TEST_SUITE_P(SelfCollision, TurningBall, testing::Bool());
+INSTANTIATE_TEST_SUITE_P(SelfCollision, TurningBall,
+                         testing::Combine(testing::Bool(), testing::Values(1.005, 1.001)));
 
 }  // namespace
 }  // namespace offstage::sim
