@@ -14,20 +14,12 @@ using Options = std::vector<std::string>;
 /// Options for conversion from full-range sRGB to limited-range BT.709 in the given pixel format, with the
 /// matching tags.
 Options yuv(const std::string& pixel_format, Options options) {
-  const Options colours = {"-vf",
-                           "scale=in_range=full:out_color_matrix=bt709:out_range=tv:flags=bicubic+accurate_"
-                           "rnd+full_chroma_inp+bitexact,"
-                           "format=" +
-                               pixel_format,
-                           "-colorspace",
-                           "bt709",
-                           "-color_primaries",
-                           "bt709",
-                           "-color_trc",
-                           "iec61966-2-1",
-                           "-color_range",
-                           "tv"};
-  options.insert(options.end(), colours.begin(), colours.end());
+  // Options like -color_trc do not tag the film since FFmpeg 7, so a filter sets the tags.
+  const std::string filter =
+      "scale=in_range=full:out_color_matrix=bt709:out_range=tv:flags=bicubic+accurate_rnd+full_chroma_inp+"
+      "bitexact,format=" +
+      pixel_format + ",setparams=colorspace=bt709:color_primaries=bt709:color_trc=iec61966-2-1:range=tv";
+  options.insert(options.end(), {"-vf", filter});
   return options;
 }
 

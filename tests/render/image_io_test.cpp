@@ -91,7 +91,8 @@ TEST(DecodeImage, NamesUnreadableFiles) {
 
 TEST(DecodeImage, RefusesMoreThan16384PixelsASideBeforeItAllocates) {
   const std::string header = std::string("\x89PNG\r\n\x1a\n") + big_endian(13) + "IHDR" + big_endian(20000) +
-                             big_endian(10) + std::string("\x08\x06\0\0\0", 5) + big_endian(0);
+                             big_endian(10) + std::string("\x08\x06\0\0\0", 5) + big_endian(0) +
+                             big_endian(1) + "IDAT";
   const std::string message = message_of<FileError>([&] { decode_image(bytes_of(header), "big"); });
   EXPECT_NE(message.find("20000x10"), std::string::npos) << message;
 }
