@@ -10,9 +10,8 @@
 namespace offstage::render {
 namespace {
 
-constexpr int kMostOnRay = 128;              // particles on a segment; the farther ones are left out
-constexpr float kDark = 1.0f / 256;          // transmittance below which nothing behind is visible
-constexpr unsigned kOthers = 1, kDrops = 2;  // groups of particles that a ray can ignore
+constexpr int kMostOnRay = 128;      // particles on a segment; the farther ones are left out
+constexpr float kDark = 1.0f / 256;  // transmittance below which nothing behind is visible
 
 // Equal to coverage() in shaders/points_shape.glsl.
 float coverage(float across, float softness) {
@@ -50,6 +49,7 @@ float phase(Scattering scattering, float forward) {
 void RayParticles::clear() {
   sets_.clear();
   tree_.reset();
+  tree_with_drops_.reset();
   built_ = MetParticles::none;
 }
 
@@ -66,11 +66,24 @@ std::vector<RayParticleSet*> RayParticles::build(MetParticles groups) {
     if (set.lines) lines = std::max(lines, set.size());
   for (std::size_t i = first_of_line_.size(); i < lines; ++i)
     first_of_line_.push_back(2 * static_cast<uint32_t>(i));
-  tree_ = embree::make_tree(RTC_BUILD_QUALITY_LOW);
+  const bool first = !tree_;
+  if (first) tree_ = tree_of(MetParticles::no_drops);
+  bool drops = false;
+  for (RayParticleSet& set : sets_) {
+    const bool is_drops = set.scattering == Scattering::drop;
+    drops = drops || is_drops;
+    const bool is_new = is_drops ? groups == MetParticles::all : first;
+    if (is_new && set.scattering != Scattering::none) unlit.push_back(&set);
+  }
+  if (drops && groups == MetParticles::all) tree_with_drops_ = tree_of(groups);
+  return unlit;
+}
+
+RayTree RayParticles::tree_of(MetParticles groups) const {
+  RayTree tree = embree::make_tree(RTC_BUILD_QUALITY_LOW);
   for (std::size_t k = 0; k < sets_.size(); ++k) {
-    RayParticleSet& set = sets_[k];
-    const bool drops = set.scattering == Scattering::drop;
-    if (drops && groups != MetParticles::all) continue;
+    const RayParticleSet& set = sets_[k];
+    if (set.scattering == Scattering::drop && groups != MetParticles::all) continue;
     RTCGeometry geometry = rtcNewGeometry(
         embree::device(), set.lines ? RTC_GEOMETRY_TYPE_FLAT_LINEAR_CURVE : RTC_GEOMETRY_TYPE_DISC_POINT);
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, set.places.data(), 0,
@@ -78,26 +91,25 @@ std::vector<RayParticleSet*> RayParticles::build(MetParticles groups) {
     if (set.lines)
       rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, first_of_line_.data(),
                                  0, sizeof(uint32_t), set.size());
-    rtcSetGeometryMask(geometry, drops ? kDrops : kOthers);
-    embree::attach(tree_.get(), geometry, static_cast<unsigned>(k));
-    if (set.scattering != Scattering::none && set.light.empty()) unlit.push_back(&set);
+    embree::attach(tree.get(), geometry, static_cast<unsigned>(k));
   }
-  rtcCommitScene(tree_.get());
-  return unlit;
+  rtcCommitScene(tree.get());
+  return tree;
 }
 
 ParticlesOnRay RayParticles::along(const Vector3f& from, const Vector3f& direction, float length,
                                    MetParticles groups, const ParticleAir& air) const {
   const float forward = std::max(air.to_sun.dot(direction), 0.0f);
-  const unsigned mask = groups == MetParticles::all ? kOthers | kDrops : kOthers;
+  const bool with_drops = groups == MetParticles::all && tree_with_drops_ != nullptr;
+  RTCScene tree = with_drops ? tree_with_drops_.get() : tree_.get();
   ParticlesOnRay found;
   float near = 0;
   for (int k = 0; k < kMostOnRay && found.transmittance > kDark; ++k) {
     RTCRayHit ray;
-    embree::set_ray(ray.ray, from, direction, length, mask);
+    embree::set_ray(ray.ray, from, direction, length, ~0u);
     ray.ray.tnear = near;
     ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    embree::intersect(tree_.get(), ray);
+    embree::intersect(tree, ray);
     if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) break;
     near = std::nextafter(ray.ray.tfar, std::numeric_limits<float>::infinity());
     const RayParticleSet& set = sets_[ray.hit.geomID];

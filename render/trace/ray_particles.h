@@ -57,8 +57,8 @@ class RayParticles {
   /// Adds particles. A set without particles is ignored.
   void add(RayParticleSet set);
   bool empty() const { return sets_.empty(); }
-  /// Builds the hierarchy of these groups. Returns the sets whose light must be set before along(), which are
-  /// the lit ones that were not built before.
+  /// Builds the hierarchies for rays that meet these groups or fewer. Returns the sets whose light must be
+  /// set before along(), which are the lit ones that were not built before.
   std::vector<RayParticleSet*> build(MetParticles groups);
   /// Returns the particles on a segment. `direction` is a unit vector; `length` [m]. The groups must have
   /// been built.
@@ -68,8 +68,11 @@ class RayParticles {
  private:
   std::vector<RayParticleSet> sets_;     ///< sets by Embree's geometry id
   std::vector<uint32_t> first_of_line_;  ///< index of the head of each line; shared by all sets of lines
-  RayTree tree_;
+  RayTree tree_;                         ///< the sets without drops
+  RayTree tree_with_drops_;              ///< all sets; null if there are no drops
   MetParticles built_ = MetParticles::none;
+
+  RayTree tree_of(MetParticles groups) const;
 };
 
 }  // namespace offstage::render
