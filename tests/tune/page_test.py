@@ -101,6 +101,16 @@ class Editing(Case):
         self.assertIn('"overrides": {"jet": {"rate": 500}}', page.text())
         self.assertEqual(page.js('return tuneStore.doc.errors'), [])
 
+    def test_presets_that_arrive_late_are_added_to_the_open_list(self):
+        page = self.page
+        wait(lambda: page.js('return tuneStore.presets.length'))
+        page.js('window.presets = tuneStore.presets; tuneStore.presets = []')
+        page.click('#add-button')
+        self.assertEqual(page.all('[data-preset]'), [])
+        page.driver.execute_async_script("const done = arguments[0]; import('./page/store.js').then(m => { m.store.presets = window.presets; m.emit('presets'); done(); })")
+        page.click('[data-preset="fountain"]')
+        wait(lambda: page.js('return tuneStore.value.effects?.[0]?.preset') == 'fountain')
+
 
 class EmptyStage(Case):
     scene_text = '{\n  "version": 1\n}\n'

@@ -34,10 +34,13 @@ export function togglePin() {
 const plain = text => text.replace(/`/g, '');
 
 export function showAdd(anchor) {
-  const cards = store.presets.map(p => el('button', {class: 'card', 'data-preset': p.name, title: plain(p.preset.description ?? ''), onclick: () => { close(); addTo('effects', {preset: p.name, position: [0, 0, 0]}, `add ${p.name}`); }},
-    el('img', {src: `page/presets/${p.name}.jpg`, alt: '', onerror: event => event.target.replaceWith(el('span', {class: 'no-picture'}))}), el('strong', {}, p.name.replace(/_/g, ' ')), el('small', {}, plain(p.preset.description ?? ''))));
+  const cards = el('div', {class: 'cards'});
+  const fill = () => cards.replaceChildren(...store.presets.map(p => el('button', {class: 'card', 'data-preset': p.name, title: plain(p.preset.description ?? ''), onclick: () => { close(); addTo('effects', {preset: p.name, position: [0, 0, 0]}, `add ${p.name}`); }},
+    el('img', {src: `page/presets/${p.name}.jpg`, alt: '', onerror: event => event.target.replaceWith(el('span', {class: 'no-picture'}))}), el('strong', {}, p.name.replace(/_/g, ' ')), el('small', {}, plain(p.preset.description ?? '')))));
+  fill();
+  if (!store.presets.length) on('presets', fill);  // the list may arrive after the first click
   const objects = kNew.map(([text, list, value]) => el('button', {onclick: () => { close(); addTo(list, fresh(list, value), `add ${text.toLowerCase()}`); }}, text));
-  const close = popover(anchor, 'Add', el('div', {class: 'stack'}, el('h3', {}, 'Objects'), el('div', {class: 'chips'}, objects), el('h3', {}, 'Effects from presets'), el('div', {class: 'cards'}, cards)), true);
+  const close = popover(anchor, 'Add', el('div', {class: 'stack'}, el('h3', {}, 'Objects'), el('div', {class: 'chips'}, objects), el('h3', {}, 'Effects from presets'), cards), true);
 }
 const kNew = [
   ['Emitter', 'emitters', {name: 'emitter', rate: 500, speed: {mean: 3, deviation: 0.5}, spread_deg: {mean: 10, deviation: 5}, radius: 0.02, lifespan: 3, surface: {type: 'disc', radius: 0.1}}],
