@@ -1,9 +1,8 @@
 #include "render/particle_rays.h"
 
 #include <algorithm>
-#include <utility>
-
-#include "render/puffs_pass.h"
+#include <cmath>
+#include <vector>
 
 namespace offstage::render {
 namespace {
@@ -17,12 +16,29 @@ float drawn_radius(const GpuPoint& point, const View& view, float pixel_m) {
                   kLeastRadius_px * pixel_m * (point.position.head<3>() - view.eye).norm());
 }
 
-RayParticleSet discs_of(const PointSet& set, const View& view, float pixel_m) {
+void reserve(RayParticleSet& set, std::size_t count) {
+  set.places.reserve(set.lines ? 2 * count : count);
+  set.colors.reserve(count);
+  set.numbers.reserve(count);
+}
+
+/// Returns the softness s of a disc with the mean opacity `mean`, which is the mean of coverage() in
+/// shaders/points_shape.glsl over the disc, 1 - s + 0.3 s^2. The smallest mean is 0.3.
+float softness_of_mean(float mean) {
+  return (1 - std::sqrt(std::max(1 - 1.2f * (1 - mean), 0.16f))) / 0.6f;
+}
+
+RayParticleSet discs_of(const PointSet& set, const PuffsPass& puffs, const View& view, float pixel_m) {
   const bool fire = set.def.style == PointStyle::fire;
   RayParticleSet result;
-  if (set.def.lit && !fire) result.scattering = set.is_puffs() ? Scattering::puff : Scattering::flake;
+  if (set.def.lit && !fire)
+    result.scattering = set.is_puffs()                        ? Scattering::puff
+                        : set.def.style == PointStyle::sprite ? Scattering::sprite
+                                                              : Scattering::flake;
   result.cover = fire ? kFlameCover : set.def.additive ? 0.0f : 1.0f;
-  result.softness = set.is_puffs() ? 1.0f : std::clamp(set.def.softness, 0.01f, 1.0f);
+  result.softness = std::clamp(
+      set.is_puffs() ? softness_of_mean(puffs.mean_cover(set.def.style)) : set.def.softness, 0.01f, 1.0f);
+  reserve(result, set.points.size());
   for (std::size_t i = 0; i < set.points.size(); ++i) {
     const GpuPoint& point = set.points[i];
     const float drawn = drawn_radius(point, view, pixel_m), thinning = point.position.w() / drawn;
@@ -49,6 +65,7 @@ RayParticleSet lines_of(const PointSet& set, const View& view, float pixel_m) {
   result.cover = set.def.additive ? 0.0f : 1.0f;
   result.softness = std::clamp(set.def.softness, 0.01f, 1.0f);
   result.taper = set.def.taper;
+  reserve(result, set.points.size());
   for (const GpuPoint& point : set.points) {
     const float drawn = drawn_radius(point, view, pixel_m);
     const Vector3f half_axis = 0.5f * set.def.stretch_s * point.velocity.head<3>();
@@ -67,14 +84,14 @@ RayParticleSet lines_of(const PointSet& set, const View& view, float pixel_m) {
 
 }  // namespace
 
-void set_particles(RayParticles& particles, std::span<const PointSet* const> sets, const View& view,
-                   float pixel_m) {
-  particles.clear();
-  for (const PointSet* set : sets) {
-    if (set->def.style == PointStyle::sphere) continue;
-    particles.add(set->def.style == PointStyle::streak ? lines_of(*set, view, pixel_m)
-                                                       : discs_of(*set, view, pixel_m));
-  }
+std::vector<RayParticleSet> particles_for_rays(std::span<const PointSet* const> sets, const PuffsPass& puffs,
+                                               const View& view, float pixel_m) {
+  std::vector<RayParticleSet> result;
+  for (const PointSet* set : sets)
+    if (set->def.style != PointStyle::sphere)
+      result.push_back(set->def.style == PointStyle::streak ? lines_of(*set, view, pixel_m)
+                                                            : discs_of(*set, puffs, view, pixel_m));
+  return result;
 }
 
 }  // namespace offstage::render

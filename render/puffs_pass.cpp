@@ -20,8 +20,8 @@ constexpr float kTolerance = 0.25f;   // depth in typical radii over which puffs
 constexpr float kFlameWobble = 0.5f;  // [rad]
 constexpr float kSpin = 0.35f;        // [rad/s]
 
-PuffAtlas::Kind kind_of(const PointSet& set) {
-  return set.def.style == PointStyle::fire ? PuffAtlas::Kind::flame : PuffAtlas::Kind::smoke;
+PuffAtlas::Kind kind_of(PointStyle style) {
+  return style == PointStyle::fire ? PuffAtlas::Kind::flame : PuffAtlas::Kind::smoke;
 }
 
 // Several independent random properties of a puff, derived from its random number in [0, 1), which has 24
@@ -80,6 +80,10 @@ void PuffsPass::prepare(std::span<const PointSet* const> sets, const Sun& sun) {
     }
   }
   grid_.build(absorbers, -sun.direction.normalized());
+}
+
+float PuffsPass::mean_cover(PointStyle style) const {
+  return atlas_->mean_cover(kind_of(style)) * (4 / std::numbers::pi_v<float>);
 }
 
 void PuffsPass::measure(const PaintOrder& order, const View& view, float pixel_m) {
@@ -157,7 +161,7 @@ Eigen::Matrix3f place_puff(const PointSet& set, std::size_t i, const PuffScreen&
       (Vector2f::Ones() + (stretch * stretch - 1) * along.cwiseAbs2()).cwiseSqrt() * radius_px;
   s.half_x = half.x();
   s.half_y = half.y();
-  s.cell = atlas.level(kind_of(set), shape.variant, 2 * radius_px * stretch);
+  s.cell = atlas.level(kind_of(set.def.style), shape.variant, 2 * radius_px * stretch);
 
   Eigen::Matrix3f world_from_cell;
   world_from_cell << u.x() * view.right + u.y() * view.up, v.x() * view.right + v.y() * view.up,

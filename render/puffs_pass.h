@@ -31,6 +31,9 @@ class PuffsPass {
   /// Computes the attenuation of sunlight by the smoke and drops of these sets.
   void prepare(std::span<const PointSet* const> sets, const Sun& sun);
   const OpacityGrid& grid() const { return grid_; }
+  /// Returns the mean opacity of opaque puffs over their discs. `style`: smoke or fire. Must be called after
+  /// prepare().
+  float mean_cover(PointStyle style) const;
   /// Lights the puffs of a sub-frame. The order must stay in memory until they are drawn.
   void prepare_splats(const PaintOrder& order, const View& view, const PuffLight& light);
   /// Returns the pixels that puffs `first` to `last` (keys in the PaintOrder) can change.

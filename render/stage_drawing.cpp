@@ -169,8 +169,12 @@ void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<
   }
   if (sky.has_bright_part()) light_sources.lamps.emplace_back(sky.turned);
   if (!puffs_pass.grid().empty()) light_sources.smoke = &puffs_pass.grid();
-  set_particles(ray_particles, sets, view, frame.eye.w());
-  if (!ray_particles.empty()) light_sources.particles = &ray_particles;
+  if (std::ranges::any_of(sets, [](const PointSet* set) { return set->def.style != PointStyle::sphere; })) {
+    ray_particles.reset([this, sets, &view, pixel_m = frame.eye.w()] {
+      return particles_for_rays(sets, puffs_pass, view, pixel_m);
+    });
+    light_sources.particles = &ray_particles;
+  }
   light_pass.trace(light_sources, view, offsets, stop);
 }
 

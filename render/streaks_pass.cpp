@@ -4,6 +4,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include "render/trace/ray_particles.h"
+
 namespace offstage::render {
 namespace {
 
@@ -19,10 +21,9 @@ Vector3f drop_light(const PuffLight& light, const GpuPoint& point, const Vector3
   const float radius = point.position.w(), number = point.velocity.w();
   const Vector3f through =
       0.5f * (around.sky * light.sky_reflection(-to_eye, 0.25f) + around.light.at(Vector3f::UnitY()));
-  const float forward = 0.5f - 0.5f * light.to_sun.dot(to_eye);
-  const float forward2 = forward * forward, forward8 = forward2 * forward2 * forward2 * forward2;
+  const float scattered = scattered_fraction(Scattering::drop, -light.to_sun.dot(to_eye));
   const float visibility = light.air.sun(place, radius, number) * std::exp(-light.grid.depth(place));
-  return through + visibility * (0.12f + 0.9f * forward8) * light.frame.sun_radiance.head<3>() +
+  return through + visibility * scattered * light.frame.sun_radiance.head<3>() +
          light.air.lamps_around(place, radius, number);
 }
 

@@ -51,9 +51,11 @@ MetParticles particles_in_mirror(float roughness) {
 /// Returns the particles that are visible in mirror images by any of the surfaces.
 MetParticles particles_in_mirrors(const SurfaceBuffer& surfaces) {
   MetParticles met = MetParticles::none;
-  for (const Vector4f& place : surfaces.places)
-    if (place.w() >= SurfaceBuffer::kMirrors)
-      met = std::max(met, particles_in_mirror(std::fmod(place.w(), SurfaceBuffer::kMirrors)));
+  for (const Vector4f& place : surfaces.places) {
+    if (place.w() < SurfaceBuffer::kMirrors) continue;
+    met = std::max(met, particles_in_mirror(std::fmod(place.w(), SurfaceBuffer::kMirrors)));
+    if (met == MetParticles::all) break;
+  }
   return met;
 }
 
@@ -512,7 +514,8 @@ void LightTracer::trace_arriving(const SurfaceBuffer& surfaces, const LightView&
   light.has_mirrors = std::ranges::any_of(surfaces.places,
                                           [](const Vector4f& p) { return p.w() >= SurfaceBuffer::kMirrors; });
   if (light.has_mirrors) light.mirrored.resize(pixels);
-  if (light.has_mirrors) prepare_particles(particles_in_mirrors(surfaces), view.offsets);
+  if (light.has_mirrors && sources_.particles != nullptr)
+    prepare_particles(particles_in_mirrors(surfaces), view.offsets);
   for_rows(height, [&](int y) {
     for (int x = 0; x < width; x += kLanes) trace_pixels(surfaces, x, y, view, light);
   });

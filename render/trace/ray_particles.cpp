@@ -35,38 +35,37 @@ float opacity_on_ray(const RayParticleSet& set, std::size_t i, const Vector3f& f
   return coverage((to_head + t * axis).norm() / head.w(), set.softness) * (1 - set.taper * t);
 }
 
-/// Returns the fraction of the sun's light that a particle scatters to the eye. `forward`: cosine between the
-/// ray and the direction to the sun, 0 if it is negative. Equal to the factors in shaders/points.vert,
-/// puff_light.cpp and streaks_pass.cpp, without the direction of the surface.
-float phase(Scattering scattering, float forward) {
-  const float f2 = forward * forward, f4 = f2 * f2;
-  if (scattering == Scattering::puff) return 0.68f + 0.9f * f4 * f2;
-  return scattering == Scattering::drop ? 0.12f + 0.9f * f4 * f4 : 0.4f + 0.8f * f4;
-}
-
 }  // namespace
 
-void RayParticles::clear() {
+float scattered_fraction(Scattering scattering, float cosine) {
+  if (scattering == Scattering::drop) {
+    const float forward = 0.5f + 0.5f * cosine, forward2 = forward * forward;
+    return 0.12f + 0.9f * (forward2 * forward2 * forward2 * forward2);
+  }
+  const float forward = std::max(cosine, 0.0f), forward2 = forward * forward, forward4 = forward2 * forward2;
+  if (scattering == Scattering::puff) return 0.68f + 0.9f * forward4 * forward2;
+  return (scattering == Scattering::sprite ? 0.45f : 0.4f) + 0.8f * forward4;
+}
+
+void RayParticles::reset(std::function<std::vector<RayParticleSet>()> make) {
+  make_ = std::move(make);
   sets_.clear();
   tree_.reset();
   tree_with_drops_.reset();
   built_ = MetParticles::none;
 }
 
-void RayParticles::add(RayParticleSet set) {
-  if (!set.colors.empty()) sets_.push_back(std::move(set));
-}
-
 std::vector<RayParticleSet*> RayParticles::build(MetParticles groups) {
   std::vector<RayParticleSet*> unlit;
   if (groups <= built_) return unlit;
+  const bool first = built_ == MetParticles::none;
   built_ = groups;
+  if (first) sets_ = make_();
   std::size_t lines = 0;
   for (const RayParticleSet& set : sets_)
     if (set.lines) lines = std::max(lines, set.size());
   for (std::size_t i = first_of_line_.size(); i < lines; ++i)
     first_of_line_.push_back(2 * static_cast<uint32_t>(i));
-  const bool first = !tree_;
   if (first) tree_ = tree_of(MetParticles::no_drops);
   bool drops = false;
   for (RayParticleSet& set : sets_) {
@@ -83,7 +82,8 @@ RayTree RayParticles::tree_of(MetParticles groups) const {
   RayTree tree = embree::make_tree(RTC_BUILD_QUALITY_LOW);
   for (std::size_t k = 0; k < sets_.size(); ++k) {
     const RayParticleSet& set = sets_[k];
-    if (set.scattering == Scattering::drop && groups != MetParticles::all) continue;
+    const bool is_met = groups == MetParticles::all || set.scattering != Scattering::drop;
+    if (!is_met || set.size() == 0) continue;
     RTCGeometry geometry = rtcNewGeometry(
         embree::device(), set.lines ? RTC_GEOMETRY_TYPE_FLAT_LINEAR_CURVE : RTC_GEOMETRY_TYPE_DISC_POINT);
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, set.places.data(), 0,
@@ -99,7 +99,7 @@ RayTree RayParticles::tree_of(MetParticles groups) const {
 
 ParticlesOnRay RayParticles::along(const Vector3f& from, const Vector3f& direction, float length,
                                    MetParticles groups, const ParticleAir& air) const {
-  const float forward = std::max(air.to_sun.dot(direction), 0.0f);
+  const float towards_sun = air.to_sun.dot(direction);
   const bool with_drops = groups == MetParticles::all && tree_with_drops_ != nullptr;
   RTCScene tree = with_drops ? tree_with_drops_.get() : tree_.get();
   ParticlesOnRay found;
@@ -118,7 +118,8 @@ ParticlesOnRay RayParticles::along(const Vector3f& from, const Vector3f& directi
     Vector3f radiance = set.colors[i].head<3>();
     if (set.scattering != Scattering::none)
       radiance = radiance.cwiseProduct(set.light[i].head<3>() +
-                                       set.light[i].w() * phase(set.scattering, forward) * air.sun_radiance);
+                                       set.light[i].w() * scattered_fraction(set.scattering, towards_sun) *
+                                           air.sun_radiance);
     found.radiance += found.transmittance * opacity * std::exp(-air.fog * ray.ray.tfar) * radiance;
     found.transmittance *= 1 - set.cover * opacity;
   }

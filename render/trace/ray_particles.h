@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "render/mesh.h"
@@ -12,7 +13,13 @@
 namespace offstage::render {
 
 /// How particles scatter light. `none`: they are not lit, and their colour is their radiance.
-enum class Scattering { none, puff, flake, drop };
+enum class Scattering { none, puff, sprite, flake, drop };
+
+/// Returns the fraction of the sun's light that a particle scatters along a ray to the eye. `cosine`: of the
+/// angle between the direction in which the ray is traced and the direction to the sun. For sprites and
+/// flakes equal to the factors in shaders/points.vert, for puffs to those of light that smoke does not absorb
+/// in PuffLight, both without the effect of the direction of their surface.
+float scattered_fraction(Scattering scattering, float cosine);
 
 /// Groups of particles that a ray meets. Drops are too small to be visible in blurred mirror images.
 enum class MetParticles { none, no_drops, all };
@@ -52,11 +59,8 @@ struct ParticlesOnRay {
 
 class RayParticles {
  public:
-  /// Removes all particles.
-  void clear();
-  /// Adds particles. A set without particles is ignored.
-  void add(RayParticleSet set);
-  bool empty() const { return sets_.empty(); }
+  /// Replaces the particles. `make` returns the new sets. It is only called if rays can meet particles.
+  void reset(std::function<std::vector<RayParticleSet>()> make);
   /// Builds the hierarchies for rays that meet these groups or fewer. Returns the sets whose light must be
   /// set before along(), which are the lit ones that were not built before.
   std::vector<RayParticleSet*> build(MetParticles groups);
@@ -66,6 +70,7 @@ class RayParticles {
                        const ParticleAir& air) const;
 
  private:
+  std::function<std::vector<RayParticleSet>()> make_;
   std::vector<RayParticleSet> sets_;     ///< sets by Embree's geometry id
   std::vector<uint32_t> first_of_line_;  ///< index of the head of each line; shared by all sets of lines
   RayTree tree_;                         ///< the sets without drops

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <tuple>
 
@@ -45,6 +46,9 @@ constexpr Real kTermsShare = 0.02;
 /// A point slides throughout the interval if contacts change its sliding velocity by less than this fraction
 /// of its sliding speed at the start.
 constexpr Real kSlidesOn = 0.5;
+
+/// Greatest number of solutions with points that are assumed to slide throughout; see add_sliding().
+constexpr int kMostAssumed = 4;
 
 /// Returns the angular speed of a body's corners [rad/s]. The rotation of round bodies about their axis does
 /// not count.
@@ -116,8 +120,7 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
     // The fast solver has shorter sub-steps, so it loses less energy than an undivided solution.
     const bool is_divided =
         !has_closing() ||
-        divide_at_closings(island, interval, std::min(2 * budget, kMostDivision) - newton_.cost(),
-                           outcome.work);
+        divide_at_closings(island, interval, std::min(2 * budget, kMostDivision) - cost_, outcome.work);
     outcome.is_applied = is_divided || !std::isfinite(budget);
     if (!outcome.is_applied) return outcome;
   }
@@ -134,13 +137,14 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
 std::optional<ContactWork> ExactContacts::solve_by_newton(Real budget) {
   const std::vector<ContactBody> start = bodies_;
   ContactWork total;
-  for (cost_ = 0;; bodies_ = start) {
+  cost_ = 0;
+  for (int turn = 1;; ++turn, bodies_ = start) {
     const std::optional<ContactWork> work =
         newton_.solve(bodies_, contacts_, joints_.problem(), budget - cost_);
     cost_ += newton_.cost();
     if (!work) return {};
     total.add(*work);
-    if (!remove_sliding()) return total;
+    if (!remove_sliding(turn >= kMostAssumed)) return total;
   }
 }
 
@@ -251,17 +255,24 @@ void ExactContacts::add_sliding(const Vec3& u, Real force, Real duration) {
 }
 
 /// Finds points that do not slide throughout the interval, contrary to what add_sliding() assumed. Their
-/// friction then opposes the velocity at the end. Returns whether there are any: the contacts must then be
-/// solved again.
-bool ExactContacts::remove_sliding() {
-  return std::erase_if(sliding_, [this](const Sliding& s) {
-           Contact& c = contacts_[s.contact];
-           const Eigen::Vector2d end = c.relative_velocity(bodies_).tail<2>() - s.start;
-           if (c.impulse.x() == 0 || (end - s.start).norm() <= kSlidesOn * s.start.norm()) return false;
-           c.bias.tail<2>() -= s.change;
-           c.offset.tail<2>() -= s.change;
-           return true;
-         }) > 0;
+/// friction, or that of all points if `all` is true, then opposes the velocity at the end. Returns whether
+/// there are any: the contacts must then be solved again.
+bool ExactContacts::remove_sliding(bool all) {
+  const auto is_wrong = [this](const Sliding& s) {
+    const Contact& c = contacts_[s.contact];
+    const Eigen::Vector2d end = c.relative_velocity(bodies_).tail<2>() - s.start;
+    return c.impulse.x() != 0 && (end - s.start).norm() > kSlidesOn * s.start.norm();
+  };
+  const auto wrong = all && std::ranges::any_of(sliding_, is_wrong)
+                         ? sliding_.begin()
+                         : std::stable_partition(sliding_.begin(), sliding_.end(), std::not_fn(is_wrong));
+  const bool any = wrong != sliding_.end();
+  std::for_each(wrong, sliding_.end(), [this](const Sliding& s) {
+    contacts_[s.contact].bias.tail<2>() -= s.change;
+    contacts_[s.contact].offset.tail<2>() -= s.change;
+  });
+  sliding_.erase(wrong, sliding_.end());
+  return any;
 }
 
 uint32_t ExactContacts::add_body(Body& body, const ContactInterval& interval) {

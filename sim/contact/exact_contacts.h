@@ -48,7 +48,7 @@ class ExactContacts {
   uint32_t add_body(Body& body, const ContactInterval& interval);
   void add_points(ContactPair& pair, const ContactInterval& interval, Method method);
   void add_sliding(const Vec3& u, Real force, Real duration);
-  bool remove_sliding();
+  bool remove_sliding(bool all);
   std::optional<ContactWork> solve_by_newton(Real budget);
   bool solve_lcp(ContactWork& work);
   bool has_closing() const;

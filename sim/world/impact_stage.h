@@ -67,8 +67,8 @@ class ImpactStage {
   Real start_, h_;
   StepReport& report_;
   std::vector<Event> pending_;
-  Real accurate_left_ =
-      5e5;  // cost of accurate solutions of large clusters that is left in the sub-step [ns]
+  /// Cost of accurate solutions of large clusters that is left in the sub-step [ns]; at its start 0.5 ms.
+  Real accurate_left_ = 5e5;
 };
 
 }  // namespace offstage::sim

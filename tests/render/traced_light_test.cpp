@@ -359,6 +359,23 @@ TEST_F(TracedLight, MirrorsShowParticlesBehindTheCamera) {
   }
 }
 
+// Flames look in a mirror as they do from the same distance. A highlight of their light would be added to
+// them.
+TEST_F(TracedLight, MirrorsShowFlamesWithoutAHighlight) {
+  const PointsHandle points = s.stage.add_points({.style = PointStyle::fire});
+  s.stage.set_points(
+      points,
+      std::array{
+          Point{.position = {0, 0, 8}, .velocity = {0, 1, 0}, .radius = 1, .color = {1, 1, 1, 1}, .id = 1}});
+  const auto seen = [&](const Camera& from) {
+    look(from);
+    return mean_around(mean_of(s, 4), {80, 60}, 12);
+  };
+  const float direct = seen({.eye = {0, 0, -4}, .target = {0, 0, 0}});
+  s.add(make_box({2, 2, 0.1f}), {.color = {1, 1, 1, 1}, .metallic = 1, .roughness = 0.01f});
+  EXPECT_NEAR(seen({.eye = {0, 0, 4}, .target = {0, 0, 0}}) / direct, 1, 0.25f);
+}
+
 // In a closed room of metal that glows with e and reflects a fraction r, the radiance is e / (1 - r). Seen at
 // a right angle, since metal reflects more at grazing angles.
 TEST_F(TracedLight, InAGlowingRoomOfMirrorsIsTheSumOfAllReflections) {
