@@ -12,13 +12,14 @@ from page_case import Case, SCENE
 
 class Drag(Case):
     def changes_and_films_of_a_drag(self, element):
-        """Moves the pointer for about 3 s; counts the changes that the page sends and the versions that it shows."""
+        """Moves the pointer for about 3 s; counts the changes that start a film, and the films that it shows."""
         return self.driver.execute_async_script('''
             const [target, done] = arguments, box = target.getBoundingClientRect(), x = box.left + box.width / 2, y = box.top + box.height / 2;
             const canvas = document.getElementById('film'), films = new Set([canvas.dataset.film]), fetch_ = window.fetch;
             const start = performance.now();
             let changes = 0, moves = 0;
-            window.fetch = (...all) => { changes += /(edit|view)$/.test(String(all[0])); return fetch_(...all); };
+            const starts = (url, {body} = {}) => /edit$/.test(url) || /view$/.test(url) && 'camera' in JSON.parse(body);
+            window.fetch = (...all) => { changes += starts(...all); return fetch_(...all); };
             target.setPointerCapture = () => {};
             const send = (type, dx) => target.dispatchEvent(new PointerEvent(type, {clientX: x + dx, clientY: y, button: 0, pointerId: 1, bubbles: true}));
             send('pointerdown', 0);
