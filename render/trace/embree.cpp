@@ -27,6 +27,12 @@ RayTree make_tree(RTCBuildQuality quality) {
   return tree;
 }
 
+RTCGeometry make_geometry(RTCGeometryType type) {
+  RTCGeometry geometry = rtcNewGeometry(device(), type);
+  rtcSetGeometryMask(geometry, ~0u);
+  return geometry;
+}
+
 unsigned attach(RTCScene tree, RTCGeometry geometry) {
   rtcCommitGeometry(geometry);
   const unsigned id = rtcAttachGeometry(tree, geometry);

@@ -19,6 +19,9 @@ namespace offstage::render::embree {
 RTCDevice device();
 /// Returns an empty hierarchy.
 RayTree make_tree(RTCBuildQuality quality);
+/// Returns a geometry that belongs to all groups of objects. (By default, a geometry belongs to all groups in
+/// Embree 3, but only to the first one in Embree 4.)
+RTCGeometry make_geometry(RTCGeometryType type);
 /// Attaches a geometry, gives up its reference, and returns its number, which may be chosen.
 unsigned attach(RTCScene tree, RTCGeometry geometry);
 void attach(RTCScene tree, RTCGeometry geometry, unsigned number);

@@ -84,8 +84,8 @@ RayTree RayParticles::tree_of(MetParticles groups) const {
     const RayParticleSet& set = sets_[k];
     const bool is_met = groups == MetParticles::all || set.scattering != Scattering::drop;
     if (!is_met || set.size() == 0) continue;
-    RTCGeometry geometry = rtcNewGeometry(
-        embree::device(), set.lines ? RTC_GEOMETRY_TYPE_FLAT_LINEAR_CURVE : RTC_GEOMETRY_TYPE_DISC_POINT);
+    RTCGeometry geometry =
+        embree::make_geometry(set.lines ? RTC_GEOMETRY_TYPE_FLAT_LINEAR_CURVE : RTC_GEOMETRY_TYPE_DISC_POINT);
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, set.places.data(), 0,
                                sizeof(Vector4f), set.places.size());
     if (set.lines)

@@ -28,7 +28,7 @@ constexpr int kMostPassed = 64;
 
 RTCGeometry make_triangles(const void* positions, std::size_t stride, std::size_t count,
                            std::span<const uint32_t> indices) {
-  RTCGeometry geometry = rtcNewGeometry(embree::device(), RTC_GEOMETRY_TYPE_TRIANGLE);
+  RTCGeometry geometry = embree::make_geometry(RTC_GEOMETRY_TYPE_TRIANGLE);
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, positions, 0, stride,
                              count);
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, indices.data(), 0,
@@ -179,7 +179,7 @@ unsigned RayScene::add(const RayMesh& mesh, const RayMaterial& material,
   if (mesh.indices.empty() || !world_from_mesh.matrix().allFinite()) return kNone;
   const float determinant = world_from_mesh.linear().determinant();
   if (determinant == 0) return kNone;
-  RTCGeometry geometry = rtcNewGeometry(embree::device(), RTC_GEOMETRY_TYPE_INSTANCE);
+  RTCGeometry geometry = embree::make_geometry(RTC_GEOMETRY_TYPE_INSTANCE);
   rtcSetGeometryInstancedScene(geometry, mesh.tree());
   rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, world_from_mesh.matrix().data());
   Object object{.material = &material, .mesh = &mesh, .world_from_mesh = world_from_mesh};
@@ -201,7 +201,7 @@ void RayScene::add_cloth(std::span<const ClothVertex> vertices, std::span<const 
 void RayScene::add_balls(const Vector4f* balls, const Vector4f* colors, std::size_t stride, std::size_t count,
                          const RayMaterial& material, bool casts_shadow) {
   if (count == 0) return;
-  RTCGeometry geometry = rtcNewGeometry(embree::device(), RTC_GEOMETRY_TYPE_SPHERE_POINT);
+  RTCGeometry geometry = embree::make_geometry(RTC_GEOMETRY_TYPE_SPHERE_POINT);
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, balls, 0, stride, count);
   attach(geometry,
          {.material = &material,
@@ -214,7 +214,7 @@ void RayScene::add_balls(const Vector4f* balls, const Vector4f* colors, std::siz
 void RayScene::add_sprites(const Vector4f* balls, const Vector4f* colors, std::size_t stride,
                            std::size_t count, float softness) {
   if (count == 0) return;
-  RTCGeometry geometry = rtcNewGeometry(embree::device(), RTC_GEOMETRY_TYPE_SPHERE_POINT);
+  RTCGeometry geometry = embree::make_geometry(RTC_GEOMETRY_TYPE_SPHERE_POINT);
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, balls, 0, stride, count);
   rtcSetGeometryMask(geometry, kSprite);
   has_translucent_ = true;

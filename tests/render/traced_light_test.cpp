@@ -218,6 +218,18 @@ TEST_F(TracedLight, ReachesPanesBehindGlass) {
   EXPECT_NEAR(brightness() / by_sun, 0.9f, 0.15f);
 }
 
+// The sun passes both faces of a black plate of opacity a: a fraction (1 - a)^2 of its light reaches the
+// floor.
+TEST_F(TracedLight, OfTheSunIsDimmedByTranslucentPlates) {
+  s.stage.set_sun({.direction = {0, 1, 0}, .intensity = 2, .size_deg = 0.5f});
+  s.add(make_ground(20), kPlaster);
+  look({.eye = {0, 1, 3}, .target = {0, 0, 0}, .fov_deg = 20});
+  const auto brightness = [&] { return mean_around(mean_of(s, 4), place_of({0, 0, 0}), 3); };
+  const float without = brightness();
+  s.add(make_box({2, 0.1f, 2}), {.color = {0, 0, 0, 0.4f}, .roughness = 1}, {0, 2.5f, 0});
+  EXPECT_NEAR(brightness() / without, 0.6f * 0.6f, 0.01f);
+}
+
 // A room that only a small sunlit patch of its floor lights. Rays seldom find the patch, so its walls get
 // further paths.
 TEST_F(TracedLight, OfASmallBrightPatchHasLittleNoise) {
