@@ -101,15 +101,35 @@ class Editing(Case):
         self.assertIn('"overrides": {"jet": {"rate": 500}}', page.text())
         self.assertEqual(page.js('return tuneStore.doc.errors'), [])
 
+    def presets_arrive(self):
+        self.driver.execute_async_script("const done = arguments[0]; import('./page/store.js').then(m => { m.store.presets = window.presets; m.emit('presets'); done(); })")
+
+    def without_presets(self):
+        wait(lambda: self.page.js('return tuneStore.presets.length'))
+        self.page.js('window.presets = tuneStore.presets; tuneStore.presets = []')
+
     def test_presets_that_arrive_late_are_added_to_the_open_list(self):
         page = self.page
-        wait(lambda: page.js('return tuneStore.presets.length'))
-        page.js('window.presets = tuneStore.presets; tuneStore.presets = []')
+        self.without_presets()
         page.click('#add-button')
         self.assertEqual(page.all('[data-preset]'), [])
-        page.driver.execute_async_script("const done = arguments[0]; import('./page/store.js').then(m => { m.store.presets = window.presets; m.emit('presets'); done(); })")
+        self.presets_arrive()
         page.click('[data-preset="fountain"]')
         wait(lambda: page.js('return tuneStore.value.effects?.[0]?.preset') == 'fountain')
+
+    def test_presets_that_arrive_late_only_redraw_controls_that_show_them(self):
+        page = self.page
+        page.set_text(SCENE.replace('"bodies"', '"effects": [{"preset": "fountain", "position": [0, 0, 3]}],\n  "bodies"', 1))
+        self.without_presets()
+        page.select('/emitters/0')
+        row = page.row('rate')
+        self.presets_arrive()
+        self.assertTrue(row.is_displayed())  # an error if the row was removed
+        self.without_presets()
+        page.select('/effects/0')
+        self.assertEqual(page.all('[data-path="/effects/0/overrides/jet"]'), [])
+        self.presets_arrive()
+        self.assertEqual(len(page.all('[data-path="/effects/0/overrides/jet"]')), 1)
 
 
 class EmptyStage(Case):

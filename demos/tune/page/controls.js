@@ -55,7 +55,7 @@ export function drawControls(force = false) {
   const value = valueOf(find(store.root, path));
   shownPath = path;
   const query = byId('search').value.trim().toLowerCase();
-  const now = path + '|' + query + '|' + store.selection.length + signatureOf(description, value, path, presetOf(value, stepsOf(path))) + (value?.preset ?? '');
+  const now = path + '|' + query + '|' + store.selection.length + signatureOf(description, value, path, presetOf(value, stepsOf(path))) + (value?.preset ? value.preset + store.presets.length : '');
   if (now === signature && !force) return refresh();
   const top = signature.startsWith(path + '|') ? panel.scrollTop : 0, focus = panel.contains(document.activeElement) ? document.activeElement.getAttribute('aria-label') : null;
   signature = now;
@@ -206,5 +206,4 @@ export function reveal(path) {
   panel.querySelector(`[data-path="${CSS.escape(path)}"]`)?.scrollIntoView({block: 'nearest'});
 }
 
-on('document selection search', () => drawControls());
-on('presets', () => drawControls(true));
+on('document selection search presets', () => drawControls());
