@@ -1,6 +1,6 @@
 // Depth, normal, id and motion of a ball, by ray casting on its quad.
 layout(location = 2) flat in vec4 ball;  // centre, radius
-layout(location = 3) in vec3 position;
+layout(location = 3) in vec3 on_quad;  // position on the quad, from the centre
 layout(location = 4) flat in vec3 velocity;
 layout(location = 4) uniform mat4 clip_before_from_world;
 // Half the picture [px], y downwards; id; time since the previous transforms.
@@ -9,8 +9,8 @@ layout(location = 0) out vec4 normal_id;
 layout(location = 1) out vec4 motion_depth;
 
 void main() {
-  vec3 ray = normalize(position - frame.eye.xyz), to_eye = frame.eye.xyz - ball.xyz;
-  vec3 nearest = to_eye - ray * dot(to_eye, ray);  // from the centre to the ray
+  vec3 ray = normalize(ball.xyz - frame.eye.xyz + on_quad);
+  vec3 nearest = on_quad - ray * dot(on_quad, ray);  // from the centre to the ray, as in sphere.frag
   float h2 = ball.w * ball.w - dot(nearest, nearest);
   if (h2 < 0.0) discard;
   vec3 offset = nearest - ray * sqrt(h2), hit = ball.xyz + offset;

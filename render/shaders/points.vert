@@ -17,7 +17,7 @@ layout(location = 0) out vec3 place;
 #if STYLE == 2
 layout(location = 1) flat out vec4 color;
 layout(location = 2) flat out vec4 ball;     // centre, radius
-layout(location = 3) out vec3 position;  // position on the quad
+layout(location = 3) out vec3 on_quad;  // position on the quad, from the centre
 #ifdef CHANNELS
 layout(location = 4) flat out vec3 velocity;
 #endif
@@ -84,7 +84,8 @@ void main() {
   // The cone from the eye that touches the ball gives its silhouette.
   float sine = radius * frame.eye.w / viewer.w;
   half_side *= inversesqrt(max(1.0 - sine * sine, 0.02));
-  vec3 at = p + half_side * (u * corner.x + w * corner.y);
+  on_quad = half_side * (u * corner.x + w * corner.y);
+  vec3 at = p + on_quad;
 #else
   vec3 half_axis = in_velocity.xyz * (0.5 * style.y);
   vec3 across_view = half_axis - viewer.xyz * dot(half_axis, viewer.xyz);
@@ -122,7 +123,6 @@ void main() {
 #if STYLE == 2
   color = in_color;
   ball = in_position;
-  position = at;
 #ifdef CHANNELS
   velocity = in_velocity.xyz;
 #endif

@@ -1,7 +1,7 @@
 // A ball by ray casting on its quad.
 layout(location = 1) flat in vec4 color;
 layout(location = 2) flat in vec4 ball;  // centre, radius
-layout(location = 3) in vec3 position;
+layout(location = 3) in vec3 on_quad;  // position on the quad, from the centre
 layout(location = 1) uniform vec4 style;  // z: negative if not lit
 layout(location = 2) uniform vec2 surface;  // metallic, roughness
 #ifndef SURFACE
@@ -9,9 +9,10 @@ layout(location = 0) out vec4 result;
 #endif
 
 void main() {
-  vec3 ray = normalize(position - frame.eye.xyz);
-  vec3 to_eye = frame.eye.xyz - ball.xyz;
-  vec3 nearest = to_eye - ray * dot(to_eye, ray);  // from the centre to the ray
+  vec3 ray = normalize(ball.xyz - frame.eye.xyz + on_quad);
+  // From the centre to the ray. It is computed from the position on the quad, and not from the distant eye, so that rounding
+  // errors are small relative to the ball and its outline does not depend on the driver.
+  vec3 nearest = on_quad - ray * dot(on_quad, ray);
   float h2 = ball.w * ball.w - dot(nearest, nearest);
   if (h2 < 0.0) discard;
   vec3 offset = nearest - ray * sqrt(h2);
