@@ -46,6 +46,16 @@ Affine3f into_unit_ball(const std::vector<std::pair<render::Mesh, Affine3f>>& me
   return Eigen::Scaling(1 / std::max(radius, 1e-9f)) * Eigen::Translation3f(-box.center());
 }
 
+/// Returns the mesh of a shape for particles. Their balls have fewer triangles than those of bodies, because
+/// particles are many and small.
+template <class Shape>
+render::Mesh particle_mesh_of(const Shape& shape) {
+  return mesh_of(shape);
+}
+render::Mesh particle_mesh_of(const sim::Sphere& s) {
+  return render::make_sphere(to_float(s.radius), 32);
+}
+
 }  // namespace
 
 Picture::Picture(const Scene& scene, const ModelLibrary& models, render::Context& context, bool quick)
@@ -94,8 +104,9 @@ void Picture::add_particle_mesh(const ParticleLook& look, const ModelLibrary& mo
   drawn.object = object;
   std::vector<std::pair<render::Mesh, Affine3f>> meshes;
   const auto add = [&](const auto& shape, const std::string& name, const Affine3f& whole_from_part) {
-    drawn.parts.push_back({primitive(shape), material(name, models), whole_from_part});
-    meshes.emplace_back(mesh_of(shape), whole_from_part);
+    render::Mesh mesh = particle_mesh_of(shape);
+    drawn.parts.push_back({stage_.add_mesh(mesh), material(name, models), whole_from_part});
+    meshes.emplace_back(std::move(mesh), whole_from_part);
   };
   const std::string& own = drawn.look->material;
   std::visit(
