@@ -177,6 +177,18 @@ int VisibleLight::find(const Hit& hit) const {
   return static_cast<int>(index_of(column, row, guide.width_px));
 }
 
+// The pixel at (x, y) in clip coordinates shows the directions d with row_x . d = x row_w . d and row_y . d =
+// y row_w . d, where the rows are those of the matrix from world to clip coordinates.
+Vector3f VisibleLight::direction_through(int x, int y) const {
+  const Eigen::Matrix<double, 3, 4> rows = view_.clip_from_world.transpose().topRows<3>().cast<double>();
+  const Eigen::Vector3d row_w = rows.col(3);
+  const double clip_x = (2 * x + 1) / static_cast<double>(light_.pixels.width_px) - 1;
+  const double clip_y = (2 * y + 1) / static_cast<double>(light_.pixels.height_px) - 1;
+  const Eigen::Vector3d direction =
+      (rows.col(0) - clip_x * row_w).cross(rows.col(1) - clip_y * row_w).normalized();
+  return (row_w.dot(direction) > 0 ? direction : Eigen::Vector3d(-direction)).cast<float>();
+}
+
 Vector4f VisibleLight::arriving(int pixel) const {
   const auto k = static_cast<std::size_t>(pixel);
   Vector4f result = light_.arriving[k];

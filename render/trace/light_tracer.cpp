@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -592,10 +593,14 @@ void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& 
   });
 }
 
-// Returns the light that arrives at the eye through a glass surface. The path starts just before the surface.
-Vector3f LightTracer::light_through(const Point& point, PixelSampler& sampler, const VisibleLight& visible,
-                                    LightSums& sums) const {
-  Path path{.from = off_surface(point.place, point.view), .direction = -point.view, .cone = 1e-3f};
+// Returns the light that arrives at the eye through a glass surface. The path starts just before the surface,
+// at a distance of few significant bits from the eye: inside glass, paths are so sensitive to rounding errors
+// that pictures would otherwise depend on the driver that drew the surface.
+Vector3f LightTracer::light_through(const Point& point, const Vector3f& eye, PixelSampler& sampler,
+                                    const VisibleLight& visible, LightSums& sums) const {
+  const float before = (1 - 0x1p-12f) * point.view.dot(eye - point.place);
+  const float distance = std::bit_cast<float>(std::bit_cast<uint32_t>(before) & ~0x1fffu);
+  Path path{.from = eye - distance * point.view, .direction = -point.view, .cone = 1e-3f};
   Hit hit;
   if (!scene_.first_hit(path.from, path.direction, kFar, hit)) return sky_seen(path.direction);
   const Vector3f albedo = hit.material->color(hit, 0).head<3>();
@@ -627,14 +632,15 @@ void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, con
       }
       for (int i = 0; i < kLanes; ++i) {
         if (!points.visible[i]) continue;
-        const Point point = points.one(i, view.eye);
+        Point point = points.one(i, view.eye);
+        point.view = -behind.direction_through(x0 + x + i, y0 + y);
         PixelSampler sampler(static_cast<uint32_t>(x0 + x + i), static_cast<uint32_t>(y0 + y),
                              view.offsets.index, view.offsets.count);
         const SquarePoint<float> on_sun = sampler.next();
         const bool sunny = sources_.sun.intensity > 0 && point.normal.dot(sources_.sky.sun_direction) > 0;
         const std::size_t pixel = index_of(x + i, y, width);
         glass.mirrored[pixel] << mirrored_light(point, view, sampler, behind, sums), 1;
-        glass.through[pixel] << light_through(point, sampler, behind, sums),
+        glass.through[pixel] << light_through(point, view.eye, sampler, behind, sums),
             sunny ? sun_visibility(point.place, on_sun) : 0.0f;
       }
     }

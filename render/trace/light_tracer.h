@@ -78,6 +78,8 @@ class VisibleLight {
       : light_(light), view_(view), picture_(picture) {}
   /// Returns the index of the pixel that shows the hit point, or -1 if the point is not visible.
   int find(const Hit& hit) const;
+  /// Returns the unit direction from the eye through the middle of a pixel.
+  Vector3f direction_through(int x, int y) const;
   bool has_picture() const { return !picture_.empty(); }
   Vector3f color(int pixel) const { return picture_[static_cast<std::size_t>(pixel)].head<3>(); }
   /// Returns the light at the surface in a pixel from the sky, other surfaces and lamps; w: visible fraction
@@ -141,8 +143,8 @@ class LightTracer {
   float sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const;
   Lanes sun_visibility(const LaneVectors& place, IntLanes active, const SquarePoint<Lanes>& uv,
                        RayScene::Focus focus) const;
-  Vector3f light_through(const Point& point, PixelSampler& sampler, const VisibleLight& visible,
-                         LightSums& sums) const;
+  Vector3f light_through(const Point& point, const Vector3f& eye, PixelSampler& sampler,
+                         const VisibleLight& visible, LightSums& sums) const;
   Vector3f mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler,
                           const VisibleLight& visible, LightSums& sums) const;
   void lift(const Points& points, IntLanes lanes, const LightView& view, LaneVectors& place) const;
