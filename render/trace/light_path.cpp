@@ -288,7 +288,6 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
   };
   float travelled = 0;
   bool sharp = path.cone < 0.1f;
-  int bounces = 0;
   for (int step = 0; step < kMostSteps; ++step) {
     Hit hit;
     const bool hits = scene_.first_hit(path.from, path.direction, kFar, hit);
@@ -331,7 +330,7 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
           path.fraction.cwiseProduct(material.emission_at(hit.uv));
     if (follow_glass(hit, albedo, sampler, path, light)) continue;
     path.from = off_surface(hit.position, hit.face);
-    if (follow_smooth(hit, albedo, sampler, sharp, bounces > 0, path, light)) continue;
+    if (follow_smooth(hit, albedo, sampler, sharp, path.bounces > 0, path, light)) continue;
     path.fraction = path.fraction.cwiseProduct(albedo);
     if (pixel >= 0) {
       const Vector4f arriving = visible->arriving(pixel);
@@ -347,16 +346,42 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
       path.from = off_surface(hit.position, hit.face);
     }
     sum += path.fraction.cwiseProduct(direct_light(hit, path.from, sampler));
+    if (path.splits > 1) {
+      split(hit, path, sampler, light);
+      return light;
+    }
     // Russian roulette: a path survives with a probability in proportion to its remaining light.
     const float survives = std::min(path.fraction.maxCoeff(), 0.95f);
-    if (++bounces >= kMostBounces || sampler.next().x >= survives) return light;
+    if (path.bounces + 1 >= kMostBounces || sampler.next().x >= survives) return light;
     path.fraction /= survives;
     const Vector3f outgoing = to_eigen(cosine_direction(from_eigen(hit.normal), sampler.next()));
     path.scatter(hit.normal, outgoing.dot(hit.face) > 0 ? outgoing : reflected(outgoing, hit.face));
-    sharp = false;
+    ++path.bounces;
     path.cone = 0.5f;
+    sharp = false;
   }
   return light;
+}
+
+// Adds the light of several paths from a diffuse surface. Their directions are points of a Fibonacci lattice.
+void LightTracer::split(const Hit& hit, const Path& path, PixelSampler& sampler, FoundLight& light) const {
+  const auto wrapped = [](float x) { return x - std::floor(x); };
+  const auto count = static_cast<float>(path.splits);
+  const SquarePoint<float> first = sampler.next();
+  for (int k = 0; k < path.splits; ++k) {
+    const auto number = static_cast<float>(k);
+    const Vector3f outgoing = to_eigen(cosine_direction(
+        from_eigen(hit.normal), {wrapped(first.x + number / count), wrapped(first.y + 0.618034f * number)}));
+    Path part = path;
+    part.splits = 1;
+    part.bounces = 1;
+    part.cone = 0.5f;
+    part.fraction /= count;
+    part.scatter(hit.normal, outgoing.dot(hit.face) > 0 ? outgoing : reflected(outgoing, hit.face));
+    const FoundLight found = radiance(part, sampler);
+    light.noisy += found.noisy;
+    light.certain += found.certain;
+  }
 }
 
 // The arriving fraction of the sky's light is the sum over the rays without a hit, divided by the sum over

@@ -61,6 +61,8 @@ struct LightTracer::Path {
   float cone;                     ///< angle of the cone of directions that the ray represents [rad]
   Vector3f fraction = {1, 1, 1};  ///< throughput of the path per channel
   bool mirrored = false;          ///< whether mirrors have reflected the path so far
+  int bounces = 0;                ///< number of diffuse surfaces that radiance() has followed the path from
+  int splits = 1;                 ///< number of paths that leave the first diffuse surface
   MetParticles particles = MetParticles::none;  ///< particles that are visible along the path
   /// Whether the directions depend on random numbers. Only such paths can cause bright dots of noise, so only
   /// their light is limited.

@@ -30,6 +30,9 @@ constexpr int kWidestStep = 16;  // widest step of the filter of indirect light 
 constexpr float kGrazing =
     0.02f;  // cosine between light and triangle; below it, a triangle may shadow itself
 constexpr float kSharpMirror = 0.12f;  // roughness above which mirror images are filtered
+// Number of paths that leave a diffuse surface in a mirror image that is not filtered. Frames of many
+// sub-frames need few.
+constexpr int kMirrorSplits = 8, kMirrorSplitsOfMany = 2;
 
 LaneVectors from_octahedral(Lanes x, Lanes z) {
   const Lanes one = Lanes{} + 1, y = 1 - absolute(x) - absolute(z);
@@ -276,10 +279,12 @@ std::span<Vector4f> row_part(std::vector<Vector4f>& values, int x, int y, int wi
 }  // namespace
 
 Vector3f LightTracer::mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler,
-                                     const VisibleLight& visible, LightSums& sums) const {
+                                     const VisibleLight& visible, LightSums& sums, int splits) const {
   const float a = point.roughness * point.roughness;
-  const Vector3f facet =
-      a < 1e-4f ? point.normal : visible_facet(point.normal, point.view, a, sampler.next());
+  // A cone that is narrower than a pixel does not blur, and has no noise.
+  const Vector3f facet = a < std::min(view.pixel_m, kSharp)
+                             ? point.normal
+                             : visible_facet(point.normal, point.view, a, sampler.next());
   Vector3f outgoing = reflected(-point.view, facet);
   if (outgoing.dot(point.face) <= 0) outgoing = reflected(outgoing, point.face);
   const float nv = std::max(point.normal.dot(point.view), 1e-3f);
@@ -289,6 +294,7 @@ Vector3f LightTracer::mirrored_light(const Point& point, const LightView& view, 
       .direction = outgoing,
       .cone = std::max(a, view.pixel_m),
       .mirrored = true,
+      .splits = splits,
       .particles = sources_.particles == nullptr ? MetParticles::none : particles_in_mirror(point.roughness),
       .by_chance = a >= kSharp,
       .density = mirror_density(a, nv, nh)};
@@ -561,12 +567,13 @@ void LightTracer::trace_arriving(const SurfaceBuffer& surfaces, const LightView&
 void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& view,
                                 const VisibleLight& visible, LightBuffer& light) const {
   const int width = surfaces.width_px;
+  const int splits_per_pixel = view.offsets.count >= 16 ? kMirrorSplitsOfMany : kMirrorSplits;
   const Lanes none{};
-  const auto mirrored = [&](const Points& points, int i, int x, int y, LightSums& sums) {
+  const auto mirrored = [&](const Points& points, int i, int x, int y, int splits, LightSums& sums) {
     PixelSampler sampler(static_cast<uint32_t>(x + i), static_cast<uint32_t>(y), view.offsets.index,
                          view.offsets.count);
     sampler.skip(1 + static_cast<uint32_t>(sources_.lamps.size()));
-    return mirrored_light(points.one(i, view.eye), view, sampler, visible, sums);
+    return mirrored_light(points.one(i, view.eye), view, sampler, visible, sums, splits);
   };
   light.sums += sum_over_rows(light.cells.height_px, [&](int y, LightSums& sums) {
     for (int x = 0; x < light.cells.width_px; x += kLanes) {
@@ -577,7 +584,7 @@ void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& 
                                         (mirrors & (points.roughness > kSharpMirror)) ? none + 1 : none);
       LaneVectors values{none, none, none};
       for (int i = 0; i < kLanes; ++i)
-        if (mirrors[i]) set_lane(values, i, mirrored(points, i, x, y, sums));
+        if (mirrors[i]) set_lane(values, i, mirrored(points, i, x, y, 1, sums));
       store(light.mirrors.channels(), x, y, values);
     }
   });
@@ -588,7 +595,7 @@ void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& 
     for (int x = 0; x < width; x += kLanes) {
       const Points points(surfaces, pixels_of_row(surfaces, x, y));
       for (int i = 0; i < kLanes; ++i)
-        if (points.own_mirrors[i]) row[x + i] << mirrored(points, i, x, y, sums), 1;
+        if (points.own_mirrors[i]) row[x + i] << mirrored(points, i, x, y, splits_per_pixel, sums), 1;
     }
   });
 }

@@ -128,6 +128,7 @@ class LightTracer {
   };
   FoundLight radiance(Path path, PixelSampler& sampler, const VisibleLight* visible = nullptr,
                       float* met = nullptr) const;
+  void split(const Hit& hit, const Path& path, PixelSampler& sampler, FoundLight& light) const;
   bool follow_glass(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, Path& path,
                     FoundLight& found) const;
   bool follow_smooth(const Hit& hit, const Vector3f& albedo, PixelSampler& sampler, bool sharp,
@@ -146,7 +147,7 @@ class LightTracer {
   Vector3f light_through(const Point& point, const Vector3f& eye, PixelSampler& sampler,
                          const VisibleLight& visible, LightSums& sums) const;
   Vector3f mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler,
-                          const VisibleLight& visible, LightSums& sums) const;
+                          const VisibleLight& visible, LightSums& sums, int splits = 1) const;
   void lift(const Points& points, IntLanes lanes, const LightView& view, LaneVectors& place) const;
   struct LampLight;
   LampLight trace_lamps(const Points& points, const LightView& view, Sampler<UintLanes>& sampler) const;
