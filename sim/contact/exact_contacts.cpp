@@ -320,7 +320,7 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       c.is_guessed = m.forces[k].known;
       contacts_.push_back(c);
       // The moment of spinning friction has no such velocity in the middle.
-      if (method == Method::proximal && touches && !pair.surface().spinning)
+      if (method == Method::proximal && touches && pair.surface().spinning == 0)
         add_sliding(u + motion.gain - motion.bow, force, h);
       pairs_.push_back(&pair);
       forces_.push_back(&m.forces[k]);
