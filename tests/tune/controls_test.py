@@ -245,7 +245,7 @@ class Objects(Case):
         self.keys('wat')
         self.scene.write_text(SCENE.replace('4.0e2', '300').replace('"fps": 20', '"fps": 25'))
         page.js('tuneStore.doc')
-        wait(lambda: page.find('#banner').is_displayed() or '"fps": 25' in page.text(), 10)
+        wait(lambda: page.find('#banner').is_displayed() or '"fps": 25' in page.text())
         self.keys('er', Keys.ENTER)
         wait(lambda: page.value('/emitters/0/name') == 'water')
 
