@@ -178,8 +178,8 @@ void RelaxedJoints::start(uint32_t p, std::span<BodyMotion> motions) {
   soften(part, substep_);
   for (uint32_t i = part.first_row; i < part.last_row; ++i)
     if (rows_[i].impulse != 0) push(part, problem_.bounded[i], rows_[i], rows_[i].impulse, motions);
-  // The contacts have given their forces to single links. Without the reactions of the joints, the first
-  // sweep would take a light link that carries a heavy body to fly off, and would undo these forces.
+  // The contacts have given their initial forces to single links. Without the reactions of the joints, the
+  // first sweep would take a light link that carries a heavy body to fly off, and would undo these forces.
   if (part.first_contact == part.last_contact) return;
   join(part, motions, substep_);
   for (std::size_t j = 0; j < part.now.size(); ++j) part.now[j] += part.impulses[j];
