@@ -175,13 +175,18 @@ Real RelaxedJoints::speed(const BoundedRow& r, std::span<const BodyMotion> motio
 
 void RelaxedJoints::start(uint32_t p, std::span<BodyMotion> motions) {
   Part& part = parts_[p];
+  soften(part, substep_);
   for (uint32_t i = part.first_row; i < part.last_row; ++i)
     if (rows_[i].impulse != 0) push(part, problem_.bounded[i], rows_[i], rows_[i].impulse, motions);
+  // The contacts have given their initial forces to single links. Without the reactions of the joints, the
+  // first sweep would take a light link that carries a heavy body to fly off, and would undo these forces.
+  if (part.first_contact == part.last_contact) return;
+  join(part, motions, substep_);
+  for (std::size_t j = 0; j < part.now.size(); ++j) part.now[j] += part.impulses[j];
 }
 
-void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapsed, bool is_last) {
-  Part& part = parts_[p];
-  soften(part, elapsed);
+/// Changes the velocities of the links so that they satisfy the joints at the time `elapsed` [s].
+void RelaxedJoints::join(Part& part, std::span<BodyMotion> motions, Real elapsed) {
   JointSystem& system = part.articulation->inert_system();
   for (std::size_t k = 0; k < part.bodies.size(); ++k)
     part.velocities[k] = change_of(motions[part.bodies[k]]) - free_change(bodies_[part.bodies[k]], elapsed);
@@ -192,6 +197,12 @@ void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapse
   std::fill(correction.begin(), correction.end(), Vec6::Zero());
   system.correct(part.change, part.impulses, correction);
   for (std::size_t k = 0; k < part.bodies.size(); ++k) add_to(motions[part.bodies[k]], correction[k]);
+}
+
+void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapsed, bool is_last) {
+  Part& part = parts_[p];
+  soften(part, elapsed);
+  join(part, motions, elapsed);
   // The next sub-step starts with the velocities of this one, including the impulses. After the last sub-step
   // there is no next one.
   if (is_last) std::fill(part.now.begin(), part.now.end(), Vec6::Zero());

@@ -87,6 +87,7 @@ class RelaxedJoints {
   void prepare_row(Part& part, const BoundedRow& r, Row& row, std::span<const RelaxedBody> bodies,
                    bool whole);
   void soften(Part& part, Real elapsed);
+  void join(Part& part, std::span<BodyMotion> motions, Real elapsed);
   void push(Part& part, const BoundedRow& r, const Row& row, Real impulse,
             std::span<BodyMotion> motions) const;
   void solve_contacts(Part& part, std::span<BodyMotion> motions, Real elapsed, bool is_last);

@@ -160,9 +160,15 @@ TEST_P(CurvedFloor, LetsACartRollAsARoundTrough) {
     for (int frame = 0; frame < 60 * kTroughSeconds; ++frame) w.step(1.0 / 60);
     const Real left = (w.energy().total() - lowest) / start;
     EXPECT_LT(left, 0.97) << "shape " << shape.index();
-    // The fast solver takes part in `auto` where the exact one would be expensive.
+    // The fast solver takes part in `auto` where the exact one would be expensive. At a step of one frame the
+    // exact solver cannot divide every sub-step in which two wheels come to seams together. These seams take
+    // the whole part beta, and how many there are depends on rounding: 2 to 15 % in all.
     const SolverKind solver = std::get<0>(GetParam());
-    EXPECT_GT(left, solver == SolverKind::exact ? 0.945 : 0.82) << "shape " << shape.index();
+    const Real kept = solver == SolverKind::automatic ? 0.82
+                      : solver == SolverKind::fast    ? 0.9
+                      : is_coarse()                   ? 0.8
+                                                      : 0.945;
+    EXPECT_GT(left, kept) << "shape " << shape.index();
   }
 }
 

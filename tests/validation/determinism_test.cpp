@@ -143,7 +143,7 @@ constexpr const char* kBouncingExact = "d1a9d5c0650811fb8f4f099079567cb1";
 constexpr const char* kBouncingFast = "277acab025bc0e9da6d6cf1ce0c95efb";
 constexpr const char* kHeapFast = "1c1de1525a2637e12d0b3acf21161743";
 constexpr const char* kChainExact = "b3c15f1f41b8d3d7ff135f1f44581700";
-constexpr const char* kChainFast = "d573074e9d51393a0c7e4faab0aa3201";
+constexpr const char* kChainFast = "5c923617ae3d536eab773678e166f98b";
 
 TEST(Determinism, SameHashInEveryBuild) {
   EXPECT_EQ(run().hex(), kParticles);

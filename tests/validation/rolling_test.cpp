@@ -61,12 +61,12 @@ TEST_P(MovingContact, RollingBodiesKeepTheirSpeed) {
 
 /// Returns a cart: two axles with wheels on a chassis that touches nothing else. The rear axle may have a
 /// motor.
-BodyHandle add_cart(World& w, Real speed, Real torque) {
+BodyHandle add_cart(World& w, Real speed, Real torque, Real mass = 80) {
   constexpr Real kRadius = 0.3;
   const BodyHandle chassis = w.add_body({.shape = Box{{2, 0.2, 1}},
                                          .pose = {Vec3(0, kRadius, 0), Quat::Identity()},
                                          .velocity = Vec3(speed, 0, 0),
-                                         .mass = 80,
+                                         .mass = mass,
                                          .collides = false});
   for (const Real x : {-0.8, 0.8}) {
     const Vec3 place(x, kRadius, 0);
@@ -92,6 +92,19 @@ TEST_P(MovingContact, ACartOnFreeWheelsKeepsItsSpeed) {
   run(w, 5);
   EXPECT_NEAR(w.body(chassis).velocity.x(), 8, 8e-3);
   EXPECT_NEAR(w.body(chassis).velocity.y(), 0, 5e-3);
+}
+
+TEST_P(MovingContact, LightWheelsCarryAHeavyCart) {
+  World w = world();
+  w.add_body(ground(1));
+  const BodyHandle chassis = add_cart(w, 5, 0, 2000);
+  Real lowest = 1;
+  for (int i = 0; i < 60; ++i) {
+    run(w, 0.05);
+    lowest = std::min(lowest, w.body(chassis).centre.y());
+  }
+  EXPECT_GT(lowest, 0.3 - 1e-3);
+  EXPECT_NEAR(w.body(chassis).velocity.x(), 5, 5e-4);
 }
 
 // The torque T on wheels of radius R accelerates the mass m and rotates the wheels, each with I = m_w R^2 /
