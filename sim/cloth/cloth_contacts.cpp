@@ -27,10 +27,11 @@ constexpr Real kMostMobile = 0.25;
 /// A point that its support keeps at the right distance but for rounding touches the body, in thicknesses.
 constexpr Real kTouching = 1e-6;
 
-/// Returns the mass of each cloth [kg].
+/// Returns the mass of each cloth [kg]; infinite if pins hold it, because it can then stop any body.
 std::vector<Real> masses(const ClothPoints& points) {
   std::vector<Real> mass(points.cloth.back() + 1, 0);
-  for (std::size_t i = 0; i < points.size(); ++i) mass[points.cloth[i]] += points.mass[i];
+  for (std::size_t i = 0; i < points.size(); ++i)
+    mass[points.cloth[i]] += points.inverse_mass[i] > 0 ? points.mass[i] : kInfinity;
   return mass;
 }
 
