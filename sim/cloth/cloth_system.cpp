@@ -188,6 +188,8 @@ void ClothSystem::integrate(Real dt) {
       ++cloths_[c]->report.unconverged;
   }
   for (const Held& held : held_) points_.start[held.point] = held.from;
+  for (const Support& s : points_.supports)
+    if (s.body && s.given != Vec4::Zero()) s.body->apply_impulse(-s.given.head<3>() / dt, s.on_body);
 }
 
 /// Limits the bending of cloths whose integrator does not.

@@ -222,11 +222,15 @@ bool solve_on_supports(ImplicitSystem& system, ClothPoints& points, const ClothR
   }
 }
 
-/// Distributes the momentum error of the solution over all points of a free cloth.
+/// Distributes the momentum error of the solution over all points of a free cloth that no immovable body
+/// supports.
 void keep_momentum(const ClothPoints& points, const ClothRange& cloth, const ImplicitSystem& system,
-                   const SpringRun& b, SpringRun& v) {
-  if (!system.resting.empty()) return;
+                   const SpringRun& b, Real h, SpringRun& v) {
   Vec4 lost = Vec4::Zero();
+  for (const Support* s : system.resting) {
+    if (!s->body) return;
+    lost += s->impulse / h * s->normal;
+  }
   Real mass = 0;
   for (std::size_t i = 0; i < v.size(); ++i) {
     if (is_held(points, cloth.begin + i)) return;
@@ -244,13 +248,13 @@ bool step_implicit(ClothPoints& points, const ClothRange& cloth, Real h) {
   ImplicitSystem system(points, cloth, h);
   const SpringRun b = system.right_side(v, h);
   const bool converged = solve_on_supports(system, points, cloth, b, h, v);
-  keep_momentum(points, cloth, system, b, v);
+  keep_momentum(points, cloth, system, b, h, v);
   system.pass_on(points, v, h);
   for (std::size_t i = 0; i < x.size(); ++i)
     if (!is_held(points, cloth.begin + i)) points.position[cloth.begin + i] = x[i] + h * v[i];
-  for (const Support* s : system.resting) {
+  for (Support* s : system.resting) {
     const Vec4 move = h * v[s->point - cloth.begin];
-    points.position[s->point] = points.start[s->point] + s->rubbed(move, 1, points.inverse_mass[s->point]);
+    points.position[s->point] = points.start[s->point] + s->rub(move, 1, points.mass[s->point]);
   }
   return converged;
 }

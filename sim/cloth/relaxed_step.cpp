@@ -163,14 +163,15 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
       bend_limit.apply(h, points.moves);
       hold_up(points, supports, part, points.moves);
     }
-    for (const Support& s : supports)
-      points.moves[s.point] = s.rubbed(points.moves[s.point], 1.0 / steps, points.inverse_mass[s.point]);
+    for (Support& s : supports)
+      points.moves[s.point] = s.rub(points.moves[s.point], 1.0 / steps, points.mass[s.point]);
     for (std::size_t i = 0; i < n; ++i) {
       const Vec4 move = moves[i];
       x[i] += move;
       coast(i, move);
     }
   }
+  for (Support& s : supports) s.given *= steps;  // the sum of the impulses times the whole sub-step
   for (std::size_t i = 0; i < n; ++i) {
     const std::size_t k = cloth.begin + i;
     if (held(i)) {
