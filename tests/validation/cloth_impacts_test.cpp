@@ -201,7 +201,7 @@ TEST_P(ClothLandingOnABody, TakesEnergyAndKeepsMomentum) {
   const BodyHandle box =
       world.add_body({.shape = Box{Vec3(1.5, 0.2, 1.5)}, .pose = {Vec3(0, 0.1, 0)}, .mass = mass});
   const ClothHandle cloth = world.add_cloth(def);
-  const auto momentum = [&] {
+  const auto momentum = [&, mass = mass] {
     Vec3 sum = mass * world.body(box).velocity;
     for (std::size_t k = 0; k < def.masses.size(); ++k)
       sum += def.masses[k] * world.cloth(cloth).velocities[k];

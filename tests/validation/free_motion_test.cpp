@@ -51,7 +51,7 @@ TEST(FreeFallOfABody, WithDragErrorFallsWithTheOrderOfTheIntegrator) {
   const Vec3 terminal = tau * gravity;
   const Vec3 exact = terminal * kTime + (v0 - terminal) * tau * (1 - decay);
   for (const auto& [kind, order] : kOrders) {
-    const auto error = [&](int steps) {
+    const auto error = [&, kind = kind](int steps) {
       return (moved(start, gravity, kind, steps, kTime).position - exact).norm();
     };
     const int steps = order < 2 ? 200 : 40;
@@ -97,7 +97,7 @@ TEST(SymmetricTop, TurnsTorqueFreeAsTheClosedFormWithTheOrderOfTheIntegrator) {
   for (const auto& [kind, order] : kOrders) {
     // The error is the sine of half the angle between both orientations. Unlike an arc cosine, it is accurate
     // for small angles.
-    const auto error = [&](int steps) {
+    const auto error = [&, kind = kind](int steps) {
       return (moved(top, Vec3::Zero(), kind, steps, kTime).orientation * exact.conjugate()).vec().norm();
     };
     // The step doubling methods, and Euler's method with a normalized quaternion, may exceed their order but
