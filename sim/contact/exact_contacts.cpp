@@ -28,7 +28,7 @@ constexpr std::size_t kMostDivided = 6;
 /// Corners of bodies that turn farther than this in an interval do not move on straight lines [rad]. Islands
 /// of several bodies with such a body are not divided, since bodies that have touched would overlap.
 constexpr Real kMostTurned = 0.1;
-/// Greatest cost of a solution and its division [ns, see ProximalNewton::cost()].
+/// Greatest cost of a solution and its division if there is a budget [ns, see ProximalNewton::cost()].
 constexpr Real kMostDivision = 2e6;
 /// Uncertainty of the speed of approach at a resting contact. It is this fraction of the change of the normal
 /// velocity due to rotation in half an interval.
@@ -117,10 +117,10 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
     if (outcome.work.fallbacks > 0)
       if (const auto worst = worst_contact(bodies_, contacts_)) outcome.rough = pairs_[*worst];
     if (!outcome.is_applied) return outcome;
-    // The fast solver has shorter sub-steps, so it loses less energy than an undivided solution.
-    const bool is_divided =
-        !has_closing() ||
-        divide_at_closings(island, interval, std::min(2 * budget, kMostDivision) - cost_, outcome.work);
+    // The fast solver has shorter sub-steps, so it loses less energy than an undivided solution. Without a
+    // budget that solution would be applied, so the division may cost what it must.
+    const Real left = std::isfinite(budget) ? std::min(2 * budget, kMostDivision) - cost_ : budget;
+    const bool is_divided = !has_closing() || divide_at_closings(island, interval, left, outcome.work);
     outcome.is_applied = is_divided || !std::isfinite(budget);
     if (!outcome.is_applied) return outcome;
   }

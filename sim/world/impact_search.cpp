@@ -138,6 +138,15 @@ std::optional<Real> tumbling_impact_time(const ContactPair& pair, const WorldDef
   return std::nullopt;
 }
 
+/// Returns where a contact feature of a body is [m] when the body has moved from one pose to another. `out`
+/// and `out_after` are the directions to the other body in both poses; see turned_arm().
+Vec3 moved_point(const Body& body, const Pose& from, const Pose& to, const Vec3& point, const Vec3& out,
+                 const Vec3& out_after) {
+  const Vec3 centre = body.is_awake() ? body.rigid.centre : Vec3(Vec3::Zero());
+  return to.point_to_world(centre) + turned_arm(body, point - from.point_to_world(centre), from.orientation,
+                                                out, to.orientation, out_after);
+}
+
 /// Returns the time at which bodies that already touch at some points touch at their other known points.
 std::optional<Real> point_impact_time(const ContactPair& pair, const WorldDef& def, Real h) {
   const Body &a = pair.a(), &b = pair.b();
@@ -149,15 +158,15 @@ std::optional<Real> point_impact_time(const ContactPair& pair, const WorldDef& d
       const Real speed = pair.relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n);
       if (speed >= -def.collision_speed) continue;
       if (point.separation <= kTouching) return from;
-      // Both points move with their bodies; the normal turns with the body that defines it.
+      // Both points move with their features; the normal turns with the body that defines it.
       const bool with_b = m.manifold.source == NormalSource::face_of_b;
       const Pose pose_a = a.placed_at(from, h), pose_b = b.placed_at(from, h);
-      const Vec3 on_a = pose_a.point_to_body(point.on_a), on_b = pose_b.point_to_body(point.on_b);
       const Vec3 n = with_b ? pose_b.vector_to_body(m.frame.n) : pose_a.vector_to_body(m.frame.n);
       const auto gap = [&](Real time) {
         const Pose p = a.placed_at(time, h), q = b.placed_at(time, h);
         const Vec3 normal = with_b ? q.vector_to_world(n) : p.vector_to_world(n);
-        return normal.dot(p.point_to_world(on_a) - q.point_to_world(on_b));
+        return normal.dot(moved_point(a, pose_a, p, point.on_a, -m.frame.n, -normal) -
+                          moved_point(b, pose_b, q, point.on_b, m.frame.n, normal));
       };
       Real early = from, late = first.value_or(h);
       if (gap(late) > kTouching / 2) continue;
