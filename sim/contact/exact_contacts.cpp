@@ -118,7 +118,7 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
       if (const auto worst = worst_contact(bodies_, contacts_)) outcome.rough = pairs_[*worst];
     if (!outcome.is_applied) return outcome;
     // The fast solver has shorter sub-steps, so it loses less energy than an undivided solution. Without a
-    // budget there is no fast solver to fall back on, and the division costs what it must.
+    // budget that solution would be applied, so the division may cost what it must.
     const Real left = std::isfinite(budget) ? std::min(2 * budget, kMostDivision) - cost_ : budget;
     const bool is_divided = !has_closing() || divide_at_closings(island, interval, left, outcome.work);
     outcome.is_applied = is_divided || !std::isfinite(budget);

@@ -17,8 +17,8 @@ namespace {
 /// contacts, or with more than kGrowths extensions, are solved as a whole only on request.
 constexpr std::size_t kSmallCluster = 40, kCluster = 100;
 constexpr int kGrowths = 2;
-/// Contacts that approach faster than this have not closed yet [m/s].
-constexpr Real kApproaching = 1e-4;
+/// Contacts that approach more slowly than this carry their bodies [m/s].
+constexpr Real kStillCloses = 1e-4;
 /// Cost of an update of a contact, and of a product of a dense factorization [ns].
 constexpr Real kContactUpdate = 60, kDenseProduct = 0.7;
 
@@ -74,7 +74,7 @@ struct CollisionCluster {
     bool carries = false;
     for (std::size_t i = 0; i < contacts.size(); ++i) {
       const Contact& c = contacts[i];
-      const bool approaches = c.relative_velocity(bodies).x() < -kApproaching,
+      const bool approaches = c.relative_velocity(bodies).x() < -kStillCloses,
                  yields = bodies[c.a].is_moved() && bodies[c.b].is_moved();
       if ((bounces[i] && touches[i]) || (approaches && yields)) return false;
       carries = carries || !(approaches || yields);

@@ -23,8 +23,9 @@ struct CollisionOutcome {
 };
 
 /// Resolves the collisions of an island's pairs. It reads poses and velocities from Body::start, and changes
-/// these velocities. `budget` [ns] limits the cost of accurate solutions of clusters of up to 100 contacts,
-/// and is reduced by this cost.
+/// these velocities. If nothing bounces, and contacts with unmoved bodies close while another one carries a
+/// body, it changes nothing, since this is resting contact. `budget` [ns] limits the cost of accurate
+/// solutions of clusters of up to 100 contacts, and is reduced by this cost.
 CollisionOutcome resolve_collisions(const Island& island, const CollisionSettings& settings, Real& budget);
 
 }  // namespace offstage::sim
