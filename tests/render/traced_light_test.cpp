@@ -257,6 +257,30 @@ TEST_F(TracedLight, OfASmallBrightPatchHasLittleNoise) {
   EXPECT_LT(std::sqrt(error2 / sum2), 0.25f);  // 0.16; without the further paths 0.41
 }
 
+// A metal mirror shows a wall behind the camera, which is in shadow and lit by a sunlit floor of bright and
+// dark strips. Mirror images are not filtered, so each has several paths from the wall.
+TEST_F(TracedLight, OfWallsInMirrorsHasLittleNoise) {
+  s.stage.set_sun({.direction = {0, 1, 0}, .intensity = 3, .size_deg = 0.5f});
+  for (int i = -6; i < 6; ++i)
+    s.add(make_box({12, 0.1f, 0.5f}),
+          {.color = i % 2 == 0 ? Vector4f(0.9f, 0.9f, 0.9f, 1) : Vector4f(0.05f, 0.05f, 0.05f, 1),
+           .roughness = 1},
+          {0, -1.05f, static_cast<float>(i) + 0.5f});
+  s.add(make_box({12, 4, 0.1f}), kPlaster, {0, 1, 5});
+  s.add(make_box({4, 2, 0.1f}), {.color = {1, 1, 1, 1}, .metallic = 1, .roughness = 0}, {0, 0, -2});
+  look({.eye = {0, 0.2f, 1}, .target = {0, 0.2f, -2}, .fov_deg = 20});
+  const HdrImage picture = mean_of(s, 4), reference = mean_of(s, 64);
+  float error2 = 0, sum2 = 0;
+  for (int y = 20; y < 60; ++y)
+    for (int x = 20; x < 140; ++x) {
+      const float light = pixel(reference, x, y).y(), off = pixel(picture, x, y).y() - light;
+      error2 += off * off;
+      sum2 += light * light;
+    }
+  ASSERT_GT(sum2, 1);
+  EXPECT_LT(std::sqrt(error2 / sum2), 0.8f);  // 0.63; with one path per pixel 1.3
+}
+
 // The furnace for particles: inside a closed ball, they have the light of its wall, whatever the sky outside.
 TEST_F(TracedLight, ParticlesIndoorsHaveTheLightOfTheWalls) {
   Environment sky = even_sky(2);
