@@ -55,9 +55,7 @@ class ClothBending {
   /// matrix.
   Real diagonal(uint32_t point) const { return diagonal_[point]; }
 
-  /// Number of patches, on which curvature is measured. Each triangle has two. One measures its surroundings
-  /// as a smooth surface. The other has half the weight and measures shapes that alternate from point to
-  /// point, which the first cannot see.
+  /// Number of patches, on which curvature is measured. Each triangle has two (see TrianglePatches).
   std::size_t patch_count() const { return patches_.size(); }
   /// Curvature of a patch in excess of its curvature at rest, |H x - n b0| [1/m].
   Real curvature(std::size_t patch, std::span<const Vec4> x) const;
@@ -80,7 +78,7 @@ class ClothBending {
     uint32_t first = 0, count = 0;  // range in points_ and weights_
     Real area = 0;
     Vec3 rest = Vec3::Zero();  // unstressed curvature
-    bool rough = false;        // whether it is computed from jumps of gradients
+    Real divisor = 1;          // see TrianglePatch
   };
 
   std::vector<uint8_t> affected(std::span<const uint8_t> changed, std::vector<uint8_t> near) const;
