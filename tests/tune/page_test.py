@@ -131,6 +131,12 @@ class Editing(Case):
         self.presets_arrive()
         self.assertEqual(len(page.all('[data-path="/effects/0/overrides/jet"]')), 1)
 
+    def test_the_controls_are_kept_when_the_event_stream_connects(self):
+        self.page.select('/emitters/0')
+        row = self.page.row('rate')
+        self.driver.execute_async_script("const done = arguments[0]; import('./page/store.js').then(m => { m.on('writer', done); m.emit('connected'); })")
+        self.assertTrue(row.is_displayed())  # an error if the row was removed
+
 
 class EmptyStage(Case):
     scene_text = '{\n  "version": 1\n}\n'

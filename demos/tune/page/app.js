@@ -8,7 +8,7 @@ import './scrub.js';
 import './editor.js';
 import {loadFigures} from './plots.js';
 import {showVersions, togglePin, showAdd, showOverlays, saveFile, offerDraft} from './panels.js';
-import {drawControls} from './controls.js';
+import './controls.js';
 
 function drawBar() {
   const doc = store.doc, mine = isWriter();
@@ -85,7 +85,7 @@ addEventListener('keydown', event => {
 
 on('document writer', () => { if (store.doc) drawBar(); });
 on('document film film-changed', drawFilmState);
-on('writer', () => { if (isWriter()) reportView(); drawControls(true); });
+on('writer', () => { if (isWriter()) reportView(); });
 
 async function start() {
   bind();
