@@ -139,14 +139,19 @@ void main() {
 #endif
   if (alpha < min_alpha) discard;
   if (min_alpha > 0.5) alpha = 1.0;  // the opaque pass leaves no holes
-  s.roughness = filtered_roughness(s.roughness, n);
 #ifdef SURFACE
+  // The mirror images of smooth metals and glass are traced per pixel, and without a filter they stay sharp. Where the
+  // normal varies so much that a pixel shows half of the surroundings, they would have noise.
+  float filtered = filtered_roughness(s.roughness, n);
+  bool own_mirror = (s.metallic > 0.5 || transmitted > 0.0) && s.roughness <= 0.12 && filtered <= 0.25;
+  if (!own_mirror) s.roughness = filtered;
   float mirror = s.metallic > 0.5 ? 10.0 : s.roughness < 0.3 ? 2.0 : 0.0;
   write_surface(position, n, cross(dFdx(position), dFdy(position)), view, s.roughness + mirror);
 #ifdef PLAIN
   surface_color = vec4(s.albedo, 0.5 + 0.5 * s.metallic);
 #endif
 #else
+  s.roughness = filtered_roughness(s.roughness, n);
 #ifdef ENDLESS
   vec4 fog = fog_to(position, horizon_haze(smooth_normal, view));
 #else

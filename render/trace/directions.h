@@ -57,6 +57,14 @@ Three<T> cosine_direction(const Three<T>& n, const SquarePoint<T>& uv) {
   return normalized(a * d.x + b * d.y + n * up);
 }
 
+/// Returns point k of `count` evenly distributed points of the unit square: a Fibonacci lattice that is moved
+/// so that it contains `first`.
+inline SquarePoint<float> lattice_point(const SquarePoint<float>& first, int k, int count) {
+  const auto wrapped = [](float x) { return x - std::floor(x); };
+  const auto number = static_cast<float>(k);
+  return {wrapped(first.x + number / static_cast<float>(count)), wrapped(first.y + 0.618034f * number)};
+}
+
 /// Returns a unit direction that is uniformly distributed over the sphere.
 inline Eigen::Vector3f even_direction(const SquarePoint<float>& uv) {
   const float y = 1 - 2 * uv.x, across = std::sqrt(std::max(1 - y * y, 0.0f));

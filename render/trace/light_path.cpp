@@ -363,20 +363,17 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
   return light;
 }
 
-// Adds the light of several paths from a diffuse surface. Their directions are points of a Fibonacci lattice.
+// Adds the light of several paths from a diffuse surface.
 void LightTracer::split(const Hit& hit, const Path& path, PixelSampler& sampler, FoundLight& light) const {
-  const auto wrapped = [](float x) { return x - std::floor(x); };
-  const auto count = static_cast<float>(path.splits);
   const SquarePoint<float> first = sampler.next();
   for (int k = 0; k < path.splits; ++k) {
-    const auto number = static_cast<float>(k);
-    const Vector3f outgoing = to_eigen(cosine_direction(
-        from_eigen(hit.normal), {wrapped(first.x + number / count), wrapped(first.y + 0.618034f * number)}));
+    const Vector3f outgoing =
+        to_eigen(cosine_direction(from_eigen(hit.normal), lattice_point(first, k, path.splits)));
     Path part = path;
     part.splits = 1;
     part.bounces = 1;
     part.cone = 0.5f;
-    part.fraction /= count;
+    part.fraction /= static_cast<float>(path.splits);
     part.scatter(hit.normal, outgoing.dot(hit.face) > 0 ? outgoing : reflected(outgoing, hit.face));
     const FoundLight found = radiance(part, sampler);
     light.noisy += found.noisy;

@@ -33,6 +33,9 @@ constexpr float kSharpMirror = 0.12f;  // roughness above which mirror images ar
 // Number of paths that leave a diffuse surface in a mirror image that is not filtered. Frames of many
 // sub-frames need few.
 constexpr int kMirrorSplits = 8, kMirrorSplitsOfMany = 2;
+constexpr int kMirrorRays = 2;        // number of rays in a mirror image that is neither sharp nor filtered
+constexpr float kSmoothLobe = 0.1f;   // largest roughness^2 of surfaces whose highlights have mirrored rays
+constexpr float kBrightestLobe = 40;  // limit of the lobes of other surfaces
 
 LaneVectors from_octahedral(Lanes x, Lanes z) {
   const Lanes one = Lanes{} + 1, y = 1 - absolute(x) - absolute(z);
@@ -224,48 +227,117 @@ struct LightTracer::LampLight {
   }
 };
 
-LightTracer::LampLight LightTracer::trace_lamps(const Points& points, const LightView& view,
-                                                Sampler<UintLanes>& sampler) const {
-  const Lanes none{};
-  const LaneVectors& n = points.normal;
-  const LaneVectors to_eye = normalized(all_lanes(view.eye) - points.place);
-  const Lanes nv = larger(absolute(dot(n, to_eye)), none + 1e-3f);
-  const Lanes rough = points.roughness;
-  LaneVectors diffuse{none, none, none}, lobes{none, none, none};
-  Lanes grazing{};
-  for (const RayLamp& lamp : sources_.lamps) {
-    const LampPoint<Lanes> point = lamp.point(points.place, sampler.next());
-    const Lanes nl = dot(n, point.towards);
-    const IntLanes lit = points.visible & (nl > 0.0f) & (point.fraction > 0.0f);
-    if (!any(lit)) continue;
-    LaneVectors arriving = point.arriving * (lit ? nl : none);
-    if (lamp.def().shadows) {
-      const RayScene::Focus focus = lamp.is_focused() ? view.focus : RayScene::Focus::passes;
-      LaneVectors place = points.place;
-      lift(points, lit & (dot(points.face, point.towards) < kGrazing), view, place);
-      const LaneVectors seen = scene_.transmittance(place, point.towards, point.distance, lit, focus);
-      arriving = {arriving.x * seen.x, arriving.y * seen.y, arriving.z * seen.z};
+/// The highlights of lamps on eight surfaces. Smooth surfaces have two samples of each lamp: a point of the
+/// lamp, and the point that a mirrored ray hits. Each has the weight of multiple importance sampling.
+struct LightTracer::Highlights {
+  const Points& points;
+  Lanes variance;  ///< see highlight_variance()
+  Vector3f eye;
+  SquarePoint<Lanes> uv;  ///< selects the mirrored rays
+  LaneVectors to_eye;
+  Lanes nv;
+
+  Lanes a{};          ///< roughness^2
+  IntLanes smooth{};  ///< surfaces with a mirrored ray
+  LaneVectors mirrored{};
+  LaneVectors lobes{};
+  Lanes grazing{};  ///< sum of all channels of `lobes`, each times its Fresnel factor
+
+  Highlights(const Points& surfaces, Lanes variance_of_normals, const Vector3f& from,
+             const SquarePoint<Lanes>& sample)
+      : points(surfaces),
+        variance(variance_of_normals),
+        eye(from),
+        uv(sample),
+        to_eye(normalized(all_lanes(eye) - surfaces.place)),
+        nv(larger(absolute(dot(points.normal, to_eye)), Lanes{} + 1e-3f)) {}
+
+  /// Prepares the highlights of a lamp. If it is smaller than the solid angle from which a pixel mirrors
+  /// light, the roughness is increased.
+  void begin(const RayLamp& lamp) {
+    const Lanes none{}, rough = points.roughness * points.roughness;
+    const Lanes density =
+        lamp.is_sky() ? none + 1e12f : lamp.point(points.place, {none + 0.5f, none + 0.5f}).density;
+    const Lanes size2 = 0.25f / (std::numbers::pi_v<float> * larger(density, none + 1e-12f));
+    a = square_root(smaller(rough * rough + larger(variance - size2, none), none + 1));
+    smooth = lamp.is_sky() ? IntLanes{} : points.visible & (a <= kSmoothLobe);
+    for (int i = 0; i < kLanes; ++i) {
+      if (!smooth[i]) continue;
+      const Point point = points.one(i, eye);
+      const Vector3f facet =
+          a[i] < kSharp ? point.normal : visible_facet(point.normal, point.view, a[i], {uv.x[i], uv.y[i]});
+      set_lane(mirrored, i, reflected(-point.view, facet));
     }
-    diffuse = diffuse + arriving;
+  }
+  /// Adds the light of a point of a lamp. `light`: radiance of a white surface that faces the point.
+  void add(const RayLamp& lamp, const LampPoint<Lanes>& point, const LaneVectors& light) {
     const LaneVectors h = normalized(point.towards + to_eye);
-    const Lanes wide = 0.5f * lamp.def().radius / larger(point.distance, none + 1e-6f) + 0.002f;
-    const Lanes m = 1 - clamped_to(dot(to_eye, h), 0, 1);
-    // The highlight is limited, because one point represents the lamp. If rays can also hit the lamp, a
-    // weight makes the limit unnecessary.
-    const Lanes most = point.density > 0.0f ? none + 1e12f : none + 40;
-    const Lanes lobe =
-        lobe_of(smaller(larger(rough * rough, wide), none + 1), nl, nv, clamped_to(dot(n, h), 0, 1), most);
-    // The traced mirror image has the rest of the weight.
-    const Lanes by_mirror = mirror_density(rough * rough, nv, clamped_to(dot(n, h), 0, 1));
-    const Lanes weight =
-        (points.mirrors & (point.density > 0.0f)) ? power_heuristic(point.density, by_mirror) : none + 1;
-    const IntLanes shown = lamp.def().in_mirrors ? lit & ~points.mirrors : lit;
-    const LaneVectors bright = arriving * (shown ? lobe * weight : none);
+    const Lanes none{}, nh = clamped_to(dot(points.normal, h), 0, 1);
+    const IntLanes twice = lamp.is_sky() ? points.mirrors : smooth;
+    // One point represents the lamp on rough surfaces, so their highlights are limited.
+    const Lanes most = twice ? none + 1e12f : none + kBrightestLobe;
+    const Lanes weight = twice ? power_heuristic(point.density, mirror_density(a, nv, nh)) : none + 1;
+    const Lanes nl = larger(dot(points.normal, point.towards), none);
+    add_lobe(light, weight * nl * lobe_of(larger(a, none + kSharp), nl, nv, nh, most), h);
+  }
+  /// Adds the light of a point of a lamp that the mirrored ray hits.
+  void add_mirrored(const LampPoint<Lanes>& point, const LaneVectors& light) {
+    const LaneVectors h = normalized(mirrored + to_eye);
+    const Lanes none{}, nh = clamped_to(dot(points.normal, h), 0, 1);
+    const Lanes nl = larger(dot(points.normal, mirrored), none), a2 = a * a;
+    // The lobe divided by mirror_density().
+    const Lanes scale = std::numbers::pi_v<float> * nl * (nv + square_root(a2 + (1 - a2) * nv * nv)) /
+                        larger(2 * nl * nv * (1 - a) + (nl + nv) * a, none + 1e-6f);
+    add_lobe(light, scale * point.density * power_heuristic(mirror_density(a, nv, nh), point.density), h);
+  }
+
+ private:
+  void add_lobe(const LaneVectors& light, Lanes lobe, const LaneVectors& h) {
+    const LaneVectors bright = light * lobe;
+    const Lanes m = 1 - clamped_to(dot(to_eye, h), 0, 1), m2 = m * m;
     lobes = lobes + bright;
-    const Lanes m2 = m * m;
     grazing += (bright.x + bright.y + bright.z) * (m2 * m2 * m);
   }
-  return {diffuse, lobes, grazing / larger(lobes.x + lobes.y + lobes.z, none + 1e-12f)};
+};
+
+// Returns the light at eight surfaces from points of a lamp. `lanes`: the surfaces that are computed.
+LaneVectors LightTracer::light_of_lamp(const RayLamp& lamp, const LampPoint<Lanes>& point,
+                                       const Points& points, IntLanes lanes, const LightView& view) const {
+  const Lanes none{};
+  const LaneVectors light = point.arriving * (lanes ? none + 1 : none);
+  if (!lamp.def().shadows || !any(lanes)) return light;
+  const RayScene::Focus focus = lamp.is_focused() ? view.focus : RayScene::Focus::passes;
+  LaneVectors place = points.place;
+  lift(points, lanes & (dot(points.face, point.towards) < kGrazing), view, place);
+  const LaneVectors seen = scene_.transmittance(place, point.towards, point.distance, lanes, focus);
+  return {light.x * seen.x, light.y * seen.y, light.z * seen.z};
+}
+
+// Returns the light of all lamps at eight surfaces. `variance`: see highlight_variance().
+LightTracer::LampLight LightTracer::trace_lamps(const Points& points, Lanes variance, const LightView& view,
+                                                Sampler<UintLanes>& sampler) const {
+  const Lanes none{};
+  Sampler<UintLanes> after_lamps = sampler;
+  after_lamps.skip(static_cast<uint32_t>(sources_.lamps.size()));
+  Highlights highlights(points, variance, view.eye, after_lamps.next());
+  LaneVectors diffuse{none, none, none};
+  for (const RayLamp& lamp : sources_.lamps) {
+    const IntLanes shiny = points.visible & ~(lamp.def().in_mirrors ? points.mirrors : IntLanes{});
+    const auto lit = [&](const LampPoint<Lanes>& point) {
+      return (dot(points.normal, point.towards) > 0.0f) & (point.fraction > 0.0f);
+    };
+    const LampPoint<Lanes> point = lamp.point(points.place, sampler.next());
+    const LaneVectors light = light_of_lamp(lamp, point, points, points.visible & lit(point), view);
+    diffuse = diffuse + light * larger(dot(points.normal, point.towards), none);
+    highlights.begin(lamp);
+    highlights.add(lamp, point, light * (shiny ? none + 1 : none));
+    if (!any(highlights.smooth & shiny)) continue;
+    const LampPoint<Lanes> met = lamp.point_towards(points.place, highlights.mirrored);
+    const IntLanes lanes = highlights.smooth & shiny & lit(met);
+    if (any(lanes)) highlights.add_mirrored(met, light_of_lamp(lamp, met, points, lanes, view));
+  }
+  const LaneVectors& lobes = highlights.lobes;
+  return {diffuse, lobes, highlights.grazing / larger(lobes.x + lobes.y + lobes.z, none + 1e-12f)};
 }
 
 namespace {
@@ -278,13 +350,29 @@ std::span<Vector4f> row_part(std::vector<Vector4f>& values, int x, int y, int wi
 
 }  // namespace
 
+// Returns the light that a surface mirrors to the eye. `rays`: number of mirrored rays, if these differ;
+// `splits`: number of paths that leave the diffuse surfaces that they meet.
 Vector3f LightTracer::mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler,
-                                     const VisibleLight& visible, LightSums& sums, int splits) const {
-  const float a = point.roughness * point.roughness;
+                                     const VisibleLight& visible, LightSums& sums, int rays,
+                                     int splits) const {
   // A cone that is narrower than a pixel does not blur, and has no noise.
-  const Vector3f facet = a < std::min(view.pixel_m, kSharp)
-                             ? point.normal
-                             : visible_facet(point.normal, point.view, a, sampler.next());
+  if (point.roughness * point.roughness < std::min(view.pixel_m, kSharp))
+    return mirrored_along(point, point.normal, view, sampler, visible, sums, splits);
+  const SquarePoint<float> first = sampler.next();
+  Vector3f sum = Vector3f::Zero();
+  for (int k = 0; k < rays; ++k) {
+    const Vector3f facet = visible_facet(point.normal, point.view, point.roughness * point.roughness,
+                                         lattice_point(first, k, rays));
+    sum += mirrored_along(point, facet, view, sampler, visible, sums, std::max(splits / rays, 1));
+  }
+  return sum / static_cast<float>(rays);
+}
+
+// Returns the light that a facet of a surface mirrors to the eye.
+Vector3f LightTracer::mirrored_along(const Point& point, const Vector3f& facet, const LightView& view,
+                                     PixelSampler& sampler, const VisibleLight& visible, LightSums& sums,
+                                     int splits) const {
+  const float a = point.roughness * point.roughness;
   Vector3f outgoing = reflected(-point.view, facet);
   if (outgoing.dot(point.face) <= 0) outgoing = reflected(outgoing, point.face);
   const float nv = std::max(point.normal.dot(point.view), 1e-3f);
@@ -358,6 +446,25 @@ void LightTracer::trace_sparse_sun(const SurfaceBuffer& surfaces, int y, const L
   if (count > 0) trace_collected();
 }
 
+// Returns by how much roughness^4 of the highlights of small lamps is increased at eight pixels of a row,
+// because the normal varies within a pixel. Only for mirrors that are traced per pixel; for other surfaces,
+// filtered_roughness() in shaders/mesh.frag has done so already.
+Lanes LightTracer::highlight_variance(const SurfaceBuffer& surfaces, const Points& points, int x, int y) {
+  Lanes variance{};
+  if (!any(points.own_mirrors)) return variance;
+  const auto change2 = [&](int dx, int dy) {
+    constexpr float kOther = 4;  // another object
+    if (x + dx < 0 || y + dy < 0 || y + dy >= surfaces.height_px) return Lanes{} + kOther;
+    const Points beside(surfaces, pixels_of_row(surfaces, x + dx, y + dy));
+    const LaneVectors change = beside.normal - points.normal;
+    return beside.own_mirrors ? dot(change, change) : Lanes{} + kOther;
+  };
+  // The smaller one of two differences does not cross the outline of an object.
+  for (const auto& [right, up] : {std::pair(1, 0), std::pair(0, 1)})
+    variance += 0.5f * smaller(change2(right, up), change2(-right, -up));
+  return points.own_mirrors ? smaller(variance, Lanes{} + 0.18f) : Lanes{};
+}
+
 // Traces the light of sun, lamps and glowing meshes at eight pixels of a row.
 void LightTracer::trace_pixels(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
                                LightBuffer& light) const {
@@ -371,7 +478,7 @@ void LightTracer::trace_pixels(const SurfaceBuffer& surfaces, int x, int y, cons
   if (!view.sparse) light.direct.channels()[0].set_lanes(x, y, sun_at(points, on_sun, view));
   if (!sources_.glow.empty()) store(light.glow.channels(), x, y, trace_glow(points, x, y, view));
   if (sources_.lamps.empty()) return;
-  const LampLight lamps = trace_lamps(points, view, sampler);
+  const LampLight lamps = trace_lamps(points, highlight_variance(surfaces, points, x, y), view, sampler);
   store(light.direct.channels().subspan(1), x, y, lamps.diffuse);
   const int width = surfaces.width_px;
   lamps.store(row_part(light.lamps, x, y, width), row_part(light.highlights, x, y, width));
@@ -567,13 +674,14 @@ void LightTracer::trace_arriving(const SurfaceBuffer& surfaces, const LightView&
 void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& view,
                                 const VisibleLight& visible, LightBuffer& light) const {
   const int width = surfaces.width_px;
-  const int splits_per_pixel = view.offsets.count >= 16 ? kMirrorSplitsOfMany : kMirrorSplits;
+  const bool many = view.offsets.count >= 16;
   const Lanes none{};
-  const auto mirrored = [&](const Points& points, int i, int x, int y, int splits, LightSums& sums) {
+  const auto mirrored = [&](const Points& points, int i, int x, int y, int rays, int splits,
+                            LightSums& sums) {
     PixelSampler sampler(static_cast<uint32_t>(x + i), static_cast<uint32_t>(y), view.offsets.index,
                          view.offsets.count);
     sampler.skip(1 + static_cast<uint32_t>(sources_.lamps.size()));
-    return mirrored_light(points.one(i, view.eye), view, sampler, visible, sums, splits);
+    return mirrored_light(points.one(i, view.eye), view, sampler, visible, sums, rays, splits);
   };
   light.sums += sum_over_rows(light.cells.height_px, [&](int y, LightSums& sums) {
     for (int x = 0; x < light.cells.width_px; x += kLanes) {
@@ -584,7 +692,7 @@ void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& 
                                         (mirrors & (points.roughness > kSharpMirror)) ? none + 1 : none);
       LaneVectors values{none, none, none};
       for (int i = 0; i < kLanes; ++i)
-        if (mirrors[i]) set_lane(values, i, mirrored(points, i, x, y, 1, sums));
+        if (mirrors[i]) set_lane(values, i, mirrored(points, i, x, y, 1, 1, sums));
       store(light.mirrors.channels(), x, y, values);
     }
   });
@@ -595,7 +703,10 @@ void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& 
     for (int x = 0; x < width; x += kLanes) {
       const Points points(surfaces, pixels_of_row(surfaces, x, y));
       for (int i = 0; i < kLanes; ++i)
-        if (points.own_mirrors[i]) row[x + i] << mirrored(points, i, x, y, splits_per_pixel, sums), 1;
+        if (points.own_mirrors[i])
+          row[x + i] << mirrored(points, i, x, y, many ? 1 : kMirrorRays,
+                                 many ? kMirrorSplitsOfMany : kMirrorSplits, sums),
+              1;
     }
   });
 }
@@ -630,11 +741,12 @@ void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, con
     for (int x = 0; x < width; x += kLanes) {
       Points points(surfaces, pixels_of_row(surfaces, x, y));
       points.mirrors = points.visible;  // mirror images of glass are traced for any roughness
+      points.own_mirrors = points.visible & (points.roughness <= kSharpMirror);
       if (with_lamps > 0) {
         Sampler<UintLanes> sampler(UintLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<uint32_t>(x0 + x),
                                    UintLanes{} + static_cast<uint32_t>(y0 + y), view.offsets.index,
                                    view.offsets.count);
-        trace_lamps(points, view, sampler)
+        trace_lamps(points, highlight_variance(surfaces, points, x, y), view, sampler)
             .store(row_part(glass.lamps, x, y, width), row_part(glass.highlights, x, y, width));
       }
       for (int i = 0; i < kLanes; ++i) {
@@ -646,7 +758,7 @@ void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, con
         const SquarePoint<float> on_sun = sampler.next();
         const bool sunny = sources_.sun.intensity > 0 && point.normal.dot(sources_.sky.sun_direction) > 0;
         const std::size_t pixel = index_of(x + i, y, width);
-        glass.mirrored[pixel] << mirrored_light(point, view, sampler, behind, sums), 1;
+        glass.mirrored[pixel] << mirrored_light(point, view, sampler, behind, sums, 1, 1), 1;
         glass.through[pixel] << light_through(point, view.eye, sampler, behind, sums),
             sunny ? sun_visibility(point.place, on_sun) : 0.0f;
       }

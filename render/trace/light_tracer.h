@@ -147,10 +147,18 @@ class LightTracer {
   Vector3f light_through(const Point& point, const Vector3f& eye, PixelSampler& sampler,
                          const VisibleLight& visible, LightSums& sums) const;
   Vector3f mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler,
-                          const VisibleLight& visible, LightSums& sums, int splits = 1) const;
+                          const VisibleLight& visible, LightSums& sums, int rays, int splits) const;
+  Vector3f mirrored_along(const Point& point, const Vector3f& facet, const LightView& view,
+                          PixelSampler& sampler, const VisibleLight& visible, LightSums& sums,
+                          int splits) const;
   void lift(const Points& points, IntLanes lanes, const LightView& view, LaneVectors& place) const;
   struct LampLight;
-  LampLight trace_lamps(const Points& points, const LightView& view, Sampler<UintLanes>& sampler) const;
+  struct Highlights;
+  LaneVectors light_of_lamp(const RayLamp& lamp, const LampPoint<Lanes>& point, const Points& points,
+                            IntLanes lanes, const LightView& view) const;
+  LampLight trace_lamps(const Points& points, Lanes variance, const LightView& view,
+                        Sampler<UintLanes>& sampler) const;
+  static Lanes highlight_variance(const SurfaceBuffer& surfaces, const Points& points, int x, int y);
   void trace_pixels(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
                     LightBuffer& light) const;
   Lanes sun_at(const Points& points, const SquarePoint<Lanes>& on_sun, const LightView& view) const;

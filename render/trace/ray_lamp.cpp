@@ -32,33 +32,59 @@ LampPoint<float> RayLamp::point_of_sky(const SquarePoint<float>& uv) const {
 }
 
 template <class T>
-LampPoint<T> RayLamp::point_of(const Three<T>& place, const SquarePoint<T>& uv) const {
-  const bool rectangle = def_.size.x() > 0;
+RayLamp::Area<T> RayLamp::area_from(const Three<T>& place) const {
   const auto everywhere = [](const Vector3f& v) { return Three<T>{T{} + v.x(), T{} + v.y(), T{} + v.z()}; };
-  const Three<T> middle = everywhere(def_.position);
-  Three<T> a = everywhere(right_), b = everywhere(up_);
-  T softening{};
-  SquarePoint<T> along = {(uv.x - 0.5f) * def_.size.x(), (uv.y - 0.5f) * def_.size.y()};
-  if (!rectangle) {  // the disc of the ball that is visible from the place
-    const Three<T> to_place = place - middle;
-    make_basis(to_place * (1.0f / square_root(larger(dot(to_place, to_place), T{} + 1e-24f))), a, b);
-    const SquarePoint<T> d = on_disc(uv);
-    along = {d.x * def_.radius, d.y * def_.radius};
-    softening = T{} + 0.25f * def_.radius * def_.radius;
-  }
-  const Three<T> offset = middle + a * along.x + b * along.y - place;
+  const Three<T> from_place = everywhere(def_.position) - place;
+  if (is_rectangle()) return {from_place, everywhere(right_), everywhere(up_), everywhere(def_.direction)};
+  Area<T> disc{from_place, {}, {}, {}};
+  disc.facing = from_place * (-1.0f / square_root(larger(dot(from_place, from_place), T{} + 1e-24f)));
+  make_basis(disc.facing, disc.right, disc.up);
+  return disc;
+}
+
+// Returns a point of the area. `along`: its coordinates from the middle [m].
+template <class T>
+LampPoint<T> RayLamp::point_on(const Area<T>& area, const SquarePoint<T>& along) const {
+  const auto everywhere = [](const Vector3f& v) { return Three<T>{T{} + v.x(), T{} + v.y(), T{} + v.z()}; };
+  const Three<T> offset = area.right * along.x + area.up * along.y + area.from_place;
   LampPoint<T> result;
   result.distance = square_root(dot(offset, offset));
   result.towards = offset * (1.0f / larger(result.distance, T{} + 1e-12f));
   const T cosine = -dot(result.towards, everywhere(def_.direction));
   T fraction = T{} + 1.0f;
-  if (rectangle) fraction = larger(cosine, T{});
+  if (is_rectangle()) fraction = larger(cosine, T{});
   if (def_.cone_deg > 0) fraction = clamped_to(cone_factor_ * cosine + cone_offset_, 0, 1);
   if (def_.squared_edge) fraction = fraction * fraction;
-  result.fraction = fraction / (result.distance * result.distance + softening + 1e-12f);
+  const T distance2 = result.distance * result.distance;
+  const float softening = is_rectangle() ? 0 : 0.25f * def_.radius * def_.radius;
+  result.fraction = fraction / (distance2 + (softening + 1e-12f));
   result.arriving = everywhere(def_.intensity) * result.fraction;
-  result.density = T{};
+  const float area_m2 =
+      is_rectangle() ? def_.size.prod() : std::numbers::pi_v<float> * def_.radius * def_.radius;
+  result.density = distance2 / (area_m2 * larger(-dot(result.towards, area.facing), T{} + 1e-6f));
   return result;
+}
+
+template <class T>
+LampPoint<T> RayLamp::point_of(const Three<T>& place, const SquarePoint<T>& uv) const {
+  if (is_rectangle())
+    return point_on(area_from(place), {(uv.x - 0.5f) * def_.size.x(), (uv.y - 0.5f) * def_.size.y()});
+  const SquarePoint<T> d = on_disc(uv);
+  return point_on(area_from(place), {d.x * def_.radius, d.y * def_.radius});
+}
+
+LampPoint<Lanes> RayLamp::point_towards(const LaneVectors& place, const LaneVectors& towards) const {
+  const Area<Lanes> area = area_from(place);
+  const Lanes approach = -dot(towards, area.facing);
+  const Lanes distance = -dot(area.from_place, area.facing) / larger(approach, Lanes{} + 1e-6f);
+  const LaneVectors offset = towards * distance - area.from_place;
+  const SquarePoint<Lanes> along = {dot(offset, area.right), dot(offset, area.up)};
+  const IntLanes inside = is_rectangle() ? (absolute(along.x) <= 0.5f * def_.size.x()) &
+                                               (absolute(along.y) <= 0.5f * def_.size.y())
+                                         : along.x * along.x + along.y * along.y <= def_.radius * def_.radius;
+  LampPoint<Lanes> point = point_on(area, along);
+  point.fraction = (approach > 1e-6f) & (distance > 0.0f) & inside ? point.fraction : Lanes{};
+  return point;
 }
 
 LampPoint<float> RayLamp::point(const Three<float>& place, const SquarePoint<float>& uv) const {

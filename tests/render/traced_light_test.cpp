@@ -441,6 +441,52 @@ TEST_F(TracedLight, MirrorsShowSurfacesThatALampLights) {
   EXPECT_NEAR(mean_around(picture, place_of({0.3f, 0, -0.8f}), 1) / seen, 1, 0.05f);
 }
 
+// The mirror image of a lamp has the radiance of the lamp, without noise: pi times the intensity per visible
+// area.
+TEST_F(TracedLight, MirrorsShowLampsWithTheirRadianceAndShape) {
+  look({.eye = {0, 0, 4}, .target = {0, 0, 0}, .fov_deg = 20});
+  const Lamp square{
+      .position = {0, 0, 6}, .intensity = {2, 2, 2}, .size = {0.8f, 0.8f}, .direction = {0, 0, -1}};
+  const Lamp ball{.position = {0, 0, 6}, .intensity = {2, 2, 2}, .radius = 0.4f};
+  const Vector2f middle = place_of({0, 0, -6}), inside = place_of({0.32f, 0.32f, -6}),
+                 outside = place_of({0.5f, 0.5f, -6});
+  for (const float roughness : {0.0f, 0.03f}) {
+    const InstanceHandle mirror =
+        s.add(make_box({6, 6, 0.1f}), {.color = {1, 1, 1, 1}, .metallic = 1, .roughness = roughness},
+              {0, 0, -0.05f});
+    for (const Lamp& lamp : {square, ball}) {
+      s.stage.set_lamps(std::array{lamp});
+      const float area =
+          lamp.size.x() > 0 ? lamp.size.prod() : std::numbers::pi_v<float> * lamp.radius * lamp.radius;
+      const float radiance = std::numbers::pi_v<float> * lamp.intensity.y() / area;
+      const HdrImage picture = mean_of(s, 4);
+      for (const Vector2f& place : {middle, Vector2f(0.5f * (middle + inside))})
+        EXPECT_NEAR(mean_around(picture, place, 0) / radiance, 1, 0.05f) << roughness;
+      EXPECT_NEAR(mean_around(picture, middle, 4) / radiance, 1, 0.02f) << roughness;
+      EXPECT_NEAR(mean_around(picture, inside, 0) / radiance, lamp.size.x() > 0 ? 1 : 0, 0.1f) << roughness;
+      EXPECT_NEAR(mean_around(picture, outside, 0) / radiance, 0, 0.02f) << roughness;
+    }
+    s.stage.remove(mirror);
+  }
+}
+
+// The highlight of a lamp contains the same light whether or not mirrored rays are traced, which they are up
+// to a roughness^2 of 0.1.
+TEST_F(TracedLight, OfAHighlightDoesNotDependOnHowItIsSampled) {
+  look({.eye = {0, 0, 4}, .target = {0, 0, 0}, .fov_deg = 30});
+  s.stage.set_lamps(std::array{
+      Lamp{.position = {0, 0.5f, 6}, .intensity = {2, 2, 2}, .size = {1.5f, 1}, .direction = {0, 0, -1}}});
+  std::vector<float> light;
+  for (const float roughness : {0.316f, 0.317f}) {
+    const InstanceHandle mirror =
+        s.add(make_box({6, 6, 0.1f}), {.color = {1, 1, 1, 1}, .metallic = 1, .roughness = roughness},
+              {0, 0, -0.05f});
+    light.push_back(mean_around(mean_of(s, 4), {80, 60}, 50));
+    s.stage.remove(mirror);
+  }
+  EXPECT_NEAR(light[0] / light[1], 1, 0.01f);
+}
+
 // A ball of glass with the index of refraction 1.5 shows distant things upside down.
 TEST_F(TracedLight, ABallOfGlassTurnsThePictureUpsideDown) {
   s.add(make_sphere(1), {.color = {1, 1, 1, 1}, .roughness = 0.01f, .transmission = 1, .refraction = 1.5f});
