@@ -5,8 +5,7 @@
 namespace offstage::render {
 namespace {
 
-constexpr float kSmoothLobe = 0.1f;   // largest roughness^2 of surfaces whose highlights have mirrored rays
-constexpr float kBrightestLobe = 40;  // limit of the lobes of other surfaces
+constexpr float kBrightestLobe = 40;  // limit of the lobes of surfaces without mirrored rays
 
 // The GGX lobe as in shaders/light.glsl, limited to `most`.
 Lanes lobe_of(Lanes a, Lanes nl, Lanes nv, Lanes nh, Lanes most) {
@@ -111,23 +110,30 @@ LightTracer::LampLight LightTracer::trace_lamps(const Points& points, Lanes vari
   after_lamps.skip(static_cast<uint32_t>(sources_.lamps.size()));
   Highlights highlights(points, variance, view.eye, after_lamps.next());
   LaneVectors diffuse{none, none, none};
+  bool partly_hidden = false;
   for (const RayLamp& lamp : sources_.lamps) {
     const IntLanes shiny = points.visible & ~(lamp.def().in_mirrors ? points.mirrors : IntLanes{});
     const auto lit = [&](const LampPoint<Lanes>& point) {
       return (dot(points.normal, point.towards) > 0.0f) & (point.fraction > 0.0f);
     };
     const LampPoint<Lanes> point = lamp.point(points.place, sampler.next());
-    const LaneVectors light = light_of_lamp(lamp, point, points, points.visible & lit(point), view);
+    const IntLanes lanes = points.visible & lit(point);
+    const LaneVectors light = light_of_lamp(lamp, point, points, lanes, view);
+    partly_hidden |=
+        differs((light.x + light.y + light.z) /
+                    larger(point.arriving.x + point.arriving.y + point.arriving.z, none + 1e-20f),
+                lanes);
     diffuse = diffuse + light * larger(dot(points.normal, point.towards), none);
     highlights.begin(lamp);
     highlights.add(lamp, point, light * (shiny ? none + 1 : none));
     if (!any(highlights.smooth & shiny)) continue;
     const LampPoint<Lanes> met = lamp.point_towards(points.place, highlights.mirrored);
-    const IntLanes lanes = highlights.smooth & shiny & lit(met);
-    if (any(lanes)) highlights.add_mirrored(met, light_of_lamp(lamp, met, points, lanes, view));
+    const IntLanes hit = highlights.smooth & shiny & lit(met);
+    if (any(hit)) highlights.add_mirrored(met, light_of_lamp(lamp, met, points, hit, view));
   }
   const LaneVectors& lobes = highlights.lobes;
-  return {diffuse, lobes, highlights.grazing / larger(lobes.x + lobes.y + lobes.z, none + 1e-12f)};
+  return {diffuse, lobes, highlights.grazing / larger(lobes.x + lobes.y + lobes.z, none + 1e-12f),
+          partly_hidden};
 }
 
 // Returns by how much roughness^4 of the highlights of small lamps is increased at eight pixels of a row,
@@ -137,11 +143,11 @@ Lanes LightTracer::highlight_variance(const SurfaceBuffer& surfaces, const Point
   Lanes variance{};
   if (!any(points.own_mirrors)) return variance;
   const auto change2 = [&](int dx, int dy) {
-    constexpr float kOther = 4;  // another object
+    constexpr float kOther = 4;  // nothing is visible
     if (x + dx < 0 || y + dy < 0 || y + dy >= surfaces.height_px) return Lanes{} + kOther;
     const Points beside(surfaces, pixels_of_row(surfaces, x + dx, y + dy));
     const LaneVectors change = beside.normal - points.normal;
-    return beside.own_mirrors ? dot(change, change) : Lanes{} + kOther;
+    return beside.visible ? dot(change, change) : Lanes{} + kOther;
   };
   // The smaller one of two differences does not cross the outline of an object.
   for (const auto& [right, up] : {std::pair(1, 0), std::pair(0, 1)})

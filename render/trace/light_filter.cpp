@@ -197,7 +197,7 @@ void LightValues::Averaging::average_run(int x0, int y, int length) {
     else if (channels_ == 3)
       average_lanes<3>(x, y);
     else
-      average_lanes<4>(x, y);
+      average_lanes<7>(x, y);
   }
 }
 

@@ -127,7 +127,7 @@ struct LightGuide {
 class LightValues {
  public:
   LightValues() = default;
-  /// `channels`: 1, 3 or 4.
+  /// `channels`: 1, 3 or 7.
   LightValues(int width_px, int height_px, std::size_t channels);
   std::span<LightPlane> channels() { return values_; }
   std::span<const LightPlane> channels() const { return values_; }

@@ -1,6 +1,6 @@
 #pragma once
-/// Private: paths of light rays. light_tracer.cpp, mirror_light.cpp and caustics.cpp start them; light_path.cpp
-/// follows them.
+/// Private: paths of light rays. light_tracer.cpp, mirror_light.cpp and caustics.cpp start them;
+/// light_path.cpp follows them.
 
 #include <numbers>
 

@@ -10,14 +10,21 @@
 namespace offstage::render {
 namespace {
 
-constexpr uint32_t kRowsPerRound = 4096;                // offset of the sampler's row from round to round
 constexpr int kRoundsPerSubFrame = 2, kMostRounds = 8;  // limits of the further rounds of indirect light
+// Number of further rounds of shadow rays in penumbras. Frames of many sub-frames need few.
+constexpr int kPenumbraRounds = 3, kPenumbraRoundsOfMany = 1;
 // Further rounds are traced where variance / mean^2 of the filtered indirect light exceeds the target. The
 // filter averages at most kMostAveraged cells.
 constexpr float kTargetVariance = 0.0256f, kMostAveraged = 400;
 constexpr float kBrightest =
     50;  // limit of radiance found by random directions; brighter samples would be visible as dots
 constexpr int kWidestStep = 16;  // widest step of the filter of indirect light [cells]
+
+/// Returns the row of the sampler for a round of a row of pixels or cells.
+uint32_t sampler_row(int y, int round) {
+  constexpr int kRowsPerRound = 4096;
+  return static_cast<uint32_t>(y + kRowsPerRound * round);
+}
 
 }  // namespace
 
@@ -41,6 +48,7 @@ LightBuffer::LightBuffer(int width, int height)
       with_mirror(cells.width_px, cells.height_px),
       with_rough_mirror(cells.width_px, cells.height_px) {
   arriving.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  partly_hidden.resize(static_cast<std::size_t>(runs()) * static_cast<std::size_t>(height));
 }
 
 LightTracer::LightTracer(const RayScene& scene, const LightSources& sources, StopTest stop)
@@ -110,8 +118,9 @@ void LightTracer::set_guide(const Points& points, int x, int y, const LightView&
 }
 
 // Returns the visible fraction of the sun at eight pixels.
-Lanes LightTracer::sun_at(const Points& points, const SquarePoint<Lanes>& on_sun,
-                          const LightView& view) const {
+// `partly_hidden`, if not null, is set to whether the sun is visible from some of the pixels only.
+Lanes LightTracer::sun_at(const Points& points, const SquarePoint<Lanes>& on_sun, const LightView& view,
+                          bool* partly_hidden) const {
   const LaneVectors to_sun = all_lanes(sources_.sky.sun_direction);
   const Lanes towards_sun = dot(points.normal, to_sun);
   IntLanes sunny = points.visible & (towards_sun > 0.0f);
@@ -126,7 +135,9 @@ Lanes LightTracer::sun_at(const Points& points, const SquarePoint<Lanes>& on_sun
   }
   if (sources_.sun.intensity <= 0) sunny = IntLanes{};
   lift(points, sunny & ~points.cloth & (dot(points.face, to_sun) < kGrazing), view, place);
-  return sun_visibility(place, sunny, on_sun, view.focus);
+  const Lanes fraction = sun_visibility(place, sunny, on_sun, view.focus);
+  if (partly_hidden != nullptr) *partly_hidden = differs(fraction, sunny);
+  return fraction;
 }
 
 // Traces the visible fraction of the sun for the pixels of a row of a sparse picture that are no gaps.
@@ -153,23 +164,69 @@ void LightTracer::trace_sparse_sun(const SurfaceBuffer& surfaces, int y, const L
   if (count > 0) trace_collected();
 }
 
-// Traces the light of sun, lamps and glowing meshes at eight pixels of a row.
-void LightTracer::trace_pixels(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
+// Traces the light of sun, lamps and glowing meshes at eight pixels of a row. The result of a further round
+// is averaged with the rounds before it.
+void LightTracer::trace_pixels(const SurfaceBuffer& surfaces, int x, int y, int round, const LightView& view,
                                LightBuffer& light) const {
   const Points points(surfaces, pixels_of_row(surfaces, x, y));
-  set_guide(points, x, y, view, 1, light.pixels);
+  if (round == 0) set_guide(points, x, y, view, 1, light.pixels);
   if (view.sparse && sources_.glow.empty() && sources_.lamps.empty()) return;
   const UintLanes columns = UintLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<uint32_t>(x);
-  Sampler<UintLanes> sampler(columns, UintLanes{} + static_cast<uint32_t>(y), view.offsets.index,
+  Sampler<UintLanes> sampler(columns, UintLanes{} + sampler_row(y, round), view.offsets.index,
                              view.offsets.count);
+  const float weight = 1 / static_cast<float>(round + 1);
+  const auto add = [&](LightPlane& plane, Lanes value) {
+    const Lanes before = round == 0 ? value : plane.lanes(x, y);
+    plane.set_lanes(x, y, before + weight * (value - before));
+  };
   const SquarePoint<Lanes> on_sun = sampler.next();
-  if (!view.sparse) light.direct.channels()[0].set_lanes(x, y, sun_at(points, on_sun, view));
-  if (!sources_.glow.empty()) store(light.glow.channels(), x, y, trace_glow(points, x, y, view));
-  if (sources_.lamps.empty()) return;
-  const LampLight lamps = trace_lamps(points, highlight_variance(surfaces, points, x, y), view, sampler);
-  store(light.direct.channels().subspan(1), x, y, lamps.diffuse);
-  const int width = surfaces.width_px;
-  lamps.store(row_part(light.lamps, x, y, width), row_part(light.highlights, x, y, width));
+  bool partly_hidden = false;
+  const std::span<LightPlane> direct = light.direct.channels();
+  if (!view.sparse) add(direct[0], sun_at(points, on_sun, view, &partly_hidden));
+  if (!sources_.glow.empty() && round == 0)
+    store(light.glow.channels(), x, y, trace_glow(points, x, y, view));
+  if (!sources_.lamps.empty()) {
+    const LampLight lamps = trace_lamps(points, highlight_variance(surfaces, points, x, y), view, sampler);
+    const Lanes none{};
+    add(direct[1], lamps.diffuse.x);
+    add(direct[2], lamps.diffuse.y);
+    add(direct[3], lamps.diffuse.z);
+    // The highlights of rough surfaces are filtered.
+    const Lanes smooth = points.roughness * points.roughness > kSmoothLobe ? none : none + 1;
+    const LaneVectors filtered = lamps.lobes * (1 - smooth);
+    add(direct[4], filtered.x);
+    add(direct[5], filtered.y);
+    add(direct[6], filtered.z);
+    const std::span<Vector4f> highlights = row_part(light.highlights, x, y, surfaces.width_px);
+    for (std::size_t i = 0; i < highlights.size(); ++i) {
+      const Vector4f value(smooth[i] * lamps.lobes.x[i], smooth[i] * lamps.lobes.y[i],
+                           smooth[i] * lamps.lobes.z[i], lamps.fresnel[i]);
+      highlights[i] = round == 0 ? value : highlights[i] + weight * (value - highlights[i]);
+    }
+    partly_hidden |= lamps.partly_hidden;
+  }
+  if (round == 0) light.partly_hidden[index_of(x / kLanes, y, light.runs())] = partly_hidden;
+}
+
+// Traces further rounds for runs of pixels in penumbras, which are beside runs from which a light source is
+// visible in part. The samples of a run do not influence whether it gets further ones, because this would
+// change their mean.
+void LightTracer::refine_penumbras(const SurfaceBuffer& surfaces, const LightView& view,
+                                   LightBuffer& light) const {
+  const int runs = light.runs();
+  const int rounds = view.offsets.count >= 16 ? kPenumbraRoundsOfMany : kPenumbraRounds;
+  const auto is_hidden = [&](int run, int y) {
+    return run >= 0 && run < runs && y >= 0 && y < surfaces.height_px &&
+           light.partly_hidden[index_of(run, y, runs)] != 0;
+  };
+  for_rows(surfaces.height_px, [&](int y) {
+    for (int run = 0; run < runs; ++run) {
+      const bool beside = is_hidden(run, y - 1) || is_hidden(run, y + 1);
+      if (!beside && !(is_hidden(run - 1, y) && is_hidden(run + 1, y))) continue;
+      for (int round = 1; round <= rounds; ++round)
+        trace_pixels(surfaces, kLanes * run, y, round, view, light);
+    }
+  });
 }
 
 // Returns the index of the pixel that represents each of eight cells of a row. The four pixels of a cell take
@@ -201,7 +258,7 @@ void LightTracer::trace_cells(const SurfaceBuffer& surfaces, int x, int y, int r
   if (!view.sparse && round == 0) set_guide(points, x, y, view, 2, light.cells);
   const Lanes none{};
   const int shift = view.sparse ? 1 : 0;  // gives consecutive numbers to the cells that are not gaps
-  const uint32_t row = (static_cast<uint32_t>(y) >> shift) + static_cast<uint32_t>(round) * kRowsPerRound;
+  const uint32_t row = sampler_row(y >> shift, round);
   Sampler<UintLanes> samplers((UintLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<uint32_t>(x)) >> shift,
                               UintLanes{} + row, k, view.offsets.count);
   const LaneVectors directions = cosine_direction(points.normal, samplers.next());
@@ -287,7 +344,7 @@ void LightTracer::trace_arriving(const SurfaceBuffer& surfaces, const LightView&
                                  LightBuffer& light) const {
   const int width = surfaces.width_px, height = surfaces.height_px;
   const std::size_t pixels = light.arriving.size(), with_lamps = sources_.lamps.empty() ? 0 : pixels;
-  const std::size_t channels = sources_.lamps.empty() ? 1 : 4;
+  const std::size_t channels = sources_.lamps.empty() ? 1 : 7;
   if (light.direct.channels().size() != channels) light.direct = LightValues(width, height, channels);
   light.lamps.resize(with_lamps);
   light.highlights.resize(with_lamps);
@@ -297,8 +354,9 @@ void LightTracer::trace_arriving(const SurfaceBuffer& surfaces, const LightView&
                                           [](const Vector4f& p) { return p.w() >= SurfaceBuffer::kMirrors; });
   if (light.has_mirrors) light.mirrored.resize(pixels);
   for_rows(height, [&](int y) {
-    for (int x = 0; x < width; x += kLanes) trace_pixels(surfaces, x, y, view, light);
+    for (int x = 0; x < width; x += kLanes) trace_pixels(surfaces, x, y, 0, view, light);
   });
+  if (!view.sparse) refine_penumbras(surfaces, view, light);
   if (view.sparse) {
     for_rows(light.cells.height_px, [&](int y) {
       for (int x = 0; x < light.cells.width_px; x += kLanes)
@@ -329,9 +387,14 @@ void LightTracer::trace_arriving(const SurfaceBuffer& surfaces, const LightView&
         light.arriving[row + static_cast<std::size_t>(x)][static_cast<int>(i)] +=
             *light.glow.channels()[i].at(x, y);
     for (int x = 0; x < width && !light.lamps.empty(); ++x) {
-      Vector4f& lamps = light.lamps[row + static_cast<std::size_t>(x)];
-      for (std::size_t i = 0; i < 3; ++i)
-        lamps[static_cast<int>(i)] = *light.direct.channels()[i + 1].at(x, y);
+      Vector4f &lamps = light.lamps[row + static_cast<std::size_t>(x)],
+               &highlight = light.highlights[row + static_cast<std::size_t>(x)];
+      lamps[3] = 0;
+      for (int i = 0; i < 3; ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        lamps[i] = *light.direct.channels()[1 + k].at(x, y);
+        highlight[i] += *light.direct.channels()[4 + k].at(x, y);
+      }
     }
   });
 }

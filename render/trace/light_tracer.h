@@ -29,6 +29,7 @@ struct SurfaceBuffer {
 /// Light at the visible surfaces, as the radiance of a white surface.
 struct LightBuffer {
   LightBuffer(int width_px, int height_px);
+  int runs() const { return (pixels.width_px + kLanes - 1) / kLanes; }  ///< runs of eight pixels per row
 
   // Results, rows from the bottom up.
   std::vector<Vector4f>
@@ -41,12 +42,15 @@ struct LightBuffer {
 
   // Intermediate values. Indirect light is traced per cell of 2x2 pixels.
   LightGuide pixels, cells;
-  LightValues direct;           ///< for each pixel: visible fraction of the sun, and diffuse light of lamps
+  /// For each pixel: visible fraction of the sun, diffuse light of lamps, and highlights of rough surfaces.
+  LightValues direct;
   LightValues glow;             ///< for each pixel: light of glowing meshes; empty if there are none
   LightValues around, mirrors;  ///< for each cell: diffuse indirect light, and mirrored light
   LightPlane inverse_distance, brightness, reach2, noisy_reach2;  ///< see LightGuide::find_reach
   /// For each cell: 1 if its surface has a mirror image that is traced per cell, or a blurred one; else 0.
   LightPlane with_mirror, with_rough_mirror;
+  /// For each run of eight pixels of a row: whether a light source is visible from some of the pixels only.
+  std::vector<uint8_t> partly_hidden;
 };
 
 /// Light at the glass surfaces in a part of the picture, rows from the bottom up.
@@ -159,9 +163,11 @@ class LightTracer {
   LampLight trace_lamps(const Points& points, Lanes variance, const LightView& view,
                         Sampler<UintLanes>& sampler) const;
   static Lanes highlight_variance(const SurfaceBuffer& surfaces, const Points& points, int x, int y);
-  void trace_pixels(const SurfaceBuffer& surfaces, int x, int y, const LightView& view,
+  void trace_pixels(const SurfaceBuffer& surfaces, int x, int y, int round, const LightView& view,
                     LightBuffer& light) const;
-  Lanes sun_at(const Points& points, const SquarePoint<Lanes>& on_sun, const LightView& view) const;
+  void refine_penumbras(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
+  Lanes sun_at(const Points& points, const SquarePoint<Lanes>& on_sun, const LightView& view,
+               bool* partly_hidden = nullptr) const;
   void trace_sparse_sun(const SurfaceBuffer& surfaces, int y, const LightView& view,
                         LightBuffer& light) const;
   static void fill_sparse(LightBuffer& light);

@@ -147,8 +147,10 @@ void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, con
         Sampler<UintLanes> sampler(UintLanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<uint32_t>(x0 + x),
                                    UintLanes{} + static_cast<uint32_t>(y0 + y), view.offsets.index,
                                    view.offsets.count);
-        trace_lamps(points, highlight_variance(surfaces, points, x, y), view, sampler)
-            .store(row_part(glass.lamps, x, y, width), row_part(glass.highlights, x, y, width));
+        const LampLight lamps =
+            trace_lamps(points, highlight_variance(surfaces, points, x, y), view, sampler);
+        lamps.store_diffuse(row_part(glass.lamps, x, y, width));
+        lamps.store_highlights(row_part(glass.highlights, x, y, width));
       }
       for (int i = 0; i < kLanes; ++i) {
         if (!points.visible[i]) continue;

@@ -15,6 +15,8 @@
 
 namespace offstage::render {
 
+/// Roughness^2 of surfaces, above which highlights are filtered and have no mirrored rays.
+inline constexpr float kSmoothLobe = 0.1f;
 /// Roughness above which mirror images are filtered.
 inline constexpr float kSharpMirror = 0.12f;
 /// Cosine between light and triangle, below which the triangle may shadow itself.
@@ -38,6 +40,18 @@ inline void set_lane(LaneVectors& lanes, int i, const Vector3f& value) {
 inline IntLanes pixels_of_row(const SurfaceBuffer& surfaces, int x, int y) {
   const IntLanes columns = IntLanes{0, 1, 2, 3, 4, 5, 6, 7} + x;
   return columns < surfaces.width_px ? columns + y * surfaces.width_px : IntLanes{} - 1;
+}
+
+/// Returns whether the fraction of a light source that is visible differs between the active lanes.
+inline bool differs(Lanes fraction, IntLanes active) {
+  constexpr float kDifferent = 0.3f;
+  float least = 1, most = 0;
+  for (int i = 0; i < kLanes; ++i) {
+    if (!active[i]) continue;
+    least = std::min(least, fraction[i]);
+    most = std::max(most, fraction[i]);
+  }
+  return most - least > kDifferent;
 }
 
 /// Stores vectors for the pixels x ... x + 7 of a row.
@@ -111,13 +125,15 @@ struct LightTracer::Points {
 /// Light of lamps at eight surfaces.
 struct LightTracer::LampLight {
   LaneVectors diffuse, lobes;
-  Lanes fresnel;  ///< factor of the lobes
+  Lanes fresnel;       ///< factor of the lobes
+  bool partly_hidden;  ///< whether a lamp is visible from some of the surfaces only
 
-  void store(std::span<Vector4f> lamps, std::span<Vector4f> highlights) const {
-    for (std::size_t i = 0; i < lamps.size(); ++i) {
-      lamps[i] = {diffuse.x[i], diffuse.y[i], diffuse.z[i], 0};
+  void store_diffuse(std::span<Vector4f> lamps) const {
+    for (std::size_t i = 0; i < lamps.size(); ++i) lamps[i] = {diffuse.x[i], diffuse.y[i], diffuse.z[i], 0};
+  }
+  void store_highlights(std::span<Vector4f> highlights) const {
+    for (std::size_t i = 0; i < highlights.size(); ++i)
       highlights[i] = {lobes.x[i], lobes.y[i], lobes.z[i], fresnel[i]};
-    }
   }
 };
 

@@ -265,6 +265,21 @@ TEST_F(TracedLight, OfASmallBrightPatchHasLittleNoise) {
             0.25f);  // 0.16; without the further paths 0.41
 }
 
+// The penumbra of a wide lamp, on a floor with a highlight. Pixels in penumbras get further shadow rays, and
+// the highlights of rough surfaces are filtered.
+TEST_F(TracedLight, OfPenumbrasHasLittleNoise) {
+  s.add(make_ground(20), {.color = {0.5f, 0.5f, 0.5f, 1}, .roughness = 0.6f});
+  s.add(make_box({0.1f, 1, 4}), kGrey, {-1, 1, 0});
+  s.stage.set_lamps(std::array{Lamp{.position = {-3, 3, 0},
+                                    .intensity = {9, 9, 9},
+                                    .size = {2, 2},
+                                    .direction = Vector3f(1, -1, 0).normalized()}});
+  look({.eye = {2, 1.5f, 0}, .target = {0, 0, 0}, .fov_deg = 40});
+  const HdrImage picture = mean_of(s, 4), reference = mean_of(s, 64);
+  EXPECT_LT(relative_error(picture, reference, {Eigen::Vector2i(20, 10), Eigen::Vector2i(140, 80)}),
+            0.022f);  // 0.017; without them 0.034
+}
+
 // A metal mirror shows a wall behind the camera, which is in shadow and lit by a sunlit floor of bright and
 // dark strips. Mirror images are not filtered, so each has several paths from the wall.
 TEST_F(TracedLight, OfWallsInMirrorsHasLittleNoise) {
