@@ -106,32 +106,40 @@ SkyGrid sky_grid_of(const HdrImage& image) {
   return grid;
 }
 
-/// Returns the convolution with a Gaussian of the angle between directions, up to three standard deviations.
+/// Returns the convolution with a Gaussian of the angle between directions. A sun can be ten thousand times
+/// as bright as the sky around it, so the Gaussian reaches so far that its end is not visible, and the cells
+/// are smaller than it.
 SkyGrid blurred_sky(const SkyGrid& source, float sigma) {
-  const int columns = std::clamp(2 * static_cast<int>(2 * kSkyPi / sigma), 32, std::max(source.columns, 32));
+  constexpr float kReach = 6;  // [sigma]; the Gaussian is 1.5e-8 there
+  constexpr int kMostColumns = 2048;
+  const int columns = std::clamp(2 * static_cast<int>(2 * kSkyPi / sigma), 32, kMostColumns);
   const SkyGrid grid = resampled(source, columns, columns / 2);
   SkyGrid result = grid;
-  const float reach = 3 * sigma, row_angle = kSkyPi / static_cast<float>(grid.rows);
+  const float reach = kReach * sigma, row_angle = kSkyPi / static_cast<float>(grid.rows);
   const int rows_around = static_cast<int>(std::ceil(reach / row_angle));
   tbb::parallel_for(0, grid.rows, [&](int row) {
-    for (int column = 0; column < grid.columns; ++column) {
-      const Vector3f middle = sky_direction(grid, column, row);
-      Vector3f sum = Vector3f::Zero();
-      float weights = 0;
-      for (int y = std::max(row - rows_around, 0); y <= std::min(row + rows_around, grid.rows - 1); ++y) {
-        const float sine = std::sin((static_cast<float>(y) + 0.5f) * row_angle);
-        const int widest = static_cast<int>(std::ceil(reach / (row_angle * std::max(sine, 1e-3f))));
-        const int half = std::min(widest, grid.columns / 2 - 1);
-        for (int k = -half; k <= half; ++k) {
-          const int x = (column + k + grid.columns) % grid.columns;
-          const float cosine = std::min(middle.dot(sky_direction(grid, x, y)), 1.0f);
-          const float weight = sine * std::exp((cosine - 1) / (sigma * sigma));
-          sum += weight * grid.cell(x, y);
-          weights += weight;
-        }
+    std::vector<Vector3f> sums(static_cast<std::size_t>(columns), Vector3f::Zero());
+    const Vector3f middle = sky_direction(grid, 0, row);
+    float weights = 0;
+    for (int y = std::max(row - rows_around, 0); y <= std::min(row + rows_around, grid.rows - 1); ++y) {
+      const float sine = std::sin((static_cast<float>(y) + 0.5f) * row_angle);
+      const int widest = static_cast<int>(std::ceil(reach / (row_angle * std::max(sine, 1e-3f))));
+      const int half = std::min(widest, columns / 2 - 1);
+      for (int k = -half; k <= half; ++k) {
+        const float cosine = std::min(middle.dot(sky_direction(grid, (k + columns) % columns, y)), 1.0f);
+        const float weight = sine * std::exp((cosine - 1) / (sigma * sigma));
+        if (!(weight > 0)) continue;
+        weights += weight;
+        // The columns from 0 take values from `first` on; those at the end take the first ones.
+        const int first = (k + columns) % columns;
+        for (int column = 0; column < columns - first; ++column)
+          sums[static_cast<std::size_t>(column)] += weight * grid.cell(column + first, y);
+        for (int column = columns - first; column < columns; ++column)
+          sums[static_cast<std::size_t>(column)] += weight * grid.cell(column + first - columns, y);
       }
-      result.cell(column, row) = sum / weights;
     }
+    for (int column = 0; column < columns; ++column)
+      result.cell(column, row) = sums[static_cast<std::size_t>(column)] / weights;
   });
   return result;
 }

@@ -252,6 +252,25 @@ TEST(StageSkyPicture, BackgroundIsBlurredOrHidden) {
   EXPECT_LT(mean_color(picture, {60, 60}, 2).y(), 0.4f);
 }
 
+// A small, very bright sun. Where its blurred image is still brighter than the sky, it is round.
+TEST(StageSkyPicture, ABlurredSunIsRound) {
+  const HdrImage sky = disc_sky(Vector3f(0, 0, -1), 2, {30000, 30000, 30000}, 0.01f, 512);
+  LitStage s(sky);
+  Environment environment;
+  environment.picture = std::make_shared<const SkyPicture>(sky, 3.0f);
+  s.stage.set_environment(environment);
+  const float away = std::tan(12 * kPi / 180);  // four standard deviations
+  std::vector<float> seen;
+  for (int k = 0; k < 16; ++k) {
+    const float turn = kPi / 8 * static_cast<float>(k);
+    s.look({.eye = {0, 0, 0}, .target = {away * std::cos(turn), away * std::sin(turn), -1}, .fov_deg = 5});
+    seen.push_back(center_pixel(s.draw()).y());
+  }
+  const auto [least, most] = std::ranges::minmax(seen);
+  EXPECT_GT(least, 1);
+  EXPECT_LT(most / least, 1.3f);
+}
+
 // A rough mirror shows the mean of the sky over its lobe, which is partly found by the rays of the mirror
 // image and partly by those to the bright part: the integral of the density of mirrored directions times the
 // radiance.
