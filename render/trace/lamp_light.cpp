@@ -45,11 +45,13 @@ struct LightTracer::Highlights {
   /// light, the roughness is increased.
   void begin(const RayLamp& lamp) {
     const Lanes none{}, rough = points.roughness * points.roughness;
-    const Lanes density =
-        lamp.is_sky() ? none + 1e12f : lamp.point(points.place, {none + 0.5f, none + 0.5f}).density;
+    a = rough;
+    smooth = IntLanes{};
+    if (lamp.is_sky() || !any(points.visible & (rough <= kSmoothLobe))) return;
+    const Lanes density = lamp.point(points.place, {none + 0.5f, none + 0.5f}).density;
     const Lanes size2 = 0.25f / (std::numbers::pi_v<float> * larger(density, none + 1e-12f));
     a = square_root(smaller(rough * rough + larger(variance - size2, none), none + 1));
-    smooth = lamp.is_sky() ? IntLanes{} : points.visible & (a <= kSmoothLobe);
+    smooth = points.visible & (a <= kSmoothLobe);
     for (int i = 0; i < kLanes; ++i) {
       if (!smooth[i]) continue;
       const Point point = points.one(i, eye);
@@ -110,7 +112,7 @@ LightTracer::LampLight LightTracer::trace_lamps(const Points& points, Lanes vari
   after_lamps.skip(static_cast<uint32_t>(sources_.lamps.size()));
   Highlights highlights(points, variance, view.eye, after_lamps.next());
   LaneVectors diffuse{none, none, none};
-  bool partly_hidden = false;
+  Lanes without_shadows{};  // sum of all channels of `diffuse`
   for (const RayLamp& lamp : sources_.lamps) {
     const IntLanes shiny = points.visible & ~(lamp.def().in_mirrors ? points.mirrors : IntLanes{});
     const auto lit = [&](const LampPoint<Lanes>& point) {
@@ -119,11 +121,9 @@ LightTracer::LampLight LightTracer::trace_lamps(const Points& points, Lanes vari
     const LampPoint<Lanes> point = lamp.point(points.place, sampler.next());
     const IntLanes lanes = points.visible & lit(point);
     const LaneVectors light = light_of_lamp(lamp, point, points, lanes, view);
-    partly_hidden |=
-        differs((light.x + light.y + light.z) /
-                    larger(point.arriving.x + point.arriving.y + point.arriving.z, none + 1e-20f),
-                lanes);
-    diffuse = diffuse + light * larger(dot(points.normal, point.towards), none);
+    const Lanes nl = larger(dot(points.normal, point.towards), none);
+    diffuse = diffuse + light * nl;
+    without_shadows += (lanes ? nl : none) * (point.arriving.x + point.arriving.y + point.arriving.z);
     highlights.begin(lamp);
     highlights.add(lamp, point, light * (shiny ? none + 1 : none));
     if (!any(highlights.smooth & shiny)) continue;
@@ -133,7 +133,7 @@ LightTracer::LampLight LightTracer::trace_lamps(const Points& points, Lanes vari
   }
   const LaneVectors& lobes = highlights.lobes;
   return {diffuse, lobes, highlights.grazing / larger(lobes.x + lobes.y + lobes.z, none + 1e-12f),
-          partly_hidden};
+          differs((diffuse.x + diffuse.y + diffuse.z) / without_shadows, without_shadows > 0.0f)};
 }
 
 // Returns by how much roughness^4 of the highlights of small lamps is increased at eight pixels of a row,

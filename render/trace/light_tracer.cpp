@@ -11,8 +11,9 @@ namespace offstage::render {
 namespace {
 
 constexpr int kRoundsPerSubFrame = 2, kMostRounds = 8;  // limits of the further rounds of indirect light
-// Number of further rounds of shadow rays in penumbras. Frames of many sub-frames need few.
-constexpr int kPenumbraRounds = 3, kPenumbraRoundsOfMany = 1;
+// Number of further shadow rays to sun and lamps together, for each pixel in a penumbra. Frames of many
+// sub-frames need few.
+constexpr int kPenumbraRays = 6, kPenumbraRaysOfMany = 2;
 // Further rounds are traced where variance / mean^2 of the filtered indirect light exceeds the target. The
 // filter averages at most kMostAveraged cells.
 constexpr float kTargetVariance = 0.0256f, kMostAveraged = 400;
@@ -214,11 +215,13 @@ void LightTracer::trace_pixels(const SurfaceBuffer& surfaces, int x, int y, int 
 void LightTracer::refine_penumbras(const SurfaceBuffer& surfaces, const LightView& view,
                                    LightBuffer& light) const {
   const int runs = light.runs();
-  const int rounds = view.offsets.count >= 16 ? kPenumbraRoundsOfMany : kPenumbraRounds;
+  const int sources = static_cast<int>(sources_.lamps.size()) + (sources_.sun.intensity > 0 ? 1 : 0);
+  const int rounds = (view.offsets.count >= 16 ? kPenumbraRaysOfMany : kPenumbraRays) / std::max(sources, 2);
   const auto is_hidden = [&](int run, int y) {
     return run >= 0 && run < runs && y >= 0 && y < surfaces.height_px &&
            light.partly_hidden[index_of(run, y, runs)] != 0;
   };
+  if (rounds == 0) return;
   for_rows(surfaces.height_px, [&](int y) {
     for (int run = 0; run < runs; ++run) {
       const bool beside = is_hidden(run, y - 1) || is_hidden(run, y + 1);

@@ -49,7 +49,7 @@ struct LightBuffer {
   LightPlane inverse_distance, brightness, reach2, noisy_reach2;  ///< see LightGuide::find_reach
   /// For each cell: 1 if its surface has a mirror image that is traced per cell, or a blurred one; else 0.
   LightPlane with_mirror, with_rough_mirror;
-  /// For each run of eight pixels of a row: whether a light source is visible from some of the pixels only.
+  /// For each run of eight pixels of a row: whether some of the pixels are in shadow, and others less.
   std::vector<uint8_t> partly_hidden;
 };
 

@@ -42,7 +42,7 @@ inline IntLanes pixels_of_row(const SurfaceBuffer& surfaces, int x, int y) {
   return columns < surfaces.width_px ? columns + y * surfaces.width_px : IntLanes{} - 1;
 }
 
-/// Returns whether the fraction of a light source that is visible differs between the active lanes.
+/// Returns whether the fraction of the light that arrives differs between the active lanes.
 inline bool differs(Lanes fraction, IntLanes active) {
   constexpr float kDifferent = 0.3f;
   float least = 1, most = 0;
@@ -126,7 +126,7 @@ struct LightTracer::Points {
 struct LightTracer::LampLight {
   LaneVectors diffuse, lobes;
   Lanes fresnel;       ///< factor of the lobes
-  bool partly_hidden;  ///< whether a lamp is visible from some of the surfaces only
+  bool partly_hidden;  ///< whether some of the surfaces are in shadow, and others less
 
   void store_diffuse(std::span<Vector4f> lamps) const {
     for (std::size_t i = 0; i < lamps.size(); ++i) lamps[i] = {diffuse.x[i], diffuse.y[i], diffuse.z[i], 0};
