@@ -355,6 +355,7 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
   for (std::size_t i = 0; i < joints_.articulations().size(); ++i)
     for (const Body* body : joints_.articulations()[i]->bodies())
       rest_[body->row] = 1 - joints_.acting_from(i);
+  riding_.find(island, bodies_, contacts_, pairs_, duration);
   for (std::size_t i = 0; i < island.bodies.size(); ++i) {
     Body& body = *island.bodies[i];
     const Vec3 dv = bodies_[i].velocity - free_[i].velocity,
@@ -363,6 +364,10 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
     if (closing_[i] && !is_kicked[i]) {
       mean = (dv + bodies_[i].velocity - body.start_twist.velocity) / 2;
       mean_spin = (dw + bodies_[i].angular_velocity - body.start_twist.angular_velocity) / 2;
+    }
+    if (interval.is_whole && !riding_.empty() && !closing_[i]) {
+      mean += riding_.deviation(i).shift / duration;
+      mean_spin += riding_.deviation(i).turn / duration;
     }
     if (!displacements_.empty()) {
       const auto& [shift, turn] = displacements_[i];
