@@ -93,8 +93,6 @@ void ParticleContacts::find_pairs(uint32_t i, Found& found) const {
       const Real speed = -u.dot(met->normal);
       pair.is_impact = is_impact(speed, greater_acceleration(a, b), *step_);
       // A contact that is not an impact acts during the whole sub-step. Its target closes the gap at the end.
-      // On their real paths they may meet in the next sub-step only.
-      if (pair.is_impact && (free_end_[i] - free_end_[j]).dot(met->normal) > a.radius + b.radius) continue;
       const Real from = std::max(a.from, b.from);
       target = pair.is_impact ? pair_restitution(a, b) * speed : -speed * (met->time - from) / h;
       normal = met->normal;
