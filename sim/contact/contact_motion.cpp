@@ -79,10 +79,6 @@ Twist twist_of(const Body& body) {
   return body.is_awake() ? body.start_twist : body.is_kinematic() ? body.drive : Twist{};
 }
 
-Twist twist_at_start(const Body& body) {
-  return body.is_kinematic() ? body.start_twist : twist_of(body);
-}
-
 Twist mean_twist(const Body& body) {
   if (!body.is_kinematic()) return twist_of(body);
   return {(body.start_twist.velocity + body.drive.velocity) / 2,
@@ -362,7 +358,11 @@ ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, co
                              const Vec3& place, Real gap, Real duration, Real substep) {
   const Twist twist_a = twist_of(a), twist_b = twist_of(b);
   const Vec3 arm_a = place - start_centre(a), arm_b = place - start_centre(b);
-  const Start start{a, b, m, arm_a, arm_b, gap, twist_at_start(a).at(arm_a) - twist_at_start(b).at(arm_b)};
+  const auto first_twist = [](const Body& body, const Twist& twist) -> const Twist& {
+    return body.is_kinematic() ? body.start_twist : twist;
+  };
+  const Start start{
+      a, b, m, arm_a, arm_b, gap, first_twist(a, twist_a).at(arm_a) - first_twist(b, twist_b).at(arm_b)};
   ContactMotion motion;
   motion.frame = frame;
   const bool is_face = m.source == NormalSource::face_of_a || m.source == NormalSource::face_of_b;

@@ -12,25 +12,21 @@ constexpr Real kRides = 1e-3;
 /// Greatest number of passes that look for bodies on riding bodies: the height of a stack.
 constexpr int kMostPasses = 20;
 
-/// Whether points fixed on the body have accelerations.
-bool accelerates(const Body& body) {
+}  // namespace
+
+bool RidingBodies::can_carry(const Body& body) {
   return body.is_kinematic() &&
          (body.drive.angular_velocity != Vec3::Zero() || body.drive.velocity != body.start_twist.velocity ||
           body.start_twist.angular_velocity != Vec3::Zero());
 }
 
-}  // namespace
-
 void RidingBodies::find(const Island& island, std::span<const ContactBody> bodies,
                         std::span<const Contact> contacts, std::span<const ContactPair* const> pairs,
                         Real duration) {
-  carriers_.clear();
-  const auto is_carried = [](const ContactPair* p) { return accelerates(p->a()) || accelerates(p->b()); };
-  if (std::none_of(pairs.begin(), pairs.end(), is_carried)) return;
   carriers_.assign(island.bodies.size(), nullptr);
   deviations_.assign(island.bodies.size(), {});
   const auto carrier_of = [&](const Body& body) -> const Body* {
-    if (body.is_kinematic()) return accelerates(body) ? &body : nullptr;
+    if (body.is_kinematic()) return can_carry(body) ? &body : nullptr;
     return body.is_awake() ? carriers_[body.row] : nullptr;
   };
   const auto spread = [&](const Body& from, const Body& to) {

@@ -20,6 +20,9 @@ class RidingBodies {
   void find(const Island& island, std::span<const ContactBody> bodies, std::span<const Contact> contacts,
             std::span<const ContactPair* const> pairs, Real duration);
 
+  /// Whether points fixed on a body have accelerations, because it is kinematic and turns or speeds up.
+  static bool can_carry(const Body& body);
+  void clear() { carriers_.clear(); }
   bool empty() const { return carriers_.empty(); }
   /// Returns the displacement in the interval of a point fixed on the carrier at the place of the i-th body,
   /// minus the displacement by the mean of its velocities at the start and the end. Zero if it does not ride.
