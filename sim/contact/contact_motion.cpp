@@ -64,7 +64,8 @@ Quat meridian_turn(const Vec3& arm, const Quat& from, const Vec3& out_from, cons
   return cosine > 0.1 ? to * Quat(cosine, 0, sine, 0) * from.conjugate() : to * from.conjugate();
 }
 
-/// State of a body at a time after the interval's start, if it keeps the velocities of the start.
+/// State of a body at a time after the interval's start, if it keeps the velocities of the start. A kinematic
+/// body moves by the mean of its velocities.
 struct Carried {
   Vec3 shift = Vec3::Zero();  // displacement of the centre of mass, or of the origin
   Quat orientation, turn = Quat::Identity();
@@ -78,9 +79,15 @@ Twist twist_of(const Body& body) {
   return body.is_awake() ? body.start_twist : body.is_kinematic() ? body.drive : Twist{};
 }
 
+Twist mean_twist(const Body& body) {
+  if (!body.is_kinematic()) return twist_of(body);
+  return {(body.start_twist.velocity + body.drive.velocity) / 2,
+          (body.start_twist.angular_velocity + body.drive.angular_velocity) / 2};
+}
+
 Carried carried(const Body& body, Real time) {
   Carried c;
-  const Twist twist = twist_of(body);
+  const Twist twist = mean_twist(body);
   c.shift = time * twist.velocity;
   if (time * time * twist.angular_velocity.squaredNorm() > kStraight * kStraight)
     c.turn = rotation(twist.angular_velocity, time);
@@ -351,7 +358,11 @@ ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, co
                              const Vec3& place, Real gap, Real duration, Real substep) {
   const Twist twist_a = twist_of(a), twist_b = twist_of(b);
   const Vec3 arm_a = place - start_centre(a), arm_b = place - start_centre(b);
-  const Start start{a, b, m, arm_a, arm_b, gap, twist_a.at(arm_a) - twist_b.at(arm_b)};
+  const auto first_twist = [](const Body& body, const Twist& twist) -> const Twist& {
+    return body.is_kinematic() ? body.start_twist : twist;
+  };
+  const Start start{
+      a, b, m, arm_a, arm_b, gap, first_twist(a, twist_a).at(arm_a) - first_twist(b, twist_b).at(arm_b)};
   ContactMotion motion;
   motion.frame = frame;
   const bool is_face = m.source == NormalSource::face_of_a || m.source == NormalSource::face_of_b;
@@ -398,8 +409,10 @@ ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, co
     return motion;
   }
   const Shape& carrier = (m.source == NormalSource::face_of_a ? b : a).def.shape;
-  if (is_face && most2 < kEven * kEven && !is_revolved(carrier) && round_radius(carrier) == 0 &&
-      !std::holds_alternative<Ellipsoid>(carrier)) {
+  // A body that rides on a turning one would gain the error of the parabola in every interval.
+  const bool is_carried = a.is_kinematic() || b.is_kinematic();
+  if (is_face && !is_carried && most2 < kEven * kEven && !is_revolved(carrier) &&
+      round_radius(carrier) == 0 && !std::holds_alternative<Ellipsoid>(carrier)) {
     set_even_motion(start, frame, duration, motion);
     return motion;
   }

@@ -87,6 +87,7 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
   forces_.clear();
   approach_.clear();
   sliding_.clear();
+  has_carrier_ = false;
   for (Body* body : island.bodies) {
     body->row = static_cast<uint32_t>(bodies_.size());
     add_body(*body, interval);
@@ -282,6 +283,7 @@ uint32_t ExactContacts::add_body(Body& body, const ContactInterval& interval) {
                                                                                            interval.substep)),
                                       body.rigid.velocity(), body.rigid.angular_velocity()}
                         : unmoved_body(body));
+  has_carrier_ = has_carrier_ || RidingBodies::can_carry(body);
   return static_cast<uint32_t>(bodies_.size() - 1);
 }
 
@@ -313,6 +315,10 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       // speed would then be unbounded.
       c.target = touches ? std::min(-kPushOut * point.separation / interval.substep, kFastestPush)
                          : -point.separation / h;
+      // Surfaces that rebound, and then approach because the bodies turn, have a gap in between: they need no
+      // force. The approach at the end may undo a half of the separation.
+      if (touches && u.x() > 0 && approach > interval.impact_speed && c.bias.x() < 0)
+        c.target = std::min(c.target, std::max(c.bias.x(), -u.x() / 2));
       std::tie(c.friction_t, c.friction_k) = friction(pair.surface(), u);
       c.rolling = pair.surface().rolling;
       c.spinning = pair.surface().spinning;
@@ -355,6 +361,8 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
   for (std::size_t i = 0; i < joints_.articulations().size(); ++i)
     for (const Body* body : joints_.articulations()[i]->bodies())
       rest_[body->row] = 1 - joints_.acting_from(i);
+  riding_.clear();
+  if (has_carrier_ && interval.is_whole) riding_.find(island, bodies_, contacts_, pairs_, duration);
   for (std::size_t i = 0; i < island.bodies.size(); ++i) {
     Body& body = *island.bodies[i];
     const Vec3 dv = bodies_[i].velocity - free_[i].velocity,
@@ -363,6 +371,10 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
     if (closing_[i] && !is_kicked[i]) {
       mean = (dv + bodies_[i].velocity - body.start_twist.velocity) / 2;
       mean_spin = (dw + bodies_[i].angular_velocity - body.start_twist.angular_velocity) / 2;
+    }
+    if (!riding_.empty() && !closing_[i]) {
+      mean += riding_.deviation(i).shift / duration;
+      mean_spin += riding_.deviation(i).turn / duration;
     }
     if (!displacements_.empty()) {
       const auto& [shift, turn] = displacements_[i];

@@ -7,6 +7,7 @@
 #include "sim/contact/closing_contacts.h"
 #include "sim/contact/island_joints.h"
 #include "sim/contact/proximal_newton.h"
+#include "sim/contact/riding_bodies.h"
 
 namespace offstage::sim {
 
@@ -73,6 +74,8 @@ class ExactContacts {
   bool may_divide_ = false;                  // whether the interval of the island may be divided
   std::vector<ClosingPoint> points_;         // by contact
   std::vector<Displacement> displacements_;  // by body, if the interval was divided
+  bool has_carrier_ = false;                 // whether a body may ride on a body of the contacts
+  RidingBodies riding_;
   Real cost_ = 0;
   IslandJoints joints_;
   ProximalNewton newton_;

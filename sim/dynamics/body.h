@@ -70,7 +70,9 @@ struct Body : BodyModel {
   // The current interval of motion: a whole sub-step, or the rest of it after an impact.
   Real from = 0;  // start of the interval, since the sub-step's start [s]
   Pose start_pose;
-  Twist start_twist;  // dynamic bodies: twist of the centre of mass at the start of the interval
+  // Velocity at the start of the interval of the centre of mass or, for a kinematic body, of the pose's
+  // origin at the start of the sub-step; and angular velocity.
+  Twist start_twist;
   Twist drive;  // kinematic bodies: velocity of the pose's origin and angular velocity, at the interval's end
   Real turning = 0;  // see turning_speed()
   RigidState start;  // dynamic bodies: state at the start of the interval

@@ -137,17 +137,31 @@ void ParticleContacts::find_surfaces(uint32_t i, NearObstacles& near, Found& fou
   const std::size_t first = found.surfaces.size();
   for (const Obstacle* o : near.all()) {
     if (o->body == impacts_->struck_body(i)) continue;
+    Vec3 later = Vec3::Zero();
     if (g.from < h) {
       const ObstacleHit hit = NearObstacles::hit(*o, g.position, end, g.radius, g.from / h,
                                                  std::numeric_limits<Real>::infinity());
-      if (hit.obstacle) add_surface(i, *o, hit.normal, 0, hit.fraction * h, true, first, found);
+      later = hit.obstacle && hits_later(i, hit) ? hit.normal : Vec3(Vec3::Zero());
+      if (hit.obstacle && later.isZero())
+        add_surface(i, *o, hit.normal, 0, hit.fraction * h, true, first, found);
     }
     for_each_surface(o->solid, o->end.point_to_body(end), g.radius + margin,
-                     [&](Real distance, const Vec3& normal) {
-                       add_surface(i, *o, o->end.vector_to_world(normal), distance - g.radius, g.from, false,
-                                   first, found);
+                     [&](Real distance, const Vec3& local) {
+                       const Vec3 normal = o->end.vector_to_world(local);
+                       if (later.dot(normal) > kSameSurface) return;
+                       add_surface(i, *o, normal, distance - g.radius, g.from, false, first, found);
                      });
   }
+}
+
+/// Whether the particle reaches a surface in an impact, but in the next sub-step only. Contacts are found on
+/// straight paths with the velocities at the end; the particle may not come that far.
+bool ParticleContacts::hits_later(uint32_t i, const ObstacleHit& hit) const {
+  const CollidingParticle& g = particles_[i];
+  const Vec3 surface = hit.obstacle->velocity_at(hit.position, hit.fraction);
+  if (!is_impact((surface - g.velocity).dot(hit.normal), g.acceleration.norm(), *step_)) return false;
+  const Real rest = (1 - hit.fraction) * step_->h;
+  return (free_end_[i] - hit.position - rest * surface).dot(hit.normal) > 0;
 }
 
 /// Adds the contact of particle i with a surface that it hits (`meets`), or whose distance at the end is
@@ -254,6 +268,7 @@ void ParticleContacts::solve(std::span<CollidingParticle> particles, const Order
   search_ = &search;
   impacts_ = &impacts;
   step_ = &step;
+  free_end_ = end;
   std::swap(pairs_, pairs_before_);
   std::swap(surfaces_, surfaces_before_);
   std::swap(pair_begin_, pair_begin_before_);

@@ -137,6 +137,7 @@ class ParticleContacts {
   void find();
   void find_pairs(uint32_t i, Found& found) const;
   void find_surfaces(uint32_t i, NearObstacles& near, Found& found) const;
+  bool hits_later(uint32_t i, const ObstacleHit& hit) const;
   void add_surface(uint32_t i, const Obstacle& o, const Vec3& normal, Real target_or_gap, Real time,
                    bool meets, std::size_t first, Found& found) const;
   void recall(Pair& pair) const;
@@ -179,7 +180,8 @@ class ParticleContacts {
   const ParticleSearch* search_ = nullptr;
   const ParticleImpacts* impacts_ = nullptr;
   const ParticleStep* step_ = nullptr;
-  std::vector<Found> found_;  // by chunk
+  std::span<const Vec3> free_end_;  // ends of the paths without the contacts
+  std::vector<Found> found_;        // by chunk
   std::vector<Pair> pairs_, pairs_before_;
   std::vector<Surface> surfaces_, surfaces_before_;
   // Index of the first contact of each particle; a pair belongs to its first particle.

@@ -15,6 +15,8 @@ constexpr std::size_t kMaxImpacts = 5000;
 /// A particle with this many neighbours at small gaps is in a crowd.
 constexpr uint32_t kCrowd = 4;
 constexpr Real kNeighbourGap = 0.1;
+/// Greatest number of surfaces along which a particle slides before an impact.
+constexpr int kMaxSlowHits = 3;
 /// Particles touch if their gap is below this fraction of the distance of their centres.
 constexpr Real kTouching = 1e-6;
 /// Collisions of larger clusters are left to the solver of resting contacts.
@@ -105,17 +107,30 @@ void ParticleImpacts::find_with(uint32_t i, uint32_t j, Add&& add) const {
 template <class Add>
 void ParticleImpacts::find_obstacle(uint32_t i, NearObstacles& near, Add&& add) const {
   const CollidingParticle& g = particles_[i];
-  if (!g.hits_bodies || g.from >= step_->h) return;
-  const Vec3 end = g.at(step_->h);
-  near.find(g.position, end, g.radius);
-  if (near.all().empty()) return;
-  const ObstacleHit hit = near.first_hit(g.position, end, g.radius, g.from / step_->h);
-  if (!hit.obstacle || hit.obstacle->body == struck_body_[i]) return;
-  const Real time = hit.fraction * step_->h;
-  const Vec3 u = g.velocity_at(time, step_->h) - hit.obstacle->velocity_at(hit.position, hit.fraction);
-  const Real speed = -u.dot(hit.normal);
-  if (!is_impact(speed, g.acceleration.norm(), *step_) || is_left_to_resting_contact(i, i, speed)) return;
-  add(Impact{time, i, kNone, stamp_[i], 0, hit.normal, hit.obstacle});
+  const Real h = step_->h;
+  if (!g.hits_bodies || g.from >= h) return;
+  Vec3 from = g.position, end = g.at(h);
+  Real fraction = g.from / h;
+  for (int slide = 0; slide <= kMaxSlowHits; ++slide) {
+    near.find(from, end, g.radius);
+    if (near.all().empty()) return;
+    const ObstacleHit hit = near.first_hit(from, end, g.radius, fraction);
+    if (!hit.obstacle || hit.obstacle->body == struck_body_[i]) return;
+    const Real time = hit.fraction * h;
+    const Vec3 surface = hit.obstacle->velocity_at(hit.position, hit.fraction);
+    const Real speed = -(g.velocity_at(time, h) - surface).dot(hit.normal);
+    if (is_impact(speed, g.acceleration.norm(), *step_)) {
+      if (!is_left_to_resting_contact(i, i, speed))
+        add(Impact{time, i, kNone, stamp_[i], 0, hit.normal, hit.obstacle});
+      return;
+    }
+    // The particle slides along the surface, and may hit another one.
+    if (near.all().size() == 1) return;
+    from = hit.position;
+    fraction = hit.fraction;
+    const Real behind = (end - from - (1 - fraction) * h * surface).dot(hit.normal);
+    if (behind < 0) end -= behind * hit.normal;
+  }
 }
 
 /// Calls f for each particle that may come near the path of `particle`. The search includes particles whose

@@ -167,13 +167,16 @@ void World::Impl::begin_bodies(Real start, Real end) {
 void World::Impl::begin_kinematic(Real start, Real end) {
   for (Body* body : active.kinematic()) {
     const Motion motion = body->def.track.at(end, body->def.pose);
-    if (body->def.track.jumps(start, end)) {
+    const bool jumps = body->def.track.jumps(start, end);
+    const Motion before = jumps ? motion : body->def.track.at(start, body->def.pose);
+    if (jumps) {
       // The body jumps to the new pose, and sweeps nothing on the way.
       wake_neighbours(*body);
       body->pose = motion.pose;
     }
     body->before_substep = body->pose;
     body->begin_interval(0);
+    body->start_twist = {before.velocity, before.angular_velocity};
     body->drive_to(motion);
   }
 }

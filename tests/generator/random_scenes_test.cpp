@@ -46,9 +46,9 @@ class RandomBodies : public RandomScenes {};
 TEST_P(RandomBodies, KeepEnergyMomentumBoundsAndTime) {
   check_block(Parts::bodies);
 }
-// Known failures among the seeds 0 to 4999: the angular momentum of seed 522 changes by 0.2 %, seed 2521
-// gains 0.7 % of its energy, and the overlaps of the seeds 993, 3906 and 4759 are up to 1.5 times the allowed
-// depth. The long tests contain these seeds and fail there.
+// Known failures among the seeds 0 to 4999: the angular momentum of seed 522 changes by 0.2 %, and the
+// overlaps of the seeds 993, 3906 and 4759 are up to 1.4 times the allowed depth. The long tests contain
+// these seeds and fail there.
 INSTANTIATE_TEST_SUITE_P(Some, RandomBodies, testing::Values<uint64_t>(2, 3, 4, 6));
 INSTANTIATE_TEST_SUITE_P(LongFirst, RandomBodies, testing::Values<uint64_t>(0, 1, 5));
 INSTANTIATE_TEST_SUITE_P(Long, RandomBodies, testing::Range<uint64_t>(7, 50));
@@ -95,6 +95,12 @@ TEST(RandomScene, SeedsWithJointsKeepMomentumAndDoNotOverlap) {
 // a thin rod spun up (3876).
 TEST(RandomScene, SeedsOfBodiesThatOverlappedDoNot) {
   for (const uint64_t seed : {87, 1133, 1189, 2004, 2281, 3392, 3876}) check(seed, Parts::bodies);
+}
+
+// A contact that rebounded pushed again at the end of the step, because the bodies turned, although it had a
+// gap by then. The bodies gained 0.7 % of their energy.
+TEST(RandomScene, SeedOfTurningBodiesThatReboundKeepsItsEnergy) {
+  check(2521, Parts::bodies);
 }
 
 // With these seeds, a step stopped only some of the links of an articulation (197, 894, 2457, 2865, 3239,

@@ -140,7 +140,7 @@ TEST(ParticlesAndBodies, ManyHitsOnALightBodyInOneStepKeepMomentumAndEnergy) {
 
 /// Simulates an elastic gas in a shaft, below a lid with weight. Returns the greatest relative change of
 /// energy.
-Real gas_drift(bool joined, bool internal, Real max_step, Real seconds) {
+Real gas_drift(bool joined, bool internal, Real max_step, Real seconds, uint64_t seed = 5) {
   World world({.max_step = max_step, .sleep = false});
   const auto wall = [&](const Vec3& at, const Vec3& normal) {
     world.add_body({.shape = Plane{},
@@ -159,7 +159,7 @@ Real gas_drift(bool joined, bool internal, Real max_step, Real seconds) {
   if (joined)
     world.add_joint({.type = JointType::prismatic, .a = lid, .anchor = {0, 1, 0}, .axis = Vec3::UnitY()});
   const auto gas = world.add_particle_system({.internal = internal});
-  const Scatter random{5};
+  const Scatter random{seed};
   for (uint64_t i = 0; i < 20; ++i)
     world.add_particle(gas, {.position = {random.uniform(i, 0) * 0.9 - 0.45, 0.1 + 0.8 * random.uniform(i, 1),
                                           random.uniform(i, 2) * 0.9 - 0.45},
@@ -182,6 +182,13 @@ Real gas_drift(bool joined, bool internal, Real max_step, Real seconds) {
 TEST(ParticlesAndJoints, AGasUnderARailedLidKeepsItsEnergy) {
   EXPECT_LT(gas_drift(true, false, 1.0 / 240, 10), 1e-3);
   EXPECT_LT(gas_drift(true, true, 1.0 / 240, 10), 1e-3);
+}
+
+// In the seeds 4, 9 and 16, a particle that slides along a wall hits the lid in the same step as another
+// particle. In seed 58, a particle reaches the floor shortly after the end of a step.
+TEST(ParticlesAndJoints, AGasUnderARailedLidKeepsItsEnergyInLongSteps) {
+  for (const uint64_t seed : {4, 5, 9, 16, 58})
+    EXPECT_LT(gas_drift(true, true, 1.0 / 60, 10, seed), 1e-3) << seed;
 }
 
 }  // namespace
