@@ -234,10 +234,11 @@ void ClothBending::add_forces(std::span<const Vec4> x, Real scale, std::span<Vec
   if (curved_) add_rest_forces(x, scale, f);
 }
 
-void ClothBending::add_damped_forces(std::span<const Vec4> x, std::span<const Vec4> v, std::span<Vec4> f) {
+void ClothBending::add_damped_forces(std::span<const Vec4> x, std::span<const Vec4> v, Real rate,
+                                     std::span<Vec4> f) {
   if (damping_ == 0) return add_forces(x, 1, f);
   image_.resize(x.size());
-  for (std::size_t i = 0; i < x.size(); ++i) image_[i] = x[i] + damping_ * v[i];
+  for (std::size_t i = 0; i < x.size(); ++i) image_[i] = x[i] + damping_ * rate * v[i];
   multiply(image_, -1, f);
   if (curved_) add_rest_forces(x, 1, f);
 }

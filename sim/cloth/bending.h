@@ -47,8 +47,8 @@ class ClothBending {
   Real energy(std::span<const Vec4> x) const;
   /// Adds scale times the bending forces at x to f. The points are numbered within the cloth, from 0.
   void add_forces(std::span<const Vec4> x, Real scale, std::span<Vec4> f) const;
-  /// Adds the bending forces at x, and the damping forces at the velocities v, to f.
-  void add_damped_forces(std::span<const Vec4> x, std::span<const Vec4> v, std::span<Vec4> f);
+  /// Adds the bending forces at x, and the damping forces at the velocities rate v, to f.
+  void add_damped_forces(std::span<const Vec4> x, std::span<const Vec4> v, Real rate, std::span<Vec4> f);
   /// Adds scale K p to y, where K is the Hessian of the energy without the curvature at rest.
   void multiply(std::span<const Vec4> p, Real scale, std::span<Vec4> y) const;
   /// Returns the factor d [N/m] of the diagonal block of K for a point, which is d times the 3 x 3 unit

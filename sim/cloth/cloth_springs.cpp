@@ -87,6 +87,7 @@ void ClothSprings::assign(std::span<const ClothSpring> springs, const ClothPoint
     return color_of(a) != color_of(b) ? color_of(a) < color_of(b) : a->springs.size() > b->springs.size();
   });
   row_.clear();
+  spring_.clear();
   elastic_.clear();
   counterparts_.clear();
   batch_.clear();
@@ -104,6 +105,8 @@ void ClothSprings::assign(std::span<const ClothSpring> springs, const ClothPoint
     ends[own] = batch_.size();
     i = end;
   }
+  axis_.assign(row_.size(), AxisFloats{});
+  impulse_.assign(row_.size(), Floats{});
   add_stages(ends);
   prepared_for_ = -1;
   is_stretched_ = false;
@@ -121,18 +124,19 @@ void ClothSprings::add_batch(std::span<const SpringPath* const> paths, std::span
   for (std::size_t k = 0; k <= batch.length; ++k) {
     Row row{};
     Elastic elastic{};
+    std::array<uint32_t, kLanes> own_springs;
+    own_springs.fill(kNoSpring);
     Counterparts counterparts{};
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       const SpringPath& path = *paths[std::min(lane, paths.size() - 1)];
       // Lanes without a path, and the rest of shorter paths, are read but have no stiffness.
       row.point[lane] = path.points[std::min(k, path.points.size() - 1)];
       counterparts.a[lane] = counterparts.b[lane] = row.point[lane];
-      elastic.spring[lane] = kNoSpring;
       if (lane >= paths.size() || k >= path.points.size()) continue;
       row.count = static_cast<uint32_t>(lane) + 1;
       if (k == path.springs.size()) continue;
       const ClothSpring& s = springs[path.springs[k]];
-      elastic.spring[lane] = path.springs[k];
+      own_springs[lane] = path.springs[k];
       elastic.rest[lane] = s.rest_length;
       if (s.counterpart_rest == 0) continue;
       counterparts.a[lane] = s.counterpart[0];
@@ -140,6 +144,7 @@ void ClothSprings::add_batch(std::span<const SpringPath* const> paths, std::span
       counterparts.rest[lane] = s.counterpart_rest;
     }
     row_.push_back(row);
+    spring_.push_back(own_springs);
     elastic_.push_back(elastic);
     if (batch.counterparts != kNone) counterparts_.push_back(counterparts);
   }
@@ -206,7 +211,7 @@ Real ClothSprings::bound_across(const ClothPoints& points) const {
     if ((too_long[0] | too_long[1] | too_long[2] | too_long[3]) == 0) return;
     const Lanes length = lane_root(square), elongation = elongations(batch, r, length, x);
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      const uint32_t spring = elastic_[r].spring[lane];
+      const uint32_t spring = spring_[r][lane];
       if (too_long[lane] == 0 || spring == kNoSpring) continue;
       const Material& m = material_[spring];
       const Real strain = std::max(elongation[lane] / length[lane], 0.0);
@@ -227,7 +232,7 @@ void ClothSprings::adapt_to_stretch(const ClothPoints& points) {
   for_rows(x, [&](const Batch& batch, std::size_t r, const FourVectors& d) {
     const Lanes length = lane_root(d.dot(d)), elongation = elongations(batch, r, length, x);
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      const uint32_t spring = elastic_[r].spring[lane];
+      const uint32_t spring = spring_[r][lane];
       if (spring == kNoSpring || !(elongation[lane] > 0)) continue;
       const Real stiffness = material_[spring].stiffness * elongation[lane] / length[lane];
       for (uint32_t end : {row_[r].point[lane], row_[r + 1].point[lane]})
@@ -281,7 +286,7 @@ void ClothSprings::begin(const ClothPoints& points, Real step) {
       const bool is_there = lane < row.count;
       row.weight[lane] = is_there ? inverse_mass_[row.point[lane]] : 0;
       if (is_there && row.weight[lane] == 0) row.held |= 1u << lane;
-      const uint32_t i = elastic_[r].spring[lane];
+      const uint32_t i = spring_[r][lane];
       if (i == kNoSpring) continue;
       const Material& material = material_[i];
       const Real mobility = inverse_mass_[material.a] + inverse_mass_[material.b];
@@ -340,39 +345,38 @@ void ClothSprings::apply(ClothPoints& points, std::span<Vec4> moves, const Batch
     if (row.held != 0) pass_on(points, row, impulse);
   };
   for (std::size_t r = batch.first, end = r + batch.length; r < end; ++r) {
-    Row& row = row_[r];
     const FourVectors next = FourVectors::of(x, row_[r + 1].point), d = at - next;
     const Lanes square = d.dot(d), least = kNoLength2 + Lanes{}, length = lane_root(lane_max(square, least));
     const FourVectors axis = d * (1 / length);
     const FourVectors impulse = axis * (elastic_[r].stiffness * elongations(batch, r, length, x));
-    give(row, before - impulse);
-    row.axis = {narrowed(axis.x), narrowed(axis.y), narrowed(axis.z)};
-    row.impulse = SpringFloats{};
+    give(row_[r], before - impulse);
+    axis_[r] = {narrowed(axis.x), narrowed(axis.y), narrowed(axis.z)};
     before = impulse;
     at = next;
   }
   give(row_[batch.first + batch.length], before);
 }
 
-/// Relaxes the springs of a row by Gauss-Seidel on their impulses, which are zero at first: r + impulse / c =
-/// 0 for each spring. `at` and `next`: moves of the points of this row and of the row `after` it.
-inline void ClothSprings::relax(ClothPoints& points, Row& row, const Row& after, FourVectors& at,
-                                FourVectors& next) {
-  const FourVectors axis = widened(row.axis);
-  const Lanes step = widened(row.along) * axis.dot(at - next) - widened(row.forget) * widened(row.impulse);
-  row.impulse += narrowed(step);
-  const FourVectors impulse = axis * step;
-  at = at - impulse * row.weight;
-  next = next + impulse * after.weight;
-  if (row.held != 0) pass_on(points, row, FourVectors{} - impulse);
-  if (after.held != 0) pass_on(points, after, impulse);
+/// Relaxes the springs of a row by Gauss-Seidel on their impulses: r + impulse / c = 0 for each spring, where
+/// `impulse` is that of the sweep so far. Returns the change of the impulses. `at` and `next`: moves of the
+/// points of this row and of the row `after` it.
+inline Lanes ClothSprings::relax(ClothPoints& points, const Row& row, const Row& after,
+                                 const FourVectors& axis, Lanes impulse, FourVectors& at, FourVectors& next) {
+  const Lanes step = widened(row.along) * axis.dot(at - next) - widened(row.forget) * impulse;
+  const FourVectors change = axis * step;
+  at = at - change * row.weight;
+  next = next + change * after.weight;
+  if (row.held != 0) pass_on(points, row, FourVectors{} - change);
+  if (after.held != 0) pass_on(points, after, change);
+  return step;
 }
 
+/// The impulses of the sweep forwards are 0 at first.
 inline void ClothSprings::relax_forward(ClothPoints& points, std::span<Vec4> moves, std::size_t r,
                                         FourVectors& at) {
   const Row& after = row_[r + 1];
   FourVectors next = FourVectors::of(moves.data(), after.point);
-  relax(points, row_[r], after, at, next);
+  impulse_[r] = narrowed(relax(points, row_[r], after, widened(axis_[r]), Lanes{}, at, next));
   store(moves, row_[r], at);
   at = next;
 }
@@ -381,7 +385,7 @@ inline void ClothSprings::relax_backward(ClothPoints& points, std::span<Vec4> mo
                                          FourVectors& next) {
   const Row& after = row_[r + 1];
   FourVectors at = FourVectors::of(moves.data(), row_[r].point);
-  relax(points, row_[r], after, at, next);
+  relax(points, row_[r], after, widened(axis_[r]), widened(impulse_[r]), at, next);
   store(moves, after, next);
   next = at;
 }

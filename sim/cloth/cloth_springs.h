@@ -61,13 +61,14 @@ class ClothSprings {
     Real fastest;             // k (1/m_a + 1/m_b)
     Real most, most_at_rest;  // limits of h^2 `fastest`: at the current stretch, and without stretch
   };
-  /// For each of four paths, a point and the spring to the next point. The structure is small because every
-  /// sweep reads all of them. A relative move d along the axis causes the impulse `along` d; the fraction
-  /// `forget` of the sweep's impulse so far is subtracted.
+  typedef std::array<Floats, 3> AxisFloats;  ///< four unit vectors, by x, y and z
+  /// For each of four paths, a point and the spring to the next point. A relative move d along the axis of
+  /// the spring causes the impulse `along` d; the fraction `forget` of the sweep's impulse so far is
+  /// subtracted. The time of a sweep is that of reading the rows, so a row has only the values that the
+  /// explicit step and both sweeps need.
   struct Row {
-    Lanes weight;                // inverse masses of the points
-    std::array<Floats, 3> axis;  // unit vector from the next point to this one, by x, y and z
-    Floats along, forget, impulse;
+    Lanes weight;  // inverse masses of the points
+    Floats along, forget;
     std::array<uint32_t, kLanes> point;
     uint32_t count;  // number of lanes that have this point
     uint32_t held;   // bit mask of the lanes whose point is pinned
@@ -75,7 +76,6 @@ class ClothSprings {
   /// Values of a row that are needed only for the explicit step.
   struct Elastic {
     Lanes rest, stiffness;  // stiffness: times h^2, clamped if necessary
-    std::array<uint32_t, kLanes> spring;
   };
   /// The other diagonals of springs that have a counterpart.
   struct Counterparts {
@@ -113,8 +113,9 @@ class ClothSprings {
   template <class Act>
   [[gnu::always_inline]] static void for_lanes(const Row& row, Act&& act);
   [[gnu::always_inline]] static void store(std::span<Vec4> moves, const Row& row, const FourVectors& move);
-  [[gnu::always_inline]] static void relax(ClothPoints& points, Row& row, const Row& after, FourVectors& at,
-                                           FourVectors& next);
+  [[gnu::always_inline]] static Lanes relax(ClothPoints& points, const Row& row, const Row& after,
+                                            const FourVectors& axis, Lanes impulse, FourVectors& at,
+                                            FourVectors& next);
   [[gnu::always_inline]] void relax_forward(ClothPoints& points, std::span<Vec4> moves, std::size_t row,
                                             FourVectors& at);
   [[gnu::always_inline]] void relax_backward(ClothPoints& points, std::span<Vec4> moves, std::size_t row,
@@ -124,7 +125,10 @@ class ClothSprings {
 
   std::vector<Material> material_;  // by spring
   std::vector<Row> row_;
-  std::vector<Elastic> elastic_;
+  std::vector<std::array<uint32_t, kLanes>> spring_;  // by row: its springs
+  std::vector<Elastic> elastic_;                      // by row
+  std::vector<AxisFloats> axis_;                      // by row: from the next point to this one
+  std::vector<Floats> impulse_;                       // by row: impulses of the sweep forwards
   std::vector<Counterparts> counterparts_;
   std::vector<Batch> batch_;
   std::vector<Stage> apply_, forward_, backward_;  // stages of a step of any length

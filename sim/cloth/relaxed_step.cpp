@@ -8,46 +8,53 @@
 namespace offstage::sim {
 namespace {
 
-/// Bending is stable as an explicit force if the square of the step times the fastest frequency, damping
-/// included, is at most this.
-constexpr Real kSoftBending = 0.25;
+/// Greatest square of the time for which an explicit force of bending is constant, times the square of the
+/// fastest frequency, damping included. The limit of stability is 2 or more.
+constexpr Real kSoftBending = 1;
 
-/// Bending in a sub-step of step_relaxed().
+/// Bending in a sub-step of step_relaxed(). If a step of the springs is short enough for an explicit force,
+/// the force is computed at the start of as many steps as stability permits, and constant in these.
+/// Otherwise each step has an implicit force.
 class RelaxedBending {
  public:
-  RelaxedBending(const ClothPoints& points, const ClothRange& cloth, Real dt, Real h)
-      : cloth_(cloth), damping_(cloth.bending.damping()), h_(h) {
+  RelaxedBending(const ClothPoints& points, const ClothRange& cloth, uint32_t steps, Real h)
+      : cloth_(cloth), damping_(cloth.bending.damping()), h_(h), steps_(steps) {
     ClothBending& bending = cloth.bending;
-    is_stiff_ = dt * (dt + damping_) * bending.fastest() > kSoftBending;
+    // A force a that is constant in n steps of length h moves a point by n (n + 1) / 2 h^2 a, and not by
+    // (n h)^2 a as a single step of symplectic Euler. Therefore the area in the phase plane grows by the
+    // fraction n (n - 1) / 2 h^2 omega^2. The damping n h tau omega^2 must be at least as large.
+    const auto is_soft = [&](uint32_t count) {
+      const Real length = count * h;
+      return 2 * damping_ >= (count - 1) * h &&
+             length * (length + damping_) * bending.fastest() <= kSoftBending;
+    };
+    while (steps_ > 0 && !is_soft(steps_)) --steps_;
+    is_steady_ = steps_ == steps;
+    for (std::size_t i = cloth.begin; i < cloth.end; ++i)
+      if (is_held(points, i)) held_.push_back(i - cloth.begin);
     force_.assign(cloth.end - cloth.begin, Vec4::Zero());
-    if (is_stiff_) return;
-    // The damped force is computed once for the whole sub-step.
-    bending.add_damped_forces(cloth.part(points.start), cloth.part(points.velocity), force_);
+    if (is_steady_)
+      bending.add_damped_forces(cloth.part(points.start), cloth.part(points.velocity), 1, force_);
   }
-  bool is_stiff() const { return is_stiff_; }
+  bool is_implicit() const { return steps_ == 0; }
+  /// Whether the force is constant in the whole sub-step; steady_gain() contains it then.
+  bool is_steady() const { return is_steady_; }
 
-  /// Returns the change of a point's move by bending that is not stiff; 0 for pinned points. It is equal in
-  /// all steps.
+  /// Returns the change of a point's move by a force that is constant in all steps; 0 for pinned points.
   Vec4 steady_gain(const ClothPoints& points, std::size_t i) const {
     return h_ * h_ * points.inverse_mass[cloth_.begin + i] * force_[i];
   }
   /// Adds the impulses of bending in a step to `pin_impulse` for pinned points. For other points it adds the
-  /// effect of stiff bending to the moves.
-  void apply(ClothPoints& points, std::span<Vec4> moves) {
-    if (is_stiff_) {
-      std::fill(force_.begin(), force_.end(), Vec4::Zero());
-      cloth_.bending.add_forces(cloth_.part(points.start), 1, force_);
-    }
-    for (std::size_t i = 0; i < force_.size(); ++i) {
-      const std::size_t k = cloth_.begin + i;
-      if (is_held(points, k))
-        points.pin_impulse[k] += h_ * h_ * force_[i];
-      else if (is_stiff_)
-        moves[k] += h_ * h_ * points.inverse_mass[k] * force_[i];
-    }
+  /// effect of bending to the moves, unless steady_gain() contains it.
+  void apply(ClothPoints& points, uint32_t step, std::span<Vec4> moves) {
+    if (!is_steady_) compute(points, step);
+    for (std::size_t i : held_) points.pin_impulse[cloth_.begin + i] += h_ * h_ * force_[i];
+    for (std::size_t i = 0; !is_steady_ && i < force_.size(); ++i)
+      moves[cloth_.begin + i] += h_ * h_ * points.inverse_mass[cloth_.begin + i] * force_[i];
   }
 
-  /// Damps the part of the moves that stiff bending resists. Returns whether the tolerance was reached.
+  /// Damps the part of the moves that bending resists, for an implicit step. Returns whether the tolerance
+  /// was reached.
   bool filter(ClothPoints& points, std::span<Vec4> moves) {
     const Real stiff = h_ * (h_ + damping_);
     const std::span<Vec4> own = moves.subspan(cloth_.begin, force_.size());
@@ -55,16 +62,29 @@ class RelaxedBending {
         cloth_.bending.filter(cloth_.part(points.mass), cloth_.part(points.inverse_mass), stiff, own);
     std::fill(force_.begin(), force_.end(), Vec4::Zero());
     cloth_.bending.multiply(own, -stiff, force_);
-    for (std::size_t i = 0; i < force_.size(); ++i)
-      if (is_held(points, cloth_.begin + i)) points.pin_impulse[cloth_.begin + i] += force_[i];
+    for (std::size_t i : held_) points.pin_impulse[cloth_.begin + i] += force_[i];
     return done;
   }
 
  private:
+  /// Computes the force at the start of a step, if it changes there. filter() adds the damping of an implicit
+  /// step.
+  void compute(const ClothPoints& points, uint32_t step) {
+    if (!is_implicit() && step % steps_ != 0) return;
+    std::fill(force_.begin(), force_.end(), Vec4::Zero());
+    if (is_implicit())
+      cloth_.bending.add_forces(cloth_.part(points.start), 1, force_);
+    else
+      cloth_.bending.add_damped_forces(cloth_.part(points.start), cloth_.part(points.step_velocity), 1 / h_,
+                                       force_);
+  }
+
   const ClothRange& cloth_;
   Real damping_, h_;
-  bool is_stiff_;
+  uint32_t steps_;  // number of steps in which a force is constant; 0: implicit
+  bool is_steady_;
   SpringRun force_;
+  std::vector<std::size_t> held_;  // pinned points
 };
 
 /// Keeps supported points above their planes in a step that ends after the fraction `part` of the sub-step.
@@ -129,7 +149,7 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
   const auto held = [&](std::size_t i) { return is_held(points, cloth.begin + i); };
   const bool bends = !cloth.bending.empty(), drags = !cloth.air.empty();
   std::optional<RelaxedBending> bending;
-  if (bends) bending.emplace(points, cloth, dt, h);
+  if (bends) bending.emplace(points, cloth, steps, h);
   RelaxedBendLimit bend_limit(points, cloth);
   if (drags) cloth.air.begin(h);
   springs.begin(points, h);
@@ -144,7 +164,7 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
     from[i] = x[i];
     gain[i] = held(i) ? Vec4(Vec4::Zero()) : Vec4(h * h * points.acceleration[k]);
     if (drags && !held(i)) gain[i] += h * h * cloth.air.resist(i, cloth.air.from(i));
-    if (bends && !bending->is_stiff()) gain[i] += bending->steady_gain(points, i);
+    if (bends && bending->is_steady()) gain[i] += bending->steady_gain(points, i);
     coast(i, held(i) ? Vec4((points.position[k] - x[i]) / steps) : Vec4(h * points.velocity[k]));
   }
   bool solved = true;
@@ -152,11 +172,11 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
   for (uint32_t step = 0; step < steps; ++step) {
     const Real part = (step + 1.0) / steps;
     for (Support& s : supports) s.impulse = 0;
-    if (bends) bending->apply(points, points.moves);
+    if (bends) bending->apply(points, step, points.moves);
     springs.apply(points, points.moves);
     for (std::size_t i = 0; drags && i < n; ++i)
       if (!held(i)) moves[i] = velocity[i] + cloth.air.respond(i, moves[i] - velocity[i]);
-    if (bends && bending->is_stiff()) solved &= bending->filter(points, points.moves);
+    if (bends && bending->is_implicit()) solved &= bending->filter(points, points.moves);
     hold_up(points, supports, part, points.moves);
     springs.relax(points, points.moves, [&] { hold_up(points, supports, part, points.moves); });
     if (cloth.bend_limit) {

@@ -204,5 +204,43 @@ TEST(ClothBendDamping, EndsVibrationAtTheRateOfItsTime) {
   }
 }
 
+/// Returns the amplitude of an undamped strip's third symmetric free vibration after ten periods, as a
+/// fraction of the amplitude at the start, with the default sub-step. `bend`: rigidity [N m].
+Real amplitude_after_ten_periods(Real bend) {
+  constexpr uint32_t kCells = 30, kMiddleRow = 3 * (kCells + 1);
+  constexpr Real kLength = 0.2, kMode = 10.9956;
+  effects::Fabric fabric = effects::find_fabric("denim")->fabric;
+  fabric.bend = bend;
+  fabric.damping = fabric.bend_damping = 0;
+  ClothDef def = effects::grid_cloth({kLength, 0.04, kCells, 6}, {}, fabric);
+  def.self_collision = def.collides = false;
+  def.air.density = 0;
+  def.rest_vertices = def.vertices;
+  for (Vec3& p : def.vertices) {
+    const Real b = kMode / kLength;
+    p.y() = 2e-4 * (std::cosh(b * p.x()) / std::cosh(kMode / 2) + std::cos(b * p.x()) / std::cos(kMode / 2));
+  }
+  World world({.gravity = Vec3::Zero()});
+  const ClothHandle cloth = world.add_cloth(def);
+  const auto deflection = [&] {
+    const auto points = world.cloth(cloth).points;
+    return std::abs(points[kMiddleRow].y() - points[kMiddleRow + kCells / 2].y());
+  };
+  const Real first = deflection();
+  const Real period =
+      2 * std::numbers::pi * std::pow(kLength / kMode, 2) * std::sqrt(fabric.areal_density / bend);
+  Real last = 0;
+  for (Real t = 0; t < 10 * period; t += def.substep) {
+    world.step(def.substep);
+    if (t > 8.5 * period) last = std::max(last, deflection());
+  }
+  return last / first;
+}
+
+TEST(ClothBendDamping, UndampedVibrationKeepsItsAmplitude) {
+  // Backward Euler in each of the 14 steps of the springs would take 9 %, 29 % and 50 %.
+  for (Real bend : {2e-5, 1e-3, 5e-3}) EXPECT_NEAR(amplitude_after_ten_periods(bend), 1, 0.05) << bend;
+}
+
 }  // namespace
 }  // namespace offstage::sim
