@@ -87,6 +87,12 @@ class Numbers(Case):
             self.assertEqual(sorted(value) if isinstance(value, dict) else None, keys)
             self.assertEqual(page.js('return tuneStore.doc.errors'), [])
 
+    def test_the_new_seed_button_stays_in_its_place_while_the_film_is_simulated(self):
+        page = self.page
+        place = page.find('#new-seed').rect
+        wait(lambda: 'Film complete' in page.find('#facts').text, what='the end of the film')
+        self.assertEqual(page.find('#new-seed').rect, place)
+
     def test_the_new_seed_button_changes_the_seed_and_the_film(self):
         page = self.page
         page.wait_for_frame(1)

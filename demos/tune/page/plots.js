@@ -84,11 +84,12 @@ function drawFacts() {
   const notes = [...(film.phase === 'failed' ? [{what: film.message, bad: true, path: objectIn(film.message)}] : []), ...(doc.warnings ?? []).map(w => ({what: w.what, path: w.path})), ...(film.notes ?? []).map(t => ({what: t.replace(/^(warning|note): /, ''), path: objectIn(t)}))]
     .map(n => ({...n, line: n.path && lineOf(n.path)}));
   const mine = isWriter();
+  // The button comes first, so that facts whose length changes do not move it while the user aims at it.
   const parts = [
+    fact('seed', doc.scene.seed + ' ' + mine, () => el('span', {class: 'fact'}, `Seed ${doc.scene.seed} `, el('button', {class: 'quiet', id: 'new-seed', disabled: !mine, title: 'Use another random seed', onclick: () => setValue('/world/seed', Math.floor(Math.random() * 1e6) + 1, 'new seed')}, 'New seed'))),
     fact('progress', progress, () => el('span', {class: 'fact', id: 'progress'}, progress)),
     now && fact('state', store.frame + now.state, () => el('span', {class: 'fact'}, 'State ', hash(now.state, `state of frame ${store.frame}`))),
     last && fact('last', last, () => el('span', {class: 'fact', id: 'final-state', 'data-hash': last}, 'Final state ', hash(last, 'state after the last frame, as `offstage simulate` prints it'))),
-    fact('seed', doc.scene.seed + ' ' + mine, () => el('span', {class: 'fact'}, `Seed ${doc.scene.seed} `, el('button', {class: 'quiet', id: 'new-seed', disabled: !mine, title: 'Use another random seed', onclick: () => setValue('/world/seed', Math.floor(Math.random() * 1e6) + 1, 'new seed')}, 'New seed'))),
     film.statistics && fact('statistics', '', () => el('button', {class: 'quiet', onclick: event => showStatistics(event.currentTarget)}, 'Statistics')),
   ];
   keepIn(factsLine, parts.filter(Boolean));
