@@ -89,7 +89,7 @@ class Numbers(Case):
 
     def test_the_new_seed_button_stays_in_its_place_while_the_film_is_simulated(self):
         page = self.page
-        place = page.find('#new-seed').rect
+        place = wait(lambda: page.all('#new-seed'), what='the button')[0].rect
         wait(lambda: 'Film complete' in page.find('#facts').text, what='the end of the film')
         self.assertEqual(page.find('#new-seed').rect, place)
 
