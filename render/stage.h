@@ -161,6 +161,8 @@ struct SampleOffsets {
   /// Number of sub-frames in the frame. If there are several, the noise filter is applied to their mean, not
   /// to each of them.
   int count = 1;
+  /// Whether the mean of the sub-frames has so little noise that each of them needs fewer rays.
+  bool are_many() const { return count >= 16; }
 };
 /// Offsets of sub-frame i of n: a fixed low-discrepancy set; all zero for n = 1.
 SampleOffsets sample_offsets(int i, int n);

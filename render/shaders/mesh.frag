@@ -141,7 +141,8 @@ void main() {
   if (min_alpha > 0.5) alpha = 1.0;  // the opaque pass leaves no holes
 #ifdef SURFACE
   // The mirror images of smooth metals and glass are traced per pixel, and without a filter they stay sharp. Where the
-  // normal varies so much that a pixel shows half of the surroundings, they would have noise.
+  // normal varies so much that a pixel shows half of the surroundings, they would have noise. 0.12: kSharpMirror in
+  // render/trace/surface_rows.h.
   float filtered = filtered_roughness(s.roughness, n);
   bool own_mirror = (s.metallic > 0.5 || transmitted > 0.0) && s.roughness <= 0.12 && filtered <= 0.25;
   if (!own_mirror) s.roughness = filtered;

@@ -216,7 +216,7 @@ void LightTracer::refine_penumbras(const SurfaceBuffer& surfaces, const LightVie
                                    LightBuffer& light) const {
   const int runs = light.runs();
   const int sources = static_cast<int>(sources_.lamps.size()) + (sources_.sun.intensity > 0 ? 1 : 0);
-  const int rounds = (view.offsets.count >= 16 ? kPenumbraRaysOfMany : kPenumbraRays) / std::max(sources, 2);
+  const int rounds = (view.offsets.are_many() ? kPenumbraRaysOfMany : kPenumbraRays) / std::max(sources, 2);
   const auto is_hidden = [&](int run, int y) {
     return run >= 0 && run < runs && y >= 0 && y < surfaces.height_px &&
            light.partly_hidden[index_of(run, y, runs)] != 0;
@@ -377,7 +377,7 @@ void LightTracer::trace_arriving(const SurfaceBuffer& surfaces, const LightView&
   if (!view.sparse) refine_cells(surfaces, noise, view, light);
   light.direct.average(light.pixels, light.pixels.filled, nullptr, 1);
   if (glows) light.glow.average(light.pixels, light.pixels.filled, nullptr, 1);
-  const int widest = view.offsets.count >= 16 ? 4 : 8;
+  const int widest = view.offsets.are_many() ? 4 : 8;
   for (int step = 1; step <= kWidestStep; step *= 2)
     light.around.average(light.cells, light.cells.filled,
                          step <= widest ? &light.reach2 : &light.noisy_reach2, step);

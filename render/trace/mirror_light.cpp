@@ -75,7 +75,7 @@ void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& 
                                 const VisibleLight& visible, LightBuffer& light) const {
   const int width = surfaces.width_px;
   if (sources_.particles != nullptr) prepare_particles(particles_in_mirrors(surfaces), view.offsets);
-  const bool many = view.offsets.count >= 16;
+  const bool many = view.offsets.are_many();
   const Lanes none{};
   const auto mirrored = [&](const Points& points, int i, int x, int y, int rays, int splits,
                             LightSums& sums) {

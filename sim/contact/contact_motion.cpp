@@ -64,8 +64,7 @@ Quat meridian_turn(const Vec3& arm, const Quat& from, const Vec3& out_from, cons
   return cosine > 0.1 ? to * Quat(cosine, 0, sine, 0) * from.conjugate() : to * from.conjugate();
 }
 
-/// State of a body at a time after the interval's start, if it keeps the velocities of the start. A kinematic
-/// body moves by the mean of its velocities.
+/// State of a body at a time after the interval's start, if it keeps its mean_twist().
 struct Carried {
   Vec3 shift = Vec3::Zero();  // displacement of the centre of mass, or of the origin
   Quat orientation, turn = Quat::Identity();
@@ -75,10 +74,17 @@ const Quat& start_orientation(const Body& body) {
   return body.is_awake() ? body.start.orientation : body.start_pose.orientation;
 }
 
+/// Velocities at the start of the interval or, for a kinematic body, at its end.
 Twist twist_of(const Body& body) {
   return body.is_awake() ? body.start_twist : body.is_kinematic() ? body.drive : Twist{};
 }
 
+/// Velocities at the start of the interval.
+Twist first_twist(const Body& body) {
+  return body.is_kinematic() ? body.start_twist : twist_of(body);
+}
+
+/// Velocities at the start of the interval or, for a kinematic body, their means in the interval.
 Twist mean_twist(const Body& body) {
   if (!body.is_kinematic()) return twist_of(body);
   return {(body.start_twist.velocity + body.drive.velocity) / 2,
@@ -358,11 +364,7 @@ ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, co
                              const Vec3& place, Real gap, Real duration, Real substep) {
   const Twist twist_a = twist_of(a), twist_b = twist_of(b);
   const Vec3 arm_a = place - start_centre(a), arm_b = place - start_centre(b);
-  const auto first_twist = [](const Body& body, const Twist& twist) -> const Twist& {
-    return body.is_kinematic() ? body.start_twist : twist;
-  };
-  const Start start{
-      a, b, m, arm_a, arm_b, gap, first_twist(a, twist_a).at(arm_a) - first_twist(b, twist_b).at(arm_b)};
+  const Start start{a, b, m, arm_a, arm_b, gap, first_twist(a).at(arm_a) - first_twist(b).at(arm_b)};
   ContactMotion motion;
   motion.frame = frame;
   const bool is_face = m.source == NormalSource::face_of_a || m.source == NormalSource::face_of_b;

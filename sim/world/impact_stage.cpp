@@ -24,13 +24,15 @@ constexpr std::size_t kImpactWork = 2000, kExactImpactWork = 80'000;
 constexpr std::size_t kPointWork = 1, kPairWork = 3, kLookWork = 3;
 /// After this multiple of the limit, no pair is traced back in the rest of the sub-step.
 constexpr std::size_t kLastWork = 3;
-/// If the contact point of a body moves around its rim by more than kRimTurn [rad] in the sub-step, the
-/// sub-step is divided for that body into at most kMostRimPieces pieces, and its contacts are updated after
+/// If the contact point of a body moves around its rim by more than `turn` [rad] in the sub-step, the
+/// sub-step is divided for that body into at most `most` pieces, and its contacts are updated after
 /// each piece. Islands with more than kMostRimBodies bodies are not divided, because all of their contacts
 /// would be solved once for each piece. The fast solver loses energy at a rate that grows with the cube of
-/// the angle, so its pieces are shorter by the factor kFastPieces for a body that touches no other moving
-/// one.
-constexpr Real kRimTurn = 0.1, kMostRimPieces = 16, kFastPieces = 0.7;
+/// the angle, so a body that touches no other moving one has more pieces there.
+struct RimPieces {
+  Real turn, most;
+};
+constexpr RimPieces kRimPieces{0.1, 16}, kFastRimPieces{0.07, 22};
 constexpr std::size_t kMostRimBodies = 8;
 /// Greatest number of times that an island continues from the same impact because new contacts of the same
 /// bodies were found.
@@ -93,11 +95,11 @@ void ImpactStage::add_rim_updates() {
     for (const PlacedManifold& m : pair->manifolds())
       for (const Body* body : {&pair->a(), &pair->b()})
         turn = std::max(turn, h_ * rim_speed(*body, m.frame.n));
-    if (turn <= kFastPieces * kRimTurn) continue;
+    if (turn <= kFastRimPieces.turn) continue;
     const Body& body = pair->a().is_awake() ? pair->a() : pair->b();
-    const bool is_short = is_fast && islands_[body.island].bodies.size() == 1;
-    const Real part = is_short ? kFastPieces : 1;
-    const Real pieces = std::min(std::ceil(turn / (part * kRimTurn)), kMostRimPieces / part);
+    const bool is_single = islands_[body.island].bodies.size() == 1;
+    const RimPieces limits = is_fast && is_single ? kFastRimPieces : kRimPieces;
+    const Real pieces = std::min(std::ceil(turn / limits.turn), limits.most);
     for (Real i = 1; i < pieces; ++i) pending_.push_back({h_ * i / pieces, pair, false});
   }
 }
