@@ -60,7 +60,7 @@ void ChannelsPass::draw(const Instance& instance) {
   glFrontFace(instance.world_from_mesh.linear().determinant() < 0 ? GL_CW : GL_CCW);
   glVertexArrayVertexBuffer(instance.mesh->vertex_array, 1, instance.mesh->vertices, 0, 0);  // not read
   glBindVertexArray(instance.mesh->vertex_array);
-  glDrawElements(GL_TRIANGLES, instance.mesh->index_count, GL_UNSIGNED_INT, nullptr);
+  gl::draw_triangles(instance.mesh->index_count);
 }
 
 void ChannelsPass::draw(const Cloth& cloth) {
@@ -78,8 +78,7 @@ void ChannelsPass::draw(const Cloth& cloth) {
   glVertexArrayVertexBuffer(cloth_layout_, 1, places_before_, 0, sizeof(Vector3f));
   glVertexArrayElementBuffer(cloth_layout_, cloth.indices);
   glBindVertexArray(cloth_layout_);
-  glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(cloth.surface.indices().size()), GL_UNSIGNED_INT,
-                 nullptr);
+  gl::draw_triangles(static_cast<GLsizei>(cloth.surface.indices().size()));
 }
 
 void ChannelsPass::draw_balls(PointsPass& pass, const PointSet& set, float time) {

@@ -46,8 +46,7 @@ void ClothPass::prepare(Cloth& cloth) {
 
 void ClothPass::draw_triangles(const Cloth& cloth) {
   glBindVertexArray(cloth.vertex_array);
-  glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(cloth.surface.indices().size()), GL_UNSIGNED_INT,
-                 nullptr);
+  gl::draw_triangles(static_cast<GLsizei>(cloth.surface.indices().size()));
 }
 
 void ClothPass::bind(const Cloth& cloth) {

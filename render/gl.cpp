@@ -1,6 +1,7 @@
 #include "render/gl.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <map>
 #include <string>
 
@@ -48,6 +49,47 @@ VertexArray make_vertex_array() {
   GLuint name = 0;
   glCreateVertexArrays(1, &name);
   return VertexArray(name);
+}
+
+namespace {
+
+constexpr GLsizei kMostPending = 8192;
+
+/// Waits until all draws of this thread's context are done whenever kMostPending triangles were drawn since
+/// the last time. `triangles`: number of triangles that were drawn now.
+void finish_triangles(GLsizei triangles) {
+  thread_local GLsizei pending = 0;
+  pending += triangles;
+  if (pending < kMostPending) return;
+  glFinish();
+  pending = 0;
+}
+
+}  // namespace
+
+void draw_triangles(GLsizei index_count, GLsizei instances, GLuint first) {
+  const GLsizei triangles = index_count / 3, part = std::min(triangles, kMostPending);
+  const GLsizei together = std::max(kMostPending / std::max(triangles, 1), 1);
+  for (GLsizei i = 0; i < instances; i += together) {
+    const GLsizei copies = std::min(together, instances - i);
+    for (GLsizei from = 0; from < triangles; from += part) {
+      const GLsizei count = std::min(part, triangles - from);
+      const auto offset_bytes = static_cast<std::uintptr_t>(3 * from) * sizeof(GLuint);
+      glDrawElementsInstancedBaseInstance(GL_TRIANGLES, 3 * count, GL_UNSIGNED_INT,
+                                          reinterpret_cast<const void*>(offset_bytes), copies,
+                                          first + static_cast<GLuint>(i));
+      finish_triangles(count * copies);
+    }
+  }
+}
+
+void draw_quads(GLsizei count, GLuint first) {
+  constexpr GLsizei kTogether = kMostPending / 2;
+  for (GLsizei from = 0; from < count; from += kTogether) {
+    const GLsizei drawn = std::min(kTogether, count - from);
+    glDrawArraysInstancedBaseInstance(GL_TRIANGLE_STRIP, 0, 4, drawn, first + static_cast<GLuint>(from));
+    finish_triangles(2 * drawn);
+  }
 }
 
 Texture make_target(GLenum format, int width_px, int height_px, GLenum filter) {

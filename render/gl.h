@@ -94,6 +94,13 @@ class StreamBuffer {
 /// `offset`: in a vertex [bytes].
 void set_attribute(GLuint vertex_array, GLuint attribute, GLuint binding, int components, std::size_t offset);
 
+/// Draws `instances` copies of an indexed mesh of triangles with the bound vertex array, from instance
+/// `first` on. Large draws are split, and the parts are waited for, because llvmpipe stores all triangles
+/// that it has not drawn yet, in up to 36 MB.
+void draw_triangles(GLsizei index_count, GLsizei instances = 1, GLuint first = 0);
+/// Draws the instances `first` ... `first + count - 1` of a strip of four vertices, split as above.
+void draw_quads(GLsizei count, GLuint first = 0);
+
 /// Links a program. Each stage is a list of files of shaders/ joined in order behind #version and `defines`
 /// ("NAME value" each); an empty fragment list means depth only. Throws UnavailableError with the compiler's
 /// log.

@@ -70,7 +70,7 @@ void LinesPass::draw(const LineSet& set, int width_px, int height_px) {
     if (opacity <= 0) return;
     glDepthFunc(depth_test);
     glUniform1f(2, opacity);
-    glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, set.drawn);
+    gl::draw_quads(set.drawn);
   };
   draw_where(GL_LEQUAL, set.def.hidden);  // depth increases towards the eye
   draw_where(GL_GREATER, 1);

@@ -251,8 +251,7 @@ void MeshPass::draw(const Batch& batch) {
   const GpuMesh& mesh = *batch.mesh;
   glVertexArrayVertexBuffer(mesh.vertex_array, kInstanceBinding, rows_, 0, sizeof(Rows));
   glBindVertexArray(mesh.vertex_array);
-  glDrawElementsInstancedBaseInstance(GL_TRIANGLES, mesh.index_count, GL_UNSIGNED_INT, nullptr, batch.count,
-                                      batch.first);
+  gl::draw_triangles(mesh.index_count, batch.count, batch.first);
 }
 
 gl::LazyProgram& MeshPass::surface_program(const Batch& batch, Shading shading) {

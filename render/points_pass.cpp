@@ -189,7 +189,7 @@ void PointsPass::draw(const PointSet& set) {
   glVertexArrayVertexBuffer(vertex_array_, 0, set.buffer, 0, sizeof(GpuPoint));
   glBindVertexArray(vertex_array_);
   glUniform4fv(1, 1, style_of(set.def).data());
-  glDrawArraysInstanced(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(set.seen));
+  gl::draw_quads(static_cast<GLsizei>(set.seen));
 }
 
 void PointsPass::draw_spheres(const PointSet& set, const Features& features) {
@@ -214,8 +214,7 @@ void PointsPass::draw_blended(PointStyle style, uint32_t first, uint32_t last) {
     if (with_pictures != (pictures != 0)) blended_program(style, pictures != 0).use();
     with_pictures = pictures != 0;
     if (pictures) glBindTextureUnit(kPictureUnit, pictures);
-    glDrawArraysInstancedBaseInstance(GL_TRIANGLE_STRIP, 0, 4, static_cast<GLsizei>(to - from),
-                                      static_cast<GLuint>(from));
+    gl::draw_quads(static_cast<GLsizei>(to - from), static_cast<GLuint>(from));
     from = to;
   }
 }

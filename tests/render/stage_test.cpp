@@ -171,6 +171,49 @@ TEST(Stage, NearerBodiesHideFartherOnesInAnyOrder) {
   }
 }
 
+// Draws of many triangles are split. Each object covers the picture with more of them than one part has.
+TEST(Stage, DrawsAllPartsOfLargeObjects) {
+  constexpr int kColumns = 130, kRows = 90;
+  static constexpr float kSide = 0.06f;
+  const auto place = [](int column, int row) {
+    return Vector3f(kSide * (static_cast<float>(column) - 0.5f * kColumns),
+                    kSide * (static_cast<float>(row) - 0.5f * kRows), 0);
+  };
+  const Material material = glowing({1, 1, 1});
+  const auto add_quad = [](Mesh& mesh, const Vector3f& corner) {
+    const auto first = static_cast<uint32_t>(mesh.positions.size());
+    for (const Vector3f& offset :
+         {Vector3f(0, 0, 0), Vector3f(1, 0, 0), Vector3f(1, 1, 0), Vector3f(0, 1, 0)}) {
+      mesh.positions.push_back(corner + kSide * offset);
+      mesh.normals.push_back(Vector3f::UnitZ());
+      mesh.uvs.push_back(offset.head<2>());
+    }
+    for (const uint32_t i : {0u, 1u, 2u, 0u, 2u, 3u}) mesh.indices.push_back(first + i);
+  };
+  SmallStage mesh, instances, balls;
+  Mesh grid, quad;
+  std::vector<Point> points;
+  add_quad(quad, Vector3f::Zero());
+  const MeshHandle quads = instances.stage.add_mesh(quad);
+  const MaterialHandle bright = instances.stage.add_material(material);
+  for (int row = 0; row < kRows; ++row) {
+    for (int column = 0; column < kColumns; ++column) {
+      add_quad(grid, place(column, row));
+      points.push_back(point_at(place(column, row), kSide, Vector4f::Ones(), points.size()));
+      instances.stage.set_transform(instances.stage.add_instance(quads, bright),
+                                    Eigen::Affine3f(Eigen::Translation3f(place(column, row))));
+    }
+  }
+  mesh.add(grid, material);
+  balls.stage.set_points(balls.stage.add_points({.style = PointStyle::sphere}), points);
+  for (SmallStage* stage : {&mesh, &instances, &balls}) {
+    const HdrImage picture = stage->draw();
+    int covered = 0;
+    for (std::size_t i = 3; i < picture.rgba.size(); i += 4) covered += picture.rgba[i] == 1;
+    EXPECT_EQ(covered, picture.width_px * picture.height_px);
+  }
+}
+
 TEST(Stage, DepthIsPreciseFarAway) {
   SmallStage s;
   s.stage.set_camera(
