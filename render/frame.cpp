@@ -156,6 +156,9 @@ FrameUniforms make_frame(const View& view, const Sun& sun, const Environment& en
   const std::array<Vector3f, 9> irradiance = sky_irradiance(sky);
   for (std::size_t k = 0; k < 7; ++k)
     frame.irradiance[k] = vec4(irradiance[k], k < 6 ? irradiance[7 + k / 3][static_cast<int>(k % 3)] : 0);
+  // The disc of the half vectors to the part of the sun's disc that a sub-frame represents: radius^2.
+  const float radius = 0.5f * frame.sun_radiance.w();
+  frame.irradiance[6].w() = radius * radius / static_cast<float>(offsets.count);
   frame.air = {time, environment.clouds, static_cast<float>(offsets.count), 0};
   return frame;
 }

@@ -24,7 +24,8 @@ struct FrameUniforms {
   Vector4f sun_direction;
   Vector4f sun_radiance;
   Vector4f zenith, horizon, ground, glow;
-  std::array<Vector4f, 7> irradiance;  ///< nine coefficients; the last two are in the w components
+  std::array<Vector4f, 7> irradiance;  ///< nine coefficients; the last two are in the first six w; the
+                                       ///< last w: see sun_lobe() in light.glsl
   Vector4f ray_center, ray_x, ray_y;
   Vector4f depth;
   Vector4f air;

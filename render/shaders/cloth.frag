@@ -28,7 +28,7 @@ void main() {
   vec3 middle = position - normal.xyz * normal.w;
   write_surface(middle, n, cross(dFdx(middle), dFdy(middle)), view, material.surface.y + 4.0);
 #else
-  Surface s = Surface(material.color.rgb, material.surface.y, material.surface.x, material.emission.rgb);
+  Surface s = Surface(material.color.rgb, material.surface.y, material.surface.x, material.emission.rgb, 0.0, ONE_NORMAL);
   vec2 slope = vec2(0.0);
 #ifdef PATTERN
   PatternSample pattern = pattern_sample(vec3(uv, 0.0), vec3(0.0, 0.0, 1.0));
@@ -44,6 +44,7 @@ void main() {
     through = sqrt(s.albedo * material.back.rgb);
     if (!gl_FrontFacing) s.albedo = material.back.rgb;
   }
+  s.lobe = s.roughness;
   Threads weave = threads(uv);
   s.albedo *= weave.shade;
   // The transmitted light has a more saturated colour, because it has travelled farther in the cloth.

@@ -55,7 +55,7 @@ vec3 shade_fabric(Surface s, vec3 through, vec3 normal, vec3 view, Light light) 
 
   vec3 f0 = mix(vec3(0.04), s.albedo, s.metallic);
   vec3 fresnel = fresnel_at(f0, vh);
-  float lobe = sun_lobe(sun_roughness(s.roughness), nl, nv, nh);
+  float lobe = sun_lobe(s.lobe, s.normals, normal, h, nl, nv);
   vec3 sheen = material.sheen.rgb * sqrt(s.albedo);  // fibres are dyed like the cloth
   float grazing = 1.0 - nv, sheen_sky = 0.03 + 0.45 * grazing * grazing * grazing;
   float sin2 = 1.0 - nh * nh, sheen_sun = 0.75 * sin2 * sin2 / (nl + nv - nl * nv);

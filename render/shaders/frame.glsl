@@ -10,7 +10,7 @@
   qualifier vec4 horizon; \
   qualifier vec4 ground;            /* w: intensity of the sky's picture */ \
   qualifier vec4 glow;              /* w: turn of the sky's picture, as a fraction of a full turn */ \
-  qualifier vec4 irradiance[7];     /* ambient light of a white surface: see ambient() */
+  qualifier vec4 irradiance[7];     /* ambient light of a white surface: see ambient(); last w: see sun_lobe() */
 
 layout(std140, binding = 0) uniform Frame {
   mat4 clip_from_world;

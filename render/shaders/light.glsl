@@ -7,21 +7,54 @@ vec3 dielectric_f0 = vec3(0.04);
 #define dielectric_f0 vec3(0.04)
 #endif
 
+// The normals within a pixel: an ellipse around the normal in its middle.
+struct Normals {
+  vec3 major;   // half of its long axis
+  float minor2; // square of half of its short axis
+};
+#define ONE_NORMAL Normals(vec3(0.0), 0.0)
+
 struct Surface {
   vec3 albedo;
   float roughness;
   float metallic;
   vec3 emission;
+  float lobe;  // roughness for the sun's highlight
+  Normals normals;
 };
 
-// GGX with the visibility term of E. Hammon (2017), times pi.
-float sun_lobe(float a, float nl, float nv, float nh) {
-  float a2 = a * a;
-  float d = nh * nh * (a2 - 1.0) + 1.0;
-  float lobe = a2 / (d * d) * 0.5 / mix(2.0 * nl * nv, nl + nv, a);
-  return min(lobe, 40.0);
+// Means of the GGX distribution, times pi. It is a^2 / (a^2 + u)^2 as a function of u = tan^2 of the angle to the normal.
+// Over a disc of radius^2 `disc` around the half vector. The fraction within u is u / (a^2 + u), so the mean is 1 / (a^2 + disc)
+// at the normal. Outside of the disc, the mean from u - disc to u is used; `sum` is the sum of both over all directions.
+float mean_over_disc(float a2, float u, float disc) {
+  float x = disc / a2, sum = x < 0.01 ? 1.0 + 0.5 * x : x / (1.0 + x) + log(1.0 + x) / x;
+  return a2 / ((a2 + max(u, disc)) * (a2 + max(u - disc, 0.0)) * sum);
 }
-float sun_roughness(float roughness) { return max(roughness * roughness, 0.5 * frame.sun_radiance.w + 0.002); }
+// Over a line through the half vector. `along`, `across2`: position of the half vector along the line, and the square of that
+// across; `reach`: half of the line's length.
+float mean_over_line(float a2, float along, float across2, float reach) {
+  float c2 = a2 + across2, c = sqrt(c2), from = along - reach, to = along + reach, product = from * to;
+  return a2 * ((c2 - product) / ((c2 + to * to) * (c2 + from * from)) + atan(2.0 * reach * c, c2 + product) / (2.0 * reach * c)) /
+         (2.0 * c2);
+}
+
+// The sun's highlight: GGX with the visibility term of E. Hammon (2017), times pi. It is the mean over the normals within a
+// pixel and over the part of the sun's disc that a sub-frame represents, so that it does not flicker, and is neither wider nor
+// darker in a picture of fewer pixels.
+float sun_lobe(float roughness, Normals normals, vec3 normal, vec3 h, float nl, float nv) {
+  const float brightest = 1e4;
+  float a = max(roughness * roughness, 1e-4), a2 = a * a, minor2 = normals.minor2 + frame.irradiance[6].w;
+  float cosine = max(dot(normal, h), 0.01), major2 = dot(normals.major, normals.major);
+  vec3 slope = (h - normal * dot(normal, h)) / cosine;
+  float u = dot(slope, slope), longer = sqrt(major2 / minor2), line = smoothstep(2.0, 4.0, longer), mean = 0.0;
+  if (line < 1.0) mean = mean_over_disc(a2, u, minor2 * max(longer, 1.0));
+  if (line > 0.0) {
+    float reach = sqrt(major2), along = dot(slope, normals.major) / reach;
+    mean = mix(mean, mean_over_line(a2 + minor2, along, max(u - along * along, 0.0), reach), line);
+  }
+  float cos2 = cosine * cosine;
+  return min(mean / (cos2 * cos2) * 0.5 / mix(2.0 * nl * nv, nl + nv, a), brightest);
+}
 
 vec3 fresnel_at(vec3 f0, float vh) {
   float m = 1.0 - vh, m2 = m * m;
@@ -57,11 +90,11 @@ vec3 shade(Surface s, vec3 normal, vec3 view, Light light) {
   vec3 l = frame.sun_direction.xyz;
   vec3 h = normalize(l + view);
   float nl = saturate(dot(normal, l)), nv = max(abs(dot(normal, view)), 1e-3);
-  float nh = saturate(dot(normal, h)), vh = saturate(dot(view, h));
+  float vh = saturate(dot(view, h));
 
   vec3 f0 = mix(dielectric_f0, s.albedo, s.metallic);
   vec3 fresnel = fresnel_at(f0, vh);
-  float lobe = sun_lobe(sun_roughness(s.roughness), nl, nv, nh);
+  float lobe = sun_lobe(s.lobe, s.normals, normal, h, nl, nv);
   vec3 diffuse = s.albedo * (1.0 - s.metallic);
   vec3 sun = frame.sun_radiance.rgb * (nl * light.sun) * (diffuse * (1.0 - fresnel) + lobe * fresnel);
 

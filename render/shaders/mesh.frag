@@ -19,13 +19,30 @@ layout(location = 0) uniform float min_alpha;  // smallest alpha that this pass 
 layout(location = 0) out vec4 color;
 #endif
 
-// Roughness, increased where the normal varies within a pixel, so that highlights do not flicker (Kaplanyan and
+// Roughness, increased where the normal varies within a pixel, so that mirror images do not flicker (Kaplanyan and
 // Tokuyoshi, "Stable Geometric Specular Antialiasing", 2019).
 float filtered_roughness(float roughness, vec3 normal) {
   vec3 dx = dFdx(normal), dy = dFdy(normal);
   float variance = 0.25 * (dot(dx, dx) + dot(dy, dy));
   float a = roughness * roughness;
   return sqrt(sqrt(saturate(a * a + min(2.0 * variance, 0.18))));
+}
+
+// Returns the slope of a normal that differs from `normal` by `change`.
+vec3 slope_to(vec3 normal, vec3 change) {
+  return (change - normal * dot(normal, change)) / max(1.0 - 0.5 * dot(change, change), 0.5);
+}
+
+// Returns the normals within a pixel. `normal`: in its middle.
+Normals normals_in_pixel(vec3 normal) {
+  const float widest2 = 0.18;
+  vec3 dx = slope_to(normal, dFdx(normal)), dy = slope_to(normal, dFdy(normal));
+  float xx = dot(dx, dx), xy = dot(dx, dy), yy = dot(dy, dy), middle = 0.5 * (xx + yy);
+  float apart = sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy), major2 = middle + apart;
+  vec3 along = xx > yy ? (major2 - yy) * dx + xy * dy : xy * dx + (major2 - xx) * dy;
+  float size2 = dot(along, along);
+  return Normals(along * (0.5 * inversesqrt(max(size2, 1e-30)) * sqrt(min(major2, 4.0 * widest2))),
+                 0.25 * min(max(middle - apart, 0.0), 4.0 * widest2));
 }
 
 #ifdef DETAILED
@@ -82,9 +99,9 @@ vec3 with_layers(vec3 radiance, vec3 n, vec3 smooth_normal, vec3 view, Light lig
   radiance = radiance * (1.0 - max(sheen.r, max(sheen.g, sheen.b)) * sheen_sky) +
              sheen * (sun * (nl * sheen_sun) + (light.around + light.lamps) * sheen_sky);
   n = smooth_normal;
-  nl = saturate(dot(n, l)), nv = max(abs(dot(n, view)), 1e-3), nh = saturate(dot(n, h));
+  nl = saturate(dot(n, l)), nv = max(abs(dot(n, view)), 1e-3);
   float rough = material.coat.y, through = 1.0 - material.coat.x * fresnel_at(vec3(0.04), nv).r;
-  vec3 coat = sun * (nl * sun_lobe(sun_roughness(rough), nl, nv, nh) * fresnel_at(vec3(0.04), saturate(dot(view, h))).r) +
+  vec3 coat = sun * (nl * sun_lobe(rough, normals_in_pixel(n), n, h, nl, nv) * fresnel_at(vec3(0.04), saturate(dot(view, h))).r) +
               reflected_light(view, n, rough, light) * sky_reflectance(vec3(0.04), rough, nv);
   return radiance * through + material.coat.x * coat;
 }
@@ -94,7 +111,7 @@ void main() {
   vec3 view = normalize(frame.eye.xyz - position);
   vec3 smooth_normal = normalize(gl_FrontFacing ? normal : -normal), n = smooth_normal;
   float alpha = material.color.a;
-  Surface s = Surface(material.color.rgb, material.surface.y, material.surface.x, material.emission.rgb);
+  Surface s = Surface(material.color.rgb, material.surface.y, material.surface.x, material.emission.rgb, 0.0, ONE_NORMAL);
 #ifdef PATTERN
   PatternSample pattern = pattern_sample(object_position, object_normal);
   s.albedo = pattern.color;
@@ -152,6 +169,8 @@ void main() {
   surface_color = vec4(s.albedo, 0.5 + 0.5 * s.metallic);
 #endif
 #else
+  s.lobe = s.roughness;
+  s.normals = normals_in_pixel(n);
   s.roughness = filtered_roughness(s.roughness, n);
 #ifdef ENDLESS
   vec4 fog = fog_to(position, horizon_haze(smooth_normal, view));

@@ -20,7 +20,7 @@ void main() {
   vec4 place = texelFetch(surface_places, pixel, 0);
   vec3 n = from_octahedral(texelFetch(surface_normals, pixel, 0).xy), view = normalize(frame.eye.xyz - place.xyz);
   float roughness = place.w - 2.0 * floor(0.5 * place.w);  // without the flags, which are multiples of 2
-  Surface s = Surface(own.rgb, roughness, 2.0 * own.a - 1.0, vec3(0.0));
+  Surface s = Surface(own.rgb, roughness, 2.0 * own.a - 1.0, vec3(0.0), roughness, ONE_NORMAL);
   vec3 radiance = shade(s, n, view, traced_light(n, n)) + highlights_of_lamps(mix(dielectric_f0, s.albedo, s.metallic));
   color = vec4(apply_fog(radiance, place.xyz), 1.0);
 }

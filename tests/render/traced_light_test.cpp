@@ -502,6 +502,63 @@ TEST_F(TracedLight, OfAHighlightDoesNotDependOnHowItIsSampled) {
   EXPECT_NEAR(light[0] / light[1], 1, 0.01f);
 }
 
+/// Returns the sum of a picture's light over the solid angle of its pixels.
+double light_in_picture(const Camera& camera, const HdrImage& picture) {
+  double sum = 0;
+  for (std::size_t i = 1; i < picture.rgba.size(); i += 4) sum += static_cast<double>(picture.rgba[i]);
+  const double pixel = 2 * std::tan(static_cast<double>(camera.fov_deg) * std::numbers::pi / 360) /
+                       static_cast<double>(picture.height_px);
+  return sum * pixel * pixel;
+}
+
+// A mirror ball scatters the light of a distant source evenly: intensity = irradiance * radius^2 / 4. The
+// glint of the sun is the same light whatever the size of the pixels.
+TEST(SunGlint, OfAMirrorBallHasTheLightOfItsCrossSection) {
+  const Camera camera{.eye = {0, 0, 60}, .target = {0, 0, 0}, .fov_deg = 2.4f};
+  const double expected = std::numbers::pi * 0.25 / (60 * 60);  // of a sun of intensity 1
+  for (const int height_px : {12, 60, 240}) {
+    for (const bool tessellated : {true, false}) {
+      for (const float roughness : {0.02f, 0.1f, 0.2f}) {
+        SmallStage s(height_px, height_px);
+        s.stage.set_environment(kNoLight);
+        s.stage.set_sun({.direction = Vector3f(0.5f, 0.4f, 1).normalized(), .intensity = 1});
+        s.stage.set_camera(camera);
+        if (tessellated) {
+          s.add(make_sphere(1, 96), {.color = {1, 1, 1, 1}, .metallic = 1, .roughness = roughness});
+        } else {
+          const PointsHandle points =
+              s.stage.add_points({.style = PointStyle::sphere, .metallic = 1, .roughness = roughness});
+          s.stage.set_points(
+              points, std::array{Point{.position = {0, 0, 0}, .radius = 1, .color = Vector4f::Ones()}});
+        }
+        EXPECT_NEAR(light_in_picture(camera, mean_of(s, 16)) / expected, 1, 0.12)
+            << height_px << " px, roughness " << roughness << (tessellated ? ", mesh" : ", point");
+      }
+    }
+  }
+}
+
+// Across a thin bar all normals are within a pixel, but along it they are the same: the bar is only bright
+// where its axis is nearly perpendicular to the half vector.
+TEST(SunGlint, OfABarDoesNotDependOnTheSizeOfThePixels) {
+  const Camera camera{.eye = {0, 0, 60}, .target = {0, 0, 0}, .fov_deg = 2.4f};
+  for (const float tilt : {0.0f, 0.12f, 0.3f}) {
+    std::vector<double> light;
+    for (const int height_px : {16, 40, 400}) {
+      SmallStage s(height_px, height_px);
+      s.stage.set_environment(kNoLight);
+      s.stage.set_sun({.direction = Vector3f(2 * tilt, 0.5f, 1).normalized(), .intensity = 1});
+      s.stage.set_camera(camera);
+      const InstanceHandle bar =
+          s.add(make_cylinder(0.1f, 2), {.color = {1, 1, 1, 1}, .metallic = 1, .roughness = 0.25f});
+      s.stage.set_transform(
+          bar, Eigen::Affine3f(Eigen::AngleAxisf(std::numbers::pi_v<float> / 2, Vector3f::UnitZ())));
+      light.push_back(light_in_picture(camera, mean_of(s, 16)));
+    }
+    for (const double of_few_pixels : light) EXPECT_NEAR(of_few_pixels / light.back(), 1, 0.1) << tilt;
+  }
+}
+
 // A ball of glass with the index of refraction 1.5 shows distant things upside down.
 TEST_F(TracedLight, ABallOfGlassTurnsThePictureUpsideDown) {
   s.add(make_sphere(1), {.color = {1, 1, 1, 1}, .roughness = 0.01f, .transmission = 1, .refraction = 1.5f});
