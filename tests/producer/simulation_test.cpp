@@ -27,6 +27,10 @@ class Simulated {
       if (body.name == name) return simulation_.world().body(body.handle);
     throw std::out_of_range(name);
   }
+  /// Returns the position of the first particle of a group.
+  Vec3 particle(std::size_t group) const {
+    return simulation_.world().particles(simulation_.particle_groups()[group].handle).position.front();
+  }
   SimulationTotals totals() const { return simulation_.totals(); }
 
  private:
@@ -104,6 +108,15 @@ TEST(Simulation, AGrabHoldsABodyByOnePoint) {
                 "keyframes": [{"time": 0, "position": [0, 0.5, 0]}, {"time": 2, "position": [3, 1.5, 0]}]}],
     "output": {"fps": 10, "duration": 8}})");
   EXPECT_TRUE(run.body("box").centre.isApprox(Vec3(3, 1 - 2 * kGravity / 400, 0), 1e-3));
+}
+
+TEST(Simulation, ASpringActsFromTheTimeAtWhichItsParticleAppears) {
+  const Simulated run(
+      R"({"particles": [{"name": "late", "mass": 1, "places": [{"position": [0, 1, 0]}], "appear_at": 0.5}],
+    "springs": [{"a": {"position": [0, 2, 0]}, "b": {"particles": "late"}, "stiffness": 100}],
+    "output": {"fps": 10, "duration": 1.1}})");
+  const Real oscillation = std::cos(std::sqrt(100.0) * 0.5);
+  EXPECT_NEAR(run.particle(0).y(), 1 - kGravity / 100 * (1 - oscillation), 1e-4);
 }
 
 TEST(Simulation, AConveyorAcceleratesBodiesToItsSpeed) {

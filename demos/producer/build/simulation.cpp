@@ -96,7 +96,8 @@ Simulation::Simulation(const Scene& scene, const ModelLibrary& models, Collision
       world_.add_contact_rule(def);
     });
   add_particle_groups(scene);
-  add_springs(scene);
+  springs_.resize(scene.springs.size());
+  add_springs(0);
   add_joints(scene);
   add_cloths(scene, models);
   sources_.emplace(scene, models, world_, [this](const std::string& name) { return body_named(name); });
@@ -235,14 +236,24 @@ void Simulation::add_particles(const ParticleGroup& group, sim::ParticleSystemHa
                         elapsed);
 }
 
-/// Adds the groups that appear in this sub-step.
+/// Adds the groups that appear in this sub-step, and the springs that end at their particles.
 void Simulation::add_late_particles(Real start, Real end) {
-  for (const Group& group : groups_)
-    if (const Real at = group.scene->appear_at; at > start && at <= end)
-      add_particles(*group.scene, group.handle, end - at);
+  bool appears = false;
+  for (const Group& group : groups_) {
+    const Real at = group.scene->appear_at;
+    if (at <= start || at > end) continue;
+    add_particles(*group.scene, group.handle, end - at);
+    appears = true;
+  }
+  if (appears) add_springs(end);
 }
 
-void Simulation::add_springs(const Scene& scene) {
+/// Adds the springs whose particles exist at a time, and that do not exist yet.
+void Simulation::add_springs(Real time) {
+  const auto exists = [&](const SpringEnd& end) {
+    const auto group = std::ranges::find(scene_.particles, end.particles, &ParticleGroup::name);
+    return end.particles.empty() || group->appear_at <= time;
+  };
   const auto attachment = [&](const SpringEnd& end) -> sim::Attachment {
     if (!end.body.empty()) return sim::BodyPoint{body_named(end.body), end.position};
     if (!end.particles.empty()) {
@@ -251,16 +262,16 @@ void Simulation::add_springs(const Scene& scene) {
     }
     return sim::WorldPoint{end.position};
   };
-  for (std::size_t i = 0; i < scene.springs.size(); ++i) {
-    const Spring& spring = scene.springs[i];
-    springs_.push_back({{.name = spring.name,
-                         .a = attachment(spring.a),
-                         .b = attachment(spring.b),
-                         .stiffness = spring.stiffness,
-                         .damping = spring.damping,
-                         .rest_length = spring.rest_length},
-                        objects_.rod_of_spring[i]});
-    at_place(spring.where, [&] { world_.add_spring(springs_.back().def); });
+  for (std::size_t i = 0; i < scene_.springs.size(); ++i) {
+    const Spring& spring = scene_.springs[i];
+    if (springs_[i] || !exists(spring.a) || !exists(spring.b)) continue;
+    springs_[i] = {.name = spring.name,
+                   .a = attachment(spring.a),
+                   .b = attachment(spring.b),
+                   .stiffness = spring.stiffness,
+                   .damping = spring.damping,
+                   .rest_length = spring.rest_length};
+    at_place(spring.where, [&] { world_.add_spring(*springs_[i]); });
   }
 }
 
@@ -428,22 +439,24 @@ Snapshot Simulation::snapshot() const {
   for (const sim::Pose& pose : moving_poses_)
     snapshot.bodies.push_back({pose.position.cast<float>(), pose.orientation.cast<float>()});
 
+  const Eigen::Vector3f nowhere = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
   const auto end_point = [&](const sim::Attachment& attachment) -> Eigen::Vector3f {
     if (const auto* body = std::get_if<sim::BodyPoint>(&attachment); body && !world_.is_present(body->body))
-      return Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
+      return nowhere;
     if (const auto* body = std::get_if<sim::BodyPoint>(&attachment))
       return world_.body(body->body).pose.point_to_world(body->position).cast<float>();
     if (const auto* particle = std::get_if<sim::ParticlePoint>(&attachment)) {
       const sim::ParticleArrays& particles = world_.particles(particle->system);
       const std::size_t i = index_of(particles, particle->id);
-      return i < particles.size()
-                 ? Eigen::Vector3f(particles.position[i].cast<float>())
-                 : Eigen::Vector3f(Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
+      return i < particles.size() ? Eigen::Vector3f(particles.position[i].cast<float>()) : nowhere;
     }
     return std::get<sim::WorldPoint>(attachment).position.cast<float>();
   };
   snapshot.rods.resize(objects_.rods.size());
-  for (const auto& [def, rod] : springs_) snapshot.rods[rod] = {end_point(def.a), end_point(def.b)};
+  for (std::size_t i = 0; i < springs_.size(); ++i)
+    snapshot.rods[objects_.rod_of_spring[i]] =
+        springs_[i] ? RodSample{end_point(springs_[i]->a), end_point(springs_[i]->b)}
+                    : RodSample{nowhere, nowhere};
   for (const auto& [handle, first_rod] : joints_) {
     const sim::JointState state = world_.joint(handle);
     const sim::JointDef& def = world_.joint_def(handle);

@@ -113,7 +113,7 @@ class Simulation {
   void add_particle_groups(const Scene& scene);
   void add_particles(const ParticleGroup& group, sim::ParticleSystemHandle system, sim::Real elapsed);
   void add_late_particles(sim::Real start, sim::Real end);
-  void add_springs(const Scene& scene);
+  void add_springs(sim::Real time);
   void add_joints(const Scene& scene);
   void add_cloths(const Scene& scene, const ModelLibrary& models);
   void note_cloths();
@@ -125,10 +125,6 @@ class Simulation {
   int skipped_pieces() const;  // pieces in which the time before output.start is simulated
   void note(const sim::StepReport& report);
 
-  struct DrawnSpring {
-    sim::SpringDef def;
-    std::size_t rod;
-  };
   struct DrawnJoint {
     sim::JointHandle handle;
     std::size_t first_rod;
@@ -142,9 +138,9 @@ class Simulation {
   std::vector<Group> groups_;
   std::vector<NamedCloth> cloths_;
   std::map<std::string, sim::BodyHandle> bodies_;
-  std::vector<sim::Pose> moving_poses_;             // by slot; kept up to date from World::moved()
-  std::map<sim::BodyHandle, std::size_t> slot_of_;  // slots of moving bodies
-  std::vector<DrawnSpring> springs_;
+  std::vector<sim::Pose> moving_poses_;                 // by slot; kept up to date from World::moved()
+  std::map<sim::BodyHandle, std::size_t> slot_of_;      // slots of moving bodies
+  std::vector<std::optional<sim::SpringDef>> springs_;  ///< by index in the scene; those that were added
   std::vector<DrawnJoint> joints_;
   std::optional<Overlays> overlays_;
   std::function<void(double)> on_substep_;

@@ -31,7 +31,10 @@ struct Table<Spring> {
         {"damping", &T::damping, "damping of the spring: force per speed of extension", "N s/m",
          kNotNegative},
         {"rest_length", &T::rest_length,
-         "length at which the spring exerts no force; negative: the distance of the ends at time 0", "m"},
+         "length at which the spring exerts no force; negative: the distance of the ends at time 0, or when "
+         "its "
+         "particle appears",
+         "m"},
         {"visible", &T::visible, "whether the spring is drawn as a rod"},
         {"radius", &T::radius, "radius of the rod", "m", kPositive},
         {"material", &T::material, "name of the rod's material; empty: grey"},
