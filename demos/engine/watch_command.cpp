@@ -55,11 +55,11 @@ class Watcher {
     if (target_.kind == OutputKind::pipe)
       throw OutputError("--watch needs an output that can be replaced; standard output cannot");
     if (target_.kind == OutputKind::video) {
-      producer::check_file(target_.path.string(), options.force);
+      producer::check_file(target_.path.string(), options.force, options.scene);
     } else if (!options.force && fs::exists(folder() / "manifest.json")) {
       throw OutputError(folder().string() + ": already contains frames; replace them with --force");
     }
-    producer::check_file(options.stats, options.force);
+    producer::check_file(options.stats, options.force, options.scene);
     if (options.cameras.size() > 1 ||
         (options.cameras.size() == 1 && options.cameras.front() == producer::kAllCameras))
       throw OutputError("--watch draws one camera; name it with --camera");

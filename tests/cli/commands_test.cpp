@@ -168,6 +168,21 @@ TEST(Commands, ContactsOfARestingBodyCarryItsWeight) {
   }
 }
 
+// Also with --force, which is for the results of earlier runs.
+TEST(Commands, DoNotReplaceTheSceneOrAnInclude) {
+  const TemporaryFolder folder;
+  write_file(folder / "parts.json", R"({"bodies": [{"name": "ball", "shape": {"type": "sphere"}}]})");
+  write_file(folder / "s.json", R"({"version": 1, "include": ["parts.json"], "output": {"duration": 0.1}})");
+  const auto before = contents(folder.path());
+  for (const std::string option : {"--trace s.json", "--stats ./s.json", "--contacts parts.json"}) {
+    const Outcome run = offstage("simulate s.json --force --progress none " + option, folder.path());
+    EXPECT_EQ(run.code, 2) << option;
+    EXPECT_NE(run.err.find("is read by the scene; give the output another name"), std::string::npos)
+        << run.err;
+    EXPECT_EQ(contents(folder.path()), before) << option;
+  }
+}
+
 TEST(Commands, FiguresOfContactsAreInTheStats) {
   const TemporaryFolder folder;
   write_file(folder / "s.json", falling_crate(R"(, "world": {"solver": "exact", "sleep": false})"));

@@ -29,11 +29,12 @@ struct ExportOptions {
   bool force = false;
 };
 
-/// Throws OutputError before the work begins if the output already exists.
-void check_target(const ExportTarget& target, const std::vector<int>& frames, bool force) {
+/// Throws OutputError before the work begins if the output already exists and must not be replaced.
+void check_target(const ExportTarget& target, const std::vector<int>& frames, const ExportOptions& options) {
   render::create_parent_folders(target.path);
-  if (!target.sequence()) return check_file(target.path.string(), force);
-  for (const int frame : frames) check_file(render::frame_path(target.path, frame).string(), force);
+  if (!target.sequence()) return check_file(target.path.string(), options.force, options.scene);
+  for (const int frame : frames)
+    check_file(render::frame_path(target.path, frame).string(), options.force, options.scene);
 }
 
 int export_command(const ExportOptions& options) {
@@ -41,7 +42,7 @@ int export_command(const ExportOptions& options) {
   const LoadedScene loaded = load(options.scene, options.log.quiet);
   const ModelLibrary models = load_models(loaded, options.scene, options.log);
   const std::vector<int> frames = parse_frames(options.frames, loaded.scene.frame_count());
-  check_target(target, frames, options.force);
+  check_target(target, frames, options);
   const auto threads = simulation_threads(options.threads);
 
   const FilmParts parts(loaded.scene, models);

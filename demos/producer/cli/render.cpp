@@ -27,6 +27,7 @@
 #include "producer/run/run_notes.h"
 #include "producer/run/run_report.h"
 #include "producer/run/snapshot_cache.h"
+#include "producer/run/watch.h"
 #include "render/context.h"
 #include "render/error.h"
 #include "render/frame_files.h"
@@ -267,7 +268,7 @@ int render_cameras(const RenderOptions& options) {
       throw std::invalid_argument("there is no camera '" + name + "'" + suggestion(name, known));
   for (const std::string& name : names) {
     const OutputTarget target = parse_output(output_of_camera(options.out, name));
-    if (target.kind == OutputKind::video) check_file(target.path.string(), options.force);
+    if (target.kind == OutputKind::video) check_file(target.path.string(), options.force, options.scene);
   }
   std::optional<HiddenFolder> states;
   if (options.cache.empty() && !options.resume && !options.dry_run && names.size() > 1)
@@ -305,6 +306,16 @@ void check_file(const std::string& file, bool force) {
     throw OutputError(file + ": is a symbolic link, which outputs do not follow; name the file itself");
   if (status.type() != fs::file_type::regular) throw OutputError(file + ": is not a regular file");
   if (!force) throw OutputError(file + ": exists already; replace it with --force");
+}
+
+void check_file(const std::string& file, bool force, const SceneOptions& scene) {
+  check_file(file, force);
+  if (file.empty() || !fs::exists(file) || scene.from_standard_input()) return;
+  for (const fs::path& read : files_of_scene(scene.file, scene.overrides())) {
+    std::error_code error;
+    if (fs::equivalent(file, read, error))
+      throw OutputError(file + ": is read by the scene; give the output another name");
+  }
 }
 
 void check_distinct(const std::string& a, const std::string& b) {
@@ -345,7 +356,7 @@ int render_command(const RenderOptions& given) {
   const Plan plan = make_plan(options, models, std::move(loaded));
   if (plan.target.kind == OutputKind::video) {
     render::check_video(video_def(plan));
-    check_file(plan.target.path.string(), options.force);
+    check_file(plan.target.path.string(), options.force, options.scene);
     if (!options.chunk.empty())
       throw OutputError(
           plan.target.path.string() +
@@ -356,9 +367,9 @@ int render_command(const RenderOptions& given) {
       throw OutputError(stale.string() +
                         ": contains channels of an earlier film; remove it, or replace it with --force");
   }
-  check_file(options.stats, options.force || options.resume);
+  check_file(options.stats, options.force || options.resume, options.scene);
   check_distinct(options.stats, options.out);
-  check_file(options.report, options.force || options.resume);
+  check_file(options.report, options.force || options.resume, options.scene);
   check_distinct(options.report, options.out);
   check_distinct(options.report, options.stats);
   if (plan.channels.choice.any() && plan.target.kind == OutputKind::pipe)

@@ -29,7 +29,7 @@ int simulate_command(const SimulateOptions& options) {
   const std::array files = {options.stats,        options.trace,  options.contacts, options.cloths,
                             options.cloth_points, options.joints, options.particles};
   for (std::size_t i = 0; i < files.size(); ++i) {
-    check_file(files[i], options.force);
+    check_file(files[i], options.force, options.scene);
     for (std::size_t k = 0; k < i; ++k) check_distinct(files[k], files[i]);
   }
   const auto threads = simulation_threads(options.threads);
