@@ -24,6 +24,22 @@ void ClothMotion::arrange() {
   system_.assign(std::move(all));
 }
 
+void ClothMotion::place_pins(const Body& body) {
+  world_.cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
+    if (cloth->absent) return;
+    for (ClothPin& pin : cloth->pins)
+      if (pin.body == body.handle) pin.position = body.pose.point_to_body(cloth->points[pin.vertex]);
+  });
+}
+
+void ClothMotion::place_pins(Cloth& cloth) {
+  for (ClothPin& pin : cloth.pins) {
+    if (!pin.body) continue;
+    const Body& body = *world_.bodies[pin.body];
+    if (!body.absent) pin.position = body.pose.point_to_body(cloth.points[pin.vertex]);
+  }
+}
+
 void ClothMotion::detach(BodyHandle body) {
   world_.cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
     std::erase_if(cloth->pins, [&](const ClothPin& pin) { return pin.body == body; });

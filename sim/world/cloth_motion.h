@@ -17,6 +17,11 @@ class ClothMotion {
 
   /// Updates the list of cloths to step. Call it after a cloth has been added or removed, or has appeared.
   void arrange();
+  /// Lets the pins of all cloths that exist hold their vertices at the present places relative to a body.
+  /// Call it when the body appears.
+  void place_pins(const Body& body);
+  /// The same for all pins of a cloth to bodies that exist. Call it when the cloth appears.
+  void place_pins(Cloth& cloth);
   /// Releases all cloth vertices that are pinned to a body.
   void detach(BodyHandle body);
 

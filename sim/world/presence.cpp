@@ -32,8 +32,10 @@ void World::Impl::update_presence(Real time) {
   bool changed = false;
   cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
     const bool exists = has_come(cloth->def.appear_at, time) && !has_come(cloth->def.remove_at, time);
-    changed |= cloth->absent == exists;
+    if (cloth->absent != exists) return;
+    changed = true;
     cloth->absent = !exists;
+    if (exists) cloth_motion.place_pins(*cloth);
   });
   if (!changed) return;
   active.wake_all();
@@ -46,6 +48,7 @@ void World::Impl::appear(Body& body, Real time) {
   body.type = body.def.motion;
   if (body.is_kinematic()) body.pose = body.def.track.at(time, body.def.pose).pose;
   body.before_step = body.before_substep = body.start_pose = body.pose;
+  cloth_motion.place_pins(body);
   contacts.add(body);
   if (body.is_dynamic() || body.is_kinematic()) active.add_stepped(body);
   active.note_new_set();

@@ -31,6 +31,9 @@ class Simulated {
   Vec3 particle(std::size_t group) const {
     return simulation_.world().particles(simulation_.particle_groups()[group].handle).position.front();
   }
+  Vec3 cloth_point(uint32_t vertex) const {
+    return simulation_.world().cloth(simulation_.cloths().front().handle).points[vertex];
+  }
   SimulationTotals totals() const { return simulation_.totals(); }
 
  private:
@@ -117,6 +120,26 @@ TEST(Simulation, ASpringActsFromTheTimeAtWhichItsParticleAppears) {
     "output": {"fps": 10, "duration": 1.1}})");
   const Real oscillation = std::cos(std::sqrt(100.0) * 0.5);
   EXPECT_NEAR(run.particle(0).y(), 1 - kGravity / 100 * (1 - oscillation), 1e-4);
+}
+
+// The cloth falls until the bar appears. From then on, the bar holds its edge where it is.
+TEST(Simulation, PinsToABodyThatAppearsHoldTheClothWhereItIsThen) {
+  const auto film = [](const std::string& duration) {
+    return Simulated(
+        R"({"bodies": [{"name": "bar", "motion": "static", "shape": {"type": "box", "size": [0.6, 0.05, 0.05]},
+        "position": [0, 1.2, -0.3], "appear_at": 0.2, "collides": false}],
+      "cloths": [{"fabric": "cotton", "position": [0, 1.2, 0], "shape": {"type": "grid", "size": [0.6, 0.6], "cells": [6, 6]},
+        "pins": [{"type": "side", "side": "top", "body": "bar"}]}],
+      "output": {"fps": 10, "duration": )" +
+        duration + "}}");
+  };
+  const Simulated falling = film("0.25"), held = film("1");
+  for (uint32_t vertex = 0; vertex < 7; ++vertex) {
+    const Vec3 then = falling.cloth_point(vertex);
+    EXPECT_LT(then.y(), 1.05);
+    EXPECT_LT((held.cloth_point(vertex) - then).norm(), 1e-9) << vertex;
+  }
+  EXPECT_LT(held.totals().cloth.strain, 0.05);
 }
 
 TEST(Simulation, AConveyorAcceleratesBodiesToItsSpeed) {

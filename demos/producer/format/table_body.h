@@ -108,8 +108,8 @@ struct Table<Body> {
         {"interpolation", &T::interpolation, kInterpolationHelp},
         {"loop", &T::loop, "whether the keyframes repeat; false: the last pose is held"},
         {"appear_at", &T::appear_at,
-         "time at which the body appears, at its pose and velocity of time 0; its joints then connect it to "
-         "the other bodies, in their poses at that time",
+         "time at which the body appears, at its pose and velocity of time 0; its joints and cloth pins then "
+         "connect it to the other bodies and the cloths, where these are at that time",
          "s", kNotNegative},
         {"remove_at", &T::remove_at,
          "time at which the body is removed, with its springs, joints and cloth pins; must be later than "

@@ -303,8 +303,11 @@ struct Table<Cloth> {
              "with the integrator `relaxed`: whether springs take a single step in each `substep`, which is "
              "faster. The stiffness of springs that are too stiff for this step is reduced, and a warning "
              "gives the factor"},
-            {"appear_at", &T::appear_at, "time at which the cloth appears, with its shape of time 0", "s",
-             kNotNegative},
+            {"appear_at", &T::appear_at,
+             "time at which the cloth appears, with its shape of time 0; its pins then connect it to the "
+             "bodies, where "
+             "these are at that time",
+             "s", kNotNegative},
             {"remove_at", &T::remove_at, "time at which the cloth is removed; must be later than `appear_at`",
              "s", kPositive},
             {"visible", &T::visible, "whether the object is drawn"},
