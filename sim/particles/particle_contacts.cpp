@@ -14,6 +14,12 @@ namespace {
 constexpr std::size_t kContactChunk = ParticleSearch::kChunk;
 /// Contacts belong to the same surface if the cosine of the angle between their normals is greater than this.
 constexpr Real kSameSurface = 0.95;
+/// Depth below a contact at which the surface is looked up [m], and the least cosine between its normals on a
+/// face.
+constexpr Real kInside = 1e-8, kSameFace = 1 - 1e-14;
+/// Greatest step between flush obstacles [m], and as a fraction of the particle's diameter, as for bodies
+/// (sim/contact/internal_edges.h).
+constexpr Real kFlushStep = 1e-4, kFlushStepFraction = 1e-3;
 
 /// Calls f(distance, normal) for points of a solid's surface within `reach` [m] of p, in the solid's frame. A
 /// mesh gives the nearest point of each triangle; other solids give only their nearest point.
@@ -43,6 +49,37 @@ Vec3 admissible(const Vec3& impulse, const Vec3& normal, Real friction) {
   const Vec3 across = impulse - pressing * normal;
   const Real size = across.norm(), limit = friction * pressing;
   return pressing * normal + (size > limit ? Real(limit / size) : 1) * across;
+}
+
+/// Whether a contact is on a face, and not on an edge or a corner with a normal between those of faces: its
+/// normal is that of the nearest surface inside the obstacle, too. The point there is a little nearer to the
+/// obstacle's middle, because a contact at the border of a face has the normal of the face. Contacts with
+/// meshes do not count.
+bool is_on_face(const ParticleContacts::Touch& touch, Real h) {
+  if (touch.obstacle->solid.mesh) return false;
+  const Pose pose = touch.obstacle->at(touch.meets ? touch.time / h : 1);
+  const Vec3 normal = pose.vector_to_body(touch.normal), place = pose.point_to_body(touch.place);
+  const Vec3 to_middle = normal.dot(place) * normal - place;
+  const Vec3 inside = place - kInside * normal + 2 * kInside * to_middle.stableNormalized();
+  return signed_distance(touch.obstacle->solid, inside).normal.dot(normal) > kSameFace;
+}
+
+/// Removes the contacts with edges that do not rise above a face of another obstacle that the particle
+/// touches: edges between flush obstacles stop no particle.
+void remove_internal_edges(std::vector<ParticleContacts::Touch>& touches, Real radius, Real h) {
+  using Touch = ParticleContacts::Touch;
+  const auto is_of_first = [&](const Touch& touch) { return touch.obstacle == touches.front().obstacle; };
+  if (std::ranges::all_of(touches, is_of_first)) return;
+  std::vector<Touch> faces;
+  for (const Touch& touch : touches)
+    if (is_on_face(touch, h)) faces.push_back(touch);
+  const Real flush = std::min(kFlushStep, kFlushStepFraction * 2 * radius);
+  std::erase_if(touches, [&](const Touch& touch) {
+    if (touch.obstacle->solid.mesh || is_on_face(touch, h)) return false;
+    return std::ranges::any_of(faces, [&](const Touch& face) {
+      return face.obstacle != touch.obstacle && (touch.place - face.place).dot(face.normal) <= flush;
+    });
+  });
 }
 
 }  // namespace
@@ -134,7 +171,8 @@ void ParticleContacts::find_surfaces(uint32_t i, NearObstacles& near, Found& fou
   const Real h = step_->h, margin = kMargin * g.radius;
   const Vec3 end = g.at(h);
   near.find(g.position, end, g.radius + margin);
-  const std::size_t first = found.surfaces.size();
+  std::vector<Touch>& touches = found.touches;
+  touches.clear();
   for (const Obstacle* o : near.all()) {
     if (o->body == impacts_->struck_body(i)) continue;
     Vec3 later = Vec3::Zero();
@@ -143,15 +181,18 @@ void ParticleContacts::find_surfaces(uint32_t i, NearObstacles& near, Found& fou
                                                  std::numeric_limits<Real>::infinity());
       later = hit.obstacle && hits_later(i, hit) ? hit.normal : Vec3(Vec3::Zero());
       if (hit.obstacle && later.isZero())
-        add_surface(i, *o, hit.normal, 0, hit.fraction * h, true, first, found);
+        touches.push_back({o, hit.normal, hit.position - g.radius * hit.normal, 0, hit.fraction * h, true});
     }
-    for_each_surface(o->solid, o->end.point_to_body(end), g.radius + margin,
-                     [&](Real distance, const Vec3& local) {
-                       const Vec3 normal = o->end.vector_to_world(local);
-                       if (later.dot(normal) > kSameSurface) return;
-                       add_surface(i, *o, normal, distance - g.radius, g.from, false, first, found);
-                     });
+    for_each_surface(
+        o->solid, o->end.point_to_body(end), g.radius + margin, [&](Real distance, const Vec3& local) {
+          const Vec3 normal = o->end.vector_to_world(local);
+          if (later.dot(normal) > kSameSurface) return;
+          touches.push_back({o, normal, end - distance * normal, distance - g.radius, g.from, false});
+        });
   }
+  remove_internal_edges(touches, g.radius, h);
+  const std::size_t first = found.surfaces.size();
+  for (const Touch& t : touches) add_surface(i, *t.obstacle, t.normal, t.gap, t.time, t.meets, first, found);
 }
 
 /// Whether the particle reaches a surface in an impact, but in the next sub-step only. Contacts are found on

@@ -39,6 +39,15 @@ class ParticleContacts {
     std::span<const uint32_t> before;  ///< index of each particle in the previous solution, or kNone
   };
 
+  /// A point at which a particle touches an obstacle in the sub-step.
+  struct Touch {
+    const Obstacle* obstacle;
+    Vec3 normal, place;
+    Real gap;    ///< gap at the end of the sub-step [m]; 0 if `meets`
+    Real time;   ///< start of the contact, since the sub-step's start [s]
+    bool meets;  ///< whether the particle reaches the surface in the sub-step
+  };
+
   /// Solves the contacts and moves the particles to the end of the sub-step. Clusters of at most
   /// `lcp_cluster` contacts are solved by pivoting (contact_lcp.h), others by relaxation; 0: all by
   /// relaxation. Velocities are stored in `particles`, positions in `end`, and in `touched` whether a
@@ -120,6 +129,7 @@ class ParticleContacts {
     bool operator>(const Passing& o) const { return std::tie(time, a, b) > std::tie(o.time, o.a, o.b); }
   };
   struct Found {
+    std::vector<Touch> touches;  // of one particle
     std::vector<Pair> pairs;
     std::vector<Surface> surfaces;
     std::vector<Reaction> reactions;

@@ -111,6 +111,68 @@ TEST(ParticlesAndJoints, AnImpulseReachesEveryLinkAndTheJointsHold) {
   EXPECT_LT(world.joint(near).error, 1e-9);
 }
 
+/// A floor of static boxes of this side [m] along X, whose tops are at the height 0. The boxes from the n-th
+/// on are higher by `step` [m].
+void add_tiles(World& world, Real side, int n, Real step) {
+  for (int i = 0; i < 2 * n; ++i)
+    world.add_body({.shape = Box{{side, 0.1, 1}},
+                    .motion = MotionType::static_body,
+                    .pose = {Vec3((i - n + 0.5) * side, (i < n ? 0 : step) - 0.05, 0)},
+                    .restitution = 0,
+                    .friction = 0});
+}
+
+// Particles that have resting contacts slide over the seams between flush boxes as on one box.
+TEST(ParticlesAndBodies, SeamsBetweenFlushBoxesDoNotStopParticles) {
+  struct Variant {
+    bool internal, external, rotates;
+  };
+  for (const Variant v :
+       {Variant{true, false, false}, Variant{false, true, false}, Variant{false, false, true}}) {
+    for (const Real radius : {0.01, 0.05}) {
+      for (const Real side : {0.05, 0.25, 2.0}) {
+        for (const Real h : {1.0 / 60, 1.0 / 240}) {
+          World world({.max_step = h, .sleep = false});
+          add_tiles(world, side, static_cast<int>(std::ceil(2 / side)), 0);
+          const auto system = world.add_particle_system(
+              {.internal = v.internal, .external = v.external, .rotates = v.rotates});
+          world.add_particle(system, {.position = {-1.5, radius, 0.03},
+                                      .velocity = {5, 0, 0},
+                                      .mass = 1,
+                                      .radius = radius,
+                                      .restitution = 0,
+                                      .friction = 0});
+          Real highest = 0;
+          for (int i = 0; i < 36; ++i) {
+            world.step(1.0 / 60);
+            highest = std::max(highest, world.particles(system).position[0].y());
+          }
+          EXPECT_NEAR(world.particles(system).position[0].x(), 1.5, 5e-6)
+              << radius << ' ' << side << ' ' << h;
+          EXPECT_LT(highest, radius + 5e-6) << radius << ' ' << side << ' ' << h;
+        }
+      }
+    }
+  }
+}
+
+// A step of a fifth of the radius is no seam: without restitution, the particle loses the part of its
+// velocity that points into the edge.
+TEST(ParticlesAndBodies, ALowStepHoldsParticlesBack) {
+  World world({.max_step = 1.0 / 240, .sleep = false});
+  add_tiles(world, 1, 2, 0.01);
+  const auto system = world.add_particle_system({.internal = true});
+  world.add_particle(system, {.position = {-1, 0.05, 0},
+                              .velocity = {2, 0, 0},
+                              .mass = 1,
+                              .radius = 0.05,
+                              .restitution = 0,
+                              .friction = 0});
+  for (int i = 0; i < 33; ++i) world.step(1.0 / 60);
+  EXPECT_GT(world.particles(system).position[0].y(), 0.06);
+  EXPECT_LT(world.particles(system).velocity[0].x(), 1.5);
+}
+
 // A hundred particles that are heavier than the plate together: resolving each impact on its own would add
 // energy.
 TEST(ParticlesAndBodies, ManyHitsOnALightBodyInOneStepKeepMomentumAndEnergy) {
