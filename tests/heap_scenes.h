@@ -106,10 +106,12 @@ inline void add_ragdoll(World& world, const Pose& at) {
   }
 }
 
-/// Returns the world of a heap at the start, before there are any contacts.
-inline World heap_scene(Heap heap, SolverKind solver = SolverKind::automatic, Real step = 1.0 / 240) {
+/// Returns the world of a heap at the start, before there are any contacts. Each seed places the bodies
+/// differently.
+inline World heap_scene(Heap heap, SolverKind solver = SolverKind::automatic, Real step = 1.0 / 240,
+                        uint64_t seed = 11) {
   World world({.max_step = step, .solver = solver});
-  const Scatter random{11};
+  const Scatter random{seed};
   const auto u = [&](int i, uint64_t k) { return random.uniform(static_cast<uint64_t>(i), k); };
   const auto turn = [&](int i) {
     return Quat(u(i, 4) - 0.5, u(i, 5) - 0.5, u(i, 6) - 0.5, u(i, 7) - 0.5).normalized();

@@ -59,6 +59,7 @@ class Pieces {
     }
     return {};
   }
+  Real cost() const { return cost_; }  ///< [ns]
 
  private:
   /// Solves the closed contacts and the joints: for the rest of the interval, or for an impact at the current
@@ -87,8 +88,8 @@ class Pieces {
     const std::vector<ContactBody> before = bodies_;
     const std::optional<ContactWork> work = newton_.solve(
         bodies_, closed_, {problem_.joints.constraints, bounded_, reactions_}, problem_.budget - cost_);
-    if (!work || work->fallbacks > 0) return false;
     cost_ += newton_.cost();
+    if (!work || work->fallbacks > 0) return false;
     result_.work.add(*work);
     return now ? added_energy(before, bodies_, closed_) <= kClosingRounding * kinetic_energy(before) : true;
   }
@@ -200,8 +201,12 @@ class Pieces {
 
 }  // namespace
 
-std::optional<ClosingSolution> solve_closing(const ClosingProblem& problem, ProximalNewton& newton) {
-  return Pieces(problem, newton).solve();
+std::optional<ClosingSolution> solve_closing(const ClosingProblem& problem, ProximalNewton& newton,
+                                             Real& cost) {
+  Pieces pieces(problem, newton);
+  std::optional<ClosingSolution> solution = pieces.solve();
+  cost = pieces.cost();
+  return solution;
 }
 
 }  // namespace offstage::sim

@@ -60,7 +60,8 @@ struct ClosingProblem {
 
 /// Solves an interval in pieces. A point with a gap pushes from the time at which the gap closes, and does
 /// not rebound. Returns no result if there are more than 16 closing times, if a solution fails or adds
-/// energy, or if the total cost exceeds the budget.
-std::optional<ClosingSolution> solve_closing(const ClosingProblem& problem, ProximalNewton& newton);
+/// energy, or if the total cost exceeds the budget. `cost` is the cost in any case [ns].
+std::optional<ClosingSolution> solve_closing(const ClosingProblem& problem, ProximalNewton& newton,
+                                             Real& cost);
 
 }  // namespace offstage::sim

@@ -36,6 +36,9 @@ constexpr uint32_t kCollisionSweeps = 200, kPlasticSweeps = 400, kJointedSweeps 
 /// kMoreUpdates: the same for later solutions of the same cluster. kBoundedSolves: solutions in the search
 /// for the restitution. kJointBudget: cost of a solution with joints [ns].
 constexpr std::size_t kUpdates = 4'000, kMoreUpdates = 1'000;
+/// Sweeps under Effort::bounded that cannot be improved end when no velocity changes by more than this
+/// fraction of the velocities.
+constexpr Real kSweptRest = 1e-4;
 constexpr int kBoundedSolves = 3;
 constexpr Real kJointBudget = 1e6;
 /// Clusters of at most this many contacts whose sweeps did not converge are solved by the proximal method, if
@@ -258,17 +261,22 @@ class Cluster {
     return is_swept() || work.residual <= kRoughResidual * fastest_;
   }
 
-  /// Makes a bounded number of sweeps. The first call starts with zero impulses; later calls start with the
-  /// impulses of the previous call.
+  /// Makes a bounded number of sweeps. The first call starts with the guesses of the impulses, if there are
+  /// any; later calls start with the impulses of the previous call.
   ContactWork go_on_sweeping() {
     const std::size_t updates = has_swept_ ? kMoreUpdates : kUpdates;
     if (!has_swept_)
-      for (Contact& c : contacts_) c.impulse.setZero();
+      for (Contact& c : contacts_) {
+        if (!c.is_guessed) c.impulse.setZero();
+        apply(c, c.impulse, bodies_);
+      }
     has_swept_ = true;
+    const bool may_improve = contacts_.size() <= kImproved && budget_ && *budget_ > 0;
     const uint32_t most = sweeps_of(updates),
-                   sweeps = projected_gauss_seidel(bodies_, contacts_, most, kRounding * fastest_);
+                   sweeps = projected_gauss_seidel(bodies_, contacts_, most,
+                                                   (may_improve ? kRounding : kSweptRest) * fastest_);
     ContactWork work{.solves = 1, .iterations = sweeps, .residual = residual(bodies_, contacts_)};
-    if (sweeps == most && contacts_.size() <= kImproved && budget_ && *budget_ > 0) improve(work);
+    if (sweeps == most && may_improve) improve(work);
     return work;
   }
 
@@ -442,6 +450,7 @@ class Sequence {
     for (Contact& c : contacts) {
       still_ = std::max(still_, kResting * approach(c, bodies));
       c.impulse.setZero();
+      c.is_guessed = false;
       c.target = 0;
     }
   }

@@ -18,6 +18,8 @@ struct ContactInterval {
   /// impact would be far too large for a whole sub-step. Forces would also accumulate if a part were solved
   /// again after each of many impacts.
   bool is_whole = true;
+  /// Whether SolverKind::automatic uses the fast solver in any case.
+  bool is_cheap = false;
 };
 
 }  // namespace offstage::sim

@@ -81,6 +81,7 @@ ClosingPoint closing_point(Real gap, const Vec3& surface, const ContactMotion& m
 
 ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactInterval& interval,
                                             Real budget, Method method) {
+  cost_ = division_cost_ = 0;
   bodies_.clear();
   contacts_.clear();
   pairs_.clear();
@@ -138,7 +139,6 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
 std::optional<ContactWork> ExactContacts::solve_by_newton(Real budget) {
   const std::vector<ContactBody> start = bodies_;
   ContactWork total;
-  cost_ = 0;
   for (int turn = 1;; ++turn, bodies_ = start) {
     const std::optional<ContactWork> work =
         newton_.solve(bodies_, contacts_, joints_.problem(), budget - cost_);
@@ -218,8 +218,8 @@ bool ExactContacts::divide_at_closings(const Island& island, const ContactInterv
   for (std::size_t i = 0; i < guesses.size(); ++i)
     if (guesses[i].is_guessed) guesses[i].impulse = interval.duration * forces_[i]->last;
   const JointProblem joints = joints_.problem();
-  std::optional<ClosingSolution> solution =
-      solve_closing({start, free_, guesses, points_, joints, interval.duration, budget}, newton_);
+  std::optional<ClosingSolution> solution = solve_closing(
+      {start, free_, guesses, points_, joints, interval.duration, budget}, newton_, division_cost_);
   if (!solution) return false;
   const auto exchange = [&] {
     std::swap(bodies_, solution->bodies);

@@ -34,9 +34,10 @@ class ExactContacts {
   /// energy; otherwise the fast solver, whose work is bounded, must solve the island.
   Outcome solve(const Island& island, const ContactInterval& interval, Real budget,
                 Method method = Method::proximal);
-  /// Cost of the last solve() [ns]. The cost of dividing the interval at the times at which contacts close is
-  /// not included.
+  /// Cost of the last solve(), without division_cost() [ns].
   Real cost() const { return cost_; }
+  /// Cost of dividing the interval of the last solve() at the times at which contacts close [ns].
+  Real division_cost() const { return division_cost_; }
 
  private:
   /// A point that slides throughout the interval.
@@ -76,7 +77,7 @@ class ExactContacts {
   std::vector<Displacement> displacements_;  // by body, if the interval was divided
   bool has_carrier_ = false;                 // whether a body may ride on a body of the contacts
   RidingBodies riding_;
-  Real cost_ = 0;
+  Real cost_ = 0, division_cost_ = 0;
   IslandJoints joints_;
   ProximalNewton newton_;
 };

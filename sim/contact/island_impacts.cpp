@@ -19,14 +19,27 @@ constexpr std::size_t kSmallCluster = 40, kCluster = 100;
 constexpr int kGrowths = 2;
 /// Contacts that approach more slowly than this carry their bodies [m/s].
 constexpr Real kStillCloses = 1e-4;
-/// Cost of an update of a contact, and of a product of a dense factorization [ns].
-constexpr Real kContactUpdate = 60, kDenseProduct = 0.7;
+/// Cost of an update of a contact, of a product of a dense factorization, and of a body in a factorization of
+/// a system with joints, which is sparse [ns].
+constexpr Real kContactUpdate = 60, kDenseProduct = 0.7, kSparseBody = 3000;
+
+/// Returns the cost of a factorization without joints, for at most this many contacts [ns].
+Real dense_cost(std::size_t contacts, bool whole) {
+  const std::size_t most = whole ? kSmallCluster : kFewContacts;
+  return std::pow(3.0 * static_cast<Real>(std::min(contacts, most)), 3) * kDenseProduct;
+}
 
 std::vector<std::size_t> indices_of(std::span<const uint8_t> marks) {
   std::vector<std::size_t> marked;
   for (std::size_t i = 0; i < marks.size(); ++i)
     if (marks[i]) marked.push_back(i);
   return marked;
+}
+
+std::vector<std::size_t> all_of(std::size_t count) {
+  std::vector<std::size_t> all(count);
+  std::iota(all.begin(), all.end(), 0);
+  return all;
 }
 
 /// Contacts of an island that collide together, with the bodies' velocities before the collision.
@@ -37,7 +50,7 @@ struct CollisionCluster {
   std::vector<uint8_t> bounces, touches;  // by contact
   std::vector<const ContactPair*> pairs;  // by contact
 
-  void add(const ContactPair& pair, Real reach, Real collision_speed, ImpactLaw law) {
+  void add(const ContactPair& pair, const CollisionSettings& settings) {
     const auto row = [&](const Body& body) {
       if (body.is_awake()) return body.row;
       bodies.push_back(unmoved_body(body));
@@ -48,8 +61,11 @@ struct CollisionCluster {
     for (const PlacedManifold& m : pair.manifolds())
       for (uint32_t k = 0; k < m.manifold.count; ++k) {
         const ContactPoint& point = m.manifold.points[k];
-        if (point.separation > reach) continue;
         const Vec3 place = (point.on_a + point.on_b) / 2;
+        if (point.separation > settings.reach &&
+            (settings.ahead == 0 ||
+             point.separation + settings.ahead * pair.relative_velocity(place).dot(m.frame.n) > 0))
+          continue;
         Contact c{.a = a, .b = b, .frame = m.frame};
         c.arm_a = place - origin(pair.a());
         c.arm_b = place - origin(pair.b());
@@ -58,11 +74,11 @@ struct CollisionCluster {
         std::tie(c.friction_t, c.friction_k) = friction(pair.surface(), u);
         contacts.push_back(c);
         pairs.push_back(&pair);
-        bounces.push_back(u.x() < -collision_speed);
+        bounces.push_back(u.x() < -settings.collision_speed);
         touches.push_back(point.separation <= kTouching);
         // In a sequence, the impulse of another contact can make a resting contact collide.
-        restitution.push_back(bounces.back() || law == ImpactLaw::sequential ? pair.surface().restitution
-                                                                             : 0);
+        restitution.push_back(
+            bounces.back() || settings.law == ImpactLaw::sequential ? pair.surface().restitution : 0);
       }
   }
 
@@ -92,15 +108,26 @@ struct CollisionCluster {
   }
 };
 
+/// Returns the cost of solving some contacts of a cluster [ns].
+Real cost_of(const ContactWork& work, const CollisionCluster& cluster, std::size_t contacts, bool whole,
+             bool with_joints) {
+  const Real factorization =
+      with_joints ? kSparseBody * static_cast<Real>(cluster.bodies.size()) : dense_cost(contacts, whole);
+  return kContactUpdate * static_cast<Real>(work.iterations * contacts) +
+         factorization * static_cast<Real>(work.factorizations);
+}
+
 /// Collides the part of a large cluster that the impact reaches: the bouncing contacts and the contacts
-/// around them. If the impulses make other contacts approach faster than `speed`, these contacts and the
+/// around them. If the impulses make other contacts approach so fast that they bounce, these contacts and the
 /// contacts around them are added. This is repeated until there are no more. The other contacts need no
 /// impulse. After kGrowths extensions, a cluster of at most kCluster contacts is solved as a whole if there
-/// is budget left. Others are truncated; afterwards the omitted contacts block as resting contacts.
-ContactWork collide_reached(CollisionCluster& cluster, Real speed, ImpactLaw law, const JointProblem& joints,
-                            Real& budget) {
+/// is budget left. Others are truncated; afterwards the omitted contacts block as resting contacts. The cost
+/// is added to `cost` [ns].
+ContactWork collide_reached(CollisionCluster& cluster, const CollisionSettings& settings,
+                            const JointProblem& joints, Real& budget, Real& cost) {
   std::vector<uint8_t> taken(cluster.contacts.size(), 0);
   std::vector<std::size_t> wanted = indices_of(cluster.bounces);
+  if (settings.ahead > 0 && !wanted.empty()) wanted = all_of(cluster.contacts.size());
   const std::vector<ContactBody> before = cluster.bodies;
   ContactWork work;
   for (int round = 0; !wanted.empty(); ++round) {
@@ -113,21 +140,24 @@ ContactWork collide_reached(CollisionCluster& cluster, Real speed, ImpactLaw law
       restitution.push_back(cluster.restitution[i]);
     }
     cluster.bodies = before;
-    const ContactWork one = collide_bounded(cluster.bodies, contacts, restitution, law, joints, budget);
+    const ContactWork one =
+        collide_bounded(cluster.bodies, contacts, restitution, settings.law, joints, budget);
+    cost += cost_of(one, cluster, contacts.size(), false, !joints.empty());
     work.add(one);
     work.solves = 1;
     work.fallbacks = one.fallbacks;
     work.residual = one.residual;
-    for (std::size_t k = 0; k < together.size(); ++k)
+    for (std::size_t k = 0; k < together.size(); ++k) {
       cluster.contacts[together[k]].impulse = contacts[k].impulse;
+      cluster.contacts[together[k]].is_guessed = true;
+    }
     wanted.clear();
     for (std::size_t i = 0; i < taken.size(); ++i)
-      if (!taken[i] && cluster.contacts[i].relative_velocity(cluster.bodies).x() < -speed)
+      if (!taken[i] && cluster.contacts[i].relative_velocity(cluster.bodies).x() < -settings.collision_speed)
         wanted.push_back(i);
     if (wanted.empty()) break;
     if (round == kGrowths && taken.size() <= kCluster && budget > 0) {
-      wanted.resize(taken.size());
-      std::iota(wanted.begin(), wanted.end(), 0);
+      wanted = all_of(taken.size());
     } else if (together.size() > kCluster || round >= kGrowths) {
       work.cluster_truncated = 1;
       break;
@@ -145,26 +175,22 @@ CollisionOutcome resolve_collisions(const Island& island, const CollisionSetting
     cluster.bodies.push_back({1 / body->rigid.mass, inverse_inertia(body->rigid, body->start.orientation),
                               body->start_twist.velocity, body->start_twist.angular_velocity});
   }
-  for (const ContactPair* pair : island.pairs)
-    cluster.add(*pair, settings.reach, settings.collision_speed, settings.law);
+  for (const ContactPair* pair : island.pairs) cluster.add(*pair, settings);
   CollisionOutcome outcome;
   if (cluster.contacts.empty() || cluster.only_closes()) return outcome;
   IslandJoints joints;
   joints.collect_for_collision(island, settings.time, settings.substep);
   const JointProblem problem = joints.problem();
+  const bool is_reached = !settings.whole && cluster.contacts.size() > kSmallCluster;
   if (settings.whole)
     outcome.work = collide(cluster.bodies, cluster.contacts, cluster.restitution, settings.law, problem);
-  else if (cluster.contacts.size() <= kSmallCluster)
+  else if (!is_reached)
     outcome.work =
         collide_bounded(cluster.bodies, cluster.contacts, cluster.restitution, settings.law, problem, budget);
   else
-    outcome.work = collide_reached(cluster, settings.collision_speed, settings.law, problem, budget);
-  // Without joints, the work is bounded and only small clusters are factorized.
-  const std::size_t dense =
-      std::min(cluster.contacts.size(), settings.whole || !problem.empty() ? kSmallCluster : kFewContacts);
-  outcome.cost = static_cast<Real>(outcome.work.iterations * cluster.contacts.size()) * kContactUpdate +
-                 static_cast<Real>(outcome.work.factorizations) *
-                     std::pow(3.0 * static_cast<Real>(dense), 3) * kDenseProduct;
+    outcome.work = collide_reached(cluster, settings, problem, budget, outcome.cost);
+  if (!is_reached)
+    outcome.cost = cost_of(outcome.work, cluster, cluster.contacts.size(), settings.whole, !problem.empty());
   if (outcome.work.fallbacks > 0)
     if (const auto worst = worst_contact(cluster.bodies, cluster.contacts))
       outcome.rough = cluster.pairs[*worst];

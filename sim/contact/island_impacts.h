@@ -13,6 +13,8 @@ struct CollisionSettings {
   Real collision_speed;  ///< contacts that approach faster bounce [m/s]
   ImpactLaw law;
   bool whole;  ///< true: all contacts of the island; false: only those around the contacts that bounce
+  /// Contacts that will close within this time at their current speed also take part [s].
+  Real ahead = 0;
 };
 
 struct CollisionOutcome {

@@ -28,11 +28,18 @@ constexpr Real kLittle = 0.05;
 /// stay at rest and the following solutions are cheap.
 constexpr Real kMostOfFew = 2e6, kMostOfMoving = 3, kQuiet = 0.1;
 
+/// Greatest cost of all attempts of a sub-step [ns], in a small world [ns], and as a multiple of the fast
+/// solver's cost. The first sub-step of a world may use the whole credit: no forces are known yet, and a
+/// scene that starts at rest stays at rest.
+constexpr Real kMostOfSubstep = 1e6, kMostOfSmallSubstep = 3e6, kMostOfLargeSubstep = 3;
+
 bool is_quiet(const Island& island) {
   return std::all_of(island.bodies.begin(), island.bodies.end(), [](const Body* body) {
     return body->start_twist.velocity.norm() + body->turning_speed() < kQuiet;
   });
 }
+
+}  // namespace
 
 Real fast_cost(const Island& island, Real duration) {
   Real points = 0;
@@ -43,19 +50,30 @@ Real fast_cost(const Island& island, Real duration) {
   return (points * kFastPoint + joints * kFastJoint) * relaxation_substeps(duration);
 }
 
-}  // namespace
-
 void ExactSolverBudget::begin(std::span<Island* const> islands, Real duration) {
   Real fast = 0;
   for (const Island* island : islands) fast += fast_cost(*island, duration);
   small_ = fast < kSmall;
   debt_ = std::max(0.0, debt_ - kFraction * fast);
   left_ = std::max(0.0, 1 - debt_ / (kCredit * std::max(fast, kSmall)));
+  substep_left_ = is_first_ ? kInfinity
+                  : small_  ? kMostOfSmallSubstep
+                            : std::max(kMostOfSubstep, kMostOfLargeSubstep * fast);
+  is_first_ = is_first_ && islands.empty();
 }
 
-bool SolverChoice::should_try_exact(const Island& island, const ExactSolverBudget& shared) {
+void ExactSolverBudget::share(std::span<Real> budgets) const {
+  Real sum = 0;
+  for (const Real budget : budgets) sum += budget;
+  if (sum <= substep_left_) return;
+  for (Real& budget : budgets) budget *= substep_left_ / sum;
+}
+
+bool SolverChoice::should_try_exact(const Island& island, const ExactSolverBudget& shared, bool is_whole) {
+  if (!shared.has_left_in_substep()) return false;
   if (shared.is_small() && island.bodies.size() <= kFewBodies) return true;
-  if (wait_ == 0) return proven_ || shared.left() > kLittle;
+  if (wait_ == 0)
+    return proven_ || (shared.left() > kLittle && (is_whole || island.bodies.size() <= kFewBodies));
   --wait_;
   return false;
 }
@@ -68,10 +86,11 @@ Real SolverChoice::budget(const Island& island, Real duration, const ExactSolver
 
 void SolverChoice::record_attempt(const Island& island, Real duration, bool solved,
                                   ExactSolverBudget& shared) {
-  if (shared.is_small() && island.bodies.size() <= kFewBodies) return;
   const Real fast = fast_cost(island, duration), excess = exact->cost() - kWorth * fast;
+  const bool always = shared.is_small() && island.bodies.size() <= kFewBodies;
+  shared.spend(exact->cost() + exact->division_cost(), always ? 0 : excess);
+  if (always) return;
   proven_ = solved && excess <= 0;
-  shared.spend(excess);
   debt_ = std::max(0.0, debt_ + excess);
   if (solved && debt_ <= kCredit * fast) return;
   wait_ = static_cast<uint32_t>(std::clamp(debt_ / (kFraction * fast), 1.0, kLongestWait));

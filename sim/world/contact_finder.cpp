@@ -195,6 +195,7 @@ void ContactFinder::propagate_impact_speeds(Real h) {
 }
 
 void ContactFinder::find(Real h) {
+  traces_impacts_ = true;
   const std::span<Body* const> awake = active_.awake();
   is_exact_ = world_.is_exact() || (world_.def.solver == SolverKind::automatic && awake.size() <= kFewBodies);
   std::vector<Aabb> swept_boxes(awake.size());
@@ -245,6 +246,7 @@ void ContactFinder::find_points(ContactPair& pair, Real time, Real h) const {
   const bool exact = is_exact_;
   // An impact moves a body at most as fast as the body that hits it.
   const Real impact = std::max(pair.a().impact_speed_bound, pair.b().impact_speed_bound) * left;
+  pair.toi_exhausted = pair.toi_exhausted || !traces_impacts_;
   // If the pair is not traced back again, only its contact points keep the bodies apart.
   const Real most = pair.toi_exhausted ? std::numeric_limits<Real>::infinity() : far;
   const Real margin = base + std::min(std::max(2 * motion, impact), most);

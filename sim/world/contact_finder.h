@@ -59,6 +59,8 @@ class ContactFinder {
   /// Whether each collision of this sub-step is resolved at its own time. This holds for the exact solvers,
   /// and for SolverKind::automatic while few bodies move.
   bool is_exact() const { return is_exact_; }
+  /// Sets ContactPair::toi_exhausted for all pairs whose points are found in the rest of the sub-step.
+  void stop_tracing() { traces_impacts_ = false; }
 
   /// Adds the statistics of the sub-step to the report.
   void count(StepReport& report) const;
@@ -79,7 +81,7 @@ class ContactFinder {
   GroupedBroadPhase broad_phase_;  // the colliding bodies, by slot; articulations are groups
   ContactGraph graph_;
   std::vector<ContactPair*> pairs_;
-  bool is_current_ = false, is_exact_ = false;
+  bool is_current_ = false, is_exact_ = false, traces_impacts_ = true;
   uint64_t version_ = 0;  // ActiveBodies::version() for which the pairs were found
 };
 

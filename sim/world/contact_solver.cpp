@@ -48,6 +48,7 @@ Real most_energy(const Island& island, Real fraction) {
 }  // namespace
 
 void ContactSolver::solve_all(std::span<Island> islands, Real start, Real h, StepReport& report) {
+  cost_ = 0;
   std::vector<Island*> all;
   for (Island& island : islands)
     if (has_forces(island)) all.push_back(&island);
@@ -77,7 +78,8 @@ void ContactSolver::solve(std::span<Island* const> group, const ContactInterval&
       continue;
     }
     SolverChoice& choice = choices_[island->bodies.front()->handle.index];
-    if (world_.def.solver == SolverKind::automatic && !choice.should_try_exact(*island, patience_)) {
+    if (world_.def.solver == SolverKind::automatic &&
+        (interval.is_cheap || !choice.should_try_exact(*island, patience_, interval.is_whole))) {
       fast.push_back(island);
       continue;
     }
@@ -90,11 +92,15 @@ void ContactSolver::solve(std::span<Island* const> group, const ContactInterval&
   std::vector<ExactContacts::Outcome> outcomes(exact.size());
   using Method = ExactContacts::Method;
   const Method method = world_.def.solver == SolverKind::lcp ? Method::lcp : Method::proximal;
+  std::vector<Real> budgets(exact.size(), kInfinity);
+  if (!world_.is_exact()) {
+    for (std::size_t i = 0; i < exact.size(); ++i)
+      budgets[i] = exact[i].second->budget(*exact[i].first, interval.duration, patience_);
+    patience_.share(budgets);
+  }
   const auto run = [&](std::size_t i) {
     const auto& [island, choice] = exact[i];
-    const Real budget = world_.is_exact() ? std::numeric_limits<Real>::infinity()
-                                          : choice->budget(*island, interval.duration, patience_);
-    outcomes[i] = choice->exact->solve(*island, interval, budget, method);
+    outcomes[i] = choice->exact->solve(*island, interval, budgets[i], method);
   };
   if (exact.size() < 2) {
     for (std::size_t i = 0; i < exact.size(); ++i) run(i);
@@ -107,11 +113,13 @@ void ContactSolver::solve(std::span<Island* const> group, const ContactInterval&
     report.solvers.exact.add(outcome.work);
     report.solvers.lcp.add(outcome.lcp);
     record_rough_contact(outcome.rough, report);
+    cost_ += choice->exact->cost() + choice->exact->division_cost();
     choice->record_attempt(*island, interval.duration, outcome.is_applied, patience_);
     if (outcome.is_applied) continue;
     report.solvers.exact.over_budget += outcome.work.fallbacks == 0;
     fast.push_back(island);
   }
+  for (const Island* island : fast) cost_ += fast_cost(*island, interval.duration);
   if (!fast.empty()) report.solvers.fast.add(fast_.solve(fast, interval));
   sprung.keep_on_contacts();
   for (std::size_t i = 0; i < group.size(); ++i)

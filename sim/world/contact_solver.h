@@ -21,12 +21,15 @@ class ContactSolver {
   void solve(std::span<Island* const> group, const ContactInterval& interval, StepReport& report);
   /// Solves one island over an interval, if any forces can act in it.
   void solve(Island& island, const ContactInterval& interval, StepReport& report);
+  /// Cost of all solutions since the start of the sub-step, estimated from the number of operations [ns].
+  Real cost() const { return cost_; }
 
  private:
   const WorldState& world_;
   std::map<uint32_t, SolverChoice> choices_;  // by the slot of an island's first body
   ExactSolverBudget patience_;
   FastContacts fast_;
+  Real cost_ = 0;
 };
 
 /// Adds a pair with inaccurate contact forces to StepReport::rough_contacts. Does nothing for null.

@@ -15,15 +15,17 @@ namespace {
 
 constexpr uint32_t kMaxImpactsOfPair = 40, kMaxOfTumblingPair = 100;
 constexpr std::size_t kMaxImpacts = 128, kImpactsPerBody = 4;
-/// Limits of the work of impacts in a sub-step, for the fast and for the exact solver [us]. In a pile each
-/// impact moves many bodies and causes hundreds of other impacts.
-constexpr std::size_t kImpactWork = 2000, kExactImpactWork = 80'000;
-/// Work of an impact: for each body and contact point that is moved again (kPointWork), and for each near
-/// pair that is not two spheres (kPairWork). kLookWork: work of a search for the time of impact of a pair,
-/// for each piece of its path [us].
-constexpr std::size_t kPointWork = 1, kPairWork = 3, kLookWork = 3;
-/// After this multiple of the limit, no pair is traced back in the rest of the sub-step.
-constexpr std::size_t kLastWork = 3;
+/// Limits of the cost of impacts in a sub-step: of many bodies, of few ones, and with the exact solvers [ns].
+/// In a pile each impact moves many bodies and causes hundreds of other impacts. After the first limit,
+/// restitution is suppressed, and impacts are solved together. After kLastCost times the limit, all impacts
+/// that are still pending are solved together, and no pair is traced back in the rest of the sub-step.
+/// The limits are larger in sub-steps that are longer than kUsualStep [s], which contain more impacts.
+constexpr Real kImpactCost = 6e5, kImpactCostOfFew = 2e6, kExactImpactCost = 8e7, kLastCost = 2;
+constexpr Real kUsualStep = 1.0 / 240;
+/// Cost of an impact, in addition to the solvers: of each body and contact point that is moved again
+/// (kPointCost), of finding the points of a pair (kPairCost), and of a search for the time of impact of a
+/// pair, for each piece of its path (kSearchCost) [ns].
+constexpr Real kPointCost = 200, kPairCost = 500, kSearchCost = 3000;
 /// If the contact point of a body moves around its rim by more than `turn` [rad] in the sub-step, the
 /// sub-step is divided for that body into at most `most` pieces, and its contacts are updated after
 /// each piece. Islands with more than kMostRimBodies bodies are not divided, because all of their contacts
@@ -45,12 +47,12 @@ bool is_in(const Body& body, uint32_t island) {
   return body.is_awake() && body.island == island;
 }
 
-/// Returns the work of moving an island again [us].
-std::size_t impact_work(const Island& island) {
-  std::size_t work = island.bodies.size();
+/// Returns the cost of moving an island again, without its contact forces [ns].
+Real moving_cost(const Island& island) {
+  std::size_t count = island.bodies.size();
   for (const ContactPair* pair : island.pairs)
-    for (const PlacedManifold& m : pair->manifolds()) work += m.manifold.count;
-  return kPointWork * work;
+    for (const PlacedManifold& m : pair->manifolds()) count += m.manifold.count;
+  return kPointCost * static_cast<Real>(count);
 }
 
 /// Returns the speed that forces have given to the points of a body in the rest of its interval, which lasts
@@ -64,8 +66,17 @@ Real speed_by_forces(const Body& body, Real duration) {
 
 }  // namespace
 
+/// Returns the cost of the impacts of the sub-step so far [ns].
+Real ImpactStage::cost() const {
+  return cost_ + solver_.cost() - cost_before_;
+}
+Real ImpactStage::greatest_cost() const {
+  if (world_.is_exact()) return kExactImpactCost;
+  return std::max(1.0, h_ / kUsualStep) * (contacts_.is_exact() ? kImpactCostOfFew : kImpactCost);
+}
+
 template <class IsWanted>
-std::size_t ImpactStage::search(IsWanted&& is_wanted) {
+void ImpactStage::search(IsWanted&& is_wanted) {
   const std::span<ContactPair* const> pairs = contacts_.pairs();
   const std::vector<std::size_t> wanted =
       indices_where(pairs.size(), [&](std::size_t i) { return pairs[i]->needs_toi && is_wanted(*pairs[i]); });
@@ -78,12 +89,10 @@ std::size_t ImpactStage::search(IsWanted&& is_wanted) {
     report_.contacts.volume_tests += t.volumes;
     report_.contacts.piece_tests += t.pieces;
   }
-  std::size_t work = 0;
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     if (times[i]) pending_.push_back({*times[i], pairs[wanted[i]], true});
-    work += kLookWork * search_pieces(*pairs[wanted[i]], h_);
+    cost_ += kSearchCost * search_pieces(*pairs[wanted[i]], h_);
   }
-  return work;
 }
 
 /// Adds events that update the contacts of pairs whose contact point moves around a rim.
@@ -105,52 +114,110 @@ void ImpactStage::add_rim_updates() {
 }
 
 void ImpactStage::resolve() {
-  std::size_t work = search([](const ContactPair&) { return true; });
+  cost_before_ = solver_.cost();
+  search([](const ContactPair&) { return true; });
   add_rim_updates();
   if (pending_.empty()) return;
   // An impact moves back only bodies to which it is connected by forces. Most others in an island are only
   // near; they join if the impact sends a body towards them.
   find_moving_islands(world_, active_.awake(), contacts_.pairs(), touch_or_push, motion_.whole(), islands_);
 
-  const std::size_t most_work = world_.is_exact() ? kExactImpactWork : kImpactWork;
   for (std::size_t count = 0; !pending_.empty();) {
     const auto next = std::min_element(pending_.begin(), pending_.end(),
                                        [](const Event& x, const Event& y) { return x.time < y.time; });
     const Event event = *next;
+    if (event.is_impact && cost() > kLastCost * greatest_cost()) return end_at_once(event);
     if (event.is_impact) {
-      limit(*event.pair, count++, work);
+      limit(*event.pair, count++);
     } else {
       pending_.erase(next);
       const Body& body = event.pair->a().is_awake() ? event.pair->a() : event.pair->b();
       const Island& moving = islands_[body.island];
-      if (work > most_work || moving.from >= event.time || moving.bodies.size() > kMostRimBodies) continue;
+      if (cost() > greatest_cost() || moving.from >= event.time || moving.bodies.size() > kMostRimBodies)
+        continue;
     }
     const uint32_t island = gather(*event.pair, event.time);
-    work += impact_work(islands_[island]);
+    cost_ += moving_cost(islands_[island]);
     if (event.is_impact) {
       ++report_.impacts.tracebacks;
-      if (work > most_work) {
+      if (cost() > greatest_cost()) {
         join_pending(island, event.time);
         suppress_restitution(island);
       }
-      work += collide(island, event.time);
+      collide(island, event.time);
     } else {
       continue_from(island, event.time);
     }
     // The pending impacts of these bodies are no longer valid; the next ones are searched again.
     const auto involved = [&](const ContactPair& p) { return is_in(p.a(), island) || is_in(p.b(), island); };
     std::erase_if(pending_, [&](const Event& e) { return e.is_impact && involved(*e.pair); });
-    work += search(involved);
+    search(involved);
   }
 }
 
+/// Merges the islands that have pending impacts, and those that are near them, with an island at a time.
+void ImpactStage::join_all_pending(uint32_t number, Real time) {
+  const auto take = [&](const ContactPair& pair) {
+    for (const Body* body : {&pair.a(), &pair.b()}) {
+      if (!body->is_awake() || body->island == number) continue;
+      const uint32_t other = body->island;
+      trace_back(islands_[other], time);
+      join(number, other);
+    }
+  };
+  for (const Event& event : pending_)
+    if (event.is_impact) take(*event.pair);
+  for (bool grown = true; grown;) {
+    grown = false;
+    for (const ContactPair* pair : contacts_.pairs()) {
+      if (!pair->a().is_awake() || !pair->b().is_awake()) continue;
+      if ((pair->a().island == number) == (pair->b().island == number)) continue;
+      take(*pair);
+      grown = true;
+    }
+  }
+}
+
+/// Solves the rest of the sub-step together for all bodies near pending impacts, from the next impact on. All
+/// contacts that will close in this rest bounce at once, so that they keep their restitution. Afterwards only
+/// the contact solver stops bodies that approach each other.
+void ImpactStage::end_at_once(const Event& first) {
+  const Real time = first.time;
+  ++report_.impacts.toi_limit_reached;
+  contacts_.stop_tracing();
+  if (time >= h_ * (1 - kInstant)) return;
+  const uint32_t number = gather(*first.pair, time);
+  join_all_pending(number, time);
+  ++report_.impacts.tracebacks;
+  join_next(number, time);
+  accurate_left_ = 0;
+  bounce(number, time, h_ - time);
+  // The contact solver can propagate the greatest speed to all bodies.
+  Real fastest = 0;
+  for (const Body* body : islands_[number].bodies)
+    fastest = std::max(fastest, body->start_twist.velocity.norm());
+  for (Body* body : islands_[number].bodies)
+    body->impact_speed_bound = std::max(body->impact_speed_bound, fastest);
+  Island& island = islands_[number];
+  island.motion = &motion_.move_group(island.bodies, start_, time, h_ - time);
+  find_pairs_again(number);
+  join_next(number, time);
+  solver_.solve(islands_[number],
+                {.duration = h_ - time,
+                 .end = start_ + h_,
+                 .substep = h_,
+                 .impact_speed = world_.def.collision_speed,
+                 .is_whole = false,
+                 .is_cheap = true},
+                report_);
+  find_pairs_again(number);
+}
+
 /// Decides whether later impacts of a pair in this sub-step are traced back, and if not, sets
-/// ContactPair::toi_exhausted. `count`: number of previous impacts; `work`: work of impacts so far [us].
-void ImpactStage::limit(ContactPair& pair, std::size_t count, std::size_t work) {
+/// ContactPair::toi_exhausted. `count`: number of previous impacts.
+void ImpactStage::limit(ContactPair& pair, std::size_t count) {
   const std::size_t most = kMaxImpacts + kImpactsPerBody * active_.awake().size();
-  const std::size_t most_work = world_.is_exact() ? kExactImpactWork : kImpactWork;
-  if (++pair.impacts <= (turns_fast(pair, h_) ? kMaxOfTumblingPair : kMaxImpactsOfPair) && count < most &&
-      work <= kLastWork * most_work)
+  if (++pair.impacts <= (turns_fast(pair, h_) ? kMaxOfTumblingPair : kMaxImpactsOfPair) && count < most)
     return;
   pair.toi_exhausted = true;
   ++report_.impacts.toi_limit_reached;
@@ -230,13 +297,12 @@ void ImpactStage::join(uint32_t into, uint32_t other) {
 }
 
 /// Collides an island's bodies with each other and with other bodies that they touch at a time, and continues
-/// their motion from there. Returns the work of this [us].
-std::size_t ImpactStage::collide(uint32_t number, Real time) {
+/// their motion from there.
+void ImpactStage::collide(uint32_t number, Real time) {
   const std::span<ContactPair* const> pairs = contacts_.pairs();
   // Bodies of other islands that these bodies touch join the island, and then their own neighbours. The
   // points of a pair are found again when its second body has joined, because that body was moved back.
   std::vector<uint8_t> members(pairs.size(), 0);
-  std::size_t work = 0;
   for (bool grown = true; grown;) {
     grown = false;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -245,7 +311,7 @@ std::size_t ImpactStage::collide(uint32_t number, Real time) {
       const auto count = static_cast<uint8_t>(has_a + has_b);
       if (count == members[i]) continue;
       members[i] = count;
-      contacts_.find_points(pair, time, h_);
+      find_points(pair, time);
       const Body& other = has_a ? pair.b() : pair.a();
       if (count == 2 || !other.is_awake() || pair.separation() > kTouching) continue;
       const uint32_t joined = other.island;
@@ -258,21 +324,36 @@ std::size_t ImpactStage::collide(uint32_t number, Real time) {
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     ContactPair& pair = *pairs[i];
     const Body& other = is_in(pair.a(), number) ? pair.b() : pair.a();
-    if (members[i] > 0 && !pair.has_sphere()) work += kPairWork;
     if (members[i] == 0 || (members[i] == 1 && other.is_awake()) || pair.manifolds().empty()) continue;
     islands_[number].pairs.push_back(&pair);
   }
-  Island& island = islands_[number];
-  contacts_.remove_internal_edge_contacts(island.pairs, time, h_);
-  const CollisionSettings settings{
-      start_ + time, h_, kCluster, world_.def.collision_speed, world_.def.impact, contacts_.is_exact()};
+  contacts_.remove_internal_edge_contacts(islands_[number].pairs, time, h_);
+  bounce(number, time, 0);
+  if (time < h_ * (1 - kInstant)) continue_from(number, time);
+}
+
+/// Changes the velocities of an island by the impacts at a time. `ahead`: see CollisionSettings.
+void ImpactStage::bounce(uint32_t number, Real time, Real ahead) {
+  const Island& island = islands_[number];
+  const CollisionSettings settings{.time = start_ + time,
+                                   .substep = h_,
+                                   .reach = kCluster,
+                                   .collision_speed = world_.def.collision_speed,
+                                   .law = world_.def.impact,
+                                   .whole = contacts_.is_exact(),
+                                   .ahead = ahead};
   const CollisionOutcome outcome = resolve_collisions(island, settings, accurate_left_);
   report_.impacts.collisions += outcome.bounces;
   report_.solvers.impacts.add(outcome.work);
   record_rough_contact(outcome.rough, report_);
   for (Body* body : island.bodies) body->rigid.set_state(body->start);
-  if (time < h_ * (1 - kInstant)) continue_from(number, time);
-  return work + static_cast<std::size_t>(outcome.cost / 1000);
+  cost_ += outcome.cost;
+}
+
+/// Finds the contact points of a pair at a time.
+void ImpactStage::find_points(ContactPair& pair, Real time) {
+  contacts_.find_points(pair, time, h_);
+  cost_ += kPairCost;
 }
 
 /// Continues the motion of an island from an impact to the end of the sub-step. Its velocities have changed,
@@ -316,7 +397,7 @@ bool ImpactStage::join_next(uint32_t number, Real time) {
     ContactPair& pair = *pairs[i];
     const bool has_a = is_in(pair.a(), number), has_b = is_in(pair.b(), number);
     if (!has_a && !has_b) continue;
-    contacts_.find_points(pair, time, h_);
+    find_points(pair, time);
     const Body& other = has_a ? pair.b() : pair.a();
     if (has_a == has_b || !other.is_awake()) {
       if (!pair.manifolds().empty()) islands_[number].pairs.push_back(&pair);
@@ -349,7 +430,7 @@ bool ImpactStage::join_overtaken(uint32_t number, Real time) {
     // The known points of this pair have limited its approach.
     if (is_inside && !pair.manifolds().empty()) continue;
     if (std::max(pair.a().impact_speed_bound, pair.b().impact_speed_bound) * (h_ - time) > kTouching)
-      contacts_.find_points(pair, time, h_);
+      find_points(pair, time);
     if (pair.needs_toi || !overlaps_at_end(pair, time)) continue;
     if (is_inside) {
       new_inside.push_back(&pair);

@@ -3,7 +3,8 @@
 /// back to the time of impact, collide there, and continue for the rest of the sub-step. Other bodies are not
 /// changed. The work is bounded: if a pair collides too often in a sub-step, or if there are too many
 /// impacts, later ones are left to the contact solver, which also prevents tunnelling. In a pile with too
-/// many impacts the restitution of slower ones is suppressed for the rest of the sub-step.
+/// many impacts the restitution of slower ones is suppressed for the rest of the sub-step. If that is not
+/// enough, all contacts that would close in the rest of the sub-step bounce at once.
 ///
 /// The contact point of a wobbling coin moves far around its rim within a sub-step. Such a body is moved in
 /// several pieces of the sub-step, and its contacts are updated between them.
@@ -42,15 +43,21 @@ class ImpactStage {
   };
 
   template <class IsWanted>
-  std::size_t search(IsWanted&& is_wanted);
+  void search(IsWanted&& is_wanted);
+  Real cost() const;
+  Real greatest_cost() const;
   void add_rim_updates();
   uint32_t gather(const ContactPair& pair, Real time);
-  void limit(ContactPair& pair, std::size_t count, std::size_t work);
+  void join_all_pending(uint32_t number, Real time);
+  void end_at_once(const Event& first);
+  void limit(ContactPair& pair, std::size_t count);
   void trace_back(Island& island, Real time);
   void join(uint32_t into, uint32_t island);
   void join_pending(uint32_t number, Real time);
   void suppress_restitution(uint32_t island);
-  std::size_t collide(uint32_t number, Real time);
+  void collide(uint32_t number, Real time);
+  void bounce(uint32_t number, Real time, Real ahead);
+  void find_points(ContactPair& pair, Real time);
   void continue_from(uint32_t number, Real time);
   bool join_next(uint32_t number, Real time);
   bool join_overtaken(uint32_t number, Real time);
@@ -67,6 +74,8 @@ class ImpactStage {
   Real start_, h_;
   StepReport& report_;
   std::vector<Event> pending_;
+  Real cost_ = 0;         // without the solvers of resting contact [ns]
+  Real cost_before_ = 0;  // of the solvers of resting contact, before the first impact [ns]
   /// Cost of accurate solutions of large clusters that is left in the sub-step [ns]; at its start 0.5 ms.
   Real accurate_left_ = 5e5;
 };
