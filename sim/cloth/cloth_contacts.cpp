@@ -21,18 +21,15 @@ constexpr int kStopSweeps = 30;
 /// Points whose free motion ends nearer than this to the distance that they keep from a body have a support,
 /// in thicknesses: springs may move them farther.
 constexpr Real kSupportReach = 0.2;
-/// A dynamic body is a support of a cloth if the cloth's mass times the mobility of the body is at most this.
-/// A lighter body would need the impulses of the cloth within the sub-step.
-constexpr Real kMostMobile = 0.25;
 /// A point that its support keeps at the right distance but for rounding touches the body, in thicknesses.
 constexpr Real kTouching = 1e-6;
 
-/// Returns the mass of each cloth [kg]; infinite if pins hold it, because it can then stop any body.
-std::vector<Real> masses(const ClothPoints& points) {
-  std::vector<Real> mass(points.cloth.back() + 1, 0);
+/// Returns for each cloth whether pins hold it.
+std::vector<uint8_t> pinned_cloths(const ClothPoints& points) {
+  std::vector<uint8_t> pinned(points.cloth.back() + 1, 0);
   for (std::size_t i = 0; i < points.size(); ++i)
-    mass[points.cloth[i]] += points.inverse_mass[i] > 0 ? points.mass[i] : kInfinity;
-  return mass;
+    if (!(points.inverse_mass[i] > 0)) pinned[points.cloth[i]] = 1;
+  return pinned;
 }
 
 }  // namespace
@@ -168,7 +165,7 @@ void ClothContacts::collect(const ClothPoints& points, std::vector<BodyContact>&
 
 void ClothContacts::find_supports(ClothPoints& points, Real dt) {
   points.supports.clear();
-  std::vector<Real> mass;  // by cloth, if there are dynamic bodies
+  std::vector<uint8_t> pinned;  // by cloth, if there are dynamic bodies
   for (std::size_t k = 0; k < near_.size(); ++k) {
     Near& near = near_[k];
     const uint32_t i = near.point;
@@ -181,8 +178,8 @@ void ClothContacts::find_supports(ClothPoints& points, Real dt) {
     Touch t;
     if (!touch(points, near, end.head<3>(), kSupportReach * points.thickness[i], t)) continue;
     if (body.is_dynamic()) {
-      if (mass.empty()) mass = masses(points);
-      if (mass[points.cloth[i]] * body.mobility(t.on_body, t.normal) > kMostMobile) continue;
+      if (pinned.empty()) pinned = pinned_cloths(points);
+      if (pinned[points.cloth[i]]) continue;
     }
     const Vec4 normal = padded(t.normal), surface = padded(body.surface_motion(t.on_body));
     const Real gap = std::max(t.gap - normal.dot(end - points.start[i] - surface), 0.0);

@@ -179,6 +179,9 @@ void ClothSystem::integrate(Real dt) {
     const ClothRange range{first_[c],     first_[c] + cloths_[c]->points.size(),
                            springs_of(c), cloths_[c]->bending,
                            air_[c],       bend_limit_of(c)};
+    if (c > 0)  // cloths that were integrated before may have moved the bodies
+      for (Support& s : range.supports(points_))
+        if (s.body) s.surface = padded(s.body->surface_motion(s.on_body));
     if (integrator == ClothIntegrator::symplectic) step_symplectic(points_, range, dt);
     if (integrator == ClothIntegrator::rk4) step_rk4(points_, range, dt, kick_);
     if (integrator == ClothIntegrator::implicit && !step_implicit(points_, range, dt))
@@ -188,8 +191,6 @@ void ClothSystem::integrate(Real dt) {
       ++cloths_[c]->report.unconverged;
   }
   for (const Held& held : held_) points_.start[held.point] = held.from;
-  for (const Support& s : points_.supports)
-    if (s.body && s.given != Vec4::Zero()) s.body->apply_impulse(-s.given.head<3>() / dt, s.on_body);
 }
 
 /// Limits the bending of cloths whose integrator does not.
