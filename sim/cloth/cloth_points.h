@@ -2,6 +2,7 @@
 /// The points of all cloths of a world, as structures of arrays.
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -38,6 +39,21 @@ struct Support {
   Real least(Real part) const { return part * normal.dot(surface) - gap; }
 };
 
+/// A feature of a body under a triangle: the support of the point with these weights in the triangle. Only
+/// `relaxed` keeps it; after the other integrators, CornerContacts separates feature and triangle.
+struct TriangleSupport : Support {
+  Triangle corners;  ///< corners[0] == point
+  std::array<Real, 3> weights;
+
+  /// Returns the weighted sum of a value of the points.
+  template <class ValueOfPoint>
+  Vec4 sum(ValueOfPoint&& value) const {
+    Vec4 all = weights[0] * value(corners[0]);
+    for (std::size_t k = 1; k < 3; ++k) all += weights[k] * value(corners[k]);
+    return all;
+  }
+};
+
 struct ClothPoints {
   std::vector<Vec4> position;
   std::vector<Vec4> start;         ///< position at the start of the cloth's sub-step
@@ -58,12 +74,15 @@ struct ClothPoints {
   std::vector<Real> thickness, friction, self_friction;
   std::vector<uint32_t> cloth;    ///< index of the cloth of each point
   std::vector<Support> supports;  ///< of the sub-step, by point; at most one of a point
+  std::vector<std::vector<TriangleSupport>> triangle_supports;  ///< of the sub-step, by cloth
   /// Whether a support pushed the point in the last sub-step, for the integrator `implicit`.
   std::vector<uint8_t> supported;
 
   std::size_t size() const { return position.size(); }
   Vec3 at(std::size_t i) const { return position[i].head<3>(); }
   Vec3 start_at(std::size_t i) const { return start[i].head<3>(); }
+  /// Returns the position after a sub-step of length dt [s] without springs, contacts and pins.
+  Vec4 free_end(std::size_t i, Real dt) const { return start[i] + dt * (velocity[i] + dt * acceleration[i]); }
 };
 
 /// A part of a point's move that must not count as velocity, such as the correction of a penetration.

@@ -319,7 +319,7 @@ void keep_momentum(const ClothPoints& points, const ClothRange& cloth, const Imp
 bool step_implicit(ClothPoints& points, const ClothRange& cloth, Real h) {
   SpringRun x, v;
   begin_run(points, cloth, h, x, v);
-  SupportBodies bodies(points, cloth.supports(points));
+  SupportBodies bodies(points, cloth.supports(points), {});
   ImplicitSystem system(points, cloth, bodies, h);
   v.resize(system.size(), Vec4::Zero());
   const SpringRun b = system.right_side(v, h);
@@ -331,7 +331,7 @@ bool step_implicit(ClothPoints& points, const ClothRange& cloth, Real h) {
   for (const auto& [s, index] : system.resting()) bodies.push(index, -s->impulse * s->normal);
   for (const auto& [s, index] : system.resting()) {
     Vec4 move = h * v[s->point - cloth.begin];
-    bodies.rub(index, *s, 1, move);
+    move += bodies.rub(index, *s, 1, move);
     points.position[s->point] = points.start[s->point] + move;
   }
   bodies.advance();
