@@ -81,6 +81,7 @@ void ClothSystem::assemble() {
   points_.acceleration = points_.flow = points_.outer;
   points_.field_drag.assign(points_.size(), 0);
   points_.supported.assign(points_.size(), 0);
+  points_.triangle_supports.resize(cloths_.size());
   points_.pin_impulse.assign(points_.size(), Vec4::Zero());
   springs_.clear();
   springs_.resize(cloths_.size());

@@ -115,6 +115,17 @@ void ClothBody::apply_contact_impulse(const Vec3& impulse, const Vec3& p, Real f
   end_ = moved(on_path(to_), obstacle_.centre, shift_, turn_);
 }
 
+void ClothBody::apply_impulses(const Vec6& impulse, const Vec6& displacement) {
+  touched = true;
+  const Vec3 linear = impulse.head<3>(), angular = impulse.tail<3>();
+  reaction_.impulse += linear;
+  reaction_.angular_impulse += angular;
+  accelerate(obstacle_.inverse_mass * linear, obstacle_.inverse_inertia * angular);
+  shift_ += displacement.head<3>();
+  turn_ += displacement.tail<3>();
+  end_ = moved(on_path(to_), obstacle_.centre, shift_, turn_);
+}
+
 Mat6 ClothBody::mobility(const Mat6& carried) const {
   Mat6 own = Mat6::Zero();
   own.topLeftCorner<3, 3>().diagonal().setConstant(obstacle_.inverse_mass);

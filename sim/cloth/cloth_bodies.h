@@ -65,6 +65,9 @@ class ClothBody {
   /// the cloth: by `fraction` times the change of velocity times the length of the sub-step. A delayed
   /// response of the body would add energy.
   void apply_contact_impulse(const Vec3& impulse, const Vec3& p, Real fraction);
+  /// Applies an impulse [N s] and an angular impulse about centre() [N m s], and displaces the body by a
+  /// translation [m] and a small rotation [rad] already in this sub-step of the cloth.
+  void apply_impulses(const Vec6& impulse, const Vec6& displacement);
   /// Applies an impulse and an angular impulse about centre(), in this order, to a body together with the
   /// mass of the points pinned to it. `moving` is the part of the impulse that acts from the start of the
   /// cloth's sub-step and displaces the body within it. `carried` is the 6x6 mass matrix of these points

@@ -18,22 +18,8 @@ constexpr Real kStabilization = 0.3;
 /// Two normals face each other if the cosine of their angle is below this. Cloth between them is pinched.
 constexpr Real kFacing = -0.5;
 constexpr int kStopSweeps = 30;
-/// Points whose free motion ends nearer than this to the distance that they keep from a body have a support,
-/// in thicknesses: springs may move them farther.
-constexpr Real kSupportReach = 0.2;
-/// A dynamic body is a support of a cloth if the cloth's mass times the mobility of the body is at most this.
-/// A lighter body would need the impulses of the cloth within the sub-step.
-constexpr Real kMostMobile = 0.25;
 /// A point that its support keeps at the right distance but for rounding touches the body, in thicknesses.
 constexpr Real kTouching = 1e-6;
-
-/// Returns the mass of each cloth [kg]; infinite if pins hold it, because it can then stop any body.
-std::vector<Real> masses(const ClothPoints& points) {
-  std::vector<Real> mass(points.cloth.back() + 1, 0);
-  for (std::size_t i = 0; i < points.size(); ++i)
-    mass[points.cloth[i]] += points.inverse_mass[i] > 0 ? points.mass[i] : kInfinity;
-  return mass;
-}
 
 }  // namespace
 
@@ -61,6 +47,9 @@ void ClothContacts::find(const ClothPoints& points, std::span<const uint8_t> col
   collides_ = collides;
   active_.assign(points.cloth.empty() ? 0 : points.cloth.back() + 1, 0);
   touched_.assign(active_.size(), 0);
+  pinned_.assign(active_.size(), 0);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (!(points.inverse_mass[i] > 0)) pinned_[points.cloth[i]] = 1;
   h_ = h;
   near_.clear();
   boxes_.clear();
@@ -166,24 +155,22 @@ void ClothContacts::collect(const ClothPoints& points, std::vector<BodyContact>&
   }
 }
 
+bool ClothContacts::may_support(const ClothPoints& points, const ClothBody& body, uint32_t point) const {
+  if (!body.is_dynamic()) return true;
+  const auto near = std::ranges::equal_range(near_, point, {}, &Near::point);
+  return !pinned_[points.cloth[point]] &&
+         std::ranges::all_of(near, [&](const Near& n) { return &bodies_[n.body] == &body; });
+}
+
 void ClothContacts::find_supports(ClothPoints& points, Real dt) {
   points.supports.clear();
-  std::vector<Real> mass;  // by cloth, if there are dynamic bodies
-  for (std::size_t k = 0; k < near_.size(); ++k) {
-    Near& near = near_[k];
+  for (Near& near : near_) {
     const uint32_t i = near.point;
     ClothBody& body = bodies_[near.body];
-    const bool alone =
-        (k == 0 || near_[k - 1].point != i) && (k + 1 == near_.size() || near_[k + 1].point != i);
-    // A point between a dynamic body and another one is pinched, and left to solve().
-    if ((body.is_dynamic() && !alone) || !(points.inverse_mass[i] > 0)) continue;
-    const Vec4 end = points.start[i] + dt * (points.velocity[i] + dt * points.acceleration[i]);
+    if (!(points.inverse_mass[i] > 0) || !may_support(points, body, i)) continue;
+    const Vec4 end = points.free_end(i, dt);
     Touch t;
     if (!touch(points, near, end.head<3>(), kSupportReach * points.thickness[i], t)) continue;
-    if (body.is_dynamic()) {
-      if (mass.empty()) mass = masses(points);
-      if (mass[points.cloth[i]] * body.mobility(t.on_body, t.normal) > kMostMobile) continue;
-    }
     const Vec4 normal = padded(t.normal), surface = padded(body.surface_motion(t.on_body));
     const Real gap = std::max(t.gap - normal.dot(end - points.start[i] - surface), 0.0);
     const Support found{i,

@@ -16,6 +16,10 @@
 
 namespace offstage::sim {
 
+/// Supports reach this far beyond the distance that points and triangles keep from a body, in thicknesses:
+/// springs may move them farther than their free motion.
+inline constexpr Real kSupportReach = 0.2;
+
 class ClothContacts {
  public:
   /// Finds the bodies that points can touch in a sub-step of the world of length h [s]. `collides`: for each
@@ -26,6 +30,9 @@ class ClothContacts {
   Real fastest_approach(const ClothPoints& points) const;
   /// Repeats the search for points that moved farther than predicted.
   void find_runaways(const ClothPoints& points);
+  /// Returns whether a body may be a support of a point. Pinned cloth and points that are near another body
+  /// are left to solve() if the body is dynamic.
+  bool may_support(const ClothPoints& points, const ClothBody& body, uint32_t point) const;
   /// Finds the supports of points (ClothPoints::supports) for a sub-step of the cloth of length dt [s].
   void find_supports(ClothPoints& points, Real dt);
   /// Moves points out of the bodies in a sub-step of the cloth of length dt [s]. `parts`: number of such
@@ -95,6 +102,7 @@ class ClothContacts {
   std::vector<Aabb> boxes_;       // boxes of the bodies' paths
   std::vector<uint64_t> active_;
   std::vector<uint8_t> touched_;  // by cloth
+  std::vector<uint8_t> pinned_;   // by cloth: whether pins hold it
   std::vector<Touch> touches_;    // contacts of one point
 };
 

@@ -1,7 +1,8 @@
 #pragma once
 /// Integrators of cloth: they move the points of a cloth through a sub-step of length h [s] under springs,
 /// bending and outer accelerations. `relaxed` and `implicit` also keep points above their supports
-/// (ClothPoints::supports), and `relaxed` limits bending. Drag is implicit in all of them (air_drag.h).
+/// (ClothPoints::supports), and `relaxed` keeps triangles above
+/// theirs and limits bending. Drag is implicit in all of them (air_drag.h).
 /// Pinned points must already have been moved. If the velocity at the end differs from displacement / h, the
 /// difference is stored in `kick`.
 
@@ -30,6 +31,10 @@ struct ClothRange {
   std::span<Support> supports(ClothPoints& points) const {
     const auto first = std::ranges::lower_bound(points.supports, begin, {}, &Support::point);
     return {first, std::ranges::lower_bound(first, points.supports.end(), end, {}, &Support::point)};
+  }
+  /// Returns the supports of this cloth's triangles.
+  std::span<TriangleSupport> triangle_supports(ClothPoints& points) const {
+    return points.triangle_supports[points.cloth[begin]];
   }
   /// Returns the part of an array over all points that belongs to this cloth.
   template <class T>

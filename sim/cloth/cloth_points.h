@@ -2,6 +2,7 @@
 /// The points of all cloths of a world, as structures of arrays.
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -20,35 +21,36 @@ inline Vec4 padded(const Vec3& p) {
   return {p.x(), p.y(), p.z(), 0};
 }
 
-/// A body under a point that may touch it in a sub-step of the cloth. It is fixed, keyframed or heavy: within
-/// the sub-step, the cloth does not change its motion. The integrators keep the point above the plane that
-/// touches the body there. A point that was moved out of the body after the springs would compress them, and
-/// they would gain k h^2 / m times the energy of its motion.
+/// A body under a point that may touch it in a sub-step of the cloth. The integrators keep the point above
+/// the plane that touches the body there, and let a dynamic body move with the impulses (support_bodies.h). A
+/// point that was moved out of the body after the springs would compress them, and they would gain k h^2 / m
+/// times the energy of its motion.
 struct Support {
   uint32_t point;
-  Vec4 normal;      ///< unit, from the body to the point
-  Real gap;         ///< distance to the plane at the start of the sub-step, >= 0 [m]
-  Vec4 surface;     ///< motion of the body's surface in the sub-step [m]
-  Real friction;    ///< coefficient of friction
-  ClothBody* body;  ///< the body if it is dynamic; null: no impulse moves it
-  Vec3 on_body;     ///< where the point touches it
-  /// Impulse of the body on the point, times the length of the cloth's sub-step [kg m].
-  Vec4 given = Vec4::Zero();
+  Vec4 normal;       ///< unit, from the body to the point
+  Real gap;          ///< distance to the plane at the start of the sub-step, >= 0 [m]
+  Vec4 surface;      ///< motion of the body's surface in the sub-step without this cloth's impulses [m]
+  Real friction;     ///< coefficient of friction
+  ClothBody* body;   ///< the body if it is dynamic; null: no impulse moves it
+  Vec3 on_body;      ///< where the point touches it
   Real impulse = 0;  ///< along the normal in the last step of the integrator, times that step [kg m], >= 0
 
   /// Returns the smallest displacement along the normal after the fraction `part` of the sub-step [m].
   Real least(Real part) const { return part * normal.dot(surface) - gap; }
-  /// Applies Coulomb friction to the displacement of the point in the fraction `part` of the sub-step.
-  Vec4 rubbed(const Vec4& move, Real part, Real inverse_mass) const {
-    const Vec4 relative = move - part * surface, slip = relative - normal.dot(relative) * normal;
-    const Real length = slip.norm();
-    return length > 0 ? Vec4(move - std::min(1.0, friction * impulse * inverse_mass / length) * slip) : move;
-  }
-  /// Does the same, and adds the impulses along the normal and by friction to `given`.
-  Vec4 rub(const Vec4& move, Real part, Real mass) {
-    const Vec4 end = rubbed(move, part, 1 / mass);
-    given += impulse * normal + mass * (end - move);
-    return end;
+};
+
+/// A feature of a body under a triangle: the support of the point with these weights in the triangle. Only
+/// `relaxed` keeps it; after the other integrators, CornerContacts separates feature and triangle.
+struct TriangleSupport : Support {
+  Triangle corners;  ///< corners[0] == point
+  std::array<Real, 3> weights;
+
+  /// Returns the weighted sum of a value of the points.
+  template <class ValueOfPoint>
+  Vec4 sum(ValueOfPoint&& value) const {
+    Vec4 all = weights[0] * value(corners[0]);
+    for (std::size_t k = 1; k < 3; ++k) all += weights[k] * value(corners[k]);
+    return all;
   }
 };
 
@@ -72,12 +74,15 @@ struct ClothPoints {
   std::vector<Real> thickness, friction, self_friction;
   std::vector<uint32_t> cloth;    ///< index of the cloth of each point
   std::vector<Support> supports;  ///< of the sub-step, by point; at most one of a point
+  std::vector<std::vector<TriangleSupport>> triangle_supports;  ///< of the sub-step, by cloth
   /// Whether a support pushed the point in the last sub-step, for the integrator `implicit`.
   std::vector<uint8_t> supported;
 
   std::size_t size() const { return position.size(); }
   Vec3 at(std::size_t i) const { return position[i].head<3>(); }
   Vec3 start_at(std::size_t i) const { return start[i].head<3>(); }
+  /// Returns the position after a sub-step of length dt [s] without springs, contacts and pins.
+  Vec4 free_end(std::size_t i, Real dt) const { return start[i] + dt * (velocity[i] + dt * acceleration[i]); }
 };
 
 /// A part of a point's move that must not count as velocity, such as the correction of a penetration.

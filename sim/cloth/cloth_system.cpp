@@ -92,6 +92,7 @@ void ClothSystem::substep(Real from, Real to, Real dt) {
   cuts_.clear();
   move_held();
   contacts_.find_supports(points_, dt);
+  corner_contacts_.find_supports(points_, contacts_, dt);
   integrate(dt);
   stop_diverged(dt);
   apply_pin_impulses_to_bodies(dt);
@@ -179,6 +180,8 @@ void ClothSystem::integrate(Real dt) {
     const ClothRange range{first_[c],     first_[c] + cloths_[c]->points.size(),
                            springs_of(c), cloths_[c]->bending,
                            air_[c],       bend_limit_of(c)};
+    if (c > 0)  // cloths that were integrated before may have moved the bodies
+      update_supports(range);
     if (integrator == ClothIntegrator::symplectic) step_symplectic(points_, range, dt);
     if (integrator == ClothIntegrator::rk4) step_rk4(points_, range, dt, kick_);
     if (integrator == ClothIntegrator::implicit && !step_implicit(points_, range, dt))
@@ -188,8 +191,15 @@ void ClothSystem::integrate(Real dt) {
       ++cloths_[c]->report.unconverged;
   }
   for (const Held& held : held_) points_.start[held.point] = held.from;
-  for (const Support& s : points_.supports)
-    if (s.body && s.given != Vec4::Zero()) s.body->apply_impulse(-s.given.head<3>() / dt, s.on_body);
+}
+
+/// Updates the motion of dynamic bodies under the supports of a cloth.
+void ClothSystem::update_supports(const ClothRange& cloth) {
+  const auto update = [](Support& s) {
+    if (s.body) s.surface = padded(s.body->surface_motion(s.on_body));
+  };
+  std::ranges::for_each(cloth.supports(points_), update);
+  std::ranges::for_each(cloth.triangle_supports(points_), update);
 }
 
 /// Limits the bending of cloths whose integrator does not.

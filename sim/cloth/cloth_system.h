@@ -24,6 +24,8 @@
 
 namespace offstage::sim {
 
+struct ClothRange;
+
 class ClothSystem {
  public:
   /// Sets the cloths to step. Their addresses must stay valid until the next call.
@@ -82,6 +84,7 @@ class ClothSystem {
   Real fastest_strain_rate() const;
   void substep(Real from, Real to, Real dt);
   void integrate(Real dt);
+  void update_supports(const ClothRange& cloth);
   void limit_bending(Real dt);
   BendLimit* bend_limit_of(std::size_t cloth);
   void close_seams(Real dt);

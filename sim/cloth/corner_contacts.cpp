@@ -12,6 +12,11 @@ namespace {
 /// A triangle lies over a feature if the cosine between its normal and the feature's outward direction is at
 /// least this.
 constexpr Real kLeastCosine = 0.3;
+/// A support's point may lie outside of its triangle by this weight: springs may move the feature to the
+/// neighbouring triangle.
+constexpr Real kSupportOverhang = 0.1;
+/// A support of a triangle needs at least this weight of points that are not pinned.
+constexpr Real kLeastFree = 0.1;
 constexpr int kMaxSamples = 32;            // per edge
 constexpr std::size_t kMaxCorners = 2000;  // per mesh
 
@@ -121,29 +126,71 @@ void CornerContacts::find(const ClothPoints& points, std::span<ClothBody> bodies
 
 void CornerContacts::solve(ClothPoints& points, Real dt, std::vector<VelocityCut>& cuts) {
   round_.solve(triangles_, points, bodies_, dt, cuts);
-  for (const Near& near : near_) press(points, near, dt, cuts);
+  for (const Near& near : near_) {
+    const Triangle& t = triangles_[near.triangle];
+    if (const auto contact =
+            touch(near, {points.at(t[0]), points.at(t[1]), points.at(t[2])}, points.thickness[t[0]], 0, 0))
+      separate(*contact, t, points, bodies_[near.body], dt, cuts);
+  }
 }
 
-void CornerContacts::press(ClothPoints& points, const Near& near, Real dt, std::vector<VelocityCut>& cuts) {
-  const Triangle& t = triangles_[near.triangle];
-  ClothBody& body = bodies_[near.body];
+void CornerContacts::find_supports(ClothPoints& points, const ClothContacts& of_points, Real dt) const {
+  for (auto& of_cloth : points.triangle_supports) of_cloth.clear();
+  const auto add = [&](uint32_t triangle, ClothBody& body, auto&& find) {
+    const Triangle& t = triangles_[triangle];
+    std::array<Vec3, 3> at;
+    for (std::size_t k = 0; k < 3; ++k)
+      at[k] = (points.inverse_mass[t[k]] > 0 ? points.free_end(t[k], dt) : points.position[t[k]]).head<3>();
+    const std::optional<TriangleContact> contact = find(t, at, kSupportReach * points.thickness[t[0]]);
+    if (!contact ||
+        std::ranges::any_of(t, [&](uint32_t i) { return !of_points.may_support(points, body, i); }))
+      return;
+    Real free = 0;  // weight of the points that are not pinned
+    for (std::size_t k = 0; k < 3; ++k)
+      if (points.inverse_mass[t[k]] > 0) free += std::abs(contact->weights[k]);
+    if (free < kLeastFree) return;
+    TriangleSupport found{{t[0], padded(contact->normal), 0, padded(body.surface_motion(contact->on_body)),
+                           std::sqrt(points.friction[t[0]] * body.obstacle().friction),
+                           body.is_dynamic() ? &body : nullptr, contact->on_body},
+                          t,
+                          contact->weights};
+    Vec4 motion = -found.surface;
+    for (std::size_t k = 0; k < 3; ++k) motion += contact->weights[k] * (padded(at[k]) - points.start[t[k]]);
+    found.gap = std::max(contact->gap - found.normal.dot(motion), 0.0);
+    points.triangle_supports[points.cloth[t[0]]].push_back(found);
+  };
+  // A thin dynamic body such as a needle turns aside within a sub-step, and is left to solve().
+  round_.for_each([&](uint32_t triangle, uint32_t b) {
+    if (bodies_[b].is_dynamic()) return;
+    add(triangle, bodies_[b], [&](const Triangle& t, const std::array<Vec3, 3>& at, Real reach) {
+      return RoundContacts::touch(t, points, at, bodies_[b], reach, true);
+    });
+  });
+  for (const Near& near : near_)
+    add(near.triangle, bodies_[near.body], [&](const Triangle& t, const std::array<Vec3, 3>& at, Real reach) {
+      return touch(near, at, points.thickness[t[0]], reach, kSupportOverhang);
+    });
+}
+
+std::optional<TriangleContact> CornerContacts::touch(const Near& near, const std::array<Vec3, 3>& at,
+                                                     Real thickness, Real reach, Real overhang) const {
+  const ClothBody& body = bodies_[near.body];
   const Vec3 p = body.end().point_to_world(near.corner.place);
   const Vec3 outward = body.end().vector_to_world(near.corner.outward);
-  const Vec3 a = points.at(t[0]), ab = points.at(t[1]) - a, ac = points.at(t[2]) - a;
+  const Vec3 a = at[0], ab = at[1] - a, ac = at[2] - a;
   const Vec3 cross = ab.cross(ac);
   const Real size2 = cross.squaredNorm();
-  if (!(size2 > 0)) return;
+  if (!(size2 > 0)) return {};
   const Vec3 n = cross / std::sqrt(size2) * (cross.dot(outward) < 0 ? -1 : 1);
   const Real cosine = n.dot(outward);
-  if (cosine < kLeastCosine) return;
-  const Real height = n.dot(a - p), gap = height - kTriangleDistance * points.thickness[t[0]];
-  if (gap >= 0 || height < -near.corner.depth) return;
+  if (cosine < kLeastCosine) return {};
+  const Real height = n.dot(a - p), gap = height - kTriangleDistance * thickness;
+  if (gap >= reach || height < -near.corner.depth) return {};
   const Vec3 hit = p + height / cosine * outward - a;
   const Real s = hit.cross(ac).dot(cross) / size2, r = ab.cross(hit).dot(cross) / size2;
   const std::array<Real, 3> weights = {1 - s - r, s, r};
-  if (std::ranges::min(weights) < 0) return;
-
-  separate({weights, p, n, gap}, t, points, body, dt, cuts);
+  if (std::ranges::min(weights) < -overhang) return {};
+  return TriangleContact{weights, p, n, gap};
 }
 
 }  // namespace offstage::sim

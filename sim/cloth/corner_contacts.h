@@ -3,6 +3,8 @@
 /// cones, hull vertices of meshes, and rounded bodies (round_contacts.h). cloth_contacts.h keeps the points
 /// of cloth out of bodies; the contacts here do so for the triangles between the points.
 
+#include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -20,6 +22,9 @@ class CornerContacts {
   /// Finds the pairs of features and triangles that can touch in a sub-step of the world of length h [s].
   void find(const ClothPoints& points, std::span<ClothBody> bodies, Real h);
   Real mean_edge() const { return 2 * spacing_; }  ///< mean length of the triangles' edges [m]
+  /// Finds the supports of triangles (ClothPoints::triangle_supports) for a sub-step of the cloth of length
+  /// dt [s]. `of_points`: contacts of the same points.
+  void find_supports(ClothPoints& points, const ClothContacts& of_points, Real dt) const;
   /// Separates features and triangles in a sub-step of the cloth of length dt [s]. Displacements that must
   /// not count as velocity are appended to `cuts`.
   void solve(ClothPoints& points, Real dt, std::vector<VelocityCut>& cuts);
@@ -42,7 +47,10 @@ class CornerContacts {
   };
 
   std::vector<Corner> corners(const Solid& solid) const;
-  void press(ClothPoints& points, const Near& near, Real dt, std::vector<VelocityCut>& cuts);
+  /// Returns the contact if the distance of a triangle with its corners at `at` exceeds the contact distance
+  /// by less than `reach` [m], and no weight is below -`overhang`.
+  std::optional<TriangleContact> touch(const Near& near, const std::array<Vec3, 3>& at, Real thickness,
+                                       Real reach, Real overhang) const;
 
   std::vector<Triangle> triangles_;
   ClothTree tree_;

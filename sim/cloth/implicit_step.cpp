@@ -1,7 +1,9 @@
 #include <utility>
 
+#include "sim/cloth/cloth_bodies.h"
 #include "sim/cloth/cloth_integrators.h"
 #include "sim/cloth/spring_run.h"
+#include "sim/cloth/support_bodies.h"
 
 namespace offstage::sim {
 namespace {
@@ -15,12 +17,16 @@ constexpr int kMaxTurnsOfSupports = 2;
 constexpr Real kSupportTolerance = 1e-3;
 
 /// The linear system of an implicit step of cloth by backward Euler (step_implicit()). Its matrix consists of
-/// the masses, the matrix of bending, and a block alpha u u^T + beta 1 for each spring, between its ends.
+/// the masses, the matrix of bending, and a block alpha u u^T + beta 1 for each spring, between its ends. The
+/// unknowns are the velocities of the points, followed by the gains of velocity and angular velocity of each
+/// body under a support. A point that rests on a support has the velocity of the support along the normal.
 class ImplicitSystem {
  public:
-  ImplicitSystem(const ClothPoints& points, const ClothRange& cloth, Real h)
+  ImplicitSystem(const ClothPoints& points, const ClothRange& cloth, const SupportBodies& bodies, Real h)
       : points_(points),
         cloth_(cloth),
+        bodies_(bodies),
+        size_(cloth.end - cloth.begin),
         bending_(cloth.bending.empty() ? 0 : h * (h + cloth.bending.damping())) {
     block_.assign(cloth.end - cloth.begin, Mat3::Zero());
     for (std::size_t i = 0; i < block_.size(); ++i)
@@ -47,14 +53,55 @@ class ImplicitSystem {
       block_[s.b - cloth.begin] += k;
     }
     for (Mat3& b : block_) b = b.inverse().eval();
+    for (std::size_t k = 0; k < bodies.count(); ++k)
+      inertia_.push_back(bodies.body(k).obstacle().inverse_inertia.inverse());
+    body_block_.resize(bodies.count());
   }
 
-  /// Points that rest on their supports: their motion along the normals is given.
-  std::vector<Support*> resting;
+  /// A point that rests on its support: its motion along the normal is that of the support.
+  struct Resting {
+    Support* support;
+    std::size_t index;  // of the support
+  };
+  /// Sets the points that rest on their supports.
+  void set_resting(std::vector<Resting> resting) {
+    resting_ = std::move(resting);
+    for (std::size_t k = 0; k < body_block_.size(); ++k) {
+      body_block_[k].setZero();
+      body_block_[k].topLeftCorner<3, 3>().diagonal().setConstant(bodies_.body(k).mass());
+      body_block_[k].bottomRightCorner<3, 3>() = inertia_[k];
+    }
+    for (const auto& [s, index] : resting_) {
+      const uint32_t body = bodies_.body_of(index);
+      if (body == SupportBodies::kNone) continue;
+      const Vec3 normal = s->normal.head<3>();
+      const Vec6 row = (Vec6() << normal, bodies_.arm(index).cross(normal)).finished();
+      body_block_[body] += row * row.transpose() / normal.dot(block_[s->point - cloth_.begin] * normal);
+    }
+    for (Mat6& b : body_block_) b = b.inverse().eval();
+  }
+  std::span<const Resting> resting() const { return resting_; }
+
+  /// Returns the number of unknown vectors.
+  std::size_t size() const { return size_ + 2 * bodies_.count(); }
+  std::span<const Vec4> of_points(const SpringRun& v) const { return {v.data(), size_}; }
+  std::span<Vec4> of_points(SpringRun& v) const { return {v.data(), size_}; }
+
+  /// Returns the gain of the surface's velocity along the normal of support k by the impulses.
+  Real surface_gain(std::size_t k, const Support& support, const SpringRun& v) const {
+    const uint32_t body = bodies_.body_of(k);
+    if (body == SupportBodies::kNone) return 0;
+    const std::size_t at = size_ + 2 * body;
+    return support.normal.head<3>().dot(v[at].head<3>() + v[at + 1].head<3>().cross(bodies_.arm(k)));
+  }
 
   /// Computes y = A p.
   void multiply_all(const SpringRun& p, SpringRun& y) const {
-    for (std::size_t i = 0; i < p.size(); ++i) y[i] = points_.mass[cloth_.begin + i] * p[i];
+    for (std::size_t i = 0; i < size_; ++i) y[i] = points_.mass[cloth_.begin + i] * p[i];
+    for (std::size_t k = 0; k < inertia_.size(); ++k) {
+      y[size_ + 2 * k] = bodies_.body(k).mass() * p[size_ + 2 * k];
+      y[size_ + 2 * k + 1] = padded(inertia_[k] * p[size_ + 2 * k + 1].head<3>());
+    }
     for (std::size_t i = 0; i < drag_.size(); ++i) y[i] += dragged(i, p[i]);
     for (std::size_t k = 0; k < links_.size(); ++k) {
       const ClothSpring& s = cloth_.springs[k];
@@ -65,7 +112,7 @@ class ImplicitSystem {
       y[a] += f;
       y[b] -= f;
     }
-    if (bending_ > 0) cloth_.bending.multiply(p, bending_, y);
+    if (bending_ > 0) cloth_.bending.multiply(of_points(p), bending_, of_points(y));
   }
 
   /// y = A p, without the components of given motions.
@@ -75,22 +122,32 @@ class ImplicitSystem {
   }
 
   /// Removes the components along which motion is given: all of pinned points, and the normal one of those
-  /// that rest on supports.
+  /// that rest on supports, which acts on the bodies.
   void clear_given(SpringRun& y) const {
-    for (std::size_t i = 0; i < y.size(); ++i)
+    for (std::size_t i = 0; i < size_; ++i)
       if (is_held(points_, cloth_.begin + i)) y[i].setZero();
-    for (const Support* s : resting) {
+    for (const auto& [s, index] : resting_) {
       Vec4& at = y[s->point - cloth_.begin];
-      at -= s->normal.dot(at) * s->normal;
+      const Vec4 normal = s->normal.dot(at) * s->normal;
+      at -= normal;
+      const uint32_t body = bodies_.body_of(index);
+      if (body == SupportBodies::kNone) continue;
+      y[size_ + 2 * body] += normal;
+      y[size_ + 2 * body + 1] += padded(bodies_.arm(index).cross(normal.head<3>()));
     }
+  }
+  /// Gives points that rest on supports the motion of these along the normals, for velocities without it.
+  void follow_bodies(SpringRun& v) const {
+    for (const auto& [s, index] : resting_)
+      v[s->point - cloth_.begin] += surface_gain(index, *s, v) * s->normal;
   }
 
   /// Adds the impulses of springs on pinned points, for points that move with v throughout the step.
   void pass_on(ClothPoints& points, const SpringRun& v, Real h) const {
     if (bending_ > 0) {
-      SpringRun force(v.size(), Vec4::Zero());
+      SpringRun force(size_, Vec4::Zero());
       cloth_.bending.add_forces(cloth_.part(points.start), h * h, force);
-      cloth_.bending.multiply(v, -h * bending_, force);
+      cloth_.bending.multiply(of_points(v), -h * bending_, force);
       for (std::size_t i = 0; i < force.size(); ++i)
         if (is_held(points, cloth_.begin + i)) points.pin_impulse[cloth_.begin + i] += force[i];
     }
@@ -106,8 +163,16 @@ class ImplicitSystem {
   }
 
   void precondition(const SpringRun& r, SpringRun& z) const {
-    for (std::size_t i = 0; i < r.size(); ++i) z[i] = padded(block_[i] * r[i].head<3>());
+    for (std::size_t i = 0; i < size_; ++i) z[i] = padded(block_[i] * r[i].head<3>());
     clear_given(z);
+    for (std::size_t k = 0; k < body_block_.size(); ++k) {
+      Vec4 &linear = z[size_ + 2 * k], &angular = z[size_ + 2 * k + 1];
+      const Vec6 gain =
+          body_block_[k] * (Vec6() << r[size_ + 2 * k].head<3>(), r[size_ + 2 * k + 1].head<3>()).finished();
+      linear = padded(gain.head<3>());
+      angular = padded(gain.tail<3>());
+    }
+    if (!body_block_.empty()) follow_bodies(z);
   }
 
   /// Returns the impulse of the linear part of the drag on point i at the velocity v.
@@ -117,8 +182,8 @@ class ImplicitSystem {
 
   /// Returns M v + h (spring forces + M a), plus the part of the drag that the matrix does not contain.
   SpringRun right_side(const SpringRun& v, Real h) const {
-    SpringRun b(v.size());
-    for (std::size_t i = 0; i < b.size(); ++i) {
+    SpringRun b(size(), Vec4::Zero());
+    for (std::size_t i = 0; i < size_; ++i) {
       const std::size_t k = cloth_.begin + i;
       b[i] = points_.mass[k] * (v[i] + h * points_.acceleration[k]);
     }
@@ -128,7 +193,7 @@ class ImplicitSystem {
       b[cloth_.springs[k].a - cloth_.begin] -= f;
       b[cloth_.springs[k].b - cloth_.begin] += f;
     }
-    if (bending_ > 0) cloth_.bending.add_forces(cloth_.part(points_.start), h, b);
+    if (bending_ > 0) cloth_.bending.add_forces(cloth_.part(points_.start), h, of_points(b));
     return b;
   }
 
@@ -140,7 +205,12 @@ class ImplicitSystem {
 
   const ClothPoints& points_;
   const ClothRange& cloth_;
-  Real bending_;  // factor of the matrix of bending
+  const SupportBodies& bodies_;
+  std::size_t size_;  // number of points
+  Real bending_;      // factor of the matrix of bending
+  std::vector<Resting> resting_;
+  std::vector<Mat3> inertia_;     // by body
+  std::vector<Mat6> body_block_;  // by body: inverse of its diagonal block with the points that rest on it
   std::vector<Link> links_;
   std::vector<Mat3> block_;  // by point: inverse of its diagonal block
   std::vector<Mat3> drag_;   // by point; empty without air
@@ -191,20 +261,24 @@ bool solve_on_supports(ImplicitSystem& system, ClothPoints& points, const ClothR
   const std::span<uint8_t> pushed = cloth.part(points.supported);
   std::vector<uint8_t> rests(supports.size());
   const auto velocity = [&](const Support& s) -> Vec4& { return v[s.point - cloth.begin]; };
-  const auto lacks = [&](const Support& s) { return s.least(1) - h * s.normal.dot(velocity(s)); };
+  const auto lacks = [&](std::size_t k) {
+    const Support& s = supports[k];
+    return s.least(1) + h * (system.surface_gain(k, s, v) - s.normal.dot(velocity(s)));
+  };
   const auto small = [&](const Support& s) { return kSupportTolerance * points.thickness[s.point]; };
   for (std::size_t k = 0; k < supports.size(); ++k)
-    rests[k] = pushed[supports[k].point - cloth.begin] || lacks(supports[k]) > small(supports[k]);
+    rests[k] = pushed[supports[k].point - cloth.begin] || lacks(k) > small(supports[k]);
   std::ranges::fill(pushed, uint8_t{0});
   if (supports.empty()) return solve(system, b, v);
   SpringRun image(v.size());
   for (int turn = 1;; ++turn) {
-    system.resting.clear();
+    std::vector<ImplicitSystem::Resting> resting;
     for (std::size_t k = 0; k < supports.size(); ++k) {
       if (!rests[k]) continue;
-      system.resting.push_back(&supports[k]);
-      velocity(supports[k]) += lacks(supports[k]) / h * supports[k].normal;
+      resting.push_back({&supports[k], k});
+      velocity(supports[k]) += lacks(k) / h * supports[k].normal;
     }
+    system.set_resting(std::move(resting));
     const bool converged = solve(system, b, v);
     system.multiply_all(v, image);
     bool changed = false;
@@ -213,7 +287,7 @@ bool solve_on_supports(ImplicitSystem& system, ClothPoints& points, const ClothR
       const std::size_t i = s.point - cloth.begin;
       s.impulse = rests[k] ? h * s.normal.dot(image[i] - b[i]) : 0;
       const bool pushes =
-          rests[k] ? s.impulse * points.inverse_mass[s.point] >= -small(s) : lacks(s) > small(s);
+          rests[k] ? s.impulse * points.inverse_mass[s.point] >= -small(s) : lacks(k) > small(s);
       changed |= std::exchange(rests[k], pushes) != pushes;
       s.impulse = std::max(s.impulse, 0.0);
       pushed[i] = pushes;
@@ -227,17 +301,17 @@ bool solve_on_supports(ImplicitSystem& system, ClothPoints& points, const ClothR
 void keep_momentum(const ClothPoints& points, const ClothRange& cloth, const ImplicitSystem& system,
                    const SpringRun& b, Real h, SpringRun& v) {
   Vec4 lost = Vec4::Zero();
-  for (const Support* s : system.resting) {
+  for (const auto& [s, index] : system.resting()) {
     if (!s->body) return;
     lost += s->impulse / h * s->normal;
   }
   Real mass = 0;
-  for (std::size_t i = 0; i < v.size(); ++i) {
+  for (std::size_t i = 0; i < cloth.end - cloth.begin; ++i) {
     if (is_held(points, cloth.begin + i)) return;
     lost += b[i] - points.mass[cloth.begin + i] * v[i] - system.dragged(i, v[i]);
     mass += points.mass[cloth.begin + i];
   }
-  for (Vec4& velocity : v) velocity += lost / mass;
+  for (Vec4& velocity : system.of_points(v)) velocity += lost / mass;
 }
 
 }  // namespace
@@ -245,17 +319,23 @@ void keep_momentum(const ClothPoints& points, const ClothRange& cloth, const Imp
 bool step_implicit(ClothPoints& points, const ClothRange& cloth, Real h) {
   SpringRun x, v;
   begin_run(points, cloth, h, x, v);
-  ImplicitSystem system(points, cloth, h);
+  SupportBodies bodies(points, cloth.supports(points), {});
+  ImplicitSystem system(points, cloth, bodies, h);
+  v.resize(system.size(), Vec4::Zero());
   const SpringRun b = system.right_side(v, h);
   const bool converged = solve_on_supports(system, points, cloth, b, h, v);
   keep_momentum(points, cloth, system, b, h, v);
   system.pass_on(points, v, h);
   for (std::size_t i = 0; i < x.size(); ++i)
     if (!is_held(points, cloth.begin + i)) points.position[cloth.begin + i] = x[i] + h * v[i];
-  for (Support* s : system.resting) {
-    const Vec4 move = h * v[s->point - cloth.begin];
-    points.position[s->point] = points.start[s->point] + s->rub(move, 1, points.mass[s->point]);
+  for (const auto& [s, index] : system.resting()) bodies.push(index, -s->impulse * s->normal);
+  for (const auto& [s, index] : system.resting()) {
+    Vec4 move = h * v[s->point - cloth.begin];
+    move += bodies.rub(index, *s, 1, move);
+    points.position[s->point] = points.start[s->point] + move;
   }
+  bodies.advance();
+  bodies.apply(h);
   return converged;
 }
 

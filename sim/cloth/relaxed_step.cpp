@@ -4,6 +4,7 @@
 
 #include "sim/cloth/cloth_integrators.h"
 #include "sim/cloth/spring_run.h"
+#include "sim/cloth/support_bodies.h"
 
 namespace offstage::sim {
 namespace {
@@ -87,17 +88,87 @@ class RelaxedBending {
   std::vector<std::size_t> held_;  // pinned points
 };
 
-/// Keeps supported points above their planes in a step that ends after the fraction `part` of the sub-step.
-/// The impulses of the step so far may also become smaller, so that a point can leave its support.
-void hold_up(const ClothPoints& points, std::span<Support> supports, Real part, std::span<Vec4> moves) {
-  for (Support& s : supports) {
-    const Vec4 moved = points.start[s.point] - points.step_start[s.point] + moves[s.point];
-    const Real lacks = points.mass[s.point] * (s.least(part) - s.normal.dot(moved));
-    const Real impulse = std::max(s.impulse + lacks, 0.0);
-    moves[s.point] += points.inverse_mass[s.point] * (impulse - s.impulse) * s.normal;
-    s.impulse = impulse;
+/// The supports of a cloth in a sub-step of step_relaxed().
+class RelaxedSupports {
+ public:
+  RelaxedSupports(ClothPoints& points, const ClothRange& cloth, uint32_t steps)
+      : points_(points),
+        supports_(cloth.supports(points)),
+        of_triangles_(cloth.triangle_supports(points)),
+        bodies_(points, supports_, of_triangles_),
+        steps_(steps) {}
+
+  void begin_step(uint32_t step) {
+    part_ = (step + 1.0) / steps_;
+    for (Support& s : supports_) s.impulse = 0;
+    for (Support& s : of_triangles_) s.impulse = 0;
   }
-}
+  /// Keeps supported points and triangles above their planes in the current step. The impulses of the step so
+  /// far may also become smaller, so that a point can leave its support. Supports of the same dynamic body or
+  /// point depend on each other, so the order is reversed each time.
+  void hold_up() {
+    is_reverse_ = !is_reverse_;
+    const std::size_t count = supports_.size() + of_triangles_.size();
+    for (std::size_t n = 0; n < count; ++n) {
+      const std::size_t k = is_reverse_ ? count - 1 - n : n;
+      k < supports_.size() ? hold_up_point(k) : hold_up_triangle(k);
+    }
+  }
+  void end_step() {
+    for (std::size_t k = 0; k < supports_.size(); ++k) {
+      Vec4& move = points_.moves[supports_[k].point];
+      move += bodies_.rub(k, supports_[k], 1.0 / steps_, move);
+    }
+    for (std::size_t n = 0; n < of_triangles_.size(); ++n) {
+      const std::size_t k = supports_.size() + n;
+      const TriangleSupport& s = of_triangles_[n];
+      const Vec4 move = s.sum([&](uint32_t i) -> const Vec4& { return points_.moves[i]; });
+      push(s, bodies_.point_mass(k) * bodies_.rub(k, s, 1.0 / steps_, move));
+    }
+    bodies_.advance();
+  }
+  /// Ends the sub-step, whose steps have the length h.
+  void end(Real h) { bodies_.apply(h); }
+
+ private:
+  void hold_up_point(std::size_t k) {
+    Support& s = supports_[k];
+    points_.moves[s.point] += points_.inverse_mass[s.point] * impulse_on(k, s, moved(s.point));
+  }
+  void hold_up_triangle(std::size_t k) {
+    TriangleSupport& s = of_triangles_[k - supports_.size()];
+    push(s, impulse_on(k, s, s.sum([&](uint32_t i) { return moved(i); })));
+  }
+  Vec4 moved(uint32_t i) const { return points_.start[i] - points_.step_start[i] + points_.moves[i]; }
+  /// Applies the impulse that keeps a point above its support k, and the opposite one to the body. Returns
+  /// the impulse on the point.
+  Vec4 impulse_on(std::size_t k, Support& s, const Vec4& moved) {
+    const Real lacks = s.least(part_) + bodies_.displacement(k, s) - s.normal.dot(moved);
+    const Real impulse = std::max(s.impulse + bodies_.effective_mass(k) * lacks, 0.0);
+    const Vec4 change = (impulse - s.impulse) * s.normal;
+    bodies_.push(k, -change);
+    s.impulse = impulse;
+    return change;
+  }
+  /// Distributes an impulse over the corners of a triangle.
+  void push(const TriangleSupport& s, const Vec4& impulse) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const uint32_t i = s.corners[k];
+      if (is_held(points_, i))
+        points_.pin_impulse[i] += s.weights[k] * impulse;
+      else
+        points_.moves[i] += points_.inverse_mass[i] * s.weights[k] * impulse;
+    }
+  }
+
+  ClothPoints& points_;
+  std::span<Support> supports_;
+  std::span<TriangleSupport> of_triangles_;
+  SupportBodies bodies_;
+  Real part_ = 0;  // end of the current step as a fraction of the sub-step
+  uint32_t steps_;
+  bool is_reverse_ = true;
+};
 
 /// The smallest radius of bending in a sub-step of step_relaxed(). It acts in each step of the springs:
 /// moves across an arc stretch it, and in a long step stiff springs would gain more than motion loses.
@@ -168,30 +239,28 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
     coast(i, held(i) ? Vec4((points.position[k] - x[i]) / steps) : Vec4(h * points.velocity[k]));
   }
   bool solved = true;
-  const std::span<Support> supports = cloth.supports(points);
+  RelaxedSupports supports(points, cloth, steps);
   for (uint32_t step = 0; step < steps; ++step) {
-    const Real part = (step + 1.0) / steps;
-    for (Support& s : supports) s.impulse = 0;
+    supports.begin_step(step);
     if (bends) bending->apply(points, step, points.moves);
     springs.apply(points, points.moves);
     for (std::size_t i = 0; drags && i < n; ++i)
       if (!held(i)) moves[i] = velocity[i] + cloth.air.respond(i, moves[i] - velocity[i]);
     if (bends && bending->is_implicit()) solved &= bending->filter(points, points.moves);
-    hold_up(points, supports, part, points.moves);
-    springs.relax(points, points.moves, [&] { hold_up(points, supports, part, points.moves); });
+    supports.hold_up();
+    springs.relax(points, points.moves, [&] { supports.hold_up(); });
     if (cloth.bend_limit) {
       bend_limit.apply(h, points.moves);
-      hold_up(points, supports, part, points.moves);
+      supports.hold_up();
     }
-    for (Support& s : supports)
-      points.moves[s.point] = s.rub(points.moves[s.point], 1.0 / steps, points.mass[s.point]);
+    supports.end_step();
     for (std::size_t i = 0; i < n; ++i) {
       const Vec4 move = moves[i];
       x[i] += move;
       coast(i, move);
     }
   }
-  for (Support& s : supports) s.given *= steps;  // the sum of the impulses times the whole sub-step
+  supports.end(h);
   for (std::size_t i = 0; i < n; ++i) {
     const std::size_t k = cloth.begin + i;
     if (held(i)) {

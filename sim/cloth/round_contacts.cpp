@@ -45,6 +45,10 @@ TrianglePoint nearest_to_axis(const Rounding& shape, const std::array<Vec3, 3>& 
   return nearest;
 }
 
+std::array<Vec3, 3> present(const Triangle& t, const ClothPoints& points) {
+  return {points.at(t[0]), points.at(t[1]), points.at(t[2])};
+}
+
 }  // namespace
 
 bool RoundContacts::concerns(const Solid& solid, Real edge, Real thickness) {
@@ -55,7 +59,8 @@ bool RoundContacts::concerns(const Solid& solid, Real edge, Real thickness) {
 }
 
 std::optional<TriangleContact> RoundContacts::touch(const Triangle& t, const ClothPoints& points,
-                                                    const ClothBody& body, Real reach) {
+                                                    const std::array<Vec3, 3>& ends, const ClothBody& body,
+                                                    Real reach, bool is_short) {
   const std::optional<Rounding> shape = rounding(body.solid());
   if (!shape) return {};
   const Real keeps = kTriangleDistance * points.thickness[t[0]];
@@ -63,10 +68,11 @@ std::optional<TriangleContact> RoundContacts::touch(const Triangle& t, const Clo
   Real longest = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     from[k] = body.start().point_to_body(points.start_at(t[k]));
-    to[k] = body.end().point_to_body(points.at(t[k]));
+    to[k] = body.end().point_to_body(ends[k]);
     longest = std::max(longest, (to[k] - from[k]).norm());
   }
   const Real samples = std::ceil(longest / (kSampleSpacing * (shape->radius + keeps)));
+  if (is_short && samples > 1) return {};
   const int count = std::clamp(static_cast<int>(std::min(samples, 1e6)), 1, kMaxPathSamples);
   for (int i = 1; i <= count; ++i) {
     const Real s = static_cast<Real>(i) / count;
@@ -89,9 +95,11 @@ std::optional<TriangleContact> RoundContacts::touch(const Triangle& t, const Clo
 
 void RoundContacts::solve(std::span<const Triangle> triangles, ClothPoints& points,
                           std::span<ClothBody> bodies, Real dt, std::vector<VelocityCut>& cuts) const {
-  for (const Near& near : near_)
-    if (const auto contact = touch(triangles[near.triangle], points, bodies[near.body], 0))
-      separate(*contact, triangles[near.triangle], points, bodies[near.body], dt, cuts);
+  for (const Near& near : near_) {
+    const Triangle& t = triangles[near.triangle];
+    if (const auto contact = touch(t, points, present(t, points), bodies[near.body], 0, false))
+      separate(*contact, t, points, bodies[near.body], dt, cuts);
+  }
 }
 
 void RoundContacts::collect(std::span<const Triangle> triangles, const ClothPoints& points,
@@ -100,7 +108,7 @@ void RoundContacts::collect(std::span<const Triangle> triangles, const ClothPoin
     ClothBody& body = bodies[near.body];
     if (!body.is_dynamic()) continue;
     const Triangle& t = triangles[near.triangle];
-    const auto contact = touch(t, points, body, reach * points.thickness[t[0]]);
+    const auto contact = touch(t, points, present(t, points), body, reach * points.thickness[t[0]], false);
     if (!contact) continue;
     found.push_back({t, contact->weights, &body, contact->normal, contact->on_body, contact->gap});
   }

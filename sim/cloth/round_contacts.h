@@ -4,6 +4,7 @@
 /// ball, however, would pass between the points. For these bodies, the point of a triangle that is nearest to
 /// the body's axis is swept along the paths of both.
 
+#include <array>
 #include <optional>
 #include <span>
 #include <vector>
@@ -33,13 +34,22 @@ class RoundContacts {
   void collect(std::span<const Triangle> triangles, const ClothPoints& points, std::span<ClothBody> bodies,
                Real reach, std::vector<BodyContact>& found) const;
 
+  /// Calls visit(triangle, body) for each pair, with their indices.
+  template <class Visit>
+  void for_each(Visit&& visit) const {
+    for (const Near& near : near_) visit(near.triangle, near.body);
+  }
+  /// Returns the contact of a triangle whose corners move to `ends`, if its distance exceeds the contact
+  /// distance by less than `reach` [m]. `is_short`: only if the path is short compared with the body's
+  /// radius, so that the direction of the contact hardly changes.
+  static std::optional<TriangleContact> touch(const Triangle& t, const ClothPoints& points,
+                                              const std::array<Vec3, 3>& ends, const ClothBody& body,
+                                              Real reach, bool is_short);
+
  private:
   struct Near {
     uint32_t triangle, body;
   };
-
-  static std::optional<TriangleContact> touch(const Triangle& t, const ClothPoints& points,
-                                              const ClothBody& body, Real reach);
 
   std::vector<Near> near_;
 };
