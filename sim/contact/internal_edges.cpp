@@ -114,23 +114,26 @@ struct Verdict {
 /// The contacts of one body X at one time.
 class BodyContacts {
  public:
-  BodyContacts(const Body& x, std::span<ContactPair* const> pairs, Real time, Real h)
+  /// `is_decided(pair, i)`: whether there is a verdict on the i-th contact of a pair. It is left out then.
+  BodyContacts(const Body& x, std::span<ContactPair* const> pairs, const auto& is_decided, Real time, Real h)
       : x_(x), time_(time), h_(h) {
     for (ContactPair* pair : pairs) {
       const std::vector<PlacedManifold>& all = pair->manifolds();
       const std::size_t found = all.size() - pair->speculative;
-      for (std::size_t i = 0; i < all.size(); ++i)
-        views_.emplace_back(*pair, static_cast<uint32_t>(i), i >= found,
-                            i >= found ? pair->at_end(i - found) : all[i].manifold, &pair->a() == &x);
+      for (uint32_t i = 0; i < all.size(); ++i)
+        if (!is_decided(pair, i))
+          views_.emplace_back(*pair, i, i >= found, i >= found ? pair->at_end(i - found) : all[i].manifold,
+                              &pair->a() == &x);
     }
     flush_ = std::min(kFlush, kFlushFraction * x.extent);
     for (const View& v : views_)
       if (!v.speculative && v.is_face() && v.separation() <= flush_) faces_.push_back(&v);
   }
 
-  std::vector<Verdict> judge() const {
+  std::vector<Verdict> judge() {
     std::vector<Verdict> verdicts;
     if (views_.size() > kMostContacts) return verdicts;
+    drop_faces_at_internal_edges();
     struct Hidden {
       std::size_t contact, by;
       Vec3 normal;  // normal of the surface at the contact
@@ -308,6 +311,21 @@ class BodyContacts {
     });
   }
 
+  /// Drops faces on which X does not lie because of another face. For example, the side of a part may be in
+  /// the plane of a seam, so that it touches the side of a tile along an edge. Contacts of other parts at
+  /// this seam must not get the normal of that side. If each of two faces excludes the other one, both
+  /// remain.
+  void drop_faces_at_internal_edges() {
+    const auto excludes = [&](const View& face, const View& v) {
+      return keeps_apart(face, v) || (v.may_be_at_internal_edge() && normal_instead(v, face));
+    };
+    const std::vector<const View*> all = faces_;
+    std::erase_if(faces_, [&](const View* f) {
+      return std::any_of(all.begin(), all.end(),
+                         [&](const View* g) { return g != f && excludes(*g, *f) && !excludes(*f, *g); });
+    });
+  }
+
   /// Returns a contact's manifold with a new normal and without its points. The new normal points towards X
   /// and is fixed in Y.
   static Manifold without_points(const View& v, const Vec3& normal) {
@@ -421,12 +439,16 @@ struct Group {
   std::vector<ContactPair*> pairs;
 };
 
-/// Returns groups of pairs, in the order of the bodies' slots: one for each movable body that has a contact
-/// that may be at an internal edge. Before them, each pair of an immovable body with a body of several pieces
-/// is a group of its own.
-std::vector<Group> groups_with_internal_edges(std::span<ContactPair* const> pairs) {
+struct BodyGroups {
+  std::vector<Group> movable;    ///< in the order of the bodies' slots
+  std::vector<Group> immovable;  ///< each has one pair, with a body of several pieces
+};
+
+/// Returns a group for each movable body that has a contact that may be at an internal edge, and one for each
+/// pair of an immovable body with a body of several pieces.
+BodyGroups groups_with_internal_edges(std::span<ContactPair* const> pairs) {
   constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
-  std::vector<Group> groups;
+  BodyGroups groups;
   std::vector<std::size_t> group_of;  // by slot
   std::vector<Body*> bodies;
   for (ContactPair* pair : pairs)
@@ -439,19 +461,20 @@ std::vector<Group> groups_with_internal_edges(std::span<ContactPair* const> pair
         if (group_of[x->handle.index] == kNone) bodies.push_back(x);
         group_of[x->handle.index] = 0;  // numbered below
       } else if (y->collision_shape().piece_count() > 1) {
-        groups.push_back({x, {pair}});
+        groups.immovable.push_back({x, {pair}});
       }
     }
   }
   std::sort(bodies.begin(), bodies.end(), [](Body* a, Body* b) { return a->handle.index < b->handle.index; });
   for (Body* x : bodies) {
-    group_of[x->handle.index] = groups.size();
-    groups.push_back({x, {}});
+    group_of[x->handle.index] = groups.movable.size();
+    groups.movable.push_back({x, {}});
   }
   for (ContactPair* pair : pairs) {
     if (pair->manifolds().empty()) continue;
     for (const Body* x : {&pair->a(), &pair->b()})
-      if (const std::size_t g = group_of[x->handle.index]; g != kNone) groups[g].pairs.push_back(pair);
+      if (const std::size_t g = group_of[x->handle.index]; g != kNone)
+        groups.movable[g].pairs.push_back(pair);
   }
   return groups;
 }
@@ -462,17 +485,31 @@ std::vector<ContactPair*> remove_internal_edge_contacts(std::span<ContactPair* c
                                                         Real h) {
   const bool none = std::none_of(pairs.begin(), pairs.end(), [](ContactPair* p) { return p->has_narrow(); });
   if (none) return {};
-  const std::vector<Group> groups = groups_with_internal_edges(pairs);
-  std::vector<std::vector<Verdict>> verdicts(groups.size());
-  for_each_index(groups.size(), [&](std::size_t i) {
-    verdicts[i] = BodyContacts(*groups[i].x, groups[i].pairs, time, h).judge();
-  });
+  const BodyGroups groups = groups_with_internal_edges(pairs);
+  std::vector<std::pair<ContactPair*, uint32_t>> decided;
+  const auto is_decided = [&](ContactPair* pair, uint32_t i) {
+    return std::binary_search(decided.begin(), decided.end(), std::pair(pair, i));
+  };
+  std::vector<Verdict> verdicts;
+  // A movable body lies on several bodies, and an immovable one is seen with one other body alone. A contact
+  // that is at an internal edge for the movable body is therefore left out for the immovable one: it must not
+  // serve as a face that hides other contacts.
+  for (const std::vector<Group>* bodies : {&groups.movable, &groups.immovable}) {
+    std::vector<std::vector<Verdict>> of(bodies->size());
+    for_each_index(of.size(), [&](std::size_t i) {
+      const Group& group = (*bodies)[i];
+      of[i] = BodyContacts(*group.x, group.pairs, is_decided, time, h).judge();
+    });
+    for (const std::vector<Verdict>& of_body : of)
+      verdicts.insert(verdicts.end(), of_body.begin(), of_body.end());
+    for (const Verdict& v : verdicts) decided.emplace_back(v.pair, v.index);
+    std::sort(decided.begin(), decided.end());
+  }
   std::vector<ContactPair*> changed;
-  for (const std::vector<Verdict>& of_body : verdicts)
-    for (const Verdict& v : of_body) {
-      v.pair->replace(v.index, v.instead);
-      changed.push_back(v.pair);
-    }
+  for (const Verdict& v : verdicts) {
+    v.pair->replace(v.index, v.instead);
+    changed.push_back(v.pair);
+  }
   if (changed.empty()) return changed;
   std::vector<ContactPair*> in_order;
   std::sort(changed.begin(), changed.end());
