@@ -96,9 +96,12 @@ class Numbers(Case):
     def test_the_new_seed_button_changes_the_seed_and_the_film(self):
         page = self.page
         page.wait_for_frame(1)
+        button = page.find('#new-seed')
+        wait(lambda: button.is_enabled(), what='permission to write')
         film = page.film()
-        page.click('#new-seed')
+        button.click()
         wait(lambda: page.film() != film)
+        self.assertEqual(page.find('#new-seed'), button, 'a button that is replaced loses clicks')
         self.assertIn('"seed": ', page.text())
         self.command('z')
         self.assertEqual(page.text(), SCENE)

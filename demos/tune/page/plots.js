@@ -85,8 +85,10 @@ function drawFacts() {
     .map(n => ({...n, line: n.path && lineOf(n.path)}));
   const mine = isWriter();
   // The button comes first, so that facts whose length changes do not move it while the user aims at it.
+  seedText.textContent = `Seed ${doc.scene.seed} `;
+  seedButton.disabled = !mine;
   const parts = [
-    fact('seed', doc.scene.seed + ' ' + mine, () => el('span', {class: 'fact'}, `Seed ${doc.scene.seed} `, el('button', {class: 'quiet', id: 'new-seed', disabled: !mine, title: 'Use another random seed', onclick: () => setValue('/world/seed', Math.floor(Math.random() * 1e6) + 1, 'new seed')}, 'New seed'))),
+    seedFact,
     fact('progress', progress, () => el('span', {class: 'fact', id: 'progress'}, progress)),
     now && fact('state', store.frame + now.state, () => el('span', {class: 'fact'}, 'State ', hash(now.state, `state of frame ${store.frame}`))),
     last && fact('last', last, () => el('span', {class: 'fact', id: 'final-state', 'data-hash': last}, 'Final state ', hash(last, 'state after the last frame, as `offstage simulate` prints it'))),
@@ -96,6 +98,9 @@ function drawFacts() {
   keepIn(byId('facts'), [factsLine, notes.length ? fact('notes', JSON.stringify(notes), () => el('ul', {class: 'notes'}, notes.map(noteItem))) : null].filter(Boolean));
 }
 const factsLine = el('div', {class: 'facts-line'});
+const seedText = el('span', {});
+const seedButton = el('button', {class: 'quiet', id: 'new-seed', title: 'Use another random seed', onclick: () => setValue('/world/seed', Math.floor(Math.random() * 1e6) + 1, 'new seed')}, 'New seed');
+const seedFact = el('span', {class: 'fact'}, seedText, seedButton);
 const noteItem = n => el('li', {class: n.bad ? 'bad' : ''}, n.path ? el('button', {class: 'problem', title: 'Show it in the controls and in the text', onclick: () => { reveal(n.path); emit('show-text', n.path); }}, el('span', {class: 'where'}, `line ${n.line}`), n.what) : n.what);
 
 // A fact is rebuilt only when it changes. If a button were replaced between press and release, the click would be lost.
