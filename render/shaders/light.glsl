@@ -23,6 +23,25 @@ struct Surface {
   Normals normals;
 };
 
+#ifdef FRAGMENT
+// Returns the slope of a normal that differs from `normal` by `change`.
+vec3 slope_to(vec3 normal, vec3 change) {
+  return (change - normal * dot(normal, change)) / max(1.0 - 0.5 * dot(change, change), 0.5);
+}
+
+// Returns the normals within a pixel. `normal`: in its middle.
+Normals normals_in_pixel(vec3 normal) {
+  const float widest2 = 0.18;
+  vec3 dx = slope_to(normal, dFdx(normal)), dy = slope_to(normal, dFdy(normal));
+  float xx = dot(dx, dx), xy = dot(dx, dy), yy = dot(dy, dy), middle = 0.5 * (xx + yy);
+  float apart = sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy), major2 = middle + apart;
+  vec3 along = xx > yy ? (major2 - yy) * dx + xy * dy : xy * dx + (major2 - xx) * dy;
+  float size2 = dot(along, along);
+  return Normals(along * (0.5 * inversesqrt(max(size2, 1e-30)) * sqrt(min(major2, 4.0 * widest2))),
+                 0.25 * min(max(middle - apart, 0.0), 4.0 * widest2));
+}
+#endif
+
 // Means of the GGX distribution, times pi. It is a^2 / (a^2 + u)^2 as a function of u = tan^2 of the angle to the normal.
 // Over a disc of radius^2 `disc` around the half vector. The fraction within u is u / (a^2 + u), so the mean is 1 / (a^2 + disc)
 // at the normal. Outside of the disc, the mean from u - disc to u is used; `sum` is the sum of both over all directions.

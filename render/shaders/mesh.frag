@@ -28,23 +28,6 @@ float filtered_roughness(float roughness, vec3 normal) {
   return sqrt(sqrt(saturate(a * a + min(2.0 * variance, 0.18))));
 }
 
-// Returns the slope of a normal that differs from `normal` by `change`.
-vec3 slope_to(vec3 normal, vec3 change) {
-  return (change - normal * dot(normal, change)) / max(1.0 - 0.5 * dot(change, change), 0.5);
-}
-
-// Returns the normals within a pixel. `normal`: in its middle.
-Normals normals_in_pixel(vec3 normal) {
-  const float widest2 = 0.18;
-  vec3 dx = slope_to(normal, dFdx(normal)), dy = slope_to(normal, dFdy(normal));
-  float xx = dot(dx, dx), xy = dot(dx, dy), yy = dot(dy, dy), middle = 0.5 * (xx + yy);
-  float apart = sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy), major2 = middle + apart;
-  vec3 along = xx > yy ? (major2 - yy) * dx + xy * dy : xy * dx + (major2 - xx) * dy;
-  float size2 = dot(along, along);
-  return Normals(along * (0.5 * inversesqrt(max(size2, 1e-30)) * sqrt(min(major2, 4.0 * widest2))),
-                 0.25 * min(max(middle - apart, 0.0), 4.0 * widest2));
-}
-
 #ifdef DETAILED
 // Returns the normal from the normal map, whose Y axis points against v. Without given tangents, the directions of u and v come
 // from derivatives (M. Mikkelsen, "Bump Mapping Unparametrized Surfaces on the GPU", 2010). The back shows the
