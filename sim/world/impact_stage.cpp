@@ -15,7 +15,8 @@ namespace {
 
 constexpr uint32_t kMaxImpactsOfPair = 40, kMaxOfTumblingPair = 100;
 constexpr std::size_t kMaxImpacts = 128, kImpactsPerBody = 4;
-/// Limits of the cost of impacts in a sub-step: of many bodies, of few ones, and with the exact solvers [ns].
+/// Limits of the cost of impacts in a sub-step: of many bodies, of few ones or bodies with joints,
+/// whose impacts cost more, and with the exact solvers [ns].
 /// In a pile each impact moves many bodies and causes hundreds of other impacts. After the first limit,
 /// restitution is suppressed, and impacts are solved together. After kLastCost times the limit, all impacts
 /// that are still pending are solved together, and no pair is traced back in the rest of the sub-step.
@@ -72,7 +73,8 @@ Real ImpactStage::cost() const {
 }
 Real ImpactStage::greatest_cost() const {
   if (world_.is_exact()) return kExactImpactCost;
-  return std::max(1.0, h_ / kUsualStep) * (contacts_.is_exact() ? kImpactCostOfFew : kImpactCost);
+  const bool few = contacts_.is_exact() || !world_.joints.empty();
+  return std::max(1.0, h_ / kUsualStep) * (few ? kImpactCostOfFew : kImpactCost);
 }
 
 template <class IsWanted>

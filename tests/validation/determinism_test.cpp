@@ -143,7 +143,7 @@ constexpr const char* kBouncingExact = "ba579ae8c79a71beebc41a78ce6a72d6";
 constexpr const char* kBouncingFast = "1e2fc9eee5713f0a931782de8eabba35";
 constexpr const char* kHeapFast = "a881cb2c1373ee284b62dfb6248775c2";
 constexpr const char* kChainExact = "931a476ef70e904be100c37fc2515db0";
-constexpr const char* kChainFast = "38f699ed9bc91525b681551612f8967b";
+constexpr const char* kChainFast = "25116c917052a4257488a08fcb74406a";
 
 TEST(Determinism, SameHashInEveryBuild) {
   EXPECT_EQ(run().hex(), kParticles);
