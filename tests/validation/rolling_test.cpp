@@ -447,7 +447,7 @@ TEST(OrderOfBodies, DoesNotChangeTheirMotion) {
     for (const auto& [first, stride] : {std::pair<std::size_t, std::size_t>{18, 18}, {5, 11}}) {
       const std::vector<Pose> poses = heap_after(solver, first, stride);
       for (std::size_t i = 0; i < poses.size(); ++i)
-        EXPECT_LT((poses[i].position - expected[i].position).norm(), 1e-4) << i;
+        EXPECT_LT((poses[i].position - expected[i].position).norm(), 1e-9) << i;
     }
   }
 }
