@@ -55,11 +55,12 @@ class Watcher {
     if (target_.kind == OutputKind::pipe)
       throw OutputError("--watch needs an output that can be replaced; standard output cannot");
     if (target_.kind == OutputKind::video) {
-      producer::check_file(target_.path.string(), options.force, options.scene);
+      producer::check_file(target_.path.string(), options.force);
     } else if (!options.force && fs::exists(folder() / "manifest.json")) {
       throw OutputError(folder().string() + ": already contains frames; replace them with --force");
     }
-    producer::check_file(options.stats, options.force, options.scene);
+    producer::check_file(options.stats, options.force);
+    producer::check_not_read({target_.path.string(), options.stats}, options.scene);
     if (options.cameras.size() > 1 ||
         (options.cameras.size() == 1 && options.cameras.front() == producer::kAllCameras))
       throw OutputError("--watch draws one camera; name it with --camera");

@@ -1,10 +1,9 @@
 #pragma once
 /// Integrators of cloth: they move the points of a cloth through a sub-step of length h [s] under springs,
 /// bending and outer accelerations. `relaxed` and `implicit` also keep points above their supports
-/// (ClothPoints::supports), and `relaxed` keeps triangles above
-/// theirs and limits bending. Drag is implicit in all of them (air_drag.h).
-/// Pinned points must already have been moved. If the velocity at the end differs from displacement / h, the
-/// difference is stored in `kick`.
+/// (ClothPoints::supports), and `relaxed` keeps triangles above theirs and limits bending. Drag is implicit
+/// in all of them (air_drag.h). Pinned points must already have been moved. If the velocity at the end
+/// differs from displacement / h, the difference is stored in `kick`.
 
 #include <algorithm>
 #include <span>

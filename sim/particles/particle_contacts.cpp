@@ -70,16 +70,18 @@ void remove_internal_edges(std::vector<ParticleContacts::Touch>& touches, Real r
   using Touch = ParticleContacts::Touch;
   const auto is_of_first = [&](const Touch& touch) { return touch.obstacle == touches.front().obstacle; };
   if (std::ranges::all_of(touches, is_of_first)) return;
-  std::vector<Touch> faces;
-  for (const Touch& touch : touches)
-    if (is_on_face(touch, h)) faces.push_back(touch);
+  for (Touch& touch : touches) touch.on_face = is_on_face(touch, h);
   const Real flush = std::min(kFlushStep, kFlushStepFraction * 2 * radius);
-  std::erase_if(touches, [&](const Touch& touch) {
-    if (touch.obstacle->solid.mesh || is_on_face(touch, h)) return false;
-    return std::ranges::any_of(faces, [&](const Touch& face) {
-      return face.obstacle != touch.obstacle && (touch.place - face.place).dot(face.normal) <= flush;
+  const auto is_internal = [&](const Touch& edge) {
+    if (edge.on_face || edge.obstacle->solid.mesh) return false;
+    return std::ranges::any_of(touches, [&](const Touch& face) {
+      return face.on_face && face.obstacle != edge.obstacle &&
+             (edge.place - face.place).dot(face.normal) <= flush;
     });
-  });
+  };
+  // Only contacts that are no faces are erased, so the faces are the same for all of them.
+  for (std::size_t k = touches.size(); k-- > 0;)
+    if (is_internal(touches[k])) touches.erase(touches.begin() + static_cast<std::ptrdiff_t>(k));
 }
 
 }  // namespace

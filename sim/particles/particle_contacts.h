@@ -43,9 +43,10 @@ class ParticleContacts {
   struct Touch {
     const Obstacle* obstacle;
     Vec3 normal, place;
-    Real gap;    ///< gap at the end of the sub-step [m]; 0 if `meets`
-    Real time;   ///< start of the contact, since the sub-step's start [s]
-    bool meets;  ///< whether the particle reaches the surface in the sub-step
+    Real gap;              ///< gap at the end of the sub-step [m]; 0 if `meets`
+    Real time;             ///< start of the contact, since the sub-step's start [s]
+    bool meets;            ///< whether the particle reaches the surface in the sub-step
+    bool on_face = false;  ///< whether the contact is on a face, if other obstacles are touched, too
   };
 
   /// Solves the contacts and moves the particles to the end of the sub-step. Clusters of at most

@@ -6,6 +6,7 @@
 #include "sim/contact/contact_motion.h"
 #include "sim/contact/contact_terms.h"
 #include "sim/contact/island_impacts.h"
+#include "sim/contact/solver_choice.h"
 #include "sim/core/parallel_loop.h"
 #include "sim/world/impact_search.h"
 #include "sim/world/moving_islands.h"
@@ -15,13 +16,15 @@ namespace {
 
 constexpr uint32_t kMaxImpactsOfPair = 40, kMaxOfTumblingPair = 100;
 constexpr std::size_t kMaxImpacts = 128, kImpactsPerBody = 4;
-/// Limits of the cost of impacts in a sub-step: of many bodies, of few ones or bodies with joints,
-/// whose impacts cost more, and with the exact solvers [ns].
-/// In a pile each impact moves many bodies and causes hundreds of other impacts. After the first limit,
-/// restitution is suppressed, and impacts are solved together. After kLastCost times the limit, all impacts
-/// that are still pending are solved together, and no pair is traced back in the rest of the sub-step.
-/// The limits are larger in sub-steps that are longer than kUsualStep [s], which contain more impacts.
+/// Limits of the cost of impacts in a sub-step: of many bodies, of few ones, and with the exact solvers [ns].
+/// An impact of bodies with joints costs more, so each joint adds kImpactCostOfJoint, up to the limit of few
+/// (kFewBodies) bodies. In a pile each impact moves many bodies and causes hundreds of other impacts. After
+/// the limit, restitution is suppressed, and impacts are solved together. After kLastCost times the limit,
+/// all impacts that are still pending are solved together, and no pair is traced back in the rest of the
+/// sub-step. The limits are larger in sub-steps that are longer than kUsualStep [s], which contain more
+/// impacts.
 constexpr Real kImpactCost = 6e5, kImpactCostOfFew = 2e6, kExactImpactCost = 8e7, kLastCost = 2;
+constexpr Real kImpactCostOfJoint = 2e5;
 constexpr Real kUsualStep = 1.0 / 240;
 /// Cost of an impact, in addition to the solvers: of each body and contact point that is moved again
 /// (kPointCost), of finding the points of a pair (kPairCost), and of a search for the time of impact of a
@@ -73,8 +76,9 @@ Real ImpactStage::cost() const {
 }
 Real ImpactStage::greatest_cost() const {
   if (world_.is_exact()) return kExactImpactCost;
-  const bool few = contacts_.is_exact() || !world_.joints.empty();
-  return std::max(1.0, h_ / kUsualStep) * (few ? kImpactCostOfFew : kImpactCost);
+  const Real of_many = kImpactCost + kImpactCostOfJoint * static_cast<Real>(world_.joints.size());
+  return std::max(1.0, h_ / kUsualStep) *
+         (active_.awake().size() <= kFewBodies ? kImpactCostOfFew : std::min(of_many, kImpactCostOfFew));
 }
 
 template <class IsWanted>

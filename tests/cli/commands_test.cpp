@@ -169,17 +169,23 @@ TEST(Commands, ContactsOfARestingBodyCarryItsWeight) {
 }
 
 // Also with --force, which is for the results of earlier runs.
-TEST(Commands, DoNotReplaceTheSceneOrAnInclude) {
+TEST(Commands, DoNotReplaceFilesThatTheSceneReads) {
   const TemporaryFolder folder;
-  write_file(folder / "parts.json", R"({"bodies": [{"name": "ball", "shape": {"type": "sphere"}}]})");
-  write_file(folder / "s.json", R"({"version": 1, "include": ["parts.json"], "output": {"duration": 0.1}})");
+  std::filesystem::create_directory(folder / "look");
+  ASSERT_EQ(offstage("frame " + tiny_scene() + " -o look/0001.png --quiet", folder.path()).code, 0);
+  write_file(folder / "parts.json",
+             R"({"bodies": [{"name": "ball", "shape": {"type": "sphere"}, "material": "m"}]})");
+  write_file(folder / "s.json", R"({"version": 1, "include": ["parts.json"], "output": {"duration": 0.1},
+    "materials": [{"name": "m", "texture": "look/0001.png"}]})");
   const auto before = contents(folder.path());
-  for (const std::string option : {"--trace s.json", "--stats ./s.json", "--contacts parts.json"}) {
-    const Outcome run = offstage("simulate s.json --force --progress none " + option, folder.path());
-    EXPECT_EQ(run.code, 2) << option;
+  for (const std::string command : {"simulate s.json --trace s.json", "simulate s.json --stats ./s.json",
+                                    "simulate s.json --contacts parts.json", "frame s.json -o look/0001.png",
+                                    "render s.json --frames 1 -o look/####.png"}) {
+    const Outcome run = offstage(command + " --force --quiet", folder.path());
+    EXPECT_EQ(run.code, 2) << command;
     EXPECT_NE(run.err.find("is read by the scene; give the output another name"), std::string::npos)
         << run.err;
-    EXPECT_EQ(contents(folder.path()), before) << option;
+    EXPECT_EQ(contents(folder.path()), before) << command;
   }
 }
 

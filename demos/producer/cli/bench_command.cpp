@@ -68,7 +68,8 @@ class BenchProgress {
 /// Simulates a scene with each algorithm that it can select, and prints a table of the results.
 int bench_command(const BenchOptions& options) {
   const LoadedScene loaded = load(options.scene, options.log.quiet);
-  check_file(options.csv, options.force, options.scene);
+  check_file(options.csv, options.force);
+  check_not_read({options.csv}, options.scene);
   const ModelLibrary models = load_models(loaded, options.scene, options.log);
   const auto threads = simulation_threads(options.threads);
   const std::vector<Method> methods = methods_of(loaded.scene);

@@ -125,9 +125,9 @@ std::string write_numbered_file(const std::string& stem, const std::string& endi
 /// Checks before a long run that an output file can be written. Otherwise throws OutputError. An existing
 /// file is an error unless `force`. An empty name means that there is no such file.
 void check_file(const std::string& file, bool force);
-/// Like the function above. A file that the scene reads is an error even with `force`: the scene itself, an
-/// include, a model or a texture.
-void check_file(const std::string& file, bool force, const SceneOptions& scene);
+/// Throws OutputError if one of the output files is a file that the scene reads: the scene itself, an
+/// include, a model or a texture. Outputs replace files of earlier runs, never these.
+void check_not_read(const std::vector<std::string>& outputs, const SceneOptions& scene);
 /// Throws OutputError if two outputs are the same file.
 void check_distinct(const std::string& a, const std::string& b);
 /// Throws OutputError unless the name ends in .png.

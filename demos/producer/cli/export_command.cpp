@@ -32,9 +32,12 @@ struct ExportOptions {
 /// Throws OutputError before the work begins if the output already exists and must not be replaced.
 void check_target(const ExportTarget& target, const std::vector<int>& frames, const ExportOptions& options) {
   render::create_parent_folders(target.path);
-  if (!target.sequence()) return check_file(target.path.string(), options.force, options.scene);
+  std::vector<std::string> files;
+  if (!target.sequence()) files.push_back(target.path.string());
   for (const int frame : frames)
-    check_file(render::frame_path(target.path, frame).string(), options.force, options.scene);
+    if (target.sequence()) files.push_back(render::frame_path(target.path, frame).string());
+  for (const std::string& file : files) check_file(file, options.force);
+  check_not_read(files, options.scene);
 }
 
 int export_command(const ExportOptions& options) {

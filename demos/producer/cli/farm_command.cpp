@@ -119,7 +119,8 @@ void prepare_work(const FarmOptions& options, const FarmPlan& plan) {
     fs::remove_all(plan.work / "done");
     if (plan.encodes) remove_frames(plan.work / "frames");
   }
-  if (!options.resume && plan.encodes) check_file(plan.out.string(), options.force, options.scene);
+  if (!options.resume && plan.encodes) check_file(plan.out.string(), options.force);
+  check_not_read({plan.out.string()}, options.scene);
   fs::create_directories(plan.work / "logs");
   fs::create_directories(plan.work / "done");
   for (const FarmScript& script : step_scripts(plan)) {

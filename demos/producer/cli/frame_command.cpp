@@ -44,11 +44,12 @@ int frame_command(const FrameOptions& options) {
     frame = checked_frame(scene, wanted < 0 ? wanted + scene.frame_count() + 1 : wanted);
   }
   check_png(options.out);
-  check_file(options.out, options.force, options.scene);
   const render::ChannelChoice channels{scene.output.channels, scene.output.channel_format};
   const fs::path stem = fs::path(options.out).replace_extension();
-  for (const fs::path& file : render::channel_files(stem, channels))
-    check_file(file.string(), options.force, options.scene);
+  std::vector<std::string> files = {options.out};
+  for (const fs::path& file : render::channel_files(stem, channels)) files.push_back(file.string());
+  for (const std::string& file : files) check_file(file, options.force);
+  check_not_read(files, options.scene);
 
   class PictureSink : public render::FrameSink {
    public:

@@ -4,8 +4,12 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <memory>
 #include <optional>
+#include <set>
+#include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -268,7 +272,7 @@ int render_cameras(const RenderOptions& options) {
       throw std::invalid_argument("there is no camera '" + name + "'" + suggestion(name, known));
   for (const std::string& name : names) {
     const OutputTarget target = parse_output(output_of_camera(options.out, name));
-    if (target.kind == OutputKind::video) check_file(target.path.string(), options.force, options.scene);
+    if (target.kind == OutputKind::video) check_file(target.path.string(), options.force);
   }
   std::optional<HiddenFolder> states;
   if (options.cache.empty() && !options.resume && !options.dry_run && names.size() > 1)
@@ -284,6 +288,18 @@ int render_cameras(const RenderOptions& options) {
     if (code != kOk) return code;
   }
   return kOk;
+}
+
+/// Returns the names of all files that a run may replace or remove.
+std::vector<std::string> replaced_files(const Plan& plan, const RenderOptions& options) {
+  std::vector<std::string> files = {options.stats, options.report};
+  if (plan.target.kind == OutputKind::video) files.push_back(plan.target.path.string());
+  if (plan.target.kind != OutputKind::frames || !options.force) return files;
+  for (const int frame : plan.frames)
+    files.push_back(render::frame_path(plan.frames_pattern, frame).string());
+  for (const fs::path& file : files_of_frames(plan.frames_pattern.parent_path()))
+    files.push_back(file.string());
+  return files;
 }
 
 }  // namespace
@@ -308,14 +324,16 @@ void check_file(const std::string& file, bool force) {
   if (!force) throw OutputError(file + ": exists already; replace it with --force");
 }
 
-void check_file(const std::string& file, bool force, const SceneOptions& scene) {
-  check_file(file, force);
-  if (file.empty() || !fs::exists(file) || scene.from_standard_input()) return;
-  for (const fs::path& read : files_of_scene(scene.file, scene.overrides())) {
-    std::error_code error;
-    if (fs::equivalent(file, read, error))
-      throw OutputError(file + ": is read by the scene; give the output another name");
-  }
+void check_not_read(const std::vector<std::string>& outputs, const SceneOptions& scene) {
+  std::vector<std::string> existing;
+  std::ranges::copy_if(outputs, std::back_inserter(existing),
+                       [](const std::string& file) { return !file.empty() && fs::exists(file); });
+  if (existing.empty() || scene.from_standard_input()) return;
+  const std::set<fs::path> inputs = files_of_scene(scene.file, scene.overrides());
+  for (const std::string& file : existing)
+    for (const fs::path& input : inputs)
+      if (std::error_code error; fs::equivalent(file, input, error))
+        throw OutputError(file + ": is read by the scene; give the output another name");
 }
 
 void check_distinct(const std::string& a, const std::string& b) {
@@ -356,7 +374,7 @@ int render_command(const RenderOptions& given) {
   const Plan plan = make_plan(options, models, std::move(loaded));
   if (plan.target.kind == OutputKind::video) {
     render::check_video(video_def(plan));
-    check_file(plan.target.path.string(), options.force, options.scene);
+    check_file(plan.target.path.string(), options.force);
     if (!options.chunk.empty())
       throw OutputError(
           plan.target.path.string() +
@@ -367,11 +385,12 @@ int render_command(const RenderOptions& given) {
       throw OutputError(stale.string() +
                         ": contains channels of an earlier film; remove it, or replace it with --force");
   }
-  check_file(options.stats, options.force || options.resume, options.scene);
+  check_file(options.stats, options.force || options.resume);
   check_distinct(options.stats, options.out);
-  check_file(options.report, options.force || options.resume, options.scene);
+  check_file(options.report, options.force || options.resume);
   check_distinct(options.report, options.out);
   check_distinct(options.report, options.stats);
+  check_not_read(replaced_files(plan, options), options.scene);
   if (plan.channels.choice.any() && plan.target.kind == OutputKind::pipe)
     throw OutputError("-: channels are files beside frames or a video; choose a folder or a file as output");
   if (options.dry_run) return print_plan(plan);

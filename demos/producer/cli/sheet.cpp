@@ -70,7 +70,8 @@ namespace {
 
 int sheet_command(const SheetOptions& options) {
   check_png(options.out);
-  check_file(options.out, options.force, options.scene);
+  check_file(options.out, options.force);
+  check_not_read({options.out}, options.scene);
   SceneOptions scene_options = options.scene;
   if (!scene_options.size) scene_options.size = small_size(load(options.scene, true).scene, kSmallSide_px);
   const LoadedScene loaded = load(scene_options, options.log.quiet);

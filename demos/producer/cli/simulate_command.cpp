@@ -1,7 +1,7 @@
 // The command simulate: simulates without drawing.
 
-#include <array>
 #include <memory>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -26,12 +26,14 @@ struct SimulateOptions {
 int simulate_command(const SimulateOptions& options) {
   const LoadedScene loaded = load(options.scene, options.log.quiet);
   const ModelLibrary models = load_models(loaded, options.scene, options.log);
-  const std::array files = {options.stats,        options.trace,  options.contacts, options.cloths,
-                            options.cloth_points, options.joints, options.particles};
+  const std::vector<std::string> files = {options.stats,    options.trace,        options.contacts,
+                                          options.cloths,   options.cloth_points, options.joints,
+                                          options.particles};
   for (std::size_t i = 0; i < files.size(); ++i) {
-    check_file(files[i], options.force, options.scene);
+    check_file(files[i], options.force);
     for (std::size_t k = 0; k < i; ++k) check_distinct(files[k], files[i]);
   }
+  check_not_read(files, options.scene);
   const auto threads = simulation_threads(options.threads);
   SimulateJob job{.cache = {},
                   .force = options.force,

@@ -157,8 +157,9 @@ void check_outputs(const SweepOptions& options, const Sweep& sweep) {
     throw OutputError(sweep.finished.string() +
                       ": contains an unfinished sweep; continue with --resume, or start again with --force");
   const bool replace = options.force || (options.resume && begun);
-  check_file(options.out, replace, options.scene);
-  check_file(sweep.csv, replace, options.scene);
+  check_file(options.out, replace);
+  check_file(sweep.csv, replace);
+  check_not_read({options.out, sweep.csv}, options.scene);
 }
 
 // --- Finished runs on disk ---
