@@ -24,6 +24,18 @@ struct Surface {
 };
 
 #ifdef FRAGMENT
+// How much the variance of the normal within a pixel increases roughness^4 (Kaplanyan and Tokuyoshi, "Stable Geometric
+// Specular Antialiasing", 2019).
+float added_roughness4(vec3 normal) {
+  vec3 dx = dFdx(normal), dy = dFdy(normal);
+  return min(0.5 * (dot(dx, dx) + dot(dy, dy)), 0.18);
+}
+// Roughness for mirror images, which would flicker where the normal varies within a pixel.
+float filtered_roughness(float roughness, vec3 normal) {
+  float a = roughness * roughness;
+  return sqrt(sqrt(saturate(a * a + added_roughness4(normal))));
+}
+
 // Returns the slope of a normal that differs from `normal` by `change`.
 vec3 slope_to(vec3 normal, vec3 change) {
   return (change - normal * dot(normal, change)) / max(1.0 - 0.5 * dot(change, change), 0.5);

@@ -19,15 +19,6 @@ layout(location = 0) uniform float min_alpha;  // smallest alpha that this pass 
 layout(location = 0) out vec4 color;
 #endif
 
-// Roughness, increased where the normal varies within a pixel, so that mirror images do not flicker (Kaplanyan and
-// Tokuyoshi, "Stable Geometric Specular Antialiasing", 2019).
-float filtered_roughness(float roughness, vec3 normal) {
-  vec3 dx = dFdx(normal), dy = dFdy(normal);
-  float variance = 0.25 * (dot(dx, dx) + dot(dy, dy));
-  float a = roughness * roughness;
-  return sqrt(sqrt(saturate(a * a + min(2.0 * variance, 0.18))));
-}
-
 #ifdef DETAILED
 // Returns the normal from the normal map, whose Y axis points against v. Without given tangents, the directions of u and v come
 // from derivatives (M. Mikkelsen, "Bump Mapping Unparametrized Surfaces on the GPU", 2010). The back shows the

@@ -21,10 +21,9 @@ void main() {
   vec3 n = from_octahedral(texelFetch(surface_normals, pixel, 0).xy), view = normalize(frame.eye.xyz - place.xyz);
   float roughness = place.w - 2.0 * floor(0.5 * place.w);  // without the flags, which are multiples of 2
   float metallic = 2.0 * own.a - 1.0;
-  // The roughness before filtered_roughness() in mesh.frag, which leaves that of smooth metals.
-  vec3 dx = dFdx(n), dy = dFdy(n);
-  float r2 = roughness * roughness, added = min(0.5 * (dot(dx, dx) + dot(dy, dy)), 0.18);
-  float lobe = metallic > 0.5 && roughness <= 0.12 ? roughness : sqrt(sqrt(max(r2 * r2 - added, 0.0)));
+  // The inverse of filtered_roughness(), which mesh.frag does not apply to smooth metals.
+  float r2 = roughness * roughness;
+  float lobe = metallic > 0.5 && roughness <= 0.12 ? roughness : sqrt(sqrt(max(r2 * r2 - added_roughness4(n), 0.0)));
   Surface s = Surface(own.rgb, roughness, metallic, vec3(0.0), lobe, normals_in_pixel(n));
   vec3 radiance = shade(s, n, view, traced_light(n, n)) + highlights_of_lamps(mix(dielectric_f0, s.albedo, s.metallic));
   color = vec4(apply_fog(radiance, place.xyz), 1.0);
