@@ -27,7 +27,10 @@ void Glow::add(unsigned object, const RayMesh& mesh, const RayMaterial& material
 
 void Glow::limit() {
   if (sources_.size() <= kMost) return;
-  std::ranges::stable_sort(sources_, std::greater<>(), &Source::power);
+  // Not stable_sort: the buffer of libstdc++ 12 is not aligned as types of Eigen with AVX need it.
+  std::ranges::sort(sources_, [](const Source& a, const Source& b) {
+    return a.power != b.power ? a.power > b.power : a.object < b.object;
+  });
   sources_.resize(kMost);
 }
 

@@ -214,6 +214,23 @@ TEST(Stage, DrawsAllPartsOfLargeObjects) {
   }
 }
 
+// More of them than are sampled as lamps. Each number of bodies has another layout in memory.
+TEST(Stage, DrawsAnyNumberOfGlowingBodies) {
+  SmallStage s;
+  const MeshHandle ball = s.stage.add_mesh(make_sphere(0.1f, 12));
+  const MaterialHandle bright = s.stage.add_material(glowing({1, 1, 1}));
+  for (int i = 0; i < 120; ++i) {
+    const float turn = 0.1f * static_cast<float>(i);
+    s.stage.set_transform(
+        s.stage.add_instance(ball, bright),
+        Eigen::Affine3f(Eigen::Translation3f(std::cos(turn), std::sin(turn), -0.01f * turn)));
+    if (i < 60) continue;
+    const HdrImage picture = s.draw();
+    const Vector2f place = project({.eye = {0, 0, 5}, .target = {0, 0, 0}}, {1, 0, 0}, 96, 64);
+    EXPECT_GT(pixel(picture, static_cast<int>(place.x()), static_cast<int>(place.y())).x(), 0.5f) << i;
+  }
+}
+
 TEST(Stage, DepthIsPreciseFarAway) {
   SmallStage s;
   s.stage.set_camera(
