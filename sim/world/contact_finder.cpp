@@ -46,10 +46,12 @@ Real smaller_extent(const Body& a, const Body& b) {
 Aabb swept_bounds(const Body& body) {
   Aabb box = bounds(body.solid, body.start_pose).merged(bounds(body.solid, body.pose));
   Real margin = std::min(kMargin, kMarginFraction * body.extent);
-  if (!std::holds_alternative<Sphere>(body.def.shape)) {
+  // Without a rotation there is no bow; for a plane, whose extent is infinite, the product would be
+  // undefined.
+  if (const PosePath path = body.path(); path.turns() && !std::holds_alternative<Sphere>(body.def.shape)) {
     // The deviation of a point from the chord of its path is at most an eighth of its greatest acceleration.
     // Large rotations use the balls around the start and the end instead.
-    const Real bow = body.path().max_acceleration(body.extent) / 8;
+    const Real bow = path.max_acceleration(body.extent) / 8;
     margin += bow > kWide * body.extent ? body.extent : bow;
   }
   box.min().array() -= margin;

@@ -94,7 +94,8 @@ TEST(SceneBodies, InvalidCouplingsAreRefused) {
       {"type": "pulley", "a": "a", "b": "b", "pulley_a": [0, 3, 0], "pulley_b": [0, 3, 0], "ratio": -1},
       {"type": "distance", "a": "a", "anchor": [0, 1, 0], "length_limits": [0, 0.5]},
       {"type": "revolute", "a": "a", "stiffness": 3}, {"a": "a", "restitution": 0.5},
-      {"type": "revolute", "a": "a", "ratio": 2, "pulley_a": [0, 3, 0]}])"),
+      {"type": "revolute", "a": "a", "ratio": 2, "pulley_a": [0, 3, 0]},
+      {"a": "a", "swing_deg": 20, "restitution": 0.5}])"),
             "/joints/0/b: is needed: a gear or rack couples two bodies\n"
             "/joints/1/ratio: must not be 0\n"
             "/joints/2/ratio: must be greater than 0 for a pulley\n"

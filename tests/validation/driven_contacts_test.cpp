@@ -56,6 +56,21 @@ TEST_P(DrivenContacts, AMotorPressesALoadedArmAgainstItsLimit) {
   EXPECT_EQ(t.exact_fallbacks, 0u);
   EXPECT_NEAR(w.joint(joint).coordinate, 0.3, is_exact() ? 1e-6 : 1e-3);
 }
+
+TEST_P(DrivenContacts, APlaneThatFollowsKeysCarriesABox) {
+  for (const Real step : {1.0 / 240, 1.0 / 60}) {
+    World w(def(step));
+    BodyDef floor{.shape = Plane{}, .motion = MotionType::kinematic, .restitution = 0, .friction = 0.5};
+    floor.track.interpolation = Interpolation::linear;
+    for (const auto& [time, height] : {std::pair(0.0, 0.0), {1.0, 0.0}, {3.0, 2.0}})
+      floor.track.keys.push_back({.time = time, .pose = {{0, height, 0}, Quat::Identity()}});
+    w.add_body(floor);
+    const BodyHandle box = add_load(w, {0.3, 0.1, 0});
+    run(w, 2.5, step);
+    EXPECT_NEAR((w.body(box).centre - Vec3(0.3, 1.6, 0)).norm(), 0, is_exact() ? 1e-9 : 1e-4) << step;
+    EXPECT_NEAR(w.body(box).velocity.y(), 1, 1e-6) << step;
+  }
+}
 OFFSTAGE_BOTH_SOLVERS(Solvers, DrivenContacts);
 
 }  // namespace

@@ -110,7 +110,7 @@ class JointChecker : CheckBase {
     if (joint.ratio != 1 && !is_coupling && joint.type != screw && joint.type != pulley)
       fail(path + "/ratio", "is for gears, racks, screws and pulleys");
     if (joint.restitution > 0 && !joint.limits && !joint.length_limits && !joint.limits_deg &&
-        joint.type != pulley)
+        !joint.swing_deg && joint.type != pulley)
       fail(path + "/restitution", "has no effect: it is for impacts at limits, and the joint has none");
     if (is_coupling && (joint.limits || joint.limits_deg || joint.motor))
       fail(path, "a gear or rack has no limits and no motor; give them to the joints of its bodies");
