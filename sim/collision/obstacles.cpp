@@ -45,6 +45,12 @@ Vec3 Obstacle::friction_axis_on(const Vec3& n, Real fraction) const {
   return along / length;
 }
 
+Vec3 Obstacle::conveying_velocity(const Vec3& n, Real fraction) const {
+  if (surface_velocity == Vec3::Zero()) return surface_velocity;
+  const Vec3 v = at(fraction).vector_to_world(surface_velocity);
+  return v - n.dot(v) * n;
+}
+
 Mat3 Obstacle::mobility(const Vec3& arm) const {
   return point_mobility(inverse_mass, inverse_inertia, arm);
 }

@@ -27,6 +27,9 @@ struct Obstacle {
   /// Unit direction of the friction axis where the surface has the normal n (world) at a fraction of the
   /// sub-step; zero where friction is the same in all directions.
   Vec3 friction_axis_on(const Vec3& n, Real fraction) const;
+  /// Velocity along the surface of a conveyor relative to the solid, where the surface has the normal n
+  /// (world) at a fraction of the sub-step, world axes [m/s].
+  Vec3 conveying_velocity(const Vec3& n, Real fraction) const;
   /// Mobility K of physics P8 at the point `arm` from the centre of mass: change of the point's velocity per
   /// unit of impulse there, world axes [1/kg].
   Mat3 mobility(const Vec3& arm) const;
@@ -51,6 +54,7 @@ struct Obstacle {
   Real cross_friction = 1;  ///< friction across the friction axis, divided by friction along it
   Vec3 friction_axis =
       Vec3::Zero();       ///< direction of the surface's friction axis, in the solid's frame; zero: none
+  Vec3 surface_velocity = Vec3::Zero();  ///< BodyDef::surface_velocity
   uint32_t body = 0;      ///< the world's index of the body
   Real inverse_mass = 0;  ///< inverse mass [1/kg]; 0: particles do not move it
   /// Inverse inertia about the centre of mass, world axes at the end of the sub-step [1/(kg m^2)].

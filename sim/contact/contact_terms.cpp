@@ -118,10 +118,11 @@ Vec3 velocity_bias(const ContactPair& pair, const PlacedManifold& placed, const 
           h * placed.frame.k.dot(acceleration)};
 }
 
-Vec3 surface_velocity(const ContactPair& pair) {
+Vec3 surface_velocity(const ContactPair& pair, const Vec3& n) {
   if (!pair.surface().conveys) return Vec3::Zero();
-  return pair.a().start_pose.vector_to_world(pair.a().def.surface_velocity) -
-         pair.b().start_pose.vector_to_world(pair.b().def.surface_velocity);
+  const Vec3 v = pair.a().start_pose.vector_to_world(pair.a().def.surface_velocity) -
+                 pair.b().start_pose.vector_to_world(pair.b().def.surface_velocity);
+  return v - n.dot(v) * n;
 }
 
 Vec3 in_frame(const ContactFrame& f, const Vec3& v) {

@@ -15,8 +15,9 @@ namespace offstage::sim {
 /// contact's frame [m/s].
 Vec3 velocity_bias(const ContactPair& pair, const PlacedManifold& placed, const ContactPoint& point, Real h);
 
-/// Velocity that conveyors add to the velocity of a relative to b [m/s], world axes.
-Vec3 surface_velocity(const ContactPair& pair);
+/// Velocity that conveyors add to the velocity of a relative to b at a contact with the normal n [m/s], world
+/// axes. A conveyor moves along its surface, so the velocity has no component along n.
+Vec3 surface_velocity(const ContactPair& pair, const Vec3& n);
 
 /// Returns the components of a world vector along n, t and k.
 Vec3 in_frame(const ContactFrame& f, const Vec3& v);

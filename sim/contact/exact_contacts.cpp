@@ -291,9 +291,9 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
   const Real h = interval.duration;
   const uint32_t a = pair.a().is_awake() ? pair.a().row : add_body(pair.a(), interval);
   const uint32_t b = pair.b().is_awake() ? pair.b().row : add_body(pair.b(), interval);
-  const Vec3 surface = surface_velocity(pair);
   const Real force = last_force(pair);
-  for (PlacedManifold& m : pair.manifolds())
+  for (PlacedManifold& m : pair.manifolds()) {
+    const Vec3 surface = surface_velocity(pair, m.frame.n);
     for (uint32_t k = 0; k < m.manifold.count; ++k) {
       const ContactPoint& point = m.manifold.points[k];
       if (pair.awaits_impact(m, point, interval.impact_speed)) continue;
@@ -336,6 +336,7 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
             closing_point(touches ? 0 : point.separation, in_frame(c.frame, surface), motion,
                           motion.turns ? Vec3(Vec3::Zero()) : velocity_bias(pair, m, point, h)));
     }
+  }
 }
 
 /// Moves the bodies by the solution. Forces that are constant over the interval move a body by half of the

@@ -73,7 +73,7 @@ void set_motion(ContactPatch& patch, const ContactMotion& motion, NormalSource s
 void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifold& m,
                const ContactInterval& interval) {
   const Real duration = interval.duration;
-  const Vec3 centre_a = start_centre(pair.a()), surface = surface_velocity(pair);
+  const Vec3 centre_a = start_centre(pair.a()), surface = surface_velocity(pair, m.frame.n);
   // Only the deepest point of a rim shows the contact's position on the rim.
   const bool runs = runs_along(pair.a(), duration) || runs_along(pair.b(), duration);
   const Real gap = set_points(patch, m.manifold, m.frame, centre_a, start_centre(pair.b()), runs);

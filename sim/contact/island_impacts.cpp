@@ -57,8 +57,8 @@ struct CollisionCluster {
       return static_cast<uint32_t>(bodies.size() - 1);
     };
     const uint32_t a = row(pair.a()), b = row(pair.b());
-    const Vec3 surface = surface_velocity(pair);
-    for (const PlacedManifold& m : pair.manifolds())
+    for (const PlacedManifold& m : pair.manifolds()) {
+      const Vec3 surface = surface_velocity(pair, m.frame.n);
       for (uint32_t k = 0; k < m.manifold.count; ++k) {
         const ContactPoint& point = m.manifold.points[k];
         const Vec3 place = (point.on_a + point.on_b) / 2;
@@ -80,6 +80,7 @@ struct CollisionCluster {
         restitution.push_back(
             bounces.back() || settings.law == ImpactLaw::sequential ? pair.surface().restitution : 0);
       }
+    }
   }
 
   /// Whether nothing that touches bounces, and contacts with unmoved bodies close while another one carries a

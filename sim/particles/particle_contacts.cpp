@@ -221,7 +221,7 @@ void ParticleContacts::add_surface(uint32_t i, const Obstacle& o, const Vec3& no
   s.body = o.body;
   const Vec3 velocity = o.velocity_at(g.at(step_->h) - g.radius * normal, 1);
   s.normal_single = normal.cast<float>();
-  s.velocity = velocity;
+  s.velocity = velocity + o.conveying_velocity(normal, 1);
   s.friction_axis = o.friction_axis_on(normal, 1);
   s.friction = static_cast<float>(pair_friction(g.friction, o.friction));
   s.mass = static_cast<float>(g.mass);

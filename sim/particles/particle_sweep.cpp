@@ -239,18 +239,19 @@ void ParticleSweep::finish(ParticlePath& path, Real duration, const Vec3& extra)
 
 Vec3 collision_impulse(const Obstacle& o, Real fraction, Real particle_mass, const Vec3& u, const Vec3& n,
                        Real restitution, Real friction, const Mat3& mobility, Real turning) {
+  const Vec3 sliding = u - o.conveying_velocity(n, fraction);
   const Vec3 friction_axis = o.friction_axis_on(n, fraction);
   const bool isotropic = friction_axis.isZero();
   if (mobility.isZero(0) && isotropic)
-    return collision_impulse(particle_mass, particle_mass / (1 + turning), u, n, restitution, friction);
+    return collision_impulse(particle_mass, particle_mass / (1 + turning), sliding, n, restitution, friction);
   const ContactFrame f =
       isotropic ? contact_frame(n) : ContactFrame{n, friction_axis, n.cross(friction_axis)};
   Mat3 axes;
   axes << f.n, f.t, f.k;
   Mat3 K = Mat3::Identity() / particle_mass + mobility;
   if (turning > 0) K += turning / particle_mass * (Mat3::Identity() - n * n.transpose());
-  return axes * collision_impulse(Mat3(axes.transpose() * K * axes), Vec3(axes.transpose() * u), restitution,
-                                  friction, isotropic ? friction : o.cross_friction * friction);
+  return axes * collision_impulse(Mat3(axes.transpose() * K * axes), Vec3(axes.transpose() * sliding),
+                                  restitution, friction, isotropic ? friction : o.cross_friction * friction);
 }
 
 Reaction reaction(const Obstacle& o, const Vec3& contact, Real fraction, const Vec3& impulse_on_particle) {

@@ -58,10 +58,11 @@ struct ObstacleHit {
 };
 
 /// Returns the impulse on a particle [N s] that hits an obstacle at a fraction of the sub-step (physics P5,
-/// P8). `u`: relative velocity, u.n < 0. `mobility`: mobility of the obstacle at the contact [1/kg]; zero if
-/// the particle does not move it. `friction` applies along the obstacle's friction axis, and `friction` times
-/// Obstacle::cross_friction across it. With a friction axis each direction sticks or slides separately.
-/// `turning`: CollidingParticle::turning.
+/// P8). `u`: velocity relative to the solid, u.n < 0; for friction, the velocity relative to the conveyed
+/// surface counts (Obstacle::surface_velocity). `mobility`: mobility of the obstacle at the contact [1/kg];
+/// zero if the particle does not move it. `friction` applies along the obstacle's friction axis, and
+/// `friction` times Obstacle::cross_friction across it. With a friction axis each direction sticks or slides
+/// separately. `turning`: CollidingParticle::turning.
 Vec3 collision_impulse(const Obstacle& o, Real fraction, Real particle_mass, const Vec3& u, const Vec3& n,
                        Real restitution, Real friction, const Mat3& mobility, Real turning = 0);
 /// Returns the reaction on an obstacle to an impulse on a particle at the point `contact` (world) at a

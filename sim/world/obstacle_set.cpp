@@ -13,6 +13,7 @@ Obstacle swept_obstacle(const Body& body, Real h, bool is_fixed) {
     o.friction_axis = body.def.friction_axis;
     o.cross_friction = std::sqrt(body.def.cross_friction / body.def.friction);
   }
+  o.surface_velocity = body.def.surface_velocity;
   if (!body.is_dynamic() || is_fixed) return o;
   const RigidBody& rigid = body.rigid;
   const Mat3 axes = rigid.orientation.toRotationMatrix();

@@ -160,6 +160,31 @@ TEST(ParticlesAndBodies, SeamsBetweenFlushBoxesDoNotStopParticles) {
 
 // A step of a fifth of the radius is no seam: without restitution, the particle loses the part of its
 // velocity that points into the edge.
+// A ball whose friction has brought it to rolling has 2/7 of the conveyor's speed.
+TEST(ParticlesAndBodies, AConveyorCarriesParticles) {
+  constexpr Real kBelt = 1, kMu = 0.5, kRadius = 0.05;
+  for (const Real step : {1.0 / 240, 1.0 / 60})
+    for (const bool internal : {false, true})
+      for (const bool rotates : {false, true}) {
+        World w({.max_step = step});
+        w.add_body({.shape = Box{{10, 1, 2}},
+                    .motion = MotionType::static_body,
+                    .pose = {Vec3(0, -0.5, 0)},
+                    .restitution = 0,
+                    .friction = kMu,
+                    .surface_velocity = {kBelt, 0.5, 0}});
+        const auto system = w.add_particle_system({.internal = internal, .rotates = rotates});
+        w.add_particle(
+            system,
+            {.position = {0, kRadius, 0}, .mass = 0.1, .radius = kRadius, .restitution = 0, .friction = kMu});
+        for (Real t = 0; t < 2 - step / 2; t += step) w.step(step);
+        const Real speed = rotates ? 2.0 / 7 * kBelt : kBelt, takes = speed / (kMu * 9.81);
+        EXPECT_NEAR(w.particles(system).velocity[0].x(), speed, 1e-5);
+        EXPECT_NEAR(w.particles(system).position[0].x(), speed * (2 - takes / 2), speed * step / 2);
+        EXPECT_NEAR(w.particles(system).position[0].y(), kRadius, 1e-6);
+      }
+}
+
 TEST(ParticlesAndBodies, ALowStepHoldsParticlesBack) {
   World world({.max_step = 1.0 / 240, .sleep = false});
   add_tiles(world, 1, 2, 0.01);
