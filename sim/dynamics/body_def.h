@@ -37,7 +37,7 @@ struct BodyDef {
   /// moment at most the sum of the other two. Default: the inertia of the shape about its own centre of mass,
   /// scaled to the mass.
   std::optional<Mat3> inertia = {};
-  Real linear_drag = 0;   ///< k_v of F = -k_v v [kg/s]
+  Real linear_drag = 0;   ///< k_v of F = -k_v (v - wind) [kg/s]
   Real angular_drag = 0;  ///< k_w of tau = -k_w w [kg m^2/s]
   std::string material;   ///< name of the surface for ContactRule; may be empty
   /// Coefficient of restitution in [0, 1]; a pair uses the larger value of its bodies.

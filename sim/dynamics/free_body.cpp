@@ -133,7 +133,7 @@ void RigidStage::velocity(std::span<Real> dx) const {
 }
 
 void RigidStage::force(const BodyForces& forces, Real t, std::span<Real> dp) const {
-  Vec3 force = body.mass * forces.gravity - body.linear_drag * motion.velocity;
+  Vec3 force = body.mass * forces.gravity - body.linear_drag * (motion.velocity - forces.wind);
   Vec3 torque = -body.angular_drag * motion.angular_velocity;
   for (const ActiveForce& f : forces.forces) {
     if (!f.acts_on(body)) continue;

@@ -17,6 +17,7 @@ constexpr std::size_t kBodyX = 7, kBodyP = 6;
 struct BodyForces {
   Vec3 gravity;
   std::span<const ActiveForce> forces;
+  Vec3 wind = Vec3::Zero();  ///< velocity of the air, to which the drag of the bodies is relative [m/s]
 };
 
 /// The state of a body at a stage of an integrator. Its quaternion need not have unit length.

@@ -44,7 +44,7 @@ void CoupledSystem::resolve(const WorldState& world, std::span<const ForceDef* c
     std::sort(force.only.begin(), force.only.end());
     active_.push_back(std::move(force));
   }
-  forces_ = {world.def.gravity, active_};
+  forces_ = {world.def.gravity, active_, world.def.wind};
 }
 
 void CoupledSystem::gather(WorldState& world, std::span<Body* const> bodies, bool all_systems) {

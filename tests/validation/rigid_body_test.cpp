@@ -94,6 +94,22 @@ TEST(AngularDrag, SlowsTheSpinExponentially) {
   EXPECT_NEAR(world.body(ball).angular_velocity.z(), 7 * std::exp(-2 * 0.1 / (0.4 * 2 * 0.25)), 1e-8);
 }
 
+// v' = k (wind - v) / m
+TEST(LinearDrag, ActsRelativeToTheAir) {
+  const Vec3 wind(1, 0, -2);
+  for (const IntegratorKind kind :
+       {IntegratorKind::rk4, IntegratorKind::implicit_euler, IntegratorKind::leapfrog}) {
+    World world({.gravity = Vec3::Zero(), .wind = wind, .integrator = kind});
+    const auto ball =
+        world.add_body({.shape = Sphere{0.5}, .velocity = {5, 0, 0}, .mass = 2, .linear_drag = 1});
+    for (int i = 0; i < 120; ++i) world.step(1.0 / 60);
+    const Vec3 expected = wind + std::exp(-1.0) * (Vec3(5, 0, 0) - wind);
+    EXPECT_LT((world.body(ball).velocity - expected).norm(),
+              kind == IntegratorKind::implicit_euler ? 2e-3 * expected.norm() : 1e-5)
+        << static_cast<int>(kind);
+  }
+}
+
 struct Exact {
   Real volume, polar;  // moment of inertia about Y
 };
