@@ -110,8 +110,10 @@ struct Start {
   Vec3 sliding;  // velocity of a's material at the contact relative to b's
 };
 
-bool is_sphere(const Body& body) {
-  return std::holds_alternative<Sphere>(body.def.shape);
+/// Whether a body is a sphere whose rotation does not move its contacts: its centre of mass is in the middle.
+bool is_centred_sphere(const Body& body) {
+  return std::holds_alternative<Sphere>(body.def.shape) &&
+         (!body.is_awake() || body.rigid.centre == Vec3::Zero());
 }
 
 bool has_lines(NormalSource s) {
@@ -266,8 +268,8 @@ void set_gain(const Start& s, const ContactPlace& start, const ContactPlace& end
   motion.turns = true;
 }
 
-/// Returns the place of the contact of two spheres. Their rotation does not move the contact. All contacts in
-/// a heap of balls are of this kind.
+/// Returns the place of the contact of two centred spheres, whose rotation does not move the contact. All
+/// contacts in a heap of balls are of this kind.
 ContactPlace between_spheres(const Start& s, Real time) {
   const Vec3 between =
       (s.m.radius_a + s.m.radius_b) * s.m.normal + time * (twist_of(s.a).velocity - twist_of(s.b).velocity);
@@ -385,7 +387,7 @@ ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, co
       motion.middle.arm_a -= duration / 2 * start.sliding;
     return motion;
   }
-  if (m.source == NormalSource::points && is_sphere(a) && is_sphere(b)) {
+  if (m.source == NormalSource::points && is_centred_sphere(a) && is_centred_sphere(b)) {
     const Vec3 displacement = duration * (twist_a.velocity - twist_b.velocity);
     const Real distance = m.radius_a + m.radius_b, along = m.normal.dot(displacement),
                least = kStraight * distance;
@@ -398,7 +400,7 @@ ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, co
     return motion;
   }
   const bool by_a = m.source == NormalSource::face_of_b;
-  if (is_face && is_sphere(by_a ? a : b) && turn2(by_a ? b : a) < kStraight * kStraight) {
+  if (is_face && is_centred_sphere(by_a ? a : b) && turn2(by_a ? b : a) < kStraight * kStraight) {
     // This is a ball on a face that does not turn: only the motion of its centre moves the contact.
     const Vec3 displacement =
         duration / 2 *

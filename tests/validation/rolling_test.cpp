@@ -201,27 +201,48 @@ TEST_P(MovingContact, TheErrorOfPrecessionIsOfTheSecondOrder) {
   EXPECT_LT(fine, 0.35 * coarse + 1e-4);
 }
 
-// The heavy side goes up and down while the cylinder rolls, so that its speed changes all the time.
-TEST_P(MovingContact, UnbalancedCylindersKeepTheirEnergy) {
+// The heavy side goes up and down while the body rolls, so that its speed changes all the time.
+TEST_P(MovingContact, UnbalancedCylindersAndBallsKeepTheirEnergy) {
   constexpr Real kRadius = 0.3, kSpin = 6;
-  for (const Real off_axis : {0.05, 0.15}) {
-    World w = world();
-    w.add_body(ground(1));
-    w.add_body({.shape = Cylinder{kRadius, 0.4},
-                .pose = {Vec3(0, kRadius, 0), kLying},
-                .velocity = Vec3(0, 0, -kSpin).cross(Vec3(off_axis, kRadius, 0)),
-                .angular_velocity = Vec3(0, 0, -kSpin),
-                .mass = 5,
-                .centre = Vec3(off_axis, 0, 0),
-                .restitution = 0,
-                .friction = 1});
-    const Real energy = w.energy().total();
-    // The error is of second order in the step; the cylinder turns by 0.1 rad and more in 1/60 s.
-    const Real tolerance = step() > 0.01 && off_axis > 0.1 ? 1e-2 : 5e-4;
-    for (int i = 0; i < 240; ++i) {
-      w.step(1.0 / 60);
-      ASSERT_NEAR(w.energy().total(), energy, tolerance * energy) << off_axis << " at " << w.time() << " s";
+  for (const Shape& shape : {Shape(Cylinder{kRadius, 0.4}), Shape(Sphere{kRadius})})
+    for (const Real off_axis : {0.05, 0.15}) {
+      World w = world();
+      w.add_body(ground(1));
+      w.add_body({.shape = shape,
+                  .pose = {Vec3(0, kRadius, 0), kLying},
+                  .velocity = Vec3(0, 0, -kSpin).cross(Vec3(off_axis, kRadius, 0)),
+                  .angular_velocity = Vec3(0, 0, -kSpin),
+                  .mass = 5,
+                  .centre = Vec3(off_axis, 0, 0),
+                  .restitution = 0,
+                  .friction = 1});
+      const Real energy = w.energy().total();
+      // The error is of second order in the step; the body turns by 0.1 rad and more in 1/60 s.
+      const Real tolerance = step() > 0.01 && off_axis > 0.1 ? 1e-2 : 5e-4;
+      for (int i = 0; i < 240; ++i) {
+        w.step(1.0 / 60);
+        ASSERT_NEAR(w.energy().total(), energy, tolerance * energy)
+            << shape.index() << ", " << off_axis << " at " << w.time() << " s";
+      }
     }
+}
+
+// A toy that stands up again: its centre of mass is below the middle of the ball.
+TEST_P(MovingContact, ABallWithALowCentreRocksForEver) {
+  constexpr Real kTilt = 1;
+  World w = world();
+  w.add_body(ground(1));
+  w.add_body({.shape = Sphere{0.5},
+              .pose = {Vec3(0, 0.5, 0), Quat(Eigen::AngleAxisd(kTilt, Vec3::UnitZ()))},
+              .mass = 2,
+              .centre = Vec3(0, -0.2, 0),
+              .inertia = Mat3(0.3 * Mat3::Identity()),
+              .restitution = 0,
+              .friction = 1});
+  const Real energy = w.energy().total();
+  for (int i = 0; i < 720; ++i) {
+    w.step(1.0 / 60);
+    ASSERT_NEAR(w.energy().total(), energy, 2e-3 * energy) << w.time();
   }
 }
 
