@@ -41,12 +41,14 @@ class RowMaker {
         acting_(articulation.joint_place(j, time, still_a_, still_b_)),
         end_(articulation.end_place(j, time, end_a_, end_b_)) {}
 
-  void add_all(std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins) {
+  /// `articulation`: the one that was given to the constructor.
+  void add_all(Articulation& articulation, std::vector<BoundedRow>& rows,
+               std::vector<BoundedOrigin>& origins) {
     rows_ = &rows;
     origins_ = &origins;
     if (def_.has_free_coordinate()) {
       add_range(free(), kLimit, def_.lower, def_.upper);
-      add_motor(free());
+      add_motor(articulation, free());
     }
     if (def_.swing < kInfinite) {
       add_range(swing(), kSwing, least_swing(), def_.swing);
@@ -64,7 +66,7 @@ class RowMaker {
   void add_spring(std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins) {
     rows_ = &rows;
     origins_ = &origins;
-    for (std::size_t i = 0; i < 3; ++i) add_guessed(spring_row(i), kSpring + i, false);
+    for (std::size_t i = 0; i < 3; ++i) add_guessed(spring_row(i), kSpring + i, 0);
   }
 
   /// Returns the first impact at a limit; see first_stop() in the header.
@@ -146,11 +148,11 @@ class RowMaker {
   }
   Real speed_at_start(const Direction& d) const { return speed(d.start, start_); }
 
-  void add(const BoundedRow& row, std::size_t slot, bool closes) {
+  void add(const BoundedRow& row, std::size_t slot, Real closes) {
     rows_->push_back(row);
     origins_->push_back({&joint_, slot, acting_.arm_a, closes});
   }
-  void add_guessed(BoundedRow row, std::size_t slot, bool closes) {
+  void add_guessed(BoundedRow row, std::size_t slot, Real closes) {
     row.impulse = std::clamp(h_ * joint_.efforts[slot], row.lower, row.upper);
     add(row, slot, closes);
   }
@@ -183,7 +185,7 @@ class RowMaker {
     r.upper = side > 0 ? kInfinite : 0;
     r.target = side * at->target;
     r.from = at->fraction;
-    add(r, slot, false);
+    add(r, slot, 0);
     return true;
   }
 
@@ -212,10 +214,25 @@ class RowMaker {
     const Real approach = -side * speed_at_start(row);
     if (is_kicked_ && approach > JointDef::kBounceSpeed && side * (row.end.error - limit) < 0)
       r.target = side * std::max(side * r.target, def_.restitution * approach);
-    add_guessed(r, slot, closes);
+    add_guessed(r, slot, closes ? 1 : 0);
   }
 
-  void add_motor(const Direction& row) {
+  /// Returns the weight of the end's speed in the mean speed of a soft motor's interval, 1/2 to 1.
+  /// With the weight theta the interval is integrated by the theta method, x' = x + h v and
+  /// effort = k (target - x - theta (x' - x)) - c v with v = (1 - theta) u + theta u'. 1/2 is of second order
+  /// and keeps the energy of the spring. A part of the motion that changes at the rate s then follows the
+  /// factor (1 - (1 - theta) s h) / (1 + theta s h) per interval. For a large s h and 1/2 this is about -1: a
+  /// stiff motor would vibrate for ever. (1 - theta) s h <= 1 prevents it for a damper, s = c / m. For a
+  /// spring, s = 2 sqrt(k / m): with its critical damping both rates agree.
+  Real end_weight(Articulation& articulation, const Direction& row) const {
+    if (is_kicked_) return 1;  // Links with springs move by the velocities at the end.
+    const Real mobility = articulation.mobility(joint_, row.acting);
+    const Motor& motor = def_.motor;
+    const Real rate = std::max(2 * std::sqrt(motor.stiffness * mobility), motor.damping * mobility);
+    return 1 - std::min(0.5, 1 / (rate * h_));
+  }
+
+  void add_motor(Articulation& articulation, const Direction& row) {
     const Motor& motor = def_.motor;
     if (motor.mode == Motor::Mode::none) return;
     BoundedRow r = bounded(row);
@@ -224,18 +241,22 @@ class RowMaker {
     const Real target = motor.target(time_);
     if (motor.mode == Motor::Mode::speed) {
       r.target = target;
-      return add_guessed(r, kMotor, false);
+      return add_guessed(r, kMotor, 0);
     }
-    const Real missing = target - at_start(row);
+    Real closes = 1;
     if (motor.stiffness == 0) {
-      r.target = missing / h_;
+      r.target = (target - at_start(row)) / h_;
     } else {
-      // With the speed u at the end, effort = k (missing - h u) - c u.
-      const Real resistance = motor.stiffness * h_ + motor.damping;
-      r.softness = 1 / (h_ * resistance);
-      r.target = motor.stiffness * missing / resistance;
+      const Real end = end_weight(articulation, row), start = 1 - end;
+      const Real missing = start * motor.target(time_ - h_) + end * target - at_start(row);
+      // effort = k (missing - end h v) - c v with v = start * speed at the start + end * speed at the end.
+      const Real resistance = motor.stiffness * end * h_ + motor.damping;
+      r.softness = 1 / (end * h_ * resistance);
+      r.target = (motor.stiffness * missing / resistance - start * speed_at_start(row)) / end;
+      r.lag = start / end;
+      closes = end - start;
     }
-    add_guessed(r, kMotor, std::abs(speed_at_start(row) - r.target) > kClosing);
+    add_guessed(r, kMotor, std::abs(speed_at_start(row) - r.target) > kClosing ? closes : 0);
   }
 
   /// Adds rows for the friction and the damping of all free directions.
@@ -258,13 +279,13 @@ class RowMaker {
       if (def_.friction > 0) {
         r.upper = h_ * def_.friction;
         r.lower = -r.upper;
-        add_guessed(r, kFriction + i, false);
+        add_guessed(r, kFriction + i, 0);
       }
       if (def_.damping > 0 && !joint_.has_spring()) {
         r.upper = kInfinite;
         r.lower = -kInfinite;
         r.softness = 1 / (h_ * def_.damping);
-        add_guessed(r, kDamping + i, false);
+        add_guessed(r, kDamping + i, 0);
       }
     }
   }
@@ -314,12 +335,12 @@ std::optional<Real> first_stop(const Articulation& articulation, Real duration, 
   return first;
 }
 
-void collect_bounded_rows(const Articulation& articulation, Real duration, Real time,
-                          std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins) {
+void collect_bounded_rows(Articulation& articulation, Real duration, Real time, std::vector<BoundedRow>& rows,
+                          std::vector<BoundedOrigin>& origins) {
   if (!articulation.has_bounded_rows()) return;
   for (std::size_t j = 0; j < articulation.joints().size(); ++j)
     if (articulation.joints()[j]->has_bounded_rows())
-      RowMaker(articulation, j, duration, time).add_all(rows, origins);
+      RowMaker(articulation, j, duration, time).add_all(articulation, rows, origins);
 }
 
 void collect_springs(const Articulation& articulation, Real duration, Real time,

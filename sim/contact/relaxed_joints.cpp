@@ -166,6 +166,14 @@ void RelaxedJoints::push(Part& part, const BoundedRow& r, const Row& row, Real i
   if (r.b != kUnmoved) add_to(motions[r.b], impulse * row.response_b);
 }
 
+/// Returns the change of a row's speed since the start of the step.
+Real RelaxedJoints::speed_change(const BoundedRow& r, std::span<const BodyMotion> motions) {
+  Real change = 0;
+  if (r.a != kUnmoved) change += r.on_a.dot(change_of(motions[r.a]));
+  if (r.b != kUnmoved) change += r.on_b.dot(change_of(motions[r.b]));
+  return change;
+}
+
 Real RelaxedJoints::speed(const BoundedRow& r, std::span<const BodyMotion> motions) const {
   Real u = r.offset;
   if (r.a != kUnmoved) u += r.on_a.dot(velocity_of(bodies_[r.a], motions[r.a]));
@@ -213,8 +221,10 @@ void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapse
     Row& row = rows_[i];
     row.acts |= elapsed > (r.from - kInstant) * duration_;
     if (!row.acts) continue;
+    if (!is_last) row.before = std::exchange(row.after, 0);
     const Real u = speed(r, motions) + (1 - elapsed / duration_) * r.turning;
-    const Real wanted = row.impulse - (u - r.target + row.softness * row.impulse) * row.inverse_stiffness;
+    const Real target = r.target - r.lag * row.before;
+    const Real wanted = row.impulse - (u - target + row.softness * row.impulse) * row.inverse_stiffness;
     const Real next = std::clamp(wanted, row.lower, row.upper);
     push(part, r, row, next - row.impulse, motions);
     row.sum += is_last ? next - row.impulse : next;
@@ -223,7 +233,10 @@ void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapse
   solve_contacts(part, motions, elapsed, is_last);
   for (std::size_t j = 0; j < part.sum.size(); ++j) part.sum[j] += part.now[j];
   if (is_last) return;
-  for (uint32_t i = part.first_row; i < part.last_row; ++i) rows_[i].shift += substep_ * rows_[i].sum;
+  for (uint32_t i = part.first_row; i < part.last_row; ++i) {
+    rows_[i].shift += substep_ * rows_[i].sum;
+    if (problem_.bounded[i].lag != 0) rows_[i].after = speed_change(problem_.bounded[i], motions);
+  }
   for (uint32_t i = part.first_contact; i < part.last_contact; ++i)
     contact_rows_[i].shift += substep_ * contact_rows_[i].sum;
   for (std::size_t j = 0; j < part.sum.size(); ++j) part.shift[j] += substep_ * part.sum[j];
