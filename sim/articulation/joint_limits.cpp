@@ -18,6 +18,11 @@ constexpr Real kNear = 0.02, kReached = 1e-4;
 constexpr Real kMostTurn = 1;
 /// A joint that approaches its limit faster than this speed reaches the limit in the interval [m/s], [rad/s].
 constexpr Real kClosing = 1e-3;
+/// Fraction of an interval over which the rate of a motor's target is measured.
+constexpr Real kRatePart = 1e-3;
+/// The path of a motor's target is smooth in an interval if its mean rate differs from the mean of the rates
+/// at both ends by at most this fraction of their difference.
+constexpr Real kUneven = 0.1;
 
 /// Slots of Joint::efforts.
 enum Slot : std::size_t { kLimit = 0, kSwing = 1, kMotor = 2, kFriction = 3, kDamping = 6, kSpring = 9 };
@@ -217,6 +222,26 @@ class RowMaker {
     add_guessed(r, slot, closes ? 1 : 0);
   }
 
+  /// Returns the speed at the end that lets a position motor follow its moving target by a constant force, or
+  /// nothing if the joint is not on the target's path or the path is not smooth in the interval. With the
+  /// deviations X and U from the target's position and speed, the bodies move by X' = X + h (U + U') / 2.
+  /// U' = -X / h - U / 2 ends any small deviation in two intervals. If bodies moved by the speed at the end
+  /// instead, others that they carry would slip back by the acceleration times h^2 / 2 in each interval.
+  std::optional<Real> speed_on_track(const Direction& row) const {
+    if (is_kicked_) return std::nullopt;
+    const Motor& motor = def_.motor;
+    const Real before = time_ - h_, part = kRatePart * h_;
+    const Real first = motor.target(before), last = motor.target(time_);
+    const Real first_rate = (motor.target(before + part) - first) / part;
+    const Real last_rate = (last - motor.target(time_ - part)) / part;
+    const Real change = std::abs(last_rate - first_rate);
+    if (std::abs((last - first) / h_ - (first_rate + last_rate) / 2) > kUneven * change + kClosing)
+      return std::nullopt;
+    const Real behind = (at_start(row) - first) / h_, slow = speed_at_start(row) - first_rate;
+    if (std::max(std::abs(behind), std::abs(slow)) > change + kClosing) return std::nullopt;
+    return last_rate - behind - slow / 2;
+  }
+
   /// Returns the weight of the end's speed in the mean speed of a soft motor's interval, 1/2 to 1.
   /// With the weight theta the interval is integrated by the theta method, x' = x + h v and
   /// effort = k (target - x - theta (x' - x)) - c v with v = (1 - theta) u + theta u'. 1/2 is of second order
@@ -241,10 +266,18 @@ class RowMaker {
     const Real target = motor.target(time_);
     if (motor.mode == Motor::Mode::speed) {
       r.target = target;
+      // The motor's force is constant in the interval. If the fast solver reached the target in its first
+      // sub-step, bodies that the motor carries would slip back by the acceleration times h^2 / 2.
+      r.turning = target - speed_at_start(row);
       return add_guessed(r, kMotor, 0);
     }
     Real closes = 1;
     if (motor.stiffness == 0) {
+      if (const std::optional<Real> speed = speed_on_track(row)) {
+        r.target = *speed;
+        r.turning = r.target - speed_at_start(row);
+        return add_guessed(r, kMotor, 0);
+      }
       r.target = (target - at_start(row)) / h_;
     } else {
       const Real end = end_weight(articulation, row), start = 1 - end;
