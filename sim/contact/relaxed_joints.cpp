@@ -11,6 +11,8 @@ namespace {
 
 /// If the number of rows times the number of links is above this, the responses of all links are not stored.
 constexpr std::size_t kMostResponses = 20000;
+/// Joints that leave less than this fraction of its mobility to a row hold the row's bodies fast.
+constexpr Real kHeldFast = 1e-9;
 /// Fraction of the interval. A row that acts only from the interval's end on acts in its last sub-step.
 constexpr Real kInstant = 1e-9;
 /// The contacts of an articulation depend on each other. Passes over them end when none changes a velocity by
@@ -130,7 +132,8 @@ void RelaxedJoints::prepare_row(Part& part, const BoundedRow& r, Row& row,
   row.response_a = response(r.a, r.on_a);
   row.response_b = response(r.b, r.on_b);
   const std::size_t links = part.bodies.size();
-  Real mobility = r.on_a.dot(row.response_a) + r.on_b.dot(row.response_b);
+  const Real alone = r.on_a.dot(row.response_a) + r.on_b.dot(row.response_b);
+  Real mobility = alone;
   if (whole) {
     row.response.assign(links, Vec6::Zero());
     bool has_a = false, has_b = false;
@@ -152,6 +155,8 @@ void RelaxedJoints::prepare_row(Part& part, const BoundedRow& r, Row& row,
       if (part.bodies[k] == r.b) mobility += r.on_b.dot(row.response[k]);
     }
   }
+  // Joints may hold the bodies fast: what is left of the mobility is then rounding.
+  if (mobility < kHeldFast * alone) mobility = 0;
   const Real stiffness = mobility + row.softness;
   row.inverse_stiffness = stiffness > 1e-300 ? 1 / stiffness : 0;
 }
