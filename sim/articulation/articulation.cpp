@@ -494,6 +494,20 @@ void Articulation::place_within(Real time, Real duration, Real fraction, Real su
   sprung_->factorize(sprung_rows_, mobility_);
 }
 
+Real Articulation::mobility(const Joint& joint, const JointRow& row) {
+  std::fill(velocities_.begin(), velocities_.end(), Vec6::Zero());
+  const uint32_t a = index_in(bodies_, joint.a), b = index_in(bodies_, joint.b);
+  if (a != JointSystem::kDriven) velocities_[a] += mobility_[a].velocity(row.on_a);
+  if (b != JointSystem::kDriven) velocities_[b] += mobility_[b].velocity(row.on_b);
+  system_.relative(velocities_, change_);
+  for (Vec6& c : change_) c = -c;
+  system_.correct(change_, impulses_, velocities_);
+  Real result = 0;
+  if (a != JointSystem::kDriven) result += row.on_a.dot(velocities_[a]);
+  if (b != JointSystem::kDriven) result += row.on_b.dot(velocities_[b]);
+  return result;
+}
+
 bool Articulation::soften(Real factor) {
   if (!has_springs() || factor == softened_) return false;
   for (JointRows& rows : sprung_rows_) rows.softness *= factor / softened_;

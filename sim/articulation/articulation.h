@@ -114,6 +114,9 @@ class Articulation final : public JointedBodies {
   JointPlace start_place(std::size_t j, Real start, LinkMotion& still_a, LinkMotion& still_b) const {
     return place_of(j, start, start_motion_, still_a, still_b);
   }
+  /// Returns the change of the speed of a joint's row by a unit impulse of the row, for the constraints and
+  /// poses of the last place_within(). Springs of joints are not included.
+  Real mobility(const Joint& joint, const JointRow& row);
   bool has_bounded_rows() const { return has_bounded_rows_; }
   const JointSystem& system() const { return system_; }
   JointSystem& system() { return system_; }

@@ -18,6 +18,11 @@ constexpr Real kNear = 0.02, kReached = 1e-4;
 constexpr Real kMostTurn = 1;
 /// A joint that approaches its limit faster than this speed reaches the limit in the interval [m/s], [rad/s].
 constexpr Real kClosing = 1e-3;
+/// Fraction of an interval over which the rate of a motor's target is measured.
+constexpr Real kRatePart = 1e-3;
+/// The path of a motor's target is smooth in an interval if its mean rate differs from the mean of the rates
+/// at both ends by at most this fraction of their difference.
+constexpr Real kUneven = 0.1;
 
 /// Slots of Joint::efforts.
 enum Slot : std::size_t { kLimit = 0, kSwing = 1, kMotor = 2, kFriction = 3, kDamping = 6, kSpring = 9 };
@@ -41,12 +46,14 @@ class RowMaker {
         acting_(articulation.joint_place(j, time, still_a_, still_b_)),
         end_(articulation.end_place(j, time, end_a_, end_b_)) {}
 
-  void add_all(std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins) {
+  /// `articulation`: the one that was given to the constructor.
+  void add_all(Articulation& articulation, std::vector<BoundedRow>& rows,
+               std::vector<BoundedOrigin>& origins) {
     rows_ = &rows;
     origins_ = &origins;
     if (def_.has_free_coordinate()) {
       add_range(free(), kLimit, def_.lower, def_.upper);
-      add_motor(free());
+      add_motor(articulation, free());
     }
     if (def_.swing < kInfinite) {
       add_range(swing(), kSwing, least_swing(), def_.swing);
@@ -64,7 +71,7 @@ class RowMaker {
   void add_spring(std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins) {
     rows_ = &rows;
     origins_ = &origins;
-    for (std::size_t i = 0; i < 3; ++i) add_guessed(spring_row(i), kSpring + i, false);
+    for (std::size_t i = 0; i < 3; ++i) add_guessed(spring_row(i), kSpring + i, 0);
   }
 
   /// Returns the first impact at a limit; see first_stop() in the header.
@@ -146,11 +153,11 @@ class RowMaker {
   }
   Real speed_at_start(const Direction& d) const { return speed(d.start, start_); }
 
-  void add(const BoundedRow& row, std::size_t slot, bool closes) {
+  void add(const BoundedRow& row, std::size_t slot, Real closes) {
     rows_->push_back(row);
     origins_->push_back({&joint_, slot, acting_.arm_a, closes});
   }
-  void add_guessed(BoundedRow row, std::size_t slot, bool closes) {
+  void add_guessed(BoundedRow row, std::size_t slot, Real closes) {
     row.impulse = std::clamp(h_ * joint_.efforts[slot], row.lower, row.upper);
     add(row, slot, closes);
   }
@@ -183,7 +190,7 @@ class RowMaker {
     r.upper = side > 0 ? kInfinite : 0;
     r.target = side * at->target;
     r.from = at->fraction;
-    add(r, slot, false);
+    add(r, slot, 0);
     return true;
   }
 
@@ -212,10 +219,45 @@ class RowMaker {
     const Real approach = -side * speed_at_start(row);
     if (is_kicked_ && approach > JointDef::kBounceSpeed && side * (row.end.error - limit) < 0)
       r.target = side * std::max(side * r.target, def_.restitution * approach);
-    add_guessed(r, slot, closes);
+    add_guessed(r, slot, closes ? 1 : 0);
   }
 
-  void add_motor(const Direction& row) {
+  /// Returns the speed at the end that lets a position motor follow its moving target by a constant force, or
+  /// nothing if the joint is not on the target's path or the path is not smooth in the interval. With the
+  /// deviations X and U from the target's position and speed, the bodies move by X' = X + h (U + U') / 2.
+  /// U' = -X / h - U / 2 ends any small deviation in two intervals. If bodies moved by the speed at the end
+  /// instead, others that they carry would slip back by the acceleration times h^2 / 2 in each interval.
+  std::optional<Real> speed_on_track(const Direction& row) const {
+    if (is_kicked_) return std::nullopt;
+    const Motor& motor = def_.motor;
+    const Real before = time_ - h_, part = kRatePart * h_;
+    const Real first = motor.target(before), last = motor.target(time_);
+    const Real first_rate = (motor.target(before + part) - first) / part;
+    const Real last_rate = (last - motor.target(time_ - part)) / part;
+    const Real change = std::abs(last_rate - first_rate);
+    if (std::abs((last - first) / h_ - (first_rate + last_rate) / 2) > kUneven * change + kClosing)
+      return std::nullopt;
+    const Real behind = (at_start(row) - first) / h_, slow = speed_at_start(row) - first_rate;
+    if (std::max(std::abs(behind), std::abs(slow)) > change + kClosing) return std::nullopt;
+    return last_rate - behind - slow / 2;
+  }
+
+  /// Returns the weight of the end's speed in the mean speed of a soft motor's interval, 1/2 to 1.
+  /// With the weight theta the interval is integrated by the theta method, x' = x + h v and
+  /// effort = k (target - x - theta (x' - x)) - c v with v = (1 - theta) u + theta u'. 1/2 is of second order
+  /// and keeps the energy of the spring. A part of the motion that changes at the rate s then follows the
+  /// factor (1 - (1 - theta) s h) / (1 + theta s h) per interval. For a large s h and 1/2 this is about -1: a
+  /// stiff motor would vibrate for ever. (1 - theta) s h <= 1 prevents it for a damper, s = c / m. For a
+  /// spring, s = 2 sqrt(k / m): with its critical damping both rates agree.
+  Real end_weight(Articulation& articulation, const Direction& row) const {
+    if (is_kicked_) return 1;  // Links with springs move by the velocities at the end.
+    const Real mobility = articulation.mobility(joint_, row.acting);
+    const Motor& motor = def_.motor;
+    const Real rate = std::max(2 * std::sqrt(motor.stiffness * mobility), motor.damping * mobility);
+    return 1 - std::min(0.5, 1 / (rate * h_));
+  }
+
+  void add_motor(Articulation& articulation, const Direction& row) {
     const Motor& motor = def_.motor;
     if (motor.mode == Motor::Mode::none) return;
     BoundedRow r = bounded(row);
@@ -224,18 +266,30 @@ class RowMaker {
     const Real target = motor.target(time_);
     if (motor.mode == Motor::Mode::speed) {
       r.target = target;
-      return add_guessed(r, kMotor, false);
+      // The motor's force is constant in the interval. If the fast solver reached the target in its first
+      // sub-step, bodies that the motor carries would slip back by the acceleration times h^2 / 2.
+      r.turning = target - speed_at_start(row);
+      return add_guessed(r, kMotor, 0);
     }
-    const Real missing = target - at_start(row);
+    Real closes = 1;
     if (motor.stiffness == 0) {
-      r.target = missing / h_;
+      if (const std::optional<Real> speed = speed_on_track(row)) {
+        r.target = *speed;
+        r.turning = r.target - speed_at_start(row);
+        return add_guessed(r, kMotor, 0);
+      }
+      r.target = (target - at_start(row)) / h_;
     } else {
-      // With the speed u at the end, effort = k (missing - h u) - c u.
-      const Real resistance = motor.stiffness * h_ + motor.damping;
-      r.softness = 1 / (h_ * resistance);
-      r.target = motor.stiffness * missing / resistance;
+      const Real end = end_weight(articulation, row), start = 1 - end;
+      const Real missing = start * motor.target(time_ - h_) + end * target - at_start(row);
+      // effort = k (missing - end h v) - c v with v = start * speed at the start + end * speed at the end.
+      const Real resistance = motor.stiffness * end * h_ + motor.damping;
+      r.softness = 1 / (end * h_ * resistance);
+      r.target = (motor.stiffness * missing / resistance - start * speed_at_start(row)) / end;
+      r.lag = start / end;
+      closes = end - start;
     }
-    add_guessed(r, kMotor, std::abs(speed_at_start(row) - r.target) > kClosing);
+    add_guessed(r, kMotor, std::abs(speed_at_start(row) - r.target) > kClosing ? closes : 0);
   }
 
   /// Adds rows for the friction and the damping of all free directions.
@@ -258,13 +312,13 @@ class RowMaker {
       if (def_.friction > 0) {
         r.upper = h_ * def_.friction;
         r.lower = -r.upper;
-        add_guessed(r, kFriction + i, false);
+        add_guessed(r, kFriction + i, 0);
       }
       if (def_.damping > 0 && !joint_.has_spring()) {
         r.upper = kInfinite;
         r.lower = -kInfinite;
         r.softness = 1 / (h_ * def_.damping);
-        add_guessed(r, kDamping + i, false);
+        add_guessed(r, kDamping + i, 0);
       }
     }
   }
@@ -314,12 +368,12 @@ std::optional<Real> first_stop(const Articulation& articulation, Real duration, 
   return first;
 }
 
-void collect_bounded_rows(const Articulation& articulation, Real duration, Real time,
-                          std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins) {
+void collect_bounded_rows(Articulation& articulation, Real duration, Real time, std::vector<BoundedRow>& rows,
+                          std::vector<BoundedOrigin>& origins) {
   if (!articulation.has_bounded_rows()) return;
   for (std::size_t j = 0; j < articulation.joints().size(); ++j)
     if (articulation.joints()[j]->has_bounded_rows())
-      RowMaker(articulation, j, duration, time).add_all(rows, origins);
+      RowMaker(articulation, j, duration, time).add_all(articulation, rows, origins);
 }
 
 void collect_springs(const Articulation& articulation, Real duration, Real time,

@@ -14,9 +14,10 @@ struct BoundedOrigin {
   Joint* joint;
   std::size_t slot;  ///< index of the row in Joint::efforts
   Vec3 arm;          ///< vector from the centre of the joint's body a to the anchor, world axes [m]
-  /// Whether the row makes the joint reach a given coordinate exactly at the interval's end. The bodies then
-  /// move with their new velocities during the whole interval.
-  bool closes;
+  /// Weight of the end's velocities in the motion of the bodies, from 0 to 1. 0: they move with the mean of
+  /// the velocities at the interval's start and end. 1: they move with their new velocities during the whole
+  /// interval, so that the joint reaches a given coordinate exactly at the interval's end.
+  Real closes;
 };
 
 /// Returns the fraction of an interval after which the free motion of an articulation first reaches a limit,
@@ -26,8 +27,8 @@ std::optional<Real> first_stop(const Articulation& articulation, Real duration, 
 
 /// Appends the bounded rows of an articulation for an interval that lasts `duration` [s] and ends at `time`.
 /// Call Articulation::place_within() first. The indices of bodies are Body::row.
-void collect_bounded_rows(const Articulation& articulation, Real duration, Real time,
-                          std::vector<BoundedRow>& rows, std::vector<BoundedOrigin>& origins);
+void collect_bounded_rows(Articulation& articulation, Real duration, Real time, std::vector<BoundedRow>& rows,
+                          std::vector<BoundedOrigin>& origins);
 
 /// Appends rows for springs and dampers, which resist changes of the free motion (physics A8). `duration` is
 /// the length of the interval [s]. For a collision it is the length of the sub-step: springs that are stiff

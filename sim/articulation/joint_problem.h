@@ -29,6 +29,9 @@ struct BoundedRow {
   Real softness = 0;          ///< [1/kg] or [1/(kg m^2)], >= 0
   Real lower = 0, upper = 0;  ///< bounds of the impulse [N s] or [N m s]
   Real impulse = 0;           ///< in: a guess; out: the solution
+  /// For solutions that divide the interval: `target` decreases by `lag` times the change of u from the
+  /// interval's start to the start of the part.
+  Real lag = 0;
   // For the fast solver: the fraction of the interval after which the row acts, and the difference of
   // `offset` between the interval's start and end. `offset` decreases linearly [m/s] or [rad/s].
   Real from = 0, turning = 0;

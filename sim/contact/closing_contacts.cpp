@@ -102,6 +102,7 @@ class Pieces {
     row.lower *= rest;
     row.upper *= rest;
     row.softness /= rest;
+    if (row.lag != 0) row.target -= row.lag * (row_speed(row, now_) - row_speed(row, problem_.start));
     if (!now) return;
     if (row.softness > 0 || std::isfinite(row.lower)) row.lower = row.upper = 0;
     row.target = row_speed(row, bodies_);

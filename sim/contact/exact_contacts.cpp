@@ -354,7 +354,10 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
   std::vector<uint8_t> is_kicked(bodies_.size(), 0);
   for (const Articulation* a : joints_.articulations())
     if (a->has_springs())
-      for (const Body* link : a->bodies()) is_kicked[link->row] = closing_[link->row] = 1;
+      for (const Body* link : a->bodies()) {
+        is_kicked[link->row] = 1;
+        closing_[link->row] = 1;
+      }
   close_stops();
   close_links();
   close_neighbors(island, duration);
@@ -369,11 +372,13 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
     const Vec3 dv = bodies_[i].velocity - free_[i].velocity,
                dw = bodies_[i].angular_velocity - free_[i].angular_velocity;
     Vec3 mean = rest_[i] * dv, mean_spin = rest_[i] * dw;
-    if (closing_[i] && !is_kicked[i]) {
-      mean = (dv + bodies_[i].velocity - body.start_twist.velocity) / 2;
-      mean_spin = (dw + bodies_[i].angular_velocity - body.start_twist.angular_velocity) / 2;
+    if (closing_[i] > 0 && !is_kicked[i]) {
+      const Vec3 end = (dv + bodies_[i].velocity - body.start_twist.velocity) / 2;
+      const Vec3 end_spin = (dw + bodies_[i].angular_velocity - body.start_twist.angular_velocity) / 2;
+      mean += closing_[i] * (end - mean);
+      mean_spin += closing_[i] * (end_spin - mean_spin);
     }
-    if (!riding_.empty() && !closing_[i]) {
+    if (!riding_.empty() && closing_[i] == 0) {
       mean += riding_.deviation(i).shift / duration;
       mean_spin += riding_.deviation(i).turn / duration;
     }
@@ -394,8 +399,9 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
 void ExactContacts::close_neighbors(const Island& island, Real duration) {
   const auto displacement = [&](uint32_t i, const Vec3& arm) {
     const Vec3 end = bodies_[i].velocity_at(arm);
-    if (i >= island.bodies.size() || closing_[i]) return Vec3(duration * end);
-    return Vec3(duration / 2 * (end + island.bodies[i]->start_twist.at(arm)));
+    if (i >= island.bodies.size()) return Vec3(duration * end);
+    return Vec3(duration / 2 *
+                ((1 + closing_[i]) * end + (1 - closing_[i]) * island.bodies[i]->start_twist.at(arm)));
   };
   bool changed = true;
   for (int pass = 0; changed && pass < kBlockPasses; ++pass) {
@@ -412,24 +418,25 @@ void ExactContacts::close_neighbors(const Island& island, Real duration) {
   }
 }
 
-/// Marks all links of an articulation as stopped if one of them is. If some links moved by the mean of their
-/// velocities and others by the new ones, the joints would come apart, and their projection would push light
-/// links into the obstacle that stopped them.
+/// Gives all links of an articulation the greatest weight of its links. If some links moved by the mean of
+/// their velocities and others by the new ones, the joints would come apart, and their projection would push
+/// light links into the obstacle that stopped them.
 void ExactContacts::close_links() {
   for (const Articulation* articulation : joints_.articulations()) {
     const std::span<Body* const> links = articulation->bodies();
-    if (std::any_of(links.begin(), links.end(), [&](const Body* link) { return closing_[link->row] != 0; }))
-      for (const Body* link : links) closing_[link->row] = 1;
+    Real greatest = 0;
+    for (const Body* link : links) greatest = std::max(greatest, closing_[link->row]);
+    for (const Body* link : links) closing_[link->row] = greatest;
   }
 }
 
-/// Marks the bodies of joints that reach a limit as stopped within the interval.
+/// Gives the bodies of rows that close the weight of the row.
 void ExactContacts::close_stops() {
   for (std::size_t i = 0; i < joints_.bounded().size(); ++i) {
     const BoundedRow& row = joints_.bounded()[i];
-    if (!joints_.origins()[i].closes || row.impulse == 0) continue;
+    if (row.impulse == 0) continue;
     for (uint32_t body : {row.a, row.b})
-      if (body != kUnmoved) closing_[body] = 1;
+      if (body != kUnmoved) closing_[body] = std::max(closing_[body], joints_.origins()[i].closes);
   }
 }
 

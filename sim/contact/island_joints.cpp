@@ -85,7 +85,7 @@ void IslandJoints::collect(std::span<const Island* const> islands, const Contact
     const std::size_t first = articulations_.size();
     collect_constraints(*island, springs, [&](Articulation& a) { place(a, interval); });
     for (std::size_t i = first; i < articulations_.size(); ++i) {
-      const Articulation& a = *articulations_[i];
+      Articulation& a = *articulations_[i];
       collect_bounded_rows(a, interval.duration, interval.end, bounded_, origins_);
       if (springs == Springs::rows) collect_springs(a, interval.duration, interval.end, bounded_, origins_);
       bounded_ends_.push_back(static_cast<uint32_t>(bounded_.size()));

@@ -295,7 +295,8 @@ void ProximalNewton::set_points(std::span<const ContactBody> bodies, std::span<c
                                    relative_velocity(contacts[i], points_[i], velocity_) + fixed_[i]);
 }
 
-/// Adds the rows with bounds, whose impulses also change the velocities. Call it after set_points().
+/// Adds the rows with bounds, whose impulses also change the velocities. Bounded::impulse temporarily holds
+/// the change of speed that the row demands, as a scale. Call it after set_points().
 void ProximalNewton::set_joints() {
   const auto row = [this](uint32_t body) { return body == kUnmoved ? kNone : row_of_body_[body]; };
   const auto rows = static_cast<uint32_t>(body_of_row_.size());
@@ -315,6 +316,8 @@ void ProximalNewton::set_joints() {
       p.impulse += on->dot(free_[at]);
       velocity_[at] += p.multiplier * response;
     }
+    // The target of a soft row may be far beyond any speed that the row causes.
+    if (r.softness > 0) p.impulse *= mobility / (mobility + r.softness);
     p.rho = kBoundedStiffness / mobility;
     if (std::isinf(r.lower) && std::isinf(r.upper) && r.softness > 0 && p.rho * r.softness < 1)
       p.rho = std::max(p.rho, std::min(kBoundedStiffness / r.softness, kMostStiffness / mobility));

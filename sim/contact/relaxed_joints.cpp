@@ -11,6 +11,8 @@ namespace {
 
 /// If the number of rows times the number of links is above this, the responses of all links are not stored.
 constexpr std::size_t kMostResponses = 20000;
+/// Joints that leave less than this fraction of its mobility to a row hold the row's bodies fast.
+constexpr Real kHeldFast = 1e-9;
 /// Fraction of the interval. A row that acts only from the interval's end on acts in its last sub-step.
 constexpr Real kInstant = 1e-9;
 /// The contacts of an articulation depend on each other. Passes over them end when none changes a velocity by
@@ -130,7 +132,8 @@ void RelaxedJoints::prepare_row(Part& part, const BoundedRow& r, Row& row,
   row.response_a = response(r.a, r.on_a);
   row.response_b = response(r.b, r.on_b);
   const std::size_t links = part.bodies.size();
-  Real mobility = r.on_a.dot(row.response_a) + r.on_b.dot(row.response_b);
+  const Real alone = r.on_a.dot(row.response_a) + r.on_b.dot(row.response_b);
+  Real mobility = alone;
   if (whole) {
     row.response.assign(links, Vec6::Zero());
     bool has_a = false, has_b = false;
@@ -152,6 +155,8 @@ void RelaxedJoints::prepare_row(Part& part, const BoundedRow& r, Row& row,
       if (part.bodies[k] == r.b) mobility += r.on_b.dot(row.response[k]);
     }
   }
+  // Joints may hold the bodies fast: what is left of the mobility is then rounding.
+  if (mobility < kHeldFast * alone) mobility = 0;
   const Real stiffness = mobility + row.softness;
   row.inverse_stiffness = stiffness > 1e-300 ? 1 / stiffness : 0;
 }
@@ -164,6 +169,14 @@ void RelaxedJoints::push(Part& part, const BoundedRow& r, const Row& row, Real i
     for (std::size_t j = 0; j < part.now.size(); ++j) part.now[j] += impulse * row.reaction[j];
   if (r.a != kUnmoved) add_to(motions[r.a], impulse * row.response_a);
   if (r.b != kUnmoved) add_to(motions[r.b], impulse * row.response_b);
+}
+
+/// Returns the change of a row's speed since the start of the step.
+Real RelaxedJoints::speed_change(const BoundedRow& r, std::span<const BodyMotion> motions) {
+  Real change = 0;
+  if (r.a != kUnmoved) change += r.on_a.dot(change_of(motions[r.a]));
+  if (r.b != kUnmoved) change += r.on_b.dot(change_of(motions[r.b]));
+  return change;
 }
 
 Real RelaxedJoints::speed(const BoundedRow& r, std::span<const BodyMotion> motions) const {
@@ -213,8 +226,10 @@ void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapse
     Row& row = rows_[i];
     row.acts |= elapsed > (r.from - kInstant) * duration_;
     if (!row.acts) continue;
+    if (!is_last) row.before = std::exchange(row.after, 0);
     const Real u = speed(r, motions) + (1 - elapsed / duration_) * r.turning;
-    const Real wanted = row.impulse - (u - r.target + row.softness * row.impulse) * row.inverse_stiffness;
+    const Real target = r.target - r.lag * row.before;
+    const Real wanted = row.impulse - (u - target + row.softness * row.impulse) * row.inverse_stiffness;
     const Real next = std::clamp(wanted, row.lower, row.upper);
     push(part, r, row, next - row.impulse, motions);
     row.sum += is_last ? next - row.impulse : next;
@@ -223,7 +238,10 @@ void RelaxedJoints::solve(uint32_t p, std::span<BodyMotion> motions, Real elapse
   solve_contacts(part, motions, elapsed, is_last);
   for (std::size_t j = 0; j < part.sum.size(); ++j) part.sum[j] += part.now[j];
   if (is_last) return;
-  for (uint32_t i = part.first_row; i < part.last_row; ++i) rows_[i].shift += substep_ * rows_[i].sum;
+  for (uint32_t i = part.first_row; i < part.last_row; ++i) {
+    rows_[i].shift += substep_ * rows_[i].sum;
+    if (problem_.bounded[i].lag != 0) rows_[i].after = speed_change(problem_.bounded[i], motions);
+  }
   for (uint32_t i = part.first_contact; i < part.last_contact; ++i)
     contact_rows_[i].shift += substep_ * contact_rows_[i].sum;
   for (std::size_t j = 0; j < part.sum.size(); ++j) part.shift[j] += substep_ * part.sum[j];

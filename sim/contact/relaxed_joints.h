@@ -61,8 +61,10 @@ class RelaxedJoints {
     Real impulse, lower, upper;  // bounds and impulse of a sub-step
     Real softness, sum = 0;      // softness; impulse of the whole step
     Real shift = 0;              // integral of the sum over the step
-    bool acts = false;           // whether the time from which it acts has come
-    bool is_ready = false;       // whether its responses are known
+    // Changes of the speed since the start of the step: before this sub-step, and after the last solution.
+    Real before = 0, after = 0;
+    bool acts = false;      // whether the time from which it acts has come
+    bool is_ready = false;  // whether its responses are known
     // Responses of the links to a unit impulse; empty if only the responses of the row's own two links are
     // known, in `response_a` and `response_b`.
     std::vector<Vec6> response;
@@ -92,6 +94,7 @@ class RelaxedJoints {
             std::span<BodyMotion> motions) const;
   void solve_contacts(Part& part, std::span<BodyMotion> motions, Real elapsed, bool is_last);
   Real speed(const BoundedRow& r, std::span<const BodyMotion> motions) const;
+  static Real speed_change(const BoundedRow& r, std::span<const BodyMotion> motions);
 
   JointProblem problem_;
   std::span<LinkContact> contacts_;

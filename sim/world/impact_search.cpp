@@ -37,9 +37,9 @@ bool turns_other_points(const Body& body, Real duration) {
          (std::holds_alternative<Ellipsoid>(body.def.shape) && body.turning_speed() * duration > kTouching);
 }
 
-/// Returns the number of pieces into which a rotation is divided.
+/// Returns the number of pieces into which a rotation is divided; one if the rotation is not a number.
 uint32_t pieces_of(Real turn) {
-  return static_cast<uint32_t>(std::clamp(std::ceil(turn / kImpactTurn), 1.0, kMostTurns));
+  return static_cast<uint32_t>(std::min(std::max(1.0, std::ceil(turn / kImpactTurn)), kMostTurns));
 }
 
 /// Returns the change of a body's velocity in its interval, if it is due to a steady force [m/s]. Returns
@@ -196,7 +196,7 @@ std::optional<Real> impact_time(const ContactPair& pair, const WorldDef& def, Re
   }
   const Real bow = (bend(a, h) - bend(b, h)).norm() * (h - from) / 8;
   const auto pieces =
-      static_cast<uint32_t>(std::clamp(std::ceil(std::sqrt(bow / kStraight)), 1.0, kMostArcs));
+      static_cast<uint32_t>(std::min(std::max(1.0, std::ceil(std::sqrt(bow / kStraight))), kMostArcs));
   for (uint32_t i = 0; i < pieces; ++i) {
     const Real begin = from + (h - from) * i / pieces, end = from + (h - from) * (i + 1) / pieces;
     const PosePath path_a(on_arc(a, begin, h), on_arc(a, end, h)),

@@ -81,6 +81,11 @@ Real ImpactStage::greatest_cost() const {
          (active_.awake().size() <= kFewBodies ? kImpactCostOfFew : std::min(of_many, kImpactCostOfFew));
 }
 
+/// Returns the number of impacts in a sub-step after which no pair is traced back again.
+std::size_t ImpactStage::most_impacts() const {
+  return kMaxImpacts + kImpactsPerBody * active_.awake().size();
+}
+
 template <class IsWanted>
 void ImpactStage::search(IsWanted&& is_wanted) {
   const std::span<ContactPair* const> pairs = contacts_.pairs();
@@ -132,7 +137,9 @@ void ImpactStage::resolve() {
     const auto next = std::min_element(pending_.begin(), pending_.end(),
                                        [](const Event& x, const Event& y) { return x.time < y.time; });
     const Event event = *next;
-    if (event.is_impact && cost() > kLastCost * greatest_cost()) return end_at_once(event);
+    // After most_impacts(), each pair has at most one more impact. A state that is not finite has more.
+    const bool is_last = count > 2 * most_impacts() + contacts_.pairs().size();
+    if (event.is_impact && (is_last || cost() > kLastCost * greatest_cost())) return end_at_once(event);
     if (event.is_impact) {
       limit(*event.pair, count++);
     } else {
@@ -222,9 +229,8 @@ void ImpactStage::end_at_once(const Event& first) {
 /// Decides whether later impacts of a pair in this sub-step are traced back, and if not, sets
 /// ContactPair::toi_exhausted. `count`: number of previous impacts.
 void ImpactStage::limit(ContactPair& pair, std::size_t count) {
-  const std::size_t most = kMaxImpacts + kImpactsPerBody * active_.awake().size();
-  if (++pair.impacts <= (turns_fast(pair, h_) ? kMaxOfTumblingPair : kMaxImpactsOfPair) && count < most)
-    return;
+  const uint32_t most = turns_fast(pair, h_) ? kMaxOfTumblingPair : kMaxImpactsOfPair;
+  if (++pair.impacts <= most && count < most_impacts()) return;
   pair.toi_exhausted = true;
   ++report_.impacts.toi_limit_reached;
 }

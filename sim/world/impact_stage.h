@@ -45,6 +45,7 @@ class ImpactStage {
   template <class IsWanted>
   void search(IsWanted&& is_wanted);
   Real cost() const;
+  std::size_t most_impacts() const;
   Real greatest_cost() const;
   void add_rim_updates();
   uint32_t gather(const ContactPair& pair, Real time);

@@ -9,7 +9,7 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kRadius = 0.05;
+constexpr Real kBallRadius = 0.05;
 
 struct Drop {
   std::vector<Real> apexes;  // heights above the rest position after each bounce
@@ -22,18 +22,18 @@ Drop drop(const Shape& shape, Real depth, Real e, Real seconds) {
   world.add_body(
       {.shape = shape, .motion = MotionType::static_body, .pose = {Vec3(0, -depth, 0)}, .restitution = e});
   const auto system = world.add_particle_system({.integrator = IntegratorKind::rk4});
-  world.add_particle(system, {.position = {0, 1 + kRadius, 0}, .radius = kRadius, .restitution = e});
+  world.add_particle(system, {.position = {0, 1 + kBallRadius, 0}, .radius = kBallRadius, .restitution = e});
   Drop result;
   Real last_v = 0;
   while (world.time() < seconds) {
     world.step(1.0 / 240);
-    const Real y = world.particles(system).position[0].y() - kRadius,
+    const Real y = world.particles(system).position[0].y() - kBallRadius,
                v = world.particles(system).velocity[0].y();
     // The apex of the parabola from any point on it: y + v^2 / 2g.
     if (last_v > 0 && v <= 0 && y > 1e-3) result.apexes.push_back(y + v * v / (2 * 9.81));
     last_v = v;
   }
-  result.rest_height = world.particles(system).position[0].y() - kRadius;
+  result.rest_height = world.particles(system).position[0].y() - kBallRadius;
   return result;
 }
 

@@ -71,6 +71,54 @@ TEST_P(DrivenContacts, APlaneThatFollowsKeysCarriesABox) {
     EXPECT_NEAR(w.body(box).velocity.y(), 1, 1e-6) << step;
   }
 }
+
+// The motor's force is constant in a sub-step. A platform that had its new speed from the sub-step's start on
+// would leave its load behind by the acceleration times h^2 / 2 in each sub-step: by 12 mm and 50 mm here.
+TEST_P(DrivenContacts, ALoadStaysOnAnAcceleratingPlatform) {
+  using enum Motor::Mode;
+  for (const Motor::Mode mode : {speed, position})
+    for (const Real step : {1.0 / 240, 1.0 / 60}) {
+      World w(def(step));
+      const BodyHandle platform = w.add_body({.shape = Box{{8, 0.1, 1}},
+                                              .pose = {Vec3(0, 0.05, 0), Quat::Identity()},
+                                              .density = 500,
+                                              .restitution = 0,
+                                              .friction = 0.5});
+      JointDef rail{.type = JointType::prismatic, .a = platform, .anchor = Vec3::Zero()};
+      rail.axis = Vec3::UnitX();
+      rail.motor.mode = mode;
+      for (int i = 0; i <= 120; ++i) {
+        const Real t = i / 60.0, target = mode == speed ? 3 * t : 1.5 * t * t;
+        rail.motor.targets.push_back({t, target});
+      }
+      w.add_joint(rail);
+      const BodyHandle lower = add_load(w, {0.1, 0.2, 0}), upper = add_load(w, {0.12, 0.4, 0});
+      run(w, 1.99, step);
+      const Real moved = w.body(platform).centre.x();
+      EXPECT_NEAR(moved, 1.5 * w.time() * w.time(), 1e-3) << step;
+      EXPECT_NEAR(w.body(lower).centre.x() - moved, 0.1, 1e-3) << step;
+      EXPECT_NEAR(w.body(upper).centre.x() - moved, 0.12, 1e-3) << step;
+    }
+}
+
+// A contradiction: keys move a body through others that a joint holds to the world. No impulse can move
+// these, so none may be computed from the rounding that is left of their mobility.
+TEST_P(DrivenContacts, ABodyThatKeysMoveThroughFixedBodiesLeavesThemAtRest) {
+  for (int i = 0; i < 24; ++i) {
+    World w(def());
+    KeyframeTrack track;
+    track.keys = {{0, {Vec3(-1, 1, 0), Quat::Identity()}}, {0.5, {Vec3(1, 1, 0), Quat::Identity()}}};
+    w.add_body({.shape = Capsule{0.1, 0.3}, .motion = MotionType::kinematic, .track = track});
+    const Pose pose{Vec3(0.1, 1, 0.01 * i), Quat(Eigen::AngleAxisd(0.2 * i, Vec3(0.6, 0.8, 0)))};
+    const BodyHandle fixed = w.add_body({.shape = Box{{0.3, 0.4, 0.5}}, .pose = pose});
+    w.add_joint({.type = JointType::fixed, .a = fixed, .anchor = Vec3(0, 0.5, 0)});
+    while (w.time() < 0.5 - 1e-9) {
+      w.step(1.0 / 240);
+      ASSERT_LT(w.body(fixed).velocity.norm(), 1e-2) << i << " " << w.time();
+    }
+    EXPECT_LT((w.body(fixed).pose.position - pose.position).norm(), 1e-3) << i;
+  }
+}
 OFFSTAGE_BOTH_SOLVERS(Solvers, DrivenContacts);
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <functional>
 #include <numbers>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -417,6 +418,51 @@ TEST_P(InternalEdges, DoNotStopBodiesOfPartsThatStartOnSeams) {
                   << parted.name << " on tiles of " << tile << " m, friction " << friction << ", step "
                   << step << ", from x = " << place.x() << ", towards " << heading;
             }
+}
+
+/// Adds four flush tiles that meet at the origin.
+void add_four_tiles(World& world, Real friction) {
+  for (const Real x : {-2.5, 2.5})
+    for (const Real z : {-2.5, 2.5}) world.add_body(fixed_body(Box{{5, 0.1, 5}}, {x, -0.05, z}, friction));
+}
+
+// A lying tube slides along a seam on which it lies. It touches each tile with an inclined facet, and its
+// parts touch the sides of the tiles. With the load at its front end, small errors would tip it.
+TEST_P(InternalEdges, DoNotTipATubeThatLiesOnThem) {
+  World world(def());
+  add_four_tiles(world, 0.3);
+  const Quat lying(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitX()));
+  const BodyHandle tube =
+      world.add_body({.shape = MeshShape{world.add_compound({solid_mesh(Tube{0.15, 0.1, 0.02})})},
+                      .pose = {Vec3(0, 0.15, 0), lying},
+                      .velocity = Vec3(0, 0, 2),
+                      .mass = 1,
+                      .restitution = 0,
+                      .friction = 0.3});
+  run(world, 1);
+  const Vec3 end = world.body_motion(tube, world.time()).pose.position;
+  EXPECT_LT((end - Vec3(0, 0.15, 2 / (0.3 * kFallAcceleration))).norm(), 0.01);
+}
+
+// The side of a ring's tube is inclined over the tile that the ring passes on to while it lands.
+TEST_P(InternalEdges, DoNotStopARingThatLands) {
+  for (const auto& [x, z, heading] :
+       {std::tuple(0.12036, -0.02215, -0.4046), std::tuple(0.0337, 0.1617, 4.285)}) {
+    World world(def());
+    add_four_tiles(world, 0.3);
+    const Vec3 start(x, 0.041, z), along(std::cos(heading), 0, std::sin(heading));
+    const BodyHandle ring =
+        world.add_body({.shape = MeshShape{world.add_compound({solid_mesh(Torus{0.15, 0.04})})},
+                        .pose = {start, Quat::Identity()},
+                        .velocity = 2 * along,
+                        .mass = 1,
+                        .restitution = 0,
+                        .friction = 0.3});
+    run(world, 1);
+    const Vec3 way = world.body_motion(ring, world.time()).pose.position - start;
+    EXPECT_NEAR(way.dot(along), 2 / (0.3 * kFallAcceleration), 0.02) << x;
+    EXPECT_LT(way.cross(along).norm(), 0.02) << x;
+  }
 }
 
 // A torus of flat sides stands on one of them or on a corner.

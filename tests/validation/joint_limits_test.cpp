@@ -82,5 +82,58 @@ TEST_P(JointLimits, AHeavyBodyBehindALightLinkStopsAtAWall) {
 
 OFFSTAGE_BOTH_SOLVERS(Solvers, JointLimits);
 
+class SoftMotors : public BothSolvers {
+ protected:
+  struct Oscillation {
+    Real deviation = 0;  ///< greatest deviation from the closed form [m], [rad]
+    Real late = 0;       ///< greatest distance from the target in the last second [m], [rad]
+  };
+  /// Releases a body of 2 kg or 2 kg m^2 at the distance 0.1 from the target of its motor, for 5 s.
+  static Oscillation release(JointType type, Real stiffness, Real damping, Real step) {
+    World w(weightless(step));
+    const BodyHandle body =
+        w.add_body({.shape = Box{{0.2, 0.2, 0.2}}, .mass = 2, .inertia = Mat3(2 * Mat3::Identity())});
+    JointDef def{.type = type, .a = body, .axis = Vec3::UnitY()};
+    def.motor = {
+        .mode = Motor::Mode::position, .targets = {{0, 0.1}}, .stiffness = stiffness, .damping = damping};
+    const JointHandle joint = w.add_joint(def);
+    const Real decay = damping / 4, omega = std::sqrt(std::max(0.0, stiffness / 2 - decay * decay));
+    Oscillation o;
+    while (w.time() < 5 - step / 2) {
+      w.step(step);
+      const Real t = w.time(), left = w.joint(joint).coordinate - 0.1;
+      const Real wave = std::cos(omega * t) + decay / omega * std::sin(omega * t);
+      o.deviation = std::max(o.deviation, std::abs(left + 0.1 * std::exp(-decay * t) * wave));
+      if (t > 4) o.late = std::max(o.late, std::abs(left));
+    }
+    return o;
+  }
+};
+
+// A motor with a stiffness is a spring: without damping its oscillation keeps the amplitude.
+TEST_P(SoftMotors, OscillateAsSprings) {
+  for (const JointType type : {JointType::prismatic, JointType::revolute})
+    for (const Real step : {1.0 / 240, 1.0 / 60}) {
+      const Real angle = 10 * step;  // of the oscillation in a sub-step [rad]
+      // The frequency is too small by the fraction angle^2 / 12, which in 5 s is a phase of 50 / 12 angle^2.
+      const Real deviation = 0.1 * 50 / 12 * angle * angle;
+      const Oscillation free = release(type, 200, 0, step);
+      EXPECT_GT(free.late, 0.099) << step;
+      EXPECT_LT(free.late, 0.1001) << step;
+      EXPECT_LT(free.deviation, 1.2 * deviation) << step;
+      EXPECT_LT(release(type, 200, 4, step).deviation, 0.2 * deviation) << step;
+    }
+}
+
+// Springs and dampers that are stiff over a sub-step come to rest instead of vibrating from step to step.
+TEST_P(SoftMotors, SettleIfTheyAreStiff) {
+  for (const Real step : {1.0 / 240, 1.0 / 60}) {
+    for (const Real stiffness : {1e6, 1e9, 1e12})
+      EXPECT_LT(release(JointType::prismatic, stiffness, 0, step).late, 1e-6) << stiffness << " " << step;
+    EXPECT_LT(release(JointType::prismatic, 1e4, 1e4, step).late, 0.1 * std::exp(-3.9)) << step;
+  }
+}
+OFFSTAGE_ALL_SOLVERS(Solvers, SoftMotors);
+
 }  // namespace
 }  // namespace offstage::sim

@@ -51,23 +51,44 @@ TEST_P(LongStack, TenBoxesStandForAMinute) {
 }
 
 // The exact solver handles every ratio. With the fast solver the light boxes sink in by 3.5 mm when the load
-// arrives, and then recover; it is not tested with heavier loads.
+// arrives, and then recover; it leaves heavier loads on few bodies to the exact one.
 TEST_P(Stack, HeavyOnTopStands) {
   for (const Real ratio : {100.0, 1000.0}) {
-    if (!is_exact() && ratio > 100) continue;
+    const bool exact = is_exact() || ratio > 100;
     World world(def());
     add_ground(world);
     const auto boxes = add_stack(world, 4, [&](int i) { return i == 3 ? ratio : 1; });
     const Tally t = run(world, 10);
     const Vec3 drift = world.body(boxes.back()).centre - Vec3(0, 0.7, 0);
-    EXPECT_LT(drift.norm(), is_exact() ? 1e-9 : 4e-4) << ratio;
-    EXPECT_LT(t.penetration, is_exact() ? 1e-9 : 3e-3) << ratio;
-    EXPECT_LT(t.last.contacts.penetration, is_exact() ? 1e-9 : 2e-4) << ratio;
+    EXPECT_LT(drift.norm(), exact ? 1e-9 : 4e-4) << ratio;
+    EXPECT_LT(t.penetration, exact ? 1e-9 : 3e-3) << ratio;
+    EXPECT_LT(t.last.contacts.penetration, exact ? 1e-9 : 2e-4) << ratio;
     EXPECT_EQ(t.exact_fallbacks, 0u) << ratio;
   }
 }
 
 // The force of each contact follows from statics: the weight of all bodies above.
+// The sweeps of the fast solver do not converge for such ratios, so it leaves such islands to the exact one.
+TEST_P(Stack, AThousandTimesHeavierOnTopStands) {
+  for (const Real step : {1.0 / 240, 1.0 / 60})
+    for (const Real drop : {0.0, 0.5}) {
+      World w(def(step));
+      w.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = 0.5});
+      const auto add = [&w](Real mass, Real height) {
+        return w.add_body({.shape = Box{{0.4, 0.4, 0.4}},
+                           .pose = {Vec3(0, height, 0), Quat::Identity()},
+                           .mass = mass,
+                           .restitution = 0,
+                           .friction = 0.5});
+      };
+      add(1, 0.2);
+      const BodyHandle top = add(1000, 0.6 + drop);
+      const Tally t = run(w, 3, step);
+      EXPECT_LT(t.penetration, 1e-3) << step << " " << drop;
+      EXPECT_NEAR(w.body(top).centre.y(), 0.6, 1e-3) << step << " " << drop;
+    }
+}
+
 TEST_P(Stack, CarriesItsWeight) {
   World world(def());
   add_ground(world);

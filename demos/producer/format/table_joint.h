@@ -51,8 +51,7 @@ struct Table<JointMotor> {
         {"stiffness", &T::stiffness,
          "torque or force of the motor per radian or metre from the target position; 0: the position is "
          "controlled rigidly. "
-         "Oscillations of a frequency f are also damped by pi f times `world.step`, as a fraction of the "
-         "critical damping",
+         "Oscillations with fewer than six times `world.step` per period are damped",
          "N m or N/m", kNotNegative},
         {"damping", &T::damping, "torque or force per speed that damps position control; needs a `stiffness`",
          "N m s or N s/m", kNotNegative}};
