@@ -257,6 +257,23 @@ class RowMaker {
     return 1 - std::min(0.5, 1 / (rate * h_));
   }
 
+  /// Adds the row of a motor without a stiffness. `closes`: see BoundedOrigin. A limit is a stop for a motor
+  /// of unlimited effort, too, although the rows of both contradict each other: the motor moves the joint up
+  /// to the limit and holds it there.
+  void add_rigid_motor(const Direction& row, BoundedRow r, Real closes) {
+    if (def_.has_limits() && std::isinf(def_.motor.max_effort)) {
+      const Real end = closes == 1 || is_kicked_
+                           ? at_start(row) + h_ * r.target
+                           : row.start.error + h_ / 2 * (speed_at_start(row) + r.target);
+      if (const Real within = std::clamp(end, def_.lower, def_.upper); within != end) {
+        r.target = (within - at_start(row)) / h_;
+        r.turning = 0;
+        closes = std::abs(speed_at_start(row) - r.target) > kClosing ? 1 : 0;
+      }
+    }
+    add_guessed(r, kMotor, closes);
+  }
+
   void add_motor(Articulation& articulation, const Direction& row) {
     const Motor& motor = def_.motor;
     if (motor.mode == Motor::Mode::none) return;
@@ -269,27 +286,28 @@ class RowMaker {
       // The motor's force is constant in the interval. If the fast solver reached the target in its first
       // sub-step, bodies that the motor carries would slip back by the acceleration times h^2 / 2.
       r.turning = target - speed_at_start(row);
-      return add_guessed(r, kMotor, 0);
+      return add_rigid_motor(row, r, 0);
     }
-    Real closes = 1;
+    const auto if_it_moves = [&](Real closes) {
+      return std::abs(speed_at_start(row) - r.target) > kClosing ? closes : 0;
+    };
     if (motor.stiffness == 0) {
       if (const std::optional<Real> speed = speed_on_track(row)) {
         r.target = *speed;
         r.turning = r.target - speed_at_start(row);
-        return add_guessed(r, kMotor, 0);
+        return add_rigid_motor(row, r, 0);
       }
       r.target = (target - at_start(row)) / h_;
-    } else {
-      const Real end = end_weight(articulation, row), start = 1 - end;
-      const Real missing = start * motor.target(time_ - h_) + end * target - at_start(row);
-      // effort = k (missing - end h v) - c v with v = start * speed at the start + end * speed at the end.
-      const Real resistance = motor.stiffness * end * h_ + motor.damping;
-      r.softness = 1 / (end * h_ * resistance);
-      r.target = (motor.stiffness * missing / resistance - start * speed_at_start(row)) / end;
-      r.lag = start / end;
-      closes = end - start;
+      return add_rigid_motor(row, r, if_it_moves(1));
     }
-    add_guessed(r, kMotor, std::abs(speed_at_start(row) - r.target) > kClosing ? closes : 0);
+    const Real end = end_weight(articulation, row), start = 1 - end;
+    const Real missing = start * motor.target(time_ - h_) + end * target - at_start(row);
+    // effort = k (missing - end h v) - c v with v = start * speed at the start + end * speed at the end.
+    const Real resistance = motor.stiffness * end * h_ + motor.damping;
+    r.softness = 1 / (end * h_ * resistance);
+    r.target = (motor.stiffness * missing / resistance - start * speed_at_start(row)) / end;
+    r.lag = start / end;
+    add_guessed(r, kMotor, if_it_moves(end - start));
   }
 
   /// Adds rows for the friction and the damping of all free directions.

@@ -57,6 +57,28 @@ TEST_P(DrivenContacts, AMotorPressesALoadedArmAgainstItsLimit) {
   EXPECT_NEAR(w.joint(joint).coordinate, 0.3, is_exact() ? 1e-6 : 1e-3);
 }
 
+// A limit is a stop for motors of any strength, also for those of unlimited effort.
+TEST_P(DrivenContacts, AMotorStopsAtTheLimitOfItsJoint) {
+  for (const Real step : {1.0 / 240, 1.0 / 60})
+    for (const JointType type : {JointType::revolute, JointType::prismatic})
+      for (const Motor::Mode mode : {Motor::Mode::speed, Motor::Mode::position})
+        for (const Real restitution : {0.0, 0.5}) {
+          World w(weightless(step));
+          JointDef joint{.type = type, .a = add_load(w, Vec3::Zero())};
+          joint.lower = -0.2;
+          joint.upper = 0.3;
+          joint.restitution = restitution;
+          joint.motor.mode = mode;
+          joint.motor.targets = {{0, mode == Motor::Mode::speed ? 2.0 : 0.0}, {2, 2}};
+          const JointHandle handle = w.add_joint(joint);
+          for (Real time = 0; time < 2 - step / 2; time += step) {
+            w.step(step);
+            ASSERT_LT(w.joint(handle).coordinate, 0.3 + 1e-5);
+          }
+          EXPECT_NEAR(w.joint(handle).coordinate, 0.3, 1e-6);
+        }
+}
+
 TEST_P(DrivenContacts, APlaneThatFollowsKeysCarriesABox) {
   for (const Real step : {1.0 / 240, 1.0 / 60}) {
     World w(def(step));
@@ -104,7 +126,7 @@ TEST_P(DrivenContacts, ALoadStaysOnAnAcceleratingPlatform) {
 // A contradiction: keys move a body through others that a joint holds to the world. No impulse can move
 // these, so none may be computed from the rounding that is left of their mobility.
 TEST_P(DrivenContacts, ABodyThatKeysMoveThroughFixedBodiesLeavesThemAtRest) {
-  for (int i = 0; i < 24; ++i) {
+  for (int i = 0; i < 24; i += 6) {
     World w(def());
     KeyframeTrack track;
     track.keys = {{0, {Vec3(-1, 1, 0), Quat::Identity()}}, {0.5, {Vec3(1, 1, 0), Quat::Identity()}}};
