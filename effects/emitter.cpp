@@ -106,8 +106,14 @@ void Emitter::collect_along_path(const sim::World& world, Real start, Real end) 
 }
 
 void Emitter::emit(sim::World& world, Real start, Real end) {
-  if (def_.body && !world.is_present(def_.body)) return;
   collect_due(end);
+  if (def_.body && !world.is_present(def_.body)) {
+    // What was due while the body is absent is not released later.
+    due_.clear();
+    waiting_.clear();
+    report_.waiting = 0;
+    return;
+  }
   collect_along_path(world, start, end);
   std::stable_sort(due_.begin(), due_.end(),
                    [](const Release& a, const Release& b) { return a.time < b.time; });

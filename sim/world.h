@@ -269,8 +269,9 @@ class World {
 
   /// Bodies whose pose changed during the last step (E5), in slot order.
   std::span<const MovedBody> moved() const;
-  /// Whether the body exists at this time; see BodyDef::appear_at.
+  /// Whether an object exists at this time; see BodyDef::appear_at and ClothDef::appear_at.
   bool is_present(BodyHandle body) const;
+  bool is_present(ClothHandle cloth) const;
   BodyState body(BodyHandle body) const;
   const BodyDef& body_def(BodyHandle body) const;
   /// Motion of a point of a body (world position at its current pose) at a time inside the current sub-step:

@@ -19,6 +19,10 @@ bool World::is_present(BodyHandle body) const {
   return !impl_->bodies[body]->absent;
 }
 
+bool World::is_present(ClothHandle cloth) const {
+  return !impl_->cloths[cloth]->absent;
+}
+
 void World::Impl::update_presence(Real time) {
   if (!has_lifetimes) return;
   std::vector<Body*> gone;

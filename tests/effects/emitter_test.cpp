@@ -178,6 +178,22 @@ TEST(Emitter, MovesWithItsBodyAndAddsItsVelocity) {
   }
 }
 
+TEST(Emitter, ReleasesOnlyWhileItsBodyExists) {
+  World world({.gravity = Vec3::Zero()});
+  const auto system = world.add_particle_system({});
+  const BodyHandle body = world.add_body(
+      {.shape = Sphere{0.1}, .motion = MotionType::kinematic, .appear_at = 0.5, .remove_at = 1.25});
+  Emitter emitter(
+      {.body = body,
+       .release = {.rate = 100.0, .bursts = {{.time = 0.25, .count = 7.0}, {.time = 0.75, .count = 9.0}}},
+       .particles = {.lifespan = 1e9}},
+      system);
+  for (int i = 0; i < 120; ++i)
+    world.step(1.0 / 60, [&](Real start, Real end) { emitter.emit(world, start, end); });
+  EXPECT_NEAR(static_cast<Real>(world.particles(system).size()), 75 + 9, 1);
+  for (const Real age : world.particles(system).age) EXPECT_LE(age, 1.5 + 1e-9);
+}
+
 TEST(Emitter, RefusesInvalidDistributions) {
   const auto message = [](const EmitterDef& def) {
     try {

@@ -22,14 +22,14 @@ class CsvExport : public FilmExport {
                           p.x(), p.y(), p.z());
     };
     for (const FilmBody& body : parts_.bodies) {
-      if (!body.exists_at(snapshot.time)) continue;
+      if (!body.lifetime.contains(snapshot.time)) continue;
       const BodySample& s = body.slot ? snapshot.bodies[*body.slot] : body.place;
       begin("body", body.name, 0, s.position);
       const Eigen::Quaternionf& q = s.orientation;
       rows += fmt::format("{},{},{},{},,,,,,,,\n", q.w(), q.x(), q.y(), q.z());
     }
     for (const FilmCloth& cloth : parts_.cloths) {
-      if (!exists(cloth.appear_at, cloth.remove_at, snapshot.time)) continue;
+      if (!cloth.lifetime.contains(snapshot.time)) continue;
       const ClothSample& sample = snapshot.cloths[cloth.cloth];
       for (std::size_t i = 0; i < sample.points.size(); ++i) {
         const Eigen::Vector3f& v = sample.velocities[i];

@@ -76,8 +76,7 @@ class FilmParts::Builder {
                   .slot = entry.slot,
                   .place = {body.position.cast<float>(), body.orientation.cast<float>()},
                   .parts = {},
-                  .appear_at = body.appear_at,
-                  .remove_at = body.remove_at};
+                  .lifetime = {body.appear_at, body.remove_at}};
     if (!body.visible) return;
     if (body.model)
       add_model(body.model->file,
@@ -104,8 +103,7 @@ class FilmParts::Builder {
     for (const Vector2f& uv : flat.uvs) box.extend(uv);
     const Vector2f size = box.sizes().cwiseMax(1e-6f);
     FilmCloth film{.name = names_(cloth.name, "cloth"),
-                   .appear_at = cloth.appear_at,
-                   .remove_at = cloth.remove_at,
+                   .lifetime = {cloth.appear_at, cloth.remove_at},
                    .cloth = index,
                    .material = cloth_material(cloth),
                    .triangles = flat.triangles(),

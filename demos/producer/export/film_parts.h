@@ -30,15 +30,20 @@ struct FilmPart {
   Eigen::Affine3f body_from_part = Eigen::Affine3f::Identity();
 };
 
+/// The times between which an object exists [s].
+struct Lifetime {
+  Real appear_at = 0, remove_at = kForever;
+
+  bool is_limited() const { return appear_at > 0 || remove_at < kForever; }
+  bool contains(double time) const { return exists(appear_at, remove_at, time); }
+};
+
 struct FilmBody {
   std::string name;
   std::optional<std::size_t> slot;  ///< index in Snapshot::bodies; empty: the body never moves
   BodySample place;                 ///< pose at time 0
   std::vector<FilmPart> parts;
-  Real appear_at = 0, remove_at = 1e30;  ///< times between which the object exists [s]
-
-  bool has_lifetime() const { return appear_at > 0 || remove_at < kForever; }
-  bool exists_at(double time) const { return exists(appear_at, remove_at, time); }
+  Lifetime lifetime;
 };
 
 /// A spring, rod or rope: a cylinder of length 1 along Y, which is placed between two points.
@@ -50,8 +55,8 @@ struct FilmRod {
 
 struct FilmCloth {
   std::string name;
-  Real appear_at = 0, remove_at = 1e30;  ///< times between which the cloth exists [s]
-  std::size_t cloth = 0;                 ///< index in Snapshot::cloths
+  Lifetime lifetime;
+  std::size_t cloth = 0;  ///< index in Snapshot::cloths
   std::size_t material = 0;
   std::vector<uint32_t> triangles;  ///< triangles of the untorn cloth, as indices of its vertices
   /// Texture coordinates of the vertices of the untorn cloth: 0 .. 1 over its extent, v upwards.

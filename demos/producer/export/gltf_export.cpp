@@ -163,12 +163,14 @@ class GltfExport : public FilmExport {
   void write(const Snapshot& snapshot) override {
     const int frame = snapshot.frame;
     frames_.push_back(frame);
+    times_.push_back(snapshot.time);
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
       const FilmBody& body = parts_.bodies[i];
       const BodySample& s = body.slot ? snapshot.bodies[*body.slot] : body.place;
       bodies_[i].add(frame, s.position, s.orientation);
-      if (body.has_lifetime())
-        bodies_[i].scale.add(frame, body.exists_at(snapshot.time) ? Vector3f::Ones() : Vector3f::Zero());
+      if (body.lifetime.is_limited())
+        bodies_[i].scale.add(frame,
+                             body.lifetime.contains(snapshot.time) ? Vector3f::Ones() : Vector3f::Zero());
     }
     for (std::size_t i = 0; i < rods_.size(); ++i)
       write_rod(frame, snapshot.rods[parts_.rods[i].rod], rods_[i]);
@@ -386,14 +388,15 @@ class GltfExport : public FilmExport {
       const std::size_t targets = stretch.targets.size();
       if (targets > 0) mesh["weights"] = std::vector<float>(targets, 0);
       meshes_.push_back(std::move(mesh));
+      const bool comes_or_goes = record.stretches.size() > 1 || cloth.lifetime.is_limited();
+      const SampleTrack<Vector3f> presence = presence_of(cloth, record, i);
       NodeTracks tracks;
-      if (record.stretches.size() > 1)
-        tracks.scale.add(frames_.front(), i == 0 ? Vector3f::Ones() : Vector3f::Zero());
+      if (comes_or_goes) tracks.scale.add(frames_.front(), presence.samples()[0].second);
       const int node = add_node({{"name", i == 0 ? cloth.name : fmt::format("{}/torn_{}", cloth.name, i)},
                                  {"mesh", meshes_.size() - 1}},
                                 tracks);
       if (targets > 0) animate_weights(stretch, node);
-      if (record.stretches.size() > 1) animate_presence(record, i, node);
+      if (comes_or_goes) animate(presence, node, "scale", "STEP");
     }
   }
 
@@ -409,15 +412,18 @@ class GltfExport : public FilmExport {
     add_channel(times, weights, 1, node, "weights", "LINEAR");
   }
 
-  /// Shows the mesh of a range of frames only during these frames. At other times its scale is zero.
-  void animate_presence(const ClothRecord& record, std::size_t i, int node) {
+  /// Returns the scale with which the mesh of the i-th range of frames is shown: 1 during these frames while
+  /// the cloth exists, otherwise 0.
+  SampleTrack<Vector3f> presence_of(const FilmCloth& cloth, const ClothRecord& record, std::size_t i) const {
     SampleTrack<Vector3f> scale;
-    for (const int frame : frames_) {
-      const bool begun = frame >= record.stretches[i].frames.front();
-      const bool over = i + 1 < record.stretches.size() && frame >= record.stretches[i + 1].frames.front();
-      scale.add(frame, begun && !over ? Vector3f::Ones() : Vector3f::Zero());
+    for (std::size_t k = 0; k < frames_.size(); ++k) {
+      const bool begun = frames_[k] >= record.stretches[i].frames.front();
+      const bool over =
+          i + 1 < record.stretches.size() && frames_[k] >= record.stretches[i + 1].frames.front();
+      const bool shown = begun && !over && cloth.lifetime.contains(times_[k]);
+      scale.add(frames_[k], shown ? Vector3f::Ones() : Vector3f::Zero());
     }
-    animate(scale, node, "scale", "STEP");
+    return scale;
   }
 
   void add_camera() {
@@ -512,6 +518,7 @@ class GltfExport : public FilmExport {
   render::OutputFile file_;
   GltfBuffer buffer_;
   std::vector<int> frames_;
+  std::vector<double> times_;  // of the frames [s]
   std::vector<NodeTracks> bodies_, rods_;
   std::vector<ClothRecord> cloths_;
   NodeTracks camera_;

@@ -91,7 +91,8 @@ struct ClothAttributes {
         indices("int[] faceVertexIndices", folder),
         uvs("texCoord2f[] primvars:st", folder, "vertex") {}
   SpooledAttribute points, normals, velocities, counts, indices, uvs;
-  std::optional<uint32_t> version;  // version of the triangles that were written last
+  std::optional<uint32_t> version;      // version of the triangles that were written last
+  SampleTrack<std::string> visibility;  // empty for cloths that exist during the whole film
 };
 
 struct PointAttributes {
@@ -131,6 +132,10 @@ Eigen::Matrix4f looking(const Vector3f& from, const Vector3f& direction, const V
   return transform.matrix();
 }
 
+void note_visibility(int frame, const Lifetime& lifetime, double time, SampleTrack<std::string>& visibility) {
+  if (lifetime.is_limited()) visibility.add(frame, lifetime.contains(time) ? "inherited" : "invisible");
+}
+
 class UsdExport : public FilmExport {
  public:
   UsdExport(const fs::path& file, const FilmParts& parts)
@@ -155,16 +160,18 @@ class UsdExport : public FilmExport {
       const FilmBody& body = parts_.bodies[i];
       const BodySample& s = body.slot ? snapshot.bodies[*body.slot] : body.place;
       bodies_[i].add(frame, s.position, s.orientation);
-      if (body.has_lifetime())
-        bodies_[i].visibility.add(frame, body.exists_at(snapshot.time) ? "inherited" : "invisible");
+      note_visibility(frame, body.lifetime, snapshot.time, bodies_[i].visibility);
     }
     for (std::size_t i = 0; i < rods_.size(); ++i) {
       const auto place = rod_transform(snapshot.rods[parts_.rods[i].rod]);
       rods_[i].visibility.add(frame, place ? "inherited" : "invisible");
       if (place) rods_[i].transform.add(frame, place->matrix());
     }
-    for (std::size_t i = 0; i < cloths_.size(); ++i)
-      write_cloth(frame, parts_.cloths[i], snapshot.cloths[parts_.cloths[i].cloth], *cloths_[i]);
+    for (std::size_t i = 0; i < cloths_.size(); ++i) {
+      const FilmCloth& cloth = parts_.cloths[i];
+      write_cloth(frame, cloth, snapshot.cloths[cloth.cloth], *cloths_[i]);
+      note_visibility(frame, cloth.lifetime, snapshot.time, cloths_[i]->visibility);
+    }
     for (std::size_t i = 0; i < points_.size(); ++i)
       write_points(frame, snapshot.point_sets[parts_.points[i].set], *points_[i]);
     write_camera(frame, parts_.camera_at(snapshot));
@@ -359,7 +366,7 @@ class UsdExport : public FilmExport {
                     names_(cloth.name), display_name(cloth.name), materials_[cloth.material]));
     for (SpooledAttribute* attribute : {&a.counts, &a.indices, &a.points, &a.velocities, &a.normals, &a.uvs})
       attribute->write(file_);
-    put("}\n");
+    put(sampled("token visibility", a.visibility) + "}\n");
   }
 
   void put_points(const FilmPoints& set, PointAttributes& a) {

@@ -44,7 +44,7 @@ WorldGeometry world_geometry(const FilmParts& parts, const Snapshot& snapshot) {
   uint32_t id = 0;
   for (const FilmBody& body : parts.bodies) {
     ++id;
-    if (!body.exists_at(snapshot.time)) continue;
+    if (!body.lifetime.contains(snapshot.time)) continue;
     const BodySample& s = body.slot ? snapshot.bodies[*body.slot] : body.place;
     const Affine3f world_from_body = Eigen::Translation3f(s.position) * s.orientation;
     for (const FilmPart& part : body.parts) {
@@ -63,7 +63,7 @@ WorldGeometry world_geometry(const FilmParts& parts, const Snapshot& snapshot) {
   }
   for (const FilmCloth& cloth : parts.cloths) {
     ++id;
-    if (!exists(cloth.appear_at, cloth.remove_at, snapshot.time)) continue;
+    if (!cloth.lifetime.contains(snapshot.time)) continue;
     begin_group(out, cloth.name, id, cloth.material);
     add_cloth(cloth, snapshot.cloths[cloth.cloth], out);
     end_group(out);

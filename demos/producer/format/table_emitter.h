@@ -265,7 +265,9 @@ struct Table<Emitter> {
         {"preset", &T::preset,
          "preset whose first emitter provides all keys that are not given here; \"preset/emitter\" names "
          "another of its emitters; empty: none"},
-        {"body", &T::body, "name of the body with which the emitter moves; empty: fixed in the world"},
+        {"body", &T::body,
+         "name of the body with which the emitter moves; nothing is released while the body does not exist; "
+         "empty: fixed in the world"},
         {"surface", &T::surface, "surface that particles are released from"},
         {"direction", &T::direction,
          "direction of release, in the frame of the body or in the world; zero: the normal of the surface"},

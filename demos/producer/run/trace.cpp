@@ -27,6 +27,7 @@ void Trace::record(double time) {
   const sim::Quat upright = sim::Quat::Identity();
   const sim::Vec3 none = sim::Vec3::Zero();
   for (const auto& [name, handle] : simulation_.cloths()) {
+    if (!world.is_present(handle)) continue;
     const sim::ClothView cloth = world.cloth(handle);
     const std::vector<sim::Real>& masses = world.cloth_def(handle).masses;
     sim::Vec3 p = none, v = none;
@@ -57,6 +58,7 @@ void ClothTrace::record(double time) {
   const sim::World& world = simulation_.world();
   CsvRows rows;
   for (const auto& [name, handle] : simulation_.cloths()) {
+    if (!world.is_present(handle)) continue;
     const sim::ClothReport& r = world.cloth_report(handle);
     rows.number(time).text(name).count(world.cloth(handle).points.size());
     rows.number(r.max_strain)
@@ -76,6 +78,7 @@ ClothPointTrace::ClothPointTrace(const std::filesystem::path& path, const Simula
 
 void ClothPointTrace::record(double time) {
   for (const auto& [name, handle] : simulation_.cloths()) {
+    if (!simulation_.world().is_present(handle)) continue;
     const sim::ClothView cloth = simulation_.world().cloth(handle);
     CsvRows rows;
     for (std::size_t i = 0; i < cloth.points.size(); ++i)
