@@ -215,20 +215,19 @@ class BodyContacts {
     return true;
   }
 
-  /// Whether a face on which X lies or lands prevents the overlap of a speculative contact. The free motion
-  /// leads X into the face, too, and the face lifts it out of that overlap. A wheel that rolls on to the next
-  /// tile, for example, seems to sink at the edge of the tile that it leaves. Dynamic bodies are left out,
-  /// since they may yield instead of lifting X.
+  /// Whether a face on which X lies prevents the overlap of a speculative contact. The free motion leads X
+  /// into the face, too, and the face lifts it out of that overlap. A wheel that rolls on to the next tile,
+  /// for example, seems to sink at the edge of the tile that it leaves. Dynamic bodies are left out, since
+  /// they may yield instead of lifting X.
   bool is_prevented(const View& v) const {
     if (v.y().is_dynamic()) return false;
-    return std::any_of(views_.begin(), views_.end(), [&](const View& face) {
-      if (face.speculative || !face.is_face() || face.x_piece != v.x_piece || face.y().is_dynamic())
-        return false;
-      const PlacedManifold& m = face.pair->manifolds()[face.index];
+    return std::any_of(faces_.begin(), faces_.end(), [&](const View* face) {
+      if (face->x_piece != v.x_piece || face->y().is_dynamic()) return false;
+      const PlacedManifold& m = face->pair->manifolds()[face->index];
       Real lift = std::numeric_limits<Real>::infinity();
       for (uint32_t k = 0; k < m.manifold.count; ++k)
-        lift = std::min(lift, -face.pair->separation_at_end(m, m.manifold.points[k], h_ - time_));
-      return v.separation() + std::max(0.0, lift) * face.normal.dot(v.normal) > -kPrevented;
+        lift = std::min(lift, -face->pair->separation_at_end(m, m.manifold.points[k], h_ - time_));
+      return v.separation() + std::max(0.0, lift) * face->normal.dot(v.normal) > -kPrevented;
     });
   }
 
@@ -267,20 +266,11 @@ class BodyContacts {
            speed(v, farthest(v.x(), v.x_piece, pose(x_, false), -up)) < tips;
   }
 
-  /// Returns the normal of the surface at a contact on which X lies. It is the contact's normal, unless a
-  /// face of X lies on an edge of Y: a tube on the seam of two tiles, for example, touches them with two
-  /// slightly inclined facets.
-  Vec3 normal_below(const View& face) const {
-    if (!face.is_face_of_x()) return face.normal;
-    const Vec3 own = distance(face, middle(face) + kLookOver * flush_ * face.normal).normal;
-    return own.dot(face.normal) > kOwnNormal ? own : face.normal;
-  }
-
   /// Returns a new normal for a contact at or below the level of a face on which the same piece of X lies. It
   /// is needed if the surface at the contact, seen from above the face, does not have the contact's normal.
   /// It is the surface's own normal, or the normal of the face if the surface only continues the face.
   std::optional<Vec3> normal_instead(const View& v, const View& face) const {
-    const Vec3 n = v.normal, up = normal_below(face);
+    const Vec3 n = v.normal, up = face.normal;
     if (v.x_piece != face.x_piece || n.dot(up) > kSameDirection) return std::nullopt;
     // Two convex pieces have no internal edge between them: all their contacts are valid.
     if (v.pair == face.pair && v.y_piece == face.y_piece) return std::nullopt;
@@ -312,8 +302,7 @@ class BodyContacts {
     const Vec3 over_top = top + std::max(0.0, up.dot(on_face - top)) * up + over;
     const Vec3 own = distance(v, top_piece, over_top).normal;
     if (own.dot(n) > kSameDirection) return std::nullopt;
-    if (own.dot(up) > kGoesOn)
-      return is_flat(v, over_top, up, across) ? std::optional(face.normal) : std::nullopt;
+    if (own.dot(up) > kGoesOn) return is_flat(v, over_top, up, across) ? std::optional(up) : std::nullopt;
     const bool is_slope = own.dot(up) > 0 && own.dot(n) > 0 && own.dot(n) < kOwnNormal;
     return is_slope && is_ramp(v, top, up, across) ? std::optional(own) : std::nullopt;
   }

@@ -141,7 +141,7 @@ constexpr const char* kParticles = "c5bfc404ccb7e022ce9ed6c7eb5cc342";
 constexpr const char* kSlidingExact = "b5a76a6b2a86bb2844e3e5c0256675dd";
 constexpr const char* kBouncingExact = "ba579ae8c79a71beebc41a78ce6a72d6";
 constexpr const char* kBouncingFast = "1e2fc9eee5713f0a931782de8eabba35";
-constexpr const char* kHeapFast = "a881cb2c1373ee284b62dfb6248775c2";
+constexpr const char* kHeapFast = "9f48e92972154f86ddac3668a8274367";
 constexpr const char* kChainExact = "931a476ef70e904be100c37fc2515db0";
 constexpr const char* kChainFast = "25116c917052a4257488a08fcb74406a";
 
