@@ -1,6 +1,7 @@
 /// The part of ClothSystem that joins the points and springs of all cloths to common arrays.
 
 #include <algorithm>
+#include <optional>
 
 #include "sim/cloth/cloth_system.h"
 
@@ -108,6 +109,42 @@ Aabb ClothSystem::reach(Real h) const {
       box.extend(Vec3(cloth->points[i] + around));
     }
   return box;
+}
+
+Real ClothSystem::thinnest() const {
+  Real least = kInfinity;
+  for (const Cloth* cloth : cloths_) least = std::min(least, cloth->def.thickness);
+  return least;
+}
+
+std::optional<Real> ClothSystem::first_meeting(const Aabb& box, const Vec3& velocity, Real h) const {
+  std::optional<Real> first;
+  for (const Cloth* cloth : cloths_) {
+    if (!cloth->def.collides || cloth->stopped) continue;
+    for (const Triangle& t : cloth->triangles) {
+      // The box grows by the motion of the triangle.
+      Aabb around;
+      Real speed = 0;
+      for (const uint32_t i : t) {
+        around.extend(cloth->points[i]);
+        speed = std::max(speed, cloth->velocities[i].norm());
+      }
+      const Real margin = cloth->def.thickness + h * speed;
+      Real enters = 0, leaves = first.value_or(h);
+      for (int axis = 0; axis < 3; ++axis) {
+        const Real low = around.min()[axis] - margin - box.max()[axis],
+                   high = around.max()[axis] + margin - box.min()[axis], v = velocity[axis];
+        if (v == 0) {
+          if (low > 0 || high < 0) leaves = -1;
+          continue;
+        }
+        enters = std::max(enters, std::min(low / v, high / v));
+        leaves = std::min(leaves, std::max(low / v, high / v));
+      }
+      if (enters <= leaves) first = enters;
+    }
+  }
+  return first;
 }
 
 }  // namespace offstage::sim

@@ -3,6 +3,7 @@
 /// with the bodies along the paths of the sub-step. Impulses of cloths change the velocities of bodies from
 /// the next sub-step on.
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -24,6 +25,15 @@ class ClothMotion {
   void place_pins(Cloth& cloth);
   /// Releases all cloth vertices that are pinned to a body.
   void detach(BodyHandle body);
+
+  /// Smallest thickness of a cloth that exists [m].
+  Real thinnest() const { return system_.thinnest(); }
+  /// Returns the bounding box of all positions that cloths may reach within the time h [s].
+  Aabb reach(Real h) const { return system_.reach(h); }
+  /// Returns the time within h [s] at which a box that moves at `velocity` may meet cloth.
+  std::optional<Real> first_meeting(const Aabb& box, const Vec3& velocity, Real h) const {
+    return system_.first_meeting(box, velocity, h);
+  }
 
   void begin_step();
   /// Moves all cloths through a sub-step, and displaces bodies where cloths push them. Returns the impulses
