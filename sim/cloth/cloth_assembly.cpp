@@ -11,6 +11,11 @@ namespace {
 /// The stretch limit is at least this factor above the tear limit, because otherwise cloth could not tear.
 constexpr Real kBeyondTear = 1.2;
 
+/// Whether an integrator applies the friction of supports.
+bool rubs(ClothIntegrator integrator) {
+  return integrator == ClothIntegrator::relaxed || integrator == ClothIntegrator::implicit;
+}
+
 }  // namespace
 
 void ClothSystem::assign(std::vector<Cloth*> cloths) {
@@ -33,6 +38,7 @@ void ClothSystem::assemble() {
   for (uint32_t c = 0; c < cloths_.size(); ++c) {
     Cloth& cloth = *cloths_[c];
     cloth.assign_bending();
+    points_.rubs.push_back(rubs(cloth.def.integrator));
     if (cloth.def.pressure != 0) cloth.gas.assign(cloth.triangles);
     const auto first = static_cast<uint32_t>(points_.size());
     first_.push_back(first);
@@ -84,8 +90,7 @@ void ClothSystem::assemble() {
   points_.supported.assign(points_.size(), 0);
   points_.triangle_supports.resize(cloths_.size());
   points_.pin_impulse.assign(points_.size(), Vec4::Zero());
-  springs_.clear();
-  springs_.resize(cloths_.size());
+  springs_ = std::vector<ClothSprings>(cloths_.size());
   for (std::size_t c = 0; c < cloths_.size(); ++c)
     if (cloths_[c]->def.integrator == ClothIntegrator::relaxed) springs_[c].assign(springs_of(c), points_);
   air_.resize(cloths_.size());

@@ -67,6 +67,7 @@ void ClothSystem::begin_step(const ClothWeather& weather, std::span<ClothBody> b
   adapt_springs();
   find_held(weather.time, bodies);
   for (const Carrier& carrier : carriers_) carrier.body->fall_along_parabola(weather.gravity);
+  contacts_.set_up(-weather.gravity);
   contacts_.find(points_, collides_, bodies, weather.h);
   corner_contacts_.find(points_, bodies, weather.h);
 }
@@ -112,7 +113,7 @@ void ClothSystem::substep(Real from, Real to, Real dt) {
 /// sub-step.
 void ClothSystem::touch_bodies(Real dt) {
   contacts_.find_runaways(points_);
-  corner_contacts_.solve(points_, dt, cuts_);
+  corner_contacts_.solve(points_, contacts_, dt, cuts_);
   contacts_.solve(points_, dt, parts_, cuts_);
   for (int round = 1; round < kMaxTurns && limit_.any_too_long(points_); ++round) {
     body_contacts_.clear();

@@ -129,7 +129,7 @@ void World::Impl::step_particles(Real start, Real h, const CoupledSystem& couple
 }
 
 void World::Impl::step_cloths(Real start, Real h, StepReport& report) {
-  reactions.apply(cloth_motion.step(start, h), start + h, report);
+  reactions.apply(cloth_motion.step(start, h, contacts.pairs()), start + h, report);
   collide_particles_with_cloths(*this, start, h, particle_motion.events());
 }
 
