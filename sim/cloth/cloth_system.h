@@ -93,6 +93,7 @@ class ClothSystem {
   void limit_bending(Real dt);
   BendLimit* bend_limit_of(std::size_t cloth);
   void close_seams(Real dt);
+  void disturb_flat_seams();
   void end_substep(Real dt);
   void touch_bodies(Real dt);
   void collect_triangles();
