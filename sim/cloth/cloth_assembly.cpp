@@ -1,6 +1,7 @@
 /// The part of ClothSystem that joins the points and springs of all cloths to common arrays.
 
 #include <algorithm>
+#include <optional>
 
 #include "sim/cloth/cloth_system.h"
 
@@ -9,6 +10,11 @@ namespace {
 
 /// The stretch limit is at least this factor above the tear limit, because otherwise cloth could not tear.
 constexpr Real kBeyondTear = 1.2;
+
+/// Whether an integrator applies the friction of supports.
+bool rubs(ClothIntegrator integrator) {
+  return integrator == ClothIntegrator::relaxed || integrator == ClothIntegrator::implicit;
+}
 
 }  // namespace
 
@@ -32,6 +38,7 @@ void ClothSystem::assemble() {
   for (uint32_t c = 0; c < cloths_.size(); ++c) {
     Cloth& cloth = *cloths_[c];
     cloth.assign_bending();
+    points_.rubs.push_back(rubs(cloth.def.integrator));
     if (cloth.def.pressure != 0) cloth.gas.assign(cloth.triangles);
     const auto first = static_cast<uint32_t>(points_.size());
     first_.push_back(first);
@@ -83,8 +90,7 @@ void ClothSystem::assemble() {
   points_.supported.assign(points_.size(), 0);
   points_.triangle_supports.resize(cloths_.size());
   points_.pin_impulse.assign(points_.size(), Vec4::Zero());
-  springs_.clear();
-  springs_.resize(cloths_.size());
+  springs_ = std::vector<ClothSprings>(cloths_.size());
   for (std::size_t c = 0; c < cloths_.size(); ++c)
     if (cloths_[c]->def.integrator == ClothIntegrator::relaxed) springs_[c].assign(springs_of(c), points_);
   air_.resize(cloths_.size());
@@ -108,6 +114,42 @@ Aabb ClothSystem::reach(Real h) const {
       box.extend(Vec3(cloth->points[i] + around));
     }
   return box;
+}
+
+Real ClothSystem::thinnest() const {
+  Real least = kInfinity;
+  for (const Cloth* cloth : cloths_) least = std::min(least, cloth->def.thickness);
+  return least;
+}
+
+std::optional<Real> ClothSystem::first_meeting(const Aabb& box, const Vec3& velocity, Real h) const {
+  std::optional<Real> first;
+  for (const Cloth* cloth : cloths_) {
+    if (!cloth->def.collides || cloth->stopped) continue;
+    for (const Triangle& t : cloth->triangles) {
+      // The box grows by the motion of the triangle.
+      Aabb around;
+      Real speed = 0;
+      for (const uint32_t i : t) {
+        around.extend(cloth->points[i]);
+        speed = std::max(speed, cloth->velocities[i].norm());
+      }
+      const Real margin = cloth->def.thickness + h * speed;
+      Real enters = 0, leaves = first.value_or(h);
+      for (int axis = 0; axis < 3; ++axis) {
+        const Real low = around.min()[axis] - margin - box.max()[axis],
+                   high = around.max()[axis] + margin - box.min()[axis], v = velocity[axis];
+        if (v == 0) {
+          if (low > 0 || high < 0) leaves = -1;
+          continue;
+        }
+        enters = std::max(enters, std::min(low / v, high / v));
+        leaves = std::min(leaves, std::max(low / v, high / v));
+      }
+      if (enters <= leaves) first = enters;
+    }
+  }
+  return first;
 }
 
 }  // namespace offstage::sim

@@ -93,6 +93,23 @@ class ClothBody {
     touching_speed = std::max(touching_speed, speed);
   }
 
+  /// A body against which this body presses cloth. The contact solver carries the load from body to body.
+  struct Load {
+    uint32_t body;    ///< the other body, Obstacle::body
+    Real impulse;     ///< along the normal in the world's sub-step [N s]
+    bool rubs;        ///< whether this body exerts friction on the cloth
+    Real points = 0;  ///< number of points between the two bodies
+  };
+  std::vector<Load> loads;
+  Load* load_against(const ClothBody& other) {
+    for (Load& load : loads)
+      if (load.body == other.obstacle_.body) return &load;
+    return nullptr;
+  }
+  const Load* load_against(const ClothBody& other) const {
+    return const_cast<ClothBody*>(this)->load_against(other);
+  }
+
   bool touched = false;     ///< whether cloth touched the body in this sub-step of the world
   Real touching_speed = 0;  ///< greatest relative speed of such a contact [m/s]
   /// Whether cloth is pinched between this body and another one in this sub-step of the world.

@@ -18,6 +18,9 @@ constexpr Real kStabilization = 0.3;
 /// Two normals face each other if the cosine of their angle is below this. Cloth between them is pinched.
 constexpr Real kFacing = -0.5;
 constexpr int kStopSweeps = 30;
+/// A point between two bodies that press cloth is under their load if its distance from both is at most this,
+/// in thicknesses.
+constexpr Real kUnderLoad = 1.2;
 /// A point that its support keeps at the right distance but for rounding touches the body, in thicknesses.
 constexpr Real kTouching = 1e-6;
 
@@ -71,6 +74,21 @@ void ClothContacts::find(const ClothPoints& points, std::span<const uint8_t> col
   if (bodies.empty()) return;
   tbb::parallel_for(std::size_t{0}, found.size(), chunk);
   for (const auto& f : found) near_.insert(near_.end(), f.begin(), f.end());
+  count_points_under_loads(points);
+}
+
+void ClothContacts::count_points_under_loads(const ClothPoints& points) {
+  if (std::ranges::all_of(bodies_, [](const ClothBody& body) { return body.loads.empty(); })) return;
+  const auto is_under_load = [&](const Near& near) {
+    return !bodies_[near.body].loads.empty() && near.distance < kUnderLoad * points.thickness[near.point];
+  };
+  for (std::size_t k = 0; k < near_.size(); ++k)
+    for (std::size_t l = k + 1; l < near_.size() && near_[l].point == near_[k].point; ++l) {
+      if (!is_under_load(near_[k]) || !is_under_load(near_[l])) continue;
+      ClothBody &a = bodies_[near_[k].body], &b = bodies_[near_[l].body];
+      if (ClothBody::Load* load = a.load_against(b)) ++load->points;
+      if (ClothBody::Load* load = b.load_against(a)) ++load->points;
+    }
 }
 
 Real ClothContacts::fastest_approach(const ClothPoints& points) const {
@@ -162,15 +180,45 @@ bool ClothContacts::may_support(const ClothPoints& points, const ClothBody& body
          std::ranges::all_of(near, [&](const Near& n) { return &bodies_[n.body] == &body; });
 }
 
+bool ClothContacts::is_pressed_by(const ClothPoints& points, const ClothBody& body, uint32_t point) const {
+  if (body.loads.empty()) return false;
+  return std::ranges::any_of(std::ranges::equal_range(near_, point, {}, &Near::point), [&](const Near& near) {
+    return near.distance < kUnderLoad * points.thickness[point] && body.load_against(bodies_[near.body]);
+  });
+}
+
+/// Returns whether a body presses a point against another one from above. Only the lower body then moves the
+/// point, because it carries the weight. `normal`: from the body to the point.
+bool ClothContacts::presses_from_above(const ClothPoints& points, const ClothBody& body, uint32_t point,
+                                       const Vec3& normal) const {
+  return !(normal.dot(up_) > 0) && is_pressed_by(points, body, point);
+}
+
+/// Returns the force with which another body presses a point against the body of `near`, for friction [N].
+Real ClothContacts::load_on(const ClothPoints& points, const Near& near) const {
+  Real sum = 0;
+  for (const ClothBody::Load& load : bodies_[near.body].loads) {
+    if (!load.rubs || !(load.points > 0)) continue;
+    for (const Near& other : std::ranges::equal_range(near_, near.point, {}, &Near::point))
+      if (bodies_[other.body].obstacle().body == load.body &&
+          other.distance < kUnderLoad * points.thickness[near.point])
+        sum += load.impulse / load.points / h_;
+  }
+  return sum;
+}
+
 void ClothContacts::find_supports(ClothPoints& points, Real dt) {
   points.supports.clear();
   for (Near& near : near_) {
+    near.rubbed = false;
     const uint32_t i = near.point;
     ClothBody& body = bodies_[near.body];
     if (!(points.inverse_mass[i] > 0) || !may_support(points, body, i)) continue;
     const Vec4 end = points.free_end(i, dt);
     Touch t;
-    if (!touch(points, near, end.head<3>(), kSupportReach * points.thickness[i], t)) continue;
+    if (!touch(points, near, end.head<3>(), kSupportReach * points.thickness[i], t) ||
+        presses_from_above(points, body, i, t.normal))
+      continue;
     const Vec4 normal = padded(t.normal), surface = padded(body.surface_motion(t.on_body));
     const Real gap = std::max(t.gap - normal.dot(end - points.start[i] - surface), 0.0);
     const Support found{i,
@@ -179,11 +227,15 @@ void ClothContacts::find_supports(ClothPoints& points, Real dt) {
                         surface,
                         std::sqrt(points.friction[i] * body.obstacle().friction),
                         body.is_dynamic() ? &body : nullptr,
-                        t.on_body};
+                        t.on_body,
+                        dt * dt * load_on(points, near)};
     if (points.supports.empty() || points.supports.back().point != i)
       points.supports.push_back(found);
     else if (found.gap < points.supports.back().gap)
       points.supports.back() = found;
+    else
+      continue;
+    near.rubbed = found.load > 0 && points.rubs[points.cloth[i]];
   }
 }
 
@@ -196,9 +248,11 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
     const uint32_t point = near_[k].point;
     near_to_[point] = &bodies_[near_[k].body];
     near_several_[point] = k + 1 < near_.size() && near_[k + 1].point == point;
-    for (Touch t; k < near_.size() && near_[k].point == point; ++k)
-      if (touch(points, near_[k], points.at(point), kTouching * points.thickness[point], t))
+    for (Touch t; k < near_.size() && near_[k].point == point; ++k) {
+      const Real reach = bodies_[near_[k].body].loads.empty() ? kTouching : kUnderLoad - 1;
+      if (touch(points, near_[k], points.at(point), reach * points.thickness[point], t))
         touches_.push_back(t);
+    }
     const std::size_t count = touches_.size();
     if (count == 0) continue;
     active_[points.cloth[point]] += count;
@@ -211,6 +265,7 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
       bool supported = points.inverse_mass[point] == 0;
       for (std::size_t b = 0; b < count; ++b) {
         if (touches_[a].normal.dot(touches_[b].normal) > kFacing) continue;
+        if (carries(touches_[a], touches_[b])) continue;
         supported = true;
         if (a < b && (touches_[a].body->is_dynamic() || touches_[b].body->is_dynamic()))
           pinch(touches_[a], touches_[b],
@@ -218,9 +273,21 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
                                                             touches_[b].body->obstacle().friction)));
       }
       if (points.inverse_mass[point] == 0) block(touches_[a], points.holder[point]);
-      press(points, touches_[a], dt, parts, supported && touches_[a].body->is_dynamic(), cuts);
+      const bool is_moved = !(supported && touches_[a].body->is_dynamic()) &&
+                            !presses_from_above(points, *touches_[a].body, point, touches_[a].normal);
+      press(points, touches_[a], dt, parts, !is_moved, cuts);
     }
   }
+}
+
+/// Returns whether the contact solver carries the load between two bodies that press a point. The point then
+/// only gets friction from the bodies, with its part of the load.
+bool ClothContacts::carries(Touch& a, Touch& b) const {
+  ClothBody::Load* const load = a.body->load_against(*b.body);
+  if (!load) return false;
+  a.near->pressed = load->rubs && load->points > 0 && !a.near->rubbed ? load->impulse / load->points : 0;
+  a.body->pinches = true;
+  return true;
 }
 
 /// Solves the contact of two bodies that pinch a point: their velocities must not approach. The point also
@@ -350,8 +417,8 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
   return taken;
 }
 
-/// Moves a point out of one body. `supported`: whether another body holds the point from behind; pinch() has
-/// then changed the velocities of the bodies.
+/// Moves a point out of one body. `supported`: whether another body holds the point from behind; pinch() or
+/// the contact solver has then changed the velocities of the bodies.
 void ClothContacts::press(ClothPoints& points, Touch& t, Real dt, Real parts, bool supported,
                           std::vector<VelocityCut>& cuts) {
   const uint32_t i = t.near->point;

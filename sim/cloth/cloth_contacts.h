@@ -26,6 +26,8 @@ class ClothContacts {
   /// point, whether it collides with bodies.
   void find(const ClothPoints& points, std::span<const uint8_t> collides, std::span<ClothBody> bodies, Real h,
             Real at = 0);
+  /// Sets the direction against gravity; zero without gravity.
+  void set_up(const Vec3& up) { up_ = up; }
   /// Greatest speed of a point relative to a dynamic body that it can touch [m/s].
   Real fastest_approach(const ClothPoints& points) const;
   /// Repeats the search for points that moved farther than predicted.
@@ -33,6 +35,9 @@ class ClothContacts {
   /// Returns whether a body may be a support of a point. Pinned cloth and points that are near another body
   /// are left to solve() if the body is dynamic.
   bool may_support(const ClothPoints& points, const ClothBody& body, uint32_t point) const;
+  /// Returns whether a point lies on a body against which `body` presses the cloth (ClothBody::loads). The
+  /// contact solver then keeps both bodies apart, and the cloth there does not push `body`.
+  bool is_pressed_by(const ClothPoints& points, const ClothBody& body, uint32_t point) const;
   /// Finds the supports of points (ClothPoints::supports) for a sub-step of the cloth of length dt [s].
   void find_supports(ClothPoints& points, Real dt);
   /// Moves points out of the bodies in a sub-step of the cloth of length dt [s]. `parts`: number of such
@@ -72,9 +77,10 @@ class ClothContacts {
  private:
   struct Near {
     uint32_t point, body;
-    Vec3 place;        // position of the point in the body's frame at the last search
-    Real distance;     // distance of that position from the surface
-    Real pressed = 0;  // impulse along the normal on a pinched point in this sub-step of the world [N s]
+    Vec3 place;           // position of the point in the body's frame at the last search
+    Real distance;        // distance of that position from the surface
+    Real pressed = 0;     // impulse along the normal on a pinched point in this sub-step of the world [N s]
+    bool rubbed = false;  // whether the integrator applies the friction of the loads on the body
   };
   struct Touch {
     Near* near;
@@ -85,6 +91,11 @@ class ClothContacts {
 
   void look(const ClothPoints& points, uint32_t point, std::vector<Near>& found) const;
   bool touch(const ClothPoints& points, Near& near, const Vec3& at, Real reach, Touch& t) const;
+  void count_points_under_loads(const ClothPoints& points);
+  bool carries(Touch& a, Touch& b) const;
+  bool presses_from_above(const ClothPoints& points, const ClothBody& body, uint32_t point,
+                          const Vec3& normal) const;
+  Real load_on(const ClothPoints& points, const Near& near) const;
   void pinch(Touch& a, Touch& b, Real friction);
   void block(Touch& t, ClothBody* holder);
   void press(ClothPoints& points, Touch& t, Real dt, Real parts, bool supported,
@@ -93,6 +104,7 @@ class ClothContacts {
   std::span<ClothBody> bodies_;
   std::span<const uint8_t> collides_;
   Real h_ = 0;
+  Vec3 up_ = Vec3::Zero();
   std::vector<Near> near_;  // by point
   // By point: a body near it, and whether several bodies are near it.
   std::vector<const ClothBody*> near_to_;

@@ -20,6 +20,11 @@ constexpr Real kMostStrain = 1;
 /// Greatest number of parts into which a sub-step is divided because of kMostApproach and kMostStrain.
 constexpr Real kMostDivision = 16;
 
+/// A cloth is flat if its points are out of a plane by at most this, relative to its size.
+constexpr Real kFlat = 1e-9;
+/// Velocity with which a flat cloth begins to bend when its seams close, as a fraction of their speed.
+constexpr Real kDisturbance = 0.01;
+
 }  // namespace
 
 void ClothSystem::step(const ClothWeather& weather, std::span<ClothBody> bodies) {
@@ -63,10 +68,12 @@ void ClothSystem::begin_step(const ClothWeather& weather, std::span<ClothBody> b
     add_outer_forces(*cloths_[c], first_[c], weather, points_);
     air_[c].expire();
   }
+  disturb_flat_seams();
   for (Cloth* cloth : cloths_) cloth->before = cloth->points;
   adapt_springs();
   find_held(weather.time, bodies);
   for (const Carrier& carrier : carriers_) carrier.body->fall_along_parabola(weather.gravity);
+  contacts_.set_up(-weather.gravity);
   contacts_.find(points_, collides_, bodies, weather.h);
   corner_contacts_.find(points_, bodies, weather.h);
 }
@@ -112,7 +119,7 @@ void ClothSystem::substep(Real from, Real to, Real dt) {
 /// sub-step.
 void ClothSystem::touch_bodies(Real dt) {
   contacts_.find_runaways(points_);
-  corner_contacts_.solve(points_, dt, cuts_);
+  corner_contacts_.solve(points_, contacts_, dt, cuts_);
   contacts_.solve(points_, dt, parts_, cuts_);
   for (int round = 1; round < kMaxTurns && limit_.any_too_long(points_); ++round) {
     body_contacts_.clear();
@@ -226,6 +233,55 @@ void ClothSystem::close_seams(Real dt) {
     const Real now = limit_.tie_length(k, points_);
     const Real planned = seams_[k].open_length - speed * cloth.age;
     limit_.set_tie(k, std::max({planned, closed, now - speed * dt}));
+  }
+}
+
+/// Gives the points of an exactly flat cloth with seams a small velocity out of its plane before its first
+/// sub-step. Without it the seams compress the cloth in its plane, an equilibrium that no exact computation
+/// leaves, and do not close. The momentum is unchanged.
+void ClothSystem::disturb_flat_seams() {
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    const Cloth& cloth = *cloths_[c];
+    if (cloth.age > 0 || cloth.def.seams.empty() || cloth.stopped || cloth.triangles.empty()) continue;
+    const std::span<const Vec4> at = std::span(points_.position).subspan(first_[c], cloth.points.size());
+    Vec3 normal = Vec3::Zero();
+    Real size2 = 0;
+    for (const Triangle& t : cloth.triangles) {
+      const Vec3 cross = (at[t[1]] - at[t[0]]).head<3>().cross((at[t[2]] - at[t[0]]).head<3>());
+      if (cross.squaredNorm() > normal.squaredNorm()) normal = cross;
+    }
+    normal.normalize();
+    const Vec4 n = padded(normal), origin = at[0];
+    for (const Vec4& p : at) size2 = std::max(size2, (p - origin).squaredNorm());
+    const auto is_off = [&](const Vec4& p) { return std::abs(n.dot(p - origin)) > kFlat * std::sqrt(size2); };
+    if (std::ranges::any_of(at, is_off)) continue;
+    // The ends of the seams lag behind the middle of the cloth between them.
+    Vec4 along = Vec4::Zero();
+    Real open = 0;
+    for (const ClothSeam& seam : cloth.def.seams) {
+      const Vec4 d = at[seam.b] - at[seam.a];
+      along += d.dot(along) < 0 ? Vec4(-d) : d;
+      open = std::max(open, d.norm());
+    }
+    if (!(along.norm() > 0)) continue;
+    along.normalize();
+    Real low = kInfinity, high = -kInfinity, mass = 0, mean = 0;
+    for (const Vec4& p : at) {
+      low = std::min(low, along.dot(p));
+      high = std::max(high, along.dot(p));
+    }
+    const auto ahead = [&](const Vec4& p) {
+      const Real s = (2 * along.dot(p) - low - high) / (high - low);
+      return 1 - s * s;
+    };
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      mass += points_.mass[first_[c] + i];
+      mean += points_.mass[first_[c] + i] * ahead(at[i]);
+    }
+
+    const Real speed = kDisturbance * open / cloth.def.seam_time;
+    for (std::size_t i = 0; i < at.size(); ++i)
+      points_.velocity[first_[c] + i] += speed * (ahead(at[i]) - mean / mass) * n;
   }
 }
 

@@ -40,6 +40,11 @@ class ClothSystem {
 
   /// Returns the bounding box of all points and of the positions that they may reach within the time h [s].
   Aabb reach(Real h) const;
+  /// Smallest thickness of a cloth [m]; infinite without cloth.
+  Real thinnest() const;
+  /// Returns the time within h [s] at which a box that moves at `velocity` may meet a triangle of a cloth
+  /// that collides with bodies.
+  std::optional<Real> first_meeting(const Aabb& box, const Vec3& velocity, Real h) const;
 
  private:
   struct Held {
@@ -88,6 +93,7 @@ class ClothSystem {
   void limit_bending(Real dt);
   BendLimit* bend_limit_of(std::size_t cloth);
   void close_seams(Real dt);
+  void disturb_flat_seams();
   void end_substep(Real dt);
   void touch_bodies(Real dt);
   void collect_triangles();

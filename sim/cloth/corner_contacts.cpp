@@ -24,6 +24,13 @@ int samples(Real length, Real spacing, int least) {
   return std::clamp(static_cast<int>(std::ceil(length / spacing)), least, kMaxSamples);
 }
 
+/// Whether a body presses a triangle against another body.
+bool is_pressed(const Triangle& t, const ClothBody& body, const ClothPoints& points,
+                const ClothContacts& of_points) {
+  return !body.loads.empty() &&
+         std::ranges::all_of(t, [&](uint32_t i) { return of_points.is_pressed_by(points, body, i); });
+}
+
 }  // namespace
 
 void CornerContacts::assign(std::vector<Triangle> triangles, const ClothPoints& points) {
@@ -124,10 +131,15 @@ void CornerContacts::find(const ClothPoints& points, std::span<ClothBody> bodies
   }
 }
 
-void CornerContacts::solve(ClothPoints& points, Real dt, std::vector<VelocityCut>& cuts) {
-  round_.solve(triangles_, points, bodies_, dt, cuts);
+void CornerContacts::solve(ClothPoints& points, const ClothContacts& of_points, Real dt,
+                           std::vector<VelocityCut>& cuts) {
+  const auto is_pressed = [&](const Triangle& t, const ClothBody& body) {
+    return sim::is_pressed(t, body, points, of_points);
+  };
+  round_.solve(triangles_, points, bodies_, dt, cuts, is_pressed);
   for (const Near& near : near_) {
     const Triangle& t = triangles_[near.triangle];
+    if (is_pressed(t, bodies_[near.body])) continue;
     if (const auto contact =
             touch(near, {points.at(t[0]), points.at(t[1]), points.at(t[2])}, points.thickness[t[0]], 0, 0))
       separate(*contact, t, points, bodies_[near.body], dt, cuts);
@@ -138,6 +150,7 @@ void CornerContacts::find_supports(ClothPoints& points, const ClothContacts& of_
   for (auto& of_cloth : points.triangle_supports) of_cloth.clear();
   const auto add = [&](uint32_t triangle, ClothBody& body, auto&& find) {
     const Triangle& t = triangles_[triangle];
+    if (is_pressed(t, body, points, of_points)) return;
     std::array<Vec3, 3> at;
     for (std::size_t k = 0; k < 3; ++k)
       at[k] = (points.inverse_mass[t[k]] > 0 ? points.free_end(t[k], dt) : points.position[t[k]]).head<3>();

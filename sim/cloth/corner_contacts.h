@@ -26,8 +26,8 @@ class CornerContacts {
   /// dt [s]. `of_points`: contacts of the same points.
   void find_supports(ClothPoints& points, const ClothContacts& of_points, Real dt) const;
   /// Separates features and triangles in a sub-step of the cloth of length dt [s]. Displacements that must
-  /// not count as velocity are appended to `cuts`.
-  void solve(ClothPoints& points, Real dt, std::vector<VelocityCut>& cuts);
+  /// not count as velocity are appended to `cuts`. Cloth that a body presses against another one is left out.
+  void solve(ClothPoints& points, const ClothContacts& of_points, Real dt, std::vector<VelocityCut>& cuts);
   /// Returns the contacts of rounded dynamic bodies with triangles at the points' current positions,
   /// including triangles whose distance exceeds the contact distance by up to `reach` times the thickness of
   /// the cloth.

@@ -94,9 +94,11 @@ std::optional<TriangleContact> RoundContacts::touch(const Triangle& t, const Clo
 }
 
 void RoundContacts::solve(std::span<const Triangle> triangles, ClothPoints& points,
-                          std::span<ClothBody> bodies, Real dt, std::vector<VelocityCut>& cuts) const {
+                          std::span<ClothBody> bodies, Real dt, std::vector<VelocityCut>& cuts,
+                          const std::function<bool(const Triangle&, const ClothBody&)>& is_pressed) const {
   for (const Near& near : near_) {
     const Triangle& t = triangles[near.triangle];
+    if (is_pressed(t, bodies[near.body])) continue;
     if (const auto contact = touch(t, points, present(t, points), bodies[near.body], 0, false))
       separate(*contact, t, points, bodies[near.body], dt, cuts);
   }

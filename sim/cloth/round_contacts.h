@@ -5,6 +5,7 @@
 /// the body's axis is swept along the paths of both.
 
 #include <array>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -26,9 +27,11 @@ class RoundContacts {
   /// Adds a triangle and a body that can touch in this sub-step of the world, by index.
   void add(uint32_t triangle, uint32_t body) { near_.push_back({triangle, body}); }
   /// Moves triangles out of the bodies in a sub-step of the cloth of length dt [s]. Displacements that must
-  /// not count as velocity are appended to `cuts`.
+  /// not count as velocity are appended to `cuts`. Triangles t for which is_pressed(t, body) is true are left
+  /// out.
   void solve(std::span<const Triangle> triangles, ClothPoints& points, std::span<ClothBody> bodies, Real dt,
-             std::vector<VelocityCut>& cuts) const;
+             std::vector<VelocityCut>& cuts,
+             const std::function<bool(const Triangle&, const ClothBody&)>& is_pressed) const;
   /// Returns the contacts with dynamic bodies at the points' current positions, including triangles whose
   /// distance exceeds the contact distance by up to `reach` times the thickness of the cloth.
   void collect(std::span<const Triangle> triangles, const ClothPoints& points, std::span<ClothBody> bodies,

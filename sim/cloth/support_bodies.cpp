@@ -61,7 +61,8 @@ Vec4 SupportBodies::rub(std::size_t k, const Support& support, Real part, const 
   if (!(length > 0)) return Vec4::Zero();
   Real mobility = contact.inverse_mass;
   if (contact.body != kNone) mobility += support.body->mobility(support.on_body, slip.head<3>() / length);
-  const Real stopped = std::min(1.0, support.friction * support.impulse * mobility / length);
+  const Real pressed = support.impulse + part * part * support.load;
+  const Real stopped = std::min(1.0, support.friction * pressed * mobility / length);
   const Vec4 change = stopped * (contact.inverse_mass / mobility) * slip;
   push(k, change / contact.inverse_mass);
   return -change;

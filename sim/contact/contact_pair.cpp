@@ -25,6 +25,12 @@ constexpr Real kAlong = 0.7;
 /// than kExpected [m]. This point must be within kNear [m], and the cosine of the angle between the normals
 /// must exceed kSameNormal.
 constexpr Real kSameNormal = 0.999, kNear = 0.02, kExpected = 2e-4;
+/// A layer of cloth that is compressed gets thicker by at most this fraction of its thickness at a time.
+constexpr Real kLayerRecovery = 0.05;
+/// A layer may be this far beyond the surfaces, in thicknesses: bodies that overlap the cloth.
+constexpr Real kLayerReach = 1.2;
+/// Cloth slides on a body if its velocity relative to it is greater than this [m/s].
+constexpr Real kLayerSlides = 0.01;
 /// Fraction of the spread of points that is added to the spread, so that its matrix can be inverted.
 constexpr Real kFlat = 1e-6;
 
@@ -291,8 +297,10 @@ void ContactPair::find_points(const Pose& a, const Pose& b, Real margin, Real re
   if ((a.position - b.position).squaredNorm() > apart * apart) {
     placed_.clear();
     found_margin_ = 0;
+    if (layer_) layer_->places.clear();
     return;
   }
+  if (layer_) reuse_within = 0;  // cloth moves
   if (has_sphere_) {
     found_margin_ = margin;
     placed_at_ = a;
@@ -322,10 +330,66 @@ void ContactPair::find_points(const Pose& a, const Pose& b, Real margin, Real re
     place(found[i], a, placed_[i].manifold);
     set_frame(placed_[i]);
   }
+  if (layer_) insert_layers();
   restore_forces(before, a);
   inherit(before, a);
   placed_at_ = a;
   found_.clear();
+}
+
+void ContactPair::set_cloth(std::span<const LayerTriangle> cloth) {
+  if (cloth.empty()) {
+    if (!layer_) return;
+    surface_ = layer_->bare;
+    layer_.reset();
+    found_margin_ = 0;  // the points contain the layer, so they are not reused
+    return;
+  }
+  if (!layer_) layer_ = std::make_unique<PairLayer>(PairLayer{.bare = surface_});
+  layer_->cloth = cloth;
+}
+
+/// Moves the contact points of both bodies towards each other by the distance that cloth between them keeps.
+/// Cloth that is compressed to less than this distance gets thicker slowly, as the overlap of bodies is
+/// removed slowly. The cloth also determines the surface of the pair: it absorbs impacts, and its friction
+/// on both bodies acts between them unless the cloth slides on both.
+void ContactPair::insert_layers() {
+  PairLayer& layer = *layer_;
+  layer.places.clear();
+  Real friction = kInfinity, on_a = 0, on_b = 0;  // greatest velocities of the cloth on the bodies
+  for (PlacedManifold& placed : placed_) {
+    Manifold& m = placed.manifold;
+    const Vec3& n = m.normal;
+    for (uint32_t k = 0; k < m.count; ++k) {
+      ContactPoint& p = m.points[k];
+      const Vec3 middle = (p.on_a + p.on_b) / 2;
+      const Real reach = std::abs(p.separation) / 2 + kLayerReach * layer.cloth.front().thickness;
+      const ClothLayers found = layers_across(layer.cloth, middle, n, reach);
+      if (!found.lowest) continue;
+      const Real keeps =
+          std::min(found.distance, std::max(p.separation, 0.0) + kLayerRecovery * found.distance);
+      p.on_a -= keeps / 2 * n;
+      p.on_b += keeps / 2 * n;
+      p.separation -= keeps;
+      const auto slip = [&](const Body& body) {
+        const Vec3 relative = found.lowest->velocity - body.start_velocity(middle);
+        return (relative - n.dot(relative) * n).norm();
+      };
+      on_a = std::max(on_a, slip(*a_));
+      on_b = std::max(on_b, slip(*b_));
+      friction = std::min(friction,
+                          std::sqrt(found.lowest->friction * std::min(a_->def.friction, b_->def.friction)));
+      layer.places.push_back({middle, n, found.lowest->cloth, found.lowest->number});
+    }
+  }
+  surface_ = layer.bare;
+  if (layer.places.empty()) return;
+  layer.slides = std::min(on_a, on_b) > kLayerSlides;
+  const auto inverse_mass = [](const Body& body) { return body.is_dynamic() ? 1 / body.rigid.mass : 0; };
+  layer.holds_by_a =
+      std::max(on_a, on_b) > kLayerSlides ? on_a < on_b : inverse_mass(*a_) < inverse_mass(*b_);
+  surface_.restitution = 0;
+  surface_.friction = surface_.static_friction = layer.slides ? 0 : friction;
 }
 
 Real ContactPair::free_displacement(const PlacedManifold& m, const Vec3& place, Real gap,
@@ -449,9 +513,13 @@ void ContactPair::find_one_point(const Pose& a, const Pose& b, Real margin) {
   m.manifold.continues_a = is_round(*a_);
   m.manifold.continues_b = is_round(*b_);
   sphere_manifold(a_->collision_shape().piece(0), a, b_->collision_shape().piece(0), b, margin, m.manifold);
-  if (m.manifold.count == 0) return placed_.clear();
+  if (m.manifold.count == 0) {
+    if (layer_) layer_->places.clear();
+    return placed_.clear();
+  }
   const ContactFrame before = m.frame;
   set_frame(m);
+  if (layer_) insert_layers();
   if (!known) return;
   PointForce& f = m.forces[0];
   const Vec3 last = frame_vector(m.frame, world_vector(before, f.last));

@@ -4,11 +4,14 @@
 
 #include <array>
 #include <limits>
+#include <memory>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "sim/collision/contact_frame.h"
 #include "sim/collision/narrow_phase.h"
+#include "sim/contact/cloth_layer.h"
 #include "sim/core/prefetch.h"
 #include "sim/dynamics/body.h"
 
@@ -40,6 +43,24 @@ struct PlacedManifold {
        mean_torque = 0;  ///< mean torque of all points about the normal, for the fast solver [N m]
   Manifold manifold;     ///< world
   std::array<PointForce, 4> forces;
+};
+
+/// Cloth between the bodies of a pair.
+struct PairLayer {
+  /// A contact point that cloth keeps at a distance.
+  struct Place {
+    Vec3 middle, normal;     ///< the line along the normal, world
+    uint32_t cloth, number;  ///< slot of the cloth and index of the triangle on this line
+  };
+  PairSurface bare;                      ///< surface of the pair without cloth
+  std::span<const LayerTriangle> cloth;  ///< triangles that may be between the bodies
+  std::vector<Place> places;             ///< of the last search; empty: there is no cloth at the contacts
+  /// Whether the cloth slides on both bodies. The bodies then exert no friction on each other, but both do on
+  /// the cloth. If not, the bodies exert the friction on each other.
+  bool slides = false;
+  /// Whether body a holds the cloth by friction, and not b: the body on which the cloth rests while it slides
+  /// on the other one, or else the heavier body.
+  bool holds_by_a = false;
 };
 
 /// Points with a smaller separation count as touching [m].
@@ -87,6 +108,12 @@ class alignas(64) ContactPair {
   /// other. If the relative pose of the bodies has changed by less than `reuse` [m], the points are reused
   /// and only their separations are updated. `turning`: see find_manifolds().
   void find(const Pose& a, const Pose& b, Real margin, Real reuse, bool turning);
+
+  /// Sets the triangles of cloth that may be between the bodies in the next find(). They must exist until
+  /// then. Contact points with cloth on their line are found with the distance that the cloth keeps.
+  void set_cloth(std::span<const LayerTriangle> cloth);
+  /// Returns the cloth between the bodies at the contact points of the last find(), or null.
+  const PairLayer* layer() const { return layer_ && !layer_->places.empty() ? layer_.get() : nullptr; }
 
   /// Adds speculative contacts to the contacts that find() found at the interval's start. A speculative
   /// contact is added where the freely moving bodies would overlap at the interval's end by more than the
@@ -172,6 +199,7 @@ class alignas(64) ContactPair {
   static PointForce stored_force(const StoredPoint& p, const ContactFrame& frame, const Mat3& a_axes);
   void find_points(const Pose& a, const Pose& b, Real margin, Real reuse, bool turning);
   void find_one_point(const Pose& a, const Pose& b, Real margin);
+  void insert_layers();
   void store_points(std::vector<StoredPoint>& points) const;
   void restore_forces(std::vector<StoredPoint>& points, const Pose& a);
   void inherit(std::vector<StoredPoint>& points, const Pose& a);
@@ -187,6 +215,7 @@ class alignas(64) ContactPair {
   bool is_on_plane_;
   bool has_sphere_;  // the pair has at most one point, and finding it is as fast as reusing it
   PairCache cache_;
+  std::unique_ptr<PairLayer> layer_;  // null: no cloth is near
   // Manifolds in a's frame. They are stored when they are first reused, to save memory for moving pairs.
   std::vector<Manifold> found_;
   std::vector<Manifold> at_end_;  // manifolds of the speculative contacts

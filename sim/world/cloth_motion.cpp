@@ -13,6 +13,9 @@ constexpr Real kClothRest = 0.05;
 /// A change of a body's speed in a sub-step counts as an impact above this [m/s]. Gravity changes the speed
 /// by about a fifth of it.
 constexpr Real kImpact = 0.2;
+/// Cloth is still between two sleeping bodies if it is at most this far from the middle between them, in
+/// thicknesses.
+constexpr Real kStillThere = 4;
 
 }  // namespace
 
@@ -79,8 +82,66 @@ std::vector<ClothBody> ClothMotion::bodies_near_cloths(Real h) const {
   return near;
 }
 
-std::vector<Reaction> ClothMotion::step(Real start, Real h) {
+/// Returns whether the cloth is still between two sleeping bodies.
+bool ClothMotion::is_between(const PressedCloth& pressed) const {
+  return std::ranges::any_of(pressed.places, [&](const PairLayer::Place& place) {
+    const std::unique_ptr<Cloth>* const found = world_.cloths.find(world_.cloths.at_slot(place.cloth));
+    if (!found) return false;
+    const Cloth& cloth = **found;
+    if (cloth.absent || cloth.stopped || place.number >= cloth.triangles.size()) return false;
+    const Triangle& t = cloth.triangles[place.number];
+    const LayerTriangle triangle{{cloth.points[t[0]], cloth.points[t[1]], cloth.points[t[2]]},
+                                 Vec3::Zero(),
+                                 cloth.def.thickness,
+                                 cloth.def.friction,
+                                 place.cloth,
+                                 place.number};
+    return std::abs(crossing(triangle, place.middle, place.normal)) < kStillThere * cloth.def.thickness;
+  });
+}
+
+/// Finds the bodies that press cloth. While both bodies are asleep, they press it as before. They wake when
+/// the cloth is no longer between them.
+void ClothMotion::find_pressed(std::span<ContactPair* const> pairs, Real h) {
+  std::vector<PressedCloth> now;
+  for (const ContactPair* pair : pairs) {
+    const PairLayer* layer = pair->layer();
+    if (!layer) continue;
+    Real impulse = 0;
+    for (const PlacedManifold& m : pair->manifolds())
+      for (uint32_t k = 0; k < m.manifold.count; ++k) impulse += h * std::max(m.forces[k].now.x(), 0.0);
+    now.push_back({pair->a().handle, pair->b().handle, impulse, layer->slides || layer->holds_by_a,
+                   layer->slides || !layer->holds_by_a, layer->places});
+  }
+  std::vector<Body*> uncovered;
+  for (PressedCloth& before : pressed_) {
+    const std::unique_ptr<Body>*a = world_.bodies.find(before.a), *b = world_.bodies.find(before.b);
+    if (!a || !b || (*a)->is_awake() || (*b)->is_awake() || (*a)->absent || (*b)->absent) continue;
+    const auto is_same = [&](const PressedCloth& p) { return p.a == before.a && p.b == before.b; };
+    if (std::ranges::any_of(now, is_same)) continue;
+    if (!is_between(before)) {
+      for (Body* body : {a->get(), b->get()})
+        if (body->asleep) uncovered.push_back(body);
+      continue;
+    }
+    now.push_back(std::move(before));
+  }
+  pressed_ = std::move(now);
+  for (Body* body : uncovered) active_.wake(*body);
+}
+
+std::vector<Reaction> ClothMotion::step(Real start, Real h, std::span<ContactPair* const> pairs) {
+  find_pressed(pairs, h);
   std::vector<ClothBody> near = bodies_near_cloths(h);
+  for (const PressedCloth& pressed : pressed_) {
+    const auto at = [&](BodyHandle body) {
+      return std::ranges::find(near, body.index, [](const ClothBody& n) { return n.obstacle().body; });
+    };
+    const auto a = at(pressed.a), b = at(pressed.b);
+    if (a == near.end() || b == near.end()) continue;
+    a->loads.push_back({pressed.b.index, pressed.impulse, pressed.rubs_a});
+    b->loads.push_back({pressed.a.index, pressed.impulse, pressed.rubs_b});
+  }
   const std::vector<const ForceDef*> forces = world_.active_forces();
   system_.step({start, h, world_.def.gravity, world_.def.wind, forces}, near);
   wake_unpinned(near);

@@ -3,10 +3,12 @@
 /// with the bodies along the paths of the sub-step. Impulses of cloths change the velocities of bodies from
 /// the next sub-step on.
 
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "sim/cloth/cloth_system.h"
+#include "sim/contact/contact_pair.h"
 #include "sim/world/active_bodies.h"
 
 namespace offstage::sim {
@@ -25,21 +27,41 @@ class ClothMotion {
   /// Releases all cloth vertices that are pinned to a body.
   void detach(BodyHandle body);
 
+  /// Smallest thickness of a cloth that exists [m].
+  Real thinnest() const { return system_.thinnest(); }
+  /// Returns the bounding box of all positions that cloths may reach within the time h [s].
+  Aabb reach(Real h) const { return system_.reach(h); }
+  /// Returns the time within h [s] at which a box that moves at `velocity` may meet cloth.
+  std::optional<Real> first_meeting(const Aabb& box, const Vec3& velocity, Real h) const {
+    return system_.first_meeting(box, velocity, h);
+  }
+
   void begin_step();
-  /// Moves all cloths through a sub-step, and displaces bodies where cloths push them. Returns the impulses
-  /// on the bodies.
-  std::vector<Reaction> step(Real start, Real h);
+  /// Moves all cloths through a sub-step, and displaces bodies where cloths push them. `pairs`: the pairs of
+  /// bodies of this sub-step, which may press cloth. Returns the impulses on the bodies.
+  std::vector<Reaction> step(Real start, Real h, std::span<ContactPair* const> pairs);
   /// Adds the statistics of the step to the report.
   void report(StepReport& report);
 
  private:
+  /// Two bodies with cloth between them.
+  struct PressedCloth {
+    BodyHandle a, b;
+    Real impulse;  // along the normal in the last sub-step in which one of them was awake [N s]
+    bool rubs_a, rubs_b;
+    std::vector<PairLayer::Place> places;
+  };
+
   std::vector<ClothBody> bodies_near_cloths(Real h) const;
+  void find_pressed(std::span<ContactPair* const> pairs, Real h);
+  bool is_between(const PressedCloth& pressed) const;
   void wake_unpinned(std::span<const ClothBody> near);
   std::vector<Reaction> answer(std::span<const ClothBody> near, Real h);
 
   const WorldState& world_;
   ActiveBodies& active_;
   ClothSystem system_;
+  std::vector<PressedCloth> pressed_;
 };
 
 /// Collides particles with cloths after both have moved through a sub-step, which begins at time `start` and

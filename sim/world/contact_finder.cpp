@@ -42,23 +42,6 @@ Real smaller_extent(const Body& a, const Body& b) {
   return std::min(a.extent, b.extent);
 }
 
-/// Returns a box around all positions of a body in its interval.
-Aabb swept_bounds(const Body& body) {
-  Aabb box = bounds(body.solid, body.start_pose).merged(bounds(body.solid, body.pose));
-  Real margin = std::min(kMargin, kMarginFraction * body.extent);
-  // Without a rotation there is no bow; for a plane, whose extent is infinite, the product would be
-  // undefined.
-  if (const PosePath path = body.path(); path.turns() && !std::holds_alternative<Sphere>(body.def.shape)) {
-    // The deviation of a point from the chord of its path is at most an eighth of its greatest acceleration.
-    // Large rotations use the balls around the start and the end instead.
-    const Real bow = path.max_acceleration(body.extent) / 8;
-    margin += bow > kWide * body.extent ? body.extent : bow;
-  }
-  box.min().array() -= margin;
-  box.max().array() += margin;
-  return box;
-}
-
 /// A pair with the ranks of its bodies.
 struct RankedPair {
   uint32_t low, high;
@@ -122,6 +105,24 @@ void ContactFinder::update_joint_groups() {
 void ContactFinder::clear() {
   pairs_.clear();
   is_current_ = false;
+}
+
+/// Returns a box around all positions of a body in its interval.
+Aabb ContactFinder::swept_bounds(const Body& body) const {
+  Aabb box = bounds(body.solid, body.start_pose).merged(bounds(body.solid, body.pose));
+  Real margin = std::min(kMargin, kMarginFraction * body.extent);
+  // Without a rotation there is no bow; for a plane, whose extent is infinite, the product would be
+  // undefined.
+  if (const PosePath path = body.path(); path.turns() && !std::holds_alternative<Sphere>(body.def.shape)) {
+    // The deviation of a point from the chord of its path is at most an eighth of its greatest acceleration.
+    // Large rotations use the balls around the start and the end instead.
+    const Real bow = path.max_acceleration(body.extent) / 8;
+    margin += bow > kWide * body.extent ? body.extent : bow;
+  }
+  margin += cloth_.room(body);
+  box.min().array() -= margin;
+  box.max().array() += margin;
+  return box;
 }
 
 /// Gives the box of a body's path, enlarged by a margin, to the broad phase. With `again`, in the same
@@ -200,6 +201,7 @@ void ContactFinder::find(Real h) {
   traces_impacts_ = true;
   const std::span<Body* const> awake = active_.awake();
   is_exact_ = world_.is_exact() || (world_.def.solver == SolverKind::automatic && awake.size() <= kFewBodies);
+  cloth_.begin(h);
   std::vector<Aabb> swept_boxes(awake.size());
   const std::vector<std::size_t> leaving = indices_where(awake.size(), [&](std::size_t i) {
     swept_boxes[i] = swept_bounds(*awake[i]);
@@ -208,6 +210,7 @@ void ContactFinder::find(Real h) {
   for (const std::size_t i : leaving) move(*awake[i], swept_boxes[i], false);
   for (Body* body : active_.kinematic()) move(*body, false);
   collect(false);
+  cloth_.find(pairs_);
   propagate_impact_speeds(h);
   const auto find_contacts = [&](std::size_t i) {
     // Pairs are scattered in memory.
@@ -248,15 +251,23 @@ void ContactFinder::find_points(ContactPair& pair, Real time, Real h) const {
   const bool exact = is_exact_;
   // An impact moves a body at most as fast as the body that hits it.
   const Real impact = std::max(pair.a().impact_speed_bound, pair.b().impact_speed_bound) * left;
+  // Cloth that lies between the bodies keeps them apart by its thickness, unless they are so fast that the
+  // contact points of the start do not predict the impact.
+  const std::span<const LayerTriangle> cloth =
+      motion > far ? std::span<const LayerTriangle>{} : cloth_.between(pair);
+  pair.set_cloth(cloth);
   pair.toi_exhausted = pair.toi_exhausted || !traces_impacts_;
   // If the pair is not traced back again, only its contact points keep the bodies apart.
   const Real most = pair.toi_exhausted ? std::numeric_limits<Real>::infinity() : far;
-  const Real margin = base + std::min(std::max(2 * motion, impact), most);
+  const Real margin =
+      base + std::min(std::max(2 * motion, impact), most) + (cloth.empty() ? 0 : cloth_.room());
   // An impact also turns the body.
   const Real turning = pair.turning_speed() * left + (impact > kMargin ? impact : 0);
   const Real reuse = exact ? kExactReuse : std::min(kReuse, kReuseFraction * size);
   pair.find(pair.a().placed_at(time, h), pair.b().placed_at(time, h), margin, reuse, turning > kTurning);
 
+  // The impact would be found where the bodies themselves touch.
+  if (pair.layer()) pair.toi_exhausted = true;
   const bool is_far = motion > far;
   const bool is_quick =
       !exact && time == 0 && !pair.manifolds().empty() && pair.speed_bound() * h > kFastPair;

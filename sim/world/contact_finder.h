@@ -6,6 +6,7 @@
 
 #include "sim/collision/grouped_broad_phase.h"
 #include "sim/world/active_bodies.h"
+#include "sim/world/cloth_near_bodies.h"
 #include "sim/world/contact_materials.h"
 #include "sim/world/free_motion.h"
 #include "sim/world/joint_groups.h"
@@ -16,7 +17,7 @@ class ContactFinder {
  public:
   ContactFinder(const WorldState& world, const ContactMaterials& materials, ActiveBodies& active,
                 const JointGroups& joints)
-      : world_(world), materials_(materials), active_(active), joints_(joints) {}
+      : world_(world), materials_(materials), active_(active), joints_(joints), cloth_(world) {}
 
   void use(const CollisionMethods& methods);
   /// Adds a body to collision detection, or removes it.
@@ -73,11 +74,13 @@ class ContactFinder {
   void move(Body& body, Aabb swept_box, bool again);
   bool move(Body& body, bool again);
   void collect(bool again);
+  Aabb swept_bounds(const Body& body) const;
 
   const WorldState& world_;
   const ContactMaterials& materials_;
   ActiveBodies& active_;
   const JointGroups& joints_;
+  ClothNearBodies cloth_;
   GroupedBroadPhase broad_phase_;  // the colliding bodies, by slot; articulations are groups
   ContactGraph graph_;
   std::vector<ContactPair*> pairs_;

@@ -13,6 +13,8 @@ namespace offstage::sim {
 namespace {
 
 constexpr Real kMaxSubsteps = 1e6;
+/// Greatest number of parts of a sub-step (World::Impl::first_part()).
+constexpr uint32_t kMaxParts = 32;
 constexpr std::size_t kWorthThreads = 200;
 
 /// Whether the state, and the velocities that are computed from it, are finite.
@@ -48,12 +50,17 @@ StepReport World::Impl::step(Real sampling, const BeforeSubStep& before) {
   active.update();
   active.begin_step();
   cloth_motion.begin_step();
-  report.substeps = substep_count(sampling, def.max_step);
-  for (uint32_t i = 0; i < report.substeps; ++i) {
-    const Real start = now, end = at(static_cast<Real>(i + 1) / static_cast<Real>(report.substeps));
-    if (before) before(start, end);
-    substep(start, end, report);
-    now = end;
+  const uint32_t count = substep_count(sampling, def.max_step);
+  for (uint32_t i = 0; i < count; ++i) {
+    const Real end = at(static_cast<Real>(i + 1) / static_cast<Real>(count));
+    for (uint32_t k = 0; k < kMaxParts && now < end; ++k) {
+      const Real start = now, part = k + 1 < kMaxParts ? first_part(end - start) : end - start;
+      const Real until = part < end - start ? start + part : end;
+      if (before) before(start, until);
+      substep(start, until, report);
+      now = until;
+      ++report.substeps;
+    }
   }
   update_presence(now);  // afterwards the state contains exactly the objects that exist at its time
   ++samplings;
@@ -122,7 +129,7 @@ void World::Impl::step_particles(Real start, Real h, const CoupledSystem& couple
 }
 
 void World::Impl::step_cloths(Real start, Real h, StepReport& report) {
-  reactions.apply(cloth_motion.step(start, h), start + h, report);
+  reactions.apply(cloth_motion.step(start, h, contacts.pairs()), start + h, report);
   collide_particles_with_cloths(*this, start, h, particle_motion.events());
 }
 

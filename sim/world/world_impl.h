@@ -22,6 +22,7 @@ struct World::Impl : WorldState {
   // Time (step.cpp)
   StepReport step(Real sampling_time, const BeforeSubStep& before);
   StepReport prewarm(Real from, Real to, const BeforeSubStep& before);
+  Real first_part(Real h);
   void substep(Real start, Real end, StepReport& report);
   void begin_bodies(Real start, Real end);
   void begin_kinematic(Real start, Real end);

@@ -70,9 +70,9 @@ class ClothBendLimit : public testing::TestWithParam<std::tuple<BendModel, Cloth
 TEST_P(ClothBendLimit, AClampedLimpStripTurnsDownOnAQuarterCircle) {
   // The weight of the strip bends it to the limit, from horizontal to vertical. Its lower part is straight.
   const auto [model, integrator] = GetParam();
-  constexpr Real kLength = 0.2, kCell = 0.01, kRadius = 0.05;
+  constexpr Real kLength = 0.2, kCell = 0.01, kArcRadius = 0.05;
   constexpr Real kWithin = 0.75 * kCell;  // the ends of the arc lie within cells
-  ClothDef def = bend_strip(model, kRadius, kLength, kCell);
+  ClothDef def = bend_strip(model, kArcRadius, kLength, kCell);
   make_stable(def, integrator);
   def.air.density = 40;  // dense air brings the strip to rest
   const Real edge = def.vertices[0].x();
@@ -83,12 +83,12 @@ TEST_P(ClothBendLimit, AClampedLimpStripTurnsDownOnAQuarterCircle) {
   const ClothHandle cloth = world.add_cloth(def);
   for (int i = 0; i < 60; ++i) world.step(1.0 / 24);
   const ClothView view = world.cloth(cloth);
-  const Real clamp = edge + kCell, arc = kRadius * std::numbers::pi / 2;
+  const Real clamp = edge + kCell, arc = kArcRadius * std::numbers::pi / 2;
   for (uint32_t i = 0; i < def.vertices.size(); ++i) {
     const Real s = def.vertices[i].x() - clamp;
-    const Real angle = std::clamp(s / kRadius, 0.0, std::numbers::pi / 2);
-    const Real x = clamp + kRadius * std::sin(angle) + std::min(s, 0.0);
-    const Real y = -kRadius * (1 - std::cos(angle)) - std::max(s - arc, 0.0);
+    const Real angle = std::clamp(s / kArcRadius, 0.0, std::numbers::pi / 2);
+    const Real x = clamp + kArcRadius * std::sin(angle) + std::min(s, 0.0);
+    const Real y = -kArcRadius * (1 - std::cos(angle)) - std::max(s - arc, 0.0);
     EXPECT_NEAR(view.points[i].x(), x, kWithin) << "at " << s;
     EXPECT_NEAR(view.points[i].y(), y, kWithin) << "at " << s;
   }

@@ -93,6 +93,46 @@ INSTANTIATE_TEST_SUITE_P(Fabrics, ClothBullet,
                          testing::Combine(testing::Values("cotton", "denim"), testing::Values(0.0, 1.3),
                                           testing::Values(0.0, 0.009, 0.0125)));
 
+/// Parameters: fabric, shape, mass [kg], speed of the body [m/s], steps of the world per second, and height
+/// of the cloth above the ground [m].
+class ClothAboveGround
+    : public testing::TestWithParam<std::tuple<std::string, Shape, Real, Real, Real, Real>> {};
+
+TEST_P(ClothAboveGround, StopsABodyThatWouldReachTheGroundInTheSameSubStep) {
+  // If the body first collided with the ground, it would end under the cloth, or the cloth would throw it
+  // back with the speed of its rebound in addition.
+  const auto [name, shape, mass, speed, rate, height] = GetParam();
+  World world({.max_step = 1 / rate, .sleep = false});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0.5});
+  const Vec3 from(0.013, height + 0.3, 0.017);
+  const BodyHandle body = world.add_body(
+      {.shape = shape, .pose = {from}, .velocity = {0, -speed, 0}, .mass = mass, .restitution = 0.5});
+  ClothDef def = framed_cloth(effects::find_fabric(name)->fabric, 1.2, 24);
+  for (Vec3& p : def.vertices) p.y() += height;
+  for (ClothPin& pin : def.pins) pin.position.y() += height;
+  world.add_cloth(def);
+  const Real start = speed * speed / 2;
+  for (int i = 0; i < 15; ++i) {
+    ASSERT_TRUE(world.step(1.0 / 60).finite);
+    const BodyState state = world.body(body);
+    // The cloth gives way by at most 0.6 sqrt(1.1^2 - 1) = 0.275 m.
+    ASSERT_GT(state.pose.position.y(), height - 0.28) << i;
+    ASSERT_LE(state.velocity.squaredNorm() / 2 + 9.81 * (state.pose.position - from).y(), start * 1.001) << i;
+  }
+  EXPECT_GT(world.body(body).pose.position.y(), height - 0.05);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Bodies, ClothAboveGround,
+    testing::Values(std::tuple("cotton", Shape(Sphere{0.1}), 1.0, 60.0, 60.0, 0.7),
+                    std::tuple("cotton", Shape(Sphere{0.1}), 1.0, 60.0, 60.0, 0.8),
+                    std::tuple("cotton", Shape(Sphere{0.1}), 1.0, 180.0, 240.0, 0.5),
+                    std::tuple("leather", Shape(Sphere{0.02}), 0.1, 60.0, 60.0, 0.7),
+                    std::tuple("denim", Shape(Sphere{0.02}), 0.1, 60.0, 60.0, 0.7),
+                    std::tuple("silk", Shape(Box{Vec3(0.15, 0.15, 0.15)}), 1.0, 100.0, 60.0, 0.5),
+                    std::tuple("denim", Shape(Cone{0.1, 0.2}), 1.0, 60.0, 60.0, 0.5),
+                    std::tuple("leather", Shape(Capsule{0.02, 0.3}), 1.0, 200.0, 240.0, 0.5)));
+
 TEST(ClothImpacts, GiveAFreeClothNoEnergyOfTheirOwn) {
   // The cloth is forty times lighter than the ball that hits it, and soon reaches its stretch limit.
   ClothDef def = effects::grid_cloth({0.4, 0.4, 8, 8}, {}, effects::find_fabric("cotton")->fabric);
