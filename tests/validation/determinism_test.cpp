@@ -138,12 +138,12 @@ StateHash chain(SolverKind solver) {
 // Debug, release and sanitizer builds must all give these hashes. If the physics is changed on purpose, the
 // failing test prints the new values.
 constexpr const char* kParticles = "c5bfc404ccb7e022ce9ed6c7eb5cc342";
-constexpr const char* kSlidingExact = "b5a76a6b2a86bb2844e3e5c0256675dd";
-constexpr const char* kBouncingExact = "ba579ae8c79a71beebc41a78ce6a72d6";
-constexpr const char* kBouncingFast = "1e2fc9eee5713f0a931782de8eabba35";
-constexpr const char* kHeapFast = "9f48e92972154f86ddac3668a8274367";
-constexpr const char* kChainExact = "931a476ef70e904be100c37fc2515db0";
-constexpr const char* kChainFast = "25116c917052a4257488a08fcb74406a";
+constexpr const char* kSlidingExact = "22b661293c20ed7ff77ce765768dd992";
+constexpr const char* kBouncingExact = "75f0bc3d341a43e4817bfe41d4d02dcc";
+constexpr const char* kBouncingFast = "10be081e4bd9a0610511ed9d4ae866ad";
+constexpr const char* kHeapFast = "2b8cc23d955de42b0594804b48467e92";
+constexpr const char* kChainExact = "d28df8499f11a01f7efaa78167b7d368";
+constexpr const char* kChainFast = "0da2d54bd65ddd456b5fb1838639e595";
 
 TEST(Determinism, SameHashInEveryBuild) {
   EXPECT_EQ(run().hex(), kParticles);

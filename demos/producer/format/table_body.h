@@ -100,7 +100,9 @@ struct Table<Body> {
          "`cross_friction` applies; zero: friction is the same in all directions. If both bodies of a "
          "contact have an axis, the contact uses the axis of the body that is listed first in the scene"},
         {"surface_velocity", &T::surface_velocity,
-         "velocity of the surface relative to the body, as on a conveyor belt; in the body's frame. Only its part along the surface has an effect", "m/s"},
+         "velocity of the surface relative to the body, as on a conveyor belt; in the body's frame. Only its "
+         "part along the surface has an effect",
+         "m/s"},
         {"collides", &T::collides, "whether the body collides with bodies, particles and cloths"},
         {"visible", &T::visible, "whether the object is drawn"},
         {"casts_shadow", &T::casts_shadow, "whether the object casts a shadow"},
