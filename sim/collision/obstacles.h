@@ -53,10 +53,10 @@ struct Obstacle {
   Real restitution, friction;
   Real cross_friction = 1;  ///< friction across the friction axis, divided by friction along it
   Vec3 friction_axis =
-      Vec3::Zero();       ///< direction of the surface's friction axis, in the solid's frame; zero: none
+      Vec3::Zero();  ///< direction of the surface's friction axis, in the solid's frame; zero: none
   Vec3 surface_velocity = Vec3::Zero();  ///< BodyDef::surface_velocity
-  uint32_t body = 0;      ///< the world's index of the body
-  Real inverse_mass = 0;  ///< inverse mass [1/kg]; 0: particles do not move it
+  uint32_t body = 0;                     ///< the world's index of the body
+  Real inverse_mass = 0;                 ///< inverse mass [1/kg]; 0: particles do not move it
   /// Inverse inertia about the centre of mass, world axes at the end of the sub-step [1/(kg m^2)].
   Mat3 inverse_inertia = Mat3::Zero();
   Vec3 centre = Vec3::Zero();  ///< centre of mass in the solid's frame

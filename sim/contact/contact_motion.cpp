@@ -9,7 +9,7 @@ namespace offstage::sim {
 namespace {
 
 /// The arms of bodies that turn by less than this in an interval are not rotated [rad].
-constexpr Real kStraight = 2e-5;
+constexpr Real kStraight = 5e-5;
 /// If bodies turn by less than this in an interval, the path of a corner is treated as a parabola [rad].
 constexpr Real kEven = 0.1;
 /// Cosine of the greatest predicted rotation of a normal within an interval.

@@ -326,6 +326,26 @@ TEST(SceneCheck, ASpringTooStiffForItsStepIsNamedWithTheStepItNeeds) {
   EXPECT_NE(errors_of(scene(81000, "rk4")), "");
 }
 
+// Springs in line add up. Those along different axes do not.
+TEST(SceneCheck, SpringsAtTheSameObjectsAreCheckedTogether) {
+  const auto scene = [](Real stiffness, std::vector<std::string> ends) {
+    std::string springs;
+    for (const std::string& end : ends)
+      springs += (springs.empty() ? "" : ",") + (R"({"a": {"body": "b"}, "b": {"position": )" + end) +
+                 R"(}, "stiffness": )" + std::to_string(stiffness) + "}";
+    return R"({"world": {"step": 0.01, "integrator": "leapfrog"}, "bodies": [{"name": "b", "mass": 1}],
+               "springs": [)" +
+           springs + "]}";
+  };
+  // A spring alone may have 40000 N/m.
+  EXPECT_EQ(errors_of(scene(39000, {"[1, 0, 0]", "[0, 1, 0]", "[0, 0, 1]"})), "");
+  EXPECT_EQ(errors_of(scene(19500, {"[1, 0, 0]", "[-1, 0, 0]"})), "");
+  EXPECT_EQ(
+      errors_of(scene(20500, {"[1, 0, 0]", "[-1, 0, 0]"})),
+      "/springs/0: the spring 'spring_0' and others at the same objects are together too stiff for this "
+      "sub-step: /world/step must be less than 0.00983 s, is 0.01 s\n");
+}
+
 TEST(SceneCheck, ASpringEndMustBeOneThing) {
   EXPECT_EQ(errors_of(R"({"bodies": [{"name": "b"}], "particles": [{"name": "p", "places": [{}]}],
     "springs": [{"a": {"body": "b", "particles": "p"}}, {"a": {"particles": "p"}, "b": {"particles": "p"}}]})"),

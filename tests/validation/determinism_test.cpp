@@ -139,11 +139,11 @@ StateHash chain(SolverKind solver) {
 // failing test prints the new values.
 constexpr const char* kParticles = "c5bfc404ccb7e022ce9ed6c7eb5cc342";
 constexpr const char* kSlidingExact = "22b661293c20ed7ff77ce765768dd992";
-constexpr const char* kBouncingExact = "75f0bc3d341a43e4817bfe41d4d02dcc";
-constexpr const char* kBouncingFast = "10be081e4bd9a0610511ed9d4ae866ad";
-constexpr const char* kHeapFast = "2b8cc23d955de42b0594804b48467e92";
-constexpr const char* kChainExact = "d28df8499f11a01f7efaa78167b7d368";
-constexpr const char* kChainFast = "0da2d54bd65ddd456b5fb1838639e595";
+constexpr const char* kBouncingExact = "7d2832972dfa76c2fb53576c2c956900";
+constexpr const char* kBouncingFast = "89180cfb7c5a8d48c25a7e1945536c95";
+constexpr const char* kHeapFast = "9b22a855d9873bb5eb0a0c480a2b9f3d";
+constexpr const char* kChainExact = "e8dbb75ac5fbe346d2a5bab05b94c0e0";
+constexpr const char* kChainFast = "f8df9145dec291a4a53bcf6677fd5491";
 
 TEST(Determinism, SameHashInEveryBuild) {
   EXPECT_EQ(run().hex(), kParticles);

@@ -246,6 +246,29 @@ TEST_P(MovingContact, ABallWithALowCentreRocksForEver) {
   }
 }
 
+// The contact moves along the body however little this turns in a step.
+TEST_P(MovingContact, AnEllipsoidRocksForEverInShortSteps) {
+  constexpr Real kTilt = 0.05;
+  const Vec3 radii(0.5, 0.3, 0.4);
+  for (const Real short_step : {step(), step() / 4}) {
+    World w(WorldDef{.max_step = short_step, .solver = solver(), .sleep = false});
+    w.add_body(ground(1));
+    const Real height = std::hypot(radii.x() * std::sin(kTilt), radii.y() * std::cos(kTilt));
+    const BodyHandle body =
+        w.add_body({.shape = Ellipsoid{radii},
+                    .pose = {Vec3(0, height, 0), Quat(Eigen::AngleAxisd(kTilt, Vec3::UnitZ()))},
+                    .mass = 2,
+                    .restitution = 0,
+                    .friction = 1});
+    Real greatest = 0;
+    for (int i = 0; i < 720; ++i) {
+      w.step(1.0 / 60);
+      if (i > 600) greatest = std::max(greatest, 2 * std::abs(w.body(body).pose.orientation.z()));
+    }
+    EXPECT_NEAR(greatest, kTilt, 0.01 * kTilt) << short_step;
+  }
+}
+
 /// A cone or frustum that rolls on its side around its apex, or the apex of the extended side, on the ground.
 /// It rotates about the line of contact at any speed: the forces along this line supply the torque.
 struct RollingCone {

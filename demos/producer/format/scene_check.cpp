@@ -1,6 +1,7 @@
 #include "producer/format/scene_check.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <limits>
@@ -19,6 +20,7 @@
 #include "producer/format/scene_check_joints.h"
 #include "producer/format/scene_check_particles.h"
 #include "producer/format/scene_checker.h"
+#include "producer/format/spring_net.h"
 #include "sim/geometry/mass_properties.h"
 
 namespace offstage::producer {
@@ -64,6 +66,7 @@ class Checker : SceneChecker {
     check_joints(scene_, flat_, findings_);
     for (const Emitter& emitter : scene_.emitters) check_emitter(emitter);
     for (const Spring& spring : scene_.springs) check_spring(spring);
+    check_spring_net();
     for (const Force& force : scene_.forces)
       std::visit(
           [&](const auto& f) {
@@ -342,20 +345,67 @@ class Checker : SceneChecker {
       fail(path, "has the same particle at both ends");
     if (!a || !b || *a <= 0 || *b <= 0) return;
     if (std::isinf(*a) && std::isinf(*b)) return warn(path, "has no effect: neither end can move");
-    // Stability of a single spring between two point masses. Further springs, and ends away from a centre of
-    // mass, only reduce the stable step, so a spring that fails here fails in the scene.
+    // Stability of a single spring between two point masses. Ends away from a centre of mass only reduce the
+    // stable step, so a spring that fails here fails in the scene; see also check_spring_net().
     const Real reduced = 1 / (1 / *a + 1 / *b);
     check_stiffness(spring.stiffness, spring.damping, reduced, path, "the spring '" + spring.name + "'");
   }
   void check_stiffness(Real stiffness, Real damping, Real mass, const std::string& path,
                        const std::string& what) {
     const Real largest = largest_stable_step(scene_.world.integrator, stiffness, damping, mass);
-    const Real used = std::min(scene_.world.max_step, scene_.output.fps.seconds(1));
+    const Real used = sub_step();
     if (used >= largest)
       fail(path, fmt::format(
                      "{} is too stiff for this sub-step: /world/step must be less than {:.3g} s, is {:.3g} s",
                      what, 0.995 * largest, used));
   }
+
+  /// Adds a valid spring to `net`, unless an end of it is at a joint, which makes the body heavier along some
+  /// directions, or exists only for a time.
+  void add_to_net(std::size_t index, const std::set<std::string>& jointed, SpringNet& net) const {
+    const Spring& spring = scene_.springs[index];
+    std::array<SpringNet::End, 2> ends;
+    for (const auto& [end, out] : {std::pair(&spring.a, &ends[0]), {&spring.b, &ends[1]}}) {
+      *out = {"", kUnlimited, end->position};
+      if (!end->particles.empty()) {
+        const ParticleGroup* group = find_named(scene_.particles, end->particles);
+        const auto place = static_cast<std::size_t>(end->index);
+        if (!group || place >= group->places.size() || group->appear_at > 0 || group->remove_at < kForever)
+          return;
+        *out = {group->name + step(place), group->mass, group->places[place].position};
+      } else if (!end->body.empty()) {
+        const auto it = bodies_.find(end->body);
+        if (it == bodies_.end()) return;
+        const Body& body = *it->second;
+        const auto mass = mass_of(body);
+        if (!mass || !(*mass > 0) || body.appear_at > 0 || body.remove_at < kForever) return;
+        if (jointed.contains(body.name)) return;
+        *out = {body.name, *mass, body.position + body.orientation * end->position};
+      }
+    }
+    net.add(index, ends[0], ends[1], spring.stiffness, spring.damping);
+  }
+
+  /// Checks the springs together: several at the same object are stiffer than each of them.
+  void check_spring_net() {
+    if (!findings_.errors.empty()) return;
+    std::set<std::string> jointed;
+    for (const Joint& joint : flat_.joints) jointed.insert({joint.a, joint.b});
+    SpringNet net;
+    for (std::size_t i = 0; i < scene_.springs.size(); ++i) add_to_net(i, jointed, net);
+    const SpringNet::Fastest stiffest = net.stiffest(), damped = net.most_damped();
+    const sim::IntegratorKind integrator = scene_.world.integrator;
+    const Real by_stiffness = largest_stable_step(integrator, stiffest.rate, 0, 1),
+               by_damping = largest_stable_step(integrator, 0, damped.rate, 1);
+    const Real largest = std::min(by_stiffness, by_damping), used = sub_step();
+    if (used < largest) return;
+    const Spring& spring = scene_.springs[by_stiffness < by_damping ? stiffest.spring : damped.spring];
+    fail(spring.where.path,
+         fmt::format("the spring '{}' and others at the same objects are together too stiff "
+                     "for this sub-step: /world/step must be less than {:.3g} s, is {:.3g} s",
+                     spring.name, 0.995 * largest, used));
+  }
+  Real sub_step() const { return std::min(scene_.world.max_step, scene_.output.fps.seconds(1)); }
 
   // --- Forces ---
 

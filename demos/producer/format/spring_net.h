@@ -1,0 +1,50 @@
+#pragma once
+/// How stiff springs are together, for scene_check.h.
+
+#include <cstddef>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "producer/scene/values.h"
+
+namespace offstage::producer {
+
+/// Springs at their places of time 0, with the objects at their ends. Objects are point masses here: that
+/// they also rotate only makes the springs act as stiffer ones.
+class SpringNet {
+ public:
+  struct End {
+    std::string object;  ///< name of the body or particle; empty: the world
+    Real mass = 0;       ///< [kg]; infinite: the object does not move
+    Vec3 place;          ///< [m]
+  };
+  /// `spring`: a number by which results name the spring. `stiffness`: [N/m]; `damping`: [N s/m].
+  void add(std::size_t spring, const End& a, const End& b, Real stiffness, Real damping);
+
+  /// The fastest motion of the net.
+  struct Fastest {
+    /// A lower bound of the greatest eigenvalue, which is hardly ever missed by much: of stiffness by mass
+    /// [1/s^2] or of damping by mass [1/s]. 0: there are no springs.
+    Real rate = 0;
+    std::size_t spring = 0;  ///< the spring with the greatest part of it
+  };
+  Fastest stiffest() const { return fastest(&Link::stiffness); }
+  Fastest most_damped() const { return fastest(&Link::damping); }
+
+ private:
+  struct Link {
+    std::size_t spring;
+    std::size_t a, b;  // indices of objects; 0: does not move
+    Vec3 along;        // unit
+    Real stiffness, damping;
+  };
+  std::size_t object(const End& end);
+  Fastest fastest(Real Link::*coefficient) const;
+
+  std::map<std::string, std::size_t> numbers_;
+  std::vector<Real> inverse_masses_ = {0};
+  std::vector<Link> links_;
+};
+
+}  // namespace offstage::producer
