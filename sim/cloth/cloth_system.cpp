@@ -69,7 +69,7 @@ void ClothSystem::begin_step(const ClothWeather& weather, std::span<ClothBody> b
   for (const Carrier& carrier : carriers_) carrier.body->fall_along_parabola(weather.gravity);
   contacts_.set_up(-weather.gravity);
   contacts_.find(points_, collides_, bodies, weather.h);
-  corner_contacts_.find(points_, bodies, weather.h);
+  corner_contacts_.find(points_, contacts_, bodies, weather.h);
 }
 
 /// Returns into how many sub-steps of cloth a sub-step of the world is divided, if bodies approach it at
