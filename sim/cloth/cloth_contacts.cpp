@@ -246,6 +246,12 @@ bool ClothContacts::is_pressed_by(const ClothPoints& points, const ClothBody& bo
   });
 }
 
+bool ClothContacts::is_close(const ClothPoints& points, uint32_t body, uint32_t point) const {
+  return std::ranges::any_of(std::ranges::equal_range(near_, point, {}, &Near::point), [&](const Near& near) {
+    return near.body == body && near.distance < 2 * points.thickness[point];
+  });
+}
+
 /// Returns whether a body presses a point against another one from above. Only the lower body then moves the
 /// point, because it carries the weight. `normal`: from the body to the point.
 bool ClothContacts::presses_from_above(const ClothPoints& points, const ClothBody& body, uint32_t point,

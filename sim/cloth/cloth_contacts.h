@@ -42,6 +42,8 @@ class ClothContacts {
   /// pin that the point must come that close, too. Triangles there have no contacts with the body: their
   /// free points could not separate them from it.
   bool is_held_inside(const ClothPoints& points, uint32_t body, uint32_t point) const;
+  /// Returns whether a point was closer to a body than twice its thickness when its distance was computed.
+  bool is_close(const ClothPoints& points, uint32_t body, uint32_t point) const;
   /// Finds the supports of points (ClothPoints::supports) for a sub-step of the cloth of length dt [s].
   void find_supports(ClothPoints& points, Real dt);
   /// Moves points out of the bodies in a sub-step of the cloth of length dt [s]. `parts`: number of such

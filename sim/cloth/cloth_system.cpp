@@ -128,7 +128,7 @@ void ClothSystem::touch_bodies(Real dt) {
 /// correction counts as velocity.
 void ClothSystem::collect_triangles() {
   const std::size_t first = body_contacts_.size();
-  corner_contacts_.collect(points_, 1, body_contacts_);
+  corner_contacts_.collect(points_, contacts_, 1, body_contacts_);
   for (BodyContact& c : std::span(body_contacts_).subspan(first)) {
     Vec3 motion = -c.body->surface_motion(c.on_body);
     for (std::size_t k = 0; k < 3; ++k)

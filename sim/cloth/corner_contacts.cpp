@@ -162,6 +162,23 @@ void CornerContacts::solve(ClothPoints& points, const ClothContacts& of_points, 
   }
 }
 
+void CornerContacts::collect(const ClothPoints& points, const ClothContacts& of_points, Real reach,
+                             std::vector<BodyContact>& found) const {
+  round_.collect(triangles_, points, bodies_, reach, found);
+  for (const Near& near : near_) {
+    ClothBody& body = bodies_[near.body];
+    const Triangle& t = triangles_[near.triangle];
+    if (!body.is_dynamic() || is_pressed(t, body, points, of_points)) continue;
+    const Real thickness = points.thickness[t[0]];
+    const auto c =
+        touch(near, {points.at(t[0]), points.at(t[1]), points.at(t[2])}, thickness, reach * thickness, 0);
+    // Where points touch the body as well, their contacts stop it.
+    const auto is_close = [&](uint32_t i) { return of_points.is_close(points, near.body, i); };
+    if (c && std::ranges::none_of(t, is_close))
+      found.push_back({t, c->weights, &body, c->normal, c->on_body, c->gap});
+  }
+}
+
 void CornerContacts::find_supports(ClothPoints& points, const ClothContacts& of_points, Real dt) const {
   for (auto& of_cloth : points.triangle_supports) of_cloth.clear();
   const auto add = [&](uint32_t triangle, ClothBody& body, auto&& find) {

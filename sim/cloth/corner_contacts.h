@@ -30,12 +30,10 @@ class CornerContacts {
   /// Separates features and triangles in a sub-step of the cloth of length dt [s]. Displacements that must
   /// not count as velocity are appended to `cuts`. Cloth that a body presses against another one is left out.
   void solve(ClothPoints& points, const ClothContacts& of_points, Real dt, std::vector<VelocityCut>& cuts);
-  /// Returns the contacts of rounded dynamic bodies with triangles at the points' current positions,
-  /// including triangles whose distance exceeds the contact distance by up to `reach` times the thickness of
-  /// the cloth.
-  void collect(const ClothPoints& points, Real reach, std::vector<BodyContact>& found) {
-    round_.collect(triangles_, points, bodies_, reach, found);
-  }
+  /// Returns the contacts of dynamic bodies with triangles at the points' current positions, including
+  /// triangles whose distance exceeds the contact distance by up to `reach` times the thickness of the cloth.
+  void collect(const ClothPoints& points, const ClothContacts& of_points, Real reach,
+               std::vector<BodyContact>& found) const;
 
  private:
   /// A sample of a feature, in the body's frame.

@@ -119,5 +119,25 @@ TEST(ClothOnATorus, ComesToRest) {
   }
 }
 
+// The tip lies on a triangle whose corners stretch the cloth to its limit.
+TEST(ClothUnderACone, CatchesTheTip) {
+  for (const Real step : {1.0 / 240, 1.0 / 60})
+    for (const ClothIntegrator integrator : {ClothIntegrator::relaxed, ClothIntegrator::implicit}) {
+      World world({.max_step = step});
+      const Quat down(Eigen::AngleAxis<Real>(175 * std::numbers::pi / 180, Vec3::UnitX()));
+      const BodyHandle cone =
+          world.add_body({.shape = Cone{0.1, 0.3}, .pose = {Vec3(0.02, 0.4, 0.03), down}, .mass = 0.5});
+      const effects::GridSize size{1, 1, 20, 20};
+      ClothDef def = cotton(size, {}, integrator);
+      for (uint32_t row = 0; row <= size.rows; ++row)
+        for (uint32_t column = 0; column <= size.columns; ++column)
+          if (row == 0 || column == 0 || row == size.rows || column == size.columns)
+            pin(def, effects::grid_vertex(size, column, row));
+      const ClothHandle cloth = world.add_cloth(def);
+      EXPECT_LT(run(world, cloth, step, 1.5).rise, 0.01) << step;  // of 2.3 J
+      EXPECT_GT(world.body(cone).pose.position.y(), -0.15) << step;
+    }
+}
+
 }  // namespace
 }  // namespace offstage::sim
