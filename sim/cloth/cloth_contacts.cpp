@@ -6,6 +6,7 @@
 
 #include <oneapi/tbb/parallel_for.h>
 
+#include "sim/cloth/triangle_contact.h"
 #include "sim/collision/sphere_sweep.h"
 
 namespace offstage::sim {
@@ -23,6 +24,9 @@ constexpr int kStopSweeps = 30;
 constexpr Real kUnderLoad = 1.2;
 /// A point that its support keeps at the right distance but for rounding touches the body, in thicknesses.
 constexpr Real kTouching = 1e-6;
+/// How fast the distance that points keep from a body may grow with their distance from a pin at its surface.
+/// Cloth that rises at this slope from a pin is stretched by 4 %.
+constexpr Real kSlopeAtPin = 0.3;
 
 }  // namespace
 
@@ -40,7 +44,8 @@ void ClothContacts::look(const ClothPoints& points, uint32_t i, std::vector<Near
     const Vec3 place = bodies_[b].end().point_to_body(p);
     const SurfaceDistance s = signed_distance(obstacle.solid, place);
     const Real relative = (v - obstacle.velocity_at(p, 0)).norm() * h_;
-    if (s.distance < points.thickness[i] + 2 * relative + reach) found.push_back({i, b, place, s.distance});
+    if (s.distance < points.thickness[i] + 2 * relative + reach)
+      found.push_back({i, b, place, s.distance, points.thickness[i]});
   }
 }
 
@@ -74,7 +79,59 @@ void ClothContacts::find(const ClothPoints& points, std::span<const uint8_t> col
   if (bodies.empty()) return;
   tbb::parallel_for(std::size_t{0}, found.size(), chunk);
   for (const auto& f : found) near_.insert(near_.end(), f.begin(), f.end());
+  find_held_inside(points);
   count_points_under_loads(points);
+}
+
+/// Finds the pinned points that are closer to a body than the thickness because they were placed there, and
+/// the distances that other points can keep. A dynamic body that does not hold the pin moved there itself,
+/// and is moved back.
+void ClothContacts::find_held_inside(const ClothPoints& points) {
+  held_inside_.assign(bodies_.size(), {});
+  bool any = false;
+  for (const Near& near : near_) {
+    const uint32_t i = near.point;
+    const ClothBody& body = bodies_[near.body];
+    if (points.inverse_mass[i] > 0 || !(near.distance < points.thickness[i])) continue;
+    if (body.is_dynamic() && points.holder[i] != &body) continue;
+    HeldPoints& held = held_inside_[near.body];
+    held.points.push_back({i, near.distance});
+    held.deepest = std::max(held.deepest, -near.distance);
+    any = true;
+  }
+  if (!any) return;
+  for (HeldPoints& held : held_inside_)
+    std::ranges::stable_sort(held.points, {}, [&](const HeldInside& h) { return points.rest[h.point].x(); });
+  for (Near& near : near_) near.keeps = kept_distance(points, near.body, near.point);
+}
+
+/// Returns the distance that a free point can keep from a body. Near a pin inside the body, this is less than
+/// the thickness: contacts that push the point farther out would only stretch the cloth, and the springs
+/// would turn the displacement into energy.
+Real ClothContacts::kept_distance(const ClothPoints& points, uint32_t body, uint32_t point) const {
+  const Real thickness = points.thickness[point];
+  Real keeps = thickness;
+  const std::vector<HeldInside>& held = held_inside_[body].points;
+  if (held.empty() || !(points.inverse_mass[point] > 0)) return keeps;
+  const Real reach = thickness / kSlopeAtPin + held_inside_[body].deepest;
+  const auto x = [&](const HeldInside& h) { return points.rest[h.point].x(); };
+  const Real own = points.rest[point].x();
+  for (auto h = std::ranges::lower_bound(held, own - reach, {}, x); h != held.end() && x(*h) <= own + reach;
+       ++h) {
+    if (points.cloth[h->point] != points.cloth[point]) continue;
+    // Length of cloth from the surface to the point.
+    const Real outside = (points.rest[h->point] - points.rest[point]).norm() + std::min(h->distance, 0.0);
+    keeps = std::min(keeps, outside < 0 ? outside : std::max(h->distance, 0.0) + kSlopeAtPin * outside);
+  }
+  return keeps;
+}
+
+bool ClothContacts::is_held_inside(const ClothPoints& points, uint32_t body, uint32_t point) const {
+  if (held_inside_.empty() || held_inside_[body].points.empty()) return false;
+  const Real least = kTriangleDistance * points.thickness[point];
+  if (points.inverse_mass[point] > 0) return kept_distance(points, body, point) < least;
+  return std::ranges::any_of(held_inside_[body].points,
+                             [&](const HeldInside& h) { return h.point == point && h.distance < least; });
 }
 
 void ClothContacts::count_points_under_loads(const ClothPoints& points) {
@@ -117,12 +174,13 @@ void ClothContacts::find_runaways(const ClothPoints& points) {
   const auto before = [](const Near& a, const Near& b) {
     return a.point != b.point ? a.point < b.point : a.body < b.body;
   };
+  for (Near& near : found) near.keeps = kept_distance(points, near.body, near.point);
   near_.insert(near_.end(), found.begin(), found.end());
   std::stable_sort(near_.begin(), near_.end(), before);
   near_.erase(std::unique(near_.begin(), near_.end(), same), near_.end());
 }
 
-/// Returns whether a point that moves to `at` comes nearer to a body than the cloth's thickness plus `reach`,
+/// Returns whether a point that moves to `at` comes nearer to a body than Near::keeps plus `reach`,
 /// or goes through the body's surface. Sets `t`.
 bool ClothContacts::touch(const ClothPoints& points, Near& near, const Vec3& at, Real reach, Touch& t) const {
   ClothBody& body = bodies_[near.body];
@@ -130,14 +188,15 @@ bool ClothContacts::touch(const ClothPoints& points, Near& near, const Vec3& at,
   const Vec3 place = body.end().point_to_body(at);
   // The distance changes at most by the move of the point.
   const Real moved = (place - near.place).norm();
-  if (near.distance - moved >= thickness + reach) return false;
+  if (near.distance - moved >= near.keeps + reach) return false;
   const Vec3 from = body.start().point_to_body(points.start_at(near.point));
   t.near = &near;
   t.body = &body;
-  if ((place - from).squaredNorm() > thickness * thickness / 4) {
+  const bool comes_from_outside = near.keeps > thickness / 4;
+  if (comes_from_outside && (place - from).squaredNorm() > thickness * thickness / 4) {
     if (const auto hit = sweep_sphere(body.solid(), from, place, thickness / 4)) {
       const Vec3 centre = from + hit->fraction * (place - from);
-      t.gap = hit->normal.dot(place - centre) + hit->distance - thickness;
+      t.gap = hit->normal.dot(place - centre) + hit->distance - near.keeps;
       t.normal = body.end().vector_to_world(hit->normal);
       t.on_body = body.end().point_to_world(centre - hit->distance * hit->normal);
       near.place = place;
@@ -148,7 +207,7 @@ bool ClothContacts::touch(const ClothPoints& points, Near& near, const Vec3& at,
   const SurfaceDistance s = signed_distance(body.solid(), place);
   near.place = place;
   near.distance = s.distance;
-  t.gap = s.distance - thickness;
+  t.gap = s.distance - near.keeps;
   if (!(t.gap < reach)) return false;
   t.normal = body.end().vector_to_world(s.normal);
   t.on_body = body.end().point_to_world(place - s.distance * s.normal);
@@ -184,6 +243,12 @@ bool ClothContacts::is_pressed_by(const ClothPoints& points, const ClothBody& bo
   if (body.loads.empty()) return false;
   return std::ranges::any_of(std::ranges::equal_range(near_, point, {}, &Near::point), [&](const Near& near) {
     return near.distance < kUnderLoad * points.thickness[point] && body.load_against(bodies_[near.body]);
+  });
+}
+
+bool ClothContacts::is_close(const ClothPoints& points, uint32_t body, uint32_t point) const {
+  return std::ranges::any_of(std::ranges::equal_range(near_, point, {}, &Near::point), [&](const Near& near) {
+    return near.body == body && near.distance < 2 * points.thickness[point];
   });
 }
 
@@ -377,12 +442,11 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
     ClothBody& body = bodies_[near.body];
     if (!body.is_dynamic() || !shortened[near.point]) continue;
     const Vec3 p = points.at(near.point), place = body.end().point_to_body(p);
-    const Real thickness = points.thickness[near.point];
-    if (near.distance - (place - near.place).norm() >= thickness) continue;
+    if (near.distance - (place - near.place).norm() >= near.keeps) continue;
     const SurfaceDistance s = signed_distance(body.solid(), place);
-    if (s.distance >= thickness) continue;
+    if (s.distance >= near.keeps) continue;
     add(body, body.end().vector_to_world(s.normal), body.end().point_to_world(place - s.distance * s.normal),
-        velocity(near.point, body), thickness - s.distance, near.point);
+        velocity(near.point, body), near.keeps - s.distance, near.point);
   }
   for (const BodyContact& c : triangles) {
     if (c.gap >= 0 || std::ranges::none_of(c.points, [&](uint32_t i) { return shortened[i] != 0; })) continue;

@@ -38,6 +38,12 @@ class ClothContacts {
   /// Returns whether a point lies on a body against which `body` presses the cloth (ClothBody::loads). The
   /// contact solver then keeps both bodies apart, and the cloth there does not push `body`.
   bool is_pressed_by(const ClothPoints& points, const ClothBody& body, uint32_t point) const;
+  /// Returns whether a pin holds a point closer to a body than triangles keep from it, or so near to such a
+  /// pin that the point must come that close, too. Triangles there have no contacts with the body: their
+  /// free points could not separate them from it.
+  bool is_held_inside(const ClothPoints& points, uint32_t body, uint32_t point) const;
+  /// Returns whether a point was closer to a body than twice its thickness when its distance was computed.
+  bool is_close(const ClothPoints& points, uint32_t body, uint32_t point) const;
   /// Finds the supports of points (ClothPoints::supports) for a sub-step of the cloth of length dt [s].
   void find_supports(ClothPoints& points, Real dt);
   /// Moves points out of the bodies in a sub-step of the cloth of length dt [s]. `parts`: number of such
@@ -79,19 +85,31 @@ class ClothContacts {
     uint32_t point, body;
     Vec3 place;           // position of the point in the body's frame at the last search
     Real distance;        // distance of that position from the surface
+    Real keeps;           // distance that the point keeps from the body: the thickness, or less near a pin
     Real pressed = 0;     // impulse along the normal on a pinched point in this sub-step of the world [N s]
     bool rubbed = false;  // whether the integrator applies the friction of the loads on the body
+  };
+  /// A pinned point that is closer to a body than the cloth's thickness.
+  struct HeldInside {
+    uint32_t point;
+    Real distance;  // from the body's surface
+  };
+  struct HeldPoints {
+    std::vector<HeldInside> points;  // sorted by the x of the rest position
+    Real deepest = 0;                // greatest depth in the body
   };
   struct Touch {
     Near* near;
     ClothBody* body;
     Vec3 normal, on_body;  // world
-    Real gap;              // distance minus the cloth's thickness; negative in contact
+    Real gap;              // distance minus Near::keeps; negative in contact
   };
 
   void look(const ClothPoints& points, uint32_t point, std::vector<Near>& found) const;
   bool touch(const ClothPoints& points, Near& near, const Vec3& at, Real reach, Touch& t) const;
   void count_points_under_loads(const ClothPoints& points);
+  void find_held_inside(const ClothPoints& points);
+  Real kept_distance(const ClothPoints& points, uint32_t body, uint32_t point) const;
   bool carries(Touch& a, Touch& b) const;
   bool presses_from_above(const ClothPoints& points, const ClothBody& body, uint32_t point,
                           const Vec3& normal) const;
@@ -105,7 +123,8 @@ class ClothContacts {
   std::span<const uint8_t> collides_;
   Real h_ = 0;
   Vec3 up_ = Vec3::Zero();
-  std::vector<Near> near_;  // by point
+  std::vector<Near> near_;               // by point
+  std::vector<HeldPoints> held_inside_;  // by body
   // By point: a body near it, and whether several bodies are near it.
   std::vector<const ClothBody*> near_to_;
   std::vector<uint8_t> near_several_;

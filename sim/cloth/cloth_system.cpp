@@ -75,7 +75,7 @@ void ClothSystem::begin_step(const ClothWeather& weather, std::span<ClothBody> b
   for (const Carrier& carrier : carriers_) carrier.body->fall_along_parabola(weather.gravity);
   contacts_.set_up(-weather.gravity);
   contacts_.find(points_, collides_, bodies, weather.h);
-  corner_contacts_.find(points_, bodies, weather.h);
+  corner_contacts_.find(points_, contacts_, bodies, weather.h);
 }
 
 /// Returns into how many sub-steps of cloth a sub-step of the world is divided, if bodies approach it at
@@ -134,7 +134,7 @@ void ClothSystem::touch_bodies(Real dt) {
 /// correction counts as velocity.
 void ClothSystem::collect_triangles() {
   const std::size_t first = body_contacts_.size();
-  corner_contacts_.collect(points_, 1, body_contacts_);
+  corner_contacts_.collect(points_, contacts_, 1, body_contacts_);
   for (BodyContact& c : std::span(body_contacts_).subspan(first)) {
     Vec3 motion = -c.body->surface_motion(c.on_body);
     for (std::size_t k = 0; k < 3; ++k)

@@ -24,6 +24,17 @@ int samples(Real length, Real spacing, int least) {
   return std::clamp(static_cast<int>(std::ceil(length / spacing)), least, kMaxSamples);
 }
 
+/// Returns the mean normal of the faces at a vertex. The direction from the centre is no substitute: at the
+/// top of a ring it is nearly horizontal, and cloth beside the ring would count as lying over that vertex.
+Vec3 outward_normal(const ConvexPolyhedron& hull, uint32_t vertex) {
+  Vec3 sum = Vec3::Zero();
+  for (const uint32_t e : hull.vertex_edges(vertex)) {
+    const ConvexPolyhedron::Edge& edge = hull.edge(e);
+    sum += hull.plane(edge.tail == vertex ? edge.left : edge.right).normal;  // each face once
+  }
+  return sum.normalized();
+}
+
 /// Whether a body presses a triangle against another body.
 bool is_pressed(const Triangle& t, const ClothBody& body, const ClothPoints& points,
                 const ClothContacts& of_points) {
@@ -93,32 +104,37 @@ std::vector<CornerContacts::Corner> CornerContacts::corners(const Solid& solid) 
     rim(frustum->top_radius, frustum->height / 2, 1, depth);
   } else if (solid.mesh && solid.mesh->solid && solid.mesh->hull.vertices().size() <= kMaxCorners) {
     const Aabb around = local_bounds(solid);
-    for (const Vec3& v : solid.mesh->hull.vertices())
-      found.push_back({v, (v - around.center()).normalized(), around.sizes().minCoeff() / 4});
+    const ConvexPolyhedron& hull = solid.mesh->hull;
+    for (uint32_t v = 0; v < hull.vertices().size(); ++v)
+      found.push_back({hull.vertex(v), outward_normal(hull, v), around.sizes().minCoeff() / 4});
   }
   return found;
 }
 
-void CornerContacts::find(const ClothPoints& points, std::span<ClothBody> bodies, Real h) {
+void CornerContacts::find(const ClothPoints& points, const ClothContacts& of_points,
+                          std::span<ClothBody> bodies, Real h) {
   bodies_ = bodies;
   near_.clear();
   round_.clear();
   if (triangles_.empty()) return;
   bool fitted = false;
-  const auto seek = [&](const Aabb& box, auto&& visit) {
+  const auto seek = [&](const Aabb& box, uint32_t body, auto&& visit) {
     if (!std::exchange(fitted, true)) {
       std::vector<Real> margin(points.size());
       for (std::size_t i = 0; i < margin.size(); ++i)
         margin[i] = points.thickness[i] + 2 * h * points.velocity[i].norm();
       tree_.fit(points.position, points.position, margin);
     }
-    tree_.overlapping(box, visit);
+    tree_.overlapping(box, [&](uint32_t triangle) {
+      const auto is_held = [&](uint32_t i) { return of_points.is_held_inside(points, body, i); };
+      if (std::ranges::none_of(triangles_[triangle], is_held)) visit(triangle);
+    });
   };
   for (uint32_t b = 0; b < bodies.size(); ++b) {
     if (!bodies[b].collides) continue;
     const Obstacle& obstacle = bodies[b].obstacle();
     if (RoundContacts::concerns(obstacle.solid, longest_, thinnest_))
-      seek(obstacle.swept_bounds(), [&](uint32_t t) { round_.add(t, b); });
+      seek(obstacle.swept_bounds(), b, [&](uint32_t t) { round_.add(t, b); });
     for (const Corner& corner : corners(obstacle.solid)) {
       const Vec3 from = obstacle.start.point_to_world(corner.place),
                  to = obstacle.end.point_to_world(corner.place);
@@ -126,7 +142,7 @@ void CornerContacts::find(const ClothPoints& points, std::span<ClothBody> bodies
       Aabb box(from.cwiseMin(to), from.cwiseMax(to));
       box.min().array() -= depth;
       box.max().array() += depth;
-      seek(box, [&](uint32_t t) { near_.push_back({{corner.place, corner.outward, depth}, b, t}); });
+      seek(box, b, [&](uint32_t t) { near_.push_back({{corner.place, corner.outward, depth}, b, t}); });
     }
   }
 }
@@ -143,6 +159,23 @@ void CornerContacts::solve(ClothPoints& points, const ClothContacts& of_points, 
     if (const auto contact =
             touch(near, {points.at(t[0]), points.at(t[1]), points.at(t[2])}, points.thickness[t[0]], 0, 0))
       separate(*contact, t, points, bodies_[near.body], dt, cuts);
+  }
+}
+
+void CornerContacts::collect(const ClothPoints& points, const ClothContacts& of_points, Real reach,
+                             std::vector<BodyContact>& found) const {
+  round_.collect(triangles_, points, bodies_, reach, found);
+  for (const Near& near : near_) {
+    ClothBody& body = bodies_[near.body];
+    const Triangle& t = triangles_[near.triangle];
+    if (!body.is_dynamic() || is_pressed(t, body, points, of_points)) continue;
+    const Real thickness = points.thickness[t[0]];
+    const auto c =
+        touch(near, {points.at(t[0]), points.at(t[1]), points.at(t[2])}, thickness, reach * thickness, 0);
+    // Where points touch the body as well, their contacts stop it.
+    const auto is_close = [&](uint32_t i) { return of_points.is_close(points, near.body, i); };
+    if (c && std::ranges::none_of(t, is_close))
+      found.push_back({t, c->weights, &body, c->normal, c->on_body, c->gap});
   }
 }
 

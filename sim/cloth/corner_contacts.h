@@ -20,7 +20,9 @@ class CornerContacts {
   /// Sets the triangles of all cloths that collide with bodies.
   void assign(std::vector<Triangle> triangles, const ClothPoints& points);
   /// Finds the pairs of features and triangles that can touch in a sub-step of the world of length h [s].
-  void find(const ClothPoints& points, std::span<ClothBody> bodies, Real h);
+  /// `of_points`: contacts of the same points. Triangles that pins hold inside a body have no contacts with
+  /// it.
+  void find(const ClothPoints& points, const ClothContacts& of_points, std::span<ClothBody> bodies, Real h);
   Real mean_edge() const { return 2 * spacing_; }  ///< mean length of the triangles' edges [m]
   /// Finds the supports of triangles (ClothPoints::triangle_supports) for a sub-step of the cloth of length
   /// dt [s]. `of_points`: contacts of the same points.
@@ -28,12 +30,10 @@ class CornerContacts {
   /// Separates features and triangles in a sub-step of the cloth of length dt [s]. Displacements that must
   /// not count as velocity are appended to `cuts`. Cloth that a body presses against another one is left out.
   void solve(ClothPoints& points, const ClothContacts& of_points, Real dt, std::vector<VelocityCut>& cuts);
-  /// Returns the contacts of rounded dynamic bodies with triangles at the points' current positions,
-  /// including triangles whose distance exceeds the contact distance by up to `reach` times the thickness of
-  /// the cloth.
-  void collect(const ClothPoints& points, Real reach, std::vector<BodyContact>& found) {
-    round_.collect(triangles_, points, bodies_, reach, found);
-  }
+  /// Returns the contacts of dynamic bodies with triangles at the points' current positions, including
+  /// triangles whose distance exceeds the contact distance by up to `reach` times the thickness of the cloth.
+  void collect(const ClothPoints& points, const ClothContacts& of_points, Real reach,
+               std::vector<BodyContact>& found) const;
 
  private:
   /// A sample of a feature, in the body's frame.

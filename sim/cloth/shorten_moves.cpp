@@ -350,7 +350,7 @@ void ClothSystem::stop_bodies(Real dt) {
   const std::vector<Real> recoil = recoils();
   const auto whole = whole_velocities(recoil, end_velocities(dt));
   body_contacts_.clear();
-  corner_contacts_.collect(points_, 0, body_contacts_);
+  corner_contacts_.collect(points_, contacts_, 0, body_contacts_);
   const std::vector<Vec3> taken =
       contacts_.stop_bodies(points_, shortened_, kick_, recoil, whole, body_contacts_);
   for (std::size_t c = 0; c < cloths_.size(); ++c) {

@@ -1,0 +1,143 @@
+/// Contacts between cloth and bodies add no energy: cloth that is pinned at the surface of a body or inside
+/// it, and cloth on a body with many small faces.
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <tuple>
+
+#include <gtest/gtest.h>
+
+#include "effects/cloth.h"
+#include "sim/geometry/solid_mesh.h"
+#include "sim/world.h"
+
+namespace offstage::sim {
+namespace {
+
+constexpr Real kThickness = 0.005;
+
+struct ContactRecord {
+  Real strain = 0;      // greatest strain
+  Real rise = 0;        // greatest energy above the initial energy [J]
+  Real last_speed = 0;  // greatest speed of a vertex in the last tenth of the run [m/s]
+};
+
+ContactRecord run(World& world, ClothHandle cloth, Real step, Real seconds) {
+  ContactRecord record;
+  const Real first = world.energy().total();
+  for (int i = 0; i < seconds / step; ++i) {
+    world.step(step);
+    record.strain = std::max(record.strain, world.cloth_report(cloth).max_strain);
+    record.rise = std::max(record.rise, world.energy().total() - first);
+    if (i * step < 0.9 * seconds) continue;
+    for (const Vec3& v : world.cloth(cloth).velocities)
+      record.last_speed = std::max(record.last_speed, v.norm());
+  }
+  return record;
+}
+
+ClothDef cotton(const effects::GridSize& size, const Pose& pose, ClothIntegrator integrator) {
+  ClothDef def = effects::grid_cloth(size, pose, effects::find_fabric("cotton")->fabric);
+  def.thickness = kThickness;
+  def.integrator = integrator;
+  return def;
+}
+
+void pin(ClothDef& def, uint32_t vertex) {
+  def.pins.push_back({.vertex = vertex, .position = def.vertices[vertex]});
+}
+
+class ClothPinnedAtABody : public testing::TestWithParam<std::tuple<ClothIntegrator, Real>> {
+ protected:
+  ClothIntegrator integrator() const { return std::get<0>(GetParam()); }
+  Real step() const { return std::get<1>(GetParam()); }
+};
+
+TEST_P(ClothPinnedAtABody, HangsFromTheEdgeOfABox) {
+  World world({.max_step = step()});
+  world.add_body(
+      {.shape = Box{Vec3(0.1, 0.1, 0.5)}, .motion = MotionType::static_body, .pose = {Vec3(0.55, 0, 0)}});
+  const effects::GridSize size{1, 0.4, 10, 4};
+  ClothDef def = cotton(size, {Vec3(0, 0.05, 0)}, integrator());
+  for (uint32_t row = 0; row <= size.rows; ++row) pin(def, effects::grid_vertex(size, size.columns, row));
+  const ClothHandle cloth = world.add_cloth(def);
+  const ContactRecord record = run(world, cloth, step(), 1.5);
+  EXPECT_LT(record.strain, 0.003);  // 0.0019 without the box
+  EXPECT_LT(record.rise, 1e-4);
+}
+
+TEST_P(ClothPinnedAtABody, HangsFromTheAxisOfAPole) {
+  World world({.max_step = step()});
+  world.add_body({.shape = Cylinder{0.02, 3}, .motion = MotionType::static_body});
+  const effects::GridSize size{1, 0.6, 20, 12};
+  const Quat upright(Eigen::AngleAxis<Real>(std::numbers::pi / 2, Vec3::UnitX()));
+  ClothDef def = cotton(size, {Vec3(0.5, 1, 0), upright}, integrator());
+  for (uint32_t row = 0; row <= size.rows; ++row) pin(def, effects::grid_vertex(size, 0, row));
+  const ClothHandle cloth = world.add_cloth(def);
+  const ContactRecord record = run(world, cloth, step(), 0.5);
+  EXPECT_LT(record.strain, 0.04);
+  EXPECT_LT(record.rise, 1e-3);
+}
+
+TEST_P(ClothPinnedAtABody, LiesStillOnATableOfItsSize) {
+  World world({.max_step = step()});
+  world.add_body(
+      {.shape = Box{Vec3(1, 0.1, 1)}, .motion = MotionType::static_body, .pose = {Vec3(0, -0.05, 0)}});
+  const effects::GridSize size{1, 1, 20, 20};
+  ClothDef def = cotton(size, {}, integrator());
+  for (const uint32_t row : {0u, size.rows})
+    for (const uint32_t column : {0u, size.columns}) pin(def, effects::grid_vertex(size, column, row));
+  const ClothHandle cloth = world.add_cloth(def);
+  const ContactRecord record = run(world, cloth, step(), 0.25);
+  EXPECT_LT(record.strain, 0.003);
+  EXPECT_LT(record.last_speed, 0.01);
+  // Beside the corners, the cloth keeps its distance from the table.
+  for (uint32_t i = 0; i < def.vertices.size(); ++i) {
+    if (std::ranges::any_of(def.pins, [&](const ClothPin& p) { return p.vertex == i; })) continue;
+    EXPECT_GT(world.cloth(cloth).points[i].y(), 0.9 * kThickness) << i;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Integrators, ClothPinnedAtABody,
+                         testing::Combine(testing::Values(ClothIntegrator::relaxed,
+                                                          ClothIntegrator::implicit),
+                                          testing::Values(1.0 / 240, 1.0 / 60)));
+
+// Each cell lies over several vertices of the torus.
+TEST(ClothOnATorus, ComesToRest) {
+  for (const uint32_t cells : {10u, 20u}) {
+    World world({.max_step = 1.0 / 60});
+    const MeshHandle mesh = world.add_compound({solid_mesh(Torus{0.4, 0.1})});
+    world.add_body({.shape = MeshShape{mesh}, .motion = MotionType::static_body});
+    const ClothHandle cloth =
+        world.add_cloth(cotton({1, 1, cells, cells}, {Vec3(0.013, 0.2, 0.007)}, ClothIntegrator::relaxed));
+    const ContactRecord record = run(world, cloth, 1.0 / 60, 1.5);
+    EXPECT_LT(record.strain, 0.01) << cells;
+    EXPECT_LT(record.rise, 1e-3) << cells;
+    EXPECT_LT(record.last_speed, 0.5) << cells;
+  }
+}
+
+// The tip lies on a triangle whose corners stretch the cloth to its limit.
+TEST(ClothUnderACone, CatchesTheTip) {
+  for (const Real step : {1.0 / 240, 1.0 / 60})
+    for (const ClothIntegrator integrator : {ClothIntegrator::relaxed, ClothIntegrator::implicit}) {
+      World world({.max_step = step});
+      const Quat down(Eigen::AngleAxis<Real>(175 * std::numbers::pi / 180, Vec3::UnitX()));
+      const BodyHandle cone =
+          world.add_body({.shape = Cone{0.1, 0.3}, .pose = {Vec3(0.02, 0.4, 0.03), down}, .mass = 0.5});
+      const effects::GridSize size{1, 1, 20, 20};
+      ClothDef def = cotton(size, {}, integrator);
+      for (uint32_t row = 0; row <= size.rows; ++row)
+        for (uint32_t column = 0; column <= size.columns; ++column)
+          if (row == 0 || column == 0 || row == size.rows || column == size.columns)
+            pin(def, effects::grid_vertex(size, column, row));
+      const ClothHandle cloth = world.add_cloth(def);
+      EXPECT_LT(run(world, cloth, step, 1.5).rise, 0.01) << step;  // of 2.3 J
+      EXPECT_GT(world.body(cone).pose.position.y(), -0.15) << step;
+    }
+}
+
+}  // namespace
+}  // namespace offstage::sim
