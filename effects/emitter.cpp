@@ -108,7 +108,7 @@ void Emitter::collect_along_path(const sim::World& world, Real start, Real end) 
 void Emitter::emit(sim::World& world, Real start, Real end) {
   collect_due(end);
   if (def_.body && !world.is_present(def_.body)) {
-    // What was due while the body is absent is not released later.
+    // Releases that are due while the body is absent are discarded.
     due_.clear();
     waiting_.clear();
     report_.waiting = 0;

@@ -54,7 +54,7 @@ struct EmitterDef {
   uint64_t seed = 1;
   EmitterSurface surface = {};
   /// The body with which the emitter moves; null: it is fixed in the world. While the body does not exist,
-  /// nothing is released, and what would have been due is lost.
+  /// nothing is released, and releases that are due are discarded.
   sim::BodyHandle body = {};
   EmitterRelease release = {};
   NewParticles particles = {};

@@ -260,7 +260,9 @@ class World {
   /// std::invalid_argument for other times.
   StepReport prewarm(Real from, Real to, const BeforeSubStep& before = {});
 
-  /// Advances by `sampling_time` in the fewest equal sub-steps not longer than WorldDef::max_step.
+  /// Advances by `sampling_time` [s] in the fewest equal sub-steps not longer than WorldDef::max_step. A
+  /// sub-step in which a body would pass cloth and reach another body is divided into up to 32 parts.
+  /// `before` is called for each part, and StepReport::substeps counts the parts.
   StepReport step(Real sampling_time, const BeforeSubStep& before = {});
 
   /// Time since the start of the simulation [s]. It is negative until prewarm() has reached time 0.

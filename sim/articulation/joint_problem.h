@@ -32,8 +32,9 @@ struct BoundedRow {
   /// For solutions that divide the interval: `target` decreases by `lag` times the change of u from the
   /// interval's start to the start of the part.
   Real lag = 0;
-  // For the fast solver: the fraction of the interval after which the row acts, and the difference of
-  // `offset` between the interval's start and end. `offset` decreases linearly [m/s] or [rad/s].
+  // For the fast solver: `from` is the fraction of the interval after which the row acts. `turning` is added
+  // to u at the interval's start and decreases linearly to 0 at its end [m/s] or [rad/s]: the change of
+  // `offset` as the row turns or, for a motor, its target minus the speed at the start.
   Real from = 0, turning = 0;
   bool resists_change =
       false;  ///< whether `target` is the speed u before the solution: the row resists its change

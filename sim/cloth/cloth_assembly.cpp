@@ -105,20 +105,33 @@ void ClothSystem::assemble() {
   corner_contacts_.assign(std::move(touching), points_);
 }
 
+Aabb ClothSystem::reach_of(const Cloth& cloth, Real h) {
+  Aabb box;
+  for (std::size_t i = 0; i < cloth.points.size(); ++i) {
+    const Vec3 around = Vec3::Constant(2 * cloth.def.thickness + 2 * h * cloth.velocities[i].norm());
+    box.extend(Vec3(cloth.points[i] - around));
+    box.extend(Vec3(cloth.points[i] + around));
+  }
+  return box;
+}
+
 Aabb ClothSystem::reach(Real h) const {
   Aabb box;
-  for (const Cloth* cloth : cloths_)
-    for (std::size_t i = 0; i < cloth->points.size(); ++i) {
-      const Vec3 around = Vec3::Constant(2 * cloth->def.thickness + 2 * h * cloth->velocities[i].norm());
-      box.extend(Vec3(cloth->points[i] - around));
-      box.extend(Vec3(cloth->points[i] + around));
-    }
+  for (const Cloth* cloth : cloths_) box.extend(reach_of(*cloth, h));
   return box;
+}
+
+std::vector<Aabb> ClothSystem::reaches(Real h) const {
+  std::vector<Aabb> boxes;
+  for (const Cloth* cloth : cloths_)
+    if (cloth->def.collides && !cloth->stopped) boxes.push_back(reach_of(*cloth, h));
+  return boxes;
 }
 
 Real ClothSystem::thinnest() const {
   Real least = kInfinity;
-  for (const Cloth* cloth : cloths_) least = std::min(least, cloth->def.thickness);
+  for (const Cloth* cloth : cloths_)
+    if (cloth->def.collides && !cloth->stopped) least = std::min(least, cloth->def.thickness);
   return least;
 }
 

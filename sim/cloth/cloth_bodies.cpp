@@ -28,13 +28,11 @@ void add_point_mass(Real mass, const Vec3& arm, Mat6& matrix) {
 
 }  // namespace
 
-ClothBody::ClothBody(const Obstacle& obstacle, Real h, const Vec3& velocity, const Vec3& angular_velocity,
-                     const Vec3& surface_velocity)
+ClothBody::ClothBody(const Obstacle& obstacle, Real h, const Vec3& velocity, const Vec3& angular_velocity)
     : obstacle_(obstacle),
       h_(h),
       velocity_(velocity),
       angular_velocity_(angular_velocity),
-      surface_velocity_(surface_velocity),
       reaction_{obstacle.body, Vec3::Zero(), Vec3::Zero()} {}
 
 void ClothBody::fall_along_parabola(const Vec3& gravity) {
@@ -62,7 +60,7 @@ void ClothBody::begin(Real from, Real to, Real dt) {
   dt_ = dt;
   to_ = to;
   is_still_ = start_.position == end_.position && start_.orientation.coeffs() == end_.orientation.coeffs() &&
-              obstacle_.angular_velocity == Vec3::Zero() && surface_velocity_ == Vec3::Zero();
+              obstacle_.angular_velocity == Vec3::Zero() && obstacle_.surface_velocity == Vec3::Zero();
 }
 
 Vec3 ClothBody::rigid_move(const Vec3& p) const {
@@ -75,14 +73,13 @@ Vec3 ClothBody::rigid_move(const Vec3& p) const {
   return end - p;
 }
 
-Vec3 ClothBody::surface_motion(const Vec3& p) const {
+Vec3 ClothBody::surface_motion(const Vec3& p, const Vec3& n) const {
   if (is_still_ && !is_dynamic()) return Vec3::Zero();
   Vec3 motion = p - start_.point_to_world(end_.point_to_body(p));
   if (obstacle_.turn == 0 &&
       obstacle_.angular_velocity != Vec3::Zero())  // the path of a sphere does not contain its rotation
     motion += dt_ * obstacle_.angular_velocity.cross(p - end_.position);
-  if (surface_velocity_ != Vec3::Zero()) motion += dt_ * end_.vector_to_world(surface_velocity_);
-  return motion;
+  return motion + dt_ * obstacle_.conveying_velocity(n, 1);
 }
 
 Real ClothBody::mobility(const Vec3& p, const Vec3& n) const {

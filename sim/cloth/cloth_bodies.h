@@ -17,10 +17,8 @@ namespace offstage::sim {
 class ClothBody {
  public:
   /// `velocity` and `angular_velocity`: velocities of the body at the end of the world's sub-step, which has
-  /// length h [s]. `surface_velocity`: velocity of the surface (conveyor) relative to the body, body frame
-  /// [m/s].
-  ClothBody(const Obstacle& obstacle, Real h, const Vec3& velocity, const Vec3& angular_velocity,
-            const Vec3& surface_velocity);
+  /// length h [s].
+  ClothBody(const Obstacle& obstacle, Real h, const Vec3& velocity, const Vec3& angular_velocity);
 
   /// Makes the path of a body that carries cloth a parabola within the world's sub-step, as for a body that
   /// collides with nothing. Other paths are straight lines; on these, a body that hangs at rest would sag in
@@ -49,8 +47,8 @@ class ClothBody {
   /// Displacement in the cloth's sub-step of a point that moves rigidly with the body and starts at `p` [m].
   Vec3 rigid_move(const Vec3& p) const;
   /// Displacement of the body's surface during the cloth's sub-step [m], at the surface point that is at `p`
-  /// (world) at the end of that sub-step.
-  Vec3 surface_motion(const Vec3& p) const;
+  /// (world) at the end of that sub-step. `n`: unit normal of the surface there.
+  Vec3 surface_motion(const Vec3& p, const Vec3& n) const;
   /// Velocity of the body's material point at `p` at the end of the world's sub-step, including the changes
   /// due to cloth.
   Vec3 velocity(const Vec3& p) const { return velocity_ + angular_velocity_.cross(p - centre_); }
@@ -123,7 +121,6 @@ class ClothBody {
   Obstacle obstacle_;
   Real h_;
   Vec3 velocity_, angular_velocity_;  // at the centre of mass, at the end of the world's sub-step
-  Vec3 surface_velocity_;
   Vec3 gained_ = Vec3::Zero(), gained_spin_ = Vec3::Zero();  // changes of the velocities due to cloth
   Vec3 shift_ = Vec3::Zero(), turn_ = Vec3::Zero();          // displacement and rotation by cloth
   Vec3 centre_ = Vec3::Zero();  // centre of mass at the end of the cloth's sub-step

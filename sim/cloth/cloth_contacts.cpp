@@ -22,6 +22,9 @@ constexpr int kStopSweeps = 30;
 /// A point between two bodies that press cloth is under their load if its distance from both is at most this,
 /// in thicknesses.
 constexpr Real kUnderLoad = 1.2;
+/// Two bodies that press cloth are at the same height if the sine of the slope of the line between them is
+/// less than this.
+constexpr Real kLevel = 1e-3;
 /// A point that its support keeps at the right distance but for rounding touches the body, in thicknesses.
 constexpr Real kTouching = 1e-6;
 /// How fast the distance that points keep from a body may grow with their distance from a pin at its surface.
@@ -136,6 +139,8 @@ bool ClothContacts::is_held_inside(const ClothPoints& points, uint32_t body, uin
 
 void ClothContacts::count_points_under_loads(const ClothPoints& points) {
   if (std::ranges::all_of(bodies_, [](const ClothBody& body) { return body.loads.empty(); })) return;
+  for (ClothBody& body : bodies_)
+    for (ClothBody::Load& load : body.loads) load.points = 0;
   const auto is_under_load = [&](const Near& near) {
     return !bodies_[near.body].loads.empty() && near.distance < kUnderLoad * points.thickness[near.point];
   };
@@ -221,7 +226,8 @@ void ClothContacts::collect(const ClothPoints& points, std::vector<BodyContact>&
     if (!body.is_dynamic() || !(points.inverse_mass[near.point] > 0)) continue;
     if (!touch(points, near, points.at(near.point), points.thickness[near.point], t)) continue;
     // An initial overlap is removed slowly, because the correction counts as velocity.
-    const Vec3 motion = points.at(near.point) - points.start_at(near.point) - body.surface_motion(t.on_body);
+    const Vec3 motion =
+        points.at(near.point) - points.start_at(near.point) - body.surface_motion(t.on_body, t.normal);
     const Real before = std::min(t.gap - t.normal.dot(motion), 0.0);
     found.push_back({{near.point, near.point, near.point},
                      {1, 0, 0},
@@ -253,10 +259,18 @@ bool ClothContacts::is_close(const ClothPoints& points, uint32_t body, uint32_t 
 }
 
 /// Returns whether a body presses a point against another one from above. Only the lower body then moves the
-/// point, because it carries the weight. `normal`: from the body to the point.
+/// point, because it carries the weight. Of two bodies at the same height, or without gravity, the second one
+/// of the list counts as the upper one. `normal`: from the body to the point.
 bool ClothContacts::presses_from_above(const ClothPoints& points, const ClothBody& body, uint32_t point,
                                        const Vec3& normal) const {
-  return !(normal.dot(up_) > 0) && is_pressed_by(points, body, point);
+  if (body.loads.empty()) return false;
+  const Real height = normal.dot(up_), level = kLevel * up_.norm();
+  if (height > level) return false;
+  if (height < -level) return is_pressed_by(points, body, point);
+  return std::ranges::any_of(std::ranges::equal_range(near_, point, {}, &Near::point), [&](const Near& near) {
+    return near.distance < kUnderLoad * points.thickness[point] && &bodies_[near.body] < &body &&
+           body.load_against(bodies_[near.body]);
+  });
 }
 
 /// Returns the force with which another body presses a point against the body of `near`, for friction [N].
@@ -284,7 +298,7 @@ void ClothContacts::find_supports(ClothPoints& points, Real dt) {
     if (!touch(points, near, end.head<3>(), kSupportReach * points.thickness[i], t) ||
         presses_from_above(points, body, i, t.normal))
       continue;
-    const Vec4 normal = padded(t.normal), surface = padded(body.surface_motion(t.on_body));
+    const Vec4 normal = padded(t.normal), surface = padded(body.surface_motion(t.on_body, t.normal));
     const Real gap = std::max(t.gap - normal.dot(end - points.start[i] - surface), 0.0);
     const Support found{i,
                         normal,
@@ -488,7 +502,7 @@ void ClothContacts::press(ClothPoints& points, Touch& t, Real dt, Real parts, bo
   const uint32_t i = t.near->point;
   const Vec3& n = t.normal;
   ClothBody& body = *t.body;
-  const Vec3 motion = points.at(i) - points.start_at(i) - body.surface_motion(t.on_body);
+  const Vec3 motion = points.at(i) - points.start_at(i) - body.surface_motion(t.on_body, n);
   body.touch((points.velocity[i].head<3>() - body.velocity(t.on_body)).norm());
   const Real w = points.inverse_mass[i];
   if (!(w > 0)) return;

@@ -136,7 +136,7 @@ void ClothSystem::collect_triangles() {
   const std::size_t first = body_contacts_.size();
   corner_contacts_.collect(points_, contacts_, 1, body_contacts_);
   for (BodyContact& c : std::span(body_contacts_).subspan(first)) {
-    Vec3 motion = -c.body->surface_motion(c.on_body);
+    Vec3 motion = -c.body->surface_motion(c.on_body, c.normal);
     for (std::size_t k = 0; k < 3; ++k)
       motion += c.weights[k] * (points_.at(c.points[k]) - points_.start_at(c.points[k]));
     c.gap -= (1 - kTautRecovery) * std::min(c.gap - c.normal.dot(motion), 0.0);
@@ -203,7 +203,7 @@ void ClothSystem::integrate(Real dt) {
 /// Updates the motion of dynamic bodies under the supports of a cloth.
 void ClothSystem::update_supports(const ClothRange& cloth) {
   const auto update = [](Support& s) {
-    if (s.body) s.surface = padded(s.body->surface_motion(s.on_body));
+    if (s.body) s.surface = padded(s.body->surface_motion(s.on_body, s.normal.head<3>()));
   };
   std::ranges::for_each(cloth.supports(points_), update);
   std::ranges::for_each(cloth.triangle_supports(points_), update);

@@ -40,13 +40,16 @@ class ClothSystem {
 
   /// Returns the bounding box of all points and of the positions that they may reach within the time h [s].
   Aabb reach(Real h) const;
-  /// Smallest thickness of a cloth [m]; infinite without cloth.
+  /// Returns this box for each cloth that collides with bodies and moves.
+  std::vector<Aabb> reaches(Real h) const;
+  /// Smallest thickness of these cloths [m]; infinite if there are none.
   Real thinnest() const;
   /// Returns the time within h [s] at which a box that moves at `velocity` may meet a triangle of a cloth
   /// that collides with bodies.
   std::optional<Real> first_meeting(const Aabb& box, const Vec3& velocity, Real h) const;
 
  private:
+  static Aabb reach_of(const Cloth& cloth, Real h);
   struct Held {
     uint32_t point;
     ClothBody* body;  // null: the world

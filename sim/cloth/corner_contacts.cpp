@@ -164,7 +164,10 @@ void CornerContacts::solve(ClothPoints& points, const ClothContacts& of_points, 
 
 void CornerContacts::collect(const ClothPoints& points, const ClothContacts& of_points, Real reach,
                              std::vector<BodyContact>& found) const {
-  round_.collect(triangles_, points, bodies_, reach, found);
+  const auto pressed = [&](const Triangle& t, const ClothBody& body) {
+    return is_pressed(t, body, points, of_points);
+  };
+  round_.collect(triangles_, points, bodies_, reach, pressed, found);
   for (const Near& near : near_) {
     ClothBody& body = bodies_[near.body];
     const Triangle& t = triangles_[near.triangle];
@@ -195,11 +198,12 @@ void CornerContacts::find_supports(ClothPoints& points, const ClothContacts& of_
     for (std::size_t k = 0; k < 3; ++k)
       if (points.inverse_mass[t[k]] > 0) free += std::abs(contact->weights[k]);
     if (free < kLeastFree) return;
-    TriangleSupport found{{t[0], padded(contact->normal), 0, padded(body.surface_motion(contact->on_body)),
-                           std::sqrt(points.friction[t[0]] * body.obstacle().friction),
-                           body.is_dynamic() ? &body : nullptr, contact->on_body},
-                          t,
-                          contact->weights};
+    TriangleSupport found{
+        {t[0], padded(contact->normal), 0, padded(body.surface_motion(contact->on_body, contact->normal)),
+         std::sqrt(points.friction[t[0]] * body.obstacle().friction), body.is_dynamic() ? &body : nullptr,
+         contact->on_body},
+        t,
+        contact->weights};
     Vec4 motion = -found.surface;
     for (std::size_t k = 0; k < 3; ++k) motion += contact->weights[k] * (padded(at[k]) - points.start[t[k]]);
     found.gap = std::max(contact->gap - found.normal.dot(motion), 0.0);

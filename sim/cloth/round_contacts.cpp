@@ -105,11 +105,14 @@ void RoundContacts::solve(std::span<const Triangle> triangles, ClothPoints& poin
 }
 
 void RoundContacts::collect(std::span<const Triangle> triangles, const ClothPoints& points,
-                            std::span<ClothBody> bodies, Real reach, std::vector<BodyContact>& found) const {
+                            std::span<ClothBody> bodies, Real reach,
+                            const std::function<bool(const Triangle&, const ClothBody&)>& is_pressed,
+                            std::vector<BodyContact>& found) const {
   for (const Near& near : near_) {
     ClothBody& body = bodies[near.body];
     if (!body.is_dynamic()) continue;
     const Triangle& t = triangles[near.triangle];
+    if (is_pressed(t, body)) continue;
     const auto contact = touch(t, points, present(t, points), body, reach * points.thickness[t[0]], false);
     if (!contact) continue;
     found.push_back({t, contact->weights, &body, contact->normal, contact->on_body, contact->gap});

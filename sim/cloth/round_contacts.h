@@ -33,9 +33,11 @@ class RoundContacts {
              std::vector<VelocityCut>& cuts,
              const std::function<bool(const Triangle&, const ClothBody&)>& is_pressed) const;
   /// Returns the contacts with dynamic bodies at the points' current positions, including triangles whose
-  /// distance exceeds the contact distance by up to `reach` times the thickness of the cloth.
+  /// distance exceeds the contact distance by up to `reach` times the thickness of the cloth. `is_pressed`:
+  /// as in solve().
   void collect(std::span<const Triangle> triangles, const ClothPoints& points, std::span<ClothBody> bodies,
-               Real reach, std::vector<BodyContact>& found) const;
+               Real reach, const std::function<bool(const Triangle&, const ClothBody&)>& is_pressed,
+               std::vector<BodyContact>& found) const;
 
   /// Calls visit(triangle, body) for each pair, with their indices.
   template <class Visit>

@@ -13,7 +13,7 @@ constexpr Real kTriangleRecovery = 0.2;
 
 void separate(const TriangleContact& c, const Triangle& t, ClothPoints& points, ClothBody& body, Real dt,
               std::vector<VelocityCut>& cuts) {
-  Vec3 motion = -body.surface_motion(c.on_body);
+  Vec3 motion = -body.surface_motion(c.on_body, c.normal);
   Real mobility = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     motion += c.weights[k] * (points.at(t[k]) - points.start_at(t[k]));

@@ -297,7 +297,7 @@ void ContactPair::find_points(const Pose& a, const Pose& b, Real margin, Real re
   if ((a.position - b.position).squaredNorm() > apart * apart) {
     placed_.clear();
     found_margin_ = 0;
-    if (layer_) layer_->places.clear();
+    if (layer_) clear_layers();
     return;
   }
   if (layer_) reuse_within = 0;  // cloth moves
@@ -347,6 +347,13 @@ void ContactPair::set_cloth(std::span<const LayerTriangle> cloth) {
   }
   if (!layer_) layer_ = std::make_unique<PairLayer>(PairLayer{.bare = surface_});
   layer_->cloth = cloth;
+  layer_->thickest = std::ranges::max(cloth, {}, &LayerTriangle::thickness).thickness;
+}
+
+/// Notes that no contact point is at cloth.
+void ContactPair::clear_layers() {
+  layer_->places.clear();
+  surface_ = layer_->bare;
 }
 
 /// Moves the contact points of both bodies towards each other by the distance that cloth between them keeps.
@@ -363,7 +370,7 @@ void ContactPair::insert_layers() {
     for (uint32_t k = 0; k < m.count; ++k) {
       ContactPoint& p = m.points[k];
       const Vec3 middle = (p.on_a + p.on_b) / 2;
-      const Real reach = std::abs(p.separation) / 2 + kLayerReach * layer.cloth.front().thickness;
+      const Real reach = std::abs(p.separation) / 2 + kLayerReach * layer.thickest;
       const ClothLayers found = layers_across(layer.cloth, middle, n, reach);
       if (!found.lowest) continue;
       const Real keeps =
@@ -372,7 +379,8 @@ void ContactPair::insert_layers() {
       p.on_b += keeps / 2 * n;
       p.separation -= keeps;
       const auto slip = [&](const Body& body) {
-        const Vec3 relative = found.lowest->velocity - body.start_velocity(middle);
+        const Vec3 relative = found.lowest->velocity - body.start_velocity(middle) -
+                              body.start_pose.vector_to_world(body.def.surface_velocity);
         return (relative - n.dot(relative) * n).norm();
       };
       on_a = std::max(on_a, slip(*a_));
@@ -390,6 +398,9 @@ void ContactPair::insert_layers() {
       std::max(on_a, on_b) > kLayerSlides ? on_a < on_b : inverse_mass(*a_) < inverse_mass(*b_);
   surface_.restitution = 0;
   surface_.friction = surface_.static_friction = layer.slides ? 0 : friction;
+  surface_.cross = 1;
+  surface_.axis_body = nullptr;
+  if (layer.slides) surface_.rolling = surface_.spinning = 0;
 }
 
 Real ContactPair::free_displacement(const PlacedManifold& m, const Vec3& place, Real gap,
@@ -514,7 +525,7 @@ void ContactPair::find_one_point(const Pose& a, const Pose& b, Real margin) {
   m.manifold.continues_b = is_round(*b_);
   sphere_manifold(a_->collision_shape().piece(0), a, b_->collision_shape().piece(0), b, margin, m.manifold);
   if (m.manifold.count == 0) {
-    if (layer_) layer_->places.clear();
+    if (layer_) clear_layers();
     return placed_.clear();
   }
   const ContactFrame before = m.frame;

@@ -54,6 +54,7 @@ struct PairLayer {
   };
   PairSurface bare;                      ///< surface of the pair without cloth
   std::span<const LayerTriangle> cloth;  ///< triangles that may be between the bodies
+  Real thickest = 0;                     ///< greatest thickness of these triangles [m]
   std::vector<Place> places;             ///< of the last search; empty: there is no cloth at the contacts
   /// Whether the cloth slides on both bodies. The bodies then exert no friction on each other, but both do on
   /// the cloth. If not, the bodies exert the friction on each other.
@@ -200,6 +201,7 @@ class alignas(64) ContactPair {
   void find_points(const Pose& a, const Pose& b, Real margin, Real reuse, bool turning);
   void find_one_point(const Pose& a, const Pose& b, Real margin);
   void insert_layers();
+  void clear_layers();
   void store_points(std::vector<StoredPoint>& points) const;
   void restore_forces(std::vector<StoredPoint>& points, const Pose& a);
   void inherit(std::vector<StoredPoint>& points, const Pose& a);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <vector>
 
 #include "sim/world/world_impl.h"
 
@@ -59,15 +60,15 @@ std::optional<Real> time_to(const StraightFlight& body, const Solid& solid, cons
 Real World::Impl::first_part(Real h) {
   if (cloths.empty() || active.awake().empty()) return h;
   const Real ahead = kLookAhead * h, thickness = cloth_motion.thinnest();
-  std::optional<Aabb> around;
+  std::optional<std::vector<Aabb>> around;
   Real part = h;
   for (const Body* body : active.awake()) {
     if (!body->def.collides) continue;
     const StraightFlight flight{bounds(body->solid, body->pose), body->rigid.velocity()};
     if (!(h * flight.velocity.norm() > kLeastDistance * thickness)) continue;
-    if (!around) around = cloth_motion.reach(ahead);
+    if (!around) around = cloth_motion.reaches(ahead);
     const Aabb swept = flight.swept(ahead);
-    if (!around->intersects(swept)) continue;
+    if (std::ranges::none_of(*around, [&](const Aabb& box) { return box.intersects(swept); })) continue;
     std::optional<Real> reached;
     bodies.for_each([&](BodyHandle, const std::unique_ptr<Body>& other) {
       if (other.get() == body || !other->collides() || joint_groups.is_collision_disabled(*body, *other))

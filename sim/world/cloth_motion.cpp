@@ -76,7 +76,7 @@ std::vector<ClothBody> ClothMotion::bodies_near_cloths(Real h) const {
     } else {
       obstacle.inverse_mass = 0;  // asleep: cloth does not move the body until it wakes
     }
-    near.emplace_back(obstacle, h, velocity, spin, body->def.surface_velocity);
+    near.emplace_back(obstacle, h, velocity, spin);
     near.back().collides = body->def.collides;
   });
   return near;
@@ -102,15 +102,15 @@ bool ClothMotion::is_between(const PressedCloth& pressed) const {
 
 /// Finds the bodies that press cloth. While both bodies are asleep, they press it as before. They wake when
 /// the cloth is no longer between them.
-void ClothMotion::find_pressed(std::span<ContactPair* const> pairs, Real h) {
+void ClothMotion::find_pressed(std::span<ContactPair* const> pairs) {
   std::vector<PressedCloth> now;
   for (const ContactPair* pair : pairs) {
     const PairLayer* layer = pair->layer();
     if (!layer) continue;
-    Real impulse = 0;
+    Real force = 0;
     for (const PlacedManifold& m : pair->manifolds())
-      for (uint32_t k = 0; k < m.manifold.count; ++k) impulse += h * std::max(m.forces[k].now.x(), 0.0);
-    now.push_back({pair->a().handle, pair->b().handle, impulse, layer->slides || layer->holds_by_a,
+      for (uint32_t k = 0; k < m.manifold.count; ++k) force += std::max(m.forces[k].now.x(), 0.0);
+    now.push_back({pair->a().handle, pair->b().handle, force, layer->slides || layer->holds_by_a,
                    layer->slides || !layer->holds_by_a, layer->places});
   }
   std::vector<Body*> uncovered;
@@ -131,7 +131,7 @@ void ClothMotion::find_pressed(std::span<ContactPair* const> pairs, Real h) {
 }
 
 std::vector<Reaction> ClothMotion::step(Real start, Real h, std::span<ContactPair* const> pairs) {
-  find_pressed(pairs, h);
+  find_pressed(pairs);
   std::vector<ClothBody> near = bodies_near_cloths(h);
   for (const PressedCloth& pressed : pressed_) {
     const auto at = [&](BodyHandle body) {
@@ -139,8 +139,8 @@ std::vector<Reaction> ClothMotion::step(Real start, Real h, std::span<ContactPai
     };
     const auto a = at(pressed.a), b = at(pressed.b);
     if (a == near.end() || b == near.end()) continue;
-    a->loads.push_back({pressed.b.index, pressed.impulse, pressed.rubs_a});
-    b->loads.push_back({pressed.a.index, pressed.impulse, pressed.rubs_b});
+    a->loads.push_back({pressed.b.index, pressed.force * h, pressed.rubs_a});
+    b->loads.push_back({pressed.a.index, pressed.force * h, pressed.rubs_b});
   }
   const std::vector<const ForceDef*> forces = world_.active_forces();
   system_.step({start, h, world_.def.gravity, world_.def.wind, forces}, near);

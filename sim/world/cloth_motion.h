@@ -27,10 +27,10 @@ class ClothMotion {
   /// Releases all cloth vertices that are pinned to a body.
   void detach(BodyHandle body);
 
-  /// Smallest thickness of a cloth that exists [m].
+  /// Smallest thickness of the cloths that collide with bodies and move [m]; infinite if there are none.
   Real thinnest() const { return system_.thinnest(); }
-  /// Returns the bounding box of all positions that cloths may reach within the time h [s].
-  Aabb reach(Real h) const { return system_.reach(h); }
+  /// Returns for each of these cloths the box of all positions that it may reach within the time h [s].
+  std::vector<Aabb> reaches(Real h) const { return system_.reaches(h); }
   /// Returns the time within h [s] at which a box that moves at `velocity` may meet cloth.
   std::optional<Real> first_meeting(const Aabb& box, const Vec3& velocity, Real h) const {
     return system_.first_meeting(box, velocity, h);
@@ -47,13 +47,13 @@ class ClothMotion {
   /// Two bodies with cloth between them.
   struct PressedCloth {
     BodyHandle a, b;
-    Real impulse;  // along the normal in the last sub-step in which one of them was awake [N s]
+    Real force;  // along the normal in the last sub-step in which one of them was awake [N]
     bool rubs_a, rubs_b;
     std::vector<PairLayer::Place> places;
   };
 
   std::vector<ClothBody> bodies_near_cloths(Real h) const;
-  void find_pressed(std::span<ContactPair* const> pairs, Real h);
+  void find_pressed(std::span<ContactPair* const> pairs);
   bool is_between(const PressedCloth& pressed) const;
   void wake_unpinned(std::span<const ClothBody> near);
   std::vector<Reaction> answer(std::span<const ClothBody> near, Real h);

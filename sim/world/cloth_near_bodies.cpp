@@ -21,9 +21,9 @@ void grow(Aabb& box, Real margin) {
 void ClothNearBodies::begin(Real h) {
   for (const uint32_t slot : filled_) near_[slot].clear();
   filled_.clear();
-  around_.setEmpty();
+  cloths_.clear();
   thickest_ = 0;
-  world_.cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
+  world_.cloths.for_each([&](ClothHandle handle, const std::unique_ptr<Cloth>& cloth) {
     if (cloth->absent || cloth->stopped || !cloth->def.collides) return;
     thickest_ = std::max(thickest_, cloth->def.thickness);
     Real fastest2 = 0;
@@ -33,9 +33,9 @@ void ClothNearBodies::begin(Real h) {
       fastest2 = std::max(fastest2, cloth->velocities[i].squaredNorm());
     }
     grow(box, h * std::sqrt(fastest2));
-    around_.extend(box);
+    cloths_.push_back({handle.index, cloth.get(), box});
   });
-  if (any()) grow(around_, room());
+  for (Near& near : cloths_) grow(near.box, room());
 }
 
 Real ClothNearBodies::room() const {
@@ -43,7 +43,9 @@ Real ClothNearBodies::room() const {
 }
 
 bool ClothNearBodies::is_near(const Body& body) const {
-  return any() && body.collides() && bounds(body.solid, body.pose).intersects(around_);
+  if (!any() || !body.collides()) return false;
+  const Aabb box = bounds(body.solid, body.pose);
+  return std::ranges::any_of(cloths_, [&](const Near& near) { return near.box.intersects(box); });
 }
 
 Real ClothNearBodies::room(const Body& body) const {
@@ -72,8 +74,8 @@ void ClothNearBodies::find(std::span<ContactPair* const> pairs) {
 
 void ClothNearBodies::collect(const Aabb& box, std::vector<LayerTriangle>& found) const {
   found.clear();
-  world_.cloths.for_each([&](ClothHandle handle, const std::unique_ptr<Cloth>& cloth) {
-    if (cloth->absent || cloth->stopped || !cloth->def.collides) return;
+  for (const auto& [slot, cloth, around] : cloths_) {
+    if (!around.intersects(box)) continue;
     const std::vector<Vec3>& at = cloth->points;
     for (std::size_t k = 0; k < cloth->triangles.size(); ++k) {
       const Triangle& t = cloth->triangles[k];
@@ -85,10 +87,10 @@ void ClothNearBodies::collect(const Aabb& box, std::vector<LayerTriangle>& found
                        (v[t[0]] + v[t[1]] + v[t[2]]) / 3,
                        cloth->def.thickness,
                        cloth->def.friction,
-                       handle.index,
+                       slot,
                        static_cast<uint32_t>(k)});
     }
-  });
+  }
 }
 
 std::span<const LayerTriangle> ClothNearBodies::between(const ContactPair& pair) const {

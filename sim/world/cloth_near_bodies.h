@@ -31,7 +31,12 @@ class ClothNearBodies {
   void collect(const Aabb& box, std::vector<LayerTriangle>& found) const;
 
   const WorldState& world_;
-  Aabb around_;                                   // all cloth that collides with bodies
+  struct Near {
+    uint32_t slot;
+    const Cloth* cloth;
+    Aabb box;  // of its motion in the sub-step, grown by room()
+  };
+  std::vector<Near> cloths_;                      // that collide with bodies
   Real thickest_ = 0;                             // greatest thickness of these cloths [m]; 0: there is none
   std::vector<std::vector<LayerTriangle>> near_;  // by slot of a body
   std::vector<uint32_t> filled_;                  // slots with triangles

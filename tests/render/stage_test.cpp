@@ -214,7 +214,8 @@ TEST(Stage, DrawsAllPartsOfLargeObjects) {
   }
 }
 
-// More of them than are sampled as lamps. Each number of bodies has another layout in memory.
+// The scene has more glowing bodies than the tracer samples as lamps. Each number of bodies gives another
+// layout of the memory.
 TEST(Stage, DrawsAnyNumberOfGlowingBodies) {
   SmallStage s;
   const MeshHandle ball = s.stage.add_mesh(make_sphere(0.1f, 12));

@@ -48,6 +48,23 @@ void pin(ClothDef& def, uint32_t vertex) {
   def.pins.push_back({.vertex = vertex, .position = def.vertices[vertex]});
 }
 
+// The part of the conveyor's velocity across the surface has no effect.
+TEST(ClothOnAConveyor, MovesWithIt) {
+  for (const Real step : {1.0 / 240, 1.0 / 60}) {
+    World world({.max_step = step});
+    world.add_body({.shape = Box{Vec3(8, 0.2, 2)},
+                    .motion = MotionType::static_body,
+                    .pose = {Vec3(0, -0.1, 0)},
+                    .friction = 0.5,
+                    .surface_velocity = {1, 1, 0}});
+    const ClothHandle cloth = world.add_cloth(
+        cotton({0.6, 0.6, 8, 8}, {Vec3(0, kThickness, 0), Quat::Identity()}, ClothIntegrator::relaxed));
+    run(world, cloth, step, 2);
+    for (const Vec3& v : world.cloth(cloth).velocities) EXPECT_LT((v - Vec3::UnitX()).norm(), 1e-3);
+    for (const Vec3& p : world.cloth(cloth).points) EXPECT_NEAR(p.y(), kThickness, 1e-5);
+  }
+}
+
 class ClothPinnedAtABody : public testing::TestWithParam<std::tuple<ClothIntegrator, Real>> {
  protected:
   ClothIntegrator integrator() const { return std::get<0>(GetParam()); }

@@ -158,8 +158,6 @@ TEST(ParticlesAndBodies, SeamsBetweenFlushBoxesDoNotStopParticles) {
   }
 }
 
-// A step of a fifth of the radius is no seam: without restitution, the particle loses the part of its
-// velocity that points into the edge.
 // A ball whose friction has brought it to rolling has 2/7 of the conveyor's speed.
 TEST(ParticlesAndBodies, AConveyorCarriesParticles) {
   constexpr Real kBelt = 1, kMu = 0.5, kRadius = 0.05;
@@ -185,6 +183,8 @@ TEST(ParticlesAndBodies, AConveyorCarriesParticles) {
       }
 }
 
+// A step of a fifth of the radius is no seam: without restitution, the particle loses the part of its
+// velocity that points into the edge.
 TEST(ParticlesAndBodies, ALowStepHoldsParticlesBack) {
   World world({.max_step = 1.0 / 240, .sleep = false});
   add_tiles(world, 1, 2, 0.01);

@@ -67,7 +67,6 @@ TEST_P(Stack, HeavyOnTopStands) {
   }
 }
 
-// The force of each contact follows from statics: the weight of all bodies above.
 // The sweeps of the fast solver do not converge for such ratios, so it leaves such islands to the exact one.
 TEST_P(Stack, AThousandTimesHeavierOnTopStands) {
   for (const Real step : {1.0 / 240, 1.0 / 60})
@@ -89,6 +88,7 @@ TEST_P(Stack, AThousandTimesHeavierOnTopStands) {
     }
 }
 
+// The force of each contact follows from statics: the weight of all bodies above.
 TEST_P(Stack, CarriesItsWeight) {
   World world(def());
   add_ground(world);

@@ -1,5 +1,5 @@
 #pragma once
-/// How stiff springs are together, for scene_check.h.
+/// Greatest natural frequency and damping rate of connected springs, for scene_check.h.
 
 #include <cstddef>
 #include <map>
@@ -10,8 +10,8 @@
 
 namespace offstage::producer {
 
-/// Springs at their places of time 0, with the objects at their ends. Objects are point masses here: that
-/// they also rotate only makes the springs act as stiffer ones.
+/// Springs at their places of time 0, with the objects at their ends as point masses. Rotation of the objects
+/// only increases the rates.
 class SpringNet {
  public:
   struct End {
@@ -24,8 +24,8 @@ class SpringNet {
 
   /// The fastest motion of the net.
   struct Fastest {
-    /// A lower bound of the greatest eigenvalue, which is hardly ever missed by much: of stiffness by mass
-    /// [1/s^2] or of damping by mass [1/s]. 0: there are no springs.
+    /// Lower bound of the greatest eigenvalue of stiffness by mass [1/s^2] or damping by mass [1/s], by 40
+    /// power iterations. 0: there are no springs.
     Real rate = 0;
     std::size_t spring = 0;  ///< the spring with the greatest part of it
   };
