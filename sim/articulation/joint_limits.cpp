@@ -153,13 +153,13 @@ class RowMaker {
   }
   Real speed_at_start(const Direction& d) const { return speed(d.start, start_); }
 
-  void add(const BoundedRow& row, std::size_t slot, Real closes) {
+  void add(const BoundedRow& row, std::size_t slot, Real end_weight) {
     rows_->push_back(row);
-    origins_->push_back({&joint_, slot, acting_.arm_a, closes});
+    origins_->push_back({&joint_, slot, acting_.arm_a, end_weight});
   }
-  void add_guessed(BoundedRow row, std::size_t slot, Real closes) {
+  void add_guessed(BoundedRow row, std::size_t slot, Real end_weight) {
     row.impulse = std::clamp(h_ * joint_.efforts[slot], row.lower, row.upper);
-    add(row, slot, closes);
+    add(row, slot, end_weight);
   }
 
   /// An impact at a limit that the free motion reaches in this interval.
@@ -249,7 +249,7 @@ class RowMaker {
   /// factor (1 - (1 - theta) s h) / (1 + theta s h) per interval. For a large s h and 1/2 this is about -1: a
   /// stiff motor would vibrate for ever. (1 - theta) s h <= 1 prevents it for a damper, s = c / m. For a
   /// spring, s = 2 sqrt(k / m): with its critical damping both rates agree.
-  Real end_weight(Articulation& articulation, const Direction& row) const {
+  Real soft_end_weight(Articulation& articulation, const Direction& row) const {
     if (is_kicked_) return 1;  // Links with springs move by the velocities at the end.
     const Real mobility = articulation.mobility(joint_, row.acting);
     const Motor& motor = def_.motor;
@@ -257,21 +257,21 @@ class RowMaker {
     return 1 - std::min(0.5, 1 / (rate * h_));
   }
 
-  /// Adds the row of a motor without a stiffness. `closes`: see BoundedOrigin. A limit is a stop for a motor
-  /// of unlimited effort, too, although the rows of both contradict each other: the motor moves the joint up
-  /// to the limit and holds it there.
-  void add_rigid_motor(const Direction& row, BoundedRow r, Real closes) {
+  /// Adds the row of a motor without a stiffness. `end_weight`: see BoundedOrigin. A limit is a stop for a
+  /// motor of unlimited effort, too, although the rows of both contradict each other: the motor moves the
+  /// joint up to the limit and holds it there.
+  void add_rigid_motor(const Direction& row, BoundedRow r, Real end_weight) {
     if (def_.has_limits() && std::isinf(def_.motor.max_effort)) {
-      const Real end = closes == 1 || is_kicked_
+      const Real end = end_weight == 1 || is_kicked_
                            ? at_start(row) + h_ * r.target
                            : row.start.error + h_ / 2 * (speed_at_start(row) + r.target);
       if (const Real within = std::clamp(end, def_.lower, def_.upper); within != end) {
         r.target = (within - at_start(row)) / h_;
         r.turning = 0;
-        closes = std::abs(speed_at_start(row) - r.target) > kClosing ? 1 : 0;
+        end_weight = std::abs(speed_at_start(row) - r.target) > kClosing ? 1 : 0;
       }
     }
-    add_guessed(r, kMotor, closes);
+    add_guessed(r, kMotor, end_weight);
   }
 
   void add_motor(Articulation& articulation, const Direction& row) {
@@ -288,8 +288,8 @@ class RowMaker {
       r.turning = target - speed_at_start(row);
       return add_rigid_motor(row, r, 0);
     }
-    const auto if_it_moves = [&](Real closes) {
-      return std::abs(speed_at_start(row) - r.target) > kClosing ? closes : 0;
+    const auto if_it_moves = [&](Real end_weight) {
+      return std::abs(speed_at_start(row) - r.target) > kClosing ? end_weight : 0;
     };
     if (motor.stiffness == 0) {
       if (const std::optional<Real> speed = speed_on_track(row)) {
@@ -300,7 +300,7 @@ class RowMaker {
       r.target = (target - at_start(row)) / h_;
       return add_rigid_motor(row, r, if_it_moves(1));
     }
-    const Real end = end_weight(articulation, row), start = 1 - end;
+    const Real end = soft_end_weight(articulation, row), start = 1 - end;
     const Real missing = start * motor.target(time_ - h_) + end * target - at_start(row);
     // effort = k (missing - end h v) - c v with v = start * speed at the start + end * speed at the end.
     const Real resistance = motor.stiffness * end * h_ + motor.damping;

@@ -17,7 +17,7 @@ struct BoundedOrigin {
   /// Weight of the end's velocities in the motion of the bodies, from 0 to 1. 0: they move with the mean of
   /// the velocities at the interval's start and end. 1: they move with their new velocities during the whole
   /// interval, so that the joint reaches a given coordinate exactly at the interval's end.
-  Real closes;
+  Real end_weight;
 };
 
 /// Returns the fraction of an interval after which the free motion of an articulation first reaches a limit,

@@ -12,7 +12,7 @@ namespace {
 constexpr Real kBeyondTear = 1.2;
 
 /// Whether an integrator applies the friction of supports.
-bool rubs(ClothIntegrator integrator) {
+bool applies_friction(ClothIntegrator integrator) {
   return integrator == ClothIntegrator::relaxed || integrator == ClothIntegrator::implicit;
 }
 
@@ -38,7 +38,7 @@ void ClothSystem::assemble() {
   for (uint32_t c = 0; c < cloths_.size(); ++c) {
     Cloth& cloth = *cloths_[c];
     cloth.assign_bending();
-    points_.rubs.push_back(rubs(cloth.def.integrator));
+    points_.applies_friction.push_back(applies_friction(cloth.def.integrator));
     if (cloth.def.pressure != 0) cloth.gas.assign(cloth.triangles);
     const auto first = static_cast<uint32_t>(points_.size());
     first_.push_back(first);

@@ -93,19 +93,16 @@ class ClothBody {
 
   /// A body against which this body presses cloth. The contact solver carries the load from body to body.
   struct Load {
-    uint32_t body;    ///< the other body, Obstacle::body
-    Real impulse;     ///< along the normal in the world's sub-step [N s]
-    bool rubs;        ///< whether this body exerts friction on the cloth
-    Real points = 0;  ///< number of points between the two bodies
+    uint32_t body;      ///< the other body, Obstacle::body
+    Real impulse;       ///< along the normal in the world's sub-step [N s]
+    bool has_friction;  ///< whether this body exerts friction on the cloth
+    Real points = 0;    ///< number of points between the two bodies
   };
   std::vector<Load> loads;
-  Load* load_against(const ClothBody& other) {
-    for (Load& load : loads)
-      if (load.body == other.obstacle_.body) return &load;
-    return nullptr;
-  }
+  /// Returns the load against another body, or null.
   const Load* load_against(const ClothBody& other) const {
-    return const_cast<ClothBody*>(this)->load_against(other);
+    const auto load = std::ranges::find(loads, other.obstacle_.body, &Load::body);
+    return load == loads.end() ? nullptr : &*load;
   }
 
   bool touched = false;     ///< whether cloth touched the body in this sub-step of the world

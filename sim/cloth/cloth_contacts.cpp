@@ -105,7 +105,7 @@ void ClothContacts::find_held_inside(const ClothPoints& points) {
   if (!any) return;
   for (HeldPoints& held : held_inside_)
     std::ranges::stable_sort(held.points, {}, [&](const HeldInside& h) { return points.rest[h.point].x(); });
-  for (Near& near : near_) near.keeps = kept_distance(points, near.body, near.point);
+  for (Near& near : near_) near.least_distance = kept_distance(points, near.body, near.point);
 }
 
 /// Returns the distance that a free point can keep from a body. Near a pin inside the body, this is less than
@@ -113,9 +113,9 @@ void ClothContacts::find_held_inside(const ClothPoints& points) {
 /// would turn the displacement into energy.
 Real ClothContacts::kept_distance(const ClothPoints& points, uint32_t body, uint32_t point) const {
   const Real thickness = points.thickness[point];
-  Real keeps = thickness;
+  Real least = thickness;
   const std::vector<HeldInside>& held = held_inside_[body].points;
-  if (held.empty() || !(points.inverse_mass[point] > 0)) return keeps;
+  if (held.empty() || !(points.inverse_mass[point] > 0)) return least;
   const Real reach = thickness / kSlopeAtPin + held_inside_[body].deepest;
   const auto x = [&](const HeldInside& h) { return points.rest[h.point].x(); };
   const Real own = points.rest[point].x();
@@ -124,9 +124,9 @@ Real ClothContacts::kept_distance(const ClothPoints& points, uint32_t body, uint
     if (points.cloth[h->point] != points.cloth[point]) continue;
     // Length of cloth from the surface to the point.
     const Real outside = (points.rest[h->point] - points.rest[point]).norm() + std::min(h->distance, 0.0);
-    keeps = std::min(keeps, outside < 0 ? outside : std::max(h->distance, 0.0) + kSlopeAtPin * outside);
+    least = std::min(least, outside < 0 ? outside : std::max(h->distance, 0.0) + kSlopeAtPin * outside);
   }
-  return keeps;
+  return least;
 }
 
 bool ClothContacts::is_held_inside(const ClothPoints& points, uint32_t body, uint32_t point) const {
@@ -148,8 +148,9 @@ void ClothContacts::count_points_under_loads(const ClothPoints& points) {
     for (std::size_t l = k + 1; l < near_.size() && near_[l].point == near_[k].point; ++l) {
       if (!is_under_load(near_[k]) || !is_under_load(near_[l])) continue;
       ClothBody &a = bodies_[near_[k].body], &b = bodies_[near_[l].body];
-      if (ClothBody::Load* load = a.load_against(b)) ++load->points;
-      if (ClothBody::Load* load = b.load_against(a)) ++load->points;
+      for (auto& [body, other] : {std::pair(&a, &b), std::pair(&b, &a)})
+        for (ClothBody::Load& load : body->loads)
+          if (load.body == other->obstacle().body) ++load.points;
     }
 }
 
@@ -179,13 +180,13 @@ void ClothContacts::find_runaways(const ClothPoints& points) {
   const auto before = [](const Near& a, const Near& b) {
     return a.point != b.point ? a.point < b.point : a.body < b.body;
   };
-  for (Near& near : found) near.keeps = kept_distance(points, near.body, near.point);
+  for (Near& near : found) near.least_distance = kept_distance(points, near.body, near.point);
   near_.insert(near_.end(), found.begin(), found.end());
   std::stable_sort(near_.begin(), near_.end(), before);
   near_.erase(std::unique(near_.begin(), near_.end(), same), near_.end());
 }
 
-/// Returns whether a point that moves to `at` comes nearer to a body than Near::keeps plus `reach`,
+/// Returns whether a point that moves to `at` comes nearer to a body than Near::least_distance plus `reach`,
 /// or goes through the body's surface. Sets `t`.
 bool ClothContacts::touch(const ClothPoints& points, Near& near, const Vec3& at, Real reach, Touch& t) const {
   ClothBody& body = bodies_[near.body];
@@ -193,15 +194,15 @@ bool ClothContacts::touch(const ClothPoints& points, Near& near, const Vec3& at,
   const Vec3 place = body.end().point_to_body(at);
   // The distance changes at most by the move of the point.
   const Real moved = (place - near.place).norm();
-  if (near.distance - moved >= near.keeps + reach) return false;
+  if (near.distance - moved >= near.least_distance + reach) return false;
   const Vec3 from = body.start().point_to_body(points.start_at(near.point));
   t.near = &near;
   t.body = &body;
-  const bool comes_from_outside = near.keeps > thickness / 4;
+  const bool comes_from_outside = near.least_distance > thickness / 4;
   if (comes_from_outside && (place - from).squaredNorm() > thickness * thickness / 4) {
     if (const auto hit = sweep_sphere(body.solid(), from, place, thickness / 4)) {
       const Vec3 centre = from + hit->fraction * (place - from);
-      t.gap = hit->normal.dot(place - centre) + hit->distance - near.keeps;
+      t.gap = hit->normal.dot(place - centre) + hit->distance - near.least_distance;
       t.normal = body.end().vector_to_world(hit->normal);
       t.on_body = body.end().point_to_world(centre - hit->distance * hit->normal);
       near.place = place;
@@ -212,7 +213,7 @@ bool ClothContacts::touch(const ClothPoints& points, Near& near, const Vec3& at,
   const SurfaceDistance s = signed_distance(body.solid(), place);
   near.place = place;
   near.distance = s.distance;
-  t.gap = s.distance - near.keeps;
+  t.gap = s.distance - near.least_distance;
   if (!(t.gap < reach)) return false;
   t.normal = body.end().vector_to_world(s.normal);
   t.on_body = body.end().point_to_world(place - s.distance * s.normal);
@@ -277,7 +278,7 @@ bool ClothContacts::presses_from_above(const ClothPoints& points, const ClothBod
 Real ClothContacts::load_on(const ClothPoints& points, const Near& near) const {
   Real sum = 0;
   for (const ClothBody::Load& load : bodies_[near.body].loads) {
-    if (!load.rubs || !(load.points > 0)) continue;
+    if (!load.has_friction || !(load.points > 0)) continue;
     for (const Near& other : std::ranges::equal_range(near_, near.point, {}, &Near::point))
       if (bodies_[other.body].obstacle().body == load.body &&
           other.distance < kUnderLoad * points.thickness[near.point])
@@ -289,7 +290,7 @@ Real ClothContacts::load_on(const ClothPoints& points, const Near& near) const {
 void ClothContacts::find_supports(ClothPoints& points, Real dt) {
   points.supports.clear();
   for (Near& near : near_) {
-    near.rubbed = false;
+    near.friction_applied = false;
     const uint32_t i = near.point;
     ClothBody& body = bodies_[near.body];
     if (!(points.inverse_mass[i] > 0) || !may_support(points, body, i)) continue;
@@ -314,7 +315,7 @@ void ClothContacts::find_supports(ClothPoints& points, Real dt) {
       points.supports.back() = found;
     else
       continue;
-    near.rubbed = found.load > 0 && points.rubs[points.cloth[i]];
+    near.friction_applied = found.load > 0 && points.applies_friction[points.cloth[i]];
   }
 }
 
@@ -362,9 +363,10 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
 /// Returns whether the contact solver carries the load between two bodies that press a point. The point then
 /// only gets friction from the bodies, with its part of the load.
 bool ClothContacts::carries(Touch& a, Touch& b) const {
-  ClothBody::Load* const load = a.body->load_against(*b.body);
+  const ClothBody::Load* const load = a.body->load_against(*b.body);
   if (!load) return false;
-  a.near->pressed = load->rubs && load->points > 0 && !a.near->rubbed ? load->impulse / load->points : 0;
+  a.near->pressed =
+      load->has_friction && load->points > 0 && !a.near->friction_applied ? load->impulse / load->points : 0;
   a.body->pinches = true;
   return true;
 }
@@ -456,11 +458,11 @@ std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::spa
     ClothBody& body = bodies_[near.body];
     if (!body.is_dynamic() || !shortened[near.point]) continue;
     const Vec3 p = points.at(near.point), place = body.end().point_to_body(p);
-    if (near.distance - (place - near.place).norm() >= near.keeps) continue;
+    if (near.distance - (place - near.place).norm() >= near.least_distance) continue;
     const SurfaceDistance s = signed_distance(body.solid(), place);
-    if (s.distance >= near.keeps) continue;
+    if (s.distance >= near.least_distance) continue;
     add(body, body.end().vector_to_world(s.normal), body.end().point_to_world(place - s.distance * s.normal),
-        velocity(near.point, body), near.keeps - s.distance, near.point);
+        velocity(near.point, body), near.least_distance - s.distance, near.point);
   }
   for (const BodyContact& c : triangles) {
     if (c.gap >= 0 || std::ranges::none_of(c.points, [&](uint32_t i) { return shortened[i] != 0; })) continue;

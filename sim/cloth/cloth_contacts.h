@@ -85,9 +85,9 @@ class ClothContacts {
     uint32_t point, body;
     Vec3 place;           // position of the point in the body's frame at the last search
     Real distance;        // distance of that position from the surface
-    Real keeps;           // distance that the point keeps from the body: the thickness, or less near a pin
+    Real least_distance;  // distance that the point keeps from the body: the thickness, or less near a pin
     Real pressed = 0;     // impulse along the normal on a pinched point in this sub-step of the world [N s]
-    bool rubbed = false;  // whether the integrator applies the friction of the loads on the body
+    bool friction_applied = false;  // whether the integrator applies the friction of the loads on the body
   };
   /// A pinned point that is closer to a body than the cloth's thickness.
   struct HeldInside {
@@ -102,7 +102,7 @@ class ClothContacts {
     Near* near;
     ClothBody* body;
     Vec3 normal, on_body;  // world
-    Real gap;              // distance minus Near::keeps; negative in contact
+    Real gap;              // distance minus Near::least_distance; negative in contact
   };
 
   void look(const ClothPoints& points, uint32_t point, std::vector<Near>& found) const;

@@ -27,14 +27,13 @@ inline Vec4 padded(const Vec3& p) {
 /// times the energy of its motion.
 struct Support {
   uint32_t point;
-  Vec4 normal;      ///< unit, from the body to the point
-  Real gap;         ///< distance to the plane at the start of the sub-step, >= 0 [m]
-  Vec4 surface;     ///< motion of the body's surface in the sub-step without this cloth's impulses [m]
-  Real friction;    ///< coefficient of friction
-  ClothBody* body;  ///< the body if it is dynamic; null: no impulse moves it
-  Vec3 on_body;     ///< where the point touches it
-  Real load =
-      0;  ///< force of another body that presses the point onto this one, times dt^2 of the sub-step [kg m]
+  Vec4 normal;       ///< unit, from the body to the point
+  Real gap;          ///< distance to the plane at the start of the sub-step, >= 0 [m]
+  Vec4 surface;      ///< motion of the body's surface in the sub-step without this cloth's impulses [m]
+  Real friction;     ///< coefficient of friction
+  ClothBody* body;   ///< the body if it is dynamic; null: no impulse moves it
+  Vec3 on_body;      ///< where the point touches it
+  Real load = 0;     ///< force of another body that presses the point onto this one, times dt^2 [kg m]
   Real impulse = 0;  ///< along the normal in the last step of the integrator, times that step [kg m], >= 0
 
   /// Returns the smallest displacement along the normal after the fraction `part` of the sub-step [m].
@@ -74,8 +73,9 @@ struct ClothPoints {
       holder;                    ///< the body to which it is pinned; null: not pinned, or pinned to the world
   std::vector<uint8_t> carried;  ///< whether that body is dynamic, so that the point moves with it
   std::vector<Real> thickness, friction, self_friction;
-  std::vector<uint32_t> cloth;    ///< index of the cloth of each point
-  std::vector<uint8_t> rubs;      ///< by cloth: whether its integrator applies the friction of supports
+  std::vector<uint32_t> cloth;  ///< index of the cloth of each point
+  std::vector<uint8_t>
+      applies_friction;           ///< by cloth: whether its integrator applies the friction of supports
   std::vector<Support> supports;  ///< of the sub-step, by point; at most one of a point
   std::vector<std::vector<TriangleSupport>> triangle_supports;  ///< of the sub-step, by cloth
   /// Whether a support pushed the point in the last sub-step, for the integrator `implicit`.

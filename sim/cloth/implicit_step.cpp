@@ -331,7 +331,7 @@ bool step_implicit(ClothPoints& points, const ClothRange& cloth, Real h) {
   for (const auto& [s, index] : system.resting()) bodies.push(index, -s->impulse * s->normal);
   for (const auto& [s, index] : system.resting()) {
     Vec4 move = h * v[s->point - cloth.begin];
-    move += bodies.rub(index, *s, 1, move);
+    move += bodies.apply_friction(index, *s, 1, move);
     points.position[s->point] = points.start[s->point] + move;
   }
   bodies.advance();

@@ -117,13 +117,13 @@ class RelaxedSupports {
   void end_step() {
     for (std::size_t k = 0; k < supports_.size(); ++k) {
       Vec4& move = points_.moves[supports_[k].point];
-      move += bodies_.rub(k, supports_[k], 1.0 / steps_, move);
+      move += bodies_.apply_friction(k, supports_[k], 1.0 / steps_, move);
     }
     for (std::size_t n = 0; n < of_triangles_.size(); ++n) {
       const std::size_t k = supports_.size() + n;
       const TriangleSupport& s = of_triangles_[n];
       const Vec4 move = s.sum([&](uint32_t i) -> const Vec4& { return points_.moves[i]; });
-      push(s, bodies_.point_mass(k) * bodies_.rub(k, s, 1.0 / steps_, move));
+      push(s, bodies_.point_mass(k) * bodies_.apply_friction(k, s, 1.0 / steps_, move));
     }
     bodies_.advance();
   }

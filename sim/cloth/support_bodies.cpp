@@ -49,7 +49,7 @@ void SupportBodies::push(std::size_t k, const Vec4& impulse) {
   on.spin += obstacle.inverse_inertia * turning;
 }
 
-Vec4 SupportBodies::rub(std::size_t k, const Support& support, Real part, const Vec4& move) {
+Vec4 SupportBodies::apply_friction(std::size_t k, const Support& support, Real part, const Vec4& move) {
   const Contact& contact = contacts_[k];
   Vec4 relative = move - part * support.surface;
   if (contact.body != kNone) {

@@ -41,7 +41,7 @@ class SupportBodies {
   void push(std::size_t k, const Vec4& impulse);
   /// Applies friction to the body under support k for the displacement `move` of the supported point in a
   /// step that is the fraction `part` of the sub-step. Returns the change of the point's displacement.
-  Vec4 rub(std::size_t k, const Support& support, Real part, const Vec4& move);
+  Vec4 apply_friction(std::size_t k, const Support& support, Real part, const Vec4& move);
   /// Begins the next step.
   void advance();
   /// Gives the bodies their impulses and displacements after the last step. All steps have the length h [s].

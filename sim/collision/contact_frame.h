@@ -13,6 +13,11 @@ namespace offstage::sim {
 /// the time derivatives of these axes [1/s].
 struct ContactFrame {
   Vec3 n, t, k;
+
+  /// Returns the components of a vector along n, t and k.
+  Vec3 components(const Vec3& v) const { return {n.dot(v), t.dot(v), k.dot(v)}; }
+  /// Returns the vector with these components.
+  Vec3 vector(const Vec3& p) const { return p.x() * n + p.y() * t + p.z() * k; }
 };
 
 /// Returns the frame of a unit normal. The tangent t is the normal with its smallest component set to zero,

@@ -230,10 +230,6 @@ ContactFrame turned_frame(const ContactFrame& f, const Vec3& n) {
   return {n, turn(f.t), turn(f.k)};
 }
 
-Vec3 components(const ContactFrame& f, const Vec3& v) {
-  return {f.n.dot(v), f.t.dot(v), f.k.dot(v)};
-}
-
 /// Change of the relative velocity because the contact moves, in the contact frame at the middle of the
 /// interval.
 struct Gain {
@@ -247,7 +243,7 @@ Gain gain(const Start& s, const ContactMotion& motion, const ContactPlace& place
   const ContactPlace& middle = motion.middle;
   const Vec3 velocity = a.velocity + wa.cross(place.arm_a) - b.velocity - wb.cross(place.arm_b);
   Vec3 by_turning =
-      components(motion.frame, wa.cross(place.arm_a - middle.arm_a) - wb.cross(place.arm_b - middle.arm_b));
+      motion.frame.components(wa.cross(place.arm_a - middle.arm_a) - wb.cross(place.arm_b - middle.arm_b));
   by_turning.x() += (place.normal - middle.normal).dot(velocity);
   if (s.m.count == 1) return {by_turning, 0, 0};  // a single point has no lever arms
   const Vec3 spin = wa - wb;
@@ -307,9 +303,9 @@ void set_even_motion(const Start& s, const ContactFrame& frame, Real duration, C
     motion.frame = turned_frame(frame, motion.middle.normal);
   }
   const Vec3 bow = wa.cross(a.curve) - wb.cross(b.curve), spin = wa - wb;
-  motion.gain = components(frame, half * (wa.cross(a.rate) - wb.cross(b.rate)) + 2 * square * bow);
+  motion.gain = frame.components(half * (wa.cross(a.rate) - wb.cross(b.rate)) + 2 * square * bow);
   motion.gain.x() += half * n_rate.dot(s.sliding);
-  motion.bow = square * components(frame, bow);
+  motion.bow = square * frame.components(bow);
   const auto along = [&](const Vec3& tangent) {
     return half * spin.dot(carrier.cross(tangent).cross(n) + tangent.cross(n_rate));
   };

@@ -83,7 +83,8 @@ class alignas(64) ContactPair {
  public:
   uint32_t impacts = 0;     ///< number of impacts of this pair in this sub-step
   uint8_t speculative = 0;  ///< number of manifolds that add_speculative_contacts() added
-  /// Whether the pair reached its limit of impacts: it is not traced back again in this sub-step.
+  /// Whether the pair is not traced back again in this sub-step: it reached its limit of impacts, or cloth is
+  /// between its bodies.
   bool toi_exhausted = false;
   /// Whether the contacts of the pair have no restitution in this sub-step. They stop the approach without a
   /// bounce.

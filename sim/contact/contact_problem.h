@@ -70,7 +70,7 @@ struct Contact {
 
   bool is_isotropic() const { return friction_t == friction_k; }
   bool resists_turning() const { return rolling > 0 || spinning > 0; }
-  Vec3 to_world(const Vec3& p) const { return p.x() * frame.n + p.y() * frame.t + p.z() * frame.k; }
+  Vec3 to_world(const Vec3& p) const { return frame.vector(p); }
   Vec3 to_frame(const Vec3& v) const { return {frame.n.dot(v), frame.t.dot(v), frame.k.dot(v)}; }
   /// Relative velocity (u_n, u_t, u_k) of a with respect to b, `offset` included [m/s].
   Vec3 relative_velocity(std::span<const ContactBody> bodies) const {

@@ -125,10 +125,6 @@ Vec3 surface_velocity(const ContactPair& pair, const Vec3& n) {
   return v - n.dot(v) * n;
 }
 
-Vec3 in_frame(const ContactFrame& f, const Vec3& v) {
-  return {f.n.dot(v), f.t.dot(v), f.k.dot(v)};
-}
-
 std::pair<Real, Real> friction(const PairSurface& surface, const Vec3& u) {
   const bool slips = u.y() * u.y() + u.z() * u.z() > kSlip * kSlip;
   const Real mu = slips ? surface.friction : surface.static_friction;

@@ -19,9 +19,6 @@ Vec3 velocity_bias(const ContactPair& pair, const PlacedManifold& placed, const 
 /// axes. A conveyor moves along its surface, so the velocity has no component along n.
 Vec3 surface_velocity(const ContactPair& pair, const Vec3& n);
 
-/// Returns the components of a world vector along n, t and k.
-Vec3 in_frame(const ContactFrame& f, const Vec3& v);
-
 /// Returns the coefficients of friction along t and k for a relative velocity u in the contact's frame [m/s].
 /// If the contact does not slide, they are the static coefficients.
 std::pair<Real, Real> friction(const PairSurface& surface, const Vec3& u);

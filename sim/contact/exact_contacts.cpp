@@ -298,7 +298,7 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       const ContactPoint& point = m.manifold.points[k];
       if (pair.awaits_impact(m, point, interval.impact_speed)) continue;
       const Vec3 place = (point.on_a + point.on_b) / 2;
-      const Vec3 u = in_frame(m.frame, pair.relative_velocity(place) + surface);
+      const Vec3 u = m.frame.components(pair.relative_velocity(place) + surface);
       const ContactMotion motion = contact_motion(pair.a(), pair.b(), m.manifold, m.frame, place,
                                                   point.separation, h, interval.substep);
       // The approach of a rotating contact differs slightly from the prediction of its rotation.
@@ -308,7 +308,7 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       Contact c{.a = a, .b = b, .frame = motion.frame};
       c.arm_a = motion.middle.arm_a;
       c.arm_b = motion.middle.arm_b;
-      c.offset = in_frame(c.frame, surface);
+      c.offset = c.frame.components(surface);
       if (touches) c.bias = motion.turns ? Vec3(motion.gain + motion.bow) : velocity_bias(pair, m, point, h);
       c.offset += c.bias;
       // This is the length of the sub-step. The rest of a sub-step after an impact can be very short, and the
@@ -333,7 +333,7 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
       approach_.push_back(approach);
       if (may_divide_)
         points_.push_back(
-            closing_point(touches ? 0 : point.separation, in_frame(c.frame, surface), motion,
+            closing_point(touches ? 0 : point.separation, c.frame.components(surface), motion,
                           motion.turns ? Vec3(Vec3::Zero()) : velocity_bias(pair, m, point, h)));
     }
   }
@@ -346,17 +346,17 @@ void ExactContacts::add_points(ContactPair& pair, const ContactInterval& interva
 /// new velocity throughout the interval, as the contact's target assumes.
 void ExactContacts::move_bodies(const Island& island, const ContactInterval& interval) {
   const Real duration = interval.duration;
-  closing_.assign(bodies_.size(), 0);
+  end_weights_.assign(bodies_.size(), 0);
   for (std::size_t i = 0; i < contacts_.size(); ++i)
     if (approach_[i] > kClosing && contacts_[i].impulse.x() > 0)
-      closing_[contacts_[i].a] = closing_[contacts_[i].b] = 1;
+      end_weights_[contacts_[i].a] = end_weights_[contacts_[i].b] = 1;
   // Links with springs move by the velocities at the end in any case.
   std::vector<uint8_t> is_kicked(bodies_.size(), 0);
   for (const Articulation* a : joints_.articulations())
     if (a->has_springs())
       for (const Body* link : a->bodies()) {
         is_kicked[link->row] = 1;
-        closing_[link->row] = 1;
+        end_weights_[link->row] = 1;
       }
   close_stops();
   close_links();
@@ -372,13 +372,13 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
     const Vec3 dv = bodies_[i].velocity - free_[i].velocity,
                dw = bodies_[i].angular_velocity - free_[i].angular_velocity;
     Vec3 mean = rest_[i] * dv, mean_spin = rest_[i] * dw;
-    if (closing_[i] > 0 && !is_kicked[i]) {
+    if (end_weights_[i] > 0 && !is_kicked[i]) {
       const Vec3 end = (dv + bodies_[i].velocity - body.start_twist.velocity) / 2;
       const Vec3 end_spin = (dw + bodies_[i].angular_velocity - body.start_twist.angular_velocity) / 2;
-      mean += closing_[i] * (end - mean);
-      mean_spin += closing_[i] * (end_spin - mean_spin);
+      mean += end_weights_[i] * (end - mean);
+      mean_spin += end_weights_[i] * (end_spin - mean_spin);
     }
-    if (!riding_.empty() && closing_[i] == 0) {
+    if (!riding_.empty() && end_weights_[i] == 0) {
       mean += riding_.deviation(i).shift / duration;
       mean_spin += riding_.deviation(i).turn / duration;
     }
@@ -400,18 +400,19 @@ void ExactContacts::close_neighbors(const Island& island, Real duration) {
   const auto displacement = [&](uint32_t i, const Vec3& arm) {
     const Vec3 end = bodies_[i].velocity_at(arm);
     if (i >= island.bodies.size()) return Vec3(duration * end);
-    return Vec3(duration / 2 *
-                ((1 + closing_[i]) * end + (1 - closing_[i]) * island.bodies[i]->start_twist.at(arm)));
+    return Vec3(
+        duration / 2 *
+        ((1 + end_weights_[i]) * end + (1 - end_weights_[i]) * island.bodies[i]->start_twist.at(arm)));
   };
   bool changed = true;
   for (int pass = 0; changed && pass < kBlockPasses; ++pass) {
     changed = false;
     for (const Contact& c : contacts_) {
-      if (closing_[c.a] == closing_[c.b]) continue;
+      if (end_weights_[c.a] == end_weights_[c.b]) continue;
       const Real separation = std::max(0.0, -c.target * duration);
       if (separation + c.frame.n.dot(displacement(c.a, c.arm_a) - displacement(c.b, c.arm_b)) > -kOverlap)
         continue;
-      closing_[c.a] = closing_[c.b] = 1;
+      end_weights_[c.a] = end_weights_[c.b] = 1;
       changed = true;
     }
     if (changed) close_links();
@@ -425,8 +426,8 @@ void ExactContacts::close_links() {
   for (const Articulation* articulation : joints_.articulations()) {
     const std::span<Body* const> links = articulation->bodies();
     Real greatest = 0;
-    for (const Body* link : links) greatest = std::max(greatest, closing_[link->row]);
-    for (const Body* link : links) closing_[link->row] = greatest;
+    for (const Body* link : links) greatest = std::max(greatest, end_weights_[link->row]);
+    for (const Body* link : links) end_weights_[link->row] = greatest;
   }
 }
 
@@ -436,7 +437,8 @@ void ExactContacts::close_stops() {
     const BoundedRow& row = joints_.bounded()[i];
     if (row.impulse == 0) continue;
     for (uint32_t body : {row.a, row.b})
-      if (body != kUnmoved) closing_[body] = std::max(closing_[body], joints_.origins()[i].closes);
+      if (body != kUnmoved)
+        end_weights_[body] = std::max(end_weights_[body], joints_.origins()[i].end_weight);
   }
 }
 

@@ -69,9 +69,9 @@ class ExactContacts {
   // By contact: absolute value of the speed at the start minus the part due to rotation [m/s].
   std::vector<Real> approach_;
   std::vector<Sliding> sliding_;
-  // By body: weight of the end's velocities in its motion, as BoundedOrigin::closes; 1 if a contact of it
+  // By body: weight of the end's velocities in its motion, as BoundedOrigin::end_weight; 1 if a contact of it
   // closed in the interval.
-  std::vector<Real> closing_;
+  std::vector<Real> end_weights_;
   // By body: mean change of velocity over the interval, divided by the change at its end.
   std::vector<Real> rest_;
   bool may_divide_ = false;                  // whether the interval of the island may be divided

@@ -78,11 +78,11 @@ void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifol
   const bool runs = runs_along(pair.a(), duration) || runs_along(pair.b(), duration);
   const Real gap = set_points(patch, m.manifold, m.frame, centre_a, start_centre(pair.b()), runs);
   const Vec3 place = centre_a + patch.arm_a;
-  const Vec3 u = in_frame(m.frame, pair.relative_velocity(place) + surface);
+  const Vec3 u = m.frame.components(pair.relative_velocity(place) + surface);
   const ContactMotion motion =
       contact_motion(pair.a(), pair.b(), m.manifold, m.frame, place, gap, duration, interval.substep);
   set_motion(patch, motion, m.manifold.source, gap);
-  patch.offset = in_frame(patch.frame, surface);
+  patch.offset = patch.frame.components(surface);
   std::tie(patch.friction_t, patch.friction_k) = friction(pair.surface(), u);
   patch.rolling = pair.surface().rolling;
   patch.spinning = pair.surface().spinning;

@@ -103,11 +103,10 @@ struct View {
   bool is_face_of_x() const {
     return m->source == (x_is_a ? NormalSource::face_of_a : NormalSource::face_of_b);
   }
-  /// Returns the manifold without points that are much less deep than the deepest, if a face of X gives the
-  /// normal. If that face is inclined over a face of Y, only an edge or a corner of Y may touch it.
+  /// Returns the manifold without points that are much less deep than the deepest. If a face of X that gives
+  /// the normal is inclined over a face of Y, only an edge or a corner of Y may touch it.
   Manifold near_deepest() const {
     Manifold near = *m;
-    if (!is_face_of_x()) return near;
     near.count = 0;
     for (uint32_t k = 0; k < m->count; ++k)
       if (m->points[k].separation <= separation() + kInclined) near.points[near.count++] = m->points[k];
@@ -115,7 +114,8 @@ struct View {
   }
   /// Whether the contact touches along a line or at a point, as a contact at an internal edge does.
   bool may_be_at_internal_edge() const {
-    if (continues() || y().collision_shape().is_plane() || !is_narrow(near_deepest())) return false;
+    if (continues() || y().collision_shape().is_plane()) return false;
+    if (!(is_face_of_x() ? is_narrow(near_deepest()) : is_narrow(*m))) return false;
     return !is_face() || !std::holds_alternative<Sphere>(x().def.shape);
   }
 };

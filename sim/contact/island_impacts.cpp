@@ -69,7 +69,7 @@ struct CollisionCluster {
         Contact c{.a = a, .b = b, .frame = m.frame};
         c.arm_a = place - origin(pair.a());
         c.arm_b = place - origin(pair.b());
-        c.offset = in_frame(m.frame, surface);
+        c.offset = m.frame.components(surface);
         const Vec3 u = c.relative_velocity(bodies);
         std::tie(c.friction_t, c.friction_k) = friction(pair.surface(), u);
         contacts.push_back(c);

@@ -139,8 +139,8 @@ std::vector<Reaction> ClothMotion::step(Real start, Real h, std::span<ContactPai
     };
     const auto a = at(pressed.a), b = at(pressed.b);
     if (a == near.end() || b == near.end()) continue;
-    a->loads.push_back({pressed.b.index, pressed.force * h, pressed.rubs_a});
-    b->loads.push_back({pressed.a.index, pressed.force * h, pressed.rubs_b});
+    a->loads.push_back({pressed.b.index, pressed.force * h, pressed.has_friction_a});
+    b->loads.push_back({pressed.a.index, pressed.force * h, pressed.has_friction_b});
   }
   const std::vector<const ForceDef*> forces = world_.active_forces();
   system_.step({start, h, world_.def.gravity, world_.def.wind, forces}, near);

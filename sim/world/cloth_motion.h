@@ -48,7 +48,7 @@ class ClothMotion {
   struct PressedCloth {
     BodyHandle a, b;
     Real force;  // along the normal in the last sub-step in which one of them was awake [N]
-    bool rubs_a, rubs_b;
+    bool has_friction_a, has_friction_b;
     std::vector<PairLayer::Place> places;
   };
 

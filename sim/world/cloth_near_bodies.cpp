@@ -9,7 +9,7 @@ namespace offstage::sim {
 namespace {
 
 /// Cloth between two bodies is searched up to this distance of the bodies, in thicknesses.
-constexpr Real kMostLayers = 4;
+constexpr Real kSearchDistance = 4;
 
 void grow(Aabb& box, Real margin) {
   box.min().array() -= margin;
@@ -39,17 +39,11 @@ void ClothNearBodies::begin(Real h) {
 }
 
 Real ClothNearBodies::room() const {
-  return kMostLayers * thickest_;
+  return kSearchDistance * thickest_;
 }
 
-bool ClothNearBodies::is_near(const Body& body) const {
-  if (!any() || !body.collides()) return false;
-  const Aabb box = bounds(body.solid, body.pose);
+bool ClothNearBodies::is_near(const Aabb& box) const {
   return std::ranges::any_of(cloths_, [&](const Near& near) { return near.box.intersects(box); });
-}
-
-Real ClothNearBodies::room(const Body& body) const {
-  return is_near(body) ? room() : 0;
 }
 
 void ClothNearBodies::find(std::span<ContactPair* const> pairs) {
@@ -58,7 +52,7 @@ void ClothNearBodies::find(std::span<ContactPair* const> pairs) {
   std::vector<const Body*> bodies;
   for (const ContactPair* pair : pairs)
     for (const Body* body : {&pair->a(), &pair->b()})
-      if (body->is_awake() && is_near(*body)) bodies.push_back(body);
+      if (body->is_awake() && is_near(bounds(body->solid, body->pose))) bodies.push_back(body);
   const auto by_slot = [](const Body* x, const Body* y) { return x->handle.index < y->handle.index; };
   std::sort(bodies.begin(), bodies.end(), by_slot);
   bodies.erase(std::unique(bodies.begin(), bodies.end()), bodies.end());

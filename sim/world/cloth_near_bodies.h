@@ -17,8 +17,9 @@ class ClothNearBodies {
   void begin(Real h);
   /// Whether there is any cloth that collides with bodies.
   bool any() const { return thickest_ > 0; }
-  /// Returns the distance by which a body's box grows, because cloth may keep other bodies away from it [m].
-  Real room(const Body& body) const;
+  /// Returns the distance by which the box of a body's path grows, because cloth may keep other bodies away
+  /// from it [m].
+  Real room(const Aabb& box) const { return is_near(box) ? room() : 0; }
   /// Greatest distance at which cloth between two bodies is searched [m].
   Real room() const;
   /// Finds the triangles near those awake bodies that have a pair.
@@ -27,7 +28,7 @@ class ClothNearBodies {
   std::span<const LayerTriangle> between(const ContactPair& pair) const;
 
  private:
-  bool is_near(const Body& body) const;
+  bool is_near(const Aabb& box) const;
   void collect(const Aabb& box, std::vector<LayerTriangle>& found) const;
 
   const WorldState& world_;

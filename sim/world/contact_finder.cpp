@@ -119,7 +119,7 @@ Aabb ContactFinder::swept_bounds(const Body& body) const {
     const Real bow = path.max_acceleration(body.extent) / 8;
     margin += bow > kWide * body.extent ? body.extent : bow;
   }
-  margin += cloth_.room(body);
+  margin += cloth_.room(box);
   box.min().array() -= margin;
   box.max().array() += margin;
   return box;

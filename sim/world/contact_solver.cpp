@@ -69,9 +69,12 @@ void ContactSolver::solve_all(std::span<Island> islands, Real start, Real h, Ste
   std::vector<Island*> all;
   for (Island& island : islands)
     if (has_forces(island)) all.push_back(&island);
-  const SolverKind kind = world_.def.solver;
-  // Impacts may merge islands to uneven ones, which the fast solver also leaves to the exact one.
-  if (kind == SolverKind::automatic || kind == SolverKind::fast) patience_.begin(all, h);
+  // Impacts may still merge islands to uneven ones, so the fast solver's budget begins without them, too.
+  std::vector<Island*> uneven;
+  if (world_.def.solver == SolverKind::fast)
+    std::ranges::copy_if(all, std::back_inserter(uneven),
+                         [](const Island* island) { return is_uneven(*island); });
+  if (!world_.is_exact()) patience_.begin(world_.def.solver == SolverKind::fast ? uneven : all, h);
   solve(all,
         {.duration = h,
          .end = start + h,
