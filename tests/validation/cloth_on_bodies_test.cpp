@@ -129,10 +129,10 @@ TEST(ClothOnATorus, ComesToRest) {
     world.add_body({.shape = MeshShape{mesh}, .motion = MotionType::static_body});
     const ClothHandle cloth =
         world.add_cloth(cotton({1, 1, cells, cells}, {Vec3(0.013, 0.2, 0.007)}, ClothIntegrator::relaxed));
-    const ContactRecord record = run(world, cloth, 1.0 / 60, 1.5);
+    const ContactRecord record = run(world, cloth, 1.0 / 60, 3);
     EXPECT_LT(record.strain, 0.01) << cells;
     EXPECT_LT(record.rise, 1e-3) << cells;
-    EXPECT_LT(record.last_speed, 0.5) << cells;
+    EXPECT_LT(record.last_speed, 0.1) << cells;  // it vibrated at 5 m/s
   }
 }
 

@@ -93,7 +93,8 @@ struct Table<WorldSettings> {
         {"wind", &T::wind, "velocity of the air; it acts on objects through their drag", "m/s"},
         {"step", &T::max_step,
          "longest sub-step of the simulation; each frame is divided into the fewest equal sub-steps that are "
-         "not longer. A shorter step is more accurate and takes more time",
+         "not longer, and those in which a body would pass cloth are divided further. A shorter step is more "
+         "accurate and takes more time",
          "s", between(1e-6, 1)},
         {"integrator", &T::integrator,
          "method that integrates the motion of bodies, and of everything connected by springs"},
