@@ -46,7 +46,7 @@ void ClothBody::fall_along_parabola(const Vec3& gravity) {
 
 /// Returns the pose on the path that the world computed, without displacement by cloth.
 Pose ClothBody::on_path(Real fraction) const {
-  Pose pose = obstacle_.at(fraction);
+  Pose pose = obstacle_.turned_at(fraction);
   pose.position -= fraction * (1 - fraction) * bow_;
   return pose;
 }
@@ -64,22 +64,12 @@ void ClothBody::begin(Real from, Real to, Real dt) {
 }
 
 Vec3 ClothBody::rigid_move(const Vec3& p) const {
-  Vec3 end = end_.point_to_world(start_.point_to_body(p));
-  const Real angle = dt_ * obstacle_.angular_velocity.norm();
-  if (obstacle_.turn == 0 && angle > 0) {  // the path of a sphere does not contain its rotation
-    const Eigen::AngleAxis<Real> turn(angle, obstacle_.angular_velocity.normalized());
-    end = end_.position + turn * (end - end_.position);
-  }
-  return end - p;
+  return end_.point_to_world(start_.point_to_body(p)) - p;
 }
 
 Vec3 ClothBody::surface_motion(const Vec3& p, const Vec3& n) const {
   if (is_still_ && !is_dynamic()) return Vec3::Zero();
-  Vec3 motion = p - start_.point_to_world(end_.point_to_body(p));
-  if (obstacle_.turn == 0 &&
-      obstacle_.angular_velocity != Vec3::Zero())  // the path of a sphere does not contain its rotation
-    motion += dt_ * obstacle_.angular_velocity.cross(p - end_.position);
-  return motion + dt_ * obstacle_.conveying_velocity(n, 1);
+  return p - start_.point_to_world(end_.point_to_body(p)) + dt_ * obstacle_.conveying_velocity(n, 1);
 }
 
 Real ClothBody::mobility(const Vec3& p, const Vec3& n) const {

@@ -20,18 +20,18 @@ Obstacle::Obstacle(const Solid& shape, const Pose& from, const Pose& to, Real du
   if (rotation.w() < 0) rotation.coeffs() = -rotation.coeffs();
   const Eigen::AngleAxisd axis_angle(rotation);
   angular_velocity = axis_angle.angle() / duration * axis_angle.axis();
-  if (std::holds_alternative<Sphere>(*shape.shape)) {
-    end.orientation = from.orientation;  // the orientation of a sphere does not matter
-  } else {
-    turn = axis_angle.angle();
-    if (from.orientation.dot(end.orientation) < 0) end.orientation.coeffs() = -end.orientation.coeffs();
-  }
+  if (from.orientation.dot(end.orientation) < 0) end.orientation.coeffs() = -end.orientation.coeffs();
+  if (!std::holds_alternative<Sphere>(*shape.shape)) turn = axis_angle.angle();
 }
 
 Pose Obstacle::at(Real fraction) const {
-  Pose pose = start;
-  pose.position += fraction * (end.position - start.position);
-  if (turn > 0)
+  if (turn > 0) return turned_at(fraction);
+  return {start.position + fraction * (end.position - start.position), start.orientation};
+}
+
+Pose Obstacle::turned_at(Real fraction) const {
+  Pose pose{start.position + fraction * (end.position - start.position), start.orientation};
+  if (angular_velocity != Vec3::Zero())
     pose.orientation.coeffs() =
         ((1 - fraction) * start.orientation.coeffs() + fraction * end.orientation.coeffs()).normalized();
   return pose;

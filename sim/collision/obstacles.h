@@ -16,8 +16,10 @@ struct Obstacle {
   /// `duration`: length of the sub-step [s]; `e`: restitution; `mu`: friction.
   Obstacle(const Solid& shape, const Pose& from, const Pose& to, Real duration, Real e, Real mu);
 
-  /// Pose at a fraction of the sub-step.
+  /// Pose at a fraction of the sub-step, without the rotation of a sphere, which does not move its surface.
   Pose at(Real fraction) const;
+  /// Pose of the body at a fraction of the sub-step. Points that are fastened to a sphere turn with it.
+  Pose turned_at(Real fraction) const;
   /// Velocity of the solid's material point that is at `p` (world) at a fraction of the sub-step.
   Vec3 velocity_at(const Vec3& p, Real fraction) const {
     return velocity + angular_velocity.cross(p - start.position - fraction * (end.position - start.position));
@@ -47,7 +49,7 @@ struct Obstacle {
   Pose start, end;
   /// Mean velocity and angular velocity over the sub-step, world axes [m/s], [rad/s].
   Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
-  Real turn = 0;  ///< angle turned [rad]
+  Real turn = 0;  ///< angle by which the surface turns [rad]; 0 for a sphere
   /// Greatest distance of the solid's points from the origin of its frame [m].
   Real extent;
   Real restitution, friction;

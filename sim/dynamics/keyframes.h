@@ -36,6 +36,10 @@ struct KeyframeTrack {
   Vec3 spin = Vec3::Zero();  ///< additional rotation about the body's origin, body axes [rad/s]
 
   bool moves() const { return !keys.empty() || !spin.isZero(); }
+  /// Whether the pose may change at a time after t.
+  bool moves_after(Real t) const {
+    return (!keys.empty() && (loop || keys.back().time > t)) || !spin.isZero();
+  }
   /// Returns the pose and its exact derivative at time t; `rest` is the pose without keys.
   Motion at(Real t, const Pose& rest) const;
   /// Whether the pose jumps at a time in (from, to], by a step or at the end of a loop that is not closed.

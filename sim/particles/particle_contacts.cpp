@@ -179,7 +179,7 @@ void ParticleContacts::find_surfaces(uint32_t i, NearObstacles& near, Found& fou
     if (o->body == impacts_->struck_body(i)) continue;
     Vec3 later = Vec3::Zero();
     if (g.from < h) {
-      const ObstacleHit hit = NearObstacles::hit(*o, g.position, end, g.radius, g.from / h,
+      const ObstacleHit hit = NearObstacles::hit(*o, SpherePath(g.position, end, g.from / h), g.radius,
                                                  std::numeric_limits<Real>::infinity());
       later = hit.obstacle && hits_later(i, hit) ? hit.normal : Vec3(Vec3::Zero());
       if (hit.obstacle && later.isZero())

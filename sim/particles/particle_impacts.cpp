@@ -109,12 +109,12 @@ void ParticleImpacts::find_obstacle(uint32_t i, NearObstacles& near, Add&& add) 
   const CollidingParticle& g = particles_[i];
   const Real h = step_->h;
   if (!g.hits_bodies || g.from >= h) return;
-  Vec3 from = g.position, end = g.at(h);
-  Real fraction = g.from / h;
+  Vec3 end = g.at(h);
+  SpherePath path(g.position, end, g.from / h);
   for (int slide = 0; slide <= kMaxSlowHits; ++slide) {
-    near.find(from, end, g.radius);
+    near.find(path, g.radius);
     if (near.all().empty()) return;
-    const ObstacleHit hit = near.first_hit(from, end, g.radius, fraction);
+    const ObstacleHit hit = near.first_hit(path, g.radius);
     if (!hit.obstacle || hit.obstacle->body == struck_body_[i]) return;
     const Real time = hit.fraction * h;
     const Vec3 surface = hit.obstacle->velocity_at(hit.position, hit.fraction);
@@ -126,10 +126,9 @@ void ParticleImpacts::find_obstacle(uint32_t i, NearObstacles& near, Add&& add) 
     }
     // The particle slides along the surface, and may hit another one.
     if (near.all().size() == 1) return;
-    from = hit.position;
-    fraction = hit.fraction;
-    const Real behind = (end - from - (1 - fraction) * h * surface).dot(hit.normal);
-    if (behind < 0) end -= behind * hit.normal;
+    const PlaneAtEnd plane(hit);
+    if (const Real above = plane.height(end); above < 0) end -= above * plane.normal;
+    path = SpherePath(hit.position, end, hit.fraction, hit.obstacle->turn > 0 ? hit.obstacle : nullptr);
   }
 }
 

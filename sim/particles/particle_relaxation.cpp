@@ -334,24 +334,24 @@ void ParticleContacts::keep_outside(uint32_t i, NearObstacles& near, Vec3& end, 
   const Real h = step_->h;
   near.find(g.position, end, g.radius);
   if (near.all().empty()) return;
-  Vec3 from = g.position;
-  Real fraction = g.from / h;
+  SpherePath path(g.position, end, g.from / h);
   for (int slide = 0;; ++slide) {
-    const ObstacleHit hit = near.first_hit(from, end, g.radius, fraction);
+    const ObstacleHit hit = near.first_hit(path, g.radius);
     if (!hit.obstacle) return;
-    from = hit.position;
-    fraction = hit.fraction;
+    const Vec3& from = hit.position;
+    const Real fraction = hit.fraction;
     const Obstacle& o = *hit.obstacle;
     const Vec3 surface = o.velocity_at(from, fraction);
-    const Real behind = (end - from - (1 - fraction) * h * surface).dot(hit.normal);
+    const PlaneAtEnd plane(hit);
     if (slide == kMaxSlides) {
-      end = from;
+      end = plane.origin;
       return;
     }
-    if (behind < 0) {
-      end -= behind * hit.normal;
-      g.velocity = velocity_after_shift(g.velocity, g.acceleration, -behind * hit.normal);
+    if (const Real above = plane.height(end); above < 0) {
+      end -= above * plane.normal;
+      g.velocity = velocity_after_shift(g.velocity, g.acceleration, -above * plane.normal);
     }
+    path = SpherePath(from, end, fraction, o.turn > 0 ? &o : nullptr);
     const Real approach = (surface - g.velocity).dot(hit.normal);
     if (approach <= 0 || o.body == impacts_->struck_body(i)) continue;
     g.velocity += approach * hit.normal;

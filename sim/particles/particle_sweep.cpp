@@ -30,9 +30,37 @@ bool is_clear(const Solid& solid, const Vec3& centre, Real radius) {
 
 }  // namespace
 
+SpherePath::SpherePath(const Vec3& a, const Vec3& b, Real from, const Obstacle* carrier)
+    : a_(a), b_(b), from_(from), carrier_(carrier) {
+  if (!carrier) return;
+  local_a_ = carrier->at(from).point_to_body(a);
+  local_b_ = carrier->at(1).point_to_body(b);
+}
+
+Vec3 SpherePath::at(Real fraction) const {
+  if (!carrier_) return a_ + fraction * (b_ - a_);
+  return carrier_->at(time(fraction)).point_to_world(local_a_ + fraction * (local_b_ - local_a_));
+}
+
+Vec3 SpherePath::in_frame(const Obstacle& o, Real fraction) const {
+  if (&o == carrier_) return local_a_ + fraction * (local_b_ - local_a_);
+  return o.at(time(fraction)).point_to_body(at(fraction));
+}
+
+int SpherePath::pieces(const Obstacle& o, Real radius) const {
+  if (&o == carrier_) return 1;
+  return carrier_ ? std::max(o.pieces(radius), carrier_->pieces(radius)) : o.pieces(radius);
+}
+
+Real SpherePath::bend() const {
+  // The path of a point that turns by less than half a turn is closest to its chord's middle in the middle.
+  return carrier_ ? 1.1 * (at(0.5) - (a_ + b_) / 2).norm() : 0;
+}
+
 SweepOutcome ParticleSweep::operator()(ParticlePath& path, Real born, const Vec3& extra) {
   SweepOutcome outcome;
   contact_count_ = 0;
+  carrier_ = nullptr;
   reactions_before_finish_ = log_.reactions.size();
   near_.find(path.start, path.end, path.radius);
   if (near_.all().empty()) return outcome;
@@ -42,27 +70,30 @@ SweepOutcome ParticleSweep::operator()(ParticlePath& path, Real born, const Vec3
   }
   Real from = born;
   for (int hits = 0;; ++hits) {
-    const ObstacleHit hit = near_.first_hit(path.start, path.end, path.radius, from);
+    const ObstacleHit hit = near_.first_hit(SpherePath(path.start, path.end, from, carrier_), path.radius);
     if (!hit.obstacle) return outcome;
     outcome.hit = true;
     if (!respond(path, hit, from, extra, outcome)) return outcome;
     from = hit.fraction;
-    if (hits + 1 == kMaxHits) break;
-    near_.find(path.start, path.end, path.radius);
+    if (hits + 1 == kMaxHits) {
+      // The particle moves on with the obstacle that it hit last, which would otherwise pass over it.
+      outcome.truncated = true;
+      path.end = hit.obstacle->at(1).point_to_world(hit.obstacle->at(from).point_to_body(path.start));
+      return outcome;
+    }
+    near_.find(SpherePath(path.start, path.end, from, carrier_), path.radius);
   }
-  outcome.truncated = true;
-  path.end = path.start;
-  return outcome;
 }
 
-void NearObstacles::find(const Vec3& a, const Vec3& b, Real radius) {
+void NearObstacles::find(const SpherePath& path, Real radius) {
   near_.clear();
+  const Vec3 &a = path.first(), &b = path.last();
   const auto add = [&](const Obstacle& o) { near_.push_back(&o); };
-  const Real reach = radius + kSkin + (b - a).norm();
-  fixed_.near_path(a, b, radius + kSkin, [&](const Obstacle& o) {
+  const Real around = radius + kSkin + path.bend(), reach = around + (b - a).norm();
+  fixed_.near_path(a, b, around, [&](const Obstacle& o) {
     if (!is_clear(o.solid, o.start.point_to_body(a), reach)) add(o);
   });
-  moving_.near_path(a, b, radius + kSkin, add);
+  moving_.near_path(a, b, around, add);
 }
 
 bool NearObstacles::eject(Vec3& start, Vec3& end, Real radius, Real fraction, bool& deep) {
@@ -87,26 +118,23 @@ bool NearObstacles::eject(Vec3& start, Vec3& end, Real radius, Real fraction, bo
   return false;
 }
 
-ObstacleHit NearObstacles::first_hit(const Vec3& a, const Vec3& b, Real radius, Real from) const {
+ObstacleHit NearObstacles::first_hit(const SpherePath& path, Real radius) const {
   ObstacleHit first;
   for (const Obstacle* o : near_) {
     const ObstacleHit found =
-        hit(*o, a, b, radius, from, first.obstacle ? first.fraction : std::numeric_limits<Real>::infinity());
+        hit(*o, path, radius, first.obstacle ? first.fraction : std::numeric_limits<Real>::infinity());
     if (found.obstacle) first = found;
   }
   return first;
 }
 
-ObstacleHit NearObstacles::hit(const Obstacle& o, const Vec3& a, const Vec3& b, Real radius, Real from,
-                               Real latest) {
-  const int pieces = o.pieces(radius);
-  const Vec3 displacement = b - a;
-  Vec3 p = o.at(from).point_to_body(a);
+ObstacleHit NearObstacles::hit(const Obstacle& o, const SpherePath& path, Real radius, Real latest) {
+  const int pieces = path.pieces(o, radius);
+  Vec3 p = path.in_frame(o, 0);
   for (int k = 0; k < pieces; ++k) {
-    const Real end_of_piece = static_cast<Real>(k + 1) / pieces, before = static_cast<Real>(k) / pieces;
-    const Vec3 q = o.at(from + end_of_piece * (1 - from)).point_to_body(a + end_of_piece * displacement);
+    const Vec3 q = path.in_frame(o, static_cast<Real>(k + 1) / pieces);
     if (const auto hit = sweep_sphere(o.solid, p, q, radius + kSkin / 2)) {
-      const Real fraction = from + (before + hit->fraction / pieces) * (1 - from);
+      const Real fraction = path.time((k + hit->fraction) / pieces);
       if (fraction >= latest) return {};
       const Pose pose = o.at(fraction);
       const Vec3 local = p + hit->fraction * (q - p) + (radius + kSkin - hit->distance) * hit->normal;
@@ -182,7 +210,13 @@ bool ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real fro
     ++outcome.collisions;
     if (log_.wants_strikes) log_.strikes.push_back({hit.fraction, hit.position, v, hit.normal});
   }
-  if (restitution == 0 || moves_it) add_contact({hit.normal, &o, friction, hit.fraction, moves_it});
+  const bool stays = restitution == 0 || moves_it;
+  if (stays) {
+    const Pose pose = o.at(hit.fraction);
+    const Vec3 n = pose.vector_to_body(hit.normal);
+    add_contact({n, &o, friction, hit.fraction, n.dot(pose.point_to_body(hit.position)), moves_it});
+  }
+  carrier_ = stays && o.turn > 0 ? &o : nullptr;
   path.start = hit.position;
   path.start_velocity = v;
   reactions_before_finish_ = log_.reactions.size();
@@ -208,14 +242,13 @@ void ParticleSweep::finish(ParticlePath& path, Real duration, const Vec3& extra)
   const Vec3 predicted = path.start + duration * path.start_velocity;
   const auto press = [&](const Contact& c) {
     if (c.gives_way) return false;
-    const Vec3 u = v - c.obstacle->velocity_at(predicted, 1);
-    if (u.dot(c.normal) >= 0) return false;
-    const Vec3 impulse =
-        collision_impulse(*c.obstacle, 1, path.mass, u, c.normal, 0, c.friction, Mat3::Zero());
+    const Vec3 u = v - c.obstacle->velocity_at(predicted, 1), normal = c.normal_at(1);
+    if (u.dot(normal) >= 0) return false;
+    const Vec3 impulse = collision_impulse(*c.obstacle, 1, path.mass, u, normal, 0, c.friction, Mat3::Zero());
     v += impulse / path.mass;
     if (c.obstacle->is_dynamic())
       log_.reactions.push_back(
-          reaction(*c.obstacle, path.start - path.radius * c.normal, c.fraction, impulse));
+          reaction(*c.obstacle, path.start - path.radius * c.normal_at(c.fraction), c.fraction, impulse));
     return true;
   };
   for (int pass = 0; pass < kContactPasses; ++pass) {
@@ -227,14 +260,37 @@ void ParticleSweep::finish(ParticlePath& path, Real duration, const Vec3& extra)
   path.end = path.start + duration / 2 * (path.start_velocity + v);
   for (std::size_t i = 0; i < contact_count_; ++i) {
     const Contact& c = contacts_[i];
-    if (!c.gives_way) continue;
-    const Vec3 behind = duration * c.obstacle->velocity_at(path.start, 1) - (path.end - path.start);
-    if (!(behind.dot(c.normal) > 0)) continue;
-    const Vec3 shift = behind.dot(c.normal) * c.normal;
-    path.end += shift;
-    path.end_velocity = velocity_after_shift(
-        path.end_velocity, forces_.acceleration(path.end_velocity, path.mass) + extra, shift);
+    if (c.gives_way)
+      stay_before(c, path, duration, extra);
+    else if (c.obstacle->turn > 0)
+      stay_above(c, path);
   }
+}
+
+/// Keeps the end of a path in front of an obstacle that gives way only in the next sub-step.
+void ParticleSweep::stay_before(const Contact& c, ParticlePath& path, Real duration,
+                                const Vec3& extra) const {
+  const Vec3 normal = c.normal_at(c.fraction),
+             behind = duration * c.obstacle->velocity_at(path.start, 1) - (path.end - path.start);
+  if (!(behind.dot(normal) > 0)) return;
+  const Vec3 shift = behind.dot(normal) * normal;
+  path.end += shift;
+  path.end_velocity = velocity_after_shift(path.end_velocity,
+                                           forces_.acceleration(path.end_velocity, path.mass) + extra, shift);
+}
+
+/// Moves the end of a path out of an obstacle that turns. The surface moves on an arc there, and the particle
+/// on a straight line, so that the particle ends beside the surface although it does not approach it.
+void ParticleSweep::stay_above(const Contact& c, ParticlePath& path) {
+  const Pose end = c.obstacle->at(1);
+  const Real below = c.height - c.normal.dot(end.point_to_body(path.end));
+  if (below > 0) path.end += below * end.vector_to_world(c.normal);
+}
+
+PlaneAtEnd::PlaneAtEnd(const ObstacleHit& hit) {
+  const Pose then = hit.obstacle->at(hit.fraction), end = hit.obstacle->at(1);
+  origin = end.point_to_world(then.point_to_body(hit.position));
+  normal = end.vector_to_world(then.vector_to_body(hit.normal));
 }
 
 Vec3 collision_impulse(const Obstacle& o, Real fraction, Real particle_mass, const Vec3& u, const Vec3& n,

@@ -57,6 +57,14 @@ struct ObstacleHit {
   Vec3 normal;        ///< normal of the obstacle
 };
 
+/// The plane in which a particle touches an obstacle, moved with the obstacle to the end of the sub-step.
+struct PlaneAtEnd {
+  explicit PlaneAtEnd(const ObstacleHit& hit);
+  /// Height of a point above the plane [m]; 0 for a particle's centre at the hit.
+  Real height(const Vec3& point) const { return normal.dot(point - origin); }
+  Vec3 origin, normal;
+};
+
 /// Returns the impulse on a particle [N s] that hits an obstacle at a fraction of the sub-step (physics P5,
 /// P8). `u`: velocity relative to the solid, u.n < 0; for friction, the velocity relative to the conveyed
 /// surface counts (Obstacle::surface_velocity). `mobility`: mobility of the obstacle at the contact [1/kg];
@@ -69,13 +77,42 @@ Vec3 collision_impulse(const Obstacle& o, Real fraction, Real particle_mass, con
 /// fraction of the sub-step.
 Reaction reaction(const Obstacle& o, const Vec3& contact, Real fraction, const Vec3& impulse_on_particle);
 
+/// Path of a sphere's centre from a fraction of the sub-step to its end.
+class SpherePath {
+ public:
+  /// A path from a to b, which is straight in the frame of `carrier` or, if it is null, in the world. A
+  /// particle that rests on a turning body or slides along it stays on its surface only in the body's frame.
+  SpherePath(const Vec3& a, const Vec3& b, Real from, const Obstacle* carrier = nullptr);
+
+  /// Position after a fraction of the path.
+  Vec3 at(Real fraction) const;
+  /// Position after a fraction of the path, in the frame of an obstacle.
+  Vec3 in_frame(const Obstacle& o, Real fraction) const;
+  /// Returns the number of pieces that are almost straight in the frame of an obstacle; see Obstacle::pieces.
+  int pieces(const Obstacle& o, Real radius) const;
+  /// Returns by how much the path deviates from its chord, at most [m].
+  Real bend() const;
+  /// Returns the fraction of the sub-step at a fraction of the path.
+  Real time(Real fraction) const { return from_ + fraction * (1 - from_); }
+
+  const Vec3& first() const { return a_; }
+  const Vec3& last() const { return b_; }
+
+ private:
+  Vec3 a_, b_;
+  Real from_;
+  const Obstacle* carrier_;
+  Vec3 local_a_ = Vec3::Zero(), local_b_ = Vec3::Zero();  ///< in the frame of the carrier
+};
+
 /// The obstacles near one particle's path.
 class NearObstacles {
  public:
   NearObstacles(const Obstacles& fixed, const Obstacles& moving) : fixed_(fixed), moving_(moving) {}
 
   /// Finds the obstacles that a sphere may touch on its path from a to b.
-  void find(const Vec3& a, const Vec3& b, Real radius);
+  void find(const Vec3& a, const Vec3& b, Real radius) { find(SpherePath(a, b, 0), radius); }
+  void find(const SpherePath& path, Real radius);
   std::span<const Obstacle* const> all() const { return near_; }
 
   /// Projects a sphere out of the bodies that contain it, along the nearest face (P4). `start` is its
@@ -83,13 +120,11 @@ class NearObstacles {
   /// fails. `deep` is set if the sphere was deeper inside than errors of rounding and of straight paths can
   /// explain. find() must have been called for `start` and `end`.
   bool eject(Vec3& start, Vec3& end, Real radius, Real fraction, bool& deep);
-  /// Returns the first hit of a sphere on its path from a, at a fraction of the sub-step, to b at its end,
-  /// among the obstacles found.
-  ObstacleHit first_hit(const Vec3& a, const Vec3& b, Real radius, Real from) const;
+  /// Returns the first hit of a sphere on its path, among the obstacles found.
+  ObstacleHit first_hit(const SpherePath& path, Real radius) const;
   /// Returns the hit of a sphere with one obstacle. ObstacleHit::obstacle is null if there is no hit before
   /// `latest`, a fraction of the sub-step.
-  static ObstacleHit hit(const Obstacle& o, const Vec3& a, const Vec3& b, Real radius, Real from,
-                         Real latest);
+  static ObstacleHit hit(const Obstacle& o, const SpherePath& path, Real radius, Real latest);
 
  private:
   const Obstacles& fixed_;
@@ -114,19 +149,24 @@ class ParticleSweep {
  private:
   /// A surface against which the particle presses until the end of the sub-step.
   struct Contact {
-    Vec3 normal;
+    Vec3 normal;  // in the obstacle's frame
     const Obstacle* obstacle;
     Real friction;
     Real fraction;  // start of the contact
+    Real height;    // of the particle's centre along the normal, in the obstacle's frame [m]
     /// Whether the obstacle was hit and will move away only in the next sub-step. Until then it blocks the
     /// particle.
     bool gives_way;
+
+    Vec3 normal_at(Real time) const { return obstacle->at(time).vector_to_world(normal); }
   };
 
   bool was_struck(const Obstacle& o) const;
   bool respond(ParticlePath& path, const ObstacleHit& hit, Real from, const Vec3& extra,
                SweepOutcome& outcome);
   void finish(ParticlePath& path, Real duration, const Vec3& extra);
+  void stay_before(const Contact& contact, ParticlePath& path, Real duration, const Vec3& extra) const;
+  static void stay_above(const Contact& contact, ParticlePath& path);
   void add_contact(const Contact& contact);
   Vec3 fly(const Vec3& v, Real mass, Real duration, const Vec3& extra) const;
 
@@ -135,6 +175,8 @@ class ParticleSweep {
   Real h_;
   SweepLog& log_;
   BodyImpulses* impulses_;
+  /// The turning obstacle in whose frame the rest of the path is straight; null: none.
+  const Obstacle* carrier_ = nullptr;
   std::size_t reactions_before_finish_ = 0;
   std::array<Contact, 4> contacts_;
   std::size_t contact_count_ = 0;

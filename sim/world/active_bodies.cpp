@@ -188,10 +188,11 @@ void ActiveBodies::put_to_sleep(std::span<const Island> islands, Real start, Rea
     // A body in an island that is driven is not at rest. A body without support is quiet only for a moment,
     // at the top of its flight.
     if (!quiet || is_driven(island, start + h)) continue;
-    const bool pushed = std::any_of(island.pairs.begin(), island.pairs.end(), [](const ContactPair* pair) {
-      const Body& other = pair->a().is_awake() ? pair->b() : pair->a();
-      return (other.is_kinematic() && other.def.track.moves()) || pair->surface().conveys;
-    });
+    const bool pushed =
+        std::any_of(island.pairs.begin(), island.pairs.end(), [start](const ContactPair* pair) {
+          const Body& other = pair->a().is_awake() ? pair->b() : pair->a();
+          return (other.is_kinematic() && other.def.track.moves_after(start)) || pair->surface().conveys;
+        });
     if (pushed) continue;
     watch_springs(island.bodies);
     for (Body* body : island.bodies) {

@@ -7,6 +7,7 @@
 #include "effects/cloth.h"
 #include "meshes.h"
 #include "sim/cloth/cloth_state.h"
+#include "sim/core/rotation.h"
 #include "sim/world.h"
 
 namespace offstage::sim {
@@ -326,6 +327,62 @@ TEST(ClothPins, AClothOnABodyTransmitsImpactsToIt) {
   const Vec3 sum =
       kMass * world.body(ball).velocity + 2 * world.body(frame).velocity + momentum(def, world.cloth(cloth));
   EXPECT_LT((sum - Vec3(0, -kSpeed * kMass, 0)).norm(), 0.02 * kSpeed * kMass);
+}
+
+/// Adds up the rotation of a body by its angular velocity, and returns how far its orientation is from it
+/// [rad].
+class TurnError {
+ public:
+  explicit TurnError(const BodyState& body)
+      : expected_(body.pose.orientation), last_(body.angular_velocity) {}
+  Real after(const BodyState& body, Real duration) {
+    expected_ = rotation((last_ + body.angular_velocity) / 2, duration) * expected_;
+    last_ = body.angular_velocity;
+    return expected_.angularDistance(body.pose.orientation);
+  }
+
+ private:
+  Quat expected_;
+  Vec3 last_;
+};
+
+// The pins move with the ball's surface. If they stayed behind, their torque would spin the ball up.
+TEST(ClothPins, ABallOnAStripGainsNoEnergyAndTurnsByItsAngularVelocity) {
+  for (const Real step : {1.0 / 240, 1.0 / 60}) {
+    World world({.max_step = step});
+    const BodyHandle ball = world.add_body({.shape = Sphere{0.05}, .pose = {{0, 0, 0.55}}, .mass = 1});
+    ClothDef def = effects::grid_cloth({0.1, 1, 2, 10}, {}, cotton());
+    for (uint32_t i = 0; i < def.vertices.size(); ++i) {
+      if (def.vertices[i].z() < -0.499) def.pins.push_back({.vertex = i, .position = def.vertices[i]});
+      if (def.vertices[i].z() > 0.499)
+        def.pins.push_back({.vertex = i, .body = ball, .position = def.vertices[i] - Vec3(0, 0, 0.55)});
+    }
+    world.add_cloth(def);
+    const Real first = world.energy().total();
+    TurnError error(world.body(ball));
+    for (int i = 0; i < 2 / step; ++i) {
+      world.step(step);
+      ASSERT_LT(world.energy().total(), first + 1e-3 * 9.81) << step << " " << world.time();
+      ASSERT_LT(error.after(world.body(ball), step), 0.2) << step << " " << world.time();
+    }
+  }
+}
+
+TEST(ClothTrampoline, ABallThatSpinsOnItTurns) {
+  World world({.max_step = 1.0 / 240});
+  constexpr uint32_t kCells = 12;
+  ClothDef def = effects::grid_cloth({1, 1, kCells, kCells}, {}, cotton());
+  for (uint32_t i = 0; i <= kCells; ++i)
+    for (uint32_t k : {i, kCells * (kCells + 1) + i, (kCells + 1) * i, (kCells + 1) * i + kCells})
+      def.pins.push_back({.vertex = k, .position = def.vertices[k]});
+  world.add_cloth(def);
+  const BodyHandle ball = world.add_body(
+      {.shape = Sphere{0.1}, .pose = {{0, 0.11, 0}}, .angular_velocity = {0, 6, 0}, .mass = 1});
+  TurnError error(world.body(ball));
+  for (int i = 0; i < 240; ++i) {
+    world.step(1.0 / 240);
+    ASSERT_LT(error.after(world.body(ball), 1.0 / 240), 0.05) << world.time();
+  }
 }
 
 }  // namespace

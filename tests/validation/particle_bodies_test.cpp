@@ -2,6 +2,7 @@
 /// (physics P8, A3), compared with closed forms and invariants.
 
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <vector>
 
@@ -181,6 +182,47 @@ TEST(ParticlesAndBodies, AConveyorCarriesParticles) {
         EXPECT_NEAR(w.particles(system).position[0].x(), speed * (2 - takes / 2), speed * step / 2);
         EXPECT_NEAR(w.particles(system).position[0].y(), kRadius, 1e-6);
       }
+}
+
+/// Keys of a tray that moves by 2 m to the right and up, and tilts by `tilt` [rad] within `duration`.
+KeyframeTrack tilting(Real tilt, Real duration) {
+  KeyframeTrack track;
+  track.keys = {{0, {Vec3::Zero(), Quat::Identity()}},
+                {duration, {Vec3(2, 2, 0), Quat(Eigen::AngleAxisd(tilt, Vec3::UnitZ()))}}};
+  return track;
+}
+
+// The floor moves on an arc, so in its frame the straight paths of resting particles end below it. Particles
+// without friction must stay on it as well. Particles that push each other against a wall may enter the floor
+// by a tenth of their radius.
+TEST(ParticlesAndBodies, ATrayThatMovesAndTurnsKeepsItsGrains) {
+  constexpr Real kRadius = 0.03;
+  for (const Real step : {1.0 / 240, 1.0 / 60})
+    for (const bool internal : {false, true})
+      for (const auto& [degrees, duration] : {std::pair{20, 1.0}, {20, 0.25}, {60, 0.5}})
+        for (const Real friction : {0.0, 0.5}) {
+          World w({.max_step = step});
+          const MeshHandle mesh = w.add_compound({solid_mesh(OpenBox{{0.6, 0.3, 0.6}, 0.03})});
+          const auto tray = w.add_body({.shape = MeshShape{mesh},
+                                        .motion = MotionType::kinematic,
+                                        .restitution = 0,
+                                        .friction = friction,
+                                        .track = tilting(degrees * std::numbers::pi / 180, duration)});
+          const auto system = w.add_particle_system({.internal = internal});
+          for (const Real x : {-0.2, -0.05, 0.1})
+            w.add_particle(system, {.position = {x, -0.09, 0},
+                                    .mass = 0.1,
+                                    .radius = kRadius,
+                                    .restitution = 0.1,
+                                    .friction = friction});
+          for (Real t = 0; t < 1.2 * duration; t += 1.0 / 60) {
+            const StepReport r = w.step(1.0 / 60);
+            EXPECT_EQ(r.particles.truncated, 0);
+            const Pose pose = w.body(tray).pose;
+            for (const Vec3& p : w.particles(system).position)
+              EXPECT_GT(pose.point_to_body(p).y(), -0.12 + kRadius - (internal ? 0.1 * kRadius : 1e-9));
+          }
+        }
 }
 
 // A step of a fifth of the radius is no seam: without restitution, the particle loses the part of its

@@ -53,6 +53,23 @@ TEST_P(Sleep, ASettledStackCostsNothing) {
   EXPECT_NE(before, StateHash{});
 }
 
+TEST_P(Sleep, ABodyOnALiftThatHasStoppedSleeps) {
+  WorldDef sleepy = def();
+  sleepy.sleep = true;
+  World world(sleepy);
+  KeyframeTrack track;
+  track.keys = {{0, {Vec3::Zero()}}, {1, {Vec3(0, 0.5, 0)}}};
+  world.add_body(
+      {.shape = Box{{1, 0.2, 1}}, .motion = MotionType::kinematic, .restitution = 0, .track = track});
+  const BodyHandle box =
+      world.add_body({.shape = Box{Vec3::Constant(0.2)}, .pose = {Vec3(0, 0.2, 0)}, .restitution = 0});
+  run(world, 0.9);
+  EXPECT_FALSE(world.is_asleep(box));
+  run(world, 1.1);
+  EXPECT_TRUE(world.is_asleep(box));
+  EXPECT_NEAR(world.body(box).centre.y(), 0.7, 1e-6);
+}
+
 TEST_P(Sleep, AnImpactWakesIt) {
   Scene s = sleeping_stack();
   s.world.add_body({.shape = Sphere{0.1}, .pose = {Vec3(-1.1, 1, 0)}, .velocity = {6, 1, 0}});
