@@ -15,6 +15,8 @@ constexpr Real kSkin = 1e-3;
 /// Greatest number of advances in the search for a hit. The few searches that need more end with a hit that
 /// is early by less than the last advance.
 constexpr int kMaxAdvances = 48;
+/// Greatest number of triangles, one after the other, that take a stopped particle along in a sub-step.
+constexpr int kMaxCarriers = 16;
 
 Vec3 unit_normal(const Vec3& a, const Vec3& b, const Vec3& c) {
   return (b - a).cross(c - a).stableNormalized();
@@ -31,15 +33,16 @@ void ClothObstacles::clear() {
   cloths_.clear();
 }
 
-void ClothObstacles::add(std::span<const Vec3> from, std::span<const Vec3> to, std::span<const Vec3> velocities,
-                         std::span<const Real> inverse_masses, std::span<const Triangle> triangles,
-                         Real friction) {
+void ClothObstacles::add(std::span<const Vec3> from, std::span<const Vec3> to,
+                         std::span<const Vec3> velocities, std::span<const Real> inverse_masses,
+                         std::span<const Triangle> triangles, Real friction) {
   const auto first = static_cast<uint32_t>(from_.size()), cloth = static_cast<uint32_t>(cloths_.size());
   from_.insert(from_.end(), from.begin(), from.end());
   to_.insert(to_.end(), to.begin(), to.end());
   velocity_.insert(velocity_.end(), velocities.begin(), velocities.end());
   inverse_mass_.insert(inverse_mass_.end(), inverse_masses.begin(), inverse_masses.end());
-  for (const Triangle& t : triangles) triangles_.push_back({{t[0] + first, t[1] + first, t[2] + first}, cloth});
+  for (const Triangle& t : triangles)
+    triangles_.push_back({{t[0] + first, t[1] + first, t[2] + first}, cloth});
   cloths_.push_back({first, friction});
 }
 
@@ -60,7 +63,8 @@ Real ClothObstacles::kept_distance(Real radius) {
 /// Conservative advancement: the triangle is behind the plane through its nearest point and perpendicular to
 /// the line to the particle's centre, and each corner moves straight. So the centre is at least as far from
 /// the triangle as from the planes through the corners that are parallel to this one.
-std::optional<ClothObstacles::Hit> ClothObstacles::hit(uint32_t triangle, const Path& path, Real latest) const {
+std::optional<ClothObstacles::Hit> ClothObstacles::hit(uint32_t triangle, const Path& path,
+                                                       Real latest) const {
   const Triangle& corners = triangles_[triangle].corners;
   Real t = path.from, reach = path.radius, margin = kSkin / 2 * path.radius;
   for (int i = 0; i <= kMaxAdvances; ++i) {
@@ -69,8 +73,7 @@ std::optional<ClothObstacles::Hit> ClothObstacles::hit(uint32_t triangle, const 
     const Vec3 p = path.at(t);
     const TrianglePoint nearest = closest_on_triangle(p, at[0], at[1], at[2]);
     Vec3 rate = path.rate;
-    for (std::size_t k = 0; k < 3; ++k)
-      rate -= nearest.weights[k] * (to_[corners[k]] - from_[corners[k]]);
+    for (std::size_t k = 0; k < 3; ++k) rate -= nearest.weights[k] * (to_[corners[k]] - from_[corners[k]]);
     const Vec3 apart = p - nearest.point;
     const Real distance = apart.norm();
     Vec3 n = apart / distance;
@@ -97,8 +100,8 @@ std::optional<ClothObstacles::Hit> ClothObstacles::hit(uint32_t triangle, const 
   return {};
 }
 
-std::optional<ClothObstacles::Hit> ClothObstacles::first_hit(const Vec3& a, const Vec3& b, Real radius, Real from,
-                                                             Real latest) const {
+std::optional<ClothObstacles::Hit> ClothObstacles::first_hit(const Vec3& a, const Vec3& b, Real radius,
+                                                             Real from, Real latest) const {
   if (!(from < 1)) return {};
   Aabb around(a.cwiseMin(b), a.cwiseMax(b));
   around.min().array() -= (1 + kSkin) * radius;
@@ -110,6 +113,19 @@ std::optional<ClothObstacles::Hit> ClothObstacles::first_hit(const Vec3& a, cons
     if (auto found = hit(k, path, first ? first->fraction : latest)) first = found;
   });
   return first;
+}
+
+Vec3 ClothObstacles::held_end(const Vec3& a, const Vec3& b, Real radius, Real from) const {
+  Vec3 start = a, end = b;
+  for (int k = 0; k < kMaxCarriers; ++k) {
+    const auto hit = first_hit(start, end, radius, from, 1);
+    if (!hit) break;
+    start = hit->position;
+    end = carried(*hit);
+    from = hit->fraction;
+    radius /= 2;
+  }
+  return end;
 }
 
 bool ClothObstacles::separates(const Vec3& a, const Vec3& b, Real fraction) const {
@@ -135,7 +151,8 @@ Vec3 ClothObstacles::displacement(const Hit& hit) const {
 
 Vec3 ClothObstacles::carried(const Hit& hit) const {
   const Triangle& t = triangles_[hit.triangle].corners;
-  const Vec3 before = unit_normal(corner(t[0], hit.fraction), corner(t[1], hit.fraction), corner(t[2], hit.fraction)),
+  const Vec3 before = unit_normal(corner(t[0], hit.fraction), corner(t[1], hit.fraction),
+                                  corner(t[2], hit.fraction)),
              after = unit_normal(to_[t[0]], to_[t[1]], to_[t[2]]);
   const Quat turn = Quat::FromTwoVectors(before, after);
   return hit.position - hit.distance * hit.normal + displacement(hit) + hit.distance * (turn * hit.normal);

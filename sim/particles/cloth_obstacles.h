@@ -1,7 +1,7 @@
 #pragma once
 /// The cloths with which particles collide during one sub-step (physics F9). The corners of a triangle move
-/// straight from their positions at the start of the sub-step to those at its end. Impulses of particles change
-/// the velocities of the corners, which move with them from the next sub-step on.
+/// straight from their positions at the start of the sub-step to those at its end. Impulses of particles
+/// change the velocities of the corners, which move with them from the next sub-step on.
 
 #include <cstdint>
 #include <optional>
@@ -35,9 +35,14 @@ class ClothObstacles {
   bool empty() const { return triangles_.empty(); }
 
   /// Returns the first hit of a sphere whose centre moves straight from a, at the fraction `from` of the
-  /// sub-step, to b at its end; empty if there is none before the fraction `latest`. A sphere that is closer to
-  /// a triangle than its radius at first hits it at once if it approaches, and otherwise comes hardly closer.
+  /// sub-step, to b at its end; empty if there is none before the fraction `latest`. A sphere that is closer
+  /// to a triangle than its radius at first hits it at once if it approaches, and otherwise comes hardly
+  /// closer.
   std::optional<Hit> first_hit(const Vec3& a, const Vec3& b, Real radius, Real from, Real latest) const;
+  /// Returns the end of the path of a particle that must not pass cloth: b, or the place to which the first
+  /// triangle that it meets takes it along. Where several layers of cloth close on it, it comes as close to
+  /// them as necessary.
+  Vec3 held_end(const Vec3& a, const Vec3& b, Real radius, Real from) const;
   /// Returns whether the centre of a particle passes cloth on a straight line at a fraction of the sub-step.
   bool separates(const Vec3& a, const Vec3& b, Real fraction) const;
   /// Returns the distance at which particles of a radius are kept from cloth [m].
@@ -78,7 +83,9 @@ class ClothObstacles {
     Vec3 at(Real fraction) const { return start + (fraction - from) * rate; }
   };
 
-  Vec3 corner(uint32_t point, Real fraction) const { return from_[point] + fraction * (to_[point] - from_[point]); }
+  Vec3 corner(uint32_t point, Real fraction) const {
+    return from_[point] + fraction * (to_[point] - from_[point]);
+  }
   std::optional<Hit> hit(uint32_t triangle, const Path& path, Real latest) const;
 
   Real h_ = 0;

@@ -15,6 +15,8 @@ namespace {
 /// to rounding, does not hit it.
 constexpr Real kSkin = 1e-10;
 constexpr int kMaxHits = 8;
+/// The part of a particle's radius around its centre that must not pass cloth in any case.
+constexpr Real kNarrow = 1e-3;
 /// Greatest number of projections out of bodies; each removes one layer of overlapping bodies.
 constexpr int kMaxEjections = 4;
 /// Overlaps up to this fraction of the particle's radius can be caused by dividing paths around turning
@@ -31,6 +33,16 @@ bool is_clear(const Solid& solid, const Vec3& centre, Real radius) {
 }  // namespace
 
 SweepOutcome ParticleSweep::operator()(ParticlePath& path, Real born, const Vec3& extra) {
+  const Vec3 start = path.start;
+  const SweepOutcome outcome = sweep(path, born, extra);
+  // Where bodies and several layers of cloth push a particle, its centre still stays on its side of the
+  // cloth.
+  if (cloths_ && outcome.hit && !outcome.strikes_body)
+    path.end = cloths_->held_end(start, path.end, kNarrow * path.radius, born);
+  return outcome;
+}
+
+SweepOutcome ParticleSweep::sweep(ParticlePath& path, Real born, const Vec3& extra) {
   SweepOutcome outcome;
   contact_count_ = 0;
   cloth_contact_count_ = 0;
@@ -58,7 +70,7 @@ SweepOutcome ParticleSweep::operator()(ParticlePath& path, Real born, const Vec3
     from = cloth ? cloth->fraction : hit.fraction;
   }
   outcome.truncated = true;
-  stop(path, from);
+  path.end = cloths_ ? cloths_->held_end(path.start, path.start, path.radius, from) : path.start;
   return outcome;
 }
 
@@ -71,18 +83,6 @@ bool ParticleSweep::eject(ParticlePath& path, Real born, SweepOutcome& outcome) 
   path.start = start;
   path.end = end;
   return true;
-}
-
-/// Stops a particle that has reached the limit of collisions at its last one. Cloth takes it along.
-void ParticleSweep::stop(ParticlePath& path, Real from) const {
-  path.end = path.start;
-  for (int hits = 0; cloths_ && hits < kMaxHits; ++hits) {
-    const auto hit = cloths_->first_hit(path.start, path.end, path.radius, from, 1);
-    if (!hit) return;
-    path.end = cloths_->carried(*hit);
-    path.start = hit->position;
-    from = hit->fraction;
-  }
 }
 
 void NearObstacles::find(const Vec3& a, const Vec3& b, Real radius) {
@@ -293,7 +293,8 @@ void ParticleSweep::keep_off_cloth(ParticlePath& path, const Vec3& extra) {
     bool behind_any = false;
     for (const ClothContact& c : cloth_contacts()) {
       const Vec3 at = c.hit.position - c.hit.distance * c.hit.normal + cloths_->displacement(c.hit);
-      const Real behind = ClothObstacles::kept_distance(path.radius) - c.hit.normal.dot(path.end + shift - at);
+      const Real behind =
+          ClothObstacles::kept_distance(path.radius) - c.hit.normal.dot(path.end + shift - at);
       if (behind > 0) shift += behind * c.hit.normal;
       behind_any |= behind > 0;
     }
@@ -301,8 +302,8 @@ void ParticleSweep::keep_off_cloth(ParticlePath& path, const Vec3& extra) {
   }
   if (shift.isZero(0)) return;
   path.end += shift;
-  path.end_velocity = velocity_after_shift(
-      path.end_velocity, forces_.acceleration(path.end_velocity, path.mass) + extra, shift);
+  path.end_velocity = velocity_after_shift(path.end_velocity,
+                                           forces_.acceleration(path.end_velocity, path.mass) + extra, shift);
 }
 
 /// Adds a contact. If there are too many, the oldest one is dropped, because it is least important at the

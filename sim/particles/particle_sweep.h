@@ -2,8 +2,8 @@
 /// Moves one particle through a sub-step among obstacles (physics P3-P5). The integrated path is swept
 /// against the bodies, in each body's own frame between its poses, so that neither a fast particle nor a
 /// moving body passes through the other. At a hit the particle is placed at the surface and its velocity is
-/// changed by the impulse. It then continues for the remaining time under the same forces. Cloths are obstacles,
-/// too (physics F9).
+/// changed by the impulse. It then continues for the remaining time under the same forces. Cloths are
+/// obstacles, too (physics F9).
 
 #include <array>
 #include <cstdint>
@@ -32,8 +32,8 @@ struct SweepOutcome {
   bool ejected = false;     ///< whether the particle was inside a body and was projected out (P4)
   bool trapped = false;     ///< whether the particle was inside a body and could not be projected out (P4)
   bool truncated = false;   ///< whether the particle reached the limit of collisions
-  /// Whether the particle hits a dynamic body or cloth at the fraction `time`, and its path was therefore left
-  /// unchanged; see ParticleSweep().
+  /// Whether the particle hits a dynamic body or cloth at the fraction `time`, and its path was therefore
+  /// left unchanged; see ParticleSweep().
   bool strikes_body = false;
   Real time = 0;  ///< time of that hit, as a fraction of the sub-step
 };
@@ -103,9 +103,9 @@ class NearObstacles {
 class ParticleSweep {
  public:
   /// `fixed` and `moving` are the obstacles of a sub-step of length h [s]; `cloths` may be null. With
-  /// `impulses`, each hit of a dynamic body or of cloth changes its velocity immediately, so particles must be
-  /// swept one after the other. Without `impulses`, particles can be swept in parallel; those that hit a dynamic
-  /// body or cloth are left unchanged and reported by SweepOutcome::strikes_body.
+  /// `impulses`, each hit of a dynamic body or of cloth changes its velocity immediately, so particles must
+  /// be swept one after the other. Without `impulses`, particles can be swept in parallel; those that hit a
+  /// dynamic body or cloth are left unchanged and reported by SweepOutcome::strikes_body.
   ParticleSweep(const Obstacles& fixed, const Obstacles& moving, ClothObstacles* cloths,
                 const ParticleForces& forces, Real h, SweepLog& log, BodyImpulses* impulses = nullptr)
       : near_(fixed, moving),
@@ -138,6 +138,7 @@ class ParticleSweep {
     Vec3 impulse = Vec3::Zero();  // on the particle after the hit, not yet applied to the cloth [N s]
   };
 
+  SweepOutcome sweep(ParticlePath& path, Real born, const Vec3& extra);
   bool was_struck(const Obstacle& o) const;
   bool eject(ParticlePath& path, Real born, SweepOutcome& outcome);
   Vec3 arrival(const ParticlePath& path, const Vec3& position, Real duration, const Vec3& extra) const;
@@ -146,7 +147,6 @@ class ParticleSweep {
   void add_contact(const ClothContact& contact);
   bool press_cloth(ClothContact& contact, Vec3& v, Real mass, Real friction) const;
   void keep_off_cloth(ParticlePath& path, const Vec3& extra);
-  void stop(ParticlePath& path, Real from) const;
   bool respond(ParticlePath& path, const ObstacleHit& hit, Real from, const Vec3& extra,
                SweepOutcome& outcome);
   void finish(ParticlePath& path, Real duration, const Vec3& extra);

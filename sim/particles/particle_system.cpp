@@ -234,28 +234,29 @@ ParticleTally ParticleSystem::step(const ParticleStage& stage, const ParticleFor
   std::vector<std::vector<Striker>> strikers(tallies.size());
   fly_each(stage, forces, coupled, [&](std::size_t chunk) {
     logs[chunk].wants_strikes = def.report_collisions;
-    return [&, chunk, &log = logs[chunk],
-            obstacles = ParticleSweep(stage.fixed, stage.moving, &stage.cloths, forces, stage.h, logs[chunk])](
-               std::size_t i, const Flight& flight, bool integrated) mutable {
-      ParticleTally& tally = tallies[chunk];
-      arrays.age[i] += flight.duration;
-      if (is_lost(i, flight, tally)) {
-        fate_[i] = Fate::dead;
-        return;
-      }
-      SweepOutcome outcome;
-      if (def.collides && flight.duration > 0) {
-        const std::size_t reactions = log.reactions.size();
-        outcome = sweep(stage, forces, obstacles, i, flight, integrated);
-        if (outcome.strikes_body) {
-          log.reactions.resize(reactions);
-          log.strikes.clear();
-          strikers[chunk].push_back({outcome.time, i, flight, integrated});
-          return;
-        }
-      }
-      finish_sweep(stage, i, outcome, log, tally);
-    };
+    return
+        [&, chunk, &log = logs[chunk],
+         obstacles = ParticleSweep(stage.fixed, stage.moving, &stage.cloths, forces, stage.h, logs[chunk])](
+            std::size_t i, const Flight& flight, bool integrated) mutable {
+          ParticleTally& tally = tallies[chunk];
+          arrays.age[i] += flight.duration;
+          if (is_lost(i, flight, tally)) {
+            fate_[i] = Fate::dead;
+            return;
+          }
+          SweepOutcome outcome;
+          if (def.collides && flight.duration > 0) {
+            const std::size_t reactions = log.reactions.size();
+            outcome = sweep(stage, forces, obstacles, i, flight, integrated);
+            if (outcome.strikes_body) {
+              log.reactions.resize(reactions);
+              log.strikes.clear();
+              strikers[chunk].push_back({outcome.time, i, flight, integrated});
+              return;
+            }
+          }
+          finish_sweep(stage, i, outcome, log, tally);
+        };
   });
   std::vector<Striker> all;
   for (std::size_t chunk = 0; chunk < logs.size(); ++chunk) {
@@ -266,8 +267,8 @@ ParticleTally ParticleSystem::step(const ParticleStage& stage, const ParticleFor
   return sum_up(tallies);
 }
 
-/// Processes the particles that hit dynamic bodies or cloth in sequence, in the order of time. Each particle hits a
-/// body whose velocity includes the previous impulses.
+/// Processes the particles that hit dynamic bodies or cloth in sequence, in the order of time. Each particle
+/// hits a body whose velocity includes the previous impulses.
 void ParticleSystem::strike_bodies(const ParticleStage& stage, const ParticleForces& forces,
                                    std::vector<Striker> strikers, ParticleTally& tally) {
   std::sort(strikers.begin(), strikers.end(), [](const Striker& a, const Striker& b) {
@@ -333,10 +334,10 @@ bool ParticleSystem::meet_cloths(const ParticleStage& stage, const ParticleForce
     const Real approach = -u.dot(hit->normal);
     const Real gain = -stage.h * forces.acceleration(v, mass).dot(hit->normal);
     if (approach > 0) {
-      const Real restitution =
-          2 * arrays.restitution[i] * approach < gain ? 0 : arrays.restitution[i];
-      const Vec3 impulse = collision_impulse(1 / (1 / mass + cloths.mobility(*hit)), u, hit->normal, restitution,
-                                             std::sqrt(arrays.friction[i] * cloths.friction(*hit)));
+      const Real restitution = 2 * arrays.restitution[i] * approach < gain ? 0 : arrays.restitution[i];
+      const Vec3 impulse =
+          collision_impulse(1 / (1 / mass + cloths.mobility(*hit)), u, hit->normal, restitution,
+                            std::sqrt(arrays.friction[i] * cloths.friction(*hit)));
       v += impulse / mass;
       cloths.push(*hit, -impulse);
     }
@@ -347,7 +348,7 @@ bool ParticleSystem::meet_cloths(const ParticleStage& stage, const ParticleForce
         tally.events.push_back(collision_event(stage, i, {hit->fraction, hit->position, v, hit->normal}));
     }
     if (hits + 1 == kMostClothHits) {
-      end = cloths.carried(*hit);
+      end = cloths.held_end(hit->position, hit->position, radius, hit->fraction);
       ++tally.truncated;
       return touches;
     }

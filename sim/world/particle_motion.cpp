@@ -78,7 +78,8 @@ void ParticleMotion::gather_cloths(Real h) {
     for (std::size_t i = 0; moves && i < cloth->points.size(); ++i) inverse_masses[i] = 1 / cloth->masses[i];
     for (const ClothPin& pin : cloth->pins) inverse_masses[pin.vertex] = 0;
     const std::vector<Vec3>& before = moves ? cloth->before : cloth->points;
-    cloths_.add(before, cloth->points, cloth->velocities, inverse_masses, cloth->triangles, cloth->def.friction);
+    cloths_.add(before, cloth->points, cloth->velocities, inverse_masses, cloth->triangles,
+                cloth->def.friction);
   });
   cloths_.build(h);
 }

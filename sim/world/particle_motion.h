@@ -1,6 +1,6 @@
 #pragma once
-/// Motion of particles through a sub-step, among bodies and cloths that have moved through it, and their collisions
-/// (physics P3-P8).
+/// Motion of particles through a sub-step, among bodies and cloths that have moved through it, and their
+/// collisions (physics P3-P8).
 
 #include <vector>
 
