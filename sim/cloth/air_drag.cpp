@@ -13,7 +13,7 @@ namespace {
 constexpr Real kMostChange = 0.1;
 /// Longest time for which a linearisation is kept, because normals turn [s]; and the greatest angle by which
 /// a triangle may turn in this time [rad]. Lift with an old normal does work on the rotation.
-constexpr Real kLongestHold = 1.0 / 240, kMostTurn = 0.25;
+constexpr Real kLongestHold = 1.0 / 240, kHeldTurn = 0.25;
 /// Number of triangles at a point of a regular mesh.
 constexpr Real kValence = 6;
 
@@ -53,7 +53,7 @@ uint32_t AirDrag::substeps_until_change(const ClothPoints& points, Real dt) cons
         std::max(turning2, (points.velocity[first_ + s.a] - points.velocity[first_ + s.b]).squaredNorm() /
                                (s.rest_length * s.rest_length));
   Real hold = std::min(kLongestHold, rate > 0 ? kMostChange / rate : kLongestHold);
-  if (turning2 > 0) hold = std::min(hold, kMostTurn / std::sqrt(turning2));
+  if (turning2 > 0) hold = std::min(hold, kHeldTurn / std::sqrt(turning2));
   return static_cast<uint32_t>(std::max(1.0, std::floor(hold / dt * (1 + 1e-9))));
 }
 

@@ -11,14 +11,14 @@ namespace {
 
 /// Particles are kept from cloth at their radius and this fraction of it. A hit is detected at half of this
 /// distance, so a particle that slides along flat cloth does not hit it in each sub-step.
-constexpr Real kSkin = 1e-3;
+constexpr Real kClothSkin = 1e-3;
 /// Greatest number of advances in the search for a hit. The few searches that need more end with a hit that
 /// is early by less than the last advance.
-constexpr int kMaxAdvances = 48;
+constexpr int kMaxClothAdvances = 48;
 /// Greatest number of triangles, one after the other, that take a stopped particle along in a sub-step.
 constexpr int kMaxCarriers = 16;
 
-Vec3 unit_normal(const Vec3& a, const Vec3& b, const Vec3& c) {
+Vec3 normal_of(const Vec3& a, const Vec3& b, const Vec3& c) {
   return (b - a).cross(c - a).stableNormalized();
 }
 
@@ -57,7 +57,7 @@ void ClothObstacles::build(Real h) {
 }
 
 Real ClothObstacles::kept_distance(Real radius) {
-  return (1 + kSkin) * radius;
+  return (1 + kClothSkin) * radius;
 }
 
 /// Conservative advancement: the triangle is behind the plane through its nearest point and perpendicular to
@@ -66,8 +66,8 @@ Real ClothObstacles::kept_distance(Real radius) {
 std::optional<ClothObstacles::Hit> ClothObstacles::hit(uint32_t triangle, const Path& path,
                                                        Real latest) const {
   const Triangle& corners = triangles_[triangle].corners;
-  Real t = path.from, reach = path.radius, margin = kSkin / 2 * path.radius;
-  for (int i = 0; i <= kMaxAdvances; ++i) {
+  Real t = path.from, reach = path.radius, margin = kClothSkin / 2 * path.radius;
+  for (int i = 0; i <= kMaxClothAdvances; ++i) {
     std::array<Vec3, 3> at;
     for (std::size_t k = 0; k < 3; ++k) at[k] = corner(corners[k], t);
     const Vec3 p = path.at(t);
@@ -78,11 +78,11 @@ std::optional<ClothObstacles::Hit> ClothObstacles::hit(uint32_t triangle, const 
     const Real distance = apart.norm();
     Vec3 n = apart / distance;
     if (!(distance > 1e-9 * path.radius)) {
-      n = unit_normal(at[0], at[1], at[2]);
+      n = normal_of(at[0], at[1], at[2]);
       if (n.dot(rate) > 0) n = -n;
     }
-    if (distance <= reach + margin || i == kMaxAdvances) {
-      if (rate.dot(n) < 0 || i == kMaxAdvances)
+    if (distance <= reach + margin || i == kMaxClothAdvances) {
+      if (rate.dot(n) < 0 || i == kMaxClothAdvances)
         return Hit{triangle, t, p, n, distance, {nearest.weights[0], nearest.weights[1], nearest.weights[2]}};
       if (distance < path.radius + margin) {  // it moves away, and may only come back to nearly this distance
         reach = std::min(reach, distance - std::min(2 * margin, distance / 2));
@@ -104,8 +104,8 @@ std::optional<ClothObstacles::Hit> ClothObstacles::first_hit(const Vec3& a, cons
                                                              Real from, Real latest) const {
   if (!(from < 1)) return {};
   Aabb around(a.cwiseMin(b), a.cwiseMax(b));
-  around.min().array() -= (1 + kSkin) * radius;
-  around.max().array() += (1 + kSkin) * radius;
+  around.min().array() -= (1 + kClothSkin) * radius;
+  around.max().array() += (1 + kClothSkin) * radius;
   std::optional<Hit> first;
   const Path path{a, (b - a) / (1 - from), from, radius};
   tree_.overlapping(around, [&](uint32_t k) {
@@ -151,9 +151,9 @@ Vec3 ClothObstacles::displacement(const Hit& hit) const {
 
 Vec3 ClothObstacles::carried(const Hit& hit) const {
   const Triangle& t = triangles_[hit.triangle].corners;
-  const Vec3 before = unit_normal(corner(t[0], hit.fraction), corner(t[1], hit.fraction),
-                                  corner(t[2], hit.fraction)),
-             after = unit_normal(to_[t[0]], to_[t[1]], to_[t[2]]);
+  const Vec3 before = normal_of(corner(t[0], hit.fraction), corner(t[1], hit.fraction),
+                                corner(t[2], hit.fraction)),
+             after = normal_of(to_[t[0]], to_[t[1]], to_[t[2]]);
   const Quat turn = Quat::FromTwoVectors(before, after);
   return hit.position - hit.distance * hit.normal + displacement(hit) + hit.distance * (turn * hit.normal);
 }

@@ -12,7 +12,7 @@
 namespace offstage::sim {
 namespace {
 
-ClothDef cotton(Real size, uint32_t cells, const Vec3& place) {
+ClothDef wide_cotton(Real size, uint32_t cells, const Vec3& place) {
   return effects::grid_cloth({size, size, cells, cells}, {place}, effects::find_fabric("cotton")->fabric);
 }
 
@@ -39,7 +39,7 @@ int passed(const Shower& shower, bool pinned, bool internal) {
   World world({.max_step = shower.step});
   world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
   constexpr uint32_t kCells = 20;
-  ClothDef def = cotton(1, kCells, {0, 0.3, 0});
+  ClothDef def = wide_cotton(1, kCells, {0, 0.3, 0});
   if (pinned) pin_border(def, kCells);
   const ClothHandle cloth = world.add_cloth(def);
   const ParticleSystemHandle drops = world.add_particle_system({.name = "drops", .internal = internal});
@@ -117,7 +117,7 @@ TEST(ClothParticles, MeetATriangleAsABodyOfItsMass) {
 TEST(ClothParticles, RestOnAPinnedCloth) {
   World world;
   constexpr uint32_t kCells = 20;
-  ClothDef def = cotton(1, kCells, {0, 0.3, 0});
+  ClothDef def = wide_cotton(1, kCells, {0, 0.3, 0});
   pin_border(def, kCells);
   world.add_cloth(def);
   const ParticleSystemHandle beads = world.add_particle_system({.name = "beads"});

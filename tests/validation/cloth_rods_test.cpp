@@ -12,12 +12,12 @@
 namespace offstage::sim {
 namespace {
 
-constexpr Real kLength = 0.3;
+constexpr Real kRodLength = 0.3;
 
 /// Whether the axis of a rod passes through a triangle of the cloth.
 bool pierces(const World& world, BodyHandle rod, ClothHandle cloth) {
   const BodyState state = world.body(rod);
-  const Vec3 half = kLength / 2 * state.pose.vector_to_world(Vec3::UnitY());
+  const Vec3 half = kRodLength / 2 * state.pose.vector_to_world(Vec3::UnitY());
   const ClothView view = world.cloth(cloth);
   for (const Triangle& t : view.triangles)
     if (segment_intersects_triangle(state.centre - half, state.centre + half,
@@ -52,13 +52,13 @@ void drop_rod(const Shape& shape, Real speed, Real step) {
 }
 
 TEST(ClothUnderARod, StopsARoundEnd) {
-  drop_rod(Capsule{0.005, kLength}, 2, 1.0 / 60);
-  drop_rod(Capsule{0.005, kLength}, 10, 1.0 / 60);
-  drop_rod(Capsule{0.005, kLength}, 10, 1.0 / 240);
+  drop_rod(Capsule{0.005, kRodLength}, 2, 1.0 / 60);
+  drop_rod(Capsule{0.005, kRodLength}, 10, 1.0 / 60);
+  drop_rod(Capsule{0.005, kRodLength}, 10, 1.0 / 240);
 }
 
 TEST(ClothUnderARod, StopsAFlatEnd) {
-  drop_rod(Cylinder{0.005, kLength}, 2, 1.0 / 60);
+  drop_rod(Cylinder{0.005, kRodLength}, 2, 1.0 / 60);
 }
 
 }  // namespace
