@@ -13,7 +13,7 @@ namespace {
 constexpr Real kMostChange = 0.1;
 /// Longest time for which a linearisation is kept, because normals turn [s]; and the greatest angle by which
 /// a triangle may turn in this time [rad]. Lift with an old normal does work on the rotation.
-constexpr Real kLongestHold = 1.0 / 240, kHeldTurn = 0.25;
+constexpr Real kLongestHold = 1.0 / 240, kHeldTurn = 1;
 /// Number of triangles at a point of a regular mesh.
 constexpr Real kValence = 6;
 
