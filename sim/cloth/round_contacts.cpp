@@ -50,7 +50,10 @@ TrianglePoint nearest_to_axis(const Rounding& shape, const std::array<Vec3, 3>& 
 /// over it. The nearest point of the surface would be beside the axis, and the shape would pass.
 std::optional<TriangleContact> passed_by_axis(const Rounding& shape, const Solid& solid,
                                               const std::array<Vec3, 3>& t, Real keeps) {
-  if (!(shape.half > 0)) return {};
+  // The tip of a cone is a corner, which has contacts of its own (corner_contacts.h).
+  const bool is_rod =
+      std::holds_alternative<Capsule>(*solid.shape) || std::holds_alternative<Cylinder>(*solid.shape);
+  if (!is_rod || !(shape.half > 0)) return {};
   // The signed areas of the triangle's projection along the axis, opposite to each corner.
   std::array<Real, 3> w;
   for (std::size_t k = 0; k < 3; ++k) {
