@@ -11,8 +11,9 @@ namespace {
 
 /// A linearisation is kept until the air may have changed the velocities by this fraction.
 constexpr Real kMostChange = 0.1;
-/// Longest time for which a linearisation is kept, because normals turn [s].
-constexpr Real kLongestHold = 1.0 / 240;
+/// Longest time for which a linearisation is kept, because normals turn [s]; and the greatest angle by which
+/// a triangle may turn in this time [rad]. Lift with an old normal does work on the rotation.
+constexpr Real kLongestHold = 1.0 / 240, kHeldTurn = 1;
 /// Number of triangles at a point of a regular mesh.
 constexpr Real kValence = 6;
 
@@ -45,7 +46,14 @@ uint32_t AirDrag::substeps_until_change(const ClothPoints& points, Real dt) cons
   }
   const Real rate =
       std::max(def.air.drag, def.ram_pressure) * def.air.density / 2 * std::sqrt(speed2) * lightness_ + field;
-  const Real hold = std::min(kLongestHold, rate > 0 ? kMostChange / rate : kLongestHold);
+  Real turning2 =
+      0;  // square of the greatest angular velocity of a spring, which may also be its strain rate
+  for (const ClothSpring& s : cloth_->springs)
+    turning2 =
+        std::max(turning2, (points.velocity[first_ + s.a] - points.velocity[first_ + s.b]).squaredNorm() /
+                               (s.rest_length * s.rest_length));
+  Real hold = std::min(kLongestHold, rate > 0 ? kMostChange / rate : kLongestHold);
+  if (turning2 > 0) hold = std::min(hold, kHeldTurn / std::sqrt(turning2));
   return static_cast<uint32_t>(std::max(1.0, std::floor(hold / dt * (1 + 1e-9))));
 }
 

@@ -15,8 +15,9 @@ constexpr Real kMaxParts = 1000;
 /// Greatest distance by which a body may approach cloth in a sub-step, as a fraction of the mean edge of the
 /// triangles.
 constexpr Real kMostApproach = 0.1;
-/// Greatest relative displacement of a spring's ends in a sub-step, as a fraction of the spring's length.
-constexpr Real kMostStrain = 1;
+/// Greatest relative displacement of a spring's ends in a sub-step, as a fraction of the spring's length. It
+/// is also the greatest angle by which a spring turns; where air acts on the cloth, kMostTurn is.
+constexpr Real kMostStrain = 1, kMostTurn = 0.25;
 /// Greatest number of parts into which a sub-step is divided because of kMostApproach and kMostStrain.
 constexpr Real kMostDivision = 16;
 
@@ -88,8 +89,10 @@ Real ClothSystem::parts_in(Real h, Real speed) const {
     longest = std::min(longest, std::max(kMostApproach * corner_contacts_.mean_edge() / speed, shortest));
   // Fast cloth such as torn skin needs short sub-steps. In a long one, springs between a point whose move is
   // shortened and a point whose move is not would gain much more energy than the motion loses.
+  // Shreds without self-collision turn fast in the wind. In a long sub-step, the lift of the normal at its
+  // start would do work on the rotation.
   if (const Real rate = fastest_strain_rate(); rate > 0)
-    longest = std::min(longest, std::max(kMostStrain / rate, shortest));
+    longest = std::min(longest, std::max(1 / rate, shortest));
   return std::clamp(std::ceil(h / longest * (1 - 1e-12)), 1.0, kMaxParts);
 }
 
@@ -143,15 +146,18 @@ void ClothSystem::collect_triangles() {
   }
 }
 
-/// Returns the greatest relative speed of both ends of a spring divided by its length at rest [1/s], in
-/// cloths with self-collision.
+/// Returns the greatest relative speed of both ends of a spring divided by its length at rest [1/s] and by
+/// the greatest relative displacement in a sub-step, in cloths with self-collision or in air.
 Real ClothSystem::fastest_strain_rate() const {
   Real fastest2 = 0;
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
-    if (!cloths_[c]->def.self_collision || cloths_[c]->stopped) continue;
+    const ClothDef& def = cloths_[c]->def;
+    const bool in_air = def.air.density > 0 && def.air.lift > 0;
+    if ((!def.self_collision && !in_air) || cloths_[c]->stopped) continue;
+    const Real most = in_air ? kMostTurn : kMostStrain;
     for (const ClothSpring& s : springs_of(c))
       fastest2 = std::max(fastest2, (points_.velocity[s.a] - points_.velocity[s.b]).squaredNorm() /
-                                        (s.rest_length * s.rest_length));
+                                        (most * most * s.rest_length * s.rest_length));
   }
   return std::sqrt(fastest2);
 }

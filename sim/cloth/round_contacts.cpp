@@ -45,6 +45,35 @@ TrianglePoint nearest_to_axis(const Rounding& shape, const std::array<Vec3, 3>& 
   return nearest;
 }
 
+/// Returns the contact of a triangle that the axis of a shape passes, in the frame of the shape: the end of
+/// the shape that is nearer to the crossing has come through the triangle, and the triangle is pushed back
+/// over it. The nearest point of the surface would be beside the axis, and the shape would pass.
+std::optional<TriangleContact> passed_by_axis(const Rounding& shape, const Solid& solid,
+                                              const std::array<Vec3, 3>& t, Real keeps) {
+  // The tip of a cone is a corner, which has contacts of its own (corner_contacts.h).
+  const bool is_rod =
+      std::holds_alternative<Capsule>(*solid.shape) || std::holds_alternative<Cylinder>(*solid.shape);
+  if (!is_rod || !(shape.half > 0)) return {};
+  // The signed areas of the triangle's projection along the axis, opposite to each corner.
+  std::array<Real, 3> w;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec3 &a = t[(k + 1) % 3], &b = t[(k + 2) % 3];
+    w[k] = a.z() * b.x() - a.x() * b.z();
+  }
+  const Real area = w[0] + w[1] + w[2];
+  if (!(std::abs(area) > 0)) return {};
+  Real height = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    w[k] /= area;
+    if (w[k] < 0) return {};
+    height += w[k] * t[k].y();
+  }
+  if (!(std::abs(height) < shape.half)) return {};
+  const Real up = height < 0 ? -1 : 1;
+  const Real end = shape.half + (std::holds_alternative<Capsule>(*solid.shape) ? shape.radius : 0);
+  return TriangleContact{w, Vec3(0, up * end, 0), Vec3(0, up, 0), up * height - end - keeps};
+}
+
 std::array<Vec3, 3> present(const Triangle& t, const ClothPoints& points) {
   return {points.at(t[0]), points.at(t[1]), points.at(t[2])};
 }
@@ -70,6 +99,11 @@ std::optional<TriangleContact> RoundContacts::touch(const Triangle& t, const Clo
     from[k] = body.start().point_to_body(points.start_at(t[k]));
     to[k] = body.end().point_to_body(ends[k]);
     longest = std::max(longest, (to[k] - from[k]).norm());
+  }
+  if (auto passed = passed_by_axis(*shape, body.solid(), to, keeps)) {
+    passed->on_body = body.end().point_to_world(passed->on_body);
+    passed->normal = body.end().vector_to_world(passed->normal);
+    return passed;
   }
   const Real samples = std::ceil(longest / (kSampleSpacing * (shape->radius + keeps)));
   if (is_short && samples > 1) return {};

@@ -15,6 +15,8 @@ namespace {
 /// to rounding, does not hit it.
 constexpr Real kSkin = 1e-10;
 constexpr int kMaxHits = 8;
+/// The part of a particle's radius around its centre that must not pass cloth in any case.
+constexpr Real kNarrow = 1e-3;
 /// Greatest number of projections out of bodies; each removes one layer of overlapping bodies.
 constexpr int kMaxEjections = 4;
 /// Overlaps up to this fraction of the particle's radius can be caused by dividing paths around turning
@@ -58,31 +60,61 @@ Real SpherePath::bend() const {
 }
 
 SweepOutcome ParticleSweep::operator()(ParticlePath& path, Real born, const Vec3& extra) {
+  const Vec3 start = path.start;
+  const SweepOutcome outcome = sweep(path, born, extra);
+  // Where bodies and several layers of cloth push a particle, its centre still stays on its side of the
+  // cloth.
+  if (cloths_ && outcome.hit && !outcome.strikes_body)
+    path.end = cloths_->held_end(start, path.end, kNarrow * path.radius, born);
+  return outcome;
+}
+
+SweepOutcome ParticleSweep::sweep(ParticlePath& path, Real born, const Vec3& extra) {
   SweepOutcome outcome;
   contact_count_ = 0;
+  cloth_contact_count_ = 0;
   carrier_ = nullptr;
   reactions_before_finish_ = log_.reactions.size();
   near_.find(path.start, path.end, path.radius);
-  if (near_.all().empty()) return outcome;
-  if (!near_.eject(path.start, path.end, path.radius, born, outcome.ejected)) {
+  if (near_.all().empty() && !cloths_) return outcome;
+  if (!eject(path, born, outcome)) {
     outcome.trapped = true;
     return outcome;
   }
   Real from = born;
-  for (int hits = 0;; ++hits) {
-    const ObstacleHit hit = near_.first_hit(SpherePath(path.start, path.end, from, carrier_), path.radius);
-    if (!hit.obstacle) return outcome;
-    outcome.hit = true;
-    if (!respond(path, hit, from, extra, outcome)) return outcome;
-    from = hit.fraction;
-    if (hits + 1 == kMaxHits) {
-      // The particle moves on with the obstacle that it hit last, which would otherwise pass over it.
-      outcome.truncated = true;
-      path.end = hit.obstacle->at(1).point_to_world(hit.obstacle->at(from).point_to_body(path.start));
+  Vec3 held = path.start;  // position at the end of the sub-step without a further path
+  for (int hits = 0; hits < kMaxHits; ++hits) {
+    const SpherePath rest(path.start, path.end, from, carrier_);
+    if (hits > 0) near_.find(rest, path.radius);
+    const ObstacleHit hit = near_.first_hit(rest, path.radius);
+    std::optional<ClothObstacles::Hit> cloth;
+    if (cloths_)
+      cloth = cloths_->first_hit(path.start, path.end, path.radius, from, hit.obstacle ? hit.fraction : 1);
+    if (!hit.obstacle && !cloth) {
+      for (const ClothContact& c : cloth_contacts()) cloths_->push(c.hit, -c.impulse);
       return outcome;
     }
-    near_.find(SpherePath(path.start, path.end, from, carrier_), path.radius);
+    outcome.hit = true;
+    if (!(cloth ? respond(path, *cloth, from, extra, outcome) : respond(path, hit, from, extra, outcome)))
+      return outcome;
+    from = cloth ? cloth->fraction : hit.fraction;
+    held = cloth ? path.start : PlaneAtEnd(hit).origin;
   }
+  // The particle moves on with what it hit last, which would otherwise pass over it.
+  outcome.truncated = true;
+  path.end = cloths_ ? cloths_->held_end(path.start, held, path.radius, from) : held;
+  return outcome;
+}
+
+/// Projects the particle out of bodies, but not through cloth. Returns false if this fails.
+bool ParticleSweep::eject(ParticlePath& path, Real born, SweepOutcome& outcome) {
+  if (near_.all().empty()) return true;
+  const Vec3 start = path.start, end = path.end;
+  if (!near_.eject(path.start, path.end, path.radius, born, outcome.ejected)) return false;
+  if (!cloths_ || path.start == start || !cloths_->separates(start, path.start, born)) return true;
+  path.start = start;
+  path.end = end;
+  return true;
 }
 
 void NearObstacles::find(const SpherePath& path, Real radius) {
@@ -158,6 +190,14 @@ Vec3 ParticleSweep::fly(const Vec3& v, Real mass, Real duration, const Vec3& ext
   return v + DampedKick(duration, forces_.drag / mass).end * (forces_.acceleration(v, mass) + extra);
 }
 
+/// Returns the velocity with which the particle arrives at a hit, `duration` after the start of its path.
+Vec3 ParticleSweep::arrival(const ParticlePath& path, const Vec3& position, Real duration,
+                            const Vec3& extra) const {
+  const Vec3 v = fly(path.start_velocity, path.mass, duration, extra);
+  return velocity_after_shift(v, forces_.acceleration(v, path.mass) + extra,
+                              position - path.start - duration / 2 * (path.start_velocity + v));
+}
+
 /// Moves the particle to the hit, applies the impulse (P5), and integrates the rest of its path. Returns
 /// false without moving the particle if it hits a dynamic body whose impulses the caller does not accept:
 /// other particles may hit this body earlier.
@@ -166,12 +206,8 @@ bool ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real fro
   const Obstacle& o = *hit.obstacle;
   const Real friction = std::sqrt(path.friction * o.friction);
   log_.reactions.resize(reactions_before_finish_);
-  const Real duration = (hit.fraction - from) * h_;
-  Vec3 v = fly(path.start_velocity, path.mass, duration, extra);
+  Vec3 v = arrival(path, hit.position, (hit.fraction - from) * h_, extra);
   const Vec3 acceleration = forces_.acceleration(v, path.mass) + extra;
-  v = velocity_after_shift(v, acceleration,
-                           hit.position - path.start - duration / 2 * (path.start_velocity + v));
-
   Vec3 u = v - o.velocity_at(hit.position, hit.fraction);
   Real approach = -u.dot(hit.normal);
   const Real pressing = -acceleration.dot(hit.normal);
@@ -224,6 +260,89 @@ bool ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real fro
   return true;
 }
 
+/// The same for a hit on cloth. The cloth moves by the impulse only from the next sub-step on; until then it
+/// takes the particle along.
+bool ParticleSweep::respond(ParticlePath& path, const ClothObstacles::Hit& hit, Real from, const Vec3& extra,
+                            SweepOutcome& outcome) {
+  if (!impulses_) {
+    outcome.strikes_body = true;
+    outcome.time = hit.fraction;
+    return false;
+  }
+  log_.reactions.resize(reactions_before_finish_);
+  Vec3 v = arrival(path, hit.position, (hit.fraction - from) * h_, extra);
+  const Vec3 u = v - cloths_->velocity(hit);
+  const Real approach = -u.dot(hit.normal);
+  const Real gain = -h_ * (forces_.acceleration(v, path.mass) + extra).dot(hit.normal);
+  const Real restitution = 2 * path.restitution * approach < gain ? 0 : path.restitution;
+  if (approach > 0) {
+    const Vec3 impulse = collision_impulse(1 / (1 / path.mass + cloths_->mobility(hit)), u, hit.normal,
+                                           restitution, std::sqrt(path.friction * cloths_->friction(hit)));
+    v += impulse / path.mass;
+    cloths_->push(hit, -impulse);
+  }
+  if (approach > std::max(gain, 0.0)) {
+    ++outcome.collisions;
+    cloths_->count(hit);
+    if (log_.wants_strikes) log_.strikes.push_back({hit.fraction, hit.position, v, hit.normal});
+  }
+  add_contact(ClothContact{hit, restitution == 0});
+  carrier_ = nullptr;
+  path.start = hit.position;
+  path.start_velocity = v;
+  reactions_before_finish_ = log_.reactions.size();
+  finish(path, (1 - hit.fraction) * h_, extra);
+  return true;
+}
+
+/// Adds a contact with cloth. It replaces the contact with the same triangle or, if there are too many, the
+/// oldest one.
+void ParticleSweep::add_contact(const ClothContact& contact) {
+  const auto end = cloth_contacts_.begin() + static_cast<std::ptrdiff_t>(cloth_contact_count_);
+  auto old = std::find_if(cloth_contacts_.begin(), end,
+                          [&](const ClothContact& c) { return c.hit.triangle == contact.hit.triangle; });
+  if (old == end && cloth_contact_count_ < cloth_contacts_.size()) {
+    cloth_contacts_[cloth_contact_count_++] = contact;
+    return;
+  }
+  if (old == end) old = cloth_contacts_.begin();
+  std::move(old + 1, end, old);
+  cloth_contacts_[cloth_contact_count_ - 1] = contact;
+}
+
+/// Cancels the velocity at which forces press a particle against cloth at the end of the sub-step. Returns
+/// whether they do.
+bool ParticleSweep::press_cloth(ClothContact& contact, Vec3& v, Real mass, Real friction) const {
+  const ClothObstacles::Hit& hit = contact.hit;
+  const Vec3 u = v - cloths_->velocity(hit);
+  if (!contact.presses || u.dot(hit.normal) >= 0) return false;
+  const Vec3 impulse = collision_impulse(1 / (1 / mass + cloths_->mobility(hit)), u, hit.normal, 0,
+                                         std::sqrt(friction * cloths_->friction(hit)));
+  contact.impulse += impulse;
+  v += impulse / mass;
+  return true;
+}
+
+/// Keeps the end of the path off the cloth that the particle has hit, along the normals there.
+void ParticleSweep::keep_off_cloth(ParticlePath& path, const Vec3& extra) {
+  Vec3 shift = Vec3::Zero();
+  for (int pass = 0; pass < kContactPasses; ++pass) {
+    bool behind_any = false;
+    for (const ClothContact& c : cloth_contacts()) {
+      const Vec3 at = c.hit.position - c.hit.distance * c.hit.normal + cloths_->displacement(c.hit);
+      const Real behind =
+          ClothObstacles::kept_distance(path.radius) - c.hit.normal.dot(path.end + shift - at);
+      if (behind > 0) shift += behind * c.hit.normal;
+      behind_any |= behind > 0;
+    }
+    if (!behind_any || cloth_contact_count_ == 1) break;
+  }
+  if (shift.isZero(0)) return;
+  path.end += shift;
+  path.end_velocity = velocity_after_shift(path.end_velocity,
+                                           forces_.acceleration(path.end_velocity, path.mass) + extra, shift);
+}
+
 /// Adds a contact. If there are too many, the oldest one is dropped, because it is least important at the
 /// current position.
 void ParticleSweep::add_contact(const Contact& contact) {
@@ -251,13 +370,16 @@ void ParticleSweep::finish(ParticlePath& path, Real duration, const Vec3& extra)
           reaction(*c.obstacle, path.start - path.radius * c.normal_at(c.fraction), c.fraction, impulse));
     return true;
   };
+  for (ClothContact& c : cloth_contacts()) c.impulse.setZero();
   for (int pass = 0; pass < kContactPasses; ++pass) {
     bool pressed = false;
     for (std::size_t i = 0; i < contact_count_; ++i) pressed |= press(contacts_[i]);
-    if (!pressed || contact_count_ == 1) break;
+    for (ClothContact& c : cloth_contacts()) pressed |= press_cloth(c, v, path.mass, path.friction);
+    if (!pressed || contact_count_ + cloth_contact_count_ == 1) break;
   }
   path.end_velocity = v;
   path.end = path.start + duration / 2 * (path.start_velocity + v);
+  if (cloth_contact_count_ > 0) keep_off_cloth(path, extra);
   for (std::size_t i = 0; i < contact_count_; ++i) {
     const Contact& c = contacts_[i];
     if (c.gives_way)

@@ -2,15 +2,18 @@
 /// Moves one particle through a sub-step among obstacles (physics P3-P5). The integrated path is swept
 /// against the bodies, in each body's own frame between its poses, so that neither a fast particle nor a
 /// moving body passes through the other. At a hit the particle is placed at the surface and its velocity is
-/// changed by the impulse. It then continues for the remaining time under the same forces.
+/// changed by the impulse. It then continues for the remaining time under the same forces. Cloths are
+/// obstacles, too (physics F9).
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "sim/collision/obstacles.h"
 #include "sim/dynamics/body_impulses.h"
+#include "sim/particles/cloth_obstacles.h"
 #include "sim/particles/particle_forces.h"
 
 namespace offstage::sim {
@@ -29,8 +32,8 @@ struct SweepOutcome {
   bool ejected = false;     ///< whether the particle was inside a body and was projected out (P4)
   bool trapped = false;     ///< whether the particle was inside a body and could not be projected out (P4)
   bool truncated = false;   ///< whether the particle reached the limit of collisions
-  /// Whether the particle hits a dynamic body at the fraction `time`, and its path was therefore left
-  /// unchanged; see ParticleSweep().
+  /// Whether the particle hits a dynamic body or cloth at the fraction `time`, and its path was therefore
+  /// left unchanged; see ParticleSweep().
   bool strikes_body = false;
   Real time = 0;  ///< time of that hit, as a fraction of the sub-step
 };
@@ -134,13 +137,18 @@ class NearObstacles {
 
 class ParticleSweep {
  public:
-  /// `fixed` and `moving` are the obstacles of a sub-step of length h [s]. With `impulses`, each hit of a
-  /// dynamic body changes the body immediately, so particles must be swept one after the other. Without
-  /// `impulses`, particles can be swept in parallel; those that hit a dynamic body are left unchanged and
-  /// reported by SweepOutcome::strikes_body.
-  ParticleSweep(const Obstacles& fixed, const Obstacles& moving, const ParticleForces& forces, Real h,
-                SweepLog& log, BodyImpulses* impulses = nullptr)
-      : near_(fixed, moving), forces_(forces), h_(h), log_(log), impulses_(impulses) {}
+  /// `fixed` and `moving` are the obstacles of a sub-step of length h [s]; `cloths` may be null. With
+  /// `impulses`, each hit of a dynamic body or of cloth changes its velocity immediately, so particles must
+  /// be swept one after the other. Without `impulses`, particles can be swept in parallel; those that hit a
+  /// dynamic body or cloth are left unchanged and reported by SweepOutcome::strikes_body.
+  ParticleSweep(const Obstacles& fixed, const Obstacles& moving, ClothObstacles* cloths,
+                const ParticleForces& forces, Real h, SweepLog& log, BodyImpulses* impulses = nullptr)
+      : near_(fixed, moving),
+        cloths_(cloths && !cloths->empty() ? cloths : nullptr),
+        forces_(forces),
+        h_(h),
+        log_(log),
+        impulses_(impulses) {}
 
   /// Sweeps a particle that exists from fraction `born` of the sub-step to its end. `extra` is the mean
   /// acceleration by forces beyond ParticleForces (springs).
@@ -161,16 +169,33 @@ class ParticleSweep {
     Vec3 normal_at(Real time) const { return obstacle->at(time).vector_to_world(normal); }
   };
 
+  /// Contact with cloth until the end of the sub-step.
+  struct ClothContact {
+    ClothObstacles::Hit hit;
+    bool presses = false;         // whether the particle does not bounce
+    Vec3 impulse = Vec3::Zero();  // on the particle after the hit, not yet applied to the cloth [N s]
+  };
+
+  SweepOutcome sweep(ParticlePath& path, Real born, const Vec3& extra);
   bool was_struck(const Obstacle& o) const;
+  bool eject(ParticlePath& path, Real born, SweepOutcome& outcome);
+  Vec3 arrival(const ParticlePath& path, const Vec3& position, Real duration, const Vec3& extra) const;
+  bool respond(ParticlePath& path, const ClothObstacles::Hit& hit, Real from, const Vec3& extra,
+               SweepOutcome& outcome);
+  void add_contact(const ClothContact& contact);
+  bool press_cloth(ClothContact& contact, Vec3& v, Real mass, Real friction) const;
+  void keep_off_cloth(ParticlePath& path, const Vec3& extra);
   bool respond(ParticlePath& path, const ObstacleHit& hit, Real from, const Vec3& extra,
                SweepOutcome& outcome);
   void finish(ParticlePath& path, Real duration, const Vec3& extra);
   void stay_before(const Contact& contact, ParticlePath& path, Real duration, const Vec3& extra) const;
   static void stay_above(const Contact& contact, ParticlePath& path);
+  std::span<ClothContact> cloth_contacts() { return std::span(cloth_contacts_).first(cloth_contact_count_); }
   void add_contact(const Contact& contact);
   Vec3 fly(const Vec3& v, Real mass, Real duration, const Vec3& extra) const;
 
   NearObstacles near_;
+  ClothObstacles* cloths_;
   const ParticleForces& forces_;
   Real h_;
   SweepLog& log_;
@@ -180,6 +205,8 @@ class ParticleSweep {
   std::size_t reactions_before_finish_ = 0;
   std::array<Contact, 4> contacts_;
   std::size_t contact_count_ = 0;
+  std::array<ClothContact, 4> cloth_contacts_;
+  std::size_t cloth_contact_count_ = 0;
 };
 
 }  // namespace offstage::sim

@@ -18,6 +18,8 @@ constexpr std::size_t kChunk = 1024;
 /// For a particle that was created before the sub-step: number of integration steps per second until the
 /// sub-step begins, and the greatest number of these steps.
 constexpr Real kStepsBefore = 120, kMostStepsBefore = 10000;
+/// Greatest number of hits on cloth in a sub-step, for particles that collide with particles.
+constexpr int kMostClothHits = 8;
 /// Durations below this are rounding errors [s].
 constexpr Real kRounding = 1e-11;
 
@@ -232,28 +234,29 @@ ParticleTally ParticleSystem::step(const ParticleStage& stage, const ParticleFor
   std::vector<std::vector<Striker>> strikers(tallies.size());
   fly_each(stage, forces, coupled, [&](std::size_t chunk) {
     logs[chunk].wants_strikes = def.report_collisions;
-    return [&, chunk, &log = logs[chunk],
-            obstacles = ParticleSweep(stage.fixed, stage.moving, forces, stage.h, logs[chunk])](
-               std::size_t i, const Flight& flight, bool integrated) mutable {
-      ParticleTally& tally = tallies[chunk];
-      arrays.age[i] += flight.duration;
-      if (is_lost(i, flight, tally)) {
-        fate_[i] = Fate::dead;
-        return;
-      }
-      SweepOutcome outcome;
-      if (def.collides && flight.duration > 0) {
-        const std::size_t reactions = log.reactions.size();
-        outcome = sweep(stage, forces, obstacles, i, flight, integrated);
-        if (outcome.strikes_body) {
-          log.reactions.resize(reactions);
-          log.strikes.clear();
-          strikers[chunk].push_back({outcome.time, i, flight, integrated});
-          return;
-        }
-      }
-      finish_sweep(stage, i, outcome, log, tally);
-    };
+    return
+        [&, chunk, &log = logs[chunk],
+         obstacles = ParticleSweep(stage.fixed, stage.moving, &stage.cloths, forces, stage.h, logs[chunk])](
+            std::size_t i, const Flight& flight, bool integrated) mutable {
+          ParticleTally& tally = tallies[chunk];
+          arrays.age[i] += flight.duration;
+          if (is_lost(i, flight, tally)) {
+            fate_[i] = Fate::dead;
+            return;
+          }
+          SweepOutcome outcome;
+          if (def.collides && flight.duration > 0) {
+            const std::size_t reactions = log.reactions.size();
+            outcome = sweep(stage, forces, obstacles, i, flight, integrated);
+            if (outcome.strikes_body) {
+              log.reactions.resize(reactions);
+              log.strikes.clear();
+              strikers[chunk].push_back({outcome.time, i, flight, integrated});
+              return;
+            }
+          }
+          finish_sweep(stage, i, outcome, log, tally);
+        };
   });
   std::vector<Striker> all;
   for (std::size_t chunk = 0; chunk < logs.size(); ++chunk) {
@@ -264,8 +267,8 @@ ParticleTally ParticleSystem::step(const ParticleStage& stage, const ParticleFor
   return sum_up(tallies);
 }
 
-/// Processes the particles that hit dynamic bodies in sequence, in the order of time. Each particle hits a
-/// body whose velocity includes the previous impulses.
+/// Processes the particles that hit dynamic bodies or cloth in sequence, in the order of time. Each particle
+/// hits a body whose velocity includes the previous impulses.
 void ParticleSystem::strike_bodies(const ParticleStage& stage, const ParticleForces& forces,
                                    std::vector<Striker> strikers, ParticleTally& tally) {
   std::sort(strikers.begin(), strikers.end(), [](const Striker& a, const Striker& b) {
@@ -273,7 +276,7 @@ void ParticleSystem::strike_bodies(const ParticleStage& stage, const ParticleFor
   });
   SweepLog log;
   log.wants_strikes = def.report_collisions;
-  ParticleSweep obstacles(stage.fixed, stage.moving, forces, stage.h, log, &stage.impulses);
+  ParticleSweep obstacles(stage.fixed, stage.moving, &stage.cloths, forces, stage.h, log, &stage.impulses);
   for (const Striker& s : strikers) {
     const SweepOutcome outcome = sweep(stage, forces, obstacles, s.particle, s.flight, s.integrated);
     for (const Reaction& r : log.reactions) stage.impulses.push(r);
@@ -304,6 +307,58 @@ void ParticleSystem::fly_all(const ParticleStage& stage, const ParticleForces& f
       arrays.age[i] += flight.duration;
     };
   });
+}
+
+void ParticleSystem::meet_cloths(const ParticleStage& stage, const ParticleForces& forces,
+                                 std::span<uint8_t> touched, ParticleTally& tally) {
+  if (stage.cloths.empty() || !def.collides) return;
+  for (std::size_t i = 0; i < arrays.size(); ++i)
+    if (arrays.position[i].allFinite() && arrays.velocity[i].allFinite())
+      touched[i] |= meet_cloths(stage, forces, i, tally);
+}
+
+/// Stops a particle at the cloths that it meets on the straight line from the start of its flight to its new
+/// position. Returns whether there are any.
+bool ParticleSystem::meet_cloths(const ParticleStage& stage, const ParticleForces& forces, std::size_t i,
+                                 ParticleTally& tally) {
+  ClothObstacles& cloths = stage.cloths;
+  Vec3 &end = arrays.position[i], &v = arrays.velocity[i], start = start_position_[i];
+  const Real mass = arrays.mass[i], radius = arrays.radius[i];
+  Real from = 1 - duration_[i] / stage.h;
+  bool touches = false;
+  for (int hits = 0;; ++hits) {
+    const auto hit = cloths.first_hit(start, end, radius, from, 1);
+    if (!hit) return touches;
+    touches = true;
+    const Vec3 u = v - cloths.velocity(*hit);
+    const Real approach = -u.dot(hit->normal);
+    const Real gain = -stage.h * forces.acceleration(v, mass).dot(hit->normal);
+    if (approach > 0) {
+      const Real restitution = 2 * arrays.restitution[i] * approach < gain ? 0 : arrays.restitution[i];
+      const Vec3 impulse =
+          collision_impulse(1 / (1 / mass + cloths.mobility(*hit)), u, hit->normal, restitution,
+                            std::sqrt(arrays.friction[i] * cloths.friction(*hit)));
+      v += impulse / mass;
+      cloths.push(*hit, -impulse);
+    }
+    if (approach > std::max(gain, 0.0)) {
+      ++tally.collisions;
+      cloths.count(*hit);
+      if (def.report_collisions)
+        tally.events.push_back(collision_event(stage, i, {hit->fraction, hit->position, v, hit->normal}));
+    }
+    if (hits + 1 == kMostClothHits) {
+      end = cloths.held_end(hit->position, hit->position, radius, hit->fraction);
+      ++tally.truncated;
+      return touches;
+    }
+    // It slides on along the cloth, which it follows.
+    const Vec3 at = hit->position - hit->distance * hit->normal + cloths.displacement(*hit);
+    const Real behind = ClothObstacles::kept_distance(radius) - hit->normal.dot(end - at);
+    if (behind > 0) end += behind * hit->normal;
+    start = hit->position;
+    from = hit->fraction;
+  }
 }
 
 /// Turns a particle by its angular velocity over its flight.

@@ -31,6 +31,7 @@ struct ParticleStage {
   const Obstacles& moving;
   const Aabb& bounds;
   BodyImpulses& impulses;  ///< impulses on dynamic bodies
+  ClothObstacles& cloths;
 };
 
 struct ParticleSystem {
@@ -73,6 +74,10 @@ struct ParticleSystem {
     Real duration;
   };
   Flight flight(std::size_t i) const { return {start_position_[i], start_velocity_[i], duration_[i]}; }
+  /// After the collisions with particles, stops particles that would pass cloth on their way from flight() to
+  /// their new positions, and sets `touched` for those that touch cloth.
+  void meet_cloths(const ParticleStage& stage, const ParticleForces& forces, std::span<uint8_t> touched,
+                   ParticleTally& tally);
   /// Increases the age of the particles and removes those whose life has ended. `touched` and `trapped`: see
   /// ParticleCollisions::Outcome.
   ParticleTally end_step(const ParticleStage& stage, std::span<const uint8_t> touched,
@@ -94,6 +99,8 @@ struct ParticleSystem {
                     ParticleTally& tally);
   void end(const ParticleStage& stage, std::size_t i, bool spent, bool trapped, ParticleTally& tally);
   void turn(std::size_t i);
+  bool meet_cloths(const ParticleStage& stage, const ParticleForces& forces, std::size_t i,
+                   ParticleTally& tally);
   ParticleTally sum_up(std::span<const ParticleTally> tallies);
 
   void fly(const ParticleForces& forces, Real t, Real h, std::size_t begin, std::size_t end,

@@ -1,5 +1,5 @@
 #pragma once
-/// Motion of cloths through a sub-step (physics F6-F8). Cloths move after bodies and particles, and collide
+/// Motion of cloths through a sub-step (physics F6-F8). Cloths move after bodies and before particles, and collide
 /// with the bodies along the paths of the sub-step. Impulses of cloths change the velocities of bodies from
 /// the next sub-step on.
 
@@ -63,9 +63,5 @@ class ClothMotion {
   ClothSystem system_;
   std::vector<PressedCloth> pressed_;
 };
-
-/// Collides particles with cloths after both have moved through a sub-step, which begins at time `start` and
-/// has length h [s]. Appends the collisions of particle systems that report events to `events`.
-void collide_particles_with_cloths(WorldState& world, Real start, Real h, std::vector<ParticleEvent>& events);
 
 }  // namespace offstage::sim

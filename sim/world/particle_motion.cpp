@@ -32,7 +32,9 @@ bool ParticleMotion::step(Real start, Real h, const CoupledSystem& coupled, Step
   for (const auto& articulation : world_.articulations) articulation->begin_impulses(start + h);
   impulses_.begin(joints_.links());
   events_.clear();
-  const ParticleStage stage{start, h, obstacles_.fixed(), obstacles_.moving(), world_.def.bounds, impulses_};
+  gather_cloths(h);
+  const ParticleStage stage{start,     h,      obstacles_.fixed(), obstacles_.moving(), world_.def.bounds,
+                            impulses_, cloths_};
   report.solvers.particle_lcp.add(collide(stage, coupled));
   auto collided = collisions_.outcomes().begin();
   bool any_removed = false;
@@ -41,6 +43,7 @@ bool ParticleMotion::step(Real start, Real h, const CoupledSystem& coupled, Step
     ParticleTally tally;
     if (system.hits_particles()) {
       tally = std::move(collided->tally);
+      system.meet_cloths(stage, world_.forces(system), collided->touched, tally);
       tally += system.end_step(stage, collided->touched, collided->trapped);
       ++collided;
     } else {
@@ -55,7 +58,41 @@ bool ParticleMotion::step(Real start, Real h, const CoupledSystem& coupled, Step
     }
     report.finite &= !tally.lost;
   });
+  return_cloths();
   return any_removed;
+}
+
+/// Collects the cloths with which particles collide. While particles are prewarmed, cloths stand still.
+void ParticleMotion::gather_cloths(Real h) {
+  cloths_.clear();
+  bool wanted = false;
+  world_.systems.for_each([&](ParticleSystemHandle, const ParticleSystem& s) {
+    wanted |= s.def.collides && s.arrays.size() > 0;
+  });
+  if (!wanted) return;
+  std::vector<Real> inverse_masses;
+  world_.cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
+    if (cloth->absent || !cloth->def.collides) return;
+    inverse_masses.assign(cloth->points.size(), 0);
+    const bool moves = !cloth->stopped && !is_prewarming_;
+    for (std::size_t i = 0; moves && i < cloth->points.size(); ++i) inverse_masses[i] = 1 / cloth->masses[i];
+    for (const ClothPin& pin : cloth->pins) inverse_masses[pin.vertex] = 0;
+    const std::vector<Vec3>& before = moves ? cloth->before : cloth->points;
+    cloths_.add(before, cloth->points, cloth->velocities, inverse_masses, cloth->triangles,
+                cloth->def.friction);
+  });
+  cloths_.build(h);
+}
+
+/// Changes the velocities of the cloths by the impulses of particles.
+void ParticleMotion::return_cloths() {
+  if (cloths_.empty() || is_prewarming_) return;
+  std::size_t k = 0;
+  world_.cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
+    if (cloth->absent || !cloth->def.collides) return;
+    std::ranges::copy(cloths_.velocities(k), cloth->velocities.begin());
+    cloth->report.particle_hits += cloths_.hits(k++);
+  });
 }
 
 /// Moves the particles that collide with other particles, of all systems together. Returns the work of the

@@ -1,6 +1,6 @@
 #pragma once
-/// Motion of particles through a sub-step, among bodies that have moved through it, and their collisions
-/// (physics P3-P8).
+/// Motion of particles through a sub-step, among bodies and cloths that have moved through it, and their
+/// collisions (physics P3-P8).
 
 #include <vector>
 
@@ -35,11 +35,14 @@ class ParticleMotion {
   bool waits(ParticleSystemHandle system) const;
   ContactWork collide(const ParticleStage& stage, const CoupledSystem& coupled);
   void add(std::vector<ParticleEvent>& events);
+  void gather_cloths(Real h);
+  void return_cloths();
 
   WorldState& world_;
   const ActiveBodies& active_;
   const JointGroups& joints_;
   ObstacleSet obstacles_;
+  ClothObstacles cloths_;
   ParticleCollisions collisions_;
   BodyImpulses impulses_;
   std::vector<ParticleEvent> events_;

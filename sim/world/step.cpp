@@ -79,7 +79,9 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
   update_joints();
   active.update();
   begin_bodies(start, end);
-  if (!active.awake().empty() || !active.kinematic().empty() || !springs.empty() || !systems.empty()) {
+  const bool moves =
+      !active.awake().empty() || !active.kinematic().empty() || !springs.empty() || !systems.empty();
+  if (moves) {
     // With few bodies, several threads would cost more time than they save, in particular on a busy machine.
     const auto bodies_move = [&] { move_bodies(start, h, report); };
     if (active.awake().size() < kWorthThreads && !has_pair_forces())
@@ -89,14 +91,15 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
     free_motion.count(report);
     for (const auto& articulation : articulations) articulation->count_turns(end);
     joint_groups.break_overloaded(h, report);
-    if (!systems.empty()) step_particles(start, h, free_motion.whole(), report);
   } else {
     islands.clear();
     contacts.clear();
     contacts.count(report);
     report.bodies.islands = 0;
   }
-  if (!cloths.empty()) step_cloths(start, h, report);
+  if (!cloths.empty()) reactions.apply(cloth_motion.step(start, h, contacts.pairs()), start + h, report);
+  // Particles move last, so that they meet cloths and bodies on the paths of both.
+  if (moves && !systems.empty()) step_particles(start, h, free_motion.whole(), report);
 }
 
 /// Moves all bodies through a sub-step, with their contacts and impacts.
@@ -122,15 +125,10 @@ void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
   active.put_to_sleep(islands, start, h);
 }
 
-/// Moves the particles. They collide with the bodies and with each other, and push the bodies.
+/// Moves the particles. They collide with bodies, cloths and each other, and push them.
 void World::Impl::step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report) {
   if (particle_motion.step(start, h, coupled, report)) remove_dead_springs();
   reactions.apply(particle_motion.reactions(), start + h, report);
-}
-
-void World::Impl::step_cloths(Real start, Real h, StepReport& report) {
-  reactions.apply(cloth_motion.step(start, h, contacts.pairs()), start + h, report);
-  collide_particles_with_cloths(*this, start, h, particle_motion.events());
 }
 
 /// Implements World::prewarm(): only particles move; dynamic bodies stand still, and kinematic bodies follow

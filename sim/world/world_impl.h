@@ -29,7 +29,6 @@ struct World::Impl : WorldState {
   void explode(Real start, Real end);
   void move_bodies(Real start, Real h, StepReport& report);
   void step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report);
-  void step_cloths(Real start, Real h, StepReport& report);
   void update_joints();
   bool is_within_bounds(const Body& body) const;
   void retire(Body& body, StepReport& report);

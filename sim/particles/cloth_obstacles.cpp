@@ -1,0 +1,189 @@
+#include "sim/particles/cloth_obstacles.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "sim/geometry/closest_points.h"
+#include "sim/geometry/intersection.h"
+
+namespace offstage::sim {
+namespace {
+
+/// Particles are kept from cloth at their radius and this fraction of it. A hit is detected at half of this
+/// distance, so a particle that slides along flat cloth does not hit it in each sub-step.
+constexpr Real kClothSkin = 1e-3;
+/// Greatest number of advances in the search for a hit. The few searches that need more end with a hit that
+/// is early by less than the last advance.
+constexpr int kMaxClothAdvances = 48;
+/// Greatest number of triangles, one after the other, that take a stopped particle along in a sub-step.
+constexpr int kMaxCarriers = 16;
+
+Vec3 normal_of(const Vec3& a, const Vec3& b, const Vec3& c) {
+  return (b - a).cross(c - a).stableNormalized();
+}
+
+}  // namespace
+
+void ClothObstacles::clear() {
+  from_.clear();
+  to_.clear();
+  velocity_.clear();
+  inverse_mass_.clear();
+  triangles_.clear();
+  cloths_.clear();
+}
+
+void ClothObstacles::add(std::span<const Vec3> from, std::span<const Vec3> to,
+                         std::span<const Vec3> velocities, std::span<const Real> inverse_masses,
+                         std::span<const Triangle> triangles, Real friction) {
+  const auto first = static_cast<uint32_t>(from_.size()), cloth = static_cast<uint32_t>(cloths_.size());
+  from_.insert(from_.end(), from.begin(), from.end());
+  to_.insert(to_.end(), to.begin(), to.end());
+  velocity_.insert(velocity_.end(), velocities.begin(), velocities.end());
+  inverse_mass_.insert(inverse_mass_.end(), inverse_masses.begin(), inverse_masses.end());
+  for (const Triangle& t : triangles)
+    triangles_.push_back({{t[0] + first, t[1] + first, t[2] + first}, cloth});
+  cloths_.push_back({first, friction});
+}
+
+void ClothObstacles::build(Real h) {
+  h_ = h;
+  boxes_.clear();
+  for (const ClothTriangle& t : triangles_) {
+    Aabb& box = boxes_.emplace_back();
+    for (uint32_t point : t.corners) box.extend(from_[point]).extend(to_[point]);
+  }
+  tree_ = AabbTree(boxes_);
+}
+
+Real ClothObstacles::kept_distance(Real radius) {
+  return (1 + kClothSkin) * radius;
+}
+
+/// Conservative advancement: the triangle is behind the plane through its nearest point and perpendicular to
+/// the line to the particle's centre, and each corner moves straight. So the centre is at least as far from
+/// the triangle as from the planes through the corners that are parallel to this one.
+std::optional<ClothObstacles::Hit> ClothObstacles::hit(uint32_t triangle, const Path& path,
+                                                       Real latest) const {
+  const Triangle& corners = triangles_[triangle].corners;
+  Real t = path.from, reach = path.radius, margin = kClothSkin / 2 * path.radius;
+  for (int i = 0; i <= kMaxClothAdvances; ++i) {
+    std::array<Vec3, 3> at;
+    for (std::size_t k = 0; k < 3; ++k) at[k] = corner(corners[k], t);
+    const Vec3 p = path.at(t);
+    const TrianglePoint nearest = closest_on_triangle(p, at[0], at[1], at[2]);
+    Vec3 rate = path.rate;
+    for (std::size_t k = 0; k < 3; ++k) rate -= nearest.weights[k] * (to_[corners[k]] - from_[corners[k]]);
+    const Vec3 apart = p - nearest.point;
+    const Real distance = apart.norm();
+    Vec3 n = apart / distance;
+    if (!(distance > 1e-9 * path.radius)) {
+      n = normal_of(at[0], at[1], at[2]);
+      if (n.dot(rate) > 0) n = -n;
+    }
+    if (distance <= reach + margin || i == kMaxClothAdvances) {
+      if (rate.dot(n) < 0 || i == kMaxClothAdvances)
+        return Hit{triangle, t, p, n, distance, {nearest.weights[0], nearest.weights[1], nearest.weights[2]}};
+      if (distance < path.radius + margin) {  // it moves away, and may only come back to nearly this distance
+        reach = std::min(reach, distance - std::min(2 * margin, distance / 2));
+        margin = std::min(margin, (distance - reach) / 2);
+      }
+    }
+    Real advance = std::numeric_limits<Real>::infinity();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Real closing = -n.dot(path.rate - (to_[corners[k]] - from_[corners[k]]));
+      if (closing > 0) advance = std::min(advance, (n.dot(p - at[k]) - reach) / closing);
+    }
+    t += advance;
+    if (!(t < std::min(latest, 1.0))) return {};
+  }
+  return {};
+}
+
+std::optional<ClothObstacles::Hit> ClothObstacles::first_hit(const Vec3& a, const Vec3& b, Real radius,
+                                                             Real from, Real latest) const {
+  if (!(from < 1)) return {};
+  Aabb around(a.cwiseMin(b), a.cwiseMax(b));
+  around.min().array() -= (1 + kClothSkin) * radius;
+  around.max().array() += (1 + kClothSkin) * radius;
+  std::optional<Hit> first;
+  const Path path{a, (b - a) / (1 - from), from, radius};
+  tree_.overlapping(around, [&](uint32_t k) {
+    if (!boxes_[k].intersects(around)) return;
+    if (auto found = hit(k, path, first ? first->fraction : latest)) first = found;
+  });
+  return first;
+}
+
+Vec3 ClothObstacles::held_end(const Vec3& a, const Vec3& b, Real radius, Real from) const {
+  Vec3 start = a, end = b;
+  for (int k = 0; k < kMaxCarriers; ++k) {
+    const auto hit = first_hit(start, end, radius, from, 1);
+    if (!hit) break;
+    start = hit->position;
+    end = carried(*hit);
+    from = hit->fraction;
+    radius /= 2;
+  }
+  return end;
+}
+
+bool ClothObstacles::separates(const Vec3& a, const Vec3& b, Real fraction) const {
+  const Aabb around(a.cwiseMin(b), a.cwiseMax(b));
+  bool found = false;
+  tree_.overlapping(around, [&](uint32_t k) {
+    const Triangle& t = triangles_[k].corners;
+    found = found || (boxes_[k].intersects(around) &&
+                      segment_intersects_triangle(
+                          a, b, {corner(t[0], fraction), corner(t[1], fraction), corner(t[2], fraction)}));
+  });
+  return found;
+}
+
+Vec3 ClothObstacles::displacement(const Hit& hit) const {
+  Vec3 sum = Vec3::Zero();
+  for (std::size_t k = 0; k < 3; ++k) {
+    const uint32_t point = triangles_[hit.triangle].corners[k];
+    sum += hit.weights[static_cast<Eigen::Index>(k)] * (to_[point] - from_[point]);
+  }
+  return (1 - hit.fraction) * sum;
+}
+
+Vec3 ClothObstacles::carried(const Hit& hit) const {
+  const Triangle& t = triangles_[hit.triangle].corners;
+  const Vec3 before = normal_of(corner(t[0], hit.fraction), corner(t[1], hit.fraction),
+                                corner(t[2], hit.fraction)),
+             after = normal_of(to_[t[0]], to_[t[1]], to_[t[2]]);
+  const Quat turn = Quat::FromTwoVectors(before, after);
+  return hit.position - hit.distance * hit.normal + displacement(hit) + hit.distance * (turn * hit.normal);
+}
+
+Vec3 ClothObstacles::velocity(const Hit& hit) const {
+  Vec3 sum = Vec3::Zero();
+  for (std::size_t k = 0; k < 3; ++k)
+    sum += hit.weights[static_cast<Eigen::Index>(k)] * velocity_[triangles_[hit.triangle].corners[k]];
+  return sum;
+}
+
+Real ClothObstacles::mobility(const Hit& hit) const {
+  Real sum = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Real weight = hit.weights[static_cast<Eigen::Index>(k)];
+    sum += weight * weight * inverse_mass_[triangles_[hit.triangle].corners[k]];
+  }
+  return sum;
+}
+
+void ClothObstacles::push(const Hit& hit, const Vec3& impulse) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    const uint32_t point = triangles_[hit.triangle].corners[k];
+    velocity_[point] += hit.weights[static_cast<Eigen::Index>(k)] * inverse_mass_[point] * impulse;
+  }
+}
+
+std::span<const Vec3> ClothObstacles::velocities(std::size_t cloth) const {
+  const std::size_t end = cloth + 1 < cloths_.size() ? cloths_[cloth + 1].first : velocity_.size();
+  return std::span(velocity_).subspan(cloths_[cloth].first, end - cloths_[cloth].first);
+}
+
+}  // namespace offstage::sim

@@ -1,0 +1,100 @@
+#pragma once
+/// The cloths with which particles collide during one sub-step (physics F9). The corners of a triangle move
+/// straight from their positions at the start of the sub-step to those at its end. Impulses of particles
+/// change the velocities of the corners, which move with them from the next sub-step on.
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "sim/collision/bounding_tree.h"
+
+namespace offstage::sim {
+
+class ClothObstacles {
+ public:
+  /// A collision of a particle with a triangle of cloth.
+  struct Hit {
+    uint32_t triangle;
+    Real fraction;  ///< time as a fraction of the sub-step
+    Vec3 position;  ///< position of the particle's centre
+    Vec3 normal;    ///< unit vector from the nearest point of the triangle to the particle's centre
+    Real distance;  ///< distance between these two points [m]
+    Vec3 weights;   ///< barycentric coordinates of the nearest point
+  };
+
+  /// Removes all cloths.
+  void clear();
+  /// Adds a cloth. `from` and `to`: positions of its points at the start and the end of the sub-step [m];
+  /// `velocities` at the end [m/s]; `inverse_masses` [1/kg], 0 for points that particles do not move.
+  void add(std::span<const Vec3> from, std::span<const Vec3> to, std::span<const Vec3> velocities,
+           std::span<const Real> inverse_masses, std::span<const Triangle> triangles, Real friction);
+  /// Prepares the search, after all cloths have been added. `h`: length of the sub-step [s].
+  void build(Real h);
+  bool empty() const { return triangles_.empty(); }
+
+  /// Returns the first hit of a sphere whose centre moves straight from a, at the fraction `from` of the
+  /// sub-step, to b at its end; empty if there is none before the fraction `latest`. A sphere that is closer
+  /// to a triangle than its radius at first hits it at once if it approaches, and otherwise comes hardly
+  /// closer.
+  std::optional<Hit> first_hit(const Vec3& a, const Vec3& b, Real radius, Real from, Real latest) const;
+  /// Returns the end of the path of a particle that must not pass cloth: b, or the place to which the first
+  /// triangle that it meets takes it along. Where several layers of cloth close on it, it comes as close to
+  /// them as necessary.
+  Vec3 held_end(const Vec3& a, const Vec3& b, Real radius, Real from) const;
+  /// Returns whether the centre of a particle passes cloth on a straight line at a fraction of the sub-step.
+  bool separates(const Vec3& a, const Vec3& b, Real fraction) const;
+  /// Returns the distance at which particles of a radius are kept from cloth [m].
+  static Real kept_distance(Real radius);
+
+  /// Displacement of the point that was hit, from the time of the hit to the end of the sub-step [m].
+  Vec3 displacement(const Hit& hit) const;
+  /// Position at the end of the sub-step of a particle that moves with the triangle from the hit on.
+  Vec3 carried(const Hit& hit) const;
+  /// Velocity of the point that was hit at the end of the sub-step, with all impulses so far [m/s].
+  Vec3 velocity(const Hit& hit) const;
+  /// Change of velocity() per unit of impulse [1/kg].
+  Real mobility(const Hit& hit) const;
+  Real friction(const Hit& hit) const { return cloths_[triangles_[hit.triangle].cloth].friction; }
+  /// Applies an impulse to the cloth at the point that was hit [N s].
+  void push(const Hit& hit, const Vec3& impulse);
+  /// Counts a collision of a particle with the cloth.
+  void count(const Hit& hit) { ++cloths_[triangles_[hit.triangle].cloth].hits; }
+
+  /// Velocities of a cloth's points with all impulses, and its number of collisions, in the order of add().
+  std::span<const Vec3> velocities(std::size_t cloth) const;
+  uint64_t hits(std::size_t cloth) const { return cloths_[cloth].hits; }
+
+ private:
+  struct ClothTriangle {
+    Triangle corners;
+    uint32_t cloth;
+  };
+  struct Sheet {
+    std::size_t first;  // its first point
+    Real friction;
+    uint64_t hits = 0;
+  };
+  /// The path of a particle's centre: its position at the fraction `from`, and displacement per sub-step.
+  struct Path {
+    Vec3 start, rate;
+    Real from, radius;
+    Vec3 at(Real fraction) const { return start + (fraction - from) * rate; }
+  };
+
+  Vec3 corner(uint32_t point, Real fraction) const {
+    return from_[point] + fraction * (to_[point] - from_[point]);
+  }
+  std::optional<Hit> hit(uint32_t triangle, const Path& path, Real latest) const;
+
+  Real h_ = 0;
+  std::vector<Vec3> from_, to_, velocity_;
+  std::vector<Real> inverse_mass_;
+  std::vector<ClothTriangle> triangles_;
+  std::vector<Sheet> cloths_;
+  std::vector<Aabb> boxes_;
+  AabbTree tree_;
+};
+
+}  // namespace offstage::sim
