@@ -16,6 +16,9 @@ constexpr Real kMaxSubsteps = 1e6;
 /// Greatest number of parts of a sub-step (World::Impl::first_part()).
 constexpr uint32_t kMaxParts = 32;
 constexpr std::size_t kWorthThreads = 200;
+/// The velocities of keyframed bodies at the ends of a sub-step are computed at this fraction of its length
+/// inside of it.
+constexpr Real kInside = 1e-6;
 
 /// Whether the state, and the velocities that are computed from it, are finite.
 bool is_finite(const RigidBody& b) {
@@ -171,9 +174,18 @@ void World::Impl::begin_bodies(Real start, Real end) {
 
 void World::Impl::begin_kinematic(Real start, Real end) {
   for (Body* body : active.kinematic()) {
-    const Motion motion = body->def.track.at(end, body->def.pose);
+    const auto at = [&](Real time) { return body->def.track.at(time, body->def.pose); };
+    // The velocity may jump at a key. So the velocities are those just after the start and just before the
+    // end. Otherwise the contacts of this sub-step would stop bodies for a motion that begins later.
+    const Real inside = kInside * (end - start);
+    Motion motion = at(end);
     const bool jumps = body->def.track.jumps(start, end);
-    const Motion before = jumps ? motion : body->def.track.at(start, body->def.pose);
+    if (!jumps) {
+      const Motion last = at(end - inside);
+      motion.velocity = last.velocity;
+      motion.angular_velocity = last.angular_velocity;
+    }
+    const Motion before = jumps ? motion : at(start + inside);
     if (jumps) {
       // The body jumps to the new pose, and sweeps nothing on the way.
       wake_neighbours(*body);
