@@ -7,13 +7,16 @@ namespace offstage::sim {
 namespace {
 
 /// Greatest number of times in an interval at which contacts close.
-constexpr int kMostClosings = 16;
+constexpr int kMostClosings = 64;
 /// Gaps smaller than kClosed count as closed [m]. Contacts close together if their closing times differ by
 /// less than the fraction kTogether of the interval: apart from rounding, all points of a wheel reach a seam
 /// of a surface at the same time.
 constexpr Real kClosed = 1e-11, kTogether = 1e-3;
 /// Contacts that approach at a lower speed than this need not be stopped [m/s].
 constexpr Real kStopped = 1e-9;
+/// A closed contact whose surfaces separate faster than this opens [m/s]. The speed of a contact that turns
+/// is uncertain by the fraction kTurningShare of the change of its velocity in the interval.
+constexpr Real kOpening = 1e-3, kTurningShare = 0.25;
 /// Fraction of the kinetic energy that a solution may add because of rounding.
 constexpr Real kClosingRounding = 1e-9;
 
@@ -22,9 +25,11 @@ constexpr Real kClosingRounding = 1e-9;
 /// between.
 Real closing_time(Real gap, Real first, Real last, Real rest) {
   const Real never = 2 * rest, curve = (last - first) / (2 * rest);
-  // Solves gap + first t + curve t^2 = 0 by the formula that is accurate for small curves.
+  // Solves gap + first t + curve t^2 = 0 for the later root if the gap grows at first, else for the earlier
+  // one, by the formula that is accurate for small curves.
   const Real root = first * first - 4 * curve * gap;
   if (root < 0) return never;
+  if (first > 0) return curve < 0 ? (first + std::sqrt(root)) / (-2 * curve) : never;
   const Real sum = -first + std::sqrt(root);
   if (!(sum > 0)) return never;
   return 2 * gap / sum;
@@ -44,12 +49,15 @@ class Pieces {
     result_.displacements.resize(now_.size());
     for (const ClosingPoint& p : problem.points) gaps_.push_back(p.gap);
     for (const Contact& c : problem.contacts) guesses_.push_back(c.impulse);
+    for (const Real gap : gaps_) open_.push_back(gap > 0);
     closing_.resize(gaps_.size());
   }
 
   std::optional<ClosingSolution> solve() {
     for (int closings = 0; closings <= kMostClosings; ++closings) {
-      if (!close() || !solve_rest()) return {};
+      if (!close()) return {};
+      open();
+      if (!solve_rest()) return {};
       const Real rest = problem_.duration - time_, closing = next_closing();
       advance(std::min(closing, rest));
       if (closing >= rest) {
@@ -70,7 +78,7 @@ class Pieces {
     closed_.clear();
     rows_.clear();
     for (uint32_t i = 0; i < problem_.contacts.size(); ++i) {
-      if (gaps_[i] > 0) continue;
+      if (open_[i]) continue;
       Contact c = problem_.contacts[i];
       c.bias = problem_.points[i].bias_at(now ? elapsed : 1);
       c.offset = problem_.points[i].surface + c.bias;
@@ -141,7 +149,7 @@ class Pieces {
     const Real rest = problem_.duration - time_;
     Real next = 2 * rest;
     for (uint32_t i = 0; i < gaps_.size(); ++i) {
-      if (gaps_[i] == 0) continue;
+      if (!open_[i]) continue;
       closing_[i] = closing_time(gaps_[i], speed(i, now_), speed(i, bodies_), rest);
       next = std::min(next, closing_[i]);
     }
@@ -161,9 +169,16 @@ class Pieces {
       d.turn += duration / 2 * (now_[i].angular_velocity + next[i].angular_velocity);
     }
     for (uint32_t i = 0; i < gaps_.size(); ++i) {
-      if (gaps_[i] == 0) continue;
-      gaps_[i] += duration / 2 * (speed(i, now_) + speed(i, next));
-      if (gaps_[i] <= kClosed || closing_[i] <= duration + kTogether * problem_.duration) gaps_[i] = 0;
+      const Real change = duration / 2 * (speed(i, now_) + speed(i, next));
+      if (!open_[i]) {
+        // A closed contact without force may have a gap when it opens.
+        gaps_[i] = std::max(0.0, gaps_[i] + change);
+        continue;
+      }
+      gaps_[i] += change;
+      if (gaps_[i] > kClosed && closing_[i] > duration + kTogether * problem_.duration) continue;
+      gaps_[i] = 0;
+      open_[i] = false;
     }
     now_ = std::move(next);
     time_ += duration;
@@ -173,8 +188,8 @@ class Pieces {
     const Real elapsed = time_ / problem_.duration;
     bool approaches = false;
     for (uint32_t i = 0; i < gaps_.size(); ++i)
-      approaches = approaches ||
-                   (gaps_[i] == 0 && speed(i, now_) + problem_.points[i].bias_at(elapsed).x() < -kStopped);
+      approaches =
+          approaches || (!open_[i] && speed(i, now_) + problem_.points[i].bias_at(elapsed).x() < -kStopped);
     if (!approaches) return true;
     bodies_ = now_;
     if (!solve_closed(true)) return false;
@@ -183,11 +198,26 @@ class Pieces {
     return true;
   }
 
+  /// Opens the closed contacts whose surfaces separate at the current time. If they counted as closed, their
+  /// forces would keep the surfaces from approaching at the end of the interval while the surfaces move
+  /// apart, and would add energy: a box on its four corners would rock for ever.
+  void open() {
+    const Real elapsed = time_ / problem_.duration;
+    for (uint32_t i = 0; i < gaps_.size(); ++i) {
+      if (open_[i]) continue;
+      const ClosingPoint& point = problem_.points[i];
+      const Real turning = std::abs(point.bias_at(1).x() - point.bias_at(0).x());
+      open_[i] = speed(i, now_) + point.bias_at(elapsed).x() > kOpening + kTurningShare * turning;
+      if (!open_[i]) gaps_[i] = 0;
+    }
+  }
+
   const ClosingProblem& problem_;
   ProximalNewton& newton_;
   ClosingSolution result_;
   Real time_ = 0, cost_ = 0;
-  /// By contact: the current gap [m], 0 if it is closed; the time until it closes [s].
+  /// By contact: whether it is open; the current gap [m]; the time until it closes [s].
+  std::vector<uint8_t> open_;
   std::vector<Real> gaps_, closing_;
   /// By contact: the impulse over the whole interval.
   std::vector<Vec3> guesses_;

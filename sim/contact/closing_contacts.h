@@ -59,8 +59,9 @@ struct ClosingProblem {
 };
 
 /// Solves an interval in pieces. A point with a gap pushes from the time at which the gap closes, and does
-/// not rebound. Returns no result if there are more than 16 closing times, if a solution fails or adds
-/// energy, or if the total cost exceeds the budget. `cost` is the cost in any case [ns].
+/// not rebound. A point that separates does not push until it closes again. Returns no result if there are
+/// more than 64 closing times, if a solution fails or adds energy, or if the total cost exceeds the budget.
+/// `cost` is the cost in any case [ns].
 std::optional<ClosingSolution> solve_closing(const ClosingProblem& problem, ProximalNewton& newton,
                                              Real& cost);
 

@@ -35,15 +35,32 @@ bool is_uneven(const Island& island) {
   });
 }
 
+/// Returns the potential energy of an island by gravity [J].
+Real height_energy(const Island& island, const Vec3& gravity) {
+  Real sum = 0;
+  for (const Body* body : island.bodies) sum -= body->rigid.mass * gravity.dot(body->rigid.position);
+  return sum;
+}
+
+/// Upper bound of an island's kinetic energy after its contacts are solved, and its potential energy before
+/// [J].
+struct EnergyBound {
+  Real kinetic, height;
+};
+
 /// Projects the bodies onto the joints, because contacts and limits move them so that the joints are
-/// satisfied only approximately. If links turn far in a step, the kinetic energy may then exceed
-/// `most_energy` [J]; in this case the relative velocities of the links are reduced.
-JointFigures settle_joints(const Island& island, Real end, Real most_energy) {
+/// satisfied only approximately. If links turn far in a step, the kinetic energy may then exceed its bound;
+/// in this case the relative velocities of the links are reduced. Where contacts and limits lead to a lower
+/// position than the free motion, gravity has done more work: a pendulum that rebounds from a limit falls
+/// while the free one would still rise.
+JointFigures settle_joints(const Island& island, Real end, const EnergyBound& bound, const Vec3& gravity) {
   JointFigures tally;
   for (Articulation* articulation : island.articulations) {
     articulation->settle(end, tally);
     for (Body* body : articulation->bodies()) body->pose = body->rigid.pose();
   }
+  if (std::isinf(bound.kinetic)) return tally;
+  const Real most_energy = bound.kinetic + std::max(0.0, bound.height - height_energy(island, gravity));
   if (const Real excess = kinetic_energy(island) - most_energy; excess > 0) {
     Real internal = 0;
     for (const Articulation* a : island.articulations) internal += internal_energy(*a);
@@ -54,12 +71,12 @@ JointFigures settle_joints(const Island& island, Real end, Real most_energy) {
   return tally;
 }
 
-/// Returns an upper bound of an island's kinetic energy after its contacts are solved [J]. Contacts and
-/// joints dissipate energy, except for the error of their velocity terms. `fraction`: length of the interval
-/// divided by the sub-step.
-Real most_energy(const Island& island, Real fraction) {
-  if (island.articulations.empty() || can_do_work(island)) return std::numeric_limits<Real>::infinity();
-  return (1 + kAddedByJoints * fraction) * kinetic_energy(island);
+/// Returns the bound of an island's energy before its contacts are solved. Contacts and joints dissipate
+/// energy, except for the error of their velocity terms. `fraction`: length of the interval divided by the
+/// sub-step.
+EnergyBound energy_bound(const Island& island, Real fraction, const Vec3& gravity) {
+  if (island.articulations.empty() || can_do_work(island)) return {std::numeric_limits<Real>::infinity(), 0};
+  return {(1 + kAddedByJoints * fraction) * kinetic_energy(island), height_energy(island, gravity)};
 }
 
 }  // namespace
@@ -108,9 +125,10 @@ void ContactSolver::solve(std::span<Island* const> group, const ContactInterval&
     if (!choice.exact) choice.exact = std::make_unique<ExactContacts>();
     exact.emplace_back(island, &choice);
   }
-  std::vector<Real> most(group.size());
-  for (std::size_t i = 0; i < group.size(); ++i)
-    most[i] = most_energy(*group[i], interval.duration / interval.substep);
+  const Vec3& gravity = world_.def.gravity;
+  std::vector<EnergyBound> bounds;
+  for (const Island* island : group)
+    bounds.push_back(energy_bound(*island, interval.duration / interval.substep, gravity));
   std::vector<ExactContacts::Outcome> outcomes(exact.size());
   using Method = ExactContacts::Method;
   const Method method = world_.def.solver == SolverKind::lcp ? Method::lcp : Method::proximal;
@@ -145,7 +163,8 @@ void ContactSolver::solve(std::span<Island* const> group, const ContactInterval&
   if (!fast.empty()) report.solvers.fast.add(fast_.solve(fast, interval));
   sprung.keep_on_contacts();
   for (std::size_t i = 0; i < group.size(); ++i)
-    if (!group[i]->articulations.empty()) report.joints.add(settle_joints(*group[i], interval.end, most[i]));
+    if (!group[i]->articulations.empty())
+      report.joints.add(settle_joints(*group[i], interval.end, bounds[i], gravity));
 }
 
 void record_rough_contact(const ContactPair* pair, StepReport& report) {

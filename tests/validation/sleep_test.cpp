@@ -225,6 +225,24 @@ TEST_P(Sleep, AnArrivingKinematicBodyWakesIt) {
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, Sleep);
 
+// A box that stands on a face, but not quite flat, falls onto its corners one after the other and stays
+// there. Contacts that pushed while they moved apart gave it the energy to rock for ever, by micrometres.
+TEST(Rocking, OfABoxOnItsCornersEnds) {
+  for (const Real about_x : {2e-5, 1e-4, 3e-4, 1e-3})
+    for (const Real about_z : {0.0, 2e-5, 1.5e-4, 1e-3}) {
+      World world({.solver = SolverKind::exact});
+      world.add_body(
+          {.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = 0.8});
+      const BodyHandle box = world.add_body({.shape = Box{{0.125, 0.27, 0.2}},
+                                             .pose = {{0, 0.135 + 0.1 * about_x + 0.0625 * about_z, 0},
+                                                      Quat(1, about_x / 2, 0, about_z / 2).normalized()},
+                                             .restitution = 0,
+                                             .friction = 0.8});
+      run(world, 2);
+      EXPECT_TRUE(world.is_asleep(box)) << about_x << " " << about_z;
+    }
+}
+
 class Overlap : public BothSolvers {};
 
 // Overlaps are removed at no more than the correction speed, and no velocity remains.
