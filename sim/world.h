@@ -253,10 +253,10 @@ class World {
 
   /// Advances only the particles, from time `from` to time `to` [s], before the first step(). The times must
   /// satisfy from <= to <= 0. A further call must start where the last one ended. The sub-steps are as long
-  /// as in step(). Afterwards time() is `to`. Particles collide with each other, with bodies and with cloths. Dynamic
-  /// bodies, cloths, springs and previously existing particles do not move. Kinematic bodies follow their
-  /// tracks. Forces have their values at time 0, and forces between particles do not act. With from = to = 0,
-  /// `before` is called once, and particles created at that time exist from then on. Throws
+  /// as in step(). Afterwards time() is `to`. Particles collide with each other, with bodies and with cloths.
+  /// Dynamic bodies, cloths, springs and previously existing particles do not move. Kinematic bodies follow
+  /// their tracks. Forces have their values at time 0, and forces between particles do not act. With from =
+  /// to = 0, `before` is called once, and particles created at that time exist from then on. Throws
   /// std::invalid_argument for other times.
   StepReport prewarm(Real from, Real to, const BeforeSubStep& before = {});
 

@@ -1,7 +1,7 @@
 #pragma once
-/// Motion of cloths through a sub-step (physics F6-F8). Cloths move after bodies and before particles, and collide
-/// with the bodies along the paths of the sub-step. Impulses of cloths change the velocities of bodies from
-/// the next sub-step on.
+/// Motion of cloths through a sub-step (physics F6-F8). Cloths move after bodies and before particles, and
+/// collide with the bodies along the paths of the sub-step. Impulses of cloths change the velocities of
+/// bodies from the next sub-step on.
 
 #include <optional>
 #include <span>
