@@ -16,7 +16,7 @@ constexpr Real kMaxParts = 1000;
 /// triangles.
 constexpr Real kMostApproach = 0.1;
 /// Greatest relative displacement of a spring's ends in a sub-step, as a fraction of the spring's length. It
-/// is also the greatest angle by which a spring turns; where air acts on the cloth, kMostTurn is.
+/// is also the greatest angle by which a spring turns; in air and without self-collision, kMostTurn is.
 constexpr Real kMostStrain = 1, kMostTurn = 0.25;
 /// Greatest number of parts into which a sub-step is divided because of kMostApproach and kMostStrain.
 constexpr Real kMostDivision = 16;
@@ -154,7 +154,7 @@ Real ClothSystem::fastest_strain_rate() const {
     const ClothDef& def = cloths_[c]->def;
     const bool in_air = def.air.density > 0 && def.air.lift > 0;
     if ((!def.self_collision && !in_air) || cloths_[c]->stopped) continue;
-    const Real most = in_air ? kMostTurn : kMostStrain;
+    const Real most = def.self_collision ? kMostStrain : kMostTurn;
     for (const ClothSpring& s : springs_of(c))
       fastest2 = std::max(fastest2, (points_.velocity[s.a] - points_.velocity[s.b]).squaredNorm() /
                                         (most * most * s.rest_length * s.rest_length));

@@ -246,13 +246,13 @@ bool ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real fro
     ++outcome.collisions;
     if (log_.wants_strikes) log_.strikes.push_back({hit.fraction, hit.position, v, hit.normal});
   }
-  const bool stays = restitution == 0 || moves_it;
+  const bool gives_way = moves_it || moved_it, stays = restitution == 0 || gives_way;
   if (stays) {
     const Pose pose = o.at(hit.fraction);
     const Vec3 n = pose.vector_to_body(hit.normal);
-    add_contact({n, &o, friction, hit.fraction, n.dot(pose.point_to_body(hit.position)), moves_it});
+    add_contact({n, &o, friction, hit.fraction, n.dot(pose.point_to_body(hit.position)), gives_way});
   }
-  carrier_ = stays && o.turn > 0 ? &o : nullptr;
+  carrier_ = stays && !gives_way && o.turn > 0 ? &o : nullptr;
   path.start = hit.position;
   path.start_velocity = v;
   reactions_before_finish_ = log_.reactions.size();

@@ -71,6 +71,13 @@ bool leaves(const Body& body, const Aabb& swept_box) {
   return body.collides() && !body.swept.contains(swept_box);
 }
 
+/// Whether a keyframed body does not move in this sub-step.
+bool stands_still(const Body& body) {
+  return body.is_kinematic() && body.drive.velocity == Vec3::Zero() &&
+         body.drive.angular_velocity == Vec3::Zero() && body.pose.position == body.before_substep.position &&
+         body.pose.orientation.coeffs() == body.before_substep.orientation.coeffs();
+}
+
 }  // namespace
 
 void ContactFinder::use(const CollisionMethods& methods) {
@@ -300,9 +307,12 @@ void ContactFinder::remove_internal_edge_contacts(std::span<ContactPair* const> 
 std::vector<Body*> ContactFinder::wake_touched(FreeMotion& motion, Real start, Real h) {
   if (active_.asleep() == 0) return {};
   std::vector<Body*> touched;
-  for (ContactPair* pair : pairs_)
+  for (ContactPair* pair : pairs_) {
+    if (pair->manifolds().empty() && !pair->needs_toi) continue;
+    if (stands_still(pair->a()) || stands_still(pair->b())) continue;
     for (Body* body : {&pair->a(), &pair->b()})
-      if (body->asleep && (!pair->manifolds().empty() || pair->needs_toi)) touched.push_back(body);
+      if (body->asleep) touched.push_back(body);
+  }
   if (touched.empty()) return {};
   std::vector<Body*> woken;
   for (Body* body : touched)

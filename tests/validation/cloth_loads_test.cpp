@@ -7,7 +7,7 @@
 #include "effects/cloth.h"
 #include "meshes.h"
 #include "sim/cloth/cloth_state.h"
-#include "sim/core/rotation.h"
+#include "sim/dynamics/free_body.h"
 #include "sim/world.h"
 
 namespace offstage::sim {

@@ -1,6 +1,5 @@
 // The command cache: lists, verifies and clears caches.
 
-#include <map>
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -16,8 +15,7 @@ namespace offstage::producer {
 namespace {
 
 struct CacheOptions {
-  enum class Action { list, verify, clear };
-  Action action = Action::list;
+  std::string action;
   std::vector<std::string> folders;
   bool json = false;
 };
@@ -84,14 +82,8 @@ int clear_caches(const CacheOptions& options) {
 
 /// Lists, verifies or clears folders of snapshots.
 int cache_command(const CacheOptions& options) {
-  switch (options.action) {
-    case CacheOptions::Action::list:
-      return list_caches(options);
-    case CacheOptions::Action::verify:
-      return verify_caches(options);
-    case CacheOptions::Action::clear:
-      break;
-  }
+  if (options.action == "list") return list_caches(options);
+  if (options.action == "verify") return verify_caches(options);
   return clear_caches(options);
 }
 
@@ -102,14 +94,11 @@ Command add_cache(CLI::App& app) {
   CacheOptions& given = *options;
   CLI::App* command =
       app.add_subcommand("cache", "List, verify or clear folders of snapshots that `simulate --cache` wrote");
-  const std::map<std::string, CacheOptions::Action> actions = {{"list", CacheOptions::Action::list},
-                                                               {"verify", CacheOptions::Action::verify},
-                                                               {"clear", CacheOptions::Action::clear}};
   command
       ->add_option("action", given.action,
                    "list: print their contents; verify: read every snapshot; clear: remove the snapshots")
       ->required()
-      ->transform(CLI::CheckedTransformer(actions).description("{list,verify,clear}"));
+      ->check(CLI::IsMember({"list", "verify", "clear"}));
   command
       ->add_option("folders", given.folders,
                    "Folders with a cache; `list` and `verify` also accept folders that contain several")

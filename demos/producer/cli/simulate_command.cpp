@@ -30,6 +30,7 @@ int simulate_command(const SimulateOptions& options) {
                                           options.cloths,   options.cloth_points, options.joints,
                                           options.particles};
   for (std::size_t i = 0; i < files.size(); ++i) {
+    if (files[i] == "-") throw OutputError("-: tables and statistics need the name of a file");
     check_file(files[i], options.force);
     for (std::size_t k = 0; k < i; ++k) check_distinct(files[k], files[i]);
   }
