@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "sim/cloth/cloth_springs.h"
 #include "sim/cloth/four_vectors.h"
 
 namespace offstage::sim {
@@ -46,14 +47,9 @@ uint32_t AirDrag::substeps_until_change(const ClothPoints& points, Real dt) cons
   }
   const Real rate =
       std::max(def.air.drag, def.ram_pressure) * def.air.density / 2 * std::sqrt(speed2) * lightness_ + field;
-  Real turning2 =
-      0;  // square of the greatest angular velocity of a spring, which may also be its strain rate
-  for (const ClothSpring& s : cloth_->springs)
-    turning2 =
-        std::max(turning2, (points.velocity[first_ + s.a] - points.velocity[first_ + s.b]).squaredNorm() /
-                               (s.rest_length * s.rest_length));
+  const Real turning = fastest_spring_rate(points, cloth_->springs, first_);
   Real hold = std::min(kLongestHold, rate > 0 ? kMostChange / rate : kLongestHold);
-  if (turning2 > 0) hold = std::min(hold, kHeldTurn / std::sqrt(turning2));
+  if (turning > 0) hold = std::min(hold, kHeldTurn / turning);
   return static_cast<uint32_t>(std::max(1.0, std::floor(hold / dt * (1 + 1e-9))));
 }
 

@@ -60,6 +60,15 @@ inline FourVectors widened(const std::array<SpringFloats, 3>& v) {
 
 }  // namespace
 
+Real fastest_spring_rate(const ClothPoints& points, std::span<const ClothSpring> springs, std::size_t first) {
+  Real fastest2 = 0;
+  for (const ClothSpring& s : springs)
+    fastest2 =
+        std::max(fastest2, (points.velocity[first + s.a] - points.velocity[first + s.b]).squaredNorm() /
+                               (s.rest_length * s.rest_length));
+  return std::sqrt(fastest2);
+}
+
 void ClothSprings::assign(std::span<const ClothSpring> springs, const ClothPoints& points) {
   std::vector<Real> around(points.size(), 0);  // by point: sum of k / m of its springs
   std::vector<uint32_t> count(points.size(), 0);

@@ -19,6 +19,11 @@
 
 namespace offstage::sim {
 
+/// Returns the greatest relative speed of both ends of a spring, divided by its length at rest [1/s]. It is
+/// the greatest strain rate or angular velocity of a spring. `first`: index of the vertex 0 of the springs.
+Real fastest_spring_rate(const ClothPoints& points, std::span<const ClothSpring> springs,
+                         std::size_t first = 0);
+
 class ClothSprings {
  public:
   /// Sets the springs of one cloth. Their ends are indices into the points of all cloths.

@@ -91,7 +91,7 @@ Real ClothSystem::parts_in(Real h, Real speed) const {
   // shortened and a point whose move is not would gain much more energy than the motion loses.
   // Shreds without self-collision turn fast in the wind. In a long sub-step, the lift of the normal at its
   // start would do work on the rotation.
-  if (const Real rate = fastest_strain_rate(); rate > 0)
+  if (const Real rate = parts_by_strain(); rate > 0)
     longest = std::min(longest, std::max(1 / rate, shortest));
   return std::clamp(std::ceil(h / longest * (1 - 1e-12)), 1.0, kMaxParts);
 }
@@ -146,20 +146,18 @@ void ClothSystem::collect_triangles() {
   }
 }
 
-/// Returns the greatest relative speed of both ends of a spring divided by its length at rest [1/s] and by
-/// the greatest relative displacement in a sub-step, in cloths with self-collision or in air.
-Real ClothSystem::fastest_strain_rate() const {
-  Real fastest2 = 0;
+/// Returns into how many parts a second must be divided so that no spring deforms or turns too far in any of
+/// them [1/s]; 0 if no cloth needs it.
+Real ClothSystem::parts_by_strain() const {
+  Real fastest = 0;
   for (std::size_t c = 0; c < cloths_.size(); ++c) {
     const ClothDef& def = cloths_[c]->def;
     const bool in_air = def.air.density > 0 && def.air.lift > 0;
-    if ((!def.self_collision && !in_air) || cloths_[c]->stopped) continue;
-    const Real most = def.self_collision ? kMostStrain : kMostTurn;
-    for (const ClothSpring& s : springs_of(c))
-      fastest2 = std::max(fastest2, (points_.velocity[s.a] - points_.velocity[s.b]).squaredNorm() /
-                                        (most * most * s.rest_length * s.rest_length));
+    if (cloths_[c]->stopped || (!def.self_collision && !in_air)) continue;
+    fastest = std::max(fastest, fastest_spring_rate(points_, springs_of(c)) /
+                                    (def.self_collision ? kMostStrain : kMostTurn));
   }
-  return std::sqrt(fastest2);
+  return fastest;
 }
 
 void ClothSystem::adapt_springs() {

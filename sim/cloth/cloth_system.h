@@ -89,7 +89,7 @@ class ClothSystem {
   }
   void begin_step(const ClothWeather& weather, std::span<ClothBody> bodies);
   Real parts_in(Real h, Real speed) const;
-  Real fastest_strain_rate() const;
+  Real parts_by_strain() const;
   void substep(Real from, Real to, Real dt);
   void integrate(Real dt);
   void update_supports(const ClothRange& cloth);

@@ -1,10 +1,12 @@
 #include "sim/particles/cloth_obstacles.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "sim/geometry/closest_points.h"
 #include "sim/geometry/intersection.h"
+#include "sim/particles/particles.h"
 
 namespace offstage::sim {
 namespace {
@@ -46,14 +48,15 @@ void ClothObstacles::add(std::span<const Vec3> from, std::span<const Vec3> to,
   cloths_.push_back({first, friction});
 }
 
-void ClothObstacles::build(Real h) {
-  h_ = h;
+void ClothObstacles::build() {
   boxes_.clear();
   for (const ClothTriangle& t : triangles_) {
     Aabb& box = boxes_.emplace_back();
     for (uint32_t point : t.corners) box.extend(from_[point]).extend(to_[point]);
   }
+  if (triangles_ == in_tree_) return tree_.refit(boxes_);
   tree_ = AabbTree(boxes_);
+  in_tree_ = triangles_;
 }
 
 Real ClothObstacles::kept_distance(Real radius) {
@@ -172,6 +175,21 @@ Real ClothObstacles::mobility(const Hit& hit) const {
     sum += weight * weight * inverse_mass_[triangles_[hit.triangle].corners[k]];
   }
   return sum;
+}
+
+ClothObstacles::Impact ClothObstacles::collide(const Hit& hit, const Vec3& v, const Collider& particle,
+                                               Real gain) {
+  Sheet& cloth = cloths_[triangles_[hit.triangle].cloth];
+  const Vec3 u = v - velocity(hit);
+  const Real approach = -u.dot(hit.normal);
+  const Real restitution = 2 * particle.restitution * approach < gain ? 0 : particle.restitution;
+  Impact impact{.strikes = approach > std::max(gain, 0.0), .bounces = restitution > 0};
+  cloth.hits += impact.strikes;
+  if (!(approach > 0)) return impact;
+  impact.impulse = collision_impulse(1 / (1 / particle.mass + mobility(hit)), u, hit.normal, restitution,
+                                     std::sqrt(particle.friction * cloth.friction));
+  push(hit, -impact.impulse);
+  return impact;
 }
 
 void ClothObstacles::push(const Hit& hit, const Vec3& impulse) {

@@ -30,8 +30,8 @@ class ClothObstacles {
   /// `velocities` at the end [m/s]; `inverse_masses` [1/kg], 0 for points that particles do not move.
   void add(std::span<const Vec3> from, std::span<const Vec3> to, std::span<const Vec3> velocities,
            std::span<const Real> inverse_masses, std::span<const Triangle> triangles, Real friction);
-  /// Prepares the search, after all cloths have been added. `h`: length of the sub-step [s].
-  void build(Real h);
+  /// Prepares the search, after all cloths have been added.
+  void build();
   bool empty() const { return triangles_.empty(); }
 
   /// Returns the first hit of a sphere whose centre moves straight from a, at the fraction `from` of the
@@ -52,6 +52,19 @@ class ClothObstacles {
   Vec3 displacement(const Hit& hit) const;
   /// Position at the end of the sub-step of a particle that moves with the triangle from the hit on.
   Vec3 carried(const Hit& hit) const;
+  struct Collider {
+    Real mass, restitution, friction;
+  };
+  struct Impact {
+    Vec3 impulse = Vec3::Zero();  ///< on the particle [N s]
+    bool strikes = false;         ///< whether it counts as a collision, and not as a resting contact
+    bool bounces = false;
+  };
+  /// Collides a particle of the velocity v with the cloth, which gets the opposite impulse. `gain`: speed of
+  /// approach that forces restore within a sub-step [m/s]. A bounce that would end within the sub-step does
+  /// not take place (E6).
+  Impact collide(const Hit& hit, const Vec3& v, const Collider& particle, Real gain);
+
   /// Velocity of the point that was hit at the end of the sub-step, with all impulses so far [m/s].
   Vec3 velocity(const Hit& hit) const;
   /// Change of velocity() per unit of impulse [1/kg].
@@ -59,8 +72,6 @@ class ClothObstacles {
   Real friction(const Hit& hit) const { return cloths_[triangles_[hit.triangle].cloth].friction; }
   /// Applies an impulse to the cloth at the point that was hit [N s].
   void push(const Hit& hit, const Vec3& impulse);
-  /// Counts a collision of a particle with the cloth.
-  void count(const Hit& hit) { ++cloths_[triangles_[hit.triangle].cloth].hits; }
 
   /// Velocities of a cloth's points with all impulses, and its number of collisions, in the order of add().
   std::span<const Vec3> velocities(std::size_t cloth) const;
@@ -70,6 +81,7 @@ class ClothObstacles {
   struct ClothTriangle {
     Triangle corners;
     uint32_t cloth;
+    bool operator==(const ClothTriangle&) const = default;
   };
   struct Sheet {
     std::size_t first;  // its first point
@@ -88,10 +100,10 @@ class ClothObstacles {
   }
   std::optional<Hit> hit(uint32_t triangle, const Path& path, Real latest) const;
 
-  Real h_ = 0;
   std::vector<Vec3> from_, to_, velocity_;
   std::vector<Real> inverse_mass_;
   std::vector<ClothTriangle> triangles_;
+  std::vector<ClothTriangle> in_tree_;  // the triangles for which the tree was built
   std::vector<Sheet> cloths_;
   std::vector<Aabb> boxes_;
   AabbTree tree_;

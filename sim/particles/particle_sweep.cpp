@@ -82,12 +82,13 @@ SweepOutcome ParticleSweep::sweep(ParticlePath& path, Real born, const Vec3& ext
     return outcome;
   }
   Real from = born;
-  Vec3 held = path.start;  // position at the end of the sub-step without a further path
+  ObstacleHit hit;
+  std::optional<ClothObstacles::Hit> cloth;
   for (int hits = 0; hits < kMaxHits; ++hits) {
     const SpherePath rest(path.start, path.end, from, carrier_);
     if (hits > 0) near_.find(rest, path.radius);
-    const ObstacleHit hit = near_.first_hit(rest, path.radius);
-    std::optional<ClothObstacles::Hit> cloth;
+    hit = near_.first_hit(rest, path.radius);
+    cloth.reset();
     if (cloths_)
       cloth = cloths_->first_hit(path.start, path.end, path.radius, from, hit.obstacle ? hit.fraction : 1);
     if (!hit.obstacle && !cloth) {
@@ -98,10 +99,10 @@ SweepOutcome ParticleSweep::sweep(ParticlePath& path, Real born, const Vec3& ext
     if (!(cloth ? respond(path, *cloth, from, extra, outcome) : respond(path, hit, from, extra, outcome)))
       return outcome;
     from = cloth ? cloth->fraction : hit.fraction;
-    held = cloth ? path.start : PlaneAtEnd(hit).origin;
   }
   // The particle moves on with what it hit last, which would otherwise pass over it.
   outcome.truncated = true;
+  const Vec3 held = cloth ? path.start : PlaneAtEnd(hit).origin;
   path.end = cloths_ ? cloths_->held_end(path.start, held, path.radius, from) : held;
   return outcome;
 }
@@ -247,11 +248,7 @@ bool ParticleSweep::respond(ParticlePath& path, const ObstacleHit& hit, Real fro
     if (log_.wants_strikes) log_.strikes.push_back({hit.fraction, hit.position, v, hit.normal});
   }
   const bool gives_way = moves_it || moved_it, stays = restitution == 0 || gives_way;
-  if (stays) {
-    const Pose pose = o.at(hit.fraction);
-    const Vec3 n = pose.vector_to_body(hit.normal);
-    add_contact({n, &o, friction, hit.fraction, n.dot(pose.point_to_body(hit.position)), gives_way});
-  }
+  if (stays) add_contact({hit.normal, PlaneAtEnd(hit), &o, friction, hit.fraction, gives_way});
   carrier_ = stays && !gives_way && o.turn > 0 ? &o : nullptr;
   path.start = hit.position;
   path.start_velocity = v;
@@ -271,22 +268,15 @@ bool ParticleSweep::respond(ParticlePath& path, const ClothObstacles::Hit& hit, 
   }
   log_.reactions.resize(reactions_before_finish_);
   Vec3 v = arrival(path, hit.position, (hit.fraction - from) * h_, extra);
-  const Vec3 u = v - cloths_->velocity(hit);
-  const Real approach = -u.dot(hit.normal);
   const Real gain = -h_ * (forces_.acceleration(v, path.mass) + extra).dot(hit.normal);
-  const Real restitution = 2 * path.restitution * approach < gain ? 0 : path.restitution;
-  if (approach > 0) {
-    const Vec3 impulse = collision_impulse(1 / (1 / path.mass + cloths_->mobility(hit)), u, hit.normal,
-                                           restitution, std::sqrt(path.friction * cloths_->friction(hit)));
-    v += impulse / path.mass;
-    cloths_->push(hit, -impulse);
-  }
-  if (approach > std::max(gain, 0.0)) {
+  const ClothObstacles::Impact impact =
+      cloths_->collide(hit, v, {path.mass, path.restitution, path.friction}, gain);
+  v += impact.impulse / path.mass;
+  if (impact.strikes) {
     ++outcome.collisions;
-    cloths_->count(hit);
     if (log_.wants_strikes) log_.strikes.push_back({hit.fraction, hit.position, v, hit.normal});
   }
-  add_contact(ClothContact{hit, restitution == 0});
+  add_contact(ClothContact{hit, !impact.bounces});
   carrier_ = nullptr;
   path.start = hit.position;
   path.start_velocity = v;
@@ -361,13 +351,14 @@ void ParticleSweep::finish(ParticlePath& path, Real duration, const Vec3& extra)
   const Vec3 predicted = path.start + duration * path.start_velocity;
   const auto press = [&](const Contact& c) {
     if (c.gives_way) return false;
-    const Vec3 u = v - c.obstacle->velocity_at(predicted, 1), normal = c.normal_at(1);
+    const Vec3 u = v - c.obstacle->velocity_at(predicted, 1);
+    const Vec3& normal = c.plane.normal;
     if (u.dot(normal) >= 0) return false;
     const Vec3 impulse = collision_impulse(*c.obstacle, 1, path.mass, u, normal, 0, c.friction, Mat3::Zero());
     v += impulse / path.mass;
     if (c.obstacle->is_dynamic())
       log_.reactions.push_back(
-          reaction(*c.obstacle, path.start - path.radius * c.normal_at(c.fraction), c.fraction, impulse));
+          reaction(*c.obstacle, path.start - path.radius * c.normal, c.fraction, impulse));
     return true;
   };
   for (ClothContact& c : cloth_contacts()) c.impulse.setZero();
@@ -382,35 +373,34 @@ void ParticleSweep::finish(ParticlePath& path, Real duration, const Vec3& extra)
   if (cloth_contact_count_ > 0) keep_off_cloth(path, extra);
   for (std::size_t i = 0; i < contact_count_; ++i) {
     const Contact& c = contacts_[i];
+    // A surface that turns moves on an arc, and the particle on a straight line, so that the particle may end
+    // below the surface although it does not approach it.
     if (c.gives_way)
       stay_before(c, path, duration, extra);
     else if (c.obstacle->turn > 0)
-      stay_above(c, path);
+      path.end -= std::min(c.plane.height(path.end), 0.0) * c.plane.normal;
   }
 }
 
 /// Keeps the end of a path in front of an obstacle that gives way only in the next sub-step.
 void ParticleSweep::stay_before(const Contact& c, ParticlePath& path, Real duration,
                                 const Vec3& extra) const {
-  const Vec3 normal = c.normal_at(c.fraction),
-             behind = duration * c.obstacle->velocity_at(path.start, 1) - (path.end - path.start);
-  if (!(behind.dot(normal) > 0)) return;
-  const Vec3 shift = behind.dot(normal) * normal;
+  const Vec3 behind = duration * c.obstacle->velocity_at(path.start, 1) - (path.end - path.start);
+  if (!(behind.dot(c.normal) > 0)) return;
+  const Vec3 shift = behind.dot(c.normal) * c.normal;
   path.end += shift;
   path.end_velocity = velocity_after_shift(path.end_velocity,
                                            forces_.acceleration(path.end_velocity, path.mass) + extra, shift);
 }
 
-/// Moves the end of a path out of an obstacle that turns. The surface moves on an arc there, and the particle
-/// on a straight line, so that the particle ends beside the surface although it does not approach it.
-void ParticleSweep::stay_above(const Contact& c, ParticlePath& path) {
-  const Pose end = c.obstacle->at(1);
-  const Real below = c.height - c.normal.dot(end.point_to_body(path.end));
-  if (below > 0) path.end += below * end.vector_to_world(c.normal);
-}
-
 PlaneAtEnd::PlaneAtEnd(const ObstacleHit& hit) {
-  const Pose then = hit.obstacle->at(hit.fraction), end = hit.obstacle->at(1);
+  const Obstacle& o = *hit.obstacle;
+  if (o.turn == 0) {
+    origin = hit.position + (1 - hit.fraction) * (o.end.position - o.start.position);
+    normal = hit.normal;
+    return;
+  }
+  const Pose then = o.at(hit.fraction), end = o.at(1);
   origin = end.point_to_world(then.point_to_body(hit.position));
   normal = end.vector_to_world(then.vector_to_body(hit.normal));
 }

@@ -62,6 +62,7 @@ struct ObstacleHit {
 
 /// The plane in which a particle touches an obstacle, moved with the obstacle to the end of the sub-step.
 struct PlaneAtEnd {
+  PlaneAtEnd() = default;
   explicit PlaneAtEnd(const ObstacleHit& hit);
   /// Height of a point above the plane [m]; 0 for a particle's centre at the hit.
   Real height(const Vec3& point) const { return normal.dot(point - origin); }
@@ -137,14 +138,14 @@ class NearObstacles {
 
 class ParticleSweep {
  public:
-  /// `fixed` and `moving` are the obstacles of a sub-step of length h [s]; `cloths` may be null. With
+  /// `fixed` and `moving` are the obstacles, and `cloths` the cloths, of a sub-step of length h [s]. With
   /// `impulses`, each hit of a dynamic body or of cloth changes its velocity immediately, so particles must
   /// be swept one after the other. Without `impulses`, particles can be swept in parallel; those that hit a
   /// dynamic body or cloth are left unchanged and reported by SweepOutcome::strikes_body.
-  ParticleSweep(const Obstacles& fixed, const Obstacles& moving, ClothObstacles* cloths,
+  ParticleSweep(const Obstacles& fixed, const Obstacles& moving, ClothObstacles& cloths,
                 const ParticleForces& forces, Real h, SweepLog& log, BodyImpulses* impulses = nullptr)
       : near_(fixed, moving),
-        cloths_(cloths && !cloths->empty() ? cloths : nullptr),
+        cloths_(cloths.empty() ? nullptr : &cloths),
         forces_(forces),
         h_(h),
         log_(log),
@@ -157,16 +158,14 @@ class ParticleSweep {
  private:
   /// A surface against which the particle presses until the end of the sub-step.
   struct Contact {
-    Vec3 normal;  // in the obstacle's frame
+    Vec3 normal;  // at the start of the contact
+    PlaneAtEnd plane;
     const Obstacle* obstacle;
     Real friction;
     Real fraction;  // start of the contact
-    Real height;    // of the particle's centre along the normal, in the obstacle's frame [m]
     /// Whether the obstacle was hit and will move away only in the next sub-step. Until then it blocks the
     /// particle.
     bool gives_way;
-
-    Vec3 normal_at(Real time) const { return obstacle->at(time).vector_to_world(normal); }
   };
 
   /// Contact with cloth until the end of the sub-step.
@@ -189,13 +188,12 @@ class ParticleSweep {
                SweepOutcome& outcome);
   void finish(ParticlePath& path, Real duration, const Vec3& extra);
   void stay_before(const Contact& contact, ParticlePath& path, Real duration, const Vec3& extra) const;
-  static void stay_above(const Contact& contact, ParticlePath& path);
   std::span<ClothContact> cloth_contacts() { return std::span(cloth_contacts_).first(cloth_contact_count_); }
   void add_contact(const Contact& contact);
   Vec3 fly(const Vec3& v, Real mass, Real duration, const Vec3& extra) const;
 
   NearObstacles near_;
-  ClothObstacles* cloths_;
+  ClothObstacles* cloths_;  ///< null if there are none
   const ParticleForces& forces_;
   Real h_;
   SweepLog& log_;

@@ -234,29 +234,28 @@ ParticleTally ParticleSystem::step(const ParticleStage& stage, const ParticleFor
   std::vector<std::vector<Striker>> strikers(tallies.size());
   fly_each(stage, forces, coupled, [&](std::size_t chunk) {
     logs[chunk].wants_strikes = def.report_collisions;
-    return
-        [&, chunk, &log = logs[chunk],
-         obstacles = ParticleSweep(stage.fixed, stage.moving, &stage.cloths, forces, stage.h, logs[chunk])](
-            std::size_t i, const Flight& flight, bool integrated) mutable {
-          ParticleTally& tally = tallies[chunk];
-          arrays.age[i] += flight.duration;
-          if (is_lost(i, flight, tally)) {
-            fate_[i] = Fate::dead;
-            return;
-          }
-          SweepOutcome outcome;
-          if (def.collides && flight.duration > 0) {
-            const std::size_t reactions = log.reactions.size();
-            outcome = sweep(stage, forces, obstacles, i, flight, integrated);
-            if (outcome.strikes_body) {
-              log.reactions.resize(reactions);
-              log.strikes.clear();
-              strikers[chunk].push_back({outcome.time, i, flight, integrated});
-              return;
-            }
-          }
-          finish_sweep(stage, i, outcome, log, tally);
-        };
+    return [&, chunk, &log = logs[chunk],
+            obstacles = ParticleSweep(stage.fixed, stage.moving, stage.cloths, forces, stage.h, logs[chunk])](
+               std::size_t i, const Flight& flight, bool integrated) mutable {
+      ParticleTally& tally = tallies[chunk];
+      arrays.age[i] += flight.duration;
+      if (is_lost(i, flight, tally)) {
+        fate_[i] = Fate::dead;
+        return;
+      }
+      SweepOutcome outcome;
+      if (def.collides && flight.duration > 0) {
+        const std::size_t reactions = log.reactions.size();
+        outcome = sweep(stage, forces, obstacles, i, flight, integrated);
+        if (outcome.strikes_body) {
+          log.reactions.resize(reactions);
+          log.strikes.clear();
+          strikers[chunk].push_back({outcome.time, i, flight, integrated});
+          return;
+        }
+      }
+      finish_sweep(stage, i, outcome, log, tally);
+    };
   });
   std::vector<Striker> all;
   for (std::size_t chunk = 0; chunk < logs.size(); ++chunk) {
@@ -276,7 +275,7 @@ void ParticleSystem::strike_bodies(const ParticleStage& stage, const ParticleFor
   });
   SweepLog log;
   log.wants_strikes = def.report_collisions;
-  ParticleSweep obstacles(stage.fixed, stage.moving, &stage.cloths, forces, stage.h, log, &stage.impulses);
+  ParticleSweep obstacles(stage.fixed, stage.moving, stage.cloths, forces, stage.h, log, &stage.impulses);
   for (const Striker& s : strikers) {
     const SweepOutcome outcome = sweep(stage, forces, obstacles, s.particle, s.flight, s.integrated);
     for (const Reaction& r : log.reactions) stage.impulses.push(r);
@@ -330,20 +329,12 @@ bool ParticleSystem::meet_cloths(const ParticleStage& stage, const ParticleForce
     const auto hit = cloths.first_hit(start, end, radius, from, 1);
     if (!hit) return touches;
     touches = true;
-    const Vec3 u = v - cloths.velocity(*hit);
-    const Real approach = -u.dot(hit->normal);
     const Real gain = -stage.h * forces.acceleration(v, mass).dot(hit->normal);
-    if (approach > 0) {
-      const Real restitution = 2 * arrays.restitution[i] * approach < gain ? 0 : arrays.restitution[i];
-      const Vec3 impulse =
-          collision_impulse(1 / (1 / mass + cloths.mobility(*hit)), u, hit->normal, restitution,
-                            std::sqrt(arrays.friction[i] * cloths.friction(*hit)));
-      v += impulse / mass;
-      cloths.push(*hit, -impulse);
-    }
-    if (approach > std::max(gain, 0.0)) {
+    const ClothObstacles::Impact impact =
+        cloths.collide(*hit, v, {mass, arrays.restitution[i], arrays.friction[i]}, gain);
+    v += impact.impulse / mass;
+    if (impact.strikes) {
       ++tally.collisions;
-      cloths.count(*hit);
       if (def.report_collisions)
         tally.events.push_back(collision_event(stage, i, {hit->fraction, hit->position, v, hit->normal}));
     }

@@ -32,7 +32,7 @@ bool ParticleMotion::step(Real start, Real h, const CoupledSystem& coupled, Step
   for (const auto& articulation : world_.articulations) articulation->begin_impulses(start + h);
   impulses_.begin(joints_.links());
   events_.clear();
-  gather_cloths(h);
+  gather_cloths();
   const ParticleStage stage{start,     h,      obstacles_.fixed(), obstacles_.moving(), world_.def.bounds,
                             impulses_, cloths_};
   report.solvers.particle_lcp.add(collide(stage, coupled));
@@ -63,7 +63,7 @@ bool ParticleMotion::step(Real start, Real h, const CoupledSystem& coupled, Step
 }
 
 /// Collects the cloths with which particles collide. While particles are prewarmed, cloths stand still.
-void ParticleMotion::gather_cloths(Real h) {
+void ParticleMotion::gather_cloths() {
   cloths_.clear();
   bool wanted = false;
   world_.systems.for_each([&](ParticleSystemHandle, const ParticleSystem& s) {
@@ -81,7 +81,7 @@ void ParticleMotion::gather_cloths(Real h) {
     cloths_.add(before, cloth->points, cloth->velocities, inverse_masses, cloth->triangles,
                 cloth->def.friction);
   });
-  cloths_.build(h);
+  cloths_.build();
 }
 
 /// Changes the velocities of the cloths by the impulses of particles.

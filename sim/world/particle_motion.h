@@ -35,7 +35,7 @@ class ParticleMotion {
   bool waits(ParticleSystemHandle system) const;
   ContactWork collide(const ParticleStage& stage, const CoupledSystem& coupled);
   void add(std::vector<ParticleEvent>& events);
-  void gather_cloths(Real h);
+  void gather_cloths();
   void return_cloths();
 
   WorldState& world_;

@@ -83,9 +83,9 @@ TEST_P(JointLimits, AHeavyBodyBehindALightLinkStopsAtAWall) {
 }
 
 // The free motion of a rod that rebounds while it rises would rise on. Gravity does more work in the rebound,
-// so the energy of the free motion is no bound for it.
+// so the energy of the free motion is no bound for it. The fast solver loses about half of the energy in 140
+// rebounds (a limit that physics.md names), but it must not gain any.
 TEST_P(JointLimits, KeepTheEnergyIfTheyAreElastic) {
-  if (!is_exact()) GTEST_SKIP() << "the fast solver loses half of the energy";
   World w(def());
   const BodyHandle rod = w.add_body({.shape = Box{{0.1, 1, 0.1}},
                                      .pose = {Vec3(0, -0.5, 0)},
@@ -96,7 +96,7 @@ TEST_P(JointLimits, KeepTheEnergyIfTheyAreElastic) {
   const Real lowest = -9.81 / 2, before = w.energy().total() - lowest;
   run(w, 20);
   EXPECT_LT(w.energy().total() - lowest, 1.001 * before);
-  EXPECT_GT(w.energy().total() - lowest, 0.97 * before);
+  EXPECT_GT(w.energy().total() - lowest, (is_exact() ? 0.97 : 0.4) * before);
 }
 
 OFFSTAGE_BOTH_SOLVERS(Solvers, JointLimits);
