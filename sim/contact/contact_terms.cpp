@@ -73,16 +73,26 @@ Quat rotation(const Vec3& v) {
 /// Corrects a body whose rotation has more energy than expected, by more than `fraction` of the larger of the
 /// expected and the free energy (`free_energy` is twice the energy). The orientation is turned so that the
 /// angular momentum has the direction that belongs to the angular velocity `expected`. If this takes a
-/// rotation of more than `farthest` [rad], the body gets the expected angular velocity instead.
-void agree_with_spin(RigidBody& r, const Vec3& expected, Real free_energy, Real fraction, Real farthest) {
+/// rotation of more than `farthest` [rad], the body gets the expected angular velocity instead. If a body
+/// turns by radians, the sum of two velocities at different orientations may itself have too much energy.
+/// Energy above `most`, twice the energy at the orientation at which the impulses act, is then removed.
+void agree_with_spin(RigidBody& r, const Vec3& expected, Real free_energy, Real most, Real fraction,
+                     Real farthest) {
   const Vec3 wanted = r.spin_momentum(r.orientation, expected);
-  const Real energy = expected.dot(wanted), excess = r.angular_velocity().dot(r.angular_momentum) - energy;
-  if (!(excess > fraction * std::max(free_energy, energy))) return;
-  const Real aligned = std::max(kAligned, 1 - farthest * farthest / 2);
-  if (wanted.dot(r.angular_momentum) > aligned * wanted.norm() * r.angular_momentum.norm())
-    r.orientation = (rotation_between(wanted, r.angular_momentum) * r.orientation).normalized();
-  else
-    r.angular_momentum = wanted;
+  const Real energy = expected.dot(wanted);
+  const auto exceeds = [&](Real limit) {
+    const Real excess = r.angular_velocity().dot(r.angular_momentum) - limit;
+    return excess > fraction * std::max(free_energy, limit);
+  };
+  if (exceeds(energy)) {
+    const Real aligned = std::max(kAligned, 1 - farthest * farthest / 2);
+    if (wanted.dot(r.angular_momentum) > aligned * wanted.norm() * r.angular_momentum.norm())
+      r.orientation = (rotation_between(wanted, r.angular_momentum) * r.orientation).normalized();
+    else
+      r.angular_momentum = wanted;
+  }
+  if (energy > most && exceeds(most))
+    r.angular_momentum *= std::sqrt(most / r.angular_velocity().dot(r.angular_momentum));
 }
 
 }  // namespace
@@ -168,7 +178,9 @@ void add_effect(Body& body, const IntervalEffect& effect) {
   // and the whole turn in the interval has an effect of second order.
   if (r.is_thin()) {
     const Real turned = rotation_vector(body.start.orientation, r.orientation).squaredNorm();
-    agree_with_spin(r, expected, free_energy, effect.fraction * kSpinExcess, effect.turn.norm() + turned);
+    const Real most = (effect.free_spin + effect.spin).dot(r.angular_momentum);
+    agree_with_spin(r, expected, free_energy, most, effect.fraction * kSpinExcess,
+                    effect.turn.norm() + turned);
   }
   body.pose = r.pose();
 }

@@ -40,9 +40,11 @@ Vec3 rotation_vector(const Quat& from, const Quat& to);
 /// Effect of the contacts and joints of an interval on a body.
 struct IntervalEffect {
   Vec3 impulse, angular_impulse;  ///< [N s], [N m s]
-  Vec3 spin;                      ///< expected change of the angular velocity [rad/s]
-  Vec3 shift, turn;               ///< displacement of the centre of mass [m] and small rotation vector [rad]
-  Real fraction;                  ///< length of the interval divided by the length of the sub-step
+  /// Angular velocity of the free motion at the orientation at which the impulses act, and the expected
+  /// change of the angular velocity [rad/s].
+  Vec3 free_spin, spin;
+  Vec3 shift, turn;  ///< displacement of the centre of mass [m] and small rotation vector [rad]
+  Real fraction;     ///< length of the interval divided by the length of the sub-step
 };
 
 /// Adds the effect of an interval to a body in its state at the end of the free motion.

@@ -46,7 +46,8 @@ Real kept_fraction(const Island& island, std::span<const RelaxedBody> relaxed) {
   for (std::size_t i = 0; i < island.bodies.size(); ++i) {
     const RigidBody& body = island.bodies[i]->rigid;
     const RelaxedBody& r = relaxed[i];
-    const Vec3 v = body.velocity(), w = body.angular_velocity();
+    // Impulses, inertia and angular velocity belong to the same orientation.
+    const Vec3 v = body.velocity(), w = r.inverse_inertia * body.angular_momentum;
     kinetic += (v.dot(body.momentum) + w.dot(body.angular_momentum)) / 2;
     first += v.dot(r.impulse) + w.dot(r.angular_impulse);
     second += (r.inverse_mass * r.impulse.squaredNorm() +

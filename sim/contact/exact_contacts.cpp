@@ -388,8 +388,9 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
       mean_spin = turn / duration - (body.start_twist.angular_velocity + free_[i].angular_velocity) / 2;
     }
     add_effect(body, {body.rigid.mass * dv,
-                      body.rigid.spin_momentum(body.impulse_orientation(duration, interval.substep), dw), dw,
-                      duration * mean, duration * mean_spin, duration / interval.substep});
+                      body.rigid.spin_momentum(body.impulse_orientation(duration, interval.substep), dw),
+                      free_[i].inverse_inertia * body.rigid.angular_momentum, dw, duration * mean,
+                      duration * mean_spin, duration / interval.substep});
   }
 }
 

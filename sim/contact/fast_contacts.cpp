@@ -208,8 +208,10 @@ ContactWork FastContacts::solve(std::span<const Island* const> islands, const Co
   }
   for_each_interval(std::span(members_).first(moved_), [&](std::size_t i) {
     const RelaxedBody& b = bodies_[i];
-    add_effect(*members_[i], {b.impulse, b.angular_impulse, b.inverse_inertia * b.angular_impulse,
-                              b.displacement, b.rotation_vector, h / interval.substep});
+    add_effect(
+        *members_[i],
+        {b.impulse, b.angular_impulse, b.inverse_inertia * members_[i]->rigid.angular_momentum,
+         b.inverse_inertia * b.angular_impulse, b.displacement, b.rotation_vector, h / interval.substep});
   });
   return work;
 }
