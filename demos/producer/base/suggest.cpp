@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -11,6 +12,18 @@ namespace {
 
 constexpr std::size_t kMostComparisons = 100'000;
 thread_local std::size_t comparisons_left = SIZE_MAX;
+
+/// Returns the only candidate of which `word` is the first or last part, as "tube" of "tube_radius"; empty if
+/// there is none, or more than one.
+std::string only_extension(std::string_view word, std::span<const std::string> candidates) {
+  const std::string first = std::string(word) + '_', last = '_' + std::string(word);
+  const auto extends = [&](const std::string& name) {
+    return name.starts_with(first) || name.ends_with(last);
+  };
+  const auto found = std::ranges::find_if(candidates, extends);
+  if (found == candidates.end() || std::any_of(found + 1, candidates.end(), extends)) return {};
+  return *found;
+}
 
 }  // namespace
 
@@ -56,8 +69,9 @@ std::string nearest(std::string_view word, std::span<const std::string> candidat
 std::string suggestion(std::string_view word, std::span<const std::string> candidates,
                        std::string_view if_none) {
   if (candidates.empty()) return std::string(if_none);
-  if (const std::string near = nearest(word, candidates); !near.empty())
-    return "; did you mean '" + near + "'?";
+  std::string near = nearest(word, candidates);
+  if (near.empty()) near = only_extension(word, candidates);
+  if (!near.empty()) return "; did you mean '" + near + "'?";
   constexpr std::size_t kMost = 50;
   std::string text = "; known: ";
   for (std::size_t i = 0; i < std::min(candidates.size(), kMost); ++i)

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include "producer/base/suggest.h"
 
 namespace offstage::producer {
@@ -197,13 +200,28 @@ void Reader::keys(const Node& node, std::string_view name, std::span<const Spec*
       std::vector<std::string> known;
       if (tagged) known.push_back("type");
       for (const Spec* spec : specs) known.push_back(spec->key);
-      fail(member.at, "unknown key in " + std::string(name) + suggestion(member.key, known));
+      fail(member.at, "unknown key in " + std::string(name) + known_keys(member.key, known));
     });
   }
   for (const Spec* spec : specs) {
     if (spec->required && !node.find(spec->key))
       within(spec->key, [&] { fail(node.at, "is required: " + spec->help); });
   }
+}
+
+/// Returns the end of a message about an unknown key: the known key that is meant, or other objects that have
+/// such a key, or all known keys.
+std::string Reader::known_keys(const std::string& unknown, std::span<const std::string> known) const {
+  constexpr std::size_t kMost = 8;
+  if (nearest(unknown, known).empty()) {
+    std::vector<std::string> owners = owners_(unknown);
+    if (owners.size() > kMost) {
+      owners.resize(kMost);
+      owners.emplace_back("...");
+    }
+    if (!owners.empty()) return fmt::format("; '{}' is a key of: {}", unknown, fmt::join(owners, ", "));
+  }
+  return suggestion(unknown, known);
 }
 
 Description Catalogue::refer(const std::string& name, std::string_view help,

@@ -82,8 +82,12 @@ struct Spec {
 /// Reads values from a JSON tree. After a problem it continues, so that all problems are collected.
 class Reader {
  public:
-  /// `files`: names of the files to which Position::file refers.
-  explicit Reader(std::span<const std::string> files) : files_(files) {}
+  /// Returns the names of the objects of the format that have a key.
+  using Owners = std::function<std::vector<std::string>(std::string_view key)>;
+
+  /// `files`: names of the files to which Position::file refers. `owners` is used in messages about unknown
+  /// keys.
+  Reader(std::span<const std::string> files, Owners owners) : files_(files), owners_(std::move(owners)) {}
 
   /// Appends `step` to the path in messages, runs f, and removes the step again.
   template <class F>
@@ -131,7 +135,10 @@ class Reader {
   const std::vector<Problem>& problems() const { return problems_; }
 
  private:
+  std::string known_keys(const std::string& unknown, std::span<const std::string> known) const;
+
   std::span<const std::string> files_;
+  Owners owners_;
   std::string path_;
   std::vector<Problem> problems_;
   std::size_t more_ = 0;

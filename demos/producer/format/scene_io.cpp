@@ -109,7 +109,7 @@ LoadedScene parse_scene(std::string_view text, const std::string& name, const Sc
 
   const std::vector<Problem> retired = drop_retired_keys(source);
   Scene described;
-  Reader reader(source.files);
+  Reader reader(source.files, objects_with_key);
   read_scene(reader, source.root, described);
   errors.insert(errors.end(), reader.problems().begin(), reader.problems().end());
   // A picture of the sky has its own sun, so the default sun is removed.

@@ -69,4 +69,13 @@ Catalogue scene_catalogue() {
   return all;
 }
 
+std::vector<std::string> objects_with_key(std::string_view key) {
+  static const Catalogue all = scene_catalogue();
+  std::vector<std::string> names;
+  for (const ObjectEntry& entry : all.objects())
+    if (std::ranges::any_of(entry.properties, [&](const Member& m) { return m.key == key; }))
+      names.push_back(entry.name);
+  return names;
+}
+
 }  // namespace offstage::producer

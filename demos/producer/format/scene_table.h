@@ -35,5 +35,7 @@ void read_scene(Reader& in, const Node& node, Scene& out);
 Node write_scene(const Scene& scene);
 /// Returns the descriptions of all objects of the format, the scene itself first.
 Catalogue scene_catalogue();
+/// Returns the names of the objects in the catalogue that have a key.
+std::vector<std::string> objects_with_key(std::string_view key);
 
 }  // namespace offstage::producer

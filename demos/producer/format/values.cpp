@@ -70,7 +70,7 @@ Description Codec<bool>::describe(Catalogue&, const Spec&) {
 
 void Codec<std::string>::read(Reader& in, const Node& node, const Spec& spec, std::string& out) {
   const std::string* v = node.as<std::string>();
-  if (!v) return in.refuse(node, "a string");
+  if (!v) return in.refuse(node, spec.help.empty() ? "a string" : "a string (" + spec.help + ")");
   if (spec.required && v->empty()) return in.fail(node.at, "must not be empty");
   out = *v;
 }
