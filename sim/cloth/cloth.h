@@ -219,6 +219,7 @@ struct ClothReport {
 struct ClothView {
   std::span<const Vec3> points;      ///< [m]
   std::span<const Vec3> velocities;  ///< [m/s]
+  std::span<const Real> masses;      ///< [kg]
   std::span<const Triangle> triangles;
   /// For each point, the vertex of the definition that it comes from. Points are added where cloth tears.
   std::span<const uint32_t> sources;

@@ -36,7 +36,7 @@ bool leaks(const Cloth& cloth) {
 struct Run {
   const Cloth& cloth;
   std::size_t first;
-  Real time;
+  Real time, h;
   ClothPoints& points;
   Real total_mass;
 
@@ -90,13 +90,24 @@ void add(const PointField& f, Run& run) {
   for (std::size_t i = 0; i < run.size(); ++i)
     run.accelerate(i, strength(f.region, f.drop_rate, run.at(i)) * f.force * direction(f.point - run.at(i)));
 }
+/// Adds the force of the hand, which the points that it holds share in proportion to their mass. The spring
+/// pulls to the end of the sub-step by its length there, gap + h v, so that no stiffness is too large for the
+/// step; h v is a drag.
 void add(const Grab& f, Run& run) {
-  const Motion hand = f.track.at(run.time, Pose{});
+  const Vec3 hand = f.track.at(run.time + run.h, Pose{}).pose.position;
+  const Vec3 velocity = f.track.at(run.time, Pose{}).velocity;
+  std::vector<std::size_t> held;
+  Real mass = 0;
   for (std::size_t i = 0; i < run.size(); ++i) {
-    const Vec3 gap = run.at(i) - hand.pose.position;
-    if (gap.norm() > f.reach) continue;
-    run.accelerate(i, -f.stiffness * gap);
-    run.drag(i, f.damping, hand.velocity);
+    if ((run.at(i) - hand).norm() > f.reach) continue;
+    held.push_back(i);
+    mass += run.cloth.masses[i];
+  }
+  for (const std::size_t i : held) {
+    const Real share = run.total_mass / mass;
+    run.accelerate(i, -share * f.stiffness * (run.at(i) - hand));
+    run.drag(i, share * f.stiffness * run.h, Vec3::Zero());
+    run.drag(i, share * f.damping, velocity);
   }
 }
 void add(const AppliedForce&, Run&) {}  // acts on bodies only
@@ -187,7 +198,7 @@ void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather&
                       ClothPoints& points) {
   Real total = 0;
   for (Real m : cloth.masses) total += m;
-  Run run{cloth, first, weather.time, points, total};
+  Run run{cloth, first, weather.time, weather.h, points, total};
   const auto fill = [&](auto& values, const auto& value) {
     std::fill_n(values.begin() + static_cast<std::ptrdiff_t>(first), run.size(), value);
   };
@@ -195,8 +206,7 @@ void add_outer_forces(const Cloth& cloth, std::size_t first, const ClothWeather&
   fill(points.flow, padded(weather.wind));
   fill(points.field_drag, Real{0});
   for (const ForceDef* f : weather.forces)
-    if (f->acts_on(cloth.handle) && f->is_on(weather.time))
-      std::visit([&](const auto& effect) { add(effect, run); }, f->effect);
+    if (f->acts_on(cloth.handle)) std::visit([&](const auto& effect) { add(effect, run); }, f->effect);
   inflate(run, weather.gravity);
   set_inertia(run);
 }

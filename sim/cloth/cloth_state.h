@@ -11,7 +11,7 @@ struct Cloth {
   /// `def` must be valid: problem() must return an empty text for it.
   Cloth(ClothHandle cloth, const ClothDef& definition);
 
-  ClothView view() const { return {points, velocities, triangles, sources, springs, version}; }
+  ClothView view() const { return {points, velocities, masses, triangles, sources, springs, version}; }
 
   ClothHandle handle;
   ClothDef def;

@@ -11,6 +11,9 @@ namespace {
 constexpr int kMaxIterations = 300;
 /// Square of the accepted residual as a fraction of the right side's, in the preconditioner's norm.
 constexpr Real kTolerance2 = 1e-12;
+/// The same as a fraction of the right side with the given motions. What is left of cloth that lies still may
+/// be nothing but rounding.
+constexpr Real kRounding2 = 1e-28;
 /// Greatest number of solutions with other sets of supports. What is left then is up to the contacts.
 constexpr int kMaxTurnsOfSupports = 2;
 /// A support that is missing or pulls is left to the contacts up to this displacement, in thicknesses.
@@ -162,6 +165,12 @@ class ImplicitSystem {
     }
   }
 
+  /// Returns the square of the preconditioner's norm of the points' part of r, with the given motions.
+  Real norm2(const SpringRun& r) const {
+    Real sum = 0;
+    for (std::size_t i = 0; i < size_; ++i) sum += r[i].head<3>().dot(block_[i] * r[i].head<3>());
+    return sum;
+  }
   void precondition(const SpringRun& r, SpringRun& z) const {
     for (std::size_t i = 0; i < size_; ++i) z[i] = padded(block_[i] * r[i].head<3>());
     clear_given(z);
@@ -231,14 +240,16 @@ bool solve(const ImplicitSystem& system, const SpringRun& b, SpringRun& v) {
   for (std::size_t i = 0; i < r.size(); ++i) r[i] = b[i] - y[i];
   system.clear_given(r);
   system.precondition(b, z);
-  const Real enough = kTolerance2 * dot(b, z);
+  const Real enough = std::max(kTolerance2 * dot(b, z), kRounding2 * system.norm2(b));
   system.precondition(r, z);
   SpringRun p = z;
   Real rz = dot(r, z);
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
     if (!(rz > enough)) return true;
     system.multiply(p, y);
-    const Real step = rz / dot(p, y);
+    const Real py = dot(p, y);
+    if (!(py > 0)) return false;
+    const Real step = rz / py;
     for (std::size_t i = 0; i < v.size(); ++i) {
       v[i] += step * p[i];
       r[i] -= step * y[i];

@@ -17,6 +17,8 @@ namespace {
 /// kPushOut: fraction of a penetration that a step removes. kFastestPush: greatest speed of this correction
 /// [m/s].
 constexpr Real kPushOut = 0.2, kFastestPush = 0.5;
+/// A correction that is faster than this is a displacement; bodies keep the velocity of a slower one [m/s].
+constexpr Real kKeptPush = 1e-3;
 /// Points that approach faster than this closed within the interval, and not before it [m/s].
 constexpr Real kClosing = 1e-3;
 /// In an interval that may be divided, points with a gap close later if they approach faster than this, even
@@ -107,6 +109,7 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
   if (contacts_.empty() && joints_.bounded().empty()) return {.is_applied = true, .work = {}};
 
   free_ = bodies_;
+  push_apart(interval.duration);
   joints_.project(bodies_, interval.end);
   Outcome outcome;
   if (method == Method::lcp) outcome.is_applied = solve_lcp(outcome.lcp);
@@ -133,6 +136,29 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
     for (PointForce* force : forces_) force->last = force->now;
   move_bodies(island, interval);
   return outcome;
+}
+
+/// Moves overlapping bodies apart, without a change of their velocities: they would keep the speed of the
+/// correction, which depends on the length of the sub-step. Slow corrections and those of linked bodies are
+/// left to the solution of the velocities.
+void ExactContacts::push_apart(Real duration) {
+  pushes_.clear();
+  const auto fastest = std::ranges::max_element(contacts_, {}, &Contact::target);
+  if (contacts_.empty() || fastest->target <= kKeptPush || !joints_.articulations().empty()) return;
+  std::vector<Contact> pushing = contacts_;
+  for (Contact& c : pushing) {
+    c.offset = c.bias = c.impulse = c.moment = Vec3::Zero();
+    c.friction_t = c.friction_k = c.rolling = c.spinning = 0;
+    c.is_guessed = false;
+  }
+  std::vector<ContactBody> moved = bodies_;
+  for (ContactBody& body : moved) body.velocity = body.angular_velocity = Vec3::Zero();
+  const std::optional<ContactWork> work = newton_.solve(moved, pushing, {}, kInfinity);
+  cost_ += newton_.cost();
+  if (!work || work->fallbacks > 0) return;
+  for (const ContactBody& body : moved)
+    pushes_.push_back({duration * body.velocity, duration * body.angular_velocity});
+  for (Contact& c : contacts_) c.target = std::min(c.target, 0.0);
 }
 
 /// Solves the contacts by N11. Returns no result if this would cost more than `budget`.
@@ -386,6 +412,10 @@ void ExactContacts::move_bodies(const Island& island, const ContactInterval& int
       const auto& [shift, turn] = displacements_[i];
       mean = shift / duration - (body.start_twist.velocity + free_[i].velocity) / 2;
       mean_spin = turn / duration - (body.start_twist.angular_velocity + free_[i].angular_velocity) / 2;
+    }
+    if (!pushes_.empty()) {
+      mean += pushes_[i].shift / duration;
+      mean_spin += pushes_[i].turn / duration;
     }
     add_effect(body, {body.rigid.mass * dv,
                       body.rigid.spin_momentum(body.impulse_orientation(duration, interval.substep), dw),

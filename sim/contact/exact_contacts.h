@@ -51,6 +51,7 @@ class ExactContacts {
   void add_points(ContactPair& pair, const ContactInterval& interval, Method method);
   void add_sliding(const Vec3& u, Real force, Real duration);
   bool remove_sliding(bool all);
+  void push_apart(Real duration);
   std::optional<ContactWork> solve_by_newton(Real budget);
   bool solve_lcp(ContactWork& work);
   bool has_closing() const;
@@ -77,6 +78,7 @@ class ExactContacts {
   bool may_divide_ = false;                  // whether the interval of the island may be divided
   std::vector<ClosingPoint> points_;         // by contact
   std::vector<Displacement> displacements_;  // by body, if the interval was divided
+  std::vector<Displacement> pushes_;         // by body: corrections of overlaps; empty if there are none
   bool has_carrier_ = false;                 // whether a body may ride on a body of the contacts
   RidingBodies riding_;
   Real cost_ = 0, division_cost_ = 0;

@@ -224,7 +224,11 @@ std::string problem(const ForceDef& def) {
 
 Wrench wrench(const ForceDef& def, Real time, const RigidMotion& motion, const Vec3& centre,
               Real linear_drag) {
-  if (!def.is_on(time)) return {};
+  return def.is_on(time) ? effect_wrench(def, time, motion, centre, linear_drag) : Wrench{};
+}
+
+Wrench effect_wrench(const ForceDef& def, Real time, const RigidMotion& motion, const Vec3& centre,
+                     Real linear_drag) {
   const Target target{motion, centre, linear_drag};
   return std::visit([&](const auto& effect) { return at(effect, time, target); }, def.effect);
 }

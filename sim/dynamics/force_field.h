@@ -153,6 +153,9 @@ struct RigidMotion {
 /// active at `time`, and for an explosion.
 Wrench wrench(const ForceDef& def, Real time, const RigidMotion& motion, const Vec3& centre,
               Real linear_drag = 0);
+/// Does the same, whether or not the force is active at `time`.
+Wrench effect_wrench(const ForceDef& def, Real time, const RigidMotion& motion, const Vec3& centre,
+                     Real linear_drag = 0);
 
 /// Returns the impulse of an explosion on a solid [N s], and the angular impulse about its centre of mass
 /// `centre` (world) [N m s].
@@ -166,16 +169,12 @@ inline Vec3 air_drag(Real drag, Real own, const Vec3& air, const Vec3& velocity)
   return drag > 0 ? Vec3(drag * (air - velocity)) : Vec3(own * air);
 }
 
-/// A force whose bodies have been resolved.
+/// A force that acts in the current sub-step, with its bodies.
 struct ActiveForce {
   const ForceDef* def;
   std::vector<const RigidBody*> only;  ///< sorted by address; used if the definition names any body
 
   bool acts_on(const RigidBody& body) const;
-  /// Whether the force acts on the body at any time from `from` to `to`.
-  bool acts_on(const RigidBody& body, Real from, Real to) const {
-    return !def->is_explosion() && def->start <= to && def->end > from && acts_on(body);
-  }
 };
 
 }  // namespace offstage::sim

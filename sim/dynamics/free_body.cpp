@@ -43,9 +43,8 @@ bool is_isotropic(const Mat3& inertia) {
          std::abs(inertia(2, 2) - inertia(0, 0)) <= tiny;
 }
 
-bool is_pulled(const RigidBody& body, std::span<const ActiveForce> forces, Real from, Real to) {
-  return std::any_of(forces.begin(), forces.end(),
-                     [&](const ActiveForce& f) { return f.acts_on(body, from, to); });
+bool is_pulled(const RigidBody& body, std::span<const ActiveForce> forces) {
+  return std::any_of(forces.begin(), forces.end(), [&](const ActiveForce& f) { return f.acts_on(body); });
 }
 
 void integrate(RigidBody& body, const BodyForces& forces, const Integrator& integrator, Real t, Real h,
@@ -137,7 +136,7 @@ void RigidStage::force(const BodyForces& forces, Real t, std::span<Real> dp) con
   Vec3 torque = -body.angular_drag * motion.angular_velocity;
   for (const ActiveForce& f : forces.forces) {
     if (!f.acts_on(body)) continue;
-    const Wrench w = wrench(*f.def, t, motion, body.centre, body.linear_drag);
+    const Wrench w = effect_wrench(*f.def, forces.inside(t), motion, body.centre, body.linear_drag);
     force += w.force;
     torque += w.torque;
   }
@@ -204,7 +203,7 @@ Quat rotation(const Vec3& w, Real h) {
 
 void fly(RigidBody& body, const BodyForces& forces, const Integrator& integrator, Real t, Real h,
          IntegratorWorkspace& work) {
-  if (body.linear_drag != 0 || body.angular_drag != 0 || is_pulled(body, forces.forces, t, t + h))
+  if (body.linear_drag != 0 || body.angular_drag != 0 || is_pulled(body, forces.forces))
     return integrate(body, forces, integrator, t, h, work);
   const Vec3 velocity = body.velocity();
   const Vec3 position = body.position + h * (velocity + h / 2 * forces.gravity);

@@ -2,6 +2,8 @@
 /// Bodies as dynamic systems (physics R1, R2), and the motion of a body without springs and joints. The
 /// motion is exact where it has a closed form; otherwise an integrator computes its 13 numbers.
 
+#include <algorithm>
+#include <limits>
 #include <span>
 
 #include "sim/dynamics/force_field.h"
@@ -18,6 +20,11 @@ struct BodyForces {
   Vec3 gravity;
   std::span<const ActiveForce> forces;
   Vec3 wind = Vec3::Zero();  ///< velocity of the air, to which the drag of the bodies is relative [m/s]
+  /// Forces may jump at the ends of a sub-step. They have the values of the times from `first` to `last`,
+  /// which lie just inside of it [s].
+  Real first = -std::numeric_limits<Real>::infinity(), last = std::numeric_limits<Real>::infinity();
+
+  Real inside(Real t) const { return std::clamp(t, first, last); }
 };
 
 /// The state of a body at a stage of an integrator. Its quaternion need not have unit length.

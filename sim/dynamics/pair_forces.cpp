@@ -200,9 +200,8 @@ void add_block(const Mat3& block, std::size_t row, std::size_t column, int at_v,
 
 }  // namespace
 
-void PairForces::accelerate(Real t, std::span<const Real> x, std::span<Real> dv) const {
+void PairForces::accelerate(std::span<const Real> x, std::span<Real> dv) const {
   for (const Group& g : groups_) {
-    if (!g.def->is_on(t)) continue;
     with_law(*g.def, [&](const auto& law) {
       const Cloud cloud(law, g.members, x);
       const auto k = kernel(law);
@@ -215,7 +214,7 @@ void PairForces::accelerate(Real t, std::span<const Real> x, std::span<Real> dv)
   }
 }
 
-void PairForces::jacobian(Real t, std::span<const Real> x, int at_x, int at_v, SparseEntries& entries) const {
+void PairForces::jacobian(std::span<const Real> x, int at_x, int at_v, SparseEntries& entries) const {
   for (const Group& g : groups_)
     with_law(*g.def, [&](const auto& law) {
       const Cloud cloud(law, g.members, x);
@@ -227,13 +226,12 @@ void PairForces::jacobian(Real t, std::span<const Real> x, int at_x, int at_v, S
         Mat3 own = Mat3::Zero();
         std::fill(row.begin(), row.end(), Mat3::Zero());
         // The derivative of factor d is factor 1 + 2 factor' d d^T.
-        if (g.def->is_on(t))
-          cloud.for_each_near(i, [&](std::size_t j, const Vec3& d) {
-            const Real r2 = d.squaredNorm(), w = cloud.w[i] * cloud.w[j] / g.members[cloud.member[i]].mass;
-            const Mat3 change = w * (k.factor(r2) * Mat3::Identity() + 2 * k.slope(r2) * d * d.transpose());
-            own += change;
-            if (exact) row[j] = -change;
-          });
+        cloud.for_each_near(i, [&](std::size_t j, const Vec3& d) {
+          const Real r2 = d.squaredNorm(), w = cloud.w[i] * cloud.w[j] / g.members[cloud.member[i]].mass;
+          const Mat3 change = w * (k.factor(r2) * Mat3::Identity() + 2 * k.slope(r2) * d * d.transpose());
+          own += change;
+          if (exact) row[j] = -change;
+        });
         const auto place = [&](std::size_t j) { return g.members[cloud.member[j]].place; };
         add_block(own, place(i), place(i), at_v, at_x, entries);
         for (std::size_t j = 0; j < row.size(); ++j)

@@ -27,11 +27,11 @@ class PairForces {
   bool empty() const { return groups_.empty(); }
 
   /// Adds the accelerations by the forces at the positions `x` to `dv`.
-  void accelerate(Real t, std::span<const Real> x, std::span<Real> dv) const;
+  void accelerate(std::span<const Real> x, std::span<Real> dv) const;
   /// Appends the derivatives of dv/dt by x, which begin at row `at_v` and column `at_x`. They are exact for
   /// up to kExactJacobian particles. For more particles the derivatives between different particles are
   /// omitted, because their pattern would change with the state.
-  void jacobian(Real t, std::span<const Real> x, int at_x, int at_v, SparseEntries& entries) const;
+  void jacobian(std::span<const Real> x, int at_x, int at_v, SparseEntries& entries) const;
   /// Potential energy [J]; 0 at infinity, or at the cut-off distance. Strengths in a region count as constant
   /// factors.
   Real potential_energy(Real t, std::span<const Real> x) const;

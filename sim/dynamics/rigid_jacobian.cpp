@@ -71,7 +71,7 @@ Eigen::Matrix<Real, 13, 13> RigidDerivative::own_rates(const BodyForces& forces,
   d.block<3, 3>(kMomentum, kMomentum).diagonal().array() -= body.linear_drag / body.mass;
   d.bottomRows<3>() = -body.angular_drag * angular_velocity_;
   for (const ActiveForce& f : forces.forces) {
-    if (!f.acts_on(body) || !f.def->is_on(t)) continue;
+    if (!f.acts_on(body)) continue;
     const Real drag = std::visit(
         [&](const auto& effect) -> Real {
           if constexpr (requires { effect.drag; })
@@ -82,7 +82,7 @@ Eigen::Matrix<Real, 13, 13> RigidDerivative::own_rates(const BodyForces& forces,
     d.block<3, 3>(kMomentum, kMomentum).diagonal().array() -= drag / body.mass;
     if (const auto* grab = std::get_if<Grab>(&f.def->effect)) {
       const Vec3 arm = stage_.motion.orientation * (grab->point - body.centre);
-      const Vec3 force = wrench(*f.def, t, stage_.motion, body.centre).force;
+      const Vec3 force = effect_wrench(*f.def, forces.inside(t), stage_.motion, body.centre).force;
       const PointDerivative pull = -grab->stiffness * position(arm) - grab->damping * velocity(arm);
       d.middleRows<3>(kMomentum) += pull;
       d.bottomRows<3>() += cross_matrix(arm) * pull + torque(arm, force);

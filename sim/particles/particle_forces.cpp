@@ -129,9 +129,8 @@ void ParticleForces::accelerate(Real t, std::span<const Real> x, std::span<const
   for (std::size_t i = 0; i < mass.size(); ++i) vec3(dv, 3 * i) = acceleration(vec3(v, 3 * i), mass[i]);
   for (std::size_t i = 0; i < damping.size(); ++i) damping[i] = drag / mass[i];
   const Run run{t, x, v, mass, drag, dv, damping};
-  for (const ForceDef* field : fields) {
-    if (field->is_on(t)) std::visit([&](const auto& effect) { add(effect, run); }, field->effect);
-  }
+  for (const ForceDef* field : fields)
+    std::visit([&](const auto& effect) { add(effect, run); }, field->effect);
 }
 
 void ParticleForces::leapfrog_step(Real h, std::span<Vec3> x, std::span<Vec3> v,
@@ -160,7 +159,6 @@ void ParticleForces::jacobian(Real t, std::span<const Real> x, std::span<const R
   for (std::size_t i = 0; i < mass.size(); ++i) {
     Stiffness sum{0, drag};
     for (const ForceDef* field : fields) {
-      if (!field->is_on(t)) continue;
       const Stiffness s =
           std::visit([&](const auto& effect) { return stiffness(effect, t, vec3(x, 3 * i)); }, field->effect);
       sum.by_position += s.by_position;

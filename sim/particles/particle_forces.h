@@ -41,7 +41,7 @@ struct ParticleForces {
 
   Vec3 gravity, force, wind;
   Real drag;
-  std::vector<const ForceDef*> fields;  ///< fields of the world that act on the system
+  std::vector<const ForceDef*> fields;  ///< fields of the world that act on the system in this sub-step
 };
 
 /// Dynamic system of consecutive particles in free flight. Coordinates are positions and rates are velocities

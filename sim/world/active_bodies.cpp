@@ -11,12 +11,22 @@ namespace {
 /// A body is quiet while no point of it moves faster than kQuietSpeed [m/s]. When all bodies of an island
 /// have been quiet for kQuietTime [s], the island falls asleep.
 constexpr Real kQuietSpeed = 0.01, kQuietTime = 0.5;
+/// Bodies that overlap by more than this are moved apart and do not fall asleep [m].
+constexpr Real kApart = 1e-3;
 /// A sleeping body wakes when the forces on it have changed so much since it fell asleep that one of its
 /// points would be accelerated by this [m/s^2].
 constexpr Real kPush = 0.01;
 
 Real fastest_point(const Body& body) {
   return body.rigid.velocity().norm() + body.rigid.angular_velocity().norm() * body.extent;
+}
+
+/// Whether the contacts of a pair move its bodies apart.
+bool overlaps(const ContactPair& pair) {
+  return std::ranges::any_of(pair.manifolds(), [](const PlacedManifold& m) {
+    const std::span points(m.manifold.points.data(), m.manifold.count);
+    return std::ranges::any_of(points, [](const ContactPoint& p) { return p.separation < -kApart; });
+  });
 }
 
 /// Returns the wrench of a spring on a sleeping body. The body is at one end of the spring or at both.
@@ -146,8 +156,8 @@ Wrench ActiveBodies::time_dependent_wrench(const Body& body, Real time) const {
   const RigidMotion at_rest{body.rigid.position, body.rigid.orientation, Vec3::Zero(), Vec3::Zero()};
   Wrench sum;
   world_.force_defs.for_each([&](ForceHandle, const ForceDef& force) {
-    if (!force.changes() || !force.acts_on(body.handle)) return;
-    const Wrench w = wrench(force, time, at_rest, body.rigid.centre, body.rigid.linear_drag);
+    if (!force.changes() || !force.acts_on(body.handle) || !world_.acts(force)) return;
+    const Wrench w = effect_wrench(force, time, at_rest, body.rigid.centre, body.rigid.linear_drag);
     sum.force += w.force;
     sum.torque += w.torque;
   });
@@ -191,7 +201,8 @@ void ActiveBodies::put_to_sleep(std::span<const Island> islands, Real start, Rea
     const bool pushed =
         std::any_of(island.pairs.begin(), island.pairs.end(), [start](const ContactPair* pair) {
           const Body& other = pair->a().is_awake() ? pair->b() : pair->a();
-          return (other.is_kinematic() && other.def.track.moves_after(start)) || pair->surface().conveys;
+          return (other.is_kinematic() && other.def.track.moves_after(start)) || pair->surface().conveys ||
+                 overlaps(*pair);
         });
     if (pushed) continue;
     watch_springs(island.bodies);

@@ -47,7 +47,7 @@ void CoupledGroup::add_group(const WorldState& world, ParticleSystem& system) {
 /// Adds the forces between particles. New particles take part from their first whole sub-step on.
 void CoupledGroup::add_pair_forces(const WorldState& world) {
   world.force_defs.for_each([&](ForceHandle, const ForceDef& def) {
-    if (!def.is_pairwise()) return;
+    if (!def.is_pairwise() || !world.acts(def)) return;
     std::vector<PairMember> members;
     for (const Group& g : groups_) {
       if (!def.acts_on(g.system->handle)) continue;
@@ -183,7 +183,7 @@ void CoupledGroup::set_all_forces(Real t, std::span<const Real> x, std::span<con
   const auto particles_dv = dp.subspan(particle_p(0));
   for (const Group& g : groups_)
     g.forces.accelerate(t, g.part(particles_x), g.part(particles_v), g.mass, g.part(particles_dv));
-  pair_forces_.accelerate(t, particles_x, particles_dv);
+  pair_forces_.accelerate(particles_x, particles_dv);
   for (const ActiveSpring& s : springs_) {
     const Pull f = pull(s, t, x, p);
     apply(s.a, -f.size * f.along, x, dp);
@@ -198,7 +198,7 @@ bool CoupledGroup::force_and_damping(Real t, std::span<const Real> x, std::span<
   if (!bodies_.empty() || !springs_.empty()) return false;
   for (const Group& g : groups_)
     FreeFlight(g.forces, g.mass).force_and_damping(t, g.part(x), g.part(p), g.part(dp), g.part(damping));
-  pair_forces_.accelerate(t, x, dp);
+  pair_forces_.accelerate(x, dp);
   return true;
 }
 

@@ -86,7 +86,7 @@ void CoupledGroup::jacobian(Real t, std::span<const Real> x, std::span<const Rea
   for (const Group& g : groups_)
     g.forces.jacobian(t, g.part(particles_x), g.mass, static_cast<int>(particle_x(g.offset)),
                       n + static_cast<int>(particle_p(g.offset)), entries);
-  pair_forces_.jacobian(t, particles_x, static_cast<int>(particle_x(0)), n + static_cast<int>(particle_p(0)),
+  pair_forces_.jacobian(particles_x, static_cast<int>(particle_x(0)), n + static_cast<int>(particle_p(0)),
                         entries);
   for (const ActiveSpring& s : springs_) add_derivatives(s, t, x, p, entries);
 }

@@ -44,7 +44,9 @@ void CoupledSystem::resolve(const WorldState& world, std::span<const ForceDef* c
     std::sort(force.only.begin(), force.only.end());
     active_.push_back(std::move(force));
   }
-  forces_ = {world.def.gravity, active_, world.def.wind};
+  const Real inside = kInside * (world.substep_end - world.substep_start);
+  forces_ = {world.def.gravity, active_, world.def.wind, world.substep_start + inside,
+             world.substep_end - inside};
 }
 
 void CoupledSystem::gather(WorldState& world, std::span<Body* const> bodies, bool all_systems) {

@@ -54,6 +54,7 @@ void World::Impl::appear(Body& body, Real time) {
   body.before_step = body.before_substep = body.start_pose = body.pose;
   cloth_motion.place_pins(body);
   contacts.add(body);
+  wake_overlapped(body, body.pose);
   if (body.is_dynamic() || body.is_kinematic()) active.add_stepped(body);
   active.note_new_set();
   joint_groups.note_change();
@@ -97,6 +98,15 @@ void World::Impl::wake_neighbours(Body& body) {
   contacts.for_each([&](ContactPair& pair) {
     if (&pair.a() == &body) active.wake(pair.b());
     if (&pair.b() == &body) active.wake(pair.a());
+  });
+}
+
+/// Wakes the sleeping bodies that a body may overlap when it appears at a place or jumps to it.
+void World::Impl::wake_overlapped(const Body& body, const Pose& pose) {
+  if (!body.collides()) return;
+  const Aabb box = bounds(body.solid, pose);
+  bodies.for_each([&](BodyHandle, const std::unique_ptr<Body>& other) {
+    if (other->asleep && bounds(other->solid, other->pose).intersects(box)) active.wake(*other);
   });
 }
 

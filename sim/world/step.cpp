@@ -16,9 +16,6 @@ constexpr Real kMaxSubsteps = 1e6;
 /// Greatest number of parts of a sub-step (World::Impl::first_part()).
 constexpr uint32_t kMaxParts = 32;
 constexpr std::size_t kWorthThreads = 200;
-/// The velocities of keyframed bodies at the ends of a sub-step are computed at this fraction of its length
-/// inside of it.
-constexpr Real kInside = 1e-6;
 
 /// Whether the state, and the velocities that are computed from it, are finite.
 bool is_finite(const RigidBody& b) {
@@ -76,8 +73,11 @@ StepReport World::Impl::step(Real sampling, const BeforeSubStep& before) {
 
 void World::Impl::substep(Real start, Real end, StepReport& report) {
   const Real h = end - start;
+  substep_start = start;
+  substep_end = end;
   update_presence(start);
   active.wake_pushed(start);
+  wake_at_jumps(start, end);
   explode(start, end);
   update_joints();
   active.update();
@@ -148,6 +148,8 @@ StepReport World::Impl::prewarm(Real from, Real to, const BeforeSubStep& before)
     const Real start = now, fraction = static_cast<Real>(i + 1) / static_cast<Real>(report.substeps);
     const Real end = i + 1 < report.substeps ? from + fraction * (to - from) : to;
     if (before) before(start, end);
+    substep_start = start;
+    substep_end = end;
     begin_kinematic(start, end);
     step_particles(start, end - start, still, report);
     now = end;
@@ -172,6 +174,16 @@ void World::Impl::begin_bodies(Real start, Real end) {
   free_motion.begin_substep();
 }
 
+/// Wakes the sleeping bodies beside those that jump at a key, at their old and their new places.
+void World::Impl::wake_at_jumps(Real start, Real end) {
+  if (active.asleep() == 0) return;
+  bodies.for_each([&](BodyHandle, const std::unique_ptr<Body>& body) {
+    if (!body->is_kinematic() || !body->def.track.jumps(start, end)) return;
+    wake_neighbours(*body);
+    wake_overlapped(*body, body->def.track.at(end, body->def.pose).pose);
+  });
+}
+
 void World::Impl::begin_kinematic(Real start, Real end) {
   for (Body* body : active.kinematic()) {
     const auto at = [&](Real time) { return body->def.track.at(time, body->def.pose); };
@@ -188,7 +200,6 @@ void World::Impl::begin_kinematic(Real start, Real end) {
     const Motion before = jumps ? motion : at(start + inside);
     if (jumps) {
       // The body jumps to the new pose, and sweeps nothing on the way.
-      wake_neighbours(*body);
       body->pose = motion.pose;
     }
     body->before_substep = body->pose;

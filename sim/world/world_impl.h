@@ -42,6 +42,8 @@ struct World::Impl : WorldState {
   void detach(Body& body);
   void remove_dead_springs();
   void wake_neighbours(Body& body);
+  void wake_overlapped(const Body& body, const Pose& pose);
+  void wake_at_jumps(Real start, Real end);
 
   // Time is a base plus an integer number of equal sampling times, so that rounding errors do not add up.
   Real base_time = 0, sampling_time = 0;

@@ -4,14 +4,16 @@ namespace offstage::sim {
 
 std::vector<const ForceDef*> WorldState::active_forces() const {
   std::vector<const ForceDef*> active;
-  force_defs.for_each([&](ForceHandle, const ForceDef& f) { active.push_back(&f); });
+  force_defs.for_each([&](ForceHandle, const ForceDef& f) {
+    if (!f.is_explosion() && acts(f)) active.push_back(&f);
+  });
   return active;
 }
 
 ParticleForces WorldState::forces(const ParticleSystem& system) const {
   std::vector<const ForceDef*> acting;
   force_defs.for_each([&](ForceHandle, const ForceDef& f) {
-    if (!f.is_explosion() && !f.is_pairwise() && f.acts_on(system.handle)) acting.push_back(&f);
+    if (!f.is_explosion() && !f.is_pairwise() && acts(f) && f.acts_on(system.handle)) acting.push_back(&f);
   });
   return {system.def, def.gravity, def.wind, std::move(acting)};
 }

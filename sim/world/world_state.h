@@ -14,6 +14,10 @@
 
 namespace offstage::sim {
 
+/// Values that may jump at the ends of a sub-step, as the velocities of keyframed bodies, are those at this
+/// fraction of its length inside of it.
+constexpr Real kInside = 1e-6;
+
 struct Spring {
   SpringDef def;
   Real rest_length;
@@ -30,9 +34,15 @@ struct WorldState {
   SlotMap<std::unique_ptr<Joint>, JointTag> joints;
   std::vector<std::unique_ptr<Articulation>> articulations;  // the connected components of the intact joints
 
+  Real substep_start = 0, substep_end = 0;  // the current sub-step [s]
+
   Body& body_at(uint32_t slot) const { return *bodies[bodies.at_slot(slot)]; }
   /// Whether each collision is resolved at its own time, and contacts are solved to rounding.
   bool is_exact() const { return def.solver == SolverKind::exact || def.solver == SolverKind::lcp; }
+  /// Whether a force acts in the current sub-step: the whole sub-step or nothing, by the time of its middle.
+  /// If the stages of an integrator decided for themselves, the last stage would miss a force that ends with
+  /// the sub-step, and its impulse would be too small.
+  bool acts(const ForceDef& force) const { return force.is_on((substep_start + substep_end) / 2); }
   std::vector<const ForceDef*> active_forces() const;
   /// The forces that act on each particle of a system independently of other particles.
   ParticleForces forces(const ParticleSystem& system) const;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <string>
 #include <tuple>
 
@@ -83,6 +84,11 @@ TEST_P(ClothBullet, GoesThroughOnlyWhereTheClothTears) {
     ASSERT_LE(world.body(ball).velocity.norm(), 200 * (1 + 1e-9)) << i;
   }
   EXPECT_EQ(torn > 0, tear > 0);
+  // Tearing adds points, whose masses are taken from their neighbours.
+  const ClothView view = world.cloth(cloth);
+  ASSERT_EQ(view.masses.size(), view.points.size());
+  EXPECT_NEAR(std::accumulate(view.masses.begin(), view.masses.end(), 0.0),
+              std::accumulate(def.masses.begin(), def.masses.end(), 0.0), 1e-12);
   if (tear > 0) return;
   // A whole cloth gives way by half its width times sqrt(1.1^2 - 1) = 0.14 m, and throws the ball back.
   EXPECT_GT(world.body(ball).pose.position.y(), -0.15);

@@ -385,5 +385,42 @@ TEST(ClothTrampoline, ABallThatSpinsOnItTurns) {
   }
 }
 
+// The points that a hand holds share its spring: it carries the whole sheet by a corner, k d = m g. A stiff
+// spring at a light point is stable.
+TEST(ClothGrab, CarriesASheetByItsCorner) {
+  for (const Real stiffness : {100.0, 1e5}) {
+    World world({.max_step = 1.0 / 60});
+    ClothDef def = effects::grid_cloth({0.5, 0.5, 5, 5}, {}, cotton());
+    def.air.density = 0.5;
+    const ClothHandle cloth = world.add_cloth(def);
+    world.add_force({.name = "hand",
+                     .cloths = {cloth},
+                     .effect = Grab{.track = {.keys = {{0, {def.vertices[0]}}}},
+                                    .stiffness = stiffness,
+                                    .damping = 5,
+                                    .reach = 0.09}});
+    for (int i = 0; i < 600; ++i) world.step(1.0 / 60);
+    Real mass = 0;
+    for (Real m : def.masses) mass += m;
+    const Real sag = mass * kClothGravity / stiffness;
+    EXPECT_NEAR(def.vertices[0].y() - world.cloth(cloth).points[0].y(), sag, 0.03 * sag + 2e-4) << stiffness;
+  }
+}
+
+// A flat sheet that lands on a floor has no motion left along the floor, except for rounding.
+TEST(ClothOnFloor, AFlatSheetComesToRestWithEachIntegrator) {
+  for (const ClothIntegrator integrator : {ClothIntegrator::relaxed, ClothIntegrator::implicit})
+    for (const uint32_t cells : {4u, 6u, 10u}) {
+      World world;
+      world.add_body({.shape = Plane{}, .motion = MotionType::static_body});
+      ClothDef def = effects::grid_cloth({0.6, 0.6, cells, cells}, {Vec3(0, 0.1, 0)}, cotton());
+      def.integrator = integrator;
+      const ClothHandle cloth = world.add_cloth(def);
+      for (int i = 0; i < 60; ++i) ASSERT_TRUE(world.step(1.0 / 60).finite) << cells;
+      for (const Vec3& p : world.cloth(cloth).points) EXPECT_NEAR(p.y(), def.thickness, 1e-4);
+      for (const Vec3& v : world.cloth(cloth).velocities) EXPECT_LT(v.norm(), 1e-3);
+    }
+}
+
 }  // namespace
 }  // namespace offstage::sim

@@ -223,6 +223,33 @@ TEST_P(Sleep, AnArrivingKinematicBodyWakesIt) {
   run(s.world, 1);
   EXPECT_GT(s.world.body(s.stack[2]).centre.x(), 0.15);
 }
+
+// A sleeping box is lifted by a body that jumps or appears into it, and does not sleep while it overlaps.
+TEST_P(Sleep, ABodyThatJumpsOrAppearsInItWakesIt) {
+  for (const bool jumps : {true, false}) {
+    WorldDef sleepy = def();
+    sleepy.sleep = true;
+    World world(sleepy);
+    world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0});
+    const BodyHandle box =
+        world.add_body({.shape = Box{Vec3::Constant(0.2)}, .pose = {Vec3(0, 0.1, 0)}, .restitution = 0});
+    BodyDef slab{.shape = Box{{1, 0.2, 1}}, .pose = {Vec3(0, -0.07, 0)}, .restitution = 0};
+    if (jumps) {
+      slab.motion = MotionType::kinematic;
+      slab.track = {.keys = {{0, {Vec3(0, -0.5, 0)}}, {1.5, {Vec3(0, -0.07, 0)}}},
+                    .interpolation = Interpolation::step};
+    } else {
+      slab.motion = MotionType::static_body;
+      slab.appear_at = 1.5;
+    }
+    world.add_body(slab);
+    run(world, 1.4);
+    ASSERT_TRUE(world.is_asleep(box));
+    run(world, 8);
+    EXPECT_TRUE(world.is_asleep(box)) << jumps;
+    EXPECT_NEAR(world.body(box).centre.y(), 0.13, 1.1e-3) << jumps;
+  }
+}
 OFFSTAGE_BOTH_SOLVERS(Solvers, Sleep);
 
 // A box that stands on a face, but not quite flat, falls onto its corners one after the other and stays
@@ -243,7 +270,47 @@ TEST(Rocking, OfABoxOnItsCornersEnds) {
     }
 }
 
+// A solid with many corners wobbles around its rim and comes to rest. Its corners overlapped the floor by
+// millimetres in the course of this, and the speed at which they were pushed out kept it wobbling.
+TEST(Rocking, OfAFacetedConeEnds) {
+  TriangleMesh cone;
+  constexpr int kSides = 24;
+  for (int i = 0; i < kSides; ++i) {
+    const Real angle = 2 * M_PI * i / kSides;
+    cone.vertices.emplace_back(0.2 * std::cos(angle), -0.1, 0.2 * std::sin(angle));
+  }
+  cone.vertices.emplace_back(0, 0.3, 0);
+  for (uint32_t i = 0; i < kSides; ++i) cone.triangles.push_back({(i + 1) % kSides, i, kSides});
+  for (uint32_t i = 2; i < kSides; ++i) cone.triangles.push_back({0, i - 1, i});
+  for (const Real tilt : {0.5, 0.87, 1.2}) {
+    World world({.solver = SolverKind::exact});
+    world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = 0.5});
+    const Vec3 axis = Vec3(1, 2, 0.5).normalized();
+    const BodyHandle body = world.add_body({.shape = MeshShape{world.add_mesh(cone)},
+                                            .pose = {{0, 0.4, 0}, Quat(Eigen::AngleAxisd(tilt, axis))},
+                                            .mass = 10,
+                                            .restitution = 0,
+                                            .friction = 0.5});
+    run(world, 4);
+    EXPECT_TRUE(world.is_asleep(body)) << tilt << " " << world.body(body).angular_momentum.norm();
+  }
+}
+
 class Overlap : public BothSolvers {};
+
+// Without gravity, two boxes that overlap at the start come apart and stand still.
+TEST_P(Overlap, LeavesNoVelocity) {
+  for (const Real step : {1.0 / 60, 1.0 / 240}) {
+    World world(weightless(step));
+    std::vector<BodyHandle> boxes;
+    for (const Real x : {-0.495, 0.495})
+      boxes.push_back(
+          world.add_body({.shape = Box{Vec3::Ones()}, .pose = {Vec3(x, 0, 0)}, .restitution = 0}));
+    const Tally t = run(world, 4, step);
+    EXPECT_LT(t.last.contacts.penetration, 2e-4);
+    for (const BodyHandle b : boxes) EXPECT_LT(world.body(b).velocity.norm(), 1.1e-3) << step;
+  }
+}
 
 // Overlaps are removed at no more than the correction speed, and no velocity remains.
 TEST_P(Overlap, IsPushedApartGently) {

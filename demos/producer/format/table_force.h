@@ -161,7 +161,9 @@ struct Table<Grab> {
             {"damping", &T::damping, "damping of the springs: force per speed relative to the hand", "N s/m",
              kNotNegative},
             {"reach", &T::reach,
-             "particles and cloth points at a greater distance from the hand are not held", "m", kPositive},
+             "particles and cloth points at a greater distance from the hand are not held; the held points "
+             "of a cloth share the spring",
+             "m", kPositive},
             {"start", &T::start, "time at which the hand grabs", "s", kNotNegative},
             {"end", &T::end, "time at which the hand releases", "s", kNotNegative}};
   }

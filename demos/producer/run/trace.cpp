@@ -29,13 +29,12 @@ void Trace::record(double time) {
   for (const auto& [name, handle] : simulation_.cloths()) {
     if (!world.is_present(handle)) continue;
     const sim::ClothView cloth = world.cloth(handle);
-    const std::vector<sim::Real>& masses = world.cloth_def(handle).masses;
     sim::Vec3 p = none, v = none;
     sim::Real mass = 0;
-    for (std::size_t i = 0; i < masses.size(); ++i) {
-      mass += masses[i];
-      p += masses[i] * cloth.points[i];
-      v += masses[i] * cloth.velocities[i];
+    for (std::size_t i = 0; i < cloth.masses.size(); ++i) {
+      mass += cloth.masses[i];
+      p += cloth.masses[i] * cloth.points[i];
+      v += cloth.masses[i] * cloth.velocities[i];
     }
     add_state(rows, time, name, p / mass, upright, v / mass, none);
   }

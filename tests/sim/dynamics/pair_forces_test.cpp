@@ -30,7 +30,7 @@ struct Swarm {
   }
   std::vector<Real> accelerations(const ForceDef& def) const {
     std::vector<Real> dv(x.size(), 0.0);
-    under(def).accelerate(0, x, dv);
+    under(def).accelerate(x, dv);
     return dv;
   }
 
@@ -73,7 +73,7 @@ TEST(PairForces, OfTwoParticlesAgreeWithClosedForms) {
     PairForces forces;
     forces.add(def, {{0, 4, 1e-4}, {1, 5, -3e-4}});
     std::vector<Real> dv(6);
-    forces.accelerate(0, x, dv);
+    forces.accelerate(x, dv);
     EXPECT_EQ(4 * dv[1], -5 * dv[4]);
     return std::pair(4 * dv[1], forces.potential_energy(0, x));
   };
@@ -149,7 +149,7 @@ TEST(PairForces, InARegionAreWeakenedByBothStrengths) {
       .effect = MutualGravitation{.constant = 1, .region = SphereRegion{{0, 0, 0}, 2}, .drop_rate = 1}};
   forces.add(def, {{0, 2, 0}, {1, 3, 0}});
   std::vector<Real> dv(6);
-  forces.accelerate(0, x, dv);
+  forces.accelerate(x, dv);
   EXPECT_NEAR(2 * dv[0], 1 * 0.75 * 6 / 0.25, 1e-12);
   EXPECT_NEAR(3 * dv[3], -1 * 0.75 * 6 / 0.25, 1e-12);
 }
@@ -160,7 +160,7 @@ TEST(PairForces, DerivativesAgreeWithDifferences) {
     const PairForces forces = swarm.under(def);
     const auto n = static_cast<Eigen::Index>(swarm.x.size());
     SparseEntries entries;
-    forces.jacobian(0, swarm.x, 0, 0, entries);
+    forces.jacobian(swarm.x, 0, 0, entries);
     Eigen::MatrixXd exact = Eigen::MatrixXd::Zero(n, n);
     for (const auto& e : entries) exact(e.row(), e.col()) += e.value();
     for (Eigen::Index k = 0; k < n; ++k) {
