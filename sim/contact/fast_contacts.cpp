@@ -60,6 +60,10 @@ Vec3 free_change(const Body& body) {
 /// that touched before acts throughout. A new one closes at the time t with the speed of approach u, and then
 /// resists the acceleration a of the free approach until the end.
 Real acting_time(const ContactPair& pair, const PlacedManifold& m, Real duration) {
+  // The inertia of a thin body belongs to the middle (Body::impulse_orientation). The moment of an impulse
+  // with the arm of another time would spin it about its axis.
+  for (const Body* body : {&pair.a(), &pair.b()})
+    if (body->is_dynamic() && body->rigid.is_thin()) return duration / 2;
   Real closing = kNearTime * duration, approach = 0;
   for (uint32_t k = 0; k < m.manifold.count; ++k) {
     if (m.forces[k].last.x() > 0) return duration / 2;
