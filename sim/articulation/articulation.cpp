@@ -114,6 +114,7 @@ Articulation::Articulation(std::vector<Joint*> joints)
   for (Joint* joint : joints_) {
     joint->articulation = this;
     has_bounded_rows_ |= joint->has_bounded_rows();
+    has_elastic_limits_ |= joint->def.restitution > 0;
     for (const Body* body : {joint->a, joint->b}) has_kinematic_ |= body && body->is_kinematic();
     frames_a_.push_back(link_frame(joint->a, joint->on_a));
     frames_b_.push_back(link_frame(joint->b, joint->on_b));
@@ -506,6 +507,19 @@ Real Articulation::mobility(const Joint& joint, const JointRow& row) {
   if (a != JointSystem::kDriven) result += row.on_a.dot(velocities_[a]);
   if (b != JointSystem::kDriven) result += row.on_b.dot(velocities_[b]);
   return result;
+}
+
+void Articulation::strike(Joint& joint, const JointRow& row, const Vec3& arm, Real impulse) {
+  mobility(joint, row);  // leaves the responses to a unit impulse in velocities_ and impulses_
+  for (std::size_t k = 0; k < bodies_.size(); ++k) {
+    const Twist& twist = bodies_[k]->start_twist;
+    bodies_[k]->set_start_velocity(twist.velocity + impulse * velocities_[k].head<3>(),
+                                   twist.angular_velocity + impulse * velocities_[k].tail<3>());
+  }
+  for (Vec6& p : impulses_) p *= impulse;
+  add_impact_impulses(impulses_);
+  const Vec6 on_a = impulse * row.on_a;
+  joint.impact_impulse += Wrench{on_a.head<3>(), on_a.tail<3>() - arm.cross(on_a.head<3>())};
 }
 
 bool Articulation::soften(Real factor) {

@@ -118,6 +118,16 @@ class Articulation final : public JointedBodies {
   /// poses of the last place_within(). Springs of joints are not included.
   Real mobility(const Joint& joint, const JointRow& row);
   bool has_bounded_rows() const { return has_bounded_rows_; }
+  /// Adds an impulse along a row of a joint to the velocities at the interval's start, with the impulses of
+  /// the other joints that follow from it, and to the loads of the joints. `arm`: vector from the centre of
+  /// the joint's body a to the anchor, world axes [m]. Call place() at the start before.
+  void strike(Joint& joint, const JointRow& row, const Vec3& arm, Real impulse);
+  /// Whether impacts at limits with restitution are traced back to their times, so that these limits have no
+  /// rows. In each sub-step this is done at most kMostRebounds times; afterwards rows replace it.
+  bool traces_rebounds() const { return rebounds_left_ > 0; }
+  void begin_rebounds() { rebounds_left_ = has_elastic_limits_ && !has_springs() ? kMostRebounds : 0; }
+  void count_rebound() { --rebounds_left_; }
+  void end_rebounds() { rebounds_left_ = 0; }
   const JointSystem& system() const { return system_; }
   JointSystem& system() { return system_; }
   /// Returns the linear system after place_within(). It contains the constraints, and the springs and dampers
@@ -166,7 +176,9 @@ class Articulation final : public JointedBodies {
   std::vector<Body*> bodies_;
   std::vector<JointFrame> frames_a_, frames_b_;  // relative to the links' centres
   std::vector<Driven> driven_a_, driven_b_;      // accelerations of driven links in this motion
-  bool has_bounded_rows_ = false, has_kinematic_ = false;
+  bool has_bounded_rows_ = false, has_kinematic_ = false, has_elastic_limits_ = false;
+  static constexpr uint32_t kMostRebounds = 32;
+  uint32_t rebounds_left_ = 0;
   std::vector<Momenta> settled_;  // momenta of the bodies after settle()
   JointSystem system_;
 

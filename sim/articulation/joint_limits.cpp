@@ -14,6 +14,10 @@ constexpr Real kPushOut = 0.2, kFastestPush = 2;
 /// A limit whose distance from the coordinate is at most kNear has a row. A limit within kReached takes part
 /// in collisions [rad], [m].
 constexpr Real kNear = 0.02, kReached = 1e-4;
+/// A limit within this distance is reached if its impact was traced back to the current time [rad], [m].
+constexpr Real kTraced = 1e-3;
+/// Greatest number of rebounds at one time, and of bisections for this time.
+constexpr int kMostAtOnce = 8, kBisections = 50;
 /// Links that turn by more than this in an interval are not predicted [rad].
 constexpr Real kMostTurn = 1;
 /// A joint that approaches its limit faster than this speed reaches the limit in the interval [m/s], [rad/s].
@@ -39,6 +43,8 @@ class RowMaker {
   RowMaker(const Articulation& articulation, std::size_t j, Real duration, Real time)
       : joint_(*articulation.joints()[j]),
         is_kicked_(articulation.has_springs()),
+        is_traced_(articulation.traces_rebounds() && joint_.def.restitution > 0 &&
+                   joint_.def.motor.mode == Motor::Mode::none),  // a motor would drive the joint on
         def_(joint_.def),
         h_(duration),
         time_(time),
@@ -87,7 +93,70 @@ class RowMaker {
     return first;
   }
 
+  /// Returns the first impact with a rebound; see first_rebound() in the header.
+  std::optional<Real> first_rebound() const {
+    std::optional<Real> first;
+    for_each_limit([&](const Direction& row, Real limit, int side) {
+      if (const auto at = rebound_time(row, limit, side)) first = std::min(first.value_or(1), *at);
+    });
+    return first;
+  }
+
+  /// Lets the joint rebound from a limit that it has reached. Returns whether it does so.
+  bool rebound(Articulation& articulation) {
+    bool any = false;
+    for_each_limit([&](const Direction& row, Real limit, int side) {
+      const Real speed_now = speed(row), mobility = articulation.mobility(joint_, row.end);
+      if (any || side * (row.end.error - limit) > kTraced || !bounces(side * speed_now) || !(mobility > 0))
+        return;
+      articulation.strike(joint_, row.end, end_.arm_a, -(1 + def_.restitution) * speed_now / mobility);
+      any = true;
+    });
+    return any;
+  }
+
  private:
+  /// Calls look(row, limit, side) for each limit that is traced. `side`: see stop().
+  template <class Look>
+  void for_each_limit(Look&& look) const {
+    if (!is_traced_) return;
+    const auto both = [&](const Direction& row, Real lower, Real upper) {
+      if (lower == upper) return;
+      look(row, lower, 1);
+      look(row, upper, -1);
+    };
+    if (def_.has_free_coordinate()) both(free(), def_.lower, def_.upper);
+    if (def_.swing < kInfinite) both(swing(), least_swing(), def_.swing);
+  }
+  static bool bounces(Real speed) { return speed < -JointDef::kBounceSpeed; }
+
+  /// Returns the fraction of the interval before an impact with a rebound, or nothing if there is none. The
+  /// path of the coordinate is the cubic with the coordinates and the speeds of both ends.
+  std::optional<Real> rebound_time(const Direction& row, Real limit, int side) const {
+    const Real gap = side * (row.start.error - limit), left = side * (row.end.error - limit);
+    if (!(left < 0) || gap < -kTraced) return std::nullopt;
+    const Real before = side * speed_at_start(row), after = side * speed(row);
+    if (!bounces(before + std::max(gap, 0.0) / (std::max(gap, 0.0) - left) * (after - before)))
+      return std::nullopt;
+    Real low = 0, high = 1;
+    for (int k = 0; k < kBisections && gap > 0; ++k) {
+      const Real s = (low + high) / 2, r = 1 - s;
+      const Real at =
+          r * r * ((1 + 2 * s) * gap + s * h_ * before) + s * s * ((3 - 2 * s) * left - r * h_ * after);
+      (at > 0 ? low : high) = s;
+    }
+    return gap > 0 ? high : 0;
+  }
+
+  /// Whether a limit has no row in this interval because its impact is traced back to its time. A limit that
+  /// the joint only approaches has none either, since it would slow the joint down before.
+  bool awaits_rebound(const Direction& row, Real limit, int side) const {
+    if (!is_traced_) return false;
+    const bool approaches = side * (row.start.error - limit) > -kTraced &&
+                            bounces(side * speed_at_start(row)) && bounces(side * speed(row));
+    return approaches || rebound_time(row, limit, side).has_value();
+  }
+
   Real least_swing() const { return def_.type == JointType::universal ? -def_.swing : -kInfinite; }
 
   /// Returns the free coordinate of the joint, which counts whole turns.
@@ -183,7 +252,8 @@ class RowMaker {
     if (!(left < 0) || gap < 0) return std::nullopt;
     const Real before = side * speed_at_start(row), after = side * speed(row), fraction = gap / (gap - left);
     const Real impact = before + fraction * (after - before);
-    const Real restitution = impact < -JointDef::kBounceSpeed ? def_.restitution : 0;
+    const Real restitution = bounces(impact) ? def_.restitution : 0;
+    if (is_traced_ && restitution > 0) return std::nullopt;
     // A joint that rests at its limit still approaches it, by the speed that the forces of an interval cause.
     if (restitution == 0 && !(impact < -std::max(kClosing, std::abs(after - before)))) return std::nullopt;
     return Stop{fraction, std::max(0.0, (1 - fraction) * (after - before) - restitution * impact)};
@@ -203,6 +273,10 @@ class RowMaker {
 
   /// Adds a row for the nearer of the two limits. If both limits are equal, the row fixes the coordinate.
   void add_range(const Direction& row, std::size_t slot, Real lower, Real upper) {
+    if (lower < upper && (awaits_rebound(row, lower, 1) || awaits_rebound(row, upper, -1))) {
+      joint_.efforts[slot] = 0;
+      return;
+    }
     if (!is_kicked_ && lower < upper &&
         (add_stop_within(row, slot, lower, 1) || add_stop_within(row, slot, upper, -1)))
       return;
@@ -377,7 +451,7 @@ class RowMaker {
   }
 
   Joint& joint_;
-  bool is_kicked_;
+  bool is_kicked_, is_traced_;
   const JointDef& def_;
   Real h_, time_;
   LinkMotion start_a_, start_b_, still_a_, still_b_, end_a_, end_b_;
@@ -395,6 +469,27 @@ std::optional<Real> first_stop(const Articulation& articulation, Real duration, 
       if (const auto at = RowMaker(articulation, j, duration, time).first_stop())
         first = std::min(first.value_or(1), *at);
   return first;
+}
+
+std::optional<Real> first_rebound(const Articulation& articulation, Real duration, Real time) {
+  std::optional<Real> first;
+  for (std::size_t j = 0; j < articulation.joints().size(); ++j)
+    if (articulation.joints()[j]->def.restitution > 0)
+      if (const auto at = RowMaker(articulation, j, duration, time).first_rebound())
+        first = std::min(first.value_or(1), *at);
+  return first;
+}
+
+void rebound(Articulation& articulation, Real time) {
+  // A rebound may send another joint against its limit.
+  bool any = true;
+  for (int k = 0; any && k < kMostAtOnce; ++k) {
+    any = false;
+    articulation.place(time, true);
+    for (std::size_t j = 0; !any && j < articulation.joints().size(); ++j)
+      any = articulation.joints()[j]->def.restitution > 0 &&
+            RowMaker(articulation, j, 1, time).rebound(articulation);
+  }
 }
 
 void collect_bounded_rows(Articulation& articulation, Real duration, Real time, std::vector<BoundedRow>& rows,

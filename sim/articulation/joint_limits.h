@@ -25,6 +25,15 @@ struct BoundedOrigin {
 /// Articulation::place_within() first.
 std::optional<Real> first_stop(const Articulation& articulation, Real duration, Real time);
 
+/// Returns the fraction of an interval after which an articulation first rebounds from a limit, from 0 to 1,
+/// if Articulation::traces_rebounds() and its joints reach such a limit in the interval. The interval lasts
+/// `duration` [s] and ends at `time`. Call Articulation::place_within() first.
+std::optional<Real> first_rebound(const Articulation& articulation, Real duration, Real time);
+
+/// Lets the joints of an articulation rebound from the limits that they have reached at `time`: changes the
+/// velocities at the interval's start.
+void rebound(Articulation& articulation, Real time);
+
 /// Appends the bounded rows of an articulation for an interval that lasts `duration` [s] and ends at `time`.
 /// Call Articulation::place_within() first. The indices of bodies are Body::row.
 void collect_bounded_rows(Articulation& articulation, Real duration, Real time, std::vector<BoundedRow>& rows,

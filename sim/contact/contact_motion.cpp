@@ -221,13 +221,18 @@ bool place_after(const Start& s, Real time, ContactPlace& place) {
   return true;
 }
 
-/// Returns a contact frame with the normal n: the frame f after the smallest rotation.
-ContactFrame turned_frame(const ContactFrame& f, const Vec3& n) {
-  if (n == f.n) return f;
-  const auto turn = [&](const Vec3& tangent) {
-    return Vec3(tangent - tangent.dot(n) / (1 + f.n.dot(n)) * (f.n + n));
-  };
-  return {n, turn(f.t), turn(f.k)};
+/// Moves the arms of a contact whose normal cannot be predicted: the contact moves with the body that defines
+/// it. Its place is the same for both bodies, so that impulses keep the angular momentum.
+void carry_along(const Start& s, Real time, ContactPlace& place) {
+  const Carried a = carried(s.a, time), b = carried(s.b, time);
+  const Vec3 apart = s.arm_a - s.arm_b - (a.shift - b.shift);  // from a's centre to b's
+  if (moves_with_b(s.m.source)) {
+    place.arm_b = b.turn * s.arm_b;
+    place.arm_a = place.arm_b + apart;
+  } else {
+    place.arm_a = a.turn * s.arm_a;
+    place.arm_b = place.arm_a - apart;
+  }
 }
 
 /// Change of the relative velocity because the contact moves, in the contact frame at the middle of the
@@ -316,6 +321,14 @@ void set_even_motion(const Start& s, const ContactFrame& frame, Real duration, C
 
 }  // namespace
 
+ContactFrame turned_frame(const ContactFrame& f, const Vec3& n) {
+  if (n == f.n) return f;
+  const auto turn = [&](const Vec3& tangent) {
+    return Vec3(tangent - tangent.dot(n) / (1 + f.n.dot(n)) * (f.n + n));
+  };
+  return {n, turn(f.t), turn(f.k)};
+}
+
 bool moves_with_b(NormalSource source) {
   return source == NormalSource::face_of_a || source == NormalSource::edge_of_a;
 }
@@ -356,6 +369,21 @@ Vec3 turned_arm(const Body& body, const Vec3& arm, const Quat& from, const Vec3&
   // stays the same.
   const Vec3 off_axis = centre_off_axis(body), from_axis = arm + from * off_axis;
   return meridian_turn(from_axis, from, out_from, to, out_to) * from_axis - to * off_axis;
+}
+
+ContactPlace contact_place(const Body& a, const Body& b, const Manifold& m, const Vec3& place, Real gap,
+                           Real time, Real substep) {
+  const Vec3 arm_a = place - start_centre(a), arm_b = place - start_centre(b);
+  const Start start{a, b, m, arm_a, arm_b, gap, first_twist(a).at(arm_a) - first_twist(b).at(arm_b)};
+  const ContactPlace at_start{m.normal, arm_a, arm_b, Quat::Identity()};
+  if (std::max(twist_of(a).angular_velocity.norm(), twist_of(b).angular_velocity.norm()) * substep >
+      kMostPredictedTurn)
+    return at_start;
+  ContactPlace now;
+  if (place_after(start, time, now)) return now;
+  now = at_start;
+  carry_along(start, time, now);
+  return now;
 }
 
 ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, const ContactFrame& frame,
@@ -417,7 +445,10 @@ ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, co
     return motion;
   }
   ContactPlace middle, end;
-  if (!place_after(start, duration / 2, middle) || !place_after(start, duration, end)) return motion;
+  if (!place_after(start, duration / 2, middle) || !place_after(start, duration, end)) {
+    carry_along(start, duration / 2, motion.middle);
+    return motion;
+  }
   motion.middle = middle;
   motion.frame = turned_frame(frame, middle.normal);
   set_gain(start, at_start, end, motion);

@@ -64,6 +64,15 @@ Real rim_speed(const Body& body, const Vec3& normal);
 ContactMotion contact_motion(const Body& a, const Body& b, const Manifold& m, const ContactFrame& frame,
                              const Vec3& place, Real gap, Real duration, Real substep);
 
+/// Predicts the place of a contact `time` [s] after the interval's start; for the other arguments see
+/// contact_motion(). If the normal cannot be predicted, it is kept, and the contact moves with the body that
+/// defines it.
+ContactPlace contact_place(const Body& a, const Body& b, const Manifold& m, const Vec3& place, Real gap,
+                           Real time, Real substep);
+
+/// Returns a contact frame with the normal n: the frame f after the smallest rotation.
+ContactFrame turned_frame(const ContactFrame& f, const Vec3& n);
+
 /// Returns the arm from the centre of mass to a contact feature [m] after the body has turned from
 /// orientation `from` to orientation `to`. `arm` is the arm before. Corners turn with the body; points of
 /// spheres, caps, rims and round sides stay on the side that faces the other body. `out_from` and `out_to`

@@ -264,19 +264,32 @@ bool ExactContacts::divide_at_closings(const Island& island, const ContactInterv
 }
 
 /// Lets the friction of a point oppose its sliding in the middle of the interval, if the point seems to slide
-/// throughout. `u` is the relative velocity at the start with the arms of the middle, and `force` the normal
-/// force of the pair [N].
+/// throughout. Axes with limits of their own are treated one by one, since a point that slides along the
+/// friction axis may stick across it. `u` is the relative velocity at the start with the arms of the middle,
+/// and `force` the normal force of the pair [N].
 void ExactContacts::add_sliding(const Vec3& u, Real force, Real duration) {
-  Contact& c = contacts_.back();
-  const Real speed = u.tail<2>().norm();
-  if (!(force > 0) || speed == 0) return;
+  if (!(force > 0)) return;
+  const Contact& c = contacts_.back();
   const Mat3 K = mobility(c, bodies_);
   // A point that was hardly loaded may be loaded now.
   const Real stop = std::max(0.0, -c.relative_velocity(bodies_).x()) / K(0, 0);
-  const Real limit = std::max(c.friction_t, c.friction_k) * (duration * force + stop);
-  if (limit * (K(1, 1) + K(2, 2)) / 2 > kSlidesOn * speed) return;
-  const Eigen::Vector2d start = u.tail<2>(), change = start - c.bias.tail<2>();
-  sliding_.push_back({static_cast<uint32_t>(contacts_.size() - 1), start, change});
+  const Real load = duration * force + stop;
+  if (c.is_isotropic()) {
+    add_sliding(u, {1, 1}, c.friction_t * load * (K(1, 1) + K(2, 2)) / 2);
+  } else {
+    add_sliding(u, {1, 0}, c.friction_t * load * K(1, 1));
+    add_sliding(u, {0, 1}, c.friction_k * load * K(2, 2));
+  }
+}
+
+/// Does so along `axes` (1 or 0 for t and k), unless friction may change the sliding velocity along them by
+/// more than kSlidesOn of it. `greatest_change` is the greatest change [m/s].
+void ExactContacts::add_sliding(const Vec3& u, const Eigen::Vector2d& axes, Real greatest_change) {
+  Contact& c = contacts_.back();
+  const Eigen::Vector2d start = u.tail<2>().cwiseProduct(axes);
+  if (start.isZero(0) || greatest_change > kSlidesOn * start.norm()) return;
+  const Eigen::Vector2d change = start - c.bias.tail<2>().cwiseProduct(axes);
+  sliding_.push_back({static_cast<uint32_t>(contacts_.size() - 1), axes, start, change});
   c.bias.tail<2>() += change;
   c.offset.tail<2>() += change;
 }
@@ -287,7 +300,7 @@ void ExactContacts::add_sliding(const Vec3& u, Real force, Real duration) {
 bool ExactContacts::remove_sliding(bool all) {
   const auto is_wrong = [this](const Sliding& s) {
     const Contact& c = contacts_[s.contact];
-    const Eigen::Vector2d end = c.relative_velocity(bodies_).tail<2>() - s.start;
+    const Eigen::Vector2d end = c.relative_velocity(bodies_).tail<2>().cwiseProduct(s.axes) - s.start;
     return c.impulse.x() != 0 && (end - s.start).norm() > kSlidesOn * s.start.norm();
   };
   const auto wrong = all && std::ranges::any_of(sliding_, is_wrong)

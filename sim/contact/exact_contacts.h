@@ -40,9 +40,11 @@ class ExactContacts {
   Real division_cost() const { return division_cost_; }
 
  private:
-  /// A point that slides throughout the interval.
+  /// A point that slides throughout the interval, along the axes t and k for which `axes` is 1. Vectors are 0
+  /// along the others.
   struct Sliding {
     uint32_t contact;
+    Eigen::Vector2d axes;
     /// Sliding velocity at the start with the arms of the middle, and this velocity minus the velocity terms
     /// of a point that does not slide, in (t, k) [m/s].
     Eigen::Vector2d start, change;
@@ -50,6 +52,7 @@ class ExactContacts {
   uint32_t add_body(Body& body, const ContactInterval& interval);
   void add_points(ContactPair& pair, const ContactInterval& interval, Method method);
   void add_sliding(const Vec3& u, Real force, Real duration);
+  void add_sliding(const Vec3& u, const Eigen::Vector2d& axes, Real greatest_change);
   bool remove_sliding(bool all);
   void push_apart(Real duration);
   std::optional<ContactWork> solve_by_newton(Real budget);

@@ -14,6 +14,10 @@ namespace {
 /// Separation of points that must not push [m].
 constexpr Real kOutOfReach = 1e3;
 
+/// A gap that the speed at the interval's start closes within this multiple of the interval may be closed at
+/// the interval's end, because the bodies are accelerated or turn.
+constexpr Real kNearTime = 2;
+
 /// Whether points of a body can be left out of a step that will be traced back to the body's next impact. Two
 /// kinds of bodies do not allow this. If a body has several pieces, a piece without a known point may touch
 /// first. A thin body may spin far in the rest of the sub-step.
@@ -47,22 +51,81 @@ RelaxedBody relaxed(const Body& body, const ContactInterval& interval) {
   return b;
 }
 
+/// Returns the change of a body's velocity by its free motion in the interval [m/s].
+Vec3 free_change(const Body& body) {
+  return body.is_awake() ? Vec3(body.rigid.velocity() - body.start_twist.velocity) : Vec3(Vec3::Zero());
+}
+
+/// Returns the mean time from the interval's start at which the impulses of a manifold act [s]. A contact
+/// that touched before acts throughout. A new one closes at the time t with the speed of approach u, and then
+/// resists the acceleration a of the free approach until the end.
+Real acting_time(const ContactPair& pair, const PlacedManifold& m, Real duration) {
+  // The inertia of a thin body belongs to the middle (Body::impulse_orientation). The moment of an impulse
+  // with the arm of another time would spin it about its axis.
+  for (const Body* body : {&pair.a(), &pair.b()})
+    if (body->is_dynamic() && body->rigid.is_thin()) return duration / 2;
+  Real closing = kNearTime * duration, approach = 0;
+  for (uint32_t k = 0; k < m.manifold.count; ++k) {
+    if (m.forces[k].last.x() > 0) return duration / 2;
+    const ContactPoint& point = m.manifold.points[k];
+    const Real speed = -pair.relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n);
+    const Real gap = std::max(point.separation, 0.0);
+    if (!(gap < closing * speed)) continue;
+    closing = gap / speed;
+    approach = speed;
+  }
+  if (approach == 0) return duration / 2;
+  closing = std::min(closing, duration);
+  const Real rest = duration - closing;
+  const Real press =
+      std::max(0.0, (free_change(pair.b()) - free_change(pair.a())).dot(m.frame.n)) * rest / duration;
+  return (approach * closing + press * (closing + rest / 2)) / (approach + press);
+}
+
+/// The motion of a contact in the interval, and its place at the time at which its impulses act.
+struct ActingMotion {
+  ContactMotion motion;
+  ContactPlace place;
+  ContactFrame frame;
+  Real time = 0;  // from -1 at the interval's start to 1 at its end
+};
+
+/// Predicts the motion of a patch's contact; see contact_motion(). With the arms of another time than that of
+/// the impulses, the impulses on the two bodies would not act at the same place, and would change the angular
+/// momentum.
+ActingMotion acting_motion(const ContactPair& pair, const PlacedManifold& m, const Vec3& place, Real gap,
+                           const ContactInterval& interval) {
+  const Body &a = pair.a(), &b = pair.b();
+  const Real duration = interval.duration, time = acting_time(pair, m, duration);
+  ActingMotion acting{.motion =
+                          contact_motion(a, b, m.manifold, m.frame, place, gap, duration, interval.substep)};
+  acting.place = acting.motion.middle;
+  acting.frame = acting.motion.frame;
+  if (time == duration / 2) return acting;
+  acting.place = contact_place(a, b, m.manifold, place, gap, time, interval.substep);
+  acting.frame = turned_frame(m.frame, acting.place.normal);
+  acting.time = 2 * time / duration - 1;
+  return acting;
+}
+
 /// Sets the motion of the contact at the patch's centre, where the surfaces are `gap` apart. The points move
 /// with the body that defines the contact, and lie at different heights over the other body.
-void set_motion(ContactPatch& patch, const ContactMotion& motion, NormalSource source, Real gap) {
-  patch.arm_a = motion.middle.arm_a;
-  patch.arm_b = motion.middle.arm_b;
+void set_motion(ContactPatch& patch, const ActingMotion& acting, NormalSource source, Real gap) {
+  const ContactMotion& motion = acting.motion;
+  patch.arm_a = acting.place.arm_a;
+  patch.arm_b = acting.place.arm_b;
   patch.turns = motion.turns;
   if (!motion.turns) return;
   const ContactFrame& f = patch.frame;
   const Real side = moves_with_b(source) ? -1 : 1;
   for (uint32_t i = 0; i < patch.count; ++i) {
     ContactPatch::Point& p = patch.points[i];
-    const Vec3 arm = motion.middle.turn * (p.t * f.t + p.k * f.k + side * (p.separation - gap) * f.n);
-    p.t = motion.frame.t.dot(arm);
-    p.k = motion.frame.k.dot(arm);
+    const Vec3 arm = acting.place.turn * (p.t * f.t + p.k * f.k + side * (p.separation - gap) * f.n);
+    p.t = acting.frame.t.dot(arm);
+    p.k = acting.frame.k.dot(arm);
   }
-  patch.frame = motion.frame;
+  patch.frame = acting.frame;
+  patch.acting = acting.time;
   patch.gain = motion.gain;
   patch.bow = motion.bow;
   patch.gain_along_t = motion.gain_along_t;
@@ -79,9 +142,7 @@ void set_patch(ContactPatch& patch, const ContactPair& pair, const PlacedManifol
   const Real gap = set_points(patch, m.manifold, m.frame, centre_a, start_centre(pair.b()), runs);
   const Vec3 place = centre_a + patch.arm_a;
   const Vec3 u = m.frame.components(pair.relative_velocity(place) + surface);
-  const ContactMotion motion =
-      contact_motion(pair.a(), pair.b(), m.manifold, m.frame, place, gap, duration, interval.substep);
-  set_motion(patch, motion, m.manifold.source, gap);
+  set_motion(patch, acting_motion(pair, m, place, gap, interval), m.manifold.source, gap);
   patch.offset = patch.frame.components(surface);
   std::tie(patch.friction_t, patch.friction_k) = friction(pair.surface(), u);
   patch.rolling = pair.surface().rolling;

@@ -1,7 +1,7 @@
 #include "sim/contact/friction_cone.h"
 
+#include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace offstage::sim {
 namespace {
@@ -28,23 +28,28 @@ Mat3 pyramid_derivative(const Contact& c, int t, int k) {
   return D;
 }
 
+ConeRegion pyramid_region(int t, int k) {
+  return std::ranges::find_if(kPyramid, [&](const Reached& r) { return r.t == t && r.k == k; })->region;
+}
+
+/// The normal impulse p_n of the nearest point is where the derivative of the squared distance,
+///   p_n - q_n - mu_t max(|q_t| - mu_t p_n, 0) - mu_k max(|q_k| - mu_k p_n, 0),
+/// is zero. It increases with p_n, so the active limits follow from its sign where a limit becomes inactive.
+/// They must not be found by comparing distances: at a point that slides, |q| is 1e6 times the impulse, and
+/// rounding would hide the differences.
 ConeProjection project_on_pyramid(const Contact& c, const Vec3& q) {
-  const auto inside = [&](const Vec3& p) {
-    return p.x() >= 0 && std::abs(p.y()) <= c.friction_t * p.x() * (1 + 1e-12) &&
-           std::abs(p.z()) <= c.friction_k * p.x() * (1 + 1e-12);
-  };
-  if (inside(q)) return {q, ConeRegion::inside};
-  ConeProjection best{Vec3::Zero(), ConeRegion::apex};
-  Real nearest = q.squaredNorm();
-  for (const Reached& r : kPyramid) {
-    const Vec3 p = pyramid_derivative(c, r.t, r.k) * q;
-    const Real distance = (p - q).squaredNorm();
-    if (distance < nearest && inside(p)) {
-      nearest = distance;
-      best = {p, r.region};
-    }
-  }
-  return best;
+  const Real mu_t = c.friction_t, mu_k = c.friction_k, t = std::abs(q.y()), k = std::abs(q.z());
+  if (q.x() >= 0 && t <= mu_t * q.x() && k <= mu_k * q.x()) return {q, ConeRegion::inside};
+  Real normal = (q.x() + mu_t * t + mu_k * k) / (1 + mu_t * mu_t + mu_k * mu_k);
+  if (normal <= 0) return {Vec3::Zero(), ConeRegion::apex};
+  // The limit of t is active up to the normal impulse t / mu_t, and that of k up to k / mu_k.
+  const bool t_is_last = t * mu_k >= k * mu_t;
+  const bool limits_t = t_is_last || mu_t * normal < t, limits_k = !t_is_last || mu_k * normal < k;
+  if (!limits_k) normal = (q.x() + mu_t * t) / (1 + mu_t * mu_t);
+  if (!limits_t) normal = (q.x() + mu_k * k) / (1 + mu_k * mu_k);
+  const int sign_t = limits_t ? (q.y() < 0 ? -1 : 1) : 0, sign_k = limits_k ? (q.z() < 0 ? -1 : 1) : 0;
+  return {{normal, limits_t ? sign_t * mu_t * normal : q.y(), limits_k ? sign_k * mu_k * normal : q.z()},
+          pyramid_region(sign_t, sign_k)};
 }
 
 }  // namespace

@@ -262,8 +262,10 @@ void set_approach(PatchBatch& p, unsigned lane, const ContactPatch& c, const Rel
   if (!std::exchange(p.turns, true)) {
     p.gain = PatchGroups{};
     p.bow = Vector{};
+    p.acting = FloatLanes{};
   }
   p.bow.set(lane, c.bow);
+  p.acting[lane] = static_cast<float>(c.acting);
   p.gain.normal.set(lane, {c.gain.x(), c.gain_along_k, -c.gain_along_t});
   p.gain.friction.set(lane, {c.gain.y(), c.gain.z(), 0});
 }
@@ -451,13 +453,15 @@ Single solve_single_friction(PatchBatch& p, Single& u) {
 /// Returns the change of the relative twist at the end of a sub-step because arms and frames turn.
 /// turning_displacement() returns the displacement that this change has caused before the sub-step.
 Groups turning_velocity(const PatchBatch& p, const SubstepTime& time) {
-  const FloatLanes s = _mm256_set1_ps(time.s), s2 = s * s;
+  const FloatLanes now = _mm256_set1_ps(time.s), s = now - p.acting, s2 = now * now - p.acting * p.acting;
   return {s * p.gain.normal + Vector{s2 * p.bow.x, FloatLanes{}, FloatLanes{}},
           s * p.gain.friction + Vector{s2 * p.bow.y, s2 * p.bow.z, FloatLanes{}}};
 }
 Vector turning_displacement(const PatchBatch& p, const SubstepTime& time) {
-  return _mm256_set1_ps(time.s_sum) * p.gain.normal +
-         Vector{_mm256_set1_ps(time.s2_sum) * p.bow.x, FloatLanes{}, FloatLanes{}};
+  const FloatLanes elapsed = float_lanes(time.elapsed);
+  const FloatLanes s = _mm256_set1_ps(time.s_sum) - elapsed * p.acting,
+                   s2 = _mm256_set1_ps(time.s2_sum) - elapsed * p.acting * p.acting;
+  return s * p.gain.normal + Vector{s2 * p.bow.x, FloatLanes{}, FloatLanes{}};
 }
 
 /// Returns the relative twist at the end of a sub-step.

@@ -86,6 +86,7 @@ struct PatchBatch {
   std::array<Point, 4> points;
   PatchGroups gain;  ///< ContactPatch::gain, including gain_along_t and gain_along_k
   Vector bow;        ///< ContactPatch::bow, along n, t, k
+  Lanes acting;      ///< ContactPatch::acting
 };
 
 /// The times of a sub-step within a step.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/articulation/joint_limits.h"
 #include "sim/contact/contact_motion.h"
 #include "sim/contact/contact_terms.h"
 #include "sim/contact/island_impacts.h"
@@ -106,6 +107,41 @@ void ImpactStage::search(IsWanted&& is_wanted) {
   }
 }
 
+/// Adds the next rebounds from joint limits of the wanted articulations.
+template <class IsWanted>
+void ImpactStage::search_rebounds(IsWanted&& is_wanted) {
+  for (const auto& articulation : world_.articulations) {
+    const Body& body = *articulation->bodies().front();
+    if (!articulation->traces_rebounds() || !body.is_awake() || !is_wanted(body)) continue;
+    const Real duration = h_ - body.from;
+    if (!(duration > h_ * kInstant)) continue;
+    articulation->place_within(start_ + h_, duration, 0.5, h_);
+    if (const auto fraction = first_rebound(*articulation, duration, start_ + h_))
+      pending_.push_back({body.from + *fraction * duration, nullptr, false, articulation.get()});
+  }
+}
+
+/// Moves an articulation, with its island, to the time at which it reaches a limit, and lets it rebound. If
+/// there are too many rebounds, rows replace them in the rest of the sub-step. Returns the island's number.
+uint32_t ImpactStage::rebound_at(const Event& event) {
+  Articulation& articulation = *event.rebounding;
+  const uint32_t number = articulation.bodies().front()->island;
+  trace_back(islands_[number], event.time);
+  cost_ += moving_cost(islands_[number]);
+  ++report_.impacts.tracebacks;
+  articulation.count_rebound();
+  if (cost() > greatest_cost()) articulation.end_rebounds();
+  if (articulation.traces_rebounds()) {
+    rebound(articulation, start_ + event.time);
+    ++report_.impacts.collisions;
+    collide(number, event.time);
+  } else {
+    ++report_.impacts.toi_limit_reached;
+    continue_from(number, event.time);
+  }
+  return number;
+}
+
 /// Adds events that update the contacts of pairs whose contact point moves around a rim.
 void ImpactStage::add_rim_updates() {
   const bool is_fast = world_.def.solver == SolverKind::fast;
@@ -127,6 +163,7 @@ void ImpactStage::add_rim_updates() {
 void ImpactStage::resolve() {
   cost_before_ = solver_.cost();
   search([](const ContactPair&) { return true; });
+  search_rebounds([](const Body&) { return true; });
   add_rim_updates();
   if (pending_.empty()) return;
   // An impact moves back only bodies to which it is connected by forces. Most others in an island are only
@@ -139,33 +176,57 @@ void ImpactStage::resolve() {
     const Event event = *next;
     // After most_impacts(), each pair has at most one more impact. A state that is not finite has more.
     const bool is_last = count > 2 * most_impacts() + contacts_.pairs().size();
-    if (event.is_impact && (is_last || cost() > kLastCost * greatest_cost())) return end_at_once(event);
-    if (event.is_impact) {
+    if (event.is_impact && (is_last || cost() > kLastCost * greatest_cost())) return end_tracing(event);
+    uint32_t island = 0;
+    if (event.rebounding) {
+      island = rebound_at(event);
+    } else if (event.is_impact) {
       limit(*event.pair, count++);
+      island = impact_at(event);
     } else {
       pending_.erase(next);
       const Body& body = event.pair->a().is_awake() ? event.pair->a() : event.pair->b();
       const Island& moving = islands_[body.island];
       if (cost() > greatest_cost() || moving.from >= event.time || moving.bodies.size() > kMostRimBodies)
         continue;
-    }
-    const uint32_t island = gather(*event.pair, event.time);
-    cost_ += moving_cost(islands_[island]);
-    if (event.is_impact) {
-      ++report_.impacts.tracebacks;
-      if (cost() > greatest_cost()) {
-        join_pending(island, event.time);
-        suppress_restitution(island);
-      }
-      collide(island, event.time);
-    } else {
+      island = gather(*event.pair, event.time);
+      cost_ += moving_cost(islands_[island]);
       continue_from(island, event.time);
     }
     // The pending impacts of these bodies are no longer valid; the next ones are searched again.
-    const auto involved = [&](const ContactPair& p) { return is_in(p.a(), island) || is_in(p.b(), island); };
-    std::erase_if(pending_, [&](const Event& e) { return e.is_impact && involved(*e.pair); });
+    const auto moved = [&](const Body& body) { return is_in(body, island); };
+    const auto involved = [&](const ContactPair& p) { return moved(p.a()) || moved(p.b()); };
+    std::erase_if(pending_, [&](const Event& e) {
+      return e.rebounding ? moved(*e.rebounding->bodies().front()) : e.is_impact && involved(*e.pair);
+    });
     search(involved);
+    search_rebounds(moved);
   }
+}
+
+/// Moves the islands of a pair to the time of its impact, and lets them collide. Returns the number of the
+/// merged island.
+uint32_t ImpactStage::impact_at(const Event& event) {
+  const uint32_t island = gather(*event.pair, event.time);
+  cost_ += moving_cost(islands_[island]);
+  ++report_.impacts.tracebacks;
+  if (cost() > greatest_cost()) {
+    join_pending(island, event.time);
+    suppress_restitution(island);
+  }
+  collide(island, event.time);
+  return island;
+}
+
+/// Ends the tracing of impacts and rebounds in the sub-step. Rows replace the rebounds that are still
+/// pending.
+void ImpactStage::end_tracing(const Event& first) {
+  for (const auto& articulation : world_.articulations) articulation->end_rebounds();
+  std::vector<const Body*> rebounding;
+  for (const Event& event : pending_)
+    if (event.rebounding) rebounding.push_back(event.rebounding->bodies().front());
+  end_at_once(first);
+  for (const Body* body : rebounding) continue_from(body->island, islands_[body->island].from);
 }
 
 /// Merges the islands that have pending impacts, and those that are near them, with an island at a time.

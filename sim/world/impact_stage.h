@@ -6,6 +6,8 @@
 /// many impacts the restitution of slower ones is suppressed for the rest of the sub-step. If that is not
 /// enough, all contacts that would close in the rest of the sub-step bounce at once.
 ///
+/// Joints that rebound from their limits are moved back to the times of these impacts in the same way.
+///
 /// The contact point of a wobbling coin moves far around its rim within a sub-step. Such a body is moved in
 /// several pieces of the sub-step, and its contacts are updated between them.
 
@@ -40,10 +42,17 @@ class ImpactStage {
     Real time;  // since the sub-step's start
     ContactPair* pair;
     bool is_impact;  // if false, the contacts of the pair are updated, because they move around a rim
+    // If not null, the articulation rebounds from a limit of a joint; there is no pair.
+    Articulation* rebounding = nullptr;
   };
 
   template <class IsWanted>
   void search(IsWanted&& is_wanted);
+  template <class IsWanted>
+  void search_rebounds(IsWanted&& is_wanted);
+  uint32_t rebound_at(const Event& event);
+  uint32_t impact_at(const Event& event);
+  void end_tracing(const Event& first);
   Real cost() const;
   std::size_t most_impacts() const;
   Real greatest_cost() const;

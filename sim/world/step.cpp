@@ -107,6 +107,7 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
 
 /// Moves all bodies through a sub-step, with their contacts and impacts.
 void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
+  for (const auto& articulation : articulations) articulation->begin_rebounds();
   free_motion.move_all(active.awake(), start, h);
   if (!active.awake().empty() || (!active.kinematic().empty() && active.asleep() > 0)) {
     do contacts.find(h);

@@ -46,9 +46,6 @@ class RandomBodies : public RandomScenes {};
 TEST_P(RandomBodies, KeepEnergyMomentumBoundsAndTime) {
   check_block(Parts::bodies);
 }
-// Known failures among the seeds 0 to 4999: the angular momentum of seed 522 changes by 0.2 %, and the
-// overlaps of the seeds 993, 3906 and 4759 are up to 1.4 times the allowed depth. The long tests contain
-// these seeds and fail there.
 INSTANTIATE_TEST_SUITE_P(Some, RandomBodies, testing::Values<uint64_t>(2, 3, 4, 6));
 INSTANTIATE_TEST_SUITE_P(LongFirst, RandomBodies, testing::Values<uint64_t>(0, 1, 5));
 INSTANTIATE_TEST_SUITE_P(Long, RandomBodies, testing::Range<uint64_t>(7, 50));

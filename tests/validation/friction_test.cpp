@@ -108,6 +108,79 @@ TEST_P(Incline, BoxTipsIfItDoesNotSlideFirst) {
 }
 OFFSTAGE_BOTH_SOLVERS(Solvers, Incline);
 
+// Each axis of a surface with a friction axis has its own limit, so the motions along both axes are
+// independent.
+class FrictionAxis : public BothSolvers {
+ protected:
+  struct Slide {
+    Vec3 shift, velocity;
+    Tally tally;
+  };
+  /// Lets a body slide on a level floor for a second. `owner` has the surface with a friction axis along
+  /// x.
+  enum class Owner : uint8_t { body, floor };
+  static Slide slide(const Shape& shape, Real height, Owner owner, Real along, Real across,
+                     const Vec3& velocity) {
+    World world(def());
+    BodyDef floor{.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = 1};
+    BodyDef slider{
+        .shape = shape, .pose = {Vec3(0, height, 0)}, .velocity = velocity, .restitution = 0, .friction = 1};
+    BodyDef& rough = owner == Owner::body ? slider : floor;
+    rough.friction = along * along;
+    rough.cross_friction = across * across;
+    rough.friction_axis = Vec3::UnitX();
+    world.add_body(floor);
+    const auto body = world.add_body(slider);
+    const Vec3 start = world.body(body).centre;
+    Slide s;
+    s.tally = run(world, 1);
+    s.shift = world.body(body).centre - start;
+    s.velocity = world.body(body).velocity;
+    return s;
+  }
+  /// Returns the distance and the speed after a second of sliding from `speed` with the deceleration mu g.
+  static std::pair<Real, Real> expected(Real speed, Real mu) {
+    const Real rate = mu * kFrictionGravity, time = std::min(1.0, speed / rate);
+    return {speed * time - rate * time * time / 2, speed - rate * time};
+  }
+};
+
+TEST_P(FrictionAxis, ASkateSlidesByEachOfItsCoefficients) {
+  for (const auto& [along, across] : {std::pair(0.02, 0.8), {0.3, 0.1}, {0.1, 0.5}})
+    for (const Vec3& v : {Vec3(2, 0, 0), Vec3(0, 0, 2), Vec3(2, 0, 1.5)}) {
+      const Slide s = slide(Box{{0.4, 0.1, 0.2}}, 0.05, Owner::body, along, across, v);
+      const auto [x, vx] = expected(v.x(), along);
+      const auto [z, vz] = expected(v.z(), across);
+      const auto test = [&] {
+        return testing::Message() << along << ", " << across << ": " << v.transpose();
+      };
+      EXPECT_NEAR(s.shift.x(), x, 1e-4) << test();
+      EXPECT_NEAR(s.shift.z(), z, 1e-4) << test();
+      EXPECT_NEAR(s.velocity.x(), vx, 1e-4) << test();
+      EXPECT_NEAR(s.velocity.z(), vz, 1e-4) << test();
+      EXPECT_LT(s.velocity.y(), 1e-6) << test();
+      EXPECT_EQ(s.tally.exact_fallbacks + s.tally.lcp_fallbacks, 0U) << test();
+    }
+}
+
+// The velocities of the contact point decrease at 7/2 mu g along each axis; then the ball rolls at 5/7 of its
+// speed.
+TEST_P(FrictionAxis, ABallBeginsToRollAlongEachAxisAtItsOwnTime) {
+  for (const auto& [along, across] : {std::pair(0.3, 0.1), {0.1, 0.5}}) {
+    const Slide s = slide(Sphere{0.1}, 0.1, Owner::floor, along, across, {2, 0, 1.5});
+    const auto shift = [](Real speed, Real mu) {
+      const Real rate = mu * kFrictionGravity, time = 2 * speed / (7 * rate);
+      return speed * time - rate * time * time / 2 + 5.0 / 7 * speed * (1 - time);
+    };
+    EXPECT_NEAR(s.shift.x() / shift(2, along), 1, 1e-3) << along;
+    EXPECT_NEAR(s.shift.z() / shift(1.5, across), 1, 1e-3) << across;
+    EXPECT_NEAR(s.velocity.x() / (5.0 / 7 * 2), 1, 1e-3) << along;
+    EXPECT_NEAR(s.velocity.z() / (5.0 / 7 * 1.5), 1, 1e-3) << across;
+    EXPECT_EQ(s.tally.exact_fallbacks + s.tally.lcp_fallbacks, 0U) << along;
+  }
+}
+OFFSTAGE_BOTH_SOLVERS(Solvers, FrictionAxis);
+
 class Level : public BothSolvers {
  protected:
   static BodyHandle add_floor(World& world, Real mu, Real mu_static = -1) {

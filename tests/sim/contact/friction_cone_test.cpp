@@ -51,6 +51,19 @@ TEST(FrictionCone, ProjectionIsTheNearestPoint) {
   }
 }
 
+// The impulses that the exact solver projects are up to a million times their projections. Rounding must not
+// choose another face of the pyramid: the part within the limits stays as it is.
+TEST(FrictionCone, ProjectionOfADistantPointIsExact) {
+  const Contact c = with_friction(0.02, 0.8);
+  Dice dice(4);
+  for (int i = 0; i < 1000; ++i) {
+    // A point at normal impulse 1 that slides along t and sticks along k.
+    const Real slide = dice.uniform(1e4, 1e6), stuck = dice.uniform(-0.79, 0.79);
+    const Vec3 q(1 - c.friction_t * slide, c.friction_t + slide, stuck);
+    EXPECT_LT((project_on_cone(c, q).point - Vec3(1, c.friction_t, stuck)).norm(), 1e-9) << q.transpose();
+  }
+}
+
 // A frictionless contact that separates without sliding must get exactly zero impulse.
 TEST(FrictionCone, WithoutFrictionNothingPulls) {
   const Contact c = with_friction(0, 0);
