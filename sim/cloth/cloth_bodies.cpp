@@ -75,6 +75,8 @@ Vec3 ClothBody::surface_motion(const Vec3& p, const Vec3& n) const {
 Real ClothBody::mobility(const Vec3& p, const Vec3& n) const {
   if (!is_dynamic()) return 0;
   const Vec3 turning = (p - centre_).cross(n);
+  if (!resting_.empty())
+    return resting_.mobility(gained(), -(Vec6() << n, turning).finished(), -free_change(n, turning));
   return obstacle_.inverse_mass + turning.dot(obstacle_.inverse_inertia * turning);
 }
 
@@ -82,9 +84,30 @@ void ClothBody::apply_impulse(const Vec3& impulse, const Vec3& p) {
   touched = true;
   if (!is_dynamic()) return;
   const Vec3 turning = (p - centre_).cross(impulse);
+  if (!resting_.empty()) {
+    respond((Vec6() << impulse, turning).finished(), free_change(impulse, turning), Mat6::Zero());
+    return;
+  }
   reaction_.impulse += impulse;
   reaction_.angular_impulse += turning;
   accelerate(obstacle_.inverse_mass * impulse, obstacle_.inverse_inertia * turning);
+}
+
+/// Change of the velocities by an impulse on a body without contacts.
+Vec6 ClothBody::free_change(const Vec3& impulse, const Vec3& angular) const {
+  return (Vec6() << obstacle_.inverse_mass * impulse, obstacle_.inverse_inertia * angular).finished();
+}
+
+/// Applies an impulse to a body that rests on others. `free_change`: change of the velocities without these
+/// contacts. Returns the change with them.
+Vec6 ClothBody::respond(const Vec6& impulse, const Vec6& free_change, const Mat6& carried) {
+  Vec6 after = gained() + free_change;
+  const Vec6 held = resting_.respond(after);
+  const Vec6 change = after - gained(), own = impulse + held - carried * change;
+  reaction_.impulse += own.head<3>();
+  reaction_.angular_impulse += own.tail<3>();
+  accelerate(change.head<3>(), change.tail<3>());
+  return change;
 }
 
 void ClothBody::record_pin_impulse(const Vec3& impulse, const Vec3& p) {
@@ -105,29 +128,52 @@ void ClothBody::apply_contact_impulse(const Vec3& impulse, const Vec3& p, Real f
 void ClothBody::apply_impulses(const Vec6& impulse, const Vec6& displacement) {
   touched = true;
   const Vec3 linear = impulse.head<3>(), angular = impulse.tail<3>();
-  reaction_.impulse += linear;
-  reaction_.angular_impulse += angular;
-  accelerate(obstacle_.inverse_mass * linear, obstacle_.inverse_inertia * angular);
+  if (!resting_.empty()) {
+    respond(impulse, free_change(linear, angular), Mat6::Zero());
+  } else {
+    reaction_.impulse += linear;
+    reaction_.angular_impulse += angular;
+    accelerate(obstacle_.inverse_mass * linear, obstacle_.inverse_inertia * angular);
+  }
   shift_ += displacement.head<3>();
   turn_ += displacement.tail<3>();
   end_ = moved(on_path(to_), obstacle_.centre, shift_, turn_);
 }
 
-Mat6 ClothBody::mobility(const Mat6& carried) const {
+Mat6 ClothBody::free_mobility() const {
   Mat6 own = Mat6::Zero();
   own.topLeftCorner<3, 3>().diagonal().setConstant(obstacle_.inverse_mass);
   own.bottomRightCorner<3, 3>() = obstacle_.inverse_inertia;
+  return own;
+}
+
+/// Returns the mobility of a body without contacts and of points that it carries.
+Mat6 ClothBody::carrying_mobility(const Mat6& carried) const {
+  const Mat6 own = free_mobility();
   return (Mat6::Identity() + own * carried).partialPivLu().solve(own);
+}
+
+Mat6 ClothBody::mobility(const Mat6& carried) const {
+  const Mat6 whole = carrying_mobility(carried);
+  return resting_.empty() ? whole : resting_.held_mobility(whole);
 }
 
 Vec6 ClothBody::apply_pin_impulses(const Vec6& impulse, const Vec6& moving, const Mat6& carried) {
   const Mat6 response = mobility(carried);
-  const Vec6 change = response * impulse, shift = dt_ * response * moving;
-  const Vec6 own = impulse - carried * change;
+  const Vec6 shift = dt_ * response * moving;
+  Vec6 change = response * impulse;
   touched = true;
-  reaction_.impulse += own.head<3>();
-  reaction_.angular_impulse += own.tail<3>();
-  accelerate(change.head<3>(), change.tail<3>());
+  if (!resting_.empty()) {
+    const Mat6 whole = carrying_mobility(carried);
+    resting_.set_mobility(whole);
+    change = respond(impulse, whole * impulse, carried);
+    resting_.set_mobility(free_mobility());
+  } else {
+    const Vec6 own = impulse - carried * change;
+    reaction_.impulse += own.head<3>();
+    reaction_.angular_impulse += own.tail<3>();
+    accelerate(change.head<3>(), change.tail<3>());
+  }
   shift_ += shift.head<3>();
   turn_ += shift.tail<3>();
   end_ = moved(end_, obstacle_.centre, shift.head<3>(), shift.tail<3>());

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "sim/cloth/cloth_points.h"
+#include "sim/cloth/resting_contacts.h"
 #include "sim/collision/obstacles.h"
 #include "sim/linear/block_cholesky.h"
 
@@ -55,7 +56,8 @@ class ClothBody {
   const Vec3& angular_velocity() const {
     return angular_velocity_;
   }  ///< angular velocity at the same time [rad/s]
-  /// Change of velocity along n (unit) of the point p, per unit of impulse along n at p [1/kg].
+  /// Change of velocity against n (unit) of the point p, per unit of an impulse against n at p [1/kg]. On the
+  /// other side, the contacts of the body with others may permit another change.
   Real mobility(const Vec3& p, const Vec3& n) const;
   /// Applies an impulse [N s] at a point, world.
   void apply_impulse(const Vec3& impulse, const Vec3& p);
@@ -72,8 +74,18 @@ class ClothBody {
   /// about centre() [kg, kg m, kg m^2]. Returns the change of velocity.
   Vec6 apply_pin_impulses(const Vec6& impulse, const Vec6& moving, const Mat6& carried);
   /// Change of [velocity, angular velocity] per unit of [impulse, angular impulse] about centre(), with the
-  /// mass of the pinned points; see apply_pin_impulses().
+  /// mass of the pinned points; see apply_pin_impulses(). The body keeps the contacts that cloth presses.
   Mat6 mobility(const Mat6& carried) const;
+
+  /// Sets the contacts with the bodies on which this body rests.
+  void set_resting(std::vector<RestingContact> contacts) {
+    resting_ = RestingContacts(std::move(contacts), free_mobility());
+  }
+  const RestingContacts& resting() const { return resting_; }
+  /// Changes of velocity and angular velocity due to cloth in the world's sub-step.
+  Vec6 gained() const { return (Vec6() << gained_, gained_spin_).finished(); }
+  /// Mobility without contacts; as mobility() for a body without pinned points.
+  Mat6 free_mobility() const;
   /// Multiplies the body's displacement relative to `drift` [m] in this sub-step of the cloth by `fraction`,
   /// and changes its velocity accordingly. Returns the change of velocity [m/s].
   Vec3 shorten(Real fraction, const Vec3& drift);
@@ -84,6 +96,7 @@ class ClothBody {
   /// pins.
   const std::optional<Reaction>& pin_load() const { return pin_load_; }
 
+  /// Change of the momentum and the angular momentum by cloth.
   const Reaction& reaction() const { return reaction_; }
   /// Records that a point of cloth touches the body, with this relative speed [m/s].
   void touch(Real speed) {
@@ -113,6 +126,9 @@ class ClothBody {
 
  private:
   void accelerate(const Vec3& dv, const Vec3& dw);
+  Vec6 respond(const Vec6& impulse, const Vec6& free_change, const Mat6& carried);
+  Vec6 free_change(const Vec3& impulse, const Vec3& angular) const;
+  Mat6 carrying_mobility(const Mat6& carried) const;
   Pose on_path(Real fraction) const;
 
   Obstacle obstacle_;
@@ -127,6 +143,7 @@ class ClothBody {
   Real dt_ = 0, to_ = 0;     // dt_: length of the cloth's sub-step [s]; to_: its end as a fraction
                              // of the world's sub-step
   bool is_still_ = false;    // whether its surface stood still at the start of the cloth's sub-step
+  RestingContacts resting_;
   Reaction reaction_;
   std::optional<Reaction> pin_load_;
 };

@@ -375,7 +375,7 @@ bool ClothContacts::carries(Touch& a, Touch& b) const {
 /// transmits friction between them, which may be more than its own mass could cause.
 void ClothContacts::pinch(Touch& a, Touch& b, Real friction) {
   const Vec3 n = (a.normal - b.normal).normalized();
-  const Real mobility = a.body->mobility(a.on_body, n) + b.body->mobility(b.on_body, n);
+  const Real mobility = a.body->mobility(a.on_body, n) + b.body->mobility(b.on_body, -n);
   if (!(mobility > 0)) return;
   const Real approach = n.dot(a.body->velocity(a.on_body) - b.body->velocity(b.on_body));
   const Real overlap = -(a.gap + b.gap);
@@ -391,7 +391,7 @@ void ClothContacts::pinch(Touch& a, Touch& b, Real friction) {
   const Real speed = slip.norm();
   if (!(speed > 0)) return;
   const Vec3 along = slip / speed;
-  const Real stick = speed / (a.body->mobility(a.on_body, along) + b.body->mobility(b.on_body, along));
+  const Real stick = speed / (a.body->mobility(a.on_body, along) + b.body->mobility(b.on_body, -along));
   const Real held = std::min(stick, friction * impulse);
   a.body->apply_impulse(-held * along, a.on_body);
   b.body->apply_impulse(held * along, b.on_body);
@@ -401,7 +401,7 @@ void ClothContacts::pinch(Touch& a, Touch& b, Real friction) {
 void ClothContacts::block(Touch& t, ClothBody* holder) {
   if (holder == t.body) return;
   const Real mobility =
-      t.body->mobility(t.on_body, t.normal) + (holder ? holder->mobility(t.on_body, t.normal) : 0);
+      t.body->mobility(t.on_body, t.normal) + (holder ? holder->mobility(t.on_body, -t.normal) : 0);
   if (!(mobility > 0)) return;
   const Vec3 held = holder ? holder->velocity(t.on_body) : Vec3(Vec3::Zero());
   const Real approach = t.normal.dot(t.body->velocity(t.on_body) - held);
@@ -526,7 +526,7 @@ void ClothContacts::press(ClothPoints& points, Touch& t, Real dt, Real parts, bo
   if (length > 0) {
     const Real friction = std::sqrt(points.friction[i] * body.obstacle().friction);
     const Vec3 along = slip / length;
-    const Real stick = length / (w + body.mobility(t.on_body, along));
+    const Real stick = length / (w + body.mobility(t.on_body, -along));
     correction -= std::min(stick, friction * pressed) * along;
   }
   points.position[i] += padded(w * correction);

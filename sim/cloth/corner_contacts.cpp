@@ -194,6 +194,8 @@ void CornerContacts::find_supports(ClothPoints& points, const ClothContacts& of_
     if (!contact ||
         std::ranges::any_of(t, [&](uint32_t i) { return !of_points.may_support(points, body, i); }))
       return;
+    // The support may keep the triangle exactly at its distance, so that solve() finds no overlap.
+    if (contact->gap <= 0) body.touch(0);
     Real free = 0;  // weight of the points that are not pinned
     for (std::size_t k = 0; k < 3; ++k)
       if (points.inverse_mass[t[k]] > 0) free += std::abs(contact->weights[k]);

@@ -57,7 +57,7 @@ class ImplicitSystem {
     }
     for (Mat3& b : block_) b = b.inverse().eval();
     for (std::size_t k = 0; k < bodies.count(); ++k)
-      inertia_.push_back(bodies.body(k).obstacle().inverse_inertia.inverse());
+      inertia_.push_back(bodies.body(k).mobility(Mat6::Zero()).inverse());
     body_block_.resize(bodies.count());
   }
 
@@ -70,9 +70,7 @@ class ImplicitSystem {
   void set_resting(std::vector<Resting> resting) {
     resting_ = std::move(resting);
     for (std::size_t k = 0; k < body_block_.size(); ++k) {
-      body_block_[k].setZero();
-      body_block_[k].topLeftCorner<3, 3>().diagonal().setConstant(bodies_.body(k).mass());
-      body_block_[k].bottomRightCorner<3, 3>() = inertia_[k];
+      body_block_[k] = inertia_[k];
     }
     for (const auto& [s, index] : resting_) {
       const uint32_t body = bodies_.body_of(index);
@@ -102,8 +100,10 @@ class ImplicitSystem {
   void multiply_all(const SpringRun& p, SpringRun& y) const {
     for (std::size_t i = 0; i < size_; ++i) y[i] = points_.mass[cloth_.begin + i] * p[i];
     for (std::size_t k = 0; k < inertia_.size(); ++k) {
-      y[size_ + 2 * k] = bodies_.body(k).mass() * p[size_ + 2 * k];
-      y[size_ + 2 * k + 1] = padded(inertia_[k] * p[size_ + 2 * k + 1].head<3>());
+      const Vec6 momentum =
+          inertia_[k] * (Vec6() << p[size_ + 2 * k].head<3>(), p[size_ + 2 * k + 1].head<3>()).finished();
+      y[size_ + 2 * k] = padded(momentum.head<3>());
+      y[size_ + 2 * k + 1] = padded(momentum.tail<3>());
     }
     for (std::size_t i = 0; i < drag_.size(); ++i) y[i] += dragged(i, p[i]);
     for (std::size_t k = 0; k < links_.size(); ++k) {
@@ -218,7 +218,7 @@ class ImplicitSystem {
   std::size_t size_;  // number of points
   Real bending_;      // factor of the matrix of bending
   std::vector<Resting> resting_;
-  std::vector<Mat3> inertia_;     // by body
+  std::vector<Mat6> inertia_;     // by body: with the contacts on which it rests
   std::vector<Mat6> body_block_;  // by body: inverse of its diagonal block with the points that rest on it
   std::vector<Link> links_;
   std::vector<Mat3> block_;  // by point: inverse of its diagonal block
@@ -330,7 +330,7 @@ void keep_momentum(const ClothPoints& points, const ClothRange& cloth, const Imp
 bool step_implicit(ClothPoints& points, const ClothRange& cloth, Real h) {
   SpringRun x, v;
   begin_run(points, cloth, h, x, v);
-  SupportBodies bodies(points, cloth.supports(points), {});
+  SupportBodies bodies(points, cloth.supports(points), {}, h);
   ImplicitSystem system(points, cloth, bodies, h);
   v.resize(system.size(), Vec4::Zero());
   const SpringRun b = system.right_side(v, h);
@@ -346,7 +346,7 @@ bool step_implicit(ClothPoints& points, const ClothRange& cloth, Real h) {
     points.position[s->point] = points.start[s->point] + move;
   }
   bodies.advance();
-  bodies.apply(h);
+  bodies.apply();
   return converged;
 }
 

@@ -91,11 +91,11 @@ class RelaxedBending {
 /// The supports of a cloth in a sub-step of step_relaxed().
 class RelaxedSupports {
  public:
-  RelaxedSupports(ClothPoints& points, const ClothRange& cloth, uint32_t steps)
+  RelaxedSupports(ClothPoints& points, const ClothRange& cloth, uint32_t steps, Real h)
       : points_(points),
         supports_(cloth.supports(points)),
         of_triangles_(cloth.triangle_supports(points)),
-        bodies_(points, supports_, of_triangles_),
+        bodies_(points, supports_, of_triangles_, h),
         steps_(steps) {}
 
   void begin_step(uint32_t step) {
@@ -127,8 +127,7 @@ class RelaxedSupports {
     }
     bodies_.advance();
   }
-  /// Ends the sub-step, whose steps have the length h.
-  void end(Real h) { bodies_.apply(h); }
+  void end() { bodies_.apply(); }
 
  private:
   void hold_up_point(std::size_t k) {
@@ -239,7 +238,7 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
     coast(i, held(i) ? Vec4((points.position[k] - x[i]) / steps) : Vec4(h * points.velocity[k]));
   }
   bool solved = true;
-  RelaxedSupports supports(points, cloth, steps);
+  RelaxedSupports supports(points, cloth, steps, h);
   for (uint32_t step = 0; step < steps; ++step) {
     supports.begin_step(step);
     if (bends) bending->apply(points, step, points.moves);
@@ -260,7 +259,7 @@ bool step_relaxed(ClothPoints& points, const ClothRange& cloth, ClothSprings& sp
       coast(i, move);
     }
   }
-  supports.end(h);
+  supports.end();
   for (std::size_t i = 0; i < n; ++i) {
     const std::size_t k = cloth.begin + i;
     if (held(i)) {

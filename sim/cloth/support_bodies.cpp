@@ -7,7 +7,8 @@
 namespace offstage::sim {
 
 SupportBodies::SupportBodies(const ClothPoints& points, std::span<const Support> supports,
-                             std::span<const TriangleSupport> of_triangles) {
+                             std::span<const TriangleSupport> of_triangles, Real h)
+    : h_(h) {
   contacts_.reserve(supports.size() + of_triangles.size());
   for (const Support& s : supports) add(s, points.inverse_mass[s.point], points.mass[s.point]);
   for (const TriangleSupport& s : of_triangles) {
@@ -23,7 +24,7 @@ void SupportBodies::add(const Support& s, Real inverse_mass, Real mass) {
   if (s.body) {
     const auto at = std::ranges::find(bodies_, s.body, &Moved::body);
     contact.body = static_cast<uint32_t>(at - bodies_.begin());
-    if (at == bodies_.end()) bodies_.push_back({s.body});
+    if (at == bodies_.end()) bodies_.push_back({.body = s.body, .resting = s.body->resting().scaled(h_)});
     contact.arm = s.on_body - s.body->centre();
     contact.effective_mass = 1 / (inverse_mass + s.body->mobility(s.on_body, s.normal.head<3>()));
   }
@@ -39,7 +40,7 @@ Real SupportBodies::displacement(std::size_t k, const Support& support) const {
 
 void SupportBodies::push(std::size_t k, const Vec4& impulse) {
   const Contact& contact = contacts_[k];
-  if (contact.body == kNone) return;
+  if (contact.body == kNone || impulse.isZero(0)) return;
   Moved& on = bodies_[contact.body];
   const Obstacle& obstacle = on.body->obstacle();
   const Vec3 given = impulse.head<3>(), turning = contact.arm.cross(given);
@@ -47,6 +48,13 @@ void SupportBodies::push(std::size_t k, const Vec4& impulse) {
   on.angular += turning;
   on.move += obstacle.inverse_mass * given;
   on.spin += obstacle.inverse_inertia * turning;
+  if (on.resting.empty()) return;
+  // One sweep is enough: each impulse of a point makes another one, and ClothBody solves to the end.
+  const Vec6 before = h_ * on.body->gained();
+  Vec6 gained = before + (Vec6() << on.move, on.spin).finished();
+  on.resting.respond(gained, 1);
+  on.move = (gained - before).head<3>();
+  on.spin = (gained - before).tail<3>();
 }
 
 Vec4 SupportBodies::apply_friction(std::size_t k, const Support& support, Real part, const Vec4& move) {
@@ -60,7 +68,7 @@ Vec4 SupportBodies::apply_friction(std::size_t k, const Support& support, Real p
   const Real length = slip.norm();
   if (!(length > 0)) return Vec4::Zero();
   Real mobility = contact.inverse_mass;
-  if (contact.body != kNone) mobility += support.body->mobility(support.on_body, slip.head<3>() / length);
+  if (contact.body != kNone) mobility += support.body->mobility(support.on_body, -slip.head<3>() / length);
   const Real pressed = support.impulse + part * part * support.load;
   const Real stopped = std::min(1.0, support.friction * pressed * mobility / length);
   const Vec4 change = stopped * (contact.inverse_mass / mobility) * slip;
@@ -75,11 +83,11 @@ void SupportBodies::advance() {
   }
 }
 
-void SupportBodies::apply(Real h) {
+void SupportBodies::apply() {
   for (const Moved& on : bodies_) {
     if (on.impulse == Vec3::Zero() && on.angular == Vec3::Zero()) continue;
     const auto both = [](const Vec3& a, const Vec3& b) { return (Vec6() << a, b).finished(); };
-    on.body->apply_impulses(both(on.impulse, on.angular) / h, both(on.shift, on.turn));
+    on.body->apply_impulses(both(on.impulse, on.angular) / h_, both(on.shift, on.turn));
   }
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "sim/cloth/cloth_points.h"
+#include "sim/cloth/resting_contacts.h"
 
 namespace offstage::sim {
 
@@ -18,9 +19,9 @@ class ClothBody;
 class SupportBodies {
  public:
   /// `supports` and `of_triangles`: those of the cloth that is integrated. The latter have the indices behind
-  /// those of the former.
+  /// those of the former. `h`: length of a step [s].
   SupportBodies(const ClothPoints& points, std::span<const Support> supports,
-                std::span<const TriangleSupport> of_triangles);
+                std::span<const TriangleSupport> of_triangles, Real h);
 
   std::size_t count() const { return bodies_.size(); }
   ClothBody& body(std::size_t index) const { return *bodies_[index].body; }
@@ -44,8 +45,8 @@ class SupportBodies {
   Vec4 apply_friction(std::size_t k, const Support& support, Real part, const Vec4& move);
   /// Begins the next step.
   void advance();
-  /// Gives the bodies their impulses and displacements after the last step. All steps have the length h [s].
-  void apply(Real h);
+  /// Gives the bodies their impulses and displacements after the last step.
+  void apply();
 
  private:
   struct Moved {
@@ -53,6 +54,7 @@ class SupportBodies {
     Vec3 shift = Vec3::Zero(), turn = Vec3::Zero();  // displacement up to the start of the step [m], [rad]
     Vec3 move = Vec3::Zero(), spin = Vec3::Zero();   // displacement in the step [m], [rad]
     Vec3 impulse = Vec3::Zero(), angular = Vec3::Zero();  // sum of impulses times a step [kg m], [kg m^2]
+    RestingContacts resting;                              // with velocities and impulses times a step
   };
   struct Contact {
     uint32_t body;
@@ -63,6 +65,7 @@ class SupportBodies {
 
   void add(const Support& support, Real inverse_mass, Real mass);
 
+  Real h_;
   std::vector<Moved> bodies_;
   std::vector<Contact> contacts_;  // by support
 };

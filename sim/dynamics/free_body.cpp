@@ -132,8 +132,9 @@ void RigidStage::velocity(std::span<Real> dx) const {
 }
 
 void RigidStage::force(const BodyForces& forces, Real t, std::span<Real> dp) const {
-  Vec3 force = body.mass * forces.gravity - body.linear_drag * (motion.velocity - forces.wind);
-  Vec3 torque = -body.angular_drag * motion.angular_velocity;
+  Vec3 force =
+      body.mass * forces.gravity - body.linear_drag * (motion.velocity - forces.wind) + body.push.force;
+  Vec3 torque = -body.angular_drag * motion.angular_velocity + body.push.torque;
   for (const ActiveForce& f : forces.forces) {
     if (!f.acts_on(body)) continue;
     const Wrench w = effect_wrench(*f.def, forces.inside(t), motion, body.centre, body.linear_drag);
@@ -163,7 +164,7 @@ void FreeBody::velocity(Real, std::span<const Real> x, std::span<const Real> p, 
 }
 
 void FreeBody::force(Real t, std::span<const Real> x, std::span<const Real> p, std::span<Real> dp) const {
-  if (forces_.forces.empty() && body_.linear_drag == 0 && body_.angular_drag == 0) {
+  if (forces_.forces.empty() && body_.linear_drag == 0 && body_.angular_drag == 0 && !body_.is_pushed()) {
     vec3(dp, 0) = body_.mass * forces_.gravity;
     vec3(dp, 3).setZero();
   } else {
@@ -203,7 +204,7 @@ Quat rotation(const Vec3& w, Real h) {
 
 void fly(RigidBody& body, const BodyForces& forces, const Integrator& integrator, Real t, Real h,
          IntegratorWorkspace& work) {
-  if (body.linear_drag != 0 || body.angular_drag != 0 || is_pulled(body, forces.forces))
+  if (body.linear_drag != 0 || body.angular_drag != 0 || body.is_pushed() || is_pulled(body, forces.forces))
     return integrate(body, forces, integrator, t, h, work);
   const Vec3 velocity = body.velocity();
   const Vec3 position = body.position + h * (velocity + h / 2 * forces.gravity);

@@ -2,6 +2,7 @@
 /// State and equations of motion of a rigid body (physics R1). Integration uses (x, q) and the momenta (L,
 /// H), so torque-free motion conserves the angular momentum exactly.
 
+#include "sim/core/twist.h"
 #include "sim/core/types.h"
 
 namespace offstage::sim {
@@ -22,7 +23,9 @@ struct RigidBody : RigidState {
   Mat3 inertia = Mat3::Identity();  ///< inertia about the centre of mass, axes of the shape's frame [kg m^2]
   Mat3 inverse_inertia = Mat3::Identity();
   Real linear_drag = 0, angular_drag = 0;
+  Wrench push;  ///< constant force and torque in the current sub-step, from cloth [N], [N m]
 
+  bool is_pushed() const { return push.force != Vec3::Zero() || push.torque != Vec3::Zero(); }
   const RigidState& state() const { return *this; }
   void set_state(const RigidState& state) { static_cast<RigidState&>(*this) = state; }
 

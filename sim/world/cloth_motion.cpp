@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "sim/world/obstacle_set.h"
+#include "sim/world/resting_bodies.h"
 
 namespace offstage::sim {
 namespace {
@@ -52,6 +53,17 @@ void ClothMotion::detach(BodyHandle body) {
 void ClothMotion::begin_step() {
   world_.cloths.for_each(
       [](ClothHandle, const std::unique_ptr<Cloth>& cloth) { cloth->report = {.finite = !cloth->stopped}; });
+}
+
+void ClothMotion::begin_substep(Real h) {
+  const auto set = [&](BodyHandle handle, const Wrench& push) {
+    if (const std::unique_ptr<Body>* body = world_.bodies.find(handle)) (*body)->rigid.push = push;
+  };
+  for (const BodyHandle body : std::exchange(pushed_, {})) set(body, {});
+  for (const Push& push : std::exchange(pushes_, {})) {
+    set(push.body, {push.impulse.force / h, push.impulse.torque / h});
+    pushed_.push_back(push.body);
+  }
 }
 
 /// Returns the bodies that cloths may touch in a sub-step of length h, and the bodies that hold pins.
@@ -133,6 +145,7 @@ void ClothMotion::find_pressed(std::span<ContactPair* const> pairs) {
 std::vector<Reaction> ClothMotion::step(Real start, Real h, std::span<ContactPair* const> pairs) {
   find_pressed(pairs);
   std::vector<ClothBody> near = bodies_near_cloths(h);
+  set_resting_contacts(world_, pairs, h, near);
   for (const PressedCloth& pressed : pressed_) {
     const auto at = [&](BodyHandle body) {
       return std::ranges::find(near, body.index, [](const ClothBody& n) { return n.obstacle().body; });
@@ -185,8 +198,28 @@ std::vector<Reaction> ClothMotion::answer(std::span<const ClothBody> near, Real 
       body.rigid.place(body.pose);
     }
     reactions.push_back(at.reaction());
+    push_supports(at, reactions);
   }
   return reactions;
+}
+
+/// Passes on what the contacts of a body with others have balanced of the impulses of cloth.
+void ClothMotion::push_supports(const ClothBody& at, std::vector<Reaction>& reactions) {
+  Wrench held;
+  const std::span<const RestingContact> contacts = at.resting().contacts();
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const RestingContact& c = contacts[k];
+    const Vec3 impulse = -at.resting().impulse(k);
+    if (impulse == Vec3::Zero()) continue;
+    if (c.yield > 0) {
+      const Vec3 arm = at.centre() + c.arm - world_.body_at(c.other).rigid.position;
+      reactions.push_back({c.other, impulse, arm.cross(impulse)});
+    } else {
+      held += {impulse, c.arm.cross(impulse)};
+    }
+  }
+  const BodyHandle body = world_.bodies.at_slot(at.obstacle().body);
+  if (held.force != Vec3::Zero() || held.torque != Vec3::Zero()) pushes_.push_back({body, held});
 }
 
 void ClothMotion::report(StepReport& report) {

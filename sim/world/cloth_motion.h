@@ -37,6 +37,9 @@ class ClothMotion {
   }
 
   void begin_step();
+  /// Gives the bodies that cloth pressed against others in the last sub-step the impulse that this needs, as
+  /// a constant force in the sub-step of length h [s] that begins.
+  void begin_substep(Real h);
   /// Moves all cloths through a sub-step, and displaces bodies where cloths push them. `pairs`: the pairs of
   /// bodies of this sub-step, which may press cloth. Returns the impulses on the bodies.
   std::vector<Reaction> step(Real start, Real h, std::span<ContactPair* const> pairs);
@@ -57,11 +60,18 @@ class ClothMotion {
   bool is_between(const PressedCloth& pressed) const;
   void wake_unpinned(std::span<const ClothBody> near);
   std::vector<Reaction> answer(std::span<const ClothBody> near, Real h);
+  void push_supports(const ClothBody& at, std::vector<Reaction>& reactions);
 
   const WorldState& world_;
   ActiveBodies& active_;
   ClothSystem system_;
   std::vector<PressedCloth> pressed_;
+  struct Push {
+    BodyHandle body;
+    Wrench impulse;  // [N s], [N m s]
+  };
+  std::vector<Push> pushes_;        // for the next sub-step
+  std::vector<BodyHandle> pushed_;  // bodies with a force of the last sub-step
 };
 
 }  // namespace offstage::sim

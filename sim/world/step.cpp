@@ -172,6 +172,7 @@ void World::Impl::begin_bodies(Real start, Real end) {
     awake[i]->begin_interval(0);
   });
   begin_kinematic(start, end);
+  cloth_motion.begin_substep(end - start);
   free_motion.begin_substep();
 }
 

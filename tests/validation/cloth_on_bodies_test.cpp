@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <tuple>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -154,6 +155,98 @@ TEST(ClothUnderACone, CatchesTheTip) {
       EXPECT_LT(run(world, cloth, step, 1.5).rise, 0.01) << step;  // of 2.3 J
       EXPECT_GT(world.body(cone).pose.position.y(), -0.15) << step;
     }
+}
+
+/// Shape, mass of the body [kg], mass of the cloth per area [kg/m^2], sub-steps per second, integrator.
+class LightBodyUnderCloth
+    : public testing::TestWithParam<std::tuple<Shape, Real, Real, int, ClothIntegrator>> {
+ protected:
+  static constexpr Real kHalf = 0.05;
+  static BodyDef light(const Shape& shape, Real mass, const Vec3& at) {
+    return {.shape = shape, .pose = {at}, .mass = mass, .friction = 0.5};
+  }
+  static ClothDef falling(Real density, Real height, ClothIntegrator integrator) {
+    effects::Fabric fabric = effects::find_fabric("cotton")->fabric;
+    fabric.areal_density = density;
+    ClothDef def = effects::grid_cloth({1, 1, 14, 14}, {Vec3(0, height, 0)}, fabric);
+    def.integrator = integrator;
+    return def;
+  }
+};
+
+TEST_P(LightBodyUnderCloth, StaysOnTheGround) {
+  // If the body could move freely within the sub-step of the cloth, the cloth would push it into the ground
+  // by F h^2 / m.
+  const auto& [shape, mass, density, rate, integrator] = GetParam();
+  World world({.max_step = 1.0 / rate});
+  world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .friction = 0.5});
+  const BodyHandle body = world.add_body(light(shape, mass, Vec3(0, kHalf, 0)));
+  world.add_cloth(falling(density, 0.3, integrator));
+  const Real start = world.energy().total();
+  for (int i = 0; i < 60; ++i) {
+    world.step(1.0 / 60);
+    ASSERT_GT(world.body(body).pose.position.y(), kHalf - 1e-3) << i;
+    ASSERT_LE(world.energy().total(), 1.001 * start) << i;
+  }
+  EXPECT_LT(std::abs(world.body(body).velocity.y()), 1e-3);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Bodies, LightBodyUnderCloth,
+    testing::Combine(testing::Values(Shape(Sphere{0.05}), Shape(Box{Vec3(0.1, 0.1, 0.1)})),
+                     testing::Values(0.02, 0.3, 2), testing::Values(0.1, 3), testing::Values(60, 240),
+                     testing::Values(ClothIntegrator::relaxed, ClothIntegrator::implicit)));
+
+TEST(LightBodiesUnderCloth, FallAsleepInAStack) {
+  for (const int rate : {60, 240}) {
+    World world({.max_step = 1.0 / rate});
+    world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .friction = 0.5});
+    std::vector<BodyHandle> boxes;
+    for (const Real height : {0.05, 0.15})
+      boxes.push_back(world.add_body(
+          {.shape = Box{Vec3(0.1, 0.1, 0.1)}, .pose = {Vec3(0, height, 0)}, .mass = 0.05, .friction = 0.5}));
+    effects::Fabric fabric = effects::find_fabric("cotton")->fabric;
+    fabric.areal_density = 1;
+    world.add_cloth(effects::grid_cloth({1, 1, 14, 14}, {Vec3(0, 0.4, 0)}, fabric));
+    for (int i = 0; i < 4 * 60; ++i) world.step(1.0 / 60);
+    for (std::size_t k = 0; k < boxes.size(); ++k) {
+      EXPECT_TRUE(world.is_asleep(boxes[k])) << rate;
+      EXPECT_NEAR(world.body(boxes[k]).pose.position.y(), 0.05 + 0.1 * static_cast<Real>(k), 2e-4) << rate;
+    }
+  }
+}
+
+TEST(LightBodiesUnderCloth, KeepTheirMomentum) {
+  // A cloth is thrown onto a free box that lies on another free box. Each box gets its impulse at once.
+  for (const ClothIntegrator integrator : {ClothIntegrator::relaxed, ClothIntegrator::implicit}) {
+    World world({.gravity = Vec3::Zero(), .max_step = 1.0 / 60, .sleep = false});
+    const Real mass = 0.05;
+    const BodyHandle lower = world.add_body(
+        {.shape = Box{Vec3(0.3, 0.1, 0.3)}, .pose = {Vec3(0, 0.05, 0)}, .mass = mass, .friction = 0.5});
+    const BodyHandle upper = world.add_body(
+        {.shape = Box{Vec3(0.1, 0.1, 0.1)}, .pose = {Vec3(0, 0.15, 0)}, .mass = mass, .friction = 0.5});
+    effects::Fabric fabric = effects::find_fabric("cotton")->fabric;
+    fabric.areal_density = 1;
+    ClothDef def = effects::grid_cloth({1, 1, 14, 14}, {Vec3(0, 0.3, 0)}, fabric);
+    def.air.density = 0;
+    def.velocity = Vec3(0, -3, 0);
+    def.integrator = integrator;
+    const ClothHandle cloth = world.add_cloth(def);
+    const auto momentum = [&] {
+      Vec3 sum = mass * (world.body(lower).velocity + world.body(upper).velocity);
+      for (std::size_t k = 0; k < def.masses.size(); ++k)
+        sum += def.masses[k] * world.cloth(cloth).velocities[k];
+      return sum;
+    };
+    const Vec3 whole = momentum();
+    const Real start = world.energy().total();
+    for (int i = 0; i < 60; ++i) {
+      world.step(1.0 / 60);
+      ASSERT_LE((momentum() - whole).norm(), 1e-9 * whole.norm()) << i;
+      ASSERT_LE(world.energy().total(), 1.001 * start) << i;
+    }
+    EXPECT_LT(world.body(lower).velocity.y(), -1);
+  }
 }
 
 }  // namespace
