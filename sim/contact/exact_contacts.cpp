@@ -18,7 +18,9 @@ namespace {
 /// [m/s].
 constexpr Real kPushOut = 0.2, kFastestPush = 0.5;
 /// A correction that is faster than this is a displacement; bodies keep the velocity of a slower one [m/s].
-constexpr Real kKeptPush = 1e-3;
+/// Where bodies turn, the overlap is an error of the prediction, which has taken as much energy from a
+/// rolling body as the slow correction returns.
+constexpr Real kKeptPush = 1e-3, kKeptPushOfTurning = 1e-2;
 /// Points that approach faster than this closed within the interval, and not before it [m/s].
 constexpr Real kClosing = 1e-3;
 /// In an interval that may be divided, points with a gap close later if they approach faster than this, even
@@ -109,7 +111,7 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
   if (contacts_.empty() && joints_.bounded().empty()) return {.is_applied = true, .work = {}};
 
   free_ = bodies_;
-  push_apart(interval.duration);
+  push_apart(island, interval.duration);
   joints_.project(bodies_, interval.end);
   Outcome outcome;
   if (method == Method::lcp) outcome.is_applied = solve_lcp(outcome.lcp);
@@ -140,11 +142,15 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
 
 /// Moves overlapping bodies apart, without a change of their velocities: they would keep the speed of the
 /// correction, which depends on the length of the sub-step. Slow corrections and those of linked bodies are
-/// left to the solution of the velocities.
-void ExactContacts::push_apart(Real duration) {
+/// left to the solution of the velocities, and so are those of thin bodies, whose energy depends on their
+/// orientation.
+void ExactContacts::push_apart(const Island& island, Real duration) {
   pushes_.clear();
-  const auto fastest = std::ranges::max_element(contacts_, {}, &Contact::target);
-  if (contacts_.empty() || fastest->target <= kKeptPush || !joints_.articulations().empty()) return;
+  const bool is_slow = std::ranges::all_of(contacts_, [](const Contact& c) {
+    return c.target <= (c.bias.x() != 0 ? kKeptPushOfTurning : kKeptPush);
+  });
+  const auto is_thin = [](const Body* body) { return body->rigid.is_thin(); };
+  if (is_slow || !joints_.articulations().empty() || std::ranges::any_of(island.bodies, is_thin)) return;
   std::vector<Contact> pushing = contacts_;
   for (Contact& c : pushing) {
     c.offset = c.bias = c.impulse = c.moment = Vec3::Zero();

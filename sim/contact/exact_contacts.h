@@ -54,7 +54,7 @@ class ExactContacts {
   void add_sliding(const Vec3& u, Real force, Real duration);
   void add_sliding(const Vec3& u, const Eigen::Vector2d& axes, Real greatest_change);
   bool remove_sliding(bool all);
-  void push_apart(Real duration);
+  void push_apart(const Island& island, Real duration);
   std::optional<ContactWork> solve_by_newton(Real budget);
   bool solve_lcp(ContactWork& work);
   bool has_closing() const;

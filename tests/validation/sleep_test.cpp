@@ -298,7 +298,7 @@ TEST(Rocking, OfAFacetedConeEnds) {
 
 class Overlap : public BothSolvers {};
 
-// Without gravity, two boxes that overlap at the start come apart and stand still.
+// Without gravity, two boxes that overlap at the start come apart and hardly move afterwards.
 TEST_P(Overlap, LeavesNoVelocity) {
   for (const Real step : {1.0 / 60, 1.0 / 240}) {
     World world(weightless(step));
