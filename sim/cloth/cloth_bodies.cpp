@@ -159,13 +159,16 @@ Mat6 ClothBody::mobility(const Mat6& carried) const {
 }
 
 Vec6 ClothBody::apply_pin_impulses(const Vec6& impulse, const Vec6& moving, const Mat6& carried) {
-  const Mat6 response = mobility(carried);
-  const Vec6 shift = dt_ * response * moving;
-  Vec6 change = response * impulse;
+  const Mat6 whole = carrying_mobility(carried);
+  Vec6 change = whole * impulse, shift = dt_ * whole * moving;
   touched = true;
   if (!resting_.empty()) {
-    const Mat6 whole = carrying_mobility(carried);
     resting_.set_mobility(whole);
+    // The contacts hold the body against the displacement, too, by friction as well.
+    RestingContacts holding = resting_;
+    Vec6 after = gained() + whole * moving;
+    holding.respond(after);
+    shift = dt_ * (after - gained());
     change = respond(impulse, whole * impulse, carried);
     resting_.set_mobility(free_mobility());
   } else {

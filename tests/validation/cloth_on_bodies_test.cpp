@@ -197,6 +197,32 @@ INSTANTIATE_TEST_SUITE_P(
                      testing::Values(0.02, 0.3, 2), testing::Values(0.1, 3), testing::Values(60, 240),
                      testing::Values(ClothIntegrator::relaxed, ClothIntegrator::implicit)));
 
+// A box that carries cloth by pins, or under a blanket, stays on a ramp inside its friction cone.
+TEST(LoadedBodies, StayOnARampWithTheirCloth) {
+  const Quat slope(Eigen::AngleAxisd(-20 * std::numbers::pi / 180, Vec3::UnitZ()));
+  for (const bool pinned : {true, false})
+    for (const SolverKind solver : {SolverKind::automatic, SolverKind::fast})
+      for (const int rate : {60, 240}) {
+        World world({.max_step = 1.0 / rate, .solver = solver, .sleep = false});
+        world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .pose = {Vec3::Zero(), slope}});
+        const Vec3 place = slope * Vec3(0, 0.1, 0);
+        const BodyHandle box =
+            world.add_body({.shape = Box{Vec3(0.6, 0.2, 0.6)}, .pose = {place, slope}, .mass = 1});
+        effects::Fabric fabric = effects::find_fabric("cotton")->fabric;
+        fabric.areal_density = 4;
+        ClothDef def = effects::grid_cloth({0.5, 0.5, 4, 4}, {slope * Vec3(0, 0.206, 0), slope}, fabric);
+        def.air.density = 0;
+        def.friction = 5;
+        if (pinned)
+          for (uint32_t i = 0; i < def.vertices.size(); ++i)
+            def.pins.push_back(
+                {.vertex = i, .body = box, .position = slope.conjugate() * (def.vertices[i] - place)});
+        world.add_cloth(def);
+        for (int i = 0; i < 2 * rate; ++i) world.step(1.0 / rate);
+        EXPECT_LT((world.body(box).centre - place).norm(), 2e-4) << pinned << " " << rate;
+      }
+}
+
 TEST(LightBodiesUnderCloth, FallAsleepInAStack) {
   for (const int rate : {60, 240}) {
     World world({.max_step = 1.0 / rate});
