@@ -11,11 +11,11 @@ namespace offstage::sim {
 namespace {
 
 /// Returns the acceleration that one force gives a particle of 2 kg whose own drag coefficient is 0.5 kg/s.
-Vec3 acceleration(const ForceDef& def, const Vec3& x, const Vec3& v = Vec3::Zero(), Real t = 0) {
+Vec3 acceleration(const ForceDef& def, const Vec3& x, const Vec3& v = Vec3::Zero()) {
   const ParticleForces forces({.linear_drag = 0.5, .gravity = false}, Vec3::Zero(), Vec3::Zero(), {&def});
   const Real mass[] = {2};
   Vec3 dv;
-  forces.accelerate(t, {x.data(), 3}, {v.data(), 3}, mass, {dv.data(), 3});
+  forces.accelerate(0, {x.data(), 3}, {v.data(), 3}, mass, {dv.data(), 3});
   return dv + 0.25 * v;  // subtracts the particle's own drag
 }
 
@@ -38,13 +38,6 @@ TEST(ParticleForces, OfAirUseTheFieldsDragOrTheParticlesOwn) {
   // -k (v - wind) is the particle's own drag plus k wind.
   EXPECT_NEAR((acceleration({.effect = WindField{.wind = wind}}, Vec3::Zero(), v) - 0.25 * wind).norm(), 0,
               1e-15);
-}
-
-TEST(ParticleForces, ActDuringTheirTimeOnly) {
-  const ForceDef push{.start = 1, .end = 2, .effect = ConstantField{{2, 0, 0}}};
-  EXPECT_EQ(acceleration(push, Vec3::Zero(), Vec3::Zero(), 0.99), Vec3::Zero());
-  EXPECT_EQ(acceleration(push, Vec3::Zero(), Vec3::Zero(), 1), Vec3(1, 0, 0));
-  EXPECT_EQ(acceleration(push, Vec3::Zero(), Vec3::Zero(), 2), Vec3::Zero());
 }
 
 // The circulation: the integral of the velocity around a circle about the axis is Gamma r^2 / (r^2 + R^2).
