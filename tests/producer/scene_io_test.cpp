@@ -206,12 +206,12 @@ TEST(SceneIo, EveryProblemIsReportedAtOnceInOrder) {
 
 TEST(SceneIo, MessagesAboutWrongKeysNameThePlaceOfTheRightOnes) {
   EXPECT_EQ(load_errors(R"({"bodies": [{"shape": {"type": "torus", "tube": 0.1}}]})"),
-            "s:1:40: /bodies/0/shape/tube: unknown key in torus; did you mean 'tube_radius'?");
+            "s:1:41: /bodies/0/shape/tube: unknown key in torus; did you mean 'tube_radius'?");
   EXPECT_EQ(load_errors(R"({"bodies": [{"rolling_friction": 0.5}]})"),
-            "s:1:13: /bodies/0/rolling_friction: unknown key in body; 'rolling_friction' is a key of: "
+            "s:1:14: /bodies/0/rolling_friction: unknown key in body; 'rolling_friction' is a key of: "
             "material, contact");
   EXPECT_EQ(load_errors(R"({"bodies": [{"material": {"friction": 0.5}}]})"),
-            "s:1:25: /bodies/0/material: must be a string (name of a material; empty: grey, or the materials "
+            "s:1:26: /bodies/0/material: must be a string (name of a material; empty: grey, or the materials "
             "of the model file), got an object");
 }
 
