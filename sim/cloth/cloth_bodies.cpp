@@ -84,13 +84,7 @@ void ClothBody::apply_impulse(const Vec3& impulse, const Vec3& p) {
   touched = true;
   if (!is_dynamic()) return;
   const Vec3 turning = (p - centre_).cross(impulse);
-  if (!resting_.empty()) {
-    respond((Vec6() << impulse, turning).finished(), free_change(impulse, turning), Mat6::Zero());
-    return;
-  }
-  reaction_.impulse += impulse;
-  reaction_.angular_impulse += turning;
-  accelerate(obstacle_.inverse_mass * impulse, obstacle_.inverse_inertia * turning);
+  add_impulse((Vec6() << impulse, turning).finished());
 }
 
 /// Change of the velocities by an impulse on a body without contacts.
@@ -98,16 +92,19 @@ Vec6 ClothBody::free_change(const Vec3& impulse, const Vec3& angular) const {
   return (Vec6() << obstacle_.inverse_mass * impulse, obstacle_.inverse_inertia * angular).finished();
 }
 
-/// Applies an impulse to a body that rests on others. `free_change`: change of the velocities without these
-/// contacts. Returns the change with them.
-Vec6 ClothBody::respond(const Vec6& impulse, const Vec6& free_change, const Mat6& carried) {
+/// Returns the change of the velocities that the contacts with other bodies permit. `free_change`: the change
+/// without these contacts. Their impulses are added to `impulse`.
+Vec6 ClothBody::respond(RestingContacts& contacts, const Vec6& free_change, Vec6& impulse) const {
+  if (contacts.empty()) return free_change;
   Vec6 after = gained() + free_change;
-  const Vec6 held = resting_.respond(after);
-  const Vec6 change = after - gained(), own = impulse + held - carried * change;
-  reaction_.impulse += own.head<3>();
-  reaction_.angular_impulse += own.tail<3>();
-  accelerate(change.head<3>(), change.tail<3>());
-  return change;
+  impulse += contacts.respond(after);
+  return after - gained();
+}
+
+/// Applies an impulse and an angular impulse about centre() to a body without pinned points.
+void ClothBody::add_impulse(Vec6 impulse) {
+  const Vec6 change = respond(resting_, free_change(impulse.head<3>(), impulse.tail<3>()), impulse);
+  take(change, impulse);
 }
 
 void ClothBody::record_pin_impulse(const Vec3& impulse, const Vec3& p) {
@@ -127,14 +124,7 @@ void ClothBody::apply_contact_impulse(const Vec3& impulse, const Vec3& p, Real f
 
 void ClothBody::apply_impulses(const Vec6& impulse, const Vec6& displacement) {
   touched = true;
-  const Vec3 linear = impulse.head<3>(), angular = impulse.tail<3>();
-  if (!resting_.empty()) {
-    respond(impulse, free_change(linear, angular), Mat6::Zero());
-  } else {
-    reaction_.impulse += linear;
-    reaction_.angular_impulse += angular;
-    accelerate(obstacle_.inverse_mass * linear, obstacle_.inverse_inertia * angular);
-  }
+  add_impulse(impulse);
   shift_ += displacement.head<3>();
   turn_ += displacement.tail<3>();
   end_ = moved(on_path(to_), obstacle_.centre, shift_, turn_);
@@ -160,28 +150,27 @@ Mat6 ClothBody::mobility(const Mat6& carried) const {
 
 Vec6 ClothBody::apply_pin_impulses(const Vec6& impulse, const Vec6& moving, const Mat6& carried) {
   const Mat6 whole = carrying_mobility(carried);
-  Vec6 change = whole * impulse, shift = dt_ * whole * moving;
   touched = true;
-  if (!resting_.empty()) {
-    resting_.set_mobility(whole);
-    // The contacts hold the body against the displacement, too, by friction as well.
-    RestingContacts holding = resting_;
-    Vec6 after = gained() + whole * moving;
-    holding.respond(after);
-    shift = dt_ * (after - gained());
-    change = respond(impulse, whole * impulse, carried);
-    resting_.set_mobility(free_mobility());
-  } else {
-    const Vec6 own = impulse - carried * change;
-    reaction_.impulse += own.head<3>();
-    reaction_.angular_impulse += own.tail<3>();
-    accelerate(change.head<3>(), change.tail<3>());
-  }
+  resting_.set_mobility(whole);
+  // The contacts hold the body against the displacement, too, and by friction as well.
+  RestingContacts holding = resting_;
+  Vec6 of_displacement = moving, own = impulse;
+  const Vec6 shift = dt_ * respond(holding, whole * moving, of_displacement);
+  const Vec6 change = respond(resting_, whole * impulse, own);
+  take(change, own - carried * change);
+  resting_.set_mobility(free_mobility());
   shift_ += shift.head<3>();
   turn_ += shift.tail<3>();
   end_ = moved(end_, obstacle_.centre, shift.head<3>(), shift.tail<3>());
   centre_ = end_.point_to_world(obstacle_.centre);
   return change;
+}
+
+/// Changes the velocities by `change`, and the momenta of the body by `impulse`.
+void ClothBody::take(const Vec6& change, const Vec6& impulse) {
+  reaction_.impulse += impulse.head<3>();
+  reaction_.angular_impulse += impulse.tail<3>();
+  accelerate(change.head<3>(), change.tail<3>());
 }
 
 void ClothBody::accelerate(const Vec3& dv, const Vec3& dw) {

@@ -126,7 +126,9 @@ class ClothBody {
 
  private:
   void accelerate(const Vec3& dv, const Vec3& dw);
-  Vec6 respond(const Vec6& impulse, const Vec6& free_change, const Mat6& carried);
+  void take(const Vec6& change, const Vec6& impulse);
+  Vec6 respond(RestingContacts& contacts, const Vec6& free_change, Vec6& impulse) const;
+  void add_impulse(Vec6 impulse);
   Vec6 free_change(const Vec3& impulse, const Vec3& angular) const;
   Mat6 carrying_mobility(const Mat6& carried) const;
   Pose on_path(Real fraction) const;

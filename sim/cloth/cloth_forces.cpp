@@ -90,9 +90,9 @@ void add(const PointField& f, Run& run) {
   for (std::size_t i = 0; i < run.size(); ++i)
     run.accelerate(i, strength(f.region, f.drop_rate, run.at(i)) * f.force * direction(f.point - run.at(i)));
 }
-/// Adds the force of the hand, which the points that it holds share in proportion to their mass. The spring
-/// pulls to the end of the sub-step by its length there, gap + h v, so that no stiffness is too large for the
-/// step; h v is a drag.
+/// Adds the force of the hand, which the points that it holds share in proportion to their mass. The force of
+/// the spring is that at the end of the sub-step, where the distance from the hand is gap + h v; otherwise a
+/// stiff spring would be unstable. The term with v is added as a drag.
 void add(const Grab& f, Run& run) {
   const Vec3 hand = f.track.at(run.time + run.h, Pose{}).pose.position;
   const Vec3 velocity = f.track.at(run.time, Pose{}).velocity;
@@ -103,8 +103,8 @@ void add(const Grab& f, Run& run) {
     held.push_back(i);
     mass += run.cloth.masses[i];
   }
+  const Real share = run.total_mass / mass;
   for (const std::size_t i : held) {
-    const Real share = run.total_mass / mass;
     run.accelerate(i, -share * f.stiffness * (run.at(i) - hand));
     run.drag(i, share * f.stiffness * run.h, Vec3::Zero());
     run.drag(i, share * f.damping, velocity);

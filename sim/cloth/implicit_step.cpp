@@ -69,9 +69,7 @@ class ImplicitSystem {
   /// Sets the points that rest on their supports.
   void set_resting(std::vector<Resting> resting) {
     resting_ = std::move(resting);
-    for (std::size_t k = 0; k < body_block_.size(); ++k) {
-      body_block_[k] = inertia_[k];
-    }
+    body_block_ = inertia_;
     for (const auto& [s, index] : resting_) {
       const uint32_t body = bodies_.body_of(index);
       if (body == SupportBodies::kNone) continue;

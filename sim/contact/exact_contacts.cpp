@@ -18,9 +18,9 @@ namespace {
 /// [m/s].
 constexpr Real kPushOut = 0.2, kFastestPush = 0.5;
 /// A correction that is faster than this is a displacement; bodies keep the velocity of a slower one [m/s].
-/// Where bodies turn, the overlap is an error of the prediction, which has taken as much energy from a
-/// rolling body as the slow correction returns.
-constexpr Real kKeptPush = 1e-3, kKeptPushOfTurning = 1e-2;
+/// Where bodies turn, they also keep one within the uncertainty of the velocity terms (kTurningShare), whose
+/// error is the cause of such overlaps: it has taken from a rolling body what the correction returns.
+constexpr Real kKeptPush = 1e-3;
 /// Points that approach faster than this closed within the interval, and not before it [m/s].
 constexpr Real kClosing = 1e-3;
 /// In an interval that may be divided, points with a gap close later if they approach faster than this, even
@@ -147,7 +147,7 @@ ExactContacts::Outcome ExactContacts::solve(const Island& island, const ContactI
 void ExactContacts::push_apart(const Island& island, Real duration) {
   pushes_.clear();
   const bool is_slow = std::ranges::all_of(contacts_, [](const Contact& c) {
-    return c.target <= (c.bias.x() != 0 ? kKeptPushOfTurning : kKeptPush);
+    return c.target <= std::max(kKeptPush, kTurningShare * std::abs(c.bias.x()));
   });
   const auto is_thin = [](const Body* body) { return body->rigid.is_thin(); };
   if (is_slow || !joints_.articulations().empty() || std::ranges::any_of(island.bodies, is_thin)) return;

@@ -74,11 +74,11 @@ struct ContactPatch {
   /// Vectors from the centres of mass to the patch's centre [m].
   Vec3 arm_a = Vec3::Zero(), arm_b = Vec3::Zero();
   Vec3 offset = Vec3::Zero();  ///< (n, t, k), added to the relative velocity: effect of moving surfaces [m/s]
-  /// Change of the relative velocity at the centre due to turning arms and frames, in (n, t, k): gain (s -
-  /// s0)
-  /// + bow (s^2 - s0^2), where s increases linearly from -1 at the step's start to 1 at its end [m/s]. The
-  /// normal velocity also changes by gain_along_t (s - s0) and gain_along_k (s - s0) per metre along t and k
-  /// [1/s]. Frame and arms belong to s0, the time at which the impulses act (`acting`).
+  /// Change of the relative velocity at the centre due to turning arms and frames, in (n, t, k) [m/s]. With
+  /// s, which increases linearly from -1 at the step's start to 1 at its end, it is gain times (s - s0) plus
+  /// bow times (s^2 - s0^2). The normal velocity also changes by gain_along_t (s - s0) and gain_along_k (s -
+  /// s0) per metre along t and k [1/s]. Frame and arms belong to s0, the time at which the impulses act
+  /// (`acting`).
   Vec3 gain = Vec3::Zero(), bow = Vec3::Zero();
   Real gain_along_t = 0, gain_along_k = 0, acting = 0;
   bool turns = false;  ///< whether any gain differs from 0

@@ -5,6 +5,8 @@
 #include <map>
 #include <vector>
 
+#include "sim/contact/contact_terms.h"
+
 namespace offstage::sim {
 namespace {
 
@@ -62,15 +64,13 @@ class HeldBodies {
   std::map<uint32_t, std::vector<Vec3>> normals_;  // by slot
 };
 
-/// Displacement in the interval of the point of a body at `place` at its start. The point stays where it is
-/// on a rolling body: small rotations.
+/// Displacement in the interval of the point of a body at `place` at its start, for small rotations.
 Vec3 displacement(const Body& body, const Vec3& place) {
   if (!body.can_move()) return Vec3::Zero();
   const bool dynamic = body.is_dynamic();
   const Vec3 from = dynamic ? body.start.position : body.start_pose.position;
   const Vec3 to = dynamic ? body.rigid.position : body.pose.position;
-  const Quat turned = body.pose.orientation * body.start_pose.orientation.conjugate();
-  const Vec3 turn = 2 * (turned.w() < 0 ? -1 : 1) * turned.vec();
+  const Vec3 turn = rotation_vector(body.start_pose.orientation, body.pose.orientation);
   return to - from + turn.cross(place - from);
 }
 

@@ -77,9 +77,10 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
   substep_end = end;
   update_presence(start);
   active.wake_pushed(start);
-  wake_at_jumps(start, end);
   explode(start, end);
   update_joints();
+  active.update();
+  wake_at_jumps(start, end);
   active.update();
   begin_bodies(start, end);
   const bool moves =
@@ -179,11 +180,11 @@ void World::Impl::begin_bodies(Real start, Real end) {
 /// Wakes the sleeping bodies beside those that jump at a key, at their old and their new places.
 void World::Impl::wake_at_jumps(Real start, Real end) {
   if (active.asleep() == 0) return;
-  bodies.for_each([&](BodyHandle, const std::unique_ptr<Body>& body) {
-    if (!body->is_kinematic() || !body->def.track.jumps(start, end)) return;
+  for (Body* body : active.kinematic()) {
+    if (!body->def.track.jumps(start, end)) continue;
     wake_neighbours(*body);
     wake_overlapped(*body, body->def.track.at(end, body->def.pose).pose);
-  });
+  }
 }
 
 void World::Impl::begin_kinematic(Real start, Real end) {

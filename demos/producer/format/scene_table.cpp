@@ -1,5 +1,7 @@
 #include "producer/format/scene_table.h"
 
+#include <algorithm>
+
 #include "producer/format/table_articulation.h"
 #include "producer/format/table_body.h"
 #include "producer/format/table_camera.h"
