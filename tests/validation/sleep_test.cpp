@@ -273,26 +273,25 @@ TEST(Rocking, OfABoxOnItsCornersEnds) {
 // A solid with many corners wobbles around its rim and comes to rest. Its corners overlapped the floor by
 // millimetres in the course of this, and the speed at which they were pushed out kept it wobbling.
 TEST(Rocking, OfAFacetedConeEnds) {
-  TriangleMesh cone;
-  constexpr int kSides = 24;
-  for (int i = 0; i < kSides; ++i) {
-    const Real angle = 2 * M_PI * i / kSides;
-    cone.vertices.emplace_back(0.2 * std::cos(angle), -0.1, 0.2 * std::sin(angle));
-  }
-  cone.vertices.emplace_back(0, 0.3, 0);
-  for (uint32_t i = 0; i < kSides; ++i) cone.triangles.push_back({(i + 1) % kSides, i, kSides});
-  for (uint32_t i = 2; i < kSides; ++i) cone.triangles.push_back({0, i - 1, i});
-  for (const Real tilt : {0.5, 0.87, 1.2}) {
+  for (const uint32_t sides : {32u, 64u}) {
+    TriangleMesh cone;
+    for (uint32_t i = 0; i < sides; ++i) {
+      const Real angle = 2 * M_PI * i / sides;
+      cone.vertices.emplace_back(0.2 * std::cos(angle), -0.2, 0.2 * std::sin(angle));
+    }
+    cone.vertices.emplace_back(0, 0.2, 0);
+    for (uint32_t i = 0; i < sides; ++i) cone.triangles.push_back({(i + 1) % sides, i, sides});
+    for (uint32_t i = 2; i < sides; ++i) cone.triangles.push_back({0, i - 1, i});
     World world({.solver = SolverKind::exact});
     world.add_body({.shape = Plane{}, .motion = MotionType::static_body, .restitution = 0, .friction = 0.5});
     const Vec3 axis = Vec3(1, 2, 0.5).normalized();
     const BodyHandle body = world.add_body({.shape = MeshShape{world.add_mesh(cone)},
-                                            .pose = {{0, 0.4, 0}, Quat(Eigen::AngleAxisd(tilt, axis))},
-                                            .mass = 10,
+                                            .pose = {{0, 0.4, 0}, Quat(Eigen::AngleAxisd(0.873, axis))},
+                                            .mass = 13,
                                             .restitution = 0,
                                             .friction = 0.5});
     run(world, 4);
-    EXPECT_TRUE(world.is_asleep(body)) << tilt << " " << world.body(body).angular_momentum.norm();
+    EXPECT_TRUE(world.is_asleep(body)) << sides << " " << world.body(body).angular_momentum.norm();
   }
 }
 
