@@ -104,66 +104,52 @@ Lanes LightGuide::similar_around(int x, int y) const {
   return sum * (1.0f / 25);
 }
 
-LightValues::LightValues(int width_px, int height_px, std::size_t channels)
-    : values_(channels, LightPlane(width_px, height_px)), next_(channels, LightPlane(width_px, height_px)) {}
+void LightValues::average(const LightGuide& guide, const LightPlane& filled, const LightPlane* reach2,
+                          int step) {
+  if (next_.empty()) next_.assign(values_.size(), LightPlane(guide.width_px, guide.height_px));
+  const LightAverage means(*this, guide, filled, reach2, step);
+  for_filter_rows(guide.height_px, [&](int y) { means.write_row(y, next_, y); });
+  values_.swap(next_);
+}
 
-/// One step of the filter.
-class LightValues::Averaging {
- public:
-  Averaging(LightValues& light, const LightGuide& guide, const LightPlane& filled, const LightPlane* reach2,
-            int step)
-      : light_(light),
-        guide_(guide),
-        filled_(filled),
-        reach2_(reach2),
-        step_(step),
-        runs_((guide.width_px + kRun - 1) / kRun),
-        channels_(light.channels().size()) {
-    light_.even_.resize(static_cast<std::size_t>(runs_ * guide.height_px) * channels_);
-  }
+LightAverage::LightAverage(const LightValues& light, const LightGuide& guide, const LightPlane& filled,
+                           const LightPlane* reach2, int step)
+    : values_(light.channels()),
+      guide_(guide),
+      filled_(filled),
+      reach2_(reach2),
+      step_(step),
+      runs_((guide.width_px + kRun - 1) / kRun),
+      channels_(values_.size()),
+      even_(static_cast<std::size_t>(runs_ * guide.height_px) * channels_) {
+  for_filter_rows(guide.height_px, [&](int y) { find_even_runs(y); });
+}
 
-  void find_even_runs(int y);
-  void average_row(int y);
-
- private:
-  float* even(int run, int y) { return &light_.even_[static_cast<std::size_t>(y * runs_ + run) * channels_]; }
-  bool is_even(int run, int y);
-  void average_run(int x0, int y, int length);
-  template <std::size_t kChannels>
-  void average_lanes(int x, int y);
-
-  LightValues& light_;
-  const LightGuide& guide_;
-  const LightPlane& filled_;
-  const LightPlane* reach2_;
-  int step_, runs_;
-  std::size_t channels_;
-};
-
-void LightValues::Averaging::find_even_runs(int y) {
+void LightAverage::find_even_runs(int y) {
   for (int run = 0; run < runs_; ++run) {
     const auto length = static_cast<std::size_t>(std::min(kRun, guide_.width_px - run * kRun));
     for (std::size_t i = 0; i < channels_; ++i) {
-      const float* values = light_.values_[i].at(run * kRun, y);
+      const float* values = values_[i].at(run * kRun, y);
       std::size_t equal = 0;
       for (std::size_t x = 0; x < length; ++x) equal += values[x] == values[0] ? 1 : 0;
-      even(run, y)[i] = equal == length ? values[0] : std::numeric_limits<float>::quiet_NaN();
+      even_[even_index(run, y) + i] = equal == length ? values[0] : std::numeric_limits<float>::quiet_NaN();
     }
   }
 }
 
-bool LightValues::Averaging::is_even(int run, int y) {
-  const float* here = even(run, y);
+bool LightAverage::is_even(int run, int y) const {
+  const float* here = &even_[even_index(run, y)];
   for (int row = std::max(y - step_, y % step_); row <= std::min(y + step_, guide_.height_px - 1);
        row += step_)
     for (int r = std::max(run - 1, 0); r <= std::min(run + 1, runs_ - 1); ++r)
-      if (!std::equal(here, here + channels_, even(r, row))) return false;  // a NaN is not equal to any value
+      if (!std::equal(here, here + channels_, &even_[even_index(r, row)]))
+        return false;  // a NaN is not equal to any value
   return true;
 }
 
 // Averages the pixels x ... x + 7 of row y.
 template <std::size_t kChannels>
-void LightValues::Averaging::average_lanes(int x, int y) {
+void LightAverage::average_lanes(int x, int y, const Target& to) const {
   const LaneVectors p = lanes_of(guide_.place, x, y), n = lanes_of(guide_.normal, x, y);
   const Lanes size2 = guide_.inverse_size2.lanes(x, y);
   const Lanes reach2 = reach2_ ? reach2_->lanes(x, y) : Lanes{};
@@ -179,47 +165,40 @@ void LightValues::Averaging::average_lanes(int x, int y) {
       const float kernel = (there == x ? 2.0f : 1.0f) * (row == y ? 2.0f : 1.0f);
       const Lanes weight = kernel * filled_.lanes(there, row) * f8 * f8 / (spread * spread);
       sum_of_weights += weight;
-      for (std::size_t i = 0; i < kChannels; ++i) sums[i] += weight * light_.values_[i].lanes(there, row);
+      for (std::size_t i = 0; i < kChannels; ++i) sums[i] += weight * values_[i].lanes(there, row);
     }
   }
   const IntLanes filled = filled_.lanes(x, y) > 0.0f;
   const Lanes scale = 1 / larger(sum_of_weights, Lanes{} + 1e-20f);
   for (std::size_t i = 0; i < kChannels; ++i) {
     const Lanes mean = sums[i] * scale;
-    light_.next_[i].set_lanes(x, y, filled ? mean : light_.values_[i].lanes(x, y));
+    to.planes[i].set_lanes(x, to.row, filled ? mean : values_[i].lanes(x, y));
   }
 }
 
-void LightValues::Averaging::average_run(int x0, int y, int length) {
+void LightAverage::average_run(int x0, int y, int length, const Target& to) const {
   for (int x = x0; x < x0 + length; x += kLanes) {
     if (channels_ == 1)
-      average_lanes<1>(x, y);
+      average_lanes<1>(x, y, to);
     else if (channels_ == 3)
-      average_lanes<3>(x, y);
+      average_lanes<3>(x, y, to);
     else
-      average_lanes<7>(x, y);
+      average_lanes<7>(x, y, to);
   }
 }
 
-void LightValues::Averaging::average_row(int y) {
+void LightAverage::write_row(int y, std::span<LightPlane> planes, int to_row) const {
+  const Target to{planes, to_row};
   for (int run = 0; run < runs_; ++run) {
     const int x = run * kRun;
     const int length = std::min(kRun, guide_.width_px - x);
     if (!is_even(run, y)) {
-      average_run(x, y, length);
+      average_run(x, y, length, to);
       continue;
     }
     for (std::size_t i = 0; i < channels_; ++i)
-      std::copy_n(light_.values_[i].at(x, y), length, light_.next_[i].at(x, y));
+      std::copy_n(values_[i].at(x, y), length, to.planes[i].at(x, to.row));
   }
-}
-
-void LightValues::average(const LightGuide& guide, const LightPlane& filled, const LightPlane* reach2,
-                          int step) {
-  Averaging averaging(*this, guide, filled, reach2, step);
-  for_filter_rows(guide.height_px, [&](int y) { averaging.find_even_runs(y); });
-  for_filter_rows(guide.height_px, [&](int y) { averaging.average_row(y); });
-  values_.swap(next_);
 }
 
 namespace {
@@ -301,7 +280,7 @@ Lanes even_pixels(const float* pixels) {
 // The coarse pixel c covers the fine pixels 2c (side 0) and 2c + 1 (side 1). The nearest coarse pixels of
 // each are c and the neighbour of c on that side. Eight fine pixels of one side are computed at a time.
 void interpolate(const LightGuide& fine, const LightGuide& coarse, int y, const CoarseValues& from,
-                 const LightPlane* fourth, Eigen::Vector4f* row) {
+                 const float* fourth, Eigen::Vector4f* row) {
   const int near_row = y / 2, far_row = std::clamp(near_row + (y % 2 == 0 ? -1 : 1), 0, coarse.height_px - 1);
   for (int x0 = 0; x0 < fine.width_px; x0 += 2 * kLanes) {
     for (int side = 0; side < 2; ++side) {
@@ -325,7 +304,7 @@ void interpolate(const LightGuide& fine, const LightGuide& coarse, int y, const 
         sum = sum + lanes_of(from.values->channels(), there, q) * weight;
       }
       sum = sum * (1 / larger(sum_of_weights, Lanes{} + 1e-30f));
-      const Lanes last = fourth               ? even_pixels(fourth->at(x0 + side, y))
+      const Lanes last = fourth               ? even_pixels(fourth + x0 + side)
                          : sum_of_weights > 0 ? Lanes{} + 1
                                               : Lanes{};
       for (int i = 0; i < kLanes && x0 + 2 * i + side < fine.width_px; ++i)

@@ -128,19 +128,52 @@ class LightValues {
  public:
   LightValues() = default;
   /// `channels`: 1, 3 or 7.
-  LightValues(int width_px, int height_px, std::size_t channels);
+  LightValues(int width_px, int height_px, std::size_t channels)
+      : values_(channels, LightPlane(width_px, height_px)) {}
   std::span<LightPlane> channels() { return values_; }
   std::span<const LightPlane> channels() const { return values_; }
 
-  /// Replaces each value by a weighted mean of 3x3 pixels that are `step` pixels apart. Calls with the steps
-  /// 1, 2, 4 ... together have a wide, smooth kernel. Only pixels where `filled` is 1 are read and changed.
-  /// `reach2`: see LightGuide::find_reach; null: the distance is not limited. Runs of pixels that equal all
-  /// pixels around them are copied.
+  /// Replaces each value by its LightAverage. Calls with the steps 1, 2, 4 ... together have a wide, smooth
+  /// kernel.
   void average(const LightGuide& guide, const LightPlane& filled, const LightPlane* reach2, int step);
 
  private:
-  class Averaging;
-  std::vector<LightPlane> values_, next_;
+  std::vector<LightPlane> values_;
+  std::vector<LightPlane> next_;  ///< averages; created by the first call of average()
+};
+
+/// Weighted means of 3x3 pixels that are `step` pixels apart. Only pixels where `filled` is 1 are read and
+/// averaged; the others keep their values. Runs of pixels that equal all pixels around them are copied.
+class LightAverage {
+ public:
+  /// All arguments must outlive this object. `reach2`: see LightGuide::find_reach; null: the distance is not
+  /// limited.
+  LightAverage(const LightValues& light, const LightGuide& guide, const LightPlane& filled,
+               const LightPlane* reach2, int step);
+  /// Writes row y of all channels to row `to_row` of `to`, which must not be the averaged planes.
+  void write_row(int y, std::span<LightPlane> to, int to_row) const;
+
+ private:
+  /// Where results are written.
+  struct Target {
+    std::span<LightPlane> planes;
+    int row;
+  };
+  void find_even_runs(int y);
+  std::size_t even_index(int run, int y) const {
+    return static_cast<std::size_t>(y * runs_ + run) * channels_;
+  }
+  bool is_even(int run, int y) const;
+  void average_run(int x0, int y, int length, const Target& to) const;
+  template <std::size_t kChannels>
+  void average_lanes(int x, int y, const Target& to) const;
+
+  std::span<const LightPlane> values_;
+  const LightGuide& guide_;
+  const LightPlane& filled_;
+  const LightPlane* reach2_;
+  int step_, runs_;
+  std::size_t channels_;
   /// For each run of pixels and each channel: the common value of all pixels of the run; NaN if they differ.
   std::vector<float> even_;
 };
@@ -168,6 +201,6 @@ struct CoarseValues {
 /// and normal have more weight. w is taken from `fourth`; without it, w is 1, or 0 where no coarse pixel has
 /// a value.
 void interpolate(const LightGuide& fine, const LightGuide& coarse, int y, const CoarseValues& from,
-                 const LightPlane* fourth, Eigen::Vector4f* row);
+                 const float* fourth, Eigen::Vector4f* row);
 
 }  // namespace offstage::render

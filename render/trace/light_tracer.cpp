@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "render/frame.h"
@@ -375,30 +376,37 @@ void LightTracer::trace_arriving(const SurfaceBuffer& surfaces, const LightView&
   const LightNoise noise(light.cells, light.brightness);
   light.cells.find_reach(light.inverse_distance, noise, light.reach2, light.noisy_reach2);
   if (!view.sparse) refine_cells(surfaces, noise, view, light);
-  light.direct.average(light.pixels, light.pixels.filled, nullptr, 1);
-  if (glows) light.glow.average(light.pixels, light.pixels.filled, nullptr, 1);
   const int widest = view.offsets.are_many() ? 4 : 8;
   for (int step = 1; step <= kWidestStep; step *= 2)
     light.around.average(light.cells, light.cells.filled,
                          step <= widest ? &light.reach2 : &light.noisy_reach2, step);
-  for_rows(height, [&](int y) {
-    const std::size_t row = index_of(0, y, width);
+  write_arriving(light);
+}
+
+// Writes the results from the intermediate values. The light of sources is averaged over neighbouring pixels.
+void LightTracer::write_arriving(LightBuffer& light) const {
+  const int width = light.pixels.width_px;
+  const LightAverage direct(light.direct, light.pixels, light.pixels.filled, nullptr, 1);
+  std::optional<LightAverage> glow;
+  if (!sources_.glow.empty()) glow.emplace(light.glow, light.pixels, light.pixels.filled, nullptr, 1);
+  for_rows(light.pixels.height_px, [&](int y) {
+    const std::size_t start = index_of(0, y, width);
+    LightValues row(width, 1, light.direct.channels().size());
+    direct.write_row(y, row.channels(), 0);
+    const auto value = [&](std::size_t channel, int x) { return *row.channels()[channel].at(x, 0); };
     interpolate(light.pixels, light.cells, y, {&light.around, &light.cells.filled},
-                &light.direct.channels()[0], &light.arriving[row]);
-    for (int x = 0; x < width && glows; ++x)
-      for (std::size_t i = 0; i < 3; ++i)
-        light.arriving[row + static_cast<std::size_t>(x)][static_cast<int>(i)] +=
-            *light.glow.channels()[i].at(x, y);
+                row.channels()[0].at(0, 0), &light.arriving[start]);
     for (int x = 0; x < width && !light.lamps.empty(); ++x) {
-      Vector4f &lamps = light.lamps[row + static_cast<std::size_t>(x)],
-               &highlight = light.highlights[row + static_cast<std::size_t>(x)];
-      lamps[3] = 0;
-      for (int i = 0; i < 3; ++i) {
-        const auto k = static_cast<std::size_t>(i);
-        lamps[i] = *light.direct.channels()[1 + k].at(x, y);
-        highlight[i] += *light.direct.channels()[4 + k].at(x, y);
-      }
+      const std::size_t pixel = start + static_cast<std::size_t>(x);
+      light.lamps[pixel] << value(1, x), value(2, x), value(3, x), 0;
+      light.highlights[pixel].head<3>() += Vector3f(value(4, x), value(5, x), value(6, x));
     }
+    if (!glow) return;
+    row = LightValues(width, 1, 3);
+    glow->write_row(y, row.channels(), 0);
+    for (int x = 0; x < width; ++x)
+      light.arriving[start + static_cast<std::size_t>(x)].head<3>() +=
+          Vector3f(value(0, x), value(1, x), value(2, x));
   });
 }
 

@@ -173,6 +173,7 @@ class LightTracer {
   static void fill_sparse(LightBuffer& light);
   static IntLanes pixels_of_cells(const SurfaceBuffer& surfaces, int x, int y, const LightView& view);
   void trace_arriving(const SurfaceBuffer& surfaces, const LightView& view, LightBuffer& light) const;
+  void write_arriving(LightBuffer& light) const;
   void for_rows(int height, const auto& each) const;
   LightSums sum_over_rows(int height, const auto& each) const;
   void trace_mirrors(const SurfaceBuffer& surfaces, const LightView& view, const VisibleLight& visible,
