@@ -35,7 +35,7 @@ Mesh revolve(const std::vector<ProfilePoint>& profile, int segments) {
       const float c = std::cos(angle), s = std::sin(angle);
       mesh.positions.emplace_back(point.radius * c, point.y, -point.radius * s);
       mesh.normals.emplace_back(point.normal.x() * c, point.normal.y(), -point.normal.x() * s);
-      mesh.uvs.emplace_back(static_cast<float>(j) / static_cast<float>(segments), along[i] / total);
+      mesh.uvs.emplace_back(static_cast<float>(j) / static_cast<float>(segments), 1 - along[i] / total);
     }
   }
   const auto columns = static_cast<uint32_t>(segments + 1);
@@ -61,6 +61,21 @@ void append_cap(std::vector<ProfilePoint>& profile, float radius, float center_y
     profile.push_back({radius * out, center_y + radius * up, {out, up}});
   }
 }
+
+/// The directions to the right and upwards on a face of a box, as seen from outside. On the sides, up is +Y.
+/// The top and the bottom are seen from the front, so up is -Z on the top and +Z on the bottom.
+struct FaceAxes {
+  explicit FaceAxes(const Vector3f& normal)
+      : up(normal.y() == 0 ? Vector3f(Vector3f::UnitY()) : Vector3f(-normal.y() * Vector3f::UnitZ())),
+        right(up.cross(normal)) {}
+  /// Returns the texture coordinates of a point of a rectangle on the face. `offset`: from the middle of the
+  /// rectangle. `size`: edges of a box that has the rectangle as a face.
+  Vector2f uv(const Vector3f& offset, const Vector3f& size) const {
+    return {0.5f + right.dot(offset) / right.cwiseAbs().dot(size),
+            0.5f - up.dot(offset) / up.cwiseAbs().dot(size)};
+  }
+  Vector3f up, right;
+};
 
 // Returns the grid lines along one axis of a box. They bound the flat part and two bevels of one facet each.
 // Their normals make the bevels look round. Finer bevels would dominate the cost of a scene of boxes.
@@ -132,6 +147,7 @@ Mesh make_box(const Vector3f& size, float bevel) {
     const auto& vs = lines[static_cast<std::size_t>(v)];
     for (const float sign : {-1.0f, 1.0f}) {
       const Vector3f face_normal = sign * Vector3f::Unit(axis);
+      const FaceAxes axes(face_normal);
       const auto first = static_cast<uint32_t>(mesh.positions.size());
       for (const float pv : vs) {
         for (const float pu : us) {
@@ -140,7 +156,7 @@ Mesh make_box(const Vector3f& size, float bevel) {
           point[u] = pu;
           point[v] = pv;
           add_box_vertex(mesh, point, half, bevel, face_normal);
-          mesh.uvs.emplace_back(0.5f + 0.5f * sign * pu / half[u], 0.5f + 0.5f * pv / half[v]);
+          mesh.uvs.push_back(axes.uv(point, size));
         }
       }
       const auto columns = static_cast<uint32_t>(us.size());
@@ -209,11 +225,12 @@ Mesh make_open_box(const Vector3f& size, float thickness) {
   // Adds a rectangle with a corner and two edges u and v. Its normal is along u x v.
   const auto add = [&](const Vector3f& corner, const Vector3f& u, const Vector3f& v) {
     const auto first = static_cast<uint32_t>(mesh.positions.size());
-    const Vector3f normal = u.cross(v).normalized();
+    const Vector3f normal = u.cross(v).normalized(), sides = u.cwiseAbs() + v.cwiseAbs();
+    const FaceAxes axes(normal);
     for (const auto& [s, t] : {std::pair(0.f, 0.f), {1.f, 0.f}, {1.f, 1.f}, {0.f, 1.f}}) {
       mesh.positions.push_back(corner + s * u + t * v);
       mesh.normals.push_back(normal);
-      mesh.uvs.emplace_back(s, t);
+      mesh.uvs.push_back(axes.uv((s - 0.5f) * u + (t - 0.5f) * v, sides));
     }
     for (const uint32_t k : {0u, 1u, 2u, 0u, 2u, 3u}) mesh.indices.push_back(first + k);
   };
@@ -253,7 +270,7 @@ Mesh make_ground(float half_size) {
     for (const float x : lines) {
       mesh.positions.emplace_back(x, 0.0f, z);
       mesh.normals.push_back(Vector3f::UnitY());
-      mesh.uvs.emplace_back(0.5f + 0.5f * x / half_size, 0.5f - 0.5f * z / half_size);
+      mesh.uvs.emplace_back(0.5f + 0.5f * x / half_size, 0.5f + 0.5f * z / half_size);
     }
   }
   const auto columns = static_cast<uint32_t>(lines.size());

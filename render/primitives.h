@@ -1,6 +1,7 @@
 #pragma once
 /// Creates meshes of primitive shapes with normals and texture coordinates. Shapes are centred at the origin,
-/// and their axes of revolution are along Y. Lengths are in metres.
+/// and their axes of revolution are along Y. Lengths are in metres. A texture covers each side of a box, the
+/// profile of a body of revolution, or the ground once; it is upright on surfaces that face sideways.
 
 #include "render/model.h"
 

@@ -27,10 +27,10 @@ struct Camera {
   Vector3f eye = {0, 1.5f, 5};
   Vector3f target = Vector3f::Zero();
   Vector3f up = Vector3f::UnitY();
-  float fov_deg = 40;  ///< vertical field of view, in (0, 180)
-  float near_m = 0.05f, far_m = 1e6f;
-  float aperture = 0;  ///< lens diameter [m]; 0: everything is sharp
-  float focus = 0;     ///< distance in focus [m]; 0: the distance of the target
+  float fov_deg = 40;                  ///< vertical field of view, in (0, 180)
+  float near_m = 1e-4f, far_m = 1e6f;  ///< depths between which objects are visible
+  float aperture = 0;                  ///< lens diameter [m]; 0: everything is sharp
+  float focus = 0;                     ///< distance in focus [m]; 0: the distance of the target
 };
 
 struct Sun {

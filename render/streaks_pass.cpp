@@ -11,6 +11,7 @@ namespace {
 
 // Radius from which a streak near the lens fades out, as a fraction of half the picture.
 constexpr float kNearestStreak = 0.016f;
+constexpr float kNearLens_m = 0.5f;   // distance up to which such a streak is invisible
 constexpr float kThinnest_px = 0.6f;  // radius; thinner streaks are drawn with this radius and fainter
 
 // Returns the light of a drop that is stretched by its motion. The drop refracts the sky behind it, and is
@@ -92,7 +93,7 @@ StreakSplat splat_of(const GpuPoint& point, const PointsDef& def, const View& vi
   s.opacity =
       std::min(point.color.w(), 1.0f) * (radius / drawn) * std::clamp(0.5f * room / drawn, 0.0f, 1.0f);
   // A drop near the lens fades out. Otherwise it would be a bar across the picture.
-  const float apart = std::clamp(0.1f * distance / view.near_m - 1, 0.0f, 1.0f);
+  const float apart = std::clamp(distance / kNearLens_m - 1, 0.0f, 1.0f);
   s.opacity *= std::max(apart, std::clamp(2 - radius_px / (kNearestStreak * half_size.y()), 0.0f, 1.0f));
   s.cover = def.additive ? 0.0f : 1.0f;
   s.softness = std::clamp(def.softness, 0.01f, 1.0f);

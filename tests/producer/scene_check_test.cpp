@@ -38,6 +38,11 @@ TEST(SceneCheck, NamesAreUniqueWithinASection) {
             "/bodies/1/name: the name 'a_1' is already used by /bodies/0\n");
 }
 
+TEST(SceneCheck, ABodyAndAClothHaveDifferentNames) {
+  EXPECT_EQ(errors_of(R"({"bodies": [{"name": "a"}], "cloths": [{"name": "a"}]})"),
+            "/cloths/0/name: the name 'a' is already used by /bodies/0\n");
+}
+
 TEST(SceneCheck, EmittersThatPushABodyOrGetItsVelocityNeedOne) {
   EXPECT_EQ(errors_of(R"({"emitters": [{"inherit_velocity": 0.5}]})"),
             "/emitters/0/inherit_velocity: is a fraction of the velocity of a body; the emitter needs a "

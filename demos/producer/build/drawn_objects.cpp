@@ -21,8 +21,9 @@ constexpr float kGroundTexture_m = 2000;  // width of one copy of the plane's te
 render::Mesh mesh_of(const sim::Sphere& s) {
   return render::make_sphere(to_float(s.radius));
 }
-render::Mesh mesh_of(const sim::Box& s) {
-  return render::make_box(s.size.cast<float>(), 0.04f * to_float(s.size.minCoeff()));
+render::Mesh mesh_of(const sim::Box& s, std::optional<Real> bevel) {
+  return render::make_box(s.size.cast<float>(),
+                          to_float(bevel.value_or(std::min(0.04 * s.size.minCoeff(), 0.05))));
 }
 render::Mesh mesh_of(const sim::Capsule& s) {
   return render::make_capsule(to_float(s.radius), to_float(s.height));

@@ -205,9 +205,10 @@ std::vector<std::pair<render::MeshHandle, render::MaterialHandle>> Picture::mode
 }
 
 template <class Primitive>
-render::MeshHandle Picture::primitive(const Primitive& shape) {
-  render::MeshHandle& mesh = primitives_[shape_key(shape)];
-  if (!mesh) mesh = stage_.add_mesh(mesh_of(shape));
+render::MeshHandle Picture::primitive(const Primitive& shape, const Body& body) {
+  const DrawnShape drawn{shape, body.bevel};
+  render::MeshHandle& mesh = primitives_[drawn.key()];
+  if (!mesh) mesh = stage_.add_mesh(drawn.mesh());
   return mesh;
 }
 
@@ -220,7 +221,7 @@ void Picture::add_shape(const Body& body, const ModelLibrary& models, std::vecto
                     parts);
         } else if constexpr (std::is_same_v<S, Compound>) {
           for (const CompoundPart& part : shape.parts) {
-            const auto mesh = std::visit([&](const auto& own) { return primitive(own); }, part.shape);
+            const auto mesh = std::visit([&](const auto& own) { return primitive(own, body); }, part.shape);
             const std::string& look = part.material.empty() ? body.material : part.material;
             parts.push_back({stage_.add_instance(mesh, material(look, models), body.casts_shadow),
                              affine(part.position, part.orientation)});
@@ -228,8 +229,9 @@ void Picture::add_shape(const Body& body, const ModelLibrary& models, std::vecto
         } else {
           // A plane is the ground: it receives shadows and casts none.
           const bool casts = body.casts_shadow && !std::is_same_v<S, sim::Plane>;
-          parts.push_back({stage_.add_instance(primitive(shape), material(body.material, models), casts),
-                           Affine3f::Identity()});
+          parts.push_back(
+              {stage_.add_instance(primitive(shape, body), material(body.material, models), casts),
+               Affine3f::Identity()});
         }
       },
       body.shape);

@@ -116,7 +116,7 @@ class Picture {
   void add_convex_parts(const MeshFile& mesh, const Body& body, const ModelLibrary& models,
                         std::vector<DrawnPart>& parts);
   template <class Primitive>
-  render::MeshHandle primitive(const Primitive& shape);
+  render::MeshHandle primitive(const Primitive& shape, const Body& body);
   void add_rod(const ObjectTable::RodEntry& rod, const ModelLibrary& models);
   void add_cloth(const ObjectTable::ClothEntry& entry, const ModelLibrary& models);
   render::MaterialHandle cloth_material(const Cloth& cloth, const ModelLibrary& models);

@@ -83,7 +83,7 @@ class FilmParts::Builder {
                 placed(body.model->position, body.model->orientation, scale_of(*body.model, models_)),
                 body.material, film);
     else
-      std::visit([&](const auto& shape) { add_shape(shape, body.material, film); }, body.shape);
+      std::visit([&](const auto& shape) { add_shape(shape, body, film); }, body.shape);
     parts_.bodies.push_back(std::move(film));
   }
 
@@ -119,22 +119,30 @@ class FilmParts::Builder {
 
  private:
   template <class S>
-  void add_shape(const S& shape, const std::string& material_name, FilmBody& film) {
+  void add_shape(const S& shape, const Body& body, FilmBody& film) {
     if constexpr (std::is_same_v<S, MeshFile>) {
-      add_model(shape.file, placed(Vec3::Zero(), Quat::Identity(), scale_of(shape, models_)), material_name,
+      add_model(shape.file, placed(Vec3::Zero(), Quat::Identity(), scale_of(shape, models_)), body.material,
                 film);
     } else if constexpr (std::is_same_v<S, Compound>) {
       for (const CompoundPart& part : shape.parts) {
-        const std::string& look = part.material.empty() ? material_name : part.material;
+        const std::string& look = part.material.empty() ? body.material : part.material;
         const std::size_t own = std::visit(
-            [&](const auto& s) { return mesh(shape_key(s), [&] { return mesh_of(s); }); }, part.shape);
+            [&](const auto& s) {
+              return primitive(DrawnShape{s, body.bevel});
+            },
+            part.shape);
         film.parts.push_back({own, material(look), placed(part.position, part.orientation, 1)});
       }
     } else if constexpr (std::is_same_v<S, sim::Plane>) {
-      film.parts.push_back({mesh(shape_key(shape), ground_square), material(material_name)});
+      film.parts.push_back({mesh(shape_key(shape), ground_square), material(body.material)});
     } else {
-      film.parts.push_back({mesh(shape_key(shape), [&] { return mesh_of(shape); }), material(material_name)});
+      film.parts.push_back({primitive(DrawnShape{shape, body.bevel}), material(body.material)});
     }
+  }
+
+  template <class S>
+  std::size_t primitive(const DrawnShape<S>& drawn) {
+    return mesh(drawn.key(), [&] { return drawn.mesh(); });
   }
 
   void add_model(const std::string& file, const Affine3f& body_from_model, const std::string& material_name,

@@ -112,10 +112,8 @@ class Checker : SceneChecker {
 
   void check_names() {
     check_unique(scene_.materials);
-    check_unique(flat_.bodies);
-
+    check_unique(flat_.bodies, flat_.cloths);  // the columns `object` of traces name both
     check_unique(scene_.springs);
-    check_unique(flat_.cloths);
     std::vector<NamedForce> forces;
     for (const Force& force : scene_.forces) forces.push_back(named(force));
     check_unique(forces);
@@ -261,9 +259,19 @@ class Checker : SceneChecker {
       warn(path + "/angular_velocity", "has no effect: the body is not dynamic");
     if (body.mass > 0 && body.density != Body{}.density)
       warn(path + "/density", "has no effect: \"mass\" is given");
+    if (body.bevel && (body.model || !has_box(body.shape)))
+      warn(path + "/bevel", "has no effect: the body is not drawn as a box");
     const Material* material = find_named(scene_.materials, body.material);
     if (has_grain(body) && !(material && material->cross_friction))
       warn(path + "/friction_axis", "has no effect: the body's material has no cross_friction");
+  }
+
+  static bool has_box(const Shape& shape) {
+    if (std::holds_alternative<sim::Box>(shape)) return true;
+    const auto* compound = std::get_if<Compound>(&shape);
+    return compound && std::ranges::any_of(compound->parts, [](const CompoundPart& part) {
+             return std::holds_alternative<sim::Box>(part.shape);
+           });
   }
 
   void check_animation(const Body& body) {

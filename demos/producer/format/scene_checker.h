@@ -64,15 +64,17 @@ class SceneChecker : protected CheckBase {
     for (const Body& body : flat.bodies) bodies_.emplace(body.name, &body);
   }
 
-  template <class T>
-  void check_unique(const std::vector<T>& objects) {
+  /// Checks that no two objects of the lists have the same name.
+  template <class... T>
+  void check_unique(const std::vector<T>&... lists) {
     std::map<std::string, std::string> owners;
     std::set<std::string> reported;
-    for (const T& object : objects) {
+    const auto check = [&](const auto& object) {
       const auto [it, fresh] = owners.emplace(object.name, object.where.path);
-      if (fresh || !reported.insert(object.where.path).second) continue;
+      if (fresh || !reported.insert(object.where.path).second) return;
       fail(object.where.path + "/name", "the name '" + object.name + "' is already used by " + it->second);
-    }
+    };
+    (std::ranges::for_each(lists, check), ...);
   }
   void check_body_name(const std::string& path, const std::string& name) {
     if (bodies_.contains(name)) return;

@@ -65,7 +65,8 @@ struct Table<Body> {
   static Fields<Body> fields() {
     using T = Body;
     return Fields<T>{
-        {"name", &T::name, "unique name; default: body_N, where N is the index in the list"},
+        {"name", &T::name,
+         "name, unique among bodies and cloths; default: body_N, where N is the index in the list"},
         {"motion", &T::motion,
          "`static` bodies never move, `kinematic` bodies follow their keyframes and spin, `dynamic` bodies "
          "are moved by forces"},
@@ -106,6 +107,12 @@ struct Table<Body> {
         {"collides", &T::collides, "whether the body collides with bodies, particles and cloths"},
         {"visible", &T::visible, "whether the object is drawn"},
         {"casts_shadow", &T::casts_shadow, "whether the object casts a shadow"},
+        {"bevel", &T::bevel,
+         "radius of the rounded edges with which the body's boxes are drawn; 0: sharp edges, through whose "
+         "seams "
+         "no light falls. Their collision shape has sharp edges. Default: 0.04 of the smallest edge, at most "
+         "0.05 m",
+         "m", kNotNegative},
         {"keyframes", &T::keyframes, "poses over time; kinematic bodies only"},
         {"interpolation", &T::interpolation, kInterpolationHelp},
         {"loop", &T::loop, "whether the keyframes repeat; false: the last pose is held"},

@@ -253,7 +253,8 @@ struct Table<Cloth> {
   static Fields<Cloth> fields() {
     using T = Cloth;
     return Fields<T>{
-        {"name", &T::name, "unique name; default: cloth_N, where N is the index in the list"},
+        {"name", &T::name,
+         "name, unique among bodies and cloths; default: cloth_N, where N is the index in the list"},
         {"shape", &T::shape, "shape of the cloth at rest"},
         {"fabric", &T::fabric, "name of the fabric; `offstage presets` lists them"},
     }

@@ -142,6 +142,7 @@ struct Body {
   bool collides = true;
   bool visible = true;
   bool casts_shadow = true;
+  std::optional<Real> bevel;  ///< radius of the drawn edges of its boxes [m]; default: see DrawnShape
   std::vector<BodyKey> keyframes;
   sim::Interpolation interpolation = sim::Interpolation::monotone;
   bool loop = false;
