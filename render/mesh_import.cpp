@@ -274,9 +274,9 @@ Model import_by_assimp(const std::filesystem::path& path, const std::string& nod
   if (!scene) throw FileError("cannot be read as a model: " + reason(importer));
 
   const bool obj = has_ending(path, ".obj");
-  std::vector<unsigned> uv_sets =
-      import_materials(*scene, path.parent_path(), folders,
-                       obj ? read_mtl_of(path, folders) : std::map<std::string, MtlMaterial>{}, model);
+  std::vector<unsigned> uv_sets = import_materials(
+      *scene, path.parent_path(), folders,
+      obj ? read_mtl_of(path, folders, model.warnings) : std::map<std::string, MtlMaterial>{}, model);
   model.unit = unit_of(*scene, path);
   model.unit_source = unit_source_of(path);
   if (model.materials.empty()) model.materials.emplace_back();

@@ -15,7 +15,7 @@ namespace {
 
 constexpr uint64_t kMaxMtlBytes = uint64_t{256} << 20;
 constexpr uint64_t kMaxObjBytes = uint64_t{2} << 30;
-constexpr std::size_t kMaxLibraries = 64;
+constexpr std::size_t kMaxLibraries = 64, kMaxUsedMaterials = 4096;
 constexpr std::array kAssimpMtl = {"newmtl", "Ka", "Kd", "Ks",    "Ke",     "Ns",
                                    "Ni",     "d",  "Tr", "illum", "map_Kd", "map_Ke"};
 constexpr std::array<std::string_view, 5> kDrawnMtlMaps = {"map_kd", "map_ke", "map_d", "bump", "norm"};
@@ -145,28 +145,53 @@ std::string mtl_for_assimp(const std::string& text) {
   return result;
 }
 
-std::map<std::string, MtlMaterial> read_mtl_of(const std::filesystem::path& obj,
-                                               const InputFolders& folders) {
-  std::map<std::string, MtlMaterial> materials;
+namespace {
+
+/// The names in the statements of an OBJ file that are about materials.
+struct MaterialNames {
+  std::vector<std::string> libraries, used;  ///< of mtllib and usemtl, each name once
+};
+
+MaterialNames material_names(const std::filesystem::path& obj) {
+  MaterialNames names;
   const std::vector<uint8_t> bytes = read_file(obj, kMaxObjBytes);
-  std::vector<std::string> libraries;
+  const auto add = [](std::vector<std::string>& to, std::string_view name, std::size_t most) {
+    if (to.size() < most && std::ranges::find(to, name) == to.end()) to.emplace_back(name);
+  };
   for_each_line({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, [&](std::string_view line) {
-    if (!line.starts_with("mtllib")) return;
-    next_word(line);
-    const std::string name(line);
-    if (libraries.size() < kMaxLibraries && std::ranges::find(libraries, name) == libraries.end())
-      libraries.push_back(name);
+    const std::string_view key = next_word(line);
+    if (key == "mtllib") add(names.libraries, line, kMaxLibraries);
+    if (key == "usemtl") add(names.used, line, kMaxUsedMaterials);
   });
-  for (const std::string& name : libraries) {
+  return names;
+}
+
+}  // namespace
+
+std::map<std::string, MtlMaterial> read_mtl_of(const std::filesystem::path& obj, const InputFolders& folders,
+                                               std::vector<std::string>& warnings) {
+  std::map<std::string, MtlMaterial> materials;
+  const MaterialNames names = material_names(obj);
+  bool complete = !names.libraries.empty();
+  for (const std::string& name : names.libraries) {
     const std::filesystem::path file = find_beside(obj.parent_path(), name);
-    if (file.empty() || !folders.contain(file)) continue;
+    if (file.empty() || !folders.contain(file)) {
+      warnings.push_back("the material library '" + name +
+                         "' is not found; its materials have the default appearance");
+      complete = false;
+      continue;
+    }
     try {
       const std::vector<uint8_t> text = read_file(file, kMaxMtlBytes);
       read_mtl({text.begin(), text.end()}, materials);
     } catch (const FileError&) {
-      continue;  // no message here: assimp reads the same file and reports the error
+      complete = false;  // no message here: assimp reads the same file and reports the error
     }
   }
+  for (const std::string& name : names.used)
+    if (complete && !materials.contains(name))
+      warnings.push_back("the material '" + name +
+                         "' is in no material library; it has the default appearance");
   return materials;
 }
 

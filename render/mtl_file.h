@@ -37,7 +37,9 @@ void read_mtl(const std::string& text, std::map<std::string, MtlMaterial>& mater
 /// options. assimp misreads options with fewer values than usual, and refuses statements such as `decal`.
 std::string mtl_for_assimp(const std::string& text);
 
-/// Reads the material libraries that an OBJ file names. Libraries that do not exist in `folders` are ignored.
-std::map<std::string, MtlMaterial> read_mtl_of(const std::filesystem::path& obj, const InputFolders& folders);
+/// Reads the material libraries that an OBJ file names. Adds a line to `warnings` for each library that is
+/// not in `folders`, and, if all libraries are there, for the used materials that none of them defines.
+std::map<std::string, MtlMaterial> read_mtl_of(const std::filesystem::path& obj, const InputFolders& folders,
+                                               std::vector<std::string>& warnings);
 
 }  // namespace offstage::render

@@ -129,7 +129,7 @@ void Stage::Impl::trace_light(std::span<const Instance* const> shown, std::span<
                               const SampleOffsets& offsets, const StopTest& stop) {
   RayScene& scene = light_pass.scene();
   scene.clear();
-  light_sources = {.sun = sun, .sky = sky, .fog = environment.fog};
+  light_sources = {.sun = sun, .sky = sky, .sky_is_visible = environment.visible, .fog = environment.fog};
   light_sources.open_air.constant = frame.irradiance_at(0);
   light_sources.open_air.slope << frame.irradiance_at(3), frame.irradiance_at(1), frame.irradiance_at(2);
   for (const Instance* instance : shown) {

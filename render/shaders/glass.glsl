@@ -1,6 +1,6 @@
 // Light through a piece of glass, which was traced for this sub-frame (render/trace).
 layout(binding = 20) uniform sampler2D traced_through;  // w: visible fraction of the sun
-layout(binding = 21) uniform sampler2D traced_by_glass; // mirror image
+layout(binding = 21) uniform sampler2D traced_by_glass; // mirror image; w: visible fraction of a transparent background
 #ifdef PARTICLES
 // Rays do not find sprites, streaks and smoke. Their light behind glass is the difference of two pictures, with and without
 // them. The pictures are read where the refracted ray would arrive if the piece of glass were a ball of its thickness.
@@ -31,7 +31,13 @@ vec3 seen_through(vec3 color, vec3 position, vec3 n, vec3 view) {
   return light;
 }
 
+// Returns the fraction of a transparent background that is visible through the glass.
+float background_through() {
+  return texelFetch(traced_by_glass, ivec2(gl_FragCoord.xy), 0).w;
+}
+
 Light light_on_glass(vec3 normal) {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  return Light(texelFetch(traced_through, pixel, 0).w, ambient(normal), light_of_lamps(), 1.0, texelFetch(traced_by_glass, pixel, 0));
+  vec3 mirrored = texelFetch(traced_by_glass, pixel, 0).rgb;
+  return Light(texelFetch(traced_through, pixel, 0).w, ambient(normal), light_of_lamps(), 1.0, vec4(mirrored, 1.0));
 }

@@ -174,5 +174,8 @@ void main() {
   if (material.options.y > 0.5) radiance = albedo;
 #endif
   color = vec4((radiance * fog.w + fog.rgb) * alpha, alpha);
+#ifdef GLASS
+  color.a *= 1.0 - transmitted * background_through();
+#endif
 #endif
 }

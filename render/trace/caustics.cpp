@@ -17,8 +17,12 @@ namespace {
 
 constexpr float kRaysPerPixel = 1;  // photons per pixel that a piece of glass covers, in a sub-frame
 constexpr float kMostRays = 4e5f;   // approximate limit of the photons of a sub-frame, at most one per pixel
+// Small pieces of glass have more photons: in total one for so many pixels of the picture. Fewer photons
+// would be visible as single spots on distant walls.
+constexpr float kPixelsPerRay = 32;
+constexpr float kMostRaysPerPixel = 64;
 constexpr float kRaysPerMean = 64;  // photons over which a pixel of a frame is averaged
-constexpr int kWidestMean_px = 8;   // largest half-width of the averaged square of pixels
+constexpr int kWidestMean_px = 12;  // largest half-width of the averaged square of pixels
 constexpr int kMostSurfaces = 16;   // largest number of glass surfaces on the path of a photon
 
 /// Estimates the number of pixels that a piece covers, from the mean projected area of its box over all
@@ -130,21 +134,35 @@ LightTracer::Photon LightTracer::trace_photon(const Beam& beam, uint32_t number,
 
 // Distributes the light of a photon over the pixels around its end point that show the same surface.
 void LightTracer::add_photon(const Photon& photon, int half_px, const LightView& view, LightBuffer& light) {
+  constexpr int kSide = 2 * kWidestMean_px + 1, kGroups = (kSide + kLanes - 1) / kLanes;
   const LightGuide& guide = light.pixels;
   const int x0 = photon.pixel % guide.width_px, y0 = photon.pixel / guide.width_px;
   const Vector3f normal = guide.at(guide.normal, x0, y0), place = guide.at(guide.place, x0, y0);
-  const Vector3f each = photon.light / area_of_pixel(place, normal, view);
-  const auto for_pixels = [&](auto&& use) {
-    for (int y = std::max(y0 - half_px, 0); y <= std::min(y0 + half_px, guide.height_px - 1); ++y)
-      for (int x = std::max(x0 - half_px, 0); x <= std::min(x0 + half_px, guide.width_px - 1); ++x)
-        if (guide.shows(x, y, place, normal))
-          use(x, y, static_cast<float>((half_px + 1 - std::abs(x - x0)) * (half_px + 1 - std::abs(y - y0))));
-  };
+  const int left = x0 - half_px, low = std::max(y0 - half_px, 0),
+            high = std::min(y0 + half_px, guide.height_px - 1), groups = (2 * half_px + kLanes) / kLanes;
+  const auto slope = [&](auto distance) { return static_cast<float>(half_px + 1) - absolute(distance); };
+  std::array<std::array<Lanes, kGroups>, kSide> weights;
+  Lanes sums{};
+  for (int y = low; y <= high; ++y)
+    for (int group = 0; group < groups; ++group) {
+      const int x = left + group * kLanes;
+      const Lanes column = Lanes{0, 1, 2, 3, 4, 5, 6, 7} + static_cast<float>(x - x0);
+      const Lanes weight = larger(slope(column), Lanes{}) * slope(static_cast<float>(y - y0));
+      Lanes& kept = weights[static_cast<std::size_t>(y - low)][static_cast<std::size_t>(group)];
+      kept = guide.shows(x, y, all_lanes(place), all_lanes(normal)) ? weight : Lanes{};
+      sums += kept;
+    }
   float sum = 0;
-  for_pixels([&](int, int, float weight) { sum += weight; });
-  for_pixels([&](int x, int y, float weight) {
-    light.arriving[index_of(x, y, guide.width_px)].head<3>() += weight / sum * each;
-  });
+  for (int i = 0; i < kLanes; ++i) sum += sums[i];
+  const Vector3f each = photon.light / (sum * area_of_pixel(place, normal, view));
+  for (int y = low; y <= high; ++y)
+    for (int group = 0; group < groups; ++group) {
+      const Lanes& weight = weights[static_cast<std::size_t>(y - low)][static_cast<std::size_t>(group)];
+      for (int i = 0; i < kLanes; ++i)
+        if (weight[i] > 0)
+          light.arriving[index_of(left + group * kLanes + i, y, guide.width_px)].head<3>() +=
+              weight[i] * each;
+    }
 }
 
 std::vector<LightTracer::Beam> LightTracer::beams_to(const GlassPiece& piece) const {
@@ -161,8 +179,11 @@ std::vector<LightTracer::Beam> LightTracer::beams_to(const GlassPiece& piece) co
 void LightTracer::add_caustics(const LightView& view, LightBuffer& light) const {
   float pixels = 0;
   for (const GlassPiece& piece : sources_.glass) pixels += pixels_of(piece, view);
-  const float most = std::min(kMostRays, static_cast<float>(light.pixels.width_px * light.pixels.height_px));
-  const float per_pixel = std::min(kRaysPerPixel, most / std::max(pixels, 1.0f));
+  const int size = light.pixels.width_px * light.pixels.height_px;
+  const float most = std::min(kMostRays, static_cast<float>(size));
+  const float planned = std::min(kRaysPerPixel * pixels, most),
+              least = static_cast<float>(size) / kPixelsPerRay;
+  const float per_pixel = std::min(std::max(planned, least) / std::max(pixels, 1.0f), kMostRaysPerPixel);
   const VisibleLight visible(light, view);
   std::vector<Photon> photons;
   for (const GlassPiece& piece : sources_.glass) {

@@ -30,6 +30,7 @@ class Glow {
   /// by chance.
   void limit();
   bool empty() const { return sources_.empty(); }
+  std::size_t size() const { return sources_.size(); }
   /// Returns a random point of a source, as seen from a surface at `place`. A source is chosen in proportion
   /// to an estimate of its light on the surface. The point is uniformly distributed over the area of a mesh,
   /// or over the solid angle of a ball. `normal`: unit normal of the surface, or zero for a point in the air.

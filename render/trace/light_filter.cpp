@@ -66,6 +66,13 @@ bool LightGuide::shows(int x, int y, const Eigen::Vector3f& position,
   return own.dot(unit_normal) > kSameSurface && off * off * *inverse_size2.at(x, y) < 1;
 }
 
+IntLanes LightGuide::shows(int x, int y, const LaneVectors& position, const LaneVectors& unit_normal) const {
+  const LaneVectors own = lanes_of(normal, x, y);
+  const Lanes off = dot(own, lanes_of(place, x, y) - position);
+  return (filled.lanes(x, y) > 0.0f) & (dot(own, unit_normal) > kSameSurface) &
+         (off * off * inverse_size2.lanes(x, y) < 1.0f);
+}
+
 void LightGuide::find_reach(const LightPlane& inverse_distance, const LightNoise& noise, LightPlane& reach2,
                             LightPlane& noisy_reach2) const {
   const float least_px = std::min(kLeastNoisyFraction * static_cast<float>(height_px), kLeastNoisy_px);

@@ -112,6 +112,8 @@ struct LightGuide {
   Lanes similar_around(int x, int y) const;
   /// Returns whether pixel (x, y) shows the surface at a point with this unit normal.
   bool shows(int x, int y, const Eigen::Vector3f& position, const Eigen::Vector3f& unit_normal) const;
+  /// The same for the pixels x ... x + 7.
+  IntLanes shows(int x, int y, const LaneVectors& position, const LaneVectors& unit_normal) const;
   /// Returns the position [m] or normal of a pixel; `planes`: place or normal.
   static Eigen::Vector3f at(const std::array<LightPlane, 3>& planes, int x, int y) {
     return {*planes[0].at(x, y), *planes[1].at(x, y), *planes[2].at(x, y)};

@@ -292,6 +292,10 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
     Hit hit;
     const bool hits = scene_.first_hit(path.from, path.direction, kFar, hit);
     if (path.particles != MetParticles::none) meet_particles(hits ? hit.distance : kFar, path, light);
+    if (!hits && path.from_background && sharp && !path.mirrored) {
+      light.background = path.fraction.mean();
+      return light;
+    }
     if (!hits) {
       add_source(sky_met(path.direction, sharp, path.density));
       return light;

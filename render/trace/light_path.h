@@ -65,6 +65,8 @@ struct LightTracer::Path {
   int bounces = 0;                ///< number of diffuse surfaces that radiance() has followed the path from
   int splits = 1;                 ///< number of paths that leave the first diffuse surface
   MetParticles particles = MetParticles::none;  ///< particles that are visible along the path
+  bool from_background =
+      false;  ///< whether the path shows a transparent background if it leaves the scene unmirrored
   /// Whether the directions depend on random numbers. Only such paths can cause bright dots of noise, so only
   /// their light is limited.
   bool by_chance = false;

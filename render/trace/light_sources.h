@@ -43,6 +43,7 @@ struct AirRadiance {
 struct LightSources {
   Sun sun;
   SkyModel sky;
+  bool sky_is_visible = true;  ///< false: the background of the picture is transparent
   float fog = 0;
   std::vector<RayLamp> lamps;
   Glow glow;

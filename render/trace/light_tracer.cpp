@@ -15,6 +15,7 @@ constexpr int kRoundsPerSubFrame = 2, kMostRounds = 8;  // limits of the further
 // Number of further shadow rays to sun and lamps together, for each pixel in a penumbra. Frames of many
 // sub-frames need few.
 constexpr int kPenumbraRays = 6, kPenumbraRaysOfMany = 2;
+constexpr std::size_t kMostGlowRays = 3;  // shadow rays of a pixel to glowing meshes in a sub-frame
 // Further rounds are traced where variance / mean^2 of the filtered indirect light exceeds the target. The
 // filter averages at most kMostAveraged cells.
 constexpr float kTargetVariance = 0.0256f, kMostAveraged = 400;
@@ -72,26 +73,35 @@ Lanes LightTracer::sun_visibility(const LaneVectors& place, IntLanes active, con
   return fraction * ((light.x + light.y + light.z) * (1.0f / 3));
 }
 
+// Traces one shadow ray for each glowing mesh, but at most kMostGlowRays. The ranges of random numbers that
+// choose the meshes of these rays do not overlap.
 LaneVectors LightTracer::trace_glow(const Points& points, int x, int y, const LightView& view) const {
   const Lanes none{};
-  LaneVectors light{none, none, none}, towards{none, none + 1, none};
-  Lanes distance{};
-  for (int i = 0; i < kLanes; ++i) {
-    if (!points.visible[i]) continue;
-    PixelSampler sampler(static_cast<uint32_t>(x + i), static_cast<uint32_t>(y), view.offsets.index,
-                         view.offsets.count);
-    sampler.skip(1 + static_cast<uint32_t>(sources_.lamps.size()));
-    const Point point = points.one(i, view.eye);
-    const float choice = sampler.next().x;
-    const GlowSample sample = sources_.glow.sample(point.place, point.normal, choice, sampler.next());
-    set_lane(light, i, light_of_glow(sample, point.normal, point.face));
-    set_lane(towards, i, sample.towards);
-    distance[i] = kBeforeGlow * sample.distance;
+  LaneVectors light{none, none, none};
+  const auto rays = static_cast<int>(std::min(sources_.glow.size(), kMostGlowRays));
+  const float part = 1 / static_cast<float>(rays);
+  for (int ray = 0; ray < rays; ++ray) {
+    LaneVectors found{none, none, none}, towards{none, none + 1, none};
+    Lanes distance{};
+    for (int i = 0; i < kLanes; ++i) {
+      if (!points.visible[i]) continue;
+      PixelSampler sampler(static_cast<uint32_t>(x + i), static_cast<uint32_t>(y), view.offsets.index,
+                           view.offsets.count);
+      sampler.skip(1 + static_cast<uint32_t>(sources_.lamps.size()));
+      const Point point = points.one(i, view.eye);
+      const float choice = part * (static_cast<float>(ray) + sampler.next().x);
+      sampler.skip(static_cast<uint32_t>(ray));
+      const GlowSample sample = sources_.glow.sample(point.place, point.normal, choice, sampler.next());
+      set_lane(found, i, part * light_of_glow(sample, point.normal, point.face));
+      set_lane(towards, i, sample.towards);
+      distance[i] = kBeforeGlow * sample.distance;
+    }
+    const IntLanes lit = found.x + found.y + found.z > 0.0f;
+    if (!any(lit)) continue;
+    const LaneVectors seen = scene_.transmittance(points.place, towards, distance, lit);
+    light = light + LaneVectors{found.x * seen.x, found.y * seen.y, found.z * seen.z};
   }
-  const IntLanes lit = light.x + light.y + light.z > 0.0f;
-  if (!any(lit)) return light;
-  const LaneVectors seen = scene_.transmittance(points.place, towards, distance, lit);
-  return {light.x * seen.x, light.y * seen.y, light.z * seen.z};
+  return light;
 }
 
 // Moves the origins of shadow rays onto the smooth surface (RayScene::smooth_place). This is needed where a

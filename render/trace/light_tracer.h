@@ -57,7 +57,9 @@ struct LightBuffer {
 struct GlassBuffer {
   std::vector<Vector4f>
       through;  ///< light that comes through the glass; w: fraction of the sun that is visible
-  std::vector<Vector4f> mirrored;           ///< light from the mirrored direction; w: 1
+  /// Light from the mirrored direction; w: fraction of a transparent background that is visible through the
+  /// glass.
+  std::vector<Vector4f> mirrored;
   std::vector<Vector4f> lamps, highlights;  ///< light of lamps; see LightBuffer
   LightSums sums;
 };
@@ -84,8 +86,10 @@ class VisibleLight {
   int find(const Hit& hit) const;
   /// Returns the unit direction from the eye through the middle of a pixel.
   Vector3f direction_through(int x, int y) const;
+  int pixel(int x, int y) const { return y * light_.pixels.width_px + x; }
   bool has_picture() const { return !picture_.empty(); }
   Vector3f color(int pixel) const { return picture_[static_cast<std::size_t>(pixel)].head<3>(); }
+  float opacity(int pixel) const { return picture_[static_cast<std::size_t>(pixel)].w(); }
   /// Returns the light at the surface in a pixel from the sky, other surfaces and lamps; w: visible fraction
   /// of the sun.
   Vector4f arriving(int pixel) const;
@@ -127,6 +131,7 @@ class LightTracer {
     Vector3f noisy = Vector3f::Zero();  ///< light found by random directions
     /// Light found without random directions, or with a weight because its source is also sampled.
     Vector3f certain = Vector3f::Zero();
+    float background = 0;  ///< fraction of a transparent background that is visible along the path
     /// Returns the sum of both parts, the noisy one limited to a maximum brightness. Adds to `sums`.
     Vector3f limited(LightSums& sums) const;
   };
@@ -148,8 +153,8 @@ class LightTracer {
   float sun_visibility(const Vector3f& place, const SquarePoint<float>& uv) const;
   Lanes sun_visibility(const LaneVectors& place, IntLanes active, const SquarePoint<Lanes>& uv,
                        RayScene::Focus focus) const;
-  Vector3f light_through(const Point& point, const Vector3f& eye, PixelSampler& sampler,
-                         const VisibleLight& visible, LightSums& sums) const;
+  FoundLight light_through(const Point& point, const Vector3f& eye, PixelSampler& sampler,
+                           const VisibleLight& visible, bool from_background) const;
   Vector3f mirrored_light(const Point& point, const LightView& view, PixelSampler& sampler,
                           const VisibleLight& visible, LightSums& sums, int rays, int splits) const;
   Vector3f mirrored_along(const Point& point, const Vector3f& facet, const LightView& view,

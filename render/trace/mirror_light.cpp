@@ -115,18 +115,20 @@ void LightTracer::trace_mirrors(const SurfaceBuffer& surfaces, const LightView& 
 // Returns the light that arrives at the eye through a glass surface. The path starts just before the surface,
 // at a distance of few significant bits from the eye: inside glass, paths are so sensitive to rounding errors
 // that pictures would otherwise depend on the driver that drew the surface.
-Vector3f LightTracer::light_through(const Point& point, const Vector3f& eye, PixelSampler& sampler,
-                                    const VisibleLight& visible, LightSums& sums) const {
+LightTracer::FoundLight LightTracer::light_through(const Point& point, const Vector3f& eye,
+                                                   PixelSampler& sampler, const VisibleLight& visible,
+                                                   bool from_background) const {
   const float before = (1 - 0x1p-12f) * point.view.dot(eye - point.place);
   const float distance = std::bit_cast<float>(std::bit_cast<uint32_t>(before) & ~0x1fffu);
   Path path{.from = eye - distance * point.view, .direction = -point.view, .cone = 1e-3f};
+  path.from_background = from_background;
   Hit hit;
-  if (!scene_.first_hit(path.from, path.direction, kFar, hit)) return sky_seen(path.direction);
+  if (!scene_.first_hit(path.from, path.direction, kFar, hit)) return radiance(path, sampler, &visible);
   const Vector3f albedo = hit.material->color(hit, 0).head<3>();
   path.fraction *= 1 - mirrored_fraction(hit, path.direction);
   path.by_chance = is_rough_glass(*hit.material);
   path.fraction = path.fraction.cwiseProduct(enter(hit, albedo, sampler, path.from, path.direction));
-  return radiance(path, sampler, &visible).limited(sums);
+  return radiance(path, sampler, &visible);
 }
 
 void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, const LightView& view,
@@ -161,9 +163,12 @@ void LightTracer::trace_glass(const SurfaceBuffer& surfaces, int x0, int y0, con
         const SquarePoint<float> on_sun = sampler.next();
         const bool sunny = sources_.sun.intensity > 0 && point.normal.dot(sources_.sky.sun_direction) > 0;
         const std::size_t pixel = index_of(x + i, y, width);
-        glass.mirrored[pixel] << mirrored_light(point, view, sampler, behind, sums, 1, 1), 1;
-        glass.through[pixel] << light_through(point, view.eye, sampler, behind, sums),
-            sunny ? sun_visibility(point.place, on_sun) : 0.0f;
+        const Vector3f mirrored = mirrored_light(point, view, sampler, behind, sums, 1, 1);
+        const bool from_background =
+            !sources_.sky_is_visible && behind.opacity(behind.pixel(x0 + x + i, y0 + y)) == 0;
+        const FoundLight through = light_through(point, view.eye, sampler, behind, from_background);
+        glass.mirrored[pixel] << mirrored, through.background;
+        glass.through[pixel] << through.limited(sums), sunny ? sun_visibility(point.place, on_sun) : 0.0f;
       }
     }
   });
