@@ -22,10 +22,11 @@ bool sticks(const PairSurface& surface, const Vec3& force) {
 
 }  // namespace
 
-SprungPaths::SprungPaths(std::span<Island* const> islands, Real duration) : islands_(islands) {
+SprungPaths::SprungPaths(std::span<Island* const> islands, Real duration)
+    : islands_(islands), duration_(duration) {
   for (const Island* island : islands)
     for (Body* body : island->bodies) {
-      if (!body->on_spring) continue;
+      if (!body->has_motion_forces) continue;
       const RigidBody& end = body->rigid;
       const Twist& start = body->start_twist;
       Path path{body};
@@ -34,6 +35,7 @@ SprungPaths::SprungPaths(std::span<Island* const> islands, Real duration) : isla
                   duration / 2 * (start.angular_velocity + end.angular_velocity());
       path.shift_before = path.shift;
       path.turn_before = path.turn;
+      path.free = {end.velocity(), end.angular_velocity()};
       path.inverse_inertia = inverse_inertia(end, end.orientation);
       paths_.push_back(path);
     }
@@ -63,7 +65,7 @@ SprungPaths::Held SprungPaths::hold(const std::array<Path*, 2>& paths, const Vec
 }
 
 void SprungPaths::keep_on_contacts() {
-  if (paths_.empty()) return;
+  if (paths_.empty() || duration_ <= 0) return;
   std::vector<Held> held;
   for (const Island* island : islands_)
     for (const ContactPair* pair : island->pairs) {
@@ -96,6 +98,8 @@ void SprungPaths::keep_on_contacts() {
   }
   for (const Path& path : paths_) {
     Body& body = *path.body;
+    body.held.set({(body.rigid.velocity() - path.free.velocity) / duration_,
+                   (body.rigid.angular_velocity() - path.free.angular_velocity) / duration_});
     body.rigid.position += path.shift - path.shift_before;
     body.rigid.orientation =
         (rotation(path.turn - path.turn_before, 1) * body.rigid.orientation).normalized();

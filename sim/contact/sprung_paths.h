@@ -19,7 +19,8 @@ class SprungPaths {
   SprungPaths(std::span<Island* const> islands, Real duration);
 
   /// Removes the deviations along the normals of the contacts that pushed in the interval, and along the
-  /// tangents where friction held the bodies.
+  /// tangents where friction held the bodies. Stores the accelerations by contacts for the next sub-step (see
+  /// HeldMotion). Must be called after the contacts have changed the velocities.
   void keep_on_contacts();
 
  private:
@@ -27,6 +28,7 @@ class SprungPaths {
     Body* body;
     Vec3 shift, turn;  // deviation from the mean velocity times the duration [m], [rad]
     Vec3 shift_before, turn_before;
+    Twist free;            // velocities at the end of the free motion
     Mat3 inverse_inertia;  // in world axes
   };
   struct Held {
@@ -41,6 +43,7 @@ class SprungPaths {
   static Held hold(const std::array<Path*, 2>& paths, const Vec3& place, const Vec3& direction);
 
   std::span<Island* const> islands_;
+  Real duration_;
   std::vector<Path> paths_;  // by rank of the bodies
 };
 

@@ -17,6 +17,44 @@ const CollisionShape& BodyModel::triangle_shape() {
   return *triangle_shape_;
 }
 
+namespace {
+
+/// Returns the next value of a series that ends with `last`, after `second` and `third`. The slope is the
+/// smaller one of the last two if they have the same direction. A value without this slope would lag behind
+/// an oscillation, and springs would add energy to it.
+Vec3 extrapolated(const Vec3& last, const Vec3& second, const Vec3& third) {
+  if (last.dot(second) <= 0) return Vec3::Zero();
+  const Real limit = 2 * second.norm(), size = last.norm();
+  if (size > limit) return limit / size * last;
+  const Vec3 slope = last - second, slope_before = second - third;
+  if (slope.dot(slope_before) <= 0) return last;
+  return last + (slope.squaredNorm() < slope_before.squaredNorm() ? slope : slope_before);
+}
+
+}  // namespace
+
+void HeldMotion::begin_substep() {
+  const auto next = [&](Vec3 Twist::*part) {
+    return extrapolated(last_[0].*part, last_[1].*part, last_[2].*part);
+  };
+  expected_ = {next(&Twist::velocity), next(&Twist::angular_velocity)};
+  last_ = {Twist{}, last_[0], last_[1]};
+}
+
+void HeldMotion::add_to(RigidBody& body) {
+  added_ = {body.mass * expected_.velocity, body.spin_momentum(body.orientation, expected_.angular_velocity)};
+  body.push += added_;
+}
+
+void HeldMotion::take_back(RigidBody& body, Real duration) {
+  body.push += {-added_.force, -added_.torque};
+  body.momentum -= duration * added_.force;
+  body.angular_momentum -= duration * added_.torque;
+  const Real moved = duration * duration / 2;
+  body.position -= moved * expected_.velocity;
+  body.orientation = (rotation(expected_.angular_velocity, -moved) * body.orientation).normalized();
+}
+
 Motion Body::motion(Real now, Real time) const {
   if (is_kinematic()) return def.track.at(time, def.pose);
   if (!is_dynamic()) return {.pose = pose};

@@ -1,6 +1,7 @@
 #pragma once
 /// A body of the world: its constant model, its state, and its data for the current sub-step.
 
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -52,6 +53,27 @@ struct SleepMemory {
   std::vector<SpringHandle> moving_springs;  // springs whose other end can move independently
 };
 
+/// The acceleration of a body by contacts. Springs and drag depend on the motion of the body. The free motion
+/// contains this acceleration, so that they act along a path close to the true one, and takes it back at its
+/// end (physics R7).
+class HeldMotion {
+ public:
+  /// Begins a sub-step. Its acceleration is extrapolated from the last ones. An acceleration that has more
+  /// than doubled counts as an impact, which does not repeat.
+  void begin_substep();
+  /// Stores the acceleration in the current sub-step [m/s^2], [rad/s^2].
+  void set(const Twist& acceleration) { last_[0] = acceleration; }
+  /// Adds the expected acceleration to the forces on the body.
+  void add_to(RigidBody& body);
+  /// Takes the acceleration back after a motion of this duration [s]: velocity, position, and the force.
+  void take_back(RigidBody& body, Real duration);
+
+ private:
+  std::array<Twist, 3> last_;  // accelerations in the current sub-step and the two before
+  Twist expected_;
+  Wrench added_;
+};
+
 struct Body : BodyModel {
   // State. The members that contact pairs read come first, close together in memory.
   MotionType type =
@@ -82,9 +104,10 @@ struct Body : BodyModel {
 
   // The current sub-step and sampling time.
   Pose before_substep, before_step;
-  Aabb swept;              // box around its motion in the sub-step, as given to the broad phase
-  bool on_cloth = false;   // whether cloth touched it in the last sub-step
-  bool on_spring = false;  // whether a spring ends on it in this sub-step
+  Aabb swept;                      // box around its motion in the sub-step, as given to the broad phase
+  bool on_cloth = false;           // whether cloth touched it in the last sub-step
+  bool has_motion_forces = false;  // whether springs, drag or fields act on it in this sub-step
+  HeldMotion held;                 // used if it has motion forces
 
   SleepMemory sleep;
 

@@ -100,7 +100,16 @@ bool CoupledSystem::holds(const ParticleSystem& system) const {
                      [&](const CoupledGroup& n) { return n.holds(system); });
 }
 
+void CoupledSystem::for_each_held_body(const auto& use) const {
+  const auto use_held = [&](Body* body) {
+    if (body->has_motion_forces) use(*body);
+  };
+  std::ranges::for_each(lone_, use_held);
+  for (const CoupledGroup& n : networks_) std::ranges::for_each(n.bodies(), use_held);
+}
+
 void CoupledSystem::step(const Integrator& integrator, Real t, Real h, Real tolerance) {
+  for_each_held_body([](Body& body) { body.held.add_to(body.rigid); });
   fly_uncoupled(integrator, t, h, tolerance);
   std::vector<IntegratorReport> reports(networks_.size());
   tbb::parallel_for(std::size_t{0}, networks_.size(), [&](std::size_t i) {
@@ -110,6 +119,7 @@ void CoupledSystem::step(const Integrator& integrator, Real t, Real h, Real tole
     reports[i] = work.report;
   });
   for (const IntegratorReport& r : reports) report_.add(r);
+  for_each_held_body([h](Body& body) { body.held.take_back(body.rigid, h); });
 }
 
 void CoupledSystem::fly_uncoupled(const Integrator& integrator, Real t, Real h, Real tolerance) {

@@ -45,6 +45,7 @@ class CoupledSystem {
  private:
   void resolve(const WorldState& world, std::span<const ForceDef* const> forces);
   void gather(WorldState& world, std::span<Body* const> bodies, bool all_systems);
+  void for_each_held_body(const auto& use) const;
   void fly_uncoupled(const Integrator& integrator, Real t, Real h, Real tolerance);
 
   bool begins_substep_;

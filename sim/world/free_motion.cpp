@@ -1,17 +1,30 @@
 #include "sim/world/free_motion.h"
 
+#include <algorithm>
+
 #include "sim/core/parallel_loop.h"
 #include "sim/world/joint_groups.h"
 
 namespace offstage::sim {
 
-void FreeMotion::move_all(std::span<Body* const> awake, Real start, Real h) {
-  for (Body* body : awake) body->on_spring = false;
+/// Finds the bodies on which springs, drag or fields act.
+void FreeMotion::find_motion_forces(std::span<Body* const> awake) {
+  const std::vector<const ForceDef*> active = world_.active_forces();
+  for (Body* body : awake) {
+    body->held.begin_substep();
+    body->has_motion_forces =
+        body->rigid.linear_drag > 0 || body->rigid.angular_drag > 0 ||
+        std::ranges::any_of(active, [&](const ForceDef* force) { return force->acts_on(body->handle); });
+  }
   world_.springs.for_each([&](SpringHandle, const Spring& spring) {
     for (const Attachment* end : {&spring.def.a, &spring.def.b})
       if (const auto* point = std::get_if<BodyPoint>(end); point && world_.acts(spring))
-        world_.bodies[point->body]->on_spring = true;
+        world_.bodies[point->body]->has_motion_forces = true;
   });
+}
+
+void FreeMotion::move_all(std::span<Body* const> awake, Real start, Real h) {
+  find_motion_forces(awake);
   systems_.push_back(std::make_unique<CoupledSystem>(world_, world_.active_forces()));
   CoupledSystem& system = *systems_.back();
   system.save();

@@ -30,6 +30,8 @@ class FreeMotion {
   void count(StepReport& report) const;
 
  private:
+  void find_motion_forces(std::span<Body* const> awake);
+
   WorldState& world_;
   std::vector<std::unique_ptr<CoupledSystem>> systems_;  // systems of this sub-step
 };
