@@ -7,13 +7,6 @@ namespace {
 
 constexpr float kBrightestLobe = 40;  // limit of the lobes of surfaces without mirrored rays
 
-// The GGX lobe as in shaders/light.glsl, limited to `most`.
-Lanes lobe_of(Lanes a, Lanes nl, Lanes nv, Lanes nh, Lanes most) {
-  const Lanes a2 = a * a, d = nh * nh * (a2 - 1) + 1;
-  const Lanes mean = 2 * nl * nv * (1 - a) + (nl + nv) * a;
-  return smaller(a2 / (d * d) * 0.5f / larger(mean, Lanes{} + 1e-6f), most);
-}
-
 }  // namespace
 
 /// The highlights of lamps on eight surfaces. Smooth surfaces have two samples of each lamp: a point of the
@@ -69,7 +62,7 @@ struct LightTracer::Highlights {
     const Lanes most = twice ? none + 1e12f : none + kBrightestLobe;
     const Lanes weight = twice ? power_heuristic(point.density, mirror_density(a, nv, nh)) : none + 1;
     const Lanes nl = larger(dot(points.normal, point.towards), none);
-    add_lobe(light, weight * nl * lobe_of(larger(a, none + kSharp), nl, nv, nh, most), h);
+    add_lobe(light, weight * nl * smaller(lobe_of(larger(a, none + kSharp), nl, nv, nh), most), h);
   }
   /// Adds the light of a point of a lamp that the mirrored ray hits.
   void add_mirrored(const LampPoint<Lanes>& point, const LaneVectors& light) {

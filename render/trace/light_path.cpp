@@ -16,6 +16,7 @@ namespace {
 constexpr int kMostBounces = 16;       // largest number of diffuse surfaces on a path
 constexpr int kMostSteps = 32;         // largest number of surfaces on a path, including mirrors and glass
 constexpr int kAirRays = 8;            // rays from each point in the air
+constexpr float kFaintest = 1e-3f;     // radiance of highlights that need no shadow ray
 constexpr float kSmoothMetal = 0.35f;  // roughness of metals below which a path is reflected
 
 float fresnel_of_glass(float cosine, float ratio) {
@@ -227,6 +228,40 @@ bool LightTracer::follow_glass(const Hit& hit, const Vector3f& albedo, PixelSamp
   return true;
 }
 
+// Returns the light of sun and lamps that a surface in a mirror image mirrors. Its lobe is widened by the
+// size of the light source, so that one point of the source is enough.
+Vector3f LightTracer::highlights(const Hit& hit, const Vector3f& albedo, const Path& path) const {
+  const RayMaterial& material = *hit.material;
+  const Vector3f to_eye = -path.direction, from = off_surface(hit.position, hit.face);
+  const Vector3f f0 = material.metallic > 0.5f ? albedo : Vector3f(Vector3f::Constant(0.04f));
+  const float a = material.roughness * material.roughness, nv = std::max(hit.normal.dot(to_eye), 1e-3f);
+  Vector3f sum = Vector3f::Zero();
+  const auto add = [&](const LampPoint<float>& point, bool shadows) {
+    const Vector3f towards = to_eigen(point.towards), h = (towards + to_eye).normalized();
+    const float nl = hit.normal.dot(towards);
+    if (nl <= 0 || hit.face.dot(towards) <= 0) return;
+    const float wide = 0.25f / (std::numbers::pi_v<float> * std::max(point.density, 1e-12f));
+    const float lobe =
+        nl * lobe_of(std::min(std::sqrt(a * a + wide), 1.0f), nl, nv, std::min(hit.normal.dot(h), 1.0f));
+    const float m = 1 - std::clamp(h.dot(to_eye), 0.0f, 1.0f), grazing = m * m * m * m * m;
+    const Vector3f light =
+        lobe * (f0 + (Vector3f::Ones() - f0) * grazing).cwiseProduct(to_eigen(point.arriving));
+    if (light.maxCoeff() < kFaintest) return;
+    sum +=
+        shadows ? Vector3f(light.cwiseProduct(scene_.transmittance(from, towards, point.distance))) : light;
+  };
+  const Sun& sun = sources_.sun;
+  const float radius = 0.5f * sun.size_deg * std::numbers::pi_v<float> / 180;
+  if (sun.intensity > 0)
+    add({from_eigen(sources_.sky.sun_direction), kFar, 1, from_eigen(sun.intensity * sun.color),
+         1 / (std::numbers::pi_v<float> * std::max(radius * radius, 1e-8f))},
+        sun.shadows);
+  for (const RayLamp& lamp : sources_.lamps)
+    if (!lamp.is_sky() && !lamp.def().in_mirrors)
+      add(lamp.point(from_eigen(from), {0.5f, 0.5f}), lamp.def().shadows);
+  return sum;
+}
+
 // Returns the light of sun, lamps and glowing meshes on a white surface.
 Vector3f LightTracer::direct_light(const Hit& hit, const Vector3f& from, PixelSampler& sampler) const {
   Vector3f result = Vector3f::Zero();
@@ -332,10 +367,19 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
       (path.by_chance ? light.noisy : light.certain) +=
           path.fraction_of_glow(hit, sources_.glow) *
           path.fraction.cwiseProduct(material.emission_at(hit.uv));
+    const bool in_mirror = sharp && path.mirrored;
+    if (in_mirror && (hit.front || material.transmission <= 0))
+      (path.by_chance ? light.noisy : light.certain) +=
+          path.fraction.cwiseProduct(highlights(hit, albedo, path));
     if (follow_glass(hit, albedo, sampler, path, light)) continue;
     path.from = off_surface(hit.position, hit.face);
     if (follow_smooth(hit, albedo, sampler, sharp, path.bounces > 0, path, light)) continue;
     path.fraction = path.fraction.cwiseProduct(albedo);
+    const bool has_highlights_only = in_mirror && material.metallic > 0.5f;
+    if (pixel >= 0 && has_highlights_only) {
+      sum += path.fraction.cwiseProduct(visible->around(pixel));
+      return light;
+    }
     if (pixel >= 0) {
       const Vector4f arriving = visible->arriving(pixel);
       const float cosine = hit.normal.dot(sources_.sky.sun_direction);
@@ -349,7 +393,8 @@ LightTracer::FoundLight LightTracer::radiance(Path path, PixelSampler& sampler, 
       hit.face = -hit.face;
       path.from = off_surface(hit.position, hit.face);
     }
-    sum += path.fraction.cwiseProduct(direct_light(hit, path.from, sampler));
+    sum += path.fraction.cwiseProduct(has_highlights_only ? glow_at(path.from, hit.normal, hit.face, sampler)
+                                                          : direct_light(hit, path.from, sampler));
     if (path.splits > 1) {
       split(hit, path, sampler, light);
       return light;

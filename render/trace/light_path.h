@@ -50,6 +50,15 @@ T mirror_density(T a, T nv, T nh) {
   return a < kSharp ? T{} + 1e18f : density;
 }
 
+/// Returns the GGX lobe of a surface, as in shaders/light.glsl. a: roughness^2; nl, nv, nh: cosines between
+/// the normal and the directions to the light and to the eye, and the half vector.
+template <class T>
+T lobe_of(T a, T nl, T nv, T nh) {
+  const T a2 = a * a, d = nh * nh * (a2 - 1.0f) + 1.0f;
+  const T mean = 2.0f * nl * nv * (1.0f - a) + (nl + nv) * a;
+  return a2 / (d * d) * 0.5f / larger(mean, T{} + 1e-6f);
+}
+
 /// Returns the weight of a direction that one sampling technique chose with density a, if another technique
 /// chooses it with density b: the power heuristic (E. Veach, "Robust Monte Carlo Methods", 1997).
 template <class T>

@@ -93,6 +93,8 @@ class VisibleLight {
   /// Returns the light at the surface in a pixel from the sky, other surfaces and lamps; w: visible fraction
   /// of the sun.
   Vector4f arriving(int pixel) const;
+  /// The same without lamps and sun.
+  Vector3f around(int pixel) const { return light_.arriving[static_cast<std::size_t>(pixel)].head<3>(); }
 
  private:
   const LightBuffer& light_;
@@ -144,6 +146,7 @@ class LightTracer {
                      bool scattered, Path& path, FoundLight& light) const;
   void prepare_particles(MetParticles groups, const SampleOffsets& offsets) const;
   void meet_particles(float length, Path& path, FoundLight& found) const;
+  Vector3f highlights(const Hit& hit, const Vector3f& albedo, const Path& path) const;
   Vector3f direct_light(const Hit& hit, const Vector3f& from, PixelSampler& sampler) const;
   Vector3f glow_at(const Vector3f& place, const Vector3f& normal, const Vector3f& face,
                    PixelSampler& sampler) const;
