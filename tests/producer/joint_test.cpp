@@ -271,6 +271,19 @@ TEST(Vehicle, SpeedAndTurningCircleFollowFromTheWheels) {
   EXPECT_NEAR(turning.angular_velocity.y(), turning.velocity.norm() / std::hypot(radius, base / 2), 0.02);
 }
 
+TEST(Vehicle, ThatMovesAtTime0RollsOnItsWheels) {
+  const LoadedScene loaded = parse(R"(
+    "output": {"fps": 30, "duration": 8}, "world": {"solver": "exact"},
+    "materials": [{"name": "road", "friction": 1, "restitution": 0}],
+    "bodies": [{"name": "ground", "motion": "static", "shape": {"type": "plane"}, "material": "road"}],
+    "articulations": [{"type": "vehicle", "name": "car", "tyre": "road", "velocity": [6, 0, 8],
+      "orientation": [0.94868330, 0, 0.31622777, 0]}])");
+  const ModelLibrary models;
+  Simulation simulation(loaded.scene, models);
+  while (simulation.world().time() < 1) simulation.advance();
+  EXPECT_NEAR(simulation.world().body(handle_of(simulation, "car/chassis")).velocity.norm(), 10, 0.02);
+}
+
 TEST(Crane, HoldsItsLoadAndMovesItByItsMotors) {
   const LoadedScene loaded = parse(R"(
     "output": {"fps": 30, "duration": 16}, "world": {"solver": "exact"},

@@ -43,6 +43,12 @@ TEST(SceneCheck, ABodyAndAClothHaveDifferentNames) {
             "/cloths/0/name: the name 'a' is already used by /bodies/0\n");
 }
 
+TEST(SceneCheck, ABevelIsForBoxes) {
+  EXPECT_EQ(warnings_of(R"({"bodies": [{"shape": {"type": "sphere"}, "bevel": 0.1}]})"),
+            "/bodies/0/bevel: has no effect: the body is not drawn as a box\n");
+  EXPECT_EQ(warnings_of(R"({"bodies": [{"shape": {"type": "box"}, "bevel": 0}]})"), "");
+}
+
 TEST(SceneCheck, EmittersThatPushABodyOrGetItsVelocityNeedOne) {
   EXPECT_EQ(errors_of(R"({"emitters": [{"inherit_velocity": 0.5}]})"),
             "/emitters/0/inherit_velocity: is a fraction of the velocity of a body; the emitter needs a "

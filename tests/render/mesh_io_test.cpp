@@ -244,6 +244,21 @@ TEST(ReadModel, FindsTexturesOfOtherMachinesBesideTheModel) {
             0);
 }
 
+TEST(ReadModel, NamesMissingMaterialsOfObjFiles) {
+  const ScratchFolder folder;
+  const auto warnings = [&](const std::string& head) {
+    return read_model(folder.put("a.obj", head + std::string(kTriangle) + "usemtl gold\nf 1 2 3\n")).warnings;
+  };
+  EXPECT_EQ(warnings("mtllib gone.mtl\n"),
+            std::vector<std::string>{
+                "the material library 'gone.mtl' is not found; its materials have the default appearance"});
+  folder.put("there.mtl", "newmtl silver\nKd 1 1 1\n");
+  EXPECT_EQ(warnings("mtllib there.mtl\n"),
+            std::vector<std::string>{
+                "the material 'gold' is in no material library; it has the default appearance"});
+  EXPECT_TRUE(warnings("").empty()) << "files without a library may name materials";
+}
+
 TEST(ReadModel, ReadsEmbeddedTexturesOnceAndDropsAlphaThatIsNotMeant) {
   const ScratchFolder folder;
   const Image image{1, 1, {10, 20, 30, 40}};

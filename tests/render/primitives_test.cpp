@@ -109,6 +109,34 @@ TEST(Primitives, NormalsAreUnitAndFaceTheSameSideAsTheirTriangles) {
   }
 }
 
+// Texture coordinates increase to the right and downwards, as in pictures.
+TEST(Primitives, TexturesAreUprightAndNotMirrored) {
+  std::vector<Named> shapes = closed_primitives();
+  shapes.push_back({"ground", make_ground(8), 0, 0, {}});
+  for (const Named& shape : shapes) {
+    const Mesh& mesh = shape.mesh;
+    for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+      const auto at = [&](std::size_t k) { return mesh.indices[i + k]; };
+      const Vector3f a = mesh.positions[at(1)] - mesh.positions[at(0)],
+                     b = mesh.positions[at(2)] - mesh.positions[at(0)];
+      const Vector2f u = mesh.uvs[at(1)] - mesh.uvs[at(0)], v = mesh.uvs[at(2)] - mesh.uvs[at(0)];
+      const float area = u.x() * v.y() - u.y() * v.x();
+      const Vector3f normal = a.cross(b).normalized();
+      if (std::abs(area) < 1e-6f) continue;  // at a pole
+      ASSERT_LT(area, 0) << shape.name << ": mirrored";
+      // The direction in which v decreases.
+      const Vector3f up = (u.x() * b - v.x() * a) / -area;
+      const bool faces_outwards = normal.dot(mesh.positions[at(0)]) > 0;
+      if (std::abs(normal.y()) < 0.1f && faces_outwards) {
+        ASSERT_GT(up.normalized().y(), 0.9f) << shape.name;
+      }
+      if (shape.name == std::string("ground")) {
+        ASSERT_LT(up.normalized().z(), -0.9f);
+      }
+    }
+  }
+}
+
 TEST(Primitives, GroundIsASquareThatFacesUpAndIsFinerInTheMiddle) {
   const Mesh ground = make_ground(1000);
   const Totals totals = totals_of(ground);

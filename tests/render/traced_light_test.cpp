@@ -372,6 +372,16 @@ TEST_F(TracedLight, ABrightWallColoursTheFloorBesideIt) {
   EXPECT_GT(redness(0.15f), 1.1f * redness(1.9f));
 }
 
+// The front of a clear pane mirrors 0.04 of the light. What the back mirrors is added to the refracted light.
+TEST_F(TracedLight, GlassLetsATransparentBackgroundThrough) {
+  const Material clear{.color = {1, 1, 1, 1}, .roughness = 0, .transmission = 1};
+  s.add(make_box({2, 2, 0.1f}), clear);
+  look({.eye = {0, 0, 4}, .target = {0, 0, 0}});
+  EXPECT_NEAR(center_pixel(s.draw()).w(), 0.04f, 0.002f);
+  s.add(make_box({3, 3, 0.1f}), kPlaster, {0, 0, -2});
+  EXPECT_EQ(center_pixel(s.draw()).w(), 1);
+}
+
 TEST_F(TracedLight, MirrorsShowObjectsBehindTheCamera) {
   s.add(make_box({2, 2, 0.1f}), {.color = {0.9f, 0.9f, 0.9f, 1}, .metallic = 1, .roughness = 0.01f});
   s.add(make_box({3, 3, 0.1f}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = {1, 0.5f, 0}}, {0, 0, 8});
@@ -454,6 +464,29 @@ TEST_F(TracedLight, MirrorsShowSurfacesThatALampLights) {
   // A point of the floor and its mirror image, which is seen in the plane z = 0.
   const float seen = mean_around(picture, place_of({0.3f, 0, 0.8f}), 1);
   EXPECT_NEAR(mean_around(picture, place_of({0.3f, 0, -0.8f}), 1) / seen, 1, 0.05f);
+}
+
+// A glossy plate behind the camera, seen in a mirror, and seen from the place behind the mirror that the
+// image has as its eye.
+TEST_F(TracedLight, MirrorsShowHighlights) {
+  for (const Material& glossy : {Material{.color = {0.9f, 0.5f, 0.2f, 1}, .metallic = 1, .roughness = 0.4f},
+                                 Material{.color = {0.9f, 0.5f, 0.2f, 1}, .metallic = 1, .roughness = 0.3f},
+                                 Material{.color = {0.2f, 0.2f, 0.2f, 1}, .roughness = 0.4f}}) {
+    std::array<float, 2> seen{};
+    for (const bool in_mirror : {false, true}) {
+      SmallStage scene(160, 120);
+      scene.stage.set_environment(kNoLight);
+      scene.stage.set_sun({.intensity = 0, .shadows = false});
+      scene.stage.set_lamps(std::array{Lamp{.position = {-5, 0, 6}, .intensity = {2, 2, 2}, .radius = 0.1f}});
+      scene.add(make_box({12, 4, 0.1f}), glossy, {-4, 0, 8.05f});
+      if (in_mirror)
+        scene.add(make_box({1, 1, 0.1f}), {.color = {1, 1, 1, 1}, .metallic = 1, .roughness = 0},
+                  {0, 0, -0.05f});
+      scene.stage.set_camera({.eye = {2, 0, in_mirror ? 4.0f : -4.0f}, .target = {0, 0, 0}, .fov_deg = 30});
+      seen[in_mirror] = mean_around(mean_of(scene, 4), {80, 60}, 12);
+    }
+    EXPECT_NEAR(seen[1] / seen[0], 1, 0.12f) << glossy.metallic << " " << glossy.roughness;
+  }
 }
 
 // The mirror image of a lamp has the radiance of the lamp, without noise: pi times the intensity per visible
@@ -621,10 +654,7 @@ TEST_F(TracedLight, DoesNotDependOnTheSizeOfTheScene) {
     SmallStage scene(160, 120);
     scene.stage.set_environment(even_sky(0.5f));
     scene.stage.set_sun({.direction = Vector3f(1, 2, 1).normalized()});
-    scene.stage.set_camera({.eye = Vector3f(2, 2, 4) * scale,
-                            .target = {0, 0, 0},
-                            .near_m = 0.05f * scale,
-                            .far_m = 1e3f * scale});
+    scene.stage.set_camera({.eye = Vector3f(2, 2, 4) * scale, .target = {0, 0, 0}});
     scene.add(make_box(Vector3f(8, 0.2f, 8) * scale), kPlaster, Vector3f(0, -0.1f, 0) * scale);
     scene.add(make_box(Vector3f(1, 1, 1) * scale), kPlaster, Vector3f(0, 0.5f, 0) * scale);
     scene.add(make_box(Vector3f(1, 1, 1) * scale), kPlaster, Vector3f(1.2f, 0.5f, -1) * scale);

@@ -47,6 +47,10 @@ class MachineBuilder {
             const Vec3& centre) {
     return part(name, material, sim::Box{size}, size.prod(), mass, centre);
   }
+  /// Returns the angular velocity with which a wheel of this radius about the machine's X axis rolls along Z.
+  Vec3 rolling(Real radius) const {
+    return orientation_ * Vec3((orientation_.conjugate() * velocity_).z() / radius, 0, 0);
+  }
   Joint& join(sim::JointType type, const std::string& name, const std::string& a, const std::string& b,
               const Vec3& anchor, const Vec3& axis = Vec3::UnitY()) {
     Joint& j = make.joint(name, make.own(a), make.own(b), place(anchor));
@@ -117,7 +121,8 @@ Parts build(const Vehicle& car) {
         steering.behaviour.motor = follow(sim::Motor::Mode::position, mapped(car.steer, angle));
       }
       make.part(wheel, car.tyre, sim::Cylinder{r, tread}, std::numbers::pi * r * r * tread, wheel_mass,
-                centre, Quat(Eigen::AngleAxisd(-std::numbers::pi / 2, Vec3::UnitZ())));
+                centre, Quat(Eigen::AngleAxisd(-std::numbers::pi / 2, Vec3::UnitZ())))
+          .angular_velocity = make.rolling(r);
       Joint& axle = make.join(revolute, wheel, wheel, front ? knuckle : hub, centre, Vec3::UnitX());
       if (!front && !car.speed.empty())
         axle.behaviour.motor =

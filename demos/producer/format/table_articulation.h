@@ -110,7 +110,7 @@ struct Table<Vehicle> {
         {"name", &T::name, "unique name; default: articulation_N, where N is the index in the list"},
         {"position", &T::position, "point on the ground at the centre of the wheels", "m"},
         {"orientation", &T::orientation, "orientation of the car, about `position`"},
-        {"velocity", &T::velocity, "velocity of the car at time 0", "m/s"},
+        {"velocity", &T::velocity, "velocity of the car at time 0, at which its wheels roll", "m/s"},
         {"length", &T::length, "length of the car's body", "m", kPositive},
         {"width", &T::width, "width over the wheels", "m", kPositive},
         {"wheel_radius", &T::wheel_radius, "radius of each wheel", "m", kPositive},
