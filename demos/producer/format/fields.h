@@ -45,6 +45,8 @@ struct Limits {
 };
 inline constexpr Limits kPositive{.low = 0, .open_low = true};
 inline constexpr Limits kNotNegative{.low = 0};
+/// Brightness of lights. Sums of brighter ones would not be finite.
+inline constexpr Limits kBrightness{.low = 0, .high = 1e6};
 inline constexpr Limits kFraction{.low = 0, .high = 1};
 inline constexpr Limits kDirection{.nonzero = true};
 /// Returns the limits from `low` to `high`, both included.

@@ -47,7 +47,7 @@ struct Table<EnvironmentSettings> {
              "colour below the horizon, and of the light from below; default: the light that a ground plane "
              "would reflect"},
             {"intensity", &T::intensity, "factor of the sky's brightness and of the ambient light", "",
-             kNotNegative},
+             kBrightness},
             {"fog", &T::fog,
              "density of the fog: the fraction exp(-fog * distance) of the light passes. 0: no fog, but an "
              "infinite plane still blends into the sky in the last quarter of a degree below its horizon",

@@ -13,13 +13,12 @@ struct Table<SunLight> {
   static constexpr const char* kHelp = "Parallel light. A scene has at most one sun.";
   static Fields<SunLight> fields() {
     using T = SunLight;
-    return {
-        {"direction", &T::direction, "direction towards the sun, above the horizon", "", kDirection},
-        {"color", &T::color, "colour of the light"},
-        {"intensity", &T::intensity, "brightness of a white surface that faces the sun", "", kNotNegative},
-        {"size_deg", &T::size_deg, "angular diameter of the sun's disc; larger: softer shadows", "degrees",
-         between(0, 90)},
-        {"shadows", &T::shadows, "whether the light casts shadows"}};
+    return {{"direction", &T::direction, "direction towards the sun, above the horizon", "", kDirection},
+            {"color", &T::color, "colour of the light"},
+            {"intensity", &T::intensity, "brightness of a white surface that faces the sun", "", kBrightness},
+            {"size_deg", &T::size_deg, "angular diameter of the sun's disc; larger: softer shadows",
+             "degrees", between(0, 90)},
+            {"shadows", &T::shadows, "whether the light casts shadows"}};
   }
 };
 template <>
@@ -32,7 +31,7 @@ struct Table<LampBase> {
         {"color", &T::color, "colour of the light"},
         {"intensity", &T::intensity,
          "brightness of a white surface that faces the light 1 m away; a number or a curve over time", "",
-         kNotNegative},
+         kBrightness},
         {"shadows", &T::shadows, "whether the light casts shadows"}};
   }
 };
@@ -89,7 +88,7 @@ struct Table<ModelLights> {
         {"name", &T::name, "name of the light's node in the file; empty: all lights"},
         {"intensity", &T::intensity,
          "factor of the intensities in the file; files that Blender wrote in watts need about 0.001", "",
-         kNotNegative},
+         kBrightness},
         {"radius", &T::radius, "radius of point and spot lights, which have none in the file", "m",
          kPositive},
         {"size_deg", &T::size_deg, "angular diameter of a directional light, which becomes the scene's sun",

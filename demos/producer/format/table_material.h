@@ -42,7 +42,7 @@ struct Table<Material> {
          between(1, 3)},
         {"emission", &T::emission, "colour of the emitted light"},
         {"emission_strength", &T::emission_strength,
-         "factor of the emission; 1 is as bright as a white surface in sunlight", "", kNotNegative},
+         "factor of the emission; 1 is as bright as a white surface in sunlight", "", kBrightness},
         {"pattern", &T::pattern, "pattern in a second colour over the base colour"},
         {"pattern_color", &T::pattern_color, "second colour, used by the pattern"},
         {"pattern_scale", &T::pattern_scale, "size of one cell of the pattern", "m", kPositive},
