@@ -1,10 +1,13 @@
 #include "render/image_io.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 
 #include <fcntl.h>
@@ -56,7 +59,22 @@ void check_image_size(int width, int height, const std::string& name, uint64_t m
     throw unreadable_image(name, size + std::to_string(max_pixels >> 20) + " Mi pixels are possible");
 }
 
+/// Returns the size in the header of a PNG file, or nothing for other files. stb_image calls a PNG file that
+/// is too large for it an unknown type.
+std::optional<std::array<uint32_t, 2>> png_size(std::span<const uint8_t> bytes) {
+  constexpr std::array<uint8_t, 8> kSignature = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1A, '\n'};
+  constexpr std::size_t kSizeAt = 16;  // after the signature, and the length and name of the first chunk
+  if (bytes.size() < kSizeAt + 8 || !std::ranges::equal(bytes.first(kSignature.size()), kSignature))
+    return {};
+  std::array<uint32_t, 2> size{};
+  for (std::size_t i = 0; i < 8; ++i) size[i / 4] = size[i / 4] << 8 | bytes[kSizeAt + i];
+  return size;
+}
+
 void check_declared_size(std::span<const uint8_t> bytes, const std::string& name, uint64_t max_pixels) {
+  constexpr uint32_t kMostOfFormat = std::numeric_limits<int>::max();
+  if (const auto size = png_size(bytes); size && std::max((*size)[0], (*size)[1]) <= kMostOfFormat)
+    check_image_size(static_cast<int>((*size)[0]), static_cast<int>((*size)[1]), name, max_pixels);
   int width = 0, height = 0, channels = 0;
   if (!stbi_info_from_memory(bytes.data(), static_cast<int>(bytes.size()), &width, &height, &channels))
     throw unreadable_image(name, stbi_failure_reason());

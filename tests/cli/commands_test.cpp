@@ -374,6 +374,7 @@ TEST(Commands, FrameTimesOutsideTheFilmAreRefused) {
   for (const char* at : {"-1", "nan", "1e300", "1e9", "0.5", "-0.2"}) {
     const Outcome run = offstage("frame " + tiny_scene() + " -o a.png --at=" + at, folder.path());
     EXPECT_EQ(run.code, 2) << at;
+    EXPECT_NE(run.err.find("outside the film, which shows 0 to"), std::string::npos) << run.err;
   }
   EXPECT_EQ(offstage("frame " + tiny_scene() + " -o a.jpg -n 1", folder.path()).code, 2);
   EXPECT_TRUE(contents(folder.path()).empty());

@@ -59,6 +59,7 @@ TEST(New, NeverReplacesAFileUnaskedAndSuggestsTemplates) {
   EXPECT_EQ(slip.code, 2);
   EXPECT_NE(slip.err.find("did you mean 'sprinkler'?"), std::string::npos) << slip.err;
   EXPECT_NE(slip.err.find("explosion"), std::string::npos) << "the message lists all templates";
+  EXPECT_EQ(slip.err.find('\\'), std::string::npos) << "no escaped line breaks: " << slip.err;
   EXPECT_EQ(offstage("new nowhere/a", folder.path()).code, 2);
   EXPECT_EQ(contents(folder.path()).size(), 1u);
   EXPECT_EQ(offstage("new rain --force", folder.path()).code, 0);
@@ -85,6 +86,21 @@ TEST(BareScene, AMisspelledCommandGetsItsOwnMessage) {
   write_file(folder / "film.txt", "");
   EXPECT_NE(offstage("film.txt", folder.path()).err.find("film.txt is not a scene"), std::string::npos);
   EXPECT_EQ(offstage("nowhere.json", folder.path()).code, 3);
+}
+
+TEST(Output, AFrameNumberInTheNameOfAFolderIsRefused) {
+  const TemporaryFolder folder;
+  for (const std::string command :
+       {"render " + tiny_scene() + " -o o/####/####.png", "render " + tiny_scene() + " -o o/####/a.mp4",
+        "frame " + tiny_scene() + " -o o/####/a.png", "export " + tiny_scene() + " -o o/##/####.ply"}) {
+    const Outcome run = offstage(command, folder.path());
+    EXPECT_EQ(run.code, 2) << command;
+    EXPECT_NE(run.err.find("not in that of its folder"), std::string::npos) << run.err;
+  }
+  EXPECT_TRUE(contents(folder.path()).empty());
+  std::filesystem::create_directory(folder / "take#2");
+  EXPECT_EQ(offstage("frame " + tiny_scene() + " -o take#2/a.png -q", folder.path()).code, 0)
+      << "an existing folder may have any name";
 }
 
 TEST(Output, PatternsOfOtherProgramsGetAHint) {

@@ -6,12 +6,14 @@ usage: export_test.py OFFSTAGE SOURCE_DIR
 
 import bisect
 import csv
+import json
 import math
 import os
 import subprocess
 import sys
 import tempfile
 
+from look_model import write_look_model
 from readers import Gltf, UsdText, read_ply
 
 TOLERANCE = 1e-5  # m; positions of a few metres as float32 have errors of 2e-7
@@ -158,6 +160,91 @@ def check_sequences(table, usd):
     assert used <= made and "mtllib f.mtl" in lines
 
 
+def resolved(film, material):
+    """A material with its textures replaced by their samplers and the bytes of their pictures."""
+    def visit(value):
+        if isinstance(value, list):
+            return [visit(v) for v in value]
+        if not isinstance(value, dict):
+            return round(value, 4) if isinstance(value, float) else value
+        out = {key: visit(v) for key, v in value.items()}
+        if "index" in out:
+            texture = film.json["textures"][out.pop("index")]
+            view = film.json["bufferViews"][film.json["images"][texture["source"]]["bufferView"]]
+            out["picture"] = film.binary[view["byteOffset"]:view["byteOffset"] + view["byteLength"]]
+            out["sampler"] = film.json["samplers"][texture["sampler"]]
+        return out
+    return visit(film.json["materials"][material])
+
+
+def looks_of(path):
+    """The materials of a film by name, and the attributes of their meshes."""
+    film = Gltf(path)
+    looks = {}
+    for mesh in film.json["meshes"]:
+        for primitive in mesh["primitives"]:
+            material = resolved(film, primitive["material"])
+            material["attributes"] = sorted(primitive["attributes"])
+            looks[material["name"]] = material
+    return looks
+
+
+def check_looks():
+    """A model keeps its materials through two exports, and each format reports what it cannot hold."""
+    write_look_model("model.gltf")
+
+    def export(model, out):
+        with open("looks.json", "w") as file:
+            json.dump({"version": 1, "materials": [{"name": "tiles", "pattern": "checker"}],
+                       "bodies": [{"motion": "static", "material": "tiles"},
+                                  {"motion": "static", "collides": False, "shape": {"type": "mesh", "file": model}}],
+                       "output": {"duration": 0.04}}, file)
+        return offstage("export", "looks.json", "-o", out).stderr
+
+    notes = export("model.gltf", "looks.glb")
+    assert "glTF has no procedural patterns; those of material 'tiles' are replaced by their first colour" in notes, notes
+    assert notes.count("glTF has no") == 2 and "light of the sky" in notes, notes
+    looks = looks_of("looks.glb")
+    assert "COLOR_0" in looks["colours"]["attributes"] and "COLOR_0" not in looks["leaf"]["attributes"]
+    assert looks["leaf"]["alphaMode"] == "MASK" and looks["leaf"]["alphaCutoff"] == 0.25 and looks["leaf"]["doubleSided"]
+    assert looks["blend"]["alphaMode"] == "BLEND" and "alphaMode" not in looks["colours"]
+    assert looks["relief"]["normalTexture"]["scale"] == 0.5 and looks["relief"]["occlusionTexture"]["strength"] == 0.5
+    sampled = looks["sampled"]["pbrMetallicRoughness"]["baseColorTexture"]
+    assert sampled["sampler"] == {"magFilter": 9728, "minFilter": 9728, "wrapS": 33071, "wrapT": 33648}
+    assert sampled["extensions"]["KHR_texture_transform"] == {"offset": [0.25, 0.5], "rotation": 0.5, "scale": [2, 3]}
+    glass, sheet = looks["solid glass"]["extensions"], looks["sheet"]["extensions"]
+    assert glass["KHR_materials_volume"]["thicknessFactor"] > 0 and glass["KHR_materials_ior"]["ior"] == 1.25
+    assert "KHR_materials_volume" not in sheet and "KHR_materials_specular" not in glass
+    assert looks["glow"]["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] == 4
+    assert looks["lacquer"]["extensions"]["KHR_materials_clearcoat"] == {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.25}
+    assert looks["flat"]["extensions"] == {"KHR_materials_unlit": {}}
+    export("looks.glb", "again.glb")
+    again = looks_of("again.glb")
+    for name, look in looks.items():
+        same = dict(again[name])
+        assert same == look, f"{name}:\n{look}\n{same}"
+
+    notes = export("model.gltf", "looks.usda")
+    for lost in ("procedural patterns", "vertex colours; those of material 'colours'", "refraction and transmission",
+                 "layers of sheen"):
+        assert lost in notes, notes
+    materials = UsdText("looks.usda").root.find("World").find("Materials")
+    leaf = materials.find("leaf").find("Surface").attributes
+    assert leaf["inputs:opacityThreshold"] == 0.25 and leaf["inputs:opacity.connect"].endswith("Texture.outputs:a>")
+    assert "NormalTexture" in materials.find("relief").find("Surface").attributes["inputs:normal.connect"]
+    turned = materials.find("sampled").find("TextureTransform").attributes
+    assert distance(turned["inputs:scale"], (2, 3)) < 1e-5 and abs(turned["inputs:rotation"] - math.degrees(0.5)) < 1e-3
+    notes = export("model.gltf", "ply/looks##.ply")
+    for lost in ("PLY has no textures", "PLY has no normal maps", "PLY has no camera"):
+        assert lost in notes and "vertex colours" not in notes, notes
+    vertices, _ = read_ply("ply/looks01.ply")
+    assert {(255, 0, 0), (0, 255, 0), (0, 0, 255)} <= set(zip(vertices["red"], vertices["green"], vertices["blue"]))
+    assert "OBJ has no procedural patterns" in export("model.gltf", "obj/looks##.obj")
+    mtl = open("obj/looks.mtl").read()
+    assert "map_d looks.leaf.png" in mtl and "norm -bm 0.5 looks.relief.Normal.png" in mtl and "map_Ke" in mtl
+    assert any(len(line.split()) == 7 for line in open("obj/looks01.obj") if line.startswith("v ")), "vertex colours"
+
+
 def check_command():
     offstage("simulate", scene, "--cache", "cache", "-q")
     offstage("export", scene, "-o", "cached.usda", "--cache", "cache", "-q")
@@ -176,5 +263,6 @@ with tempfile.TemporaryDirectory() as folder:
     usd = check_usd(trace, table)
     check_gltf(trace, usd)
     check_sequences(table, usd)
+    check_looks()
     check_command()
 print("ok")

@@ -5,6 +5,7 @@
 #include "producer/build/drawn_objects.h"
 #include "producer/build/lights.h"
 #include "producer/format/scene_io.h"
+#include "render/file_io.h"
 #include "render/frame_files.h"
 #include "render/image_io.h"
 #include "tests/render/scratch.h"
@@ -43,6 +44,19 @@ render::Material material_of_scene(const std::string& keys, const PictureFiles& 
   const ModelLibrary models(loaded.scene, loaded.folder, {}, warnings);
   std::vector<render::Image> textures;
   return material_of(loaded.scene, "m", models, textures);
+}
+
+TEST(Textures, AHeaderWithTooManyPixelsIsReportedWithItsSize) {
+  const PictureFiles folder;
+  std::vector<uint8_t> bytes = render::read_file(folder.path() / "a.png", 1 << 20);
+  for (const std::size_t at : {16u, 20u}) {  // width and height: 60000
+    bytes[at + 2] = 0xEA;
+    bytes[at + 3] = 0x60;
+  }
+  render::write_file_atomically(folder.path() / "huge.png", bytes);
+  const std::string found = findings_of(
+      R"({"materials": [{"name": "m", "texture": "huge.png"}], "bodies": [{"material": "m"}]})", folder);
+  EXPECT_NE(found.find("60000x60000 pixels; at most"), std::string::npos) << found;
 }
 
 TEST(Textures, AreScaledAndTurnedAboutTheirCentre) {

@@ -6,6 +6,8 @@
 
 #include <gtest/gtest.h>
 
+#include "producer/run/time_left.h"
+
 namespace offstage::producer {
 namespace {
 
@@ -58,6 +60,36 @@ TEST(Progress, BeforeTheFirstFrameItNamesTheSimulation) {
   const std::string line = progress_bar(
       {.done = 0, .total = 1, .fraction = 0.3, .frames_simulated = 270, .frames_to_simulate = 900}, 100);
   EXPECT_NE(line.find("simulating frame 270/900"), std::string::npos) << line;
+}
+
+TEST(Progress, TheRemainingTimeDoesNotRepeatTheCostOfTheFirstFrame) {
+  constexpr int kFrames = 16, kThreads = 2;
+  constexpr double kFirst_s = 4, kOther_s = 0.25;
+  TimeLeft left(kFrames, kFrames, kThreads, 300);
+  double now = kFirst_s;
+  for (int frame = 0; frame < kFrames; ++frame) left.simulated(1);
+  left.finished(1000 * kFirst_s, now);
+  EXPECT_FALSE(left.is_steady());
+  left.finished(1000 * kFirst_s, now);  // the first frame of the other thread
+  EXPECT_FALSE(left.is_steady());
+  for (int frame = kThreads; frame < kFrames; frame += kThreads) {
+    now += kOther_s;
+    left.finished(1000 * kOther_s, now);
+    left.finished(1000 * kOther_s, now);
+    EXPECT_TRUE(left.is_steady());
+    EXPECT_NEAR(left.seconds(now), kOther_s * (kFrames - frame - kThreads) / kThreads, 1e-9);
+  }
+  EXPECT_EQ(left.fraction(), 1);
+}
+
+TEST(Progress, TheRemainingTimeOfASimulationIsProportionalToItsFrames) {
+  TimeLeft left(100, 100, 0, 0);
+  for (int frame = 0; frame < 25; ++frame) {
+    left.simulated(20);
+    left.finished(0, 0.02 * (frame + 1));
+  }
+  EXPECT_NEAR(left.fraction(), 0.25, 1e-12);
+  EXPECT_NEAR(left.seconds(0.5), 1.5, 1e-12);
 }
 
 }  // namespace

@@ -231,5 +231,32 @@ TEST(Simulation, TheSceneSelectsSolverAndSleep) {
   EXPECT_EQ(exact.totals().contacts.points, 4u);
 }
 
+TEST(SceneBodies, OnlyBodiesWhoseShapeIsReadHaveACollisionMesh) {
+  // Bodies, overlays, and whether body "a" needs its mesh.
+  const auto has_mesh = [](const std::string& keys, const std::string& overlays) {
+    LoadedScene loaded =
+        parse_scene(R"({"bodies": [{"name": "a", "shape": {"type": "mesh", "file": "rock.glb"}, )" + keys +
+                        R"(}, {"name": "b", "motion": "kinematic"}], "overlays": [)" + overlays + "]}",
+                    "scene", OFFSTAGE_SOURCE_DIR);
+    const ModelLibrary models(loaded.scene, loaded.folder, DecompositionCache(), loaded.warnings);
+    const Simulation simulation(loaded.scene, models);
+    bool found = false;
+    simulation.world().for_each_body([&](sim::BodyHandle body) {
+      const sim::BodyDef& def = simulation.world().body_def(body);
+      if (def.name == "a") found = std::holds_alternative<sim::MeshShape>(def.shape);
+    });
+    return found;
+  };
+  const std::string idle = R"("motion": "static", "collides": false)";
+  EXPECT_FALSE(has_mesh(idle, ""));
+  EXPECT_FALSE(has_mesh(idle, R"({"type": "contacts"}, {"type": "islands"}, {"type": "text"})"));
+  EXPECT_TRUE(has_mesh(R"("motion": "static")", ""));
+  EXPECT_TRUE(has_mesh(R"("motion": "kinematic", "collides": false)", ""));
+  EXPECT_TRUE(has_mesh(R"("collides": false)", ""));
+  EXPECT_TRUE(has_mesh(idle, R"({"type": "tree", "body": "a"})"));
+  EXPECT_TRUE(has_mesh(idle, R"({"type": "closest", "a": "a", "b": "b"})"));
+  EXPECT_TRUE(has_mesh(idle, R"({"type": "contacts", "a": "b", "b": "a"})"));
+}
+
 }  // namespace
 }  // namespace offstage::producer

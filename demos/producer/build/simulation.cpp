@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -66,6 +67,37 @@ std::string mesh_key(const MeshFile& file, const ModelLibrary& models) {
                      models.parts(file) ? "parts" : "", scale_of(file, models));
 }
 
+/// Copies the contact properties of a body's material.
+void set_contact(const Material& material, const Body& body, sim::BodyDef& def) {
+  def.restitution = material.restitution;
+  def.friction = material.friction;
+  def.static_friction = material.static_friction.value_or(def.static_friction);
+  def.rolling_friction = material.rolling_friction;
+  def.spinning_friction = material.spinning_friction;
+  if (!material.cross_friction || body.friction_axis.isZero(0)) return;
+  def.cross_friction = *material.cross_friction;
+  def.friction_axis = body.friction_axis;
+}
+
+/// Returns the names of the bodies whose collision shapes an overlay reads.
+std::set<std::string> bodies_of_overlays(const Scene& scene) {
+  std::set<std::string> names;
+  for (const Overlay& overlay : scene.overlays) {
+    if (const auto* tree = std::get_if<TreeOverlay>(&overlay)) names.insert(tree->body);
+    if (const auto* closest = std::get_if<ClosestOverlay>(&overlay)) names.insert({closest->a, closest->b});
+    if (const auto* contacts = std::get_if<ContactsOverlay>(&overlay))
+      names.insert({contacts->a, contacts->b});
+  }
+  return names;
+}
+
+/// Returns a box as large as a model.
+sim::Box box_around(const MeshFile& file, const ModelLibrary& models) {
+  constexpr Real kLeast = 1e-6;  // [m]; a flat model has no height
+  const Vec3 size = models.model(file.file).bounds().sizes().cast<Real>();
+  return {(scale_of(file, models) * size).cwiseMax(kLeast)};
+}
+
 nlohmann::ordered_json stats_json(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
 }
@@ -114,6 +146,7 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models, Coll
   std::map<std::string, sim::MeshHandle> meshes;
   std::vector<std::pair<const Body*, sim::BodyDef>> animated;
   std::map<std::vector<float>, sim::MeshHandle> compounds;
+  const std::set<std::string> shown = bodies_of_overlays(scene);
   moving_.resize(objects_.slots);
   moving_poses_.resize(objects_.slots);
   for (const auto& [described, slot, id] : objects_.bodies) {
@@ -135,17 +168,7 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models, Coll
                      .remove_at = body.remove_at};
     def.centre = body.centre;
     def.inertia = inertia_of(body);
-    if (const Material* material = find_material(scene, body.material)) {
-      def.restitution = material->restitution;
-      def.friction = material->friction;
-      def.static_friction = material->static_friction.value_or(def.static_friction);
-      def.rolling_friction = material->rolling_friction;
-      def.spinning_friction = material->spinning_friction;
-      if (material->cross_friction && !body.friction_axis.isZero(0)) {
-        def.cross_friction = *material->cross_friction;
-        def.friction_axis = body.friction_axis;
-      }
-    }
+    if (const Material* material = find_material(scene, body.material)) set_contact(*material, body, def);
     if (body.has_animated_shape() && body.collides) {
       animated.emplace_back(&body, def);
       def.collides = false;  // the pieces of the animated shape collide instead
@@ -154,6 +177,13 @@ void Simulation::add_bodies(const Scene& scene, const ModelLibrary& models, Coll
       std::visit(
           [&](const auto& shape) {
             if constexpr (std::is_same_v<std::decay_t<decltype(shape)>, MeshFile>) {
+              // Nothing reads the shape of a static body without collisions. Its collision mesh would take
+              // milliseconds and memory for each size of a model, as in a forest of scaled trees.
+              if (body.motion == sim::MotionType::static_body && !body.collides &&
+                  !shown.contains(body.name)) {
+                def.shape = box_around(shape, models);
+                return;
+              }
               const std::string key = mesh_key(shape, models);
               sim::MeshHandle& mesh = meshes[key];
               if (!mesh && shared && shared->contains(key)) mesh = world_.add_shared_mesh(shared->at(key));

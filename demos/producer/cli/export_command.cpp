@@ -31,6 +31,7 @@ struct ExportOptions {
 
 /// Throws OutputError before the work begins if the output already exists and must not be replaced.
 void check_target(const ExportTarget& target, const std::vector<int>& frames, const ExportOptions& options) {
+  check_folder(target.path);
   render::create_parent_folders(target.path);
   std::vector<std::string> files;
   if (!target.sequence()) files.push_back(target.path.string());

@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "producer/base/json.h"
 #include "producer/base/suggest.h"
@@ -38,9 +39,10 @@ std::string_view template_text(const std::string& name) {
     if (known == name) return text;
   const std::vector<std::string> names = template_names();
   const std::string near = nearest(name, names);
-  throw std::invalid_argument(fmt::format("there is no template '{}'{}; the templates are\n{}", name,
-                                          near.empty() ? "" : "; did you mean '" + near + "'?",
-                                          list_of_templates()));
+  // In one line, because messages are printed with their control characters escaped.
+  throw std::invalid_argument(
+      fmt::format("there is no template '{}'{} The templates are {}; `offstage new --list` describes them",
+                  name, near.empty() ? "." : "; did you mean '" + near + "'?", fmt::join(names, ", ")));
 }
 
 /// Returns the file name as one types it in a shell.

@@ -344,6 +344,7 @@ void check_distinct(const std::string& a, const std::string& b) {
 void check_png(const std::string& file) {
   if (fs::path(file).extension() != ".png")
     throw OutputError(file + ": a picture is a PNG file; give a name ending in .png");
+  check_folder(file);
 }
 
 int checked_frame(const Scene& scene, double number) {
@@ -355,7 +356,11 @@ int checked_frame(const Scene& scene, double number) {
 }
 
 int frame_at(const Scene& scene, double time) {
-  return checked_frame(scene, 1 + std::round((time - scene.output.start) * scene.output.fps.per_second()));
+  const int count = scene.frame_count();
+  const double number = 1 + std::round((time - scene.output.start) * scene.output.fps.per_second());
+  if (number >= 1 && number <= count) return static_cast<int>(number);
+  throw std::invalid_argument(fmt::format("the time {:g} s is outside the film, which shows {:g} to {:g} s",
+                                          time, scene.output.start, scene.output.time_of(count)));
 }
 
 std::string default_film(const std::string& scene_file) {

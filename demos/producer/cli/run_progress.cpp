@@ -25,9 +25,9 @@ void RunProgress::operator()(const Progress& progress) {
 
 void RunProgress::warn_of_long_run(const Progress& progress) {
   constexpr double kLong_s = 10;
-  constexpr double kPatience_s = 3;  // the first frames take longer than later ones
-  // Whether the time of a frame is known.
-  const bool known = progress.done >= std::min(2, progress.total - 1);
+  constexpr double kPatience_s = 3;
+  // Of a single frame, only the simulation is known before it is finished.
+  const bool known = progress.is_steady || progress.total == 1;
   const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   const double all = elapsed + progress.eta_s;
   if (!known || elapsed < kPatience_s || progress.fraction <= 0 || progress.fraction >= 1 || all < kLong_s)

@@ -1,8 +1,10 @@
 #include "producer/export/film_parts.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
+#include <span>
 
 #include "producer/base/to_float.h"
 #include "producer/build/body_shapes.h"
@@ -34,19 +36,6 @@ render::Mesh ground_square() {
           .normals = std::vector<Vector3f>(4, Vector3f::UnitY()),
           .uvs = {{0, 0}, {0, 1}, {1, 1}, {1, 0}},
           .indices = {0, 1, 2, 0, 2, 3}};
-}
-
-/// Returns a mesh with the texture coordinates at which a texture of its material is read: from the right
-/// set, and transformed.
-render::Mesh with_coordinates_of(const render::TextureMap& map, const render::Mesh& mesh) {
-  render::Mesh result = mesh;
-  if (map.is_plain()) return result;
-  if (map.uv_set == 1) result.uvs = mesh.second_uvs;
-  for (Vector2f& uv : result.uvs) {
-    const Eigen::Vector3f place(uv.x(), uv.y(), 1);
-    uv = {map.rows[0].dot(place), map.rows[1].dot(place)};
-  }
-  return result;
 }
 
 /// Makes names unique.
@@ -153,15 +142,9 @@ class FilmParts::Builder {
     auto& [first_mesh, first_material] = it->second;
     if (is_new) {
       first_mesh = parts_.meshes.size();
-      for (const render::Model::Part& part : model.parts)
-        parts_.meshes.push_back(
-            own_look
-                ? with_coordinates_of(
-                      model.materials[static_cast<std::size_t>(part.material)].base_color_texture, part.mesh)
-                : part.mesh);
+      for (const render::Model::Part& part : model.parts) parts_.meshes.push_back(part.mesh);
       first_material = parts_.materials.size();
-      if (own_look)
-        for (const render::Material& m : model.materials) add_material(m, model.textures);
+      if (own_look) add_materials(model.materials, model.textures);
     }
     for (std::size_t i = 0; i < model.parts.size(); ++i)
       film.parts.push_back({first_mesh + i,
@@ -199,11 +182,19 @@ class FilmParts::Builder {
     return it->second;
   }
 
+  /// Adds a material, whose maps have indices of `textures`.
   void add_material(const render::Material& look, const std::vector<render::Image>& textures) {
-    FilmMaterial material{material_names_(look.name, "material"), look, {}};
-    if (look.base_color_texture.image >= 0)
-      material.texture = textures.at(static_cast<std::size_t>(look.base_color_texture.image));
-    parts_.materials.push_back(std::move(material));
+    add_materials({&look, 1}, textures);
+  }
+  void add_materials(std::span<const render::Material> looks, const std::vector<render::Image>& textures) {
+    const auto first = static_cast<int>(parts_.textures.size());
+    parts_.textures.insert(parts_.textures.end(), textures.begin(), textures.end());
+    for (const render::Material& look : looks) {
+      parts_.materials.push_back({material_names_(look.name, "material"), look});
+      render::for_each_texture(parts_.materials.back().look, [&](render::TextureMap& map) {
+        if (map.image >= 0) map.image += first;
+      });
+    }
   }
 
   FilmParts& parts_;
@@ -226,10 +217,18 @@ FilmParts::FilmParts(const Scene& s, const ModelLibrary& models)
   for (std::size_t i = 0; i < objects.cloths.size(); ++i) builder.add_cloth(*objects.cloths[i].cloth, i);
   for (std::size_t i = 0; i < objects.point_sets.size(); ++i) {
     const auto& [name, look, id] = objects.point_sets[i];
-    points.push_back({builder.unique(name, "particles"), i, !points_def(*look).lit});
+    points.push_back(
+        {builder.unique(name, "particles"), i, !points_def(*look).lit, look->style == LookStyle::sphere});
   }
   for (const std::string& name : lamp_names(s, models)) lamps.push_back(builder.unique(name, "lamp"));
   sun = sun_of(s, models);
+}
+
+bool FilmParts::has_alpha(const render::TextureMap& map) const {
+  const render::Image* image = texture(map);
+  for (std::size_t i = 3; image != nullptr && i < image->rgba.size(); i += 4)
+    if (image->rgba[i] != 255) return true;
+  return false;
 }
 
 render::Camera FilmParts::camera_at(const Snapshot& snapshot) const {
@@ -266,20 +265,16 @@ ClothSurface cloth_surface(const FilmCloth& cloth, const ClothSample& sample) {
   return surface;
 }
 
-std::vector<std::string> look_notes(const Scene& scene) {
-  std::vector<std::string> notes;
-  if (scene.environment.picture)
-    notes.push_back("the environment picture is not exported; load " + scene.environment.picture->file +
-                    " in the other program");
-  const bool laid = std::ranges::any_of(scene.materials, [](const Material& m) {
-    return !m.texture.empty() && (m.texture_projection == TextureProjection::triplanar ||
-                                  m.texture_scale != 1 || m.texture_angle_deg != 0);
-  });
-  if (laid)
-    notes.push_back(
-        "texture_projection, texture_scale and texture_angle_deg are not exported; textures use the UV "
-        "coordinates of their shapes");
-  return notes;
+UvTransform uv_transform(const render::Material& look, const render::TextureMap& map) {
+  if (look.triplanar) return {};
+  const Vector3f &u = map.rows[0], &v = map.rows[1];
+  UvTransform result;
+  // u = (c sx, s sy, ox), v = (-s sx, c sy, oy) with c and s of the angle.
+  result.scale.x() = std::hypot(u.x(), v.x());
+  result.angle = result.scale.x() > 0 ? std::atan2(-v.x(), u.x()) : std::atan2(u.y(), v.y());
+  result.scale.y() = std::sin(result.angle) * u.y() + std::cos(result.angle) * v.y();
+  result.offset = {u.z(), v.z()};
+  return result;
 }
 
 }  // namespace offstage::producer

@@ -19,10 +19,21 @@
 namespace offstage::producer {
 
 struct FilmMaterial {
-  std::string name;  ///< name of the material: unique, not empty
-  render::Material look;
-  std::optional<render::Image> texture;  ///< texture of the base colour
+  std::string name;       ///< name of the material: unique, not empty
+  render::Material look;  ///< its maps have indices of FilmParts::textures
 };
+
+/// The transform of texture coordinates of a map as in KHR_texture_transform: scale, then rotation (positive
+/// turns the image clockwise), then offset; v points downwards.
+struct UvTransform {
+  Eigen::Vector2f scale = {1, 1}, offset = {0, 0};
+  float angle = 0;  ///< [rad]
+
+  bool is_identity() const { return scale.isOnes(0) && offset.isZero(0) && angle == 0; }
+};
+/// Returns the transform of a map. The result is the identity for a map that is projected along three axes,
+/// because its coordinates are not those of the mesh.
+UvTransform uv_transform(const render::Material& look, const render::TextureMap& map);
 
 /// A mesh with a material, placed in the frame of a body. `mesh` and `material` are indices in FilmParts.
 struct FilmPart {
@@ -65,8 +76,9 @@ struct FilmCloth {
 
 struct FilmPoints {
   std::string name;
-  std::size_t set = 0;  ///< index in Snapshot::point_sets
-  bool glows = false;   ///< whether the particles emit light in their colour
+  std::size_t set = 0;    ///< index in Snapshot::point_sets
+  bool glows = false;     ///< whether the particles emit light in their colour
+  bool are_balls = true;  ///< whether they are drawn as balls, not as smoke, streaks, pictures or meshes
 };
 
 /// The meshes, materials and objects of a film. Invisible objects are omitted. Names are unique among objects
@@ -78,6 +90,7 @@ class FilmParts {
   const Scene& scene;
   std::vector<render::Mesh> meshes;
   std::vector<FilmMaterial> materials;
+  std::vector<render::Image> textures;
   std::vector<FilmBody> bodies;
   std::vector<FilmRod> rods;
   std::vector<FilmCloth> cloths;
@@ -85,6 +98,12 @@ class FilmParts {
   std::vector<std::string> lamps;  ///< names of the lights, in the order of lamps_at()
   render::Sun sun;
 
+  /// Returns the picture of a map; null if it has none.
+  const render::Image* texture(const render::TextureMap& map) const {
+    return map.image < 0 ? nullptr : &textures[static_cast<std::size_t>(map.image)];
+  }
+  /// Returns whether a map has a picture with translucent pixels.
+  bool has_alpha(const render::TextureMap& map) const;
   /// Each function returns the camera or the lights at the time of a snapshot.
   render::Camera camera_at(const Snapshot& snapshot) const;
   std::vector<render::Lamp> lamps_at(const Snapshot& snapshot) const;
@@ -109,8 +128,5 @@ struct ClothSurface {
 };
 /// Returns the surface of a cloth in a frame. `cloth` and `sample` must outlive the result.
 ClothSurface cloth_surface(const FilmCloth& cloth, const ClothSample& sample);
-
-/// Returns one note for each feature of the scene's materials that USD and glTF files cannot express.
-std::vector<std::string> look_notes(const Scene& scene);
 
 }  // namespace offstage::producer

@@ -2,10 +2,10 @@
 // cloths are meshes with a morph target for each frame.
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
+#include <set>
+#include <type_traits>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -13,11 +13,11 @@
 #include "producer/base/to_float.h"
 #include "producer/base/version.h"
 #include "producer/build/lights.h"
+#include "producer/export/export_notes.h"
 #include "producer/export/film_export.h"
+#include "producer/export/gltf_buffer.h"
+#include "producer/export/gltf_looks.h"
 #include "producer/export/sample_track.h"
-#include "producer/export/spool.h"
-#include "render/error.h"
-#include "render/image_io.h"
 #include "render/output_file.h"
 #include "sim/core/rotation.h"
 
@@ -31,71 +31,7 @@ using Eigen::Vector3f;
 using Json = nlohmann::ordered_json;
 
 // Constants of the format.
-constexpr int kFloat = 5126, kUnsignedInt = 5125;
-constexpr int kArrayBuffer = 34962, kElementBuffer = 34963;
 constexpr uint32_t kGlbMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
-
-/// The binary buffer of a file, and the accessors that refer to it.
-class GltfBuffer {
- public:
-  explicit GltfBuffer(const fs::path& file) : file_(file), spool_(file.parent_path()) {}
-
-  /// Adds data and returns the index of its accessor. `target`: usage of the data, as a glTF constant; 0:
-  /// neither vertices nor indices.
-  int add(std::span<const float> numbers, int width, int target = 0, bool with_bounds = false) {
-    const char* type = width == 1 ? "SCALAR" : width == 2 ? "VEC2" : width == 3 ? "VEC3" : "VEC4";
-    Json accessor = {{"bufferView", add_view(bytes_of(numbers), target)},
-                     {"componentType", kFloat},
-                     {"count", numbers.size() / static_cast<std::size_t>(width)},
-                     {"type", type}};
-    if (with_bounds) add_bounds(numbers, static_cast<std::size_t>(width), accessor);
-    accessors.push_back(std::move(accessor));
-    return static_cast<int>(accessors.size()) - 1;
-  }
-  int add(std::span<const Vector3f> vectors, int target, bool with_bounds = false) {
-    return add({vectors.empty() ? nullptr : vectors[0].data(), 3 * vectors.size()}, 3, target, with_bounds);
-  }
-  int add_indices(std::span<const uint32_t> indices) {
-    accessors.push_back({{"bufferView", add_view(bytes_of(indices), kElementBuffer)},
-                         {"componentType", kUnsignedInt},
-                         {"count", indices.size()},
-                         {"type", "SCALAR"}});
-    return static_cast<int>(accessors.size()) - 1;
-  }
-  int add_view(std::span<const uint8_t> bytes, int target = 0) {
-    Json view = {{"buffer", 0}, {"byteOffset", spool_.size()}, {"byteLength", bytes.size()}};
-    if (target != 0) view["target"] = target;
-    views.push_back(std::move(view));
-    spool_.append(bytes);
-    constexpr std::array<uint8_t, 4> kZero{};
-    spool_.append(std::span(kZero).first((4 - bytes.size() % 4) % 4));
-    if (spool_.size() > std::numeric_limits<uint32_t>::max() - (1u << 28))
-      throw render::FileError(file_.string() +
-                              ": a .glb file holds 4 GiB at most; export fewer frames, or .usda");
-    return static_cast<int>(views.size()) - 1;
-  }
-  Spool& spool() { return spool_; }
-
-  Json views = Json::array(), accessors = Json::array();
-
- private:
-  template <class T>
-  static std::span<const uint8_t> bytes_of(std::span<const T> values) {
-    return {reinterpret_cast<const uint8_t*>(values.data()), values.size_bytes()};
-  }
-  static void add_bounds(std::span<const float> numbers, std::size_t width, Json& accessor) {
-    std::vector<float> least(width, std::numeric_limits<float>::max()), most(width, -least[0]);
-    for (std::size_t i = 0; i < numbers.size(); ++i) {
-      least[i % width] = std::min(least[i % width], numbers[i]);
-      most[i % width] = std::max(most[i % width], numbers[i]);
-    }
-    accessor["min"] = least;
-    accessor["max"] = most;
-  }
-
-  fs::path file_;
-  Spool spool_;
-};
 
 /// A range of frames in which a cloth has the same triangles. In the file it is a mesh with a morph target
 /// for each frame after the first.
@@ -155,6 +91,7 @@ class GltfExport : public FilmExport {
       : parts_(parts),
         file_(file),
         buffer_(file),
+        looks_(parts, buffer_),
         bodies_(parts.bodies.size()),
         rods_(parts.rods.size()),
         cloths_(parts.cloths.size()),
@@ -189,7 +126,8 @@ class GltfExport : public FilmExport {
   }
 
   void close() override {
-    add_materials();
+    looks_.write();
+    for (const FilmCloth& cloth : parts_.cloths) looks_.materials[cloth.material]["doubleSided"] = true;
     add_meshes();
     for (std::size_t i = 0; i < bodies_.size(); ++i) add_body(parts_.bodies[i], bodies_[i]);
     for (std::size_t i = 0; i < rods_.size(); ++i)
@@ -203,7 +141,12 @@ class GltfExport : public FilmExport {
   }
 
   std::vector<std::string> notes() const override {
-    std::vector<std::string> notes = look_notes(parts_.scene);
+    using enum LookFeature;
+    std::vector<std::string> notes =
+        export_notes(parts_, "glTF",
+                     {texture, glow_texture, normal_map, surface_map, specular_map, vertex_colors, mask,
+                      glass, lacquer, sheen, surface},
+                     {FilmFeature::camera});
     if (!parts_.points.empty())
       notes.push_back(fmt::format(
           "glTF cannot store particles: {} particle system{} not exported; use .usda, .ply or .csv",
@@ -244,9 +187,9 @@ class GltfExport : public FilmExport {
     stretch.frames.push_back(frame);
     std::vector<Vector3f> moves(sample.points.size());
     for (std::size_t i = 0; i < moves.size(); ++i) moves[i] = sample.points[i] - stretch.points[i];
-    const int positions = buffer_.add(moves, kArrayBuffer, true);
+    const int positions = buffer_.add(moves, kGltfVertices, true);
     for (std::size_t i = 0; i < moves.size(); ++i) moves[i] = surface.normals[i] - stretch.normals[i];
-    stretch.targets.emplace_back(positions, buffer_.add(moves, kArrayBuffer));
+    stretch.targets.emplace_back(positions, buffer_.add(moves, kGltfVertices));
   }
 
   float time_of(int frame) const {
@@ -287,56 +230,18 @@ class GltfExport : public FilmExport {
     return index;
   }
 
-  static Json sampler_of(const render::TextureMap& map) {
-    constexpr int kClamp = 33071, kMirror = 33648, kRepeat = 10497, kNearest = 9728, kLinear = 9729;
-    const auto code = [](render::Wrap wrap) {
-      return wrap == render::Wrap::clamp ? kClamp : wrap == render::Wrap::mirror ? kMirror : kRepeat;
-    };
-    return {{"wrapS", code(map.wrap_u)},
-            {"wrapT", code(map.wrap_v)},
-            {"magFilter", map.nearest ? kNearest : kLinear}};
-  }
-
-  void add_materials() {
-    for (const FilmMaterial& m : parts_.materials) {
-      const render::Material& look = m.look;
-      Json pbr = {{"baseColorFactor", {look.color.x(), look.color.y(), look.color.z(), look.color.w()}},
-                  {"metallicFactor", look.metallic},
-                  {"roughnessFactor", look.roughness}};
-      if (m.texture) {
-        const int view = buffer_.add_view(render::encode_png(*m.texture));
-        images_.push_back({{"bufferView", view}, {"mimeType", "image/png"}});
-        texture_samplers_.push_back(sampler_of(look.base_color_texture));
-        textures_.push_back({{"source", images_.size() - 1}, {"sampler", images_.size() - 1}});
-        pbr["baseColorTexture"] = {{"index", textures_.size() - 1}};
-      }
-      Json material = {{"name", m.name}, {"pbrMetallicRoughness", std::move(pbr)}};
-      if (look.color.w() < 1) material["alphaMode"] = "BLEND";
-      if (look.two_sided) material["doubleSided"] = true;
-      const float glow = look.emission.maxCoeff();
-      if (glow > 0) {
-        material["emissiveFactor"] = array(look.emission / std::max(glow, 1.f));
-        if (glow > 1) {
-          material["extensions"]["KHR_materials_emissive_strength"] = {{"emissiveStrength", glow}};
-          used_.insert("KHR_materials_emissive_strength");
-        }
-      }
-      if (look.transmission > 0) {
-        material["extensions"]["KHR_materials_transmission"] = {{"transmissionFactor", look.transmission}};
-        material["extensions"]["KHR_materials_ior"] = {{"ior", look.refraction}};
-        used_.insert({"KHR_materials_transmission", "KHR_materials_ior"});
-      }
-      materials_.push_back(std::move(material));
-    }
-    for (const FilmCloth& cloth : parts_.cloths) materials_[cloth.material]["doubleSided"] = true;
-  }
-
   void add_meshes() {
+    const auto add = [&](const auto& vectors) {
+      constexpr int kWidth = std::remove_cvref_t<decltype(vectors[0])>::SizeAtCompileTime;
+      return buffer_.add({vectors[0].data(), kWidth * vectors.size()}, kWidth, kGltfVertices);
+    };
     for (const render::Mesh& mesh : parts_.meshes) {
-      Json attributes = {{"POSITION", buffer_.add(mesh.positions, kArrayBuffer, true)}};
-      if (!mesh.normals.empty()) attributes["NORMAL"] = buffer_.add(mesh.normals, kArrayBuffer);
-      if (!mesh.uvs.empty())
-        attributes["TEXCOORD_0"] = buffer_.add({mesh.uvs[0].data(), 2 * mesh.uvs.size()}, 2, kArrayBuffer);
+      Json attributes = {{"POSITION", buffer_.add(mesh.positions, kGltfVertices, true)}};
+      if (!mesh.normals.empty()) attributes["NORMAL"] = add(mesh.normals);
+      if (!mesh.tangents.empty()) attributes["TANGENT"] = add(mesh.tangents);
+      if (!mesh.uvs.empty()) attributes["TEXCOORD_0"] = add(mesh.uvs);
+      if (!mesh.second_uvs.empty()) attributes["TEXCOORD_1"] = add(mesh.second_uvs);
+      if (!mesh.colors.empty()) attributes["COLOR_0"] = add(mesh.colors);
       primitives_.push_back(
           {{"attributes", std::move(attributes)}, {"indices", buffer_.add_indices(mesh.indices)}});
     }
@@ -348,6 +253,8 @@ class GltfExport : public FilmExport {
     if (is_new) {
       Json primitive = primitives_[mesh];
       primitive["material"] = material;
+      // In glTF, the colours of a mesh multiply those of every material.
+      if (!parts_.materials[material].look.vertex_colors) primitive["attributes"].erase("COLOR_0");
       meshes_.push_back({{"primitives", Json::array({std::move(primitive)})}});
     }
     return it->second;
@@ -376,9 +283,9 @@ class GltfExport : public FilmExport {
     for (std::size_t i = 0; i < record.stretches.size(); ++i) {
       const ClothStretch& stretch = record.stretches[i];
       const Json attributes = {
-          {"POSITION", buffer_.add(stretch.points, kArrayBuffer, true)},
-          {"NORMAL", buffer_.add(stretch.normals, kArrayBuffer)},
-          {"TEXCOORD_0", buffer_.add({stretch.uvs[0].data(), 2 * stretch.uvs.size()}, 2, kArrayBuffer)}};
+          {"POSITION", buffer_.add(stretch.points, kGltfVertices, true)},
+          {"NORMAL", buffer_.add(stretch.normals, kGltfVertices)},
+          {"TEXCOORD_0", buffer_.add({stretch.uvs[0].data(), 2 * stretch.uvs.size()}, 2, kGltfVertices)}};
       Json primitive = {{"attributes", attributes},
                         {"indices", buffer_.add_indices(stretch.triangles)},
                         {"material", cloth.material}};
@@ -441,7 +348,6 @@ class GltfExport : public FilmExport {
     const auto add = [&](Json light, const NodeTracks& tracks) {
       const std::string name = light["name"];
       lights_.push_back(std::move(light));
-      used_.insert("KHR_lights_punctual");
       add_node({{"name", name}, {"extensions", {{"KHR_lights_punctual", {{"light", lights_.size() - 1}}}}}},
                tracks);
     };
@@ -486,15 +392,19 @@ class GltfExport : public FilmExport {
       if (!list.empty()) json[key] = std::move(list);
     };
     add("meshes", meshes_);
-    add("materials", materials_);
-    add("textures", textures_);
-    add("images", images_);
-    add("samplers", texture_samplers_);
+    add("materials", looks_.materials);
+    add("textures", looks_.textures);
+    add("images", looks_.images);
+    add("samplers", looks_.samplers);
     if (!channels_.empty())
       json["animations"] = Json::array(
           {{{"name", "film"}, {"samplers", std::move(samplers_)}, {"channels", std::move(channels_)}}});
-    if (!lights_.empty()) json["extensions"] = {{"KHR_lights_punctual", {{"lights", std::move(lights_)}}}};
-    if (!used_.empty()) json["extensionsUsed"] = used_;
+    std::set<std::string> used = looks_.used;
+    if (!lights_.empty()) {
+      used.insert("KHR_lights_punctual");
+      json["extensions"] = {{"KHR_lights_punctual", {{"lights", std::move(lights_)}}}};
+    }
+    if (!used.empty()) json["extensionsUsed"] = used;
     add("accessors", buffer_.accessors);
     add("bufferViews", buffer_.views);
     if (buffer_.spool().size() > 0) json["buffers"] = Json::array({{{"byteLength", buffer_.spool().size()}}});
@@ -517,6 +427,7 @@ class GltfExport : public FilmExport {
   const FilmParts& parts_;
   render::OutputFile file_;
   GltfBuffer buffer_;
+  GltfLooks looks_;
   std::vector<int> frames_;
   std::vector<double> times_;  // of the frames [s]
   std::vector<NodeTracks> bodies_, rods_;
@@ -526,12 +437,9 @@ class GltfExport : public FilmExport {
   std::vector<render::Lamp> first_lamps_;
   float first_fov_deg_ = 40;
   bool zooms_ = false, flickers_ = false;
-  Json nodes_ = Json::array(), meshes_ = Json::array(), materials_ = Json::array(), textures_ = Json::array(),
-       images_ = Json::array(), texture_samplers_ = Json::array(), cameras_ = Json::array(),
-       lights_ = Json::array(), samplers_ = Json::array(), channels_ = Json::array(),
-       primitives_ = Json::array();
+  Json nodes_ = Json::array(), meshes_ = Json::array(), cameras_ = Json::array(), lights_ = Json::array(),
+       samplers_ = Json::array(), channels_ = Json::array(), primitives_ = Json::array();
   std::vector<int> roots_;
-  std::set<std::string> used_;
   std::map<std::pair<std::size_t, std::size_t>, int> meshes_done_;
 };
 

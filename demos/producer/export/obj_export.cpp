@@ -1,15 +1,18 @@
 // OBJ (Wavefront): one file per frame, and one file of materials beside them. Particles are points ("p")
 // without size.
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
+#include "producer/export/export_notes.h"
 #include "producer/export/film_export.h"
 #include "producer/export/world_geometry.h"
 #include "render/file_io.h"
 #include "render/image_io.h"
 #include "render/sink.h"
+#include "render/tone_map.h"
 
 namespace offstage::producer {
 namespace {
@@ -21,6 +24,12 @@ std::string one_word(const std::string& name) {
   std::string out;
   for (const char c : name) out += static_cast<unsigned char>(c) <= 0x20 ? '_' : c;
   return out;
+}
+
+/// Returns a linear colour in the encoding of OBJ and MTL files, sRGB. Brighter light is written as it is.
+std::string srgb(const Eigen::Vector3f& linear) {
+  const auto encoded = [](float c) { return c > 1 ? c : render::srgb_encode(std::max(c, 0.f)); };
+  return fmt::format("{} {} {}", encoded(linear.x()), encoded(linear.y()), encoded(linear.z()));
 }
 
 class ObjExport : public FilmExport {
@@ -50,18 +59,24 @@ class ObjExport : public FilmExport {
   }
   void close() override {}
   std::vector<std::string> notes() const override {
-    if (parts_.points.empty()) return {};
-    return {"OBJ has no size and colour of particles: they are written as points"};
+    using enum LookFeature;
+    std::vector<std::string> notes =
+        export_notes(parts_, "OBJ", {texture, glow_texture, normal_map, vertex_colors, mask, surface}, {});
+    if (!parts_.points.empty())
+      notes.push_back("OBJ has no size and colour of particles: they are written as points");
+    return notes;
   }
 
  private:
   void write_group(const WorldGeometry& g, const GeometryGroup& group, std::string& out) const {
     out += fmt::format("o {}\nusemtl {}\n", one_word(group.object),
                        one_word(parts_.materials[group.material].name));
+    const bool colored = parts_.materials[group.material].look.vertex_colors;
     for (std::size_t i = group.first_vertex; i < group.first_vertex + group.vertices; ++i) {
       const Eigen::Vector3f &p = g.positions[i], &n = g.normals[i];
-      out += fmt::format("v {} {} {}\nvn {} {} {}\nvt {} {}\n", p.x(), p.y(), p.z(), n.x(), n.y(), n.z(),
-                         g.uvs[i].x(), 1 - g.uvs[i].y());
+      out += fmt::format("v {} {} {}", p.x(), p.y(), p.z());
+      if (colored) out += " " + srgb(g.colors[i].head<3>());
+      out += fmt::format("\nvn {} {} {}\nvt {} {}\n", n.x(), n.y(), n.z(), g.uvs[i].x(), 1 - g.uvs[i].y());
     }
     for (std::size_t i = group.first_index; i + 2 < group.first_index + group.indices; i += 3) {
       out += 'f';
@@ -71,25 +86,40 @@ class ObjExport : public FilmExport {
   }
 
   void write_materials(const std::string& stem) const {
-    const fs::path folder = pattern_.parent_path();
     std::string out;
     for (const FilmMaterial& m : parts_.materials) {
       const std::string name = one_word(m.name);
-      const Eigen::Vector4f& c = m.look.color;
-      out +=
-          fmt::format("newmtl {}\nKd {} {} {}\nKe {} {} {}\nPr {}\nPm {}\nd {}\nNi {}\n", name, c.x(), c.y(),
-                      c.z(), m.look.emission.x(), m.look.emission.y(), m.look.emission.z(), m.look.roughness,
-                      m.look.metallic, c.w() * (1 - m.look.transmission), m.look.refraction);
-      if (!m.texture) continue;
-      std::string picture = stem + "." + name + ".png";
-      for (char& letter : picture)
-        if (letter == '/') letter = '_';
-      render::write_png(folder / picture, *m.texture);
-      const bool clamped = m.look.base_color_texture.wrap_u == render::Wrap::clamp;
-      out += std::string("map_Kd ") + (clamped ? "-clamp on " : "") + picture + "\n";
+      const render::Material& look = m.look;
+      out += fmt::format("newmtl {}\nKd {}\nKe {}\nPr {}\nPm {}\nd {}\nNi {}\n", name,
+                         srgb(look.color.head<3>()), srgb(look.emission), look.roughness, look.metallic,
+                         look.color.w() * (1 - look.transmission), look.refraction);
+      const std::string base = stem + "." + name;
+      write_map("map_Kd", base, look.base_color_texture, out);
+      if (parts_.has_alpha(look.base_color_texture))
+        out += "map_d " + options_of(look.base_color_texture) + picture_name(base) + "\n";
+      write_map("map_Ke", base + ".Emission", look.emission_texture, out);
+      const std::string slope = look.normal_scale == 1 ? "" : fmt::format("-bm {} ", look.normal_scale);
+      write_map("norm " + slope, base + ".Normal", look.normal_texture, out);
     }
-    render::write_file_atomically(folder / library_,
+    render::write_file_atomically(pattern_.parent_path() / library_,
                                   {reinterpret_cast<const uint8_t*>(out.data()), out.size()});
+  }
+
+  /// Writes the picture of a map, if it has one, and adds its statement.
+  void write_map(const std::string& statement, const std::string& name, const render::TextureMap& map,
+                 std::string& out) const {
+    const render::Image* image = parts_.texture(map);
+    if (image == nullptr) return;
+    const std::string picture = picture_name(name);
+    render::write_png(pattern_.parent_path() / picture, *image);
+    out += statement + (statement.ends_with(' ') ? "" : " ") + options_of(map) + picture + "\n";
+  }
+  static std::string options_of(const render::TextureMap& map) {
+    return map.wrap_u == render::Wrap::clamp ? "-clamp on " : "";
+  }
+  static std::string picture_name(std::string name) {
+    std::ranges::replace(name, '/', '_');
+    return name + ".png";
   }
 
   fs::path pattern_;

@@ -7,11 +7,13 @@
 
 #include <fmt/format.h>
 
+#include "producer/export/export_notes.h"
 #include "producer/export/film_export.h"
 #include "producer/export/world_geometry.h"
 #include "render/file_io.h"
 #include "render/image_io.h"
 #include "render/sink.h"
+#include "render/tone_map.h"
 
 namespace offstage::producer {
 namespace {
@@ -20,9 +22,7 @@ static_assert(std::endian::native == std::endian::little);
 
 /// Converts linear light to eight bits of sRGB, the usual encoding of vertex colours.
 uint8_t srgb_byte(float linear) {
-  const float c = std::clamp(linear, 0.f, 1.f);
-  const float s = c <= 0.0031308f ? 12.92f * c : 1.055f * std::pow(c, 1 / 2.4f) - 0.055f;
-  return static_cast<uint8_t>(std::lround(255 * s));
+  return static_cast<uint8_t>(std::lround(255 * render::srgb_encode(std::clamp(linear, 0.f, 1.f))));
 }
 
 class PlyExport : public FilmExport {
@@ -49,7 +49,8 @@ class PlyExport : public FilmExport {
     for (const GeometryGroup& group : geometry.groups) {
       const Eigen::Vector4f& color = parts_.materials[group.material].look.color;
       for (std::size_t i = group.first_vertex; i < group.first_vertex + group.vertices; ++i)
-        put_vertex(geometry.positions[i], geometry.normals[i], color, 0, group.id, 0);
+        put_vertex(geometry.positions[i], geometry.normals[i], color.cwiseProduct(geometry.colors[i]), 0,
+                   group.id, 0);
     }
     for (const GeometryParticles& p : geometry.particles)
       for (const render::Point& point : p.set->points)
@@ -62,6 +63,12 @@ class PlyExport : public FilmExport {
     render::write_file_atomically(render::frame_path(pattern_, snapshot.frame), bytes_);
   }
   void close() override {}
+  std::vector<std::string> notes() const override {
+    std::vector<std::string> notes = export_notes(parts_, "PLY", {LookFeature::vertex_colors}, {});
+    if (!std::ranges::all_of(parts_.points, &FilmPoints::are_balls))
+      notes.push_back("PLY has no smoke, streaks and pictures: all particles are exported as points");
+    return notes;
+  }
 
  private:
   template <class T>

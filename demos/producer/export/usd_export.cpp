@@ -1,6 +1,7 @@
 // USD as text (.usda): "Universal Scene Description", openusd.org. Lengths are in metres, Y is up, and time
 // codes are frames.
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -10,11 +11,12 @@
 #include "producer/base/to_float.h"
 #include "producer/base/version.h"
 #include "producer/build/lights.h"
+#include "producer/export/export_notes.h"
 #include "producer/export/film_export.h"
 #include "producer/export/sample_track.h"
 #include "producer/export/spool.h"
+#include "producer/export/usd_looks.h"
 #include "producer/export/usd_text.h"
-#include "render/image_io.h"
 #include "render/output_file.h"
 #include "sim/core/rotation.h"
 
@@ -141,8 +143,8 @@ class UsdExport : public FilmExport {
   UsdExport(const fs::path& file, const FilmParts& parts)
       : parts_(parts),
         folder_(file.parent_path()),
-        stem_(file.stem().string()),
         file_(file),
+        looks_(parts, folder_, file.stem().string()),
         bodies_(parts.bodies.size()),
         rods_(parts.rods.size()),
         lamps_(parts.lamps.size()) {
@@ -182,7 +184,7 @@ class UsdExport : public FilmExport {
   void close() override {
     put_header();
     put("def Xform \"World\"\n{\n");
-    put_materials();
+    put(looks_.write());
     put_bodies();
     put_rods();
     for (std::size_t i = 0; i < cloths_.size(); ++i) put_cloth(parts_.cloths[i], *cloths_[i]);
@@ -195,12 +197,12 @@ class UsdExport : public FilmExport {
   }
 
   std::vector<std::string> notes() const override {
-    std::vector<std::string> notes = look_notes(parts_.scene);
-    for (const FilmMaterial& m : parts_.materials)
-      if (m.look.pattern != render::Pattern::none) {
-        notes.push_back("USD: patterns of materials are replaced by their first colour");
-        break;
-      }
+    using enum LookFeature;
+    std::vector<std::string> notes = export_notes(
+        parts_, "UsdPreviewSurface", {texture, glow_texture, normal_map, surface_map, mask, lacquer, surface},
+        {FilmFeature::sky, FilmFeature::camera, FilmFeature::lens});
+    if (!std::ranges::all_of(parts_.points, &FilmPoints::are_balls))
+      notes.push_back("USD has no smoke, streaks and pictures: all particles are exported as points");
     return notes;
   }
 
@@ -276,46 +278,6 @@ class UsdExport : public FilmExport {
                     parts_.scene.output.fps.per_second(), first_, parts_.scene.output.fps.per_second()));
   }
 
-  static const char* wrap_name(render::Wrap wrap) {
-    return wrap == render::Wrap::clamp ? "clamp" : wrap == render::Wrap::mirror ? "mirror" : "repeat";
-  }
-
-  void put_materials() {
-    put("def Scope \"Materials\"\n{\n");
-    for (std::size_t i = 0; i < parts_.materials.size(); ++i) {
-      const FilmMaterial& m = parts_.materials[i];
-      const std::string name = material_names_(m.name), path = "/World/Materials/" + name;
-      materials_.push_back(path);
-      const render::Material& look = m.look;
-      const float opacity = look.color.w() * (1 - look.transmission);
-      std::string diffuse =
-          fmt::format("color3f inputs:diffuseColor = {}\n", usd::text(Vector3f(look.color.head<3>())));
-      std::string texture;
-      if (m.texture) {
-        const std::string picture = fmt::format("{}.{}.png", stem_, name);
-        render::write_png(folder_ / picture, *m.texture);
-        diffuse = fmt::format("color3f inputs:diffuseColor.connect = <{}/Texture.outputs:rgb>\n", path);
-        texture = fmt::format(
-            "def Shader \"Coordinates\"\n{{\nuniform token info:id = \"UsdPrimvarReader_float2\"\n"
-            "string inputs:varname = \"st\"\nfloat2 outputs:result\n}}\n"
-            "def Shader \"Texture\"\n{{\nuniform token info:id = \"UsdUVTexture\"\n"
-            "asset inputs:file = @./{}@\nfloat2 inputs:st.connect = <{}/Coordinates.outputs:result>\n"
-            "token inputs:wrapS = \"{}\"\ntoken inputs:wrapT = \"{}\"\n"
-            "token inputs:sourceColorSpace = \"sRGB\"\nfloat3 outputs:rgb\n}}\n",
-            picture, path, wrap_name(look.base_color_texture.wrap_u),
-            wrap_name(look.base_color_texture.wrap_v));
-      }
-      put(fmt::format(
-          "def Material \"{}\"\n{{\ntoken outputs:surface.connect = <{}/Surface.outputs:surface>\n"
-          "def Shader \"Surface\"\n{{\nuniform token info:id = \"UsdPreviewSurface\"\n{}"
-          "color3f inputs:emissiveColor = {}\nfloat inputs:metallic = {}\nfloat inputs:roughness = {}\n"
-          "float inputs:opacity = {}\nfloat inputs:ior = {}\ntoken outputs:surface\n}}\n{}}}\n",
-          name, path, diffuse, usd::text(look.emission), look.metallic, look.roughness, opacity,
-          look.refraction, texture));
-    }
-    put("}\n");
-  }
-
   static std::string display_name(const std::string& name) {
     return fmt::format("displayName = {}", usd::quoted(name));
   }
@@ -331,7 +293,7 @@ class UsdExport : public FilmExport {
             fmt::format("def \"part_{}\" (\n  prepend references = </_Meshes/mesh_{}>\n"
                         "  prepend apiSchemas = [\"MaterialBindingAPI\"]\n)\n{{\n"
                         "rel material:binding = <{}>\n",
-                        k, part.mesh, materials_[part.material]));
+                        k, part.mesh, looks_.path(part.material)));
         if (parts_.materials[part.material].look.two_sided) put("uniform bool doubleSided = 1\n");
         if (!part.body_from_part.matrix().isIdentity(0))
           put(
@@ -352,7 +314,7 @@ class UsdExport : public FilmExport {
                       "  prepend apiSchemas = [\"MaterialBindingAPI\"]\n)\n{{\n"
                       "rel material:binding = <{}>\n{}"
                       "uniform token[] xformOpOrder = [\"xformOp:transform\"]\n}}\n",
-                      names_(rod.name), display_name(rod.name), rod.mesh, materials_[rod.material],
+                      names_(rod.name), display_name(rod.name), rod.mesh, looks_.path(rod.material),
                       sampled("matrix4d xformOp:transform", rods_[i].transform) +
                           sampled("token visibility", rods_[i].visibility)));
     }
@@ -363,7 +325,7 @@ class UsdExport : public FilmExport {
         fmt::format("def Mesh \"{}\" (\n  {}\n  prepend apiSchemas = [\"MaterialBindingAPI\"]\n)\n{{\n"
                     "rel material:binding = <{}>\nuniform token subdivisionScheme = \"none\"\n"
                     "uniform bool doubleSided = 1\n",
-                    names_(cloth.name), display_name(cloth.name), materials_[cloth.material]));
+                    names_(cloth.name), display_name(cloth.name), looks_.path(cloth.material)));
     for (SpooledAttribute* attribute : {&a.counts, &a.indices, &a.points, &a.velocities, &a.normals, &a.uvs})
       attribute->write(file_);
     put(sampled("token visibility", a.visibility) + "}\n");
@@ -424,6 +386,14 @@ class UsdExport : public FilmExport {
     }
   }
 
+  void put_coordinates(const char* name, const std::vector<Eigen::Vector2f>& uvs) {
+    if (uvs.empty()) return;
+    std::vector<Eigen::Vector2f> upwards;
+    for (const Eigen::Vector2f& uv : uvs) upwards.push_back({uv.x(), 1 - uv.y()});
+    put(fmt::format("texCoord2f[] primvars:{} = {} (\n  interpolation = \"vertex\"\n)\n", name,
+                    usd::list(std::span<const Eigen::Vector2f>(upwards))));
+  }
+
   /// The meshes that bodies refer to. A class prim is not drawn by itself.
   void put_prototypes() {
     put("class \"_Meshes\"\n{\n");
@@ -438,12 +408,8 @@ class UsdExport : public FilmExport {
       if (!mesh.normals.empty())
         put(fmt::format("normal3f[] normals = {} (\n  interpolation = \"vertex\"\n)\n",
                         usd::list(std::span<const Vector3f>(mesh.normals))));
-      if (!mesh.uvs.empty()) {
-        std::vector<Eigen::Vector2f> upwards;
-        for (const Eigen::Vector2f& uv : mesh.uvs) upwards.push_back({uv.x(), 1 - uv.y()});
-        put(fmt::format("texCoord2f[] primvars:st = {} (\n  interpolation = \"vertex\"\n)\n",
-                        usd::list(std::span<const Eigen::Vector2f>(upwards))));
-      }
+      put_coordinates("st", mesh.uvs);
+      put_coordinates("st1", mesh.second_uvs);
       put("}\n");
     }
     put("}\n");
@@ -451,8 +417,8 @@ class UsdExport : public FilmExport {
 
   const FilmParts& parts_;
   fs::path folder_;
-  std::string stem_;
   render::OutputFile file_;
+  UsdLooks looks_;
   int first_ = 0, last_ = 0;
   std::vector<PoseTrack> bodies_;
   std::vector<RodTracks> rods_;
@@ -461,8 +427,7 @@ class UsdExport : public FilmExport {
   SampleTrack<Eigen::Matrix4f> camera_;
   SampleTrack<float> focal_, focus_, f_stop_;
   std::vector<LampTracks> lamps_;
-  usd::PrimNames names_, material_names_;
-  std::vector<std::string> materials_;  // paths of the materials
+  usd::PrimNames names_;
 };
 
 }  // namespace

@@ -28,8 +28,11 @@ struct GeometryParticles {
 
 struct WorldGeometry {
   std::vector<Eigen::Vector3f> positions, normals;
-  std::vector<Eigen::Vector2f> uvs;  ///< texture coordinates, v downwards; zero where a mesh has none
-  std::vector<uint32_t> indices;     ///< indices of vertices, three per triangle
+  /// Places in the texture of the base colour, v downwards; zero where a mesh has no texture coordinates.
+  std::vector<Eigen::Vector2f> uvs;
+  /// Vertex colours, linear with straight alpha; white where the material does not use them.
+  std::vector<Eigen::Vector4f> colors;
+  std::vector<uint32_t> indices;  ///< indices of vertices, three per triangle
   std::vector<GeometryGroup> groups;
   std::vector<GeometryParticles> particles;
 };

@@ -102,7 +102,8 @@ class CostTable {
     ObjectCost& picture = entry({}, "picture", "");
     picture.size = fmt::format("{}x{}, {} sub-frame{}", scene_.render.size.x(), scene_.render.size.y(),
                                subframes_, subframes_ > 1 ? "s" : "");
-    picture.advice = "a smaller --size, or --quality draft";
+    picture.advice = scene_.render.quality == Quality::draft ? "a smaller --size, or fewer --frames"
+                                                             : "a smaller --size, or --quality draft";
     picture.drawing_s = subframes_ * pixels_ * kPixel_s;
   }
 

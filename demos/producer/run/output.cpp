@@ -86,8 +86,17 @@ std::string hash_pattern(const std::string& pattern) {
          found.suffix().str();
 }
 
+void check_folder(const fs::path& file) {
+  const fs::path folder = file.parent_path();
+  std::error_code error;
+  if (folder.string().find('#') == std::string::npos || fs::is_directory(folder, error)) return;
+  throw OutputError(file.string() +
+                    ": the frame number (#) can only be in the name of the file, not in that of its folder");
+}
+
 OutputTarget parse_output(const std::string& out) {
   if (out == "-") return {OutputKind::pipe, {}};
+  check_folder(out);
   const std::vector<std::string> endings = render::video_endings();
   const auto is_ending = [&](const std::string& text) {
     return std::ranges::find(endings, text) != endings.end();

@@ -34,6 +34,10 @@ struct OutputTarget {
   std::filesystem::path path;  ///< pattern of the frames, or file of the video
 };
 
+/// Throws OutputError if the folder of a file has a # in its name, which is meant as a frame number, and does
+/// not exist.
+void check_folder(const std::filesystem::path& file);
+
 /// Parses the argument OUT. Throws OutputError for an unknown ending. Also throws OutputError for a number
 /// pattern of another program, such as f%04d.png; the message gives the equivalent pattern with #.
 OutputTarget parse_output(const std::string& out);

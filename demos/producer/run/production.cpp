@@ -20,6 +20,7 @@
 #include "producer/run/pipeline.h"
 #include "producer/run/snapshot_cache.h"
 #include "producer/run/state_source.h"
+#include "producer/run/time_left.h"
 #include "producer/run/trace.h"
 #include "render/context.h"
 #include "render/error.h"
@@ -39,9 +40,10 @@ double ms_since(Clock::time_point start) {
 /// thread that writes share one object.
 class ProgressMeter {
  public:
-  /// `drawing_ms`: initial estimate of the time to draw a frame [ms].
-  ProgressMeter(const ProgressCallback& callback, int frames, int frames_to_simulate, double drawing_ms)
-      : callback_(callback), guess_ms_(drawing_ms) {
+  /// See TimeLeft for the arguments.
+  ProgressMeter(const ProgressCallback& callback, int frames, int frames_to_simulate, int warm_ups,
+                double drawing_ms)
+      : callback_(callback), left_(frames, frames_to_simulate, warm_ups, drawing_ms) {
     latest_.total = frames;
     latest_.frames_to_simulate = frames_to_simulate;
   }
@@ -49,7 +51,9 @@ class ProgressMeter {
     const std::lock_guard lock(mutex_);
     if (!callback_ || latest_.frames_simulated >= latest_.frames_to_simulate) return;
     ++latest_.frames_simulated;
-    simulation_ms_ += ms_since(simulating_since_);
+    const double ms = ms_since(simulating_since_);
+    left_.simulated(ms);
+    latest_.simulating_s += ms / 1000;
     latest_.frame_finished = false;
     report();
     simulating_since_ = Clock::now();
@@ -60,7 +64,8 @@ class ProgressMeter {
     const std::lock_guard lock(mutex_);
     if (!callback_) return;
     ++latest_.done;
-    drawing_ms_ += render_ms + encode_ms;
+    left_.finished(render_ms + encode_ms, ms_since(start_) / 1000);
+    latest_.drawing_s += (render_ms + encode_ms) / 1000;
     latest_.sim_ms = sim_ms;
     latest_.render_ms = render_ms;
     latest_.encode_ms = encode_ms;
@@ -70,26 +75,17 @@ class ProgressMeter {
   }
 
  private:
-  /// Computes the progress, with the mean times of simulated and finished frames as weights, and reports it.
   void report() {
-    constexpr double kKnown = 0.02;  // fraction of the work after which the rest can be estimated
-    const auto mean = [](double sum, int count, double guess) { return count > 0 ? sum / count : guess; };
-    const double simulating = mean(simulation_ms_, latest_.frames_simulated, 0),
-                 drawing = mean(drawing_ms_, latest_.done, guess_ms_);
-    const double done = simulating * latest_.frames_simulated + drawing * latest_.done,
-                 all = simulating * latest_.frames_to_simulate + drawing * latest_.total;
-    latest_.fraction = latest_.done == latest_.total ? 1 : all > 0 ? std::min(1.0, done / all) : 0;
-    latest_.simulating_s = simulation_ms_ / 1000;
-    latest_.drawing_s = drawing_ms_ / 1000;
-    latest_.eta_s = latest_.fraction > kKnown ? ms_since(start_) / 1000 * (1 / latest_.fraction - 1) : 0;
+    latest_.fraction = left_.fraction();
+    latest_.eta_s = left_.seconds(ms_since(start_) / 1000);
+    latest_.is_steady = left_.is_steady();
     callback_(latest_);
   }
 
   const ProgressCallback& callback_;
-  const double guess_ms_;
   std::mutex mutex_;
+  TimeLeft left_;
   Progress latest_;
-  double simulation_ms_ = 0, drawing_ms_ = 0;
   const Clock::time_point start_ = Clock::now();
   Clock::time_point simulating_since_ = start_;  // only the simulating thread uses it
 };
@@ -307,7 +303,8 @@ RunStats render_frames(const LoadedScene& loaded, const ModelLibrary& models, co
   StateSource& source = own ? *own : *job.states;
   constexpr double kDrawing_ms = 300;
   const auto frames = static_cast<int>(job.frames.size());
-  ProgressMeter meter(progress, frames, frames > 0 ? source.advances_to(job.frames.back()) : 0, kDrawing_ms);
+  ProgressMeter meter(progress, frames, frames > 0 ? source.advances_to(job.frames.back()) : 0, job.threads,
+                      kDrawing_ms);
 
   Pipeline pipeline(job.threads + 2);
   const auto draw = [&] {
@@ -375,7 +372,7 @@ RunStats simulate_frames(const LoadedScene& loaded, const ModelLibrary& models, 
   stats.bodies = simulation.body_count();
   stats.energy_start = simulation.energy();
 
-  ProgressMeter meter(progress, total, simulation.advances_to(total), 0);
+  ProgressMeter meter(progress, total, simulation.advances_to(total), 0, 0);
   for (int frame = 1; frame <= total; ++frame) {
     const auto step_start = Clock::now();
     meter.simulation_goes_on();
@@ -421,7 +418,7 @@ RunStats visit_frames(const LoadedScene& loaded, const ModelLibrary& models, con
       job.cache ? cached_source(loaded, models, *job.cache)
                 : std::make_unique<LiveSource>(loaded.scene, models, kept, std::nullopt);
   const auto frames = static_cast<int>(job.frames.size());
-  ProgressMeter meter(progress, frames, frames > 0 ? source->advances_to(job.frames.back()) : 0, 0);
+  ProgressMeter meter(progress, frames, frames > 0 ? source->advances_to(job.frames.back()) : 0, 0, 0);
   for (const int frame : job.frames) {
     const auto sim_start = Clock::now();
     meter.simulation_goes_on();

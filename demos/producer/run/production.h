@@ -86,6 +86,8 @@ struct Progress {
   bool frame_finished = true;
   /// Time spent so far. The time of drawing includes encoding, and is summed over all threads.
   double simulating_s = 0, drawing_s = 0;
+  /// Whether `eta_s` does not extrapolate the first frames, which take longer (see TimeLeft).
+  bool is_steady = false;
 };
 using ProgressCallback = std::function<void(const Progress&)>;
 
