@@ -209,14 +209,17 @@ void FastContacts::collect(std::span<const Island* const> islands) {
     }
 }
 
-/// Collects the contact points of links, grouped by articulation.
+/// Marks the links among the bodies, and collects their contact points, grouped by articulation.
 void FastContacts::collect_link_contacts() {
   link_contacts_.clear();
   if (joints_.articulations().empty()) return;
   constexpr uint32_t kNone = UINT32_MAX;
   std::vector<uint32_t> part_of(members_.size(), kNone);
   for (uint32_t i = 0; i < joints_.articulations().size(); ++i)
-    for (const Body* body : joints_.articulations()[i]->bodies()) part_of[body->row] = i;
+    for (const Body* body : joints_.articulations()[i]->bodies()) {
+      part_of[body->row] = i;
+      bodies_[body->row].is_link = true;
+    }
   for (uint32_t k = 0; k < patches_.size(); ++k) {
     const ContactPatch& p = patches_[k];
     const uint32_t part = std::min(part_of[p.a], part_of[p.b]);

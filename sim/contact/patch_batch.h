@@ -70,6 +70,7 @@ struct PatchBatch {
   PatchGroups approach;  ///< twist due to the velocities at the start, conveyors included
   Lanes conveyed;        ///< component of `approach` along n due to conveyors [m/s]
   Lanes friction_t, friction_k;
+  Lanes allowed;                         ///< overlap that push-out leaves; see RelaxedBody::is_link [m]
   bool resists_turning;                  ///< whether a lane has rolling or spinning friction
   Lanes rolling;                         ///< radius of the disc of rolling friction per normal impulse [m]
   Lanes spin_arm;                        ///< spinning friction divided by the coefficient of friction [m]

@@ -35,6 +35,7 @@ namespace offstage::sim {
 /// A body during a step of the fast solver.
 struct RelaxedBody {
   Real inverse_mass = 0;                ///< [1/kg]; 0: contacts do not move it, but it may be moving
+  bool is_link = false;                 ///< whether joints hold it; contacts know its own mass only
   Mat3 inverse_inertia = Mat3::Zero();  ///< inverse inertia about the centre of mass, world axes [1/(kg m^2)]
   Vec3 velocity = Vec3::Zero();  ///< velocity of the centre of mass [m/s]; in: at the start, out: at the end
   Vec3 angular_velocity = Vec3::Zero();           ///< world [rad/s]; in: at the start, out: at the end

@@ -324,6 +324,7 @@ void ParticleContacts::solve(std::span<CollidingParticle> particles, const Order
   if (lcp_cluster > 0) solve_clusters(lcp_cluster);
   relax();
   displace(end, touched);
+  follow_carriers(end);
   push_apart(end);
   stop_passing(end);
   keep_outside(end, reactions, strikes);

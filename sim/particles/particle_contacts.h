@@ -171,6 +171,9 @@ class ParticleContacts {
   void relax();
   void displace(std::span<Vec3> end, std::span<uint8_t> touched);
   void push_apart(std::span<Vec3> end);
+  // carried_particles.cpp
+  std::vector<const Obstacle*> find_carriers() const;
+  void follow_carriers(std::span<Vec3> end) const;
   // tunneling_guard.cpp
   void stop_passing(std::span<Vec3> end);
   bool predict_paths(std::span<const Vec3> end);

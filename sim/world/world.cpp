@@ -10,6 +10,7 @@
 #include "sim/articulation/joint_energy.h"
 #include "sim/contact/contact_lcp.h"
 #include "sim/dynamics/pair_forces.h"
+#include "sim/geometry/solid_check.h"
 #include "sim/world/coupled_system.h"
 #include "sim/world/world_impl.h"
 
@@ -155,9 +156,7 @@ void check_mesh(const std::string& object, const TriangleMesh& mesh) {
 }
 
 RigidBody make_rigid_body(const std::string& object, const BodyDef& def, const Solid& solid) {
-  if (solid.mesh && !solid.mesh->solid)
-    refuse(object,
-           "a dynamic body needs a closed mesh, this one has: " + solid.mesh->topology.defects().describe());
+  if (solid.mesh && !solid.mesh->solid) refuse(object, problem_of_solid(solid.mesh->topology.defects()));
   const MassProperties unit = solid.mesh ? solid.mesh->mass : mass_properties(def.shape);
   if (!(unit.volume > 0)) refuse(object, "a dynamic body needs a solid shape, this one has no volume");
   RigidBody rigid;

@@ -118,5 +118,27 @@ TEST(ModelSize, AutoIsReadAndWritten) {
   EXPECT_THROW(parse_scene(wrong, "scene", OFFSTAGE_SOURCE_DIR), SceneError);
 }
 
+// The decomposition of a large open mesh may take minutes.
+TEST(OpenModel, OfADynamicBodyIsRefusedBeforeItsDecomposition) {
+  const render::ScratchFolder folder;
+  folder.put("shell.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n");
+  const LoadedScene loaded = parse_scene(
+      R"({"bodies": [{"name": "shell", "shape": {"type": "mesh", "file": "shell.obj"}},
+                     {"name": "ball", "position": [0, 5, 0]}]})",
+      "scene", folder.path());
+  std::vector<Problem> warnings;
+  std::vector<std::string> steps;
+  try {
+    ModelLibrary(loaded.scene, loaded.folder, {}, warnings,
+                 [&](const std::string& step) { steps.push_back(step); });
+    ADD_FAILURE() << "not refused";
+  } catch (const SceneError& error) {
+    EXPECT_NE(std::string(error.what()).find("body \"shell\": a dynamic body needs a closed mesh"),
+              std::string::npos)
+        << error.what();
+  }
+  EXPECT_TRUE(steps.empty());
+}
+
 }  // namespace
 }  // namespace offstage::producer

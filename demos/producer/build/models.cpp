@@ -17,6 +17,7 @@
 #include "render/image_io.h"
 #include "render/mesh_io.h"
 #include "sim/geometry/mesh.h"
+#include "sim/geometry/solid_check.h"
 
 namespace offstage::producer {
 namespace {
@@ -283,6 +284,7 @@ ModelLibrary::ModelLibrary(const Scene& scene, const SceneFolder& folder, const 
   if (problems.empty()) check_cameras_and_lights(scene, *this, problems, warnings);
   digest_ = hex(XXH3_128bits_digest(hash));
   XXH3_freeState(hash);
+  if (problems.empty()) check_solids(scene, problems);
   if (!problems.empty()) throw SceneError(std::move(problems));
   decompose_models(scene, cache, warnings, on_step);
 }
@@ -351,6 +353,21 @@ std::string ModelLibrary::parts_key(const MeshFile& mesh) {
   const sim::DecompositionSettings s = settings_of(mesh.decomposition);
   return fmt::format("{}\n{} {} {} {} {} {}", mesh.file, static_cast<int>(s.method), s.max_error, s.max_parts,
                      s.most_parts, s.min_dihedral, s.min_distance);
+}
+
+void ModelLibrary::check_solids(const Scene& scene, std::vector<Problem>& problems) const {
+  std::map<std::string, std::string> known;  // by file
+  for (const Body& body : scene.bodies) {
+    const auto* mesh = std::get_if<MeshFile>(&body.shape);
+    if (!mesh || body.motion != sim::MotionType::dynamic || body.has_animated_shape()) continue;
+    const auto [at, is_new] = known.try_emplace(mesh->file);
+    if (is_new) {
+      const sim::TriangleMesh welded = sim::weld(collision_mesh(model(mesh->file), 1));
+      at->second = sim::problem_of_solid(sim::MeshTopology(welded).defects());
+    }
+    if (!at->second.empty())
+      problems.push_back({body.where, fmt::format("body \"{}\": {}", body.name, at->second)});
+  }
 }
 
 void ModelLibrary::decompose_models(const Scene& scene, const DecompositionCache& cache,

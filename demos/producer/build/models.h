@@ -74,6 +74,9 @@ class ModelLibrary {
                               std::vector<Problem>& warnings);
   static std::string animation_key(const Body& body);
   void read_animations(const Scene& scene, const DecompositionCache& cache, std::vector<Problem>& problems);
+  /// Adds a problem for each dynamic body whose model is not closed. The decomposition of such a model may
+  /// take minutes.
+  void check_solids(const Scene& scene, std::vector<Problem>& problems) const;
   void decompose_models(const Scene& scene, const DecompositionCache& cache, std::vector<Problem>& warnings,
                         const StepCallback& on_step);
 
