@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <tuple>
 
 #include "sim/geometry/closest_points.h"
@@ -31,6 +32,9 @@ constexpr Real kSelfRecovery = 0.05;
 /// kNearest: a pair nearer than this fraction of its thickness does not approach further, because its
 /// distance and its side would soon be lost in rounding.
 constexpr Real kLeft = 0.1, kNearest = 0.02;
+/// Sine of the angle by which the surface around a closest point may rise towards the other surface, for
+/// rounding.
+constexpr Real kRise = 0.01;
 /// Distance below which the normal is undefined [m].
 constexpr Real kNoSide = 1e-9;
 /// A unit vector in single precision has at least this length.
@@ -144,6 +148,7 @@ void SelfContacts::assign(std::vector<Triangle> triangles, const ClothPoints& po
       owns_point_[t][k] = !std::exchange(point_taken[a], uint8_t{1});
       owns_edge_[t][k] = edge_taken.try_emplace(std::minmax(a, b)).second;
     }
+  find_neighbours(points.size());
   pairs_.clear();
   contacts_.clear();
   travel_.assign(points.size(), 0);
@@ -154,6 +159,22 @@ void SelfContacts::assign(std::vector<Triangle> triangles, const ClothPoints& po
   margin_.resize(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) margin_[i] = points.thickness[i] * (1 + kMargin) / 2;
   horizon_ = -1;
+}
+
+void SelfContacts::find_neighbours(std::size_t point_count) {
+  std::vector<std::pair<uint32_t, uint32_t>> pairs;
+  for (const Triangle& t : triangles_)
+    for (std::size_t k = 0; k < 3; ++k)
+      for (std::size_t j : {(k + 1) % 3, (k + 2) % 3}) pairs.emplace_back(t[k], t[j]);
+  std::ranges::sort(pairs);
+  pairs.erase(std::ranges::unique(pairs).begin(), pairs.end());
+  neighbours_.clear();
+  first_neighbour_.assign(point_count + 1, 0);
+  for (const auto& [point, neighbour] : pairs) {
+    neighbours_.push_back(neighbour);
+    ++first_neighbour_[point + 1];
+  }
+  std::partial_sum(first_neighbour_.begin(), first_neighbour_.end(), first_neighbour_.begin());
 }
 
 /// Adds the pairs of the points and edges of two triangles that may touch within the horizon, if
@@ -288,6 +309,52 @@ SelfContacts::Sides SelfContacts::sides_of(const Pair& pair, const Vec4& normal,
   return sides;
 }
 
+/// Returns the sum of the normals of the triangles at an edge, of any length and sign.
+Vec4 SelfContacts::normal_at_edge(const ClothPoints& points, uint32_t a, uint32_t b) const {
+  const Vec3 from = points.start_at(a), along = points.start_at(b) - from;
+  const std::span<const uint32_t> beside = neighbours(b);
+  Vec3 sum = Vec3::Zero();
+  for (uint32_t i : neighbours(a)) {
+    if (std::ranges::find(beside, i) == beside.end()) continue;
+    const Vec3 normal = along.cross(points.start_at(i) - from);
+    sum += normal.dot(sum) < 0 ? Vec3(-normal) : normal;
+  }
+  return padded(sum);
+}
+
+/// Returns other normals, of any length and sign, of planes that may separate a pair in its whole sub-step,
+/// if a plane perpendicular to the line between its closest points does not. That line may be inclined to
+/// layers that slide on each other by more than their distance. Parallel edges have no common normal; those
+/// of their surfaces take its place.
+std::array<Vec4, 3> SelfContacts::other_normals(const ClothPoints& points, const Pair& pair) const {
+  const auto& p = pair.points;
+  const Vec4 common = common_normal(points.start, p, pair.edges);
+  if (!pair.edges) return {common, Vec4(Vec4::Zero()), Vec4(Vec4::Zero())};
+  return {common, normal_at_edge(points, p[0], p[1]), normal_at_edge(points, p[2], p[3])};
+}
+
+/// Seeks a normal along which a pair is at least `least` apart at the start of the sub-step, there after its
+/// drift, and at the end. Then no fractions of its moves can make it cross. Returns whether there is one; it
+/// becomes the normal of the contact.
+bool SelfContacts::turn_plane(const ClothPoints& points, Contact& contact, Real least,
+                              std::span<const Vec4> drift) const {
+  const Pair& pair = pairs_[contact.pair];
+  const Vec4& origin = points.start[pair.points[0]];
+  for (const Vec4& other : other_normals(points, pair)) {
+    const Real length = other.norm();
+    if (!(length > 0)) continue;
+    const Vec4 normal = other / (other.dot(contact.normal) < 0 ? -length : length);
+    const auto separates = [&](auto&& at) { return sides_of(pair, normal, origin, at).apart() >= least; };
+    if (!separates([&](uint32_t i) -> const Vec4& { return points.start[i]; }) ||
+        !separates([&](uint32_t i) { return Vec4(points.start[i] + drift[i]); }) ||
+        !separates([&](uint32_t i) -> const Vec4& { return points.position[i]; }))
+      continue;
+    contact.normal = normal;
+    return true;
+  }
+  return false;
+}
+
 SelfContacts::Contact SelfContacts::look(const ClothPoints& points, uint32_t k) {
   Pair& pair = pairs_[k];
   const Closest c = closest(points.start, pair.points, pair.edges);
@@ -344,6 +411,44 @@ void SelfContacts::push_apart(ClothPoints& points, Real dt) {
 
 void SelfContacts::find_doubtful(const ClothPoints& points, Real dt, std::span<const Vec4> drift) {
   gather(points, dt, drift, [](const Pair& pair) { return least_distance(pair.distance, pair.nearest); });
+  for (Contact& c : contacts_) {
+    const Pair& pair = pairs_[c.pair];
+    const Real least = least_distance(c.distance, pair.nearest);
+    const Sides sides = sides_of(pair, c.normal, points.start[pair.points[0]],
+                                 [&](uint32_t i) -> const Vec4& { return points.position[i]; });
+    if (sides.apart() < least) turn_plane(points, c, least, drift);
+  }
+}
+
+/// Whether no point of the surface near a feature is farther along `normal` than the feature, which is a
+/// point or an edge perpendicular to `normal`.
+bool SelfContacts::is_farthest(const ClothPoints& points, std::span<const uint32_t> feature,
+                               const Vec4& normal) const {
+  const Vec4& origin = points.start[feature.front()];
+  const std::span<const uint32_t> beside = neighbours(feature.back());
+  return std::ranges::all_of(neighbours(feature.front()), [&](uint32_t i) {
+    if (feature.size() > 1 && std::ranges::find(beside, i) == beside.end()) return true;
+    const Vec4 d = points.start[i] - origin;
+    return normal.dot(d) <= kRise * d.norm();
+  });
+}
+
+/// Whether the closest points of a pair are also the closest ones of the surfaces around them. Where they are
+/// not, the pair's normal is inclined to the surfaces, and would stop layers that slide on each other. Other
+/// pairs are closer, and they push.
+bool SelfContacts::is_closest(const ClothPoints& points, const Contact& contact) const {
+  const Pair& pair = pairs_[contact.pair];
+  const auto& p = pair.points;
+  const bool is_near_at_rest = pair.thickness < (points.thickness[p[0]] + points.thickness[p[3]]) / 2;
+  if (is_near_at_rest) return true;
+  std::array<uint32_t, 3> feature;
+  std::size_t count = 0;
+  for (std::size_t k = first_side(pair.edges); k < 4; ++k)
+    if (contact.weights[k] != 0) feature[count++] = p[k];
+  if (count > 2) return true;  // the normal of a triangle
+  const auto first = std::span(p).first(first_side(pair.edges));
+  return is_farthest(points, first, -contact.normal) &&
+         is_farthest(points, std::span(feature).first(count), contact.normal);
 }
 
 /// Makes one sweep that keeps the thickness between all pairs, with friction.
@@ -364,7 +469,7 @@ void SelfContacts::keep_thickness(ClothPoints& points) {
                           ? pair.thickness
                           : c.distance + kSelfRecovery * (pair.thickness - c.distance);
     const Real push = kept - c.normal.dot(apart);
-    if (!(push > 0) || !(mobility > 0)) continue;
+    if (!(push > 0) || !(mobility > 0) || !is_closest(points, c)) continue;
     ++active_[points.cloth[pair.points[0]]];
     Vec4 move = push * c.normal;
     const Vec4 slip = moved - c.normal.dot(moved) * c.normal;
@@ -385,17 +490,18 @@ void SelfContacts::keep_thickness(ClothPoints& points) {
 /// that point of each element that would go farthest beyond the plane. Pairs that remain are left to
 /// shorten(), which stops points in all directions. Springs to points that still move then gain energy, and
 /// many pressed layers jam.
-void SelfContacts::keep_sides(ClothPoints& points) const {
+void SelfContacts::keep_sides(ClothPoints& points) {
   bool again = true;
   for (int sweep = 0; again && sweep < kSideSweeps; ++sweep) {
     again = false;
-    for (const Contact& c : contacts_) {
+    for (Contact& c : contacts_) {
       const Pair& pair = pairs_[c.pair];
       const Sides sides = sides_of(pair, c.normal, points.start[pair.points[0]],
                                    [&](uint32_t i) -> const Vec4& { return points.position[i]; });
-      const Real push = kBeyondLeast * least_distance(c.distance, pair.nearest) - sides.apart();
+      const Real least = kBeyondLeast * least_distance(c.distance, pair.nearest);
+      const Real push = least - sides.apart();
       const Real mobility = points.inverse_mass[sides.first] + points.inverse_mass[sides.second];
-      if (!(push > 0) || !(mobility > 0)) continue;
+      if (!(push > 0) || !(mobility > 0) || turn_plane(points, c, least, still_)) continue;
       again = true;
       const Vec4 impulse = push / mobility * c.normal;
       for (const auto& [i, sign] : {std::pair(sides.first, 1.0), std::pair(sides.second, -1.0)}) {

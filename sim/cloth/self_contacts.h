@@ -4,7 +4,8 @@
 ///
 /// Cloth that does not cross itself at the start never crosses itself. A pair cannot have crossed if the sum
 /// of its displacements is less than its distance. Any other pair is separated by a plane at the start of the
-/// sub-step. If no plane with the same normal separates it at the end, its displacements are shortened.
+/// sub-step. If no plane with the same normal separates it at the end, and none with a few other normals
+/// separates it at both times, its displacements are shortened.
 
 #include <array>
 #include <cstdint>
@@ -71,7 +72,7 @@ class SelfContacts {
   struct Contact {
     uint32_t pair;
     std::array<Real, 4> weights;  // weights of the points in the vector between the closest points
-    Vec4 normal;                  // direction from the second element to the first
+    Vec4 normal;                  // unit direction from the second element to the first
     Real distance;                // distance at the start of the sub-step
     bool pushes;                  // if false, contacts of its neighbours push in its place
   };
@@ -84,8 +85,18 @@ class SelfContacts {
     Real apart() const { return low - high; }
   };
 
+  void find_neighbours(std::size_t point_count);
+  std::span<const uint32_t> neighbours(uint32_t point) const {
+    return std::span(neighbours_)
+        .subspan(first_neighbour_[point], first_neighbour_[point + 1] - first_neighbour_[point]);
+  }
+  Vec4 normal_at_edge(const ClothPoints& points, uint32_t a, uint32_t b) const;
+  std::array<Vec4, 3> other_normals(const ClothPoints& points, const Pair& pair) const;
+  bool is_farthest(const ClothPoints& points, std::span<const uint32_t> feature, const Vec4& normal) const;
+  bool is_closest(const ClothPoints& points, const Contact& contact) const;
   void keep_thickness(ClothPoints& points);
-  void keep_sides(ClothPoints& points) const;
+  void keep_sides(ClothPoints& points);
+  bool turn_plane(const ClothPoints& points, Contact& contact, Real least, std::span<const Vec4> drift) const;
   template <class At>
   static Sides sides_of(const Pair& pair, const Vec4& normal, const Vec4& origin, At&& at);
   void predict(const ClothPoints& points, std::size_t i, Real dt);
@@ -108,6 +119,7 @@ class SelfContacts {
 
   std::vector<Triangle> triangles_;
   std::vector<std::array<bool, 3>> owns_point_, owns_edge_;  // by triangle; each has one owner
+  std::vector<uint32_t> neighbours_, first_neighbour_;       // by point: the other points of its triangles
   ClothTree tree_;
 
   std::vector<Pair> pairs_;
