@@ -31,6 +31,21 @@ constexpr Real kTouching = 1e-6;
 /// Cloth that rises at this slope from a pin is stretched by 4 %.
 constexpr Real kSlopeAtPin = 0.3;
 
+/// Slows the sliding of a body on another one by at most the impulse `most` [N s]. `b`: null for what does
+/// not move.
+void rub(ClothBody& a, const Vec3& on_a, ClothBody* b, const Vec3& on_b, const Vec3& normal, Real most) {
+  const Vec3 relative = a.velocity(on_a) - (b ? b->velocity(on_b) : Vec3(Vec3::Zero()));
+  const Vec3 slip = relative - normal.dot(relative) * normal;
+  const Real speed = slip.norm();
+  if (!(speed > 0) || !(most > 0)) return;
+  const Vec3 along = slip / speed;
+  const Real mobility = a.mobility(on_a, along) + (b ? b->mobility(on_b, -along) : 0);
+  if (!(mobility > 0)) return;
+  const Real held = std::min(speed / mobility, most);
+  a.apply_impulse(-held * along, on_a);
+  if (b) b->apply_impulse(held * along, on_b);
+}
+
 }  // namespace
 
 /// Finds the bodies near a point. Near means within twice the distance that the two move relative to each
@@ -342,17 +357,30 @@ void ClothContacts::solve(ClothPoints& points, Real dt, Real parts, std::vector<
       return a.body->is_dynamic() > b.body->is_dynamic();
     });
     for (std::size_t a = 0; a < count; ++a) {
-      bool supported = points.inverse_mass[point] == 0;
+      const bool is_pinned = points.inverse_mass[point] == 0;
+      bool supported = is_pinned, is_carried = false;
       for (std::size_t b = 0; b < count; ++b) {
         if (touches_[a].normal.dot(touches_[b].normal) > kFacing) continue;
-        if (carries(touches_[a], touches_[b])) continue;
+        if (carries(touches_[a], touches_[b])) {
+          is_carried = true;
+          continue;
+        }
         supported = true;
-        if (a < b && (touches_[a].body->is_dynamic() || touches_[b].body->is_dynamic()))
+        if (!is_pinned && a < b && (touches_[a].body->is_dynamic() || touches_[b].body->is_dynamic()))
           pinch(touches_[a], touches_[b],
                 std::sqrt(points.friction[point] * std::min(touches_[a].body->obstacle().friction,
                                                             touches_[b].body->obstacle().friction)));
       }
-      if (points.inverse_mass[point] == 0) block(touches_[a], points.holder[point]);
+      // Where the contact solver carries the load, it also separates the bodies. At an edge of the body,
+      // block() would push it away from points beside it.
+      if (is_pinned && !is_carried) {
+        touches_[a].near->pressed = 0;
+        block(touches_[a], points.holder[point]);
+        // The point has no mass that could take up the friction in press().
+        const Real friction = std::sqrt(points.friction[point] * touches_[a].body->obstacle().friction);
+        rub(*touches_[a].body, touches_[a].on_body, points.holder[point], touches_[a].on_body,
+            touches_[a].normal, friction * touches_[a].near->pressed);
+      }
       const bool is_moved = !(supported && touches_[a].body->is_dynamic()) &&
                             !presses_from_above(points, *touches_[a].body, point, touches_[a].normal);
       press(points, touches_[a], dt, parts, !is_moved, cuts);
@@ -386,15 +414,7 @@ void ClothContacts::pinch(Touch& a, Touch& b, Real friction) {
   b.body->apply_impulse(impulse * n, b.on_body);
   a.near->pressed += impulse;
   b.near->pressed += impulse;
-  const Vec3 relative = a.body->velocity(a.on_body) - b.body->velocity(b.on_body);
-  const Vec3 slip = relative - n.dot(relative) * n;
-  const Real speed = slip.norm();
-  if (!(speed > 0)) return;
-  const Vec3 along = slip / speed;
-  const Real stick = speed / (a.body->mobility(a.on_body, along) + b.body->mobility(b.on_body, -along));
-  const Real held = std::min(stick, friction * impulse);
-  a.body->apply_impulse(-held * along, a.on_body);
-  b.body->apply_impulse(held * along, b.on_body);
+  rub(*a.body, a.on_body, b.body, b.on_body, n, friction * impulse);
 }
 
 /// Solves the contact of a body with a point that is pinned to the world or to another body.
@@ -409,7 +429,7 @@ void ClothContacts::block(Touch& t, ClothBody* holder) {
   if (!(impulse > 0)) return;
   t.body->apply_impulse(-impulse * t.normal, t.on_body);
   if (holder) holder->apply_impulse(impulse * t.normal, t.on_body);
-  t.near->pressed += impulse;
+  t.near->pressed = impulse;
 }
 
 std::vector<Vec3> ClothContacts::stop_bodies(const ClothPoints& points, std::span<const uint8_t> shortened,
