@@ -53,7 +53,7 @@ void integrate(RigidBody& body, const BodyForces& forces, const Integrator& inte
   std::array<Real, kBodyP> p;
   load(body, x, p);
   work.next_step = body.next_step;
-  integrator.step(FreeBody(body, forces), t, h, x, p, work);
+  stable_integrator(integrator, stiffness(body, forces), h).step(FreeBody(body, forces), t, h, x, p, work);
   body.next_step = work.next_step;
   store(x, p, body);
 }
@@ -157,6 +157,22 @@ void store(std::span<const Real> x, std::span<const Real> p, RigidBody& body) {
   body.orientation = Quat(turn_of(x)).normalized();
   body.momentum = vec3(p, 0);
   body.angular_momentum = vec3(p, 3);
+}
+
+Stiffness stiffness(const RigidBody& body, const BodyForces& forces) {
+  const Real by_moment = body.inverse_inertia.norm();
+  Stiffness at_centre{0, body.linear_drag}, at_points;
+  for (const ActiveForce& f : forces.forces) {
+    if (!f.acts_on(body)) continue;
+    if (const auto* grab = std::get_if<Grab>(&f.def->effect))
+      at_points +=
+          (1 / body.mass + (grab->point - body.centre).squaredNorm() * by_moment) * stiffness(*f.def);
+    else
+      at_centre += stiffness(*f.def);
+  }
+  // Forces at the centre and torques do not affect each other.
+  at_points.by_velocity += std::max(at_centre.by_velocity / body.mass, body.angular_drag * by_moment);
+  return at_points;
 }
 
 void FreeBody::velocity(Real, std::span<const Real> x, std::span<const Real> p, std::span<Real> dx) const {

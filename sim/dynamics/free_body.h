@@ -9,6 +9,7 @@
 #include "sim/dynamics/force_field.h"
 #include "sim/dynamics/integrator.h"
 #include "sim/dynamics/rigid_body.h"
+#include "sim/dynamics/stiffness.h"
 
 namespace offstage::sim {
 
@@ -42,6 +43,9 @@ struct RigidStage {
 
 void load(const RigidBody& body, std::span<Real> x, std::span<Real> p);
 void store(std::span<const Real> x, std::span<const Real> p, RigidBody& body);
+
+/// Returns an upper bound of the stiffness of the forces on a body, per mass and per moment of inertia.
+Stiffness stiffness(const RigidBody& body, const BodyForces& forces);
 
 /// The dynamic system of a single body.
 class FreeBody final : public DynamicSystem {

@@ -1,6 +1,7 @@
 #include "sim/dynamics/implicit_euler.h"
 
 #include <algorithm>
+#include <numbers>
 
 #include <Eigen/SparseLU>
 
@@ -15,10 +16,12 @@ constexpr int kIterations = 16;
 constexpr Real kConverged = 1e-9, kLeastScale = 1e-3;
 constexpr Real kShortest = 1.0 / 64;
 
-/// One implicit step of a system, from the state at time `t` to the state at time `t + h`.
-class ImplicitStep {
+}  // namespace
+
+/// The implicit equations of a system.
+class ImplicitIntegrator::Equations {
  public:
-  ImplicitStep(const DynamicSystem& system, std::size_t x_size, std::size_t p_size, IntegratorReport& report)
+  Equations(const DynamicSystem& system, std::size_t x_size, std::size_t p_size, IntegratorReport& report)
       : system_(system),
         report_(report),
         n_(static_cast<Eigen::Index>(x_size)),
@@ -27,12 +30,12 @@ class ImplicitStep {
         slope_(size_),
         velocity_(x_size) {}
 
-  /// Improves `y` until it solves y = y0 + h f(t + h, y). Returns false if the iteration fails.
-  bool solve(Real t, Real h, const Eigen::VectorXd& y0, Eigen::VectorXd& y) {
+  /// Improves `y` until it solves y = constant + h f(t, y). Returns false if the iteration fails.
+  bool solve(Real t, Real h, const Eigen::VectorXd& constant, Eigen::VectorXd& y) {
     for (int i = 0; i < kIterations; ++i) {
-      evaluate(t + h, y);
-      if (!factorize(t + h, h, y)) return false;
-      const Eigen::VectorXd correction = factors_.solve(y0 + h * slope_ - y);
+      evaluate(t, y);
+      if (!factorize(t, h, y)) return false;
+      const Eigen::VectorXd correction = factors_.solve(constant + h * slope_ - y);
       y += correction;
       ++report_.iterations;
       if (!y.allFinite()) return false;
@@ -72,7 +75,7 @@ class ImplicitStep {
   /// Whether a correction that led to `y` is negligible, both in the coordinates and by its effect on the
   /// rates.
   bool is_small(const Eigen::VectorXd& correction, Real t, Real h, const Eigen::VectorXd& y) {
-    system_.velocity(t + h, head(y), tail(y), velocity_);
+    system_.velocity(t, head(y), tail(y), velocity_);
     array(velocity_) = h * (array(velocity_) - slope_.head(n_).array());
     const Real least = kConverged * std::max(kLeastScale, greatest(head(y)));
     return greatest(head(correction)) <= least && greatest(velocity_) <= least;
@@ -89,13 +92,11 @@ class ImplicitStep {
   std::vector<Real> velocity_;
 };
 
-}  // namespace
-
-void ImplicitEuler::step(const DynamicSystem& system, Real t, Real h, std::span<Real> x, std::span<Real> p,
-                         IntegratorWorkspace& work) const {
+void ImplicitIntegrator::step(const DynamicSystem& system, Real t, Real h, std::span<Real> x,
+                              std::span<Real> p, IntegratorWorkspace& work) const {
   if (x.empty()) return;
   const auto n = static_cast<Eigen::Index>(x.size());
-  ImplicitStep implicit(system, x.size(), p.size(), work.report);
+  Equations equations(system, x.size(), p.size(), work.report);
   Eigen::VectorXd start(x.size() + p.size());
   start << array(x).matrix(), array(p).matrix();
   Eigen::VectorXd end(start.size());
@@ -103,7 +104,7 @@ void ImplicitEuler::step(const DynamicSystem& system, Real t, Real h, std::span<
   Real length = h;
   for (Real at = 0; at < h;) {
     end = start;
-    const bool good = implicit.solve(t + at, length, start, end);
+    const bool good = advance(equations, t + at, length, start, end);
     if (!good && length > h * kShortest) {
       length /= 2;  // after halving, the steps still end exactly at h
       ++work.report.rejected;
@@ -116,6 +117,21 @@ void ImplicitEuler::step(const DynamicSystem& system, Real t, Real h, std::span<
   }
   array(x) = start.head(n).array();
   array(p) = start.tail(start.size() - n).array();
+}
+
+bool ImplicitEuler::advance(Equations& equations, Real t, Real h, const Eigen::VectorXd& y0,
+                            Eigen::VectorXd& y) const {
+  return equations.solve(t + h, h, y0, y);
+}
+
+bool StiffRungeKutta::advance(Equations& equations, Real t, Real h, const Eigen::VectorXd& y0,
+                              Eigen::VectorXd& y) const {
+  // With g = 1 - sqrt(1/2): y1 = y0 + g h f(t + g h, y1) and y = y0 + (1 - g) h f(t + g h, y1)
+  // + g h f(t + h, y), where the first equation gives h f(t + g h, y1) = (y1 - y0) / g.
+  constexpr Real g = 1 - std::numbers::sqrt2 / 2;
+  const bool good = equations.solve(t + g * h, g * h, y0, y);
+  const Eigen::VectorXd constant = y0 + (1 - g) / g * (y - y0);
+  return equations.solve(t + h, g * h, constant, y) && good;
 }
 
 }  // namespace offstage::sim

@@ -105,18 +105,13 @@ void add(const Other&, const Run&) {
                 "every other kind must be handled here");
 }
 
-/// Stiffness and damping of a force on a particle: the negative derivatives of the force by position [N/m]
-/// and by velocity [N s/m].
-struct Stiffness {
-  Real by_position = 0, by_velocity = 0;
-};
-
-Stiffness stiffness(const Grab& f, Real t, const Vec3& x) {
+/// Returns the stiffness of a force on a particle at the position x.
+Stiffness stiffness_at(const Grab& f, Real t, const Vec3& x) {
   const bool held = (x - f.track.at(t, Pose{}).pose.position).norm() < f.reach;
   return held ? Stiffness{f.stiffness, f.damping} : Stiffness{};
 }
 template <class Effect>
-Stiffness stiffness(const Effect& f, Real, const Vec3& x) {
+Stiffness stiffness_at(const Effect& f, Real, const Vec3& x) {
   if constexpr (requires { f.drag; }) return {0, f.drag * strength(f.region, f.drop_rate, x)};
   return {};
 }
@@ -131,6 +126,12 @@ void ParticleForces::accelerate(Real t, std::span<const Real> x, std::span<const
   const Run run{t, x, v, mass, drag, dv, damping};
   for (const ForceDef* field : fields)
     std::visit([&](const auto& effect) { add(effect, run); }, field->effect);
+}
+
+Stiffness ParticleForces::stiffness() const {
+  Stiffness sum{0, drag};
+  for (const ForceDef* field : fields) sum += sim::stiffness(*field);
+  return sum;
 }
 
 void ParticleForces::leapfrog_step(Real h, std::span<Vec3> x, std::span<Vec3> v,
@@ -158,12 +159,9 @@ void ParticleForces::jacobian(Real t, std::span<const Real> x, std::span<const R
                               SparseEntries& entries) const {
   for (std::size_t i = 0; i < mass.size(); ++i) {
     Stiffness sum{0, drag};
-    for (const ForceDef* field : fields) {
-      const Stiffness s =
-          std::visit([&](const auto& effect) { return stiffness(effect, t, vec3(x, 3 * i)); }, field->effect);
-      sum.by_position += s.by_position;
-      sum.by_velocity += s.by_velocity;
-    }
+    for (const ForceDef* field : fields)
+      sum += std::visit([&](const auto& effect) { return stiffness_at(effect, t, vec3(x, 3 * i)); },
+                        field->effect);
     for (int k = 3 * static_cast<int>(i); k < 3 * static_cast<int>(i) + 3; ++k) {
       entries.emplace_back(at_x + k, at_v + k, 1);
       entries.emplace_back(at_v + k, at_x + k, -sum.by_position / mass[i]);

@@ -9,6 +9,7 @@
 #include "sim/dynamics/flat.h"
 #include "sim/dynamics/force_field.h"
 #include "sim/dynamics/integrator.h"
+#include "sim/dynamics/stiffness.h"
 #include "sim/particles/particles.h"
 
 namespace offstage::sim {
@@ -30,6 +31,8 @@ struct ParticleForces {
   /// if not empty, gets for each particle the rate at which drag reduces its velocity [1/s].
   void accelerate(Real t, std::span<const Real> x, std::span<const Real> v, std::span<const Real> mass,
                   std::span<Real> dv, std::span<Real> damping = {}) const;
+  /// Returns an upper bound of the stiffness of the forces on a particle [N/m], [N s/m].
+  Stiffness stiffness() const;
   /// Takes one step of IntegratorKind::leapfrog of length h [s] with consecutive particles. `fields` must be
   /// empty.
   void leapfrog_step(Real h, std::span<Vec3> x, std::span<Vec3> v, std::span<const Real> mass) const;

@@ -99,7 +99,22 @@ void ParticleSystem::fly(const ParticleForces& forces, Real t, Real h, std::size
   // The reset makes the result independent of the thread's previous particle, and so of the number of
   // threads.
   scratch.integrator.next_step = 0;
-  integrator(def.integrator).step(FreeFlight(forces, mass), t, h, flat(x), flat(v), scratch.integrator);
+  const Integrator& wanted = integrator(def.integrator);
+  Stiffness stiffness = forces.stiffness();
+  if (def.integrator == IntegratorKind::leapfrog) stiffness.by_velocity = 0;  // stable for any drag
+  const auto is_stable = [&](Real m) { return sim::is_stable(wanted, 1 / m * stiffness, h); };
+  if (is_stable(std::ranges::max(mass)))
+    wanted.step(FreeFlight(forces, mass), t, h, flat(x), flat(v), scratch.integrator);
+  if (is_stable(std::ranges::min(mass))) return;
+  // Light particles get steps of their own. The others do not depend on them.
+  for (std::size_t i = 0; i < mass.size(); ++i) {
+    if (is_stable(mass[i])) continue;
+    x[i] = scratch.position[i];
+    v[i] = scratch.velocity[i];
+    stable_integrator(wanted, 1 / mass[i] * stiffness, h)
+        .step(FreeFlight(forces, mass.subspan(i, 1)), t, h, flat(x.subspan(i, 1)), flat(v.subspan(i, 1)),
+              scratch.integrator);
+  }
 }
 
 /// Moves a particle freely until the sub-step begins, if it was created before time 0 or long before this

@@ -253,9 +253,61 @@ void CoupledGroup::kick(Real t, Real h, IntegratorWorkspace& work) {
   }
 }
 
-/// Returns the number of kicks in a step.
-Real CoupledGroup::kicks(Real h) const {
-  Real count = 1;
+/// Returns an upper bound of the stiffness of the forces on the members, per mass. Each object has the
+/// damping of its own drag and of the springs at it. A spring moves at most with the sum of both its ends:
+/// with the damping forces C (A v) of all springs and the inverse masses M, no eigenvalue of M A^T C A, which
+/// is a sum over objects, exceeds the greatest sum that a spring meets.
+Stiffness CoupledGroup::stiffness(Real t) const {
+  struct Damping {
+    Mat3 linear = Mat3::Zero();  // [kg/s]
+    Real angular = 0;            // [kg m^2/s]
+  };
+  std::vector<Damping> bodies(bodies_.size()), particles(particles_);
+  const auto damping_at = [&](const End& e) {
+    return e.kind == End::Kind::particle ? &particles[e.index] : e.is_moved() ? &bodies[e.index] : nullptr;
+  };
+  for (const ActiveSpring& s : springs_) {
+    if (s.damping == 0) continue;
+    const Vec3 along = pull(s, t, x_, p_).along;
+    for (const End* end : {&s.a, &s.b}) {
+      Damping* at = damping_at(*end);
+      if (!at) continue;
+      at->linear += s.damping * along * along.transpose();
+      if (end->kind == End::Kind::dynamic)
+        at->angular += s.damping * (end->body->rigid.orientation * end->point).cross(along).squaredNorm();
+    }
+  }
+  Stiffness most;
+  std::vector<Real> body_rates, particle_rates;
+  const auto add = [&](const Stiffness& own, Real by_springs, std::vector<Real>& rates) {
+    rates.push_back(own.by_velocity + by_springs);
+    most.by_position = std::max(most.by_position, own.by_position);
+    most.by_velocity = std::max(most.by_velocity, rates.back());
+  };
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    const RigidBody& body = bodies_[i]->rigid;
+    add(sim::stiffness(body, forces_),
+        bodies[i].linear.norm() / body.mass + bodies[i].angular * body.inverse_inertia.norm(), body_rates);
+  }
+  for (const Group& g : groups_) {
+    const Stiffness own = g.forces.stiffness();
+    for (std::size_t k = 0; k < g.mass.size(); ++k)
+      add(1 / g.mass[k] * own, particles[g.offset + k].linear.norm() / g.mass[k], particle_rates);
+  }
+  for (const ActiveSpring& s : springs_) {
+    Real sum = 0;
+    for (const End* end : {&s.a, &s.b})
+      if (end->is_moved())
+        sum += end->kind == End::Kind::particle ? particle_rates[end->index] : body_rates[end->index];
+    if (s.damping > 0) most.by_velocity = std::max(most.by_velocity, sum);
+  }
+  return most;
+}
+
+/// Returns the number of kicks in a step. `damping`: greatest rate of damping [1/s]; a kick by explicit drag
+/// covers a decay by a factor e.
+Real CoupledGroup::kicks(Real h, Real damping) const {
+  Real count = std::max(1.0, std::ceil(damping * h));
   for (const Jointed& j : articulations_)
     if (j.articulation->has_springs()) count = std::max(count, j.articulation->kicks_needed(h));
   return std::min(count, kMostPieces);
@@ -263,8 +315,9 @@ Real CoupledGroup::kicks(Real h) const {
 
 /// Returns the number of pieces into which a step is divided. No fixed-step integrator is accurate if bodies
 /// turn, or swing, by much more than kTurn or kSwing in a step. Links under high tension swing like the
-/// masses of a vibrating string.
-Real CoupledGroup::pieces(Real h) const {
+/// masses of a vibrating string. Drag of the rate `damping` [1/s] is integrated explicitly while the pieces
+/// allow it, because the implicit method does not know the derivatives of joint forces.
+Real CoupledGroup::pieces(Real h, Real damping) const {
   Real fastest = 0, tightest = 0, spin = 0;
   for (const Body* body : bodies_) spin = std::max(spin, greatest_spin(body->rigid));
   for (const Jointed& j : articulations_) {
@@ -272,7 +325,7 @@ Real CoupledGroup::pieces(Real h) const {
       fastest = std::max(fastest, body->rigid.angular_velocity().norm());
     if (!j.articulation->has_springs()) tightest = std::max(tightest, j.articulation->greatest_frequency());
   }
-  return std::clamp(std::ceil(std::max({fastest / kTurn, tightest / kSwing, spin / kSpin}) * h), 1.0,
+  return std::clamp(std::ceil(std::max({fastest / kTurn, tightest / kSwing, spin / kSpin, damping}) * h), 1.0,
                     kMostPieces);
 }
 
@@ -306,13 +359,21 @@ void CoupledGroup::step(const Integrator& integrator, Real t, Real h, Integrator
     if (const Real next = body->rigid.next_step; next > 0)
       work.next_step = work.next_step > 0 ? std::min(work.next_step, next) : next;
   const bool particles_only = bodies_.empty() && springs_.empty();
-  const Integrator& chosen =
-      particles_only ? sim::integrator(groups_.front().system->def.integrator) : integrator;
+  const IntegratorKind of_particles =
+      particles_only ? groups_.front().system->def.integrator : IntegratorKind::rk4;
+  Stiffness stiff = stiffness(t);
+  if (particles_only && of_particles == IntegratorKind::leapfrog)
+    stiff.by_velocity = 0;  // stable for any drag
   const bool is_kicked =
       std::ranges::any_of(articulations_, [](const Jointed& j) { return j.articulation->has_springs(); });
-  const Real kick_count = is_kicked ? kicks(h) : 1;
+  const Real kick_count = is_kicked ? kicks(h, stiff.by_velocity) : 1;
   for (const Jointed& j : articulations_) j.articulation->set_kicks(kick_count);
-  const Real each = std::ceil(pieces(h) / kick_count), count = kick_count * each, duration = h / count;
+  const bool is_divided = !articulations_.empty() && !is_stable(integrator, stiff, h);
+  const Real damping = is_divided ? stiff.by_velocity : 0;
+  const Real each = std::ceil(pieces(h, damping) / kick_count), count = kick_count * each,
+             duration = h / count;
+  const Integrator& chosen =
+      stable_integrator(particles_only ? sim::integrator(of_particles) : integrator, stiff, duration);
   int halvings = kMostHalvings;
   for (Real i = 0; i < count; ++i) {
     const Real begin = t + i * duration;

@@ -110,8 +110,9 @@ class CoupledGroup final : public DynamicSystem {
               std::span<const Real> dp) const;
   void add_joint_forces(const Jointed& jointed, Real t, std::span<const Real> x, std::span<const Real> p,
                         std::span<Real> dp) const;
-  Real pieces(Real h) const;
-  Real kicks(Real h) const;
+  Stiffness stiffness(Real t) const;
+  Real pieces(Real h, Real damping) const;
+  Real kicks(Real h, Real damping) const;
   void kick(Real t, Real h, IntegratorWorkspace& work);
   /// Kinetic energy [J], power of all forces except joint forces [W], and a measure of these forces: the
   /// kinetic energy that they would give to free bodies from rest in a time t, divided by t^2 [J/s^2].

@@ -248,23 +248,6 @@ TEST(SceneCheck, ForcesNameExistingObjects) {
             "/forces/0/drop_rate: has no effect without a region\n");
 }
 
-TEST(SceneCheck, GrabsAndWindsTooStrongForTheStepAreRefusedUnlessTheIntegratorFollows) {
-  const auto scene = [](const std::string& integrator) {
-    return R"({"world": {"step": 0.01, "integrator": ")" + integrator +
-           R"("}, "bodies": [{"name": "ball", "mass": 1}],
-      "forces": [{"type": "wind", "drag": 300},
-                 {"type": "grab", "body": "ball", "keyframes": [{}], "stiffness": 90000, "damping": 0}]})";
-  };
-  // Bounds: 2.785 m / c = 0.0093 s, and 2.83 sqrt(m / k) = 0.0094 s.
-  EXPECT_EQ(errors_of(scene("rk4")),
-            "/forces/0/drag: is too large for this mass and sub-step: /world/step must be less than 0.00924 "
-            "s, is 0.01 s\n"
-            "/forces/1: the grab 'force_1' is too stiff for this sub-step: /world/step must be less than "
-            "0.00938 s, is 0.01 s\n");
-  for (const char* integrator : {"implicit_euler", "adaptive_rk4", "dormand_prince"})
-    EXPECT_EQ(errors_of(scene(integrator)), "");
-}
-
 TEST(SceneCheck, EventsAtUnreachableAgesAreErrors) {
   const auto scene = [](const std::string& more) {
     return R"({"emitters": [{"lifespan": {"mean": 1, "deviation": 0.2}, )" + more + "}]}";
@@ -285,19 +268,18 @@ TEST(SceneCheck, EventsAtUnreachableAgesAreErrors) {
 
 // --- Springs ---
 
-/// Integrates x'' = -k x - c x' from rest at x = 1 and returns whether the solution stays bounded.
-bool stays_bounded(sim::IntegratorKind kind, Real k, Real c, Real h) {
+/// Integrates x'' = -k x from rest at x = 1 and returns whether the solution stays bounded.
+bool stays_bounded(sim::IntegratorKind kind, Real k, Real h) {
   Real x = 1, v = 0;
-  const auto a = [&](Real x1, Real v1) { return -k * x1 - c * v1; };
+  const auto a = [&](Real x1) { return -k * x1; };
   for (int i = 0; i < 20000 && std::abs(x) < 1e6; ++i) {
     if (kind == sim::IntegratorKind::symplectic_euler) {
-      v += h * a(x, v);
+      v += h * a(x);
       x += h * v;
     } else {
-      const Real x2 = x + h / 2 * v, v2 = v + h / 2 * a(x, v), x3 = x + h / 2 * v2,
-                 v3 = v + h / 2 * a(x2, v2);
-      const Real x4 = x + h * v3, v4 = v + h * a(x3, v3);
-      const Real next = v + h / 6 * (a(x, v) + 2 * a(x2, v2) + 2 * a(x3, v3) + a(x4, v4));
+      const Real x2 = x + h / 2 * v, v2 = v + h / 2 * a(x), x3 = x + h / 2 * v2, v3 = v + h / 2 * a(x2);
+      const Real x4 = x + h * v3, v4 = v + h * a(x3);
+      const Real next = v + h / 6 * (a(x) + 2 * a(x2) + 2 * a(x3) + a(x4));
       x += h / 6 * (v + 2 * v2 + 2 * v3 + v4);
       v = next;
     }
@@ -308,16 +290,10 @@ bool stays_bounded(sim::IntegratorKind kind, Real k, Real c, Real h) {
 TEST(SceneCheck, TheLargestStableStepIsWhereTheIntegratorsDiverge) {
   using enum sim::IntegratorKind;
   for (const auto kind : {symplectic_euler, rk4}) {
-    for (const auto& [k, c] : {std::pair(400.0, 0.0), std::pair(0.0, 30.0)}) {
-      const Real h = largest_stable_step(kind, k, c, 1);
-      EXPECT_TRUE(stays_bounded(kind, k, c, 0.99 * h)) << k;
-      // Without a spring, only the speed diverges.
-      EXPECT_TRUE(c > 0 || !stays_bounded(kind, k, c, 1.01 * h)) << k;
-    }
+    const Real h = largest_stable_step(kind, 400, 1);
+    EXPECT_TRUE(stays_bounded(kind, 400, 0.99 * h));
+    EXPECT_FALSE(stays_bounded(kind, 400, 1.01 * h));
   }
-  EXPECT_FALSE(
-      stays_bounded(symplectic_euler, 1, 30, 1.05 * largest_stable_step(symplectic_euler, 1, 30, 1)));
-  EXPECT_FALSE(stays_bounded(rk4, 1, 30, 1.05 * largest_stable_step(rk4, 1, 30, 1)));
 }
 
 TEST(SceneCheck, ASpringTooStiffForItsStepIsNamedWithTheStepItNeeds) {
@@ -428,24 +404,15 @@ TEST(SceneCheck, AgesDoNotDecreaseAndEmittersEndAfterTheyStart) {
       "/emitters/0/look/size_over_age/2: ages must not decrease\n");
 }
 
-TEST(SceneCheck, UnstableDragIsRefused) {
-  // m/k = 0.01 s: explicit methods diverge for steps above 0.02 s (0.02785 s for Runge-Kutta).
-  const auto group = [](double step) {
-    return R"({"world": {"step": )" + std::to_string(step) +
-           R"(}, "particles": [{"integrator": "symplectic_euler", "mass": 0.01, "linear_drag": 1, "places": [{}]}]})";
-  };
-  EXPECT_EQ(errors_of(group(0.019)), "");
-  EXPECT_NE(errors_of(group(0.021)).find("/particles/0/linear_drag: is too large for this mass and sub-step"),
-            std::string::npos);
-  const std::string drops =
-      R"({"emitters": [{"integrator": "symplectic_euler", "radius": 0.002, "linear_drag": 0.02}]})";
-  EXPECT_NE(errors_of(drops).find("/emitters/0/linear_drag"), std::string::npos);
-  const std::string body = R"({"bodies": [{"mass": 1, "linear_drag": 1000}]})";
-  EXPECT_NE(errors_of(body).find("/bodies/0/linear_drag"), std::string::npos);
-  // A thin rod turns easily about its axis.
-  const std::string rod =
-      R"({"bodies": [{"mass": 2, "shape": {"type": "capsule", "radius": 0.05, "height": 0.6}, "angular_drag": 3}]})";
-  EXPECT_NE(errors_of(rod).find("/bodies/0/angular_drag"), std::string::npos);
+// Drag, dampers and grabs are stable for any strength.
+TEST(SceneCheck, StrongDragIsAllowed) {
+  EXPECT_EQ(errors_of(R"({"world": {"step": 0.01},
+    "bodies": [{"name": "b", "mass": 1, "linear_drag": 1000, "angular_drag": 30}],
+    "particles": [{"name": "p", "integrator": "symplectic_euler", "mass": 0.01, "linear_drag": 10, "places": [{}]}],
+    "springs": [{"a": {"body": "b"}, "b": {"position": [0, 1, 0]}, "damping": 5000}],
+    "forces": [{"type": "wind", "drag": 300},
+               {"type": "grab", "body": "b", "keyframes": [{}], "stiffness": 90000, "damping": 1000}]})"),
+            "");
 }
 
 TEST(SceneCheck, NothingStartsOutsideTheWorld) {

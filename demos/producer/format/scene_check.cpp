@@ -38,14 +38,6 @@ std::optional<Real> mass_of(const Body& body) {
   return mass ? std::optional(mass->mass) : std::nullopt;
 }
 
-/// Returns the smallest principal moment of inertia of a body [kg m^2]; nothing for a mesh, because model
-/// files are not read here.
-std::optional<Real> least_moment_of(const Body& body) {
-  const auto by_shape = mass_by_shape(body);
-  if (!by_shape) return {};
-  return sim::diagonalise(by_shape->inertia).moments.minCoeff();
-}
-
 class Checker : SceneChecker {
  public:
   Checker(const Scene& scene, const Scene& flat, const SceneFolder& folder, Findings& findings)
@@ -249,10 +241,6 @@ class Checker : SceneChecker {
     check_lifetime(path, body.appear_at, body.remove_at);
     check_times(body.keyframes, path + "/keyframes");
     check_place(body.position, path + "/position");
-    if (const auto mass = mass_of(body); dynamic && mass && *mass > 0)
-      check_drag(scene_.world.integrator, body.linear_drag, *mass, path + "/linear_drag");
-    if (const auto moment = dynamic ? least_moment_of(body) : std::nullopt; moment && *moment > 0)
-      check_drag(scene_.world.integrator, body.angular_drag, *moment, path + "/angular_drag");
     if (!dynamic && !body.velocity.isZero(0))
       warn(path + "/velocity", "has no effect: the body is not dynamic");
     if (!dynamic && !body.angular_velocity.isZero(0))
@@ -295,9 +283,6 @@ class Checker : SceneChecker {
 
   void check_place(const Vec3& position, const std::string& path) {
     if (const auto problem = outside(scene_, position)) fail(path, *problem);
-  }
-  void check_drag(sim::IntegratorKind integrator, Real drag, Real m, const std::string& path) {
-    if (const auto problem = drag_problem(scene_, integrator, drag, m)) fail(path, *problem);
   }
 
   void check_emitter(const Emitter& emitter) {
@@ -356,11 +341,10 @@ class Checker : SceneChecker {
     // Stability of a single spring between two point masses. Ends away from a centre of mass only reduce the
     // stable step, so a spring that fails here fails in the scene; see also check_spring_net().
     const Real reduced = 1 / (1 / *a + 1 / *b);
-    check_stiffness(spring.stiffness, spring.damping, reduced, path, "the spring '" + spring.name + "'");
+    check_stiffness(spring.stiffness, reduced, path, "the spring '" + spring.name + "'");
   }
-  void check_stiffness(Real stiffness, Real damping, Real mass, const std::string& path,
-                       const std::string& what) {
-    const Real largest = largest_stable_step(scene_.world.integrator, stiffness, damping, mass);
+  void check_stiffness(Real stiffness, Real mass, const std::string& path, const std::string& what) {
+    const Real largest = largest_stable_step(scene_.world.integrator, stiffness, mass);
     const Real used = sub_step();
     if (used >= largest)
       fail(path, fmt::format(
@@ -391,7 +375,7 @@ class Checker : SceneChecker {
         *out = {body.name, *mass, body.position + body.orientation * end->position};
       }
     }
-    net.add(index, ends[0], ends[1], spring.stiffness, spring.damping);
+    net.add(index, ends[0], ends[1], spring.stiffness);
   }
 
   /// Checks the springs together: several at the same object are stiffer than each of them.
@@ -401,13 +385,10 @@ class Checker : SceneChecker {
     for (const Joint& joint : flat_.joints) jointed.insert({joint.a, joint.b});
     SpringNet net;
     for (std::size_t i = 0; i < scene_.springs.size(); ++i) add_to_net(i, jointed, net);
-    const SpringNet::Fastest stiffest = net.stiffest(), damped = net.most_damped();
-    const sim::IntegratorKind integrator = scene_.world.integrator;
-    const Real by_stiffness = largest_stable_step(integrator, stiffest.rate, 0, 1),
-               by_damping = largest_stable_step(integrator, 0, damped.rate, 1);
-    const Real largest = std::min(by_stiffness, by_damping), used = sub_step();
+    const SpringNet::Fastest stiffest = net.stiffest();
+    const Real largest = largest_stable_step(scene_.world.integrator, stiffest.rate, 1), used = sub_step();
     if (used < largest) return;
-    const Spring& spring = scene_.springs[by_stiffness < by_damping ? stiffest.spring : damped.spring];
+    const Spring& spring = scene_.springs[stiffest.spring];
     fail(spring.where.path,
          fmt::format("the spring '{}' and others at the same objects are together too stiff "
                      "for this sub-step: /world/step must be less than {:.3g} s, is {:.3g} s",
@@ -456,13 +437,6 @@ class Checker : SceneChecker {
     check_period(field, field.start, field.end);
     check_region(field.where.path, field.region, field.drop_rate);
   }
-  /// Returns whether a list names a body itself, or the original of which the body is a copy.
-  bool names(const std::vector<std::string>& bodies, const Body& body) const {
-    return std::ranges::any_of(bodies, [&](const std::string& name) {
-      const Body* original = find_named(scene_.bodies, name);
-      return name == body.name || (original && original->where.path == body.where.path);
-    });
-  }
   template <class E>
   void check_force(const PairForceOf<E>& force) {
     check_systems(force, force.particles);
@@ -470,14 +444,6 @@ class Checker : SceneChecker {
     check_region(force.where.path, force.region, force.drop_rate);
     if (force.particles.empty() && !force.where.path.empty())
       warn(force.where.path + "/particles", "has no effect: the list is empty");
-  }
-  void check_force(const WindField& wind) {
-    check_force<sim::WindField>(wind);
-    Real lightest = kUnlimited;
-    for (const Body& body : flat_.bodies)
-      if (names(wind.bodies, body) || (wind.bodies.empty() && wind.particles.empty() && wind.cloths.empty()))
-        lightest = std::min(lightest, mass_of(body).value_or(kUnlimited));
-    if (lightest > 0) check_drag(scene_.world.integrator, wind.drag, lightest, wind.where.path + "/drag");
   }
   void check_force(const Grab& grab) {
     const std::string& path = grab.where.path;
@@ -489,10 +455,6 @@ class Checker : SceneChecker {
     check_period(grab, grab.start, grab.end);
     if (grab.keyframes.empty()) fail(path, "needs at least one entry in \"keyframes\"");
     check_times(grab.keyframes, path + "/keyframes");
-    const auto body = bodies_.find(grab.body);
-    const auto mass = body == bodies_.end() ? std::nullopt : mass_of(*body->second);
-    if (mass && *mass > 0 && std::isfinite(*mass))
-      check_stiffness(grab.stiffness, grab.damping, *mass, path, "the grab '" + grab.name + "'");
   }
   void check_force(const AppliedForce& force) {
     const std::string& path = force.where.path;
@@ -525,25 +487,12 @@ Findings check_scene(const Scene& scene, const Scene& flat, const SceneFolder& f
   return findings;
 }
 
-Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real c, Real m) {
-  // x'' = -(k/m) x and v' = -(c/m) v: limits of the stability region on the imaginary and on the negative
-  // real axis. For the Euler methods, leapfrog and the midpoint rule both are 2; for Runge-Kutta 4 they are 2
-  // sqrt(2) and 2.785. The implicit method has no limit, and the following methods choose their own step.
+Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real m) {
+  // x'' = -(k/m) x: limits of the stability region on the imaginary axis. For the Euler methods, leapfrog and
+  // the midpoint rule this is 2; for Runge-Kutta 4 it is 2 sqrt(2). The implicit method has no limit, and the
+  // following methods choose their own step.
   if (integrator >= sim::IntegratorKind::implicit_euler) return kUnlimited;
-  const bool rk4 = integrator == sim::IntegratorKind::rk4;
-  const Real by_stiffness = (rk4 ? 2 * std::sqrt(2.0) : 2) * std::sqrt(m / k),
-             by_damping = (rk4 ? 2.785 : 2) * m / c;
-  return std::min(by_stiffness, by_damping);
-}
-
-std::optional<std::string> drag_problem(const Scene& scene, sim::IntegratorKind integrator, Real drag,
-                                        Real m) {
-  const Real largest = largest_stable_step(integrator, 0, drag, m),
-             used = std::min(scene.world.max_step, scene.output.fps.seconds(1));
-  if (drag <= 0 || used < largest) return {};
-  return fmt::format(
-      "is too large for this mass and sub-step: /world/step must be less than {:.3g} s, is {:.3g} s",
-      0.995 * largest, used);
+  return (integrator == sim::IntegratorKind::rk4 ? 2 * std::sqrt(2.0) : 2) * std::sqrt(m / k);
 }
 
 std::optional<std::string> outside(const Scene& scene, const Vec3& position) {

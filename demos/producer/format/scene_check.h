@@ -22,14 +22,10 @@ struct Findings {
 /// `folder`. The problems contain only the path of a value; the caller adds file and line.
 Findings check_scene(const Scene& scene, const Scene& flat, const SceneFolder& folder);
 
-/// Returns the longest step [s] at which the integrator is stable for a damped spring. `k`: stiffness [N/m];
-/// `c`: damping [N s/m]; `m`: reduced mass [kg].
-Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real c, Real m);
+/// Returns the longest step [s] at which the integrator is stable for a spring without damping; damping is
+/// stable with any step. `k`: stiffness [N/m]; `m`: reduced mass [kg].
+Real largest_stable_step(sim::IntegratorKind integrator, Real k, Real m);
 
-/// Returns an error message if a drag coefficient is too large for the mass or moment of inertia `m`: a
-/// linear drag [kg/s] with a mass [kg], or an angular drag [kg m^2/s] with a moment of inertia [kg m^2].
-std::optional<std::string> drag_problem(const Scene& scene, sim::IntegratorKind integrator, Real drag,
-                                        Real m);
 /// Returns an error message if a position is outside of `world.bounds`; otherwise nothing.
 std::optional<std::string> outside(const Scene& scene, const Vec3& position);
 

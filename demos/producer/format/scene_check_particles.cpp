@@ -66,12 +66,6 @@ class ParticleChecker : CheckBase {
                           const Emission&) { claim(name, source.where.path); });
   }
 
-  void check_drag(const sim::ParticleSystemDef& behaviour, Real mass, const std::string& path) {
-    if (behaviour.integrator == sim::IntegratorKind::leapfrog) return;  // stable for any drag
-    if (const auto problem = drag_problem(scene_, behaviour.integrator, behaviour.linear_drag, mass))
-      fail(path + "/linear_drag", *problem);
-  }
-
   // --- Looks and groups ---
 
   template <class V>
@@ -126,7 +120,6 @@ class ParticleChecker : CheckBase {
   }
   void check_group(const ParticleGroup& group) {
     check_look(group.look, group.where.path + "/look");
-    check_drag(group.behaviour, group.mass, group.where.path);
     check_lifetime(group.where.path, group.appear_at, group.remove_at);
     for (std::size_t i = 0; i < group.places.size(); ++i)
       if (const auto problem = outside(scene_, group.places[i].position)) {
@@ -141,14 +134,8 @@ class ParticleChecker : CheckBase {
   void check_source(const ParticleSource& source) {
     const std::string& path = source.where.path;
     check_look(source.look, path + "/look");
-    const Real smallest = effects::lower_bound(source.radius);
     if (effects::upper_bound(source.radius) < kSmallest)
       fail(path + "/radius", fmt::format("must be at least {:g} m", kSmallest));
-    const Real lightest = effects::upper_bound(source.mass) > 0
-                              ? effects::lower_bound(source.mass)
-                              : effects::lower_bound(source.density) * 4 / 3 * std::numbers::pi * smallest *
-                                    smallest * smallest;
-    if (lightest > 0) check_drag(source.behaviour, lightest, path);
     check_lifespan(source);
     const sim::ParticleSystemDef& b = source.behaviour;
     const bool hits = b.collides || b.internal || b.external;

@@ -12,15 +12,15 @@ std::size_t SpringNet::object(const End& end) {
   return it->second;
 }
 
-void SpringNet::add(std::size_t spring, const End& a, const End& b, Real stiffness, Real damping) {
+void SpringNet::add(std::size_t spring, const End& a, const End& b, Real stiffness) {
   const Vec3 d = a.place - b.place;
   if (d.isZero()) return;  // without a length it has no direction yet
-  links_.push_back({spring, object(a), object(b), d.normalized(), stiffness, damping});
+  links_.push_back({spring, object(a), object(b), d.normalized(), stiffness});
 }
 
 // Power iteration with the matrix W K W, where W is the root of the inverse mass. The quotient of Rayleigh is
 // a lower bound after any number of iterations.
-SpringNet::Fastest SpringNet::fastest(Real Link::*coefficient) const {
+SpringNet::Fastest SpringNet::stiffest() const {
   constexpr int kIterations = 40;
   const std::size_t n = inverse_masses_.size();
   std::vector<Vec3> x(n), next(n);
@@ -38,7 +38,7 @@ SpringNet::Fastest SpringNet::fastest(Real Link::*coefficient) const {
     for (const Vec3& v : x) length2 += v.squaredNorm();
     for (const Link& link : links_) {
       const Real speed = link.along.dot(root[link.a] * x[link.a] - root[link.b] * x[link.b]);
-      const Real force = link.*coefficient * speed;
+      const Real force = link.stiffness * speed;
       next[link.a] += root[link.a] * force * link.along;
       next[link.b] -= root[link.b] * force * link.along;
       sum += force * speed;

@@ -1,5 +1,5 @@
 #pragma once
-/// Greatest natural frequency and damping rate of connected springs, for scene_check.h.
+/// Greatest natural frequency of connected springs, for scene_check.h.
 
 #include <cstddef>
 #include <map>
@@ -19,28 +19,26 @@ class SpringNet {
     Real mass = 0;       ///< [kg]; infinite: the object does not move
     Vec3 place;          ///< [m]
   };
-  /// `spring`: a number by which results name the spring. `stiffness`: [N/m]; `damping`: [N s/m].
-  void add(std::size_t spring, const End& a, const End& b, Real stiffness, Real damping);
+  /// `spring`: a number by which results name the spring. `stiffness`: [N/m].
+  void add(std::size_t spring, const End& a, const End& b, Real stiffness);
 
   /// The fastest motion of the net.
   struct Fastest {
-    /// Lower bound of the greatest eigenvalue of stiffness by mass [1/s^2] or damping by mass [1/s], by 40
-    /// power iterations. 0: there are no springs.
+    /// Lower bound of the greatest eigenvalue of stiffness by mass [1/s^2], by 40 power iterations. 0: there
+    /// are no springs.
     Real rate = 0;
     std::size_t spring = 0;  ///< the spring with the greatest part of it
   };
-  Fastest stiffest() const { return fastest(&Link::stiffness); }
-  Fastest most_damped() const { return fastest(&Link::damping); }
+  Fastest stiffest() const;
 
  private:
   struct Link {
     std::size_t spring;
     std::size_t a, b;  // indices of objects; 0: does not move
     Vec3 along;        // unit
-    Real stiffness, damping;
+    Real stiffness;
   };
   std::size_t object(const End& end);
-  Fastest fastest(Real Link::*coefficient) const;
 
   std::map<std::string, std::size_t> numbers_;
   std::vector<Real> inverse_masses_ = {0};
