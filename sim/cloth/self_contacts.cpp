@@ -32,9 +32,9 @@ constexpr Real kSelfRecovery = 0.05;
 /// kNearest: a pair nearer than this fraction of its thickness does not approach further, because its
 /// distance and its side would soon be lost in rounding.
 constexpr Real kLeft = 0.1, kNearest = 0.02;
-/// Sine of the angle by which the surface around a closest point may rise towards the other surface, for
-/// rounding.
-constexpr Real kRise = 0.01;
+/// Sine of the angle by which the surface around a closest point may rise towards the other surface, so that
+/// curved layers touch at several places. A contact inclined by it takes kRise^2 of the speed of sliding.
+constexpr Real kRise = 0.05;
 /// Distance below which the normal is undefined [m].
 constexpr Real kNoSide = 1e-9;
 /// A unit vector in single precision has at least this length.

@@ -105,7 +105,7 @@ TEST(StrongDrag, SpinsEndAndWindTakesLightBodiesAlong) {
                                              .angular_drag = 0.01});
     for (int i = 0; i < 60; ++i) world.step(kStep);
     EXPECT_LT((world.body(plate).velocity - Vec3(2, 0, 0)).norm(), 1e-5) << static_cast<int>(kind);
-    EXPECT_LT(world.body(plate).angular_velocity.norm(), 1e-5) << static_cast<int>(kind);
+    EXPECT_LT(world.body(plate).angular_velocity.norm(), 1e-4) << static_cast<int>(kind);
     EXPECT_NEAR(world.body(plate).pose.position.x(), 2 - 2 * 0.005 / 2, 1e-3) << static_cast<int>(kind);
   }
 }
