@@ -90,7 +90,7 @@ TEST(BareScene, AMisspelledCommandGetsItsOwnMessage) {
 
 TEST(Output, AFrameNumberInTheNameOfAFolderIsRefused) {
   const TemporaryFolder folder;
-  for (const std::string command :
+  for (const std::string& command :
        {"render " + tiny_scene() + " -o o/####/####.png", "render " + tiny_scene() + " -o o/####/a.mp4",
         "frame " + tiny_scene() + " -o o/####/a.png", "export " + tiny_scene() + " -o o/##/####.ply"}) {
     const Outcome run = offstage(command, folder.path());
