@@ -58,7 +58,7 @@ std::vector<Real> automatic_scales(const render::ScratchFolder& folder,
     MeshFile mesh{name};
     mesh.scale.automatic = true;
     scene.bodies.emplace_back().shape = mesh;
-    scene.bodies.back().collides = false;
+    scene.bodies.back().motion = sim::MotionType::static_body;  // open meshes have no mass
   }
   std::vector<Problem> warnings;
   const ModelLibrary models(scene, SceneFolder(folder.path()), {}, warnings);
