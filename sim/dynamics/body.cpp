@@ -19,6 +19,10 @@ const CollisionShape& BodyModel::triangle_shape() {
 
 namespace {
 
+/// Greatest angular acceleration that is expected [rad/s^2]. Rotations do not commute, so that a fast one
+/// cannot be taken back exactly.
+constexpr Real kMostTurning = 40;
+
 /// Returns the next value of a series that ends with `last`, after `second` and `third`. The slope is the
 /// smaller one of the last two if they have the same direction. A value without this slope would lag behind
 /// an oscillation, and springs would add energy to it.
@@ -38,6 +42,7 @@ void HeldMotion::begin_substep() {
     return extrapolated(last_[0].*part, last_[1].*part, last_[2].*part);
   };
   expected_ = {next(&Twist::velocity), next(&Twist::angular_velocity)};
+  if (expected_.angular_velocity.norm() > kMostTurning) expected_ = {};
   last_ = {Twist{}, last_[0], last_[1]};
 }
 
