@@ -357,7 +357,7 @@ TEST(StageSkyPicture, ABrightSunIsAsBrightInAMirrorAndBehindAPane) {
     EXPECT_NEAR(seen.z() / 2000, 1, 0.02f);
   }
   {
-    LitStage s(sky);
+    LitStage s(sky, 0, true);
     s.add(make_box({9, 9, 0.001f}), {.color = {1, 1, 1, 1}, .roughness = 0, .transmission = 1, .thin = true});
     s.look({.eye = -3 * sun, .target = {0, 0, 0}, .fov_deg = 4});
     EXPECT_GT(mean_color(s.mean_of(4), {80, 60}, 4).x(), 0.8f * 5000);
