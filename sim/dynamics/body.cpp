@@ -19,30 +19,33 @@ const CollisionShape& BodyModel::triangle_shape() {
 
 namespace {
 
-/// Greatest angular acceleration that is expected [rad/s^2]. Rotations do not commute, so that a fast one
-/// cannot be taken back exactly.
-constexpr Real kMostTurning = 40;
+/// Greatest change of an acceleration in a sub-step, relative to its value, that can be extrapolated. A
+/// greater one is an impact, or a contact that begins or ends.
+constexpr Real kResolved = 0.5;
 
-/// Returns the next value of a series that ends with `last`, after `second` and `third`. The slope is the
-/// smaller one of the last two if they have the same direction. A value without this slope would lag behind
-/// an oscillation, and springs would add energy to it.
-Vec3 extrapolated(const Vec3& last, const Vec3& second, const Vec3& third) {
-  if (last.dot(second) <= 0) return Vec3::Zero();
-  const Real limit = 2 * second.norm(), size = last.norm();
-  if (size > limit) return limit / size * last;
-  const Vec3 slope = last - second, slope_before = second - third;
-  if (slope.dot(slope_before) <= 0) return last;
-  return last + (slope.squaredNorm() < slope_before.squaredNorm() ? slope : slope_before);
+Twist operator-(const Twist& a, const Twist& b) {
+  return {a.velocity - b.velocity, a.angular_velocity - b.angular_velocity};
 }
 
 }  // namespace
 
-void HeldMotion::begin_substep() {
-  const auto next = [&](Vec3 Twist::*part) {
-    return extrapolated(last_[0].*part, last_[1].*part, last_[2].*part);
+void HeldMotion::begin_substep(const RigidBody& body) {
+  const auto product = [&](const Twist& a, const Twist& b) {  // in the metric of masses
+    return body.mass * a.velocity.dot(b.velocity) +
+           body.spin_momentum(body.orientation, a.angular_velocity).dot(b.angular_velocity);
   };
-  expected_ = {next(&Twist::velocity), next(&Twist::angular_velocity)};
-  if (expected_.angular_velocity.norm() > kMostTurning) expected_ = {};
+  const Twist last = last_[0], slope = last - last_[1], slope_before = last_[1] - last_[2];
+  expected_ = {};
+  if (product(slope, slope) <= kResolved * kResolved * product(last, last)) {
+    // Without a slope the acceleration would lag behind an oscillation, and springs would add energy to it.
+    expected_ = last;
+    if (product(slope, slope_before) > 0) {
+      const bool is_smaller = product(slope, slope) < product(slope_before, slope_before);
+      const Twist& smaller = is_smaller ? slope : slope_before;
+      expected_.velocity += smaller.velocity;
+      expected_.angular_velocity += smaller.angular_velocity;
+    }
+  }
   last_ = {Twist{}, last_[0], last_[1]};
 }
 

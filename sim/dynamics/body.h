@@ -58,9 +58,9 @@ struct SleepMemory {
 /// end (physics R7).
 class HeldMotion {
  public:
-  /// Begins a sub-step. Its acceleration is extrapolated from the last ones. An acceleration that has more
-  /// than doubled counts as an impact, which does not repeat.
-  void begin_substep();
+  /// Begins a sub-step of a body. Its acceleration is extrapolated from the last ones, if the sub-steps
+  /// resolve their course: an impact does not repeat.
+  void begin_substep(const RigidBody& body);
   /// Stores the acceleration in the current sub-step [m/s^2], [rad/s^2].
   void set(const Twist& acceleration) { last_[0] = acceleration; }
   /// Adds the expected acceleration to the forces on the body.

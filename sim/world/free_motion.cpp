@@ -11,7 +11,7 @@ namespace offstage::sim {
 void FreeMotion::find_motion_forces(std::span<Body* const> awake) {
   const std::vector<const ForceDef*> active = world_.active_forces();
   for (Body* body : awake) {
-    body->held.begin_substep();
+    body->held.begin_substep(body->rigid);
     body->has_motion_forces =
         body->rigid.linear_drag > 0 || body->rigid.angular_drag > 0 ||
         std::ranges::any_of(active, [&](const ForceDef* force) { return force->acts_on(body->handle); });
