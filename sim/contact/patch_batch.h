@@ -54,9 +54,9 @@ struct PatchBatch {
 
   Index a, b, patch;  ///< indices; in unused lanes, bodies.size() for a and b, kNone for patch
   std::array<bool, ContactColoring::kLanes> moves_a, moves_b;
-  uint32_t count;   ///< greatest number of points in a lane
-  float tolerance;  ///< tolerance of the next sweep's rounds [m/s]
-  bool alone;       ///< whether no other patch corrects remaining errors; see prepare()
+  uint32_t count;  ///< greatest number of points in a lane
+  bool is_fresh;   ///< whether the next sweep solves the patches completely
+  bool alone;      ///< whether no other patch corrects remaining errors; see prepare()
   Vector n, t, k, arm_a, arm_b;
   Lanes inverse_mass_a, inverse_mass_b;
   Symmetric inverse_inertia_a, inverse_inertia_b;
