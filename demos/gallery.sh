@@ -12,7 +12,7 @@ chapters=(
   "Cloth|drape:3.5 flag:3 curtain:1.9 sheets:3 rotating_sphere:3 tablecloth:1.68 hammock:5 torn_banner:4 parachute:1.2 balloons:2.07 swatches:2.6 laundry:2.4"
   "Water and weather|fountain:5 jet_fountain:3 sprinkler:3.3 lawn_sprinkler:3 water_jet:3 rain:4 rain_square:3 hail:3 snow:5 thunderstorm:3"
   "Smoke and fire|smoke:6 fire:4 fireworks:8 sparks:3 rocket_exhaust:3.5 grenade:1.5 dust:3 rocket_sled:1.6"
-  "Particles|landscape:3 galton:5.5 hopper:2.4 crossing_jets:3 autumn:4 plume:1.6 fields:1.4"
+  "Particles|landscape:3 galton:5.5 hopper:2.4 crossing_jets:3 autumn:4 plume:1.6 balance:8 fields:1.4"
 )
 strip="wall dominoes arch marbles pile explosion glass cradle sprinkler rain fountain machine flag landscape drape smoke fire fireworks sparks rocket_exhaust"
 

@@ -5,18 +5,6 @@
 namespace offstage::sim {
 namespace {
 
-/// Returns a pose after its point `centre` (body frame) has moved by `shift`, and the body has turned about
-/// it by a small angle.
-Pose moved(const Pose& pose, const Vec3& centre, const Vec3& shift, const Vec3& turn) {
-  if (shift == Vec3::Zero() && turn == Vec3::Zero()) return pose;
-  const Vec3 place = pose.point_to_world(centre) + shift;
-  const Quat q(1, turn.x() / 2, turn.y() / 2, turn.z() / 2);
-  Pose result;
-  result.orientation = (q * pose.orientation).normalized();
-  result.position = place - result.vector_to_world(centre);
-  return result;
-}
-
 /// Adds the mass matrix of a point mass at the lever arm `arm`.
 void add_point_mass(Real mass, const Vec3& arm, Mat6& matrix) {
   const Mat3 cross = cross_matrix(arm);
@@ -52,10 +40,10 @@ Pose ClothBody::on_path(Real fraction) const {
 }
 
 void ClothBody::begin(Real from, Real to, Real dt) {
-  start_ = from > 0 ? end_ : moved(on_path(from), obstacle_.centre, shift_, turn_);
+  start_ = from > 0 ? end_ : displaced(on_path(from), obstacle_.centre, shift_, turn_);
   shift_ += dt * gained_;
   turn_ += dt * gained_spin_;
-  end_ = moved(on_path(to), obstacle_.centre, shift_, turn_);
+  end_ = displaced(on_path(to), obstacle_.centre, shift_, turn_);
   centre_ = end_.point_to_world(obstacle_.centre);
   dt_ = dt;
   to_ = to;
@@ -119,7 +107,7 @@ void ClothBody::apply_contact_impulse(const Vec3& impulse, const Vec3& p, Real f
   if (!is_dynamic()) return;
   shift_ += fraction * dt_ * (gained_ - gained);
   turn_ += fraction * dt_ * (gained_spin_ - gained_spin);
-  end_ = moved(on_path(to_), obstacle_.centre, shift_, turn_);
+  end_ = displaced(on_path(to_), obstacle_.centre, shift_, turn_);
 }
 
 void ClothBody::apply_impulses(const Vec6& impulse, const Vec6& displacement) {
@@ -127,7 +115,7 @@ void ClothBody::apply_impulses(const Vec6& impulse, const Vec6& displacement) {
   add_impulse(impulse);
   shift_ += displacement.head<3>();
   turn_ += displacement.tail<3>();
-  end_ = moved(on_path(to_), obstacle_.centre, shift_, turn_);
+  end_ = displaced(on_path(to_), obstacle_.centre, shift_, turn_);
 }
 
 Mat6 ClothBody::free_mobility() const {
@@ -161,7 +149,7 @@ Vec6 ClothBody::apply_pin_impulses(const Vec6& impulse, const Vec6& moving, cons
   resting_.set_mobility(free_mobility());
   shift_ += shift.head<3>();
   turn_ += shift.tail<3>();
-  end_ = moved(end_, obstacle_.centre, shift.head<3>(), shift.tail<3>());
+  end_ = displaced(end_, obstacle_.centre, shift.head<3>(), shift.tail<3>());
   centre_ = end_.point_to_world(obstacle_.centre);
   return change;
 }
@@ -187,7 +175,7 @@ Vec3 ClothBody::shorten(Real fraction, const Vec3& drift) {
   const Vec3 lost = (1 - fraction) * displacement, lost_turn = (1 - fraction) * turn;
   shift_ -= lost;
   turn_ -= lost_turn;
-  end_ = moved(start_, obstacle_.centre, drift + fraction * displacement, fraction * turn);
+  end_ = displaced(start_, obstacle_.centre, drift + fraction * displacement, fraction * turn);
   centre_ = end_.point_to_world(obstacle_.centre);
   const Vec3 dv = -lost / dt_, dw = -lost_turn / dt_;
   touched = true;

@@ -13,7 +13,15 @@ constexpr int kMaxPieces = 16;
 }  // namespace
 
 Obstacle::Obstacle(const Solid& shape, const Pose& from, const Pose& to, Real duration, Real e, Real mu)
-    : solid(shape), start(from), end(to), extent(reach(shape)), restitution(e), friction(mu) {
+    : solid(shape), extent(reach(shape)), restitution(e), friction(mu) {
+  set_path(from, to, duration);
+}
+
+void Obstacle::set_path(const Pose& from, const Pose& to, Real duration) {
+  start = from;
+  end = to;
+  velocity = angular_velocity = Vec3::Zero();
+  turn = 0;
   if (from.position != to.position) velocity = (to.position - from.position) / duration;
   if (from.orientation.coeffs() == to.orientation.coeffs()) return;
   Quat rotation = to.orientation * from.orientation.conjugate();
@@ -21,7 +29,7 @@ Obstacle::Obstacle(const Solid& shape, const Pose& from, const Pose& to, Real du
   const Eigen::AngleAxisd axis_angle(rotation);
   angular_velocity = axis_angle.angle() / duration * axis_angle.axis();
   if (from.orientation.dot(end.orientation) < 0) end.orientation.coeffs() = -end.orientation.coeffs();
-  if (!std::holds_alternative<Sphere>(*shape.shape)) turn = axis_angle.angle();
+  if (!std::holds_alternative<Sphere>(*solid.shape)) turn = axis_angle.angle();
 }
 
 Pose Obstacle::at(Real fraction) const {
@@ -80,6 +88,11 @@ Obstacles::Obstacles(std::vector<Obstacle> obstacles) : obstacles_(std::move(obs
     }
   }
   tree_ = AabbTree(boxes_);
+}
+
+void Obstacles::move_end(const Obstacle& of, const Pose& end, Real h) {
+  Obstacle& moved = obstacles_.at(static_cast<std::size_t>(&of - obstacles_.data()));
+  moved.set_path(moved.start, end, h);
 }
 
 }  // namespace offstage::sim

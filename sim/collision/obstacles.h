@@ -1,6 +1,7 @@
 #pragma once
-/// The bodies with which particles can collide, and their motion during one sub-step. The motion is not
-/// changed within the sub-step: impulses of particles change it from the next sub-step on (physics P8).
+/// The bodies with which particles can collide, and their motion during one sub-step. Impulses of particles
+/// change the motion from the next sub-step on, except that resting contacts move the end of a body's path
+/// (physics P8).
 
 #include <algorithm>
 #include <span>
@@ -16,6 +17,8 @@ struct Obstacle {
   /// `duration`: length of the sub-step [s]; `e`: restitution; `mu`: friction.
   Obstacle(const Solid& shape, const Pose& from, const Pose& to, Real duration, Real e, Real mu);
 
+  /// Sets the path of a sub-step of this length [s].
+  void set_path(const Pose& from, const Pose& to, Real duration);
   /// Pose at a fraction of the sub-step, without the rotation of a sphere, which does not move its surface.
   Pose at(Real fraction) const;
   /// Pose of the body at a fraction of the sub-step. Points that are fastened to a sphere turn with it.
@@ -72,6 +75,7 @@ struct Reaction {
   uint32_t body;         ///< Obstacle::body
   Vec3 impulse;          ///< [N s]
   Vec3 angular_impulse;  ///< angular impulse about the centre of mass [N m s]
+  bool is_load = false;  ///< whether it comes from a resting contact, which may last
 };
 
 /// A set of obstacles. Planes are in a list; all other obstacles are in a tree of swept boxes.
@@ -81,6 +85,8 @@ class Obstacles {
   explicit Obstacles(std::vector<Obstacle> obstacles);
 
   std::span<const Obstacle> all() const { return obstacles_; }
+  /// Changes the end of an obstacle's path in a sub-step of length h [s] by a small distance.
+  void move_end(const Obstacle& of, const Pose& end, Real h);
 
   /// Calls visit(obstacle) for each obstacle that a sphere may touch on its path from a to b (world) within
   /// the sub-step. The test is conservative.

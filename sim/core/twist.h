@@ -23,6 +23,9 @@ struct Wrench {
     return *this;
   }
 };
+inline Wrench operator*(Real factor, const Wrench& w) {
+  return {factor * w.force, factor * w.torque};
+}
 
 /// Returns the matrix M for which M u is the cross product v x u.
 inline Mat3 cross_matrix(const Vec3& v) {
@@ -36,6 +39,18 @@ inline Mat3 cross_matrix(const Vec3& v) {
 inline Mat3 point_mobility(Real inverse_mass, const Mat3& inverse_inertia, const Vec3& arm) {
   const Mat3 cross = cross_matrix(arm);
   return inverse_mass * Mat3::Identity() - cross * inverse_inertia * cross;
+}
+
+/// Returns a pose after its point `centre` (body frame) has moved by `shift`, and the body has turned about
+/// it by a small angle.
+inline Pose displaced(const Pose& pose, const Vec3& centre, const Vec3& shift, const Vec3& turn) {
+  if (shift == Vec3::Zero() && turn == Vec3::Zero()) return pose;
+  const Vec3 place = pose.point_to_world(centre) + shift;
+  const Quat q(1, turn.x() / 2, turn.y() / 2, turn.z() / 2);
+  Pose result;
+  result.orientation = (q * pose.orientation).normalized();
+  result.position = place - result.vector_to_world(centre);
+  return result;
 }
 
 }  // namespace offstage::sim

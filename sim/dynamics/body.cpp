@@ -1,5 +1,6 @@
 #include "sim/dynamics/body.h"
 
+#include "sim/dynamics/expected_acceleration.h"
 #include "sim/dynamics/free_body.h"
 
 namespace offstage::sim {
@@ -17,35 +18,8 @@ const CollisionShape& BodyModel::triangle_shape() {
   return *triangle_shape_;
 }
 
-namespace {
-
-/// Greatest change of an acceleration in a sub-step, relative to its value, that can be extrapolated. A
-/// greater one is an impact, or a contact that begins or ends.
-constexpr Real kResolved = 0.5;
-
-Twist operator-(const Twist& a, const Twist& b) {
-  return {a.velocity - b.velocity, a.angular_velocity - b.angular_velocity};
-}
-
-}  // namespace
-
 void HeldMotion::begin_substep(const RigidBody& body) {
-  const auto product = [&](const Twist& a, const Twist& b) {  // in the metric of masses
-    return body.mass * a.velocity.dot(b.velocity) +
-           body.spin_momentum(body.orientation, a.angular_velocity).dot(b.angular_velocity);
-  };
-  const Twist last = last_[0], slope = last - last_[1], slope_before = last_[1] - last_[2];
-  expected_ = {};
-  if (product(slope, slope) <= kResolved * kResolved * product(last, last)) {
-    // Without a slope the acceleration would lag behind an oscillation, and springs would add energy to it.
-    expected_ = last;
-    if (product(slope, slope_before) > 0) {
-      const bool is_smaller = product(slope, slope) < product(slope_before, slope_before);
-      const Twist& smaller = is_smaller ? slope : slope_before;
-      expected_.velocity += smaller.velocity;
-      expected_.angular_velocity += smaller.angular_velocity;
-    }
-  }
+  expected_ = expected_acceleration(body, last_).value_or(Twist{});
   last_ = {Twist{}, last_[0], last_[1]};
 }
 

@@ -1,22 +1,42 @@
 #include "sim/dynamics/body_impulses.h"
 
+#include <utility>
+
 #include "sim/dynamics/rigid_jacobian.h"
 
 namespace offstage::sim {
 
-void BodyImpulses::begin(std::span<const Link> links) {
+void BodyImpulses::begin(std::span<const Link> links, std::map<uint32_t, Load> expected) {
   links_ = links;
+  expected_ = std::move(expected);
+  loads_.clear();
   sums_.clear();
   gained_.clear();
 }
 
 Mat3 BodyImpulses::mobility(const Obstacle& o, const Vec3& arm, const Vec3& push) const {
-  const Link at = link(o.body);
-  if (!at.bodies || !o.is_dynamic()) return o.mobility(arm);
+  const auto load = expected_.find(o.body);
+  const bool is_held = load != expected_.end() && load->second.mobility;
+  if (!o.is_dynamic() || (!link(o.body).bodies && !is_held)) return o.mobility(arm);
   // The point's velocity is v + w x arm = E (v, w), and an impulse P at the point acts as E^T P.
   Eigen::Matrix<Real, 3, 6> E;
   E << Mat3::Identity(), -cross_matrix(arm);
-  return E * at.bodies->link_mobility(at.index, E.transpose() * push) * E.transpose();
+  return E * mobility(o, Vec6(E.transpose() * push)) * E.transpose();
+}
+
+Mat6 BodyImpulses::mobility(const Obstacle& o, const Vec6& push) const {
+  if (const auto load = expected_.find(o.body); load != expected_.end() && load->second.mobility)
+    return *load->second.mobility;
+  if (const Link at = link(o.body); at.bodies) return at.bodies->link_mobility(at.index, push);
+  Mat6 mobility = Mat6::Zero();
+  mobility.topLeftCorner<3, 3>() = o.inverse_mass * Mat3::Identity();
+  mobility.bottomRightCorner<3, 3>() = o.inverse_inertia;
+  return mobility;
+}
+
+Wrench BodyImpulses::expected(uint32_t body) const {
+  const auto found = expected_.find(body);
+  return found == expected_.end() ? Wrench{} : found->second.expected;
 }
 
 Vec3 BodyImpulses::velocity(const Obstacle& o, const Vec3& arm) const {
@@ -27,8 +47,11 @@ Vec3 BodyImpulses::velocity(const Obstacle& o, const Vec3& arm) const {
       spin += known->second[at.index].tail<3>();
     }
   } else if (const auto sum = sums_.find(o.body); sum != sums_.end()) {
-    velocity += o.inverse_mass * sum->second.impulse;
-    spin += o.inverse_inertia * sum->second.angular_impulse;
+    Vec6 impulse;
+    impulse << sum->second.impulse, sum->second.angular_impulse;
+    const Vec6 gained = mobility(o, impulse) * impulse;
+    velocity += gained.head<3>();
+    spin += gained.tail<3>();
   }
   return velocity + spin.cross(arm);
 }
@@ -38,6 +61,7 @@ void BodyImpulses::push(const Reaction& reaction) {
       sums_.try_emplace(reaction.body, Reaction{reaction.body, Vec3::Zero(), Vec3::Zero()}).first->second;
   sum.impulse += reaction.impulse;
   sum.angular_impulse += reaction.angular_impulse;
+  if (reaction.is_load) loads_[reaction.body] += {reaction.impulse, reaction.angular_impulse};
   const Link at = link(reaction.body);
   if (!at.bodies) return;
   std::vector<Vec6>& gained = gained_[at.bodies];
@@ -45,6 +69,10 @@ void BodyImpulses::push(const Reaction& reaction) {
   Vec6 impulse;
   impulse << reaction.impulse, reaction.angular_impulse;
   at.bodies->respond(at.index, impulse, gained);
+}
+
+void BodyImpulses::subtract_expected() {
+  for (const auto& [body, load] : expected_) push({body, -load.expected.force, -load.expected.torque});
 }
 
 std::vector<Reaction> BodyImpulses::sums() const {

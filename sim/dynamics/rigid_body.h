@@ -23,7 +23,7 @@ struct RigidBody : RigidState {
   Mat3 inertia = Mat3::Identity();  ///< inertia about the centre of mass, axes of the shape's frame [kg m^2]
   Mat3 inverse_inertia = Mat3::Identity();
   Real linear_drag = 0, angular_drag = 0;
-  Wrench push;  ///< constant force and torque in the current sub-step, from cloth [N], [N m]
+  Wrench push;  ///< constant force and torque in the current sub-step, by cloth and particles [N], [N m]
 
   bool is_pushed() const { return push.force != Vec3::Zero() || push.torque != Vec3::Zero(); }
   const RigidState& state() const { return *this; }

@@ -28,6 +28,13 @@ struct CollidingParticle {
   uint32_t system;          ///< number of its system
   bool internal, external;  ///< collision flags of its system; see ParticleSystemDef
   bool hits_bodies;
+  /// The dynamic body on which the particle has pressed most in the last sub-step, and the speed of approach
+  /// [m/s] that this contact ended.
+  struct Carrier {
+    uint32_t body = ~0u;
+    Real speed = 0;
+  };
+  Carrier carrier = {};
 
   Vec3 at(Real t) const { return position + (t - from) * path_velocity; }
   /// Applies a change of velocity [m/s] by a collision at time t of a sub-step of length h [s]. The path
@@ -100,7 +107,7 @@ inline std::optional<Meeting> meeting(const CollidingParticle& a, const Collidin
 struct ParticleStep {
   Real h;  ///< length of the sub-step [s]
   const Obstacles& fixed;
-  const Obstacles& moving;
+  Obstacles& moving;  ///< bodies that particles push are displaced
   ImpactLaw law;
   Real collision_speed;    ///< slower contacts do not bounce [m/s]
   BodyImpulses& impulses;  ///< impulses on dynamic bodies
@@ -114,6 +121,13 @@ inline bool is_impact(Real speed, Real acceleration, const ParticleStep& step) {
 }
 inline Real greater_acceleration(const CollidingParticle& a, const CollidingParticle& b) {
   return std::sqrt(std::max(a.acceleration.squaredNorm(), b.acceleration.squaredNorm()));
+}
+
+/// Returns the acceleration with which a particle may approach a body while it rests on it: that of the
+/// particle or, if the body has carried it in the last sub-step, that which the contact has prevented.
+/// Without the particle, a light body on a spring accelerates much.
+inline Real greater_acceleration(const CollidingParticle& g, const Obstacle& o, Real h) {
+  return std::max(g.acceleration.norm(), g.carrier.body == o.body ? g.carrier.speed / h : 0);
 }
 
 /// A collision of a particle, as reported to the caller. The velocity is the velocity after the collision.

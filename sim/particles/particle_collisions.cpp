@@ -168,7 +168,12 @@ void ParticleCollisions::match() {
     const Known known{system.handle, system.arrays.id[sources_[k].index], place[k]};
     const auto name = [](const Known& x) { return std::tie(x.system, x.id); };
     while (old != known_.end() && name(*old) < name(known)) ++old;
-    if (old != known_.end() && name(*old) == name(known)) before_[place[k]] = old->place;
+    if (old != known_.end() && name(*old) == name(known)) {
+      before_[place[k]] = old->place;
+      // Here the impacts and contacts are still those of the last sub-step.
+      particles_[place[k]].carrier = std::max(contacts_.carrier(old->place), impacts_.struck(old->place),
+                                              [](const auto& a, const auto& b) { return a.speed < b.speed; });
+    }
     now.push_back(known);
   }
   known_ = std::move(now);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 
 #include <oneapi/tbb/parallel_for.h>
 
@@ -202,7 +203,9 @@ void ParticleContacts::find_surfaces(uint32_t i, NearObstacles& near, Found& fou
 bool ParticleContacts::hits_later(uint32_t i, const ObstacleHit& hit) const {
   const CollidingParticle& g = particles_[i];
   const Vec3 surface = hit.obstacle->velocity_at(hit.position, hit.fraction);
-  if (!is_impact((surface - g.velocity).dot(hit.normal), g.acceleration.norm(), *step_)) return false;
+  if (!is_impact((surface - g.velocity).dot(hit.normal), greater_acceleration(g, *hit.obstacle, step_->h),
+                 *step_))
+    return false;
   const Real rest = (1 - hit.fraction) * step_->h;
   return (free_end_[i] - hit.position - rest * surface).dot(hit.normal) > 0;
 }
@@ -227,17 +230,10 @@ void ParticleContacts::add_surface(uint32_t i, const Obstacle& o, const Vec3& no
   s.mass = static_cast<float>(g.mass);
   s.sliding_mass = static_cast<float>(g.mass / (1 + g.turning));
   const Real speed = (velocity - g.velocity).dot(normal);
-  s.is_impact = meets && is_impact(speed, g.acceleration.norm(), *step_);
+  s.is_impact = meets && is_impact(speed, greater_acceleration(g, o, step_->h), *step_);
   Real target = meets ? -speed * (time - g.from) / step_->h : std::min(0.0, -speed - gap / step_->h);
   s.time = static_cast<float>(s.is_impact ? time : g.from);
-  if (s.is_impact) {
-    // The body moves only in the next sub-step. Until then the particle gets the velocity that the body will
-    // have.
-    const Vec3 arm = g.at(time) - g.radius * normal - o.centre_at(time / step_->h);
-    const Real yielding =
-        o.is_dynamic() ? g.mass * normal.dot(step_->impulses.mobility(o, arm, -normal) * normal) : 0;
-    target = speed * ((1 + std::max(g.restitution, o.restitution)) / (1 + yielding) - 1);
-  }
+  if (s.is_impact) target = speed * std::max(g.restitution, o.restitution);
   s.target = static_cast<float>(target);
   recall(s);
   found.surfaces.push_back(s);
@@ -272,6 +268,18 @@ void ParticleContacts::recall(Surface& s) const {
   }
 }
 
+CollidingParticle::Carrier ParticleContacts::carrier(uint32_t particle) const {
+  CollidingParticle::Carrier carrier;
+  for (uint32_t k = surface_begin_[particle]; k < surface_begin_[particle + 1]; ++k) {
+    const Surface& s = surfaces_[k];
+    if (s.pushed == kNone || !s.acts()) continue;
+    const Vec3 change =
+        motion_[particle].inverse_mass() * s.impulse() - PushedBody::at(pushed_[s.pushed].gained, s.arm);
+    if (const Real speed = change.dot(s.normal()); speed > carrier.speed) carrier = {s.body, speed};
+  }
+  return carrier;
+}
+
 /// Merges the results of the chunks.
 void ParticleContacts::collect() {
   std::size_t pairs = 0, surfaces = 0;
@@ -301,6 +309,49 @@ void ParticleContacts::collect() {
     if (pairs_[k].is_far) far_.push_back(static_cast<uint32_t>(k));
 }
 
+/// Finds the dynamic bodies that particles touch, and the effective masses of the contacts with them.
+void ParticleContacts::find_pushed_bodies() {
+  pushed_.clear();
+  on_pushed_.clear();
+  std::map<uint32_t, uint32_t> index;  // by body
+  std::vector<Vec6> direction;
+  for (uint32_t k = 0; k < surfaces_.size(); ++k) {
+    Surface& s = surfaces_[k];
+    if (!s.obstacle->is_dynamic()) continue;
+    const auto [found, is_new] = index.try_emplace(s.body, static_cast<uint32_t>(pushed_.size()));
+    if (is_new) {
+      pushed_.push_back({s.obstacle});
+      direction.push_back(Vec6::Zero());
+    }
+    s.pushed = found->second;
+    const CollidingParticle& g = particles_[s.particle];
+    s.arm = g.at(s.time) - g.radius * s.normal() - s.obstacle->centre_at(s.time / step_->h);
+    Vec6 push;
+    push << -s.normal(), s.arm.cross(-s.normal());
+    direction[s.pushed] += push;
+    on_pushed_.push_back(k);
+  }
+  for (std::size_t b = 0; b < pushed_.size(); ++b) {
+    PushedBody& body = pushed_[b];
+    const Wrench expected = step_->impulses.expected(body.obstacle->body);
+    Vec6 impulse;
+    impulse << expected.force, expected.torque;
+    body.mobility = step_->impulses.mobility(*body.obstacle, direction[b]);
+    body.gained = -body.mobility * impulse;
+  }
+  for (const uint32_t k : on_pushed_) {
+    Surface& s = surfaces_[k];
+    const CollidingParticle& g = particles_[s.particle];
+    Eigen::Matrix<Real, 3, 6> E;
+    E << Mat3::Identity(), -cross_matrix(s.arm);
+    const Mat3 K = E * pushed_[s.pushed].mobility * E.transpose();
+    const Real along = s.normal().dot(K * s.normal());
+    // The trace bounds the mobilities along the surface in all directions.
+    s.mass = static_cast<float>(1 / (1 / g.mass + along));
+    s.sliding_mass = static_cast<float>(1 / ((1 + g.turning) / g.mass + K.trace() - along));
+  }
+}
+
 void ParticleContacts::solve(std::span<CollidingParticle> particles, const Order& order,
                              const ParticleSearch& search, const ParticleImpacts& impacts,
                              const ParticleStep& step, uint32_t lcp_cluster, std::span<Vec3> end,
@@ -321,9 +372,11 @@ void ParticleContacts::solve(std::span<CollidingParticle> particles, const Order
   find();
   solved_.clear();
   lcp_work_ = {};
+  find_pushed_bodies();
   if (lcp_cluster > 0) solve_clusters(lcp_cluster);
   relax();
   displace(end, touched);
+  displace_bodies();
   follow_carriers(end);
   push_apart(end);
   stop_passing(end);

@@ -58,6 +58,8 @@ class ParticleContacts {
              std::span<Vec3> end, std::span<uint8_t> touched, std::vector<Reaction>& reactions,
              std::vector<ParticleStrike>& strikes);
 
+  /// The carrier of a particle in the last solution, by its index there.
+  CollidingParticle::Carrier carrier(uint32_t particle) const;
   std::size_t contacts() const { return pairs_.size() + surfaces_.size(); }
   uint32_t sweeps() const { return sweeps_; }
   /// Work of pivoting in the last solve(); its fall-backs are the clusters that relaxation has solved.
@@ -98,8 +100,10 @@ class ParticleContacts {
     bool is_impact;
     uint32_t body;
     const Obstacle* obstacle;
-    Vec3 velocity;       // velocity of the surface
-    Vec3 friction_axis;  // Obstacle::friction_axis_on() of the surface
+    Vec3 velocity;            // velocity of the surface
+    Vec3 friction_axis;       // Obstacle::friction_axis_on() of the surface
+    uint32_t pushed = kNone;  // index of the dynamic body in pushed_
+    Vec3 arm = Vec3::Zero();  // vector from the body's centre of mass to the contact
 
     /// Does the same as Contact::held(). With a friction axis, the limits along and across the axis are
     /// separate.
@@ -115,11 +119,29 @@ class ParticleContacts {
   struct Motion {
     Lanes velocity;
     Vec3 at() const { return vector_of(velocity); }
+    Real inverse_mass() const { return velocity[3]; }
   };
   /// Rotation of a ball (see CollidingParticle): the spin of its surface, and turning / mass [1/kg].
   struct Turn {
     Lanes surface_spin;
     Vec3 at() const { return vector_of(surface_spin); }
+  };
+  /// A dynamic body that particles touch. The contacts change its velocity at the end of the sub-step.
+  struct PushedBody {
+    const Obstacle* obstacle;
+    Mat6 mobility = Mat6::Zero();
+    Vec6 gained = Vec6::Zero();  // change of its velocity by the impulses beyond the expected ones
+    Vec6 kick = Vec6::Zero();    // the part of `gained` by impacts
+
+    /// Change of the velocity of a point [m/s].
+    static Vec3 at(const Vec6& change, const Vec3& arm) {
+      return change.head<3>() + Vec3(change.tail<3>()).cross(arm);
+    }
+    void push(const Vec3& impulse, const Vec3& arm) {
+      Vec6 push;
+      push << impulse, arm.cross(impulse);
+      gained += mobility * push;
+    }
   };
   /// Two particles that would pass through each other on their paths.
   struct Passing {
@@ -163,6 +185,7 @@ class ParticleContacts {
   void solve_clusters(uint32_t most);
   bool is_solved(uint32_t particle) const { return !solved_.empty() && solved_[particle] != 0; }
   // particle_relaxation.cpp
+  void find_pushed_bodies();
   void start_motion();
   Lanes relative_velocity(const Pair& c, Lanes normal) const;
   Lanes relative_velocity(const Surface& c, Lanes normal) const;
@@ -170,6 +193,7 @@ class ParticleContacts {
   void apply(const Surface& c, Lanes normal, Lanes impulse);
   void relax();
   void displace(std::span<Vec3> end, std::span<uint8_t> touched);
+  void displace_bodies();
   void push_apart(std::span<Vec3> end);
   // carried_particles.cpp
   std::vector<const Obstacle*> find_carriers() const;
@@ -201,6 +225,8 @@ class ParticleContacts {
   // Index of the first contact of each particle; a pair belongs to its first particle.
   std::vector<uint32_t> pair_begin_, surface_begin_, pair_begin_before_, surface_begin_before_;
   std::vector<uint32_t> far_;
+  std::vector<PushedBody> pushed_;
+  std::vector<uint32_t> on_pushed_;  // contacts with pushed_
   std::vector<Motion> motion_;
   std::vector<Turn> turns_;  // by particle; empty if none turns
   std::vector<Real> slab_change2_;

@@ -33,7 +33,7 @@ void ParticleImpacts::resolve(std::span<CollidingParticle> particles, const Part
   step_ = &step;
   strikes_ = &strikes;
   stamp_.assign(particles.size(), 0);
-  struck_body_.assign(particles.size(), kNone);
+  struck_.assign(particles.size(), {});
   sorted_stamp_.assign(particles.size(), 0);
   changed_.clear();
   unsorted_.clear();
@@ -115,11 +115,11 @@ void ParticleImpacts::find_obstacle(uint32_t i, NearObstacles& near, Add&& add) 
     near.find(path, g.radius);
     if (near.all().empty()) return;
     const ObstacleHit hit = near.first_hit(path, g.radius);
-    if (!hit.obstacle || hit.obstacle->body == struck_body_[i]) return;
+    if (!hit.obstacle || hit.obstacle->body == struck_[i].body) return;
     const Real time = hit.fraction * h;
     const Vec3 surface = hit.obstacle->velocity_at(hit.position, hit.fraction);
     const Real speed = -(g.velocity_at(time, h) - surface).dot(hit.normal);
-    if (is_impact(speed, g.acceleration.norm(), *step_)) {
+    if (is_impact(speed, greater_acceleration(g, *hit.obstacle, h), *step_)) {
       if (!is_left_to_resting_contact(i, i, speed))
         add(Impact{time, i, kNone, stamp_[i], 0, hit.normal, hit.obstacle});
       return;
@@ -165,7 +165,7 @@ void ParticleImpacts::collide_with_obstacle(const Impact& impact) {
           : Vec3(Vec3::Zero());
   if (o.is_dynamic()) {
     step_->impulses.push(reaction(o, contact, fraction, impulse));
-    struck_body_[impact.a] = o.body;
+    struck_[impact.a] = {o.body, std::max(0.0, -u.dot(impact.normal))};
   }
   particles_[impact.a].turn(impact.normal, impulse);
   strike(impact.a, impact.time, impulse / g.mass, impact.normal);

@@ -31,7 +31,9 @@ class ParticleImpacts {
   std::span<const uint32_t> changed() const { return changed_; }
   /// Obstacle::body of the dynamic body that a particle hit last; kNone if there is none. The body reacts
   /// only in the next sub-step.
-  uint32_t struck_body(uint32_t particle) const { return struck_body_[particle]; }
+  uint32_t struck_body(uint32_t particle) const { return struck_[particle].body; }
+  /// The same body, and the speed of approach.
+  const CollidingParticle::Carrier& struck(uint32_t particle) const { return struck_[particle]; }
   uint64_t count() const { return count_; }
 
  private:
@@ -71,7 +73,7 @@ class ParticleImpacts {
   std::vector<std::vector<Impact>> found_;  // by chunk
   std::vector<uint32_t> stamp_;             // number of collisions of each particle so far
   std::vector<uint32_t> neighbours_;        // number of neighbours that nearly touch, for each particle
-  std::vector<uint32_t> struck_body_;
+  std::vector<CollidingParticle::Carrier> struck_;
   std::vector<uint32_t> changed_;
   // The changed particles that are sorted, and the particles changed since then.
   ParticleSearch changed_search_;

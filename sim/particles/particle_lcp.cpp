@@ -10,20 +10,22 @@
 
 namespace offstage::sim {
 
-/// Returns the clusters: groups of particles that touch each other, with their contacts. Bodies do not
-/// connect clusters, because the velocities of bodies are given in this stage. Clusters of more than `most`
-/// contacts are counted as fall-backs and not returned.
+/// Returns the clusters: groups of particles that touch each other, with their contacts. Clusters of more
+/// than `most` contacts are counted as fall-backs and not returned. Clusters on dynamic bodies are not
+/// returned either: they change the velocities of the bodies, and so depend on each other.
 std::vector<ParticleContacts::Cluster> ParticleContacts::find_clusters(uint32_t most) {
   DisjointSets sets(particles_.size());
   for (const Pair& c : pairs_) sets.join(c.a, c.b);
   std::vector<uint32_t> sizes(particles_.size(), 0);
   for (const Pair& c : pairs_) ++sizes[sets.find(c.a)];
   for (const Surface& c : surfaces_) ++sizes[sets.find(c.particle)];
+  std::vector<uint8_t> is_shared(particles_.size(), 0);
+  for (const uint32_t k : on_pushed_) is_shared[sets.find(surfaces_[k].particle)] = 1;
   constexpr uint32_t kTooLarge = ~0u;
   std::vector<uint32_t> number(particles_.size(), kTooLarge);
   std::vector<Cluster> clusters;
   for (uint32_t i = 0; i < particles_.size(); ++i) {
-    if (sizes[i] == 0) continue;
+    if (sizes[i] == 0 || is_shared[i]) continue;
     ++lcp_work_.solves;
     if (sizes[i] > most) {
       ++lcp_work_.fallbacks;

@@ -2,12 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <map>
-#include <set>
 
 #include <oneapi/tbb/parallel_for.h>
 
-#include "sim/core/disjoint_sets.h"
 #include "sim/particles/particle_contacts.h"
 
 namespace offstage::sim {
@@ -26,53 +23,6 @@ constexpr int kMaxSlides = 4;
 /// other's velocities.
 constexpr uint32_t kStreams = 4;
 constexpr std::size_t kRelaxationChunk = ParticleSearch::kChunk;
-
-/// The total impulse of resting particles on a body in a sub-step.
-struct Load {
-  const Obstacle* obstacle;
-  Vec3 impulse = Vec3::Zero(), angular_impulse = Vec3::Zero();
-  Real arm = 0;                ///< greatest lever arm of its parts [m]
-  Real brought = 0, mass = 0;  ///< sums over the heaps that rest on it
-  Real fraction = 1;
-};
-
-/// Particles that touch each other.
-struct Heap {
-  Real brought = 0;  ///< sum of the particles' momenta before the contacts acted [N s]
-  Real mass = 0;     ///< [kg]
-};
-
-/// Limits the impulse of resting particles on each body to the sum of two parts. The first part acts against
-/// the motion of the body and at most stops it. The second part is at most the momentum of these particles
-/// relative to the body, and its angular impulse is at most this momentum times the greatest lever arm.
-void limit_loads(std::span<Reaction> reactions, std::map<uint32_t, Load>& loads) {
-  for (const Reaction& r : reactions)
-    if (const auto load = loads.find(r.body); load != loads.end()) {
-      load->second.impulse += r.impulse;
-      load->second.angular_impulse += r.angular_impulse;
-      if (const Real size = r.impulse.norm(); size > 0)
-        load->second.arm = std::max(load->second.arm, r.angular_impulse.norm() / size);
-    }
-  for (auto& [body, load] : loads) {
-    const Obstacle& o = *load.obstacle;
-    // The fraction s of the load changes the energy by first s + second s^2.
-    const Real first = o.end_velocity.dot(load.impulse) + o.end_spin.dot(load.angular_impulse);
-    const Real second = (o.inverse_mass * load.impulse.squaredNorm() +
-                         load.angular_impulse.dot(o.inverse_inertia * load.angular_impulse)) /
-                        2;
-    const Real size = load.impulse.norm(), turn = load.angular_impulse.norm();
-    const Real stops = second > 0 ? std::max(0.0, -first) / (2 * second) : 1;
-    const Real most = load.brought + load.mass * o.end_velocity.norm();
-    Real bears = size > 0 ? most / size : 1;
-    if (turn > 0) bears = std::min(bears, most * load.arm / turn);
-    load.fraction = std::min(1.0, stops + bears);
-  }
-  for (Reaction& r : reactions)
-    if (const auto load = loads.find(r.body); load != loads.end()) {
-      r.impulse *= load->second.fraction;
-      r.angular_impulse *= load->second.fraction;
-    }
-}
 
 Lanes lanes_of(const Eigen::Vector3f& v) {
   return Lanes{v[0], v[1], v[2], 0};
@@ -139,8 +89,11 @@ void ParticleContacts::for_each_contact(OnPair&& on_pair, OnSurface&& on_surface
           more = true;
         }
       }
-      for (uint32_t c = surface_begin_[begin]; c < surface_begin_[end]; ++c) on_surface(surfaces_[c], slab);
+      for (uint32_t c = surface_begin_[begin]; c < surface_begin_[end]; ++c)
+        if (surfaces_[c].pushed == kNone) on_surface(surfaces_[c], slab);
     });
+  // Contacts of all particles with a body share its velocity.
+  for (const uint32_t c : on_pushed_) on_surface(surfaces_[c], 0);
   for (const uint32_t c : far_) on_pair(pairs_[c], 0);
 }
 
@@ -169,7 +122,8 @@ void ParticleContacts::start_motion() {
 
 [[gnu::always_inline]] inline Lanes ParticleContacts::relative_velocity(const Surface& c,
                                                                         Lanes normal) const {
-  const Lanes u = without_fourth(motion_[c.particle].velocity - lanes(c.velocity));
+  Lanes u = without_fourth(motion_[c.particle].velocity - lanes(c.velocity));
+  if (c.pushed != kNone) u -= lanes(PushedBody::at(pushed_[c.pushed].gained, c.arm));
   return turns_.empty() ? u : u + lane_cross(normal, turns_[c.particle].surface_spin);
 }
 
@@ -191,6 +145,7 @@ void ParticleContacts::start_motion() {
 [[gnu::always_inline]] inline void ParticleContacts::apply(const Surface& c, Lanes normal, Lanes impulse) {
   Lanes& v = motion_[c.particle].velocity;
   v += fourth(v) * impulse;
+  if (c.pushed != kNone) pushed_[c.pushed].push(-vector_of(impulse), c.arm);
   if (turns_.empty()) return;
   Lanes& spin = turns_[c.particle].surface_spin;
   spin -= fourth(spin) * lane_cross(normal, impulse);
@@ -252,6 +207,25 @@ void ParticleContacts::displace(std::span<Vec3> end, std::span<uint8_t> touched)
   });
 }
 
+/// Moves the bodies by the impulses of resting contacts beyond the expected ones.
+void ParticleContacts::displace_bodies() {
+  for (PushedBody& body : pushed_) body.kick.setZero();
+  for (const uint32_t k : on_pushed_) {
+    const Surface& s = surfaces_[k];
+    if (!s.is_impact || !s.acts()) continue;
+    Vec6 push;
+    push << -s.impulse(), s.arm.cross(-s.impulse());
+    pushed_[s.pushed].kick += pushed_[s.pushed].mobility * push;
+  }
+  const std::span<const Obstacle> moving = step_->moving.all();
+  for (const PushedBody& body : pushed_) {
+    const Obstacle& o = *body.obstacle;
+    if (moving.empty() || &o < &moving.front() || &o > &moving.back()) continue;  // asleep
+    const Vec6 move = step_->h * (body.gained - body.kick);
+    step_->moving.move_end(o, displaced(o.end, o.centre, move.head<3>(), move.tail<3>()), step_->h);
+  }
+}
+
 /// Removes a part of the overlaps.
 void ParticleContacts::push_apart(std::span<Vec3> end) {
   for_each_contact(
@@ -282,51 +256,10 @@ void ParticleContacts::keep_outside(std::span<Vec3> end, std::vector<Reaction>& 
     if (particles_[i].hits_bodies) keep_outside(i, near, end[i], found);
   });
   for_each([&](uint32_t i, NearObstacles&, Found& found) { report(i, found); });
-  const std::size_t first = reactions.size();
   for (const Found& found : found_) {
     reactions.insert(reactions.end(), found.reactions.begin(), found.reactions.end());
     strikes.insert(strikes.end(), found.strikes.begin(), found.strikes.end());
   }
-
-  // For a particle caught between a body and another object there is no solution, and its impulses grow with
-  // each sweep.
-  std::map<uint32_t, Load> loads;
-  for (const Surface& s : surfaces_)
-    if (s.acts() && s.obstacle->is_dynamic()) loads.try_emplace(s.body, Load{s.obstacle});
-  if (loads.empty()) return;
-  std::vector<Vec3> momentum(particles_.size());  // by particle, before the contacts acted
-  std::vector<uint8_t> acts(particles_.size(), 0);
-  for (std::size_t i = 0; i < particles_.size(); ++i)
-    momentum[i] = particles_[i].mass * particles_[i].velocity;
-  const auto take_back = [&](const Contact& c, uint32_t i, Real sign) {
-    momentum[i] -= sign * c.impulse();
-    acts[i] |= c.acts();
-  };
-  for (const Pair& c : pairs_) {
-    take_back(c, c.a, 1);
-    take_back(c, c.b, -1);
-  }
-  for (const Surface& c : surfaces_) take_back(c, c.particle, 1);
-  // Particles that touch each other load a body together.
-  DisjointSets heaps(particles_.size());
-  for (const Pair& c : pairs_)
-    if (c.acts()) heaps.join(c.a, c.b);
-  std::map<uint32_t, Heap> of_heap;
-  for (uint32_t i = 0; i < particles_.size(); ++i)
-    if (acts[i]) {
-      Heap& heap = of_heap[heaps.find(i)];
-      heap.brought += momentum[i].norm();
-      heap.mass += particles_[i].mass;
-    }
-  std::set<std::pair<uint32_t, uint32_t>> seen;
-  for (const Surface& s : surfaces_) {
-    const auto load = loads.find(s.body);
-    if (!s.acts() || load == loads.end() || !seen.insert({s.body, heaps.find(s.particle)}).second) continue;
-    const Heap& heap = of_heap[heaps.find(s.particle)];
-    load->second.brought += heap.brought;
-    load->second.mass += heap.mass;
-  }
-  limit_loads(std::span(reactions).subspan(first), loads);
 }
 
 void ParticleContacts::keep_outside(uint32_t i, NearObstacles& near, Vec3& end, Found& found) {
@@ -347,12 +280,19 @@ void ParticleContacts::keep_outside(uint32_t i, NearObstacles& near, Vec3& end, 
       end = plane.origin;
       return;
     }
+    const auto pushed = std::ranges::find(pushed_, &o, &PushedBody::obstacle);
+    const bool is_kicked = pushed != pushed_.end() && !pushed->kick.isZero(0);
     if (const Real above = plane.height(end); above < 0) {
       end -= above * plane.normal;
-      g.velocity = velocity_after_shift(g.velocity, g.acceleration, -above * plane.normal);
+      // A body that an impact kicks moves with its new velocity from the next sub-step on. Until then it only
+      // stops the particle.
+      if (!is_kicked) g.velocity = velocity_after_shift(g.velocity, g.acceleration, -above * plane.normal);
     }
     path = SpherePath(from, end, fraction, o.turn > 0 ? &o : nullptr);
-    const Real approach = (surface - g.velocity).dot(hit.normal);
+    const Vec3 kick = is_kicked
+                          ? PushedBody::at(pushed->kick, from - g.radius * hit.normal - o.centre_at(fraction))
+                          : Vec3::Zero();
+    const Real approach = (surface + kick - g.velocity).dot(hit.normal);
     if (approach <= 0 || o.body == impacts_->struck_body(i)) continue;
     g.velocity += approach * hit.normal;
     if (o.is_dynamic())
@@ -379,6 +319,7 @@ void ParticleContacts::report(uint32_t i, Found& found) const {
     // The impulse acts where the contact begins; the particle may be far away afterwards.
     const Vec3 contact = particles_[i].at(s.time) - particles_[i].radius * s.normal();
     found.reactions.push_back(reaction(*s.obstacle, contact, s.time / step_->h, s.impulse()));
+    found.reactions.back().is_load = !s.is_impact;
   }
 }
 

@@ -28,7 +28,7 @@ struct ParticleTally : ParticleFigures {
 struct ParticleStage {
   Real time, h;
   const Obstacles& fixed;
-  const Obstacles& moving;
+  Obstacles& moving;
   const Aabb& bounds;
   BodyImpulses& impulses;  ///< impulses on dynamic bodies
   ClothObstacles& cloths;

@@ -1,6 +1,11 @@
 #include "sim/world/body_reactions.h"
 
-#include <vector>
+#include <algorithm>
+#include <utility>
+
+#include "sim/core/twist.h"
+#include "sim/dynamics/expected_acceleration.h"
+#include "sim/world/resting_bodies.h"
 
 namespace offstage::sim {
 namespace {
@@ -8,7 +13,127 @@ namespace {
 /// A sleeping body wakes if an impact would make it faster than this [m/s].
 constexpr Real kNudge = 1e-4;
 
+/// Mobility of a body without contacts and joints.
+Mat6 mobility(const RigidBody& body) {
+  Mat6 result = Mat6::Zero();
+  result.topLeftCorner<3, 3>().diagonal().setConstant(1 / body.mass);
+  const Mat3 axes = body.orientation.toRotationMatrix();
+  result.bottomRightCorner<3, 3>() = axes * body.inverse_inertia * axes.transpose();
+  return result;
+}
+
+/// Returns the load of a body that is expected in the next sub-step. Resting contacts persist, so a load that
+/// changes much is expected with the smaller of its last two values.
+Wrench expected_load(const RigidBody& body, const std::array<Wrench, 3>& last) {
+  std::array<Twist, 3> accelerations;
+  for (std::size_t i = 0; i < last.size(); ++i)
+    accelerations[i] = {last[i].force / body.mass, body.angular_velocity(body.orientation, last[i].torque)};
+  const auto& [now, before, first] = accelerations;
+  const Twist smaller = square(body, now) < square(body, before) ? now : before;
+  const Twist expected = expected_acceleration(body, accelerations).value_or(smaller);
+  return {body.mass * expected.velocity, body.spin_momentum(body.orientation, expected.angular_velocity)};
+}
+
 }  // namespace
+
+void BodyReactions::begin_substep() {
+  for (const BodyHandle handle : std::exchange(pushed_, {}))
+    if (const std::unique_ptr<Body>* body = world_.bodies.find(handle)) (*body)->rigid.push = {};
+  for (auto& [slot, load] : loads_) {
+    const Body& body = world_.body_at(slot);
+    load.expected = body.is_dynamic() ? expected_load(body.rigid, load.last) : Wrench{};
+    add_force(body.handle, load.expected);
+    add_force(body.handle, load.passed);
+  }
+}
+
+void BodyReactions::add_force(BodyHandle handle, const Wrench& force) {
+  const std::unique_ptr<Body>* body = world_.bodies.find(handle);
+  if (!body) return;
+  (*body)->rigid.push += force;
+  pushed_.push_back(handle);
+}
+
+std::map<uint32_t, BodyImpulses::Load> BodyReactions::loads(std::span<ContactPair* const> pairs,
+                                                            const Aabb& particles, Real h) {
+  for (const Body* body : active_.awake())
+    if (body->collides() && body->swept.intersects(particles)) loads_.try_emplace(body->handle.index);
+  std::map<uint32_t, std::vector<RestingContact>> contacts;
+  for (auto& [slot, load] : loads_) {
+    load.mobility.reset();
+    if (world_.body_at(slot).is_awake() && !joints_.articulation_of(slot)) contacts[slot];
+  }
+  find_resting_contacts(pairs, h, contacts);
+  for (auto& [slot, found] : contacts) {
+    std::erase_if(found, [](const RestingContact& c) { return c.yield > 0; });  // on bodies that yield
+    const Mat6 free = mobility(world_.body_at(slot).rigid);
+    if (!found.empty()) loads_[slot].mobility = RestingContacts(std::move(found), free).held_mobility(free);
+  }
+  std::map<uint32_t, BodyImpulses::Load> loads;
+  for (const auto& [slot, load] : loads_) loads[slot] = {h * load.expected, load.mobility};
+  return loads;
+}
+
+/// Returns the part of the impulses on a body that its contacts with other bodies do not balance. The other
+/// part acts on the bodies beneath in the next sub-step. They have carried the expected load already: where
+/// the particles press less, nothing is passed on.
+Reaction BodyReactions::balance(const Body& body, Load& load, const Reaction& sum, Real h) const {
+  if (!load.mobility) return sum;
+  const auto left = [&](const Vec6& impulse) {
+    const Vec6 gained = *load.mobility * impulse;
+    Vec6 momentum;
+    momentum << body.rigid.mass * gained.head<3>(),
+        body.rigid.spin_momentum(body.rigid.orientation, gained.tail<3>());
+    return momentum;
+  };
+  Vec6 impulse, expected;
+  impulse << sum.impulse, sum.angular_impulse;
+  expected << h * load.expected.force, h * load.expected.torque;
+  const Real along = impulse.head<3>().dot(expected.head<3>()), size2 = expected.head<3>().squaredNorm();
+  const Real unloaded = size2 > 0 ? std::clamp(-along / size2, 0.0, 1.0) : 0;
+  const Vec6 pressing = impulse + unloaded * expected, passed = (pressing - left(pressing)) / h;
+  load.passed = {passed.head<3>(), passed.tail<3>()};
+  const Vec6 own = left(impulse);
+  return {sum.body, own.head<3>(), own.tail<3>()};
+}
+
+/// Moves a body by the impulses of resting particles beyond the expected ones.
+void BodyReactions::displace(Body& body, const Load& load, Real h) {
+  if (!body.is_awake()) return;
+  Vec6 more;
+  more << h * (load.last[0].force - load.expected.force), h * (load.last[0].torque - load.expected.torque);
+  if (more.isZero(0)) return;
+  const BodyImpulses::Link link = joints_.link(body.handle.index);
+  const Mat6 own = load.mobility ? *load.mobility
+                   : link.bodies ? link.bodies->link_mobility(link.index, more)
+                                 : mobility(body.rigid);
+  const Vec6 move = h * own * more;
+  body.pose = displaced(body.pose, body.rigid.centre, move.head<3>(), move.tail<3>());
+  body.rigid.place(body.pose);
+}
+
+void BodyReactions::apply_particles(const BodyImpulses& impulses, Real time, Real h, StepReport& report) {
+  for (auto& [slot, load] : loads_) {
+    load.last = {Wrench{}, load.last[0], load.last[1]};
+    load.passed = {};
+  }
+  for (const auto& [slot, impulse] : impulses.loads()) loads_[slot].last[0] = (1 / h) * impulse;
+  std::vector<Reaction> reactions = impulses.sums();
+  for (Reaction& r : reactions)
+    if (const auto load = loads_.find(r.body); load != loads_.end())
+      r = balance(world_.body_at(r.body), load->second, r, h);
+  for (const auto& [slot, load] : loads_) displace(world_.body_at(slot), load, h);
+  apply(reactions, time, report);
+  const auto is_zero = [](const Wrench& w) { return w.force.isZero(0) && w.torque.isZero(0); };
+  std::erase_if(loads_, [&](const auto& entry) {
+    return std::ranges::all_of(entry.second.last, is_zero) && is_zero(entry.second.passed);
+  });
+}
+
+void BodyReactions::forget(const Body& body) {
+  pending_.erase(body.handle.index);
+  loads_.erase(body.handle.index);
+}
 
 void BodyReactions::apply(std::span<const Reaction> reactions, Real time, StepReport& report) {
   std::vector<uint32_t> pushed;

@@ -55,15 +55,9 @@ void ClothMotion::begin_step() {
       [](ClothHandle, const std::unique_ptr<Cloth>& cloth) { cloth->report = {.finite = !cloth->stopped}; });
 }
 
-void ClothMotion::begin_substep(Real h) {
-  const auto set = [&](BodyHandle handle, const Wrench& push) {
-    if (const std::unique_ptr<Body>* body = world_.bodies.find(handle)) (*body)->rigid.push = push;
-  };
-  for (const BodyHandle body : std::exchange(pushed_, {})) set(body, {});
-  for (const Push& push : std::exchange(pushes_, {})) {
-    set(push.body, {push.impulse.force / h, push.impulse.torque / h});
-    pushed_.push_back(push.body);
-  }
+void ClothMotion::begin_substep(Real h, BodyReactions& reactions) {
+  for (const Push& push : std::exchange(pushes_, {}))
+    reactions.add_force(push.body, {push.impulse.force / h, push.impulse.torque / h});
 }
 
 /// Returns the bodies that cloths may touch in a sub-step of length h, and the bodies that hold pins.

@@ -10,6 +10,7 @@
 #include "sim/cloth/cloth_system.h"
 #include "sim/contact/contact_pair.h"
 #include "sim/world/active_bodies.h"
+#include "sim/world/body_reactions.h"
 
 namespace offstage::sim {
 
@@ -39,7 +40,7 @@ class ClothMotion {
   void begin_step();
   /// Gives the bodies that cloth pressed against others in the last sub-step the impulse that this needs, as
   /// a constant force in the sub-step of length h [s] that begins.
-  void begin_substep(Real h);
+  void begin_substep(Real h, BodyReactions& reactions);
   /// Moves all cloths through a sub-step, and displaces bodies where cloths push them. `pairs`: the pairs of
   /// bodies of this sub-step, which may press cloth. Returns the impulses on the bodies.
   std::vector<Reaction> step(Real start, Real h, std::span<ContactPair* const> pairs);
@@ -70,8 +71,7 @@ class ClothMotion {
     BodyHandle body;
     Wrench impulse;  // [N s], [N m s]
   };
-  std::vector<Push> pushes_;        // for the next sub-step
-  std::vector<BodyHandle> pushed_;  // bodies with a force of the last sub-step
+  std::vector<Push> pushes_;  // for the next sub-step
 };
 
 }  // namespace offstage::sim

@@ -29,6 +29,10 @@ class JointGroups {
   Articulation* articulation_of(uint32_t slot) const;
   /// The places of bodies in their articulations, by the slots of the bodies.
   std::span<const BodyImpulses::Link> links() const { return links_; }
+  /// The place of one body; without joints, its `bodies` is null.
+  BodyImpulses::Link link(uint32_t slot) const {
+    return slot < links_.size() ? links_[slot] : BodyImpulses::Link{};
+  }
 
   /// Breaks the joints whose load in a sub-step of length h [s] exceeded their limits, and reports them.
   void break_overloaded(Real h, StepReport& report);

@@ -17,7 +17,7 @@ class ObstacleSet {
   /// World::prewarm().
   void update(const WorldState& world, const ActiveBodies& active, Real h, bool fixes_dynamic);
   const Obstacles& fixed() const { return fixed_; }
-  const Obstacles& moving() const { return moving_; }
+  Obstacles& moving() { return moving_; }
 
  private:
   Obstacles fixed_, moving_;

@@ -1,6 +1,7 @@
 #include "sim/world/particle_motion.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace offstage::sim {
 
@@ -27,15 +28,17 @@ bool ParticleMotion::waits(ParticleSystemHandle system) const {
   return is_prewarming_ && std::find(waiting_.begin(), waiting_.end(), system) != waiting_.end();
 }
 
-bool ParticleMotion::step(Real start, Real h, const CoupledSystem& coupled, StepReport& report) {
+bool ParticleMotion::step(Real start, Real h, const CoupledSystem& coupled,
+                          std::map<uint32_t, BodyImpulses::Load> expected, StepReport& report) {
   obstacles_.update(world_, active_, h, is_prewarming_);
   for (const auto& articulation : world_.articulations) articulation->begin_impulses(start + h);
-  impulses_.begin(joints_.links());
+  impulses_.begin(joints_.links(), std::move(expected));
   events_.clear();
   gather_cloths();
   const ParticleStage stage{start,     h,      obstacles_.fixed(), obstacles_.moving(), world_.def.bounds,
                             impulses_, cloths_};
   report.solvers.particle_lcp.add(collide(stage, coupled));
+  impulses_.subtract_expected();
   auto collided = collisions_.outcomes().begin();
   bool any_removed = false;
   world_.systems.for_each([&](ParticleSystemHandle handle, ParticleSystem& system) {
@@ -60,6 +63,20 @@ bool ParticleMotion::step(Real start, Real h, const CoupledSystem& coupled, Step
   });
   return_cloths();
   return any_removed;
+}
+
+Aabb ParticleMotion::colliding_bounds(Real h) const {
+  Aabb bounds;
+  world_.systems.for_each([&](ParticleSystemHandle handle, const ParticleSystem& system) {
+    if (!system.hits_particles() || !system.def.collides || waits(handle)) return;
+    const ParticleArrays& p = system.arrays;
+    for (std::size_t i = 0; i < p.size(); ++i) {
+      const Real reach = p.radius[i] + 2 * h * (p.velocity[i].norm() + h * world_.def.gravity.norm());
+      bounds.extend(p.position[i] - Vec3::Constant(reach));
+      bounds.extend(p.position[i] + Vec3::Constant(reach));
+    }
+  });
+  return bounds;
 }
 
 /// Collects the cloths with which particles collide. While particles are prewarmed, cloths stand still.

@@ -2,6 +2,7 @@
 /// Motion of particles through a sub-step, among bodies and cloths that have moved through it, and their
 /// collisions (physics P3-P8).
 
+#include <map>
 #include <vector>
 
 #include "sim/dynamics/body_impulses.h"
@@ -18,10 +19,14 @@ class ParticleMotion {
       : world_(world), active_(active), joints_(joints) {}
 
   /// Moves all particles through a sub-step and resolves their collisions. Particles that `coupled` has moved
-  /// already only collide. Returns whether any particle was removed.
-  bool step(Real start, Real h, const CoupledSystem& coupled, StepReport& report);
-  /// Impulses on bodies in the last sub-step, in the order of their slots.
-  std::vector<Reaction> reactions() const { return impulses_.sums(); }
+  /// already only collide. `expected`: loads of bodies, by slot. Returns whether any particle was removed.
+  bool step(Real start, Real h, const CoupledSystem& coupled, std::map<uint32_t, BodyImpulses::Load> expected,
+            StepReport& report);
+  /// Box around the paths of the particles that collide with each other and with bodies, in the next sub-step
+  /// of length h [s].
+  Aabb colliding_bounds(Real h) const;
+  /// Impulses on bodies in the last sub-step.
+  const BodyImpulses& impulses() const { return impulses_; }
   /// Events of the last sub-step.
   std::vector<ParticleEvent>& events() { return events_; }
   void forget(ParticleSystemHandle system);

@@ -119,17 +119,22 @@ void add_contacts(const ContactPair& pair, const Side& side, const HeldBodies& h
 
 }  // namespace
 
-void set_resting_contacts(const WorldState& world, std::span<ContactPair* const> pairs, Real h,
-                          std::span<ClothBody> near) {
-  std::map<uint32_t, std::vector<RestingContact>> contacts;  // by slot
-  for (const ClothBody& body : near)
-    if (body.is_dynamic() && world.body_at(body.obstacle().body).is_awake()) contacts[body.obstacle().body];
+void find_resting_contacts(std::span<ContactPair* const> pairs, Real h,
+                           std::map<uint32_t, std::vector<RestingContact>>& contacts) {
   if (contacts.empty()) return;
   const HeldBodies held(pairs);
   for (const ContactPair* pair : pairs)
     for (const Side& side : sides(*pair))
       if (const auto of_body = contacts.find(side.body->handle.index); of_body != contacts.end())
         add_contacts(*pair, side, held, h, of_body->second);
+}
+
+void set_resting_contacts(const WorldState& world, std::span<ContactPair* const> pairs, Real h,
+                          std::span<ClothBody> near) {
+  std::map<uint32_t, std::vector<RestingContact>> contacts;  // by slot
+  for (const ClothBody& body : near)
+    if (body.is_dynamic() && world.body_at(body.obstacle().body).is_awake()) contacts[body.obstacle().body];
+  find_resting_contacts(pairs, h, contacts);
   for (ClothBody& body : near)
     if (const auto found = contacts.find(body.obstacle().body); found != contacts.end())
       body.set_resting(std::move(found->second));

@@ -83,8 +83,8 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
   wake_at_jumps(start, end);
   active.update();
   begin_bodies(start, end);
-  const bool moves =
-      !active.awake().empty() || !active.kinematic().empty() || !springs.empty() || !systems.empty();
+  const bool moves = !active.awake().empty() || !active.kinematic().empty() || !springs.empty() ||
+                     !systems.empty() || reactions.has_loads();
   if (moves) {
     // With few bodies, several threads would cost more time than they save, in particular on a busy machine.
     const auto bodies_move = [&] { move_bodies(start, h, report); };
@@ -103,7 +103,7 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
   }
   if (!cloths.empty()) reactions.apply(cloth_motion.step(start, h, contacts.pairs()), start + h, report);
   // Particles move last, so that they meet cloths and bodies on the paths of both.
-  if (moves && !systems.empty()) step_particles(start, h, free_motion.whole(), report);
+  if (!systems.empty() || reactions.has_loads()) step_particles(start, h, free_motion.whole(), report);
 }
 
 /// Moves all bodies through a sub-step, with their contacts and impacts.
@@ -132,8 +132,10 @@ void World::Impl::move_bodies(Real start, Real h, StepReport& report) {
 
 /// Moves the particles. They collide with bodies, cloths and each other, and push them.
 void World::Impl::step_particles(Real start, Real h, const CoupledSystem& coupled, StepReport& report) {
-  if (particle_motion.step(start, h, coupled, report)) remove_dead_springs();
-  reactions.apply(particle_motion.reactions(), start + h, report);
+  const Aabb particles = particle_motion.colliding_bounds(h);
+  if (particle_motion.step(start, h, coupled, reactions.loads(contacts.pairs(), particles, h), report))
+    remove_dead_springs();
+  reactions.apply_particles(particle_motion.impulses(), start + h, h, report);
 }
 
 /// Implements World::prewarm(): only particles move; dynamic bodies stand still, and kinematic bodies follow
@@ -173,7 +175,8 @@ void World::Impl::begin_bodies(Real start, Real end) {
     awake[i]->begin_interval(0);
   });
   begin_kinematic(start, end);
-  cloth_motion.begin_substep(end - start);
+  reactions.begin_substep();
+  cloth_motion.begin_substep(end - start, reactions);
   free_motion.begin_substep();
 }
 
