@@ -97,19 +97,33 @@ Reaction BodyReactions::balance(const Body& body, Load& load, const Reaction& su
   return {sum.body, own.head<3>(), own.tail<3>()};
 }
 
-/// Moves a body by the impulses of resting particles beyond the expected ones.
-void BodyReactions::displace(Body& body, const Load& load, Real h) {
-  if (!body.is_awake()) return;
-  Vec6 more;
-  more << h * (load.last[0].force - load.expected.force), h * (load.last[0].torque - load.expected.torque);
-  if (more.isZero(0)) return;
-  const BodyImpulses::Link link = joints_.link(body.handle.index);
-  const Mat6 own = load.mobility ? *load.mobility
-                   : link.bodies ? link.bodies->link_mobility(link.index, more)
-                                 : mobility(body.rigid);
-  const Vec6 move = h * own * more;
-  body.pose = displaced(body.pose, body.rigid.centre, move.head<3>(), move.tail<3>());
-  body.rigid.place(body.pose);
+/// Moves the bodies by the impulses of resting particles beyond the expected ones.
+void BodyReactions::displace(Real h) {
+  const auto move = [&](Body& body, const Vec6& change) {
+    body.pose = displaced(body.pose, body.rigid.centre, h * change.head<3>(), h * change.tail<3>());
+    body.rigid.place(body.pose);
+  };
+  std::map<uint32_t, std::pair<Articulation*, std::vector<Vec6>>> jointed;  // by slot of the first link
+  for (const auto& [slot, load] : loads_) {
+    Body& body = world_.body_at(slot);
+    Vec6 more;
+    more << h * (load.last[0].force - load.expected.force), h * (load.last[0].torque - load.expected.torque);
+    if (!body.is_awake() || more.isZero(0)) continue;
+    Articulation* articulation = joints_.articulation_of(slot);
+    if (!articulation) {
+      move(body, (load.mobility ? *load.mobility : mobility(body.rigid)) * more);
+      continue;
+    }
+    auto& [moved, changes] = jointed[articulation->bodies().front()->handle.index];
+    moved = articulation;
+    changes.resize(articulation->link_count(), Vec6::Zero());
+    articulation->respond(joints_.link(slot).index, more, changes);
+  }
+  for (const auto& [slot, links] : jointed)
+    for (std::size_t i = 0; i < links.second.size(); ++i) {
+      Body& link = *links.first->bodies()[i];
+      if (link.is_awake()) move(link, links.second[i]);
+    }
 }
 
 void BodyReactions::apply_particles(const BodyImpulses& impulses, Real time, Real h, StepReport& report) {
@@ -122,7 +136,7 @@ void BodyReactions::apply_particles(const BodyImpulses& impulses, Real time, Rea
   for (Reaction& r : reactions)
     if (const auto load = loads_.find(r.body); load != loads_.end())
       r = balance(world_.body_at(r.body), load->second, r, h);
-  for (const auto& [slot, load] : loads_) displace(world_.body_at(slot), load, h);
+  displace(h);
   apply(reactions, time, report);
   const auto is_zero = [](const Wrench& w) { return w.force.isZero(0) && w.torque.isZero(0); };
   std::erase_if(loads_, [&](const auto& entry) {

@@ -46,7 +46,7 @@ class BodyReactions {
     Wrench passed;
     std::optional<Mat6> mobility;  ///< of a body that rests on others; see RestingContacts::held_mobility()
   };
-  void displace(Body& body, const Load& load, Real h);
+  void displace(Real h);
   Reaction balance(const Body& body, Load& load, const Reaction& sum, Real h) const;
 
   const WorldState& world_;

@@ -133,6 +133,35 @@ TEST(ParticleLoad, TakesPartInOscillations) {
   }
 }
 
+// The load moves all links of a chain together. When only the plate moved, the force on the upper hook
+// changed by a third from sub-step to sub-step.
+TEST(ParticleLoad, PullsAtAChainOfLinks) {
+  Scale scale(1.0 / 240, 5);
+  const auto link = scale.world.add_body({.name = "link",
+                                          .shape = Box{{0.02, 0.2, 0.02}},
+                                          .pose = {Vec3(0, 0.3, 0)},
+                                          .mass = 0.1,
+                                          .collides = false});
+  const auto hook = scale.world.add_joint({.name = "upper",
+                                           .type = JointType::revolute,
+                                           .a = link,
+                                           .anchor = {0, 0.4, 0},
+                                           .axis = Vec3::UnitZ(),
+                                           .damping = 0.5});
+  scale.world.add_joint({.name = "lower",
+                         .type = JointType::revolute,
+                         .a = scale.plate,
+                         .b = link,
+                         .anchor = {0, 0.2, 0},
+                         .axis = Vec3::UnitZ(),
+                         .damping = 0.5});
+  scale.run(3);
+  for (int i = 0; i < 60; ++i) {
+    scale.world.step(1.0 / 240);
+    EXPECT_NEAR(scale.world.joint(hook).force.y(), (kPlateMass + 0.1 + 5) * kWeightPerMass, 0.05) << i;
+  }
+}
+
 // A sleeping body carries the particles on it, and does not wake again and again.
 TEST(ParticleLoad, DoesNotWakeABody) {
   Scale scale(1.0 / 240, 0.5, 0.05, 1e9, true);
