@@ -93,6 +93,9 @@ class alignas(64) ContactPair {
   /// Whether the island of this pair is moved back to the times of the pair's impacts. If not, the contact
   /// points limit the approach.
   bool needs_toi = false;
+  /// Whether a body turns far and all touching points rebound. The next impact may then be at any point, and
+  /// its time is not known without a search.
+  bool tumbles_away = false;
 
   /// Only body `b` may be a plane.
   ContactPair(Body& a, Body& b, const PairSurface& surface);
@@ -139,12 +142,14 @@ class alignas(64) ContactPair {
   }
 
   /// Whether the island will be moved back to the impact at this point. The point must then not limit the
-  /// approach before the impact. While other points of the pair touch, this requires an approach faster than
-  /// `impact_speed` [m/s].
+  /// approach before the impact. While points of the pair touch and do not tumble away, this requires an
+  /// approach faster than `impact_speed` [m/s]. If none touches, speculative contacts wait, too; at their
+  /// places at the start they may seem to touch.
   bool awaits_impact(const PlacedManifold& m, const ContactPoint& point, Real impact_speed) const {
-    if (!needs_toi || point.separation <= kTouching) return false;
-    return separation_ > kTouching ||
-           relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n) < -impact_speed;
+    if (!needs_toi) return false;
+    if (separation_ > kTouching) return true;
+    return point.separation > kTouching &&
+           (tumbles_away || relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n) < -impact_speed);
   }
 
   /// Prefetches the pair for find(). Call prefetch_manifold(), which prefetches its first manifold, a little

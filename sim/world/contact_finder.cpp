@@ -9,6 +9,7 @@
 #include "sim/contact/internal_edges.h"
 #include "sim/contact/solver_choice.h"
 #include "sim/core/parallel_loop.h"
+#include "sim/world/impact_search.h"
 
 namespace offstage::sim {
 namespace {
@@ -69,6 +70,18 @@ void sort_by_rank(std::span<const RankedPair> pairs, std::size_t bodies, std::ve
 /// Whether the box of a body's path is not within its box in the broad phase.
 bool leaves(const Body& body, const Aabb& swept_box) {
   return body.collides() && !body.swept.contains(swept_box);
+}
+
+/// Whether all touching points of a pair separate faster than `speed` [m/s].
+bool rebounds(const ContactPair& pair, Real speed) {
+  for (const PlacedManifold& m : pair.manifolds())
+    for (uint32_t k = 0; k < m.manifold.count; ++k) {
+      const ContactPoint& point = m.manifold.points[k];
+      if (point.separation <= kTouching &&
+          pair.relative_velocity((point.on_a + point.on_b) / 2).dot(m.frame.n) <= speed)
+        return false;
+    }
+  return true;
 }
 
 /// Whether a keyframed body does not move in this sub-step.
@@ -286,6 +299,7 @@ void ContactFinder::find_points(ContactPair& pair, Real time, Real h) const {
 /// whether the relative motion is too large for the known contact points.
 void ContactFinder::choose_event(ContactPair& pair, bool far, Real left) const {
   pair.needs_toi = far && !pair.toi_exhausted;
+  pair.tumbles_away = pair.needs_toi && turns_fast(pair, left) && rebounds(pair, world_.def.collision_speed);
   const bool bounces = is_exact_ || pair.surface().restitution > 0;
   if (far || pair.toi_exhausted || !bounces || pair.restitution_suppressed) return;
   for (const PlacedManifold& m : pair.manifolds())
@@ -323,6 +337,10 @@ std::vector<Body*> ContactFinder::wake_touched(FreeMotion& motion, Real start, R
   for (Body* body : woken) move(*body, false);
   active_.update();
   return woken;
+}
+
+bool ContactFinder::has_left(const Body& body) const {
+  return leaves(body, swept_bounds(body));
 }
 
 bool ContactFinder::follow(std::span<Body* const> bodies) {

@@ -20,19 +20,30 @@ namespace {
 constexpr Real kAddedByJoints = 1e-3, kUsualExcess = 0.02;
 /// The sweeps of the fast solver pass on a load to a light body in steps of about this body's own weight:
 /// with 32 sweeps in 1/60 s, stacks of two boxes hold if the upper one has at most about 300 times the mass.
-/// An island is uneven if its heaviest body has more than kUneven times the mass of one that is squeezed.
+/// An island is uneven if its heaviest body, or the links of an articulation together, have more than kUneven
+/// times the mass of a body that is squeezed.
 constexpr Real kUneven = 100;
 
-/// Whether a heavy body may press a light one against others, in an island small enough for the exact solver.
+/// Whether a heavy body, or the links of an articulation together, may press a light body against others, in
+/// an island small enough for the exact solver.
 bool is_uneven(const Island& island) {
   if (island.bodies.size() > kFewBodies || island.pairs.size() < 2) return false;
   Real heaviest = 0;
   for (const Body* body : island.bodies) heaviest = std::max(heaviest, body->rigid.mass);
+  const auto presses = [&](const Articulation* articulation, const Body* light) {
+    const std::span<Body* const> links = articulation->bodies();
+    Real mass = 0;
+    for (const Body* link : links) mass += link->rigid.mass;
+    return mass > kUneven * light->rigid.mass && std::ranges::find(links, light) == links.end();
+  };
   return std::ranges::any_of(island.bodies, [&](const Body* body) {
-    return heaviest > kUneven * body->rigid.mass &&
-           std::ranges::count_if(island.pairs, [&](const ContactPair* pair) {
-             return &pair->a() == body || &pair->b() == body;
-           }) > 1;
+    const bool is_light = heaviest > kUneven * body->rigid.mass ||
+                          std::ranges::any_of(island.articulations, [&](const Articulation* articulation) {
+                            return presses(articulation, body);
+                          });
+    return is_light && std::ranges::count_if(island.pairs, [&](const ContactPair* pair) {
+                         return &pair->a() == body || &pair->b() == body;
+                       }) > 1;
   });
 }
 
