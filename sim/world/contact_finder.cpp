@@ -339,10 +339,6 @@ std::vector<Body*> ContactFinder::wake_touched(FreeMotion& motion, Real start, R
   return woken;
 }
 
-bool ContactFinder::has_left(const Body& body) const {
-  return leaves(body, swept_bounds(body));
-}
-
 bool ContactFinder::follow(std::span<Body* const> bodies) {
   bool left = false;
   for (Body* body : bodies) left |= move(*body, true);

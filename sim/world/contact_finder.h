@@ -48,8 +48,6 @@ class ContactFinder {
   /// because impacts and islands refer to them. Returns whether pairs may have been added; see
   /// ContactPair::is_new().
   bool follow(std::span<Body* const> bodies);
-  /// Whether the path of a body is no longer within its box, so that follow() would change it.
-  bool has_left(const Body& body) const;
   /// Adds the pairs of bodies that have been woken.
   void extend() { collect(true); }
   /// Finds the points where a pair's bodies touch at their interval's start, or may touch in the rest of the

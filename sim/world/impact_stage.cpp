@@ -160,28 +160,8 @@ void ImpactStage::add_rim_updates() {
   }
 }
 
-/// Contact forces may move bodies out of their boxes in the broad phase, and into bodies that were no
-/// neighbours on the free paths: an impact on a heavy link swings a light one far. Their islands are solved
-/// again with these neighbours, unless they are too large.
-void ImpactStage::meet_new_neighbours() {
-  const std::span<Body* const> awake = active_.awake();
-  for (const std::size_t i :
-       indices_where(awake.size(), [&](std::size_t k) { return contacts_.has_left(*awake[k]); })) {
-    const uint32_t number = awake[i]->island;
-    const Real cost_again = moving_cost(islands_[number]);
-    if (islands_[number].from > 0 || cost() + cost_again > greatest_cost()) continue;
-    const std::vector<ContactPair*> added = find_pairs_again(number);
-    if (std::none_of(added.begin(), added.end(),
-                     [&](const ContactPair* pair) { return !pair->needs_toi && overlaps_at_end(*pair, 0); }))
-      continue;
-    cost_ += cost_again;
-    continue_from(number, 0);
-  }
-}
-
 void ImpactStage::resolve() {
   cost_before_ = solver_.cost();
-  meet_new_neighbours();
   search([](const ContactPair&) { return true; });
   search_rebounds([](const Body&) { return true; });
   add_rim_updates();
@@ -571,27 +551,21 @@ bool ImpactStage::overlaps_at_end(const ContactPair& pair, Real time) const {
 }
 
 /// Updates the pairs of an island's bodies. Bodies that leave their boxes in the broad phase have new
-/// neighbours. Sleeping ones wake, and form an island of their own. Returns the new pairs.
-std::vector<ContactPair*> ImpactStage::find_pairs_again(uint32_t number) {
-  if (!contacts_.follow(islands_[number].bodies)) return {};
-  std::vector<ContactPair*> near = islands_[number].pairs, added;
+/// neighbours. Sleeping ones wake, and form an island of their own.
+void ImpactStage::find_pairs_again(uint32_t number) {
+  if (!contacts_.follow(islands_[number].bodies)) return;
+  std::vector<ContactPair*> near = islands_[number].pairs;
   for (ContactPair* pair : contacts_.pairs()) {
     if (!pair->is_new()) continue;
     contacts_.find_points(*pair, std::max(pair->a().from, pair->b().from), h_);
     near.push_back(pair);
-    added.push_back(pair);
   }
   contacts_.remove_internal_edge_contacts(near, islands_[number].from, h_);
   const std::vector<Body*> woken = contacts_.wake_touched(motion_, start_, h_);
-  if (!woken.empty()) add_woken(woken);
-  return added;
-}
-
-/// Makes an island of bodies that have been woken.
-void ImpactStage::add_woken(std::span<Body* const> woken) {
+  if (woken.empty()) return;
   const auto added = static_cast<uint32_t>(islands_.size());
   islands_.emplace_back();
-  islands_[added].bodies.assign(woken.begin(), woken.end());
+  islands_[added].bodies = woken;
   islands_[added].motion = &motion_.last();
   for (Body* body : woken) body->island = added;
   for (const auto& articulation : world_.articulations)

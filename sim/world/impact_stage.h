@@ -57,7 +57,6 @@ class ImpactStage {
   std::size_t most_impacts() const;
   Real greatest_cost() const;
   void add_rim_updates();
-  void meet_new_neighbours();
   uint32_t gather(const ContactPair& pair, Real time);
   void join_all_pending(uint32_t number, Real time);
   void end_at_once(const Event& first);
@@ -74,8 +73,7 @@ class ImpactStage {
   bool join_overtaken(uint32_t number, Real time);
   bool closes(const ContactPair& pair, Real left) const;
   bool overlaps_at_end(const ContactPair& pair, Real time) const;
-  std::vector<ContactPair*> find_pairs_again(uint32_t number);
-  void add_woken(std::span<Body* const> woken);
+  void find_pairs_again(uint32_t number);
 
   const WorldState& world_;
   const ActiveBodies& active_;
