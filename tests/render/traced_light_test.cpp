@@ -214,21 +214,6 @@ TEST_F(TracedLight, OfTheSunIsFocusedByABallOfGlass) {
   EXPECT_LT(lost, 0.25f);
 }
 
-// A pixel has a shadow ray to each of up to three glowing bodies.
-TEST_F(TracedLight, OfSeveralGlowingBodiesHasLittleNoise) {
-  s.add(make_box({4, 4, 0.1f}), kGrey, {0, 0, -0.5f});
-  for (const Vector3f& place :
-       {Vector3f(-1, 0.5f, 0.2f), Vector3f(0, -0.5f, 0.2f), Vector3f(1, 0.5f, 0.2f)}) {
-    Vector3f light = Vector3f::Zero();
-    light[static_cast<int>(place.x()) + 1] = 5;
-    s.add(make_box({0.05f, 0.5f, 0.05f}), {.color = {0, 0, 0, 1}, .roughness = 1, .emission = light}, place);
-  }
-  look({.eye = {0, 0, 4}, .target = {0, 0, 0}, .fov_deg = 40});
-  const HdrImage picture = mean_of(s, 4), reference = mean_of(s, 64);
-  const Eigen::AlignedBox2i wall(Eigen::Vector2i(10, 10), Eigen::Vector2i(150, 110));
-  EXPECT_LT(relative_error(picture, reference, wall), 0.11f);
-}
-
 // Photons end at opaque surfaces only. Panes behind glass are lit straight through it, and not dark.
 TEST_F(TracedLight, ReachesPanesBehindGlass) {
   s.add(make_box({4, 0.05f, 4}), {.color = {1, 1, 1, 0.6f}, .roughness = 1});
