@@ -116,8 +116,8 @@ struct Table<WorldSettings> {
         {"collision", &T::collision, "algorithms of collision detection"},
         {"particle_contacts", &T::particle_contacts,
          "contact forces of particles that collide with particles: `relaxation`, or `lcp`, which solves "
-         "clusters of at most `particle_cluster` contacts by Dantzig's and Baraff's pivoting and the others "
-         "by relaxation"},
+         "clusters of at most `particle_cluster` contacts, without dynamic bodies, by Dantzig's and Baraff's "
+         "pivoting and the others by relaxation"},
         {"particle_cluster", &T::particle_cluster,
          "for `particle_contacts: lcp`: greatest number of contacts that are solved together", "",
          between(1, 64)},
