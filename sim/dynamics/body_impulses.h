@@ -2,8 +2,8 @@
 /// Impulses of particles on dynamic bodies in a sub-step (physics P8, A3). The impulses change the velocities
 /// of the bodies from the next sub-step on. Each collision of a particle uses the velocity that the body has
 /// after the previous collisions. Therefore many impulses together never transfer too much momentum or
-/// energy. An impulse on a body with joints acts on its whole articulation. The loads of resting particles are
-/// expected: they act already as forces while the bodies move.
+/// energy. An impulse on a body with joints acts on its whole articulation. The loads of resting particles
+/// are expected: they act already as forces while the bodies move.
 
 #include <map>
 #include <optional>
