@@ -1,6 +1,6 @@
 #include "sim/cloth/cloth_bodies.h"
 
-#include "sim/core/twist.h"
+#include "sim/linear/rigid_mobility.h"
 
 namespace offstage::sim {
 namespace {
@@ -119,10 +119,7 @@ void ClothBody::apply_impulses(const Vec6& impulse, const Vec6& displacement) {
 }
 
 Mat6 ClothBody::free_mobility() const {
-  Mat6 own = Mat6::Zero();
-  own.topLeftCorner<3, 3>().diagonal().setConstant(obstacle_.inverse_mass);
-  own.bottomRightCorner<3, 3>() = obstacle_.inverse_inertia;
-  return own;
+  return sim::free_mobility(obstacle_.inverse_mass, obstacle_.inverse_inertia);
 }
 
 /// Returns the mobility of a body without contacts and of points that it carries.

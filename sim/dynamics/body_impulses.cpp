@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "sim/dynamics/rigid_jacobian.h"
+#include "sim/linear/rigid_mobility.h"
 
 namespace offstage::sim {
 
@@ -14,24 +14,22 @@ void BodyImpulses::begin(std::span<const Link> links, std::map<uint32_t, Load> e
   gained_.clear();
 }
 
+/// Returns the mobility of a body that rests on others; null for other bodies.
+const Mat6* BodyImpulses::held_mobility(uint32_t body) const {
+  const auto load = expected_.find(body);
+  return load != expected_.end() && load->second.mobility ? &*load->second.mobility : nullptr;
+}
+
 Mat3 BodyImpulses::mobility(const Obstacle& o, const Vec3& arm, const Vec3& push) const {
-  const auto load = expected_.find(o.body);
-  const bool is_held = load != expected_.end() && load->second.mobility;
-  if (!o.is_dynamic() || (!link(o.body).bodies && !is_held)) return o.mobility(arm);
-  // The point's velocity is v + w x arm = E (v, w), and an impulse P at the point acts as E^T P.
-  Eigen::Matrix<Real, 3, 6> E;
-  E << Mat3::Identity(), -cross_matrix(arm);
+  if (!o.is_dynamic() || (!link(o.body).bodies && !held_mobility(o.body))) return o.mobility(arm);
+  const auto E = point_velocity(arm);
   return E * mobility(o, Vec6(E.transpose() * push)) * E.transpose();
 }
 
 Mat6 BodyImpulses::mobility(const Obstacle& o, const Vec6& push) const {
-  if (const auto load = expected_.find(o.body); load != expected_.end() && load->second.mobility)
-    return *load->second.mobility;
+  if (const Mat6* held = held_mobility(o.body)) return *held;
   if (const Link at = link(o.body); at.bodies) return at.bodies->link_mobility(at.index, push);
-  Mat6 mobility = Mat6::Zero();
-  mobility.topLeftCorner<3, 3>() = o.inverse_mass * Mat3::Identity();
-  mobility.bottomRightCorner<3, 3>() = o.inverse_inertia;
-  return mobility;
+  return free_mobility(o.inverse_mass, o.inverse_inertia);
 }
 
 Wrench BodyImpulses::expected(uint32_t body) const {
@@ -47,8 +45,7 @@ Vec3 BodyImpulses::velocity(const Obstacle& o, const Vec3& arm) const {
       spin += known->second[at.index].tail<3>();
     }
   } else if (const auto sum = sums_.find(o.body); sum != sums_.end()) {
-    Vec6 impulse;
-    impulse << sum->second.impulse, sum->second.angular_impulse;
+    const Vec6 impulse = stacked(sum->second.impulse, sum->second.angular_impulse);
     const Vec6 gained = mobility(o, impulse) * impulse;
     velocity += gained.head<3>();
     spin += gained.tail<3>();
@@ -66,9 +63,7 @@ void BodyImpulses::push(const Reaction& reaction) {
   if (!at.bodies) return;
   std::vector<Vec6>& gained = gained_[at.bodies];
   if (gained.empty()) gained.assign(at.bodies->link_count(), Vec6::Zero());
-  Vec6 impulse;
-  impulse << reaction.impulse, reaction.angular_impulse;
-  at.bodies->respond(at.index, impulse, gained);
+  at.bodies->respond(at.index, stacked(reaction.impulse, reaction.angular_impulse), gained);
 }
 
 void BodyImpulses::subtract_expected() {

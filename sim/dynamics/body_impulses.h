@@ -74,6 +74,7 @@ class BodyImpulses {
 
  private:
   Link link(uint32_t body) const { return body < links_.size() ? links_[body] : Link{}; }
+  const Mat6* held_mobility(uint32_t body) const;
 
   std::span<const Link> links_;
   std::map<uint32_t, Reaction> sums_;                             // by body

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <map>
 
 #include <oneapi/tbb/parallel_for.h>
 
@@ -312,13 +311,13 @@ void ParticleContacts::collect() {
 /// Finds the dynamic bodies that particles touch, and the effective masses of the contacts with them.
 void ParticleContacts::find_pushed_bodies() {
   pushed_.clear();
+  pushed_index_.clear();
   on_pushed_.clear();
-  std::map<uint32_t, uint32_t> index;  // by body
-  std::vector<Vec6> direction;
+  std::vector<Vec6> direction;  // by pushed body: sum of unit impulses of the particles
   for (uint32_t k = 0; k < surfaces_.size(); ++k) {
     Surface& s = surfaces_[k];
     if (!s.obstacle->is_dynamic()) continue;
-    const auto [found, is_new] = index.try_emplace(s.body, static_cast<uint32_t>(pushed_.size()));
+    const auto [found, is_new] = pushed_index_.try_emplace(s.body, static_cast<uint32_t>(pushed_.size()));
     if (is_new) {
       pushed_.push_back({s.obstacle});
       direction.push_back(Vec6::Zero());
@@ -326,24 +325,18 @@ void ParticleContacts::find_pushed_bodies() {
     s.pushed = found->second;
     const CollidingParticle& g = particles_[s.particle];
     s.arm = g.at(s.time) - g.radius * s.normal() - s.obstacle->centre_at(s.time / step_->h);
-    Vec6 push;
-    push << -s.normal(), s.arm.cross(-s.normal());
-    direction[s.pushed] += push;
+    direction[s.pushed] += stacked(-s.normal(), -s.arm.cross(s.normal()));
     on_pushed_.push_back(k);
   }
   for (std::size_t b = 0; b < pushed_.size(); ++b) {
     PushedBody& body = pushed_[b];
-    const Wrench expected = step_->impulses.expected(body.obstacle->body);
-    Vec6 impulse;
-    impulse << expected.force, expected.torque;
     body.mobility = step_->impulses.mobility(*body.obstacle, direction[b]);
-    body.gained = -body.mobility * impulse;
+    body.gained = -body.mobility * stacked(step_->impulses.expected(body.obstacle->body));
   }
   for (const uint32_t k : on_pushed_) {
     Surface& s = surfaces_[k];
     const CollidingParticle& g = particles_[s.particle];
-    Eigen::Matrix<Real, 3, 6> E;
-    E << Mat3::Identity(), -cross_matrix(s.arm);
+    const auto E = point_velocity(s.arm);
     const Mat3 K = E * pushed_[s.pushed].mobility * E.transpose();
     const Real along = s.normal().dot(K * s.normal());
     // The trace bounds the mobilities along the surface in all directions.

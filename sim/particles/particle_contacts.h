@@ -13,10 +13,12 @@
 #include <limits>
 #include <span>
 #include <tuple>
+#include <unordered_map>
 #include <vector>
 
 #include "sim/contact/contact_problem.h"
 #include "sim/linear/lanes.h"
+#include "sim/linear/rigid_mobility.h"
 #include "sim/particles/colliding_particle.h"
 #include "sim/particles/particle_impacts.h"
 #include "sim/particles/particle_search.h"
@@ -138,9 +140,7 @@ class ParticleContacts {
       return change.head<3>() + Vec3(change.tail<3>()).cross(arm);
     }
     void push(const Vec3& impulse, const Vec3& arm) {
-      Vec6 push;
-      push << impulse, arm.cross(impulse);
-      gained += mobility * push;
+      gained += mobility * stacked(impulse, arm.cross(impulse));
     }
   };
   /// Two particles that would pass through each other on their paths.
@@ -176,6 +176,7 @@ class ParticleContacts {
   void recall(Pair& pair) const;
   void recall(Surface& surface) const;
   void collect();
+  void find_pushed_bodies();
   // particle_lcp.cpp
   struct Cluster {
     std::vector<uint32_t> pairs, surfaces;
@@ -185,7 +186,6 @@ class ParticleContacts {
   void solve_clusters(uint32_t most);
   bool is_solved(uint32_t particle) const { return !solved_.empty() && solved_[particle] != 0; }
   // particle_relaxation.cpp
-  void find_pushed_bodies();
   void start_motion();
   Lanes relative_velocity(const Pair& c, Lanes normal) const;
   Lanes relative_velocity(const Surface& c, Lanes normal) const;
@@ -194,6 +194,7 @@ class ParticleContacts {
   void relax();
   void displace(std::span<Vec3> end, std::span<uint8_t> touched);
   void displace_bodies();
+  const PushedBody* pushed_body(const Obstacle& o) const;
   void push_apart(std::span<Vec3> end);
   // carried_particles.cpp
   std::vector<const Obstacle*> find_carriers() const;
@@ -226,7 +227,8 @@ class ParticleContacts {
   std::vector<uint32_t> pair_begin_, surface_begin_, pair_begin_before_, surface_begin_before_;
   std::vector<uint32_t> far_;
   std::vector<PushedBody> pushed_;
-  std::vector<uint32_t> on_pushed_;  // contacts with pushed_
+  std::unordered_map<uint32_t, uint32_t> pushed_index_;  // by body
+  std::vector<uint32_t> on_pushed_;                      // contacts with pushed_
   std::vector<Motion> motion_;
   std::vector<Turn> turns_;  // by particle; empty if none turns
   std::vector<Real> slab_change2_;

@@ -207,15 +207,20 @@ void ParticleContacts::displace(std::span<Vec3> end, std::span<uint8_t> touched)
   });
 }
 
+/// Returns the body of an obstacle if particles touch it; null otherwise.
+const ParticleContacts::PushedBody* ParticleContacts::pushed_body(const Obstacle& o) const {
+  if (!o.is_dynamic()) return nullptr;
+  const auto found = pushed_index_.find(o.body);
+  return found == pushed_index_.end() ? nullptr : &pushed_[found->second];
+}
+
 /// Moves the bodies by the impulses of resting contacts beyond the expected ones.
 void ParticleContacts::displace_bodies() {
   for (PushedBody& body : pushed_) body.kick.setZero();
   for (const uint32_t k : on_pushed_) {
     const Surface& s = surfaces_[k];
     if (!s.is_impact || !s.acts()) continue;
-    Vec6 push;
-    push << -s.impulse(), s.arm.cross(-s.impulse());
-    pushed_[s.pushed].kick += pushed_[s.pushed].mobility * push;
+    pushed_[s.pushed].kick += pushed_[s.pushed].mobility * stacked(-s.impulse(), -s.arm.cross(s.impulse()));
   }
   const std::span<const Obstacle> moving = step_->moving.all();
   for (const PushedBody& body : pushed_) {
@@ -280,8 +285,8 @@ void ParticleContacts::keep_outside(uint32_t i, NearObstacles& near, Vec3& end, 
       end = plane.origin;
       return;
     }
-    const auto pushed = std::ranges::find(pushed_, &o, &PushedBody::obstacle);
-    const bool is_kicked = pushed != pushed_.end() && !pushed->kick.isZero(0);
+    const PushedBody* pushed = pushed_body(o);
+    const bool is_kicked = pushed && !pushed->kick.isZero(0);
     if (const Real above = plane.height(end); above < 0) {
       end -= above * plane.normal;
       // A body that an impact kicks moves with its new velocity from the next sub-step on. Until then it only

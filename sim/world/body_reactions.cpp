@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "sim/core/twist.h"
 #include "sim/dynamics/expected_acceleration.h"
+#include "sim/linear/rigid_mobility.h"
 #include "sim/world/resting_bodies.h"
 
 namespace offstage::sim {
@@ -13,13 +13,9 @@ namespace {
 /// A sleeping body wakes if an impact would make it faster than this [m/s].
 constexpr Real kNudge = 1e-4;
 
-/// Mobility of a body without contacts and joints.
-Mat6 mobility(const RigidBody& body) {
-  Mat6 result = Mat6::Zero();
-  result.topLeftCorner<3, 3>().diagonal().setConstant(1 / body.mass);
+Mat6 mobility_of(const RigidBody& body) {
   const Mat3 axes = body.orientation.toRotationMatrix();
-  result.bottomRightCorner<3, 3>() = axes * body.inverse_inertia * axes.transpose();
-  return result;
+  return free_mobility(1 / body.mass, axes * body.inverse_inertia * axes.transpose());
 }
 
 /// Returns the load of a body that is expected in the next sub-step. Resting contacts persist, so a load that
@@ -66,7 +62,7 @@ std::map<uint32_t, BodyImpulses::Load> BodyReactions::loads(std::span<ContactPai
   find_resting_contacts(pairs, h, contacts);
   for (auto& [slot, found] : contacts) {
     std::erase_if(found, [](const RestingContact& c) { return c.yield > 0; });  // on bodies that yield
-    const Mat6 free = mobility(world_.body_at(slot).rigid);
+    const Mat6 free = mobility_of(world_.body_at(slot).rigid);
     if (!found.empty()) loads_[slot].mobility = RestingContacts(std::move(found), free).held_mobility(free);
   }
   std::map<uint32_t, BodyImpulses::Load> loads;
@@ -81,14 +77,10 @@ Reaction BodyReactions::balance(const Body& body, Load& load, const Reaction& su
   if (!load.mobility) return sum;
   const auto left = [&](const Vec6& impulse) {
     const Vec6 gained = *load.mobility * impulse;
-    Vec6 momentum;
-    momentum << body.rigid.mass * gained.head<3>(),
-        body.rigid.spin_momentum(body.rigid.orientation, gained.tail<3>());
-    return momentum;
+    return stacked(body.rigid.mass * gained.head<3>(),
+                   body.rigid.spin_momentum(body.rigid.orientation, gained.tail<3>()));
   };
-  Vec6 impulse, expected;
-  impulse << sum.impulse, sum.angular_impulse;
-  expected << h * load.expected.force, h * load.expected.torque;
+  const Vec6 impulse = stacked(sum.impulse, sum.angular_impulse), expected = h * stacked(load.expected);
   const Real along = impulse.head<3>().dot(expected.head<3>()), size2 = expected.head<3>().squaredNorm();
   const Real unloaded = size2 > 0 ? std::clamp(-along / size2, 0.0, 1.0) : 0;
   const Vec6 pressing = impulse + unloaded * expected, passed = (pressing - left(pressing)) / h;
@@ -106,12 +98,11 @@ void BodyReactions::displace(Real h) {
   std::map<uint32_t, std::pair<Articulation*, std::vector<Vec6>>> jointed;  // by slot of the first link
   for (const auto& [slot, load] : loads_) {
     Body& body = world_.body_at(slot);
-    Vec6 more;
-    more << h * (load.last[0].force - load.expected.force), h * (load.last[0].torque - load.expected.torque);
+    const Vec6 more = h * (stacked(load.last[0]) - stacked(load.expected));
     if (!body.is_awake() || more.isZero(0)) continue;
     Articulation* articulation = joints_.articulation_of(slot);
     if (!articulation) {
-      move(body, (load.mobility ? *load.mobility : mobility(body.rigid)) * more);
+      move(body, (load.mobility ? *load.mobility : mobility_of(body.rigid)) * more);
       continue;
     }
     auto& [moved, changes] = jointed[articulation->bodies().front()->handle.index];
