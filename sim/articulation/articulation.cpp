@@ -393,16 +393,19 @@ Eigen::VectorXd Articulation::stop_impulses() const {
 
 /// Returns the mobility of a link. Joint limits that the impulse `push` would exceed are treated as
 /// constraints.
-Mat6 Articulation::link_mobility(uint32_t link, const Vec6& push) {
-  const std::lock_guard lock(responding_);
-  place_for_impulses();
-  const Mat6 free = free_mobility(link);
-  if (stops_.empty()) return free;
+/// Returns the stops against which a push on a link presses.
+std::vector<const Articulation::Stop*> Articulation::stops_against(uint32_t link, const Vec6& push) {
+  if (stops_.empty()) return {};
   find_response(link, push);
   const Eigen::VectorXd impulses = stop_impulses();
   std::vector<const Stop*> pressed;
   for (std::size_t i = 0; i < stops_.size(); ++i)
     if (impulses[static_cast<Eigen::Index>(i)] > 0) pressed.push_back(&stops_[i]);
+  return pressed;
+}
+
+/// Returns the matrix that maps an impulse on a link to the impulses of stops against it.
+Eigen::MatrixXd Articulation::stop_matrix(std::span<const Stop* const> pressed, uint32_t link) const {
   const auto n = static_cast<Eigen::Index>(pressed.size());
   Eigen::MatrixXd among(n, n), on_link(6, n);
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -411,8 +414,39 @@ Mat6 Articulation::link_mobility(uint32_t link, const Vec6& push) {
       among(i, k) =
           pressed[static_cast<std::size_t>(i)]->speed(pressed[static_cast<std::size_t>(k)]->response);
   }
-  const Mat6 held = on_link * among.ldlt().solve(on_link.transpose());
+  return among.ldlt().solve(on_link.transpose());
+}
+
+Mat6 Articulation::link_mobility(uint32_t link, const Vec6& push) {
+  const std::lock_guard lock(responding_);
+  place_for_impulses();
+  const Mat6 free = free_mobility(link);
+  const std::vector<const Stop*> pressed = stops_against(link, push);
+  if (pressed.empty()) return free;
+  const Eigen::MatrixXd impulses = stop_matrix(pressed, link);
+  Mat6 held = Mat6::Zero();
+  for (std::size_t i = 0; i < pressed.size(); ++i)
+    held += pressed[i]->response[link] * impulses.row(static_cast<Eigen::Index>(i));
   return free - (held + held.transpose()) / 2;
+}
+
+std::vector<Mat6> Articulation::link_responses(uint32_t link, const Vec6& push) {
+  const Mat6 own = link_mobility(link, push);
+  const std::lock_guard lock(responding_);
+  std::vector<Mat6> responses(bodies_.size());
+  for (Eigen::Index k = 0; k < 6; ++k) {
+    find_response(link, Vec6::Unit(k));
+    for (std::size_t i = 0; i < responses.size(); ++i) responses[i].col(k) = response_[i];
+  }
+  const std::vector<const Stop*> pressed = stops_against(link, push);
+  if (!pressed.empty()) {
+    const Eigen::MatrixXd impulses = stop_matrix(pressed, link);
+    for (std::size_t i = 0; i < responses.size(); ++i)
+      for (std::size_t s = 0; s < pressed.size(); ++s)
+        responses[i] -= pressed[s]->response[i] * impulses.row(static_cast<Eigen::Index>(s));
+  }
+  responses[link] = own;
+  return responses;
 }
 
 Mat6 Articulation::free_mobility(uint32_t link) {

@@ -147,6 +147,9 @@ class Articulation final : public JointedBodies {
   /// linear system.
   void begin_impulses(Real time);
   Mat6 link_mobility(uint32_t link, const Vec6& push) override;
+  /// Returns for each link the changes of its velocities per unit of impulse and angular impulse on `link`.
+  /// The matrix of `link` itself is link_mobility().
+  std::vector<Mat6> link_responses(uint32_t link, const Vec6& push);
   void respond(uint32_t link, const Vec6& impulse, std::span<Vec6> velocities) override;
   std::size_t link_count() const override { return bodies_.size(); }
 
@@ -209,6 +212,8 @@ class Articulation final : public JointedBodies {
   void pass_on(std::span<Vec6> velocities);
   void find_response(uint32_t link, const Vec6& impulse);
   Mat6 free_mobility(uint32_t link);
+  std::vector<const Stop*> stops_against(uint32_t link, const Vec6& push);
+  Eigen::MatrixXd stop_matrix(std::span<const Stop* const> pressed, uint32_t link) const;
   Eigen::VectorXd stop_impulses() const;
   std::vector<Stop> stops_;  // computed since begin_impulses()
   std::mutex responding_;

@@ -20,6 +20,7 @@ bool applies_friction(ClothIntegrator integrator) {
 
 void ClothSystem::assign(std::vector<Cloth*> cloths) {
   cloths_ = std::move(cloths);
+  frozen_.assign(cloths_.size(), {});
   changed_ = true;
 }
 

@@ -1,9 +1,15 @@
 #include "sim/cloth/cloth_bodies.h"
 
-#include "sim/linear/rigid_mobility.h"
+#include <utility>
 
 namespace offstage::sim {
 namespace {
+
+/// Joints permit no motion with a mobility below this fraction of the greatest one.
+constexpr Real kSingular = 1e-9;
+/// A body whose velocity changes by up to twice this in a sub-step of the world may accelerate steadily
+/// [m/s].
+constexpr Real kSmoothChange = 0.1;
 
 /// Adds the mass matrix of a point mass at the lever arm `arm`.
 void add_point_mass(Real mass, const Vec3& arm, Mat6& matrix) {
@@ -12,6 +18,10 @@ void add_point_mass(Real mass, const Vec3& arm, Mat6& matrix) {
   matrix.topRightCorner<3, 3>() -= mass * cross;
   matrix.bottomLeftCorner<3, 3>() += mass * cross;
   matrix.bottomRightCorner<3, 3>() -= mass * cross * cross;
+}
+
+Vec6 momentum_of(const Reaction& r) {
+  return stacked(r.impulse, r.angular_impulse);
 }
 
 }  // namespace
@@ -23,32 +33,61 @@ ClothBody::ClothBody(const Obstacle& obstacle, Real h, const Vec3& velocity, con
       angular_velocity_(angular_velocity),
       reaction_{obstacle.body, Vec3::Zero(), Vec3::Zero()} {}
 
-void ClothBody::fall_along_parabola(const Vec3& gravity) {
+void ClothBody::accelerate_steadily(const Vec3& gravity) {
   const Vec3 mean =
       (obstacle_.end.point_to_world(obstacle_.centre) - obstacle_.start.point_to_world(obstacle_.centre)) /
       h_;
   const Vec3 bow = (velocity_ - mean) * h_;
+  const Vec3 turn_bow = (angular_velocity_ - obstacle_.angular_velocity) * h_;
   // A greater deviation is due to an impact; the path then stays a line.
-  if (bow.norm() <= gravity.norm() * h_ * h_) bow_ = bow;
+  const Real most = h_ * std::max(gravity.norm() * h_, kSmoothChange);
+  if (bow.norm() <= most) bow_ = bow;
+  if (turn_bow.norm() * obstacle_.extent <= most) turn_bow_ = turn_bow;
 }
 
 /// Returns the pose on the path that the world computed, without displacement by cloth.
 Pose ClothBody::on_path(Real fraction) const {
-  Pose pose = obstacle_.turned_at(fraction);
-  pose.position -= fraction * (1 - fraction) * bow_;
-  return pose;
+  const Real sag = fraction * (1 - fraction);
+  const Pose pose = obstacle_.turned_at(fraction);
+  if (turn_bow_.isZero(0)) return {pose.position - sag * bow_, pose.orientation};
+  return displaced(pose, obstacle_.centre, -sag * bow_, -sag * turn_bow_);
 }
 
 void ClothBody::begin(Real from, Real to, Real dt) {
   start_ = from > 0 ? end_ : displaced(on_path(from), obstacle_.centre, shift_, turn_);
   shift_ += dt * gained_;
   turn_ += dt * gained_spin_;
+  moved_by_others_ += dt * gained_by_others_;
+  const Vec6 rate = 2 / h_ * stacked(bow_, turn_bow_);
+  steady_change_ = (to - from) * rate;
+  left_ = (1 - to) * rate;
+  if (dt > 0) {
+    take_back(std::exchange(unreturned_lead_, {}), dt);
+    steady_change_ -= dt / h_ * free_change(expected_.force, expected_.torque);
+    take_back(dt / h_ * expected_, dt / 2);
+    lead_ = {};
+  }
   end_ = displaced(on_path(to), obstacle_.centre, shift_, turn_);
   centre_ = end_.point_to_world(obstacle_.centre);
   dt_ = dt;
   to_ = to;
   is_still_ = start_.position == end_.position && start_.orientation.coeffs() == end_.orientation.coeffs() &&
               obstacle_.angular_velocity == Vec3::Zero() && obstacle_.surface_velocity == Vec3::Zero();
+}
+
+/// Takes back an impulse that the path contains, and the displacement by it in `displacing_time` [s].
+void ClothBody::take_back(const Wrench& impulse, Real displacing_time) {
+  if (is_zero(impulse)) return;
+  const Vec6 change = -free_change(impulse.force, impulse.torque);
+  take(change, -stacked(impulse));
+  shift_ += displacing_time * change.head<3>();
+  turn_ += displacing_time * change.tail<3>();
+  displace_connected(-displacing_time * stacked(impulse));
+}
+
+Wrench ClothBody::contained() const {
+  Wrench sum = expected_;
+  return sum += given_lead_;
 }
 
 Vec3 ClothBody::rigid_move(const Vec3& p) const {
@@ -63,9 +102,10 @@ Vec3 ClothBody::surface_motion(const Vec3& p, const Vec3& n) const {
 Real ClothBody::mobility(const Vec3& p, const Vec3& n) const {
   if (!is_dynamic()) return 0;
   const Vec3 turning = (p - centre_).cross(n);
-  if (!resting_.empty())
-    return resting_.mobility(gained(), -(Vec6() << n, turning).finished(), -free_change(n, turning));
-  return obstacle_.inverse_mass + turning.dot(obstacle_.inverse_inertia * turning);
+  if (resting_.empty() && !jointed_)
+    return obstacle_.inverse_mass + turning.dot(obstacle_.inverse_inertia * turning);
+  const Vec6 push = stacked(n, turning), response = free_change(n, turning);
+  return resting_.empty() ? std::max(push.dot(response), 0.0) : resting_.mobility(gained(), -push, -response);
 }
 
 void ClothBody::apply_impulse(const Vec3& impulse, const Vec3& p) {
@@ -75,8 +115,8 @@ void ClothBody::apply_impulse(const Vec3& impulse, const Vec3& p) {
   add_impulse((Vec6() << impulse, turning).finished());
 }
 
-/// Change of the velocities by an impulse on a body without contacts.
 Vec6 ClothBody::free_change(const Vec3& impulse, const Vec3& angular) const {
+  if (jointed_) return *jointed_ * stacked(impulse, angular);
   return (Vec6() << obstacle_.inverse_mass * impulse, obstacle_.inverse_inertia * angular).finished();
 }
 
@@ -95,6 +135,32 @@ void ClothBody::add_impulse(Vec6 impulse) {
   take(change, impulse);
 }
 
+/// Returns an impulse and angular impulse times the time that displaces a body with joints in this way.
+Vec6 ClothBody::impulse_for(const Vec6& displacement) const {
+  // Joints make the mobility singular. Impulses in its null space do not move the other bodies either.
+  Eigen::CompleteOrthogonalDecomposition<Mat6> mobility;
+  mobility.setThreshold(kSingular);
+  return mobility.compute(*jointed_).solve(displacement);
+}
+
+/// Displaces the bodies to which joints connect this one. `impulse`: impulse and angular impulse times the
+/// time.
+void ClothBody::displace_connected(const Vec6& impulse) {
+  for (const Connected& c : connected_) {
+    const Vec6 moved = c.response * impulse;
+    c.body->moved_by_others_ += moved;
+    c.body->shift_ += moved.head<3>();
+    c.body->turn_ += moved.tail<3>();
+    c.body->move_end();
+  }
+}
+
+/// Updates the pose at the end of the cloth's sub-step.
+void ClothBody::move_end() {
+  end_ = displaced(on_path(to_), obstacle_.centre, shift_, turn_);
+  centre_ = end_.point_to_world(obstacle_.centre);
+}
+
 void ClothBody::record_pin_impulse(const Vec3& impulse, const Vec3& p) {
   if (!pin_load_) pin_load_ = Reaction{obstacle_.body, Vec3::Zero(), Vec3::Zero()};
   pin_load_->impulse += impulse;
@@ -103,11 +169,13 @@ void ClothBody::record_pin_impulse(const Vec3& impulse, const Vec3& p) {
 
 void ClothBody::apply_contact_impulse(const Vec3& impulse, const Vec3& p, Real fraction) {
   const Vec3 gained = gained_, gained_spin = gained_spin_;
+  const Reaction before = reaction_;
   apply_impulse(impulse, p);
   if (!is_dynamic()) return;
   shift_ += fraction * dt_ * (gained_ - gained);
   turn_ += fraction * dt_ * (gained_spin_ - gained_spin);
   end_ = displaced(on_path(to_), obstacle_.centre, shift_, turn_);
+  displace_connected(fraction * dt_ * (momentum_of(reaction_) - momentum_of(before)));
 }
 
 void ClothBody::apply_impulses(const Vec6& impulse, const Vec6& displacement) {
@@ -116,10 +184,11 @@ void ClothBody::apply_impulses(const Vec6& impulse, const Vec6& displacement) {
   shift_ += displacement.head<3>();
   turn_ += displacement.tail<3>();
   end_ = displaced(on_path(to_), obstacle_.centre, shift_, turn_);
+  if (!connected_.empty()) displace_connected(impulse_for(displacement));
 }
 
 Mat6 ClothBody::free_mobility() const {
-  return sim::free_mobility(obstacle_.inverse_mass, obstacle_.inverse_inertia);
+  return jointed_ ? *jointed_ : sim::free_mobility(obstacle_.inverse_mass, obstacle_.inverse_inertia);
 }
 
 /// Returns the mobility of a body without contacts and of points that it carries.
@@ -148,7 +217,13 @@ Vec6 ClothBody::apply_pin_impulses(const Vec6& impulse, const Vec6& moving, cons
   turn_ += shift.tail<3>();
   end_ = displaced(end_, obstacle_.centre, shift.head<3>(), shift.tail<3>());
   centre_ = end_.point_to_world(obstacle_.centre);
+  displace_connected(dt_ * of_displacement - carried * shift);
   return change;
+}
+
+void ClothBody::set_lead(const Vec6& impulse, const Mat6& carried) {
+  const Vec6 own = impulse - carried * carrying_mobility(carried) * impulse;
+  lead_ = {own.head<3>(), own.tail<3>()};
 }
 
 /// Changes the velocities by `change`, and the momenta of the body by `impulse`.
@@ -156,6 +231,11 @@ void ClothBody::take(const Vec6& change, const Vec6& impulse) {
   reaction_.impulse += impulse.head<3>();
   reaction_.angular_impulse += impulse.tail<3>();
   accelerate(change.head<3>(), change.tail<3>());
+  for (const Connected& c : connected_) {
+    const Vec6 gained = c.response * impulse;
+    c.body->gained_by_others_ += gained;
+    c.body->accelerate(gained.head<3>(), gained.tail<3>());
+  }
 }
 
 void ClothBody::accelerate(const Vec3& dv, const Vec3& dw) {

@@ -11,7 +11,9 @@
 #include "sim/cloth/cloth_points.h"
 #include "sim/cloth/resting_contacts.h"
 #include "sim/collision/obstacles.h"
+#include "sim/core/twist.h"
 #include "sim/linear/block_cholesky.h"
+#include "sim/linear/rigid_mobility.h"
 
 namespace offstage::sim {
 
@@ -21,10 +23,34 @@ class ClothBody {
   /// length h [s].
   ClothBody(const Obstacle& obstacle, Real h, const Vec3& velocity, const Vec3& angular_velocity);
 
-  /// Makes the path of a body that carries cloth a parabola within the world's sub-step, as for a body that
-  /// collides with nothing. Other paths are straight lines; on these, a body that hangs at rest would sag in
-  /// each sub-step. `gravity` [m/s^2].
-  void fall_along_parabola(const Vec3& gravity);
+  /// Gives a body that carries cloth a constant acceleration within the world's sub-step, as for a body that
+  /// collides with nothing. The paths of other bodies are straight lines; on these, a body that hangs at rest
+  /// would sag in each sub-step. `gravity` [m/s^2].
+  void accelerate_steadily(const Vec3& gravity);
+  /// A body to which joints connect this one, and its change of [velocity, angular velocity] per unit of
+  /// [impulse, angular impulse] on this one.
+  struct Connected {
+    ClothBody* body;
+    Mat6 response;
+  };
+  /// The body has joints. `mobility`: its own response to impulses; `connected`: other bodies near cloth.
+  void set_joints(const Mat6& mobility, std::vector<Connected> connected) {
+    jointed_ = mobility;
+    connected_ = std::move(connected);
+  }
+  bool is_jointed() const { return jointed_.has_value(); }
+  /// The path and the velocities contain the effect of this impulse and angular impulse of cloth in the
+  /// world's sub-step [N s], [N m s]. Cloth sees the body without it, and adds all of its impulses. `lead`:
+  /// lead() after the last sub-step of the world, with which the path began.
+  void expect(const Wrench& impulse, const Wrench& lead) {
+    expected_ = impulse;
+    given_lead_ = unreturned_lead_ = lead;
+  }
+  /// Velocities of cloth and of the bodies that hold it are those within the last step of the springs. The
+  /// lead is the impulse on the body from there to the end of the world's sub-step [N s], [N m s].
+  const Wrench& lead() const { return lead_; }
+  /// Impulses that the path contains: those expected, and the given lead.
+  Wrench contained() const;
   /// Begins a sub-step of cloth, which covers the fractions `from` to `to` of the world's sub-step and lasts
   /// dt [s].
   void begin(Real from, Real to, Real dt);
@@ -56,6 +82,10 @@ class ClothBody {
   const Vec3& angular_velocity() const {
     return angular_velocity_;
   }  ///< angular velocity at the same time [rad/s]
+  /// As velocity(), but at the end of the cloth's sub-step.
+  Vec3 velocity_now(const Vec3& p) const { return velocity(p) - point_velocity(left_, p); }
+  /// Change of the velocity of the point p in the cloth's sub-step that is due to the body's acceleration.
+  Vec3 steady_change(const Vec3& p) const { return point_velocity(steady_change_, p); }
   /// Change of velocity against n (unit) of the point p, per unit of an impulse against n at p [1/kg]. On the
   /// other side, the contacts of the body with others may permit another change.
   Real mobility(const Vec3& p, const Vec3& n) const;
@@ -73,6 +103,8 @@ class ClothBody {
   /// cloth's sub-step and displaces the body within it. `carried` is the 6x6 mass matrix of these points
   /// about centre() [kg, kg m, kg m^2]. Returns the change of velocity.
   Vec6 apply_pin_impulses(const Vec6& impulse, const Vec6& moving, const Mat6& carried);
+  /// Sets the lead for the body together with the points pinned to it; see apply_pin_impulses().
+  void set_lead(const Vec6& impulse, const Mat6& carried);
   /// Change of [velocity, angular velocity] per unit of [impulse, angular impulse] about centre(), with the
   /// mass of the pinned points; see apply_pin_impulses(). The body keeps the contacts that cloth presses.
   Mat6 mobility(const Mat6& carried) const;
@@ -84,8 +116,13 @@ class ClothBody {
   const RestingContacts& resting() const { return resting_; }
   /// Changes of velocity and angular velocity due to cloth in the world's sub-step.
   Vec6 gained() const { return (Vec6() << gained_, gained_spin_).finished(); }
+  /// Returns the impulse and angular impulse times the time [N s^2, N m s^2] that would have displaced a body
+  /// with joints as cloth on this body did in the world's sub-step.
+  Vec6 displacing_impulse() const { return impulse_for(stacked(shift_, turn_) - moved_by_others_); }
   /// Mobility without contacts; as mobility() for a body without pinned points.
   Mat6 free_mobility() const;
+  /// Change of the velocities by an impulse and an angular impulse, without contacts.
+  Vec6 free_change(const Vec3& impulse, const Vec3& angular) const;
   /// Multiplies the body's displacement relative to `drift` [m] in this sub-step of the cloth by `fraction`,
   /// and changes its velocity accordingly. Returns the change of velocity [m/s].
   Vec3 shorten(Real fraction, const Vec3& drift);
@@ -96,7 +133,7 @@ class ClothBody {
   /// pins.
   const std::optional<Reaction>& pin_load() const { return pin_load_; }
 
-  /// Change of the momentum and the angular momentum by cloth.
+  /// Change of the momentum and the angular momentum by cloth, less contained().
   const Reaction& reaction() const { return reaction_; }
   /// Records that a point of cloth touches the body, with this relative speed [m/s].
   void touch(Real speed) {
@@ -125,11 +162,17 @@ class ClothBody {
   bool collides = true;  ///< whether cloth collides with the body; false: the body only holds pins
 
  private:
+  Vec3 point_velocity(const Vec6& of, const Vec3& p) const {
+    return of.head<3>() + of.tail<3>().cross(p - centre_);
+  }
+  void take_back(const Wrench& impulse, Real displacing_time);
+  Vec6 impulse_for(const Vec6& displacement) const;
+  void displace_connected(const Vec6& impulse);
+  void move_end();
   void accelerate(const Vec3& dv, const Vec3& dw);
   void take(const Vec6& change, const Vec6& impulse);
   Vec6 respond(RestingContacts& contacts, const Vec6& free_change, Vec6& impulse) const;
   void add_impulse(Vec6 impulse);
-  Vec6 free_change(const Vec3& impulse, const Vec3& angular) const;
   Mat6 carrying_mobility(const Mat6& carried) const;
   Pose on_path(Real fraction) const;
 
@@ -140,12 +183,20 @@ class ClothBody {
   Vec3 shift_ = Vec3::Zero(), turn_ = Vec3::Zero();          // displacement and rotation by cloth
   Vec3 centre_ = Vec3::Zero();  // centre of mass at the end of the cloth's sub-step
   Pose start_, end_;            // poses at the start and the end of the cloth's sub-step
-  Vec3 bow_ = Vec3::Zero();  // deviation of the path from a line: half the acceleration times the square of
-                             // the world's sub-step
-  Real dt_ = 0, to_ = 0;     // dt_: length of the cloth's sub-step [s]; to_: its end as a fraction
-                             // of the world's sub-step
-  bool is_still_ = false;    // whether its surface stood still at the start of the cloth's sub-step
+  // Deviations of the path from a line, and of the rotation from a constant rate: half the acceleration times
+  // the square of the world's sub-step.
+  Vec3 bow_ = Vec3::Zero(), turn_bow_ = Vec3::Zero();
+  Vec6 steady_change_ = Vec6::Zero();  // of the velocities in the cloth's sub-step, by constant accelerations
+  Vec6 left_ = Vec6::Zero();           // the same from its end to the end of the world's sub-step
+  Real dt_ = 0, to_ = 0;               // dt_: length of the cloth's sub-step [s]; to_: its end as a fraction
+                                       // of the world's sub-step
+  bool is_still_ = false;              // whether its surface stood still at the start of the cloth's sub-step
   RestingContacts resting_;
+  std::optional<Mat6> jointed_;  // mobility of a body with joints
+  std::vector<Connected> connected_;
+  // Parts of shift_ and turn_, and of gained_ and gained_spin_, that are due to impulses on connected bodies.
+  Vec6 moved_by_others_ = Vec6::Zero(), gained_by_others_ = Vec6::Zero();
+  Wrench expected_, given_lead_, unreturned_lead_, lead_;
   Reaction reaction_;
   std::optional<Reaction> pin_load_;
 };

@@ -82,12 +82,16 @@ void ClothSystem::apply_pin_impulses_to_bodies(Real dt) {
     for (uint32_t i : carrier.points) {
       const Vec3 p = points_.at(i), arm = p - body.centre();
       const Vec3 load = impulse_on(i);
-      const Vec3 lag = points_.mass[i] * (points_.velocity[i].head<3>() - body.velocity(p));
-      const Vec3 impulse = load + lag, early = fraction_at_once(points_.cloth[i], dt) * load + lag;
+      // The part of the lag that is due to a constant acceleration displaces by half of its impulse, too.
+      const Vec3 lag = points_.mass[i] * (points_.velocity[i].head<3>() - body.velocity_now(p));
+      const Vec3 impulse = load + lag, early = fraction_at_once(points_.cloth[i], dt) * load + lag +
+                                               points_.mass[i] / 2 * body.steady_change(p);
       sum += (Vec6() << impulse, arm.cross(impulse)).finished();
       moving += (Vec6() << early, arm.cross(early)).finished();
-      points_.velocity[i] = padded(body.velocity(p));
+      points_.velocity[i] = padded(body.velocity_now(p));
     }
+    // A constant force displaces the body by half of its impulse.
+    body.set_lead(moving - sum / 2, carrier.carried(points_));
     carrier.apply_impulses(sum, moving, points_);
   }
   for (const Held& held : held_)

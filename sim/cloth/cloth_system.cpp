@@ -73,7 +73,7 @@ void ClothSystem::begin_step(const ClothWeather& weather, std::span<ClothBody> b
   for (Cloth* cloth : cloths_) cloth->before = cloth->points;
   adapt_springs();
   find_held(weather.time, bodies);
-  for (const Carrier& carrier : carriers_) carrier.body->fall_along_parabola(weather.gravity);
+  for (const Carrier& carrier : carriers_) carrier.body->accelerate_steadily(weather.gravity);
   contacts_.set_up(-weather.gravity);
   contacts_.find(points_, collides_, bodies, weather.h);
   corner_contacts_.find(points_, contacts_, bodies, weather.h);

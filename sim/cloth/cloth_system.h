@@ -28,6 +28,7 @@ struct ClothRange;
 
 class ClothSystem {
  public:
+  bool empty() const { return cloths_.empty(); }
   /// Sets the cloths to step. Their addresses must stay valid until the next call.
   void assign(std::vector<Cloth*> cloths);
 
@@ -125,6 +126,7 @@ class ClothSystem {
   bool shorten_until_valid(Shortened how);
   bool shorten_straight(Shortened how, bool& turned);
   void shorten_carrier(Carrier& carrier, Real fraction);
+  void watch_frozen(std::span<const Vec4> velocity, Real dt);
   void add_momenta(Real sign, Real dt);
   std::vector<Vec4> end_velocities(Real dt) const;
   std::vector<Real> inner_energies(std::span<const Vec4> velocity);
@@ -177,7 +179,12 @@ class ClothSystem {
   MoveFractions fractions_;
   std::vector<Frame> frames_;       // by piece
   std::vector<uint8_t> shortened_;  // by point: the frame in which its move was shortened in this sub-step
-  std::vector<uint32_t> lowered_;   // points whose fractions were lowered in a round
+  struct Frozen {
+    uint32_t since = 0;   // number of sub-steps in which shortening stopped the whole cloth
+    uint32_t thawed = 0;  // number of sub-steps left in which bodies near it do not stop it
+  };
+  std::vector<Frozen> frozen_;     // by cloth
+  std::vector<uint32_t> lowered_;  // points whose fractions were lowered in a round
   std::span<ClothBody> bodies_;
 };
 

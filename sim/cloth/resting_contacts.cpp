@@ -14,6 +14,8 @@ constexpr Real kAccuracy = 1e-9;
 constexpr int kMobilitySweeps = 8;
 /// Contacts that this mobility takes into account. Without further ones, it is greater.
 constexpr std::size_t kMostClosed = 16;
+/// A body does not move along a row whose mobility is less than this fraction of the sum of its mobilities.
+constexpr Real kImmovable = 1e-12;
 /// Stiffness of the contacts in the matrix for held contacts, relative to the body's own inertia there.
 constexpr Real kHeld = 1e6;
 
@@ -39,6 +41,10 @@ void RestingContacts::set_mobility(const Mat6& mobility) {
     for (Row* row : {&rows_[i].normal, &rows_[i].t, &rows_[i].k}) {
       row->response = mobility * row->direction;
       row->mobility = row->direction.dot(row->response) + contacts_[i].yield;
+      // Joints may hold the body along the row, so that the contact has no effect.
+      if (row->direction.dot(row->response) > kImmovable * mobility.trace()) continue;
+      row->response.setZero();
+      row->mobility = kInfinity;
     }
 }
 
@@ -88,6 +94,7 @@ Real RestingContacts::mobility(const Vec6& gained, const Vec6& push, Vec6 respon
   for (std::size_t i = 0; i < contacts_.size() && count < closed.size(); ++i) {
     const RestingContact& c = contacts_[i];
     const Row& n = rows_[i].normal;
+    if (n.response.isZero(0)) continue;
     if (n.direction.dot(gained) + c.yield * c.impulse.x() + c.slack <= tight_) closed[count++] = {&n, 0};
   }
   Real changed = 1;
@@ -107,6 +114,7 @@ Mat6 RestingContacts::held_mobility(const Mat6& mobility) const {
   Mat6 result = mobility;
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     const RestingContact& c = contacts_[i];
+    if (rows_[i].normal.response.isZero(0)) continue;
     if (!(c.impulse.x() > 0 || (is_fresh_ && c.load > 0 && c.slack <= tight_))) continue;
     // Sherman-Morrison: the inertia grows along the normal.
     const Vec6& n = rows_[i].normal.direction;

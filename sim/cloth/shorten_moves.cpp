@@ -21,6 +21,10 @@ namespace {
 constexpr int kMaxRounds = 64;
 /// Greatest number of passes for bodies that turn.
 constexpr int kMaxPasses = 6;
+/// A cloth that flies near a body is frozen after this many sub-steps in which shortening left its points
+/// less than this fraction of their moves. Then it is shortened in its own frame for so many sub-steps.
+constexpr uint32_t kFrozenAfter = 3, kThawedFor = 60;
+constexpr Real kFrozenMove = 0.01;
 
 }  // namespace
 
@@ -68,6 +72,7 @@ void ClothSystem::choose_frame(uint32_t point) {
   Frame& frame = frame_of(point);
   const ClothBody* near = frame.rests ? nullptr : nearby_other_body(point);
   if (!near) return;
+  if (!frame.anchored && frozen_[points_.cloth[point]].thawed > 0) return;
   const bool is_loose = !frame.anchored && !frame.carries && near->moves();
   const bool is_one = !contacts_.is_near_several(point) && (!frame.pusher || frame.pusher == near);
   if (is_loose && is_one)
@@ -135,6 +140,7 @@ bool ClothSystem::find_drifts() {
 void ClothSystem::shorten_moves(Real dt) {
   const bool self = !self_contacts_.empty();
   if (limit_.empty() && !self) return;
+  for (Frozen& frozen : frozen_) frozen.thawed -= frozen.thawed > 0;
   const auto find_doubtful = [&] {
     self ? self_contacts_.find_doubtful(points_, dt, drift_) : self_contacts_.find_none();
   };
@@ -171,6 +177,7 @@ void ClothSystem::shorten_moves(Real dt) {
     if (any_free) remove_energy_gains(whole, velocity, end_velocities(dt));
     add_momenta(-1, dt);
     restore_momenta();
+    watch_frozen(end_velocities(dt), dt);
   }
   if (self) self_contacts_.end_substep(points_, dt);
   if (any) stop_bodies(dt);
@@ -195,6 +202,24 @@ bool ClothSystem::shorten_in_pieces() {
   for (uint32_t i = 0; i < points_.size(); ++i)
     if (const Frame& frame = frame_of(i); is_loose(frame)) points_.position[i] += frame.move;
   return true;
+}
+
+/// Finds cloths that shortening has stopped, while they keep their momentum. In the world's frame this would
+/// repeat for ever: taut cloth cannot move unless all of its points move, and one that a body stops is enough
+/// to stop all.
+void ClothSystem::watch_frozen(std::span<const Vec4> velocity, Real dt) {
+  std::vector<Real> moved(cloths_.size(), 0), would_move(cloths_.size(), 0);
+  for (uint32_t i = 0; i < points_.size(); ++i) {
+    if (!(points_.inverse_mass[i] > 0)) continue;
+    moved[points_.cloth[i]] += (points_.position[i] - points_.start[i]).squaredNorm();
+    would_move[points_.cloth[i]] += (dt * velocity[i]).squaredNorm();
+  }
+  for (std::size_t c = 0; c < cloths_.size(); ++c) {
+    Frozen& frozen = frozen_[c];
+    const bool stopped = moved[c] < kFrozenMove * kFrozenMove * would_move[c];
+    frozen.since = stopped ? frozen.since + 1 : 0;
+    if (frozen.since >= kFrozenAfter) frozen = {.thawed = kThawedFor};
+  }
 }
 
 /// Adds the momenta of free points at the end of the sub-step, times `sign`, to their frames.

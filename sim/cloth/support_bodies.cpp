@@ -42,12 +42,12 @@ void SupportBodies::push(std::size_t k, const Vec4& impulse) {
   const Contact& contact = contacts_[k];
   if (contact.body == kNone || impulse.isZero(0)) return;
   Moved& on = bodies_[contact.body];
-  const Obstacle& obstacle = on.body->obstacle();
   const Vec3 given = impulse.head<3>(), turning = contact.arm.cross(given);
+  const Vec6 change = on.body->free_change(given, turning);
   on.impulse += given;
   on.angular += turning;
-  on.move += obstacle.inverse_mass * given;
-  on.spin += obstacle.inverse_inertia * turning;
+  on.move += change.head<3>();
+  on.spin += change.tail<3>();
   if (on.resting.empty()) return;
   // One sweep is enough: each impulse of a point makes another one, and ClothBody solves to the end.
   const Vec6 before = h_ * on.body->gained();

@@ -23,6 +23,9 @@ struct Wrench {
     return *this;
   }
 };
+inline bool is_zero(const Wrench& w) {
+  return w.force.isZero(0) && w.torque.isZero(0);
+}
 inline Wrench operator*(Real factor, const Wrench& w) {
   return {factor * w.force, factor * w.torque};
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "sim/dynamics/expected_acceleration.h"
 #include "sim/linear/rigid_mobility.h"
 #include "sim/world/resting_bodies.h"
 
@@ -13,21 +12,15 @@ namespace {
 /// A sleeping body wakes if an impact would make it faster than this [m/s].
 constexpr Real kNudge = 1e-4;
 
+/// Moves a body by a small translation and rotation [m], [rad].
+void move(Body& body, const Vec6& change) {
+  body.pose = displaced(body.pose, body.rigid.centre, change.head<3>(), change.tail<3>());
+  body.rigid.place(body.pose);
+}
+
 Mat6 mobility_of(const RigidBody& body) {
   const Mat3 axes = body.orientation.toRotationMatrix();
   return free_mobility(1 / body.mass, axes * body.inverse_inertia * axes.transpose());
-}
-
-/// Returns the load of a body that is expected in the next sub-step. Resting contacts persist, so a load that
-/// changes much is expected with the smaller of its last two values.
-Wrench expected_load(const RigidBody& body, const std::array<Wrench, 3>& last) {
-  std::array<Twist, 3> accelerations;
-  for (std::size_t i = 0; i < last.size(); ++i)
-    accelerations[i] = {last[i].force / body.mass, body.angular_velocity(body.orientation, last[i].torque)};
-  const auto& [now, before, first] = accelerations;
-  const Twist smaller = square(body, now) < square(body, before) ? now : before;
-  const Twist expected = expected_acceleration(body, accelerations).value_or(smaller);
-  return {body.mass * expected.velocity, body.spin_momentum(body.orientation, expected.angular_velocity)};
 }
 
 }  // namespace
@@ -37,8 +30,8 @@ void BodyReactions::begin_substep() {
     if (const std::unique_ptr<Body>* body = world_.bodies.find(handle)) (*body)->rigid.push = {};
   for (auto& [slot, load] : loads_) {
     const Body& body = world_.body_at(slot);
-    load.expected = body.is_dynamic() ? expected_load(body.rigid, load.last) : Wrench{};
-    add_force(body.handle, load.expected);
+    body.is_dynamic() ? load.force.expect(body.rigid) : load.force.expect_nothing();
+    add_force(body.handle, load.force.expected());
     add_force(body.handle, load.passed);
   }
 }
@@ -66,7 +59,7 @@ std::map<uint32_t, BodyImpulses::Load> BodyReactions::loads(std::span<ContactPai
     if (!found.empty()) loads_[slot].mobility = RestingContacts(std::move(found), free).held_mobility(free);
   }
   std::map<uint32_t, BodyImpulses::Load> loads;
-  for (const auto& [slot, load] : loads_) loads[slot] = {h * load.expected, load.mobility};
+  for (const auto& [slot, load] : loads_) loads[slot] = {h * load.force.expected(), load.mobility};
   return loads;
 }
 
@@ -80,7 +73,8 @@ Reaction BodyReactions::balance(const Body& body, Load& load, const Reaction& su
     return stacked(body.rigid.mass * gained.head<3>(),
                    body.rigid.spin_momentum(body.rigid.orientation, gained.tail<3>()));
   };
-  const Vec6 impulse = stacked(sum.impulse, sum.angular_impulse), expected = h * stacked(load.expected);
+  const Vec6 impulse = stacked(sum.impulse, sum.angular_impulse),
+             expected = h * stacked(load.force.expected());
   const Real along = impulse.head<3>().dot(expected.head<3>()), size2 = expected.head<3>().squaredNorm();
   const Real unloaded = size2 > 0 ? std::clamp(-along / size2, 0.0, 1.0) : 0;
   const Vec6 pressing = impulse + unloaded * expected, passed = (pressing - left(pressing)) / h;
@@ -91,26 +85,39 @@ Reaction BodyReactions::balance(const Body& body, Load& load, const Reaction& su
 
 /// Moves the bodies by the impulses of resting particles beyond the expected ones.
 void BodyReactions::displace(Real h) {
-  const auto move = [&](Body& body, const Vec6& change) {
-    body.pose = displaced(body.pose, body.rigid.centre, h * change.head<3>(), h * change.tail<3>());
-    body.rigid.place(body.pose);
-  };
-  std::map<uint32_t, std::pair<Articulation*, std::vector<Vec6>>> jointed;  // by slot of the first link
+  std::map<uint32_t, Vec6> jointed;
   for (const auto& [slot, load] : loads_) {
     Body& body = world_.body_at(slot);
-    const Vec6 more = h * (stacked(load.last[0]) - stacked(load.expected));
+    const Vec6 more = h * h * (stacked(load.force.last()) - stacked(load.force.expected()));
     if (!body.is_awake() || more.isZero(0)) continue;
-    Articulation* articulation = joints_.articulation_of(slot);
-    if (!articulation) {
+    if (joints_.articulation_of(slot))
+      jointed[slot] = more;
+    else
       move(body, (load.mobility ? *load.mobility : mobility_of(body.rigid)) * more);
-      continue;
-    }
-    auto& [moved, changes] = jointed[articulation->bodies().front()->handle.index];
-    moved = articulation;
-    changes.resize(articulation->link_count(), Vec6::Zero());
-    articulation->respond(joints_.link(slot).index, more, changes);
   }
-  for (const auto& [slot, links] : jointed)
+  displace_links(jointed);
+}
+
+std::map<uint32_t, Mat6> BodyReactions::link_responses(uint32_t slot, const Vec6& push) const {
+  Articulation* articulation = joints_.articulation_of(slot);
+  if (!articulation) return {};
+  const std::vector<Mat6> of_links = articulation->link_responses(joints_.link(slot).index, push);
+  std::map<uint32_t, Mat6> responses;
+  for (std::size_t i = 0; i < of_links.size(); ++i)
+    responses[articulation->bodies()[i]->handle.index] = of_links[i];
+  return responses;
+}
+
+void BodyReactions::displace_links(const std::map<uint32_t, Vec6>& pushes) {
+  std::map<uint32_t, std::pair<Articulation*, std::vector<Vec6>>> moved;  // by slot of the first link
+  for (const auto& [slot, push] : pushes) {
+    Articulation* articulation = joints_.articulation_of(slot);
+    auto& [of, changes] = moved[articulation->bodies().front()->handle.index];
+    of = articulation;
+    changes.resize(articulation->link_count(), Vec6::Zero());
+    articulation->respond(joints_.link(slot).index, push, changes);
+  }
+  for (const auto& [slot, links] : moved)
     for (std::size_t i = 0; i < links.second.size(); ++i) {
       Body& link = *links.first->bodies()[i];
       if (link.is_awake()) move(link, links.second[i]);
@@ -118,21 +125,20 @@ void BodyReactions::displace(Real h) {
 }
 
 void BodyReactions::apply_particles(const BodyImpulses& impulses, Real time, Real h, StepReport& report) {
+  for (const auto& [slot, impulse] : impulses.loads()) loads_.try_emplace(slot);
   for (auto& [slot, load] : loads_) {
-    load.last = {Wrench{}, load.last[0], load.last[1]};
+    const auto impulse = impulses.loads().find(slot);
+    load.force.record(impulse == impulses.loads().end() ? Wrench{} : (1 / h) * impulse->second);
     load.passed = {};
   }
-  for (const auto& [slot, impulse] : impulses.loads()) loads_[slot].last[0] = (1 / h) * impulse;
   std::vector<Reaction> reactions = impulses.sums();
   for (Reaction& r : reactions)
     if (const auto load = loads_.find(r.body); load != loads_.end())
       r = balance(world_.body_at(r.body), load->second, r, h);
   displace(h);
   apply(reactions, time, report);
-  const auto is_zero = [](const Wrench& w) { return w.force.isZero(0) && w.torque.isZero(0); };
-  std::erase_if(loads_, [&](const auto& entry) {
-    return std::ranges::all_of(entry.second.last, is_zero) && is_zero(entry.second.passed);
-  });
+  std::erase_if(
+      loads_, [](const auto& entry) { return entry.second.force.is_over() && is_zero(entry.second.passed); });
 }
 
 void BodyReactions::forget(const Body& body) {

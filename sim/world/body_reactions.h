@@ -1,7 +1,6 @@
 #pragma once
 /// The effect of particles and cloths on bodies (physics P8, A3).
 
-#include <array>
 #include <map>
 #include <optional>
 #include <span>
@@ -9,6 +8,7 @@
 
 #include "sim/contact/contact_pair.h"
 #include "sim/world/active_bodies.h"
+#include "sim/world/body_load.h"
 #include "sim/world/joint_groups.h"
 
 namespace offstage::sim {
@@ -34,13 +34,19 @@ class BodyReactions {
   /// Adds the impulses of a sub-step that ends at `time` [s] to the momenta of the bodies. Joints transmit
   /// them to whole articulations. The positions change from the next sub-step on.
   void apply(std::span<const Reaction> reactions, Real time, StepReport& report);
+  /// Returns the responses of a body with joints, and of the bodies to which they connect it, to impulses on
+  /// it roughly in the direction of `push`, by slot; see Articulation::link_responses(). It is empty for
+  /// other bodies.
+  std::map<uint32_t, Mat6> link_responses(uint32_t slot, const Vec6& push) const;
+  /// Moves bodies with joints, and the bodies to which joints connect them. `pushes`: by slot, impulse and
+  /// angular impulse about the centre of mass times the time for which they move the body [N s^2, N m s^2].
+  void displace_links(const std::map<uint32_t, Vec6>& pushes);
   void forget(const Body& body);
 
  private:
   /// The force of resting particles on a body.
   struct Load {
-    std::array<Wrench, 3> last;  ///< in the last sub-steps, newest first
-    Wrench expected;             ///< in the current sub-step
+    BodyLoad force;
     /// Force on the bodies beneath in the next sub-step: the part of the impulses on this body that its
     /// contacts with them have balanced.
     Wrench passed;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "sim/linear/rigid_mobility.h"
 #include "sim/world/obstacle_set.h"
 #include "sim/world/resting_bodies.h"
 
@@ -48,6 +49,7 @@ void ClothMotion::detach(BodyHandle body) {
   world_.cloths.for_each([&](ClothHandle, const std::unique_ptr<Cloth>& cloth) {
     std::erase_if(cloth->pins, [&](const ClothPin& pin) { return pin.body == body; });
   });
+  loads_.erase(body.index);
 }
 
 void ClothMotion::begin_step() {
@@ -55,9 +57,19 @@ void ClothMotion::begin_step() {
       [](ClothHandle, const std::unique_ptr<Cloth>& cloth) { cloth->report = {.finite = !cloth->stopped}; });
 }
 
-void ClothMotion::begin_substep(Real h, BodyReactions& reactions) {
+void ClothMotion::begin_substep(Real time, Real h, BodyReactions& reactions, StepReport& report) {
   for (const Push& push : std::exchange(pushes_, {}))
     reactions.add_force(push.body, {push.impulse.force / h, push.impulse.torque / h});
+  if (system_.empty()) loads_.clear();
+  std::erase_if(loads_, [&](const auto& entry) { return !world_.body_at(entry.first).is_awake(); });
+  std::vector<Reaction> leads;
+  for (auto& [slot, load] : loads_) {
+    const Body& body = world_.body_at(slot);
+    std::ranges::binary_search(resting_, slot) ? load.force.expect_nothing() : load.force.expect(body.rigid);
+    reactions.add_force(body.handle, load.force.expected());
+    if (!is_zero(load.lead)) leads.push_back({slot, load.lead.force, load.lead.torque});
+  }
+  reactions.apply(leads, time, report);
 }
 
 /// Returns the bodies that cloths may touch in a sub-step of length h, and the bodies that hold pins.
@@ -67,6 +79,7 @@ std::vector<ClothBody> ClothMotion::bodies_near_cloths(Real h) const {
     for (const ClothPin& pin : cloth->pins)
       if (pin.body) holds[pin.body.index] = 1;
   });
+  for (const auto& entry : loads_) holds[entry.first] = 1;
   const Aabb around = system_.reach(h);
   std::vector<ClothBody> near;
   world_.bodies.for_each([&](BodyHandle handle, const std::unique_ptr<Body>& body) {
@@ -84,6 +97,8 @@ std::vector<ClothBody> ClothMotion::bodies_near_cloths(Real h) const {
     }
     near.emplace_back(obstacle, h, velocity, spin);
     near.back().collides = body->def.collides;
+    if (const auto load = loads_.find(handle.index); load != loads_.end() && body->is_awake())
+      near.back().expect(h * load->second.force.expected(), load->second.lead);
   });
   return near;
 }
@@ -136,9 +151,30 @@ void ClothMotion::find_pressed(std::span<ContactPair* const> pairs) {
   for (Body* body : uncovered) active_.wake(*body);
 }
 
-std::vector<Reaction> ClothMotion::step(Real start, Real h, std::span<ContactPair* const> pairs) {
+/// Lets bodies with joints move as the joints permit.
+void ClothMotion::set_joints(std::span<ClothBody> near, Real h, const BodyReactions& reactions) const {
+  for (ClothBody& at : near) {
+    const uint32_t slot = at.obstacle().body;
+    if (!at.is_dynamic()) continue;
+    const auto load = loads_.find(slot);
+    const Vec6 push =
+        load == loads_.end() ? Vec6(Vec6::Zero()) : Vec6(h * stacked(load->second.force.last()));
+    std::vector<ClothBody::Connected> connected;
+    const std::map<uint32_t, Mat6> responses = reactions.link_responses(slot, push);
+    if (responses.empty()) continue;
+    for (ClothBody& other : near)
+      if (const auto of = responses.find(other.obstacle().body); of != responses.end() && &other != &at)
+        connected.push_back({&other, of->second});
+    at.set_joints(responses.at(slot), std::move(connected));
+  }
+}
+
+void ClothMotion::step(Real start, Real h, std::span<ContactPair* const> pairs, BodyReactions& reactions,
+                       StepReport& report) {
   find_pressed(pairs);
   std::vector<ClothBody> near = bodies_near_cloths(h);
+  for (const auto& articulation : world_.articulations) articulation->begin_impulses(start + h);
+  set_joints(near, h, reactions);
   set_resting_contacts(world_, pairs, h, near);
   for (const PressedCloth& pressed : pressed_) {
     const auto at = [&](BodyHandle body) {
@@ -152,7 +188,30 @@ std::vector<Reaction> ClothMotion::step(Real start, Real h, std::span<ContactPai
   const std::vector<const ForceDef*> forces = world_.active_forces();
   system_.step({start, h, world_.def.gravity, world_.def.wind, forces}, near);
   wake_unpinned(near);
-  return answer(near, h);
+  reactions.apply(answer(near, h, reactions), start + h, report);
+  record_loads(near, h);
+}
+
+/// Records the forces of cloths on bodies, and which of these rest on other bodies.
+void ClothMotion::record_loads(std::span<const ClothBody> near, Real h) {
+  resting_.clear();
+  std::map<uint32_t, Wrench> forces;
+  for (const ClothBody& at : near) {
+    const uint32_t slot = at.obstacle().body;
+    if (!at.resting().empty()) resting_.push_back(slot);
+    Wrench impulse = at.contained();
+    impulse += {at.reaction().impulse, at.reaction().angular_impulse};
+    if (!at.is_dynamic() || is_zero(impulse)) continue;
+    forces[slot] = (1 / h) * impulse;
+    loads_[slot].lead = at.resting().empty() ? at.lead() : Wrench{};
+  }
+  std::ranges::sort(resting_);
+  for (auto& [slot, load] : loads_) {
+    const auto force = forces.find(slot);
+    load.force.record(force == forces.end() ? Wrench{} : force->second);
+    if (force == forces.end()) load.lead = {};
+  }
+  std::erase_if(loads_, [](const auto& entry) { return entry.second.force.is_over(); });
 }
 
 /// Wakes sleeping bodies that no longer hold cloth by pins.
@@ -169,8 +228,9 @@ void ClothMotion::wake_unpinned(std::span<const ClothBody> near) {
 }
 
 /// Applies the displacements of bodies by cloths in this sub-step, and returns the impulses on the bodies.
-std::vector<Reaction> ClothMotion::answer(std::span<const ClothBody> near, Real h) {
-  std::vector<Reaction> reactions;
+std::vector<Reaction> ClothMotion::answer(std::span<const ClothBody> near, Real h, BodyReactions& reactions) {
+  std::vector<Reaction> answers;
+  std::map<uint32_t, Vec6> jointed;  // by slot: what has displaced a body with joints
   for (const ClothBody& at : near) {
     Body& body = world_.body_at(at.obstacle().body);
     const bool left = std::exchange(body.on_cloth, at.touched) && !at.touched;
@@ -183,18 +243,23 @@ std::vector<Reaction> ClothMotion::answer(std::span<const ClothBody> near, Real 
       if (!body.sleep.pins) body.sleep.pins = pull;
       if (is_pushed(body, pull, *body.sleep.pins)) active_.wake(body);
     }
-    if (!at.touched || body.asleep) continue;
+    if ((!at.touched && is_zero(at.contained())) || body.asleep) continue;
     // The body stays where cloth touched it. If the body returned to its position without cloth, it would
     // drag the cloth along each time. Cloth that is pinched between two bodies acts only on their velocities,
     // unless there is an impact.
     if (!at.pinches || at.reaction().impulse.norm() > kImpact * body.rigid.mass) {
-      body.pose = at.end();
-      body.rigid.place(body.pose);
+      if (at.is_jointed()) {
+        jointed[body.handle.index] = at.displacing_impulse();
+      } else {
+        body.pose = at.end();
+        body.rigid.place(body.pose);
+      }
     }
-    reactions.push_back(at.reaction());
-    push_supports(at, reactions);
+    answers.push_back(at.reaction());
+    push_supports(at, answers);
   }
-  return reactions;
+  reactions.displace_links(jointed);
+  return answers;
 }
 
 /// Passes on what the contacts of a body with others have balanced of the impulses of cloth.
@@ -213,7 +278,7 @@ void ClothMotion::push_supports(const ClothBody& at, std::vector<Reaction>& reac
     }
   }
   const BodyHandle body = world_.bodies.at_slot(at.obstacle().body);
-  if (held.force != Vec3::Zero() || held.torque != Vec3::Zero()) pushes_.push_back({body, held});
+  if (!is_zero(held)) pushes_.push_back({body, held});
 }
 
 void ClothMotion::report(StepReport& report) {

@@ -3,6 +3,7 @@
 /// collide with the bodies along the paths of the sub-step. Impulses of cloths change the velocities of
 /// bodies from the next sub-step on.
 
+#include <map>
 #include <optional>
 #include <span>
 #include <vector>
@@ -38,12 +39,13 @@ class ClothMotion {
   }
 
   void begin_step();
-  /// Gives the bodies that cloth pressed against others in the last sub-step the impulse that this needs, as
-  /// a constant force in the sub-step of length h [s] that begins.
-  void begin_substep(Real h, BodyReactions& reactions);
-  /// Moves all cloths through a sub-step, and displaces bodies where cloths push them. `pairs`: the pairs of
-  /// bodies of this sub-step, which may press cloth. Returns the impulses on the bodies.
-  std::vector<Reaction> step(Real start, Real h, std::span<ContactPair* const> pairs);
+  /// Adds the expected loads of bodies in the sub-step of length h [s] that begins at `time` [s], as constant
+  /// forces. A body that cloth pressed against others in the last sub-step gets the force that this needs.
+  void begin_substep(Real time, Real h, BodyReactions& reactions, StepReport& report);
+  /// Moves all cloths through a sub-step, displaces bodies where cloths push them, and applies the impulses
+  /// on the bodies. `pairs`: the pairs of bodies of this sub-step, which may press cloth.
+  void step(Real start, Real h, std::span<ContactPair* const> pairs, BodyReactions& reactions,
+            StepReport& report);
   /// Adds the statistics of the step to the report.
   void report(StepReport& report);
 
@@ -60,7 +62,9 @@ class ClothMotion {
   void find_pressed(std::span<ContactPair* const> pairs);
   bool is_between(const PressedCloth& pressed) const;
   void wake_unpinned(std::span<const ClothBody> near);
-  std::vector<Reaction> answer(std::span<const ClothBody> near, Real h);
+  void set_joints(std::span<ClothBody> near, Real h, const BodyReactions& reactions) const;
+  void record_loads(std::span<const ClothBody> near, Real h);
+  std::vector<Reaction> answer(std::span<const ClothBody> near, Real h, BodyReactions& reactions);
   void push_supports(const ClothBody& at, std::vector<Reaction>& reactions);
 
   const WorldState& world_;
@@ -72,6 +76,12 @@ class ClothMotion {
     Wrench impulse;  // [N s], [N m s]
   };
   std::vector<Push> pushes_;  // for the next sub-step
+  struct Load {
+    BodyLoad force;
+    Wrench lead;  // ClothBody::lead()
+  };
+  std::map<uint32_t, Load> loads_;  // by slot
+  std::vector<uint32_t> resting_;   // slots of bodies that rested on others, sorted
 };
 
 }  // namespace offstage::sim

@@ -82,7 +82,7 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
   active.update();
   wake_at_jumps(start, end);
   active.update();
-  begin_bodies(start, end);
+  begin_bodies(start, end, report);
   const bool moves = !active.awake().empty() || !active.kinematic().empty() || !springs.empty() ||
                      !systems.empty() || reactions.has_loads();
   if (moves) {
@@ -101,7 +101,7 @@ void World::Impl::substep(Real start, Real end, StepReport& report) {
     contacts.count(report);
     report.bodies.islands = 0;
   }
-  if (!cloths.empty()) reactions.apply(cloth_motion.step(start, h, contacts.pairs()), start + h, report);
+  if (!cloths.empty()) cloth_motion.step(start, h, contacts.pairs(), reactions, report);
   // Particles move last, so that they meet cloths and bodies on the paths of both.
   if (!systems.empty() || reactions.has_loads()) step_particles(start, h, free_motion.whole(), report);
 }
@@ -168,15 +168,15 @@ void World::Impl::update_joints() {
 }
 
 /// Begins a sub-step for every moving body; kinematic bodies are moved to its end.
-void World::Impl::begin_bodies(Real start, Real end) {
+void World::Impl::begin_bodies(Real start, Real end, StepReport& report) {
+  reactions.begin_substep();
+  cloth_motion.begin_substep(start, end - start, reactions, report);
   const std::span<Body* const> awake = active.awake();
   for_each_interval(awake, [&](std::size_t i) {
     awake[i]->before_substep = awake[i]->pose;
     awake[i]->begin_interval(0);
   });
   begin_kinematic(start, end);
-  reactions.begin_substep();
-  cloth_motion.begin_substep(end - start, reactions);
   free_motion.begin_substep();
 }
 

@@ -24,7 +24,7 @@ struct World::Impl : WorldState {
   StepReport prewarm(Real from, Real to, const BeforeSubStep& before);
   Real first_part(Real h);
   void substep(Real start, Real end, StepReport& report);
-  void begin_bodies(Real start, Real end);
+  void begin_bodies(Real start, Real end, StepReport& report);
   void begin_kinematic(Real start, Real end);
   void explode(Real start, Real end);
   void move_bodies(Real start, Real h, StepReport& report);

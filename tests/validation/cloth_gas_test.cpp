@@ -146,39 +146,45 @@ class PoppedBalloon : public testing::TestWithParam<bool> {};
 
 TEST_P(PoppedBalloon, FliesFreelyAndNoFasterThanItsGas) {
   // By Bernoulli's equation, gas of the gauge pressure p flows out at the speed sqrt(2 p / rho), so it cannot
-  // push the remains of the skin faster. The shreds of the skin touch, but their moves are rarely shortened.
+  // push the remains of the skin faster. The shreds of the skin touch, but their moves are rarely shortened:
+  // the median is taken, because how a skin tears depends on rounding.
   ClothDef def = effects::sphere_cloth(0.1, 3, {}, effects::find_fabric("balloon")->fabric);
   def.pressure = 8440;
   def.gas_density = 0.17;
   def.inflate_time = 0.3;
   def.tear = 1.75;
   def.self_collision = GetParam();
-  World world({.gravity = Vec3::Zero()});
-  const ClothHandle cloth = world.add_cloth(def);
-  for (int i = 0; i < 30; ++i) world.step(1.0 / 60);
-  ASSERT_FALSE(world.cloth_report(cloth).first_tear.has_value());
-  const auto volume = [&] {
-    const ClothView view = world.cloth(cloth);
-    ClothGas gas;
-    gas.assign(view.triangles);
-    return gas.volume(view.points, view.triangles);
-  };
-  const Real full = volume();
-  world.add_body(
-      {.shape = Capsule{0.004, 0.1},
-       .pose = {Vec3(-0.4, 0, 0), Quat(Eigen::AngleAxis<Real>(std::numbers::pi / 2, Vec3::UnitZ()))},
-       .velocity = {20, 0, 0},
-       .mass = 0.02});
-  uint64_t limited = 0;
-  for (int i = 0; i < 20; ++i) {
-    ASSERT_TRUE(world.step(1.0 / 60).finite) << i;
-    limited += world.cloth_report(cloth).limited;
-    for (const Vec3& v : world.cloth(cloth).velocities) ASSERT_LT(v.norm(), std::sqrt(2 * 2500 / 0.17)) << i;
+  std::vector<uint64_t> limited;
+  for (const Real speed : {19.99, 20.0, 20.1}) {
+    World world({.gravity = Vec3::Zero()});
+    const ClothHandle cloth = world.add_cloth(def);
+    for (int i = 0; i < 30; ++i) world.step(1.0 / 60);
+    ASSERT_FALSE(world.cloth_report(cloth).first_tear.has_value());
+    const auto volume = [&] {
+      const ClothView view = world.cloth(cloth);
+      ClothGas gas;
+      gas.assign(view.triangles);
+      return gas.volume(view.points, view.triangles);
+    };
+    const Real full = volume();
+    world.add_body(
+        {.shape = Capsule{0.004, 0.1},
+         .pose = {Vec3(-0.4, 0, 0), Quat(Eigen::AngleAxis<Real>(std::numbers::pi / 2, Vec3::UnitZ()))},
+         .velocity = {speed, 0, 0},
+         .mass = 0.02});
+    limited.push_back(0);
+    for (int i = 0; i < 20; ++i) {
+      ASSERT_TRUE(world.step(1.0 / 60).finite) << i;
+      limited.back() += world.cloth_report(cloth).limited;
+      for (const Vec3& v : world.cloth(cloth).velocities)
+        ASSERT_LT(v.norm(), std::sqrt(2 * 2500 / 0.17)) << i;
+    }
+    ASSERT_TRUE(world.cloth_report(cloth).first_tear.has_value());
+    EXPECT_TRUE(world.cloth_report(cloth).first_tear->touches_body);
+    EXPECT_LT(volume(), 0.3 * full);
   }
-  ASSERT_TRUE(world.cloth_report(cloth).first_tear.has_value());
-  EXPECT_TRUE(world.cloth_report(cloth).first_tear->touches_body);
-  EXPECT_LT(volume(), 0.3 * full);
-  EXPECT_LT(limited, 5 * world.cloth(cloth).points.size());  // each point moves at least 320 times
+  std::ranges::sort(limited);
+  EXPECT_LT(limited[1], 5 * def.masses.size());  // each point moves at least 320 times
 }
 
 INSTANTIATE_TEST_SUITE_P(SelfCollision, PoppedBalloon, testing::Bool());
